@@ -1,0 +1,33 @@
+// A mesh cut into spatially compact chunks that 16-bit indices reach.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bake/model/tri_mesh.hpp"
+
+namespace modar {
+
+/// One chunk: local vertex i is vertex `vertices[i]` of the TriMesh; triangles index `vertices`.
+/// Both are in their final order (vertex cache, then fetch).
+struct Chunk {
+  std::uint32_t material = 0;
+  std::vector<std::uint32_t> vertices;
+  std::vector<std::uint16_t> indices;
+};
+
+struct ChunkedMesh {
+  TriMesh mesh;
+  std::vector<Chunk> chunks;
+};
+
+struct ChunkOptions {
+  std::uint32_t max_vertices = 65535;  ///< 3 to 65535
+  [[nodiscard]] Result<void> validate() const;
+};
+
+/// Splits by material, then by a kd tree over triangle centres until every chunk fits; orders each
+/// chunk for the vertex cache and the vertex fetch. Takes the mesh over.
+Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& report);
+
+}  // namespace modar

@@ -1,0 +1,39 @@
+// The final bytes of a model, with the error that they were measured to have.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "bake/model/chunked_mesh.hpp"
+#include "formats/layout.hpp"
+
+namespace modar {
+
+/// Records whose indices and offsets count from this model's own start; the bundle stage shifts them
+/// when it merges models. `record` lacks its name, its layout index and its `first_*` fields;
+/// materials keep the texture paths in `sources` (same order as `materials`), texture = kNone.
+struct PackedMesh {
+  std::string name;
+  ModelRecord record{};
+  LayoutRecord layout{};
+  std::vector<ChunkRecord> chunks;
+  std::vector<LevelRecord> levels;
+  std::vector<MaterialRecord> materials;
+  std::vector<SourceMaterial> sources;
+  std::vector<bool> material_repeats;  ///< uv of its triangles leave [0,1]: the texture must repeat
+  std::vector<std::byte> vertices;
+  std::vector<std::byte> indices;
+};
+
+struct PackOptions {
+  double unit_metres = 0.0;  ///< metres in a source unit; 0: unknown
+};
+
+/// Quantises (half-float positions, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes
+/// and measures the greatest and rms error; computes conservative boxes and normal cones.
+/// texture_side: pixels by which uv errors are told in texels (0: no texture), one a material.
+Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint32_t>& texture_side,
+                        const PackOptions& options, Report& report);
+
+}  // namespace modar

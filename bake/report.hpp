@@ -1,0 +1,63 @@
+// What a bake says of itself: stages as they run, findings as they turn up. The progress bar, --json
+// and the summary all read this one stream.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace modar {
+
+enum class FindingSeverity : std::uint8_t { kInfo, kWarning, kError };
+
+/// Something in the input that a person may want to know or mend; the bake goes on.
+struct Finding {
+  std::string id;  ///< stable, "obj.missing-mtl"
+  FindingSeverity severity = FindingSeverity::kWarning;
+  std::string file;        ///< as the user named it
+  std::uint64_t line = 0;  ///< 1 for the first; 0: the whole file
+  std::string message;
+  std::string cure;
+};
+
+/// One stage that has run. `in` and `out` count what the stage's name suggests (faces, vertices,
+/// pixels, keypoints); max_error in the stage's unit, 0 where it is exact.
+struct StageReport {
+  std::string name;
+  double ms = 0;
+  std::uint64_t in = 0;
+  std::uint64_t out = 0;
+  double max_error = 0;
+};
+
+/// Collects the stream. Not thread-safe: stages report from the thread that called them.
+struct Report {
+  std::vector<StageReport> stages;
+  std::vector<Finding> findings;
+  /// Called when a stage begins or moves on: its name and how much of it is done (0 to 1). May be
+  /// empty.
+  std::function<void(const std::string& stage, double done)> progress;
+};
+
+/// Times a stage: begins it in the constructor, records it when done() is called.
+class StageTimer {
+ public:
+  StageTimer(Report& report, std::string name)
+      : report_(report), name_(std::move(name)), start_(std::chrono::steady_clock::now()) {
+    if (report_.progress) report_.progress(name_, 0.0);
+  }
+  void done(std::uint64_t in, std::uint64_t out, double max_error = 0.0) {
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start_;
+    if (report_.progress) report_.progress(name_, 1.0);
+    report_.stages.push_back({name_, ms.count(), in, out, max_error});
+  }
+
+ private:
+  Report& report_;
+  std::string name_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+}  // namespace modar

@@ -1,0 +1,70 @@
+// From an image file to mip levels of ETC1 blocks, ready for glCompressedTexImage2D.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bake/report.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// 8-bit RGBA pixels, sRGB, top row first, without padding.
+struct RgbaImage {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::uint8_t> pixels;  ///< width * height * 4
+};
+
+/// Reads PNG, JPEG, TGA, BMP, WebP, TIFF through OpenCV; EXIF orientation applied; grey, palette,
+/// 16-bit become 8-bit RGBA. The size in the file's header is held against the limit before anything
+/// is allocated. Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large".
+Result<RgbaImage> read_image(const std::string& path);
+
+/// Levels from the image itself down to 1x1, each side max(1, floor(side / 2)), filtered in linear
+/// light (sRGB-correct), colours weighted by alpha.
+std::vector<RgbaImage> mip_chain(const RgbaImage& image);
+
+/// ETC1 blocks of an image, 8 bytes a block in rows of ceil(width/4) blocks; edge pixels are repeated
+/// to fill blocks. Alpha is ignored. out: ceil(w/4) * ceil(h/4) * 8 bytes.
+std::vector<std::byte> encode_etc1(const RgbaImage& image);
+/// Its inverse (alpha = 255). blocks.size() as above.
+RgbaImage decode_etc1(std::span<const std::byte> blocks, std::uint32_t width, std::uint32_t height);
+
+/// Mean over R, G, B; 99 where the images are equal.
+double psnr_db(const RgbaImage& a, const RgbaImage& b);
+
+struct Etc1Level {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::byte> colour;
+  std::vector<std::byte> alpha;  ///< twin image, empty where alpha is constant 255
+  double psnr_db = 0;
+  double ssim = 0;
+};
+
+struct Etc1Texture {
+  std::string name;  ///< file name without folder
+  std::uint32_t source_width = 0;
+  std::uint32_t source_height = 0;
+  bool repeat = false;
+  bool alpha = false;
+  std::vector<Etc1Level> levels;
+};
+
+struct TextureOptions {
+  std::uint32_t max_side = 2048;
+  bool mipmaps = true;
+  bool repeat = false;  ///< sides become powers of two (ES 2.0 repeats and mips no others)
+  unsigned jobs = 1;    ///< the bytes do not depend on it
+};
+
+/// Reads, resizes to powers of two (nearest at or below where larger than max_side; mips on ES 2.0
+/// want them), builds mips, encodes, decodes again and measures PSNR and SSIM.
+Result<Etc1Texture> bake_texture(const std::string& path, const TextureOptions& options,
+                                 Report& report);
+
+}  // namespace modar

@@ -1,0 +1,74 @@
+// From plain structs to the bundle's bytes. The same content gives the same bytes, always.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/error.hpp"
+#include "formats/layout.hpp"
+
+namespace modar {
+
+/// Features of one pattern under one parameter set, in both forms.
+struct FeatureContent {
+  std::uint32_t set_id = 0;
+  std::uint32_t descriptor_bytes = 0;
+  std::vector<KeypointRecord> keypoints;
+  std::vector<std::byte> descriptors;  ///< keypoints.size() * descriptor_bytes
+  std::string yml;                     ///< OpenCV FileStorage text of the same
+};
+
+/// A section that the writer does not know: carried as it is.
+struct ExtraSection {
+  std::uint32_t type = 0;
+  std::uint16_t version = 1;
+  std::uint16_t flags = 0;
+  std::uint32_t owner = kNone;
+  std::uint32_t variant = 0;
+  std::vector<std::byte> bytes;
+};
+
+/// Everything a bundle holds. Records refer to each other by index; offsets of levels count bytes
+/// in `vertices` and `indices`, offsets of texture levels bytes in the texture's `texture_data`.
+struct BundleContent {
+  std::string names;  ///< filled by intern()
+  std::string meta;   ///< JSON text
+  std::vector<ModelRecord> models;
+  std::vector<ChunkRecord> chunks;
+  std::vector<LevelRecord> levels;
+  std::vector<MaterialRecord> materials;
+  std::vector<LayoutRecord> layouts;
+  std::vector<TextureRecord> textures;
+  std::vector<TextureLevelRecord> texture_levels;
+  std::vector<PatternRecord> patterns;
+  std::vector<ParameterSetRecord> parameter_sets;
+  std::vector<SceneRecord> scenes;
+  std::vector<std::vector<FeatureContent>> features;       ///< one list a pattern
+  std::vector<std::byte> vertices;
+  std::vector<std::byte> indices;
+  std::vector<std::vector<std::byte>> texture_data;  ///< one a texture
+  std::vector<ExtraSection> extra;
+
+  /// Stores a name once and refers to it. Names longer than kMaxNameBytes are cut at a character.
+  NameRef intern(std::string_view name);
+};
+
+/// Receives the file front to back. A false return stops the writing ("io.write").
+using ByteSink = std::function<bool(std::span<const std::byte>)>;
+
+/// Streams the bundle through `sink`. Errors: kInternal "bundle.content" where the content
+/// contradicts itself (two sections with one key), kIo "io.write".
+Result<void> write_bundle(const BundleContent& content, const ByteSink& sink);
+
+/// The same into memory.
+Result<std::vector<std::byte>> encode_bundle(const BundleContent& content);
+
+/// The same into a file: written beside `path`, synced, renamed over it.
+Result<void> save_bundle(const BundleContent& content, const std::string& path);
+
+}  // namespace modar

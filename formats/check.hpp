@@ -1,0 +1,41 @@
+// The rules that a good bundle keeps, checked from its bytes alone. `modar check` prints what they
+// find; the installer on the device runs the same ones.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+
+namespace modar {
+
+enum class Severity : std::uint8_t { kError, kWarning, kInfo };
+
+/// A rule's constant part. The table kIssueKinds is the source of ISSUES.md.
+struct IssueKind {
+  const char* id;        ///< stable: "BUNDLE_TRUNCATED"
+  Severity severity;
+  const char* message;   ///< what is wrong, as a sentence without names
+  const char* cure;
+};
+
+/// All kinds of issues, in the order of their ids in ISSUES.md.
+std::span<const IssueKind> issue_kinds();
+
+/// One finding: `where` names the asset ("model 'spider', chunk 3"), `offset` is the byte in the
+/// file, `detail` the numbers that were found.
+struct Issue {
+  const IssueKind* kind = nullptr;
+  std::string where;
+  std::uint64_t offset = 0;
+  std::string detail;
+};
+
+using IssueSink = std::function<void(const Issue&)>;
+
+/// Runs every rule over the bytes, in file order; calls `sink` for each finding. Memory does not
+/// grow with the bundle. Answers true if no finding was an error.
+bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink);
+
+}  // namespace modar

@@ -1,0 +1,50 @@
+// The one error type of the project, and the exit codes that programs answer with.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include <tl/expected.hpp>
+
+namespace modar {
+
+/// What a program of ours returns to the shell. Commands document their own codes from 10 up.
+enum class ExitCode : int {
+  kOk = 0,
+  kUsage = 1,         ///< the command line is wrong
+  kIo = 2,            ///< a file cannot be opened, read, written or renamed
+  kInvalidInput = 3,  ///< a file was read and is not what it should be
+  kInternal = 4,      ///< a bug of ours or of a library
+  kUnsupported = 5,   ///< valid, but beyond this build, this device or this version
+};
+
+/// An error a person can act on. `code` is stable ("bundle.truncated"), `where` names the file with
+/// its line or byte offset, `cause` says what was found, `cure` what to do about it.
+struct Error {
+  ExitCode exit = ExitCode::kInternal;
+  std::string code;
+  std::string where;
+  std::string cause;
+  std::string cure;
+};
+
+template <class T>
+using Result = tl::expected<T, Error>;
+
+/// Shorthand for `return fail(ExitCode::kIo, "io.open", path, "...", "...");`
+inline tl::unexpected<Error> fail(ExitCode exit, std::string code, std::string where,
+                                  std::string cause, std::string cure) {
+  return tl::unexpected<Error>(Error{exit, std::move(code), std::move(where), std::move(cause),
+                                     std::move(cure)});
+}
+
+/// One line for a terminal: "where: cause; cure [code]".
+inline std::string to_line(const Error& error) {
+  std::string line = error.where.empty() ? std::string() : error.where + ": ";
+  line += error.cause;
+  if (!error.cure.empty()) line += "; " + error.cure;
+  return line + " [" + error.code + "]";
+}
+
+}  // namespace modar

@@ -1,0 +1,47 @@
+// An OpenGL ES 2.0 context without a window (EGL pbuffer). A program with a window brings its own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// What the current context offers, or less where a device profile masks it.
+struct GlCaps {
+  std::string vendor;
+  std::string renderer;
+  std::string version;
+  bool half_float_vertices = false;  ///< GL_OES_vertex_half_float
+  bool etc1 = false;                 ///< GL_OES_compressed_ETC1_RGB8_texture
+  bool etc1_sub_texture = false;     ///< GL_EXT_compressed_ETC1_RGB8_sub_texture
+  bool npot_mipmaps = false;         ///< GL_OES_texture_npot
+  int max_texture_size = 64;
+  int max_vertex_uniform_vectors = 128;
+};
+
+/// Reads the caps of the context that is current on this thread.
+GlCaps probe_gl_caps();
+
+/// Lowers `caps` to the device profile of that name (assets/devices). Errors: kUsage
+/// "device.unknown" that lists the names.
+Result<GlCaps> mask_gl_caps(const GlCaps& caps, const std::string& device);
+
+class GlContext {
+ public:
+  /// Creates an off-screen ES 2.0 context and makes it current on this thread. Tries a display of the
+  /// system, then Mesa's surfaceless platform. Errors: kUnsupported "gl.context".
+  static Result<std::unique_ptr<GlContext>> create_offscreen();
+  GlContext(const GlContext&) = delete;
+  GlContext& operator=(const GlContext&) = delete;
+  ~GlContext();
+
+ private:
+  struct Handles;
+  explicit GlContext(std::unique_ptr<Handles> handles);
+  std::unique_ptr<Handles> handles_;
+};
+
+}  // namespace modar

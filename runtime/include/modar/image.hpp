@@ -1,0 +1,25 @@
+// Pixels that somebody else owns.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace modar {
+
+/// 8-bit grey pixels, top row first. stride: bytes from row to row, >= width.
+struct GrayImage {
+  const std::uint8_t* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride = 0;
+};
+
+/// 8-bit R, G, B pixels, top row first. stride: bytes from row to row, >= 3 * width.
+struct RgbImage {
+  const std::uint8_t* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride = 0;
+};
+
+}  // namespace modar

@@ -1,0 +1,29 @@
+// A file mapped for reading: nothing is copied, pages come when they are touched.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "formats/error.hpp"
+
+namespace modar {
+
+class MappedFile {
+ public:
+  /// Errors: kIo "io.open", "io.map"; an empty file is kInvalidInput "io.empty".
+  static Result<MappedFile> open(const std::string& path);
+  MappedFile() = default;
+  MappedFile(MappedFile&& other) noexcept;
+  MappedFile& operator=(MappedFile&& other) noexcept;
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+  ~MappedFile();
+
+  [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
+
+ private:
+  std::span<const std::byte> bytes_;
+};
+
+}  // namespace modar

@@ -1,0 +1,81 @@
+// Draws a bundle's models with OpenGL ES 2.0, straight from its mapped bytes. Usable without the AR
+// half: any program with a current context can draw models with matrices of its own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+
+#include "formats/bundle_view.hpp"
+#include "formats/error.hpp"
+#include "modar/gl_context.hpp"
+#include "modar/image.hpp"
+
+namespace modar {
+
+/// A model to draw. to_eye takes the model's decoded [-1,1] space to GL eye space (x right, y up, z
+/// backward); see scene_matrix().
+struct DrawItem {
+  std::uint32_t model = 0;
+  glm::mat4 to_eye{1.0f};
+};
+
+/// Counted over the last render() call.
+struct RenderStats {
+  int draw_calls = 0;
+  int state_changes = 0;   ///< program, buffer, texture and attribute set-ups
+  int chunks_drawn = 0;
+  int chunks_culled = 0;
+  std::uint64_t triangles = 0;
+  std::uint64_t bytes_uploaded = 0;  ///< background and uniforms of this frame
+};
+
+/// Pattern-plane matrix of a scene: its offset, rotation and scale on the default placement (the
+/// model's largest side equals the pattern's largest side).
+glm::mat4 scene_matrix(const SceneRecord& scene);
+
+/// Depth limits that enclose the items' models as tightly as depth precision needs (ModAR 3.4: from
+/// the scene, not from fixed planes). Answers {near, far}, 0 < near < far.
+struct DepthRange {
+  double near_plane = 0.1;
+  double far_plane = 100.0;
+};
+DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items);
+
+class Renderer {
+ public:
+  /// Uploads the bundle's merged buffers and textures from the mapped bytes into the current context.
+  /// Where a caps flag is missing, floats instead of halves and decoded RGB instead of ETC1 are
+  /// uploaded. The bundle's bytes must outlive the renderer.
+  /// Errors: kUnsupported "gl.*".
+  static Result<std::unique_ptr<Renderer>> create(const BundleView& bundle, const GlCaps& caps);
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+  ~Renderer();
+
+  /// Size of the picture in pixels. Creates or resizes the off-screen framebuffer.
+  /// Errors: kUnsupported "gl.framebuffer".
+  Result<void> resize(int width, int height);
+
+  /// Draws the background (may be empty: clear colour) and the items over it. projection: of GL, see
+  /// gl_projection(). Allocates nothing after the first frame of a size.
+  void render(const RgbImage& background, const glm::mat4& projection,
+              std::span<const DrawItem> items);
+
+  /// Copies the picture, top row first, 4 bytes a pixel (RGBA). rgba.size() == width * height * 4.
+  void read_pixels(std::span<std::uint8_t> rgba);
+  /// Puts the off-screen picture on the window's framebuffer (0).
+  void blit_to_window(int window_width, int window_height);
+
+  [[nodiscard]] const RenderStats& stats() const;
+
+ private:
+  struct State;
+  explicit Renderer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace modar
