@@ -1,0 +1,101 @@
+// Writes a file beside its place, syncs it and renames it over the old one.
+#include "formats/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+namespace modar {
+namespace {
+
+std::string reason(const char* deed, int number) {
+  return std::string(deed) + ": " + std::strerror(number);
+}
+
+/// A rename is durable once the folder that holds the names is synced too.
+bool sync_folder_of(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  const std::string folder =
+      slash == std::string::npos ? "." : path.substr(0, slash == 0 ? 1 : slash);
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  // Some file systems cannot sync a folder and say EINVAL; there is nothing more to do there.
+  const bool synced = ::fsync(descriptor) == 0 || errno == EINVAL;
+  ::close(descriptor);
+  return synced;
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(int descriptor, std::string path, std::string temporary)
+    : descriptor_(descriptor), path_(std::move(path)), temporary_(std::move(temporary)) {}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      path_(std::move(other.path_)),
+      temporary_(std::exchange(other.temporary_, std::string())) {}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+Result<AtomicFile> AtomicFile::create(const std::string& path) {
+  std::string temporary = path + "." + std::to_string(::getpid()) + ".tmp";
+  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    return fail(ExitCode::kIo, "io.create", path, reason("cannot create the file", errno),
+                "check that the folder exists and may be written");
+  }
+  return AtomicFile(descriptor, path, std::move(temporary));
+}
+
+Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return fail(ExitCode::kIo, "io.write", path_, reason("cannot write", errno),
+                  "make room on the disk and try again");
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return {};
+}
+
+Result<void> AtomicFile::commit() {
+  const auto failed = [this](const char* deed) {
+    return fail(ExitCode::kIo, "io.commit", path_, reason(deed, errno),
+                "check the disk; the old file, if there was one, still stands");
+  };
+  if (descriptor_ < 0) {
+    return fail(ExitCode::kInternal, "io.commit", path_, "the file was committed before", "");
+  }
+  if (::fsync(descriptor_) != 0) return failed("cannot sync");
+  // close() gives the descriptor back even where it fails, so it is never closed twice.
+  if (::close(std::exchange(descriptor_, -1)) != 0) return failed("cannot close");
+  if (std::rename(temporary_.c_str(), path_.c_str()) != 0) return failed("cannot rename");
+  temporary_.clear();
+  if (!sync_folder_of(path_)) {
+    return fail(ExitCode::kIo, "io.commit", path_, reason("cannot sync the folder", errno),
+                "the new file stands, but may not survive a power cut; check the disk");
+  }
+  return {};
+}
+
+Result<void> write_file(const std::string& path, std::string_view text) {
+  return write_file(path, std::as_bytes(std::span(text.data(), text.size())));
+}
+
+Result<void> write_file(const std::string& path, std::span<const std::byte> bytes) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected<Error>(std::move(file.error()));
+  if (auto written = file->write(bytes); !written) return written;
+  return file->commit();
+}
+
+}  // namespace modar

@@ -1,0 +1,308 @@
+// Lays the sections out, hashes them where they are, and streams them: no payload is copied.
+#include "formats/bundle_writer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <tuple>
+#include <utility>
+
+#include "formats/atomic_file.hpp"
+#include "formats/utf8.hpp"
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace modar {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "records are written as they lie");
+
+using Bytes = std::span<const std::byte>;
+constexpr std::array<std::byte, kGpuAlignment> kZeros{};
+
+/// A section before it has an offset: up to four pieces that follow each other in the file.
+struct Section {
+  SectionEntry entry{};
+  std::array<Bytes, 4> pieces;
+};
+
+auto key(const Section& section) {
+  return std::make_tuple(section.entry.type, section.entry.owner, section.entry.variant);
+}
+
+std::uint64_t align(std::uint64_t offset, std::uint64_t alignment) {
+  return (offset + alignment - 1) / alignment * alignment;
+}
+
+template <class T>
+Bytes bytes_of(const T& record) {
+  return std::as_bytes(std::span(&record, 1));
+}
+
+std::uint16_t flags_of(SectionType type) {
+  switch (type) {
+    case SectionType::kMeta:
+    case SectionType::kFeatureYml:
+      return 0;
+    case SectionType::kVertices:
+    case SectionType::kIndices:
+    case SectionType::kTextureData:
+      return kSectionRequired | kSectionGpu;
+    default:
+      return kSectionRequired;
+  }
+}
+
+/// The sections of a content, with the headers that the content itself does not hold.
+class SectionList {
+ public:
+  /// At most `capacity` headers of each kind: pieces point at them, so they must not move.
+  explicit SectionList(std::size_t capacity) {
+    table_headers_.reserve(16);
+    feature_headers_.reserve(capacity);
+  }
+
+  void add(SectionType type, std::uint32_t owner, std::uint32_t variant,
+           const std::array<Bytes, 4>& pieces) {
+    Section section;
+    section.entry.type = static_cast<std::uint32_t>(type);
+    section.entry.version = 1;
+    section.entry.flags = flags_of(type);
+    section.entry.owner = owner;
+    section.entry.variant = variant;
+    section.pieces = pieces;
+    sections_.push_back(section);
+  }
+
+  void add_blob(SectionType type, std::uint32_t owner, Bytes bytes) {
+    if (!bytes.empty()) add(type, owner, 0, {bytes});
+  }
+
+  template <class T>
+  void add_table(SectionType type, const std::vector<T>& records) {
+    if (records.empty()) return;
+    table_headers_.push_back({static_cast<std::uint32_t>(records.size()), sizeof(T), 0});
+    add(type, kNone, 0, {bytes_of(table_headers_.back()), std::as_bytes(std::span(records))});
+  }
+
+  void add_features(std::uint32_t pattern, const FeatureContent& features) {
+    FeatureHeader header{};
+    header.count = static_cast<std::uint32_t>(features.keypoints.size());
+    header.descriptor_bytes = features.descriptor_bytes;
+    header.keypoints_offset = sizeof(FeatureHeader);
+    const std::uint64_t end =
+        header.keypoints_offset + features.keypoints.size() * sizeof(KeypointRecord);
+    header.descriptors_offset = align(end, 16);
+    feature_headers_.push_back(header);
+    add(SectionType::kFeatureTwin, pattern, features.set_id,
+        {bytes_of(feature_headers_.back()), std::as_bytes(std::span(features.keypoints)),
+         Bytes(kZeros).first(header.descriptors_offset - end), Bytes(features.descriptors)});
+    if (!features.yml.empty()) {
+      add(SectionType::kFeatureYml, pattern, features.set_id,
+          {std::as_bytes(std::span(features.yml.data(), features.yml.size()))});
+    }
+  }
+
+  void add_extra(const ExtraSection& extra) {
+    Section section;
+    section.entry.type = extra.type;
+    section.entry.version = extra.version;
+    section.entry.flags = extra.flags;
+    section.entry.owner = extra.owner;
+    section.entry.variant = extra.variant;
+    section.pieces = {Bytes(extra.bytes)};
+    sections_.push_back(section);
+  }
+
+  /// Sorts, and gives each section its size, hash and place. False where two have one key.
+  [[nodiscard]] bool finish() {
+    std::sort(sections_.begin(), sections_.end(),
+              [](const Section& a, const Section& b) { return key(a) < key(b); });
+    std::uint64_t offset = sizeof(FileHeader) + sections_.size() * sizeof(SectionEntry);
+    XXH64_state_t state;
+    for (std::size_t i = 0; i < sections_.size(); ++i) {
+      if (i > 0 && key(sections_[i - 1]) == key(sections_[i])) return false;
+      SectionEntry& entry = sections_[i].entry;
+      XXH64_reset(&state, 0);
+      for (const Bytes piece : sections_[i].pieces) {
+        if (!piece.empty()) XXH64_update(&state, piece.data(), piece.size());
+        entry.size += piece.size();
+      }
+      entry.hash = XXH64_digest(&state);
+      entry.offset = align(offset, entry.flags & kSectionGpu ? kGpuAlignment : kSectionAlignment);
+      offset = entry.offset + entry.size;
+    }
+    file_size_ = offset;
+    return true;
+  }
+
+  [[nodiscard]] FileHeader header() const {
+    FileHeader header{};
+    std::copy(kMagic.begin(), kMagic.end(), header.magic);
+    header.major = kMajorVersion;
+    header.minor = kMinorVersion;
+    header.section_count = static_cast<std::uint32_t>(sections_.size());
+    header.file_size = file_size_;
+    header.table_offset = sizeof(FileHeader);
+    header.entry_size = sizeof(SectionEntry);
+    XXH64_state_t state;
+    XXH64_reset(&state, 0);
+    XXH64_update(&state, &header, offsetof(FileHeader, hash));
+    for (const Section& section : sections_) {
+      XXH64_update(&state, &section.entry, sizeof(SectionEntry));
+    }
+    header.hash = XXH64_digest(&state);
+    return header;
+  }
+
+  [[nodiscard]] const std::vector<Section>& sections() const { return sections_; }
+
+ private:
+  std::vector<Section> sections_;
+  std::vector<TableHeader> table_headers_;
+  std::vector<FeatureHeader> feature_headers_;
+  std::uint64_t file_size_ = 0;
+};
+
+/// What contradicts itself in a content, or nullptr.
+const char* contradiction(const BundleContent& content) {
+  if (content.features.size() > content.patterns.size()) return "features of a missing pattern";
+  if (content.texture_data.size() > content.textures.size()) return "data of a missing texture";
+  for (const auto& list : content.features) {
+    for (const FeatureContent& features : list) {
+      if (features.descriptors.size() != features.keypoints.size() * features.descriptor_bytes) {
+        return "descriptors that do not match their keypoints";
+      }
+    }
+  }
+  return nullptr;
+}
+
+void collect(const BundleContent& content, SectionList& list) {
+  list.add_blob(SectionType::kNames, kNone, std::as_bytes(std::span(content.names)));
+  list.add_blob(SectionType::kMeta, kNone, std::as_bytes(std::span(content.meta)));
+  list.add_table(SectionType::kModels, content.models);
+  list.add_table(SectionType::kChunks, content.chunks);
+  list.add_table(SectionType::kLevels, content.levels);
+  list.add_table(SectionType::kMaterials, content.materials);
+  list.add_table(SectionType::kLayouts, content.layouts);
+  list.add_table(SectionType::kTextures, content.textures);
+  list.add_table(SectionType::kTextureLevels, content.texture_levels);
+  list.add_table(SectionType::kPatterns, content.patterns);
+  list.add_table(SectionType::kParameterSets, content.parameter_sets);
+  list.add_table(SectionType::kScenes, content.scenes);
+  for (std::uint32_t pattern = 0; pattern < content.features.size(); ++pattern) {
+    for (const FeatureContent& features : content.features[pattern]) {
+      list.add_features(pattern, features);
+    }
+  }
+  list.add_blob(SectionType::kVertices, kNone, content.vertices);
+  list.add_blob(SectionType::kIndices, kNone, content.indices);
+  for (std::uint32_t texture = 0; texture < content.texture_data.size(); ++texture) {
+    list.add_blob(SectionType::kTextureData, texture, content.texture_data[texture]);
+  }
+  for (const ExtraSection& extra : content.extra) list.add_extra(extra);
+}
+
+/// Counts what went through, so that padding needs no bookkeeping elsewhere.
+class Stream {
+ public:
+  explicit Stream(const ByteSink& sink) : sink_(sink) {}
+  [[nodiscard]] bool put(Bytes bytes) {
+    position_ += bytes.size();
+    return bytes.empty() || sink_(bytes);
+  }
+  [[nodiscard]] bool pad_to(std::uint64_t offset) {
+    return put(Bytes(kZeros).first(static_cast<std::size_t>(offset - position_)));
+  }
+
+ private:
+  const ByteSink& sink_;
+  std::uint64_t position_ = 0;
+};
+
+bool stream(const SectionList& list, const ByteSink& sink) {
+  Stream out(sink);
+  const FileHeader header = list.header();
+  if (!out.put(bytes_of(header))) return false;
+  for (const Section& section : list.sections()) {
+    if (!out.put(bytes_of(section.entry))) return false;
+  }
+  for (const Section& section : list.sections()) {
+    if (!out.pad_to(section.entry.offset)) return false;
+    for (const Bytes piece : section.pieces) {
+      if (!out.put(piece)) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+NameRef BundleContent::intern(std::string_view name) {
+  std::string clean;
+  while (!name.empty()) {
+    const std::size_t length = utf8_character(name);
+    const std::string_view character = length != 0 ? name.substr(0, length) : "\xEF\xBF\xBD";
+    if (clean.size() + character.size() > kMaxNameBytes) break;
+    clean += character;
+    name.remove_prefix(length != 0 ? length : 1);
+  }
+  if (clean.empty()) return {0, 0};
+  // A well-formed needle is found at character boundaries only, so a part of a name serves too.
+  std::size_t offset = names.find(clean);
+  if (offset == std::string::npos) {
+    offset = names.size();
+    names += clean;
+  }
+  return {static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(clean.size())};
+}
+
+Result<void> write_bundle(const BundleContent& content, const ByteSink& sink) {
+  const char* wrong = contradiction(content);
+  std::size_t features = 0;
+  for (const auto& list : content.features) features += list.size();
+  SectionList list(features);
+  if (wrong == nullptr) {
+    collect(content, list);
+    if (!list.finish()) wrong = "two sections of one type, owner and variant";
+  }
+  if (wrong == nullptr && list.sections().size() > kMaxSections) wrong = "too many sections";
+  if (wrong != nullptr) {
+    return fail(ExitCode::kInternal, "bundle.content", "bundle",
+                std::string("the content to write has ") + wrong,
+                "this is a bug of the program that fills the bundle; please report it");
+  }
+  if (!stream(list, sink)) {
+    return fail(ExitCode::kIo, "io.write", "bundle", "the bundle could not be written in full",
+                "make room on the disk and try again");
+  }
+  return {};
+}
+
+Result<std::vector<std::byte>> encode_bundle(const BundleContent& content) {
+  std::vector<std::byte> bytes;
+  const auto written = write_bundle(content, [&bytes](Bytes part) {
+    bytes.insert(bytes.end(), part.begin(), part.end());
+    return true;
+  });
+  if (!written) return tl::unexpected<Error>(written.error());
+  return bytes;
+}
+
+Result<void> save_bundle(const BundleContent& content, const std::string& path) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected<Error>(std::move(file.error()));
+  Result<void> file_state;
+  auto written = write_bundle(content, [&](Bytes part) {
+    file_state = file->write(part);
+    return file_state.has_value();
+  });
+  if (!file_state) return file_state;
+  if (!written) return written;
+  return file->commit();
+}
+
+}  // namespace modar

@@ -1,0 +1,97 @@
+// Half floats and normalised integers, to and fro.
+#include "formats/quantise.hpp"
+
+#include <bit>
+#include <cmath>
+
+namespace modar {
+namespace {
+
+/// What ES 2.0 and ES 3 make of c, in the middle.
+double snorm8_mean(int c) {
+  const double es2 = (2.0 * c + 1.0) / 255.0;
+  const double es3 = c == -128 ? -1.0 : c / 127.0;
+  return (es2 + es3) / 2.0;
+}
+
+/// NaN becomes 0: there is no better integer for it.
+double clamped(float value, double low, double high) {
+  const double wide = static_cast<double>(value);
+  if (std::isnan(wide)) return 0.0;
+  return wide < low ? low : (wide > high ? high : wide);
+}
+
+}  // namespace
+
+std::uint16_t float_to_half(float value) {
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(value);
+  const auto sign = static_cast<std::uint16_t>((bits >> 16) & 0x8000u);
+  const std::uint32_t magnitude = bits & 0x7FFFFFFFu;
+  std::uint32_t half = 0;
+  if (magnitude > 0x7F800000u) {
+    // The quiet bit keeps a NaN whose payload lies in the lost bits from turning into infinity.
+    half = 0x7C00u | 0x0200u | ((magnitude >> 13) & 0x03FFu);
+  } else if (magnitude >= 0x47800000u) {  // 2^16 and up, infinity
+    half = 0x7C00u;
+  } else if (magnitude >= 0x38800000u) {  // normal halves, from 2^-14
+    const std::uint32_t rebased = magnitude - (112u << 23);
+    // Adding half a unit, less one where the kept part is even, rounds ties to even; a carry runs
+    // into the exponent and, at the top, into infinity, as it must.
+    half = (rebased + 0x0FFFu + ((rebased >> 13) & 1u)) >> 13;
+  } else if (magnitude >= 0x33000000u) {  // subnormal halves, from 2^-25
+    const std::uint32_t shift = 126u - (magnitude >> 23);
+    const std::uint32_t mantissa = (magnitude & 0x007FFFFFu) | 0x00800000u;
+    const std::uint32_t kept = mantissa >> shift;
+    const std::uint32_t lost = mantissa & ((1u << shift) - 1u);
+    const std::uint32_t tie = 1u << (shift - 1u);
+    half = kept + ((lost > tie || (lost == tie && (kept & 1u) != 0)) ? 1u : 0u);
+  }
+  return static_cast<std::uint16_t>(sign | half);
+}
+
+float half_to_float(std::uint16_t half) {
+  const std::uint32_t sign = (half & 0x8000u) << 16;
+  const std::uint32_t exponent = (half >> 10) & 0x1Fu;
+  const std::uint32_t mantissa = half & 0x03FFu;
+  if (exponent == 31) return std::bit_cast<float>(sign | 0x7F800000u | (mantissa << 13));
+  if (exponent != 0) {
+    return std::bit_cast<float>(sign | ((exponent + 112u) << 23) | (mantissa << 13));
+  }
+  const float magnitude = static_cast<float>(mantissa) * 0x1p-24f;
+  return sign != 0 ? -magnitude : magnitude;
+}
+
+std::int8_t float_to_snorm8(float value) {
+  const double wanted = clamped(value, -1.0, 1.0);
+  const double step = (2.0 / 255.0 + 1.0 / 127.0) / 2.0;
+  int best = static_cast<int>(std::floor((wanted - 0.5 / 255.0) / step));
+  best = best < -128 ? -128 : (best > 127 ? 127 : best);
+  // The mean of both decodings bends at -127, so the neighbour above decides by distance.
+  if (best < 127 &&
+      std::fabs(snorm8_mean(best + 1) - wanted) < std::fabs(snorm8_mean(best) - wanted)) {
+    ++best;
+  }
+  return static_cast<std::int8_t>(best);
+}
+
+float snorm8_to_float(std::int8_t value) {
+  return static_cast<float>(2 * value + 1) / 255.0f;
+}
+
+std::uint16_t float_to_unorm16(float value) {
+  return static_cast<std::uint16_t>(std::floor(clamped(value, 0.0, 1.0) * 65535.0 + 0.5));
+}
+
+float unorm16_to_float(std::uint16_t value) {
+  return static_cast<float>(value) / 65535.0f;
+}
+
+std::uint8_t float_to_unorm8(float value) {
+  return static_cast<std::uint8_t>(std::floor(clamped(value, 0.0, 1.0) * 255.0 + 0.5));
+}
+
+float unorm8_to_float(std::uint8_t value) {
+  return static_cast<float>(value) / 255.0f;
+}
+
+}  // namespace modar

@@ -1,0 +1,35 @@
+// UTF-8 as bundles hold it: well formed, without control characters, so that a name can be printed
+// on any terminal.
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+namespace modar {
+
+/// Bytes of the character that starts at text[0] (1-4), or 0 where there is none: ill-formed
+/// (Unicode 15, table 3-7) or a control character (U+0000-001F, U+007F-009F).
+inline std::size_t utf8_character(std::string_view text) {
+  const auto at = [&text](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned>(static_cast<unsigned char>(text[i])) : 0u;
+  };
+  const auto tail = [&at](std::size_t i) { return (at(i) & 0xC0u) == 0x80u; };
+  const unsigned first = at(0);
+  if (first < 0x80) return first >= 0x20 && first != 0x7F ? 1 : 0;
+  if (first < 0xC2 || first > 0xF4 || !tail(1)) return 0;
+  if (first < 0xE0) return first == 0xC2 && at(1) < 0xA0 ? 0 : 2;
+  // The second byte excludes overlong forms, surrogates and what lies beyond U+10FFFF.
+  if ((first == 0xE0 && at(1) < 0xA0) || (first == 0xED && at(1) > 0x9F) ||
+      (first == 0xF0 && at(1) < 0x90) || (first == 0xF4 && at(1) > 0x8F) || !tail(2)) {
+    return 0;
+  }
+  if (first < 0xF0) return 3;
+  return tail(3) ? 4 : 0;
+}
+
+/// True for a byte that no character starts with.
+inline bool utf8_continues(char byte) {
+  return (static_cast<unsigned char>(byte) & 0xC0u) == 0x80u;
+}
+
+}  // namespace modar
