@@ -1,0 +1,76 @@
+// Features as OpenCV FileStorage YML, written and read in memory: the interchange record.
+#include <cstring>
+
+#include <opencv2/core.hpp>
+
+#include "modar/features.hpp"
+#include "opencv_bridge.hpp"
+
+namespace modar {
+namespace {
+
+constexpr const char* kCure = "bake the pattern again";
+
+tl::unexpected<Error> bad(const char* cause) {
+  return fail(ExitCode::kInvalidInput, "features.yml", "", cause, kCure);
+}
+
+}  // namespace
+
+Result<std::string> features_to_yml(const Features& features) {
+  const auto work = [&]() -> Result<std::string> {
+    std::vector<cv::KeyPoint> keypoints;
+    keypoints.reserve(features.keypoints.size());
+    for (const KeypointRecord& record : features.keypoints) {
+      keypoints.push_back(paper::to_opencv(record));
+    }
+    cv::Mat descriptors(static_cast<int>(features.keypoints.size()),
+                        static_cast<int>(features.descriptor_bytes), CV_8UC1);
+    if (descriptors.total() != features.descriptors.size()) {
+      return fail(ExitCode::kInternal, "features.yml", "",
+                  "keypoints and descriptors differ in number", "report this as a bug");
+    }
+    if (!features.descriptors.empty()) {
+      std::memcpy(descriptors.data, features.descriptors.data(), features.descriptors.size());
+    }
+    cv::FileStorage storage(
+        ".yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML);
+    cv::write(storage, "keypoints", keypoints);
+    storage << "descriptors" << descriptors;
+    return storage.releaseAndGetString();
+  };
+  return paper::guarded(ExitCode::kInternal, "features.yml", "report this as a bug", work);
+}
+
+Result<Features> features_from_yml(const std::string& yml) {
+  const auto work = [&]() -> Result<Features> {
+    if (yml.empty()) return bad("the text is empty");
+    const cv::FileStorage storage(
+        yml, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML);
+    if (!storage.isOpened() || storage["keypoints"].isNone() || storage["descriptors"].isNone()) {
+      return bad("the nodes 'keypoints' and 'descriptors' are missing");
+    }
+    std::vector<cv::KeyPoint> keypoints;
+    cv::Mat descriptors;
+    storage["keypoints"] >> keypoints;
+    storage["descriptors"] >> descriptors;
+    if (descriptors.rows != static_cast<int>(keypoints.size())) {
+      return bad("keypoints and descriptors differ in number");
+    }
+    Features features;
+    features.descriptor_bytes = static_cast<std::uint32_t>(descriptors.cols);
+    if (keypoints.empty()) return features;
+    if (descriptors.type() != CV_8UC1 || !descriptors.isContinuous()) {
+      return bad("the descriptors are not bytes");
+    }
+    for (const cv::KeyPoint& point : keypoints) {
+      features.keypoints.push_back(paper::from_opencv(point));
+    }
+    features.descriptors.resize(descriptors.total());
+    std::memcpy(features.descriptors.data(), descriptors.data, descriptors.total());
+    return features;
+  };
+  return paper::guarded(ExitCode::kInvalidInput, "features.yml", kCure, work);
+}
+
+}  // namespace modar
