@@ -38,9 +38,30 @@ struct FeatureView {
   std::uint32_t descriptor_bytes = 0;
 };
 
+/// What a view points at. Validation fills it; everyone else reads it through BundleView.
+struct BundleParts {
+  std::span<const std::byte> bytes;
+  std::span<const SectionEntry> sections;
+  std::span<const std::byte> names;
+  std::span<const std::byte> vertices;
+  std::span<const std::byte> indices;
+  Table<ModelRecord> models;
+  Table<ChunkRecord> chunks;
+  Table<LevelRecord> levels;
+  Table<MaterialRecord> materials;
+  Table<LayoutRecord> layouts;
+  Table<TextureRecord> textures;
+  Table<TextureLevelRecord> texture_levels;
+  Table<PatternRecord> patterns;
+  Table<ParameterSetRecord> parameter_sets;
+  Table<SceneRecord> scenes;
+};
+
 /// A validated bundle. Holds pointers into the caller's bytes, which must outlive it.
 class BundleView {
  public:
+  /// A view of nothing: every table and section is empty, and header() may not be called.
+  BundleView() = default;
   /// Validates the header, the section table (with its hash) and every table record's references,
   /// ranges and enums, so that each accessor below is safe for any index in range. Payloads
   /// (vertices, indices, blocks, descriptors) are bounded but not read: see check_bundle().
@@ -48,50 +69,38 @@ class BundleView {
   /// "bundle.version" and "bundle.section-required"; `where` is the byte offset.
   static Result<BundleView> open(std::span<const std::byte> bytes);
 
-  [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
+  [[nodiscard]] std::span<const std::byte> bytes() const { return parts_.bytes; }
   [[nodiscard]] const FileHeader& header() const {
-    return *reinterpret_cast<const FileHeader*>(bytes_.data());
+    return *reinterpret_cast<const FileHeader*>(parts_.bytes.data());
   }
-  [[nodiscard]] std::span<const SectionEntry> sections() const { return sections_; }
+  [[nodiscard]] std::span<const SectionEntry> sections() const { return parts_.sections; }
   /// The bytes of a section, empty if there is none. O(log sections).
   [[nodiscard]] std::span<const std::byte> section(SectionType type, std::uint32_t owner = kNone,
                                                    std::uint32_t variant = 0) const;
 
   [[nodiscard]] std::string_view name(NameRef ref) const;
   [[nodiscard]] std::string_view meta() const;
-  [[nodiscard]] Table<ModelRecord> models() const { return models_; }
-  [[nodiscard]] Table<ChunkRecord> chunks() const { return chunks_; }
-  [[nodiscard]] Table<LevelRecord> levels() const { return levels_; }
-  [[nodiscard]] Table<MaterialRecord> materials() const { return materials_; }
-  [[nodiscard]] Table<LayoutRecord> layouts() const { return layouts_; }
-  [[nodiscard]] Table<TextureRecord> textures() const { return textures_; }
-  [[nodiscard]] Table<TextureLevelRecord> texture_levels() const { return texture_levels_; }
-  [[nodiscard]] Table<PatternRecord> patterns() const { return patterns_; }
-  [[nodiscard]] Table<ParameterSetRecord> parameter_sets() const { return parameter_sets_; }
-  [[nodiscard]] Table<SceneRecord> scenes() const { return scenes_; }
+  [[nodiscard]] Table<ModelRecord> models() const { return parts_.models; }
+  [[nodiscard]] Table<ChunkRecord> chunks() const { return parts_.chunks; }
+  [[nodiscard]] Table<LevelRecord> levels() const { return parts_.levels; }
+  [[nodiscard]] Table<MaterialRecord> materials() const { return parts_.materials; }
+  [[nodiscard]] Table<LayoutRecord> layouts() const { return parts_.layouts; }
+  [[nodiscard]] Table<TextureRecord> textures() const { return parts_.textures; }
+  [[nodiscard]] Table<TextureLevelRecord> texture_levels() const { return parts_.texture_levels; }
+  [[nodiscard]] Table<PatternRecord> patterns() const { return parts_.patterns; }
+  [[nodiscard]] Table<ParameterSetRecord> parameter_sets() const { return parts_.parameter_sets; }
+  [[nodiscard]] Table<SceneRecord> scenes() const { return parts_.scenes; }
 
-  [[nodiscard]] std::span<const std::byte> vertices() const { return vertices_; }
-  [[nodiscard]] std::span<const std::byte> indices() const { return indices_; }
+  [[nodiscard]] std::span<const std::byte> vertices() const { return parts_.vertices; }
+  [[nodiscard]] std::span<const std::byte> indices() const { return parts_.indices; }
   [[nodiscard]] std::span<const std::byte> texture_data(std::uint32_t texture) const;
   /// Nothing (count 0) if the pattern was not described with that parameter set.
   [[nodiscard]] FeatureView features(std::uint32_t pattern, std::uint32_t set_id) const;
   [[nodiscard]] std::string_view feature_yml(std::uint32_t pattern, std::uint32_t set_id) const;
 
  private:
-  std::span<const std::byte> bytes_;
-  std::span<const SectionEntry> sections_;
-  std::span<const std::byte> vertices_;
-  std::span<const std::byte> indices_;
-  Table<ModelRecord> models_;
-  Table<ChunkRecord> chunks_;
-  Table<LevelRecord> levels_;
-  Table<MaterialRecord> materials_;
-  Table<LayoutRecord> layouts_;
-  Table<TextureRecord> textures_;
-  Table<TextureLevelRecord> texture_levels_;
-  Table<PatternRecord> patterns_;
-  Table<ParameterSetRecord> parameter_sets_;
-  Table<SceneRecord> scenes_;
+  explicit BundleView(const BundleParts& parts) : parts_(parts) {}
+  BundleParts parts_;
 };
 
 }  // namespace modar

@@ -48,7 +48,7 @@ struct BundleContent {
   std::vector<PatternRecord> patterns;
   std::vector<ParameterSetRecord> parameter_sets;
   std::vector<SceneRecord> scenes;
-  std::vector<std::vector<FeatureContent>> features;       ///< one list a pattern
+  std::vector<std::vector<FeatureContent>> features;  ///< one list a pattern
   std::vector<std::byte> vertices;
   std::vector<std::byte> indices;
   std::vector<std::vector<std::byte>> texture_data;  ///< one a texture

@@ -14,14 +14,17 @@ enum class Severity : std::uint8_t { kError, kWarning, kInfo };
 
 /// A rule's constant part. The table kIssueKinds is the source of ISSUES.md.
 struct IssueKind {
-  const char* id;        ///< stable: "BUNDLE_TRUNCATED"
+  const char* id;  ///< stable: "BUNDLE_TRUNCATED"
   Severity severity;
-  const char* message;   ///< what is wrong, as a sentence without names
+  const char* message;  ///< what is wrong, as a sentence without names
   const char* cure;
 };
 
 /// All kinds of issues, in the order of their ids in ISSUES.md.
 std::span<const IssueKind> issue_kinds();
+
+/// The text of ISSUES.md, made from issue_kinds().
+std::string issues_markdown();
 
 /// One finding: `where` names the asset ("model 'spider', chunk 3"), `offset` is the byte in the
 /// file, `detail` the numbers that were found.

@@ -35,8 +35,8 @@ using Result = tl::expected<T, Error>;
 /// Shorthand for `return fail(ExitCode::kIo, "io.open", path, "...", "...");`
 inline tl::unexpected<Error> fail(ExitCode exit, std::string code, std::string where,
                                   std::string cause, std::string cure) {
-  return tl::unexpected<Error>(Error{exit, std::move(code), std::move(where), std::move(cause),
-                                     std::move(cure)});
+  return tl::unexpected<Error>(
+      Error{exit, std::move(code), std::move(where), std::move(cause), std::move(cure)});
 }
 
 /// One line for a terminal: "where: cause; cure [code]".

@@ -11,37 +11,40 @@
 namespace modar {
 
 inline constexpr std::array<std::uint8_t, 8> kMagic = {0x89, 'M', 'O', 'D', 0x0D, 0x0A, 0x1A, 0x0A};
-inline constexpr std::uint16_t kMajorVersion = 1;  ///< must match
-inline constexpr std::uint16_t kMinorVersion = 0;  ///< additive
+inline constexpr std::uint16_t kMajorVersion = 1;    ///< must match
+inline constexpr std::uint16_t kMinorVersion = 0;    ///< additive
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;  ///< "no such index"
 inline constexpr std::uint64_t kNoOffset = 0xFFFFFFFFFFFFFFFFull;
 inline constexpr std::uint32_t kMaxSections = 65536;
 inline constexpr std::uint32_t kMaxChunkVertices = 65535;
 inline constexpr std::uint32_t kMaxNameBytes = 1024;
 inline constexpr std::uint32_t kMaxTextureSide = 8192;
+inline constexpr std::uint32_t kMaxPatternSide = 65535;
+inline constexpr std::uint32_t kMaxVertexStride = 252;  ///< bytes
+inline constexpr std::uint32_t kMaxDescriptorBits = 4096;
 inline constexpr std::uint64_t kSectionAlignment = 64;
 inline constexpr std::uint64_t kGpuAlignment = 4096;
 
 /// Section types. 1-255 are tables and small text, 256 and up are payloads, so that everything that
 /// opening a bundle reads lies in its first pages.
 enum class SectionType : std::uint32_t {
-  kNames = 1,            ///< UTF-8 names, back to back
-  kMeta = 2,             ///< JSON text: how the bundle was baked
-  kModels = 16,          ///< table of ModelRecord
-  kChunks = 17,          ///< table of ChunkRecord
-  kLevels = 18,          ///< table of LevelRecord
-  kMaterials = 19,       ///< table of MaterialRecord
-  kLayouts = 20,         ///< table of LayoutRecord
-  kTextures = 32,        ///< table of TextureRecord
-  kTextureLevels = 33,   ///< table of TextureLevelRecord
-  kPatterns = 48,        ///< table of PatternRecord
-  kParameterSets = 49,   ///< table of ParameterSetRecord
-  kScenes = 64,          ///< table of SceneRecord
-  kFeatureTwin = 256,    ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
-  kFeatureYml = 257,     ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
-  kVertices = 512,       ///< GPU: merged vertex buffer of all models
-  kIndices = 513,        ///< GPU: merged 16-bit index buffer of all models
-  kTextureData = 514,    ///< GPU: owner: texture; ETC1 blocks of all its levels
+  kNames = 1,           ///< UTF-8 names, back to back
+  kMeta = 2,            ///< JSON text: how the bundle was baked
+  kModels = 16,         ///< table of ModelRecord
+  kChunks = 17,         ///< table of ChunkRecord
+  kLevels = 18,         ///< table of LevelRecord
+  kMaterials = 19,      ///< table of MaterialRecord
+  kLayouts = 20,        ///< table of LayoutRecord
+  kTextures = 32,       ///< table of TextureRecord
+  kTextureLevels = 33,  ///< table of TextureLevelRecord
+  kPatterns = 48,       ///< table of PatternRecord
+  kParameterSets = 49,  ///< table of ParameterSetRecord
+  kScenes = 64,         ///< table of SceneRecord
+  kFeatureTwin = 256,   ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
+  kFeatureYml = 257,    ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
+  kVertices = 512,      ///< GPU: merged vertex buffer of all models
+  kIndices = 513,       ///< GPU: merged 16-bit index buffer of all models
+  kTextureData = 514,   ///< GPU: owner: texture; ETC1 blocks of all its levels
 };
 
 enum SectionFlags : std::uint16_t {
@@ -55,11 +58,11 @@ struct FileHeader {
   std::uint16_t minor;
   std::uint32_t section_count;
   std::uint64_t file_size;
-  std::uint64_t table_offset;       ///< 64 in version 1
-  std::uint32_t entry_size;         ///< sizeof(SectionEntry)
+  std::uint64_t table_offset;  ///< 64 in version 1
+  std::uint32_t entry_size;    ///< sizeof(SectionEntry)
   std::uint32_t reserved0;
   std::uint64_t reserved1[2];
-  std::uint64_t hash;               ///< XXH64, seed 0, of bytes 0-55 and the section table
+  std::uint64_t hash;  ///< XXH64, seed 0, of bytes 0-55 and the section table
 };
 static_assert(sizeof(FileHeader) == 64);
 
@@ -73,7 +76,7 @@ struct SectionEntry {
   std::uint32_t variant;  ///< tells several sections of one owner apart; else 0
   std::uint64_t offset;
   std::uint64_t size;
-  std::uint64_t hash;     ///< XXH64, seed 0, of the section's bytes
+  std::uint64_t hash;  ///< XXH64, seed 0, of the section's bytes
   std::uint64_t reserved;
 };
 static_assert(sizeof(SectionEntry) == 48);
@@ -96,26 +99,26 @@ struct NameRef {
 /// source = center + scale * decoded, decoded in [-1,1].
 struct ModelRecord {
   NameRef name;
-  double center[3];             ///< source units
-  double scale;                 ///< source units; half of the largest side, 1 for a point
-  double diagonal;              ///< source units; of the source bounding box
-  double unit_metres;           ///< metres in a source unit; 0: unknown
-  double position_error_max;    ///< source units; measured on the decoded bytes
-  double position_error_rms;    ///< source units
+  double center[3];           ///< source units
+  double scale;               ///< source units; half of the largest side, 1 for a point
+  double diagonal;            ///< source units; of the source bounding box
+  double unit_metres;         ///< metres in a source unit; 0: unknown
+  double position_error_max;  ///< source units; measured on the decoded bytes
+  double position_error_rms;  ///< source units
   float normal_error_max_deg;
   float normal_error_rms_deg;
-  float uv_error_max_texels;    ///< 0 where there is no texture
+  float uv_error_max_texels;  ///< 0 where there is no texture
   float uv_error_rms_texels;
-  std::uint64_t vertex_count;   ///< packed vertices of level 0
-  std::uint64_t triangle_count; ///< of level 0
+  std::uint64_t vertex_count;    ///< packed vertices of level 0
+  std::uint64_t triangle_count;  ///< of level 0
   std::uint64_t source_vertex_count;
   std::uint64_t source_face_count;
-  std::uint32_t layout;         ///< index into kLayouts
+  std::uint32_t layout;  ///< index into kLayouts
   std::uint32_t first_chunk;
   std::uint32_t chunk_count;
   std::uint32_t first_material;
   std::uint32_t material_count;
-  std::uint32_t level_count;    ///< greatest of its chunks
+  std::uint32_t level_count;  ///< greatest of its chunks
   std::uint32_t reserved[4];
 };
 static_assert(sizeof(ModelRecord) == 160);
@@ -124,18 +127,18 @@ static_assert(sizeof(ModelRecord) == 160);
 /// Decoding: position = position_offset + position_step * attribute; uv = uv_offset + uv_scale *
 /// attribute (attributes as GL hands them to a shader: normalised ones lie in [0,1] or [-1,1]).
 struct ChunkRecord {
-  float bounds_min[3];       ///< model space, conservative over all levels, decoded positions
+  float bounds_min[3];  ///< model space, conservative over all levels, decoded positions
   float bounds_max[3];
-  float cone_axis[3];        ///< unit length, or zero where cone_cutoff > 1
-  float cone_cutoff;         ///< sine bound: invisible if dot(normalize(p - eye), axis) >= cutoff
-                             ///< for every point p of the box; > 1: never culled
+  float cone_axis[3];  ///< unit length, or zero where cone_cutoff > 1
+  float cone_cutoff;   ///< sine bound: invisible if dot(normalize(p - eye), axis) >= cutoff
+                       ///< for every point p of the box; > 1: never culled
   float position_offset[3];
   float position_step;
   float uv_offset[2];
   float uv_scale[2];
-  std::uint32_t material;    ///< index into kMaterials, absolute
-  std::uint32_t first_level; ///< index into kLevels
-  std::uint32_t level_count; ///< at least 1; level 0 is the finest
+  std::uint32_t material;     ///< index into kMaterials, absolute
+  std::uint32_t first_level;  ///< index into kLevels
+  std::uint32_t level_count;  ///< at least 1; level 0 is the finest
   std::uint32_t reserved;
 };
 static_assert(sizeof(ChunkRecord) == 88);
@@ -171,13 +174,20 @@ struct MaterialRecord {
 static_assert(sizeof(MaterialRecord) == 80);
 
 enum class Semantic : std::uint8_t {
-  kPosition = 1,
+  kPosition = 1,   ///< 3 components, or 4 of which the last is padding
   kNormal = 2,     ///< 3 components
-  kUv = 3,
+  kUv = 3,         ///< 2 components
   kColour = 4,     ///< RGBA
   kNormalOct = 5,  ///< 2 components, octahedral
 };
-enum class ComponentType : std::uint8_t { kHalf = 1, kI16 = 2, kU16 = 3, kI8 = 4, kU8 = 5, kF32 = 6 };
+enum class ComponentType : std::uint8_t {
+  kHalf = 1,
+  kI16 = 2,
+  kU16 = 3,
+  kI8 = 4,
+  kU8 = 5,
+  kF32 = 6
+};
 
 struct AttributeRecord {
   std::uint8_t semantic;    ///< Semantic
@@ -205,15 +215,15 @@ enum TextureFlags : std::uint32_t {
 
 struct TextureRecord {
   NameRef name;
-  std::uint32_t width;   ///< of level 0, pixels
+  std::uint32_t width;  ///< of level 0, pixels
   std::uint32_t height;
   std::uint32_t source_width;
   std::uint32_t source_height;
-  std::uint32_t format;  ///< TextureFormat
-  std::uint32_t flags;   ///< TextureFlags
+  std::uint32_t format;       ///< TextureFormat
+  std::uint32_t flags;        ///< TextureFlags
   std::uint32_t first_level;  ///< index into kTextureLevels
   std::uint32_t level_count;  ///< 1, or a full chain down to 1x1
-  float psnr_db;         ///< level 0 against the image that was encoded; 99 where equal
+  float psnr_db;              ///< level 0 against the image that was encoded; 99 where equal
   float ssim;
   std::uint32_t reserved[4];
 };
@@ -235,12 +245,12 @@ static_assert(sizeof(TextureLevelRecord) == 40);
 /// Pattern plane: x right, y up, z towards the viewer; corners (+-half_width, +-half_height, 0).
 struct PatternRecord {
   NameRef name;
-  std::uint32_t width;      ///< pixels
+  std::uint32_t width;  ///< pixels
   std::uint32_t height;
-  double width_mm;          ///< physical width; 0: unknown
-  float half_width;         ///< W of ModAR Eq. 1: width / max(width, height)
-  float half_height;        ///< H of ModAR Eq. 1
-  float score;              ///< 0-100; -1: not scored
+  double width_mm;    ///< physical width; 0: unknown
+  float half_width;   ///< W of ModAR Eq. 1: width / max(width, height)
+  float half_height;  ///< H of ModAR Eq. 1
+  float score;        ///< 0-100; -1: not scored
   std::uint32_t score_version;
   std::uint32_t reserved[6];
 };
@@ -259,7 +269,7 @@ struct ParameterSetRecord {
   std::uint32_t edge_threshold;
   std::uint32_t first_level;
   std::uint32_t wta_k;
-  std::uint32_t harris;        ///< 1: Harris ranking, 0: FAST score
+  std::uint32_t harris;  ///< 1: Harris ranking, 0: FAST score
   std::uint32_t patch_size;
   std::uint32_t fast_threshold;
   std::uint32_t agast_threshold;  ///< AGAST-BRISK
@@ -269,7 +279,7 @@ struct ParameterSetRecord {
   std::uint32_t max_distance;  ///< bits; a match above it is rejected
   std::uint32_t min_matches;
   std::uint32_t min_inliers;
-  float ransac_threshold;      ///< pixels
+  float ransac_threshold;  ///< pixels
   std::uint32_t reserved[3];
 };
 static_assert(sizeof(ParameterSetRecord) == 96);

@@ -1,0 +1,42 @@
+// Rules on sections as bytes: hashes and padding.
+#include <algorithm>
+
+#include "formats/check_rules.hpp"
+#include "formats/validate.hpp"
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace modar {
+namespace {
+
+void check_zero(FaultLog& log, std::span<const std::byte> bytes, std::uint64_t first,
+                std::uint64_t end, const std::string& where) {
+  const auto gap =
+      bytes.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(end - first));
+  const auto found =
+      std::find_if(gap.begin(), gap.end(), [](std::byte b) { return b != std::byte{0}; });
+  if (found == gap.end()) return;
+  log.add(Rule::kPadding, first + static_cast<std::uint64_t>(found - gap.begin()), where,
+          "a byte of padding is not zero");
+}
+
+}  // namespace
+
+void check_section_bytes(FaultLog& log, const BundleParts& parts) {
+  std::uint64_t end = sizeof(FileHeader) + parts.sections.size_bytes();
+  for (std::uint32_t i = 0; i < parts.sections.size(); ++i) {
+    const SectionEntry& entry = parts.sections[i];
+    const std::string where = "section " + std::to_string(i);
+    check_zero(log, parts.bytes, end, entry.offset, "before " + where);
+    end = entry.offset + entry.size;
+    const std::span<const std::byte> bytes = section_bytes(parts, entry);
+    if (XXH64(bytes.data(), bytes.size(), 0) != entry.hash) {
+      log.add(Rule::kSectionHash, entry.offset, where,
+              "the hash of its " + std::to_string(entry.size) + " bytes of type " +
+                  std::to_string(entry.type) + " differs from the stated one");
+    }
+  }
+}
+
+}  // namespace modar

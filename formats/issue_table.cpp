@@ -1,0 +1,182 @@
+// The constant part of every rule, the log of what broke them, and the text of ISSUES.md.
+#include <array>
+#include <charconv>
+#include <cstddef>
+
+#include "formats/check.hpp"
+#include "formats/rules.hpp"
+
+namespace modar {
+namespace {
+
+constexpr const char* kRebake = "bake the bundle again; if it comes back, report the baker";
+constexpr const char* kFetch = "copy or download the file again, or bake it again";
+constexpr const char* kUpdate = "update this program, or bake with the version that it knows";
+
+constexpr IssueKind kIssueKinds[] = {
+    {"BUNDLE_TRUNCATED", Severity::kError, "The file ends before the bundle does.", kFetch},
+    {"BUNDLE_UNALIGNED", Severity::kError, "The bytes do not start at a multiple of 8 in memory.",
+     "map the file, or read it into memory from malloc"},
+    {"BUNDLE_MAGIC", Severity::kError, "The file is no ModAR bundle.",
+     "give a file that `modar bake` wrote"},
+    {"BUNDLE_VERSION", Severity::kError, "The bundle has another major version.", kUpdate},
+    {"BUNDLE_FILE_SIZE", Severity::kError, "The file is longer than the bundle.", kFetch},
+    {"BUNDLE_HEADER", Severity::kError, "The header places the section table elsewhere.", kFetch},
+    {"BUNDLE_HEADER_HASH", Severity::kError, "Header or section table are damaged.", kFetch},
+    {"BUNDLE_SECTION_COUNT", Severity::kError, "The section table does not fit into the file.",
+     kFetch},
+    {"BUNDLE_SECTION_REQUIRED", Severity::kError, "A required section is of an unknown type.",
+     kUpdate},
+    {"BUNDLE_SECTION_VERSION", Severity::kError, "A section has an unknown version.", kUpdate},
+    {"BUNDLE_SECTION_FLAGS", Severity::kError, "A section has flags that its type does not have.",
+     kRebake},
+    {"BUNDLE_SECTION_ORDER", Severity::kError, "Sections are not sorted, or one is there twice.",
+     kRebake},
+    {"BUNDLE_SECTION_OWNER", Severity::kError, "A section belongs to a record that is not there.",
+     kRebake},
+    {"BUNDLE_SECTION_ALIGNMENT", Severity::kError, "A section is not aligned.", kRebake},
+    {"BUNDLE_SECTION_RANGE", Severity::kError, "A section leaves the file or overlaps another.",
+     kFetch},
+    {"BUNDLE_TABLE_SHAPE", Severity::kError, "A table does not fill its section with its records.",
+     kRebake},
+    {"BUNDLE_RESERVED", Severity::kError, "Reserved bytes or bits are not zero.", kRebake},
+    {"BUNDLE_ENUM", Severity::kError, "A field has a value that means nothing.", kUpdate},
+    {"BUNDLE_NUMBER", Severity::kError, "A number is not finite or out of its bounds.", kRebake},
+    {"BUNDLE_NAME", Severity::kError, "A name is not printable UTF-8 inside the names.", kRebake},
+    {"BUNDLE_MODEL_RANGE", Severity::kError,
+     "A model refers to chunks, materials or a layout that are not there.", kRebake},
+    {"BUNDLE_CHUNK_RANGE", Severity::kError,
+     "A chunk has no levels, levels that are not its own, or an impossible box.", kRebake},
+    {"BUNDLE_LEVEL_RANGE", Severity::kError,
+     "A level of detail refers to vertices or indices that are not there.", kRebake},
+    {"BUNDLE_MATERIAL_RANGE", Severity::kError,
+     "A material or a texture is referred to that is not there.", kRebake},
+    {"BUNDLE_LAYOUT", Severity::kError, "A vertex layout contradicts itself.", kRebake},
+    {"BUNDLE_TEXTURE_RANGE", Severity::kError,
+     "A texture has an impossible size or levels that are not there.", kRebake},
+    {"BUNDLE_TEXTURE_LEVEL", Severity::kError,
+     "A texture level has the wrong size or lies outside of its data.", kRebake},
+    {"BUNDLE_PATTERN", Severity::kError, "A pattern's sizes contradict each other.", kRebake},
+    {"BUNDLE_PARAMETER_SET", Severity::kError,
+     "A parameter set is out of order or describes nothing.", kRebake},
+    {"BUNDLE_FEATURES", Severity::kError, "A pattern's features do not fill their section.",
+     kRebake},
+    {"BUNDLE_SCENE", Severity::kError, "A scene refers to what is not there or turns badly.",
+     kRebake},
+    {"SECTION_HASH", Severity::kError, "The bytes of a section are damaged.", kFetch},
+    {"SECTION_PADDING", Severity::kError, "Bytes between sections are not zero.", kFetch},
+    {"META_TEXT", Severity::kWarning, "The bundle's description is not UTF-8 text.", kRebake},
+    {"MODEL_PLACEMENT", Severity::kWarning,
+     "A model's scale and diagonal cannot belong to one box.", kRebake},
+    {"MODEL_COUNTS", Severity::kError, "A model's counts differ from what it holds.", kRebake},
+    {"CHUNK_BOUNDS", Severity::kError, "A vertex lies outside of its chunk's box.", kRebake},
+    {"CHUNK_OUTSIDE", Severity::kError, "A chunk's box leaves the unit cube.", kRebake},
+    {"CHUNK_CONE", Severity::kError, "A chunk's cone axis is not of unit length.", kRebake},
+    {"LEVEL_ORDER", Severity::kError,
+     "Levels of detail do not get coarser, or level 0 states an error.", kRebake},
+    {"LEVEL_INDEX", Severity::kError, "An index refers to a vertex that its level lacks.", kRebake},
+    {"VERTEX_NOT_FINITE", Severity::kError, "A vertex attribute is infinite or not a number.",
+     kRebake},
+    {"VERTEX_NORMAL", Severity::kError, "A normal is not of unit length.", kRebake},
+    {"MATERIAL_VALUES", Severity::kError, "A material's colour, shininess or opacity is unusable.",
+     "correct the material in the source and bake again"},
+    {"TEXTURE_SIDES", Severity::kError,
+     "A texture that repeats or has mipmaps has sides that are no powers of two (OpenGL ES 2.0).",
+     kRebake},
+    {"TEXTURE_OVERLAP", Severity::kError, "Levels of a texture share bytes.", kRebake},
+    {"TEXTURE_UNREFERENCED", Severity::kWarning, "Bytes of a texture belong to no level.", kRebake},
+    {"PARAMETER_VALUES", Severity::kError,
+     "A parameter set has values that its detector cannot run with.", kRebake},
+    {"KEYPOINT_OUTSIDE", Severity::kError, "A keypoint lies outside of its pattern.", kRebake},
+    {"KEYPOINT_VALUES", Severity::kError, "A keypoint's size, angle or octave is impossible.",
+     kRebake},
+    {"DESCRIPTOR_LENGTH", Severity::kError, "Descriptors do not have their detector's length.",
+     kRebake},
+    {"PATTERN_WITHOUT_FEATURES", Severity::kWarning, "A pattern has too few features to be found.",
+     "use a pattern with more texture"},
+    {"FEATURE_TEXT", Severity::kError,
+     "A feature text is no OpenCV FileStorage or has no mapped twin.", kRebake},
+    {"VERTICES_UNREFERENCED", Severity::kWarning, "Bytes of the vertex buffer belong to no level.",
+     kRebake},
+    {"INDICES_UNREFERENCED", Severity::kWarning, "Bytes of the index buffer belong to no level.",
+     kRebake},
+    {"TRIANGLE_DEGENERATE", Severity::kWarning, "A triangle uses one vertex twice.", kRebake},
+    {"LEVEL_EMPTY", Severity::kWarning, "A level of detail has no triangles.", kRebake},
+    {"BUNDLE_EMPTY", Severity::kWarning, "The bundle holds neither models nor patterns.",
+     "bake it with --model or --pattern"},
+    {"SECTION_UNKNOWN", Severity::kInfo, "An optional section of an unknown type is skipped.",
+     "update this program if you want what it holds"},
+};
+static_assert(std::size(kIssueKinds) == static_cast<std::size_t>(Rule::kCount));
+
+const char* severity_word(Severity severity) {
+  switch (severity) {
+    case Severity::kError:
+      return "error";
+    case Severity::kWarning:
+      return "warning";
+    case Severity::kInfo:
+      return "info";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::span<const IssueKind> issue_kinds() {
+  return kIssueKinds;
+}
+
+const IssueKind& issue_kind(Rule rule) {
+  return kIssueKinds[static_cast<std::size_t>(rule)];
+}
+
+std::string error_code(const IssueKind& kind) {
+  std::string code;
+  bool first = true;
+  for (const char* letter = kind.id; *letter != '\0'; ++letter) {
+    if (*letter == '_') {
+      code += first ? '.' : '-';
+      first = false;
+    } else {
+      code += static_cast<char>(*letter - 'A' + 'a');
+    }
+  }
+  return code;
+}
+
+void FaultLog::add(Rule rule, std::uint64_t offset, std::string where, std::string detail) {
+  const IssueKind& kind = issue_kind(rule);
+  const bool is_error = kind.severity == Severity::kError;
+  if (sink_ != nullptr) {
+    if (is_error) ++errors_;
+    (*sink_)(Issue{&kind, std::move(where), offset, std::move(detail)});
+    return;
+  }
+  if (!is_error || errors_++ > 0) return;
+  const bool unsupported =
+      rule == Rule::kVersion || rule == Rule::kSectionRequired || rule == Rule::kSectionVersion;
+  first_ = Error{unsupported ? ExitCode::kUnsupported : ExitCode::kInvalidInput, error_code(kind),
+                 "byte " + std::to_string(offset) + " (" + where + ")",
+                 detail + ". " + kind.message, kind.cure};
+}
+
+std::string number_text(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
+  return std::string(text.data(), end.ptr);
+}
+
+std::string issues_markdown() {
+  std::string text =
+      "# Issues that the checker reports\n\n"
+      "Ids are stable. An error makes a bundle bad; a warning does not.\n\n"
+      "| id | severity | what is wrong | what to do |\n|---|---|---|---|\n";
+  for (const IssueKind& kind : kIssueKinds) {
+    text += std::string("| ") + kind.id + " | " + severity_word(kind.severity) + " | " +
+            kind.message + " | " + kind.cure + " |\n";
+  }
+  return text;
+}
+
+}  // namespace modar

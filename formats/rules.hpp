@@ -1,0 +1,108 @@
+// The names of all rules and the log that validation writes to. Internal to formats/.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "formats/check.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// In the order of issue_kinds(); a new rule is appended to its group here and there.
+enum class Rule : std::uint8_t {
+  kTruncated,
+  kUnaligned,
+  kMagicBytes,
+  kVersion,
+  kFileSize,
+  kHeader,
+  kHeaderHash,
+  kSectionCount,
+  kSectionRequired,
+  kSectionVersion,
+  kSectionFlags,
+  kSectionOrder,
+  kSectionOwner,
+  kSectionUnaligned,
+  kSectionRange,
+  kTableShape,
+  kReserved,
+  kEnum,
+  kNumber,
+  kName,
+  kModelRange,
+  kChunkRange,
+  kLevelRange,
+  kMaterialRange,
+  kLayout,
+  kTextureRange,
+  kTextureLevel,
+  kPattern,
+  kParameterSet,
+  kFeatures,
+  kScene,
+  kSectionHash,
+  kPadding,
+  kMetaText,
+  kModelPlacement,
+  kModelCounts,
+  kChunkBounds,
+  kChunkOutside,
+  kChunkCone,
+  kLevelOrder,
+  kIndexRange,
+  kNotFinite,
+  kNormalLength,
+  kMaterialValues,
+  kTextureSides,
+  kTextureOverlap,
+  kTextureUnreferenced,
+  kParameterValues,
+  kKeypointOutside,
+  kKeypointValues,
+  kDescriptorLength,
+  kFeaturesMissing,
+  kFeatureYml,
+  kUnreferencedVertices,
+  kUnreferencedIndices,
+  kDegenerateTriangles,
+  kEmptyLevel,
+  kNoContent,
+  kUnknownSection,
+  kCount
+};
+
+/// The constant part of a rule.
+const IssueKind& issue_kind(Rule rule);
+
+/// "bundle.section-order" for BUNDLE_SECTION_ORDER.
+std::string error_code(const IssueKind& kind);
+
+/// What validation finds. Without a sink it keeps the first fault and asks to stop there; with one
+/// it hands every fault on. Allocates nothing while there is nothing to tell.
+class FaultLog {
+ public:
+  FaultLog() = default;
+  /// `sink` must outlive the log.
+  explicit FaultLog(const IssueSink& sink) : sink_(&sink) {}
+
+  void add(Rule rule, std::uint64_t offset, std::string where, std::string detail);
+  /// True once there is nothing more to be gained from looking on.
+  [[nodiscard]] bool stop() const { return sink_ == nullptr && errors_ > 0; }
+  [[nodiscard]] bool clean() const { return errors_ == 0; }
+  [[nodiscard]] std::uint64_t errors() const { return errors_; }
+  /// The first fault as an error; only without a sink and after a fault.
+  [[nodiscard]] const Error& first() const { return first_; }
+
+ private:
+  const IssueSink* sink_ = nullptr;
+  std::uint64_t errors_ = 0;
+  Error first_;
+};
+
+/// Shortest text that reads back as the same number, in no locale.
+std::string number_text(double value);
+
+}  // namespace modar

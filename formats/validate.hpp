@@ -1,0 +1,106 @@
+// The parts of validation that BundleView::open() and check_bundle() share. Internal to formats/.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+
+#include "formats/bundle_view.hpp"
+#include "formats/rules.hpp"
+
+namespace modar {
+
+/// Header and section table. False where the sections cannot be trusted to lie inside the file;
+/// otherwise fills parts.bytes and parts.sections.
+bool validate_sections(std::span<const std::byte> bytes, FaultLog& log, BundleParts& parts);
+
+/// Finds the tables and buffers behind the sections. False where a table cannot be walked.
+bool validate_tables(FaultLog& log, BundleParts& parts);
+
+/// Models, chunks, levels, materials, layouts. Time grows with the tables, not with what they
+/// claim.
+void validate_models(FaultLog& log, const BundleParts& parts);
+
+/// Textures, patterns, parameter sets, features, scenes.
+void validate_assets(FaultLog& log, const BundleParts& parts);
+
+/// The section with that key, or nullptr.
+const SectionEntry* find_section(std::span<const SectionEntry> sections, SectionType type,
+                                 std::uint32_t owner, std::uint32_t variant);
+
+/// The index of the parameter set with that id, or kNone. Sets are sorted by id.
+std::uint32_t find_parameter_set(const Table<ParameterSetRecord>& sets, std::uint32_t id);
+
+/// Bytes of one component; 0 for an unknown type.
+std::uint32_t component_bytes(std::uint8_t type);
+
+inline std::span<const std::byte> section_bytes(const BundleParts& parts,
+                                                const SectionEntry& entry) {
+  return parts.bytes.subspan(static_cast<std::size_t>(entry.offset),
+                             static_cast<std::size_t>(entry.size));
+}
+
+/// A file of a newer minor version may use reserved fields and flag bits in ways that can be
+/// ignored.
+inline bool newer_minor(const BundleParts& parts) {
+  return reinterpret_cast<const FileHeader*>(parts.bytes.data())->minor > kMinorVersion;
+}
+
+/// One record under test: tells faults where they are.
+class RecordCheck {
+ public:
+  RecordCheck(FaultLog& log, const BundleParts& parts, const char* what, std::uint32_t index)
+      : log_(log), parts_(parts), what_(what), index_(index) {}
+
+  /// `field` points into the record.
+  void fault(Rule rule, const void* field, std::string detail) const {
+    const auto offset = static_cast<const std::byte*>(field) - parts_.bytes.data();
+    log_.add(rule, static_cast<std::uint64_t>(offset), what_ + (" " + std::to_string(index_)),
+             std::move(detail));
+  }
+
+  /// Finite and within [low, high].
+  template <class T>
+  void number(const T& field, const char* name, double low = -std::numeric_limits<T>::max(),
+              double high = std::numeric_limits<T>::max()) const {
+    const auto value = static_cast<double>(field);
+    if (value >= low && value <= high) return;
+    fault(Rule::kNumber, &field, name + (" is " + number_text(value)));
+  }
+  template <class T, std::size_t N>
+  void numbers(const T (&fields)[N], const char* name) const {
+    for (const T& field : fields) number(field, name);
+  }
+
+  void reserved(const void* field, std::size_t bytes) const {
+    if (newer_minor(parts_)) return;
+    const auto* byte = static_cast<const std::byte*>(field);
+    for (std::size_t i = 0; i < bytes; ++i) {
+      if (byte[i] != std::byte{0}) {
+        return fault(Rule::kReserved, byte + i, "a reserved byte is not zero");
+      }
+    }
+  }
+
+  void flags(const std::uint32_t& field, std::uint32_t known) const {
+    if ((field & ~known) == 0 || newer_minor(parts_)) return;
+    fault(Rule::kReserved, &field, "flags " + std::to_string(field) + " have unknown bits");
+  }
+
+  /// The name lies inside the names section and starts and ends at characters.
+  void name(const NameRef& ref) const;
+
+  /// True if first == expected and first + count stays within size; ranges follow each other.
+  [[nodiscard]] bool range(Rule rule, const std::uint32_t& first, std::uint32_t count,
+                           std::uint64_t expected, std::uint32_t size, const char* name) const;
+
+ private:
+  FaultLog& log_;
+  const BundleParts& parts_;
+  const char* what_;
+  std::uint32_t index_;
+};
+
+}  // namespace modar
