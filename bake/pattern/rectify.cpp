@@ -1,0 +1,154 @@
+// A quadrilateral in a photo to its frontal view, with the aspect ratio that the flat thing has.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+#include "bake/pattern/pattern_image.hpp"
+
+namespace modar {
+namespace {
+
+constexpr double kSmallestSide = 32.0;  // photo pixels
+constexpr std::uint32_t kLargestSide = 8192;
+
+struct Vector {
+  double x = 0;
+  double y = 0;
+  double z = 0;
+};
+
+double triple(const Vector& a, const Vector& b, const Vector& c) {
+  return (a.y * b.z - a.z * b.y) * c.x + (a.z * b.x - a.x * b.z) * c.y +
+         (a.x * b.y - a.y * b.x) * c.z;
+}
+
+double length(const PixelPoint& a, const PixelPoint& b) {
+  return std::hypot(b.x - a.x, b.y - a.y);
+}
+
+tl::unexpected<Error> bad_corners(const char* cause) {
+  return fail(ExitCode::kInvalidInput, "rectify.corners", "", cause,
+              "give the corners inside of the photo as top-left, top-right, bottom-right, "
+              "bottom-left of the pattern");
+}
+
+/// Width over height by the mean length of opposite sides.
+double aspect_of_sides(const std::array<PixelPoint, 4>& c) {
+  return (length(c[0], c[1]) + length(c[3], c[2])) / (length(c[0], c[3]) + length(c[1], c[2]));
+}
+
+/// Width over height from the perspective (Zhang & He, "Whiteboard scanning and image enhancement",
+/// Eq. 11, 12, 20, 21); 0 where the perspective is too weak to tell the focal length.
+double aspect_of_perspective(const std::array<PixelPoint, 4>& c, double width, double height) {
+  std::array<Vector, 4> m;  // the paper's order: top-left, top-right, bottom-left, bottom-right
+  constexpr std::array<std::size_t, 4> kOrder = {0, 1, 3, 2};
+  const double unit = std::max(width, height);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const PixelPoint& p = c[kOrder[i]];
+    m[i] = {(p.x - 0.5 * (width - 1)) / unit, (p.y - 0.5 * (height - 1)) / unit, 1.0};
+  }
+  const double k2 = triple(m[0], m[3], m[2]) / triple(m[1], m[3], m[2]);
+  const double k3 = triple(m[0], m[3], m[1]) / triple(m[2], m[3], m[1]);
+  const Vector n2{k2 * m[1].x - m[0].x, k2 * m[1].y - m[0].y, k2 - 1.0};
+  const Vector n3{k3 * m[2].x - m[0].x, k3 * m[2].y - m[0].y, k3 - 1.0};
+  const double focal_squared = -(n2.x * n3.x + n2.y * n3.y) / (n2.z * n3.z);
+  // Lenses of cameras see between 10 and 110 degrees; anything else is noise in the corners.
+  constexpr double kShortest = 0.35;
+  constexpr double kLongest = 6.0;
+  if (!(focal_squared > kShortest * kShortest) || !(focal_squared < kLongest * kLongest))
+    return 0.0;
+  const double across = (n2.x * n2.x + n2.y * n2.y) / focal_squared + n2.z * n2.z;
+  const double down = (n3.x * n3.x + n3.y * n3.y) / focal_squared + n3.z * n3.z;
+  return std::sqrt(across / down);
+}
+
+double aspect_ratio(const RectifyOptions& options, double width, double height) {
+  if (options.width_mm > 0 && options.height_mm > 0) return options.width_mm / options.height_mm;
+  const double by_sides = aspect_of_sides(options.corners);
+  const double by_perspective = aspect_of_perspective(options.corners, width, height);
+  const bool plausible = by_perspective > 0.25 * by_sides && by_perspective < 4.0 * by_sides;
+  return plausible ? by_perspective : by_sides;
+}
+
+Result<RgbaImage> warp(const RgbaImage& photo, const std::array<PixelPoint, 4>& corners,
+                       std::uint32_t width, std::uint32_t height, int oversampling) {
+  try {
+    const cv::Mat source(static_cast<int>(photo.height), static_cast<int>(photo.width), CV_8UC4,
+                         const_cast<std::uint8_t*>(photo.pixels.data()));
+    const cv::Size large(static_cast<int>(width) * oversampling,
+                         static_cast<int>(height) * oversampling);
+    std::array<cv::Point2f, 4> from;
+    for (std::size_t i = 0; i < 4; ++i) {
+      from[i] = {static_cast<float>(corners[i].x), static_cast<float>(corners[i].y)};
+    }
+    // The picture's edges lie half a pixel outside of the outermost pixel centres.
+    const float right = static_cast<float>(large.width) - 0.5f;
+    const float bottom = static_cast<float>(large.height) - 0.5f;
+    const std::array<cv::Point2f, 4> to = {cv::Point2f{-0.5f, -0.5f}, cv::Point2f{right, -0.5f},
+                                           cv::Point2f{right, bottom}, cv::Point2f{-0.5f, bottom}};
+    cv::Mat warped;
+    cv::warpPerspective(source, warped, cv::getPerspectiveTransform(from.data(), to.data()), large,
+                        cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+    RgbaImage out;
+    out.width = width;
+    out.height = height;
+    out.pixels.resize(std::size_t{width} * height * 4);
+    cv::Mat target(static_cast<int>(height), static_cast<int>(width), CV_8UC4, out.pixels.data());
+    cv::resize(warped, target, target.size(), 0, 0, cv::INTER_AREA);
+    return out;
+  } catch (const std::exception& thrown) {
+    return fail(ExitCode::kInternal, "rectify.opencv", "", thrown.what(), "report this as a bug");
+  }
+}
+
+}  // namespace
+
+Result<void> RectifyOptions::validate() const {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const PixelPoint& a = corners[i];
+    const PixelPoint& b = corners[(i + 1) % 4];
+    const PixelPoint& c = corners[(i + 2) % 4];
+    if (!std::isfinite(a.x) || !std::isfinite(a.y)) return bad_corners("a corner is not a number");
+    // y points down, so a clockwise turn has a positive cross product.
+    const double turn = (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x);
+    if (!(turn > 0.0)) return bad_corners("the corners are not convex and clockwise");
+    if (length(a, b) < kSmallestSide) return bad_corners("a side is shorter than 32 pixels");
+  }
+  if (!(width_mm >= 0) || !(height_mm >= 0) || !std::isfinite(width_mm) ||
+      !std::isfinite(height_mm)) {
+    return fail(ExitCode::kUsage, "rectify.size", "", "a physical size is negative or not a number",
+                "give millimetres");
+  }
+  if (max_side < 32 || max_side > kLargestSide) {
+    return fail(ExitCode::kUsage, "rectify.max-side", "",
+                "the longer side must be 32 to 8192 pixels", "give another number");
+  }
+  return {};
+}
+
+Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options) {
+  if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
+  const double width = photo.width;
+  const double height = photo.height;
+  for (const PixelPoint& corner : options.corners) {
+    if (corner.x < -0.5 || corner.y < -0.5 || corner.x > width - 0.5 || corner.y > height - 0.5) {
+      return bad_corners("a corner lies outside of the photo");
+    }
+  }
+  const auto& c = options.corners;
+  const double aspect = aspect_ratio(options, width, height);
+  const double photo_longest =
+      std::max({length(c[0], c[1]), length(c[1], c[2]), length(c[2], c[3]), length(c[3], c[0])});
+  const double longest = std::min(photo_longest, static_cast<double>(options.max_side));
+  const double shortest = aspect >= 1.0 ? longest / aspect : longest * aspect;
+  const auto long_pixels = static_cast<std::uint32_t>(std::lround(longest));
+  const auto short_pixels = static_cast<std::uint32_t>(std::max(1L, std::lround(shortest)));
+  // A coarser result would alias: it is sampled finer and averaged.
+  const int oversampling = std::clamp(static_cast<int>(std::ceil(photo_longest / longest)), 1, 8);
+  return aspect >= 1.0 ? warp(photo, c, long_pixels, short_pixels, oversampling)
+                       : warp(photo, c, short_pixels, long_pixels, oversampling);
+}
+
+}  // namespace modar

@@ -1,0 +1,64 @@
+// The two-frame rule as tables: S is a frame with a sighting, a dot one without.
+#include <gtest/gtest.h>
+
+#include "modar/tracker.hpp"
+
+namespace modar {
+namespace {
+
+std::string shown(const std::string& frames) {
+  Hysteresis hysteresis(1);
+  std::string answer;
+  for (const char frame : frames) {
+    std::vector<Sighting> visible(frame == 'S' ? 1 : 0);
+    answer += hysteresis.step(visible)[0].shown ? '1' : '0';
+  }
+  return answer;
+}
+
+TEST(Hysteresis, FollowsTheArticlesRule) {
+  EXPECT_EQ(shown("SSSS"), "0111");
+  EXPECT_EQ(shown("S.S.S."), "000000");
+  EXPECT_EQ(shown("SS...."), "011100");
+  EXPECT_EQ(shown("SS..S...."), "011111100");
+  EXPECT_EQ(shown("SS...S.SS"), "011100001");
+  EXPECT_EQ(shown("......"), "000000");
+}
+
+TEST(Hysteresis, KeepsTheNewestMeasuredPoseAndSaysWhetherItIsOfThisFrame) {
+  Hysteresis hysteresis(2);
+  Sighting sighting;
+  sighting.pattern = 1;
+  sighting.pose.translation = {1, 2, 3};
+  hysteresis.step({&sighting, 1});
+  sighting.pose.translation = {4, 5, 6};
+  auto states = hysteresis.step({&sighting, 1});
+  EXPECT_FALSE(states[0].shown);
+  EXPECT_TRUE(states[1].shown);
+  EXPECT_TRUE(states[1].measured);
+  states = hysteresis.step({});
+  EXPECT_TRUE(states[1].shown);
+  EXPECT_FALSE(states[1].measured);
+  EXPECT_EQ(states[1].pose.translation, glm::dvec3(4, 5, 6));
+}
+
+TEST(Hysteresis, IgnoresPatternsThatItDoesNotKnow) {
+  Hysteresis hysteresis(1);
+  Sighting sighting;
+  sighting.pattern = 9;
+  hysteresis.step({&sighting, 1});
+  EXPECT_FALSE(hysteresis.step({&sighting, 1})[0].shown);
+}
+
+TEST(Reason, EveryReasonHasItsWords) {
+  EXPECT_STREQ(to_string(Reason::kVisible), "visible");
+  EXPECT_STREQ(to_string(Reason::kNoFeatures), "no features");
+  EXPECT_STREQ(to_string(Reason::kFewMatches), "few matches");
+  EXPECT_STREQ(to_string(Reason::kNoGeometry), "no geometry");
+  EXPECT_STREQ(to_string(Reason::kFailedVerification), "failed verification");
+  EXPECT_STREQ(to_string(Reason::kLostByBlur), "lost by blur");
+  EXPECT_STREQ(to_string(Reason::kOutOfView), "out of view");
+}
+
+}  // namespace
+}  // namespace modar
