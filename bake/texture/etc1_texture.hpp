@@ -20,17 +20,20 @@ struct RgbaImage {
 };
 
 /// Reads PNG, JPEG, TGA, BMP, WebP, TIFF through OpenCV; EXIF orientation applied; grey, palette,
-/// 16-bit become 8-bit RGBA. The size in the file's header is held against the limit before anything
-/// is allocated. Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large".
+/// 16-bit become 8-bit RGBA. The size in the file's header is held against the limit before
+/// anything is allocated. Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large".
 Result<RgbaImage> read_image(const std::string& path);
+/// The same from a file's bytes; `name` is what errors call it.
+Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name);
 
 /// Levels from the image itself down to 1x1, each side max(1, floor(side / 2)), filtered in linear
-/// light (sRGB-correct), colours weighted by alpha.
-std::vector<RgbaImage> mip_chain(const RgbaImage& image);
+/// light (sRGB-correct), colours weighted by alpha. repeat: the filter reaches across the edges, as
+/// a texture that repeats does.
+std::vector<RgbaImage> mip_chain(const RgbaImage& image, bool repeat = false, unsigned jobs = 1);
 
-/// ETC1 blocks of an image, 8 bytes a block in rows of ceil(width/4) blocks; edge pixels are repeated
-/// to fill blocks. Alpha is ignored. out: ceil(w/4) * ceil(h/4) * 8 bytes.
-std::vector<std::byte> encode_etc1(const RgbaImage& image);
+/// ETC1 blocks of an image, 8 bytes a block in rows of ceil(width/4) blocks; edge pixels are
+/// repeated to fill blocks. Alpha is ignored. out: ceil(w/4) * ceil(h/4) * 8 bytes.
+std::vector<std::byte> encode_etc1(const RgbaImage& image, unsigned jobs = 1);
 /// Its inverse (alpha = 255). blocks.size() as above.
 RgbaImage decode_etc1(std::span<const std::byte> blocks, std::uint32_t width, std::uint32_t height);
 

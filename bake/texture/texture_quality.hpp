@@ -1,0 +1,17 @@
+// How far a decoded texture is from its source.
+#pragma once
+
+#include "bake/texture/etc1_texture.hpp"
+
+namespace modar {
+
+/// What psnr_db() answers for equal images, and never exceeds.
+inline constexpr double kEqualPsnr = 99;
+
+/// Mean structural similarity of luma, 1 where equal; 0 where the sizes differ or there is no
+/// pixel. Wang et al., "Image quality assessment: from error visibility to structural similarity",
+/// 2004: 11x11 Gaussian window of sigma 1.5. Deviation: edge pixels are repeated, so that the small
+/// levels of a mip chain have a value too.
+double ssim(const RgbaImage& a, const RgbaImage& b);
+
+}  // namespace modar

@@ -1,0 +1,135 @@
+// Whole textures: sizes, levels, alpha twins, quality figures.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "bake/texture/texture_quality.hpp"
+#include "tests/texture/texture_samples.hpp"
+
+namespace modar {
+namespace {
+
+std::string write_png(const test::ScratchFolder& folder, const RgbaImage& image) {
+  cv::Mat mat(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC4);
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    mat.data[i] = image.pixels[i + 2];
+    mat.data[i + 1] = image.pixels[i + 1];
+    mat.data[i + 2] = image.pixels[i];
+    mat.data[i + 3] = image.pixels[i + 3];
+  }
+  const std::string path = folder.file("texture.png");
+  cv::imwrite(path, mat);
+  return path;
+}
+
+Etc1Texture bake(const std::string& path, const TextureOptions& options) {
+  Report report;
+  Result<Etc1Texture> texture = bake_texture(path, options, report);
+  if (!texture) {
+    ADD_FAILURE() << to_line(texture.error());
+    Etc1Texture none;
+    none.levels.resize(1);
+    return none;
+  }
+  EXPECT_FALSE(report.stages.empty());
+  return *texture;
+}
+
+TEST(BakeTexture, SidesBecomePowersOfTwoWithAFullChain) {
+  const test::ScratchFolder folder;
+  const Etc1Texture texture = bake(write_png(folder, test::synthetic_photo(100, 90)), {});
+  EXPECT_EQ(texture.name, "texture.png");
+  EXPECT_EQ(texture.source_width, 100U);
+  EXPECT_EQ(texture.source_height, 90U);
+  ASSERT_EQ(texture.levels.size(), 8U);
+  EXPECT_EQ(texture.levels[0].width, 128U);
+  EXPECT_EQ(texture.levels[0].height, 64U);
+  EXPECT_EQ(texture.levels[7].width, 1U);
+  EXPECT_EQ(texture.levels[7].height, 1U);
+  for (const Etc1Level& level : texture.levels) {
+    EXPECT_EQ(level.colour.size(),
+              std::size_t{(level.width + 3) / 4} * ((level.height + 3) / 4) * 8);
+    EXPECT_TRUE(level.alpha.empty());
+    EXPECT_GT(level.psnr_db, 18);
+    EXPECT_LE(level.ssim, 1.0);
+  }
+  EXPECT_GT(texture.levels[0].ssim, 0.9);
+}
+
+TEST(BakeTexture, LimitsAndKeepsSizes) {
+  const test::ScratchFolder folder;
+  const std::string path = write_png(folder, test::synthetic_photo(150, 50));
+  TextureOptions options;
+  options.max_side = 100;
+  EXPECT_EQ(bake(path, options).levels[0].width, 64U);
+  options.mipmaps = false;
+  const Etc1Texture scaled = bake(path, options);
+  EXPECT_EQ(scaled.levels[0].width, 100U);
+  EXPECT_EQ(scaled.levels[0].height, 33U);
+  EXPECT_EQ(scaled.levels.size(), 1U);
+  options.max_side = 2048;
+  EXPECT_EQ(bake(path, options).levels[0].width, 150U);
+  options.repeat = true;
+  EXPECT_EQ(bake(path, options).levels[0].width, 128U);
+  Report report;
+  options.max_side = 0;
+  const Result<Etc1Texture> refused = bake_texture(path, options, report);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().exit, ExitCode::kUsage);
+}
+
+TEST(BakeTexture, AlphaHasATwinOnlyWhereItIsNotConstant) {
+  const test::ScratchFolder folder;
+  RgbaImage image = test::synthetic_photo(32, 32);
+  EXPECT_FALSE(bake(write_png(folder, image), {}).alpha);
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    image.pixels[i + 3] = static_cast<std::uint8_t>(i / 128 * 8);  // a row is 128 bytes
+  }
+  const Etc1Texture texture = bake(write_png(folder, image), {});
+  EXPECT_TRUE(texture.alpha);
+  for (const Etc1Level& level : texture.levels) ASSERT_EQ(level.alpha.size(), level.colour.size());
+  const RgbaImage alpha = decode_etc1(texture.levels[0].alpha, 32, 32);
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    EXPECT_NEAR(alpha.pixels[i], image.pixels[i + 3], 12);
+    EXPECT_EQ(alpha.pixels[i], alpha.pixels[i + 2]);
+  }
+}
+
+TEST(BakeTexture, ThreadsChangeNothing) {
+  const test::ScratchFolder folder;
+  const std::string path = write_png(folder, test::synthetic_photo(90, 70));
+  TextureOptions options;
+  const Etc1Texture one = bake(path, options);
+  for (const unsigned jobs : {2U, 8U}) {
+    options.jobs = jobs;
+    const Etc1Texture many = bake(path, options);
+    ASSERT_EQ(many.levels.size(), one.levels.size());
+    for (std::size_t i = 0; i < one.levels.size(); ++i) {
+      EXPECT_EQ(many.levels[i].colour, one.levels[i].colour);
+      EXPECT_EQ(many.levels[i].psnr_db, one.levels[i].psnr_db);
+    }
+  }
+}
+
+TEST(Quality, HasTheValuesOfItsDefinition) {
+  const RgbaImage a = test::synthetic_photo(40, 30);
+  EXPECT_EQ(psnr_db(a, a), kEqualPsnr);
+  EXPECT_DOUBLE_EQ(ssim(a, a), 1.0);
+  RgbaImage b = a;
+  for (std::size_t i = 0; i < b.pixels.size(); i += 4) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      b.pixels[i + c] =
+          static_cast<std::uint8_t>(b.pixels[i + c] + (b.pixels[i + c] < 128 ? 4 : -4));
+    }
+  }
+  EXPECT_NEAR(psnr_db(a, b), 10 * std::log10(255.0 * 255.0 / 16), 1e-9);
+  // Two flat images of 100 and 110: the formula leaves (2*100*110 + C1) / (100^2 + 110^2 + C1).
+  const RgbaImage p = test::make_image(16, 16, 100);
+  const RgbaImage q = test::make_image(16, 16, 110);
+  EXPECT_NEAR(ssim(p, q), (2 * 100 * 110 + 6.5025) / (100 * 100 + 110 * 110 + 6.5025), 1e-6);
+}
+
+}  // namespace
+}  // namespace modar
