@@ -1,0 +1,194 @@
+// Holds the byte-offset tables of formats/bundle.md against the structs, in both directions.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "formats/layout.hpp"
+
+namespace {
+
+struct Field {
+  std::size_t offset = 0;
+  std::size_t size = 0;
+  std::string type;
+  std::string name;
+  bool operator==(const Field&) const = default;
+};
+
+struct Struct {
+  std::size_t size = 0;
+  std::vector<Field> fields;
+};
+
+std::ostream& operator<<(std::ostream& out, const Field& field) {
+  return out << field.offset << " " << field.size << " " << field.type << " " << field.name;
+}
+
+template <class T>
+std::string type_name() {
+  if constexpr (std::is_array_v<T>) {
+    return type_name<std::remove_extent_t<T>>() + "[" + std::to_string(std::extent_v<T>) + "]";
+  } else if constexpr (std::is_same_v<T, modar::NameRef>) {
+    return "NameRef";
+  } else if constexpr (std::is_same_v<T, modar::AttributeRecord>) {
+    return "AttributeRecord";
+  } else {
+    const char* kind = std::is_floating_point_v<T> ? "f" : std::is_signed_v<T> ? "i" : "u";
+    return kind + std::to_string(sizeof(T) * 8);
+  }
+}
+
+std::vector<std::string> cells(const std::string& line) {
+  std::vector<std::string> out;
+  std::stringstream stream(line.substr(1));
+  for (std::string cell; std::getline(stream, cell, '|');) {
+    const auto first = cell.find_first_not_of(' ');
+    const auto last = cell.find_last_not_of(' ');
+    out.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+  }
+  return out;
+}
+
+/// Every "### Name (N bytes)" of the specification with the rows of its table.
+std::map<std::string, Struct> specified() {
+  std::ifstream file(std::string(std::getenv("MODAR_SOURCE_DIR")) + "/formats/bundle.md");
+  std::map<std::string, Struct> out;
+  std::string name;
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("#")) {
+      name.clear();
+      const auto open = line.find(" (");
+      if (line.starts_with("### ") && open != std::string::npos) {
+        name = line.substr(4, open - 4);
+        out[name].size = std::stoul(line.substr(open + 2));
+      }
+    } else if (!name.empty() && line.starts_with("| ") && std::isdigit(line[2]) != 0) {
+      const auto row = cells(line);
+      out[name].fields.push_back({std::stoul(row[0]), std::stoul(row[1]), row[2], row[3]});
+    }
+  }
+  return out;
+}
+
+#define MODAR_FIELD(type, field)                                                           \
+  Field {                                                                                  \
+    offsetof(type, field), sizeof(type::field), type_name<decltype(type::field)>(), #field \
+  }
+
+/// The structs as compiled. A field that this list forgets leaves a hole, which a test below finds.
+std::map<std::string, Struct> compiled() {
+  using namespace modar;
+  std::map<std::string, Struct> out;
+#define F(field) MODAR_FIELD(T, field)
+#define MODAR_STRUCT(type, ...)                       \
+  {                                                   \
+    using T = type;                                   \
+    out[#type] = Struct{sizeof(type), {__VA_ARGS__}}; \
+  }
+  MODAR_STRUCT(FileHeader, F(magic), F(major), F(minor), F(section_count), F(file_size),
+               F(table_offset), F(entry_size), F(reserved0), F(reserved1), F(hash))
+  MODAR_STRUCT(SectionEntry, F(type), F(version), F(flags), F(owner), F(variant), F(offset),
+               F(size), F(hash), F(reserved))
+  MODAR_STRUCT(TableHeader, F(count), F(stride), F(reserved))
+  MODAR_STRUCT(NameRef, F(offset), F(length))
+  MODAR_STRUCT(ModelRecord, F(name), F(center), F(scale), F(diagonal), F(unit_metres),
+               F(position_error_max), F(position_error_rms), F(normal_error_max_deg),
+               F(normal_error_rms_deg), F(uv_error_max_texels), F(uv_error_rms_texels),
+               F(vertex_count), F(triangle_count), F(source_vertex_count), F(source_face_count),
+               F(layout), F(first_chunk), F(chunk_count), F(first_material), F(material_count),
+               F(level_count), F(reserved))
+  MODAR_STRUCT(ChunkRecord, F(bounds_min), F(bounds_max), F(cone_axis), F(cone_cutoff),
+               F(position_offset), F(position_step), F(uv_offset), F(uv_scale), F(material),
+               F(first_level), F(level_count), F(reserved))
+  MODAR_STRUCT(LevelRecord, F(vertex_offset), F(index_offset), F(vertex_count), F(index_count),
+               F(error), F(reserved))
+  MODAR_STRUCT(MaterialRecord, F(name), F(ambient), F(diffuse), F(specular), F(emission),
+               F(shininess), F(opacity), F(texture), F(flags), F(reserved))
+  MODAR_STRUCT(LayoutRecord, F(stride), F(attribute_count), F(reserved), F(attributes))
+  MODAR_STRUCT(AttributeRecord, F(semantic), F(type), F(components), F(normalised), F(offset),
+               F(reserved))
+  MODAR_STRUCT(TextureRecord, F(name), F(width), F(height), F(source_width), F(source_height),
+               F(format), F(flags), F(first_level), F(level_count), F(psnr_db), F(ssim),
+               F(reserved))
+  MODAR_STRUCT(TextureLevelRecord, F(offset), F(alpha_offset), F(size), F(width), F(height),
+               F(psnr_db), F(ssim), F(reserved))
+  MODAR_STRUCT(PatternRecord, F(name), F(width), F(height), F(width_mm), F(half_width),
+               F(half_height), F(score), F(score_version), F(reserved))
+  MODAR_STRUCT(ParameterSetRecord, F(name), F(id), F(detector), F(max_features), F(scale_factor),
+               F(level_count), F(edge_threshold), F(first_level), F(wta_k), F(harris),
+               F(patch_size), F(fast_threshold), F(agast_threshold), F(octaves), F(pattern_scale),
+               F(descriptor_bits), F(max_distance), F(min_matches), F(min_inliers),
+               F(ransac_threshold), F(reserved))
+  MODAR_STRUCT(SceneRecord, F(pattern), F(model), F(scale), F(offset), F(rotation), F(reserved))
+  MODAR_STRUCT(FeatureHeader, F(count), F(descriptor_bytes), F(keypoints_offset),
+               F(descriptors_offset), F(reserved))
+  MODAR_STRUCT(KeypointRecord, F(x), F(y), F(size), F(angle), F(response), F(octave), F(class_id))
+  return out;
+}
+
+TEST(SpecTable, SpecificationAndStructsAreTheSame) {
+  const auto spec = specified();
+  const auto code = compiled();
+  for (const auto& [name, expected] : spec) {
+    ASSERT_TRUE(code.contains(name)) << name << " is in the specification only";
+    EXPECT_EQ(code.at(name).size, expected.size) << name;
+    EXPECT_EQ(code.at(name).fields, expected.fields) << name;
+  }
+  for (const auto& [name, ignored] : code) {
+    EXPECT_TRUE(spec.contains(name)) << name << " is in the code only";
+  }
+}
+
+TEST(SpecTable, FieldsLeaveNoHoles) {
+  for (const auto& [name, record] : compiled()) {
+    std::size_t end = 0;
+    for (const Field& field : record.fields) {
+      EXPECT_EQ(field.offset, end) << name << "." << field.name;
+      end = field.offset + field.size;
+    }
+    EXPECT_EQ(end, record.size) << name;
+  }
+}
+
+TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
+  std::ifstream file(std::string(std::getenv("MODAR_SOURCE_DIR")) + "/formats/bundle.md");
+  std::map<unsigned, std::vector<std::string>> rows;
+  for (std::string line; std::getline(file, line) && line != "## Models";) {
+    const auto row = line.starts_with("| ") ? cells(line) : std::vector<std::string>();
+    if (row.size() == 6 && std::isdigit(row[0][0]) != 0)
+      rows[static_cast<unsigned>(std::stoul(row[0]))] = row;
+  }
+  using modar::SectionType;
+  const std::map<SectionType, std::string> names = {{SectionType::kNames, "names"},
+                                                    {SectionType::kMeta, "meta"},
+                                                    {SectionType::kModels, "models"},
+                                                    {SectionType::kChunks, "chunks"},
+                                                    {SectionType::kLevels, "levels"},
+                                                    {SectionType::kMaterials, "materials"},
+                                                    {SectionType::kLayouts, "layouts"},
+                                                    {SectionType::kTextures, "textures"},
+                                                    {SectionType::kTextureLevels, "texture levels"},
+                                                    {SectionType::kPatterns, "patterns"},
+                                                    {SectionType::kParameterSets, "parameter sets"},
+                                                    {SectionType::kScenes, "scenes"},
+                                                    {SectionType::kFeatureTwin, "feature twin"},
+                                                    {SectionType::kFeatureYml, "feature text"},
+                                                    {SectionType::kVertices, "vertices"},
+                                                    {SectionType::kIndices, "indices"},
+                                                    {SectionType::kTextureData, "texture data"}};
+  EXPECT_EQ(rows.size(), names.size());
+  for (const auto& [type, name] : names) {
+    EXPECT_EQ(rows[static_cast<unsigned>(type)].at(1), name);
+  }
+}
+
+}  // namespace
