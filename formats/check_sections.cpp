@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "formats/check_rules.hpp"
+#include "formats/utf8.hpp"
 #include "formats/validate.hpp"
 
 #define XXH_INLINE_ALL
@@ -21,6 +22,21 @@ void check_zero(FaultLog& log, std::span<const std::byte> bytes, std::uint64_t f
           "a byte of padding is not zero");
 }
 
+void check_meta(FaultLog& log, const BundleParts& parts, const SectionEntry& entry) {
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  while (!rest.empty()) {
+    const bool space = rest[0] == '\n' || rest[0] == '\r' || rest[0] == '\t';
+    const std::size_t length = space ? 1 : utf8_character(rest);
+    if (length == 0) {
+      log.add(Rule::kMetaText, entry.offset + bytes.size() - rest.size(), "meta",
+              "a byte belongs to no printable character of UTF-8");
+      return;
+    }
+    rest.remove_prefix(length);
+  }
+}
+
 }  // namespace
 
 void check_section_bytes(FaultLog& log, const BundleParts& parts) {
@@ -35,6 +51,11 @@ void check_section_bytes(FaultLog& log, const BundleParts& parts) {
       log.add(Rule::kSectionHash, entry.offset, where,
               "the hash of its " + std::to_string(entry.size) + " bytes of type " +
                   std::to_string(entry.type) + " differs from the stated one");
+    }
+    if (entry.type == static_cast<std::uint32_t>(SectionType::kMeta)) check_meta(log, parts, entry);
+    if (!known_section_type(entry.type) && (entry.flags & kSectionRequired) == 0) {
+      log.add(Rule::kUnknownSection, entry.offset, where,
+              "type " + std::to_string(entry.type) + ", " + std::to_string(entry.size) + " bytes");
     }
   }
 }

@@ -26,6 +26,9 @@ void validate_models(FaultLog& log, const BundleParts& parts);
 /// Textures, patterns, parameter sets, features, scenes.
 void validate_assets(FaultLog& log, const BundleParts& parts);
 
+/// Version 1.0 gives the section type a meaning.
+bool known_section_type(std::uint32_t type);
+
 /// The section with that key, or nullptr.
 const SectionEntry* find_section(std::span<const SectionEntry> sections, SectionType type,
                                  std::uint32_t owner, std::uint32_t variant);

@@ -235,6 +235,16 @@ void validate_models(FaultLog& log, const BundleParts& parts) {
     if (found) check_chunks(log, parts, model, next_level);
   }
   if (!log.clean()) return;
+  // Levels that shared indices could make a small file cost any time to draw or check.
+  std::uint64_t index_bytes = 0;
+  for (std::uint32_t i = 0; i < parts.levels.size(); ++i) {
+    index_bytes += std::uint64_t{parts.levels[i].index_count} * 2;
+  }
+  if (index_bytes > parts.indices.size()) {
+    log.add(Rule::kLevelRange, 0, "levels",
+            "levels use " + std::to_string(index_bytes) + " bytes of indices where " +
+                std::to_string(parts.indices.size()) + " are: some are shared");
+  }
   if (next_chunk != parts.chunks.size()) {
     log.add(Rule::kModelRange, 0, "chunks",
             std::to_string(parts.chunks.size() - next_chunk) + " chunks belong to no model");

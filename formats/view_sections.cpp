@@ -197,6 +197,10 @@ void check_names(FaultLog& log, const BundleParts& parts) {
 
 }  // namespace
 
+bool known_section_type(std::uint32_t type) {
+  return known_type(type) != nullptr;
+}
+
 const SectionEntry* find_section(std::span<const SectionEntry> sections, SectionType type,
                                  std::uint32_t owner, std::uint32_t variant) {
   const auto wanted = std::make_tuple(static_cast<std::uint32_t>(type), owner, variant);

@@ -1,0 +1,187 @@
+// Rules on the records of models, chunks, levels and materials.
+#include <algorithm>
+#include <cmath>
+
+#include "formats/check_rules.hpp"
+#include "formats/validate.hpp"
+
+namespace modar {
+namespace {
+
+double wide(float value) {
+  return static_cast<double>(value);
+}
+
+void check_counts(FaultLog& log, const BundleParts& parts, const ModelRecord& model) {
+  std::uint64_t triangles = 0;
+  std::uint64_t vertices = 0;
+  std::uint32_t levels = 0;
+  for (std::uint32_t i = 0; i < model.chunk_count; ++i) {
+    const ChunkRecord& chunk = parts.chunks[model.first_chunk + i];
+    const LevelRecord& finest = parts.levels[chunk.first_level];
+    triangles += finest.index_count / 3;
+    vertices += finest.vertex_count;
+    levels = std::max(levels, chunk.level_count);
+  }
+  if (model.triangle_count != triangles || model.vertex_count > vertices ||
+      model.level_count != levels) {
+    log.add(Rule::kModelCounts, offset_of(parts, &model.vertex_count),
+            label(parts, "model", model.name),
+            "it states " + std::to_string(model.vertex_count) + " vertices, " +
+                std::to_string(model.triangle_count) + " triangles, " +
+                std::to_string(model.level_count) + " levels; its chunks have at most " +
+                std::to_string(vertices) + ", exactly " + std::to_string(triangles) + " and " +
+                std::to_string(levels));
+  }
+}
+
+/// A box whose largest side is 2 s has a diagonal between 2 s and 2 s sqrt(3).
+void check_placement(FaultLog& log, const BundleParts& parts, const ModelRecord& model) {
+  const double side = 2.0 * model.scale;
+  const bool point = model.diagonal == 0.0 && model.scale == 1.0;
+  if (point || (model.diagonal >= side * (1.0 - 1e-6) &&
+                model.diagonal <= side * std::sqrt(3.0) * (1.0 + 1e-6))) {
+    return;
+  }
+  log.add(
+      Rule::kModelPlacement, offset_of(parts, &model.scale), label(parts, "model", model.name),
+      "its largest side is " + number_text(side) + ", its diagonal " + number_text(model.diagonal));
+}
+
+void check_chunk(FaultLog& log, const BundleParts& parts, const ChunkRecord& chunk,
+                 const std::string& where) {
+  constexpr double kLimit = 1.0 + 0x1p-10;
+  double square = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (wide(chunk.bounds_min[axis]) < -kLimit || wide(chunk.bounds_max[axis]) > kLimit) {
+      log.add(Rule::kChunkOutside, offset_of(parts, &chunk), where,
+              "its box reaches from " + number_text(wide(chunk.bounds_min[axis])) + " to " +
+                  number_text(wide(chunk.bounds_max[axis])));
+    }
+    square += wide(chunk.cone_axis[axis]) * wide(chunk.cone_axis[axis]);
+  }
+  const double length = std::sqrt(square);
+  const bool unit = std::fabs(length - 1.0) <= 1e-3;
+  const bool never = length == 0.0 && chunk.cone_cutoff > 1.0f;
+  if (chunk.cone_cutoff < 0.0f || !(unit || never)) {
+    log.add(Rule::kChunkCone, offset_of(parts, chunk.cone_axis), where,
+            "the axis has length " + number_text(length) + ", the cut-off is " +
+                number_text(wide(chunk.cone_cutoff)));
+  }
+}
+
+void check_levels(FaultLog& log, const BundleParts& parts, const ChunkRecord& chunk,
+                  const std::string& where) {
+  for (std::uint32_t i = 0; i < chunk.level_count; ++i) {
+    const LevelRecord& level = parts.levels[chunk.first_level + i];
+    const LevelRecord& finer = parts.levels[chunk.first_level + (i > 0 ? i - 1 : 0)];
+    const std::string at = where + ", level " + std::to_string(i);
+    if (i == 0 ? level.error != 0.0f
+               : level.error < finer.error || level.index_count > finer.index_count) {
+      log.add(Rule::kLevelOrder, offset_of(parts, &level), at,
+              "error " + number_text(wide(level.error)) + " and " +
+                  std::to_string(level.index_count) + " indices do not follow " +
+                  (i == 0 ? "the source"
+                          : number_text(wide(finer.error)) + " and " +
+                                std::to_string(finer.index_count)));
+    }
+    if (level.index_count == 0) {
+      log.add(Rule::kEmptyLevel, offset_of(parts, &level), at, "it has no indices");
+    }
+  }
+}
+
+void check_material(FaultLog& log, const BundleParts& parts, const MaterialRecord& material) {
+  bool usable = material.shininess >= 0.0f && material.opacity >= 0.0f && material.opacity <= 1.0f;
+  for (const auto* colour :
+       {&material.ambient, &material.diffuse, &material.specular, &material.emission}) {
+    for (const float channel : *colour) usable = usable && channel >= 0.0f;
+  }
+  if (usable) return;
+  log.add(Rule::kMaterialValues, offset_of(parts, &material),
+          label(parts, "material", material.name),
+          "a channel or the shininess is negative, or the opacity " +
+              number_text(wide(material.opacity)) + " is not from 0 to 1");
+}
+
+/// Looks for the first byte of a buffer that no range of a level covers. Levels mostly lie in
+/// order, so that few passes over the table do; after that it gives the buffer the benefit of the
+/// doubt.
+template <class RangeOf>
+void check_referenced(FaultLog& log, const BundleParts& parts, Rule rule,
+                      std::span<const std::byte> buffer, RangeOf range_of) {
+  constexpr int kPasses = 16;
+  std::uint64_t covered = 0;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const std::uint64_t before = covered;
+    for (std::uint32_t i = 0; i < parts.levels.size(); ++i) {
+      const auto [first, size] = range_of(i);
+      // Three bytes and fewer align what follows.
+      if (first <= (covered + 3) / 4 * 4) covered = std::max(covered, first + size);
+    }
+    if (covered + 3 >= buffer.size()) return;
+    if (covered == before) {
+      log.add(rule, offset_of(parts, buffer.data()) + covered, "buffer",
+              "no level refers to byte " + std::to_string(covered) + " of " +
+                  std::to_string(buffer.size()));
+      return;
+    }
+  }
+}
+
+/// Strides by level would need a table; levels of a model lie together, so a cursor does.
+class StrideCursor {
+ public:
+  explicit StrideCursor(const BundleParts& parts) : parts_(parts) {}
+  /// Levels are asked for in rising order, then from 0 again.
+  std::uint32_t operator()(std::uint32_t level) {
+    if (level == 0) model_ = end_ = 0;
+    while (level >= end_ && model_ < parts_.models.size()) {
+      const ModelRecord& model = parts_.models[model_++];
+      stride_ = parts_.layouts[model.layout].stride;
+      if (model.chunk_count == 0) continue;
+      const ChunkRecord& last = parts_.chunks[model.first_chunk + model.chunk_count - 1];
+      end_ = last.first_level + last.level_count;
+    }
+    return stride_;
+  }
+
+ private:
+  const BundleParts& parts_;
+  std::uint32_t model_ = 0;
+  std::uint32_t end_ = 0;
+  std::uint32_t stride_ = 0;
+};
+
+}  // namespace
+
+void check_model_records(FaultLog& log, const BundleParts& parts) {
+  for (std::uint32_t i = 0; i < parts.materials.size(); ++i) {
+    check_material(log, parts, parts.materials[i]);
+  }
+  for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
+    const ModelRecord& model = parts.models[i];
+    check_placement(log, parts, model);
+    check_counts(log, parts, model);
+    for (std::uint32_t j = 0; j < model.chunk_count; ++j) {
+      const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];
+      const std::string where = label(parts, "model", model.name) + ", chunk " + std::to_string(j);
+      check_chunk(log, parts, chunk, where);
+      check_levels(log, parts, chunk, where);
+    }
+  }
+  StrideCursor stride(parts);
+  check_referenced(log, parts, Rule::kUnreferencedVertices, parts.vertices, [&](std::uint32_t i) {
+    const LevelRecord& level = parts.levels[i];
+    return std::pair(level.vertex_offset, std::uint64_t{level.vertex_count} * stride(i));
+  });
+  check_referenced(log, parts, Rule::kUnreferencedIndices, parts.indices, [&](std::uint32_t i) {
+    const LevelRecord& level = parts.levels[i];
+    return std::pair(level.index_offset, std::uint64_t{level.index_count} * 2);
+  });
+  if (parts.models.empty() && parts.patterns.empty()) {
+    log.add(Rule::kNoContent, 0, "bundle", "there is no model and no pattern");
+  }
+}
+
+}  // namespace modar

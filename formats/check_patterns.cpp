@@ -1,0 +1,130 @@
+// Rules on patterns: parameters that their detector can run with, and features that lie in the
+// image.
+#include <algorithm>
+#include <cmath>
+
+#include "formats/check_rules.hpp"
+#include "formats/validate.hpp"
+
+namespace modar {
+namespace {
+
+bool can_run(const ParameterSetRecord& set) {
+  const bool common = set.min_matches >= 4 && set.min_inliers >= 4 && set.ransac_threshold > 0.0f &&
+                      set.max_distance > 0 && set.max_distance <= set.descriptor_bits;
+  if (set.detector == static_cast<std::uint32_t>(Detector::kFastOrb)) {
+    return common && set.max_features >= 1 && set.scale_factor >= 1.0f && set.level_count >= 1 &&
+           set.level_count <= 32 && set.first_level < set.level_count && set.wta_k >= 2 &&
+           set.wta_k <= 4 && set.patch_size >= 2 && set.fast_threshold >= 1 &&
+           set.fast_threshold <= 255;
+  }
+  return common && set.agast_threshold >= 1 && set.agast_threshold <= 255 && set.octaves <= 16 &&
+         set.pattern_scale > 0.0f;
+}
+
+void check_parameter_set(FaultLog& log, const BundleParts& parts, const ParameterSetRecord& set) {
+  const bool orb = set.detector == static_cast<std::uint32_t>(Detector::kFastOrb);
+  const std::uint32_t bits = orb ? 256 : 512;
+  if (set.descriptor_bits != bits) {
+    log.add(
+        Rule::kDescriptorLength, offset_of(parts, &set.descriptor_bits),
+        label(parts, "parameter set", set.name),
+        std::to_string(set.descriptor_bits) + " bits, the detector makes " + std::to_string(bits));
+  }
+  if (!can_run(set)) {
+    log.add(Rule::kParameterValues, offset_of(parts, &set), label(parts, "parameter set", set.name),
+            "see PARAMETER_VALUES in bundle.md");
+  }
+}
+
+void check_twin(FaultLog& log, const BundleParts& parts, const PatternRecord& pattern,
+                const SectionEntry& entry, const std::string& where) {
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  const auto& header = *reinterpret_cast<const FeatureHeader*>(bytes.data());
+  const std::span keypoints(
+      reinterpret_cast<const KeypointRecord*>(bytes.data() + header.keypoints_offset),
+      header.count);
+  Tally values;
+  Tally outside;
+  for (const KeypointRecord& k : keypoints) {
+    // Comparisons are written so that NaN fails.
+    if (!(k.size > 0.0f && std::isfinite(k.size) && std::fabs(k.angle) <= 360.0f &&
+          std::isfinite(k.response) && k.octave >= 0 && std::isfinite(k.x) && std::isfinite(k.y))) {
+      values.hit(offset_of(parts, &k));
+    } else if (!(k.x >= 0.0f && k.y >= 0.0f &&
+                 static_cast<double>(k.x) <= static_cast<double>(pattern.width) &&
+                 static_cast<double>(k.y) <= static_cast<double>(pattern.height))) {
+      outside.hit(offset_of(parts, &k));
+    }
+  }
+  const auto tell = [&](Rule rule, const Tally& tally) {
+    if (tally.count == 0) return;
+    log.add(rule, tally.first, where, std::to_string(tally.count) + " keypoints");
+  };
+  tell(Rule::kKeypointValues, values);
+  tell(Rule::kKeypointOutside, outside);
+  const std::uint64_t end = header.keypoints_offset + keypoints.size_bytes();
+  for (std::uint64_t i = end; i < header.descriptors_offset; ++i) {
+    if (bytes[static_cast<std::size_t>(i)] == std::byte{0}) continue;
+    log.add(Rule::kPadding, entry.offset + i, where,
+            "a byte between keypoints and descriptors is not zero");
+    break;
+  }
+}
+
+void check_text(FaultLog& log, const BundleParts& parts, const SectionEntry& entry,
+                const std::string& where) {
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (!text.starts_with("%YAML:1.0")) {
+    log.add(Rule::kFeatureYml, entry.offset, where, "it does not start with %YAML:1.0");
+  }
+  if (find_section(parts.sections, SectionType::kFeatureTwin, entry.owner, entry.variant) ==
+      nullptr) {
+    log.add(Rule::kFeatureYml, entry.offset, where, "it has no mapped twin");
+  }
+}
+
+/// The twins of a pattern lie side by side in the section table.
+void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index) {
+  const auto wanted = static_cast<std::uint32_t>(SectionType::kFeatureTwin);
+  const auto first = std::lower_bound(parts.sections.begin(), parts.sections.end(), index,
+                                      [wanted](const SectionEntry& entry, std::uint32_t owner) {
+                                        return entry.type < wanted ||
+                                               (entry.type == wanted && entry.owner < owner);
+                                      });
+  for (auto entry = first;
+       entry != parts.sections.end() && entry->type == wanted && entry->owner == index; ++entry) {
+    const auto& header =
+        *reinterpret_cast<const FeatureHeader*>(section_bytes(parts, *entry).data());
+    const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry->variant);
+    if (header.count >= parts.parameter_sets[set].min_matches) return;
+  }
+  const PatternRecord& pattern = parts.patterns[index];
+  log.add(Rule::kFeaturesMissing, offset_of(parts, &pattern), label(parts, "pattern", pattern.name),
+          "no parameter set found as many features as it wants matches");
+}
+
+}  // namespace
+
+void check_patterns(FaultLog& log, const BundleParts& parts) {
+  for (std::uint32_t i = 0; i < parts.parameter_sets.size(); ++i) {
+    check_parameter_set(log, parts, parts.parameter_sets[i]);
+  }
+  for (std::uint32_t i = 0; i < parts.patterns.size(); ++i) check_findable(log, parts, i);
+  for (const SectionEntry& entry : parts.sections) {
+    const auto type = static_cast<SectionType>(entry.type);
+    if (type != SectionType::kFeatureTwin && type != SectionType::kFeatureYml) continue;
+    const PatternRecord& pattern = parts.patterns[entry.owner];
+    const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry.variant);
+    const std::string where = label(parts, "pattern", pattern.name) + ", " +
+                              label(parts, "parameter set", parts.parameter_sets[set].name);
+    if (type == SectionType::kFeatureTwin) {
+      check_twin(log, parts, pattern, entry, where);
+    } else {
+      check_text(log, parts, entry, where);
+    }
+  }
+}
+
+}  // namespace modar
