@@ -15,13 +15,12 @@ constexpr const char* kUpdate = "update this program, or bake with the version t
 
 constexpr IssueKind kIssueKinds[] = {
     {"BUNDLE_TRUNCATED", Severity::kError, "The file ends before the bundle does.", kFetch},
-    {"BUNDLE_UNALIGNED", Severity::kError, "The bytes do not start at a multiple of 8 in memory.",
-     "map the file, or read it into memory from malloc"},
     {"BUNDLE_MAGIC", Severity::kError, "The file is no ModAR bundle.",
      "give a file that `modar bake` wrote"},
     {"BUNDLE_VERSION", Severity::kError, "The bundle has another major version.", kUpdate},
     {"BUNDLE_FILE_SIZE", Severity::kError, "The file is longer than the bundle.", kFetch},
-    {"BUNDLE_HEADER", Severity::kError, "The header places the section table elsewhere.", kFetch},
+    {"BUNDLE_HEADER", Severity::kError,
+     "The section table is not where version 1 has it, or the bytes lie askew in memory.", kFetch},
     {"BUNDLE_HEADER_HASH", Severity::kError, "Header or section table are damaged.", kFetch},
     {"BUNDLE_SECTION_COUNT", Severity::kError, "The section table does not fit into the file.",
      kFetch},

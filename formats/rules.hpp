@@ -13,7 +13,6 @@ namespace modar {
 /// In the order of issue_kinds(); a new rule is appended to its group here and there.
 enum class Rule : std::uint8_t {
   kTruncated,
-  kUnaligned,
   kMagicBytes,
   kVersion,
   kFileSize,

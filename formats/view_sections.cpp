@@ -70,7 +70,7 @@ bool readable(std::span<const std::byte> bytes, FaultLog& log) {
                   "the file has " + std::to_string(bytes.size()) + " bytes, a header has 64");
   }
   if (reinterpret_cast<std::uintptr_t>(bytes.data()) % alignof(std::uint64_t) != 0) {
-    return refuse(Rule::kUnaligned, 0, "the first byte is at an address that 8 does not divide");
+    return refuse(Rule::kHeader, 0, "the first byte is at an address that 8 does not divide");
   }
   const auto& header = *reinterpret_cast<const FileHeader*>(bytes.data());
   if (std::memcmp(header.magic, kMagic.data(), kMagic.size()) != 0) {
