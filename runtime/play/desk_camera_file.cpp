@@ -1,0 +1,107 @@
+// Reads calibration files through OpenCV, and catches what it throws.
+#include <array>
+#include <cmath>
+
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+
+#include "camera_file.hpp"
+
+namespace modar {
+namespace {
+
+tl::unexpected<Error> bad(const char* code, const std::string& path, std::string cause) {
+  return fail(ExitCode::kInvalidInput, code, path, std::move(cause),
+              "write it with OpenCV's calibration: camera_matrix, distortion_coefficients, "
+              "image_width, image_height");
+}
+
+cv::FileNode first_of(const cv::FileStorage& file, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    cv::FileNode node = file[name];
+    if (!node.empty()) return node;
+  }
+  return {};
+}
+
+/// A matrix node, or a plain sequence of numbers, as one column of doubles.
+cv::Mat numbers(const cv::FileNode& node) {
+  cv::Mat values;
+  if (node.isSeq()) {
+    std::vector<double> list;
+    node >> list;
+    values = cv::Mat(list, true);
+  } else if (!node.empty()) {
+    node >> values;
+  }
+  if (values.empty() || values.channels() != 1) return {};
+  values.convertTo(values, CV_64F);
+  return values.reshape(1, static_cast<int>(values.total()));
+}
+
+void read_size(const cv::FileStorage& file, Camera& camera) {
+  const cv::FileNode width = first_of(file, {"image_width", "image_Width", "width"});
+  const cv::FileNode height = first_of(file, {"image_height", "image_Height", "height"});
+  if (width.isInt() && height.isInt()) {
+    camera.width = static_cast<int>(width);
+    camera.height = static_cast<int>(height);
+    return;
+  }
+  const cv::Mat size = numbers(first_of(file, {"image_size", "imageSize", "resolution"}));
+  if (size.total() == 2) {
+    camera.width = cvRound(size.at<double>(0));
+    camera.height = cvRound(size.at<double>(1));
+  }
+}
+
+Result<Camera> read(const cv::FileStorage& file, const std::string& path) {
+  const cv::Mat k =
+      numbers(first_of(file, {"camera_matrix", "cameraMatrix", "Camera_Matrix", "K"}));
+  if (k.total() != 9) return bad("camera.matrix", path, "it has no 3x3 camera matrix");
+  Camera camera;
+  camera.fx = k.at<double>(0);
+  camera.cx = k.at<double>(2);
+  camera.fy = k.at<double>(4);
+  camera.cy = k.at<double>(5);
+  const bool finite = std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy);
+  if (!finite || camera.fx <= 0 || camera.fy <= 0) {
+    return bad("camera.matrix", path, "the focal length of its camera matrix is not positive");
+  }
+  const cv::Mat distortion =
+      numbers(first_of(file, {"distortion_coefficients", "distCoeffs", "Distortion_Coefficients",
+                              "dist_coeffs", "D"}));
+  for (std::size_t i = 0; i < distortion.total(); ++i) {
+    const double value = distortion.at<double>(static_cast<int>(i));
+    if (!std::isfinite(value)) return bad("camera.distortion", path, "a coefficient is no number");
+    if (i < camera.distortion.size()) {
+      camera.distortion[i] = value;
+    } else if (value != 0) {
+      return fail(ExitCode::kUnsupported, "camera.distortion", path,
+                  "its distortion has more than k1 k2 p1 p2 k3",
+                  "calibrate with the five-coefficient model");
+    }
+  }
+  read_size(file, camera);
+  if (camera.width < 0 || camera.height < 0 || (camera.width == 0) != (camera.height == 0)) {
+    return bad("camera.size", path, "its image size is not positive");
+  }
+  return camera;
+}
+
+}  // namespace
+
+Result<Camera> read_camera_file(const std::string& path) {
+  try {
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    const cv::FileStorage file(path, cv::FileStorage::READ);
+    if (!file.isOpened()) {
+      return fail(ExitCode::kIo, "camera.open", path, "the camera file cannot be opened",
+                  "check the path");
+    }
+    return read(file, path);
+  } catch (const std::exception& error) {
+    return bad("camera.syntax", path, std::string("OpenCV cannot read it: ") + error.what());
+  }
+}
+
+}  // namespace modar

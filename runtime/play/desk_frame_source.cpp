@@ -1,0 +1,196 @@
+// Videos, pictures, folders of pictures and cameras through OpenCV, which throws: caught here.
+#include <dirent.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "frame_source.hpp"
+
+namespace modar {
+namespace {
+
+constexpr double kDefaultFps = 30;
+
+tl::unexpected<Error> damaged(const std::string& path, const std::string& cause) {
+  return fail(ExitCode::kInvalidInput, "input.damaged", path, cause,
+              "give a video or picture that other players show");
+}
+
+/// Blue, green, red (or grey) pixels into the frame's own buffers.
+void fill(Frame& frame, const cv::Mat& picture) {
+  frame.width = picture.cols;
+  frame.height = picture.rows;
+  const auto pixels =
+      static_cast<std::size_t>(picture.cols) * static_cast<std::size_t>(picture.rows);
+  frame.rgb.resize(3 * pixels);
+  frame.gray.resize(pixels);
+  cv::Mat rgb(picture.rows, picture.cols, CV_8UC3, frame.rgb.data());
+  cv::Mat gray(picture.rows, picture.cols, CV_8UC1, frame.gray.data());
+  cv::cvtColor(picture, rgb, cv::COLOR_BGR2RGB);
+  cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
+}
+
+/// A video file or a camera.
+class VideoSource final : public FrameSource {
+ public:
+  VideoSource(cv::VideoCapture capture, std::string name, bool live)
+      : capture_(std::move(capture)), name_(std::move(name)) {
+    info_.live = live;
+    const double fps = capture_.get(cv::CAP_PROP_FPS);
+    info_.fps = std::isfinite(fps) && fps >= 1 && fps <= 1000 ? fps : kDefaultFps;
+    const double count = live ? 0 : capture_.get(cv::CAP_PROP_FRAME_COUNT);
+    if (std::isfinite(count) && count > 0) info_.frames = static_cast<std::uint64_t>(count);
+  }
+
+  [[nodiscard]] SourceInfo info() const override { return info_; }
+
+  Result<bool> next(Frame& frame) override {
+    if (stopped_) return false;
+    try {
+      if (!capture_.read(picture_) || picture_.empty()) {
+        if (next_ > 0 && !info_.live) return false;
+        return damaged(name_, info_.live ? "the camera gives no more frames"
+                                         : "the video has no frame that can be decoded");
+      }
+      fill(frame, picture_);
+    } catch (const std::exception& error) {
+      return damaged(name_, std::string("OpenCV: ") + error.what());
+    }
+    frame.index = next_;
+    frame.time_s = static_cast<double>(next_) / info_.fps;
+    ++next_;
+    return true;
+  }
+
+  void stop() override { stopped_ = true; }
+
+ private:
+  cv::VideoCapture capture_;
+  std::string name_;
+  cv::Mat picture_;
+  SourceInfo info_;
+  std::uint64_t next_ = 0;
+  std::atomic<bool> stopped_{false};
+};
+
+/// One picture, or those of a folder in the order of their names.
+class PictureSource final : public FrameSource {
+ public:
+  explicit PictureSource(std::vector<std::string> paths) : paths_(std::move(paths)) {}
+
+  [[nodiscard]] SourceInfo info() const override { return {kDefaultFps, paths_.size(), false}; }
+
+  Result<bool> next(Frame& frame) override {
+    if (stopped_ || next_ == paths_.size()) return false;
+    const std::string& path = paths_[next_];
+    try {
+      const cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
+      if (picture.empty()) return damaged(path, "the picture cannot be decoded");
+      fill(frame, picture);
+    } catch (const std::exception& error) {
+      return damaged(path, std::string("OpenCV: ") + error.what());
+    }
+    frame.index = next_;
+    frame.time_s = static_cast<double>(next_) / kDefaultFps;
+    ++next_;
+    return true;
+  }
+
+  void stop() override { stopped_ = true; }
+
+ private:
+  std::vector<std::string> paths_;
+  std::size_t next_ = 0;
+  std::atomic<bool> stopped_{false};
+};
+
+bool is_picture_name(const std::string& name) {
+  const std::size_t dot = name.rfind('.');
+  if (dot == std::string::npos || dot == 0) return false;
+  std::string ending = name.substr(dot + 1);
+  for (char& letter : ending) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  constexpr std::array<std::string_view, 9> kEndings = {"png", "jpg", "jpeg", "bmp", "ppm",
+                                                        "pgm", "tif", "tiff", "webp"};
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
+Result<std::unique_ptr<FrameSource>> open_folder(const std::string& folder) {
+  DIR* open = opendir(folder.c_str());
+  if (open == nullptr) {
+    return fail(ExitCode::kIo, "input.open", folder, "the folder cannot be read",
+                "check its permissions");
+  }
+  std::vector<std::string> paths;
+  while (const dirent* entry = readdir(open)) {
+    if (is_picture_name(entry->d_name)) paths.push_back(folder + "/" + entry->d_name);
+  }
+  closedir(open);
+  std::sort(paths.begin(), paths.end());
+  if (paths.empty()) {
+    return fail(ExitCode::kInvalidInput, "input.empty", folder, "the folder holds no picture",
+                "give one with PNG, JPEG, BMP, PPM, TIFF or WebP files");
+  }
+  return std::make_unique<PictureSource>(std::move(paths));
+}
+
+Result<std::unique_ptr<FrameSource>> open_camera(const std::string& input) {
+  int number = 0;
+  if (input.size() > 7) {
+    const char* end = input.data() + input.size();
+    const auto [last, error] = std::from_chars(input.data() + 7, end, number);
+    if (error != std::errc() || last != end || number < 0) {
+      return fail(ExitCode::kUsage, "input.camera", input, "that is no camera",
+                  "say camera, or camera:1 for the second one");
+    }
+  }
+  cv::VideoCapture capture(number, cv::CAP_V4L2);
+  if (!capture.isOpened()) {
+    return fail(ExitCode::kIo, "input.open", input, "the camera cannot be opened",
+                "plug one in, or check the permissions of /dev/video" + std::to_string(number));
+  }
+  capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
+  return std::make_unique<VideoSource>(std::move(capture), input, true);
+}
+
+Result<std::unique_ptr<FrameSource>> open_file(const std::string& path) {
+  if (cv::haveImageReader(path)) {
+    return std::make_unique<PictureSource>(std::vector<std::string>{path});
+  }
+  cv::VideoCapture capture(path, cv::CAP_FFMPEG);
+  if (!capture.isOpened()) return damaged(path, "it is neither a picture nor a video");
+  return std::make_unique<VideoSource>(std::move(capture), path, false);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
+  try {
+    // Errors of theirs come back as ours; the same words twice help nobody.
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+    if (input == "camera" || input.starts_with("camera:")) return open_camera(input);
+    struct stat status {};
+    if (stat(input.c_str(), &status) != 0) {
+      return fail(ExitCode::kIo, "input.open", input, "there is no such file or folder",
+                  "check the path");
+    }
+    return S_ISDIR(status.st_mode) ? open_folder(input) : open_file(input);
+  } catch (const std::exception& error) {
+    return damaged(input, std::string("OpenCV: ") + error.what());
+  }
+}
+
+}  // namespace modar

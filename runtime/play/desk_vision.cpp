@@ -1,0 +1,40 @@
+// The article's tracker as a step of the pipeline.
+#include <memory>
+
+#include "vision.hpp"
+
+namespace modar {
+namespace {
+
+struct State {
+  const BundleView& bundle;
+  VisionOptions options;
+  Camera camera;
+  std::unique_ptr<PaperTracker> tracker;
+
+  Result<void> step(Job& job) {
+    const Frame& frame = job.frame;
+    if (!tracker || camera.width != frame.width || camera.height != frame.height) {
+      camera = camera_for(options.camera, frame.width, frame.height);
+      auto created = PaperTracker::create(bundle, options.parameter_set, camera);
+      if (!created) return tl::unexpected(created.error());
+      tracker = std::move(*created);
+    }
+    const std::int64_t before = now_ns();
+    Result<TrackResult> result = tracker->step(frame.gray_image());
+    if (!result) return tl::unexpected(result.error());
+    job.track = std::move(*result);
+    job.track_ms = ms_since(before);
+    job.camera = camera;
+    return {};
+  }
+};
+
+}  // namespace
+
+Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
+  const auto state = std::make_shared<State>(State{bundle, options, {}, nullptr});
+  return TrackStep([state](Job& job) { return state->step(job); });
+}
+
+}  // namespace modar

@@ -1,0 +1,56 @@
+// Where frames come from: a video file, a picture, a folder of pictures, a camera.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/error.hpp"
+#include "modar/image.hpp"
+
+namespace modar {
+
+/// One frame. Its buffers are used again: next() overwrites them.
+struct Frame {
+  std::uint64_t index = 0;      ///< in the source, from 0
+  double time_s = 0;            ///< since the first frame; of a file: index / rate
+  double read_ms = 0;           ///< that reading it took
+  std::int64_t arrived_ns = 0;  ///< steady clock when it was complete
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgb;   ///< 3 * width * height, top row first
+  std::vector<std::uint8_t> gray;  ///< width * height
+
+  [[nodiscard]] RgbImage rgb_image() const {
+    return {rgb.data(), width, height, std::ptrdiff_t{3} * width};
+  }
+  [[nodiscard]] GrayImage gray_image() const { return {gray.data(), width, height, width}; }
+};
+
+struct SourceInfo {
+  double fps = 30;           ///< frames a second; 30 where the source does not say
+  std::uint64_t frames = 0;  ///< 0: unknown
+  bool live = false;         ///< frames come whether we are ready or not
+};
+
+class FrameSource {
+ public:
+  FrameSource() = default;
+  FrameSource(const FrameSource&) = delete;
+  FrameSource& operator=(const FrameSource&) = delete;
+  virtual ~FrameSource() = default;
+
+  [[nodiscard]] virtual SourceInfo info() const = 0;
+  /// Reads the next frame into `frame`. Answers false at the end. Errors: kInvalidInput
+  /// "input.damaged", kIo "input.read".
+  virtual Result<bool> next(Frame& frame) = 0;
+  /// Called from another thread: a next() that waits, and each later one, answers false.
+  virtual void stop() = 0;
+};
+
+/// input: a path, or "camera" or "camera:N". Errors: kIo "input.open", kInvalidInput "input.*",
+/// kUnsupported "input.unsupported" in a build that cannot read it.
+Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input);
+
+}  // namespace modar

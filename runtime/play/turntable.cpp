@@ -1,0 +1,96 @@
+// Pictures of each model turning: the renderer without the AR half.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/geometric.hpp>
+
+#include "frame_sink.hpp"
+#include "json_lines.hpp"
+#include "modar/camera.hpp"
+#include "modar/renderer.hpp"
+#include "pipeline.hpp"
+#include "play.hpp"
+#include "screen.hpp"
+
+namespace modar {
+namespace {
+
+constexpr double kTiltDegrees = 20;  ///< seen from a little above
+
+/// The ball round the origin that holds the model's chunks (model space).
+double radius_of(const BundleView& bundle, std::uint32_t model) {
+  const ModelRecord& record = bundle.models()[model];
+  double radius = 1e-3;
+  for (std::uint32_t i = 0; i < record.chunk_count; ++i) {
+    const ChunkRecord& chunk = bundle.chunks()[record.first_chunk + i];
+    glm::dvec3 far_corner(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+      far_corner[axis] = std::max(std::abs(static_cast<double>(chunk.bounds_min[axis])),
+                                  std::abs(static_cast<double>(chunk.bounds_max[axis])));
+    }
+    radius = std::max(radius, glm::length(far_corner));
+  }
+  return radius;
+}
+
+/// Eye distance at which a ball of that radius fills the smaller side of the picture.
+double distance_of(const Camera& camera, double radius) {
+  const double half_side = 0.5 * std::min(camera.width, camera.height);
+  return 1.05 * radius / std::sin(std::atan(half_side / camera.fx));
+}
+
+glm::mat4 turned(double degrees, double distance) {
+  const auto radians = [](double value) {
+    return static_cast<float>(value * std::numbers::pi / 180.0);
+  };
+  const glm::mat4 back =
+      glm::translate(glm::mat4(1.0f), glm::vec3(0.0f, 0.0f, -static_cast<float>(distance)));
+  const glm::mat4 tilted = glm::rotate(back, radians(kTiltDegrees), glm::vec3(1, 0, 0));
+  return glm::rotate(tilted, radians(degrees), glm::vec3(0, 1, 0));
+}
+
+}  // namespace
+
+Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle) {
+  constexpr double kFps = 30;
+  if (bundle.models().empty()) {
+    return fail(ExitCode::kInvalidInput, "play.no-models", options.bundle,
+                "the bundle holds no model", "bake it with --model FILE");
+  }
+  Result<std::unique_ptr<Screen>> screen = Screen::open(bundle, options);
+  if (!screen) return tl::unexpected(screen.error());
+  Result<std::unique_ptr<FrameSink>> sink = open_frame_sink(options.out, kFps);
+  if (!sink) return tl::unexpected(sink.error());
+  if (auto sized = (*screen)->resize(options.width, options.height); !sized) return sized;
+
+  const Camera camera = default_camera(options.width, options.height);
+  TurntableReport turn;
+  FrameReport report;
+  for (std::uint32_t model = 0; model < bundle.models().size(); ++model) {
+    const double distance = distance_of(camera, radius_of(bundle, model));
+    turn.model = bundle.name(bundle.models()[model].name);
+    for (int i = 0; i < options.turntable; ++i) {
+      turn.angle_deg = 360.0 * i / options.turntable;
+      const std::array<DrawItem, 1> items = {{{model, turned(turn.angle_deg, distance)}}};
+      const std::int64_t before = now_ns();
+      (*screen)->draw({}, camera, items);
+      const RgbaImage picture = (*screen)->picture();
+      turn.render_ms = ms_since(before);
+      turn.triangles = (*screen)->stats().triangles;
+      turn.draw_calls = (*screen)->stats().draw_calls;
+      report.frame = turn.frame;
+      report.time_s = static_cast<double>(turn.frame) / kFps;
+      if (auto written = (*sink)->picture(picture, report); !written) return written;
+      if (options.json) {
+        if (auto printed = print_line(turntable_line(turn)); !printed) return printed;
+      }
+      ++turn.frame;
+    }
+  }
+  return (*sink)->finish("");
+}
+
+}  // namespace modar

@@ -1,0 +1,34 @@
+// Parameters and camera of the vision thread, whatever the tracker.
+#include "vision.hpp"
+
+namespace modar {
+
+Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& name) {
+  const Table<ParameterSetRecord> sets = bundle.parameter_sets();
+  if (sets.empty()) {
+    return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
+                "the bundle holds no described pattern", "bake it with --pattern IMAGE");
+  }
+  const std::string_view wanted = name.empty() ? std::string_view("orb-2000") : name;
+  std::string known;
+  for (std::uint32_t i = 0; i < sets.size(); ++i) {
+    const std::string_view each = bundle.name(sets[i].name);
+    if (each == wanted) return sets[i].id;
+    if (!known.empty()) known += ", ";
+    known += each;
+  }
+  if (name.empty()) return sets[0].id;
+  return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
+              "the bundle has no parameter set '" + name + "'", "it has: " + known);
+}
+
+Camera camera_for(const std::optional<Camera>& calibrated, int width, int height) {
+  if (!calibrated) return default_camera(width, height);
+  if (calibrated->width > 0) return scaled_camera(*calibrated, width, height);
+  Camera camera = *calibrated;
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
+
+}  // namespace modar

@@ -1,0 +1,31 @@
+// The vision thread's work: which tracker with which parameters.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "formats/bundle_view.hpp"
+#include "formats/error.hpp"
+#include "pipeline.hpp"
+
+namespace modar {
+
+struct VisionOptions {
+  std::uint32_t parameter_set = 0;  ///< id, see choose_parameter_set()
+  std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
+};
+
+/// The id of the bundle's parameter set of that name; of an empty name: "orb-2000" where it is
+/// there, else the first. Errors: kUsage "parameters.unknown" (lists what the bundle has),
+/// kInvalidInput "tracker.no-patterns" where it has none at all.
+Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& name);
+
+/// The camera for frames of that size.
+Camera camera_for(const std::optional<Camera>& calibrated, int width, int height);
+
+/// The article's method as a step of the pipeline. The bundle's bytes must outlive it. A frame of
+/// another size than the one before sets the tracker up anew.
+/// Errors: those of PaperTracker; kUnsupported "method.unsupported" in a build without OpenCV.
+Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
+
+}  // namespace modar

@@ -1,0 +1,22 @@
+# The player's parts, and the player from the outside.
+find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs videoio)
+set(play_tests
+  play_camera_file_test.cpp
+  play_faststart_test.cpp
+  play_json_test.cpp
+  play_options_test.cpp
+  play_overlay_test.cpp
+  play_report_test.cpp
+  play_sinks_test.cpp
+  play_source_test.cpp)
+modar_test(play_test SOURCES ${play_tests}
+  LIBRARIES modar_play_desk opencv_core opencv_imgproc opencv_imgcodecs opencv_videoio)
+target_include_directories(play_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
+# OpenCV, GoogleTest and nlohmann throw; the device's flags come in with modar_runtime.
+set_source_files_properties(${play_tests} PROPERTIES COMPILE_OPTIONS "-fexceptions;-frtti")
+
+# Apart, so that ThreadSanitizer sees our threads and nobody else's.
+set(play_threads_tests play_mailbox_test.cpp play_pipeline_test.cpp)
+modar_test(play_threads_test SOURCES ${play_threads_tests} LIBRARIES modar_play)
+target_include_directories(play_threads_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
+set_source_files_properties(${play_threads_tests} PROPERTIES COMPILE_OPTIONS "-fexceptions;-frtti")
