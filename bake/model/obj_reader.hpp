@@ -20,8 +20,8 @@ Result<SourceModel> read_obj(const std::string& path);
 Result<SourceModel> parse_obj(std::string_view text, const std::string& folder,
                               const std::string& label);
 
-/// Materials of an MTL text. Map paths are resolved against `folder` (backslashes, quotes, wrong case,
-/// options and blanks in names are dealt with). label: the file's name in findings.
+/// Materials of an MTL text. Map paths are resolved against `folder` (backslashes, quotes, wrong
+/// case, options and blanks in names are dealt with). label: the file's name in findings.
 std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& folder,
                                       const std::string& label, std::vector<Finding>& findings);
 

@@ -10,8 +10,8 @@
 
 namespace modar {
 
-/// Records whose indices and offsets count from this model's own start; the bundle stage shifts them
-/// when it merges models. `record` lacks its name, its layout index and its `first_*` fields;
+/// Records whose indices and offsets count from this model's own start; the bundle stage shifts
+/// them when it merges models. `record` lacks its name, its layout index and its `first_*` fields;
 /// materials keep the texture paths in `sources` (same order as `materials`), texture = kNone.
 struct PackedMesh {
   std::string name;

@@ -13,8 +13,8 @@
 
 namespace modar {
 
-/// A material as MTL or glTF names it. Paths are resolved against the file that names them, and exist;
-/// empty where there is no map or it was not found (then there is a finding).
+/// A material as MTL or glTF names it. Paths are resolved against the file that names them, and
+/// exist; empty where there is no map or it was not found (then there is a finding).
 struct SourceMaterial {
   std::string name;
   glm::vec3 ambient{0.2f};
@@ -35,9 +35,12 @@ struct Corner {
   std::uint32_t normal = kNoIndex;
 };
 
-/// Polygons of the file: face f has the corners [first_corner[f], first_corner[f + 1]), uses material
-/// face_material[f] (index into materials; 0 is a default material where the file names none) and
-/// smoothing group face_smoothing[f] (0: off).
+/// Smoothing of faces in a file that says nothing of it: as one group of their own.
+inline constexpr std::uint32_t kUnstatedSmoothing = 0xFFFFFFFFu;
+
+/// Polygons of the file: face f has the corners [first_corner[f], first_corner[f + 1]), uses
+/// material face_material[f] (index into materials; 0 is a default material where the file names
+/// none) and smoothing group face_smoothing[f] (0: off; kUnstatedSmoothing: the file does not say).
 struct SourceModel {
   std::string name;  ///< the file's stem
   std::vector<glm::dvec3> positions;

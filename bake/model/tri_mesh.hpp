@@ -20,16 +20,17 @@ struct Placement {
   double scale = 1.0;
 };
 
-/// Vertices are unique (position, uv, normal) index triples of the source. Attribute arrays are empty
-/// or as long as positions. uv: v down (row 0 of the image at v = 0), as GL samples our textures.
+/// Vertices are unique (position, uv, normal) index triples of the source. Attribute arrays are
+/// empty or as long as positions. uv: v down (row 0 of the image at v = 0), as GL samples our
+/// textures.
 struct TriMesh {
   std::string name;
   Placement placement;
   glm::dvec3 source_min{0.0};
   glm::dvec3 source_max{0.0};
-  std::vector<glm::dvec3> positions;  ///< in [-1,1]
+  std::vector<glm::dvec3> positions;           ///< in [-1,1]
   std::vector<std::uint32_t> source_position;  ///< index of the source position of each vertex
-  std::vector<glm::dvec3> normals;    ///< unit length
+  std::vector<glm::dvec3> normals;             ///< unit length
   std::vector<glm::dvec2> uvs;
   std::vector<glm::u8vec4> colours;
   std::vector<std::array<std::uint32_t, 3>> triangles;
