@@ -1,0 +1,216 @@
+// The renderer: what is set up once, and the frame.
+#include "modar/renderer.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include <glm/geometric.hpp>
+
+#include "runtime/render/background.hpp"
+#include "runtime/render/draw_list.hpp"
+#include "runtime/render/geometry_store.hpp"
+#include "runtime/render/gl_state.hpp"
+#include "runtime/render/model_painter.hpp"
+#include "runtime/render/program.hpp"
+#include "runtime/render/target.hpp"
+#include "runtime/render/texture_store.hpp"
+
+namespace modar {
+namespace {
+
+std::vector<VertexFormat> vertex_formats(const BundleView& bundle, const GlCaps& caps) {
+  std::vector<VertexFormat> formats;
+  for (std::uint32_t i = 0; i < bundle.layouts().size(); ++i) {
+    formats.push_back(vertex_format(bundle.layouts()[i], caps.half_float_vertices));
+  }
+  return formats;
+}
+
+/// The largest rectangle of the picture's aspect in the middle of the target: the projection is
+/// made for a viewport that shows the whole picture.
+struct Viewport {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+};
+
+Viewport fit(int picture_width, int picture_height, int width, int height) {
+  if (picture_width < 1 || picture_height < 1) return {0, 0, width, height};
+  const std::int64_t wide = std::int64_t{width} * picture_height;
+  const std::int64_t high = std::int64_t{height} * picture_width;
+  Viewport view{0, 0, width, height};
+  if (wide > high) view.width = std::max(1, static_cast<int>(high / picture_height));
+  if (wide < high) view.height = std::max(1, static_cast<int>(wide / picture_width));
+  view.x = (width - view.width) / 2;
+  view.y = (height - view.height) / 2;
+  return view;
+}
+
+}  // namespace
+
+struct Renderer::State {
+  State(const BundleView& view, const GlCaps& context_caps)
+      : bundle(view),
+        caps(context_caps),
+        formats(vertex_formats(bundle, caps)),
+        geometry(bundle, formats, geometry_budget(view, context_caps)),
+        textures(bundle, caps),
+        painter(bundle, formats) {}
+
+  /// Half of the memory is for each kind, unless all the geometry needs less.
+  static std::uint64_t geometry_budget(const BundleView& view, const GlCaps& caps) {
+    if (caps.gpu_memory == 0) return 0;
+    return caps.gpu_memory - std::min(caps.gpu_memory / 2, texture_bytes(view));
+  }
+
+  static std::uint64_t texture_bytes(const BundleView& view) {
+    std::uint64_t bytes = 0;
+    for (std::uint32_t i = 0; i < view.textures().size(); ++i) bytes += view.texture_data(i).size();
+    return bytes;
+  }
+
+  Result<void> upload() {
+    const Result<void> textured =
+        textures.upload(caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2));
+    if (!textured) return textured;
+    geometry.upload();
+    const Result<void> painted = painter.create(textures);
+    if (!painted) return painted;
+    const Result<void> backed = background.create();
+    if (!backed) return backed;
+    gl.reset();
+    return {};
+  }
+
+  void draw_models(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
+    list.build(bundle, painter.setups(), projection, height, items, options.lod_pixels);
+    stats.chunks_culled = list.culled();
+    if (geometry.streams()) {
+      list.sort_by_distance();
+      stats.chunks_skipped = keep_resident();
+    }
+    list.sort_by_state(bundle);
+    painter.draw(list, items, projection, options, geometry, textures, gl, stats);
+  }
+
+  /// Gives GPU memory to the nearest chunks first, at a coarser level where there is little. Drops
+  /// what has none; answers how many.
+  int keep_resident() {
+    geometry.begin_frame();
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < list.commands().size(); ++i) {
+      DrawCommand command = list.commands()[i];
+      const ChunkRecord& chunk = bundle.chunks()[command.chunk];
+      const std::uint32_t end = chunk.first_level + chunk.level_count;
+      LevelPlace place;
+      while (command.level < end && !geometry.use(command.level, gl, place)) ++command.level;
+      if (command.level < end) list.commands()[kept++] = command;
+    }
+    const int dropped = static_cast<int>(list.commands().size() - kept);
+    list.commands().resize(kept);
+    return dropped;
+  }
+
+  BundleView bundle;
+  GlCaps caps;
+  std::vector<VertexFormat> formats;
+  GlState gl;
+  GeometryStore geometry;
+  TextureStore textures;
+  ModelPainter painter;
+  Background background;
+  Target target;
+  DrawList list;
+  RenderOptions options;
+  RenderStats stats;
+};
+
+Result<std::unique_ptr<Renderer>> Renderer::create(const BundleView& bundle, const GlCaps& caps) {
+  std::unique_ptr<Renderer> renderer(new Renderer(std::make_unique<State>(bundle, caps)));
+  const Result<void> uploaded = renderer->state_->upload();
+  if (!uploaded) return tl::unexpected<Error>(uploaded.error());
+  return renderer;
+}
+
+Renderer::Renderer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+
+Renderer::~Renderer() {
+  state_->geometry.release(state_->gl);
+  state_->textures.release(state_->gl);
+  state_->painter.release();
+  state_->background.release(state_->gl);
+  state_->target.release(state_->gl);
+}
+
+Result<void> Renderer::resize(int width, int height) {
+  return state_->target.resize(width, height, state_->caps, state_->gl);
+}
+
+void Renderer::render(const RgbImage& background, const glm::mat4& projection,
+                      std::span<const DrawItem> items) {
+  State& s = *state_;
+  s.stats = RenderStats();
+  s.gl.changes = 0;
+  const std::uint64_t uploaded_before = s.geometry.uploaded_bytes();
+  const std::uint64_t evicted_before = s.geometry.evictions();
+  const Viewport view =
+      fit(background.width, background.height, s.target.width(), s.target.height());
+  s.target.bind();
+  glViewport(view.x, view.y, view.width, view.height);
+  const glm::vec4& clear = s.options.clear_colour;
+  glClearColor(clear.r, clear.g, clear.b, clear.a);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  if (background.pixels != nullptr && background.width > 0 && background.height > 0) {
+    s.stats.bytes_uploaded += s.background.upload(background, s.gl);
+    const bool exact = view.width == background.width && view.height == background.height;
+    s.stats.draw_calls += s.background.draw(exact, s.gl);
+  }
+  if (!items.empty()) s.draw_models(projection, view.height, items);
+  s.stats.state_changes = s.gl.changes;
+  s.stats.bytes_uploaded += s.geometry.uploaded_bytes() - uploaded_before;
+  s.stats.evictions = s.geometry.evictions() - evicted_before;
+}
+
+void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
+  const int width = state_->target.width();
+  const int height = state_->target.height();
+  state_->target.bind();
+  glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, rgba.data());
+  // GL's first row is the bottom one.
+  const std::size_t row = static_cast<std::size_t>(width) * 4;
+  for (std::size_t low = 0, high = static_cast<std::size_t>(height) - 1; low < high;
+       ++low, --high) {
+    std::swap_ranges(rgba.begin() + static_cast<std::ptrdiff_t>(low * row),
+                     rgba.begin() + static_cast<std::ptrdiff_t>((low + 1) * row),
+                     rgba.begin() + static_cast<std::ptrdiff_t>(high * row));
+  }
+}
+
+void Renderer::blit_to_window(int window_width, int window_height) {
+  State& s = *state_;
+  const Viewport view = fit(s.target.width(), s.target.height(), window_width, window_height);
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, window_width, window_height);
+  glClearColor(0.0f, 0.0f, 0.0f, 1.0f);
+  glClear(GL_COLOR_BUFFER_BIT);
+  glViewport(view.x, view.y, view.width, view.height);
+  s.background.draw_texture(s.target.texture(), s.gl);
+  s.gl.bind_texture(0, 0);
+}
+
+void Renderer::set_options(const RenderOptions& options) {
+  state_->options = options;
+}
+
+const RenderStats& Renderer::stats() const {
+  return state_->stats;
+}
+
+GpuMemory Renderer::gpu_memory() const {
+  return {state_->geometry.resident_bytes(), state_->textures.bytes(),
+          state_->geometry.uploaded_bytes() + state_->textures.uploaded_bytes()};
+}
+
+}  // namespace modar

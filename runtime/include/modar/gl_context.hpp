@@ -18,8 +18,13 @@ struct GlCaps {
   bool etc1 = false;                 ///< GL_OES_compressed_ETC1_RGB8_texture
   bool etc1_sub_texture = false;     ///< GL_EXT_compressed_ETC1_RGB8_sub_texture
   bool npot_mipmaps = false;         ///< GL_OES_texture_npot
+  bool depth24 = false;              ///< GL_OES_depth24
+  bool debug_groups = false;         ///< GL_KHR_debug or GL_EXT_debug_marker
+  bool instanced_arrays = false;     ///< GL_EXT/ANGLE_instanced_arrays, or the core of ES 3
   int max_texture_size = 64;
   int max_vertex_uniform_vectors = 128;
+  int max_vertex_attributes = 8;
+  std::uint64_t gpu_memory = 0;  ///< bytes that models and textures may take; 0: no limit
 };
 
 /// Reads the caps of the context that is current on this thread.
@@ -31,8 +36,8 @@ Result<GlCaps> mask_gl_caps(const GlCaps& caps, const std::string& device);
 
 class GlContext {
  public:
-  /// Creates an off-screen ES 2.0 context and makes it current on this thread. Tries a display of the
-  /// system, then Mesa's surfaceless platform. Errors: kUnsupported "gl.context".
+  /// Creates an off-screen ES 2.0 context and makes it current on this thread. Tries a display of
+  /// the system, then Mesa's surfaceless platform. Errors: kUnsupported "gl.context".
   static Result<std::unique_ptr<GlContext>> create_offscreen();
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;

@@ -26,4 +26,8 @@ class MappedFile {
   std::span<const std::byte> bytes_;
 };
 
+/// Tells the system that these bytes (a part of a mapping, or any memory) are read next, front to
+/// back, so that it may fetch them ahead. Never fails: where it cannot help, it does nothing.
+void expect_reading(std::span<const std::byte> bytes);
+
 }  // namespace modar

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
@@ -26,11 +28,29 @@ struct DrawItem {
 /// Counted over the last render() call.
 struct RenderStats {
   int draw_calls = 0;
-  int state_changes = 0;   ///< program, buffer, texture and attribute set-ups
+  int state_changes = 0;  ///< program, buffer, texture and attribute set-ups
   int chunks_drawn = 0;
   int chunks_culled = 0;
+  int chunks_skipped = 0;  ///< visible, but the GPU budget had no room left
   std::uint64_t triangles = 0;
-  std::uint64_t bytes_uploaded = 0;  ///< background and uniforms of this frame
+  std::uint64_t bytes_uploaded = 0;  ///< background, uniforms and streamed buffers of this frame
+  std::uint64_t evictions = 0;       ///< buffers that made room in this frame
+};
+
+/// What lies in GL memory for the bundle.
+struct GpuMemory {
+  std::uint64_t geometry = 0;  ///< bytes
+  std::uint64_t textures = 0;  ///< bytes
+  std::uint64_t uploaded = 0;  ///< bytes sent since create()
+};
+
+/// How to draw. May change from frame to frame.
+struct RenderOptions {
+  glm::vec3 light{0.25f, 0.45f, 0.85f};  ///< direction to the light in eye space, any length > 0
+  float light_strength = 0.7f;           ///< times a material's diffuse and specular colour
+  float ambient_strength = 0.3f;         ///< times its ambient colour
+  glm::vec4 clear_colour{0.0f, 0.0f, 0.0f, 1.0f};
+  float lod_pixels = 1.0f;  ///< a level of detail may be off by so much on the screen
 };
 
 /// Pattern-plane matrix of a scene: its offset, rotation and scale on the default placement (the
@@ -47,10 +67,12 @@ DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items
 
 class Renderer {
  public:
-  /// Uploads the bundle's merged buffers and textures from the mapped bytes into the current context.
-  /// Where a caps flag is missing, floats instead of halves and decoded RGB instead of ETC1 are
-  /// uploaded. The bundle's bytes must outlive the renderer.
-  /// Errors: kUnsupported "gl.*".
+  /// Uploads the bundle's merged buffers and textures from the mapped bytes into the current
+  /// context. Where a caps flag is missing, floats instead of halves and decoded RGB instead of
+  /// ETC1 are uploaded. Where caps.gpu_memory is not 0, no more than so many bytes are kept in GL:
+  /// textures drop their finest levels, and chunks come when they are seen, nearest first, and go
+  /// when they were not seen for longest. The bundle's bytes must outlive the renderer. Errors:
+  /// kUnsupported "gl.*".
   static Result<std::unique_ptr<Renderer>> create(const BundleView& bundle, const GlCaps& caps);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
@@ -60,8 +82,8 @@ class Renderer {
   /// Errors: kUnsupported "gl.framebuffer".
   Result<void> resize(int width, int height);
 
-  /// Draws the background (may be empty: clear colour) and the items over it. projection: of GL, see
-  /// gl_projection(). Allocates nothing after the first frame of a size.
+  /// Draws the background (may be empty: clear colour) and the items over it. projection: of GL,
+  /// see gl_projection(). Allocates nothing after the first frame of a size.
   void render(const RgbImage& background, const glm::mat4& projection,
               std::span<const DrawItem> items);
 
@@ -70,7 +92,9 @@ class Renderer {
   /// Puts the off-screen picture on the window's framebuffer (0).
   void blit_to_window(int window_width, int window_height);
 
+  void set_options(const RenderOptions& options);
   [[nodiscard]] const RenderStats& stats() const;
+  [[nodiscard]] GpuMemory gpu_memory() const;
 
  private:
   struct State;

@@ -1,0 +1,229 @@
+// Vertices and indices in GL buffers, straight from the mapped bytes.
+#include "runtime/render/geometry_store.hpp"
+
+#include <algorithm>
+
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::size_t kScratchVertices = 4096;
+
+GLuint make_buffer(GLenum target) {
+  GLuint buffer = 0;
+  glGenBuffers(1, &buffer);
+  glBindBuffer(target, buffer);
+  return buffer;
+}
+
+}  // namespace
+
+GeometryStore::GeometryStore(const BundleView& bundle, std::span<const VertexFormat> formats,
+                             std::uint64_t budget)
+    : bundle_(bundle), formats_(formats.begin(), formats.end()), budget_(budget) {
+  std::uint32_t widest = 0;
+  for (const VertexFormat& format : formats_) {
+    rewrites_ = rewrites_ || format.widened;
+    if (format.widened) widest = std::max(widest, format.stride);
+  }
+  scratch_.resize(kScratchVertices * widest);
+  collect_ranges();
+  streams_ = budget_ != 0 && total_bytes() > budget_;
+}
+
+void GeometryStore::collect_ranges() {
+  const Table<LevelRecord> levels = bundle_.levels();
+  index_ranges_.resize(levels.size());
+  level_vertices_.assign(levels.size(), 0);
+  vertex_ranges_.assign(levels.size(), Range{});
+  // A level's layout is its model's. Levels that no model has are never drawn.
+  for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
+    const ModelRecord& model = bundle_.models()[m];
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle_.chunks()[model.first_chunk + c];
+      for (std::uint32_t i = 0; i < chunk.level_count; ++i) {
+        vertex_ranges_[chunk.first_level + i].layout = model.layout;
+      }
+    }
+  }
+  for (std::uint32_t i = 0; i < levels.size(); ++i) {
+    Range& vertices = vertex_ranges_[i];
+    if (vertices.layout == kNone) continue;
+    const VertexFormat& format = formats_[vertices.layout];
+    vertices.source = levels[i].vertex_offset;
+    vertices.size = std::uint64_t{levels[i].vertex_count} * format.source_stride;
+    Range& indices = index_ranges_[i];
+    indices.source = levels[i].index_offset;
+    indices.size = std::uint64_t{levels[i].index_count} * 2;
+    indices.gpu_size = indices.size;
+    index_total_ += indices.size;
+  }
+  merge_vertex_ranges();
+}
+
+void GeometryStore::merge_vertex_ranges() {
+  // One range a distinct start; the longest level that starts there decides its size.
+  std::vector<std::uint32_t> order(vertex_ranges_.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const Range& left = vertex_ranges_[a];
+    const Range& right = vertex_ranges_[b];
+    if (left.layout != right.layout) return left.layout < right.layout;
+    return left.source != right.source ? left.source < right.source : a < b;
+  });
+  std::vector<Range> merged;
+  for (const std::uint32_t level : order) {
+    const Range& range = vertex_ranges_[level];
+    if (merged.empty() || merged.back().source != range.source ||
+        merged.back().layout != range.layout) {
+      merged.push_back(range);
+    }
+    merged.back().size = std::max(merged.back().size, range.size);
+    level_vertices_[level] = static_cast<std::uint32_t>(merged.size() - 1);
+  }
+  for (Range& range : merged) {
+    if (range.layout == kNone) continue;
+    const VertexFormat& format = formats_[range.layout];
+    range.gpu_size = range.size / format.source_stride * format.stride;
+    range.gpu_offset = rewrites_ ? vertex_total_ : range.source;
+    vertex_total_ += range.gpu_size;
+  }
+  vertex_ranges_ = std::move(merged);
+  for (Range& range : index_ranges_) range.gpu_offset = range.source;
+}
+
+void GeometryStore::upload() {
+  if (!streams_) upload_whole();
+}
+
+void GeometryStore::upload_whole() {
+  const std::span<const std::byte> vertices = bundle_.vertices();
+  const std::span<const std::byte> indices = bundle_.indices();
+  expect_reading(vertices);
+  expect_reading(indices);
+  whole_vertices_ = make_buffer(GL_ARRAY_BUFFER);
+  if (rewrites_) {
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertex_total_), nullptr, GL_STATIC_DRAW);
+    for (const Range& range : vertex_ranges_) {
+      if (range.layout != kNone) fill(range, GL_ARRAY_BUFFER, range.gpu_offset);
+    }
+  } else {
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size()), vertices.data(),
+                 GL_STATIC_DRAW);
+    uploaded_bytes_ += vertices.size();
+  }
+  whole_indices_ = make_buffer(GL_ELEMENT_ARRAY_BUFFER);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size()), indices.data(),
+               GL_STATIC_DRAW);
+  uploaded_bytes_ += indices.size();
+  resident_bytes_ = (rewrites_ ? vertex_total_ : vertices.size()) + indices.size();
+}
+
+/// Copies a range to `offset` of the buffer that is bound to `target`.
+void GeometryStore::fill(const Range& range, GLenum target, std::uint64_t offset) {
+  const bool is_vertices = range.layout != kNone;
+  const std::span<const std::byte> section = is_vertices ? bundle_.vertices() : bundle_.indices();
+  const std::span<const std::byte> source = section.subspan(range.source, range.size);
+  uploaded_bytes_ += range.gpu_size;
+  if (!is_vertices || !formats_[range.layout].widened) {
+    glBufferSubData(target, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(source.size()),
+                    source.data());
+    return;
+  }
+  const VertexFormat& format = formats_[range.layout];
+  const std::size_t step = kScratchVertices * format.source_stride;
+  for (std::size_t at = 0; at < source.size(); at += step) {
+    const std::span<const std::byte> part = source.subspan(at, std::min(step, source.size() - at));
+    const std::size_t bytes = part.size() / format.source_stride * format.stride;
+    const std::span<std::byte> rewritten(scratch_.data(), bytes);
+    widen_vertices(format, part, rewritten);
+    glBufferSubData(target, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes),
+                    rewritten.data());
+    offset += bytes;
+  }
+}
+
+bool GeometryStore::use(std::uint32_t level, GlState& gl, LevelPlace& place) {
+  Range& vertices = vertex_ranges_[level_vertices_[level]];
+  Range& indices = index_ranges_[level];
+  if (!streams_) {
+    place = {whole_vertices_, whole_indices_, vertices.gpu_offset, indices.gpu_offset};
+    return true;
+  }
+  // Stamped before room is made, so that making room for one does not throw out the other.
+  vertices.last_used = frame_;
+  indices.last_used = frame_;
+  if (!make_resident(vertices, gl) || !make_resident(indices, gl)) return false;
+  place = {vertices.buffer, indices.buffer, 0, 0};
+  return true;
+}
+
+bool GeometryStore::make_resident(Range& range, GlState& gl) {
+  if (range.buffer != 0) return true;
+  if (resident_bytes_ + range.gpu_size > budget_ && !evict(range.gpu_size, gl)) return false;
+  const bool is_vertices = range.layout != kNone;
+  const GLenum target = is_vertices ? GL_ARRAY_BUFFER : GL_ELEMENT_ARRAY_BUFFER;
+  glGenBuffers(1, &range.buffer);
+  if (is_vertices) {
+    gl.bind_array_buffer(range.buffer);
+  } else {
+    gl.bind_index_buffer(range.buffer);
+  }
+  if (is_vertices && formats_[range.layout].widened) {
+    glBufferData(target, static_cast<GLsizeiptr>(range.gpu_size), nullptr, GL_STATIC_DRAW);
+    fill(range, target, 0);
+  } else {
+    const std::span<const std::byte> section = is_vertices ? bundle_.vertices() : bundle_.indices();
+    glBufferData(target, static_cast<GLsizeiptr>(range.size), section.data() + range.source,
+                 GL_STATIC_DRAW);
+    uploaded_bytes_ += range.gpu_size;
+  }
+  resident_bytes_ += range.gpu_size;
+  return true;
+}
+
+/// Deletes the ranges that were used longest ago until `bytes` fit; nothing of this frame.
+bool GeometryStore::evict(std::uint64_t bytes, GlState& gl) {
+  while (resident_bytes_ + bytes > budget_) {
+    Range* oldest = nullptr;
+    for (std::vector<Range>* ranges : {&vertex_ranges_, &index_ranges_}) {
+      for (Range& range : *ranges) {
+        if (range.buffer == 0 || range.last_used == frame_) continue;
+        if (oldest == nullptr || range.last_used < oldest->last_used) oldest = &range;
+      }
+    }
+    if (oldest == nullptr) return false;
+    gl.forget_buffer(oldest->buffer);
+    glDeleteBuffers(1, &oldest->buffer);
+    oldest->buffer = 0;
+    resident_bytes_ -= oldest->gpu_size;
+    ++evictions_;
+  }
+  return true;
+}
+
+void GeometryStore::release(GlState& gl) {
+  for (std::vector<Range>* ranges : {&vertex_ranges_, &index_ranges_}) {
+    for (Range& range : *ranges) {
+      if (range.buffer == 0) continue;
+      gl.forget_buffer(range.buffer);
+      glDeleteBuffers(1, &range.buffer);
+    }
+  }
+  const GLuint whole[] = {whole_vertices_, whole_indices_};
+  for (const GLuint buffer : whole) gl.forget_buffer(buffer);
+  glDeleteBuffers(2, whole);
+  forget();
+}
+
+void GeometryStore::forget() {
+  for (std::vector<Range>* ranges : {&vertex_ranges_, &index_ranges_}) {
+    for (Range& range : *ranges) range.buffer = 0;
+  }
+  whole_vertices_ = 0;
+  whole_indices_ = 0;
+  resident_bytes_ = 0;
+}
+
+}  // namespace modar

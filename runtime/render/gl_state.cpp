@@ -1,0 +1,120 @@
+// Remembers what is set in the context, so that nothing is set twice.
+#include "runtime/render/gl_state.hpp"
+
+namespace modar {
+namespace {
+
+/// Stores `value` in `known`; true if GL has to be told.
+template <class T>
+bool differs(T& known, const T& value, int& changes) {
+  if (known == value) return false;
+  known = value;
+  ++changes;
+  return true;
+}
+
+void toggle(GLenum capability, bool enabled) {
+  if (enabled) {
+    glEnable(capability);
+  } else {
+    glDisable(capability);
+  }
+}
+
+}  // namespace
+
+void GlState::reset() {
+  const int counted = changes;
+  *this = GlState();
+  changes = counted;
+  for (GLuint i = 0; i < kAttributeCount; ++i) glDisableVertexAttribArray(i);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_SCISSOR_TEST);
+  glDisable(GL_STENCIL_TEST);
+  glDisable(GL_POLYGON_OFFSET_FILL);
+  glCullFace(GL_BACK);
+  glFrontFace(GL_CCW);
+  glDepthFunc(GL_LEQUAL);
+  glDepthMask(GL_TRUE);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  // The picture's alpha stays what coverage makes it, for a caller that lays it over something.
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  glBlendEquation(GL_FUNC_ADD);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+}
+
+void GlState::use_program(GLuint program) {
+  if (differs(program_, program, changes)) glUseProgram(program);
+}
+
+void GlState::bind_array_buffer(GLuint buffer) {
+  if (differs(array_buffer_, buffer, changes)) glBindBuffer(GL_ARRAY_BUFFER, buffer);
+}
+
+void GlState::bind_index_buffer(GLuint buffer) {
+  if (differs(index_buffer_, buffer, changes)) glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffer);
+}
+
+void GlState::bind_texture(GLuint unit, GLuint texture) {
+  if (textures_[unit] == texture) return;
+  if (differs(active_unit_, unit, changes)) glActiveTexture(GL_TEXTURE0 + unit);
+  textures_[unit] = texture;
+  ++changes;
+  glBindTexture(GL_TEXTURE_2D, texture);
+}
+
+void GlState::set_attribute(GLuint location, const AttributePointer& pointer) {
+  if (!differs(attributes_[location], pointer, changes)) return;
+  bind_array_buffer(pointer.buffer);
+  glVertexAttribPointer(location, pointer.components, pointer.type, pointer.normalised,
+                        pointer.stride, reinterpret_cast<const void*>(pointer.offset));
+}
+
+void GlState::enable_attributes(std::uint32_t mask) {
+  for (GLuint i = 0; i < kAttributeCount; ++i) {
+    const std::uint32_t bit = 1u << i;
+    if ((mask & bit) == (enabled_ & bit)) continue;
+    ++changes;
+    if ((mask & bit) != 0) {
+      glEnableVertexAttribArray(i);
+    } else {
+      glDisableVertexAttribArray(i);
+    }
+  }
+  enabled_ = mask;
+}
+
+void GlState::set_culling(bool enabled) {
+  if (differs(culling_, enabled, changes)) toggle(GL_CULL_FACE, enabled);
+}
+
+void GlState::set_front_face(GLenum winding) {
+  if (differs(front_face_, winding, changes)) glFrontFace(winding);
+}
+
+void GlState::set_blending(bool enabled) {
+  if (differs(blending_, enabled, changes)) toggle(GL_BLEND, enabled);
+}
+
+void GlState::set_depth_test(bool enabled) {
+  if (differs(depth_test_, enabled, changes)) toggle(GL_DEPTH_TEST, enabled);
+}
+
+void GlState::forget_buffer(GLuint buffer) {
+  if (array_buffer_ == buffer) array_buffer_ = kUnknown;
+  if (index_buffer_ == buffer) index_buffer_ = kUnknown;
+  for (AttributePointer& attribute : attributes_) {
+    if (attribute.buffer == buffer) attribute = AttributePointer();
+  }
+}
+
+void GlState::forget_texture(GLuint texture) {
+  for (GLuint& bound : textures_) {
+    if (bound == texture) bound = kUnknown;
+  }
+}
+
+}  // namespace modar

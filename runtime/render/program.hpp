@@ -1,0 +1,55 @@
+// Shader programs: one variant a vertex layout, with the places of its uniforms.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "formats/error.hpp"
+#include "runtime/render/gl_api.hpp"
+
+namespace modar {
+
+enum class NormalKind : std::uint8_t { kAbsent, kXyz, kOctahedral };
+/// Where the matrices of a draw come from.
+enum class SlotKind : std::uint8_t { kSingle, kStream, kAttributes };
+
+/// What tells one variant of the model shaders from another.
+struct ProgramKey {
+  NormalKind normal = NormalKind::kAbsent;
+  SlotKind slots = SlotKind::kSingle;
+  bool textured = false;
+  bool alpha_twin = false;
+  bool coloured = false;
+  int slot_count = 1;  ///< of kStream
+  bool operator==(const ProgramKey&) const = default;
+};
+
+/// A linked program. Uniforms that a variant lacks are at -1, which GL ignores.
+struct ModelProgram {
+  ProgramKey key;
+  GLuint id = 0;
+  GLint slots = -1;
+  GLint projection = -1;
+  GLint ambient = -1;
+  GLint diffuse = -1;
+  GLint specular = -1;
+  GLint emission = -1;
+  GLint light = -1;
+  GLint opacity = -1;
+};
+
+/// Vertex uniform vectors that a model program needs beside its slots.
+inline constexpr int kFixedUniformVectors = 4 + 5;
+
+/// Links sources under "#version 100" and `defines` (each a line). Attribute locations are those of
+/// AttributeSlot by name. Errors: kUnsupported "gl.shader", "gl.program" with the driver's log.
+Result<GLuint> link_program(const std::string& defines, const char* vertex, const char* fragment);
+
+/// The camera picture's shaders; their defines: see shaders/background.frag.
+const char* background_vertex_source();
+const char* background_fragment_source();
+
+/// Leaves the program in use, its samplers set to units 0 and 1.
+Result<ModelProgram> make_model_program(const ProgramKey& key);
+
+}  // namespace modar

@@ -1,0 +1,155 @@
+// The bundle's textures in GL.
+#include "runtime/render/texture_store.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "modar/mapped_file.hpp"
+#include "runtime/render/etc1_decode.hpp"
+
+namespace modar {
+
+TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
+    : bundle_(bundle),
+      etc1_(caps.etc1),
+      npot_mipmaps_(caps.npot_mipmaps),
+      max_side_(static_cast<std::uint32_t>(caps.max_texture_size)) {
+  const std::uint32_t count = bundle.textures().size();
+  used_.assign(count, false);
+  first_level_.assign(count, 0);
+  colours_.assign(count, 0);
+  alphas_.assign(count, 0);
+  for (std::uint32_t i = 0; i < bundle.materials().size(); ++i) {
+    const std::uint32_t texture = bundle.materials()[i].texture;
+    if (texture != kNone) used_[texture] = true;
+  }
+}
+
+std::uint64_t TextureStore::level_bytes(const TextureRecord& texture, std::uint32_t level) const {
+  const TextureLevelRecord& record = bundle_.texture_levels()[texture.first_level + level];
+  const std::uint64_t one =
+      etc1_ ? std::uint64_t{record.size} : std::uint64_t{record.width} * record.height * 3;
+  return record.alpha_offset == kNoOffset ? one : 2 * one;
+}
+
+std::uint64_t TextureStore::bytes_from(std::uint32_t texture, std::uint32_t first) const {
+  const TextureRecord& record = bundle_.textures()[texture];
+  const std::uint32_t end = mipmapped(record) ? record.level_count : first + 1;
+  std::uint64_t bytes = 0;
+  for (std::uint32_t level = first; level < end; ++level) bytes += level_bytes(record, level);
+  return bytes;
+}
+
+bool TextureStore::mipmapped(const TextureRecord& texture) const {
+  if (texture.level_count < 2) return false;
+  return npot_mipmaps_ ||
+         (std::has_single_bit(texture.width) && std::has_single_bit(texture.height));
+}
+
+Result<void> TextureStore::choose_levels(std::uint64_t budget) {
+  const Table<TextureRecord> textures = bundle_.textures();
+  bytes_ = 0;
+  for (std::uint32_t t = 0; t < textures.size(); ++t) {
+    if (!used_[t]) continue;
+    std::uint32_t level = 0;
+    while (level < textures[t].level_count &&
+           std::max(textures[t].width >> level, textures[t].height >> level) > max_side_) {
+      ++level;
+    }
+    if (level == textures[t].level_count) {
+      return fail(ExitCode::kUnsupported, "gl.texture-size",
+                  "texture '" + std::string(bundle_.name(textures[t].name)) + "'",
+                  "it is larger than this device takes, and has no smaller level",
+                  "bake it with mipmaps, or with a smaller --max-texture");
+    }
+    first_level_[t] = level;
+    bytes_ += bytes_from(t, level);
+  }
+  // The largest one gives way, again and again, until the rest fits.
+  while (budget != 0 && bytes_ > budget) {
+    std::uint32_t largest = kNone;
+    std::uint64_t largest_bytes = 0;
+    for (std::uint32_t t = 0; t < textures.size(); ++t) {
+      if (!used_[t] || first_level_[t] + 1 >= textures[t].level_count) continue;
+      const std::uint64_t size = bytes_from(t, first_level_[t]);
+      if (size > largest_bytes) {
+        largest = t;
+        largest_bytes = size;
+      }
+    }
+    if (largest == kNone) break;
+    ++first_level_[largest];
+    bytes_ = bytes_ - largest_bytes + bytes_from(largest, first_level_[largest]);
+  }
+  return {};
+}
+
+Result<void> TextureStore::upload(std::uint64_t budget) {
+  const Result<void> chosen = choose_levels(budget);
+  if (!chosen) return chosen;
+  for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
+    if (!used_[t]) continue;
+    expect_reading(bundle_.texture_data(t));
+    colours_[t] = make(t, false);
+    if ((bundle_.textures()[t].flags & kTextureAlpha) != 0) alphas_[t] = make(t, true);
+  }
+  decoded_ = {};
+  return {};
+}
+
+GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
+  const TextureRecord& record = bundle_.textures()[texture];
+  const std::span<const std::byte> data = bundle_.texture_data(texture);
+  const bool mips = mipmapped(record);
+  GLuint id = 0;
+  glGenTextures(1, &id);
+  glBindTexture(GL_TEXTURE_2D, id);
+  const std::uint32_t first = first_level_[texture];
+  const std::uint32_t end = mips ? record.level_count : first + 1;
+  for (std::uint32_t i = first; i < end; ++i) {
+    const TextureLevelRecord& level = bundle_.texture_levels()[record.first_level + i];
+    const std::uint64_t offset = alpha ? level.alpha_offset : level.offset;
+    const std::span<const std::byte> blocks = data.subspan(offset, level.size);
+    const GLint target_level = static_cast<GLint>(i - first);
+    const GLsizei width = static_cast<GLsizei>(level.width);
+    const GLsizei height = static_cast<GLsizei>(level.height);
+    if (etc1_) {
+      glCompressedTexImage2D(GL_TEXTURE_2D, target_level, GL_ETC1_RGB8_OES, width, height, 0,
+                             static_cast<GLsizei>(level.size), blocks.data());
+      uploaded_bytes_ += level.size;
+    } else {
+      const std::size_t bytes = std::size_t{level.width} * level.height * 3;
+      decoded_.resize(std::max(decoded_.size(), bytes));
+      decode_etc1_rgb(blocks, level.width, level.height, decoded_);
+      glTexImage2D(GL_TEXTURE_2D, target_level, GL_RGB, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE,
+                   decoded_.data());
+      uploaded_bytes_ += bytes;
+    }
+  }
+  // ES 2.0 repeats power-of-two textures only; the bundle says where that is asked for.
+  const bool repeat = (record.flags & kTextureRepeat) != 0;
+  const GLint wrap = repeat ? GL_REPEAT : GL_CLAMP_TO_EDGE;
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, wrap);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, wrap);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, mips ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR);
+  return id;
+}
+
+void TextureStore::release(GlState& gl) {
+  for (std::vector<GLuint>* names : {&colours_, &alphas_}) {
+    for (const GLuint name : *names) {
+      if (name == 0) continue;
+      gl.forget_texture(name);
+      glDeleteTextures(1, &name);
+    }
+  }
+  forget();
+}
+
+void TextureStore::forget() {
+  std::fill(colours_.begin(), colours_.end(), 0u);
+  std::fill(alphas_.begin(), alphas_.end(), 0u);
+}
+
+}  // namespace modar

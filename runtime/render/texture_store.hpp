@@ -1,0 +1,51 @@
+// The bundle's textures in GL: ETC1 blocks straight from the mapped bytes, or decoded to RGB.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "formats/bundle_view.hpp"
+#include "formats/error.hpp"
+#include "modar/gl_context.hpp"
+#include "runtime/render/gl_state.hpp"
+
+namespace modar {
+
+class TextureStore {
+ public:
+  TextureStore(const BundleView& bundle, const GlCaps& caps);
+
+  /// Uploads every texture that a material names. Levels larger than the context's limit are left
+  /// out; so are the finest ones while all together are larger than `budget` bytes (0: no limit).
+  /// Errors: kUnsupported "gl.texture-size" where no level is small enough.
+  Result<void> upload(std::uint64_t budget);
+  void release(GlState& gl);
+  void forget();
+
+  /// 0 where there is none.
+  [[nodiscard]] GLuint colour(std::uint32_t texture) const { return colours_[texture]; }
+  [[nodiscard]] GLuint alpha(std::uint32_t texture) const { return alphas_[texture]; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }
+
+ private:
+  [[nodiscard]] std::uint64_t level_bytes(const TextureRecord& texture, std::uint32_t level) const;
+  [[nodiscard]] std::uint64_t bytes_from(std::uint32_t texture, std::uint32_t first) const;
+  [[nodiscard]] bool mipmapped(const TextureRecord& texture) const;
+  Result<void> choose_levels(std::uint64_t budget);
+  GLuint make(std::uint32_t texture, bool alpha);
+
+  const BundleView& bundle_;
+  bool etc1_ = false;
+  bool npot_mipmaps_ = false;
+  std::uint32_t max_side_ = 64;
+  std::vector<bool> used_;
+  std::vector<std::uint32_t> first_level_;  ///< finest one that is uploaded
+  std::vector<GLuint> colours_;
+  std::vector<GLuint> alphas_;
+  std::vector<std::uint8_t> decoded_;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t uploaded_bytes_ = 0;
+};
+
+}  // namespace modar

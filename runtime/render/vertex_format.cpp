@@ -1,0 +1,116 @@
+// A bundle's vertex layout as GL takes it.
+#include "runtime/render/vertex_format.hpp"
+
+#include <cstring>
+
+#include "formats/quantise.hpp"
+
+namespace modar {
+namespace {
+
+struct Component {
+  GLenum type;
+  std::uint32_t bytes;
+};
+
+Component component(ComponentType type) {
+  switch (type) {
+    case ComponentType::kHalf:
+      return {GL_HALF_FLOAT_OES, 2};
+    case ComponentType::kI16:
+      return {GL_SHORT, 2};
+    case ComponentType::kU16:
+      return {GL_UNSIGNED_SHORT, 2};
+    case ComponentType::kI8:
+      return {GL_BYTE, 1};
+    case ComponentType::kU8:
+      return {GL_UNSIGNED_BYTE, 1};
+    case ComponentType::kF32:
+      break;
+  }
+  return {GL_FLOAT, 4};
+}
+
+/// kAttributeCount where a model shader has no such attribute.
+std::uint32_t location_of(Semantic semantic) {
+  switch (semantic) {
+    case Semantic::kPosition:
+      return kAttributePosition;
+    case Semantic::kNormal:
+    case Semantic::kNormalOct:
+      return kAttributeNormal;
+    case Semantic::kUv:
+      return kAttributeUv;
+    case Semantic::kColour:
+      return kAttributeColour;
+  }
+  return kAttributeCount;
+}
+
+bool has_halves(const LayoutRecord& layout) {
+  for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
+    if (static_cast<ComponentType>(layout.attributes[i].type) == ComponentType::kHalf) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+VertexFormat vertex_format(const LayoutRecord& layout, bool halves) {
+  VertexFormat format;
+  format.source_stride = layout.stride;
+  format.widened = !halves && has_halves(layout);
+  std::uint32_t end = 0;
+  for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
+    const AttributeRecord& record = layout.attributes[i];
+    const Semantic semantic = static_cast<Semantic>(record.semantic);
+    const std::uint32_t location = location_of(semantic);
+    if (location >= format.attributes.size()) continue;
+    const ComponentType type = static_cast<ComponentType>(record.type);
+    const Component source = component(type);
+    const bool widen = format.widened && type == ComponentType::kHalf;
+    VertexAttribute& attribute = format.attributes[location];
+    attribute.components = record.components;
+    attribute.type = widen ? GLenum{GL_FLOAT} : source.type;
+    attribute.normalised = record.normalised != 0 ? GLboolean{GL_TRUE} : GLboolean{GL_FALSE};
+    attribute.source_offset = record.offset;
+    attribute.bytes = source.bytes * record.components;
+    attribute.offset = format.widened ? end : record.offset;
+    // Attributes of a rewritten vertex start at multiples of 4, which every GPU reads fastest.
+    end += ((widen ? 2 * attribute.bytes : attribute.bytes) + 3) & ~3u;
+    format.enabled |= 1u << location;
+    if (semantic == Semantic::kNormal) format.normal = NormalKind::kXyz;
+    if (semantic == Semantic::kNormalOct) format.normal = NormalKind::kOctahedral;
+  }
+  format.stride = format.widened ? end : layout.stride;
+  return format;
+}
+
+void widen_vertices(const VertexFormat& format, std::span<const std::byte> from,
+                    std::span<std::byte> to) {
+  const std::size_t count = from.size() / format.source_stride;
+  if (!to.empty()) std::memset(to.data(), 0, to.size());
+  for (const VertexAttribute& attribute : format.attributes) {
+    if (attribute.components == 0) continue;
+    const bool widen = attribute.type == GL_FLOAT &&
+                       attribute.bytes == 2 * static_cast<std::uint32_t>(attribute.components);
+    const std::byte* source = from.data() + attribute.source_offset;
+    std::byte* target = to.data() + attribute.offset;
+    for (std::size_t v = 0; v < count; ++v) {
+      if (widen) {
+        for (std::size_t c = 0; c < static_cast<std::size_t>(attribute.components); ++c) {
+          std::uint16_t half = 0;
+          std::memcpy(&half, source + 2 * c, sizeof half);
+          const float value = half_to_float(half);
+          std::memcpy(target + 4 * c, &value, sizeof value);
+        }
+      } else {
+        std::memcpy(target, source, attribute.bytes);
+      }
+      source += format.source_stride;
+      target += format.stride;
+    }
+  }
+}
+
+}  // namespace modar

@@ -1,0 +1,37 @@
+// Lit surface: base colour (texture, vertex colour, or white) times light, plus highlights.
+// Defines: TEXTURED; ALPHA_TWIN (alpha is the luminance of a second texture); COLOURED.
+precision mediump float;
+varying vec3 v_light;
+varying vec3 v_shine;
+uniform float u_opacity;
+#ifdef TEXTURED
+// Not touched before the look-up: some GPUs keep more bits of a coordinate then.
+#ifdef GL_FRAGMENT_PRECISION_HIGH
+varying highp vec2 v_uv;
+#else
+varying vec2 v_uv;
+#endif
+uniform sampler2D u_texture;
+#endif
+#ifdef ALPHA_TWIN
+uniform sampler2D u_alpha;
+#endif
+#ifdef COLOURED
+varying vec4 v_colour;
+#endif
+
+void main() {
+  vec4 base = vec4(1.0, 1.0, 1.0, u_opacity);
+#ifdef TEXTURED
+  base.rgb = texture2D(u_texture, v_uv).rgb;
+#endif
+#ifdef ALPHA_TWIN
+  base.a *= texture2D(u_alpha, v_uv).g;
+  // Empty texels must not fill the depth buffer.
+  if (base.a < 0.03) discard;
+#endif
+#ifdef COLOURED
+  base *= v_colour;
+#endif
+  gl_FragColor = vec4(base.rgb * v_light + v_shine, base.a);
+}
