@@ -1,5 +1,5 @@
-// What a bake says of itself: stages as they run, findings as they turn up. The progress bar, --json
-// and the summary all read this one stream.
+// What a bake says of itself: stages as they run, findings as they turn up. The progress bar,
+// --json and the summary all read this one stream.
 #pragma once
 
 #include <chrono>

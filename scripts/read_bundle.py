@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Reads and checks a ModAR bundle, written from formats/bundle.md alone: a second opinion on ours.
 
-Usage: read_bundle.py FILE [--json] [--full]
-  --json  print what was decoded; --full adds every position, normal, uv, colour and index to it
-Exit: 0 good, 1 usage, 2 the file cannot be read, 3 the bundle is invalid or unsupported.
+Usage: read_bundle.py FILE... [--json] [--full]
+  --json  print what was decoded of one file; --full adds every position, normal, uv, colour, index
+Exit: 0 good, 1 usage, 2 a file cannot be read, 3 a bundle is invalid or unsupported.
 """
 import json
 import math
@@ -318,33 +318,41 @@ def check(bundle, full):
             "meta": meta, "sections": bundle.sections, **tables, "features": features}
 
 
+def read(path, full):
+    """The bundle, what was decoded of it, and an exit code with words where that fails."""
+    try:
+        with open(path, "rb") as file:
+            bundle = Bundle(file.read())
+        return bundle, check(bundle, full), 0, ""
+    except OSError as error:
+        return None, None, 2, f"error: {error}"
+    except Fault as fault:
+        return None, None, 3, str(fault)
+
+
 def main(arguments):
-    files = [a for a in arguments if not a.startswith("--")]
+    files = [a for a in arguments if not a.startswith("-")]
     options = set(arguments) - set(files)
     if options & {"--help", "-h"}:
         print(__doc__)
         return 0
-    if len(files) != 1 or options - {"--json", "--full"}:
+    if not files or options - {"--json", "--full"} or ("--json" in options and len(files) > 1):
         print(__doc__, file=sys.stderr)
         return 1
-    try:
-        with open(files[0], "rb") as file:
-            data = file.read()
-    except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    try:
-        bundle = Bundle(data)
-        decoded = check(bundle, "--full" in options)
-    except Fault as fault:
-        print(fault, file=sys.stderr)
-        return 3
-    if "--json" in options:
-        print(json.dumps(decoded, indent=1, ensure_ascii=False, allow_nan=False))
-    else:
-        counts = ", ".join(f"{len(rows)} {name}" for name, rows in bundle.tables.items() if rows)
-        print(f"good: {len(data)} bytes, {len(bundle.sections)} sections, {counts}")
-    return 0
+    worst = 0
+    for path in files:
+        prefix = f"{path}: " if len(files) > 1 else ""
+        bundle, decoded, code, words = read(path, "--full" in options)
+        worst = max(worst, code)
+        if code != 0:
+            print(prefix + words, file=sys.stderr)
+        elif "--json" in options:
+            print(json.dumps(decoded, indent=1, ensure_ascii=False, allow_nan=False))
+        else:
+            counts = [f"{len(rows)} {name}" for name, rows in bundle.tables.items() if rows]
+            print(f"{prefix}good: {len(bundle.data)} bytes, " +
+                  ", ".join([f"{len(bundle.sections)} sections"] + counts))
+    return worst
 
 
 if __name__ == "__main__":

@@ -1,0 +1,58 @@
+// The bake as a whole: files in, the content of one bundle out.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bake/report.hpp"
+#include "bake/texture/etc1_texture.hpp"
+#include "formats/bundle_writer.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// Which axis of the model points out of the pattern, towards the camera.
+enum class UpAxis : std::uint8_t { kX, kY, kZ, kMinusX, kMinusY, kMinusZ };
+
+/// A scene as the user asks for it. Names are those of files without folder and extension.
+struct SceneRequest {
+  std::string pattern;
+  std::string model;
+  double scale = 1.0;  ///< factor on: largest side of the model = largest side of the pattern
+  UpAxis up = UpAxis::kZ;
+  bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
+  std::array<double, 3> offset{};  ///< pattern units (half of its largest side), added at last
+};
+
+struct PatternRequest {
+  std::string path;
+  double width_mm = 0.0;  ///< 0: what the file states, or unknown
+};
+
+struct BakeRequest {
+  std::vector<std::string> models;
+  std::vector<PatternRequest> patterns;
+  std::vector<SceneRequest> scenes;
+  TextureOptions textures;
+  double unit_metres = 0.0;  ///< metres in a source unit of the models; 0: unknown
+  unsigned jobs = 1;         ///< the bytes do not depend on it
+  std::string tool_version;
+};
+
+/// Runs all stages. One model and one pattern without a scene make one by themselves.
+/// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown".
+Result<BundleContent> build_bundle(const BakeRequest& request, Report& report);
+
+/// The scene's record for a model whose source box has these side lengths (source units).
+SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,
+                        const std::array<double, 3>& model_sides);
+
+/// JSON of the kMeta section: tool, options and source file names, without folders or times.
+std::string bundle_meta(const BakeRequest& request);
+
+/// "dir/spider.obj" -> "spider".
+std::string file_stem(const std::string& path);
+
+}  // namespace modar

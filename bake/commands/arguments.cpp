@@ -1,0 +1,126 @@
+// The text forms that options take: scenes, corners, lengths.
+#include "bake/commands/arguments.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace modar {
+namespace {
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  std::size_t start = 0;
+  for (;;) {
+    const std::size_t end = text.find(separator, start);
+    parts.push_back(text.substr(start, end - start));
+    if (end == std::string_view::npos) return parts;
+    start = end + 1;
+  }
+}
+
+/// The whole text as a finite number.
+bool parse_number(std::string_view text, double& value) {
+  const char* last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, value);
+  return error == std::errc() && end == last && std::isfinite(value);
+}
+
+tl::unexpected<Error> scene_error(const std::string& text, const std::string& cause) {
+  return fail(
+      ExitCode::kUsage, "cli.scene", "--scene " + text, cause,
+      "write PATTERN=MODEL, then any of ,scale=S ,up=x|y|z|-x|-y|-z ,offset=X:Y:Z ,centred");
+}
+
+bool parse_up(std::string_view text, UpAxis& up) {
+  constexpr std::string_view kNames[] = {"x", "y", "z", "-x", "-y", "-z"};
+  for (std::size_t i = 0; i < std::size(kNames); ++i) {
+    if (text == kNames[i]) {
+      up = static_cast<UpAxis>(i);
+      return true;
+    }
+  }
+  return false;
+}
+
+bool parse_offset(std::string_view text, std::array<double, 3>& offset) {
+  const std::vector<std::string_view> parts = split(text, ':');
+  return parts.size() == 3 && parse_number(parts[0], offset[0]) &&
+         parse_number(parts[1], offset[1]) && parse_number(parts[2], offset[2]);
+}
+
+}  // namespace
+
+Result<SceneRequest> parse_scene(const std::string& text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  const std::size_t equals = parts[0].find('=');
+  if (equals == std::string_view::npos || equals == 0 || equals + 1 == parts[0].size()) {
+    return scene_error(text, "it does not begin with PATTERN=MODEL");
+  }
+  SceneRequest scene;
+  scene.pattern = std::string(parts[0].substr(0, equals));
+  scene.model = std::string(parts[0].substr(equals + 1));
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const std::string_view part = parts[i];
+    bool good = false;
+    if (part.starts_with("scale=")) {
+      good = parse_number(part.substr(6), scene.scale) && scene.scale > 0;
+    } else if (part.starts_with("up=")) {
+      good = parse_up(part.substr(3), scene.up);
+    } else if (part.starts_with("offset=")) {
+      good = parse_offset(part.substr(7), scene.offset);
+    } else if (part == "centred") {
+      good = scene.centred = true;
+    }
+    if (!good) return scene_error(text, "'" + std::string(part) + "' is not understood");
+  }
+  return scene;
+}
+
+Result<std::array<PixelPoint, 4>> parse_corners(const std::string& text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  std::array<double, 8> values{};
+  bool good = parts.size() == values.size();
+  for (std::size_t i = 0; good && i < values.size(); ++i) good = parse_number(parts[i], values[i]);
+  if (!good) {
+    return fail(ExitCode::kUsage, "cli.corners", "--corners " + text,
+                "these are not eight numbers with commas between them",
+                "write x,y of the top-left, top-right, bottom-right and bottom-left corner");
+  }
+  std::array<PixelPoint, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i) corners[i] = {values[2 * i], values[2 * i + 1]};
+  return corners;
+}
+
+Result<PatternRequest> parse_pattern(const std::string& text) {
+  PatternRequest request;
+  request.path = text;
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || !text.ends_with("mm")) return request;
+  const std::string_view width = std::string_view(text).substr(colon + 1, text.size() - colon - 3);
+  if (!parse_number(width, request.width_mm) || request.width_mm <= 0) {
+    return fail(ExitCode::kUsage, "cli.pattern", "--pattern " + text,
+                "'" + std::string(width) + "' is no width in millimetres",
+                "write FILE:WIDTHmm, as in cover.png:148mm");
+  }
+  request.path = text.substr(0, colon);
+  return request;
+}
+
+Result<double> parse_unit(const std::string& text) {
+  struct Unit {
+    const char* name;
+    double metres;
+  };
+  constexpr Unit kUnits[] = {{"mm", 0.001},  {"cm", 0.01},   {"m", 1.0},
+                             {"km", 1000.0}, {"in", 0.0254}, {"ft", 0.3048}};
+  for (const Unit& unit : kUnits) {
+    if (text == unit.name) return unit.metres;
+  }
+  return fail(ExitCode::kUsage, "cli.unit", "--unit " + text, "there is no such unit",
+              "name one of mm, cm, m, km, in, ft");
+}
+
+}  // namespace modar

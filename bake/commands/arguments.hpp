@@ -1,0 +1,27 @@
+// The text forms that options take: scenes, corners, lengths.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "bake/bundle_builder.hpp"
+#include "bake/pattern/pattern_image.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred]".
+/// Errors: kUsage "cli.scene".
+Result<SceneRequest> parse_scene(const std::string& text);
+
+/// "x,y,x,y,x,y,x,y" in pixels: top-left, top-right, bottom-right, bottom-left.
+/// Errors: kUsage "cli.corners".
+Result<std::array<PixelPoint, 4>> parse_corners(const std::string& text);
+
+/// "FILE" or "FILE:WIDTHmm" (a physical width). Errors: kUsage "cli.pattern".
+Result<PatternRequest> parse_pattern(const std::string& text);
+
+/// "mm", "cm", "m", "km", "in", "ft" to metres. Errors: kUsage "cli.unit".
+Result<double> parse_unit(const std::string& text);
+
+}  // namespace modar

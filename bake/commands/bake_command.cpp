@@ -1,0 +1,78 @@
+// `modar bake`: OBJ models and pattern images to one bundle.
+#include <cstdio>
+#include <string>
+
+#include "bake/bundle_builder.hpp"
+#include "bake/commands/commands.hpp"
+#include "bake/commands/json_output.hpp"
+#include "bake/commands/terminal.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+void print_summary(const BundleView& bundle, const Report& report, const std::string& path) {
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const ModelRecord& model = bundle.models()[m];
+    std::fprintf(stderr,
+                 "model   %-16s %llu triangles, %llu vertices, %u chunks, error at most %.3g of a "
+                 "diagonal of %.4g\n",
+                 std::string(bundle.name(model.name)).c_str(),
+                 static_cast<unsigned long long>(model.triangle_count),
+                 static_cast<unsigned long long>(model.vertex_count), model.chunk_count,
+                 model.position_error_max, model.diagonal);
+  }
+  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
+    const TextureRecord& texture = bundle.textures()[t];
+    std::fprintf(stderr, "texture %-16s %u x %u, %u levels, %.2f dB\n",
+                 std::string(bundle.name(texture.name)).c_str(), texture.width, texture.height,
+                 texture.level_count, static_cast<double>(texture.psnr_db));
+  }
+  for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
+    const PatternRecord& pattern = bundle.patterns()[p];
+    std::string counts;
+    for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
+      const ParameterSetRecord& set = bundle.parameter_sets()[s];
+      counts += " " + std::string(bundle.name(set.name)) + "=" +
+                std::to_string(bundle.features(p, set.id).keypoints.size());
+    }
+    std::fprintf(stderr, "pattern %-16s %u x %u, keypoints%s\n",
+                 std::string(bundle.name(pattern.name)).c_str(), pattern.width, pattern.height,
+                 counts.c_str());
+  }
+  double ms = 0;
+  for (const StageReport& stage : report.stages) ms += stage.ms;
+  std::fprintf(stderr, "%s: %s, baked in %.1f s\n", path.c_str(),
+               human_bytes(bundle.bytes().size()).c_str(), ms / 1000);
+}
+
+}  // namespace
+
+int run_bake(const BakeCommand& command) {
+  ProgressBar bar(command.quiet);
+  Report report;
+  report.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
+
+  Result<BundleContent> content = build_bundle(command.request, report);
+  bar.clear();
+  if (!command.quiet) {
+    for (const Finding& finding : report.findings) print_finding(finding);
+  }
+  if (!content) return print_error(content.error());
+  StageTimer writing(report, "write");
+  if (auto saved = save_bundle(*content, command.output); !saved) return print_error(saved.error());
+
+  // What is told of the bundle is read back from the file, so that it is true of the file.
+  Result<MappedFile> file = MappedFile::open(command.output);
+  if (!file) return print_error(file.error());
+  Result<BundleView> bundle = BundleView::open(file->bytes());
+  if (!bundle) return print_error(bundle.error());
+  writing.done(content->models.size() + content->patterns.size(), file->bytes().size());
+  bar.clear();
+  if (!command.quiet) print_summary(*bundle, report, command.output);
+  if (command.json) std::fputs(bake_json(*bundle, report, process_cost()).c_str(), stdout);
+  return static_cast<int>(ExitCode::kOk);
+}
+
+}  // namespace modar

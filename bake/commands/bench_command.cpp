@@ -1,0 +1,103 @@
+// `modar bench NAME`: figures as ratios, ours and the reference side by side in one run.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bake/commands/commands.hpp"
+#include "bake/commands/json_output.hpp"
+#include "bake/commands/terminal.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+using BenchResult = Result<std::vector<BenchRow>>;
+
+struct Bench {
+  const char* name;
+  const char* inputs;  ///< what its arguments are
+  const char* summary;
+  std::function<BenchResult(const BenchCommand&)> run;
+};
+
+/// Median milliseconds of `repeats` runs.
+double median_ms(int repeats, const std::function<void()>& work) {
+  std::vector<double> times;
+  for (int i = 0; i < repeats; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
+    times.push_back(ms.count());
+  }
+  std::nth_element(times.begin(), times.begin() + repeats / 2, times.end());
+  return times[static_cast<std::size_t>(repeats / 2)];
+}
+
+/// Opening a bundle (map, validate headers and tables) against copying its bytes once, which is the
+/// least that any format pays that has to be read.
+BenchResult bench_load(const BenchCommand& command) {
+  std::vector<BenchRow> rows;
+  for (const std::string& path : command.inputs) {
+    Result<MappedFile> warm = MappedFile::open(path);
+    if (!warm) return tl::unexpected(warm.error());
+    std::vector<std::byte> copy(warm->bytes().size());
+    bool opened = true;
+    const double open_ms = median_ms(51, [&] {
+      Result<MappedFile> file = MappedFile::open(path);
+      opened = opened && file && BundleView::open(file->bytes());
+    });
+    if (!opened) {
+      return fail(ExitCode::kInvalidInput, "bench.bundle", path, "this is no good bundle",
+                  "see what `modar check` says of it");
+    }
+    const double copy_ms = median_ms(
+        51, [&] { std::memcpy(copy.data(), warm->bytes().data(), warm->bytes().size()); });
+    rows.push_back({"open_ms " + file_stem(path), open_ms, copy_ms, open_ms / copy_ms});
+  }
+  return rows;
+}
+
+const std::vector<Bench>& benches() {
+  static const std::vector<Bench> all = {
+      {"load", "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
+       bench_load},
+  };
+  return all;
+}
+
+}  // namespace
+
+int run_bench(const BenchCommand& command) {
+  for (const Bench& bench : benches()) {
+    if (command.name != bench.name) continue;
+    if (command.inputs.empty()) {
+      return print_error({ExitCode::kUsage, "bench.inputs", command.name, "it needs input files",
+                          std::string("modar bench ") + bench.name + " " + bench.inputs});
+    }
+    const BenchResult rows = bench.run(command);
+    if (!rows) return print_error(rows.error());
+    if (command.json) {
+      std::fputs(bench_json(*rows).c_str(), stdout);
+      return static_cast<int>(ExitCode::kOk);
+    }
+    std::printf("%-32s %14s %14s %10s\n", "measure", "ours", "reference", "ratio");
+    for (const BenchRow& row : *rows) {
+      std::printf("%-32s %14.6g %14.6g %10.4g\n", row.measure.c_str(), row.ours, row.reference,
+                  row.ratio);
+    }
+    return static_cast<int>(ExitCode::kOk);
+  }
+  std::string names;
+  for (const Bench& bench : benches()) {
+    names += std::string("\n  ") + bench.name + " " + bench.inputs + ": " + bench.summary;
+  }
+  return print_error({ExitCode::kUsage, "bench.unknown", command.name, "there is no such bench",
+                      "there are:" + names});
+}
+
+}  // namespace modar

@@ -1,0 +1,208 @@
+// The command line of `modar`, told to CLI11 and taken from it as plain structs.
+#include "bake/commands/cli.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bake/commands/arguments.hpp"
+#include "bake/commands/commands.hpp"
+#include "bake/commands/terminal.hpp"
+
+#ifndef MODAR_VERSION
+#error "CMake defines MODAR_VERSION"
+#endif
+
+namespace modar {
+namespace {
+
+constexpr const char* kExitCodes =
+    "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
+    "4 a bug of ours, 5 not supported.\n";
+
+std::string example(const std::string& text) {
+  return "\nExample:\n" + text + kExitCodes;
+}
+
+/// Options as text, before they are parsed into a command.
+struct BakeTexts {
+  std::vector<std::string> patterns;
+  std::vector<std::string> scenes;
+  std::string unit;
+};
+
+CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
+  CLI::App* sub = app.add_subcommand("bake", "Models and pattern images to one bundle");
+  sub->add_option("--model", bake.request.models, "OBJ files")->type_name("FILE");
+  sub->add_option("--pattern", texts.patterns,
+                  "Images of flat things, frontal; :WIDTHmm tells the printed width")
+      ->type_name("FILE[:WIDTHmm]");
+  sub->add_option(
+         "--scene", texts.scenes,
+         "Which model stands on which pattern; needed where there is more than one of either")
+      ->type_name("PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred]");
+  sub->add_option("-o,--output", bake.output, "The bundle to write")
+      ->required()
+      ->type_name("OUT.modar");
+  sub->add_option("--unit", texts.unit, "Unit of the models' coordinates: mm, cm, m, km, in, ft");
+  sub->add_option("--max-texture", bake.request.textures.max_side,
+                  "Longest side of a texture, in pixels")
+      ->check(CLI::Range(4u, kMaxTextureSide))
+      ->capture_default_str();
+  sub->add_flag("!--no-mipmaps", bake.request.textures.mipmaps, "Store level 0 of textures only");
+  sub->add_option("--jobs", bake.request.jobs, "Threads; the bytes do not depend on it")
+      ->check(CLI::Range(1u, 256u))
+      ->capture_default_str();
+  sub->add_flag("--quiet", bake.quiet, "No progress, no summary, no findings on stderr");
+  sub->add_flag("--json", bake.json, "Print what was baked, stages and findings as JSON");
+  sub->footer(
+      example("  modar bake --model spider.obj --pattern box.png:210mm"
+              " --scene box=spider,up=y,scale=0.8 -o spider.modar\n"));
+  return sub;
+}
+
+CLI::App* add_rectify(CLI::App& pattern, RectifyCommand& rectify, std::string& corners) {
+  CLI::App* sub =
+      pattern.add_subcommand("rectify", "A frontal picture from a photo and four corners");
+  sub->add_option("photo", rectify.photo, "The photo")->required()->type_name("PHOTO");
+  sub->add_option("--corners", corners,
+                  "Pixels of the top-left, top-right, bottom-right and bottom-left corner")
+      ->required()
+      ->type_name("x,y,x,y,x,y,x,y");
+  sub->add_option("--width-mm", rectify.options.width_mm, "Physical width of the thing")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--height-mm", rectify.options.height_mm,
+                  "Physical height; without it the aspect ratio comes from the perspective")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--max-side", rectify.options.max_side, "Longest side of the result, in pixels")
+      ->check(CLI::Range(16u, kMaxTextureSide))
+      ->capture_default_str();
+  sub->add_option("-o,--output", rectify.output, "The PNG to write")
+      ->required()
+      ->type_name("IMAGE");
+  sub->add_flag("--json", rectify.json, "Print the image's size as JSON");
+  sub->footer(
+      example("  modar pattern rectify photo.jpg --corners 212,80,905,131,870,640,190,602"
+              " --width-mm 210 -o cover.png\n"));
+  return sub;
+}
+
+CLI::App* add_check(CLI::App& app, CheckCommand& check) {
+  CLI::App* sub = app.add_subcommand("check", "Prove that a bundle is good");
+  CLI::Option* bundle = sub->add_option("bundle", check.bundle, "The bundle")->type_name("BUNDLE");
+  CLI::Option* list = sub->add_flag("--list-issues", check.list_issues,
+                                    "Print all kinds of issues with their cures (ISSUES.md)");
+  bundle->excludes(list);
+  sub->add_flag("--json", check.json, "Print verdict and issues as JSON");
+  sub->add_flag("--warnings-as-errors", check.warnings_as_errors, "A warning makes the bundle bad");
+  sub->footer(example("  modar check spider.modar\n") + "A bad bundle answers 3.\n");
+  return sub;
+}
+
+CLI::App* add_inspect(CLI::App& app, InspectCommand& inspect) {
+  CLI::App* sub = app.add_subcommand("inspect", "Show what a bundle holds, or take it out");
+  sub->add_option("bundle", inspect.bundle, "The bundle")->required()->type_name("BUNDLE");
+  sub->add_option("--extract", inspect.extract,
+                  "Write models as GLB, textures as PKM and KTX, patterns as YML")
+      ->type_name("DIR");
+  sub->add_flag("--json", inspect.json, "Print as JSON");
+  sub->footer(example("  modar inspect spider.modar --extract out/\n"));
+  return sub;
+}
+
+CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
+  CLI::App* sub = app.add_subcommand("bench", "Measure, as ratios to a reference in the same run");
+  sub->add_option("name", bench.name, "Which bench; an unknown name lists them")
+      ->required()
+      ->type_name("NAME");
+  sub->add_option("inputs", bench.inputs, "Its input files");
+  sub->add_option("--crop", bench.crop, "etc1: side of the centre crop, in pixels");
+  sub->add_flag("--json", bench.json, "Print the rows as JSON");
+  sub->footer(example("  modar bench load spider.modar --json\n"));
+  return sub;
+}
+
+int bake_from_texts(BakeCommand& bake, const BakeTexts& texts) {
+  for (const std::string& text : texts.patterns) {
+    Result<PatternRequest> pattern = parse_pattern(text);
+    if (!pattern) return print_error(pattern.error());
+    bake.request.patterns.push_back(std::move(*pattern));
+  }
+  for (const std::string& text : texts.scenes) {
+    Result<SceneRequest> scene = parse_scene(text);
+    if (!scene) return print_error(scene.error());
+    bake.request.scenes.push_back(std::move(*scene));
+  }
+  if (!texts.unit.empty()) {
+    const Result<double> unit = parse_unit(texts.unit);
+    if (!unit) return print_error(unit.error());
+    bake.request.unit_metres = *unit;
+  }
+  bake.request.tool_version = MODAR_VERSION;
+  return run_bake(bake);
+}
+
+int rectify_from_texts(RectifyCommand& rectify, const std::string& corners) {
+  const Result<std::array<PixelPoint, 4>> parsed = parse_corners(corners);
+  if (!parsed) return print_error(parsed.error());
+  rectify.options.corners = *parsed;
+  return run_rectify(rectify);
+}
+
+int parse_and_run(int argc, char** argv) {
+  CLI::App app("modar: bakes models and patterns for augmented reality on old phones");
+  app.set_version_flag("--version", std::string("modar ") + MODAR_VERSION);
+  app.require_subcommand(1);
+  app.footer("\n`modar COMMAND --help` shows the options and an example of each command.\n");
+
+  BakeCommand bake;
+  bake.request.jobs = std::max(1u, std::thread::hardware_concurrency());
+  BakeTexts bake_texts;
+  CheckCommand check;
+  InspectCommand inspect;
+  BenchCommand bench;
+  RectifyCommand rectify;
+  std::string corners;
+  const CLI::App* bake_sub = add_bake(app, bake, bake_texts);
+  CLI::App* pattern_sub = app.add_subcommand("pattern", "Work on pattern images");
+  pattern_sub->require_subcommand(1);
+  const CLI::App* rectify_sub = add_rectify(*pattern_sub, rectify, corners);
+  const CLI::App* check_sub = add_check(app, check);
+  const CLI::App* inspect_sub = add_inspect(app, inspect);
+  const CLI::App* bench_sub = add_bench(app, bench);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
+                                : static_cast<int>(ExitCode::kUsage);
+  }
+  if (bake_sub->parsed()) return bake_from_texts(bake, bake_texts);
+  if (rectify_sub->parsed()) return rectify_from_texts(rectify, corners);
+  if (check_sub->parsed()) {
+    if (check.bundle.empty() && !check.list_issues) {
+      return print_error(
+          {ExitCode::kUsage, "cli.bundle", "check", "no bundle is named", "modar check BUNDLE"});
+    }
+    return run_check(check);
+  }
+  if (inspect_sub->parsed()) return run_inspect(inspect);
+  if (bench_sub->parsed()) return run_bench(bench);
+  return static_cast<int>(ExitCode::kUsage);
+}
+
+}  // namespace
+
+int run_modar(int argc, char** argv) {
+  try {
+    return parse_and_run(argc, argv);
+  } catch (const std::exception& error) {
+    return print_error({ExitCode::kInternal, "modar.bug", "", error.what(),
+                        "this is a bug of ours: please report it with the command line"});
+  }
+}
+
+}  // namespace modar

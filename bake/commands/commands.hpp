@@ -1,0 +1,53 @@
+// The commands of `modar`: plain options in, an exit code out. cli.cpp fills the options.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bake/bundle_builder.hpp"
+#include "bake/pattern/pattern_image.hpp"
+
+namespace modar {
+
+struct BakeCommand {
+  BakeRequest request;
+  std::string output;
+  bool quiet = false;
+  bool json = false;
+};
+
+struct RectifyCommand {
+  std::string photo;
+  RectifyOptions options;
+  std::string output;
+  bool json = false;
+};
+
+struct CheckCommand {
+  std::string bundle;
+  bool json = false;
+  bool warnings_as_errors = false;
+  bool list_issues = false;  ///< print ISSUES.md instead
+};
+
+struct InspectCommand {
+  std::string bundle;
+  std::string extract;  ///< folder for GLB, PKM, YML; empty: none
+  bool json = false;
+};
+
+struct BenchCommand {
+  std::string name;
+  std::vector<std::string> inputs;
+  unsigned crop = 0;  ///< etc1: side of the centre crop in pixels, 0: whole images
+  bool json = false;
+};
+
+/// Each prints data to stdout and words to stderr, and answers the exit code.
+int run_bake(const BakeCommand& command);
+int run_rectify(const RectifyCommand& command);
+int run_check(const CheckCommand& command);
+int run_inspect(const InspectCommand& command);
+int run_bench(const BenchCommand& command);
+
+}  // namespace modar

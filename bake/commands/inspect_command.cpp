@@ -1,0 +1,108 @@
+// `modar inspect`: what a bundle holds, as a table, as JSON, or taken out as files.
+#include <cstdio>
+#include <string>
+
+#include "bake/commands/commands.hpp"
+#include "bake/commands/json_output.hpp"
+#include "bake/commands/terminal.hpp"
+#include "bake/extract.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+void print_models(const BundleView& bundle) {
+  if (bundle.models().empty()) return;
+  std::printf("\n%-18s %11s %11s %7s %5s %10s %14s %10s\n", "model", "triangles", "vertices",
+              "chunks", "lods", "diagonal", "max error", "of diag.");
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const ModelRecord& model = bundle.models()[m];
+    std::printf("%-18s %11llu %11llu %7u %5u %10.5g %14.3g %10.2g\n",
+                std::string(bundle.name(model.name)).c_str(),
+                static_cast<unsigned long long>(model.triangle_count),
+                static_cast<unsigned long long>(model.vertex_count), model.chunk_count,
+                model.level_count, model.diagonal, model.position_error_max,
+                model.diagonal > 0 ? model.position_error_max / model.diagonal : 0.0);
+  }
+}
+
+void print_textures(const BundleView& bundle) {
+  if (bundle.textures().empty()) return;
+  std::printf("\n%-24s %11s %7s %10s %8s %7s %6s\n", "texture", "size", "levels", "bytes",
+              "PSNR dB", "SSIM", "alpha");
+  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
+    const TextureRecord& texture = bundle.textures()[t];
+    const std::string size = std::to_string(texture.width) + "x" + std::to_string(texture.height);
+    std::printf("%-24s %11s %7u %10s %8.2f %7.4f %6s\n",
+                std::string(bundle.name(texture.name)).c_str(), size.c_str(), texture.level_count,
+                human_bytes(bundle.texture_data(t).size()).c_str(),
+                static_cast<double>(texture.psnr_db), static_cast<double>(texture.ssim),
+                (texture.flags & kTextureAlpha) != 0 ? "yes" : "no");
+  }
+}
+
+void print_patterns(const BundleView& bundle) {
+  if (bundle.patterns().empty()) return;
+  std::printf("\n%-18s %11s %9s", "pattern", "size", "width");
+  for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
+    std::printf(" %9s", std::string(bundle.name(bundle.parameter_sets()[s].name)).c_str());
+  }
+  std::printf("\n");
+  for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
+    const PatternRecord& pattern = bundle.patterns()[p];
+    const std::string size = std::to_string(pattern.width) + "x" + std::to_string(pattern.height);
+    char width[32] = "-";
+    if (pattern.width_mm > 0) std::snprintf(width, sizeof width, "%.4g mm", pattern.width_mm);
+    std::printf("%-18s %11s %9s", std::string(bundle.name(pattern.name)).c_str(), size.c_str(),
+                width);
+    for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
+      std::printf(" %9zu", bundle.features(p, bundle.parameter_sets()[s].id).keypoints.size());
+    }
+    std::printf("\n");
+  }
+}
+
+void print_table(const BundleView& bundle, const std::string& path) {
+  std::printf("%s: bundle %u.%u, %s, %zu sections\n", path.c_str(), bundle.header().major,
+              bundle.header().minor, human_bytes(bundle.bytes().size()).c_str(),
+              bundle.sections().size());
+  print_models(bundle);
+  print_textures(bundle);
+  print_patterns(bundle);
+  if (bundle.scenes().empty()) return;
+  std::printf("\nscenes\n");
+  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
+    const SceneRecord& scene = bundle.scenes()[s];
+    std::printf("  on %s stands %s, scale %g\n",
+                std::string(bundle.name(bundle.patterns()[scene.pattern].name)).c_str(),
+                std::string(bundle.name(bundle.models()[scene.model].name)).c_str(),
+                static_cast<double>(scene.scale));
+  }
+}
+
+}  // namespace
+
+int run_inspect(const InspectCommand& command) {
+  Result<MappedFile> file = MappedFile::open(command.bundle);
+  if (!file) return print_error(file.error());
+  Result<BundleView> bundle = BundleView::open(file->bytes());
+  if (!bundle) {
+    Error error = bundle.error();
+    error.where = command.bundle + (error.where.empty() ? "" : ", " + error.where);
+    return print_error(error);
+  }
+  if (!command.extract.empty()) {
+    Result<std::vector<std::string>> files = extract_bundle(*bundle, command.extract);
+    if (!files) return print_error(files.error());
+    for (const std::string& name : *files) std::fprintf(stderr, "wrote %s\n", name.c_str());
+  }
+  if (command.json) {
+    std::fputs(inspect_json(*bundle).c_str(), stdout);
+  } else {
+    print_table(*bundle, command.bundle);
+  }
+  return static_cast<int>(ExitCode::kOk);
+}
+
+}  // namespace modar

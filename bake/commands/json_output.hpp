@@ -1,0 +1,36 @@
+// The --json documents of the commands, and the bundle's meta text. The keys are a contract.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bake/commands/terminal.hpp"
+#include "bake/report.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
+
+namespace modar {
+
+/// `modar inspect --json`.
+std::string inspect_json(const BundleView& bundle);
+
+/// `modar bake --json`: inspect's document under "bundle", stages, findings, cost.
+std::string bake_json(const BundleView& bundle, const Report& report, const ProcessCost& cost);
+
+/// `modar check --json`.
+std::string check_json(bool good, const std::vector<Issue>& issues);
+
+/// `modar pattern rectify --json`.
+std::string rectify_json(const std::string& path, std::uint32_t width, std::uint32_t height,
+                         double width_mm);
+
+/// A row of `modar bench NAME --json`.
+struct BenchRow {
+  std::string measure;
+  double ours = 0;
+  double reference = 0;
+  double ratio = 0;
+};
+std::string bench_json(const std::vector<BenchRow>& rows);
+
+}  // namespace modar

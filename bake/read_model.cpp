@@ -1,0 +1,23 @@
+// Picks the reader of a model file by its extension.
+#include "bake/read_model.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "bake/model/obj_reader.hpp"
+
+namespace modar {
+
+Result<SourceModel> read_model(const std::string& path, [[maybe_unused]] unsigned jobs) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  if (extension == ".obj") return read_obj(path);
+  return fail(ExitCode::kUnsupported, "model.format", path,
+              extension.empty() ? "the file has no extension that names its format"
+                                : "files of the kind '" + extension + "' are not read",
+              "convert it to Wavefront OBJ (.obj)");
+}
+
+}  // namespace modar

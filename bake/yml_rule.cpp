@@ -1,0 +1,67 @@
+// The one rule of the checker that needs OpenCV: a pattern's YML text equals its mapped twin.
+#include "bake/yml_rule.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "formats/bundle_view.hpp"
+#include "modar/features.hpp"
+
+namespace modar {
+namespace {
+
+const IssueKind* yml_issue_kind() {
+  for (const IssueKind& kind : issue_kinds()) {
+    if (std::strcmp(kind.id, "PATTERN_YML_DIFFERS") == 0) return &kind;
+  }
+  return nullptr;
+}
+
+/// Empty where text and twin agree, else what differs.
+std::string difference(std::string_view yml, const FeatureView& twin) {
+  const Result<Features> text = features_from_yml(std::string(yml));
+  if (!text) return to_line(text.error());
+  if (text->keypoints.size() != twin.keypoints.size()) {
+    return std::to_string(text->keypoints.size()) + " keypoints in the text, " +
+           std::to_string(twin.keypoints.size()) + " in the twin";
+  }
+  const bool same_keypoints =
+      twin.keypoints.empty() ||
+      std::memcmp(text->keypoints.data(), twin.keypoints.data(), twin.keypoints.size_bytes()) == 0;
+  if (!same_keypoints) return "keypoints differ";
+  if (!std::equal(text->descriptors.begin(), text->descriptors.end(), twin.descriptors.begin(),
+                  twin.descriptors.end())) {
+    return "descriptors differ";
+  }
+  return {};
+}
+
+}  // namespace
+
+bool check_yml_twins(std::span<const std::byte> bytes, const IssueSink& sink) {
+  const Result<BundleView> bundle = BundleView::open(bytes);
+  if (!bundle) return false;
+  bool good = true;
+  for (std::uint32_t p = 0; p < bundle->patterns().size(); ++p) {
+    for (std::uint32_t s = 0; s < bundle->parameter_sets().size(); ++s) {
+      const ParameterSetRecord& set = bundle->parameter_sets()[s];
+      const std::string_view yml = bundle->feature_yml(p, set.id);
+      if (yml.empty()) continue;
+      const std::string detail = difference(yml, bundle->features(p, set.id));
+      if (detail.empty()) continue;
+      good = false;
+      Issue issue;
+      issue.kind = yml_issue_kind();
+      issue.where = "pattern '" + std::string(bundle->name(bundle->patterns()[p].name)) + "', " +
+                    std::string(bundle->name(set.name));
+      issue.offset =
+          static_cast<std::uint64_t>(yml.data() - reinterpret_cast<const char*>(bytes.data()));
+      issue.detail = detail;
+      sink(issue);
+    }
+  }
+  return good;
+}
+
+}  // namespace modar

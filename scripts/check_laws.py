@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""Holds the tree against the laws of the house (CONTRIBUTING.md): who may include whom, what the
+player may link, what lies at the top level.
+
+  scripts/check_laws.py [--root DIR] [--player FILE]
+
+--player: a linked modar-play of the preset `device`, whose symbols and libraries are looked at.
+Prints one line a violation, exits 3 if there is one.
+"""
+import argparse
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOMS = ("formats", "bake", "runtime", "tests")
+SOURCES = (".cpp", ".hpp", ".h")
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
+
+# Header prefixes of third parties and the files that may include them (Law 4).
+OPENCV_FILES = (
+    r"bake/(texture|pattern)/.*\.cpp", r"bake/(texture|pattern)/[a-z_]*cv[a-z_]*\.hpp",
+    r"runtime/paper/.*\.(cpp|hpp)", r"runtime/play/desk_.*\.cpp", r"tests/.*",
+)
+THIRD_PARTIES = {
+    "opencv2/": OPENCV_FILES,
+    "OpenMesh/": (r"bake/model/[a-z_]*(topology|decimat)[a-z_]*\.cpp", r"tests/.*"),
+    "draco/": (r"(bake|runtime)/[a-z_/]*draco[a-z_]*\.cpp", r"tests/.*"),
+    "tiny_gltf": (r"bake/model/(glb|gltf)_[a-z_]*\.cpp", r"tests/.*"),
+    "CLI/": (r"bake/commands/cli\.cpp",),
+    "nlohmann/": (r"bake/[a-z_/]*json[a-z_]*\.cpp", r"tests/.*"),
+    "rapidjson/": (r"runtime/play/json_lines\.cpp", r"tests/.*"),
+    "SDL": (r"runtime/play/desk_.*\.cpp",),
+    "Eigen/": (r"(runtime|bake)/.*\.cpp", r"tests/.*"),
+}
+# Headers that code of the device never includes (Law 9): each one grows the player by hundreds of KB.
+BANNED_ON_DEVICE = {"iostream", "fstream", "sstream", "ostream", "istream", "iomanip", "filesystem",
+                    "locale", "regex", "codecvt"}
+# Files of the runtime that a phone never builds.
+DESK = (r"runtime/paper/.*", r"runtime/play/desk_.*")
+TOP_LEVEL = {"bake", "runtime", "formats", "shaders", "assets", "tests", "scripts", "CMakeLists.txt",
+             "CMakePresets.json", "README.md", "LICENSE", "CHANGELOG.md", "CONTRIBUTING.md",
+             "ISSUES.md"}
+UNTRACKED_TOP_LEVEL = {"build", "out"}
+BANNED_SYMBOLS = ("OpenMesh", "tinygltf", "draco", "2cv", "CLI11", "nlohmann")
+BANNED_LIBRARIES = ("opencv", "OpenMesh", "draco", "tinygltf", "SDL", "assimp", "stdc++")
+
+
+def matches(path, patterns):
+    return any(re.fullmatch(p, path) for p in patterns)
+
+
+def standard_header(name):
+    return re.fullmatch(r"[a-z_0-9]+", name) is not None
+
+
+def include_violations(path, name):
+    """Yields what is wrong with file `path` including `name`."""
+    room = path.split("/")[0]
+    for prefix, allowed in THIRD_PARTIES.items():
+        if name.startswith(prefix) and not matches(path, allowed):
+            yield f"'{name}' may be included by {', '.join(allowed)} only"
+    target = name.split("/")[0]
+    if room == "formats":
+        fine = standard_header(name) or target == "formats" or name in ("tl/expected.hpp", "xxhash.h")
+        posix = name in ("fcntl.h", "unistd.h", "sys/stat.h", "sys/types.h", "sys/mman.h")
+        if not fine and not posix:
+            yield f"formats/ includes the standard library, tl/expected.hpp and xxhash.h only, not '{name}'"
+    if room == "runtime" and target == "bake":
+        yield f"the runtime knows nothing of the bake, but includes '{name}'"
+    if room == "bake" and target == "runtime":
+        yield f"the bake uses the runtime through its public headers <modar/...>, not '{name}'"
+    if room in ("formats", "runtime") and not matches(path, DESK) and name in BANNED_ON_DEVICE:
+        yield f"code of the device does not include <{name}>"
+
+
+def check_includes(root):
+    for room in ROOMS:
+        for file in sorted((root / room).rglob("*")):
+            if file.suffix not in SOURCES:
+                continue
+            path = file.relative_to(root).as_posix()
+            for name in INCLUDE.findall(file.read_text(encoding="utf-8", errors="replace")):
+                for violation in include_violations(path, name):
+                    yield f"{path}: {violation}"
+
+
+def check_top_level(root):
+    for entry in sorted(root.iterdir()):
+        known = entry.name in TOP_LEVEL | UNTRACKED_TOP_LEVEL or entry.name.startswith(".")
+        if not known:
+            yield f"{entry.name}: does not belong at the top level"
+
+
+def check_player(player):
+    dynamic = subprocess.run(["readelf", "-d", player], capture_output=True, text=True, check=True).stdout
+    for library in re.findall(r"NEEDED.*\[(.+)\]", dynamic):
+        if any(banned in library for banned in BANNED_LIBRARIES):
+            yield f"{player}: links {library}"
+    symbols = subprocess.run(["nm", "-a", player], capture_output=True, text=True, check=True).stdout
+    for banned in BANNED_SYMBOLS:
+        hit = next((line for line in symbols.splitlines() if banned in line), None)
+        if hit:
+            yield f"{player}: holds {banned}: {hit.split()[-1]}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--root", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent)
+    parser.add_argument("--player")
+    arguments = parser.parse_args()
+    violations = list(check_includes(arguments.root)) + list(check_top_level(arguments.root))
+    if arguments.player:
+        violations += list(check_player(arguments.player))
+    for violation in violations:
+        print(violation)
+    return 3 if violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,165 @@
+"""`modar bake` and `modar check`: the same bytes always, errors that help, nothing half-written."""
+import os
+import shutil
+import unittest
+
+from programs import COVER, POTTERY, STATUE, ProgramTest
+
+
+class Bake(ProgramTest):
+    def test_one_model_and_one_pattern_make_a_scene(self):
+        bundle = self.bake_demo()
+        report = self.modar_json("inspect", bundle)
+        self.assertEqual([s["pattern"] + "=" + s["model"] for s in report["scenes"]], ["cover=pottery"])
+        self.assertEqual(self.modar("check", bundle).returncode, 0)
+
+    def test_counts_are_those_of_the_file(self):
+        lines = POTTERY.read_text().splitlines()
+        vertices = sum(line.startswith("v ") for line in lines)
+        faces = sum(line.startswith("f ") for line in lines)
+        model = self.modar_json("inspect", self.bake_demo())["models"][0]
+        self.assertEqual(model["source_vertices"], vertices)
+        self.assertEqual(model["source_faces"], faces)
+        self.assertEqual(model["triangles"], faces)  # the file holds triangles only
+        self.assertGreaterEqual(model["vertices"], vertices)
+
+    def test_the_bytes_depend_on_input_and_options_only(self):
+        reference = self.bake_demo().read_bytes()
+        elsewhere = self.folder / "another place"
+        shutil.copytree(POTTERY.parent, elsewhere)
+        shutil.copy(COVER, elsewhere)
+        for number, (jobs, env) in enumerate([(1, {"LC_ALL": "C", "TZ": "UTC"}),
+                                              (2, {"LC_ALL": "de_DE.UTF-8", "TZ": "Asia/Tokyo"}),
+                                              (8, {"LANG": "tr_TR.UTF-8", "HOME": "/nowhere"})]):
+            out = self.folder / f"again{number}.modar"
+            done = self.modar("bake", "--model", elsewhere / "pottery.obj", "--pattern", "cover.png", "-o", out,
+                              "--jobs", jobs, "--quiet", env=env, cwd=elsewhere)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(out.read_bytes(), reference, f"jobs {jobs}, {env}")
+
+    def test_models_only_and_patterns_only_are_legal(self):
+        for arguments in (["--model", STATUE], ["--pattern", COVER]):
+            out = self.folder / "one.modar"
+            done = self.modar("bake", *arguments, "-o", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(self.modar("check", out).returncode, 0)
+
+    def test_models_are_merged_in_the_same_buffers(self):
+        out = self.folder / "two.modar"
+        report = self.modar_json("bake", "--model", POTTERY, STATUE, "--pattern", COVER, "--scene",
+                                 "cover=statue,scale=0.5,up=z", "-o", out)
+        self.assertEqual([m["name"] for m in report["bundle"]["models"]], ["pottery", "statue"])
+        self.assertEqual(report["bundle"]["scenes"][0]["scale"], 0.5)
+        self.assertGreater(report["cpu_seconds"], 0)
+        self.assertGreater(report["peak_rss_bytes"], 1e6)
+        self.assertTrue(all({"name", "ms", "in", "out", "max_error"} <= set(s) for s in report["stages"]))
+
+    def test_a_progress_bar_stays_out_of_pipes(self):
+        done = self.modar("bake", "--model", POTTERY, "-o", self.folder / "a.modar")
+        self.assertNotIn("\r", done.stderr)
+        self.assertNotIn("\x1b", done.stderr)
+        self.assertEqual(done.stdout, "")
+
+
+class BadInput(ProgramTest):
+    def bake(self, *arguments):
+        return self.modar("bake", *arguments, "-o", self.folder / "out.modar")
+
+    def assert_nothing_written(self):
+        left = [name for name in os.listdir(self.folder) if "modar" in name]
+        self.assertEqual(left, [])
+
+    def test_nothing_to_bake(self):
+        self.assert_fails(self.bake(), 1, "--model")
+        self.assert_nothing_written()
+
+    def test_a_file_that_is_not_there(self):
+        self.assert_fails(self.bake("--model", "none.obj"), 2, "none.obj")
+        self.assert_fails(self.bake("--pattern", "none.png"), 2, "none.png")
+        self.assert_nothing_written()
+
+    def test_a_file_that_is_something_else(self):
+        (self.folder / "text.png").write_text("no image")
+        self.assert_fails(self.bake("--pattern", "text.png"), 3, "text.png")
+        (self.folder / "empty.obj").write_text("# nothing\n")
+        self.assert_fails(self.bake("--model", "empty.obj"), 3, "empty.obj")
+        (self.folder / "m.stl").write_text("solid\n")
+        self.assert_fails(self.bake("--model", "m.stl"), 5, ".stl", ".obj")
+        self.assert_nothing_written()
+
+    def test_a_scene_of_unknown_names(self):
+        self.assert_fails(self.bake("--model", POTTERY, "--pattern", COVER, "--scene", "cover=vase"), 1, "vase",
+                          "pottery")
+        self.assert_fails(self.bake("--model", POTTERY, "--scene", "nonsense"), 1, "PATTERN=MODEL")
+        self.assert_nothing_written()
+
+    def test_two_of_one_name(self):
+        (self.folder / "sub").mkdir()
+        shutil.copy(POTTERY, self.folder / "sub")
+        self.assert_fails(self.bake("--model", POTTERY, self.folder / "sub" / "pottery.obj"), 1, "pottery", "rename")
+
+    def test_an_output_that_cannot_be_written(self):
+        done = self.modar("bake", "--model", POTTERY, "-o", self.folder / "no" / "such" / "out.modar")
+        self.assert_fails(done, 2, "out.modar")
+
+    def test_a_failed_bake_keeps_what_was_there(self):
+        out = self.folder / "out.modar"
+        out.write_text("precious")
+        (self.folder / "text.png").write_text("no image")
+        self.assertEqual(self.bake("--model", POTTERY, "--pattern", "text.png").returncode, 3)
+        self.assertEqual(out.read_text(), "precious")
+
+
+class Check(ProgramTest):
+    def test_every_damaged_byte_of_the_tables_is_reported(self):
+        good = self.bake_demo().read_bytes()
+        bad = self.folder / "bad.modar"
+        for offset in range(0, 2048, 97):
+            damaged = bytearray(good)
+            damaged[offset] ^= 0x10
+            bad.write_bytes(damaged)
+            done = self.modar("check", bad)
+            self.assertEqual(done.returncode, 3, f"byte {offset}")
+            self.assertTrue(done.stdout.startswith(f"{bad}: BAD\n"))
+
+    def test_a_damaged_payload_is_reported_as_json(self):
+        good = bytearray(self.bake_demo().read_bytes())
+        good[-5] ^= 1
+        bad = self.folder / "bad.modar"
+        bad.write_bytes(good)
+        done = self.modar("check", bad, "--json")
+        self.assertEqual(done.returncode, 3)
+        self.assertIn('"verdict": "bad"', done.stdout)
+
+    def test_a_truncated_file_and_a_text(self):
+        good = self.bake_demo().read_bytes()
+        bad = self.folder / "bad.modar"
+        for size in (1, 63, 64, 1000, len(good) - 1):
+            bad.write_bytes(good[:size])
+            self.assertEqual(self.modar("check", bad).returncode, 3, f"size {size}")
+        bad.write_text("once upon a time")
+        self.assertEqual(self.modar("check", bad).returncode, 3)
+        self.assertEqual(self.modar("check", self.folder / "none").returncode, 2)
+
+
+class Help(ProgramTest):
+    def test_help_shows_an_example(self):
+        for command in (["bake"], ["pattern", "rectify"], ["check"], ["inspect"], ["bench"]):
+            done = self.modar(*command, "--help")
+            self.assertEqual(done.returncode, 0)
+            self.assertIn("Example:", done.stdout)
+            self.assertIn("Exit codes", done.stdout)
+            self.assertEqual(done.stderr, "")
+
+    def test_version(self):
+        done = self.modar("--version")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertRegex(done.stdout, r"^modar \d+\.\d+\.\d+\n$")
+
+    def test_a_wrong_command_line(self):
+        for arguments in ([], ["fly"], ["bake", "--nonsense"], ["check"], ["bench", "nonsense"]):
+            self.assert_fails(self.modar(*arguments), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,85 @@
+"""`modar inspect`: the documented keys, and files that other tools read."""
+import json
+import shutil
+import struct
+import subprocess
+import unittest
+
+from programs import ROOT, ProgramTest
+
+KEYS = {
+    "models": {"name", "vertices", "triangles", "chunks", "lods", "materials", "bytes", "bytes_per_triangle", "layout",
+               "diagonal", "position_error_max", "position_error_rms", "normal_error_max_deg", "uv_error_max_texels"},
+    "textures": {"name", "width", "height", "levels", "bytes", "psnr_db", "alpha"},
+    "patterns": {"name", "width", "height", "width_mm", "score", "keypoints"},
+    "scenes": {"pattern", "model", "scale"},
+}
+
+
+class Inspect(ProgramTest):
+    def test_the_keys_are_a_contract(self):
+        report = self.modar_json("inspect", self.bake_demo())
+        self.assertEqual(report["format"], {"major": 1, "minor": 0})
+        for table, keys in KEYS.items():
+            self.assertEqual(len(report[table]), 1, table)
+            self.assertLessEqual(keys, set(report[table][0]), table)
+        self.assertEqual(set(report["patterns"][0]["keypoints"]), {"orb-2000", "orb-500", "brisk-3", "brisk-2"})
+
+    def test_the_error_is_that_of_half_floats(self):
+        # Half floats in [-1,1] have steps of at most 2^-11: an error of at most 2^-12 an axis and side.
+        model = self.modar_json("inspect", self.bake_demo())["models"][0]
+        bound = model["scale"] * 2 ** -12 * 3 ** 0.5
+        self.assertGreater(model["position_error_max"], 0)
+        self.assertLessEqual(model["position_error_max"], bound * (1 + 1e-9))
+        self.assertLess(model["position_error_rms"], model["position_error_max"])
+
+    def test_the_second_reader_agrees(self):
+        bundle = self.bake_demo()
+        ours = self.modar_json("inspect", bundle)
+        done = subprocess.run(["python3", ROOT / "scripts" / "read_bundle.py", bundle, "--json"], capture_output=True,
+                              text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        theirs = json.loads(done.stdout)
+        self.assertEqual([m["name"] for m in theirs["models"]], [m["name"] for m in ours["models"]])
+        self.assertEqual([m["vertex_count"] for m in theirs["models"]], [m["vertices"] for m in ours["models"]])
+
+
+class Extract(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.out = self.folder / "extracted"
+        done = self.modar("inspect", self.bake_demo(), "--extract", self.out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_the_model_is_a_glb(self):
+        data = (self.out / "pottery.glb").read_bytes()
+        magic, version, length, json_length, json_magic = struct.unpack_from("<4sIII4s", data)
+        self.assertEqual((magic, version, length, json_magic), (b"glTF", 2, len(data), b"JSON"))
+        document = json.loads(data[20:20 + json_length])
+        triangles = sum(document["accessors"][p["indices"]]["count"] // 3
+                        for m in document["meshes"] for p in m["primitives"])
+        self.assertEqual(triangles, 3296)  # Table 3 of the article: POTTERY
+        self.assertEqual(len(document["images"]), 1)
+
+    def test_etc1tool_reads_the_textures(self):
+        if shutil.which("etc1tool") is None:
+            self.skipTest("no etc1tool here")
+        files = sorted(self.out.glob("*.pkm"))
+        self.assertGreater(len(files), 5)
+        for file in files[:3]:
+            png = self.folder / "decoded.png"
+            subprocess.run(["etc1tool", file, "--decode", "-o", png], check=True, capture_output=True)
+            width, height = struct.unpack(">II", png.read_bytes()[16:24])
+            self.assertEqual((width, height), struct.unpack(">HH", file.read_bytes()[12:16]))
+
+    def test_the_features_are_opencv_yml(self):
+        names = sorted(file.name for file in self.out.glob("*.yml"))
+        self.assertEqual(names, [f"cover.{s}.yml" for s in ("brisk-2", "brisk-3", "orb-2000", "orb-500")])
+        text = (self.out / "cover.orb-2000.yml").read_text()
+        self.assertTrue(text.startswith("%YAML:1.0"))
+        self.assertIn("keypoints:", text)
+        self.assertIn("descriptors: !!opencv-matrix", text)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,49 @@
+"""Where the programs and assets under test are, and how the tests of this folder call them."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+BIN = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin"))
+POTTERY = ROOT / "assets" / "models" / "pottery.obj"
+STATUE = ROOT / "assets" / "models" / "statue.obj"
+COVER = ROOT / "assets" / "patterns" / "cover.png"
+
+
+class ProgramTest(unittest.TestCase):
+    """A test with a folder of its own, removed afterwards."""
+
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="modar-test-"))
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+
+    def run_program(self, name, *arguments, env=None, cwd=None):
+        return subprocess.run([str(BIN / name), *map(str, arguments)], capture_output=True, text=True,
+                              env={**os.environ, **(env or {})}, cwd=cwd or self.folder)
+
+    def modar(self, *arguments, **options):
+        return self.run_program("modar", *arguments, **options)
+
+    def modar_json(self, *arguments, **options):
+        done = self.modar(*arguments, "--json", **options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
+    def assert_fails(self, done, code, *words):
+        """The exit code, words on stderr, nothing on stdout."""
+        self.assertEqual(done.returncode, code, done.stderr)
+        self.assertEqual(done.stdout, "")
+        for word in words:
+            self.assertIn(word, done.stderr)
+
+    def bake_demo(self, name="demo.modar"):
+        """Pottery on the cover."""
+        bundle = self.folder / name
+        done = self.modar("bake", "--model", POTTERY, "--pattern", COVER, "-o", bundle, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "")
+        return bundle

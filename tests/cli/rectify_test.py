@@ -1,0 +1,37 @@
+"""`modar pattern rectify`: sizes, and corners that are no corners."""
+import struct
+import unittest
+
+from programs import COVER, ProgramTest
+
+
+def png_size(path):
+    return struct.unpack(">II", path.read_bytes()[16:24])
+
+
+class Rectify(ProgramTest):
+    def rectify(self, corners, *more):
+        return self.modar("pattern", "rectify", COVER, "--corners", corners, "-o", self.folder / "out.png", *more)
+
+    def test_a_given_size_gives_the_aspect_ratio(self):
+        done = self.rectify("10,10,300,40,310,600,20,650", "--width-mm", "200", "--height-mm", "300")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        width, height = png_size(self.folder / "out.png")
+        self.assertAlmostEqual(width / height, 2 / 3, delta=0.01)
+
+    def test_the_width_travels_with_the_image(self):
+        self.assertEqual(self.rectify("10,10,300,40,310,600,20,650", "--width-mm", "200").returncode, 0)
+        bundle = self.folder / "b.modar"
+        self.assertEqual(self.modar("bake", "--pattern", "out.png", "-o", bundle).returncode, 0)
+        self.assertAlmostEqual(self.modar_json("inspect", bundle)["patterns"][0]["width_mm"], 200, delta=0.5)
+
+    def test_corners_that_are_none(self):
+        for corners, code in (("1,2,3", 1), ("1,2,3,4,5,6,7,x", 1), ("10,10,20,20,30,30,40,40", 3),
+                              ("10,10,10,10,300,600,20,650", 3), ("10,10,9999,40,310,600,20,650", 3),
+                              ("10,10,310,600,300,40,20,650", 3)):
+            self.assert_fails(self.rectify(corners), code)
+            self.assertFalse((self.folder / "out.png").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,70 @@
+// Text forms of options: what is taken, and what is refused with a cure.
+#include "bake/commands/arguments.hpp"
+
+#include <gtest/gtest.h>
+
+namespace modar {
+namespace {
+
+TEST(Scene, DefaultsAndOptions) {
+  const auto plain = parse_scene("cover=vase");
+  ASSERT_TRUE(plain);
+  EXPECT_EQ(plain->pattern, "cover");
+  EXPECT_EQ(plain->model, "vase");
+  EXPECT_EQ(plain->scale, 1.0);
+  EXPECT_EQ(plain->up, UpAxis::kZ);
+  EXPECT_FALSE(plain->centred);
+
+  const auto full = parse_scene("a b=c.d,scale=2.5,up=-y,offset=0.5:-1:1e-1,centred");
+  ASSERT_TRUE(full);
+  EXPECT_EQ(full->pattern, "a b");
+  EXPECT_EQ(full->model, "c.d");
+  EXPECT_EQ(full->scale, 2.5);
+  EXPECT_EQ(full->up, UpAxis::kMinusY);
+  EXPECT_EQ(full->offset, (std::array<double, 3>{0.5, -1.0, 0.1}));
+  EXPECT_TRUE(full->centred);
+}
+
+TEST(Scene, Refused) {
+  for (const char* text :
+       {"", "cover", "=vase", "cover=", "a=b,scale=0", "a=b,scale=-1", "a=b,scale=nan",
+        "a=b,scale=1x", "a=b,up=w", "a=b,offset=1:2", "a=b,offset=1:2:3:4", "a=b,", "a=b,fast"}) {
+    const auto scene = parse_scene(text);
+    ASSERT_FALSE(scene) << text;
+    EXPECT_EQ(scene.error().exit, ExitCode::kUsage);
+    EXPECT_EQ(scene.error().code, "cli.scene");
+  }
+}
+
+TEST(Corners, EightNumbersAndNothingElse) {
+  const auto corners = parse_corners("1,2,3.5,-4,5e1,6,7,8");
+  ASSERT_TRUE(corners);
+  EXPECT_EQ((*corners)[1].x, 3.5);
+  EXPECT_EQ((*corners)[1].y, -4);
+  EXPECT_EQ((*corners)[2].x, 50);
+  for (const char* text : {"", "1,2,3,4,5,6,7", "1,2,3,4,5,6,7,8,9", "1,2,3,4,5,6,7,", "1;2;3"}) {
+    EXPECT_FALSE(parse_corners(text)) << text;
+  }
+}
+
+TEST(Pattern, WidthIsOptional) {
+  const auto plain = parse_pattern("dir/cover.png");
+  ASSERT_TRUE(plain);
+  EXPECT_EQ(plain->path, "dir/cover.png");
+  EXPECT_EQ(plain->width_mm, 0);
+  const auto wide = parse_pattern("c:cover.png:148.5mm");
+  ASSERT_TRUE(wide);
+  EXPECT_EQ(wide->path, "c:cover.png");
+  EXPECT_EQ(wide->width_mm, 148.5);
+  EXPECT_FALSE(parse_pattern("cover.png:-3mm"));
+  EXPECT_FALSE(parse_pattern("cover.png:mm"));
+}
+
+TEST(Unit, Metres) {
+  EXPECT_EQ(parse_unit("mm").value(), 0.001);
+  EXPECT_EQ(parse_unit("ft").value(), 0.3048);
+  EXPECT_FALSE(parse_unit("parsec"));
+}
+
+}  // namespace
+}  // namespace modar

@@ -1,0 +1,24 @@
+// Sizes as people read them.
+#include "bake/commands/terminal.hpp"
+
+#include <gtest/gtest.h>
+
+namespace modar {
+namespace {
+
+TEST(HumanBytes, ThreeDigits) {
+  EXPECT_EQ(human_bytes(0), "0 B");
+  EXPECT_EQ(human_bytes(999), "999 B");
+  EXPECT_EQ(human_bytes(1000), "1.00 kB");
+  EXPECT_EQ(human_bytes(12345), "12.3 kB");
+  EXPECT_EQ(human_bytes(999499), "999 kB");
+  EXPECT_EQ(human_bytes(999500), "1.00 MB");
+  EXPECT_EQ(human_bytes(206700000), "207 MB");
+}
+
+TEST(ProcessCost, IsPositive) {
+  EXPECT_GT(process_cost().peak_rss_bytes, 100000u);
+}
+
+}  // namespace
+}  // namespace modar

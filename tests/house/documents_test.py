@@ -1,0 +1,37 @@
+"""Documents agree with the programs that they speak of."""
+import os
+import pathlib
+import re
+import subprocess
+import unittest
+
+ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+MODAR = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin")) / "modar"
+
+
+class Documents(unittest.TestCase):
+    def test_issues_md_is_fresh(self):
+        printed = subprocess.run([str(MODAR), "check", "--list-issues"], capture_output=True, text=True, check=True)
+        self.assertEqual((ROOT / "ISSUES.md").read_text(), printed.stdout,
+                         "ISSUES.md is stale: modar check --list-issues > ISSUES.md")
+
+    def test_paths_that_documents_name_exist(self):
+        missing = []
+        for name in ("README.md", "CONTRIBUTING.md", "formats/bundle.md"):
+            text = (ROOT / name).read_text()
+            for path in re.findall(r"`((?:formats|bake|runtime|shaders|assets|tests|scripts)/[\w./-]*)`", text):
+                if not (ROOT / path.rstrip("/")).exists():
+                    missing.append(f"{name}: {path}")
+        self.assertEqual(missing, [])
+
+    def test_links_between_documents_lead_somewhere(self):
+        missing = []
+        for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
+            for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", (ROOT / name).read_text()):
+                if "://" not in target and not (ROOT / target).exists():
+                    missing.append(f"{name}: {target}")
+        self.assertEqual(missing, [])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,92 @@
+"""The laws hold, and each check of scripts/check_laws.py is seen failing on a planted violation."""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+SCRIPT = ROOT / "scripts" / "check_laws.py"
+PLAYER = ROOT / "build" / "device" / "bin" / "modar-play"
+
+
+def run(*arguments):
+    done = subprocess.run([sys.executable, str(SCRIPT), *map(str, arguments)], capture_output=True, text=True)
+    return done.returncode, done.stdout
+
+
+class Laws(unittest.TestCase):
+    def test_the_tree_keeps_them(self):
+        self.assertEqual(run("--root", ROOT), (0, ""))
+
+    def test_the_player_of_the_device_keeps_them(self):
+        if not PLAYER.exists():
+            self.skipTest("the preset device is not built here (scripts/test.sh builds it)")
+        self.assertEqual(run("--root", ROOT, "--player", PLAYER), (0, ""))
+
+
+class PlantedViolations(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        for room in ("formats", "bake/commands", "bake/model", "runtime/track", "tests"):
+            (self.folder / room).mkdir(parents=True)
+
+    def assert_refused(self, path, text, expected):
+        (self.folder / path).write_text(text)
+        code, out = run("--root", self.folder)
+        self.assertEqual(code, 3)
+        self.assertIn(path, out)
+        self.assertIn(expected, out)
+
+    def test_an_empty_house_is_fine(self):
+        self.assertEqual(run("--root", self.folder), (0, ""))
+
+    def test_formats_includes_nothing_else(self):
+        self.assert_refused("formats/a.hpp", "#include <glm/vec3.hpp>\n", "standard library")
+
+    def test_runtime_knows_no_bake(self):
+        self.assert_refused("runtime/track/a.cpp", '#include "bake/report.hpp"\n', "nothing of the bake")
+
+    def test_bake_uses_public_headers(self):
+        self.assert_refused("bake/a.cpp", '#include "runtime/track/solver.hpp"\n', "public headers")
+
+    def test_opencv_stays_in_its_files(self):
+        self.assert_refused("runtime/track/a.cpp", "#include <opencv2/core.hpp>\n", "opencv2")
+
+    def test_openmesh_stays_in_its_file(self):
+        self.assert_refused("bake/model/weld.cpp", "#include <OpenMesh/Core/IO/MeshIO.hh>\n", "OpenMesh")
+
+    def test_the_command_line_library_stays_in_its_file(self):
+        self.assert_refused("bake/commands/a.cpp", "#include <CLI/CLI.hpp>\n", "CLI")
+
+    def test_no_iostream_on_the_device(self):
+        self.assert_refused("runtime/track/a.cpp", "#include <iostream>\n", "iostream")
+
+    def test_the_top_level_is_closed(self):
+        self.assert_refused("notes.txt", "", "top level")
+
+    def test_the_player_holds_no_opencv(self):
+        source = self.folder / "tests" / "player.cpp"
+        source.write_text("namespace cv { int imread() { return 1; } }\nint main() { return cv::imread(); }\n")
+        player = self.folder / "build"
+        subprocess.run([os.environ.get("CXX", "c++"), source, "-o", player], check=True)
+        code, out = run("--root", self.folder, "--player", player)
+        self.assertEqual(code, 3)
+        self.assertIn("holds 2cv", out)
+
+    def test_the_player_links_no_shared_runtime(self):
+        source = self.folder / "tests" / "player.cpp"
+        source.write_text("#include <string>\n#include <cstdlib>\n"
+                          "int main(int c, char** v) { return std::stoi(std::string(v[c - 1])); }\n")
+        player = self.folder / "build"
+        subprocess.run([os.environ.get("CXX", "c++"), source, "-o", player], check=True)
+        code, out = run("--root", self.folder, "--player", player)
+        self.assertEqual(code, 3)
+        self.assertIn("links libstdc++", out)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,42 @@
+"""Style that a tool can see: clang-format, lengths of files, lines that name unfinished work."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import unittest
+
+ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+ROOMS = ("formats", "bake", "runtime", "tests")
+MAX_LINES = 400
+
+
+def files(*suffixes):
+    found = [f for room in ROOMS for f in (ROOT / room).rglob("*") if f.suffix in suffixes]
+    return sorted(found)
+
+
+class Style(unittest.TestCase):
+    def test_clang_format(self):
+        if shutil.which("clang-format") is None:
+            self.skipTest("no clang-format here")
+        done = subprocess.run(["clang-format", "--dry-run", "-Werror", *map(str, files(".cpp", ".hpp"))],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr[:2000])
+
+    def test_files_have_one_job(self):
+        sources = files(".cpp", ".hpp", ".h", ".py") + sorted((ROOT / "scripts").glob("*.py")) + sorted(
+            (ROOT / "assets").glob("*.py"))
+        long = {f.relative_to(ROOT).as_posix(): n for f in sources
+                if (n := len(f.read_text().splitlines())) > MAX_LINES}
+        self.assertEqual(long, {})
+
+    def test_nothing_is_left_unfinished(self):
+        word = re.compile("|".join(("TO" + "DO", "FIX" + "ME", "XX" + "X")))
+        hits = [f"{f.relative_to(ROOT)}:{i}" for f in files(".cpp", ".hpp", ".h")
+                for i, line in enumerate(f.read_text().splitlines(), 1) if word.search(line)]
+        self.assertEqual(hits, [])
+
+
+if __name__ == "__main__":
+    unittest.main()
