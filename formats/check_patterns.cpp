@@ -87,14 +87,14 @@ void check_text(FaultLog& log, const BundleParts& parts, const SectionEntry& ent
 
 /// The twins of a pattern lie side by side in the section table.
 void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index) {
-  const auto wanted = static_cast<std::uint32_t>(SectionType::kFeatureTwin);
-  const auto first = std::lower_bound(parts.sections.begin(), parts.sections.end(), index,
-                                      [wanted](const SectionEntry& entry, std::uint32_t owner) {
-                                        return entry.type < wanted ||
-                                               (entry.type == wanted && entry.owner < owner);
-                                      });
+  constexpr auto kTwin = static_cast<std::uint32_t>(SectionType::kFeatureTwin);
+  const auto first =
+      std::lower_bound(parts.sections.begin(), parts.sections.end(), index,
+                       [](const SectionEntry& entry, std::uint32_t owner) {
+                         return entry.type < kTwin || (entry.type == kTwin && entry.owner < owner);
+                       });
   for (auto entry = first;
-       entry != parts.sections.end() && entry->type == wanted && entry->owner == index; ++entry) {
+       entry != parts.sections.end() && entry->type == kTwin && entry->owner == index; ++entry) {
     const auto& header =
         *reinterpret_cast<const FeatureHeader*>(section_bytes(parts, *entry).data());
     const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry->variant);

@@ -64,6 +64,7 @@ enum class Rule : std::uint8_t {
   kDescriptorLength,
   kFeaturesMissing,
   kFeatureYml,
+  kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV
   kUnreferencedVertices,
   kUnreferencedIndices,
   kDegenerateTriangles,

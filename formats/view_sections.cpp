@@ -81,11 +81,13 @@ bool readable(std::span<const std::byte> bytes, FaultLog& log) {
                   "the file has version " + std::to_string(header.major) + "." +
                       std::to_string(header.minor) + ", this program reads 1.x");
   }
-  const std::string sizes = "the header states " + std::to_string(header.file_size) +
-                            " bytes, the file has " + std::to_string(bytes.size());
-  if (bytes.size() < header.file_size) return refuse(Rule::kTruncated, bytes.size(), sizes);
+  const auto sizes = [&] {
+    return "the header states " + std::to_string(header.file_size) + " bytes, the file has " +
+           std::to_string(bytes.size());
+  };
+  if (bytes.size() < header.file_size) return refuse(Rule::kTruncated, bytes.size(), sizes());
   if (bytes.size() > header.file_size) {
-    return refuse(Rule::kFileSize, offsetof(FileHeader, file_size), sizes);
+    return refuse(Rule::kFileSize, offsetof(FileHeader, file_size), sizes());
   }
   if (header.table_offset != sizeof(FileHeader) || header.entry_size != sizeof(SectionEntry)) {
     return refuse(Rule::kHeader, offsetof(FileHeader, table_offset),

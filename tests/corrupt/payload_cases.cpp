@@ -1,0 +1,142 @@
+// Damage to payloads of bundles that open.
+#include "tests/corrupt/cases.hpp"
+
+namespace modar::test {
+namespace {
+
+Bytes vertex_damage(std::size_t at, std::byte low, std::byte high) {
+  BundleContent content = model_content();
+  content.vertices[at] = low;
+  content.vertices[at + 1] = high;
+  return encode(content);
+}
+
+/// A single level of 6 x 4 pixels that repeats.
+BundleContent odd_texture() {
+  BundleContent content = texture_content();
+  content.textures[0].width = 6;
+  content.textures[0].level_count = 1;
+  content.texture_levels.resize(1);
+  content.texture_levels[0].width = 6;
+  content.texture_data[0].resize(32);
+  return content;
+}
+
+template <class Damage>
+Bytes changed(BundleContent content, Damage damage) {
+  damage(content);
+  return encode(content);
+}
+
+KeypointRecord& keypoint(BundleContent& content) {
+  return content.features[0][0].keypoints[3];
+}
+
+constexpr CorruptCase kCases[] = {
+    {"SECTION_HASH",
+     [] {
+       Bytes bytes = encode(pattern_content());
+       bytes[entry_of(bytes, SectionType::kMeta).offset] ^= std::byte{1};
+       return bytes;
+     }},
+    {"SECTION_PADDING",
+     [] {
+       Bytes bytes = encode(pattern_content());
+       bytes[entry_of(bytes, SectionType::kMeta).offset - 1] = std::byte{1};
+       return bytes;
+     }},
+    {"META_TEXT", [] { return changed(pattern_content(), [](auto& c) { c.meta = "{\xFF}"; }); }},
+    {"MODEL_PLACEMENT",
+     [] { return changed(model_content(), [](auto& c) { c.models[0].diagonal = 1; }); }},
+    {"MODEL_COUNTS",
+     [] { return changed(model_content(), [](auto& c) { c.models[0].triangle_count = 7; }); }},
+    {"CHUNK_BOUNDS",
+     [] { return changed(model_content(), [](auto& c) { c.chunks[0].bounds_max[0] = 0.5f; }); }},
+    {"CHUNK_OUTSIDE",
+     [] { return changed(model_content(), [](auto& c) { c.chunks[1].bounds_max[0] = 1.5f; }); }},
+    {"CHUNK_CONE",
+     [] { return changed(model_content(), [](auto& c) { c.chunks[0].cone_axis[2] = 0.5f; }); }},
+    {"LEVEL_ORDER",
+     [] { return changed(model_content(), [](auto& c) { c.levels[0].error = 0.125f; }); }},
+    {"LEVEL_INDEX",
+     [] { return changed(model_content(), [](auto& c) { c.indices[4] = std::byte{6}; }); }},
+    {"VERTEX_NOT_FINITE", [] { return vertex_damage(0, std::byte{0}, std::byte{0x7C}); }},
+    {"VERTEX_NORMAL", [] { return vertex_damage(8, std::byte{0}, std::byte{0}); }},
+    {"MATERIAL_VALUES",
+     [] { return changed(model_content(), [](auto& c) { c.materials[0].opacity = 2; }); }},
+    {"TEXTURE_SIDES", [] { return encode(odd_texture()); }},
+    {"TEXTURE_OVERLAP",
+     [] {
+       return changed(texture_content(), [](auto& c) {
+         c.texture_levels[1].alpha_offset = c.texture_levels[1].offset;
+       });
+     }},
+    {"TEXTURE_UNREFERENCED",
+     [] { return changed(texture_content(), [](auto& c) { c.texture_data[0].resize(96); }); }},
+    {"PARAMETER_VALUES",
+     [] {
+       return changed(pattern_content(), [](auto& c) { c.parameter_sets[0].level_count = 0; });
+     }},
+    {"KEYPOINT_OUTSIDE",
+     [] { return changed(pattern_content(), [](auto& c) { keypoint(c).x = 64.5f; }); }},
+    {"KEYPOINT_VALUES",
+     [] { return changed(pattern_content(), [](auto& c) { keypoint(c).size = 0; }); }},
+    {"DESCRIPTOR_LENGTH",
+     [] {
+       return changed(pattern_content(), [](auto& c) {
+         c.parameter_sets[0].descriptor_bits = 128;
+         c.features[0][0].descriptor_bytes = 16;
+         c.features[0][0].descriptors.resize(9 * 16);
+       });
+     }},
+    {"PATTERN_WITHOUT_FEATURES",
+     [] {
+       return changed(pattern_content(), [](auto& c) {
+         for (FeatureContent& features : c.features[0]) {
+           features.keypoints.resize(3);
+           features.descriptors.resize(3 * features.descriptor_bytes);
+           features.yml.clear();
+         }
+       });
+     }},
+    {"FEATURE_TEXT",
+     [] {
+       return changed(pattern_content(), [](auto& c) { c.features[0][1].yml = "keypoints: 9\n"; });
+     }},
+    {"PATTERN_YML_DIFFERS",
+     [] {
+       return changed(pattern_content(), [](auto& c) {
+         std::string& yml = c.features[0][0].yml;
+         yml.replace(yml.find("22.5"), 4, "23.5");
+       });
+     }},
+    {"VERTICES_UNREFERENCED",
+     [] { return changed(model_content(), [](auto& c) { c.vertices.resize(6 * 16 + 32); }); }},
+    {"INDICES_UNREFERENCED",
+     [] { return changed(model_content(), [](auto& c) { c.indices.resize(30 * 2 + 6); }); }},
+    {"TRIANGLE_DEGENERATE",
+     [] { return changed(model_content(), [](auto& c) { c.indices[0] = c.indices[2]; }); }},
+    {"LEVEL_EMPTY",
+     [] {
+       return changed(model_content(), [](auto& c) {
+         c.levels[2].index_count = 0;
+         c.indices.resize(18 * 2);
+         c.models[0].triangle_count = 4;
+       });
+     }},
+    {"BUNDLE_EMPTY", [] { return encode(BundleContent()); }},
+    {"SECTION_UNKNOWN",
+     [] {
+       return changed(pattern_content(), [](auto& c) {
+         c.extra.push_back({100, 1, 0, kNone, 0, Bytes(4)});
+       });
+     }},
+};
+
+}  // namespace
+
+std::span<const CorruptCase> payload_cases() {
+  return kCases;
+}
+
+}  // namespace modar::test

@@ -1,0 +1,222 @@
+// Writer and view: what goes in comes out, always as the same bytes, and nothing less opens.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <type_traits>
+
+#include "formats/atomic_file.hpp"
+#include "formats/bundle_view.hpp"
+#include "tests/formats/allocation_counter.hpp"
+#include "tests/formats/support.hpp"
+
+namespace {
+
+using namespace modar;
+using namespace modar::test;
+
+template <class T>
+void expect_table(const Table<T>& table, const std::vector<T>& records, const char* name) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  ASSERT_EQ(table.size(), records.size()) << name;
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    EXPECT_EQ(std::memcmp(&table[i], &records[i], sizeof(T)), 0) << name << " " << i;
+  }
+}
+
+void expect_bytes(std::span<const std::byte> got, std::span<const std::byte> wanted,
+                  const char* name) {
+  ASSERT_EQ(got.size(), wanted.size()) << name;
+  EXPECT_TRUE(std::equal(got.begin(), got.end(), wanted.begin())) << name;
+}
+
+TEST(Bundle, RoundTripGivesTheSameContent) {
+  const BundleContent content = golden_content();
+  const Bytes bytes = encode(content);
+  const auto view = BundleView::open(bytes);
+  ASSERT_TRUE(view) << to_line(view.error());
+  EXPECT_EQ(view->header().file_size, bytes.size());
+  EXPECT_EQ(view->meta(), content.meta);
+  expect_table(view->models(), content.models, "models");
+  expect_table(view->chunks(), content.chunks, "chunks");
+  expect_table(view->levels(), content.levels, "levels");
+  expect_table(view->materials(), content.materials, "materials");
+  expect_table(view->layouts(), content.layouts, "layouts");
+  expect_table(view->textures(), content.textures, "textures");
+  expect_table(view->texture_levels(), content.texture_levels, "texture levels");
+  expect_table(view->patterns(), content.patterns, "patterns");
+  expect_table(view->parameter_sets(), content.parameter_sets, "parameter sets");
+  expect_table(view->scenes(), content.scenes, "scenes");
+  expect_bytes(view->vertices(), content.vertices, "vertices");
+  expect_bytes(view->indices(), content.indices, "indices");
+  expect_bytes(view->texture_data(0), content.texture_data[0], "texture data");
+  EXPECT_TRUE(view->texture_data(1).empty());
+  EXPECT_EQ(view->name(view->models()[1].name), "integer");
+  EXPECT_EQ(view->name(view->materials()[1].name), "glass \xC3\xA9");
+  for (std::uint32_t p = 0; p < 2; ++p) {
+    for (const FeatureContent& wanted : content.features[p]) {
+      const FeatureView got = view->features(p, wanted.set_id);
+      EXPECT_EQ(got.descriptor_bytes, wanted.descriptor_bytes);
+      expect_bytes(std::as_bytes(got.keypoints), std::as_bytes(std::span(wanted.keypoints)),
+                   "keypoints");
+      expect_bytes(got.descriptors, wanted.descriptors, "descriptors");
+      EXPECT_EQ(reinterpret_cast<std::uintptr_t>(got.descriptors.data()) % 8, 0u);
+      EXPECT_EQ(view->feature_yml(p, wanted.set_id), wanted.yml);
+    }
+  }
+  EXPECT_EQ(view->features(0, 77).keypoints.size(), 0u);
+  expect_bytes(view->section(static_cast<SectionType>(100), 7, 9), content.extra[0].bytes, "extra");
+}
+
+TEST(Bundle, SectionsAreAlignedForMapping) {
+  const Bytes bytes = encode(golden_content());
+  const auto view = BundleView::open(bytes);
+  ASSERT_TRUE(view);
+  for (const SectionEntry& entry : view->sections()) {
+    EXPECT_EQ(entry.offset % (entry.type >= 512 ? 4096 : 64), 0u) << entry.type;
+  }
+  EXPECT_EQ(view->sections().back().offset + view->sections().back().size, bytes.size());
+}
+
+TEST(Bundle, TheSameContentGivesTheSameBytes) {
+  EXPECT_EQ(encode(golden_content()), encode(golden_content()));
+  // Streaming into a file is the same as into memory.
+  std::string folder = "/tmp/modar_bundle_XXXXXX";
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const std::string path = folder + "/a.modar";
+  ASSERT_TRUE(save_bundle(golden_content(), path));
+  EXPECT_EQ(read_file(path), encode(golden_content()));
+  EXPECT_EQ(std::remove(path.c_str()), 0);
+  EXPECT_EQ(std::remove(folder.c_str()), 0);
+}
+
+TEST(Bundle, EmptyTablesHaveNoSection) {
+  EXPECT_EQ(encode(BundleContent()).size(), sizeof(FileHeader));
+  const Bytes bytes = encode(pattern_content());
+  const auto view = BundleView::open(bytes);
+  ASSERT_TRUE(view);
+  EXPECT_EQ(view->sections().size(), 8u);
+  EXPECT_TRUE(view->models().empty());
+  EXPECT_TRUE(view->vertices().empty());
+}
+
+TEST(Bundle, OpeningAllocatesNothing) {
+  const Bytes bytes = encode(golden_content());
+  const std::size_t before = allocation_count();
+  const bool opened = BundleView::open(bytes).has_value();
+  const std::size_t after = allocation_count();
+  EXPECT_TRUE(opened);
+  EXPECT_EQ(after, before);
+}
+
+TEST(Bundle, NoTruncationOpens) {
+  for (const BundleContent& content : {pattern_content(), model_content()}) {
+    const Bytes whole = encode(content);
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      // A copy of just that size, so that a read beyond it is seen.
+      const Bytes part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+      const auto view = BundleView::open(part);
+      ASSERT_FALSE(view) << size;
+      ASSERT_EQ(view.error().code, "bundle.truncated") << size;
+    }
+  }
+}
+
+/// The size in the header is corrected: only the ranges inside can tell.
+TEST(Bundle, NoRehashedTruncationOpens) {
+  const Bytes whole = encode(pattern_content());
+  for (std::size_t size = 64 + 8 * 48; size < whole.size(); ++size) {
+    Bytes part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+    rehash(part);
+    ASSERT_FALSE(BundleView::open(part)) << size;
+  }
+}
+
+TEST(Bundle, AskewBytesAreRefused) {
+  Bytes bytes = encode(pattern_content());
+  bytes.insert(bytes.begin(), std::byte{0});
+  const auto view = BundleView::open(std::span(bytes).subspan(1));
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().code, "bundle.header");
+}
+
+TEST(Bundle, ANewerMinorVersionReads) {
+  BundleContent content = pattern_content();
+  // Patterns of 72 bytes instead of 64: the last 8 are of a field that this version does not know.
+  Bytes longer(16 + 72, std::byte{0x5A});
+  const TableHeader header{1, 72, 0};
+  std::memcpy(longer.data(), &header, sizeof(header));
+  std::memcpy(longer.data() + 16, content.patterns.data(), 64);
+  Bytes bytes = encode(content);
+  content.patterns.clear();
+  content.features.clear();
+  content.extra.push_back({48, 1, kSectionRequired, kNone, 0, longer});
+  bytes = encode(content);
+  EXPECT_EQ(BundleView::open(bytes).error().code, "bundle.table-shape");
+  reinterpret_cast<FileHeader*>(bytes.data())->minor = 1;
+  reinterpret_cast<FileHeader*>(bytes.data())->reserved0 = 1;
+  entry_of(bytes, SectionType::kMeta).flags |= 4;
+  rehash(bytes);
+  const auto view = BundleView::open(bytes);
+  ASSERT_TRUE(view) << to_line(view.error());
+  EXPECT_EQ(view->patterns()[0].width, 64u);
+}
+
+TEST(Bundle, AnotherMajorVersionIsUnsupported) {
+  Bytes bytes = encode(pattern_content());
+  reinterpret_cast<FileHeader*>(bytes.data())->major = 2;
+  rehash(bytes);
+  const auto view = BundleView::open(bytes);
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().exit, ExitCode::kUnsupported);
+  EXPECT_EQ(view.error().code, "bundle.version");
+  EXPECT_NE(view.error().where.find("byte 8"), std::string::npos);
+  EXPECT_FALSE(view.error().cure.empty());
+}
+
+TEST(Bundle, SharedIndicesAreRefused) {
+  BundleContent content = model_content();
+  for (LevelRecord& level : content.levels) level.index_offset = 0;
+  content.indices.resize(24);
+  const auto view = BundleView::open(encode(content));
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().code, "bundle.level-range");
+}
+
+TEST(Intern, CleansCutsAndShares) {
+  BundleContent content;
+  const auto text = [&content](NameRef ref) {
+    return content.names.substr(ref.offset, ref.length);
+  };
+  EXPECT_EQ(text(content.intern("spider")), "spider");
+  EXPECT_EQ(content.intern("spider").offset, 0u);
+  EXPECT_EQ(content.intern("pid").offset, 1u);
+  EXPECT_EQ(content.names, "spider");
+  EXPECT_EQ(text(content.intern("caf\xE9\n")), "caf\xEF\xBF\xBD\xEF\xBF\xBD");
+  const std::string long_name = std::string(1023, 'a') + "\xC3\xA9";
+  EXPECT_EQ(text(content.intern(long_name)), std::string(1023, 'a'));
+  EXPECT_EQ(content.intern("").length, 0u);
+}
+
+TEST(Writer, RefusesContentThatContradictsItself) {
+  BundleContent twice = pattern_content();
+  twice.features[0].push_back(twice.features[0][0]);
+  EXPECT_EQ(encode_bundle(twice).error().code, "bundle.content");
+  BundleContent odd = pattern_content();
+  odd.features[0][0].descriptors.pop_back();
+  EXPECT_EQ(encode_bundle(odd).error().code, "bundle.content");
+  BundleContent stray = pattern_content();
+  stray.texture_data.resize(1);
+  EXPECT_EQ(encode_bundle(stray).error().exit, ExitCode::kInternal);
+}
+
+TEST(Writer, StopsWhereTheSinkFails) {
+  int calls = 0;
+  const auto written =
+      write_bundle(golden_content(), [&calls](std::span<const std::byte>) { return ++calls < 5; });
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, "io.write");
+  EXPECT_EQ(calls, 5);
+}
+
+}  // namespace

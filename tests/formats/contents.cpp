@@ -1,0 +1,363 @@
+// Small bundles to test on: all numbers in them are exact, so their bytes are the same everywhere.
+#include "tests/formats/support.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <string>
+
+#include "formats/quantise.hpp"
+
+namespace modar::test {
+namespace {
+
+constexpr std::array<std::array<float, 3>, 6> kCorners = {
+    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+constexpr std::array<std::uint16_t, 12> kUpper = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4};
+constexpr std::array<std::uint16_t, 12> kLower = {2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
+
+template <class T>
+void put(std::vector<std::byte>& out, T value) {
+  const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+  out.insert(out.end(), bytes, bytes + sizeof(T));
+}
+
+AttributeRecord attribute(Semantic semantic, ComponentType type, std::uint8_t components,
+                          std::uint16_t offset, bool normalised) {
+  return {static_cast<std::uint8_t>(semantic),
+          static_cast<std::uint8_t>(type),
+          components,
+          static_cast<std::uint8_t>(normalised ? 1 : 0),
+          offset,
+          0};
+}
+
+/// Half positions, 8-bit normals, 16-bit uvs.
+LayoutRecord half_layout() {
+  LayoutRecord layout{};
+  layout.stride = 16;
+  layout.attribute_count = 3;
+  layout.attributes[0] = attribute(Semantic::kPosition, ComponentType::kHalf, 3, 0, false);
+  layout.attributes[1] = attribute(Semantic::kNormal, ComponentType::kI8, 3, 8, true);
+  layout.attributes[2] = attribute(Semantic::kUv, ComponentType::kU16, 2, 12, true);
+  return layout;
+}
+
+/// 16-bit integer positions, octahedral normals, colours.
+LayoutRecord integer_layout() {
+  LayoutRecord layout{};
+  layout.stride = 12;
+  layout.attribute_count = 3;
+  layout.attributes[0] = attribute(Semantic::kPosition, ComponentType::kI16, 3, 0, false);
+  layout.attributes[1] = attribute(Semantic::kNormalOct, ComponentType::kI8, 2, 6, true);
+  layout.attributes[2] = attribute(Semantic::kColour, ComponentType::kU8, 4, 8, true);
+  return layout;
+}
+
+LayoutRecord float_layout() {
+  LayoutRecord layout{};
+  layout.stride = 32;
+  layout.attribute_count = 3;
+  layout.attributes[0] = attribute(Semantic::kPosition, ComponentType::kF32, 3, 0, false);
+  layout.attributes[1] = attribute(Semantic::kNormal, ComponentType::kF32, 3, 12, false);
+  layout.attributes[2] = attribute(Semantic::kUv, ComponentType::kF32, 2, 24, false);
+  return layout;
+}
+
+void put_vertex(std::vector<std::byte>& out, const LayoutRecord& layout,
+                const std::array<float, 3>& p) {
+  switch (layout.stride) {
+    case 16:
+      for (const float v : p) put(out, float_to_half(v));
+      put(out, std::uint16_t{0});
+      for (const float v : p) put(out, float_to_snorm8(v));
+      put(out, std::uint8_t{0});
+      put(out, float_to_unorm16((p[0] + 1) / 2));
+      put(out, float_to_unorm16((p[1] + 1) / 2));
+      break;
+    case 12:
+      for (const float v : p) put(out, static_cast<std::int16_t>(v * 16384.0f));
+      // The octahedral square: the lower tip lies in its corners.
+      put(out, float_to_snorm8(p[2] < 0 ? 1.0f : p[0]));
+      put(out, float_to_snorm8(p[2] < 0 ? 1.0f : p[1]));
+      for (const float v : p) put(out, float_to_unorm8((v + 1) / 2));
+      put(out, std::uint8_t{255});
+      break;
+    default:
+      for (const float v : p) put(out, v);
+      for (const float v : p) put(out, v);
+      put(out, p[0]);
+      put(out, p[1]);
+  }
+}
+
+ChunkRecord chunk_of(const BundleContent& content, std::uint32_t material, bool upper, float step) {
+  ChunkRecord chunk{};
+  for (int axis = 0; axis < 3; ++axis) {
+    chunk.bounds_min[axis] = -1;
+    chunk.bounds_max[axis] = 1;
+  }
+  (upper ? chunk.bounds_min : chunk.bounds_max)[2] = 0;
+  chunk.cone_cutoff = 2;
+  if (upper) {
+    chunk.cone_axis[2] = 1;
+    chunk.cone_cutoff = 0.875f;
+  }
+  chunk.position_step = step;
+  chunk.uv_scale[0] = chunk.uv_scale[1] = 1;
+  chunk.material = material;
+  chunk.first_level = static_cast<std::uint32_t>(content.levels.size());
+  chunk.level_count = upper ? 2 : 1;
+  return chunk;
+}
+
+void add_level(BundleContent& content, std::uint64_t vertex_offset,
+               std::span<const std::uint16_t> indices, float error) {
+  LevelRecord level{};
+  level.vertex_offset = vertex_offset;
+  level.index_offset = content.indices.size();
+  level.vertex_count = 6;
+  level.index_count = static_cast<std::uint32_t>(indices.size());
+  level.error = error;
+  content.levels.push_back(level);
+  for (const std::uint16_t index : indices) put(content.indices, index);
+}
+
+/// An octahedron; both its chunks use the same six vertices.
+void add_octahedron(BundleContent& content, const char* name, const LayoutRecord& layout,
+                    std::uint32_t material) {
+  ModelRecord model{};
+  model.name = content.intern(name);
+  model.center[0] = 500000.25;
+  model.center[2] = -7.5;
+  model.scale = 4;
+  model.diagonal = 13.856406460551018;
+  model.unit_metres = 0.001;
+  model.position_error_max = 0.0001220703125;
+  model.position_error_rms = 0.00006103515625;
+  model.normal_error_max_deg = 0.375f;
+  model.normal_error_rms_deg = 0.1875f;
+  model.uv_error_max_texels = 0.03125f;
+  model.uv_error_rms_texels = 0.015625f;
+  model.vertex_count = 12;
+  model.triangle_count = 8;
+  model.source_vertex_count = 6;
+  model.source_face_count = 8;
+  model.layout = static_cast<std::uint32_t>(content.layouts.size());
+  model.first_chunk = static_cast<std::uint32_t>(content.chunks.size());
+  model.chunk_count = 2;
+  model.first_material = 0;
+  model.material_count = static_cast<std::uint32_t>(content.materials.size());
+  model.level_count = 2;
+  content.layouts.push_back(layout);
+  content.models.push_back(model);
+
+  const std::uint64_t first_vertex = content.vertices.size();
+  for (const auto& corner : kCorners) put_vertex(content.vertices, layout, corner);
+  const float step = layout.stride == 12 ? 0x1p-14f : 1.0f;
+  content.chunks.push_back(chunk_of(content, material, true, step));
+  add_level(content, first_vertex, kUpper, 0);
+  add_level(content, first_vertex, std::span(kUpper).first(6), 0.25f);
+  content.chunks.push_back(chunk_of(content, material, false, step));
+  add_level(content, first_vertex, kLower, 0);
+}
+
+void add_material(BundleContent& content, const char* name, std::uint32_t texture) {
+  MaterialRecord material{};
+  material.name = content.intern(name);
+  for (int i = 0; i < 3; ++i) {
+    material.ambient[i] = 0.25f;
+    material.diffuse[i] = 0.75f;
+    material.specular[i] = 0.5f;
+  }
+  material.shininess = 16;
+  material.opacity = 1;
+  material.texture = texture;
+  material.flags = texture == kNone ? kMaterialTwoSided : 0u;
+  content.materials.push_back(material);
+}
+
+/// 8 x 4 pixels, four levels, alpha twins. Any 8 bytes are an ETC1 block.
+void add_texture(BundleContent& content) {
+  TextureRecord texture{};
+  texture.name = content.intern("body.png");
+  texture.width = 8;
+  texture.height = 4;
+  texture.source_width = 1000;
+  texture.source_height = 500;
+  texture.format = static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb);
+  texture.flags = kTextureAlpha | kTextureRepeat;
+  texture.level_count = 4;
+  texture.psnr_db = 36.5f;
+  texture.ssim = 0.96875f;
+  content.textures.push_back(texture);
+  std::vector<std::byte> data;
+  for (std::uint32_t level = 0; level < 4; ++level) {
+    TextureLevelRecord record{};
+    record.width = std::max(8u >> level, 1u);
+    record.height = std::max(4u >> level, 1u);
+    record.size = level == 0 ? 16 : 8;
+    record.offset = data.size();
+    record.alpha_offset = data.size() + record.size;
+    record.psnr_db = 36;
+    record.ssim = 0.9375f;
+    content.texture_levels.push_back(record);
+    for (std::uint32_t i = 0; i < 2 * record.size; ++i) {
+      put(data, static_cast<std::uint8_t>(data.size() * 37 + level));
+    }
+  }
+  content.texture_data.push_back(std::move(data));
+}
+
+ParameterSetRecord parameter_set(BundleContent& content, const char* name, std::uint32_t id,
+                                 Detector detector) {
+  const bool orb = detector == Detector::kFastOrb;
+  ParameterSetRecord set{};
+  set.name = content.intern(name);
+  set.id = id;
+  set.detector = static_cast<std::uint32_t>(detector);
+  if (orb) {
+    set.max_features = 2000;
+    set.scale_factor = 1.25f;
+    set.level_count = 8;
+    set.edge_threshold = 31;
+    set.wta_k = 2;
+    set.harris = 1;
+    set.patch_size = 31;
+    set.fast_threshold = 20;
+  } else {
+    set.agast_threshold = 30;
+    set.octaves = 3;
+    set.pattern_scale = 1;
+  }
+  set.descriptor_bits = orb ? 256 : 512;
+  set.max_distance = orb ? 85 : 170;
+  set.min_matches = 8;
+  set.min_inliers = 8;
+  set.ransac_threshold = 3;
+  return set;
+}
+
+/// What OpenCV's FileStorage writes of the same, in the least that it reads.
+std::string feature_text(const FeatureContent& features) {
+  std::string text = "%YAML:1.0\n---\nkeypoints:\n";
+  for (const KeypointRecord& k : features.keypoints) {
+    text += "   - [ ";
+    for (const float value : {k.x, k.y, k.size, k.angle, k.response}) {
+      std::array<char, 32> digits{};
+      const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
+                                     std::chars_format::fixed);
+      const std::string number(digits.data(), end.ptr);
+      text += number + (number.find('.') == std::string::npos ? "., " : ", ");
+    }
+    text += std::to_string(k.octave) + ", " + std::to_string(k.class_id) + " ]\n";
+  }
+  text += "descriptors: !!opencv-matrix\n   rows: " + std::to_string(features.keypoints.size()) +
+          "\n   cols: " + std::to_string(features.descriptor_bytes) + "\n   dt: u\n   data: [";
+  for (std::size_t i = 0; i < features.descriptors.size(); ++i) {
+    text += (i == 0 ? " " : (i % 16 == 0 ? ",\n       " : ", ")) +
+            std::to_string(static_cast<unsigned>(features.descriptors[i]));
+  }
+  return text + " ]\n";
+}
+
+FeatureContent features_of(const ParameterSetRecord& set, std::uint32_t count) {
+  FeatureContent features;
+  features.set_id = set.id;
+  features.descriptor_bytes = set.descriptor_bits / 8;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto at = static_cast<float>(i);
+    features.keypoints.push_back(
+        {4 + at * 1.5f, 8 + at, 31, 22.5f * at, 0.0078125f, static_cast<std::int32_t>(i % 3), -1});
+  }
+  for (std::uint32_t i = 0; i < count * features.descriptor_bytes; ++i) {
+    put(features.descriptors, static_cast<std::uint8_t>(i * 73 + set.id));
+  }
+  features.yml = feature_text(features);
+  return features;
+}
+
+void add_pattern(BundleContent& content, const char* name, std::uint32_t width,
+                 std::uint32_t height, std::uint32_t features) {
+  PatternRecord pattern{};
+  pattern.name = content.intern(name);
+  pattern.width = width;
+  pattern.height = height;
+  pattern.width_mm = 210;
+  const auto side = static_cast<float>(width > height ? width : height);
+  pattern.half_width = static_cast<float>(width) / side;
+  pattern.half_height = static_cast<float>(height) / side;
+  pattern.score = -1;
+  content.patterns.push_back(pattern);
+  content.features.emplace_back();
+  for (const ParameterSetRecord& set : content.parameter_sets) {
+    content.features.back().push_back(features_of(set, features));
+  }
+}
+
+void add_parameter_sets(BundleContent& content) {
+  content.parameter_sets.push_back(parameter_set(content, "orb-2000", 1, Detector::kFastOrb));
+  content.parameter_sets.push_back(parameter_set(content, "brisk-3", 5, Detector::kAgastBrisk));
+}
+
+void add_scene(BundleContent& content, std::uint32_t pattern, std::uint32_t model) {
+  SceneRecord scene{};
+  scene.pattern = pattern;
+  scene.model = model;
+  scene.scale = 0.5f;
+  scene.offset[1] = -0.25f;
+  scene.rotation[0] = 0.5f;
+  scene.rotation[1] = -0.5f;
+  scene.rotation[2] = 0.5f;
+  scene.rotation[3] = 0.5f;
+  content.scenes.push_back(scene);
+}
+
+}  // namespace
+
+BundleContent pattern_content() {
+  BundleContent content;
+  content.meta = "{\"tool\":\"test\"}";
+  add_parameter_sets(content);
+  add_pattern(content, "box", 64, 48, 9);
+  return content;
+}
+
+BundleContent model_content() {
+  BundleContent content;
+  add_material(content, "skin", kNone);
+  add_octahedron(content, "octahedron", half_layout(), 0);
+  return content;
+}
+
+BundleContent texture_content() {
+  BundleContent content;
+  add_texture(content);
+  return content;
+}
+
+BundleContent golden_content() {
+  BundleContent content;
+  content.meta = "{\n \"tool\": \"golden\"\n}\n";
+  add_texture(content);
+  add_material(content, "skin", 0);
+  add_material(content, "glass \xC3\xA9", kNone);
+  add_octahedron(content, "half", half_layout(), 0);
+  add_octahedron(content, "integer", integer_layout(), 1);
+  add_octahedron(content, "float", float_layout(), 0);
+  add_parameter_sets(content);
+  add_pattern(content, "box", 64, 48, 9);
+  add_pattern(content, "poster", 30, 40, 12);
+  add_scene(content, 0, 2);
+  add_scene(content, 1, 0);
+  ExtraSection extra;
+  extra.type = 100;
+  extra.version = 3;
+  extra.owner = 7;
+  extra.variant = 9;
+  for (const char letter : std::string("from the future")) put(extra.bytes, letter);
+  content.extra.push_back(extra);
+  return content;
+}
+
+}  // namespace modar::test

@@ -1,0 +1,52 @@
+// Small bundles to test on, and what it takes to damage them with intent.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/bundle_writer.hpp"
+#include "formats/layout.hpp"
+
+namespace modar::test {
+
+using Bytes = std::vector<std::byte>;
+
+/// A pattern with two described parameter sets, no model: under 6 KB.
+BundleContent pattern_content();
+
+/// An octahedron in two chunks, one of them with two levels; two GPU sections.
+BundleContent model_content();
+
+/// A texture of 8 x 4 pixels with four levels and alpha twins; one GPU section.
+BundleContent texture_content();
+
+/// All of the format: 3 models of 3 layouts, 2 materials, a texture with mipmaps and alpha twins, 2
+/// patterns, 2 scenes, an unknown optional section.
+BundleContent golden_content();
+
+/// Encodes or ends the program: test contents are never wrong.
+Bytes encode(const BundleContent& content);
+
+/// The table's entry for a section; ends the program if it is not there.
+SectionEntry& entry_of(Bytes& bytes, SectionType type);
+
+/// Record `index` of a table, to be damaged.
+template <class T>
+T& record_of(Bytes& bytes, SectionType type, std::uint32_t index = 0) {
+  return *reinterpret_cast<T*>(bytes.data() + entry_of(bytes, type).offset + sizeof(TableHeader) +
+                               index * sizeof(T));
+}
+
+/// Makes all hashes and the stated file size true again.
+void rehash(Bytes& bytes);
+
+/// "error BUNDLE_MAGIC header (byte 0): detail", one for each issue.
+std::vector<std::string> report(std::span<const std::byte> bytes);
+
+Bytes read_file(const std::string& path);
+std::string source_path(const std::string& relative);
+
+}  // namespace modar::test

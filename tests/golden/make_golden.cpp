@@ -1,0 +1,14 @@
+// Writes the golden bundle of the current version. A released version's file never changes again.
+#include <cstdio>
+
+#include "formats/atomic_file.hpp"
+#include "tests/formats/support.hpp"
+
+int main(int count, char** arguments) {
+  if (count != 2) {
+    std::fprintf(stderr, "usage: make_golden OUT.modar\n");
+    return 1;
+  }
+  const modar::test::Bytes bytes = modar::test::encode(modar::test::golden_content());
+  return modar::write_file(arguments[1], bytes) ? 0 : 2;
+}
