@@ -2,10 +2,18 @@
 #include "bake/model/normal_maker.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
 namespace modar {
+
+void NormalMaker::reset(std::size_t count) {
+  first_.release();
+  next_.release();
+  group_.release();
+  sums_.assign(count, glm::dvec3(0.0));
+}
 
 std::uint32_t NormalMaker::node(std::uint32_t position, std::uint32_t group,
                                 std::size_t position_count) {
@@ -21,7 +29,7 @@ std::uint32_t NormalMaker::node(std::uint32_t position, std::uint32_t group,
 }
 
 std::uint32_t NormalMaker::flat_node() {
-  sums_.emplace_back(0.0);
+  sums_.push_back(glm::dvec3(0.0));
   next_.push_back(kNoIndex);
   group_.push_back(0);
   return static_cast<std::uint32_t>(sums_.size() - 1);
@@ -33,7 +41,7 @@ void NormalMaker::add(std::uint32_t node, const glm::dvec3& cross, const glm::dv
   sums_[node] += cross * angle;
 }
 
-std::vector<glm::dvec3> NormalMaker::take_normals() {
+Array<glm::dvec3> NormalMaker::take_normals() {
   for (glm::dvec3& n : sums_) {
     const double length = glm::length(n);
     n = length > 0 && std::isfinite(length) ? n / length : glm::dvec3(0, 0, 1);

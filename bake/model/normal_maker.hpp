@@ -2,9 +2,7 @@
 // groups.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <vector>
 
 #include <glm/vec3.hpp>
 
@@ -18,6 +16,8 @@ namespace modar {
 /// the area; Thuermer and Wuethrich, 1998, for the angle).
 class NormalMaker {
  public:
+  /// Starts over with `count` normals, numbered by the caller.
+  void reset(std::size_t count);
   /// Number of the normal shared by the corners of this position and group; made on first use.
   std::uint32_t node(std::uint32_t position, std::uint32_t group, std::size_t position_count);
   /// Number of a normal of one face alone.
@@ -26,14 +26,14 @@ class NormalMaker {
   void add(std::uint32_t node, const glm::dvec3& cross, const glm::dvec3& a, const glm::dvec3& b,
            const glm::dvec3& c);
   /// Unit normals by number; (0, 0, 1) where the shares cancel.
-  [[nodiscard]] std::vector<glm::dvec3> take_normals();
+  [[nodiscard]] Array<glm::dvec3> take_normals();
   [[nodiscard]] bool empty() const { return sums_.empty(); }
 
  private:
-  std::vector<std::uint32_t> first_;  // of each position, kNoIndex where none
-  std::vector<std::uint32_t> next_;   // of each node
-  std::vector<std::uint32_t> group_;
-  std::vector<glm::dvec3> sums_;
+  Array<std::uint32_t> first_;  // of each position, kNoIndex where none
+  Array<std::uint32_t> next_;   // of each node
+  Array<std::uint32_t> group_;
+  Array<glm::dvec3> sums_;
 };
 
 }  // namespace modar

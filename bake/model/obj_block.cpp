@@ -167,7 +167,7 @@ class BlockParser {
     p_ += 2;
     glm::dvec3 value(0.0);
     if (real(value.x) && real(value.y)) real(value.z);
-    block_.normals.push(value);
+    block_.normals.push(glm::vec3(value));
     skip_statement();
   }
 
@@ -200,7 +200,8 @@ class BlockParser {
       out = static_cast<std::uint32_t>(value - 1);
     } else {
       // Whether it exists is known once the blocks ahead are counted.
-      block_.relative.push_back(static_cast<std::uint32_t>(3 * block_.corners.size()) + component);
+      block_.relative.push_back(static_cast<std::uint32_t>(3 * block_.corner_positions.size()) +
+                                component);
       out = static_cast<std::uint32_t>(
           static_cast<std::uint64_t>(static_cast<std::int64_t>(local) + index));
     }
@@ -243,7 +244,9 @@ class BlockParser {
       note(ObjNote::kAttributeRange);
       result.normal = kNoIndex;
     }
-    block_.corners.push(result);
+    block_.corner_positions.push(result.position);
+    block_.corner_uvs.push(result.uv);
+    block_.corner_normals.push(result.normal);
     return true;
   }
 
@@ -280,7 +283,9 @@ class BlockParser {
     if (keep) {
       block_.face_corners.push(count);
     } else {
-      block_.corners.pop(count);
+      block_.corner_positions.pop(count);
+      block_.corner_uvs.pop(count);
+      block_.corner_normals.pop(count);
       block_.relative.resize(relative);
     }
     end_statement();
@@ -376,7 +381,9 @@ void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits
   block.colours.reset(most);
   block.uvs.reset(most);
   block.normals.reset(most);
-  block.corners.reset(most);
+  block.corner_positions.reset(most);
+  block.corner_uvs.reset(most);
+  block.corner_normals.reset(most);
   block.face_corners.reset(most);
   block.relative.clear();
   block.statements.clear();

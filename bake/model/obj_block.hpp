@@ -88,8 +88,10 @@ struct ObjBlock {
   Scratch<glm::dvec3> positions;
   Scratch<glm::vec3> colours;  ///< empty, or one a position, NaN where the line had none
   Scratch<glm::dvec2> uvs;
-  Scratch<glm::dvec3> normals;
-  Scratch<Corner> corners;              ///< see relative
+  Scratch<glm::vec3> normals;
+  Scratch<std::uint32_t> corner_positions;  ///< these three: see relative
+  Scratch<std::uint32_t> corner_uvs;
+  Scratch<std::uint32_t> corner_normals;
   Scratch<std::uint32_t> face_corners;  ///< number of corners of each face
   /// Entries (3 * corner + component) whose index counts from the start of the block (modulo 2^32).
   std::vector<std::uint32_t> relative;
@@ -97,7 +99,9 @@ struct ObjBlock {
   NoteTallies notes{};
   ObjCounts highest;  ///< greatest absolute index of a corner, plus one
   std::uint64_t lines = 0;
-  std::string text;  ///< the bytes, padded; filled by whoever reads
+  std::string text;         ///< the bytes, padded; filled by whoever reads
+  std::size_t first = 0;    ///< byte of `text` where the block's own statements begin
+  bool unfinished = false;  ///< the text lacked the last line's end, which was added
 };
 
 /// Set for the second, careful pass over a file with bad indices: every corner is held against them
@@ -111,8 +115,8 @@ struct ObjLimits {
 /// limits: nullptr in the fast pass, where indices are resolved later.
 void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block);
 
-/// The end of the last whole statement that ends in [from, size): one past a '\n' that no backslash
-/// continues; 0 where there is none. Looks for the first such end.
+/// The first end of a statement whose last byte lies in [from, size): one past a '\n' that no
+/// backslash continues; 0 where there is none.
 std::size_t first_statement_end(std::string_view text, std::size_t from);
 
 }  // namespace modar

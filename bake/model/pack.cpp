@@ -110,7 +110,7 @@ class VertexPacker {
     for (std::size_t i = 0; i < chunk.vertices.size(); ++i, bytes += offsets_.stride) {
       const std::uint32_t v = chunk.vertices[i];
       decoded[i] = put_position(mesh_.positions[v], bytes);
-      put_normal(mesh_.normals[v], bytes + offsets_.normal);
+      put_normal(glm::dvec3(mesh_.normals[v]), bytes + offsets_.normal);
       if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
       if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
     }

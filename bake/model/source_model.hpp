@@ -1,7 +1,6 @@
 // What a model file said, unrepaired.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -9,6 +8,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "bake/model/array.hpp"
 #include "bake/report.hpp"
 
 namespace modar {
@@ -38,25 +38,73 @@ struct Corner {
 /// Smoothing of faces in a file that says nothing of it: as one group of their own.
 inline constexpr std::uint32_t kUnstatedSmoothing = 0xFFFFFFFFu;
 
-/// Polygons of the file: face f has the corners [first_corner[f], first_corner[f + 1]), uses
-/// material face_material[f] (index into materials; 0 is a default material where the file names
-/// none) and smoothing group face_smoothing[f] (0: off; kUnstatedSmoothing: the file does not say).
+/// The uv or normal index of every corner. Most files leave an attribute out or repeat the
+/// position's index throughout; then nothing is stored.
+struct IndexPlane {
+  enum class Kind : std::uint8_t { kAbsent, kSame, kOwn };
+  Kind kind = Kind::kAbsent;
+  Array<std::uint32_t> own;  ///< of kOwn
+
+  [[nodiscard]] std::uint32_t at(std::size_t corner, std::uint32_t position) const {
+    return kind == Kind::kOwn ? own[corner] : (kind == Kind::kSame ? position : kNoIndex);
+  }
+};
+
+/// Faces from `first_face` on, up to the next run, have `value`.
+struct FaceRun {
+  std::uint64_t first_face = 0;
+  std::uint32_t value = 0;
+};
+
+/// Polygons of the file: face f has face_size(f) corners from face_first(f) on. material_runs hold
+/// indices into materials (0 is a default material where the file names none), smoothing_runs
+/// smoothing groups (0: off; kUnstatedSmoothing: the file does not say); both are ascending, the
+/// first run begins at face 0.
 struct SourceModel {
   std::string name;  ///< the file's stem
-  std::vector<glm::dvec3> positions;
-  std::vector<glm::vec3> colours;  ///< empty, or one a position, RGB in [0,1]
-  std::vector<glm::dvec2> uvs;     ///< v up, as OBJ has it
-  std::vector<glm::dvec3> normals;
-  std::vector<Corner> corners;
-  std::vector<std::uint32_t> first_corner;  ///< faces + 1 entries
-  std::vector<std::uint32_t> face_material;
-  std::vector<std::uint32_t> face_smoothing;
+  Array<glm::dvec3> positions;
+  Array<glm::vec3> colours;  ///< empty, or one a position, RGB in [0,1]
+  Array<glm::dvec2> uvs;     ///< v up, as OBJ has it
+  Array<glm::vec3> normals;
+  Array<std::uint32_t> corner_positions;
+  IndexPlane corner_uvs;
+  IndexPlane corner_normals;
+  Array<std::uint32_t> first_corner;  ///< faces + 1 entries; empty where all faces are triangles
+  std::vector<FaceRun> material_runs;
+  std::vector<FaceRun> smoothing_runs;
   std::vector<SourceMaterial> materials;
   std::vector<Finding> findings;
 
-  [[nodiscard]] std::size_t face_count() const {
-    return first_corner.empty() ? 0 : first_corner.size() - 1;
+  [[nodiscard]] std::size_t corner_count() const { return corner_positions.size(); }
+  [[nodiscard]] Corner corner(std::size_t i) const {
+    const std::uint32_t p = corner_positions[i];
+    return {p, corner_uvs.at(i, p), corner_normals.at(i, p)};
   }
+  [[nodiscard]] std::size_t face_count() const {
+    return first_corner.empty() ? corner_count() / 3 : first_corner.size() - 1;
+  }
+  [[nodiscard]] std::size_t face_first(std::size_t f) const {
+    return first_corner.empty() ? 3 * f : first_corner[f];
+  }
+  [[nodiscard]] std::size_t face_size(std::size_t f) const {
+    return first_corner.empty() ? 3 : first_corner[f + 1] - first_corner[f];
+  }
+};
+
+/// Walks runs along rising face numbers.
+class RunCursor {
+ public:
+  explicit RunCursor(const std::vector<FaceRun>& runs) : runs_(runs) {}
+  /// The value of a face that is not below the one asked for before; 0 where there are no runs.
+  std::uint32_t at(std::size_t face) {
+    while (next_ < runs_.size() && runs_[next_].first_face <= face) value_ = runs_[next_++].value;
+    return value_;
+  }
+
+ private:
+  const std::vector<FaceRun>& runs_;
+  std::size_t next_ = 0;
+  std::uint32_t value_ = 0;
 };
 
 }  // namespace modar

@@ -26,24 +26,35 @@ struct Placement {
 struct TriMesh {
   std::string name;
   Placement placement;
-  glm::dvec3 source_min{0.0};
+  glm::dvec3 source_min{0.0};  ///< of the vertices that triangles use
   glm::dvec3 source_max{0.0};
-  std::vector<glm::dvec3> positions;           ///< in [-1,1]
-  std::vector<std::uint32_t> source_position;  ///< index of the source position of each vertex
-  std::vector<glm::dvec3> normals;             ///< unit length
-  std::vector<glm::dvec2> uvs;
-  std::vector<glm::u8vec4> colours;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::uint32_t> triangle_material;
+  Array<glm::dvec3> positions;  ///< in [-1,1]
+  /// Index of the source position of each vertex; empty where vertex v is position v.
+  Array<std::uint32_t> source_positions;
+  Array<glm::vec3> normals;  ///< unit length
+  Array<glm::dvec2> uvs;
+  Array<glm::u8vec4> colours;
+  Array<std::array<std::uint32_t, 3>> triangles;
+  Array<std::uint32_t> triangle_material;
   std::vector<SourceMaterial> materials;
   std::uint64_t source_vertex_count = 0;
   std::uint64_t source_face_count = 0;
+
+  [[nodiscard]] std::uint32_t source_position(std::uint32_t vertex) const {
+    return source_positions.empty() ? vertex : source_positions[vertex];
+  }
+};
+
+struct WeldOptions {
+  unsigned jobs = 1;  ///< threads; the result does not depend on it
 };
 
 /// Triangulates (concave polygons by ear clipping), drops what has no area, welds on index triples,
-/// makes missing normals (angle-weighted, smoothing groups respected), normalises to [-1,1].
-/// Findings of dropped and made things go to report.findings.
-/// Errors: kInvalidInput "model.empty" where no triangle is left.
-Result<TriMesh> weld(const SourceModel& source, Report& report);
+/// makes missing normals (area-and-angle weighted, smoothing groups respected), normalises to
+/// [-1,1]. Findings of dropped and made things go to report.findings. Errors: kInvalidInput
+/// "model.empty" where no triangle is left. The form that takes the source over frees its arrays as
+/// it goes: large models need half the memory.
+Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& options = {});
+Result<TriMesh> weld(const SourceModel& source, Report& report, const WeldOptions& options = {});
 
 }  // namespace modar
