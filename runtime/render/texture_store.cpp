@@ -8,6 +8,13 @@
 #include "runtime/render/etc1_decode.hpp"
 
 namespace modar {
+namespace {
+
+bool power_of_two(const TextureRecord& texture) {
+  return std::has_single_bit(texture.width) && std::has_single_bit(texture.height);
+}
+
+}  // namespace
 
 TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
     : bundle_(bundle),
@@ -126,8 +133,9 @@ GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
       uploaded_bytes_ += bytes;
     }
   }
-  // ES 2.0 repeats power-of-two textures only; the bundle says where that is asked for.
-  const bool repeat = (record.flags & kTextureRepeat) != 0;
+  // ES 2.0 repeats power-of-two textures only, and shows others black where it is asked to.
+  const bool repeat =
+      (record.flags & kTextureRepeat) != 0 && (npot_mipmaps_ || power_of_two(record));
   const GLint wrap = repeat ? GL_REPEAT : GL_CLAMP_TO_EDGE;
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, wrap);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, wrap);

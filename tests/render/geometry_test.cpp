@@ -1,0 +1,212 @@
+// Vertices and indices straight from mapped bytes land where projection says, in every layout.
+#include <random>
+
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "tests/render/reference.hpp"
+#include "tests/render/scene.hpp"
+
+namespace modar {
+namespace {
+
+Camera small_camera() {
+  Camera camera = default_camera(160, 120);
+  // Off-centre and with unequal focal lengths: nothing may cancel out.
+  camera.fx = 150.0;
+  camera.fy = 141.0;
+  camera.cx = 71.3;
+  camera.cy = 63.9;
+  return camera;
+}
+
+/// Random triangles with a colour of their own each.
+std::vector<Triangle> random_triangles(std::uint32_t seed, int count) {
+  std::mt19937 random(seed);
+  const auto coordinate = [&] {
+    return on_half_grid(static_cast<double>(random() % 2001) / 1000.0 - 1.0);
+  };
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < count; ++i) {
+    Triangle triangle;
+    const glm::dvec3 base(coordinate() * 0.7, coordinate() * 0.7, coordinate() * 0.7);
+    for (glm::dvec3& corner : triangle.corners) {
+      for (int axis = 0; axis < 3; ++axis) {
+        corner[axis] = on_half_grid(base[axis] + coordinate() * 0.3);
+      }
+    }
+    for (std::uint8_t& channel : triangle.colour) channel = static_cast<std::uint8_t>(random());
+    triangles.push_back(triangle);
+  }
+  return triangles;
+}
+
+glm::dmat4 some_view() {
+  glm::dmat4 view = glm::translate(glm::dmat4(1.0), glm::dvec3(0.1, -0.05, -2.6));
+  return glm::rotate(view, 0.7, glm::normalize(glm::dvec3(0.3, 1.0, 0.2)));
+}
+
+/// Every pixel that the rays are certain of has its triangle's colour, within `tolerance`.
+void expect_picture(const std::vector<std::uint8_t>& pixels, const std::vector<Hit>& hits,
+                    std::span<const Triangle> triangles, int tolerance) {
+  int compared = 0;
+  int covered = 0;
+  int wrong = 0;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!hits[i].certain) continue;
+    ++compared;
+    const Rgb expected = hits[i].triangle < 0
+                             ? Rgb{0, 0, 0}
+                             : triangles[static_cast<std::size_t>(hits[i].triangle)].colour;
+    covered += hits[i].triangle >= 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (std::abs(static_cast<int>(pixels[i * 4 + c]) - static_cast<int>(expected[c])) >
+          tolerance) {
+        ++wrong;
+        break;
+      }
+    }
+  }
+  EXPECT_EQ(wrong, 0) << "of " << compared << " pixels";
+  EXPECT_GT(covered, 1500);
+  EXPECT_GT(compared, static_cast<int>(hits.size()) * 3 / 4);
+}
+
+class GeometryTest : public GlTest {
+ protected:
+  void check_layout(Layout layout, const GlCaps& caps, const glm::dmat4& view, bool two_sided) {
+    const std::vector<Triangle> triangles = random_triangles(7, 60);
+    SceneMaker maker;
+    maker.add_plain_model(layout, triangles);
+    if (!two_sided) maker.content.materials[0].flags = 0;
+    const MappedBundle bundle(maker.content);
+    const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
+    ASSERT_TRUE(renderer);
+    const DrawItem item{0, glm::mat4(view)};
+    const Camera camera = small_camera();
+    const std::vector<std::uint8_t> pixels = draw(*renderer, camera, {&item, 1});
+    const auto eye = to_eye_space(triangles, glm::dmat4(item.to_eye), two_sided);
+    expect_picture(pixels, cast_rays(camera, eye), triangles, 1);
+    EXPECT_EQ(renderer->stats().draw_calls, 1);
+    EXPECT_EQ(renderer->stats().triangles, 60u);
+  }
+};
+
+TEST_F(GeometryTest, HalfFloatsDrawStraightFromTheMapping) {
+  if (!probe_gl_caps().half_float_vertices) GTEST_SKIP() << "this driver has no half floats";
+  check_layout(Layout::kHalfColoured, probe_gl_caps(), some_view(), true);
+}
+
+TEST_F(GeometryTest, HalfFloatsWidenedDrawTheSame) {
+  GlCaps caps = probe_gl_caps();
+  caps.half_float_vertices = false;
+  check_layout(Layout::kHalfColoured, caps, some_view(), true);
+}
+
+TEST_F(GeometryTest, SixteenBitIntegersDecodeByStepAndOffset) {
+  check_layout(Layout::kI16Coloured, probe_gl_caps(), some_view(), true);
+}
+
+TEST_F(GeometryTest, FloatsDraw) {
+  check_layout(Layout::kF32Coloured, probe_gl_caps(), some_view(), true);
+}
+
+TEST_F(GeometryTest, BacksOfOneSidedMaterialsAreCulled) {
+  check_layout(Layout::kHalfColoured, probe_gl_caps(), some_view(), false);
+}
+
+TEST_F(GeometryTest, BothUploadsOfAMixedBundleFindTheirVertices) {
+  // Two models of different strides share the merged buffers.
+  const std::vector<Triangle> first = random_triangles(3, 30);
+  const std::vector<Triangle> second = random_triangles(4, 30);
+  SceneMaker maker;
+  maker.add_plain_model(Layout::kHalfColoured, first);
+  maker.add_plain_model(Layout::kF32Coloured, second);
+  const MappedBundle bundle(maker.content);
+  std::vector<Triangle> all = first;
+  all.insert(all.end(), second.begin(), second.end());
+  const Camera camera = small_camera();
+  for (const bool halves : {true, false}) {
+    GlCaps caps = probe_gl_caps();
+    caps.half_float_vertices = caps.half_float_vertices && halves;
+    const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
+    ASSERT_TRUE(renderer);
+    const DrawItem items[] = {{0, glm::mat4(some_view())}, {1, glm::mat4(some_view())}};
+    const std::vector<std::uint8_t> pixels = draw(*renderer, camera, items);
+    const auto eye = to_eye_space(all, glm::dmat4(items[0].to_eye), true);
+    expect_picture(pixels, cast_rays(camera, eye), all, 1);
+    EXPECT_EQ(renderer->stats().draw_calls, 2);
+  }
+}
+
+TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
+  // A fan of small tilted squares; colour = base * max(0, n . l) by hand.
+  for (const Layout layout : {Layout::kHalfLit, Layout::kOctLit}) {
+    std::vector<Triangle> triangles;
+    std::mt19937 random(11);
+    for (int i = 0; i < 36; ++i) {
+      const double x = on_half_grid((i % 6 - 2.5) / 3.0);
+      const double y = on_half_grid((i / 6 - 2.5) / 3.0);
+      glm::dvec3 normal(static_cast<double>(random() % 200) / 100.0 - 1.0,
+                        static_cast<double>(random() % 200) / 100.0 - 1.0, 0.9);
+      normal = glm::normalize(normal);
+      const double s = on_half_grid(0.12);
+      for (const bool upper : {false, true}) {
+        Triangle triangle;
+        triangle.normal = normal;
+        triangle.colour = {200, 100, 50};
+        triangle.corners = {glm::dvec3(x - s, y - s, 0), {x + s, y + s, 0}, {x - s, y + s, 0}};
+        if (!upper)
+          triangle.corners = {glm::dvec3(x - s, y - s, 0), {x + s, y - s, 0}, {x + s, y + s, 0}};
+        triangles.push_back(triangle);
+      }
+    }
+    SceneMaker maker;
+    maker.add_plain_model(layout, triangles);
+    const MappedBundle bundle(maker.content);
+    const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+    ASSERT_TRUE(renderer);
+    RenderOptions options = flat_light();
+    options.light = {0.3f, 0.2f, 0.9f};
+    renderer->set_options(options);
+    // A stretched matrix: normals must not follow the stretch of positions.
+    glm::dmat4 view = glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -2.5));
+    view = glm::rotate(view, 0.4, glm::dvec3(1.0, 0.0, 0.0));
+    view = glm::scale(view, glm::dvec3(1.0, 1.0, 2.5));
+    const DrawItem item{0, glm::mat4(view)};
+    const Camera camera = small_camera();
+    const std::vector<std::uint8_t> pixels = draw(*renderer, camera, {&item, 1});
+    const glm::dmat3 normals = glm::transpose(glm::inverse(glm::dmat3(view)));
+    std::vector<Triangle> expected = triangles;
+    for (Triangle& triangle : expected) {
+      const glm::dvec3 n = glm::normalize(normals * triangle.normal);
+      const double cosine = std::abs(glm::dot(n, glm::normalize(glm::dvec3(options.light))));
+      for (std::uint8_t& channel : triangle.colour) {
+        channel = static_cast<std::uint8_t>(std::lround(channel * std::min(1.0, cosine)));
+      }
+    }
+    const auto eye = to_eye_space(triangles, view, true);
+    // Octahedral 8-bit normals are off by up to 1.2 degrees.
+    expect_picture(pixels, cast_rays(camera, eye), expected, layout == Layout::kOctLit ? 5 : 3);
+  }
+}
+
+TEST_F(GeometryTest, MirroredMatricesShowTheSameFrontFaces) {
+  const glm::dmat4 mirrored = glm::scale(some_view(), glm::dvec3(-1.0, 1.0, 1.0));
+  const std::vector<Triangle> triangles = random_triangles(7, 60);
+  SceneMaker maker;
+  maker.add_plain_model(Layout::kHalfColoured, triangles);
+  maker.content.materials[0].flags = 0;
+  const MappedBundle bundle(maker.content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  const DrawItem item{0, glm::mat4(mirrored)};
+  const Camera camera = small_camera();
+  const std::vector<std::uint8_t> pixels = draw(*renderer, camera, {&item, 1});
+  // A front face of the model is one in the mirror too: its corners turn round in eye space.
+  std::vector<EyeTriangle> eye = to_eye_space(triangles, glm::dmat4(item.to_eye), false);
+  for (EyeTriangle& triangle : eye) std::swap(triangle.corners[1], triangle.corners[2]);
+  expect_picture(pixels, cast_rays(camera, eye), triangles, 1);
+}
+
+}  // namespace
+}  // namespace modar
