@@ -65,7 +65,7 @@ else
     --corners 285.8,111.2,513.6,168.7,473.3,282.6,200.8,195.6 \
     --width-mm 258 --height-mm 189 -o "$pattern"
   # The spider of the package is modelled with Y up.
-  scene="box=spider,up=y"
+  scene="box=spider,up=y,scale=0.6"
 fi
 
 step "Bake"
@@ -77,7 +77,10 @@ step "Check"
 "$bin/modar" inspect "$bundle"
 
 step "Play"
-"$bin/modar-play" "$bundle" --input "$video" --method paper --outline --report "$out"
+# The article's AGAST-BRISK-3 holds this small, tilted picture in most frames; its FAST-ORB-2000, the
+# default, finds it in few of them and takes clutter for it in many.
+"$bin/modar-play" "$bundle" --input "$video" --method paper --parameters brisk-3 --outline \
+  --report "$out"
 
 step "Done. Look at"
 for file in index.html overlay.mp4 contact_sheet.png demo.modar; do
