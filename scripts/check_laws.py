@@ -26,10 +26,11 @@ THIRD_PARTIES = {
     "opencv2/": OPENCV_FILES,
     "OpenMesh/": (r"bake/model/[a-z_]*(topology|decimat)[a-z_]*\.cpp", r"tests/.*"),
     "draco/": (r"(bake|runtime)/[a-z_/]*draco[a-z_]*\.cpp", r"tests/.*"),
-    "tiny_gltf": (r"bake/model/(glb|gltf)_[a-z_]*\.cpp", r"tests/.*"),
+    "tiny_gltf": (r"bake/model/(glb|gltf)_[a-z_]*\.cpp", r"bake/model/tinygltf_library\.[ch]pp", r"tests/.*"),
+    "bake/model/tinygltf_library": (r"bake/model/[a-z_]*gl(b|tf)[a-z_]*\.cpp",),
     "CLI/": (r"bake/commands/cli\.cpp",),
     "nlohmann/": (r"bake/[a-z_/]*json[a-z_]*\.cpp", r"tests/.*"),
-    "rapidjson/": (r"runtime/play/json_lines\.cpp", r"tests/.*"),
+    "rapidjson/": (r"runtime/play/(json_lines|qos_log|recording)\.cpp", r"tests/.*"),
     "SDL": (r"runtime/play/desk_.*\.cpp",),
     "Eigen/": (r"(runtime|bake)/.*\.cpp", r"tests/.*"),
 }

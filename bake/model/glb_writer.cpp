@@ -115,6 +115,7 @@ void GlbBuilder::add_materials() {
     // The roughness whose highlight is as wide as that of the Phong exponent.
     const double exponent = std::max(0.0, static_cast<double>(source.shininess));
     pbr.roughnessFactor = std::pow(2.0 / (exponent + 2.0), 0.25);
+    material.emissiveFactor.assign(3, 0.0);
     for (std::size_t i = 0; i < 3; ++i) {
       pbr.baseColorFactor[i] =
           std::clamp(to_linear(static_cast<double>(source.diffuse[i])), 0.0, 1.0);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "bake/model/ascii.hpp"
 #include "bake/model/number_parser.hpp"
 
 namespace modar {
@@ -11,16 +12,6 @@ namespace {
 
 constexpr std::uint32_t kTooLarge = 0x7FFFFFFFu;  // no file of ours has so many elements
 constexpr std::uint32_t kMaxFaceCorners = 0x00FFFFFFu;
-
-bool is_blank(char c) {
-  return c == ' ' || c == '\t' || c == '\v' || c == '\f' || c == '\0';
-}
-bool is_line_end(char c) {
-  return c == '\n' || c == '\r';
-}
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
 
 class BlockParser {
  public:

@@ -8,8 +8,8 @@
 
 namespace modar {
 
-/// Pinhole with Brown-Conrady distortion, as OpenCV has it. Pixels; the centre of the top-left pixel
-/// is (0, 0). The article has one camera constant c: fx = fy = c.
+/// Pinhole with Brown-Conrady distortion, as OpenCV has it. Pixels; the centre of the top-left
+/// pixel is (0, 0). The article has one camera constant c: fx = fy = c.
 struct Camera {
   int width = 0;
   int height = 0;
@@ -33,8 +33,8 @@ glm::dvec2 undistort(const Camera& camera, glm::dvec2 pixel);
 glm::dvec2 project(const Camera& camera, glm::dvec3 point);
 
 /// OpenGL projection from the intrinsics (ModAR Eq. 7: NDC x M_Persp). Maps camera axes of GL (x
-/// right, y up, z backward) to clip space such that pixel centres of the frame land on pixel centres
-/// of a viewport that shows the whole frame. 0 < near < far.
+/// right, y up, z backward) to clip space such that pixel centres of the frame land on pixel
+/// centres of a viewport that shows the whole frame. 0 < near < far.
 glm::mat4 gl_projection(const Camera& camera, double near_plane, double far_plane);
 
 }  // namespace modar

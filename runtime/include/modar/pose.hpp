@@ -16,7 +16,8 @@
 namespace modar {
 
 /// World (pattern plane, z towards the viewer) to camera axes (x right, y down, z forward):
-/// X_camera = rotation * X_world + translation. Lengths in pattern units (half of its largest side).
+/// X_camera = rotation * X_world + translation. Lengths in pattern units (half of its largest
+/// side).
 struct Pose {
   glm::dmat3 rotation{1.0};
   glm::dvec3 translation{0.0};
@@ -32,13 +33,12 @@ Result<glm::dmat3> homography_from_points(std::span<const glm::dvec2, 4> from,
                                           std::span<const glm::dvec2, 4> to);
 
 /// Homography to camera pose (ModAR Eq. 3-5). homography: pattern plane -> undistorted pixels.
-/// Deviation: its sign is chosen such that the pattern lies before the camera, and the last singular
-/// vector is flipped where det(U V^T) < 0.
-/// Errors: kInvalidInput "pose.degenerate".
+/// Deviation: its sign is chosen such that the pattern lies before the camera, and the last
+/// singular vector is flipped where det(U V^T) < 0. Errors: kInvalidInput "pose.degenerate".
 Result<Pose> pose_from_homography(const Camera& camera, const glm::dmat3& homography);
 
-/// Levenberg-Marquardt over the six parameters (rotation vector, translation), minimising the squared
-/// distance between projections of plane points (z = 0) and undistorted pixels.
+/// Levenberg-Marquardt over the six parameters (rotation vector, translation), minimising the
+/// squared distance between projections of plane points (z = 0) and undistorted pixels.
 /// world.size() == pixels.size() >= 4. Answers the start pose where no step lowers the error.
 Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
                  std::span<const glm::dvec2> pixels, const Pose& start);

@@ -32,7 +32,8 @@ const char* to_string(Reason reason);
 /// A pattern measured in this frame.
 struct Sighting {
   std::uint32_t pattern = 0;
-  std::array<glm::dvec2, 4> corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left
+  std::array<glm::dvec2, 4>
+      corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left
   Pose pose;
   int matches = 0;
   int inliers = 0;
@@ -48,15 +49,15 @@ struct TrackTimes {
 };
 
 struct TrackResult {
-  std::vector<Sighting> visible;  ///< in the order of the bundle's patterns
+  std::vector<Sighting> visible;        ///< in the order of the bundle's patterns
   Reason reason = Reason::kNoFeatures;  ///< of the pattern that came furthest
-  int features = 0;  ///< keypoints of the frame
+  int features = 0;                     ///< keypoints of the frame
   TrackTimes times;
 };
 
-/// The article's pipeline (inventory C to F), with OpenCV: detect, describe, match by brute force with
-/// cross-check, RANSAC homography, Levenberg-Marquardt, corners, pose. The reference that ours is
-/// measured against; nothing of ours ever improves it.
+/// The article's pipeline (inventory C to F), with OpenCV: detect, describe, match by brute force
+/// with cross-check, RANSAC homography, Levenberg-Marquardt, corners, pose. The reference that ours
+/// is measured against; nothing of ours ever improves it.
 class PaperTracker {
  public:
   /// Reads the patterns described with parameter set `set_id` from the bundle's mapped twins.
@@ -84,9 +85,9 @@ class Hysteresis {
   explicit Hysteresis(std::size_t pattern_count);
 
   struct State {
-    bool shown = false;      ///< draw the model, at `pose`
-    bool measured = false;   ///< the pose is of this frame
-    Pose pose;               ///< the newest pose that was measured
+    bool shown = false;     ///< draw the model, at `pose`
+    bool measured = false;  ///< the pose is of this frame
+    Pose pose;              ///< the newest pose that was measured
   };
   /// Takes a frame's sightings; answers one state a pattern, valid until the next call.
   std::span<const State> step(std::span<const Sighting> visible);
