@@ -21,16 +21,17 @@ struct PixelPoint {
 struct RectifyOptions {
   /// In the photo: top-left, top-right, bottom-right, bottom-left of the pattern.
   std::array<PixelPoint, 4> corners{};
-  double width_mm = 0;        ///< physical width, 0: unknown
-  double height_mm = 0;       ///< physical height; 0: estimated from the perspective
-  std::uint32_t max_side = 720;  ///< pixels of the longer side of the result, never more than the photo has
+  double width_mm = 0;   ///< physical width, 0: unknown
+  double height_mm = 0;  ///< physical height; 0: estimated from the perspective
+  std::uint32_t max_side =
+      720;  ///< pixels of the longer side of the result, never more than the photo has
   [[nodiscard]] Result<void> validate() const;
 };
 
 /// A frontal view of the quadrilateral. Its aspect ratio comes from the sizes in mm where both are
-/// known, else from the perspective (Zhang & He, "Whiteboard scanning", 2006, with the principal point
-/// in the photo's centre), else from the sides' lengths.
-/// Errors: kInvalidInput "rectify.corners" (not convex, outside of the photo, too small).
+/// known, else from the perspective (Zhang & He, "Whiteboard scanning", 2006, with the principal
+/// point in the photo's centre), else from the sides' lengths. Errors: kInvalidInput
+/// "rectify.corners" (not convex, outside of the photo, too small).
 Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options);
 
 /// Writes a PNG whose physical size (pHYs) tells width_mm where it is not 0.
