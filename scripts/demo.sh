@@ -46,7 +46,7 @@ if [ $own = yes ]; then
   rm -rf "$out"; mkdir -p "$out"
   model=assets/models/pottery.obj
   pattern=assets/patterns/cover.png
-  scene="cover=pottery"
+  scene="cover=pottery,scale=0.5"
   step "Clip: our cover before a made-up background"
   python3 assets/make_clip.py --pattern "$pattern" --frames 60 --size 480x360 "$out/clip"
   video=$out/clip
