@@ -1,48 +1,40 @@
 // One texture from its file to measured levels of ETC1 blocks.
 #include <algorithm>
-#include <bit>
-#include <cmath>
+#include <charconv>
 
+#include "bake/texture/atlas.hpp"
 #include "bake/texture/etc1_texture.hpp"
 #include "bake/texture/resample.hpp"
 #include "bake/texture/texture_quality.hpp"
+#include "bake/texture/texture_size.hpp"
+#include "formats/layout.hpp"
 
 namespace modar {
 namespace {
 
-constexpr std::uint32_t kMaxTextureSideOption = 8192;  // formats' kMaxTextureSide
-
-/// The power of two that is nearest as a ratio, at most `limit` (itself rounded down to one).
-std::uint32_t nearest_power(std::uint32_t side, std::uint32_t limit) {
-  const std::uint64_t below = std::bit_floor(side);
-  const bool up = std::uint64_t{side} * side > below * below * 2;
-  return std::min(static_cast<std::uint32_t>(up ? below * 2 : below), std::bit_floor(limit));
+std::uint64_t pixel_count(const RgbaImage& image) {
+  return std::uint64_t{image.width} * image.height;
 }
 
-struct Size {
-  std::uint32_t width;
-  std::uint32_t height;
-};
-
-Size target_size(const RgbaImage& image, const TextureOptions& options) {
-  if (options.mipmaps || options.repeat) {
-    return {nearest_power(image.width, options.max_side),
-            nearest_power(image.height, options.max_side)};
-  }
-  const std::uint64_t longer = std::max(image.width, image.height);
-  if (longer <= options.max_side) return {image.width, image.height};
-  const auto scaled = [&](std::uint64_t side) {
-    return static_cast<std::uint32_t>(
-        std::max<std::uint64_t>(1, (side * options.max_side * 2 + longer) / (2 * longer)));
-  };
-  return {scaled(image.width), scaled(image.height)};
+std::string file_name(const std::string& path) {
+  const std::size_t slash = path.find_last_of("/\\");
+  return slash == std::string::npos ? path : path.substr(slash + 1);
 }
 
 RgbaImage resized(const RgbaImage& image, const TextureOptions& options) {
-  const Size size = target_size(image, options);
+  const TextureSize size = texture_size({image.width, image.height}, options);
   if (size.width == image.width && size.height == image.height) return image;
   return to_srgb(
       resample(to_linear(image), size.width, size.height, {options.repeat, options.jobs}));
+}
+
+/// Whether all texels that are shown look the same.
+bool is_constant(const RgbaImage& image, std::array<std::uint8_t, 4>& colour) {
+  std::copy_n(image.pixels.begin(), 4, colour.begin());
+  for (std::size_t i = 4; i < image.pixels.size(); i += 4) {
+    if (!std::equal(colour.begin(), colour.end(), &image.pixels[i])) return false;
+  }
+  return true;
 }
 
 bool has_alpha(const RgbaImage& image) {
@@ -61,34 +53,84 @@ RgbaImage alpha_twin(const RgbaImage& image) {
   return twin;
 }
 
-Etc1Level encode_level(const RgbaImage& image, bool alpha, unsigned jobs) {
+Etc1Level encode_level(const RgbaImage& image, bool alpha, const TextureOptions& texture) {
+  const Etc1Options options = {texture.effort, texture.perceptual, texture.jobs};
   Etc1Level level;
   level.width = image.width;
   level.height = image.height;
-  level.colour = encode_etc1(image, jobs);
-  if (alpha) level.alpha = encode_etc1(alpha_twin(image), jobs);
+  level.colour = encode_etc1(image, options);
+  if (alpha) level.alpha = encode_etc1(alpha_twin(image), options);
   const RgbaImage decoded = decode_etc1(level.colour, level.width, level.height);
   level.psnr_db = psnr_db(image, decoded);
   level.ssim = ssim(image, decoded);
+  const WorstBlock worst = worst_block(image, decoded);
+  level.worst_x = worst.x;
+  level.worst_y = worst.y;
+  level.worst_psnr_db = worst.psnr_db;
   return level;
 }
 
-std::uint64_t pixel_count(const RgbaImage& image) {
-  return std::uint64_t{image.width} * image.height;
+/// The images of all levels, ready to encode.
+std::vector<RgbaImage> make_levels(const RgbaImage& source, const TextureOptions& options,
+                                   Etc1Texture& texture) {
+  RgbaImage top = resized(source, options);
+  if (options.coverage) {
+    fill_uncovered(top, resize_coverage(*options.coverage, top.width, top.height));
+  }
+  texture.alpha = has_alpha(top);
+  texture.constant = is_constant(top, texture.constant_rgba);
+  if (texture.constant) {
+    top = {1, 1, {texture.constant_rgba.begin(), texture.constant_rgba.end()}};
+    return {top};
+  }
+  std::vector<RgbaImage> levels = options.mipmaps ? mip_chain(top, options.repeat, options.jobs)
+                                                  : std::vector<RgbaImage>{std::move(top)};
+  if (!options.coverage) return levels;
+  for (RgbaImage& level : levels) {
+    flatten_uncovered_blocks(level, resize_coverage(*options.coverage, level.width, level.height));
+  }
+  return levels;
 }
 
-std::string file_name(const std::string& path) {
-  const std::size_t slash = path.find_last_of("/\\");
-  return slash == std::string::npos ? path : path.substr(slash + 1);
+/// A number with two decimals, the same in every locale.
+std::string decimals(double value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, 2);
+  return {text, end.ptr};
+}
+
+/// The gate: says so where level 0 is worse than asked.
+void judge(const std::string& path, const Etc1Level& level, const TextureOptions& options,
+           Report& report) {
+  const bool bad_psnr = options.min_psnr_db > 0 && level.psnr_db < options.min_psnr_db;
+  const bool bad_ssim = options.min_ssim > 0 && level.ssim < options.min_ssim;
+  if (!bad_psnr && !bad_ssim) return;
+  report.findings.push_back(
+      {"texture.quality", FindingSeverity::kWarning, path, 0,
+       "compressed it has " + decimals(level.psnr_db) + " dB and SSIM " + decimals(level.ssim) +
+           "; its worst block, at pixel " + std::to_string(level.worst_x) + "," +
+           std::to_string(level.worst_y) + ", has " + decimals(level.worst_psnr_db) + " dB",
+       "bake it with more effort, larger, or lower the threshold"});
+}
+
+Result<void> write_picture(const RgbaImage& image, const Etc1Texture& texture,
+                           const TextureOptions& options) {
+  if (options.picture_folder.empty()) return {};
+  const Etc1Level& level = texture.levels.front();
+  const RgbaImage decoded = decode_etc1(level.colour, level.width, level.height);
+  return write_png(quality_picture(image, decoded),
+                   options.picture_folder + "/" + texture.name + ".png");
 }
 
 }  // namespace
 
 Result<Etc1Texture> bake_texture(const std::string& path, const TextureOptions& options,
                                  Report& report) {
-  if (options.max_side == 0 || options.max_side > kMaxTextureSideOption) {
-    return fail(ExitCode::kUsage, "texture.max-side", std::to_string(options.max_side),
-                "a texture's greatest side must lie between 1 and 8192", "choose another");
+  if (options.max_side == 0 || options.max_side > kMaxTextureSide) {
+    return fail(
+        ExitCode::kUsage, "texture.max-side", std::to_string(options.max_side),
+        "a texture's greatest side must lie between 1 and " + std::to_string(kMaxTextureSide),
+        "choose another");
   }
   StageTimer read_timer(report, "texture.read");
   const Result<RgbaImage> source = read_image(path);
@@ -96,26 +138,27 @@ Result<Etc1Texture> bake_texture(const std::string& path, const TextureOptions& 
   read_timer.done(1, pixel_count(*source));
 
   StageTimer mip_timer(report, "texture.mips");
-  const RgbaImage top = resized(*source, options);
-  const std::vector<RgbaImage> images =
-      options.mipmaps ? mip_chain(top, options.repeat, options.jobs) : std::vector<RgbaImage>{top};
-  std::uint64_t pixels = 0;
-  for (const RgbaImage& image : images) pixels += pixel_count(image);
-  mip_timer.done(pixel_count(*source), pixels);
-
-  StageTimer encode_timer(report, "texture.etc1");
   Etc1Texture texture;
   texture.name = file_name(path);
   texture.source_width = source->width;
   texture.source_height = source->height;
   texture.repeat = options.repeat;
-  texture.alpha = has_alpha(top);
+  const std::vector<RgbaImage> images = make_levels(*source, options, texture);
+  std::uint64_t pixels = 0;
+  for (const RgbaImage& image : images) pixels += pixel_count(image);
+  mip_timer.done(pixel_count(*source), pixels);
+
+  StageTimer encode_timer(report, "texture.etc1");
   std::uint64_t bytes = 0;
   for (const RgbaImage& image : images) {
-    texture.levels.push_back(encode_level(image, texture.alpha, options.jobs));
+    texture.levels.push_back(encode_level(image, texture.alpha, options));
     bytes += texture.levels.back().colour.size() + texture.levels.back().alpha.size();
   }
   encode_timer.done(pixels, bytes);
+  judge(path, texture.levels.front(), options, report);
+  if (const Result<void> wrote = write_picture(images.front(), texture, options); !wrote) {
+    return tl::unexpected(wrote.error());
+  }
   return texture;
 }
 

@@ -1,210 +1,152 @@
-// Pixels to ETC1 blocks: both modes, both flips, all tables, base colours refined per table.
+// An image to ETC1 blocks: cuts it into tiles, sorts their blocks into batches, hands them to the
+// kernel.
 #include <algorithm>
-#include <limits>
+#include <array>
 
-#include "bake/texture/etc1_block.hpp"
+#include "bake/texture/etc1_kernel.hpp"
+#include "bake/texture/etc1_solid.hpp"
 #include "bake/texture/etc1_texture.hpp"
 #include "bake/texture/parallel.hpp"
 
 namespace modar {
 namespace {
 
-constexpr int kMaxError = std::numeric_limits<int>::max();
-constexpr int kRefinements = 4;
+/// Blocks that one thread takes at a time, and that are sorted among themselves.
+constexpr std::size_t kTile = 512;
 
-using Colour = std::array<int, 3>;
-using Half = std::array<Colour, 8>;
+using Pixels16 = std::array<std::uint32_t, 16>;
 
-/// One half of a block with a base colour of 4 or 5 bits.
-struct HalfFit {
-  int error = kMaxError;
-  Colour base{};
-  int table = 0;
-  std::array<std::uint8_t, 8> code{};
-};
-
-/// The bounds that a half's base colour must keep, inclusive.
-struct Bounds {
-  Colour low{};
-  Colour high{};
-};
-
-int expand(int value, bool five) {
-  return five ? etc1_expand5(value) : etc1_expand4(value);
+/// What each effort means to the kernel.
+Etc1Search search_of(const Etc1Options& options) {
+  Etc1Search search;
+  search.perceptual = options.perceptual;
+  switch (options.effort) {
+    case Etc1Effort::kFast:
+      search.reach5 = 32;
+      search.reach4 = 64;
+      break;
+    case Etc1Effort::kGood:
+      search.reach5 = 24;
+      search.reach4 = 32;
+      search.spread5 = search.spread4 = 1;
+      search.exact = true;
+      search.rounds = 2;
+      break;
+    case Etc1Effort::kBest:
+      search.reach5 = search.reach4 = 2040;  // the whole path
+      search.exact = search.thorough = true;
+      search.rounds = 4;
+      break;
+  }
+  return search;
 }
 
-/// Nearest quantised value of a channel, given as a sum of eight 8-bit values.
-int quantise(int sum, bool five, int low, int high) {
-  const int top = five ? 31 : 15;
-  const int guess = std::clamp((sum * top + 1020) / 2040, low, high);
-  int best = guess;
-  int best_distance = kMaxError;
-  for (int value = std::max(low, guess - 1); value <= std::min(high, guess + 1); ++value) {
-    const int distance = std::abs(8 * expand(value, five) - sum);
-    if (distance < best_distance) {
-      best_distance = distance;
-      best = value;
+std::uint32_t rgb_of(const std::uint8_t* pixel) {
+  return std::uint32_t{pixel[0]} | std::uint32_t{pixel[1]} << 8 | std::uint32_t{pixel[2]} << 16;
+}
+
+Pixels16 gather(const RgbaImage& image, std::size_t left, std::size_t top) {
+  Pixels16 pixels;
+  if (left + 4 <= image.width && top + 4 <= image.height) {
+    for (std::size_t y = 0; y < 4; ++y) {
+      const std::uint8_t* row = &image.pixels[((top + y) * image.width + left) * 4];
+      for (std::size_t x = 0; x < 4; ++x) pixels[4 * y + x] = rgb_of(row + 4 * x);
     }
+    return pixels;
   }
-  return best;
-}
-
-/// The best codes of a base colour under one table.
-HalfFit assign(const Half& pixels, const Colour& base, int table, bool five) {
-  HalfFit fit{0, base, table, {}};
-  const Colour wide = {expand(base[0], five), expand(base[1], five), expand(base[2], five)};
-  std::array<Colour, 4> palette;
-  for (int code = 0; code < 4; ++code) {
-    const int add = etc1_modifier(table, code);
-    for (std::size_t c = 0; c < 3; ++c) {
-      palette[static_cast<std::size_t>(code)][c] = std::clamp(wide[c] + add, 0, 255);
-    }
-  }
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    int best = kMaxError;
-    for (std::size_t code = 0; code < 4; ++code) {
-      int error = 0;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const int d = pixels[i][c] - palette[code][c];
-        error += d * d;
-      }
-      if (error < best) {
-        best = error;
-        fit.code[i] = static_cast<std::uint8_t>(code);
-      }
-    }
-    fit.error += best;
-  }
-  return fit;
-}
-
-/// The base colour that the codes of a fit ask for: the mean of what is left of the pixels.
-Colour refined_base(const Half& pixels, const HalfFit& fit, bool five, const Bounds& bounds) {
-  int modifiers = 0;
-  for (const std::uint8_t code : fit.code) modifiers += etc1_modifier(fit.table, code);
-  Colour base{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    int sum = -modifiers;
-    for (const Colour& pixel : pixels) sum += pixel[c];
-    base[c] = quantise(std::clamp(sum, 0, 2040), five, bounds.low[c], bounds.high[c]);
-  }
-  return base;
-}
-
-HalfFit fit_half(const Half& pixels, bool five, const Bounds& bounds) {
-  Colour mean{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    int sum = 0;
-    for (const Colour& pixel : pixels) sum += pixel[c];
-    mean[c] = quantise(sum, five, bounds.low[c], bounds.high[c]);
-  }
-  HalfFit best;
-  for (int table = 0; table < 8; ++table) {
-    Colour base = mean;
-    for (int round = 0; round < kRefinements; ++round) {
-      const HalfFit fit = assign(pixels, base, table, five);
-      if (fit.error < best.error) best = fit;
-      const Colour next = refined_base(pixels, fit, five, bounds);
-      if (next == base) break;
-      base = next;
-    }
-  }
-  return best;
-}
-
-Bounds all_colours(bool five) {
-  const int top = five ? 31 : 15;
-  return {{0, 0, 0}, {top, top, top}};
-}
-
-/// Bounds of one half of a differential block, given the other half's colour.
-Bounds around(const Colour& other, int low, int high) {
-  Bounds bounds;
-  for (std::size_t c = 0; c < 3; ++c) {
-    bounds.low[c] = std::max(0, other[c] + low);
-    bounds.high[c] = std::min(31, other[c] + high);
-  }
-  return bounds;
-}
-
-bool within(const Colour& colour, const Bounds& bounds) {
-  for (std::size_t c = 0; c < 3; ++c) {
-    if (colour[c] < bounds.low[c] || colour[c] > bounds.high[c]) return false;
-  }
-  return true;
-}
-
-/// Fits both halves to differential mode: each alone where that is legal, else the better of
-/// keeping the one and bounding the other.
-std::array<HalfFit, 2> fit_differential(const std::array<Half, 2>& halves) {
-  const HalfFit first = fit_half(halves[0], true, all_colours(true));
-  const HalfFit second = fit_half(halves[1], true, all_colours(true));
-  if (within(second.base, around(first.base, -4, 3))) return {first, second};
-  const HalfFit bounded_second = fit_half(halves[1], true, around(first.base, -4, 3));
-  const HalfFit bounded_first = fit_half(halves[0], true, around(second.base, -3, 4));
-  if (first.error + bounded_second.error <= bounded_first.error + second.error) {
-    return {first, bounded_second};
-  }
-  return {bounded_first, second};
-}
-
-using BlockPixels = std::array<Colour, 16>;
-
-Etc1Block encode_block(const BlockPixels& pixels) {
-  Etc1Block best;
-  int best_error = kMaxError;
-  for (const bool flip : {false, true}) {
-    std::array<Half, 2> halves{};
-    std::array<std::size_t, 2> filled{};
-    for (std::size_t i = 0; i < 16; ++i) {
-      const std::size_t half = etc1_half(flip, i % 4, i / 4);
-      halves[half][filled[half]++] = pixels[i];
-    }
-    for (const bool differential : {true, false}) {
-      const std::array<HalfFit, 2> fits =
-          differential ? fit_differential(halves)
-                       : std::array<HalfFit, 2>{fit_half(halves[0], false, all_colours(false)),
-                                                fit_half(halves[1], false, all_colours(false))};
-      const int error = fits[0].error + fits[1].error;
-      if (error >= best_error) continue;
-      best_error = error;
-      best.flip = flip;
-      best.differential = differential;
-      best.base = {fits[0].base, fits[1].base};
-      best.table = {fits[0].table, fits[1].table};
-      filled = {0, 0};
-      for (std::size_t i = 0; i < 16; ++i) {
-        const std::size_t half = etc1_half(flip, i % 4, i / 4);
-        best.code[i] = fits[half].code[filled[half]++];
-      }
-    }
-  }
-  return best;
-}
-
-BlockPixels gather(const RgbaImage& image, std::size_t left, std::size_t top) {
-  BlockPixels pixels{};
   for (std::size_t i = 0; i < 16; ++i) {
     const std::size_t x = std::min<std::size_t>(left + i % 4, image.width - 1);
     const std::size_t y = std::min<std::size_t>(top + i / 4, image.height - 1);
-    const std::uint8_t* in = &image.pixels[(y * image.width + x) * 4];
-    pixels[i] = {in[0], in[1], in[2]};
+    pixels[i] = rgb_of(&image.pixels[(y * image.width + x) * 4]);
   }
   return pixels;
 }
 
+/// Difference between the brightest and the darkest pixel, 0-765.
+std::uint32_t contrast(const Pixels16& pixels) {
+  std::array<std::int16_t, 16> sums;
+  for (std::size_t i = 0; i < 16; ++i) {
+    sums[i] =
+        static_cast<std::int16_t>((pixels[i] & 255) + (pixels[i] >> 8 & 255) + (pixels[i] >> 16));
+  }
+  std::int16_t low = sums[0];
+  std::int16_t high = sums[0];
+  for (const std::int16_t sum : sums) {
+    low = std::min(low, sum);
+    high = std::max(high, sum);
+  }
+  return static_cast<std::uint32_t>(high - low);
+}
+
+void write_block(std::uint64_t word, std::byte* out) {
+  for (std::size_t i = 0; i < 8; ++i) out[i] = static_cast<std::byte>(word >> (56 - 8 * i) & 0xff);
+}
+
+/// The blocks of a tile that wait for the kernel.
+class Tile {
+ public:
+  Tile(const Etc1Search& search, std::byte* out) : search_(search), out_(out) {}
+
+  void add(std::size_t index, const Pixels16& pixels) {
+    const bool solid = std::all_of(pixels.begin(), pixels.end(),
+                                   [&pixels](std::uint32_t p) { return p == pixels[0]; });
+    if (solid) {
+      write_block(encode_solid_etc1(pixels[0], search_.perceptual), out_ + 8 * index);
+      return;
+    }
+    // A walk is as long as the contrast asks, and a vector waits for its longest: like goes to
+    // like.
+    const std::uint32_t key = search_.spread5 + search_.spread4 > 0 ? contrast(pixels) : 0;
+    order_[count_++] = key << 16 | static_cast<std::uint32_t>(index);
+    pixels_[index] = pixels;
+  }
+
+  void encode() {
+    std::sort(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(count_));
+    for (std::size_t first = 0; first < count_; first += kEtc1Batch) encode_batch(first);
+  }
+
+ private:
+  /// The last batch is filled up with its last block.
+  void encode_batch(std::size_t first) {
+    const auto index_of = [&](std::size_t i) {
+      return std::size_t{order_[std::min(first + i, count_ - 1)] & 0xffff};
+    };
+    Etc1BatchIn in;
+    for (std::size_t i = 0; i < kEtc1Batch; ++i) {
+      const Pixels16& pixels = pixels_[index_of(i)];
+      for (std::size_t pixel = 0; pixel < 16; ++pixel) in.pixels[pixel][i] = pixels[pixel];
+    }
+    Etc1BatchOut batch;
+    encode_etc1_batch(in, search_, batch);
+    for (std::size_t i = 0; i < kEtc1Batch && first + i < count_; ++i) {
+      write_block(std::uint64_t{batch.high[i]} << 32 | batch.low[i], out_ + 8 * index_of(i));
+    }
+  }
+
+  const Etc1Search& search_;
+  std::byte* out_;
+  std::size_t count_ = 0;
+  std::array<std::uint32_t, kTile> order_;
+  std::array<Pixels16, kTile> pixels_;
+};
+
 }  // namespace
 
-std::vector<std::byte> encode_etc1(const RgbaImage& image, unsigned jobs) {
-  const std::uint32_t columns = (image.width + 3) / 4;
-  const std::uint32_t rows = (image.height + 3) / 4;
-  std::vector<std::byte> blocks(std::size_t{columns} * rows * 8);
-  parallel_rows(rows, jobs, [&](std::uint32_t row) {
-    for (std::uint32_t column = 0; column < columns; ++column) {
-      const Etc1Block block = encode_block(gather(image, column * 4UL, row * 4UL));
-      pack_etc1(block,
-                std::span(blocks).subspan((std::size_t{row} * columns + column) * 8).first<8>());
+std::vector<std::byte> encode_etc1(const RgbaImage& image, const Etc1Options& options) {
+  const std::size_t columns = (std::size_t{image.width} + 3) / 4;
+  const std::size_t count = columns * ((std::size_t{image.height} + 3) / 4);
+  std::vector<std::byte> blocks(count * 8);
+  const Etc1Search search = search_of(options);
+  const auto tiles = static_cast<std::uint32_t>((count + kTile - 1) / kTile);
+  parallel_rows(tiles, options.jobs, [&](std::uint32_t number) {
+    const std::size_t first = number * kTile;
+    Tile tile(search, &blocks[first * 8]);
+    for (std::size_t i = 0; i < kTile && first + i < count; ++i) {
+      const std::size_t block = first + i;
+      tile.add(i, gather(image, block % columns * 4, block / columns * 4));
     }
+    tile.encode();
   });
   return blocks;
 }

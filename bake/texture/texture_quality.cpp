@@ -47,6 +47,22 @@ double similarity(const Moments& m) {
          ((m.mean_a * m.mean_a + m.mean_b * m.mean_b + kC1) * (variance_a + variance_b + kC2));
 }
 
+double psnr_of(std::uint64_t sum_of_squares, std::uint64_t samples) {
+  if (sum_of_squares == 0) return kEqualPsnr;
+  const double mean = static_cast<double>(sum_of_squares) / static_cast<double>(samples);
+  return std::min(kEqualPsnr, 10 * std::log10(255.0 * 255.0 / mean));
+}
+
+/// Sum over red, green and blue.
+std::uint64_t square_error(const RgbaImage& a, const RgbaImage& b, std::size_t pixel) {
+  std::uint64_t sum = 0;
+  for (std::size_t i = pixel * 4; i < pixel * 4 + 3; ++i) {
+    const int d = int{a.pixels[i]} - int{b.pixels[i]};
+    sum += static_cast<std::uint64_t>(d * d);
+  }
+  return sum;
+}
+
 std::size_t clamped(std::int64_t value, std::uint32_t size) {
   return static_cast<std::size_t>(std::clamp<std::int64_t>(value, 0, std::int64_t{size} - 1));
 }
@@ -56,14 +72,45 @@ std::size_t clamped(std::int64_t value, std::uint32_t size) {
 double psnr_db(const RgbaImage& a, const RgbaImage& b) {
   const std::size_t pixels = std::min(a.pixels.size(), b.pixels.size()) / 4;
   std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < pixels * 4; ++i) {
-    if (i % 4 == 3) continue;
-    const int d = int{a.pixels[i]} - int{b.pixels[i]};
-    sum += static_cast<std::uint64_t>(d * d);
+  for (std::size_t i = 0; i < pixels; ++i) sum += square_error(a, b, i);
+  return psnr_of(sum, pixels * 3);
+}
+
+WorstBlock worst_block(const RgbaImage& a, const RgbaImage& b) {
+  WorstBlock worst;
+  for (std::uint32_t top = 0; top < a.height; top += 4) {
+    for (std::uint32_t left = 0; left < a.width; left += 4) {
+      std::uint64_t sum = 0;
+      std::uint64_t pixels = 0;
+      for (std::uint32_t y = top; y < std::min(top + 4, a.height); ++y) {
+        for (std::uint32_t x = left; x < std::min(left + 4, a.width); ++x, ++pixels) {
+          sum += square_error(a, b, std::size_t{y} * a.width + x);
+        }
+      }
+      const double db = psnr_of(sum, pixels * 3);
+      if (db < worst.psnr_db) worst = {left, top, db};
+    }
   }
-  if (sum == 0) return kEqualPsnr;
-  const double mean = static_cast<double>(sum) / (static_cast<double>(pixels) * 3);
-  return std::min(kEqualPsnr, 10 * std::log10(255.0 * 255.0 / mean));
+  return worst;
+}
+
+RgbaImage quality_picture(const RgbaImage& source, const RgbaImage& decoded) {
+  constexpr int kGain = 8;
+  const std::size_t width = source.width;
+  RgbaImage picture{source.width * 3, source.height, {}};
+  picture.pixels.assign(width * 3 * source.height * 4, 255);
+  for (std::size_t i = 0; i < width * source.height; ++i) {
+    std::uint8_t* out = &picture.pixels[(i / width * width * 3 + i % width) * 4];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const int before = source.pixels[4 * i + c];
+      const int after = decoded.pixels[4 * i + c];
+      out[c] = static_cast<std::uint8_t>(before);
+      out[width * 4 + c] = static_cast<std::uint8_t>(after);
+      out[width * 8 + c] =
+          static_cast<std::uint8_t>(std::min(255, kGain * std::abs(before - after)));
+    }
+  }
+  return picture;
 }
 
 double ssim(const RgbaImage& a, const RgbaImage& b) {

@@ -14,4 +14,15 @@ inline constexpr double kEqualPsnr = 99;
 /// levels of a mip chain have a value too.
 double ssim(const RgbaImage& a, const RgbaImage& b);
 
+/// The 4x4 block that differs most.
+struct WorstBlock {
+  std::uint32_t x = 0;  ///< of its top-left pixel
+  std::uint32_t y = 0;
+  double psnr_db = kEqualPsnr;
+};
+WorstBlock worst_block(const RgbaImage& a, const RgbaImage& b);
+
+/// Source, decoded and eight times their difference side by side, for a person to look at.
+RgbaImage quality_picture(const RgbaImage& source, const RgbaImage& decoded);
+
 }  // namespace modar

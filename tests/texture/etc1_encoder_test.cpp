@@ -4,6 +4,8 @@
 #include <array>
 #include <random>
 
+#include "bake/texture/etc1_block.hpp"
+#include "bake/texture/etc1_kernel.hpp"
 #include "bake/texture/texture_quality.hpp"
 #include "tests/texture/libetc1.hpp"
 #include "tests/texture/texture_samples.hpp"
@@ -18,42 +20,134 @@ double quality_of_libetc1(const RgbaImage& image) {
   return psnr_db(image, decode_etc1(test::libetc1_encode(image), image.width, image.height));
 }
 
-TEST(Etc1Encoder, BlocksThatTheFormatCanHoldComeBackAsTheyWere) {
-  std::mt19937 random(5);
-  std::vector<std::byte> blocks(std::size_t{256} * 8);
-  for (std::byte& byte : blocks) byte = static_cast<std::byte>(random() & 0xff);
-  for (std::size_t i = 3; i < blocks.size(); i += 8) blocks[i] &= std::byte{0xfd};  // individual
-  const RgbaImage image = decode_etc1(blocks, 64, 64);
-  EXPECT_GT(quality(image), quality_of_libetc1(image) + 1);
+constexpr Etc1Effort kEfforts[] = {Etc1Effort::kFast, Etc1Effort::kGood, Etc1Effort::kBest};
+
+/// Sum of squared errors of a colour block with one modifier, tried for all that the format has.
+int best_solid_error(const std::array<int, 3>& colour) {
+  constexpr int kSizes[] = {2, 8, 5, 17, 9, 29, 13, 42, 18, 60, 24, 80, 33, 106, 47, 183};
+  int best = 1 << 30;
+  for (const int size : kSizes) {
+    for (const int add : {size, -size}) {
+      for (const int bits : {4, 5}) {
+        int error = 0;
+        for (const int value : colour) {
+          int nearest = 256;
+          for (int q = 0; q < 1 << bits; ++q) {
+            const int wide = bits == 4 ? q * 16 + q : q * 8 + q / 4;
+            const int shown = std::clamp(wide + add, 0, 255);
+            nearest = std::min(nearest, std::abs(shown - value));
+          }
+          error += nearest * nearest;
+        }
+        best = std::min(best, error);
+      }
+    }
+  }
+  return best;
 }
 
-TEST(Etc1Encoder, FlatColoursAreOffByAtMostTwo) {
+TEST(Etc1Encoder, FlatBlocksAreTheBestThatTheFormatHas) {
   std::mt19937 random(9);
-  for (int i = 0; i < 300; ++i) {
-    const std::array<unsigned long, 3> colour = {random() % 256, random() % 256, random() % 256};
+  for (int i = 0; i < 40; ++i) {
+    const auto value = [&random] { return static_cast<int>(random() % 256); };
+    const std::array<int, 3> colour = {value(), value(), value()};
     const RgbaImage image =
         test::paint(4, 4, [&colour](std::uint32_t, std::uint32_t) { return colour; });
     const RgbaImage decoded = decode_etc1(encode_etc1(image), 4, 4);
-    for (std::size_t k = 0; k < 64; ++k) {
-      EXPECT_LE(std::abs(int{decoded.pixels[k]} - int{image.pixels[k]}), 6)
-          << colour[0] << " " << colour[1] << " " << colour[2];
+    int error = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const int d = int{decoded.pixels[c]} - colour[c];
+      error += d * d;
     }
+    EXPECT_EQ(error, best_solid_error(colour)) << colour[0] << " " << colour[1] << " " << colour[2];
+    for (std::size_t k = 4; k < 64; ++k) EXPECT_EQ(decoded.pixels[k], decoded.pixels[k - 4]);
   }
 }
 
-TEST(Etc1Encoder, BlackWhiteAndTheirMixturesAreExact) {
-  for (unsigned mask = 0; mask < 65536; mask += 257) {
-    const RgbaImage image = test::paint(4, 4, [mask](std::uint32_t x, std::uint32_t y) {
-      const unsigned value = (mask >> (4 * y + x) & 1) != 0 ? 255 : 0;
-      return std::array<unsigned, 3>{value, value, value};
-    });
-    EXPECT_GT(quality(image), 25) << mask;
+TEST(Etc1Encoder, BlackWithWhiteIsExactAtEveryEffort) {
+  // 255 = 119 + 183 and 0 = 119 - 183, both clamped: every mixture is within the format.
+  const RgbaImage image = test::paint(64, 64, [](std::uint32_t x, std::uint32_t y) {
+    const std::uint32_t block = y / 4 * 16 + x / 4;
+    const unsigned mask = block * 2654435761U >> 16;
+    const int value = (mask >> (4 * (y % 4) + x % 4) & 1) != 0 ? 255 : 0;
+    return std::array<int, 3>{value, value, value};
+  });
+  for (const Etc1Effort effort : kEfforts) {
+    const std::vector<std::byte> blocks = encode_etc1(image, {.effort = effort});
+    EXPECT_EQ(decode_etc1(blocks, 64, 64).pixels, image.pixels) << static_cast<int>(effort);
   }
-  for (const std::uint8_t value : {std::uint8_t{0}, std::uint8_t{255}}) {
-    RgbaImage image = test::make_image(8, 8, value);
-    for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 255;
-    EXPECT_EQ(decode_etc1(encode_etc1(image), 8, 8).pixels, image.pixels);
+}
+
+TEST(Etc1Encoder, BestRecoversBlocksThatTheFormatHolds) {
+  // Colours well within 0-255, so that nothing is clamped away.
+  std::mt19937 random(5);
+  std::vector<std::byte> blocks;
+  for (int i = 0; i < 64; ++i) {
+    Etc1Block block;
+    block.flip = i % 2 != 0;
+    for (std::size_t half = 0; half < 2; ++half) {
+      block.table[half] = static_cast<int>(random() % 4);
+      for (int& base : block.base[half]) base = 4 + static_cast<int>(random() % 8);
+    }
+    for (std::uint8_t& code : block.code) code = static_cast<std::uint8_t>(random() % 4);
+    std::array<std::byte, 8> bytes{};
+    pack_etc1(block, bytes);
+    blocks.insert(blocks.end(), bytes.begin(), bytes.end());
   }
+  const RgbaImage image = decode_etc1(blocks, 32, 32);
+  const std::vector<std::byte> again = encode_etc1(image, {.effort = Etc1Effort::kBest});
+  EXPECT_EQ(decode_etc1(again, 32, 32).pixels, image.pixels);
+}
+
+TEST(Etc1Encoder, EachEffortIsBetterThanTheOneBelow) {
+  const RgbaImage photo = test::synthetic_photo(64, 64);
+  double before = quality_of_libetc1(photo);
+  for (const Etc1Effort effort : kEfforts) {
+    const double db = psnr_db(photo, decode_etc1(encode_etc1(photo, {.effort = effort}), 64, 64));
+    EXPECT_GT(db, before) << static_cast<int>(effort);
+    before = db;
+  }
+}
+
+TEST(Etc1Encoder, PerceptualSparesLuma) {
+  const RgbaImage photo = test::synthetic_photo(64, 64);
+  const auto luma_error = [&photo](const RgbaImage& decoded) {
+    double sum = 0;
+    for (std::size_t i = 0; i < photo.pixels.size(); i += 4) {
+      const double weights[] = {3, 6, 1};
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double d = double{1} * photo.pixels[i + c] - decoded.pixels[i + c];
+        sum += weights[c] * d * d;
+      }
+    }
+    return sum;
+  };
+  for (const Etc1Effort effort : kEfforts) {
+    const auto decoded = [&](bool perceptual) {
+      return decode_etc1(encode_etc1(photo, {.effort = effort, .perceptual = perceptual}), 64, 64);
+    };
+    EXPECT_LT(luma_error(decoded(true)), luma_error(decoded(false)) * 0.97);
+  }
+}
+
+TEST(Etc1Encoder, BytesDoNotDependOnTheSimdLevel) {
+  const std::vector<std::int64_t> levels = etc1_simd_levels();
+  RgbaImage image = test::synthetic_photo(52, 52);
+  const RgbaImage grains = test::noise(52, 20, 3);
+  std::copy(grains.pixels.begin(), grains.pixels.end(), image.pixels.begin());
+  for (const Etc1Effort effort : kEfforts) {
+    for (const bool perceptual : {false, true}) {
+      const Etc1Options options = {.effort = effort, .perceptual = perceptual};
+      const std::vector<std::byte> expected = encode_etc1(image, options);
+      for (const std::int64_t level : levels) {
+        force_etc1_simd_level(level);
+        EXPECT_EQ(encode_etc1(image, options), expected) << etc1_simd_name(level);
+      }
+      force_etc1_simd_level(0);
+    }
+  }
+  for (const std::int64_t level : levels) RecordProperty(etc1_simd_name(level), "compared");
+  EXPECT_GE(levels.size(), 2U) << "one SIMD level only: nothing was compared";
 }
 
 TEST(Etc1Encoder, BeatsLibetc1OnSyntheticImages) {
@@ -90,10 +184,10 @@ TEST(Etc1Encoder, EdgePixelsFillBlocks) {
 }
 
 TEST(Etc1Encoder, BytesDoNotDependOnThreads) {
-  const RgbaImage image = test::synthetic_photo(129, 67);
-  const std::vector<std::byte> blocks = encode_etc1(image, 1);
-  EXPECT_EQ(encode_etc1(image, 2), blocks);
-  EXPECT_EQ(encode_etc1(image, 8), blocks);
+  const RgbaImage image = test::synthetic_photo(229, 167);
+  const std::vector<std::byte> blocks = encode_etc1(image);
+  EXPECT_EQ(encode_etc1(image, {.jobs = 2}), blocks);
+  EXPECT_EQ(encode_etc1(image, {.jobs = 8}), blocks);
 }
 
 }  // namespace

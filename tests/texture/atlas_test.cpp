@@ -1,0 +1,204 @@
+// Coverage, filling and flattening of atlases; sets of textures; the quality gate.
+#include "bake/texture/atlas.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "bake/texture/etc1_bench.hpp"
+#include "bake/texture/texture_quality.hpp"
+#include "bake/texture/texture_set.hpp"
+#include "tests/texture/texture_samples.hpp"
+
+namespace modar {
+namespace {
+
+using Triangle = std::array<std::array<double, 2>, 3>;
+
+std::size_t count(const CoverageMask& mask) {
+  return static_cast<std::size_t>(std::count(mask.covered.begin(), mask.covered.end(), 1));
+}
+
+TEST(Coverage, HasTheTexelsThatATriangleTouches) {
+  CoverageMask mask = make_coverage(4, 4);
+  // The lower left half: 10 of 16 texels are touched on or below the diagonal of texels.
+  cover_triangle(mask, Triangle{{{0.01, 0.01}, {0.97, 0.01}, {0.01, 0.97}}});
+  const std::vector<std::uint8_t> expected = {1, 0, 0, 0, 1, 1, 0, 0, 1, 1, 1, 0, 1, 1, 1, 1};
+  EXPECT_EQ(mask.covered, expected);
+  CoverageMask turned = make_coverage(4, 4);
+  cover_triangle(turned, Triangle{{{0.01, 0.97}, {0.97, 0.01}, {0.01, 0.01}}});
+  EXPECT_EQ(turned.covered, expected);
+}
+
+TEST(Coverage, WrapsAroundAndSurvivesNonsense) {
+  CoverageMask mask = make_coverage(8, 8);
+  cover_triangle(mask, Triangle{{{-0.1, 1.05}, {-0.01, 1.05}, {-0.1, 1.1}}});
+  EXPECT_GT(count(mask), 0U);
+  EXPECT_EQ(mask.covered[7 * 8 + 7], 1);  // u -0.05 is the last column, v 1.05 the lowest row
+  CoverageMask all = make_coverage(8, 8);
+  cover_triangle(all, Triangle{{{0, 0}, {std::nan(""), 0}, {0, 1}}});
+  EXPECT_EQ(count(all), 64U);
+  CoverageMask huge = make_coverage(8, 8);
+  cover_triangle(huge, Triangle{{{0, 0}, {1e300, 0}, {0, 1e9}}});
+  EXPECT_EQ(count(huge), 64U);
+}
+
+TEST(Coverage, ResizingLosesNothing) {
+  CoverageMask mask = make_coverage(9, 5);
+  mask.covered[9 * 4 + 8] = 1;
+  const CoverageMask small = resize_coverage(mask, 2, 2);
+  EXPECT_EQ(small.covered, (std::vector<std::uint8_t>{0, 0, 0, 1}));
+  const CoverageMask large = resize_coverage(mask, 18, 10);
+  EXPECT_EQ(count(large), 4U);
+}
+
+/// Red left of the middle, garbage right of it, and the mask of the red.
+RgbaImage half_red(std::uint32_t side, CoverageMask& mask) {
+  RgbaImage image = test::noise(side, side, 4);
+  mask = make_coverage(side, side);
+  for (std::uint32_t y = 0; y < side; ++y) {
+    for (std::uint32_t x = 0; x < side / 2; ++x) {
+      const std::size_t i = std::size_t{y} * side + x;
+      mask.covered[i] = 1;
+      const std::uint8_t red[4] = {static_cast<std::uint8_t>(180 + x % 2), 20, 10, 255};
+      std::copy(red, red + 4, &image.pixels[4 * i]);
+    }
+  }
+  return image;
+}
+
+TEST(Atlas, NothingUncoveredShowsAtAnyLevel) {
+  const test::ScratchFolder folder;
+  CoverageMask mask;
+  const RgbaImage image = half_red(64, mask);
+  ASSERT_TRUE(write_png(image, folder.file("atlas.png")));
+  TextureOptions options;
+  options.coverage = &mask;
+  Report report;
+  const Result<Etc1Texture> texture = bake_texture(folder.file("atlas.png"), options, report);
+  ASSERT_TRUE(texture) << to_line(texture.error());
+  ASSERT_EQ(texture->levels.size(), 7U);
+  for (const Etc1Level& level : texture->levels) {
+    const RgbaImage decoded = decode_etc1(level.colour, level.width, level.height);
+    for (std::size_t i = 0; i < decoded.pixels.size(); i += 4) {
+      EXPECT_NEAR(decoded.pixels[i], 180, 8) << level.width;
+      EXPECT_NEAR(decoded.pixels[i + 1], 20, 8) << level.width;
+    }
+  }
+  // Of each row of 16 blocks, those from the tenth on are more than a texel away from the red: one
+  // pattern of bits for all of them.
+  std::set<std::vector<std::byte>> distinct;
+  const std::vector<std::byte>& blocks = texture->levels[0].colour;
+  for (std::size_t block = 0; block < 256; ++block) {
+    if (block % 16 < 9) continue;
+    distinct.insert({blocks.begin() + static_cast<std::ptrdiff_t>(8 * block),
+                     blocks.begin() + static_cast<std::ptrdiff_t>(8 * block + 8)});
+  }
+  EXPECT_EQ(distinct.size(), 1U);
+}
+
+TEST(Atlas, ConstantTexturesBecomeOneTexel) {
+  const test::ScratchFolder folder;
+  CoverageMask mask;
+  RgbaImage image = half_red(32, mask);
+  for (std::size_t i = 0; i < mask.covered.size(); ++i) {
+    if (mask.covered[i] != 0) image.pixels[4 * i] = 180;
+  }
+  ASSERT_TRUE(write_png(image, folder.file("flat.png")));
+  TextureOptions options;
+  options.coverage = &mask;
+  Report report;
+  const Result<Etc1Texture> texture = bake_texture(folder.file("flat.png"), options, report);
+  ASSERT_TRUE(texture);
+  EXPECT_TRUE(texture->constant);
+  EXPECT_EQ(texture->constant_rgba, (std::array<std::uint8_t, 4>{180, 20, 10, 255}));
+  ASSERT_EQ(texture->levels.size(), 1U);
+  EXPECT_EQ(texture->levels[0].width, 1U);
+  EXPECT_EQ(texture->levels[0].colour.size(), 8U);
+}
+
+TEST(Atlas, EmptyMaskChangesNothing) {
+  RgbaImage image = test::noise(16, 16, 8);
+  const std::vector<std::uint8_t> before = image.pixels;
+  fill_uncovered(image, make_coverage(16, 16));
+  flatten_uncovered_blocks(image, make_coverage(16, 16));
+  EXPECT_EQ(image.pixels, before);
+}
+
+TEST(TextureSet, FindsIdenticalTextures) {
+  const test::ScratchFolder folder;
+  std::vector<Etc1Texture> textures;
+  for (const auto& [name, seed] : {std::pair{"a.png", 1U}, {"b.png", 2U}, {"c.png", 1U}}) {
+    ASSERT_TRUE(write_png(test::synthetic_photo(16, 16, seed), folder.file(name)));
+    Report report;
+    textures.push_back(*bake_texture(folder.file(name), {}, report));
+  }
+  textures.push_back(textures[0]);
+  textures.back().repeat = true;
+  EXPECT_EQ(first_identical(textures), (std::vector<std::size_t>{0, 1, 0, 3}));
+}
+
+TEST(TextureSet, PlansWithinABudget) {
+  const std::vector<TexturePlan> plans = {{1000, 1000, false}, {512, 256, true}};
+  // 1024x1024 and 2 x 512x256 at half a byte a pixel, with a third more for the mips.
+  TextureOptions options;
+  EXPECT_NEAR(static_cast<double>(planned_bytes(plans, options)),
+              (1024.0 * 1024 + 2 * 512 * 256) / 2 * 4 / 3, 200);
+  EXPECT_EQ(plan_max_side(plans, options, 1 << 30), 2048U);
+  EXPECT_EQ(plan_max_side(plans, options, 400000), 512U);
+  EXPECT_EQ(plan_max_side(plans, options, 0), 1U);
+  options.max_side = 512;
+  Report report;
+  EXPECT_EQ(planned_bytes(std::vector<TexturePlan>{{4, 4, false}}, options), 8U * 3);
+}
+
+TEST(QualityGate, NamesTheWorstBlockAndDrawsAPicture) {
+  const test::ScratchFolder folder;
+  RgbaImage image = test::synthetic_photo(32, 32);
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    image.pixels[i] = image.pixels[i + 1] = image.pixels[i + 2] = 90;
+  }
+  const RgbaImage grains = test::noise(4, 4, 2);
+  for (std::size_t y = 0; y < 4; ++y) {
+    std::copy_n(&grains.pixels[y * 16], 16, &image.pixels[((8 + y) * 32 + 20) * 4]);
+  }
+  ASSERT_TRUE(write_png(image, folder.file("spot.png")));
+  TextureOptions options;
+  options.min_psnr_db = 60;
+  options.picture_folder = folder.file("");
+  Report report;
+  const Result<Etc1Texture> texture = bake_texture(folder.file("spot.png"), options, report);
+  ASSERT_TRUE(texture) << to_line(texture.error());
+  ASSERT_EQ(report.findings.size(), 1U);
+  EXPECT_EQ(report.findings[0].id, "texture.quality");
+  EXPECT_NE(report.findings[0].message.find("20,8"), std::string::npos);
+  const Result<RgbaImage> picture = read_image(folder.file("spot.png.png"));
+  ASSERT_TRUE(picture) << to_line(picture.error());
+  EXPECT_EQ(picture->width, 96U);
+  EXPECT_EQ(picture->height, 32U);
+  EXPECT_EQ(picture->pixels[0], 90);
+  options.min_psnr_db = 5;
+  Report quiet;
+  ASSERT_TRUE(bake_texture(folder.file("spot.png"), options, quiet));
+  EXPECT_TRUE(quiet.findings.empty());
+}
+
+TEST(Etc1Bench, HasItsSixRows) {
+  const test::ScratchFolder folder;
+  ASSERT_TRUE(write_png(test::synthetic_photo(40, 36), folder.file("photo.png")));
+  const auto rows = bench_etc1({folder.file("photo.png")}, 32);
+  ASSERT_TRUE(rows) << to_line(rows.error());
+  const std::vector<std::string> names = {"fast_db",     "fast_mpix_s", "good_db",
+                                          "good_mpix_s", "best_db",     "best_mpix_s"};
+  ASSERT_EQ(rows->size(), names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_EQ((*rows)[i].measure, names[i]);
+    EXPECT_GT((*rows)[i].ours, 0);
+  }
+  EXPECT_GT((*rows)[2].ours, (*rows)[0].ours);
+  EXPECT_EQ(bench_etc1({}, 0).error().exit, ExitCode::kUsage);
+  EXPECT_EQ(bench_etc1({folder.file("photo.png")}, 30).error().code, "bench.crop");
+}
+
+}  // namespace
+}  // namespace modar
