@@ -66,7 +66,7 @@ HWY_INLINE V colour_error(Pairs red_green, Pairs blue) {
 /// Weighted squared error of a half that takes the best code for each pixel.
 template <class W>
 HWY_NOINLINE V exact_error(const PixelPairs& pixels, bool flip, std::size_t half,
-                         const Palette& palette) {
+                           const Palette& palette) {
   V sum = set(0);
   for (std::size_t k = 0; k < 8; ++k) {
     const std::size_t i = pixel_of(flip, half, k);
@@ -86,7 +86,7 @@ HWY_NOINLINE V exact_error(const PixelPairs& pixels, bool flip, std::size_t half
 /// The low word of a block, of one half's pixels: their codes at the places where GL reads them.
 template <class W>
 HWY_NOINLINE V half_codes(const PixelPairs& pixels, bool flip, std::size_t half,
-                        const Palette& palette) {
+                          const Palette& palette) {
   V word = set(0);
   for (std::size_t k = 0; k < 8; ++k) {
     const std::size_t i = pixel_of(flip, half, k);

@@ -108,7 +108,8 @@ struct Pixels {
 };
 
 template <class W>
-HWY_NOINLINE void gather_stats(const Pixels& pixels, bool flip, std::size_t half, HalfStats& stats) {
+HWY_NOINLINE void gather_stats(const Pixels& pixels, bool flip, std::size_t half,
+                               HalfStats& stats) {
   V red = set(0);
   V green = set(0);
   V blue = set(0);
@@ -252,7 +253,7 @@ HWY_INLINE void keep_colour(V cost, V colour, HalfBest& best) {
 /// The best colour of the path, under whichever table.
 template <int kBits, class W>
 HWY_NOINLINE void sweep(const HalfStats& stats, V reach, const Triple& low, const Triple& high,
-                      HalfBest& best) {
+                        HalfBest& best) {
   store(set(0x7fffffff), best.cost);
   store(set(0), best.colour);
   walk<kBits>(stats, reach, low, high, [&](V r, V g, V b, V q) HWY_ATTR {
@@ -262,8 +263,8 @@ HWY_NOINLINE void sweep(const HalfStats& stats, V reach, const Triple& low, cons
 
 /// The best colour of the path for each table.
 template <int kBits, class W>
-HWY_NOINLINE void sweep_tables(const HalfStats& stats, V reach, const Triple& low, const Triple& high,
-                             HalfBest (&best)[8]) {
+HWY_NOINLINE void sweep_tables(const HalfStats& stats, V reach, const Triple& low,
+                               const Triple& high, HalfBest (&best)[8]) {
   for (HalfBest& each : best) {
     store(set(0x7fffffff), each.cost);
     store(set(0), each.colour);
