@@ -3,7 +3,7 @@ import os
 import shutil
 import unittest
 
-from programs import COVER, POTTERY, STATUE, ProgramTest
+from programs import COVER, POTTERY, ROOT, STATUE, ProgramTest
 
 
 class Bake(ProgramTest):
@@ -130,6 +130,11 @@ class Check(ProgramTest):
         done = self.modar("check", bad, "--json")
         self.assertEqual(done.returncode, 3)
         self.assertIn('"verdict": "bad"', done.stdout)
+
+    def test_the_text_twin_is_held_against_the_mapped_one(self):
+        done = self.modar("check", ROOT / "tests" / "corrupt" / "PATTERN_YML_DIFFERS.modar")
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("PATTERN_YML_DIFFERS", done.stdout)
 
     def test_a_truncated_file_and_a_text(self):
         good = self.bake_demo().read_bytes()
