@@ -9,6 +9,7 @@
 
 #include "bake/texture/etc1_texture.hpp"
 #include "bake/texture/image_header.hpp"
+#include "bake/texture/jpeg_check.hpp"
 #include "bake/texture/tga_reader.hpp"
 
 namespace modar {
@@ -107,6 +108,12 @@ Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::stri
   const Result<ImageHeader> header = read_image_header(bytes, name);
   if (!header) return tl::unexpected(header.error());
   if (header->format == ImageFormat::kTga) return read_tga(bytes, name);
+  if (header->format == ImageFormat::kJpeg) {
+    if (const std::string damage = jpeg_damage(bytes); !damage.empty()) {
+      return fail(ExitCode::kInvalidInput, "image.decode", name,
+                  "the JPEG data is damaged (" + damage + ")", "export the image again");
+    }
+  }
   const cv::Mat mat = decode(bytes, header->format);
   const auto is_side = [&header](int side) {
     const auto value = static_cast<std::uint32_t>(side);

@@ -183,6 +183,14 @@ TEST(ImageReader, ExifOrientationIsApplied) {
   EXPECT_GT(turned->pixels[turned->pixels.size() - 4], 200);
 }
 
+TEST(ImageReader, JpegWhoseCodedDataIsCutShortIsRefused) {
+  // Everything but the end marker is lost after the first half, so the markers alone look whole.
+  Bytes jpeg = encoded(to_mat(test::noise(64, 64, 3)), ".jpg");
+  ASSERT_TRUE(decode_image(jpeg, "whole"));
+  jpeg.resize(jpeg.size() * 2 / 3);
+  expect_code(jpeg + std::initializer_list<unsigned>{0xFF, 0xD9}, "image.decode", "cut short");
+}
+
 TEST(ImageReader, CorruptFilesGiveErrorsAndValidOnesPixels) {
   const auto hostile = test::shared_data() / "hostile";
   const auto suite = test::files_of(hostile / "pngsuite");
