@@ -3,85 +3,17 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <set>
 
 #include "bake/model/packed_mesh.hpp"
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/read_model.hpp"
+#include "bake/texture_stage.hpp"
+#include "modar/device_profile.hpp"
 #include "modar/features.hpp"
 
 namespace modar {
 namespace {
-
-/// Textures of the bundle by file and wrap mode: one file used twice is stored once.
-using TextureKey = std::pair<std::string, bool>;
-struct TextureStore {
-  std::map<TextureKey, std::uint32_t> index;
-};
-
-Result<std::uint32_t> add_texture(const std::string& path, bool repeat, const BakeRequest& request,
-                                  TextureStore& store, BundleContent& content, Report& report) {
-  const TextureKey key{path, repeat};
-  if (auto found = store.index.find(key); found != store.index.end()) return found->second;
-  TextureOptions options = request.textures;
-  options.repeat = repeat;
-  options.jobs = request.jobs;
-  Result<Etc1Texture> baked = bake_texture(path, options, report);
-  if (!baked) return tl::unexpected(baked.error());
-
-  TextureRecord record{};
-  record.name = content.intern(baked->name);
-  record.width = baked->levels.front().width;
-  record.height = baked->levels.front().height;
-  record.source_width = baked->source_width;
-  record.source_height = baked->source_height;
-  record.format = static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb);
-  record.flags = (baked->alpha ? kTextureAlpha : 0u) | (baked->repeat ? kTextureRepeat : 0u);
-  record.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
-  record.level_count = static_cast<std::uint32_t>(baked->levels.size());
-  record.psnr_db = static_cast<float>(baked->levels.front().psnr_db);
-  record.ssim = static_cast<float>(baked->levels.front().ssim);
-
-  std::vector<std::byte> data;
-  for (const Etc1Level& level : baked->levels) {
-    TextureLevelRecord out{};
-    out.offset = data.size();
-    out.alpha_offset = kNoOffset;
-    out.size = static_cast<std::uint32_t>(level.colour.size());
-    out.width = level.width;
-    out.height = level.height;
-    out.psnr_db = static_cast<float>(level.psnr_db);
-    out.ssim = static_cast<float>(level.ssim);
-    data.insert(data.end(), level.colour.begin(), level.colour.end());
-    if (baked->alpha) {
-      out.alpha_offset = data.size();
-      data.insert(data.end(), level.alpha.begin(), level.alpha.end());
-    }
-    content.texture_levels.push_back(out);
-  }
-  content.texture_data.push_back(std::move(data));
-  const auto index = static_cast<std::uint32_t>(content.textures.size());
-  content.textures.push_back(record);
-  store.index.emplace(key, index);
-  return index;
-}
-
-/// Does any triangle of the material sample outside of its image?
-std::vector<bool> repeating_materials(const TriMesh& mesh) {
-  constexpr double kSlack = 1e-4;  // half a texel at 4096: what exporters leave at the border
-  std::vector<bool> repeats(mesh.materials.size(), false);
-  if (mesh.uvs.empty()) return repeats;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const std::uint32_t v : mesh.triangles[t]) {
-      const glm::dvec2 uv = mesh.uvs[v];
-      if (uv.x < -kSlack || uv.y < -kSlack || uv.x > 1 + kSlack || uv.y > 1 + kSlack) {
-        repeats[mesh.triangle_material[t]] = true;
-      }
-    }
-  }
-  return repeats;
-}
 
 std::uint32_t layout_index(const LayoutRecord& layout, BundleContent& content) {
   const auto same = [&](const LayoutRecord& other) {
@@ -97,8 +29,18 @@ std::uint32_t layout_index(const LayoutRecord& layout, BundleContent& content) {
   return static_cast<std::uint32_t>(content.layouts.size() - 1);
 }
 
+/// A texture of one colour becomes a factor of the material, which the shader multiplies alike.
+void fold_constant(const std::array<std::uint8_t, 4>& rgba, MaterialRecord& material) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const float factor = static_cast<float>(rgba[i]) / 255.0f;
+    material.diffuse[i] *= factor;
+    material.ambient[i] *= factor;
+  }
+  material.opacity *= static_cast<float>(rgba[3]) / 255.0f;
+}
+
 /// Appends a model's records and bytes, shifting what counts from the model's own start.
-void merge_model(PackedMesh packed, const std::vector<std::uint32_t>& textures,
+void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
                  BundleContent& content) {
   ModelRecord record = packed.record;
   record.name = content.intern(packed.name);
@@ -121,7 +63,8 @@ void merge_model(PackedMesh packed, const std::vector<std::uint32_t>& textures,
   for (std::size_t m = 0; m < packed.materials.size(); ++m) {
     MaterialRecord material = packed.materials[m];
     material.name = content.intern(packed.sources[m].name);
-    material.texture = textures[m];
+    material.texture = textures[m].texture;
+    if (textures[m].constant) fold_constant(textures[m].rgba, material);
     content.materials.push_back(material);
   }
   content.vertices.insert(content.vertices.end(), packed.vertices.begin(), packed.vertices.end());
@@ -131,43 +74,69 @@ void merge_model(PackedMesh packed, const std::vector<std::uint32_t>& textures,
   content.models.push_back(record);
 }
 
-/// The model's side lengths in source units.
-Result<std::array<double, 3>> add_model(const std::string& path, const BakeRequest& request,
-                                        TextureStore& store, BundleContent& content,
-                                        Report& report) {
+/// A model that is welded and waits for its textures, which other models may share.
+struct WeldedModel {
+  TriMesh mesh;
+  std::vector<std::uint32_t> uses;  ///< of textures, one a material
+};
+
+Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& request,
+                                  TextureUses& textures, Report& report) {
   StageTimer reading(report, "read");
   Result<SourceModel> source = read_model(path, request.jobs);
   if (!source) return tl::unexpected(source.error());
   report.findings.insert(report.findings.end(), source->findings.begin(), source->findings.end());
   reading.done(source->positions.size(), source->face_count());
-
   Result<TriMesh> mesh = weld(*source, report);
   if (!mesh) return tl::unexpected(mesh.error());
-  const glm::dvec3 sides = mesh->source_max - mesh->source_min;
-  const std::vector<bool> repeats = repeating_materials(*mesh);
-  std::vector<bool> used(mesh->materials.size(), false);
-  for (const std::uint32_t material : mesh->triangle_material) used[material] = true;
+  WeldedModel welded{std::move(*mesh), {}};
+  welded.uses = collect_textures(welded.mesh, textures);
+  return welded;
+}
 
-  std::vector<std::uint32_t> textures(mesh->materials.size(), kNone);
-  std::vector<std::uint32_t> texture_side(mesh->materials.size(), 0);
-  for (std::size_t m = 0; m < mesh->materials.size(); ++m) {
-    const std::string& map = mesh->materials[m].diffuse_map;
-    if (map.empty() || !used[m] || mesh->uvs.empty()) continue;
-    Result<std::uint32_t> texture = add_texture(map, repeats[m], request, store, content, report);
-    if (!texture) return tl::unexpected(texture.error());
-    textures[m] = *texture;
-    const TextureRecord& record = content.textures[*texture];
-    texture_side[m] = std::max(record.width, record.height);
+Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& outcomes,
+                       const BakeRequest& request, BundleContent& content, Report& report) {
+  std::vector<TextureOutcome> textures(welded.uses.size());
+  std::vector<std::uint32_t> sides(welded.uses.size(), 0);
+  for (std::size_t m = 0; m < welded.uses.size(); ++m) {
+    if (welded.uses[m] != kNone) textures[m] = outcomes[welded.uses[m]];
+    sides[m] = textures[m].side;
   }
-
-  Result<ChunkedMesh> chunked = chunk(std::move(*mesh), ChunkOptions{}, report);
+  Result<ChunkedMesh> chunked = chunk(std::move(welded.mesh), ChunkOptions{}, report);
   if (!chunked) return tl::unexpected(chunked.error());
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
-  Result<PackedMesh> packed = pack(*chunked, texture_side, pack_options, report);
+  Result<PackedMesh> packed = pack(*chunked, sides, pack_options, report);
   if (!packed) return tl::unexpected(packed.error());
   merge_model(std::move(*packed), textures, content);
-  return std::array<double, 3>{sides.x, sides.y, sides.z};
+  return {};
+}
+
+/// Side lengths of each model in source units.
+using ModelSides = std::vector<std::array<double, 3>>;
+
+Result<ModelSides> add_models(const BakeRequest& request, BundleContent& content, Report& report) {
+  ModelSides sides;
+  TextureUses textures;
+  std::vector<WeldedModel> models;
+  for (const std::string& path : request.models) {
+    Result<WeldedModel> welded = read_and_weld(path, request, textures, report);
+    if (!welded) return tl::unexpected(welded.error());
+    const glm::dvec3 box = welded->mesh.source_max - welded->mesh.source_min;
+    sides.push_back({box.x, box.y, box.z});
+    models.push_back(std::move(*welded));
+  }
+  TextureOptions options = request.textures;
+  options.jobs = request.jobs;
+  const Result<std::vector<TextureOutcome>> outcomes =
+      bake_textures(textures, options, request.texture_budget, content, report);
+  if (!outcomes) return tl::unexpected(outcomes.error());
+  for (WeldedModel& model : models) {
+    if (auto added = add_model(std::move(model), *outcomes, request, content, report); !added) {
+      return tl::unexpected(added.error());
+    }
+  }
+  return sides;
 }
 
 Result<void> add_pattern(const PatternRequest& request, BundleContent& content, Report& report) {
@@ -205,7 +174,7 @@ Result<std::uint32_t> find_by_name(const std::vector<std::string>& paths, const 
 }
 
 Result<void> add_scenes(const BakeRequest& request, const std::vector<std::string>& pattern_paths,
-                        const std::vector<std::array<double, 3>>& sides, BundleContent& content) {
+                        const ModelSides& sides, BundleContent& content) {
   std::vector<SceneRequest> scenes = request.scenes;
   if (scenes.empty() && request.models.size() == 1 && pattern_paths.size() == 1) {
     SceneRequest scene;
@@ -229,6 +198,19 @@ std::string file_stem(const std::string& path) {
   return std::filesystem::path(path).stem().string();
 }
 
+Result<void> plan_for_device(const std::string& device, BakeRequest& request) {
+  const DeviceProfile* profile = find_device_profile(device);
+  if (profile == nullptr) {
+    return fail(ExitCode::kUsage, "device.unknown", "--device " + device,
+                "there is no such device profile", "name one of: " + device_profile_names());
+  }
+  const auto side = static_cast<std::uint32_t>(profile->max_texture_size);
+  request.textures.max_side = std::min(request.textures.max_side, side);
+  request.texture_budget = std::uint64_t{profile->gpu_memory_mib} * 1024 * 1024 / 2;
+  request.device = device;
+  return {};
+}
+
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
   if (request.models.empty() && request.patterns.empty()) {
     return fail(ExitCode::kUsage, "bake.nothing", "", "there is neither a model nor a pattern",
@@ -244,13 +226,8 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
   }
 
   BundleContent content;
-  TextureStore textures;
-  std::vector<std::array<double, 3>> sides;
-  for (const std::string& path : request.models) {
-    Result<std::array<double, 3>> model = add_model(path, request, textures, content, report);
-    if (!model) return tl::unexpected(model.error());
-    sides.push_back(*model);
-  }
+  const Result<ModelSides> sides = add_models(request, content, report);
+  if (!sides) return tl::unexpected(sides.error());
   if (!request.patterns.empty()) {
     for (const ParameterSetRecord& set : paper_parameter_sets()) {
       ParameterSetRecord named = set;
@@ -263,7 +240,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
       return tl::unexpected(added.error());
     }
   }
-  if (auto added = add_scenes(request, pattern_paths, sides, content); !added) {
+  if (auto added = add_scenes(request, pattern_paths, *sides, content); !added) {
     return tl::unexpected(added.error());
   }
   content.meta = bundle_meta(request);

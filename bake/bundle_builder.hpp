@@ -36,10 +36,17 @@ struct BakeRequest {
   std::vector<PatternRequest> patterns;
   std::vector<SceneRequest> scenes;
   TextureOptions textures;
-  double unit_metres = 0.0;  ///< metres in a source unit of the models; 0: unknown
-  unsigned jobs = 1;         ///< the bytes do not depend on it
+  std::uint64_t texture_budget = 0;  ///< GPU bytes that all textures may take; 0: any
+  double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
+  std::string device;                ///< profile that it is planned for; empty: none
+  unsigned jobs = 1;                 ///< the bytes do not depend on it
   std::string tool_version;
 };
+
+/// Lowers texture sizes and their budget to what a device profile allows: half of its GPU memory,
+/// so that as much is left for vertices, camera picture and framebuffers. Errors: kUsage
+/// "device.unknown" that lists the names.
+Result<void> plan_for_device(const std::string& device, BakeRequest& request);
 
 /// Runs all stages. One model and one pattern without a scene make one by themselves.
 /// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown".

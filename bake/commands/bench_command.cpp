@@ -10,6 +10,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/texture/etc1_bench.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -62,10 +63,23 @@ BenchResult bench_load(const BenchCommand& command) {
   return rows;
 }
 
+/// Our ETC1 encoder at its three efforts beside Android's libetc1.
+BenchResult bench_etc1_rows(const BenchCommand& command) {
+  Result<std::vector<Etc1BenchRow>> measured = bench_etc1(command.inputs, command.crop);
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<BenchRow> rows;
+  for (const Etc1BenchRow& row : *measured) {
+    rows.push_back({row.measure, row.ours, row.reference, row.ratio});
+  }
+  return rows;
+}
+
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
       {"load", "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
        bench_load},
+      {"etc1", "IMAGE... [--crop SIDE]", "our ETC1 encoder against Android's libetc1",
+       bench_etc1_rows},
   };
   return all;
 }

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <string>
 #include <thread>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/terminal.hpp"
+#include "modar/device_profile.hpp"
 
 #ifndef MODAR_VERSION
 #error "CMake defines MODAR_VERSION"
@@ -32,7 +34,27 @@ struct BakeTexts {
   std::vector<std::string> patterns;
   std::vector<std::string> scenes;
   std::string unit;
+  std::string device;
 };
+
+void add_texture_options(CLI::App& sub, TextureOptions& textures) {
+  sub.add_option("--max-texture", textures.max_side, "Longest side of a texture, in pixels")
+      ->check(CLI::Range(4u, kMaxTextureSide))
+      ->capture_default_str();
+  sub.add_flag("!--no-mipmaps", textures.mipmaps, "Store level 0 of textures only");
+  const std::map<std::string, Etc1Effort> efforts = {
+      {"fast", Etc1Effort::kFast}, {"good", Etc1Effort::kGood}, {"best", Etc1Effort::kBest}};
+  sub.add_option("--effort", textures.effort, "Of the ETC1 encoder: fast, good (default) or best")
+      ->transform(CLI::CheckedTransformer(efforts).description(""))
+      ->type_name("EFFORT");
+  sub.add_flag("--perceptual", textures.perceptual, "Weigh ETC1 errors as the eye does, by luma");
+  sub.add_option("--min-psnr", textures.min_psnr_db, "Report textures below this, in dB");
+  sub.add_option("--min-ssim", textures.min_ssim, "Report textures below this")
+      ->check(CLI::Range(0.0, 1.0));
+  sub.add_option("--texture-pictures", textures.picture_folder,
+                 "Write source, decoded and difference of each texture as PNG")
+      ->type_name("DIR");
+}
 
 CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   CLI::App* sub = app.add_subcommand("bake", "Models and pattern images to one bundle");
@@ -48,11 +70,11 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
       ->required()
       ->type_name("OUT.modar");
   sub->add_option("--unit", texts.unit, "Unit of the models' coordinates: mm, cm, m, km, in, ft");
-  sub->add_option("--max-texture", bake.request.textures.max_side,
-                  "Longest side of a texture, in pixels")
-      ->check(CLI::Range(4u, kMaxTextureSide))
-      ->capture_default_str();
-  sub->add_flag("!--no-mipmaps", bake.request.textures.mipmaps, "Store level 0 of textures only");
+  add_texture_options(*sub, bake.request.textures);
+  sub->add_option(
+         "--device", texts.device,
+         "Plan for a device: its texture size and GPU memory (" + device_profile_names() + ")")
+      ->type_name("NAME");
   sub->add_option("--jobs", bake.request.jobs, "Threads; the bytes do not depend on it")
       ->check(CLI::Range(1u, 256u))
       ->capture_default_str();
@@ -140,6 +162,11 @@ int bake_from_texts(BakeCommand& bake, const BakeTexts& texts) {
     const Result<double> unit = parse_unit(texts.unit);
     if (!unit) return print_error(unit.error());
     bake.request.unit_metres = *unit;
+  }
+  if (!texts.device.empty()) {
+    if (auto planned = plan_for_device(texts.device, bake.request); !planned) {
+      return print_error(planned.error());
+    }
   }
   bake.request.tool_version = MODAR_VERSION;
   return run_bake(bake);

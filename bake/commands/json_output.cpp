@@ -246,7 +246,10 @@ std::string bundle_meta(const BakeRequest& request) {
                {"models", models},
                {"patterns", patterns},
                {"options",
-                {{"max_texture", request.textures.max_side},
+                {{"device", request.device},
+                 {"effort", static_cast<int>(request.textures.effort)},
+                 {"perceptual", request.textures.perceptual},
+                 {"max_texture", request.textures.max_side},
                  {"mipmaps", request.textures.mipmaps},
                  {"unit_metres", request.unit_metres}}}});
 }

@@ -54,6 +54,23 @@ class Bake(ProgramTest):
         self.assertGreater(report["peak_rss_bytes"], 1e6)
         self.assertTrue(all({"name", "ms", "in", "out", "max_error"} <= set(s) for s in report["stages"]))
 
+    def test_a_device_profile_bounds_the_textures(self):
+        out = self.folder / "small.modar"
+        report = self.modar_json("bake", "--model", POTTERY, "--max-texture", 64, "--device", "ace2", "-o", out)
+        texture = report["bundle"]["textures"][0]
+        self.assertEqual((texture["width"], texture["height"], texture["levels"]), (64, 64, 7))
+        done = self.modar("bake", "--model", POTTERY, "--device", "toaster", "-o", out)
+        self.assert_fails(done, 1, "toaster", "ace2")
+
+    def test_an_image_of_two_models_is_stored_once(self):
+        for name in ("a", "b"):
+            text = POTTERY.read_text()
+            (self.folder / f"{name}.obj").write_text(text)
+        shutil.copy(POTTERY.parent / "pottery.mtl", self.folder)
+        shutil.copy(POTTERY.parent / "pottery.png", self.folder)
+        report = self.modar_json("bake", "--model", "a.obj", "b.obj", "-o", "ab.modar")
+        self.assertEqual(len(report["bundle"]["textures"]), 1)
+
     def test_a_progress_bar_stays_out_of_pipes(self):
         done = self.modar("bake", "--model", POTTERY, "-o", self.folder / "a.modar")
         self.assertNotIn("\r", done.stderr)
