@@ -1,96 +1,198 @@
 // The camera's picture as textures, drawn as one rectangle.
 #include "runtime/render/background.hpp"
 
+#include <algorithm>
+#include <string>
+
 #include "runtime/render/program.hpp"
 
 namespace modar {
 namespace {
 
-void set_filter(GLint filter) {
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
+/// How a plane is stored in GL.
+struct PlaneLayout {
+  GLenum format = GL_RGB;
+  int bytes = 3;    ///< a pixel
+  int divider = 1;  ///< of the picture's sides
+};
+
+struct Layouts {
+  int count = 0;
+  std::array<PlaneLayout, 3> planes;
+};
+
+Layouts layouts_of(PictureFormat format) {
+  const PlaneLayout luma{GL_LUMINANCE, 1, 1};
+  switch (format) {
+    case PictureFormat::kNv21:
+    case PictureFormat::kNv12:
+      return {2, {luma, {GL_LUMINANCE_ALPHA, 2, 2}, {}}};
+    case PictureFormat::kI420:
+      return {3, {luma, {GL_LUMINANCE, 1, 2}, {GL_LUMINANCE, 1, 2}}};
+    case PictureFormat::kRgb:
+      break;
+  }
+  return {1, {PlaneLayout{}, {}, {}}};
+}
+
+/// Rows [first, end) of a plane, full width, into the bound texture.
+std::uint64_t send_rows(const PlaneLayout& layout, const std::uint8_t* pixels,
+                        std::ptrdiff_t stride, int width, int first, int end) {
+  const std::uint8_t* start = pixels + first * stride;
+  if (stride == std::ptrdiff_t{layout.bytes} * width) {
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, first, width, end - first, layout.format, GL_UNSIGNED_BYTE,
+                    start);
+  } else {
+    // ES 2.0 cannot step over padding: row by row, without a copy of ours.
+    for (int y = first; y < end; ++y, start += stride) {
+      glTexSubImage2D(GL_TEXTURE_2D, 0, 0, y, width, 1, layout.format, GL_UNSIGNED_BYTE, start);
+    }
+  }
+  return static_cast<std::uint64_t>(layout.bytes) * static_cast<std::uint64_t>(width) *
+         static_cast<std::uint64_t>(end - first);
 }
 
 }  // namespace
 
+Background::Kind Background::kind_of(PictureFormat format) {
+  if (format == PictureFormat::kRgb) return kRgb;
+  return format == PictureFormat::kI420 ? kPlanes : kPair;
+}
+
 Result<void> Background::create() {
-  const Result<GLuint> program =
-      link_program("", background_vertex_source(), background_fragment_source());
-  if (!program) return tl::unexpected<Error>(program.error());
-  program_ = *program;
-  glUseProgram(program_);
-  glUniform1i(glGetUniformLocation(program_, "u_texture"), 0);
-  uv_ = glGetUniformLocation(program_, "u_uv");
   const float corners[] = {0, 0, 1, 0, 0, 1, 1, 1};
   glGenBuffers(1, &rectangle_);
   glBindBuffer(GL_ARRAY_BUFFER, rectangle_);
   glBufferData(GL_ARRAY_BUFFER, sizeof corners, corners, GL_STATIC_DRAW);
+  return link(kRgb);
+}
+
+Result<void> Background::link(Kind kind) {
+  constexpr std::array<const char*, kKinds> kDefines = {"", "#define CHROMA_PAIR\n",
+                                                        "#define CHROMA_PLANES\n"};
+  Program& program = programs_[kind];
+  const Result<GLuint> linked =
+      link_program(kDefines[kind], background_vertex_source(), background_fragment_source());
+  program.failed = !linked.has_value();
+  if (!linked) return tl::unexpected<Error>(linked.error());
+  program.id = *linked;
+  const auto place = [&](const char* name) { return glGetUniformLocation(program.id, name); };
+  program.uv = place("u_uv");
+  program.range = place("u_range");
+  program.swap = place("u_swap");
+  glUseProgram(program.id);
+  glUniform1i(place("u_texture"), 0);
+  glUniform1i(place("u_second"), 1);
+  glUniform1i(place("u_third"), 2);
   return {};
 }
 
 void Background::release(GlState& gl) {
-  gl.forget_texture(texture_);
+  for (const Plane& plane : planes_) {
+    gl.forget_texture(plane.texture);
+    glDeleteTextures(1, &plane.texture);
+  }
   gl.forget_buffer(rectangle_);
-  glDeleteTextures(1, &texture_);
   glDeleteBuffers(1, &rectangle_);
-  glDeleteProgram(program_);
-  forget();
-}
-
-void Background::forget() {
+  for (const Program& program : programs_) glDeleteProgram(program.id);
   *this = Background();
 }
 
-std::uint64_t Background::upload(const RgbImage& picture, GlState& gl) {
-  if (texture_ == 0) glGenTextures(1, &texture_);
-  gl.bind_texture(0, texture_);
-  if (picture.width != width_ || picture.height != height_) {
-    width_ = picture.width;
-    height_ = picture.height;
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB, width_, height_, 0, GL_RGB, GL_UNSIGNED_BYTE, nullptr);
+void Background::allocate(const CameraPicture& picture, GlState& gl) {
+  width_ = picture.width;
+  height_ = picture.height;
+  format_ = picture.format;
+  const Layouts layouts = layouts_of(format_);
+  for (int i = 0; i < layouts.count; ++i) {
+    const PlaneLayout& layout = layouts.planes[static_cast<std::size_t>(i)];
+    Plane& plane = planes_[static_cast<std::size_t>(i)];
+    if (plane.texture == 0) glGenTextures(1, &plane.texture);
+    plane.filter = 0;
+    gl.edit_texture(static_cast<GLuint>(i), plane.texture);
+    const int divider = layout.divider;
+    glTexImage2D(GL_TEXTURE_2D, 0, static_cast<GLint>(layout.format),
+                 (width_ + divider - 1) / divider, (height_ + divider - 1) / divider, 0,
+                 layout.format, GL_UNSIGNED_BYTE, nullptr);
     // ES 2.0 takes pictures that are no power of two only without mipmaps and clamped.
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    filter_ = 0;
   }
-  if (picture.stride == std::ptrdiff_t{3} * width_) {
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_RGB, GL_UNSIGNED_BYTE,
-                    picture.pixels);
-  } else {
-    // ES 2.0 cannot step over padding: row by row, without a copy of ours.
-    for (int y = 0; y < height_; ++y) {
-      glTexSubImage2D(GL_TEXTURE_2D, 0, 0, y, width_, 1, GL_RGB, GL_UNSIGNED_BYTE,
-                      picture.pixels + y * picture.stride);
-    }
+}
+
+std::uint64_t Background::upload(const CameraPicture& picture, GlState& gl) {
+  const bool same =
+      picture.width == width_ && picture.height == height_ && picture.format == format_;
+  if (!same) allocate(picture, gl);
+  full_range_ = picture.full_range;
+  const int first = same ? std::clamp(picture.first_row, 0, height_) : 0;
+  const int count = same ? std::clamp(picture.row_count, 0, height_ - first) : height_;
+  const Layouts layouts = layouts_of(format_);
+  std::uint64_t bytes = 0;
+  for (int i = 0; i < layouts.count && count > 0; ++i) {
+    const std::size_t p = static_cast<std::size_t>(i);
+    const int divider = layouts.planes[p].divider;
+    gl.edit_texture(static_cast<GLuint>(i), planes_[p].texture);
+    bytes += send_rows(layouts.planes[p], picture.planes[p], picture.strides[p],
+                       (width_ + divider - 1) / divider, first / divider,
+                       (first + count + divider - 1) / divider);
   }
-  return std::uint64_t{3} * static_cast<std::uint64_t>(width_) *
-         static_cast<std::uint64_t>(height_);
+  return bytes;
+}
+
+/// Luma and RGB are taken as they are where a texel is a pixel; chroma is always interpolated.
+void Background::set_filters(bool exact, GlState& gl) {
+  const int count = layouts_of(format_).count;
+  for (int i = 0; i < count; ++i) {
+    Plane& plane = planes_[static_cast<std::size_t>(i)];
+    gl.bind_texture(static_cast<GLuint>(i), plane.texture);
+    const GLint filter = exact && i == 0 ? GL_NEAREST : GL_LINEAR;
+    if (filter == plane.filter) continue;
+    plane.filter = filter;
+    gl.edit_texture(static_cast<GLuint>(i), plane.texture);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
+  }
 }
 
 int Background::draw(bool exact, GlState& gl) {
-  gl.bind_texture(0, texture_);
-  const GLint filter = exact ? GL_NEAREST : GL_LINEAR;
-  if (filter != filter_) {
-    filter_ = filter;
-    set_filter(filter);
+  const Kind kind = kind_of(format_);
+  Program& program = programs_[kind];
+  if (program.id == 0 && !program.failed) {
+    // The format is seen for the first time.
+    static_cast<void>(link(kind));
+    gl.forget_program();
+  }
+  if (program.failed) return 0;
+  set_filters(exact, gl);
+  gl.use_program(program.id);
+  if (kind != kRgb) {
+    // ITU-R BT.601: 219 steps of luma from 16 and 224 of chroma where the range is limited.
+    if (full_range_) {
+      glUniform3f(program.range, 1.0f, 0.0f, 1.0f);
+    } else {
+      glUniform3f(program.range, 255.0f / 219.0f, -16.0f / 219.0f, 255.0f / 224.0f);
+    }
+    glUniform1f(program.swap, format_ == PictureFormat::kNv21 ? 1.0f : 0.0f);
   }
   // Row 0 of the texture is the top of the picture.
-  return draw_rectangle(texture_, {1.0f, -1.0f, 0.0f, 1.0f}, gl);
+  return draw_rectangle(program, {1.0f, -1.0f, 0.0f, 1.0f}, gl);
 }
 
 int Background::draw_texture(GLuint texture, GlState& gl) {
-  return draw_rectangle(texture, {1.0f, 1.0f, 0.0f, 0.0f}, gl);
+  gl.bind_texture(0, texture);
+  return draw_rectangle(programs_[kRgb], {1.0f, 1.0f, 0.0f, 0.0f}, gl);
 }
 
-int Background::draw_rectangle(GLuint texture, const std::array<float, 4>& uv, GlState& gl) {
-  gl.use_program(program_);
-  gl.bind_texture(0, texture);
+int Background::draw_rectangle(const Program& program, const std::array<float, 4>& uv,
+                               GlState& gl) {
+  gl.use_program(program.id);
   gl.set_depth_test(false);
   gl.set_blending(false);
   gl.set_culling(false);
+  gl.set_front_face(GL_CCW);
   gl.set_attribute(kAttributePosition, {rectangle_, 2, GL_FLOAT, GL_FALSE, 8, 0});
   gl.enable_attributes(1u << kAttributePosition);
-  glUniform4fv(uv_, 1, uv.data());
+  glUniform4fv(program.uv, 1, uv.data());
   glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
   return 1;
 }

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "formats/error.hpp"
-#include "modar/image.hpp"
+#include "modar/renderer.hpp"
 #include "runtime/render/gl_state.hpp"
 
 namespace modar {
@@ -15,23 +16,42 @@ class Background {
   /// Makes the rectangle and the RGB program in the current context. Errors: kUnsupported "gl.*".
   Result<void> create();
   void release(GlState& gl);
-  void forget();
 
-  /// Sends the picture to its texture: bytes sent. The texture is made anew where the size changes.
-  std::uint64_t upload(const RgbImage& picture, GlState& gl);
-  /// Fills the viewport with the picture sent last; exact: a texel is a pixel there.
+  /// Sends the picture's changed rows to its textures: bytes sent. Textures are made anew where
+  /// size or format change.
+  std::uint64_t upload(const CameraPicture& picture, GlState& gl);
+  /// Fills the viewport with the picture sent last; exact: a texel is a pixel there. Answers the
+  /// draw calls: none where the driver cannot link the format's shader.
   int draw(bool exact, GlState& gl);
   /// Fills the viewport with any texture whose first row is the bottom one.
   int draw_texture(GLuint texture, GlState& gl);
 
  private:
-  int draw_rectangle(GLuint texture, const std::array<float, 4>& uv, GlState& gl);
+  /// RGB, luma with pairs of chroma, or luma with two planes of chroma.
+  enum Kind : std::size_t { kRgb, kPair, kPlanes, kKinds };
+  struct Program {
+    GLuint id = 0;
+    GLint uv = -1;
+    GLint range = -1;
+    GLint swap = -1;
+    bool failed = false;
+  };
+  struct Plane {
+    GLuint texture = 0;
+    GLint filter = 0;
+  };
 
+  static Kind kind_of(PictureFormat format);
+  Result<void> link(Kind kind);
+  void allocate(const CameraPicture& picture, GlState& gl);
+  void set_filters(bool exact, GlState& gl);
+  int draw_rectangle(const Program& program, const std::array<float, 4>& uv, GlState& gl);
+
+  std::array<Program, kKinds> programs_;
+  std::array<Plane, 3> planes_;
   GLuint rectangle_ = 0;
-  GLuint program_ = 0;
-  GLint uv_ = -1;
-  GLuint texture_ = 0;
-  GLint filter_ = 0;
+  PictureFormat format_ = PictureFormat::kRgb;
+  bool full_range_ = true;
   int width_ = 0;
   int height_ = 0;
 };

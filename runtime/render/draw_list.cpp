@@ -35,7 +35,7 @@ void DrawList::build(const BundleView& bundle, std::span<const ChunkSetup> setup
       command.level = chunk.first_level + choose_level(view, chunk, levels, lod_pixels);
       command.program = setups[c].program;
       command.texture = material.texture;
-      command.material = chunk.material;
+      command.material = setups[c].material;
       // A matrix with a NaN must not upset the order.
       const float distance = eye_distance(view, chunk);
       command.distance = distance >= 0.0f ? distance : 0.0f;

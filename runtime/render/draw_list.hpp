@@ -25,6 +25,7 @@ struct DrawCommand {
 /// What a chunk needs from the renderer's set-up.
 struct ChunkSetup {
   std::uint32_t program = 0;
+  std::uint32_t material = 0;  ///< the first one of its values
   bool blended = false;
 };
 

@@ -214,16 +214,6 @@ void GeometryStore::release(GlState& gl) {
   const GLuint whole[] = {whole_vertices_, whole_indices_};
   for (const GLuint buffer : whole) gl.forget_buffer(buffer);
   glDeleteBuffers(2, whole);
-  forget();
-}
-
-void GeometryStore::forget() {
-  for (std::vector<Range>* ranges : {&vertex_ranges_, &index_ranges_}) {
-    for (Range& range : *ranges) range.buffer = 0;
-  }
-  whole_vertices_ = 0;
-  whole_indices_ = 0;
-  resident_bytes_ = 0;
 }
 
 }  // namespace modar

@@ -30,9 +30,8 @@ class GeometryStore {
 
   /// Uploads what fits (all, or nothing yet) into the current context.
   void upload();
-  /// Deletes the GL buffers; or only forgets their names, where their context is lost.
+  /// Deletes the GL buffers.
   void release(GlState& gl);
-  void forget();
 
   /// Starts a frame: what is used from here on is not evicted before the next one.
   void begin_frame() { ++frame_; }

@@ -13,8 +13,9 @@ enum AttributeSlot : GLuint {
   kAttributeNormal = 1,
   kAttributeUv = 2,
   kAttributeColour = 3,
-  kAttributeSlot = 4,  ///< slot stream; the first of three rows where instanced arrays are used
-  kAttributeCount = 7,
+  kAttributeSlot = 4,  ///< the vertex's own choice of a slot
+  kAttributeRows = 5,  ///< the first of three rows that step once an instance
+  kAttributeCount = 8,
 };
 
 }  // namespace modar

@@ -60,10 +60,19 @@ void GlState::bind_index_buffer(GLuint buffer) {
 
 void GlState::bind_texture(GLuint unit, GLuint texture) {
   if (textures_[unit] == texture) return;
-  if (differs(active_unit_, unit, changes)) glActiveTexture(GL_TEXTURE0 + unit);
+  activate(unit);
   textures_[unit] = texture;
   ++changes;
   glBindTexture(GL_TEXTURE_2D, texture);
+}
+
+void GlState::edit_texture(GLuint unit, GLuint texture) {
+  activate(unit);
+  bind_texture(unit, texture);
+}
+
+void GlState::activate(GLuint unit) {
+  if (differs(active_unit_, unit, changes)) glActiveTexture(GL_TEXTURE0 + unit);
 }
 
 void GlState::set_attribute(GLuint location, const AttributePointer& pointer) {

@@ -29,6 +29,8 @@ class GlState {
   void bind_index_buffer(GLuint buffer);
   /// unit: 0, 1 or 2.
   void bind_texture(GLuint unit, GLuint texture);
+  /// The same, and glTexImage2D and its kin act on that texture.
+  void edit_texture(GLuint unit, GLuint texture);
   void set_attribute(GLuint location, const AttributePointer& pointer);
   /// Enables exactly the locations of the mask.
   void enable_attributes(std::uint32_t mask);
@@ -37,6 +39,8 @@ class GlState {
   void set_blending(bool enabled);
   void set_depth_test(bool enabled);
 
+  /// To be told when another program was put in use behind our back.
+  void forget_program() { program_ = kUnknown; }
   /// To be told when names are deleted, since GL may give them out again.
   void forget_buffer(GLuint buffer);
   void forget_texture(GLuint texture);
@@ -44,6 +48,8 @@ class GlState {
   int changes = 0;  ///< GL calls made here since the caller set it to 0
 
  private:
+  void activate(GLuint unit);
+
   static constexpr GLuint kUnknown = 0xFFFFFFFFu;
   GLuint program_ = kUnknown;
   GLuint array_buffer_ = kUnknown;

@@ -1,4 +1,4 @@
-// Draws the commands of a list: programs, uniforms, attributes, draw calls.
+// Draws the commands of a list: pieces, programs, uniforms, attributes, draw calls.
 #pragma once
 
 #include <array>
@@ -9,8 +9,10 @@
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
 #include "modar/renderer.hpp"
+#include "runtime/render/batch_store.hpp"
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
+#include "runtime/render/gl_extensions.hpp"
 #include "runtime/render/gl_state.hpp"
 #include "runtime/render/program.hpp"
 #include "runtime/render/texture_store.hpp"
@@ -22,24 +24,37 @@ namespace modar {
 using Slot = std::array<glm::vec4, 4>;
 Slot make_slot(const glm::mat4& to_eye, const ChunkRecord& chunk);
 
+/// What one frame is drawn with; all of it outlives the call.
+struct PaintJob {
+  DrawList& list;
+  std::span<const DrawItem> items;
+  const glm::mat4& projection;
+  const RenderOptions& options;
+  GeometryStore& geometry;
+  const TextureStore& textures;
+  GlState& gl;
+  RenderStats& stats;
+};
+
 class ModelPainter {
  public:
-  ModelPainter(const BundleView& bundle, std::span<const VertexFormat> formats);
+  /// batch_budget: bytes of GL memory for batches.
+  ModelPainter(const BundleView& bundle, std::span<const VertexFormat> formats,
+               std::uint64_t batch_budget);
 
   /// Links a program for each kind of layout and material that the bundle's chunks have.
   /// Errors: kUnsupported "gl.shader", "gl.program".
-  Result<void> create(const TextureStore& textures);
-  void release();
-  void forget() { programs_.clear(); }
+  Result<void> create(const TextureStore& textures, const GlExtensions& extensions,
+                      const GlCaps& caps);
+  void release(GlState& gl);
 
   /// One a chunk of the bundle.
   [[nodiscard]] std::span<const ChunkSetup> setups() const { return setups_; }
+  [[nodiscard]] std::uint64_t batch_bytes() const { return batches_.bytes(); }
 
-  /// Draws in the list's order; what follows on in the index buffer with the same state is one
-  /// call.
-  void draw(DrawList& list, std::span<const DrawItem> items, const glm::mat4& projection,
-            const RenderOptions& options, GeometryStore& geometry, const TextureStore& textures,
-            GlState& gl, RenderStats& stats);
+  /// Draws in the list's order. What follows on in the index buffer with the same state is one
+  /// piece; pieces of several items with the same state are drawn together.
+  void draw(const PaintJob& job);
 
  private:
   /// What a program's uniforms were last set to.
@@ -50,23 +65,64 @@ class ModelPainter {
     std::uint32_t item = kNone;
     std::uint32_t chunk = kNone;  ///< the one whose decoding is set
   };
+  /// The same surface, with the three ways to hand in matrices. The last two are linked when they
+  /// are first asked for.
+  struct ProgramSet {
+    std::array<ProgramState, 3> by_slots;
+    std::array<bool, 3> failed{};
+  };
+  /// Triangles of one item that one call draws.
+  struct Piece {
+    std::uint32_t item = 0;
+    std::uint32_t chunk = 0;
+    std::uint32_t program = 0;
+    std::uint32_t material = 0;
+    std::uint32_t layout = 0;
+    MeshRange mesh;
+    int chunks = 0;
+    bool blended = false;
+    bool mirrored = false;
+  };
 
+  void find_equals();
   Result<std::uint32_t> program_of(const ProgramKey& key);
-  void set_frame(ProgramState& state, const glm::mat4& projection, const RenderOptions& options,
-                 RenderStats& stats);
-  void set_material(ProgramState& state, std::uint32_t material, const RenderOptions& options,
-                    RenderStats& stats);
-  void set_slot(ProgramState& state, const DrawCommand& command, const glm::mat4& to_eye,
-                RenderStats& stats);
-  void set_attributes(const VertexFormat& format, const LevelPlace& place, GlState& gl) const;
+  ProgramState* program(std::uint32_t index, SlotKind slots, GlState& gl);
   [[nodiscard]] bool same_decoding(std::uint32_t a, std::uint32_t b) const;
-  [[nodiscard]] bool continues(const DrawCommand& last, const DrawCommand& next) const;
+
+  void make_pieces(const PaintJob& job);
+  [[nodiscard]] bool continues(const Piece& piece, const DrawCommand& next) const;
+  void draw_group(const PaintJob& job, std::span<Piece> group);
+  void draw_piece(const PaintJob& job, const Piece& piece);
+  bool draw_instances(const PaintJob& job, std::span<const Piece> pieces);
+  bool draw_batches(const PaintJob& job, std::span<const Piece> pieces);
+  bool draw_batch(const PaintJob& job, ProgramState& state, std::span<const Piece> pieces);
+  void draw_runs(const PaintJob& job, const Batch& batch);
+
+  void set_surface(const PaintJob& job, ProgramState& state, const Piece& piece);
+  void set_frame(const PaintJob& job, ProgramState& state);
+  void set_material(const PaintJob& job, ProgramState& state, std::uint32_t material);
+  void set_slot(const PaintJob& job, ProgramState& state, const Piece& piece);
+  void set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,
+                      std::uint32_t more, GlState& gl) const;
+  [[nodiscard]] const glm::mat4& matrix(const PaintJob& job, const Piece& piece) const {
+    return job.items[piece.item].to_eye;
+  }
 
   const BundleView& bundle_;
   std::span<const VertexFormat> formats_;
-  std::vector<ProgramState> programs_;
+  GlExtensions extensions_;
+  BatchStore batches_;
+  std::vector<ProgramSet> programs_;
   std::vector<ChunkSetup> setups_;
   std::vector<std::uint32_t> chunk_layouts_;
+  std::vector<std::uint32_t> equal_material_;  ///< the first material with the same values
+  std::vector<std::uint32_t> equal_layout_;    ///< the first layout with the same values
+  std::vector<Piece> pieces_;
+  std::vector<BatchPart> parts_;
+  std::vector<Slot> slots_;
+  std::vector<glm::vec4> rows_;
+  GLuint row_buffer_ = 0;
+  int slot_count_ = 1;
   std::uint64_t frame_ = 0;
 };
 

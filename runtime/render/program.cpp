@@ -47,9 +47,9 @@ void name_attributes(GLuint program) {
   glBindAttribLocation(program, kAttributeUv, "a_uv");
   glBindAttribLocation(program, kAttributeColour, "a_colour");
   glBindAttribLocation(program, kAttributeSlot, "a_slot");
-  glBindAttribLocation(program, kAttributeSlot, "a_row0");
-  glBindAttribLocation(program, kAttributeSlot + 1, "a_row1");
-  glBindAttribLocation(program, kAttributeSlot + 2, "a_row2");
+  glBindAttribLocation(program, kAttributeRows, "a_row0");
+  glBindAttribLocation(program, kAttributeRows + 1, "a_row1");
+  glBindAttribLocation(program, kAttributeRows + 2, "a_row2");
 }
 
 std::string model_defines(const ProgramKey& key) {

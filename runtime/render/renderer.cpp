@@ -10,6 +10,7 @@
 #include "runtime/render/background.hpp"
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
+#include "runtime/render/gl_extensions.hpp"
 #include "runtime/render/gl_state.hpp"
 #include "runtime/render/model_painter.hpp"
 #include "runtime/render/program.hpp"
@@ -57,7 +58,7 @@ struct Renderer::State {
         formats(vertex_formats(bundle, caps)),
         geometry(bundle, formats, geometry_budget(view, context_caps)),
         textures(bundle, caps),
-        painter(bundle, formats) {}
+        painter(bundle, formats, batch_budget()) {}
 
   /// Half of the memory is for each kind, unless all the geometry needs less.
   static std::uint64_t geometry_budget(const BundleView& view, const GlCaps& caps) {
@@ -71,17 +72,39 @@ struct Renderer::State {
     return bytes;
   }
 
+  /// What geometry and textures leave; nothing where not even they fit.
+  std::uint64_t batch_budget() const {
+    if (caps.gpu_memory == 0) return ~std::uint64_t{0};
+    const std::uint64_t used = geometry.total_bytes() + texture_bytes(bundle);
+    return caps.gpu_memory - std::min(caps.gpu_memory, used);
+  }
+
   Result<void> upload() {
+    extensions = load_gl_extensions(caps);
     const Result<void> textured =
         textures.upload(caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2));
     if (!textured) return textured;
     geometry.upload();
-    const Result<void> painted = painter.create(textures);
+    const Result<void> painted = painter.create(textures, extensions, caps);
     if (!painted) return painted;
     const Result<void> backed = background.create();
     if (!backed) return backed;
     gl.reset();
     return {};
+  }
+
+  void begin_frame() {
+    stats = RenderStats();
+    if (!options.exclusive_context) gl.reset();
+    gl.changes = 0;
+    uploaded_before = geometry.uploaded_bytes();
+    evicted_before = geometry.evictions();
+  }
+
+  void end_frame() {
+    stats.state_changes = gl.changes;
+    stats.bytes_uploaded += geometry.uploaded_bytes() - uploaded_before;
+    stats.evictions = geometry.evictions() - evicted_before;
   }
 
   void draw_models(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
@@ -92,7 +115,7 @@ struct Renderer::State {
       stats.chunks_skipped = keep_resident();
     }
     list.sort_by_state(bundle);
-    painter.draw(list, items, projection, options, geometry, textures, gl, stats);
+    painter.draw({list, items, projection, options, geometry, textures, gl, stats});
   }
 
   /// Gives GPU memory to the nearest chunks first, at a coarser level where there is little. Drops
@@ -116,6 +139,7 @@ struct Renderer::State {
   BundleView bundle;
   GlCaps caps;
   std::vector<VertexFormat> formats;
+  GlExtensions extensions;
   GlState gl;
   GeometryStore geometry;
   TextureStore textures;
@@ -125,6 +149,8 @@ struct Renderer::State {
   DrawList list;
   RenderOptions options;
   RenderStats stats;
+  std::uint64_t uploaded_before = 0;
+  std::uint64_t evicted_before = 0;
 };
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const BundleView& bundle, const GlCaps& caps) {
@@ -139,7 +165,7 @@ Renderer::Renderer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Renderer::~Renderer() {
   state_->geometry.release(state_->gl);
   state_->textures.release(state_->gl);
-  state_->painter.release();
+  state_->painter.release(state_->gl);
   state_->background.release(state_->gl);
   state_->target.release(state_->gl);
 }
@@ -148,29 +174,53 @@ Result<void> Renderer::resize(int width, int height) {
   return state_->target.resize(width, height, state_->caps, state_->gl);
 }
 
+Result<void> Renderer::restore(const GlCaps& caps) {
+  // The old state is dropped without a GL call: its names mean nothing in this context.
+  auto state = std::make_unique<State>(state_->bundle, caps);
+  state->options = state_->options;
+  const int width = state_->target.width();
+  const int height = state_->target.height();
+  state_ = std::move(state);
+  const Result<void> uploaded = state_->upload();
+  if (!uploaded || width == 0) return uploaded;
+  return resize(width, height);
+}
+
 void Renderer::render(const RgbImage& background, const glm::mat4& projection,
                       std::span<const DrawItem> items) {
+  CameraPicture picture;
+  picture.width = background.width;
+  picture.height = background.height;
+  picture.planes[0] = background.pixels;
+  picture.strides[0] = background.stride;
+  render(picture, projection, items);
+}
+
+void Renderer::render(const CameraPicture& background, const glm::mat4& projection,
+                      std::span<const DrawItem> items) {
   State& s = *state_;
-  s.stats = RenderStats();
-  s.gl.changes = 0;
-  const std::uint64_t uploaded_before = s.geometry.uploaded_bytes();
-  const std::uint64_t evicted_before = s.geometry.evictions();
+  s.begin_frame();
+  const bool shown =
+      background.planes[0] != nullptr && background.width > 0 && background.height > 0;
   const Viewport view =
-      fit(background.width, background.height, s.target.width(), s.target.height());
+      shown ? fit(background.width, background.height, s.target.width(), s.target.height())
+            : Viewport{0, 0, s.target.width(), s.target.height()};
   s.target.bind();
   glViewport(view.x, view.y, view.width, view.height);
   const glm::vec4& clear = s.options.clear_colour;
   glClearColor(clear.r, clear.g, clear.b, clear.a);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  if (background.pixels != nullptr && background.width > 0 && background.height > 0) {
-    s.stats.bytes_uploaded += s.background.upload(background, s.gl);
+  if (shown) {
+    const DebugGroup group(s.extensions, "camera picture");
     const bool exact = view.width == background.width && view.height == background.height;
+    s.stats.bytes_uploaded += s.background.upload(background, s.gl);
     s.stats.draw_calls += s.background.draw(exact, s.gl);
   }
-  if (!items.empty()) s.draw_models(projection, view.height, items);
-  s.stats.state_changes = s.gl.changes;
-  s.stats.bytes_uploaded += s.geometry.uploaded_bytes() - uploaded_before;
-  s.stats.evictions = s.geometry.evictions() - evicted_before;
+  if (!items.empty()) {
+    const DebugGroup group(s.extensions, "models");
+    s.draw_models(projection, view.height, items);
+  }
+  s.end_frame();
 }
 
 void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
@@ -190,6 +240,7 @@ void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
 
 void Renderer::blit_to_window(int window_width, int window_height) {
   State& s = *state_;
+  if (!s.options.exclusive_context) s.gl.reset();
   const Viewport view = fit(s.target.width(), s.target.height(), window_width, window_height);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glViewport(0, 0, window_width, window_height);
@@ -210,6 +261,7 @@ const RenderStats& Renderer::stats() const {
 
 GpuMemory Renderer::gpu_memory() const {
   return {state_->geometry.resident_bytes(), state_->textures.bytes(),
+          state_->painter.batch_bytes(),
           state_->geometry.uploaded_bytes() + state_->textures.uploaded_bytes()};
 }
 

@@ -5,6 +5,7 @@ namespace modar {
 
 Result<void> Target::resize(int width, int height, const GlCaps& caps, GlState& gl) {
   if (width == width_ && height == height_ && framebuffer_ != 0) return {};
+  gl.reset();
   release(gl);
   if (width < 1 || height < 1 || width > caps.max_texture_size || height > caps.max_texture_size) {
     return fail(ExitCode::kUnsupported, "gl.framebuffer", "renderer",
@@ -12,7 +13,7 @@ Result<void> Target::resize(int width, int height, const GlCaps& caps, GlState& 
                 "ask for a smaller picture, of at least 1x1");
   }
   glGenTextures(1, &texture_);
-  gl.bind_texture(0, texture_);
+  gl.edit_texture(0, texture_);
   // A texture, not a renderbuffer: those have at best 5-6-5 bits in ES 2.0 without extensions.
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
@@ -45,7 +46,7 @@ void Target::release(GlState& gl) {
   glDeleteFramebuffers(1, &framebuffer_);
   glDeleteRenderbuffers(1, &depth_);
   glDeleteTextures(1, &texture_);
-  forget();
+  *this = Target();
 }
 
 }  // namespace modar

@@ -12,7 +12,6 @@ class Target {
   /// Makes the framebuffer anew at that size. Errors: kUnsupported "gl.framebuffer".
   Result<void> resize(int width, int height, const GlCaps& caps, GlState& gl);
   void release(GlState& gl);
-  void forget() { *this = Target(); }
 
   /// Draw calls go here from now on.
   void bind() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_); }

@@ -152,12 +152,6 @@ void TextureStore::release(GlState& gl) {
       glDeleteTextures(1, &name);
     }
   }
-  forget();
-}
-
-void TextureStore::forget() {
-  std::fill(colours_.begin(), colours_.end(), 0u);
-  std::fill(alphas_.begin(), alphas_.end(), 0u);
 }
 
 }  // namespace modar

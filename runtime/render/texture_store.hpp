@@ -20,7 +20,6 @@ class TextureStore {
   /// Errors: kUnsupported "gl.texture-size" where no level is small enough.
   Result<void> upload(std::uint64_t budget);
   void release(GlState& gl);
-  void forget();
 
   /// 0 where there is none.
   [[nodiscard]] GLuint colour(std::uint32_t texture) const { return colours_[texture]; }

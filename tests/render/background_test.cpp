@@ -1,4 +1,5 @@
 // The camera's picture lands pixel on pixel, in its aspect, under the models.
+#include <algorithm>
 #include <random>
 
 #include <glm/gtc/matrix_transform.hpp>
@@ -100,6 +101,106 @@ TEST_F(BackgroundTest, SizesMayChangeFromFrameToFrame) {
         draw(*renderer_, default_camera(side, side), {}, picture.image);
     const std::size_t last = static_cast<std::size_t>(side * side) - 1;
     EXPECT_EQ(pixels[last * 4], picture.bytes[last * 3]) << side;
+  }
+}
+
+/// A picture in luma and chroma: random luma, one chroma pair for every 2x2 pixels, all equal so
+/// that interpolation changes nothing.
+struct YuvPicture {
+  static constexpr int kWidth = 32;
+  static constexpr int kHeight = 24;
+  std::vector<std::uint8_t> luma;
+  std::vector<std::uint8_t> chroma;  ///< pairs, or U then V
+  CameraPicture picture;
+};
+
+YuvPicture yuv_picture(PictureFormat format, std::uint8_t u, std::uint8_t v) {
+  YuvPicture made;
+  std::mt19937 random(29);
+  const int width = YuvPicture::kWidth;
+  const int quarter = width / 2 * YuvPicture::kHeight / 2;
+  for (int i = 0; i < width * YuvPicture::kHeight; ++i) {
+    made.luma.push_back(static_cast<std::uint8_t>(60 + random() % 120));
+  }
+  for (int i = 0; i < 2 * quarter; ++i) {
+    const bool is_v = format == PictureFormat::kNv21   ? i % 2 == 0
+                      : format == PictureFormat::kNv12 ? i % 2 == 1
+                                                       : i >= quarter;
+    made.chroma.push_back(is_v ? v : u);
+  }
+  made.picture.format = format;
+  made.picture.width = width;
+  made.picture.height = YuvPicture::kHeight;
+  const bool planes = format == PictureFormat::kI420;
+  made.picture.planes = {made.luma.data(), made.chroma.data(),
+                         planes ? made.chroma.data() + quarter : nullptr};
+  made.picture.strides = {width, planes ? width / 2 : width, planes ? width / 2 : 0};
+  return made;
+}
+
+std::vector<std::uint8_t> show(Renderer& renderer, const CameraPicture& picture) {
+  EXPECT_TRUE(renderer.resize(picture.width, picture.height).has_value());
+  renderer.render(picture, glm::mat4(1.0f), {});
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(picture.width * picture.height) * 4);
+  renderer.read_pixels(pixels);
+  return pixels;
+}
+
+TEST_F(BackgroundTest, ChromaBecomesColourAsBt601Says) {
+  for (const PictureFormat format :
+       {PictureFormat::kNv21, PictureFormat::kNv12, PictureFormat::kI420}) {
+    for (const bool full : {true, false}) {
+      YuvPicture made = yuv_picture(format, 110, 150);
+      made.picture.full_range = full;
+      const std::vector<std::uint8_t> pixels = show(*renderer_, made.picture);
+      // ITU-R BT.601: R = Y + 1.402 (V - 128) and so on; limited range is stretched first.
+      const double y_scale = full ? 1.0 : 255.0 / 219.0;
+      const double c_scale = full ? 1.0 : 255.0 / 224.0;
+      const double u = (110 - 128) * c_scale;
+      const double v = (150 - 128) * c_scale;
+      int wrong = 0;
+      for (std::size_t i = 0; i < made.luma.size(); ++i) {
+        const double y = (made.luma[i] - (full ? 0.0 : 16.0)) * y_scale;
+        const double rgb[] = {y + 1.402 * v, y - 0.344136 * u - 0.714136 * v, y + 1.772 * u};
+        for (std::size_t c = 0; c < 3; ++c) {
+          wrong += std::abs(pixels[i * 4 + c] - std::clamp(rgb[c], 0.0, 255.0)) > 1.5;
+        }
+      }
+      EXPECT_EQ(wrong, 0) << "format " << static_cast<int>(format) << ", full range " << full;
+      EXPECT_EQ(renderer_->stats().bytes_uploaded, made.luma.size() * 3 / 2);
+    }
+  }
+}
+
+TEST_F(BackgroundTest, OnlyChangedRowsAreSent) {
+  YuvPicture made = yuv_picture(PictureFormat::kNv21, 90, 140);
+  const std::vector<std::uint8_t> before = show(*renderer_, made.picture);
+  // Rows 5 to 8 change; everything else in memory is spoilt, and must not be read.
+  for (std::uint8_t& luma : made.luma) luma = 255;
+  made.picture.first_row = 5;
+  made.picture.row_count = 4;
+  const std::vector<std::uint8_t> after = show(*renderer_, made.picture);
+  const int row = YuvPicture::kWidth * 4;
+  for (int y = 0; y < YuvPicture::kHeight; ++y) {
+    const auto at = static_cast<std::size_t>(y * row);
+    const bool same = std::equal(before.begin() + static_cast<std::ptrdiff_t>(at),
+                                 before.begin() + static_cast<std::ptrdiff_t>(at) + row,
+                                 after.begin() + static_cast<std::ptrdiff_t>(at));
+    EXPECT_EQ(same, y < 5 || y > 8) << "row " << y;
+  }
+  // Four rows of luma, and the three rows of pairs that they lie in.
+  EXPECT_EQ(renderer_->stats().bytes_uploaded, 4u * 32 + 3u * 32);
+  made.picture.row_count = 0;
+  EXPECT_TRUE(after == show(*renderer_, made.picture));
+  EXPECT_EQ(renderer_->stats().bytes_uploaded, 0u);
+}
+
+TEST_F(BackgroundTest, FormatsMayChangeFromFrameToFrame) {
+  const Picture rgb = random_picture(32, 24, 0);
+  const YuvPicture yuv = yuv_picture(PictureFormat::kI420, 128, 128);
+  for (int round = 0; round < 2; ++round) {
+    EXPECT_NEAR(show(*renderer_, yuv.picture)[0], yuv.luma[0], 1);
+    EXPECT_EQ(draw(*renderer_, default_camera(32, 24), {}, rgb.image)[4], rgb.bytes[3]);
   }
 }
 

@@ -82,5 +82,34 @@ TEST_F(DeviceTest, EveryProfileDrawsTheSamePicture) {
   }
 }
 
+TEST(ContextLoss, ANewContextShowsTheSameFromTheSameBytes) {
+  Result<std::unique_ptr<GlContext>> first = GlContext::create_offscreen();
+  if (!first) GTEST_SKIP() << "no OpenGL ES 2.0 context here";
+  SceneMaker maker;
+  Triangle triangle;
+  triangle.corners = {glm::dvec3(-1, -1, 0), {1, -1, 0}, {0, 1, 0}};
+  triangle.colour = {10, 250, 30};
+  maker.add_plain_model(Layout::kHalfColoured, {triangle});
+  const MappedBundle bundle(maker.content);
+  std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  const Camera camera = default_camera(64, 48);
+  const glm::mat4 near_by = glm::translate(glm::mat4(1.0f), glm::vec3(0.0f, 0.0f, -3.0f));
+  const std::vector<DrawItem> items = {{0, near_by}, {0, glm::translate(near_by, glm::vec3(0.5f))}};
+  const std::vector<std::uint8_t> before = draw(*renderer, camera, items);
+  first->reset();
+  const Result<std::unique_ptr<GlContext>> second = GlContext::create_offscreen();
+  ASSERT_TRUE(second.has_value());
+  // The new context may offer less.
+  GlCaps caps = probe_gl_caps();
+  caps.half_float_vertices = false;
+  ASSERT_TRUE(renderer->restore(caps).has_value());
+  renderer->render(RgbImage{}, gl_projection(camera, 0.1, 100.0), items);
+  std::vector<std::uint8_t> after(before.size());
+  renderer->read_pixels(after);
+  EXPECT_TRUE(before == after);
+  renderer.reset();
+}
+
 }  // namespace
 }  // namespace modar

@@ -289,6 +289,9 @@ TEST_F(TextureTest, DrawsSortedByTextureBindEachOnce) {
   const MappedBundle bundle(maker.content);
   const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
   ASSERT_TRUE(renderer);
+  RenderOptions options = flat_light();
+  options.exclusive_context = true;
+  renderer->set_options(options);
   const ExactView view = exact_view(32);
   draw(*renderer, view.camera, {&view.item, 1});
   draw(*renderer, view.camera, {&view.item, 1});

@@ -2,6 +2,8 @@
 // half: any program with a current context can draw models with matrices of its own.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -25,10 +27,33 @@ struct DrawItem {
   glm::mat4 to_eye{1.0f};
 };
 
+enum class PictureFormat : std::uint8_t {
+  kRgb,   ///< one plane, 3 bytes a pixel
+  kNv21,  ///< luma, and pairs of V and U for every 2x2 pixels: what Android's cameras give
+  kNv12,  ///< luma, and pairs of U and V
+  kI420,  ///< luma, U, V: what Y4M files have
+};
+
+/// A camera's frame, top row first; its planes stay the caller's. Sides are even where chroma is
+/// shared by 2x2 pixels.
+struct CameraPicture {
+  PictureFormat format = PictureFormat::kRgb;
+  int width = 0;  ///< pixels
+  int height = 0;
+  std::array<const std::uint8_t*, 3> planes{};
+  std::array<std::ptrdiff_t, 3> strides{};  ///< bytes from row to row of each plane
+  bool full_range =
+      true;  ///< luma spans 0-255, as cameras have it; false: 16-235, as videos have it
+  /// Rows that differ from the picture before, where that had the same size and format; the rest is
+  /// not sent again.
+  int first_row = 0;
+  int row_count = 1 << 30;
+};
+
 /// Counted over the last render() call.
 struct RenderStats {
   int draw_calls = 0;
-  int state_changes = 0;  ///< program, buffer, texture and attribute set-ups
+  int state_changes = 0;  ///< program, buffer, texture, attribute and switch set-ups
   int chunks_drawn = 0;
   int chunks_culled = 0;
   int chunks_skipped = 0;  ///< visible, but the GPU budget had no room left
@@ -41,6 +66,7 @@ struct RenderStats {
 struct GpuMemory {
   std::uint64_t geometry = 0;  ///< bytes
   std::uint64_t textures = 0;  ///< bytes
+  std::uint64_t batches = 0;   ///< bytes; copies of small meshes that share draw calls
   std::uint64_t uploaded = 0;  ///< bytes sent since create()
 };
 
@@ -50,6 +76,9 @@ struct RenderOptions {
   float light_strength = 0.7f;           ///< times a material's diffuse and specular colour
   float ambient_strength = 0.3f;         ///< times its ambient colour
   glm::vec4 clear_colour{0.0f, 0.0f, 0.0f, 1.0f};
+  /// Nobody else draws in the context between frames: what is set then stays set.
+  bool exclusive_context = false;
+  bool instancing = true;   ///< items of one mesh or material share draw calls
   float lod_pixels = 1.0f;  ///< a level of detail may be off by so much on the screen
 };
 
@@ -86,6 +115,14 @@ class Renderer {
   /// see gl_projection(). Allocates nothing after the first frame of a size.
   void render(const RgbImage& background, const glm::mat4& projection,
               std::span<const DrawItem> items);
+
+  void render(const CameraPicture& background, const glm::mat4& projection,
+              std::span<const DrawItem> items);
+
+  /// The context was lost, and another one is current: makes everything anew in it from the
+  /// bundle's bytes, at the same size and with the same options. Nothing of the lost context is
+  /// touched. Errors: as create() and resize().
+  Result<void> restore(const GlCaps& caps);
 
   /// Copies the picture, top row first, 4 bytes a pixel (RGBA). rgba.size() == width * height * 4.
   void read_pixels(std::span<std::uint8_t> rgba);
