@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <vector>
@@ -16,6 +15,8 @@
 #include <opencv2/videoio.hpp>
 
 #include "frame_source.hpp"
+#include "raw_source.hpp"
+#include "v4l2_source.hpp"
 
 namespace modar {
 namespace {
@@ -146,21 +147,16 @@ Result<std::unique_ptr<FrameSource>> open_folder(const std::string& folder) {
   return std::make_unique<PictureSource>(std::move(paths));
 }
 
+/// Ours first; a camera that sends compressed pictures only goes through OpenCV.
 Result<std::unique_ptr<FrameSource>> open_camera(const std::string& input) {
-  int number = 0;
-  if (input.size() > 7) {
-    const char* end = input.data() + input.size();
-    const auto [last, error] = std::from_chars(input.data() + 7, end, number);
-    if (error != std::errc() || last != end || number < 0) {
-      return fail(ExitCode::kUsage, "input.camera", input, "that is no camera",
-                  "say camera, or camera:1 for the second one");
-    }
-  }
-  cv::VideoCapture capture(number, cv::CAP_V4L2);
-  if (!capture.isOpened()) {
-    return fail(ExitCode::kIo, "input.open", input, "the camera cannot be opened",
-                "plug one in, or check the permissions of /dev/video" + std::to_string(number));
-  }
+  const Result<int> number = camera_number(input);
+  if (!number) return tl::unexpected(number.error());
+  auto device = open_video_device("/dev/video" + std::to_string(*number));
+  if (!device) return tl::unexpected(device.error());
+  auto source = start_camera(std::move(*device), input, {});
+  if (source || source.error().code != "camera.format") return source;
+  cv::VideoCapture capture(*number, cv::CAP_V4L2);
+  if (!capture.isOpened()) return source;
   capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
   return std::make_unique<VideoSource>(std::move(capture), input, true);
 }
@@ -181,6 +177,7 @@ Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input)
     // Errors of theirs come back as ours; the same words twice help nobody.
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
     setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+    if (is_raw_input(input)) return open_raw_source(input);
     if (input == "camera" || input.starts_with("camera:")) return open_camera(input);
     struct stat status {};
     if (stat(input.c_str(), &status) != 0) {

@@ -51,13 +51,15 @@ class ContactSheet {
   static constexpr std::size_t kCells = 24;
   static constexpr std::size_t kColumns = 4;
   static constexpr int kCellWidth = 320;
+  static constexpr int kLabel = 18;  ///< pixels above the picture for its number and state
 
   static cv::Mat cell(const RgbaImage& image, const FrameReport& report) {
     const cv::Mat whole(image.height, image.width, CV_8UC4,
                         const_cast<std::uint8_t*>(image.pixels.data()));
     const int height = std::max(1, image.height * kCellWidth / image.width);
-    cv::Mat small;
-    cv::resize(whole, small, cv::Size(kCellWidth, height), 0, 0, cv::INTER_AREA);
+    cv::Mat labelled(height + kLabel, kCellWidth, CV_8UC4);
+    cv::resize(whole, labelled(cv::Rect(0, kLabel, kCellWidth, height)),
+               cv::Size(kCellWidth, height), 0, 0, cv::INTER_AREA);
     cv::Scalar ink(207, 75, 69, 255);
     if (report.state == Shown::kShown) ink = cv::Scalar(47, 158, 95, 255);
     if (report.state == Shown::kHeld) ink = cv::Scalar(227, 162, 26, 255);
@@ -65,10 +67,10 @@ class ContactSheet {
     if (report.state != Shown::kShown) {
       text += std::string(": ") + (report.visible.empty() ? to_string(report.reason) : "seen once");
     }
-    cv::rectangle(small, cv::Rect(0, 0, kCellWidth, std::min(18, height)), ink, cv::FILLED);
-    cv::putText(small, text, cv::Point(5, 13), cv::FONT_HERSHEY_SIMPLEX, 0.42,
+    labelled(cv::Rect(0, 0, kCellWidth, kLabel)) = ink;
+    cv::putText(labelled, text, cv::Point(5, 13), cv::FONT_HERSHEY_SIMPLEX, 0.42,
                 cv::Scalar(255, 255, 255, 255), 1, cv::LINE_AA);
-    return small;
+    return labelled;
   }
 
   std::vector<cv::Mat> cells_;

@@ -13,6 +13,7 @@
 #include "faststart.hpp"
 #include "formats/atomic_file.hpp"
 #include "frame_sink.hpp"
+#include "picture_file.hpp"
 
 namespace modar {
 namespace {
@@ -135,6 +136,20 @@ Result<void> write_png(const std::string& path, const RgbaImage& image) {
     return opencv_failed(path, error.what());
   }
   return write_file(path, std::as_bytes(std::span(file)));
+}
+
+Result<void> write_frame_picture(const std::string& path, const RgbImage& image) {
+  std::vector<std::uint8_t> file;
+  try {
+    const cv::Mat rgb(image.height, image.width, CV_8UC3, const_cast<std::uint8_t*>(image.pixels),
+                      static_cast<std::size_t>(image.stride));
+    cv::Mat bgr;
+    cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+    if (!cv::imencode(".png", bgr, file)) return opencv_failed(path, "the picture is not encoded");
+  } catch (const std::exception& error) {
+    return opencv_failed(path, error.what());
+  }
+  return write_file(path + ".png", std::as_bytes(std::span(file)));
 }
 
 Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, double fps) {

@@ -11,12 +11,20 @@ struct State {
   VisionOptions options;
   Camera camera;
   std::unique_ptr<PaperTracker> tracker;
+  std::shared_ptr<const SpotPattern> spot;  ///< tracked in place of the bundle's patterns
 
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
+    if (options.spot != nullptr) {
+      if (auto made = options.spot->take()) {
+        tracker.reset();
+        spot = std::move(made);
+      }
+    }
     if (!tracker || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
-      auto created = PaperTracker::create(bundle, options.parameter_set, camera);
+      auto created =
+          PaperTracker::create(spot ? spot->view : bundle, options.parameter_set, camera);
       if (!created) return tl::unexpected(created.error());
       tracker = std::move(*created);
     }
@@ -26,6 +34,7 @@ struct State {
     job.track = std::move(*result);
     job.track_ms = ms_since(before);
     job.camera = camera;
+    job.spot = spot;
     return {};
   }
 };
@@ -33,7 +42,7 @@ struct State {
 }  // namespace
 
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
-  const auto state = std::make_shared<State>(State{bundle, options, {}, nullptr});
+  const auto state = std::make_shared<State>(State{bundle, options, {}, nullptr, nullptr});
   return TrackStep([state](Job& job) { return state->step(job); });
 }
 

@@ -1,6 +1,8 @@
 // A window through SDL2 with an OpenGL ES 2.0 context.
 #include <algorithm>
 
+#include <vector>
+
 #include <SDL.h>
 
 #include "window.hpp"
@@ -10,6 +12,8 @@ namespace modar {
 struct Window::State {
   SDL_Window* window = nullptr;
   SDL_GLContext context = nullptr;
+  std::vector<UserAct> acts;
+  glm::dvec2 picture{1.0};  ///< its size
 
   State() = default;
   State(const State&) = delete;
@@ -27,6 +31,59 @@ tl::unexpected<Error> no_window() {
   return fail(ExitCode::kUnsupported, "window.unsupported", "--window",
               std::string("no window can be opened: ") + SDL_GetError(),
               "start it on a desktop, or leave out --window and use --out");
+}
+
+bool act_of(SDL_Keycode key, Act& act) {
+  switch (key) {
+    case SDLK_ESCAPE:
+    case SDLK_q:
+      act = Act::kQuit;
+      return true;
+    case SDLK_m:
+    case SDLK_RIGHT:
+      act = Act::kNextModel;
+      return true;
+    case SDLK_LEFT:
+      act = Act::kPreviousModel;
+      return true;
+    case SDLK_p:
+      act = Act::kNextPattern;
+      return true;
+    case SDLK_PLUS:
+    case SDLK_EQUALS:
+    case SDLK_UP:
+      act = Act::kLarger;
+      return true;
+    case SDLK_MINUS:
+    case SDLK_DOWN:
+      act = Act::kSmaller;
+      return true;
+    case SDLK_d:
+      act = Act::kDisplay;
+      return true;
+    case SDLK_o:
+      act = Act::kOutline;
+      return true;
+    case SDLK_SPACE:
+      act = Act::kPause;
+      return true;
+    case SDLK_f:
+      act = Act::kFreeze;
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Window coordinates to pixels of the picture, which stands in the window's middle as large as it
+/// fits (Renderer::blit_to_window()).
+glm::dvec2 picture_point(SDL_Window* window, glm::dvec2 picture, int x, int y) {
+  int width = 1;
+  int height = 1;
+  SDL_GetWindowSize(window, &width, &height);
+  const double scale = std::min(width / picture.x, height / picture.y);
+  return {(x + 0.5 - width / 2.0) / scale + picture.x / 2.0 - 0.5,
+          (y + 0.5 - height / 2.0) / scale + picture.y / 2.0 - 0.5};
 }
 
 }  // namespace
@@ -54,6 +111,7 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title) {
 }
 
 void Window::fit(int width, int height) {
+  state_->picture = {width, height};
   SDL_Rect usable{0, 0, width, height};
   SDL_GetDisplayUsableBounds(std::max(0, SDL_GetWindowDisplayIndex(state_->window)), &usable);
   const double shrink = std::min(
@@ -62,15 +120,24 @@ void Window::fit(int width, int height) {
                     std::max(1, static_cast<int>(height * shrink)));
 }
 
-bool Window::poll() {
+std::span<const UserAct> Window::acts(std::chrono::milliseconds limit) {
+  state_->acts.clear();
   SDL_Event event;
-  while (SDL_PollEvent(&event) != 0) {
-    if (event.type == SDL_QUIT) return false;
-    if (event.type != SDL_KEYDOWN) continue;
-    const SDL_Keycode key = event.key.keysym.sym;
-    if (key == SDLK_ESCAPE || key == SDLK_q) return false;
+  int more = limit.count() > 0 ? SDL_WaitEventTimeout(&event, static_cast<int>(limit.count()))
+                               : SDL_PollEvent(&event);
+  for (; more != 0; more = SDL_PollEvent(&event)) {
+    UserAct act;
+    if (event.type == SDL_QUIT) {
+      state_->acts.push_back({Act::kQuit, {}});
+    } else if (event.type == SDL_KEYDOWN && act_of(event.key.keysym.sym, act.act)) {
+      state_->acts.push_back(act);
+    } else if (event.type == SDL_MOUSEBUTTONDOWN && event.button.button == SDL_BUTTON_LEFT) {
+      act.act = Act::kClick;
+      act.at = picture_point(state_->window, state_->picture, event.button.x, event.button.y);
+      state_->acts.push_back(act);
+    }
   }
-  return true;
+  return state_->acts;
 }
 
 int Window::width() const {

@@ -1,13 +1,15 @@
 // The build of the device: what needs OpenCV or SDL2 answers that it is not there; pictures leave
 // as PPM.
-#include <sys/stat.h>
-
 #include <cstdio>
 
 #include "camera_file.hpp"
+#include "display.hpp"
 #include "formats/atomic_file.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
+#include "picture_file.hpp"
+#include "raw_source.hpp"
+#include "v4l2_source.hpp"
 #include "vision.hpp"
 #include "window.hpp"
 
@@ -20,36 +22,49 @@ tl::unexpected<Error> left_out(const char* code, const std::string& where, const
               "use the player of the preset release");
 }
 
+/// bytes_in: 3 for R, G, B, 4 where alpha follows and is left out.
+Result<void> write_ppm(const std::string& path, std::span<const std::uint8_t> pixels, int width,
+                       int height, std::size_t bytes_in) {
+  char head[64];
+  const int length = std::snprintf(head, sizeof head, "P6\n%d %d\n255\n", width, height);
+  std::string bytes(head, static_cast<std::size_t>(length));
+  bytes.reserve(bytes.size() + pixels.size());
+  for (std::size_t i = 0; i + bytes_in <= pixels.size(); i += bytes_in) {
+    for (std::size_t c = 0; c < 3; ++c) bytes.push_back(static_cast<char>(pixels[i + c]));
+  }
+  return write_file(path, std::string_view(bytes));
+}
+
 /// frame_000000.ppm and so on.
 class PpmFolder final : public FrameSink {
  public:
   explicit PpmFolder(std::string folder) : folder_(std::move(folder)) {}
 
   Result<void> picture(const RgbaImage& image, const FrameReport& report) override {
-    char head[64];
-    const int length =
-        std::snprintf(head, sizeof head, "P6\n%d %d\n255\n", image.width, image.height);
-    bytes_.assign(head, static_cast<std::size_t>(length));
-    for (std::size_t i = 0; i + 3 < image.pixels.size(); i += 4) {
-      for (std::size_t c = 0; c < 3; ++c) bytes_.push_back(static_cast<char>(image.pixels[i + c]));
-    }
     char name[40];
     std::snprintf(name, sizeof name, "/frame_%06llu.ppm",
                   static_cast<unsigned long long>(report.frame));
-    return write_file(folder_ + name, std::string_view(bytes_));
+    return write_ppm(folder_ + name, image.pixels, image.width, image.height, 4);
   }
 
   Result<void> finish(std::string_view /*summary*/) override { return {}; }
 
  private:
   std::string folder_;
-  std::string bytes_;
 };
 
 }  // namespace
 
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
-  return left_out("input.unsupported", input, "videos, pictures and cameras");
+  if (is_raw_input(input)) return open_raw_source(input);
+  if (input == "camera" || input.starts_with("camera:")) {
+    const Result<int> number = camera_number(input);
+    if (!number) return tl::unexpected(number.error());
+    auto device = open_video_device("/dev/video" + std::to_string(*number));
+    if (!device) return tl::unexpected(device.error());
+    return start_camera(std::move(*device), input, {});
+  }
+  return left_out("input.unsupported", input, "videos and pictures");
 }
 
 Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, double /*fps*/) {
@@ -62,6 +77,21 @@ Result<std::unique_ptr<FrameSink>> open_report(const std::string& folder, double
                                                const ReportTitle& /*title*/,
                                                std::span<const std::string> /*pattern_names*/) {
   return left_out("out.unsupported", folder, "reports");
+}
+
+Result<void> write_frame_picture(const std::string& path, const RgbImage& image) {
+  const auto size = static_cast<std::size_t>(image.stride * image.height);
+  return write_ppm(path + ".ppm", {image.pixels, size}, image.width, image.height, 3);
+}
+
+Result<void> draw_text_bar(const Canvas& /*canvas*/, const std::string& /*text*/) {
+  return left_out("display.unsupported", "--osd", "the on-screen display");
+}
+
+Result<std::shared_ptr<const SpotPattern>> make_spot_pattern(
+    const RgbImage& /*frame*/, const std::array<glm::dvec2, 4>& /*clicked*/,
+    const ParameterSetRecord& /*parameters*/) {
+  return left_out("spot.unsupported", "", "patterns made on the spot");
 }
 
 Result<Camera> read_camera_file(const std::string& path) {
@@ -79,8 +109,8 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& /*title*/) {
   return left_out("window.unsupported", "--window", "the window");
 }
 void Window::fit(int /*width*/, int /*height*/) {}
-bool Window::poll() {
-  return false;
+std::span<const UserAct> Window::acts(std::chrono::milliseconds /*limit*/) {
+  return {};
 }
 int Window::width() const {
   return 0;

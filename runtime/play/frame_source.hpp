@@ -49,8 +49,9 @@ class FrameSource {
   virtual void stop() = 0;
 };
 
-/// input: a path, or "camera" or "camera:N". Errors: kIo "input.open", kInvalidInput "input.*",
-/// kUnsupported "input.unsupported" in a build that cannot read it.
+/// input: a path, "camera" or "camera:N", or raw frames (see raw_source.hpp). Errors: kIo
+/// "input.open", kInvalidInput "input.*", kUnsupported "input.unsupported" in a build that cannot
+/// read it.
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input);
 
 }  // namespace modar

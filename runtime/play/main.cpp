@@ -18,7 +18,7 @@ Result<void> print_line(const std::string& line) {
 
 namespace {
 
-Result<void> run(const PlayOptions& options) {
+Result<int> run(const PlayOptions& options) {
   Result<MappedFile> file = MappedFile::open(options.bundle);
   if (!file) return tl::unexpected(file.error());
   Result<BundleView> bundle = BundleView::open(file->bytes());
@@ -27,7 +27,10 @@ Result<void> run(const PlayOptions& options) {
     error.where = options.bundle + (error.where.empty() ? "" : ":" + error.where);
     return tl::unexpected(error);
   }
-  return options.turntable > 0 ? play_turntable(options, *bundle) : play_video(options, *bundle);
+  if (options.turntable == 0) return play_video(options, *bundle);
+  const Result<void> turned = play_turntable(options, *bundle);
+  if (!turned) return tl::unexpected(turned.error());
+  return 0;
 }
 
 int report(const Error& error) {
@@ -45,8 +48,8 @@ int start(int argc, char** argv) {
     const Result<void> printed = print_line(text.substr(0, text.size() - 1));
     return printed ? 0 : report(printed.error());
   }
-  const Result<void> done = run(*options);
-  return done ? 0 : report(done.error());
+  const Result<int> done = run(*options);
+  return done ? *done : report(done.error());
 }
 
 }  // namespace

@@ -5,131 +5,126 @@
 
 #include <array>
 #include <charconv>
-#include <string_view>
 #include <vector>
+
+#include "decimal.hpp"
 
 namespace modar {
 namespace {
-
-enum Option : int {
-  kInput = 256,
-  kOut,
-  kReport,
-  kCamera,
-  kMethod,
-  kParameters,
-  kDevice,
-  kTurntable,
-  kSize,
-  kJson,
-  kWindow,
-  kRealtime,
-  kOutline,
-  kQuiet,
-  kHelp,
-  kVersion,
-};
-
-constexpr std::array<option, 17> kOptions = {{
-    {"input", required_argument, nullptr, kInput},
-    {"out", required_argument, nullptr, kOut},
-    {"report", required_argument, nullptr, kReport},
-    {"camera", required_argument, nullptr, kCamera},
-    {"method", required_argument, nullptr, kMethod},
-    {"parameters", required_argument, nullptr, kParameters},
-    {"device", required_argument, nullptr, kDevice},
-    {"turntable", required_argument, nullptr, kTurntable},
-    {"size", required_argument, nullptr, kSize},
-    {"json", no_argument, nullptr, kJson},
-    {"window", no_argument, nullptr, kWindow},
-    {"realtime", no_argument, nullptr, kRealtime},
-    {"outline", no_argument, nullptr, kOutline},
-    {"quiet", no_argument, nullptr, kQuiet},
-    {"help", no_argument, nullptr, kHelp},
-    {"version", no_argument, nullptr, kVersion},
-    {nullptr, 0, nullptr, 0},
-}};
 
 tl::unexpected<Error> usage(const char* code, std::string where, std::string cause) {
   return fail(ExitCode::kUsage, code, std::move(where), std::move(cause), "see modar-play --help");
 }
 
+/// The whole text as a number; false where it is none.
+template <class T>
+bool read_number(std::string_view text, T& value) {
+  const char* end = text.data() + text.size();
+  const auto [last, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && last == end;
+}
+
 /// A whole number from 1 to `limit`, 0 where the text is none.
 int positive(std::string_view text, int limit) {
   int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole = error == std::errc() && end == text.data() + text.size();
-  return whole && value >= 1 && value <= limit ? value : 0;
+  return read_number(text, value) && value >= 1 && value <= limit ? value : 0;
 }
 
-Result<void> set_size(PlayOptions& options, std::string_view text) {
+bool set_size(PlayOptions& options, std::string_view text) {
   constexpr int kMaxSide = 8192;
   const std::size_t x = text.find('x');
-  if (x != std::string_view::npos) {
-    options.width = positive(text.substr(0, x), kMaxSide);
-    options.height = positive(text.substr(x + 1), kMaxSide);
-    if (options.width > 0 && options.height > 0) return {};
-  }
-  return usage("usage.value", "--size", "'" + std::string(text) + "' is no size like 640x480");
+  if (x == std::string_view::npos) return false;
+  options.width = positive(text.substr(0, x), kMaxSide);
+  options.height = positive(text.substr(x + 1), kMaxSide);
+  return options.width > 0 && options.height > 0;
 }
 
-Result<void> set_turntable(PlayOptions& options, std::string_view text) {
+bool set_turntable(PlayOptions& options, std::string_view text) {
   options.turntable = positive(text, 100'000);
-  if (options.turntable > 0) return {};
-  return usage("usage.value", "--turntable",
-               "'" + std::string(text) + "' is no number of frames (1 to 100000)");
+  return options.turntable > 0;
 }
 
-Result<void> apply(PlayOptions& options, int option, const char* value) {
-  switch (option) {
-    case kInput:
-      options.input = value;
-      break;
-    case kOut:
-      options.out = value;
-      break;
-    case kReport:
-      options.report = value;
-      break;
-    case kCamera:
-      options.camera_file = value;
-      break;
-    case kMethod:
-      options.method = value;
-      break;
-    case kParameters:
-      options.parameters = value;
-      break;
-    case kDevice:
-      options.device = value;
-      break;
-    case kTurntable:
-      return set_turntable(options, value);
-    case kSize:
-      return set_size(options, value);
-    case kJson:
-      options.json = true;
-      break;
-    case kWindow:
-      options.window = true;
-      break;
-    case kRealtime:
-      options.realtime = true;
-      break;
-    case kOutline:
-      options.outline = true;
-      break;
-    case kQuiet:
-      options.quiet = true;
-      break;
-    case kHelp:
-      options.help = true;
-      break;
-    case kVersion:
-      options.version = true;
-      break;
-    default:
-      break;
+bool set_tolerance(PlayOptions& options, std::string_view text) {
+  return parse_decimal(text, options.tolerance);
+}
+
+bool set_gpu_budget(PlayOptions& options, std::string_view text) {
+  options.gpu_budget = parse_bytes(text);
+  return options.gpu_budget > 0;
+}
+
+struct TextOption {
+  const char* name;
+  std::string PlayOptions::*text;
+};
+constexpr std::array<TextOption, 10> kTexts = {{{"input", &PlayOptions::input},
+                                                {"out", &PlayOptions::out},
+                                                {"report", &PlayOptions::report},
+                                                {"record", &PlayOptions::record},
+                                                {"golden", &PlayOptions::golden},
+                                                {"qos", &PlayOptions::qos},
+                                                {"camera", &PlayOptions::camera_file},
+                                                {"method", &PlayOptions::method},
+                                                {"parameters", &PlayOptions::parameters},
+                                                {"device", &PlayOptions::device}}};
+
+struct ValueOption {
+  const char* name;
+  bool (*set)(PlayOptions&, std::string_view);
+  const char* expected;
+};
+constexpr std::array<ValueOption, 4> kValues = {{
+    {"turntable", set_turntable, "a number of frames (1 to 100000)"},
+    {"size", set_size, "a size like 640x480"},
+    {"tolerance", set_tolerance, "a number of pixels like 0.5"},
+    {"gpu-budget", set_gpu_budget, "an amount of memory like 64M"},
+}};
+
+struct SwitchOption {
+  const char* name;
+  bool PlayOptions::*on;
+};
+constexpr std::array<SwitchOption, 8> kSwitches = {{{"json", &PlayOptions::json},
+                                                    {"window", &PlayOptions::window},
+                                                    {"realtime", &PlayOptions::realtime},
+                                                    {"outline", &PlayOptions::outline},
+                                                    {"osd", &PlayOptions::osd},
+                                                    {"quiet", &PlayOptions::quiet},
+                                                    {"help", &PlayOptions::help},
+                                                    {"version", &PlayOptions::version}}};
+
+/// getopt's numbers: above any letter, in the order of the three tables.
+constexpr int kFirst = 256;
+constexpr int kFirstValue = kFirst + static_cast<int>(kTexts.size());
+constexpr int kFirstSwitch = kFirstValue + static_cast<int>(kValues.size());
+
+std::vector<option> getopt_table() {
+  std::vector<option> table;
+  int number = kFirst;
+  for (const TextOption& each : kTexts) {
+    table.push_back({each.name, required_argument, nullptr, number++});
+  }
+  for (const ValueOption& each : kValues) {
+    table.push_back({each.name, required_argument, nullptr, number++});
+  }
+  for (const SwitchOption& each : kSwitches) {
+    table.push_back({each.name, no_argument, nullptr, number++});
+  }
+  table.push_back({nullptr, 0, nullptr, 0});
+  return table;
+}
+
+Result<void> apply(PlayOptions& options, int number, const char* value) {
+  if (number >= kFirstSwitch) {
+    options.*kSwitches[static_cast<std::size_t>(number - kFirstSwitch)].on = true;
+  } else if (number < kFirstValue) {
+    options.*kTexts[static_cast<std::size_t>(number - kFirst)].text = value;
+  } else {
+    const ValueOption& each = kValues[static_cast<std::size_t>(number - kFirstValue)];
+    if (!each.set(options, value)) {
+      return usage("usage.value", std::string("--") + each.name,
+                   "'" + std::string(value) + "' is not " + each.expected);
+    }
   }
   return {};
 }
@@ -137,14 +132,19 @@ Result<void> apply(PlayOptions& options, int option, const char* value) {
 Result<void> validate(const PlayOptions& options) {
   if (options.help || options.version) return {};
   if (options.bundle.empty()) return usage("usage.bundle", "", "no bundle is named");
-  if (options.input.empty() && options.turntable == 0) {
-    return usage("usage.input", "", "neither --input nor --turntable is given");
+  if (options.input.empty() && options.golden.empty() && options.turntable == 0) {
+    return usage("usage.input", "", "none of --input, --golden and --turntable is given");
   }
-  if (!options.input.empty() && options.turntable > 0) {
-    return usage("usage.conflict", "", "--input and --turntable exclude each other");
+  const int things = (options.input.empty() ? 0 : 1) + (options.golden.empty() ? 0 : 1) +
+                     (options.turntable > 0 ? 1 : 0);
+  if (things > 1) {
+    return usage("usage.conflict", "", "--input, --golden and --turntable exclude each other");
   }
   if (options.turntable > 0 && options.out.empty()) {
     return usage("usage.out", "--turntable", "--out is missing, the pictures have no place to go");
+  }
+  if (!options.golden.empty() && (options.realtime || !options.record.empty())) {
+    return usage("usage.conflict", "--golden", "it replays every frame, and records none");
   }
   if (options.method != "paper") {
     return usage("usage.method", "--method",
@@ -153,7 +153,30 @@ Result<void> validate(const PlayOptions& options) {
   return {};
 }
 
+/// What getopt refused: optopt is the letter of a short option, else our number or 0; optind points
+/// behind a long one.
+tl::unexpected<Error> refused(int answer, const std::vector<char*>& argv) {
+  const bool letter = optopt > 0 && optopt < kFirst;
+  const std::string current = letter ? std::string("-") + static_cast<char>(optopt)
+                                     : argv[static_cast<std::size_t>(optind - 1)];
+  if (answer == ':') return usage("usage.value", current, "the option needs a value");
+  if (optopt >= kFirst) return usage("usage.value", current, "the option takes no value");
+  return usage("usage.option", "", "'" + current + "' is no option");
+}
+
 }  // namespace
+
+std::uint64_t parse_bytes(std::string_view text) {
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 40;
+  unsigned shift = 0;
+  if (text.ends_with('K')) shift = 10;
+  if (text.ends_with('M')) shift = 20;
+  if (text.ends_with('G')) shift = 30;
+  if (shift > 0) text.remove_suffix(1);
+  std::uint64_t value = 0;
+  if (!read_number(text, value) || value > (kMost >> shift)) return 0;
+  return value << shift;
+}
 
 Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
   // getopt_long permutes the array that it is given, not the texts: a copy of the pointers serves.
@@ -162,24 +185,16 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
   for (const char* argument : arguments) argv.push_back(const_cast<char*>(argument));
   argv.push_back(nullptr);
   const int argc = static_cast<int>(argv.size()) - 1;
+  const std::vector<option> table = getopt_table();
 
   PlayOptions options;
   opterr = 0;
   optind = 0;  // starts a new scan (GNU)
   for (;;) {
-    const int option = getopt_long(argc, argv.data(), ":", kOptions.data(), nullptr);
-    if (option == -1) break;
-    if (option == '?' || option == ':') {
-      // optopt: the letter of a short option, else our number or 0; optind points behind a long
-      // one.
-      const bool letter = optopt > 0 && optopt < kInput;
-      const std::string current = letter ? std::string("-") + static_cast<char>(optopt)
-                                         : argv[static_cast<std::size_t>(optind - 1)];
-      if (option == ':') return usage("usage.value", current, "the option needs a value");
-      if (optopt >= kInput) return usage("usage.value", current, "the option takes no value");
-      return usage("usage.option", "", "'" + current + "' is no option");
-    }
-    if (auto applied = apply(options, option, optarg); !applied) {
+    const int number = getopt_long(argc, argv.data(), ":", table.data(), nullptr);
+    if (number == -1) break;
+    if (number == '?' || number == ':') return refused(number, argv);
+    if (auto applied = apply(options, number, optarg); !applied) {
       return tl::unexpected(applied.error());
     }
   }
@@ -197,14 +212,19 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
 const char* help_text() {
   return R"(modar-play: plays a bundle over a video, pictures or a camera
 
-Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N] [options]
+Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
        modar-play BUNDLE --turntable N --out FOLDER|FILE.mp4
 
-  --input INPUT       frames: a video, a picture, a folder of pictures (by name), a camera
+  --input INPUT       frames: a video, a picture, a folder of pictures (by name), a camera,
+                      - or FILE.y4m (Y4M from a pipe or file), nv21:640x480@30:FILE (raw frames,
+                      - for a pipe; i420, nv12, yuyv, grey alike)
   --out OUT           pictures into FILE.mp4, or as frame_000000.png ... into a folder
   --report FOLDER     overlay.mp4, contact_sheet.png, frames.jsonl and an index.html of them
-  --window            shows the pictures in a window (Escape or Q ends)
+  --window            shows the pictures in a window; its keys: Q or Escape ends, space pauses,
+                      M or arrows change the model, P the pattern, + and - its size, O the outline,
+                      D the display
   --outline           draws the outline of each pattern that is seen
+  --osd               paints state, reason and inliers on the pictures
   --json              one JSON line a frame and a summary, to standard output
   --camera FILE.yml   camera matrix and distortion as OpenCV writes them
                       (default: focal length = width of the frame)
@@ -212,6 +232,11 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N] [options]
   --parameters SET    orb-2000 (default), orb-500, brisk-3 or brisk-2, as baked
   --device NAME       acts as this device: masks what its OpenGL ES lacks
   --realtime          plays a file at its own speed and drops frames that come too early
+  --gpu-budget SIZE   keeps at most so much in GL, nearest and visible first (64M, 1G)
+  --record FOLDER     keeps frames and poses
+  --golden FOLDER     replays a recording and compares: exit code 10 where it differs
+  --tolerance PX      of --golden: greatest mean distance of four corners (default 0.5)
+  --qos FILE          a log for field trials: times, found and lost, reasons, memory by kind
   --turntable N       N pictures of each model turning, without any pattern
   --size WxH          of the turntable's pictures (default 640x480)
   --quiet             no progress, no summary
@@ -220,7 +245,8 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N] [options]
 Example: modar-play spider.modar --input box.mp4 --outline --report out/demo
 
 Exit codes: 0 done (whether or not a pattern was seen), 1 usage, 2 a file cannot be read or
-written, 3 bad input, 4 internal error, 5 beyond this build or device.
+written, 3 bad input, 4 internal error, 5 beyond this build or device, 10 --golden found a
+difference.
 )";
 }
 

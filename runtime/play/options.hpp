@@ -1,29 +1,40 @@
 // The command line of modar-play.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "formats/error.hpp"
 
 namespace modar {
+
+/// Beyond ExitCode: --golden ran and found another result than the recording's.
+inline constexpr int kExitDifferent = 10;
 
 struct PlayOptions {
   std::string bundle;
   std::string input;   ///< path, "camera" or "camera:N"
   std::string out;     ///< folder or FILE.mp4; empty: no pictures
   std::string report;  ///< folder; empty: none
+  std::string record;  ///< folder; empty: none
+  std::string golden;  ///< folder of a recording to replay; empty: none
+  std::string qos;     ///< file; empty: none
   std::string camera_file;
   std::string method = "paper";
-  std::string parameters;  ///< empty: orb-2000 where the bundle has it, else its first
-  std::string device;      ///< empty: the context as it is
-  int turntable = 0;       ///< frames of a turn; 0: no turntable
-  int width = 640;         ///< of turntable pictures
+  std::string parameters;        ///< empty: orb-2000 where the bundle has it, else its first
+  std::string device;            ///< empty: the context as it is
+  double tolerance = 0.5;        ///< pixels; of --golden
+  std::uint64_t gpu_budget = 0;  ///< bytes; 0: the device's
+  int turntable = 0;             ///< frames of a turn; 0: no turntable
+  int width = 640;               ///< of turntable pictures
   int height = 480;
   bool json = false;
   bool window = false;
   bool realtime = false;
   bool outline = false;
+  bool osd = false;
   bool quiet = false;
   bool help = false;
   bool version = false;
@@ -31,6 +42,9 @@ struct PlayOptions {
 
 /// arguments: argv without the program's name. Errors: kUsage "usage.*" (the cure names --help).
 Result<PlayOptions> parse_options(std::span<const char* const> arguments);
+
+/// "64M", "1G", "512K" or plain bytes; 0 where it is none of these.
+std::uint64_t parse_bytes(std::string_view text);
 
 /// What --help prints.
 const char* help_text();

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 
 #include "formats/error.hpp"
 #include "frame_source.hpp"
@@ -14,12 +15,15 @@
 
 namespace modar {
 
+struct SpotPattern;
+
 /// What travels from thread to thread.
 struct Job {
   Frame frame;
   Camera camera;  ///< of this frame's size
   TrackResult track;
   double track_ms = 0;
+  std::shared_ptr<const SpotPattern> spot;  ///< what `track` is about; null: the bundle's patterns
 };
 
 /// Runs on the vision thread: fills camera, track and track_ms.

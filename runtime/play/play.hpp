@@ -7,8 +7,8 @@
 
 namespace modar {
 
-/// Plays the bundle's scenes over the frames of --input.
-Result<void> play_video(const PlayOptions& options, const BundleView& bundle);
+/// Plays the bundle's scenes over the frames of --input or --golden; answers the exit code.
+Result<int> play_video(const PlayOptions& options, const BundleView& bundle);
 
 /// Draws options.turntable pictures of each model turning, and writes them to --out.
 Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle);

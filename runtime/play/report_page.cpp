@@ -1,8 +1,6 @@
 // Composes the report's page. Everything is in the markup; the script only ties it to the movie.
 #include "report_page.hpp"
 
-#include <array>
-#include <charconv>
 #include <cmath>
 
 #include "report_style.hpp"
@@ -33,12 +31,15 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-/// A number with that many decimals; to_chars knows no locale.
+/// A number with that many decimals, 1 to 6, and a point in any locale.
 std::string fixed(double value, int decimals) {
-  std::array<char, 64> text{};
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value,
-                                          std::chars_format::fixed, decimals);
-  return error == std::errc() ? std::string(text.data(), end) : "-";
+  if (!(std::abs(value) < 1e9)) return "-";
+  const double scale = std::pow(10.0, decimals);
+  std::string digits = std::to_string(std::llround(std::abs(value) * scale));
+  const auto least = static_cast<std::size_t>(decimals) + 1;
+  if (digits.size() < least) digits.insert(0, least - digits.size(), '0');
+  digits.insert(digits.size() - static_cast<std::size_t>(decimals), 1, '.');
+  return value < 0 ? "-" + digits : digits;
 }
 
 std::string what(const PageFrame& frame) {

@@ -20,17 +20,18 @@ double RunStats::recognised_percent() const {
   return 100.0 * static_cast<double>(visible_) / static_cast<double>(times_.size());
 }
 
-StageTimes RunStats::median_ms() const {
-  StageTimes medians{};
-  if (times_.empty()) return medians;
+StageTimes RunStats::quantile_ms(double share) const {
+  StageTimes result{};
+  if (times_.empty()) return result;
   std::vector<float> column(times_.size());
-  for (std::size_t stage = 0; stage < medians.size(); ++stage) {
+  const double last = static_cast<double>(column.size() - 1);
+  const auto place = static_cast<std::ptrdiff_t>(share * last);
+  for (std::size_t stage = 0; stage < result.size(); ++stage) {
     for (std::size_t i = 0; i < times_.size(); ++i) column[i] = times_[i][stage];
-    const auto middle = column.begin() + static_cast<std::ptrdiff_t>((column.size() - 1) / 2);
-    std::nth_element(column.begin(), middle, column.end());
-    medians[stage] = static_cast<double>(*middle);
+    std::nth_element(column.begin(), column.begin() + place, column.end());
+    result[stage] = static_cast<double>(column[static_cast<std::size_t>(place)]);
   }
-  return medians;
+  return result;
 }
 
 }  // namespace modar

@@ -34,7 +34,10 @@ class RunStats {
   }
   [[nodiscard]] double recognised_percent() const;
   /// Lower median of each stage; 0 without frames.
-  [[nodiscard]] StageTimes median_ms() const;
+  [[nodiscard]] StageTimes median_ms() const { return quantile_ms(0.5); }
+  /// The value that so large a share of the frames does not exceed, rounded down to a frame's own.
+  /// share: 0 to 1.
+  [[nodiscard]] StageTimes quantile_ms(double share) const;
 
  private:
   std::vector<std::array<float, kStageNames.size()>> times_;

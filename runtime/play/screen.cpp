@@ -14,12 +14,14 @@ Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const Pla
     if (!context) return tl::unexpected(context.error());
     screen->context_ = std::move(*context);
   }
-  GlCaps caps = probe_gl_caps();
+  GlCaps& caps = screen->caps_;
+  caps = probe_gl_caps();
   if (!options.device.empty()) {
     Result<GlCaps> masked = mask_gl_caps(caps, options.device);
     if (!masked) return tl::unexpected(masked.error());
     caps = *masked;
   }
+  if (options.gpu_budget > 0) caps.gpu_memory = options.gpu_budget;
   auto renderer = Renderer::create(bundle, caps);
   if (!renderer) return tl::unexpected(renderer.error());
   screen->renderer_ = std::move(*renderer);
@@ -44,10 +46,7 @@ void Screen::draw(const RgbImage& background, const Camera& camera,
     projection = gl_projection(camera, range.near_plane, range.far_plane);
   }
   renderer_->render(background, projection, items);
-  if (window_) {
-    renderer_->blit_to_window(window_->width(), window_->height());
-    window_->swap();
-  }
+  stats_ = renderer_->stats();
 }
 
 RgbaImage Screen::picture() {
@@ -57,6 +56,28 @@ RgbaImage Screen::picture() {
 
 Canvas Screen::canvas() {
   return {rgba_, width_, height_};
+}
+
+void Screen::present() {
+  if (!window_) return;
+  renderer_->blit_to_window(window_->width(), window_->height());
+  window_->swap();
+}
+
+void Screen::present_canvas() {
+  if (!window_) return;
+  rgb_.resize(rgba_.size() / 4 * 3);
+  for (std::size_t i = 0; i < rgb_.size() / 3; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) rgb_[3 * i + c] = rgba_[4 * i + c];
+  }
+  renderer_->render({rgb_.data(), width_, height_, std::ptrdiff_t{3} * width_}, glm::mat4(1.0f),
+                    {});
+  present();
+}
+
+std::span<const UserAct> Screen::acts(std::chrono::milliseconds limit) {
+  if (!window_) return {};
+  return window_->acts(limit);
 }
 
 }  // namespace modar

@@ -1,8 +1,8 @@
 // The render thread's half: a context (window or off-screen), the renderer in it, and the picture.
 #pragma once
 
+#include <chrono>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,24 +27,34 @@ class Screen {
 
   /// Sets the picture's size; nothing happens where it stands already.
   Result<void> resize(int width, int height);
-  /// Draws the background and the items as the camera sees them, and shows them in the window.
+  /// Draws the background and the items as the camera sees them.
   void draw(const RgbImage& background, const Camera& camera, std::span<const DrawItem> items);
   /// Reads the picture back. The canvas of the same pixels may be painted on.
   RgbaImage picture();
   Canvas canvas();
 
-  [[nodiscard]] const RenderStats& stats() const { return renderer_->stats(); }
-  /// Answers false once the user ended the window.
-  bool poll() { return !window_ || window_->poll(); }
+  /// Shows what was drawn, or the canvas as it was painted on, in the window. Nothing without one.
+  void present();
+  void present_canvas();
+  [[nodiscard]] bool has_window() const { return window_ != nullptr; }
+  /// Nothing without a window.
+  std::span<const UserAct> acts(std::chrono::milliseconds limit);
+
+  [[nodiscard]] const RenderStats& stats() const { return stats_; }  ///< of the last draw()
+  [[nodiscard]] GpuMemory gpu_memory() const { return renderer_->gpu_memory(); }
+  [[nodiscard]] const GlCaps& caps() const { return caps_; }
 
  private:
-  Screen(const BundleView& bundle) : bundle_(bundle) {}
+  explicit Screen(const BundleView& bundle) : bundle_(bundle) {}
 
   const BundleView& bundle_;
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<Window> window_;
-  std::unique_ptr<Renderer> renderer_;  ///< before its context goes
+  std::unique_ptr<Renderer> renderer_;  ///< goes before its context
+  GlCaps caps_;
+  RenderStats stats_;
   std::vector<std::uint8_t> rgba_;
+  std::vector<std::uint8_t> rgb_;  ///< of the canvas, on its way to the window
   int width_ = 0;
   int height_ = 0;
 };

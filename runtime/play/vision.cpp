@@ -22,6 +22,15 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
               "the bundle has no parameter set '" + name + "'", "it has: " + known);
 }
 
+const ParameterSetRecord& parameter_set(const BundleView& bundle, std::uint32_t id) {
+  const Table<ParameterSetRecord> sets = bundle.parameter_sets();
+  std::uint32_t found = 0;
+  for (std::uint32_t i = 0; i < sets.size(); ++i) {
+    if (sets[i].id == id) found = i;
+  }
+  return sets[found];
+}
+
 Camera camera_for(const std::optional<Camera>& calibrated, int width, int height) {
   if (!calibrated) return default_camera(width, height);
   if (calibrated->width > 0) return scaled_camera(*calibrated, width, height);

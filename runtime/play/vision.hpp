@@ -7,18 +7,23 @@
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
 #include "pipeline.hpp"
+#include "spot_pattern.hpp"
 
 namespace modar {
 
 struct VisionOptions {
   std::uint32_t parameter_set = 0;  ///< id, see choose_parameter_set()
   std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
+  SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
 };
 
 /// The id of the bundle's parameter set of that name; of an empty name: "orb-2000" where it is
 /// there, else the first. Errors: kUsage "parameters.unknown" (lists what the bundle has),
 /// kInvalidInput "tracker.no-patterns" where it has none at all.
 Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& name);
+
+/// The record of a set that is there.
+const ParameterSetRecord& parameter_set(const BundleView& bundle, std::uint32_t id);
 
 /// The camera for frames of that size.
 Camera camera_for(const std::optional<Camera>& calibrated, int width, int height);

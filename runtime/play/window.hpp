@@ -1,9 +1,12 @@
-// A window with an OpenGL ES 2.0 context.
+// A window with an OpenGL ES 2.0 context, and what the user does in it.
 #pragma once
 
+#include <chrono>
 #include <memory>
+#include <span>
 #include <string>
 
+#include "controls.hpp"
 #include "formats/error.hpp"
 
 namespace modar {
@@ -17,10 +20,11 @@ class Window {
   Window& operator=(const Window&) = delete;
   ~Window();
 
-  /// Gives the window the shape of a picture, no larger than the display.
+  /// Gives the window the shape of a picture, no larger than the display. Clicks are told in that
+  /// picture's pixels from now on.
   void fit(int width, int height);
-  /// Takes what the user did. Answers false once Escape, Q or the window's button ended it.
-  bool poll();
+  /// What the user did since the last call, waiting for at most `limit`. Valid until the next call.
+  std::span<const UserAct> acts(std::chrono::milliseconds limit);
   [[nodiscard]] int width() const;  ///< of the framebuffer, pixels
   [[nodiscard]] int height() const;
   /// Brings what was drawn to the display.

@@ -2,21 +2,31 @@
 find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs videoio)
 set(play_tests
   play_camera_file_test.cpp
+  play_controls_test.cpp
+  play_display_test.cpp
   play_faststart_test.cpp
   play_json_test.cpp
   play_options_test.cpp
   play_overlay_test.cpp
+  play_qos_test.cpp
+  play_raw_source_test.cpp
+  play_recording_test.cpp
   play_report_test.cpp
   play_sinks_test.cpp
-  play_source_test.cpp)
+  play_source_test.cpp
+  play_v4l2_test.cpp)
 modar_test(play_test SOURCES ${play_tests}
   LIBRARIES modar_play_desk opencv_core opencv_imgproc opencv_imgcodecs opencv_videoio)
 target_include_directories(play_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
-# OpenCV, GoogleTest and nlohmann throw; the device's flags come in with modar_runtime.
-set_source_files_properties(${play_tests} PROPERTIES COMPILE_OPTIONS "-fexceptions;-frtti")
+# The device's classes have no run-time types for UBSan to look at.
+set_source_files_properties(${play_tests} PROPERTIES COMPILE_OPTIONS "-fno-sanitize=vptr")
 
 # Apart, so that ThreadSanitizer sees our threads and nobody else's.
 set(play_threads_tests play_mailbox_test.cpp play_pipeline_test.cpp)
 modar_test(play_threads_test SOURCES ${play_threads_tests} LIBRARIES modar_play)
 target_include_directories(play_threads_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
-set_source_files_properties(${play_threads_tests} PROPERTIES COMPILE_OPTIONS "-fexceptions;-frtti")
+set_source_files_properties(${play_threads_tests} PROPERTIES COMPILE_OPTIONS "-fno-sanitize=vptr")
+
+add_test(NAME cli_play COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/play_test.py)
+set_tests_properties(cli_play PROPERTIES TIMEOUT 600 ENVIRONMENT
+  "MODAR_SOURCE_DIR=${CMAKE_SOURCE_DIR};MODAR_BIN_DIR=${CMAKE_BINARY_DIR}/bin;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0")

@@ -5,6 +5,8 @@
 
 #include <vector>
 
+#include "decimal.hpp"
+
 namespace modar {
 namespace {
 
@@ -47,6 +49,49 @@ TEST(Options, TurntableNeedsAPlaceAndNoInput) {
   EXPECT_EQ(code_of({"a.modar", "--turntable", "12"}), "usage.out");
   EXPECT_EQ(code_of({"a.modar", "--turntable", "12", "--out", "d", "--input", "v"}),
             "usage.conflict");
+}
+
+TEST(Options, RecordingsLogsAndBudgets) {
+  const auto options = parse({"a.modar", "--input", "v", "--record", "r", "--qos", "q.jsonl",
+                              "--osd", "--gpu-budget", "64M"});
+  ASSERT_TRUE(options) << to_line(options.error());
+  EXPECT_EQ(options->record, "r");
+  EXPECT_EQ(options->qos, "q.jsonl");
+  EXPECT_TRUE(options->osd);
+  EXPECT_EQ(options->gpu_budget, 64u << 20);
+  EXPECT_EQ(parse({"a.modar", "--golden", "r", "--tolerance", "0.25"})->tolerance, 0.25);
+  EXPECT_EQ(code_of({"a.modar", "--golden", "r", "--tolerance", "-1"}), "usage.value");
+  EXPECT_EQ(code_of({"a.modar", "--golden", "r", "--tolerance", "nan"}), "usage.value");
+  EXPECT_EQ(code_of({"a.modar", "--golden", "r", "--record", "s"}), "usage.conflict");
+  EXPECT_EQ(code_of({"a.modar", "--input", "v", "--gpu-budget", "0"}), "usage.value");
+}
+
+TEST(Options, AmountsOfMemory) {
+  EXPECT_EQ(parse_bytes("1"), 1u);
+  EXPECT_EQ(parse_bytes("3K"), 3072u);
+  EXPECT_EQ(parse_bytes("2G"), std::uint64_t{2} << 30);
+  for (const char* bad : {"", "M", "1T", "-1", "1.5M", "99999999999G", "1 M", "1m"}) {
+    EXPECT_EQ(parse_bytes(bad), 0u) << bad;
+  }
+}
+
+TEST(Options, DecimalsAreTheNearestDouble) {
+  const std::pair<const char*, double> good[] = {{"0", 0},
+                                                 {"30", 30},
+                                                 {"29.97", 29.97},
+                                                 {"0.1", 0.1},
+                                                 {".5", 0.5},
+                                                 {"7.", 7},
+                                                 {"123456789.012345", 123456789.012345}};
+  for (const auto& [text, expected] : good) {
+    double value = -1;
+    EXPECT_TRUE(parse_decimal(text, value)) << text;
+    EXPECT_EQ(value, expected) << text;
+  }
+  for (const char* bad : {"", ".", "1.2.3", "1e3", "+1", "-1", " 1", "1234567890123456", "nan"}) {
+    double value = -1;
+    EXPECT_FALSE(parse_decimal(bad, value)) << bad;
+  }
 }
 
 TEST(Options, HelpAndVersionNeedNothingElse) {

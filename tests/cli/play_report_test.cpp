@@ -83,7 +83,7 @@ TEST(Report, LeavesMovieSheetLinesAndPage) {
   EXPECT_EQ(n, 61);
   const cv::Mat sheet = cv::imread(folder / "r/contact_sheet.png");
   EXPECT_EQ(sheet.cols, 4 * 326 + 6);
-  EXPECT_EQ(sheet.rows, 6 * 246 + 6) << "24 cells of 320x240";
+  EXPECT_EQ(sheet.rows, 6 * 264 + 6) << "24 cells of 320x240 with a label";
   EXPECT_EQ(count(test::read_text(folder / "r/index.html"), "<tr class="), 60u);
   EXPECT_GT(std::filesystem::file_size(folder / "r/overlay.mp4"), 500u);
 }

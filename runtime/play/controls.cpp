@@ -1,0 +1,120 @@
+// Turns keys into choices, and choices into what is drawn. Every model stays in its buffers: a
+// model that comes back needs nothing but its index.
+#include "controls.hpp"
+
+#include <algorithm>
+
+#include <glm/ext/matrix_transform.hpp>
+
+#include "modar/pose.hpp"
+
+namespace modar {
+
+Controls::Controls(const BundleView& bundle, bool outline, bool display)
+    : bundle_(bundle), outline_(outline), display_(display) {}
+
+void Controls::apply(const UserAct& act) {
+  constexpr float kStep = 1.1f;
+  constexpr float kMost = 20;
+  switch (act.act) {
+    case Act::kQuit:
+      // While corners are taken, it means that none are wanted.
+      if (frozen_) {
+        frozen_ = false;
+        corner_count_ = 0;
+      } else {
+        quit_ = true;
+      }
+      break;
+    case Act::kNextModel:
+      turn_model(1);
+      break;
+    case Act::kPreviousModel:
+      turn_model(-1);
+      break;
+    case Act::kNextPattern: {
+      const std::uint32_t count = bundle_.patterns().size();
+      const std::uint32_t next = only_pattern_ == kNone ? 0 : only_pattern_ + 1;
+      only_pattern_ = next < count ? next : kNone;
+      break;
+    }
+    case Act::kLarger:
+      scale_ = std::min(kMost, scale_ * kStep);
+      break;
+    case Act::kSmaller:
+      scale_ = std::max(1 / kMost, scale_ / kStep);
+      break;
+    case Act::kDisplay:
+      display_ = !display_;
+      break;
+    case Act::kOutline:
+      outline_ = !outline_;
+      break;
+    case Act::kPause:
+      paused_ = !paused_;
+      break;
+    case Act::kFreeze:
+      frozen_ = !frozen_;
+      corner_count_ = 0;
+      break;
+    case Act::kClick:
+      if (frozen_ && corner_count_ < corners_.size()) corners_[corner_count_++] = act.at;
+      break;
+  }
+}
+
+/// Through all models and "as the scenes say", which comes after the last.
+void Controls::turn_model(int step) {
+  const auto places = static_cast<std::int64_t>(bundle_.models().size()) + 1;
+  const std::int64_t place = model_ == kNone ? places - 1 : std::int64_t{model_};
+  const std::int64_t next = (place + step + places) % places;
+  model_ = next == places - 1 ? kNone : static_cast<std::uint32_t>(next);
+}
+
+void Controls::collect(std::span<const Hysteresis::State> states,
+                       std::vector<DrawItem>& items) const {
+  items.clear();
+  if (model_ != kNone) {
+    for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
+      if (wants(pattern)) add_standard(states[pattern], model_, items);
+    }
+    return;
+  }
+  for (std::uint32_t i = 0; i < bundle_.scenes().size(); ++i) {
+    const SceneRecord& scene = bundle_.scenes()[i];
+    const Hysteresis::State& state = states[scene.pattern];
+    if (!wants(scene.pattern) || !state.shown) continue;
+    const glm::mat4 place = gl_view(state.pose) * scene_matrix(scene);
+    items.push_back({scene.model, glm::scale(place, glm::vec3(scale_))});
+  }
+}
+
+void Controls::collect_spot(std::span<const Hysteresis::State> states,
+                            std::vector<DrawItem>& items) const {
+  items.clear();
+  if (bundle_.models().empty()) return;
+  for (const Hysteresis::State& state : states) {
+    add_standard(state, model_ == kNone ? 0 : model_, items);
+  }
+}
+
+/// The model at a scene's default placement.
+void Controls::add_standard(const Hysteresis::State& state, std::uint32_t model,
+                            std::vector<DrawItem>& items) const {
+  if (!state.shown) return;
+  SceneRecord standard{};
+  standard.scale = 1;
+  standard.rotation[3] = 1;
+  const glm::mat4 place = gl_view(state.pose) * scene_matrix(standard);
+  items.push_back({model, glm::scale(place, glm::vec3(scale_))});
+}
+
+bool Controls::take_corners(std::array<glm::dvec2, 4>& corners) {
+  if (!frozen_ || corner_count_ < corners_.size()) return false;
+  corners = corners_;
+  frozen_ = false;
+  corner_count_ = 0;
+  return true;
+}
+
+}  // namespace modar

@@ -1,0 +1,84 @@
+// What the user asked for with keys and clicks while the player runs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "formats/bundle_view.hpp"
+#include "modar/renderer.hpp"
+#include "modar/tracker.hpp"
+
+namespace modar {
+
+enum class Act : std::uint8_t {
+  kQuit,
+  kNextModel,
+  kPreviousModel,
+  kNextPattern,
+  kLarger,
+  kSmaller,
+  kDisplay,  ///< the on-screen display, on or off
+  kOutline,  ///< outlines of patterns, on or off
+  kPause,
+  kFreeze,  ///< hold the frame and take four corners of a new pattern
+  kClick,
+};
+
+struct UserAct {
+  Act act = Act::kQuit;
+  glm::dvec2 at{0.0};  ///< of a click: picture pixels
+};
+
+class Controls {
+ public:
+  /// outline, display: what the command line says at the start.
+  Controls(const BundleView& bundle, bool outline, bool display);
+
+  void apply(const UserAct& act);
+
+  /// The models to draw: each shown pattern's scenes, or the model that the user chose for it.
+  /// states: one a pattern, as Hysteresis answers. Allocates nothing once `items` has its room.
+  void collect(std::span<const Hysteresis::State> states, std::vector<DrawItem>& items) const;
+  /// The same where one pattern made on the spot is tracked: it bears the chosen model, else the
+  /// first.
+  void collect_spot(std::span<const Hysteresis::State> states, std::vector<DrawItem>& items) const;
+  /// False for a pattern that the user switched away from.
+  [[nodiscard]] bool wants(std::uint32_t pattern) const {
+    return only_pattern_ == kNone || only_pattern_ == pattern;
+  }
+
+  [[nodiscard]] bool quit() const { return quit_; }
+  [[nodiscard]] bool outline() const { return outline_; }
+  [[nodiscard]] bool display() const { return display_; }
+  /// The picture stands still: paused, or frozen for corners.
+  [[nodiscard]] bool holds() const { return paused_ || frozen_; }
+  [[nodiscard]] bool frozen() const { return frozen_; }
+  [[nodiscard]] std::span<const glm::dvec2> corners() const {
+    return {corners_.data(), corner_count_};
+  }
+  /// True once four corners stand: they are in corners(), and the picture goes on.
+  bool take_corners(std::array<glm::dvec2, 4>& corners);
+
+ private:
+  void turn_model(int step);
+  void add_standard(const Hysteresis::State& state, std::uint32_t model,
+                    std::vector<DrawItem>& items) const;
+
+  const BundleView& bundle_;
+  bool quit_ = false;
+  bool outline_;
+  bool display_;
+  bool paused_ = false;
+  bool frozen_ = false;
+  std::uint32_t model_ = kNone;         ///< kNone: as the scenes say
+  std::uint32_t only_pattern_ = kNone;  ///< kNone: all of them
+  float scale_ = 1;
+  std::array<glm::dvec2, 4> corners_{};
+  std::size_t corner_count_ = 0;
+};
+
+}  // namespace modar

@@ -1,0 +1,311 @@
+// Draws, paints, writes and logs a frame at a time.
+#include "player.hpp"
+
+#include <csignal>
+#include <cstdio>
+
+#include "json_lines.hpp"
+#include "play.hpp"
+#include "vision.hpp"
+
+namespace modar {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+std::string file_name(const std::string& path) {
+  const std::size_t end = path.find_last_not_of('/');
+  if (end == std::string::npos) return path;
+  const std::size_t slash = path.find_last_of('/', end);
+  const std::size_t first = slash == std::string::npos ? 0 : slash + 1;
+  return path.substr(first, end + 1 - first);
+}
+
+std::vector<std::string> pattern_names(const BundleView& bundle) {
+  std::vector<std::string> names;
+  for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
+    names.emplace_back(bundle.name(bundle.patterns()[i].name));
+  }
+  return names;
+}
+
+const std::string& input_of(const PlayOptions& options) {
+  return options.golden.empty() ? options.input : options.golden;
+}
+
+}  // namespace
+
+bool was_interrupted() {
+  return interrupted != 0;
+}
+
+void catch_interrupts() {
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+}
+
+Player::Player(const PlayOptions& options, const BundleView& bundle)
+    : options_(options),
+      bundle_(bundle),
+      names_(pattern_names(bundle)),
+      hysteresis_(names_.size()),
+      controls_(bundle, options.outline, options.osd || options.window),
+      progress_(!options.quiet) {
+  items_.reserve(std::max(bundle.scenes().size(), bundle.patterns().size()));
+}
+
+Result<void> Player::open(const PlayerSetup& setup) {
+  setup_ = setup;
+  auto screen = Screen::open(bundle_, options_);
+  if (!screen) return tl::unexpected(screen.error());
+  screen_ = std::move(*screen);
+  if (auto opened = open_sinks(); !opened) return opened;
+  return open_logs();
+}
+
+Result<void> Player::open_sinks() {
+  const auto add = [this](Result<std::unique_ptr<FrameSink>> sink) -> Result<void> {
+    if (!sink) return tl::unexpected(sink.error());
+    sinks_.push_back(std::move(*sink));
+    return {};
+  };
+  if (!options_.out.empty()) {
+    if (auto added = add(open_frame_sink(options_.out, setup_.source.fps)); !added) return added;
+  }
+  if (options_.report.empty()) return {};
+  const ReportTitle title{file_name(options_.bundle), file_name(input_of(options_)),
+                          options_.method};
+  return add(open_report(options_.report, setup_.source.fps, title, names_));
+}
+
+Result<void> Player::open_logs() {
+  if (!options_.record.empty()) {
+    auto recorder =
+        Recorder::create(options_.record, {options_.method, setup_.parameters, setup_.source.fps,
+                                           bundle_.header().hash, setup_.camera});
+    if (!recorder) return tl::unexpected(recorder.error());
+    recorder_ = std::move(*recorder);
+  }
+  if (options_.qos.empty()) return {};
+  const GlCaps& caps = screen_->caps();
+  Result<QosLog> log = QosLog::create(
+      options_.qos, {file_name(options_.bundle), file_name(input_of(options_)), options_.method,
+                     setup_.parameters, caps.renderer, caps.version, options_.device});
+  if (!log) return tl::unexpected(log.error());
+  qos_.emplace(std::move(*log));
+  return {};
+}
+
+Result<bool> Player::show(const Job& job) {
+  if (auto sized = screen_->resize(job.frame.width, job.frame.height); !sized) {
+    return tl::unexpected(sized.error());
+  }
+  follow_spot(job);
+  FrameReport report = begin_report(job);
+  const std::int64_t before = now_ns();
+  screen_->draw(job.frame.rgb_image(), job.camera, items_);
+  const bool painted = screen_->has_window() && (controls_.display() || controls_.outline());
+  if (painted || !sinks_.empty()) screen_->picture();
+  report.at(Stage::kRender) = ms_since(before);
+  if (painted || !sinks_.empty()) {
+    if (auto done = paint(report); !done) return tl::unexpected(done.error());
+  }
+  if (painted) {
+    screen_->present_canvas();
+  } else {
+    screen_->present();
+  }
+  report.at(Stage::kLatency) = ms_since(job.frame.arrived_ns);
+  const std::int64_t shown = now_ns();
+  if (auto written = write_picture(report); !written) return tl::unexpected(written.error());
+  report.at(Stage::kSink) = ms_since(shown);
+  if (auto written = write_line(report, job.frame); !written) {
+    return tl::unexpected(written.error());
+  }
+  stats_.add(report);
+  rate_.add(now_ns());
+  progress_.step(stats_.frames(), setup_.source.frames, stats_.visible());
+  if (auto held = hold(job); !held) return tl::unexpected(held.error());
+  return idle();
+}
+
+/// The vision thread looks for another pattern now: names and hysteresis follow.
+void Player::follow_spot(const Job& job) {
+  if (job.spot == spot_) return;
+  spot_ = job.spot;
+  names_ = pattern_names(spot_ ? spot_->view : bundle_);
+  hysteresis_ = Hysteresis(names_.size());
+}
+
+/// Hysteresis, what to draw, and all of the report that stands before drawing.
+FrameReport Player::begin_report(const Job& job) {
+  FrameReport report;
+  report.frame = job.frame.index;
+  report.time_s = job.frame.time_s;
+  for (const Sighting& seen : job.track.visible) {
+    if (spot_ || controls_.wants(seen.pattern)) report.visible.push_back(seen);
+  }
+  report.reason = job.track.reason;
+  report.at(Stage::kRead) = job.frame.read_ms;
+  report.at(Stage::kDetect) = job.track.times.detect;
+  report.at(Stage::kDescribe) = job.track.times.describe;
+  report.at(Stage::kMatch) = job.track.times.match;
+  report.at(Stage::kHomography) = job.track.times.homography;
+  report.at(Stage::kPose) = job.track.times.pose;
+  report.at(Stage::kTrack) = job.track_ms;
+
+  const auto states = hysteresis_.step(report.visible);
+  if (spot_) {
+    controls_.collect_spot(states, items_);
+  } else {
+    controls_.collect(states, items_);
+  }
+  for (const Hysteresis::State& state : states) {
+    if (!state.shown) continue;
+    if (state.measured) report.state = Shown::kShown;
+    if (report.state == Shown::kHidden) report.state = Shown::kHeld;
+  }
+  return report;
+}
+
+Result<void> Player::paint(const FrameReport& report) {
+  constexpr Colour kOutline{64, 255, 96};
+  const Canvas canvas = screen_->canvas();
+  if (controls_.outline()) {
+    for (const Sighting& seen : report.visible) draw_outline(canvas, seen.corners, kOutline);
+  }
+  if (!controls_.display()) return {};
+  // A file's pictures are the same in each run, so no clock is painted on them.
+  const bool clock = setup_.source.live || options_.realtime || options_.window;
+  return draw_text_bar(canvas, display_text(report, names_, clock ? rate_.rate() : 0));
+}
+
+Result<void> Player::write_picture(const FrameReport& report) {
+  const Canvas canvas = screen_->canvas();
+  const RgbaImage picture{canvas.rgba, canvas.width, canvas.height};
+  for (const auto& sink : sinks_) {
+    if (auto written = sink->picture(picture, report); !written) return written;
+  }
+  return {};
+}
+
+Result<void> Player::write_line(const FrameReport& report, const Frame& frame) {
+  if (golden_) golden_->add(report, names_);
+  if (qos_) {
+    if (auto written = write_qos(report); !written) return written;
+  }
+  if (!options_.json && options_.report.empty() && !recorder_) return {};
+  const std::string line = frame_line(report, names_);
+  for (const auto& sink : sinks_) {
+    if (auto written = sink->line(report, line); !written) return written;
+  }
+  if (recorder_) {
+    if (auto written = recorder_->add(frame, line); !written) return written;
+  }
+  return options_.json ? print_line(line) : Result<void>{};
+}
+
+Result<void> Player::write_qos(const FrameReport& report) {
+  if (qos_->due(report)) {
+    MemoryByKind memory = measure_memory(bundle_.bytes());
+    memory.gpu_geometry = screen_->gpu_memory().geometry;
+    memory.gpu_textures = screen_->gpu_memory().textures;
+    if (auto written = qos_->window(memory); !written) return written;
+  }
+  return qos_->add(report, names_);
+}
+
+void Player::take_acts(std::chrono::milliseconds limit) {
+  for (const UserAct& act : screen_->acts(limit)) controls_.apply(act);
+}
+
+bool Player::idle() {
+  take_acts(std::chrono::milliseconds(0));
+  return !was_interrupted() && !controls_.quit();
+}
+
+/// Stays with one frame while the user pauses or clicks corners; the window answers meanwhile.
+Result<void> Player::hold(const Job& job) {
+  constexpr std::chrono::milliseconds kLook(20);
+  while (controls_.holds() && !controls_.quit() && !was_interrupted()) {
+    if (controls_.frozen()) {
+      if (auto shown = show_frozen(job); !shown) return shown;
+    }
+    take_acts(kLook);
+    std::array<glm::dvec2, 4> corners{};
+    if (controls_.take_corners(corners)) make_pattern(job, corners);
+  }
+  return {};
+}
+
+/// The camera's picture without models, and the corners that were clicked so far.
+Result<void> Player::show_frozen(const Job& job) {
+  constexpr Colour kMark{255, 208, 64};
+  constexpr double kArm = 9;
+  screen_->draw(job.frame.rgb_image(), job.camera, {});
+  screen_->picture();
+  const Canvas canvas = screen_->canvas();
+  for (const glm::dvec2 corner : controls_.corners()) {
+    draw_line(canvas, corner - glm::dvec2(kArm, 0), corner + glm::dvec2(kArm, 0), 2, kMark);
+    draw_line(canvas, corner - glm::dvec2(0, kArm), corner + glm::dvec2(0, kArm), 2, kMark);
+  }
+  const std::size_t left = 4 - controls_.corners().size();
+  auto done = draw_text_bar(canvas, "click the corners of a new pattern: " + std::to_string(left) +
+                                        " left (Escape: never mind)");
+  screen_->present_canvas();
+  return done;
+}
+
+/// What goes wrong is told and ends nothing: the user may click again.
+void Player::make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corners) {
+  auto pattern = make_spot_pattern(job.frame.rgb_image(), corners,
+                                   parameter_set(bundle_, setup_.parameter_set));
+  if (!pattern) {
+    std::fprintf(stderr, "modar-play: %s\n", to_line(pattern.error()).c_str());
+    return;
+  }
+  if (setup_.spot != nullptr) setup_.spot->put(std::move(*pattern));
+}
+
+Result<int> Player::finish(const PipelineCounts& counts) {
+  progress_.end();
+  if (was_interrupted() && !setup_.source.live) {
+    return fail(ExitCode::kIo, "play.interrupted", "", "the run was interrupted",
+                "nothing half-made was left; start it again");
+  }
+  stats_.set_dropped(counts.dropped);
+  const std::string summary = summary_line(stats_);
+  for (const auto& sink : sinks_) {
+    if (auto done = sink->finish(summary); !done) return tl::unexpected(done.error());
+  }
+  if (recorder_) {
+    if (auto done = recorder_->finish(); !done) return tl::unexpected(done.error());
+  }
+  if (qos_) {
+    if (auto done = qos_->finish(summary); !done) return tl::unexpected(done.error());
+  }
+  if (golden_) {
+    if (auto done = print_line(golden_->line()); !done) return tl::unexpected(done.error());
+  }
+  if (options_.json || !options_.quiet) {
+    auto done = print_line(options_.json ? summary : summary_text());
+    if (!done) return tl::unexpected(done.error());
+  }
+  return golden_ && !golden_->good() ? kExitDifferent : 0;
+}
+
+std::string Player::summary_text() const {
+  const StageTimes ms = stats_.median_ms();
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "%llu frames, a pattern seen in %llu (%.1f %%), held in %llu; median ms: track "
+                "%.1f, render %.1f",
+                static_cast<unsigned long long>(stats_.frames()),
+                static_cast<unsigned long long>(stats_.visible()), stats_.recognised_percent(),
+                static_cast<unsigned long long>(stats_.count(Shown::kHeld)),
+                ms[static_cast<std::size_t>(Stage::kTrack)],
+                ms[static_cast<std::size_t>(Stage::kRender)]);
+  return text;
+}
+
+}  // namespace modar

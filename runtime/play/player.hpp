@@ -1,0 +1,87 @@
+// The render thread's step of a run: draws each frame and hands it to whatever wants it.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controls.hpp"
+#include "display.hpp"
+#include "frame_sink.hpp"
+#include "frame_source.hpp"
+#include "pipeline.hpp"
+#include "progress.hpp"
+#include "qos_log.hpp"
+#include "recording.hpp"
+#include "run_stats.hpp"
+#include "screen.hpp"
+#include "spot_pattern.hpp"
+
+namespace modar {
+
+/// What a run is about, beside its options.
+struct PlayerSetup {
+  SourceInfo source;
+  std::uint32_t parameter_set = 0;  ///< id
+  std::string parameters;           ///< its name
+  Camera camera;                    ///< calibrated; width 0: the default for each frame
+  SpotSlot* spot = nullptr;         ///< where patterns made on the spot go
+};
+
+class Player {
+ public:
+  /// Both outlive it.
+  Player(const PlayOptions& options, const BundleView& bundle);
+
+  /// Opens screen, sinks and logs on this thread.
+  Result<void> open(const PlayerSetup& setup);
+  /// Compares each frame with this recording.
+  void compare(GoldenCheck golden) { golden_ = std::move(golden); }
+
+  /// Shows one frame. Answers false once the user ended the run.
+  Result<bool> show(const Job& job);
+  /// Takes what the user did. Answers false once the user ended the run.
+  bool idle();
+  /// Completes every output; answers the program's exit code.
+  Result<int> finish(const PipelineCounts& counts);
+
+ private:
+  Result<void> open_sinks();
+  Result<void> open_logs();
+  FrameReport begin_report(const Job& job);
+  void follow_spot(const Job& job);
+  Result<void> paint(const FrameReport& report);
+  Result<void> write_picture(const FrameReport& report);
+  Result<void> write_line(const FrameReport& report, const Frame& frame);
+  Result<void> write_qos(const FrameReport& report);
+  void take_acts(std::chrono::milliseconds limit);
+  Result<void> hold(const Job& job);
+  Result<void> show_frozen(const Job& job);
+  void make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corners);
+  [[nodiscard]] std::string summary_text() const;
+
+  const PlayOptions& options_;
+  const BundleView& bundle_;
+  PlayerSetup setup_;
+  std::vector<std::string> names_;  ///< of the patterns that are looked for
+  Hysteresis hysteresis_;
+  Controls controls_;
+  Progress progress_;
+  RateMeter rate_;
+  RunStats stats_;
+  std::unique_ptr<Screen> screen_;
+  std::vector<std::unique_ptr<FrameSink>> sinks_;
+  std::unique_ptr<Recorder> recorder_;
+  std::optional<GoldenCheck> golden_;
+  std::optional<QosLog> qos_;
+  std::vector<DrawItem> items_;
+  std::shared_ptr<const SpotPattern> spot_;  ///< the one that names_ and hysteresis_ are about
+};
+
+/// True once the user asked for the end by Ctrl-C or a signal.
+bool was_interrupted();
+void catch_interrupts();
+
+}  // namespace modar

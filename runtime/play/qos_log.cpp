@@ -1,0 +1,207 @@
+// Writes the log as JSON lines; the numbers are the frames' own, so that a file gives the same log.
+#include "qos_log.hpp"
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#define RAPIDJSON_NOMEMBERITERATORCLASS
+#include <rapidjson/stringbuffer.h>
+#include <rapidjson/writer.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+namespace modar {
+namespace {
+
+using Writer = rapidjson::Writer<rapidjson::StringBuffer>;
+
+void text(Writer& writer, const char* key, std::string_view value) {
+  writer.Key(key);
+  writer.String(value.data(), static_cast<rapidjson::SizeType>(value.size()));
+}
+
+void count(Writer& writer, const char* key, std::uint64_t value) {
+  writer.Key(key);
+  writer.Uint64(value);
+}
+
+void number(Writer& writer, const char* key, double value) {
+  writer.Key(key);
+  writer.Double(std::isfinite(value) ? std::round(value * 1000) / 1000 : 0);
+}
+
+void times(Writer& writer, const RunStats& stats) {
+  const StageTimes median = stats.quantile_ms(0.5);
+  const StageTimes most = stats.quantile_ms(0.95);
+  const StageTimes worst = stats.quantile_ms(1);
+  writer.Key("ms");
+  writer.StartObject();
+  for (std::size_t i = 0; i < median.size(); ++i) {
+    writer.Key(kStageNames[i]);
+    writer.StartObject();
+    number(writer, "median", median[i]);
+    number(writer, "p95", most[i]);
+    number(writer, "max", worst[i]);
+    writer.EndObject();
+  }
+  writer.EndObject();
+}
+
+void reasons(Writer& writer, const RunStats& stats) {
+  writer.Key("reasons");
+  writer.StartObject();
+  for (const Reason reason : kReasons) {
+    if (stats.count(reason) > 0) count(writer, to_string(reason), stats.count(reason));
+  }
+  writer.EndObject();
+}
+
+void memory_of(Writer& writer, const MemoryByKind& memory) {
+  writer.Key("memory");
+  writer.StartObject();
+  count(writer, "resident", memory.resident);
+  count(writer, "heap", memory.heap);
+  count(writer, "bundle", memory.bundle);
+  count(writer, "bundle_resident", memory.bundle_resident);
+  count(writer, "gpu_geometry", memory.gpu_geometry);
+  count(writer, "gpu_textures", memory.gpu_textures);
+  writer.EndObject();
+}
+
+std::string_view view(const rapidjson::StringBuffer& buffer) {
+  return {buffer.GetString(), buffer.GetSize()};
+}
+
+/// Second number of /proc/self/statm: resident pages.
+std::uint64_t resident_pages() {
+  std::FILE* file = std::fopen("/proc/self/statm", "r");
+  if (file == nullptr) return 0;
+  char line[128] = {};
+  const std::size_t size = std::fread(line, 1, sizeof line - 1, file);
+  std::fclose(file);
+  const char* end = line + size;
+  std::uint64_t pages = 0;
+  const auto first = std::from_chars(line, end, pages);
+  if (first.ptr == end) return 0;
+  std::from_chars(first.ptr + 1, end, pages);
+  return pages;
+}
+
+}  // namespace
+
+MemoryByKind measure_memory(std::span<const std::byte> mapped) {
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  MemoryByKind memory;
+  memory.resident = resident_pages() * page;
+#ifdef __GLIBC__
+  const struct mallinfo2 heap = mallinfo2();
+  memory.heap = heap.uordblks + heap.hblkhd;
+#endif
+  memory.bundle = mapped.size();
+  std::vector<unsigned char> pages((mapped.size() + page - 1) / page);
+  void* start = const_cast<std::byte*>(mapped.data());
+  if (!mapped.empty() && mincore(start, mapped.size(), pages.data()) == 0) {
+    for (const unsigned char state : pages) memory.bundle_resident += (state & 1u) * page;
+  }
+  return memory;
+}
+
+Result<QosLog> QosLog::create(const std::string& path, const QosHead& head, double every_s) {
+  Result<AtomicFile> file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  QosLog log(std::move(*file), every_s);
+  rapidjson::StringBuffer buffer;
+  Writer writer(buffer);
+  writer.StartObject();
+  writer.Key("qos");
+  writer.StartObject();
+  writer.Key("version");
+  writer.Int(1);
+  text(writer, "bundle", head.bundle);
+  text(writer, "input", head.input);
+  text(writer, "method", head.method);
+  text(writer, "parameters", head.parameters);
+  text(writer, "gl_renderer", head.gl_renderer);
+  text(writer, "gl_version", head.gl_version);
+  text(writer, "device", head.device);
+  number(writer, "budget_ms", kFrameBudgetMs);
+  writer.EndObject();
+  writer.EndObject();
+  if (auto written = log.write(view(buffer)); !written) return tl::unexpected(written.error());
+  return log;
+}
+
+bool QosLog::due(const FrameReport& report) const {
+  return report.time_s - window_start_s_ >= every_s_ && window_.frames() > 0;
+}
+
+Result<void> QosLog::add(const FrameReport& report, std::span<const std::string> pattern_names) {
+  seen_.resize(pattern_names.size());
+  since_s_.resize(pattern_names.size());
+  last_s_ = report.time_s;
+  for (std::size_t pattern = 0; pattern < seen_.size(); ++pattern) {
+    const Sighting* sighting = nullptr;
+    for (const Sighting& each : report.visible) {
+      if (each.pattern == pattern) sighting = &each;
+    }
+    if (seen_[pattern] == (sighting != nullptr)) continue;
+    rapidjson::StringBuffer buffer;
+    Writer writer(buffer);
+    writer.StartObject();
+    text(writer, "event", sighting != nullptr ? "found" : "lost");
+    text(writer, "pattern", pattern_names[pattern]);
+    count(writer, "frame", report.frame);
+    number(writer, "time_s", report.time_s);
+    number(writer, "after_s", report.time_s - since_s_[pattern]);
+    if (sighting != nullptr) {
+      count(writer, "inliers", static_cast<std::uint64_t>(sighting->inliers));
+    } else {
+      text(writer, "reason", to_string(report.reason));
+    }
+    writer.EndObject();
+    seen_[pattern] = sighting != nullptr;
+    since_s_[pattern] = report.time_s;
+    if (auto written = write(view(buffer)); !written) return written;
+  }
+  window_.add(report);
+  return {};
+}
+
+Result<void> QosLog::window(const MemoryByKind& memory) {
+  rapidjson::StringBuffer buffer;
+  Writer writer(buffer);
+  writer.StartObject();
+  writer.Key("second");
+  writer.StartObject();
+  number(writer, "from_s", window_start_s_);
+  count(writer, "frames", window_.frames());
+  count(writer, "visible", window_.visible());
+  count(writer, "held", window_.count(Shown::kHeld));
+  count(writer, "hidden", window_.count(Shown::kHidden));
+  count(writer, "late", window_.late());
+  reasons(writer, window_);
+  times(writer, window_);
+  memory_of(writer, memory);
+  writer.EndObject();
+  writer.EndObject();
+  window_ = RunStats();
+  window_start_s_ = last_s_;
+  return write(view(buffer));
+}
+
+Result<void> QosLog::finish(std::string_view summary) {
+  if (auto written = write(summary); !written) return written;
+  return file_.commit();
+}
+
+Result<void> QosLog::write(std::string_view line) {
+  if (auto done = file_.write(std::as_bytes(std::span(line))); !done) return done;
+  return file_.write(std::as_bytes(std::span("\n", 1)));
+}
+
+}  // namespace modar

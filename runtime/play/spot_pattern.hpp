@@ -1,0 +1,57 @@
+// A pattern made on the spot: four corners in a frame, as the article's app lets its users.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "formats/bundle_view.hpp"
+#include "formats/error.hpp"
+#include "modar/image.hpp"
+#include "semaphore.hpp"
+
+namespace modar {
+
+/// A bundle of that one pattern in memory. view points into bytes: neither copied nor moved.
+struct SpotPattern {
+  std::vector<std::byte> bytes;
+  BundleView view;
+};
+
+/// The four corners in the order top-left, top-right, bottom-right, bottom-left, whatever order
+/// they were clicked in. Errors: kUsage "spot.corners" where they make no convex four-sided figure,
+/// or one smaller than 24 pixels a side.
+Result<std::array<glm::dvec2, 4>> ordered_corners(const std::array<glm::dvec2, 4>& clicked);
+
+/// Rectifies what lies between the corners (pixels of the frame) and describes it with
+/// `parameters`. Errors: those of ordered_corners(); kInvalidInput "spot.features" where nothing is
+/// found on it; kUnsupported "spot.unsupported" in a build without OpenCV.
+Result<std::shared_ptr<const SpotPattern>> make_spot_pattern(
+    const RgbImage& frame, const std::array<glm::dvec2, 4>& clicked,
+    const ParameterSetRecord& parameters);
+
+/// Hands a new pattern from the render thread to the vision thread.
+class SpotSlot {
+ public:
+  void put(std::shared_ptr<const SpotPattern> pattern) {
+    guard_.acquire();
+    pattern_.swap(pattern);
+    guard_.release();
+  }
+  /// Null where nothing was put since the last call.
+  std::shared_ptr<const SpotPattern> take() {
+    std::shared_ptr<const SpotPattern> taken;
+    guard_.acquire();
+    taken.swap(pattern_);
+    guard_.release();
+    return taken;
+  }
+
+ private:
+  Semaphore guard_{1};
+  std::shared_ptr<const SpotPattern> pattern_;
+};
+
+}  // namespace modar

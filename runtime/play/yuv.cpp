@@ -1,0 +1,151 @@
+// ITU-R BT.601 in 16-bit fixed point: the same bits on every machine.
+#include "yuv.hpp"
+
+#include <algorithm>
+
+namespace modar {
+namespace {
+
+constexpr int kShift = 16;
+constexpr int fixed(double value) {
+  return static_cast<int>(value * (1 << kShift) + 0.5);
+}
+
+/// R = y Y + rv V, G = y Y - gu U - gv V, B = y Y + bu U, with Y, U, V freed of their offsets.
+struct Weights {
+  int offset;
+  int y;
+  int rv;
+  int gu;
+  int gv;
+  int bu;
+};
+constexpr Weights kFull = {0,           fixed(1.0), fixed(1.402), fixed(0.344136), fixed(0.714136),
+                           fixed(1.772)};
+constexpr double kVideoY = 255.0 / 219.0;
+constexpr double kVideoC = 255.0 / 224.0;
+constexpr Weights kVideo = {16,
+                            fixed(kVideoY),
+                            fixed(1.402 * kVideoC),
+                            fixed(0.344136 * kVideoC),
+                            fixed(0.714136 * kVideoC),
+                            fixed(1.772 * kVideoC)};
+
+std::uint8_t rounded(int value) {
+  return static_cast<std::uint8_t>(std::clamp((value + (1 << (kShift - 1))) >> kShift, 0, 255));
+}
+
+/// Where a row's samples lie: pixel x has its chroma at chroma[(x >> shift) * step].
+struct Row {
+  const std::uint8_t* y;
+  const std::uint8_t* u;
+  const std::uint8_t* v;
+  std::size_t y_step;
+  std::size_t step;
+  unsigned shift;
+};
+
+std::size_t half(int side) {
+  return (static_cast<std::size_t>(side) + 1) / 2;
+}
+
+Row row_of(const YuvFormat& format, const std::uint8_t* bytes, int row) {
+  const auto w = static_cast<std::size_t>(format.width);
+  const auto h = static_cast<std::size_t>(format.height);
+  const auto r = static_cast<std::size_t>(row);
+  const std::uint8_t* y = bytes + r * w;
+  const std::uint8_t* chroma = bytes + w * h;
+  const std::size_t wide = half(format.width);
+  switch (format.layout) {
+    case YuvLayout::kI420: {
+      const std::uint8_t* u = chroma + r / 2 * wide;
+      return {y, u, u + wide * half(format.height), 1, 1, 1};
+    }
+    case YuvLayout::kNv12: {
+      const std::uint8_t* pair = chroma + r / 2 * 2 * wide;
+      return {y, pair, pair + 1, 1, 2, 1};
+    }
+    case YuvLayout::kNv21: {
+      const std::uint8_t* pair = chroma + r / 2 * 2 * wide;
+      return {y, pair + 1, pair, 1, 2, 1};
+    }
+    case YuvLayout::kI422: {
+      const std::uint8_t* u = chroma + r * wide;
+      return {y, u, u + wide * h, 1, 1, 1};
+    }
+    case YuvLayout::kYuyv: {
+      const std::uint8_t* line = bytes + r * 4 * wide;
+      return {line, line + 1, line + 3, 2, 4, 1};
+    }
+    case YuvLayout::kI444:
+      return {y, chroma + r * w, chroma + (h + r) * w, 1, 1, 0};
+    case YuvLayout::kGrey:
+      break;
+  }
+  return {y, nullptr, nullptr, 1, 0, 0};
+}
+
+void convert_row(const Row& row, const Weights& weights, int width, std::uint8_t* rgb,
+                 std::uint8_t* gray) {
+  for (int i = 0; i < width; ++i) {
+    const auto x = static_cast<std::size_t>(i);
+    const int luma = weights.y * (row.y[x * row.y_step] - weights.offset);
+    gray[x] = rounded(luma);
+    const std::size_t at = (x >> row.shift) * row.step;
+    const int u = row.u == nullptr ? 0 : row.u[at] - 128;
+    const int v = row.v == nullptr ? 0 : row.v[at] - 128;
+    rgb[3 * x] = rounded(luma + weights.rv * v);
+    rgb[3 * x + 1] = rounded(luma - weights.gu * u - weights.gv * v);
+    rgb[3 * x + 2] = rounded(luma + weights.bu * u);
+  }
+}
+
+}  // namespace
+
+std::size_t frame_bytes(const YuvFormat& format) {
+  const auto w = static_cast<std::size_t>(format.width);
+  const auto h = static_cast<std::size_t>(format.height);
+  switch (format.layout) {
+    case YuvLayout::kI420:
+    case YuvLayout::kNv12:
+    case YuvLayout::kNv21:
+      return w * h + 2 * half(format.width) * half(format.height);
+    case YuvLayout::kI422:
+      return w * h + 2 * half(format.width) * h;
+    case YuvLayout::kYuyv:
+      return 4 * half(format.width) * h;
+    case YuvLayout::kI444:
+      return 3 * w * h;
+    case YuvLayout::kGrey:
+      break;
+  }
+  return w * h;
+}
+
+void fill_frame(Frame& frame, const YuvFormat& format, std::span<const std::uint8_t> bytes) {
+  frame.width = format.width;
+  frame.height = format.height;
+  const auto w = static_cast<std::size_t>(format.width);
+  const std::size_t pixels = w * static_cast<std::size_t>(format.height);
+  frame.rgb.resize(3 * pixels);
+  frame.gray.resize(pixels);
+  const Weights& weights = format.full_range ? kFull : kVideo;
+  for (int row = 0; row < format.height; ++row) {
+    const std::size_t first = static_cast<std::size_t>(row) * w;
+    convert_row(row_of(format, bytes.data(), row), weights, format.width, &frame.rgb[3 * first],
+                &frame.gray[first]);
+  }
+}
+
+void gray_from_rgb(Frame& frame) {
+  constexpr int kRed = fixed(0.299);
+  constexpr int kGreen = fixed(0.587);
+  constexpr int kBlue = (1 << kShift) - kRed - kGreen;
+  frame.gray.resize(frame.rgb.size() / 3);
+  for (std::size_t i = 0; i < frame.gray.size(); ++i) {
+    frame.gray[i] = rounded(kRed * frame.rgb[3 * i] + kGreen * frame.rgb[3 * i + 1] +
+                            kBlue * frame.rgb[3 * i + 2]);
+  }
+}
+
+}  // namespace modar

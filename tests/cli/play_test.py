@@ -1,0 +1,129 @@
+"""The player from the outside: what it prints, writes and answers."""
+import json
+import os
+import shutil
+import subprocess
+import threading
+import unittest
+
+from programs import BIN, COVER, ROOT, ProgramTest
+
+
+def lines_of(done):
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+class Play(ProgramTest):
+    def play(self, *arguments, **options):
+        return self.run_program("modar-play", *arguments, **options)
+
+    def clip(self, frames=12):
+        """Our cover before a made-up background."""
+        folder = self.folder / "clip"
+        subprocess.run(["python3", ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", str(frames),
+                        "--size", "480x360", folder], check=True, capture_output=True)
+        return folder
+
+    def test_help_and_version_go_to_standard_output(self):
+        done = self.play("--help")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("Example:", done.stdout)
+        self.assertRegex(self.play("--version").stdout, r"^modar-play \d+\.\d+\.\d+\n$")
+
+    def test_mistakes_are_told_with_their_exit_codes(self):
+        bundle = self.bake_demo()
+        self.assert_fails(self.play(), 1, "--help")
+        self.assert_fails(self.play("none.modar", "--input", COVER), 2, "none.modar")
+        self.assert_fails(self.play(COVER, "--input", COVER), 3, str(COVER))
+        self.assert_fails(self.play(bundle, "--input", "none.mp4"), 2, "none.mp4")
+        self.assert_fails(self.play(bundle, "--input", bundle), 3, bundle.name)
+        self.assert_fails(self.play(bundle, "--input", COVER, "--parameters", "x"), 1, "orb-2000")
+        self.assert_fails(self.play(bundle, "--input", COVER, "--device", "x"), 1, "mali400")
+        self.assert_fails(self.play(bundle, "--input", COVER, "--window", env={"SDL_VIDEODRIVER": "none"}), 5,
+                          "--window")
+        if os.path.exists("/dev/full"):
+            with open("/dev/full", "w") as full:
+                done = subprocess.run([BIN / "modar-play", bundle, "--input", COVER, "--json"], stdout=full,
+                                      stderr=subprocess.PIPE, text=True)
+            self.assertEqual(done.returncode, 2, done.stderr)
+
+    def test_a_run_with_every_output_and_its_replay(self):
+        bundle, clip = self.bake_demo(), self.clip()
+        done = self.play(bundle, "--input", clip, "--json", "--outline", "--osd", "--out", "pictures", "--report",
+                         "report", "--record", "kept", "--qos", "trial.jsonl")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "", "no progress bar without a terminal")
+        *frames, summary = lines_of(done)
+        self.assertEqual([frame["frame"] for frame in frames], list(range(12)))
+        self.assertEqual(summary["summary"]["frames"], 12)
+        self.assertGreater(summary["summary"]["visible"], 8, "our own cover is found")
+        seen = next(frame["visible"][0] for frame in frames if frame["visible"])
+        self.assertEqual(seen["pattern"], "cover")
+        self.assertEqual([len(seen["rotation"]), len(seen["translation"])], [9, 3])
+        self.assertEqual(len(list((self.folder / "pictures").glob("frame_*.png"))), 12)
+        self.assertEqual({path.name for path in (self.folder / "report").iterdir()},
+                         {"overlay.mp4", "contact_sheet.png", "frames.jsonl", "index.html"})
+        self.assertIn('"event":"found"', (self.folder / "trial.jsonl").read_text())
+
+        same = self.play(bundle, "--golden", "kept", "--quiet")
+        self.assertEqual(same.returncode, 0, same.stdout + same.stderr)
+        self.assertEqual(json.loads(same.stdout)["golden"]["worst_px"], 0.0)
+        other = self.play(bundle, "--golden", "kept", "--quiet", "--parameters", "brisk-3", "--tolerance", "0")
+        self.assertEqual(other.returncode, 10, other.stdout + other.stderr)
+
+    def test_two_runs_give_the_same_poses_and_pictures(self):
+        bundle, clip = self.bake_demo(), self.clip(4)
+        runs = []
+        for name in ("a", "b"):
+            done = self.play(bundle, "--input", clip, "--json", "--out", name)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            frames = [{**frame, "ms": None} for frame in lines_of(done)[:-1]]
+            runs.append((frames, [path.read_bytes() for path in sorted((self.folder / name).iterdir())]))
+        self.assertEqual(runs[0], runs[1])
+
+    def test_the_movie_plays_in_a_browser(self):
+        if shutil.which("ffprobe") is None:
+            self.skipTest("no ffprobe here")
+        bundle, clip = self.bake_demo(), self.clip(4)
+        self.assertEqual(self.play(bundle, "--input", clip, "--out", "a.mp4").returncode, 0)
+        probe = subprocess.run(["ffprobe", "-v", "error", "-count_frames", "-show_streams", "-of", "json", "a.mp4"],
+                               cwd=self.folder, capture_output=True, text=True, check=True)
+        stream = json.loads(probe.stdout)["streams"][0]
+        self.assertEqual((stream["codec_name"], stream["pix_fmt"], stream["nb_read_frames"]),
+                         ("h264", "yuv420p", "4"))
+
+    def test_raw_frames_come_over_a_pipe(self):
+        bundle = self.bake_demo()
+        grey = bytes(range(256)) * (160 * 120 // 256)
+        y4m = b"YUV4MPEG2 W160 H120 F30:1 Cmono\n" + 3 * (b"FRAME\n" + grey)
+        done = subprocess.run([BIN / "modar-play", bundle, "--input", "-", "--json"], input=y4m, capture_output=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(len(done.stdout.splitlines()), 4)
+
+    def test_a_pipe_that_falls_silent_does_not_hang_the_end(self):
+        bundle = self.bake_demo()
+        process = subprocess.Popen([BIN / "modar-play", bundle, "--input", "nv21:160x120:-", "--realtime", "--json"],
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        watch = threading.Timer(60, process.kill)
+        watch.start()
+        process.stdin.write(bytes(160 * 120 * 3 // 2))
+        process.stdin.flush()
+        self.assertTrue(process.stdout.readline(), "the first frame is played while the pipe is open")
+        process.terminate()
+        self.assertEqual(process.wait(), 2)
+        watch.cancel()
+        self.assertIn(b"interrupted", process.stderr.read())
+        for stream in (process.stdin, process.stdout, process.stderr):
+            stream.close()
+
+    def test_models_turn_without_any_pattern(self):
+        bundle = self.bake_demo()
+        done = self.play(bundle, "--turntable", "3", "--out", "turn", "--size", "96x64", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([line["angle_deg"] for line in lines_of(done)], [0.0, 120.0, 240.0])
+        pictures = [path.read_bytes() for path in sorted((self.folder / "turn").iterdir())]
+        self.assertEqual(len(set(pictures)), 3)
+
+
+if __name__ == "__main__":
+    unittest.main()
