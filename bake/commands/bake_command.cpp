@@ -1,6 +1,8 @@
 // `modar bake`: OBJ models and pattern images to one bundle.
 #include <cstdio>
+#include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "bake/bundle_builder.hpp"
 #include "bake/commands/commands.hpp"
@@ -50,6 +52,14 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
 }  // namespace
 
 int run_bake(const BakeCommand& command) {
+  if (const std::string& folder = command.request.textures.picture_folder; !folder.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) {
+      return print_error({ExitCode::kIo, "bake.folder", folder, error.message(),
+                          "name a folder that can be made"});
+    }
+  }
   ProgressBar bar(command.quiet);
   Report report;
   report.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
