@@ -1,20 +1,13 @@
 // A pattern's picture to its record and its features under every parameter set of the article.
-#include <algorithm>
-#include <cmath>
 #include <string_view>
 
-#include <opencv2/imgproc.hpp>
-
 #include "bake/pattern/pattern_image.hpp"
+#include "bake/pattern/pattern_picture.hpp"
 #include "modar/features.hpp"
 #include "modar/pose.hpp"
 
 namespace modar {
 namespace {
-
-// The article's patterns are 245 to 717 pixels on a side. Larger pictures only move the scales at
-// which features are found away from those at which a camera sees the pattern.
-constexpr int kLargestSide = 720;
 
 std::string base_name(std::string_view path) {
   const std::size_t slash = path.find_last_of("/\\");
@@ -22,34 +15,6 @@ std::string base_name(std::string_view path) {
   const std::size_t dot = name.find_last_of('.');
   if (dot != std::string_view::npos && dot > 0) name = name.substr(0, dot);
   return std::string(name);
-}
-
-/// Grey as cameras deliver it; what is transparent shows white paper.
-cv::Mat grey_of(const RgbaImage& image) {
-  cv::Mat grey(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC1);
-  for (std::size_t i = 0; i < grey.total(); ++i) {
-    const std::uint8_t* p = image.pixels.data() + 4 * i;
-    // Rec. 601 luma, in 16-bit fixed point: the same bytes on every machine.
-    const std::uint32_t luma = (19595u * p[0] + 38470u * p[1] + 7471u * p[2] + 32768u) >> 16;
-    grey.data[i] = static_cast<std::uint8_t>((luma * p[3] + 255u * (255u - p[3]) + 127u) / 255u);
-  }
-  return grey;
-}
-
-Result<cv::Mat> pattern_pixels(const RgbaImage& image) {
-  try {
-    cv::Mat grey = grey_of(image);
-    const int longest = std::max(grey.cols, grey.rows);
-    if (longest <= kLargestSide) return grey;
-    const double scale = static_cast<double>(kLargestSide) / longest;
-    const cv::Size size(std::max(1, static_cast<int>(std::lround(grey.cols * scale))),
-                        std::max(1, static_cast<int>(std::lround(grey.rows * scale))));
-    cv::Mat small;
-    cv::resize(grey, small, size, 0, 0, cv::INTER_AREA);
-    return small;
-  } catch (const std::exception& thrown) {
-    return fail(ExitCode::kInternal, "pattern.opencv", "", thrown.what(), "report this as a bug");
-  }
 }
 
 Result<FeatureContent> describe(const GrayImage& image, const ParameterSetRecord& parameters) {
@@ -70,16 +35,11 @@ Result<FeatureContent> describe(const GrayImage& image, const ParameterSetRecord
 
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm, Report& report) {
   StageTimer timer(report, "pattern");
-  const auto image = read_image(path);
-  if (!image) return tl::unexpected(image.error());
-  auto pixels = pattern_pixels(*image);
-  if (!pixels) {
-    pixels.error().where = path;
-    return tl::unexpected(pixels.error());
-  }
-  const GrayImage grey{pixels->data, pixels->cols, pixels->rows,
-                       static_cast<std::ptrdiff_t>(pixels->step[0])};
-  if (grey.width != static_cast<int>(image->width)) {
+  bool shrunk = false;
+  const auto picture = load_pattern(path, shrunk);
+  if (!picture) return tl::unexpected(picture.error());
+  const GrayImage grey = picture->view();
+  if (shrunk) {
     report.findings.push_back({"pattern.resized", FindingSeverity::kInfo, path, 0,
                                "the picture was made smaller, to " + std::to_string(grey.width) +
                                    "x" + std::to_string(grey.height) + " pixels",
@@ -106,7 +66,7 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm, R
                 "the picture holds " + std::to_string(found) + " features, too few to recognise it",
                 "take a larger, sharper picture with more texture");
   }
-  timer.done(pixels->total(), found);
+  timer.done(picture->pixels.size(), found);
   return out;
 }
 

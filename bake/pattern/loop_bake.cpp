@@ -1,0 +1,365 @@
+// Chooses, of all descriptors that rendered views of a pattern give, those that random views
+// repeat.
+#include "bake/pattern/loop_bake.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <queue>
+
+#include "bake/pattern/loop_patches.hpp"
+#include "bake/pattern/view_render.hpp"
+#include "formats/loop_record.hpp"
+#include "modar/loop_features.hpp"
+
+namespace modar {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr int kLargestSide = 1023;
+constexpr double kScaleStep = 1.2599210498948732;  // three views an octave
+constexpr int kScales = 7;
+constexpr int kMargin = 24;       // pixels around a rendered pattern: a patch and the border
+constexpr int kNear = 3;          // view pixels between a trial's feature and a candidate
+constexpr int kRepeats = 64;      // bits: a candidate within this of a trial's feature repeats it
+constexpr double kEnough = 24.0;  // matches of a view after which more gain little
+
+struct Candidate {
+  double x = 0;  // pattern pixels
+  double y = 0;
+  std::array<double, 4> warp{};
+  std::array<std::uint8_t, 32> code{};
+  std::uint8_t dark = 0;
+};
+
+/// A candidate that repeats a trial's feature, and how well (0 to 1].
+struct Hit {
+  std::uint32_t feature = 0;
+  float value = 0;
+};
+
+struct Trials {
+  std::vector<std::vector<Hit>> hits;  // a list a candidate
+  std::vector<std::uint32_t> view_of;  // a view a trial feature
+  std::uint32_t views = 0;
+};
+
+int distance(const std::array<std::uint8_t, 32>& a, const std::array<std::uint8_t, 32>& b) {
+  int bits = 0;
+  for (std::size_t i = 0; i < 32; i += 8) {
+    std::uint64_t x = 0;
+    std::uint64_t y = 0;
+    std::memcpy(&x, a.data() + i, 8);
+    std::memcpy(&y, b.data() + i, 8);
+    bits += std::popcount(x ^ y);
+  }
+  return bits;
+}
+
+/// Pattern coordinates of a place in a view.
+std::array<double, 2> to_pattern(const AffineView& view, double x, double y) {
+  const auto& a = view.linear;
+  const double determinant = a[0] * a[3] - a[1] * a[2];
+  const double u = x - view.offset[0];
+  const double v = y - view.offset[1];
+  return {(a[3] * u - a[1] * v) / determinant, (a[0] * v - a[2] * u) / determinant};
+}
+
+bool within(const GrayImage& pattern, const std::array<double, 2>& p) {
+  return p[0] >= -0.5 && p[1] >= -0.5 && p[0] < pattern.width - 0.5 && p[1] < pattern.height - 0.5;
+}
+
+LoopDetectOptions generous() {
+  LoopDetectOptions options;
+  options.cell = 32;
+  options.per_cell = 16;
+  options.max_features = 20000;
+  return options;
+}
+
+void add_candidates(const std::vector<GrayPicture>& levels, const AffineView& view,
+                    std::vector<Candidate>& candidates) {
+  const GrayPicture picture = render_view(levels, view, nullptr);
+  const auto describer = LoopDescriber::create(picture.width, picture.height, generous());
+  describer->set_frame(picture.view());
+  for (const LoopFeature& feature : describer->features()) {
+    // Coarser levels show what views of smaller scale show.
+    if (feature.level != 0) continue;
+    const auto place =
+        to_pattern(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
+    if (!within(levels[0].view(), place)) continue;
+    Candidate candidate;
+    candidate.x = place[0];
+    candidate.y = place[1];
+    const double c = static_cast<double>(feature.cosine);
+    const double s = static_cast<double>(feature.sine);
+    const auto& a = view.linear;
+    candidate.warp = {c * a[0] + s * a[2], c * a[1] + s * a[3], c * a[2] - s * a[0],
+                      c * a[3] - s * a[1]};
+    candidate.code = feature.code;
+    candidate.dark = feature.dark;
+    candidates.push_back(candidate);
+  }
+}
+
+std::vector<Candidate> find_candidates(const std::vector<GrayPicture>& levels) {
+  std::vector<Candidate> candidates;
+  Random random(1);
+  double scale = 1.0;
+  for (int k = 0; k < kScales; ++k, scale /= kScaleStep) {
+    // Directions get denser with the tilt (Yu & Morel, "ASIFT", 2011).
+    for (const auto& [tilt, directions] : {std::pair{1.0, 2}, {1.5, 4}, {2.1, 6}, {2.9, 8}}) {
+      for (int i = 0; i < directions; ++i) {
+        const AffineView view =
+            make_view(levels[0].width, levels[0].height, scale, tilt, kPi * i / directions,
+                      random.uniform(0.0, 2 * kPi), kMargin);
+        add_candidates(levels, view, candidates);
+      }
+    }
+  }
+  return candidates;
+}
+
+GrayPicture clutter(Random& random, int width, int height) {
+  GrayPicture picture;
+  picture.width = width;
+  picture.height = height;
+  picture.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 128);
+  for (int i = 0; i < width * height / 400; ++i) {
+    const int x0 = static_cast<int>(random.uniform(0, width));
+    const int y0 = static_cast<int>(random.uniform(0, height));
+    const int x1 = std::min(width, x0 + static_cast<int>(random.uniform(2, 24)));
+    const int y1 = std::min(height, y0 + static_cast<int>(random.uniform(2, 24)));
+    const auto grey = static_cast<std::uint8_t>(random.uniform(0, 256));
+    for (int y = y0; y < y1; ++y) {
+      std::fill_n(picture.pixels.begin() + static_cast<std::ptrdiff_t>(y) * width + x0, x1 - x0,
+                  grey);
+    }
+  }
+  return picture;
+}
+
+/// What a camera adds: other light and noise.
+void disturb(Random& random, GrayPicture& picture) {
+  const double gain = random.uniform(0.6, 1.25);
+  const double bias = random.uniform(-20.0, 20.0);
+  for (std::uint8_t& grey : picture.pixels) {
+    const double seen = gain * grey + bias + 3.0 * random.normal();
+    grey = static_cast<std::uint8_t>(std::clamp(seen + 0.5, 0.0, 255.0));
+  }
+}
+
+/// Candidates by squares of the pattern, so that a trial's feature meets only its neighbours.
+class Grid {
+ public:
+  Grid(const GrayImage& pattern, const std::vector<Candidate>& candidates)
+      : columns_(pattern.width / kSquare + 1),
+        cells_(static_cast<std::size_t>(columns_ * (pattern.height / kSquare + 1))) {
+    for (std::uint32_t i = 0; i < candidates.size(); ++i) {
+      cells_[index(square(candidates[i].x), square(candidates[i].y))].push_back(i);
+    }
+  }
+  template <class Visit>
+  void near(double x, double y, double radius, Visit&& visit) const {
+    const int rows = static_cast<int>(cells_.size()) / columns_;
+    for (int row = std::max(0, square(y - radius)); row <= std::min(rows - 1, square(y + radius));
+         ++row) {
+      for (int column = std::max(0, square(x - radius));
+           column <= std::min(columns_ - 1, square(x + radius)); ++column) {
+        for (const std::uint32_t i : cells_[index(column, row)]) visit(i);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kSquare = 4;
+  static int square(double value) { return static_cast<int>(std::floor((value + 0.5) / kSquare)); }
+  [[nodiscard]] std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row * columns_ + column);
+  }
+  int columns_;
+  std::vector<std::vector<std::uint32_t>> cells_;
+};
+
+void run_trial(const std::vector<GrayPicture>& levels, Random& random, const Grid& grid,
+               const std::vector<Candidate>& candidates, Trials& trials) {
+  const double scale = std::exp(random.uniform(std::log(0.3), std::log(2.0)));
+  const double tilt = 1.0 / std::cos(random.uniform(0.0, 70.0) * kPi / 180.0);
+  const AffineView view =
+      make_view(levels[0].width, levels[0].height, scale, tilt, random.uniform(0.0, kPi),
+                random.uniform(0.0, 2 * kPi), kMargin + 8);
+  const GrayPicture background = clutter(random, view.width, view.height);
+  GrayPicture picture = render_view(levels, view, &background);
+  disturb(random, picture);
+  const auto describer = LoopDescriber::create(picture.width, picture.height, LoopDetectOptions{});
+  describer->set_frame(picture.view());
+  const double mean_scale = scale / std::sqrt(tilt);
+  for (const LoopFeature& feature : describer->features()) {
+    const auto place =
+        to_pattern(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
+    if (!within(levels[0].view(), place)) continue;
+    const auto id = static_cast<std::uint32_t>(trials.view_of.size());
+    trials.view_of.push_back(trials.views);
+    const double radius = std::min(kNear * (1 << feature.level) / mean_scale, 16.0);
+    grid.near(place[0], place[1], radius, [&](std::uint32_t i) {
+      const Candidate& candidate = candidates[i];
+      const double dx = candidate.x - place[0];
+      const double dy = candidate.y - place[1];
+      if (candidate.dark != feature.dark || dx * dx + dy * dy > radius * radius) return;
+      const int bits = distance(candidate.code, feature.code);
+      if (bits > kRepeats) return;
+      trials.hits[i].push_back({id, static_cast<float>(kRepeats + 8 - bits) / (kRepeats + 8)});
+    });
+  }
+  ++trials.views;
+}
+
+/// Greedy cover: each step takes the candidate that adds most to the trials' matches, where a view
+/// that has many already counts less. Gains only fall, so stale ones are recomputed lazily.
+std::vector<std::uint32_t> choose(const Trials& trials, std::uint32_t count) {
+  std::vector<float> best(trials.view_of.size(), 0.0f);
+  std::vector<double> have(trials.views, 0.0);
+  const auto gain = [&](std::uint32_t i) {
+    double sum = 0.0;
+    for (const Hit& hit : trials.hits[i]) {
+      const double more = static_cast<double>(hit.value - best[hit.feature]);
+      if (more > 0) sum += more / (1.0 + have[trials.view_of[hit.feature]] / kEnough);
+    }
+    return sum;
+  };
+  using Entry = std::pair<double, std::int64_t>;  // gain, minus the index: ties go to the first
+  std::priority_queue<Entry> queue;
+  for (std::uint32_t i = 0; i < trials.hits.size(); ++i) {
+    if (!trials.hits[i].empty()) queue.emplace(gain(i), -static_cast<std::int64_t>(i));
+  }
+  std::vector<std::uint32_t> chosen;
+  while (!queue.empty() && chosen.size() < count) {
+    const Entry top = queue.top();
+    queue.pop();
+    const auto i = static_cast<std::uint32_t>(-top.second);
+    const double now = gain(i);
+    if (now <= 0.0) continue;
+    if (!queue.empty() && now < queue.top().first) {
+      queue.emplace(now, top.second);
+      continue;
+    }
+    chosen.push_back(i);
+    for (const Hit& hit : trials.hits[i]) {
+      if (hit.value <= best[hit.feature]) continue;
+      have[trials.view_of[hit.feature]] += static_cast<double>(hit.value - best[hit.feature]);
+      best[hit.feature] = hit.value;
+    }
+  }
+  return chosen;
+}
+
+/// Bright ones first, each group filled up to whole blocks; answers the number of bright ones.
+std::uint32_t group(const std::vector<Candidate>& candidates, std::vector<std::uint32_t>& chosen) {
+  std::vector<std::uint32_t> ordered;
+  std::uint32_t bright = 0;
+  for (int dark = 0; dark < 2; ++dark) {
+    for (const std::uint32_t i : chosen) {
+      if (candidates[i].dark == dark) ordered.push_back(i);
+    }
+    while (!ordered.empty() && ordered.size() % kLoopBlockCodes != 0)
+      ordered.push_back(ordered.back());
+    if (dark == 0) bright = static_cast<std::uint32_t>(ordered.size());
+  }
+  chosen = std::move(ordered);
+  return bright;
+}
+
+LoopFeatureRecord feature_record(const Candidate& candidate) {
+  LoopFeatureRecord record{};
+  record.x = static_cast<std::uint16_t>(std::lround((candidate.x + 0.5) * 64));
+  record.y = static_cast<std::uint16_t>(std::lround((candidate.y + 0.5) * 64));
+  for (std::size_t k = 0; k < 4; ++k) {
+    record.warp[k] = static_cast<std::int16_t>(std::lround(candidate.warp[k] * 4096));
+  }
+  return record;
+}
+
+template <class T>
+void put(std::vector<std::byte>& bytes, std::uint64_t offset, const T& value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof value);
+}
+
+std::vector<std::byte> assemble(const std::vector<GrayPicture>& levels,
+                                const std::vector<Candidate>& candidates,
+                                std::vector<std::uint32_t> chosen,
+                                const std::vector<LoopPatchRecord>& patches) {
+  LoopRecordHeader header{};
+  header.describer_version = kLoopDescriberVersion;
+  header.bright_count = group(candidates, chosen);
+  header.feature_count = static_cast<std::uint32_t>(chosen.size());
+  header.patch_count = static_cast<std::uint32_t>(patches.size());
+  header.width = static_cast<std::uint32_t>(levels[0].width);
+  header.height = static_cast<std::uint32_t>(levels[0].height);
+  header.level_count = static_cast<std::uint32_t>(levels.size());
+  header.codes_offset = sizeof header;
+  header.features_offset = header.codes_offset + chosen.size() * kLoopCodeBytes;
+  header.patches_offset = header.features_offset + chosen.size() * sizeof(LoopFeatureRecord);
+  header.pixels_offset = header.patches_offset + patches.size() * sizeof(LoopPatchRecord);
+  std::vector<std::byte> bytes(header.pixels_offset);
+  put(bytes, 0, header);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const Candidate& candidate = candidates[chosen[i]];
+    const std::size_t block = i / kLoopBlockCodes;
+    for (std::size_t k = 0; k < kLoopCodeBytes; ++k) {
+      put(bytes,
+          header.codes_offset + (block * kLoopCodeBytes + k) * kLoopBlockCodes +
+              i % kLoopBlockCodes,
+          candidate.code[k]);
+    }
+    put(bytes, header.features_offset + i * sizeof(LoopFeatureRecord), feature_record(candidate));
+  }
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    put(bytes, header.patches_offset + i * sizeof(LoopPatchRecord), patches[i]);
+  }
+  for (const GrayPicture& level : levels) {
+    const auto pixels = std::as_bytes(std::span(level.pixels));
+    bytes.insert(bytes.end(), pixels.begin(), pixels.end());
+  }
+  return bytes;
+}
+
+}  // namespace
+
+Result<void> LoopBakeOptions::validate() const {
+  if (features < 32 || features > 32768 || trial_views < 1 || trial_views > 10000 ||
+      patches_per_level < 8 || patches_per_level > 256) {
+    return fail(ExitCode::kUsage, "pattern.loop-options", "", "an option is out of its range",
+                "features 32 to 32768, trial views 1 to 10000, patches 8 to 256");
+  }
+  return {};
+}
+
+Result<std::vector<std::byte>> bake_loop_record(const GrayImage& pattern,
+                                                const LoopBakeOptions& options) {
+  if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
+  if (pattern.width < 32 || pattern.height < 32 || pattern.width > kLargestSide ||
+      pattern.height > kLargestSide) {
+    return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
+                "the picture is smaller than 32 or larger than 1023 pixels on a side",
+                "give another size");
+  }
+  const std::vector<GrayPicture> levels = halved(pattern);
+  const std::vector<Candidate> candidates = find_candidates(levels);
+  const Grid grid(pattern, candidates);
+  Trials trials;
+  trials.hits.resize(candidates.size());
+  Random random(2);
+  for (std::uint32_t i = 0; i < options.trial_views; ++i) {
+    run_trial(levels, random, grid, candidates, trials);
+  }
+  const std::vector<std::uint32_t> chosen = choose(trials, options.features);
+  if (chosen.size() < 8) {
+    return fail(ExitCode::kInvalidInput, "pattern.no-features", "",
+                "fewer than 8 features of the picture repeat from view to view",
+                "take a picture with more texture");
+  }
+  return assemble(levels, candidates, chosen, choose_patches(levels, options.patches_per_level));
+}
+
+}  // namespace modar

@@ -1,0 +1,27 @@
+// The pattern's record for our own pose loop: many rendered views, the descriptors that repeat
+// best, and patches for tracking.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "formats/error.hpp"
+#include "modar/image.hpp"
+
+namespace modar {
+
+struct LoopBakeOptions {
+  std::uint32_t features = 3000;         ///< descriptors kept, at most
+  std::uint32_t trial_views = 240;       ///< random renderings that show which ones repeat
+  std::uint32_t patches_per_level = 64;  ///< at most
+  [[nodiscard]] Result<void> validate() const;
+};
+
+/// The bytes of a kLoopRecordSection. pattern: 8-bit grey, at most 1023 pixels a side. The same
+/// picture gives the same bytes on every machine.
+/// Errors: kInvalidInput "pattern.loop-size"; "pattern.no-features" where nothing repeats.
+Result<std::vector<std::byte>> bake_loop_record(const GrayImage& pattern,
+                                                const LoopBakeOptions& options);
+
+}  // namespace modar

@@ -1,0 +1,60 @@
+// Reads pictures of patterns, turns them grey and brings them to size.
+#include "bake/pattern/pattern_picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+namespace modar {
+namespace {
+
+// The article's patterns are 245 to 717 pixels on a side. Larger pictures only move the scales at
+// which features are found away from those at which a camera sees the pattern.
+constexpr int kLargestSide = 720;
+
+}  // namespace
+
+GrayPicture grey_of(const RgbaImage& image) {
+  GrayPicture grey;
+  grey.width = static_cast<int>(image.width);
+  grey.height = static_cast<int>(image.height);
+  grey.pixels.reserve(image.pixels.size() / 4);
+  for (std::size_t i = 0; i + 3 < image.pixels.size(); i += 4) {
+    const std::uint8_t* p = image.pixels.data() + i;
+    // In 16-bit fixed point: the same bytes on every machine.
+    const std::uint32_t luma = (19595u * p[0] + 38470u * p[1] + 7471u * p[2] + 32768u) >> 16;
+    grey.pixels.push_back(
+        static_cast<std::uint8_t>((luma * p[3] + 255u * (255u - p[3]) + 127u) / 255u));
+  }
+  return grey;
+}
+
+Result<GrayPicture> load_grey(const std::string& path) {
+  const auto image = read_image(path);
+  if (!image) return tl::unexpected(image.error());
+  return grey_of(*image);
+}
+
+Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
+  auto grey = load_grey(path);
+  if (!grey) return grey;
+  const int longest = std::max(grey->width, grey->height);
+  shrunk = longest > kLargestSide;
+  if (!shrunk) return grey;
+  try {
+    const double scale = static_cast<double>(kLargestSide) / longest;
+    const cv::Mat large(grey->height, grey->width, CV_8UC1, grey->pixels.data());
+    GrayPicture out;
+    out.width = std::max(1, static_cast<int>(std::lround(grey->width * scale)));
+    out.height = std::max(1, static_cast<int>(std::lround(grey->height * scale)));
+    out.pixels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+    cv::Mat small(out.height, out.width, CV_8UC1, out.pixels.data());
+    cv::resize(large, small, small.size(), 0, 0, cv::INTER_AREA);
+    return out;
+  } catch (const std::exception& thrown) {
+    return fail(ExitCode::kInternal, "pattern.opencv", path, thrown.what(), "report this as a bug");
+  }
+}
+
+}  // namespace modar

@@ -1,0 +1,19 @@
+// A pattern's picture as everything in this folder sees it: grey, and no larger than is useful.
+#pragma once
+
+#include <string>
+
+#include "bake/pattern/view_render.hpp"
+#include "bake/texture/etc1_texture.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// Grey as cameras deliver it (Rec. 601); what is transparent shows white paper.
+GrayPicture grey_of(const RgbaImage& image);
+/// Reads an image file as grey. Errors: those of read_image().
+Result<GrayPicture> load_grey(const std::string& path);
+/// The same, its longer side at most 720 pixels. shrunk: whether it was made smaller.
+Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
+
+}  // namespace modar

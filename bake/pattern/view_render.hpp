@@ -1,0 +1,53 @@
+// Affine views of a picture, anti-aliased, for the bake of patterns. Plain arithmetic, no library.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "modar/image.hpp"
+
+namespace modar {
+
+/// A repeatable sequence (SplitMix64).
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed) {}
+  std::uint64_t next();
+  double uniform(double low, double high);
+  /// Mean 0, standard deviation 1 (sum of twelve uniforms).
+  double normal();
+
+ private:
+  std::uint64_t state_;
+};
+
+/// Picture pixels to view pixels: view = linear * picture + offset. Row by row.
+struct AffineView {
+  std::array<double, 4> linear{1, 0, 0, 1};
+  std::array<double, 2> offset{};
+  int width = 0;
+  int height = 0;
+};
+
+/// A view scaled by `scale`, compressed by `tilt` (>= 1) along `direction`, then rotated; angles in
+/// radians. It shows the whole picture with `margin` pixels around.
+AffineView make_view(int picture_width, int picture_height, double scale, double tilt,
+                     double direction, double rotation, int margin);
+
+struct GrayPicture {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> pixels;
+  [[nodiscard]] GrayImage view() const { return {pixels.data(), width, height, width}; }
+};
+
+/// The picture and its halves, down to a side of 8.
+std::vector<GrayPicture> halved(const GrayImage& picture);
+
+/// Renders a view. Outside of the picture: its border pixels where `background` is null, else the
+/// background (at least of the view's size).
+GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView& view,
+                        const GrayPicture* background);
+
+}  // namespace modar

@@ -1,0 +1,54 @@
+// What our own pose loop knows of a pattern: the section of type 258, owner: pattern, variant: 0.
+// bundle.md is the normative text. Numbers are little-endian, reserved fields are zero.
+#pragma once
+
+#include <cstdint>
+
+namespace modar {
+
+inline constexpr std::uint32_t kLoopRecordSection = 258;
+inline constexpr std::uint32_t kLoopBlockCodes = 32;  ///< codes in a block
+inline constexpr std::uint32_t kLoopCodeBytes = 32;   ///< 256 bits
+inline constexpr std::uint32_t kMaxLoopFeatures = 65536;
+inline constexpr std::uint32_t kMaxLoopPatches = 4096;
+inline constexpr std::uint32_t kMaxLoopImageLevels = 8;
+
+/// Start of the section. Offsets count from the start of the section.
+struct LoopRecordHeader {
+  std::uint32_t describer_version;  ///< kLoopDescriberVersion of the baker's runtime
+  std::uint32_t feature_count;  ///< a multiple of kLoopBlockCodes; the first bright_count are of
+  std::uint32_t bright_count;   ///< corners with a brighter arc; a multiple of it, too
+  std::uint32_t patch_count;
+  std::uint32_t width;  ///< of the pattern's image, 1 to 1023
+  std::uint32_t height;
+  std::uint32_t level_count;  ///< of the image: each level halves the one before, rounding down
+  std::uint32_t reserved0;
+  std::uint64_t features_offset;  ///< LoopFeatureRecord[feature_count]
+  std::uint64_t codes_offset;     ///< a multiple of 64; blocks of kLoopBlockCodes codes: byte 0 of
+                                  ///< all codes of the block, then byte 1, ...
+  std::uint64_t patches_offset;   ///< LoopPatchRecord[patch_count], by level
+  std::uint64_t pixels_offset;    ///< 8-bit grey levels, finest first, rows without padding
+  std::uint64_t reserved1[8];
+};
+static_assert(sizeof(LoopRecordHeader) == 128);
+
+/// A feature as some view of the pattern showed it. Groups are filled up to whole blocks by
+/// repeating their last feature.
+struct LoopFeatureRecord {
+  std::uint16_t x;  ///< of the pattern's image, from its left edge, in 1/64 pixels
+  std::uint16_t y;
+  /// Image pixels around the feature to pixels of the oriented patch, row by row, in 1/4096.
+  std::int16_t warp[4];
+};
+static_assert(sizeof(LoopFeatureRecord) == 12);
+
+/// A place whose texture holds a position well.
+struct LoopPatchRecord {
+  std::uint16_t x;  ///< of level 0, from its left edge, in 1/64 pixels
+  std::uint16_t y;
+  std::uint16_t level;  ///< of the image that the patch is cut from
+  std::uint16_t score;  ///< least eigenvalue of its gradient matrix, grey values a pixel, in 1/64
+};
+static_assert(sizeof(LoopPatchRecord) == 8);
+
+}  // namespace modar

@@ -1,0 +1,66 @@
+// Corners and binary codes of our own pose loop: the one function that describes frames on the
+// device and rendered views in the bake, so that the two cannot drift.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "modar/image.hpp"
+
+namespace modar {
+
+/// Names everything that a code depends on (tests, smoothing, orientation); a record baked under
+/// another number is refused.
+inline constexpr std::uint32_t kLoopDescriberVersion = 1;
+/// Levels of the dyadic pyramid on which features are looked for.
+inline constexpr int kLoopLevels = 4;
+/// Pixels from the border of a level within which no feature can be described.
+inline constexpr int kLoopBorder = 18;
+
+struct LoopDetectOptions {
+  int threshold = 14;       ///< grey values; lower finds more corners and more noise
+  int cell = 64;            ///< pixels of a level; features are spread over such squares
+  int per_cell = 12;        ///< most features of a cell, the strongest
+  int max_features = 1000;  ///< most features of a frame, the strongest
+};
+
+struct LoopFeature {
+  float x = 0;  ///< pixels of the frame
+  float y = 0;
+  float cosine = 1;  ///< orientation: direction of the patch's centroid
+  float sine = 0;
+  std::uint8_t level = 0;  ///< found in the frame halved that many times
+  std::uint8_t dark = 0;   ///< 1: the arc of the corner is darker than its centre
+  std::uint8_t score = 0;  ///< FAST score
+  std::uint8_t reserved = 0;
+  std::array<std::uint8_t, 32> code{};
+};
+
+/// Holds the buffers for frames of one size; allocates nothing after create().
+class LoopDescriber {
+ public:
+  /// width, height: 1 to 16384.
+  static std::unique_ptr<LoopDescriber> create(int width, int height,
+                                               const LoopDetectOptions& options);
+  LoopDescriber(const LoopDescriber&) = delete;
+  LoopDescriber& operator=(const LoopDescriber&) = delete;
+  ~LoopDescriber();
+
+  /// Builds the pyramid of a frame of the size of create(). The frame's pixels must stay until the
+  /// next call: level 0 is the frame itself.
+  void set_frame(const GrayImage& frame);
+  /// The frame, halved again and again (2x2 means) down to a side of 16 or kLoopLevels + 2 levels.
+  /// Pixel (x, y) of level l is centred at ((x + 0.5) * 2^l - 0.5, ...) of the frame.
+  [[nodiscard]] std::span<const GrayImage> pyramid() const;
+  /// Finds and describes the features of the frame. Valid until the next call.
+  std::span<const LoopFeature> features();
+
+ private:
+  struct State;
+  explicit LoopDescriber(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace modar

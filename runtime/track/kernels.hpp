@@ -1,0 +1,47 @@
+// The integer loops over pixels and bits that take most of a frame's time, one table a SIMD level.
+// All levels give the same bits: the loops hold integers only.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace modar::loop {
+
+inline constexpr int kSlack = 64;       ///< elements past a range that kernels may read or write
+inline constexpr int kBlockCodes = 32;  ///< codes in a block; byte k of all of them lies together
+inline constexpr int kCodeBytes = 32;   ///< 256 bits
+
+struct Kernels {
+  const char* name;
+  /// out[i] = mean of the 2x2 pixels at 2 * i, rounded. Reads 2 * count pixels of both rows, no
+  /// more.
+  void (*halve_row)(const std::uint8_t* top, const std::uint8_t* bottom, std::uint8_t* out,
+                    int count);
+  /// Vertical binomial 1 4 6 4 1 of five rows; reads and writes `count` elements, no more.
+  void (*blur_columns)(const std::uint8_t* const* rows, std::uint16_t* out, int count);
+  /// Horizontal binomial of that, back to pixels: out[i] from in[i-2] to in[i+2].
+  /// in[-2] to in[count + kSlack] are readable, out to count + kSlack writable.
+  void (*blur_row)(const std::uint16_t* in, std::uint8_t* out, int count);
+  /// FAST-9 scores of `count` pixels from `pixels` on: the greatest threshold at which the pixel is
+  /// still a corner, 0 where that is below `threshold`. bright[i] is the score of brighter arcs
+  /// alone. Rows three above to three below, and kSlack past the range, are readable.
+  void (*corner_scores)(const std::uint8_t* pixels, std::ptrdiff_t stride, int threshold, int count,
+                        std::uint8_t* bright, std::uint8_t* score);
+  /// peak[i] = row[i] where that is a maximum of its 3x3 neighbours (of equal ones the first), else
+  /// 0.
+  void (*peaks)(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below,
+                int count, std::uint8_t* peak);
+  /// Hamming distances (at most 255) of a code to blocks of kBlockCodes; answers the smallest.
+  /// Blocks none of whose codes lies within `reach` over their first 16 bytes answer 255
+  /// throughout.
+  int (*distances)(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t block_count,
+                   int reach, std::uint8_t* out);
+};
+
+/// The best level that this processor has.
+const Kernels& kernels();
+/// Every level that this processor has, best last.
+std::span<const Kernels> all_kernels();
+
+}  // namespace modar::loop

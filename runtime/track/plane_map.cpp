@@ -1,0 +1,120 @@
+// Plane maps of poses and homographies, and the pose that explains points best.
+#include "plane_map.hpp"
+
+#include <cmath>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace modar::loop {
+namespace {
+
+constexpr double kSmallestArea = 300.0;  // square pixels
+
+double root_mean_square(const Camera& camera, const Pose& pose, std::span<const glm::dvec2> world,
+                        std::span<const glm::dvec2> ideal) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < world.size(); ++i) {
+    const glm::dvec3 p = pose.rotation * glm::dvec3(world[i], 0.0) + pose.translation;
+    const glm::dvec2 seen{camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
+    const glm::dvec2 miss = seen - ideal[i];
+    sum += glm::dot(miss, miss);
+  }
+  return std::sqrt(sum / static_cast<double>(world.size()));
+}
+
+/// The pose whose plane leans the other way about the line of sight to the pattern's centre.
+Pose mirrored(const Pose& pose) {
+  const glm::dvec3 sight = glm::normalize(pose.translation);
+  const glm::dvec3 normal = pose.rotation[2];
+  const glm::dvec3 axis = glm::cross(normal, sight);
+  const double sine = glm::length(axis);
+  if (sine < 1e-9) return pose;
+  // The face looks against the line of sight: turn the normal through it to the other side.
+  const double angle = std::atan2(sine, -glm::dot(normal, sight));
+  Pose other = pose;
+  other.rotation = rotation_matrix(-2.0 * angle / sine * axis) * pose.rotation;
+  return other;
+}
+
+}  // namespace
+
+glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& ahead) const {
+  const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);
+  ahead = p.z > 1e-12;
+  if (!ahead) return {0.0, 0.0};
+  const glm::dvec2 ideal = glm::dvec2(p) / p.z;
+  if (lens == nullptr) return ideal;
+  return project(*lens, {(ideal.x - lens->cx) / lens->fx, (ideal.y - lens->cy) / lens->fy, 1.0});
+}
+
+glm::dmat2 PlaneMap::derivative(glm::dvec2 pixel) const {
+  const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);
+  const double inverse = 1.0 / p.z;
+  const glm::dvec2 at = glm::dvec2(p) * inverse;
+  glm::dmat2 d;
+  d[0] = (glm::dvec2(homography[0]) - at * homography[0].z) * inverse;
+  d[1] = (glm::dvec2(homography[1]) - at * homography[1].z) * inverse;
+  return d;
+}
+
+const Camera* bending(const Camera& camera) {
+  for (const double k : camera.distortion) {
+    if (k != 0.0) return &camera;
+  }
+  return nullptr;
+}
+
+PlaneMap map_of_pose(const LoopPattern& pattern, const Camera& camera, const Pose& pose) {
+  glm::dmat3 k(1.0);
+  k[0][0] = camera.fx;
+  k[1][1] = camera.fy;
+  k[2] = {camera.cx, camera.cy, 1.0};
+  glm::dmat3 plane = pose.rotation;
+  plane[2] = pose.translation;
+  return {k * plane * pattern.world_from_pixels(), bending(camera)};
+}
+
+bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
+                 std::array<glm::dvec2, 4>& corners) {
+  const double right = pattern.width() - 0.5;
+  const double bottom = pattern.height() - 0.5;
+  const std::array<glm::dvec2, 4> image = {glm::dvec2{-0.5, -0.5}, glm::dvec2{right, -0.5},
+                                           glm::dvec2{right, bottom}, glm::dvec2{-0.5, bottom}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    bool ahead = false;
+    corners[i] = map.at(image[i], ahead);
+    if (!ahead || !std::isfinite(corners[i].x) || !std::isfinite(corners[i].y)) return false;
+  }
+  return true;
+}
+
+bool plausible(const std::array<glm::dvec2, 4>& corners) {
+  double area = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 a = corners[i];
+    const glm::dvec2 b = corners[(i + 1) % 4];
+    const glm::dvec2 c = corners[(i + 2) % 4];
+    // y points down: the order of the corners is clockwise on the screen.
+    if (!((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) > 0.0)) return false;
+    area += 0.5 * (a.x * b.y - b.x * a.y);
+  }
+  return area > kSmallestArea;
+}
+
+bool fit_pose(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
+              std::span<const glm::dvec2> world, std::span<const glm::dvec2> ideal,
+              FittedPose& fitted) {
+  const auto start =
+      pose_from_homography(camera, homography * glm::inverse(pattern.world_from_pixels()));
+  if (!start) return false;
+  fitted.pose = refine_pose(camera, world, ideal, *start);
+  fitted.rms = root_mean_square(camera, fitted.pose, world, ideal);
+  const Pose other = refine_pose(camera, world, ideal, mirrored(fitted.pose));
+  const double other_rms = root_mean_square(camera, other, world, ideal);
+  if (other_rms < fitted.rms) fitted = {other, other_rms};
+  // The plane's face, not its back, must look at the camera.
+  return glm::dot(fitted.pose.rotation[2], fitted.pose.translation) < 0.0;
+}
+
+}  // namespace modar::loop

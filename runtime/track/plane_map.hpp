@@ -1,0 +1,52 @@
+// From a pattern's pixels to the frame's: a homography and, where the lens bends, its distortion.
+// Internal to runtime/track.
+#pragma once
+
+#include <array>
+
+#include <glm/mat2x2.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+
+#include "loop_pattern.hpp"
+#include "modar/camera.hpp"
+#include "modar/pose.hpp"
+
+namespace modar::loop {
+
+/// homography: pattern pixels to ideal pixels (of a pinhole without distortion).
+struct PlaneMap {
+  glm::dmat3 homography{1.0};
+  const Camera* lens = nullptr;  ///< null where it does not bend
+
+  /// Frame pixel of a pattern pixel; `ahead` is false where the point lies behind the camera.
+  [[nodiscard]] glm::dvec2 at(glm::dvec2 pixel, bool& ahead) const;
+  /// Its derivative by the pattern pixel (columns), the lens taken as straight.
+  [[nodiscard]] glm::dmat2 derivative(glm::dvec2 pixel) const;
+};
+
+/// `camera` where its lens bends, else null.
+const Camera* bending(const Camera& camera);
+
+PlaneMap map_of_pose(const LoopPattern& pattern, const Camera& camera, const Pose& pose);
+
+/// Corners in the order of Sighting; false where one lies behind the camera.
+bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
+                 std::array<glm::dvec2, 4>& corners);
+
+/// False where no camera before the plane's face sees the pattern so: mirrored, bent over itself,
+/// or smaller than a thumbnail.
+bool plausible(const std::array<glm::dvec2, 4>& corners);
+
+/// Poses that explain the points, the best first: from the homography, and its mirror image about
+/// the line of sight where that explains them as well (Collins & Bartoli, "Infinitesimal
+/// plane-based pose estimation", 2014, discuss the two). Refined over all points. rms: pixels.
+struct FittedPose {
+  Pose pose;
+  double rms = 0;
+};
+bool fit_pose(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
+              std::span<const glm::dvec2> world, std::span<const glm::dvec2> ideal,
+              FittedPose& fitted);
+
+}  // namespace modar::loop

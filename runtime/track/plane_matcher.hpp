@@ -1,0 +1,65 @@
+// From a frame's features to the homography of one pattern. Internal to runtime/track.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <glm/mat2x2.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+
+#include "loop_pattern.hpp"
+#include "modar/camera.hpp"
+#include "modar/loop_features.hpp"
+
+namespace modar::loop {
+
+/// A frame's feature and the pattern's that it looks like, with the local affine map that the two
+/// orientations and scales imply.
+struct PlaneMatch {
+  glm::dvec2 pattern{};  ///< pixels of the pattern's image
+  glm::dvec2 ideal{};    ///< undistorted frame pixels
+  glm::dmat2 affine{};   ///< pattern pixels to frame pixels, around the feature
+  double sigma = 1;      ///< frame pixels that a pixel of its level stands for
+  int distance = 0;      ///< bits
+};
+
+struct PlaneFind {
+  int matches = 0;
+  int inliers = 0;
+  glm::dmat3 homography{1.0};  ///< pattern pixels to ideal pixels
+};
+
+/// Buffers for the search; allocates nothing after construction.
+class PlaneMatcher {
+ public:
+  PlaneMatcher(const Camera& camera, std::size_t most_features, std::size_t most_codes);
+  /// Answers how far it came; inliers are 0 where there is no homography.
+  PlaneFind find(const LoopPattern& pattern, std::span<const LoopFeature> features);
+  /// World and ideal points of the inliers of the last find().
+  [[nodiscard]] std::span<const glm::dvec2> inlier_world() const { return inlier_world_; }
+  [[nodiscard]] std::span<const glm::dvec2> inlier_ideal() const { return inlier_ideal_; }
+
+ private:
+  void match(const LoopPattern& pattern, std::span<const LoopFeature> features);
+  bool unique(const LoopPattern& pattern, std::size_t first, std::size_t count, int best,
+              std::size_t& at) const;
+  std::size_t support(const PlaneMatch& hypothesis, std::vector<std::uint8_t>* mask) const;
+  std::size_t fit(const PlaneMatch& hypothesis, glm::dmat3& homography);
+  bool fit_homography(std::span<const std::uint8_t> mask, glm::dmat3& homography) const;
+  bool fit_affine(std::span<const std::uint8_t> mask, glm::dmat3& homography) const;
+  std::size_t collect(const glm::dmat3& homography, double reach,
+                      std::vector<std::uint8_t>& mask) const;
+
+  Camera camera_;
+  std::vector<PlaneMatch> matches_;
+  std::vector<std::uint8_t> distances_;
+  std::vector<std::uint8_t> mask_;
+  std::vector<std::uint8_t> explained_;
+  std::vector<std::uint8_t> supporters_;
+  std::vector<std::uint32_t> order_;
+  std::vector<glm::dvec2> inlier_world_;
+  std::vector<glm::dvec2> inlier_ideal_;
+};
+
+}  // namespace modar::loop

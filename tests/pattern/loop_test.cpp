@@ -1,0 +1,238 @@
+// Our own pose loop from end to end: a record baked from a picture, frames rendered by the bench's
+// renderer, and input that means harm.
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+
+#include "bake/pattern/loop_bake.hpp"
+#include "bake/pattern/pose_scene.hpp"
+#include "formats/bundle_writer.hpp"
+#include "formats/loop_record.hpp"
+#include "modar/pose_loop.hpp"
+#include "tests/track/synthetic.hpp"
+
+namespace modar {
+namespace {
+
+const cv::Mat& picture() {
+  static const cv::Mat kPicture = test::textured_picture(300, 240, 31);
+  return kPicture;
+}
+
+const std::vector<std::byte>& record() {
+  static const std::vector<std::byte> kRecord = [] {
+    LoopBakeOptions options;
+    options.features = 1200;
+    options.trial_views = 40;
+    auto baked = bake_loop_record(test::gray(picture()), options);
+    EXPECT_TRUE(baked) << to_line(baked.error());
+    return *baked;
+  }();
+  return kRecord;
+}
+
+std::vector<std::byte> bundle_with(std::vector<std::byte> section) {
+  BundleContent content;
+  PatternRecord pattern{};
+  pattern.name = content.intern("p");
+  pattern.width = 300;
+  pattern.height = 240;
+  pattern.half_width = 1.0f;
+  pattern.half_height = 0.8f;
+  pattern.score = -1;
+  content.patterns.push_back(pattern);
+  content.features.emplace_back();
+  ExtraSection extra;
+  extra.type = kLoopRecordSection;
+  extra.owner = 0;
+  extra.bytes = std::move(section);
+  content.extra.push_back(std::move(extra));
+  return test::bundle_bytes(content);
+}
+
+double worst_corner(const Sighting& sighting, const SceneFrame& scene) {
+  double worst = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    worst = std::max(worst, glm::length(sighting.corners[i] - scene.corners[i]));
+  }
+  return worst;
+}
+
+GrayPicture plain(int width, int height, std::uint8_t grey) {
+  return {width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height), grey)};
+}
+
+GrayPicture clutter(int width, int height, std::uint32_t seed) {
+  const cv::Mat drawn = test::textured_picture(width, height, seed);
+  return {width, height, {drawn.datastart, drawn.dataend}};
+}
+
+TEST(PoseLoop, FindsThePatternWhereItIs) {
+  const Camera camera = default_camera(640, 480);
+  const auto bytes = bundle_with(record());
+  PoseLoopOptions options;
+  options.track = false;
+  auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera, options);
+  ASSERT_TRUE(loop) << to_line(loop.error());
+  SceneBand band;
+  band.area_low = 0.5;
+  band.area_high = 2.0;
+  band.tilt_high = 45;
+  Random random(4);
+  int found = 0;
+  constexpr int kFrames = 20;
+  for (int i = 0; i < kFrames; ++i) {
+    const Pose pose = draw_pose(band, test::gray(picture()), camera, random);
+    const SceneFrame scene =
+        render_scene(test::gray(picture()), camera, pose,
+                     clutter(640, 480, static_cast<std::uint32_t>(100 + i)), band, random);
+    const auto result = (*loop)->step(scene.picture.view());
+    ASSERT_TRUE(result);
+    if (result->visible.empty()) continue;
+    ++found;
+    EXPECT_LT(worst_corner(result->visible[0], scene), 2.0) << i;
+    EXPECT_NEAR(result->visible[0].pose.translation.z, pose.translation.z,
+                0.02 * pose.translation.z);
+  }
+  EXPECT_GE(found, kFrames - 1);
+}
+
+TEST(PoseLoop, TracksAPathAndTellsWhenThePatternIsGone) {
+  const Camera camera = default_camera(640, 480);
+  const auto bytes = bundle_with(record());
+  auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
+  ASSERT_TRUE(loop);
+  SceneBand band;
+  Random random(5);
+  const GrayPicture background = clutter(640, 480, 77);
+  TrackResult result;
+  const auto pose_at = [](int i) {
+    const test::View view =
+        test::look_at(2.6 + 0.02 * i, 10 + 0.5 * i, 20, 3.0 * i, 0.02 * i, -0.01 * i);
+    Pose pose;
+    for (int row = 0; row < 3; ++row) {
+      pose.translation[row] = view.translation[row];
+      for (int column = 0; column < 3; ++column)
+        pose.rotation[column][row] = view.rotation(row, column);
+    }
+    return pose;
+  };
+  for (int i = 0; i < 20; ++i) {
+    const SceneFrame scene =
+        render_scene(test::gray(picture()), camera, pose_at(i), background, band, random);
+    ASSERT_TRUE((*loop)->step(scene.picture.view(), result));
+    ASSERT_EQ(result.visible.size(), 1u) << i << " " << to_string(result.reason);
+    EXPECT_LT(worst_corner(result.visible[0], scene), 1.0) << i;
+    // Once it is held, nothing searches for it.
+    if (i > 0) {
+      EXPECT_EQ(result.features, 0);
+    }
+  }
+  ASSERT_TRUE((*loop)->step(background.view(), result));
+  EXPECT_TRUE(result.visible.empty());
+  EXPECT_NE(result.reason, Reason::kVisible);
+  const GrayPicture blank = plain(640, 480, 120);
+  (*loop)->reset();
+  ASSERT_TRUE((*loop)->step(blank.view(), result));
+  EXPECT_EQ(result.reason, Reason::kNoFeatures);
+}
+
+TEST(PoseLoop, NeverSeesThePatternInClutter) {
+  const Camera camera = default_camera(640, 480);
+  const auto bytes = bundle_with(record());
+  auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
+  ASSERT_TRUE(loop);
+  for (std::uint32_t i = 0; i < 30; ++i) {
+    const GrayPicture frame = clutter(640, 480, 1000 + i);
+    const auto result = (*loop)->step(frame.view());
+    ASSERT_TRUE(result);
+    EXPECT_TRUE(result->visible.empty()) << i;
+  }
+}
+
+TEST(PoseLoop, FramesOfAnySizeStrideAndContentDoNoHarm) {
+  const auto bytes = bundle_with(record());
+  cv::RNG random(6);
+  for (const cv::Size& size :
+       {cv::Size(1, 1), {5, 300}, {300, 5}, {36, 36}, {37, 37}, {63, 41}, {129, 97}}) {
+    auto loop =
+        PoseLoop::create(BundleView::open(bytes).value(), default_camera(size.width, size.height));
+    ASSERT_TRUE(loop);
+    const int stride = size.width + random.uniform(0, 9);
+    // Exactly as many bytes as a frame has: the sanitizer watches the ends.
+    std::vector<std::uint8_t> pixels(
+        static_cast<std::size_t>(stride * (size.height - 1) + size.width));
+    for (std::uint8_t& grey : pixels) grey = static_cast<std::uint8_t>(random.uniform(0, 256));
+    EXPECT_TRUE((*loop)->step({pixels.data(), size.width, size.height, stride}));
+    const GrayPicture flat = plain(size.width, size.height, 0);
+    EXPECT_TRUE((*loop)->step(flat.view()));
+    EXPECT_FALSE((*loop)->step({pixels.data(), size.width + 1, size.height, stride + 1}));
+  }
+}
+
+TEST(PoseLoop, BakesTheSameBytesTwice) {
+  LoopBakeOptions options;
+  options.features = 200;
+  options.trial_views = 8;
+  const auto first = bake_loop_record(test::gray(picture()), options);
+  const auto second = bake_loop_record(test::gray(picture()), options);
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(*first, *second);
+}
+
+TEST(PoseLoop, ABundleWithoutRecordsIsAnError) {
+  BundleContent content;
+  const auto bytes = test::bundle_bytes(content);
+  const auto loop = PoseLoop::create(BundleView::open(bytes).value(), default_camera(640, 480));
+  ASSERT_FALSE(loop);
+  EXPECT_EQ(loop.error().code, "tracker.no-patterns");
+}
+
+TEST(PoseLoop, RecordsCutShortOrOfAnotherVersionAreRefused) {
+  const Camera camera = default_camera(64, 64);
+  for (std::size_t size = 0; size < record().size(); size += size < 200 ? 1 : 4093) {
+    auto section = record();
+    section.resize(size);
+    const auto bytes = bundle_with(section);
+    EXPECT_FALSE(PoseLoop::create(BundleView::open(bytes).value(), camera)) << size;
+  }
+  auto other = record();
+  other[0] = std::byte{99};
+  const auto bytes = bundle_with(other);
+  const auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
+  ASSERT_FALSE(loop);
+  EXPECT_EQ(loop.error().code, "tracker.record-version");
+}
+
+// Whatever a damaged record says: it is refused, or the loop runs without touching what is not its
+// own.
+TEST(PoseLoop, DamagedRecordsDoNoHarm) {
+  const Camera camera = default_camera(320, 240);
+  SceneBand band;
+  Random random(8);
+  const Pose pose = draw_pose(band, test::gray(picture()), camera, random);
+  const SceneFrame scene =
+      render_scene(test::gray(picture()), camera, pose, clutter(320, 240, 3), band, random);
+  cv::RNG damage(9);
+  LoopRecordHeader header{};
+  std::memcpy(&header, record().data(), sizeof header);
+  for (int i = 0; i < 150; ++i) {
+    auto section = record();
+    const bool tables = i % 2 == 0;
+    const int last = tables ? static_cast<int>(header.pixels_offset) : 64;
+    for (int k = 0; k < (tables ? 200 : 2); ++k) {
+      const int at = damage.uniform(4, last);
+      section[static_cast<std::size_t>(at)] = static_cast<std::byte>(damage.uniform(0, 256));
+    }
+    const auto bytes = bundle_with(section);
+    auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
+    if (!loop) continue;
+    EXPECT_TRUE((*loop)->step(scene.picture.view()));
+    EXPECT_TRUE((*loop)->step(scene.picture.view()));
+  }
+}
+
+}  // namespace
+}  // namespace modar
