@@ -21,7 +21,7 @@ enum class Stage : std::uint8_t {
   kTrack,    ///< the whole of the vision thread's work
   kRender,   ///< draw calls and reading the picture back
   kSink,     ///< writing pictures
-  kLatency,  ///< from the complete frame to its picture
+  kLatency,  ///< from the complete frame to its picture; of files: vision and rendering
 };
 inline constexpr std::array<const char*, 10> kStageNames = {
     "read", "detect", "describe", "match", "homography",

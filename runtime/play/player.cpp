@@ -115,7 +115,10 @@ Result<bool> Player::show(const Job& job) {
   } else {
     screen_->present();
   }
-  report.at(Stage::kLatency) = ms_since(job.frame.arrived_ns);
+  // A file's frames wait for one another in the hand-off: that is no latency of anybody's.
+  report.at(Stage::kLatency) = setup_.source.live || options_.realtime
+                                   ? ms_since(job.frame.arrived_ns)
+                                   : job.track_ms + ms_since(before);
   const std::int64_t shown = now_ns();
   if (auto written = write_picture(report); !written) return tl::unexpected(written.error());
   report.at(Stage::kSink) = ms_since(shown);
@@ -210,6 +213,7 @@ Result<void> Player::write_qos(const FrameReport& report) {
     MemoryByKind memory = measure_memory(bundle_.bytes());
     memory.gpu_geometry = screen_->gpu_memory().geometry;
     memory.gpu_textures = screen_->gpu_memory().textures;
+    memory.gpu_batches = screen_->gpu_memory().batches;
     if (auto written = qos_->window(memory); !written) return written;
   }
   return qos_->add(report, names_);

@@ -70,6 +70,7 @@ void memory_of(Writer& writer, const MemoryByKind& memory) {
   count(writer, "bundle_resident", memory.bundle_resident);
   count(writer, "gpu_geometry", memory.gpu_geometry);
   count(writer, "gpu_textures", memory.gpu_textures);
+  count(writer, "gpu_batches", memory.gpu_batches);
   writer.EndObject();
 }
 

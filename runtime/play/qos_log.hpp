@@ -23,6 +23,7 @@ struct MemoryByKind {
   std::uint64_t bundle_resident = 0;  ///< of those, pages in memory
   std::uint64_t gpu_geometry = 0;
   std::uint64_t gpu_textures = 0;
+  std::uint64_t gpu_batches = 0;
 };
 
 /// Measures what the operating system tells; the GPU's part stays 0. mapped: the bundle's bytes.
