@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 
 namespace modar {
 namespace {
@@ -15,17 +16,79 @@ constexpr std::uint32_t kNoVertex = 0xFFFFFFFFu;
 
 }  // namespace
 
-void ChunkOrderer::link_triangles(std::span<const std::uint16_t> indices,
-                                  std::uint32_t vertex_count) {
-  live_.assign(vertex_count, 0);
+void ChunkOrderer::rank_vertices(std::span<const std::byte> vertices, std::uint32_t stride) {
+  const std::size_t count = vertices.size() / stride;
+  const std::size_t head_bytes = std::min<std::size_t>(stride, 8);
+  keys_.resize(count);
+  for (std::size_t v = 0; v < count; ++v) {
+    std::uint64_t head = 0;
+    for (std::size_t i = 0; i < head_bytes; ++i) {
+      head = head << 8 | std::to_integer<std::uint64_t>(vertices[v * stride + i]);
+    }
+    keys_[v] = {head, static_cast<std::uint32_t>(v)};
+  }
+  const auto compare = [&](const Key& a, const Key& b) {
+    return std::memcmp(vertices.data() + std::size_t{a.vertex} * stride,
+                       vertices.data() + std::size_t{b.vertex} * stride, stride);
+  };
+  std::sort(keys_.begin(), keys_.end(), [&](const Key& a, const Key& b) {
+    if (a.head != b.head) return a.head < b.head;
+    const int bytes = compare(a, b);
+    return bytes != 0 ? bytes < 0 : a.vertex < b.vertex;
+  });
+  rank_.resize(count);
+  vertex_of_rank_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i == 0 || keys_[i].head != keys_[i - 1].head || compare(keys_[i], keys_[i - 1]) != 0) {
+      vertex_of_rank_.push_back(static_cast<std::uint16_t>(keys_[i].vertex));
+    }
+    rank_[keys_[i].vertex] = static_cast<std::uint16_t>(vertex_of_rank_.size() - 1);
+  }
+  distinct_ = static_cast<std::uint32_t>(vertex_of_rank_.size());
+}
+
+/// Triangles over ranks, each from its lowest rank on, all sorted: by counting on the first corner,
+/// then by comparison in its few triangles.
+void ChunkOrderer::sort_triangles(std::span<std::uint16_t> indices) {
+  first_.assign(distinct_ + 1, 0);
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    std::uint16_t* t = indices.data() + i;
+    for (std::size_t c = 0; c < 3; ++c) t[c] = rank_[t[c]];
+    // Of equal lowest corners the one whose successors are lower comes first.
+    const auto from = [&](std::size_t c) {
+      return std::uint64_t{t[c]} << 32 | std::uint64_t{t[(c + 1) % 3]} << 16 | t[(c + 2) % 3];
+    };
+    const std::uint64_t least = std::min({from(0), from(1), from(2)});
+    for (std::size_t c = 0; c < 3; ++c) t[c] = static_cast<std::uint16_t>(least >> (32 - 16 * c));
+    ++first_[t[0] + std::size_t{1}];
+  }
+  for (std::uint32_t v = 0; v < distinct_; ++v) first_[v + 1] += first_[v];
+  triangles_.resize(indices.size() / 3);
+  new_of_old_.assign(first_.begin(), first_.end() - 1);  // the next free place of each vertex
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    triangles_[new_of_old_[indices[i]]++] =
+        std::uint64_t{indices[i + 1]} << 16 | std::uint64_t{indices[i + 2]};
+  }
+  for (std::uint32_t v = 0; v < distinct_; ++v) {
+    std::sort(triangles_.begin() + first_[v], triangles_.begin() + first_[v + 1]);
+    for (std::size_t t = first_[v]; t < first_[v + 1]; ++t) {
+      indices[3 * t] = static_cast<std::uint16_t>(v);
+      indices[3 * t + 1] = static_cast<std::uint16_t>(triangles_[t] >> 16);
+      indices[3 * t + 2] = static_cast<std::uint16_t>(triangles_[t]);
+    }
+  }
+}
+
+void ChunkOrderer::link_triangles(std::span<const std::uint16_t> indices) {
+  live_.assign(distinct_, 0);
   for (const std::uint16_t v : indices) ++live_[v];
-  first_.resize(vertex_count + 1);
+  first_.resize(distinct_ + 1);
   std::uint32_t sum = 0;
-  for (std::uint32_t v = 0; v < vertex_count; ++v) {
+  for (std::uint32_t v = 0; v < distinct_; ++v) {
     first_[v] = sum;
     sum += live_[v];
   }
-  first_[vertex_count] = sum;
+  first_[distinct_] = sum;
   around_.resize(indices.size());
   new_of_old_.assign(first_.begin(), first_.end() - 1);  // the next free place of each vertex
   for (std::size_t i = 0; i < indices.size(); ++i) {
@@ -36,7 +99,7 @@ void ChunkOrderer::link_triangles(std::span<const std::uint16_t> indices,
 /// The vertex to fan round next: of those just emitted the one that will still be in the cache when
 /// its triangles are out, the oldest such; else the latest seen that has triangles left; else the
 /// next in number.
-std::uint32_t ChunkOrderer::next_fan(std::uint32_t vertex_count, std::size_t ring_begin) {
+std::uint32_t ChunkOrderer::next_fan(std::size_t ring_begin) {
   std::uint32_t best = kNoVertex;
   std::uint32_t best_age = 0;
   for (std::size_t i = ring_begin; i < ordered_.size(); ++i) {
@@ -55,22 +118,21 @@ std::uint32_t ChunkOrderer::next_fan(std::uint32_t vertex_count, std::size_t rin
     recent_.pop_back();
     if (live_[v] != 0) return v;
   }
-  for (; cursor_ < vertex_count; ++cursor_) {
+  for (; cursor_ < distinct_; ++cursor_) {
     if (live_[cursor_] != 0) return cursor_;
   }
   return kNoVertex;
 }
 
-void ChunkOrderer::order_triangles(std::span<const std::uint16_t> indices,
-                                   std::uint32_t vertex_count) {
-  entered_.assign(vertex_count, 0);
+void ChunkOrderer::order_triangles(std::span<const std::uint16_t> indices) {
+  entered_.assign(distinct_, 0);
   done_.assign(indices.size() / 3, 0);
   recent_.clear();
   ordered_.clear();
   ordered_.reserve(indices.size());
   time_ = kCacheSize + 1;
   cursor_ = 0;
-  std::uint32_t fan = next_fan(vertex_count, 0);
+  std::uint32_t fan = next_fan(0);
   while (fan != kNoVertex) {
     const std::size_t ring_begin = ordered_.size();
     for (std::uint32_t k = first_[fan]; k < first_[fan + 1]; ++k) {
@@ -85,28 +147,35 @@ void ChunkOrderer::order_triangles(std::span<const std::uint16_t> indices,
         if (time_ - entered_[v] > kCacheSize) entered_[v] = time_++;
       }
     }
-    fan = next_fan(vertex_count, ring_begin);
+    fan = next_fan(ring_begin);
   }
 }
 
-std::span<const std::uint16_t> ChunkOrderer::order(std::span<std::uint16_t> indices,
-                                                   std::uint32_t vertex_count) {
-  link_triangles(indices, vertex_count);
-  order_triangles(indices, vertex_count);
-  new_of_old_.assign(vertex_count, kNoVertex);
+void ChunkOrderer::number_by_first_use(std::span<std::uint16_t> indices) {
+  new_of_old_.assign(distinct_, kNoVertex);
   old_of_new_.clear();
-  old_of_new_.reserve(vertex_count);
+  old_of_new_.reserve(distinct_);
   for (std::size_t i = 0; i < ordered_.size(); ++i) {
     const std::uint16_t v = ordered_[i];
     if (new_of_old_[v] == kNoVertex) {
       new_of_old_[v] = static_cast<std::uint32_t>(old_of_new_.size());
-      old_of_new_.push_back(v);
+      old_of_new_.push_back(vertex_of_rank_[v]);
     }
     indices[i] = static_cast<std::uint16_t>(new_of_old_[v]);
   }
-  for (std::uint32_t v = 0; v < vertex_count; ++v) {
-    if (new_of_old_[v] == kNoVertex) old_of_new_.push_back(static_cast<std::uint16_t>(v));
+  for (std::uint32_t v = 0; v < distinct_; ++v) {
+    if (new_of_old_[v] == kNoVertex) old_of_new_.push_back(vertex_of_rank_[v]);
   }
+}
+
+std::span<const std::uint16_t> ChunkOrderer::order(std::span<const std::byte> vertices,
+                                                   std::uint32_t stride,
+                                                   std::span<std::uint16_t> indices) {
+  rank_vertices(vertices, stride);
+  sort_triangles(indices);
+  link_triangles(indices);
+  order_triangles(indices);
+  number_by_first_use(indices);
   return old_of_new_;
 }
 

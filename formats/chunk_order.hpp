@@ -1,7 +1,8 @@
-// The order of triangles and vertices inside a chunk: a pure function of integers, so that baker
-// and installer agree on every processor and an order never has to travel.
+// The order of triangles and vertices inside a chunk: a pure integer function of the chunk's
+// content, so that baker and installer agree on every processor and an order never has to travel.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,23 +10,37 @@
 namespace modar {
 
 /// Puts chunks in order. Holds its scratch between chunks: memory grows to the largest one (about
-/// 30 bytes a triangle), then nothing is allocated.
+/// 40 bytes a triangle), then nothing is allocated.
 class ChunkOrderer {
  public:
-  /// Orders a chunk's triangles for a vertex cache, then its vertices by first use.
-  /// indices: 3 a triangle, each below vertex_count (at most 65536); on return the ordered
-  /// triangles, their indices counting in the new vertex order.
-  /// Returns the old number of each vertex in the new order, vertex_count entries (vertices that no
-  /// triangle uses come last, in their old order); valid until the next call.
-  /// The winding of each triangle stays. The result depends on nothing but the arguments.
-  std::span<const std::uint16_t> order(std::span<std::uint16_t> indices,
-                                       std::uint32_t vertex_count);
+  /// Merges vertices of equal bytes, orders the triangles for a vertex cache, then the vertices by
+  /// first use. The result depends on what the chunk *holds* and on nothing else: the same
+  /// triangles over the same vertices, in whatever order and from whichever corner they come, give
+  /// the same bytes. The winding of each triangle stays. vertices: vertex_count * stride bytes, at
+  /// most 65536 vertices. indices: 3 a triangle, each below vertex_count; on return the ordered
+  /// triangles, their indices counting in the new order. Returns an old number for each vertex of
+  /// the new order (vertices that no triangle uses come last, in the order of their bytes); valid
+  /// until the next call.
+  std::span<const std::uint16_t> order(std::span<const std::byte> vertices, std::uint32_t stride,
+                                       std::span<std::uint16_t> indices);
 
  private:
-  void link_triangles(std::span<const std::uint16_t> indices, std::uint32_t vertex_count);
-  void order_triangles(std::span<const std::uint16_t> indices, std::uint32_t vertex_count);
-  std::uint32_t next_fan(std::uint32_t vertex_count, std::size_t ring_begin);
+  void rank_vertices(std::span<const std::byte> vertices, std::uint32_t stride);
+  void sort_triangles(std::span<std::uint16_t> indices);
+  void link_triangles(std::span<const std::uint16_t> indices);
+  void order_triangles(std::span<const std::uint16_t> indices);
+  std::uint32_t next_fan(std::size_t ring_begin);
+  void number_by_first_use(std::span<std::uint16_t> indices);
 
+  struct Key {
+    std::uint64_t head;  // the first bytes of the vertex, compared as a number
+    std::uint32_t vertex;
+  };
+  std::vector<Key> keys_;
+  std::vector<std::uint16_t> rank_;            // of each old vertex: its place among distinct bytes
+  std::vector<std::uint16_t> vertex_of_rank_;  // the lowest old number with those bytes
+  std::vector<std::uint64_t> triangles_;       // canonical: lowest rank first, then sorted
+  std::uint32_t distinct_ = 0;
   std::vector<std::uint32_t> first_;    // of each vertex: where its triangles begin in around_
   std::vector<std::uint32_t> around_;   // triangles by vertex
   std::vector<std::uint32_t> live_;     // triangles of each vertex that are not out yet

@@ -1,12 +1,12 @@
-// Splits a mesh into chunks along a kd tree over its triangles, and puts each chunk in order.
+// Splits a mesh into chunks along a kd tree over its triangles.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include <glm/common.hpp>
 
 #include "bake/model/chunked_mesh.hpp"
-#include "formats/chunk_order.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -101,16 +101,13 @@ class ChunkBuilder {
         chunk.indices.push_back(static_cast<std::uint16_t>(local_[v]));
       }
     }
-    const auto order = orderer_.order(chunk.indices, static_cast<std::uint32_t>(used_.size()));
-    chunk.vertices.reserve(order.size());
-    for (const std::uint16_t old : order) chunk.vertices.push_back(used_[old]);
+    chunk.vertices = used_;
     forget_vertices();
   }
 
   const TriMesh& mesh_;
   std::uint32_t max_vertices_;
   std::vector<Chunk>& chunks_;
-  ChunkOrderer orderer_;
   std::vector<std::uint32_t> local_;  // of each vertex, kNoIndex outside the chunk at hand
   std::vector<std::uint32_t> used_;
   std::vector<std::pair<double, std::uint32_t>> keys_;

@@ -9,7 +9,7 @@
 namespace modar {
 
 /// One chunk: local vertex i is vertex `vertices[i]` of the TriMesh; triangles index `vertices`.
-/// Both are in their final order (vertex cache, then fetch).
+/// Triangles are in file order, vertices in that of their first use: pack() orders the final bytes.
 struct Chunk {
   std::uint32_t material = 0;
   std::vector<std::uint32_t> vertices;
@@ -26,8 +26,8 @@ struct ChunkOptions {
   [[nodiscard]] Result<void> validate() const;
 };
 
-/// Splits by material, then by a kd tree over triangle centres until every chunk fits; orders each
-/// chunk for the vertex cache and the vertex fetch. Takes the mesh over.
+/// Splits by material, then by a kd tree over triangle centres until every chunk fits.
+/// Takes the mesh over.
 Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& report);
 
 }  // namespace modar

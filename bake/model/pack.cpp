@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "bake/model/chunk_bounds.hpp"
 #include "bake/model/packed_mesh.hpp"
+#include "formats/chunk_order.hpp"
 #include "formats/quantise.hpp"
 
 namespace modar {
@@ -203,49 +205,52 @@ std::vector<bool> repeating_materials(const ChunkedMesh& chunked) {
   return repeats;
 }
 
-/// Vertices ahead of each chunk inside its range: chunks that follow each other share one range of
+/// Puts chunks in order and behind each other. Chunks that follow each other share one range of
 /// vertices, hence one set-up of attributes, as long as 16 bits reach all of it.
-struct VertexRange {
-  std::uint64_t first = 0;   ///< vertex of the model
-  std::uint32_t size = 0;    ///< of the whole range
-  std::uint32_t before = 0;  ///< of this chunk, inside the range
+class ChunkAppender {
+ public:
+  explicit ChunkAppender(PackedMesh& out) : out_(out) {}
+
+  /// vertices: as packed. indices: into them; put in order.
+  void append(std::span<const std::byte> vertices, std::vector<std::uint16_t> indices) {
+    const std::size_t stride = out_.layout.stride;
+    const auto order = orderer_.order(vertices, out_.layout.stride, indices);
+    if (range_size_ + order.size() > kMaxChunkVertices) close_range();
+    LevelRecord level{};
+    level.vertex_offset = range_begin_;
+    level.index_offset = out_.indices.size();
+    level.index_count = static_cast<std::uint32_t>(indices.size());
+    out_.levels.push_back(level);
+    for (std::uint16_t& index : indices) {
+      index = static_cast<std::uint16_t>(index + range_size_);
+    }
+    const auto bytes = std::as_bytes(std::span(indices));
+    out_.indices.insert(out_.indices.end(), bytes.begin(), bytes.end());
+    for (const std::uint16_t old : order) {
+      const auto vertex = vertices.subspan(old * stride, stride);
+      out_.vertices.insert(out_.vertices.end(), vertex.begin(), vertex.end());
+    }
+    range_size_ += static_cast<std::uint32_t>(order.size());
+    out_.record.vertex_count += order.size();
+    out_.record.triangle_count += indices.size() / 3;
+  }
+
+  /// States the size of the open range in its levels, and opens the next.
+  void close_range() {
+    for (; first_level_ < out_.levels.size(); ++first_level_) {
+      out_.levels[first_level_].vertex_count = range_size_;
+    }
+    range_begin_ = out_.vertices.size();
+    range_size_ = 0;
+  }
+
+ private:
+  PackedMesh& out_;
+  ChunkOrderer orderer_;
+  std::uint64_t range_begin_ = 0;  // bytes
+  std::uint32_t range_size_ = 0;   // vertices
+  std::size_t first_level_ = 0;    // of the open range
 };
-
-std::vector<VertexRange> share_ranges(const std::vector<Chunk>& chunks) {
-  std::vector<VertexRange> ranges(chunks.size());
-  std::uint64_t first = 0;
-  for (std::size_t i = 0; i < chunks.size();) {
-    std::uint32_t size = 0;
-    std::size_t end = i;
-    while (end < chunks.size() && size + chunks[end].vertices.size() <= kMaxChunkVertices) {
-      ranges[end].before = size;
-      size += static_cast<std::uint32_t>(chunks[end++].vertices.size());
-    }
-    for (std::size_t c = i; c < end; ++c) {
-      ranges[c].first = first;
-      ranges[c].size = size;
-    }
-    first += size;
-    i = end;
-  }
-  return ranges;
-}
-
-void append_level(const Chunk& chunk, const VertexRange& range, std::uint16_t stride,
-                  PackedMesh& out) {
-  LevelRecord level{};
-  level.vertex_offset = range.first * stride;
-  level.index_offset = out.indices.size();
-  level.vertex_count = range.size;
-  level.index_count = static_cast<std::uint32_t>(chunk.indices.size());
-  out.levels.push_back(level);
-  out.indices.resize(out.indices.size() + 2 * chunk.indices.size());
-  std::byte* to = out.indices.data() + level.index_offset;
-  for (std::size_t i = 0; i < chunk.indices.size(); ++i) {
-    const auto index = static_cast<std::uint16_t>(chunk.indices[i] + range.before);
-    std::memcpy(to + 2 * i, &index, sizeof index);
-  }
-}
 
 ChunkRecord chunk_record(const Chunk& chunk, const UvRange& uv, std::uint32_t first_level,
                          const std::vector<glm::vec3>& decoded) {
@@ -275,10 +280,6 @@ void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
   record.scale = mesh.placement.scale;
   record.diagonal = glm::length(mesh.source_max - mesh.source_min);
   record.unit_metres = options.unit_metres;
-  for (const Chunk& chunk : chunked.chunks) {
-    record.vertex_count += chunk.vertices.size();
-    record.triangle_count += chunk.indices.size() / 3;
-  }
   record.source_vertex_count = mesh.source_vertex_count;
   record.source_face_count = mesh.source_face_count;
   record.chunk_count = static_cast<std::uint32_t>(chunked.chunks.size());
@@ -304,22 +305,22 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   for (const SourceMaterial& m : mesh.materials) out.materials.push_back(material_record(m));
   out.sources = mesh.materials;
   out.material_repeats = repeating_materials(chunked);
-  out.vertices.resize(out.record.vertex_count * offsets.stride);
-  out.indices.reserve(out.record.triangle_count * 6);
+  out.vertices.reserve(mesh.positions.size() * offsets.stride);
+  out.indices.reserve(mesh.triangles.size() * 6);
 
-  const std::vector<VertexRange> ranges = share_ranges(chunked.chunks);
   VertexPacker packer(mesh, offsets);
+  ChunkAppender appender(out);
+  std::vector<std::byte> bytes;
   std::vector<glm::vec3> decoded;
-  for (std::size_t c = 0; c < chunked.chunks.size(); ++c) {
-    const Chunk& chunk = chunked.chunks[c];
+  for (const Chunk& chunk : chunked.chunks) {
     const UvRange uv = uv_range(mesh, chunk, out.material_repeats[chunk.material]);
-    std::byte* const bytes =
-        out.vertices.data() + (ranges[c].first + ranges[c].before) * offsets.stride;
-    packer.pack(chunk, uv, texture_side[chunk.material], bytes, decoded);
+    bytes.assign(chunk.vertices.size() * offsets.stride, std::byte{0});
+    packer.pack(chunk, uv, texture_side[chunk.material], bytes.data(), decoded);
     out.chunks.push_back(
         chunk_record(chunk, uv, static_cast<std::uint32_t>(out.levels.size()), decoded));
-    append_level(chunk, ranges[c], offsets.stride, out);
+    appender.append(bytes, chunk.indices);
   }
+  appender.close_range();
   packer.write_errors(out.record);
   timer.done(out.record.triangle_count, out.vertices.size() + out.indices.size(),
              out.record.position_error_max);

@@ -31,7 +31,8 @@ struct PackOptions {
 };
 
 /// Quantises (half-float positions, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes
-/// and measures the greatest and rms error; computes conservative boxes and normal cones.
+/// and measures the greatest and rms error; computes conservative boxes and normal cones; puts each
+/// chunk in the order of formats/chunk_order.hpp, where vertices of equal bytes become one.
 /// texture_side: pixels by which uv errors are told in texels (0: no texture), one a material.
 Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint32_t>& texture_side,
                         const PackOptions& options, Report& report);

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <numeric>
 #include <random>
 #include <set>
+#include <span>
+#include <vector>
 
 #include "formats/chunk_order.hpp"
 #include "tests/model/stages.hpp"
@@ -22,6 +25,13 @@ using Triangle = std::array<std::uint32_t, 3>;
 Triangle rotated(Triangle t) {
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
   return t;
+}
+
+/// Four bytes a vertex, none like another, in no order.
+std::vector<std::uint32_t> distinct_vertices(std::uint32_t count) {
+  std::vector<std::uint32_t> vertices(count);
+  for (std::uint32_t v = 0; v < count; ++v) vertices[v] = v * 2654435761u;
+  return vertices;
 }
 
 TEST(ChunkOrder, KeepsTrianglesAndHelpsTheCache) {
@@ -44,8 +54,9 @@ TEST(ChunkOrder, KeepsTrianglesAndHelpsTheCache) {
   const double random_ratio = double(count_cache_misses(indices, 16)) / double(shuffled.size());
   std::vector<std::uint16_t> ordered = indices;
   ChunkOrderer orderer;
+  const std::vector<std::uint32_t> vertices = distinct_vertices((n + 1) * (n + 1));
   const std::vector<std::uint16_t> old = [&] {
-    const auto span = orderer.order(ordered, (n + 1) * (n + 1));
+    const auto span = orderer.order(std::as_bytes(std::span(vertices)), 4, ordered);
     return std::vector<std::uint16_t>(span.begin(), span.end());
   }();
   std::multiset<Triangle> after;
@@ -66,12 +77,70 @@ TEST(ChunkOrder, KeepsTrianglesAndHelpsTheCache) {
 
 TEST(ChunkOrder, DuplicateTrianglesAndUnusedVertices) {
   std::vector<std::uint16_t> indices = {5, 3, 1, 5, 3, 1, 5, 5, 3};
+  const std::vector<std::uint32_t> vertices = {0x10, 0x11, 0x12, 0x13, 0x14, 0x15, 0x16};
   ChunkOrderer orderer;
-  const auto old = orderer.order(indices, 7);
+  const auto old = orderer.order(std::as_bytes(std::span(vertices)), 4, indices);
+  EXPECT_EQ(indices.size(), 9u);
   EXPECT_EQ(old.size(), 7u);
   EXPECT_EQ(std::set<std::uint16_t>(old.begin(), old.end()).size(), 7u);
   EXPECT_EQ(std::vector<std::uint16_t>(old.begin() + 3, old.end()),
             (std::vector<std::uint16_t>{0, 2, 4, 6}));
+}
+
+TEST(ChunkOrder, VerticesOfEqualBytesBecomeOne) {
+  const std::vector<std::uint32_t> vertices = {7, 9, 7, 8};
+  std::vector<std::uint16_t> indices = {0, 1, 3, 2, 3, 1};
+  ChunkOrderer orderer;
+  const auto old = orderer.order(std::as_bytes(std::span(vertices)), 4, indices);
+  ASSERT_EQ(old.size(), 3u);
+  std::vector<std::uint32_t> corners;
+  for (const std::uint16_t i : indices) corners.push_back(vertices[old[i]]);
+  EXPECT_EQ(std::multiset<std::uint32_t>(corners.begin(), corners.end()),
+            (std::multiset<std::uint32_t>{7, 7, 8, 8, 9, 9}));
+}
+
+/// The bytes that a chunk is stored as.
+std::vector<std::uint32_t> stored(const std::vector<std::uint32_t>& vertices,
+                                  std::vector<std::uint16_t> indices) {
+  ChunkOrderer orderer;
+  std::vector<std::uint32_t> bytes;
+  for (const std::uint16_t old : orderer.order(std::as_bytes(std::span(vertices)), 4, indices)) {
+    bytes.push_back(vertices[old]);
+  }
+  bytes.insert(bytes.end(), indices.begin(), indices.end());
+  return bytes;
+}
+
+TEST(ChunkOrder, HangsOnTheContentAlone) {
+  // Triangles at random, degenerate and doubled ones among them.
+  std::mt19937 random(3);
+  std::vector<std::uint32_t> vertices = distinct_vertices(500);
+  std::vector<std::array<std::uint16_t, 3>> triangles(1500);
+  for (auto& t : triangles) {
+    for (auto& v : t) v = static_cast<std::uint16_t>(random() % 500);
+    if (random() % 20 == 0) t[1] = t[0];
+  }
+  for (std::size_t i = 0; i < 30; ++i) triangles[3 * i] = triangles[3 * i + 1];
+  const auto flat = [](const auto& list) {
+    std::vector<std::uint16_t> indices;
+    for (const auto& t : list) indices.insert(indices.end(), t.begin(), t.end());
+    return indices;
+  };
+  const auto expected = stored(vertices, flat(triangles));
+  for (int round = 0; round < 20; ++round) {
+    std::vector<std::uint16_t> place(vertices.size());
+    std::iota(place.begin(), place.end(), std::uint16_t{0});
+    std::shuffle(place.begin(), place.end(), random);
+    std::vector<std::uint32_t> moved(vertices.size());
+    for (std::size_t v = 0; v < vertices.size(); ++v) moved[place[v]] = vertices[v];
+    auto turned = triangles;
+    std::shuffle(turned.begin(), turned.end(), random);
+    for (auto& t : turned) {
+      for (auto& v : t) v = place[v];
+      std::rotate(t.begin(), t.begin() + random() % 3, t.end());
+    }
+    ASSERT_EQ(stored(moved, flat(turned)), expected) << round;
+  }
 }
 
 TEST(Chunk, EveryTriangleOnceWithItsMaterial) {
