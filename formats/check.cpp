@@ -5,22 +5,38 @@
 #include "formats/validate.hpp"
 
 namespace modar {
+namespace {
 
-bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink) {
-  FaultLog log(sink);
-  BundleParts parts;
-  if (!validate_sections(bytes, log, parts)) return false;
-  check_section_bytes(log, parts);
+/// Everything but sections as bytes.
+void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes) {
   const std::uint64_t damaged = log.errors();
-  if (!validate_tables(log, parts)) return false;
+  if (!validate_tables(log, parts)) return;
   validate_models(log, parts);
   validate_assets(log, parts);
   // Payloads are read through records, so these have to be clean; a wrong hash does no harm.
-  if (log.errors() != damaged) return false;
+  if (log.errors() != damaged) return;
   check_model_records(log, parts);
-  check_geometry(log, parts);
+  check_geometry(log, parts, hashes);
   check_textures(log, parts);
   check_patterns(log, parts);
+}
+
+}  // namespace
+
+bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
+                  const CheckOptions& options) {
+  FaultLog log(sink);
+  BundleParts parts;
+  if (!validate_sections(bytes, log, parts)) return false;
+  check_section_bytes(log, parts, options);
+  const auto section = [&parts](SectionType type) {
+    return find_section(parts.sections, type, kNone, 0);
+  };
+  BufferHashes hashes{{log, parts, options, section(SectionType::kVertices)},
+                      {log, parts, options, section(SectionType::kIndices)}};
+  check_contents(log, parts, hashes);
+  hashes.vertices.finish();
+  hashes.indices.finish();
   return log.clean();
 }
 

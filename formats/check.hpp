@@ -37,8 +37,15 @@ struct Issue {
 
 using IssueSink = std::function<void(const Issue&)>;
 
-/// Runs every rule over the bytes, in file order; calls `sink` for each finding. Memory does not
-/// grow with the bundle. Answers true if no finding was an error.
-bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink);
+struct CheckOptions {
+  /// Told of bytes that are not read again, whole pages front to back, so that a mapping can give
+  /// them back (forget_read() in modar/mapped_file.hpp). None: nobody is told.
+  std::function<void(std::span<const std::byte>)> release;
+};
+
+/// Runs every rule over the bytes, about in file order; calls `sink` for each finding. Memory does
+/// not grow with the bundle. Answers true if no finding was an error.
+bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
+                  const CheckOptions& options = {});
 
 }  // namespace modar

@@ -7,6 +7,7 @@
 #include "formats/check_rules.hpp"
 #include "formats/quantise.hpp"
 #include "formats/validate.hpp"
+#include "formats/vertex_scan.hpp"
 
 namespace modar {
 namespace {
@@ -57,8 +58,9 @@ class GeometryCheck {
 
   /// `where()` makes the words for "model, chunk, level" if they are needed.
   template <class Where>
-  void check_level(const LayoutRecord& layout, const ChunkRecord& chunk, const LevelRecord& level,
-                   Where where) {
+  void check_level(const LayoutRecord& layout, const VertexScan& scan, const ChunkRecord& chunk,
+                   const LevelRecord& level, Where where) {
+    if (surely_good(layout, scan, chunk, level)) return;
     const auto* indices =
         reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset);
     wrong_index_ = degenerate_ = not_finite_ = normal_ = outside_ = Tally();
@@ -89,6 +91,25 @@ class GeometryCheck {
   }
 
  private:
+  /// A quick look at all indices and at all vertices, used or not. Levels that use few of many
+  /// vertices are left to the slow look, which takes no longer than their indices.
+  [[nodiscard]] bool surely_good(const LayoutRecord& layout, const VertexScan& scan,
+                                 const ChunkRecord& chunk, const LevelRecord& level) const {
+    if (!scan.possible() || level.vertex_count == 0 || level.vertex_count > level.index_count) {
+      return false;
+    }
+    const IndexScan indices = scan_indices(
+        {reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset),
+         level.index_count});
+    if (indices.degenerate || indices.greatest >= level.vertex_count) return false;
+    const VertexScan::Extent extent =
+        scan.scan(parts_.vertices.subspan(static_cast<std::size_t>(level.vertex_offset),
+                                          std::size_t{level.vertex_count} * layout.stride));
+    return extent.finite && extent.unit_normals &&
+           inside(chunk, {extent.low[0], extent.low[1], extent.low[2], 0.0}) &&
+           inside(chunk, {extent.high[0], extent.high[1], extent.high[2], 0.0});
+  }
+
   /// True the first time.
   bool mark(std::uint16_t index) {
     std::uint64_t& word = marks_[index / 64];
@@ -154,18 +175,24 @@ class GeometryCheck {
 
 }  // namespace
 
-void check_geometry(FaultLog& log, const BundleParts& parts) {
+void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes) {
   GeometryCheck check(log, parts);
   for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
     const ModelRecord& model = parts.models[i];
     const LayoutRecord& layout = parts.layouts[model.layout];
+    const VertexScan scan(layout);
     for (std::uint32_t j = 0; j < model.chunk_count; ++j) {
       const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];
       for (std::uint32_t k = 0; k < chunk.level_count; ++k) {
-        check.check_level(layout, chunk, parts.levels[chunk.first_level + k], [&] {
+        const LevelRecord& level = parts.levels[chunk.first_level + k];
+        check.check_level(layout, scan, chunk, level, [&] {
           return label(parts, "model", model.name) + ", chunk " + std::to_string(j) + ", level " +
                  std::to_string(k);
         });
+        // Hashed while the caches still hold it.
+        hashes.vertices.read_to(level.vertex_offset +
+                                std::uint64_t{level.vertex_count} * layout.stride);
+        hashes.indices.read_to(level.index_offset + 2ull * level.index_count);
       }
     }
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "formats/bundle_view.hpp"
@@ -9,9 +10,43 @@
 
 namespace modar {
 
-/// Hashes of sections, zero padding between them, sections that are skipped.
-/// Needs sections that lie inside the file, nothing more.
-void check_section_bytes(FaultLog& log, const BundleParts& parts);
+/// Hashes of sections but for vertices and indices, zero padding between them, sections that are
+/// skipped. Needs sections that lie inside the file, nothing more.
+void check_section_bytes(FaultLog& log, const BundleParts& parts, const CheckOptions& options);
+
+/// The hash of one section, taken front to back in pieces of any size. What was hashed is given
+/// back to the system (CheckOptions::release).
+class SectionHash {
+ public:
+  /// The section with that key may be missing. All arguments must outlive this.
+  SectionHash(FaultLog& log, const BundleParts& parts, const CheckOptions& options,
+              const SectionEntry* entry);
+  SectionHash(const SectionHash&) = delete;
+  SectionHash& operator=(const SectionHash&) = delete;
+  ~SectionHash();
+  /// Hashes up to the `end`th byte of the section, if that was not done yet.
+  void read_to(std::uint64_t end);
+  /// Hashes the rest and reports a hash that differs.
+  void finish();
+
+ private:
+  struct State;
+  void release(bool all);
+
+  FaultLog& log_;
+  const BundleParts& parts_;
+  const CheckOptions& options_;
+  const SectionEntry* entry_;
+  std::unique_ptr<State> state_;
+  std::uint64_t hashed_ = 0;
+  std::uint64_t released_ = 0;
+};
+
+/// The two great buffers: hashed while their contents are checked.
+struct BufferHashes {
+  SectionHash vertices;
+  SectionHash indices;
+};
 
 // What follows needs a bundle whose structure was found clean.
 
@@ -19,7 +54,7 @@ void check_section_bytes(FaultLog& log, const BundleParts& parts);
 void check_model_records(FaultLog& log, const BundleParts& parts);
 
 /// Every index and every vertex that one refers to. Time grows with the index buffer.
-void check_geometry(FaultLog& log, const BundleParts& parts);
+void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes);
 
 /// Sides, overlaps and gaps of textures.
 void check_textures(FaultLog& log, const BundleParts& parts);

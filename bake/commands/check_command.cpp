@@ -55,7 +55,8 @@ int run_check(const CheckCommand& command) {
     warned = warned || issue.kind->severity == Severity::kWarning;
     if (counts[issue.kind->id]++ < kMaxRepeats) issues.push_back(issue);
   };
-  bool good = check_bundle(file->bytes(), sink);
+  expect_reading(file->bytes());
+  bool good = check_bundle(file->bytes(), sink, {.release = forget_read});
   // The text twin needs OpenCV's parser, so this rule stands outside of formats/.
   if (good) good = check_yml_twins(file->bytes(), sink);
   if (command.warnings_as_errors && warned) good = false;

@@ -79,4 +79,14 @@ void expect_reading(std::span<const std::byte> bytes) {
   ::madvise(start, bytes.size() + lead, MADV_WILLNEED);
 }
 
+void forget_read(std::span<const std::byte> bytes) {
+  const std::uintptr_t page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const std::uintptr_t address = reinterpret_cast<std::uintptr_t>(bytes.data());
+  // Whole pages only: others share theirs with bytes that may be wanted.
+  const std::uintptr_t first = (address + page - 1) / page * page;
+  const std::uintptr_t end = (address + bytes.size()) / page * page;
+  if (first >= end) return;
+  ::madvise(const_cast<std::byte*>(bytes.data()) + (first - address), end - first, MADV_DONTNEED);
+}
+
 }  // namespace modar

@@ -62,6 +62,41 @@ TEST(Check, NoFlippedBitGoesUnseen) {
   }
 }
 
+TEST(Check, GivesBackEveryByteOfTheGreatBuffersOnceAndInOrder) {
+  BundleContent content = model_content();
+  // Great enough for several releases; bytes that no level refers to are read, too.
+  content.vertices.resize(5u << 20);
+  content.indices.resize(3u << 20);
+  Bytes bytes = encode(content);
+  const std::byte* const begin = bytes.data();
+  std::vector<std::pair<std::size_t, std::size_t>> ranges;
+  CheckOptions options;
+  options.release = [&](std::span<const std::byte> part) {
+    const auto first = static_cast<std::size_t>(part.data() - begin);
+    ranges.emplace_back(first, first + part.size());
+  };
+  EXPECT_TRUE(check_bundle(
+      bytes, [](const Issue&) {}, options));
+  std::sort(ranges.begin(), ranges.end());
+  for (const SectionType type : {SectionType::kVertices, SectionType::kIndices}) {
+    const SectionEntry& entry = entry_of(bytes, type);
+    std::size_t at = entry.offset;
+    for (const auto& [first, end] : ranges) {
+      if (first < entry.offset || first >= entry.offset + entry.size) continue;
+      EXPECT_EQ(first, at);
+      at = end;
+    }
+    EXPECT_EQ(at, entry.offset + entry.size);
+  }
+  for (const SectionType type : {SectionType::kVertices, SectionType::kIndices}) {
+    std::byte& last = bytes[entry_of(bytes, type).offset + entry_of(bytes, type).size - 1];
+    last ^= std::byte{1};
+    EXPECT_FALSE(check_bundle(
+        bytes, [](const Issue&) {}, options));
+    last ^= std::byte{1};
+  }
+}
+
 /// With true hashes the semantic rules stand alone. Whatever they say, nothing may crash, and what
 /// they pass has to open.
 TEST(Check, RehashedByteChangesNeverCrash) {

@@ -30,4 +30,8 @@ class MappedFile {
 /// back, so that it may fetch them ahead. Never fails: where it cannot help, it does nothing.
 void expect_reading(std::span<const std::byte> bytes);
 
+/// Gives the memory behind bytes of a MappedFile back to the system: they were read and are not
+/// needed soon. Reading them again is right, only slower. Never fails.
+void forget_read(std::span<const std::byte> bytes);
+
 }  // namespace modar

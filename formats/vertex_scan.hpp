@@ -1,0 +1,67 @@
+// Quick looks at a level's bytes, many vertices and indices at a time: they answer "all of it is
+// surely good" or "look closer". Internal to formats/.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "formats/layout.hpp"
+
+namespace modar {
+
+/// What a level's indices are like as a whole.
+struct IndexScan {
+  std::uint16_t greatest = 0;
+  bool degenerate = false;  ///< some triangle uses a vertex twice
+};
+
+/// indices.size() is a multiple of 3. One pass, a few bytes a cycle.
+IndexScan scan_indices(std::span<const std::uint16_t> indices);
+
+/// How vertices of one layout are scanned.
+class VertexScan {
+ public:
+  explicit VertexScan(const LayoutRecord& layout);
+
+  /// False: the layout has attributes (32-bit floats, say) that only a look at each vertex can
+  /// judge.
+  [[nodiscard]] bool possible() const { return possible_; }
+
+  /// What all vertices have in common.
+  struct Extent {
+    bool finite = true;         ///< no infinity, no NaN
+    bool unit_normals = true;   ///< lengths surely within the tolerance of VERTEX_NORMAL
+    bool clean_padding = true;  ///< bytes of no attribute are zero
+    double low[3] = {};         ///< of the position attribute, as OpenGL ES 2.0 decodes it
+    double high[3] = {};
+  };
+  /// bytes: whole vertices, at least one. Only where possible().
+  [[nodiscard]] Extent scan(std::span<const std::byte> bytes) const;
+
+ private:
+  static constexpr std::size_t kMaxVectors = 4;
+  using Lanes [[gnu::vector_size(16)]] = std::int16_t;
+  struct Range {
+    Lanes low[kMaxVectors];
+    Lanes high[kMaxVectors];
+    Lanes dirt[kMaxVectors];
+  };
+
+  void plan(const AttributeRecord& attribute);
+  template <std::size_t kVectors>
+  void scan_lanes(std::span<const std::byte> bytes, Range& range) const;
+  [[nodiscard]] bool normals_good(std::span<const std::byte> bytes) const;
+
+  bool possible_ = true;
+  std::size_t stride_ = 0;
+  std::size_t vectors_ = 0;
+  AttributeRecord position_{};
+  std::size_t normal_offset_ = kNone;  // of normals of 3 x i8
+  std::uint32_t half_lanes_ = 0;       // a bit for each 16-bit lane that holds a half float
+  Lanes half_[kMaxVectors] = {};       // 7FFF where a lane is a half float
+  Lanes flip_[kMaxVectors] = {};       // 8000 where a lane is unsigned
+  Lanes padding_[kMaxVectors] = {};    // bits that belong to no attribute
+};
+
+}  // namespace modar
