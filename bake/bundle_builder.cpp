@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <set>
 
+#include <glm/geometric.hpp>
+
 #include "bake/model/packed_mesh.hpp"
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/read_model.hpp"
@@ -87,11 +89,48 @@ Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& re
   if (!source) return tl::unexpected(source.error());
   report.findings.insert(report.findings.end(), source->findings.begin(), source->findings.end());
   reading.done(source->positions.size(), source->face_count());
-  Result<TriMesh> mesh = weld(*source, report);
+  Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
   if (!mesh) return tl::unexpected(mesh.error());
   WeldedModel welded{std::move(*mesh), {}};
   welded.uses = collect_textures(welded.mesh, textures);
   return welded;
+}
+
+/// The greatest error that is asked for, in a model's source units; 0: any.
+Result<double> max_error_of(const BakeRequest& request, const TriMesh& mesh) {
+  switch (request.max_error.unit) {
+    case MaxError::Unit::kAny:
+      return 0.0;
+    case MaxError::Unit::kSource:
+      return request.max_error.value;
+    case MaxError::Unit::kPercent:
+      return request.max_error.value / 100.0 * glm::length(mesh.source_max - mesh.source_min);
+    case MaxError::Unit::kMetres:
+      break;
+  }
+  if (!(request.unit_metres > 0)) {
+    return fail(ExitCode::kUsage, "bake.max-error-unit", "--max-error",
+                "it names a unit, and the models' own unit is not known",
+                "say it with --unit, or give the error in source units or percent");
+  }
+  return request.max_error.value / request.unit_metres;
+}
+
+/// Splits and packs a model as finely as was asked.
+Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
+                               const BakeRequest& request, Report& report) {
+  const Result<double> max_error = max_error_of(request, mesh);
+  if (!max_error) return tl::unexpected(max_error.error());
+  const Result<PositionPlan> plan = plan_positions(mesh, {request.positions, *max_error});
+  if (!plan) return tl::unexpected(plan.error());
+  ChunkOptions chunk_options;
+  chunk_options.max_side = plan->max_side;
+  Result<ChunkedMesh> chunked = chunk(std::move(mesh), chunk_options, report);
+  if (!chunked) return tl::unexpected(chunked.error());
+  PackOptions pack_options;
+  pack_options.unit_metres = request.unit_metres;
+  pack_options.positions = plan->kind;
+  return pack(*chunked, texture_sides, pack_options, report);
 }
 
 Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& outcomes,
@@ -102,11 +141,7 @@ Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& ou
     if (welded.uses[m] != kNone) textures[m] = outcomes[welded.uses[m]];
     sides[m] = textures[m].side;
   }
-  Result<ChunkedMesh> chunked = chunk(std::move(welded.mesh), ChunkOptions{}, report);
-  if (!chunked) return tl::unexpected(chunked.error());
-  PackOptions pack_options;
-  pack_options.unit_metres = request.unit_metres;
-  Result<PackedMesh> packed = pack(*chunked, sides, pack_options, report);
+  Result<PackedMesh> packed = shape_model(std::move(welded.mesh), sides, request, report);
   if (!packed) return tl::unexpected(packed.error());
   merge_model(std::move(*packed), textures, content);
   return {};

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "bake/model/position_plan.hpp"
 #include "bake/report.hpp"
 #include "bake/texture/etc1_texture.hpp"
 #include "formats/bundle_writer.hpp"
@@ -31,6 +33,13 @@ struct PatternRequest {
   double width_mm = 0.0;  ///< 0: what the file states, or unknown
 };
 
+/// How far packed positions may lie from the source's, as the user says it.
+struct MaxError {
+  enum class Unit : std::uint8_t { kAny, kSource, kPercent, kMetres };
+  Unit unit = Unit::kAny;
+  double value = 0.0;  ///< source units, percent of the model's diagonal, or metres
+};
+
 struct BakeRequest {
   std::vector<std::string> models;
   std::vector<PatternRequest> patterns;
@@ -38,8 +47,10 @@ struct BakeRequest {
   TextureOptions textures;
   std::uint64_t texture_budget = 0;  ///< GPU bytes that all textures may take; 0: any
   double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
-  std::string device;                ///< profile that it is planned for; empty: none
-  unsigned jobs = 1;                 ///< the bytes do not depend on it
+  MaxError max_error;
+  std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
+  std::string device;                     ///< profile that it is planned for; empty: none
+  unsigned jobs = 1;                      ///< the bytes do not depend on it
   std::string tool_version;
 };
 
@@ -49,7 +60,8 @@ struct BakeRequest {
 Result<void> plan_for_device(const std::string& device, BakeRequest& request);
 
 /// Runs all stages. One model and one pattern without a scene make one by themselves.
-/// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown".
+/// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown",
+/// "bake.max-error-unit".
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report);
 
 /// The scene's record for a model whose source box has these side lengths (source units).

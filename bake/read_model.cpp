@@ -8,12 +8,12 @@
 
 namespace modar {
 
-Result<SourceModel> read_model(const std::string& path, [[maybe_unused]] unsigned jobs) {
+Result<SourceModel> read_model(const std::string& path, unsigned jobs) {
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
-  if (extension == ".obj") return read_obj(path);
+  if (extension == ".obj") return read_obj(path, {jobs});
   return fail(ExitCode::kUnsupported, "model.format", path,
               extension.empty() ? "the file has no extension that names its format"
                                 : "files of the kind '" + extension + "' are not read",

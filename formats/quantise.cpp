@@ -14,6 +14,17 @@ double snorm8_mean(int c) {
   return (es2 + es3) / 2.0;
 }
 
+/// Square of the cosine between a unit vector and what octahedral coordinates decode to.
+double oct_cosine_square(double x, double y, const std::array<double, 3>& n) {
+  const double z = 1.0 - std::fabs(x) - std::fabs(y);
+  // Both cases in one: the fold moves x and y towards the middle by what z is below 0.
+  const double fold = z < 0 ? -z : 0.0;
+  const double fx = x + (x < 0 ? fold : -fold);
+  const double fy = y + (y < 0 ? fold : -fold);
+  const double dot = fx * n[0] + fy * n[1] + z * n[2];
+  return dot * std::fabs(dot) / (fx * fx + fy * fy + z * z);
+}
+
 /// NaN becomes 0: there is no better integer for it.
 double clamped(float value, double low, double high) {
   const double wide = static_cast<double>(value);
@@ -76,6 +87,41 @@ std::int8_t float_to_snorm8(float value) {
 
 float snorm8_to_float(std::int8_t value) {
   return static_cast<float>(2 * value + 1) / 255.0f;
+}
+
+std::array<std::int8_t, 2> normal_to_oct8(const std::array<double, 3>& normal) {
+  const double sum = std::fabs(normal[0]) + std::fabs(normal[1]) + std::fabs(normal[2]);
+  if (!(sum > 0) || !std::isfinite(sum)) return {0, 0};
+  double x = normal[0] / sum;
+  double y = normal[1] / sum;
+  if (normal[2] < 0) {
+    const double unfolded = x;
+    x = (1.0 - std::fabs(y)) * (x < 0 ? -1.0 : 1.0);
+    y = (1.0 - std::fabs(unfolded)) * (y < 0 ? -1.0 : 1.0);
+  }
+  const auto below = [](double wanted) {
+    const int c = static_cast<int>(std::floor((wanted * 255.0 - 1.0) / 2.0));
+    return c < -128 ? -128 : (c > 126 ? 126 : c);
+  };
+  const int x0 = below(x);
+  const int y0 = below(y);
+  int best_x = x0;
+  int best_y = y0;
+  double best = -2.0;
+  for (int k = 0; k < 4; ++k) {
+    const int cx = x0 + (k & 1);
+    const int cy = y0 + (k >> 1);
+    const double es2 = oct_cosine_square((2 * cx + 1) / 255.0, (2 * cy + 1) / 255.0, normal);
+    const double es3 =
+        oct_cosine_square(cx < -127 ? -1.0 : cx / 127.0, cy < -127 ? -1.0 : cy / 127.0, normal);
+    const double worse = es2 < es3 ? es2 : es3;
+    if (worse > best) {
+      best = worse;
+      best_x = cx;
+      best_y = cy;
+    }
+  }
+  return {static_cast<std::int8_t>(best_x), static_cast<std::int8_t>(best_y)};
 }
 
 std::uint16_t float_to_unorm16(float value) {

@@ -16,6 +16,12 @@ float half_to_float(std::uint16_t half);
 std::int8_t float_to_snorm8(float value);
 float snorm8_to_float(std::int8_t value);
 
+/// Octahedral 8-bit code of a direction (Meyer et al., "On floating-point normal vectors", 2010),
+/// of the four round it the one whose worse decoding, that of ES 2.0 or that of ES 3, is nearest in
+/// angle (as the "precise" codes of Cigolle et al., "A survey of efficient representations for
+/// independent unit vectors", 2014). normal: of unit length; what has no direction becomes +z.
+std::array<std::int8_t, 2> normal_to_oct8(const std::array<double, 3>& normal);
+
 /// Unsigned normalised integers: f = c / (2^b - 1).
 std::uint16_t float_to_unorm16(float value);
 float unorm16_to_float(std::uint16_t value);

@@ -123,4 +123,28 @@ Result<double> parse_unit(const std::string& text) {
               "name one of mm, cm, m, km, in, ft");
 }
 
+Result<MaxError> parse_max_error(const std::string& text) {
+  const std::size_t digits = std::string_view(text).find_last_of("0123456789.");
+  const std::size_t length = digits == std::string::npos ? 0 : digits + 1;
+  const std::string unit = text.substr(length);
+  MaxError error;
+  bool good =
+      parse_number(std::string_view(text).substr(0, length), error.value) && error.value > 0;
+  if (unit.empty()) {
+    error.unit = MaxError::Unit::kSource;
+  } else if (unit == "%") {
+    error.unit = MaxError::Unit::kPercent;
+  } else if (const Result<double> metres = parse_unit(unit); metres) {
+    error.unit = MaxError::Unit::kMetres;
+    error.value *= *metres;
+  } else {
+    good = false;
+  }
+  if (good) return error;
+  return fail(ExitCode::kUsage, "cli.max-error", "--max-error " + text,
+              "this is no length above 0 that we understand",
+              "write a number of source units, a percentage of the diagonal as 0.01%, or a length "
+              "as 2mm");
+}
+
 }  // namespace modar

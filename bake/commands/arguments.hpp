@@ -24,4 +24,8 @@ Result<PatternRequest> parse_pattern(const std::string& text);
 /// "mm", "cm", "m", "km", "in", "ft" to metres. Errors: kUsage "cli.unit".
 Result<double> parse_unit(const std::string& text);
 
+/// "0.002" (source units), "0.01%" (of the model's diagonal) or "2mm" (a unit of parse_unit).
+/// Errors: kUsage "cli.max-error".
+Result<MaxError> parse_max_error(const std::string& text);
+
 }  // namespace modar

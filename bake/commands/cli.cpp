@@ -34,6 +34,7 @@ struct BakeTexts {
   std::vector<std::string> patterns;
   std::vector<std::string> scenes;
   std::string unit;
+  std::string max_error;
   std::string device;
 };
 
@@ -56,6 +57,21 @@ void add_texture_options(CLI::App& sub, TextureOptions& textures) {
       ->type_name("DIR");
 }
 
+void add_geometry_options(CLI::App& sub, BakeRequest& request, BakeTexts& texts) {
+  sub.add_option("--unit", texts.unit, "Unit of the models' coordinates: mm, cm, m, km, in, ft");
+  sub.add_option("--max-error", texts.max_error,
+                 "Of packed positions: source units, a percentage of the diagonal (0.01%), or a "
+                 "length (2mm, with --unit)")
+      ->type_name("LENGTH");
+  const std::map<std::string, PositionKind> kinds = {{"half", PositionKind::kHalf},
+                                                     {"int16", PositionKind::kInt16}};
+  sub.add_option_function<PositionKind>(
+         "--positions", [&request](const PositionKind& kind) { request.positions = kind; },
+         "Store them as half or int16 (else: int16 where --max-error needs it)")
+      ->transform(CLI::CheckedTransformer(kinds).description(""))
+      ->type_name("LAYOUT");
+}
+
 CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   CLI::App* sub = app.add_subcommand("bake", "Models and pattern images to one bundle");
   sub->add_option("--model", bake.request.models, "OBJ files")->type_name("FILE");
@@ -69,7 +85,7 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   sub->add_option("-o,--output", bake.output, "The bundle to write")
       ->required()
       ->type_name("OUT.modar");
-  sub->add_option("--unit", texts.unit, "Unit of the models' coordinates: mm, cm, m, km, in, ft");
+  add_geometry_options(*sub, bake.request, texts);
   add_texture_options(*sub, bake.request.textures);
   sub->add_option(
          "--device", texts.device,
@@ -162,6 +178,11 @@ int bake_from_texts(BakeCommand& bake, const BakeTexts& texts) {
     const Result<double> unit = parse_unit(texts.unit);
     if (!unit) return print_error(unit.error());
     bake.request.unit_metres = *unit;
+  }
+  if (!texts.max_error.empty()) {
+    const Result<MaxError> max_error = parse_max_error(texts.max_error);
+    if (!max_error) return print_error(max_error.error());
+    bake.request.max_error = *max_error;
   }
   if (!texts.device.empty()) {
     if (auto planned = plan_for_device(texts.device, bake.request); !planned) {

@@ -232,6 +232,29 @@ std::string bench_json(const std::vector<BenchRow>& rows) {
   return dump(list);
 }
 
+namespace {
+
+const char* max_error_unit(const MaxError& error) {
+  switch (error.unit) {
+    case MaxError::Unit::kAny:
+      return "any";
+    case MaxError::Unit::kSource:
+      return "source";
+    case MaxError::Unit::kPercent:
+      return "percent";
+    case MaxError::Unit::kMetres:
+      break;
+  }
+  return "metres";
+}
+
+const char* positions_name(const BakeRequest& request) {
+  if (!request.positions) return "auto";
+  return *request.positions == PositionKind::kHalf ? "half" : "int16";
+}
+
+}  // namespace
+
 std::string bundle_meta(const BakeRequest& request) {
   const auto name = [](const std::string& path) {
     return std::filesystem::path(path).filename().string();
@@ -247,6 +270,9 @@ std::string bundle_meta(const BakeRequest& request) {
                {"patterns", patterns},
                {"options",
                 {{"device", request.device},
+                 {"max_error", request.max_error.value},
+                 {"max_error_unit", max_error_unit(request.max_error)},
+                 {"positions", positions_name(request)},
                  {"effort", static_cast<int>(request.textures.effort)},
                  {"perceptual", request.textures.perceptual},
                  {"max_texture", request.textures.max_side},

@@ -17,32 +17,34 @@ constexpr double kVerticesPerTriangle = 0.52;
 
 class ChunkBuilder {
  public:
-  ChunkBuilder(const TriMesh& mesh, std::uint32_t max_vertices, std::vector<Chunk>& chunks)
+  ChunkBuilder(const TriMesh& mesh, const ChunkOptions& options, std::vector<Chunk>& chunks)
       : mesh_(mesh),
-        max_vertices_(max_vertices),
+        max_vertices_(options.max_vertices),
+        max_side_(options.max_side),
         chunks_(chunks),
         local_(mesh.positions.size(), kNoIndex) {}
 
-  /// Triangles of one material, in any order that the caller can repeat.
-  void split(std::span<std::uint32_t> triangles, std::uint32_t material) {
+  /// Triangles of one material, in any order that the caller can repeat. Answers false where one
+  /// of them is longer than a chunk may be.
+  bool split(std::span<std::uint32_t> triangles, std::uint32_t material) {
     const double guess = static_cast<double>(triangles.size()) * kVerticesPerTriangle;
     double vertices = guess;
     if (guess < 4.0 * max_vertices_) {
       const std::uint32_t count = number_vertices(triangles);
-      if (count <= max_vertices_) {
+      if (count <= max_vertices_ && fits()) {
         emit(triangles, material);
-        return;
+        return true;
       }
       forget_vertices();
       vertices = count;
     }
+    if (triangles.size() == 1) return false;
     const double pieces = std::max(2.0, std::ceil(vertices * 1.02 / max_vertices_));
     const double share = std::floor(pieces / 2) / pieces;
     auto middle = static_cast<std::size_t>(static_cast<double>(triangles.size()) * share);
     middle = std::clamp<std::size_t>(middle, 1, triangles.size() - 1);
     partition(triangles, middle);
-    split(triangles.first(middle), material);
-    split(triangles.subspan(middle), material);
+    return split(triangles.first(middle), material) && split(triangles.subspan(middle), material);
   }
 
  private:
@@ -87,6 +89,19 @@ class ChunkBuilder {
     return static_cast<std::uint32_t>(used_.size());
   }
 
+  /// Are the numbered vertices as close together as they must be?
+  [[nodiscard]] bool fits() const {
+    if (!(max_side_ > 0)) return true;
+    glm::dvec3 low = mesh_.positions[used_[0]];
+    glm::dvec3 high = low;
+    for (const std::uint32_t v : used_) {
+      low = glm::min(low, mesh_.positions[v]);
+      high = glm::max(high, mesh_.positions[v]);
+    }
+    const glm::dvec3 side = high - low;
+    return std::max({side.x, side.y, side.z}) <= max_side_;
+  }
+
   void forget_vertices() {
     for (const std::uint32_t v : used_) local_[v] = kNoIndex;
     used_.clear();
@@ -107,6 +122,7 @@ class ChunkBuilder {
 
   const TriMesh& mesh_;
   std::uint32_t max_vertices_;
+  double max_side_;
   std::vector<Chunk>& chunks_;
   std::vector<std::uint32_t> local_;  // of each vertex, kNoIndex outside the chunk at hand
   std::vector<std::uint32_t> used_;
@@ -137,10 +153,14 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     triangles[next[result.mesh.triangle_material[t]]++] = t;
   }
-  ChunkBuilder builder(result.mesh, options.max_vertices, result.chunks);
+  ChunkBuilder builder(result.mesh, options, result.chunks);
   for (std::uint32_t m = 0; m + 1 < begins.size(); ++m) {
     const auto part = std::span(triangles).subspan(begins[m], begins[m + 1] - begins[m]);
-    if (!part.empty()) builder.split(part, m);
+    if (!part.empty() && !builder.split(part, m)) {
+      return fail(ExitCode::kUnsupported, "model.max-error", result.mesh.name,
+                  "a triangle is too long for the grid that the asked error needs",
+                  "allow a greater --max-error, or divide the model's longest triangles");
+    }
   }
   timer.done(result.mesh.triangles.size(), result.chunks.size());
   return result;

@@ -23,11 +23,13 @@ struct ChunkedMesh {
 
 struct ChunkOptions {
   std::uint32_t max_vertices = 65535;  ///< 3 to 65535
+  double max_side = 0.0;               ///< model space: longest side of a chunk's box; 0: any
   [[nodiscard]] Result<void> validate() const;
 };
 
 /// Splits by material, then by a kd tree over triangle centres until every chunk fits.
-/// Takes the mesh over.
+/// Takes the mesh over. Errors: kUnsupported "model.max-error" where one triangle is longer than
+/// max_side.
 Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& report);
 
 }  // namespace modar

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bake/model/chunked_mesh.hpp"
+#include "bake/model/position_plan.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -21,16 +22,16 @@ struct PackedMesh {
   std::vector<LevelRecord> levels;
   std::vector<MaterialRecord> materials;
   std::vector<SourceMaterial> sources;
-  std::vector<bool> material_repeats;  ///< uv of its triangles leave [0,1]: the texture must repeat
   std::vector<std::byte> vertices;
   std::vector<std::byte> indices;
 };
 
 struct PackOptions {
   double unit_metres = 0.0;  ///< metres in a source unit; 0: unknown
+  PositionKind positions = PositionKind::kHalf;
 };
 
-/// Quantises (half-float positions, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes
+/// Quantises (positions as asked, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes
 /// and measures the greatest and rms error; computes conservative boxes and normal cones; puts each
 /// chunk in the order of formats/chunk_order.hpp, where vertices of equal bytes become one.
 /// texture_side: pixels by which uv errors are told in texels (0: no texture), one a material.

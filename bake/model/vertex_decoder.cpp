@@ -71,21 +71,21 @@ glm::dvec3 VertexDecoder::position(const std::byte* vertex, const ChunkRecord& c
   return p;
 }
 
+glm::dvec3 oct_to_normal(double x, double y) {
+  // Meyer et al., "On floating-point normal vectors", 2010: the octahedron's lower half is folded
+  // over its upper one.
+  const double z = 1.0 - std::abs(x) - std::abs(y);
+  if (z >= 0) return {x, y, z};
+  return {(1.0 - std::abs(y)) * (x < 0 ? -1.0 : 1.0), (1.0 - std::abs(x)) * (y < 0 ? -1.0 : 1.0),
+          z};
+}
+
 glm::dvec3 VertexDecoder::normal(const std::byte* vertex) const {
   glm::dvec3 n(0.0);
   if (const AttributeRecord* a = find(Semantic::kNormal); a != nullptr) {
     for (unsigned i = 0; i < 3; ++i) n[static_cast<int>(i)] = component(*a, vertex, i);
   } else if (const AttributeRecord* oct = find(Semantic::kNormalOct); oct != nullptr) {
-    // Meyer et al., "On floating-point normal vectors", 2010: the octahedron's lower half is folded
-    // over its upper one.
-    n.x = component(*oct, vertex, 0);
-    n.y = component(*oct, vertex, 1);
-    n.z = 1.0 - std::abs(n.x) - std::abs(n.y);
-    if (n.z < 0) {
-      const double x = n.x;
-      n.x = (1.0 - std::abs(n.y)) * (x < 0 ? -1.0 : 1.0);
-      n.y = (1.0 - std::abs(x)) * (n.y < 0 ? -1.0 : 1.0);
-    }
+    n = oct_to_normal(component(*oct, vertex, 0), component(*oct, vertex, 1));
   }
   const double length = glm::length(n);
   return length > 0 ? n / length : glm::dvec3(0, 0, 1);

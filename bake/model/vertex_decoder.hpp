@@ -12,6 +12,9 @@
 
 namespace modar {
 
+/// The direction, not normalised, of octahedral coordinates in [-1,1].
+glm::dvec3 oct_to_normal(double x, double y);
+
 /// Decodes attributes of one layout. The caller keeps indices inside the bytes.
 class VertexDecoder {
  public:

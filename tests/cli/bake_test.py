@@ -54,6 +54,29 @@ class Bake(ProgramTest):
         self.assertGreater(report["peak_rss_bytes"], 1e6)
         self.assertTrue(all({"name", "ms", "in", "out", "max_error"} <= set(s) for s in report["stages"]))
 
+    def test_the_asked_error_is_kept_and_picks_the_layout(self):
+        out = self.folder / "fine.modar"
+
+        def baked(*options):
+            done = self.modar("bake", "--model", STATUE, "-o", out, "--no-mipmaps", *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(self.modar("check", out).returncode, 0)
+            return self.modar_json("inspect", out)["models"][0]
+
+        plain = baked()
+        self.assertEqual(plain["layout"], "half")
+        fine = baked("--max-error", "0.003%")
+        self.assertEqual(fine["layout"], "int16")
+        self.assertLessEqual(fine["position_error_max"], 3e-5 * fine["diagonal"])
+        self.assertLess(fine["bytes_per_triangle"], plain["bytes_per_triangle"])
+        length = 1e-5 * fine["diagonal"]
+        for options in ([f"{length:.9f}"], [f"{1000 * length:.6f}mm", "--unit", "m"]):
+            self.assertLessEqual(baked("--max-error", *options)["position_error_max"], length)
+        done = self.modar("bake", "--model", STATUE, "-o", out, "--max-error", "2mm")
+        self.assert_fails(done, 1, "--unit")
+        done = self.modar("bake", "--model", STATUE, "-o", out, "--max-error", "0.01%", "--positions", "half")
+        self.assert_fails(done, 5, "half floats")
+
     def test_a_device_profile_bounds_the_textures(self):
         out = self.folder / "small.modar"
         report = self.modar_json("bake", "--model", POTTERY, "--max-texture", 64, "--device", "ace2", "-o", out)

@@ -66,5 +66,18 @@ TEST(Unit, Metres) {
   EXPECT_FALSE(parse_unit("parsec"));
 }
 
+TEST(MaxErrorText, NumberPercentageOrLength) {
+  EXPECT_EQ(parse_max_error("0.25")->unit, MaxError::Unit::kSource);
+  EXPECT_EQ(parse_max_error("0.25")->value, 0.25);
+  EXPECT_EQ(parse_max_error("1e-3")->value, 0.001);
+  EXPECT_EQ(parse_max_error("0.01%")->unit, MaxError::Unit::kPercent);
+  EXPECT_EQ(parse_max_error("0.01%")->value, 0.01);
+  EXPECT_EQ(parse_max_error("2mm")->unit, MaxError::Unit::kMetres);
+  EXPECT_DOUBLE_EQ(parse_max_error("2mm")->value, 0.002);
+  for (const char* bad : {"", "0", "-1", "mm", "%", "1 parsec", "nan", "1..2", "2mm3"}) {
+    EXPECT_FALSE(parse_max_error(bad)) << bad;
+  }
+}
+
 }  // namespace
 }  // namespace modar

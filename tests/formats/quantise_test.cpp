@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <random>
 
 namespace {
 
@@ -86,6 +88,52 @@ TEST(Snorm8, IsTheNearestUnderTheMeanOfBothDecodings) {
   EXPECT_EQ(modar::float_to_snorm8(std::nanf("")), 0);
   for (int c = -128; c <= 127; ++c) {
     EXPECT_EQ(modar::snorm8_to_float(static_cast<std::int8_t>(c)), static_cast<float>(es2(c)));
+  }
+}
+
+/// What the specification says of octahedral normals, at full length.
+std::array<double, 3> oct_direction(double x, double y) {
+  double z = 1.0 - std::fabs(x) - std::fabs(y);
+  if (z < 0) {
+    const double old = x;
+    x = (1.0 - std::fabs(y)) * (x < 0 ? -1.0 : 1.0);
+    y = (1.0 - std::fabs(old)) * (y < 0 ? -1.0 : 1.0);
+  }
+  const double length = std::sqrt(x * x + y * y + z * z);
+  return {x / length, y / length, z / length};
+}
+
+TEST(Oct8, IsAsGoodAsTheBestOfAllCodes) {
+  const auto worse_degrees = [](int cx, int cy, const std::array<double, 3>& n) {
+    double worse = 0;
+    for (const bool es3 : {false, true}) {
+      const auto decode = [&](int c) {
+        return es3 ? std::fmax(c / 127.0, -1.0) : (2.0 * c + 1.0) / 255.0;
+      };
+      const auto d = oct_direction(decode(cx), decode(cy));
+      const double dot = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+      worse = std::fmax(worse, std::acos(std::fmin(1.0, dot)) * 57.29577951308232);
+    }
+    return worse;
+  };
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 150; ++i) {
+    std::array<double, 3> n = {normal(random), normal(random), normal(random)};
+    if (i % 5 == 0) n[static_cast<std::size_t>(i % 3)] = 0.0;
+    const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (double& c : n) c /= length;
+    double best = 180;
+    for (int cx = -128; cx <= 127; ++cx) {
+      for (int cy = -128; cy <= 127; ++cy) best = std::fmin(best, worse_degrees(cx, cy, n));
+    }
+    const auto code = modar::normal_to_oct8(n);
+    // The codes round a direction nearly always hold the best of all.
+    EXPECT_LE(worse_degrees(code[0], code[1], n), best + 0.3) << i;
+    EXPECT_LT(worse_degrees(code[0], code[1], n), 1.5) << i;
+  }
+  for (const auto& n : {std::array<double, 3>{0, 0, 0}, {NAN, 0, 0}}) {
+    EXPECT_GT(oct_direction((2.0 * modar::normal_to_oct8(n)[0] + 1) / 255, 0)[2], 0.9);
   }
 }
 
