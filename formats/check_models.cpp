@@ -70,6 +70,33 @@ void check_chunk(FaultLog& log, const BundleParts& parts, const ChunkRecord& chu
   }
 }
 
+bool has_integer_positions(const LayoutRecord& layout) {
+  for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
+    const AttributeRecord& a = layout.attributes[i];
+    if (a.semantic != static_cast<std::uint8_t>(Semantic::kPosition)) continue;
+    return a.type != static_cast<std::uint8_t>(ComponentType::kHalf) &&
+           a.type != static_cast<std::uint8_t>(ComponentType::kF32) && a.normalised == 0;
+  }
+  return false;
+}
+
+/// Does a chunk stand on the grid that the first chunk of its model has?
+void check_grid(FaultLog& log, const BundleParts& parts, const ModelRecord& model,
+                const ChunkRecord& chunk, const std::string& where) {
+  if (!has_integer_positions(parts.layouts[model.layout])) return;
+  const float step = chunk.position_step;
+  int exponent = 0;
+  bool good =
+      step == parts.chunks[model.first_chunk].position_step && std::frexp(step, &exponent) == 0.5f;
+  for (const float offset : chunk.position_offset) good = good && std::fmod(offset, step) == 0.0f;
+  if (good) return;
+  log.add(Rule::kChunkGrid, offset_of(parts, chunk.position_offset), where,
+          "step " + number_text(wide(step)) + ", offset " +
+              number_text(wide(chunk.position_offset[0])) + " " +
+              number_text(wide(chunk.position_offset[1])) + " " +
+              number_text(wide(chunk.position_offset[2])));
+}
+
 void check_levels(FaultLog& log, const BundleParts& parts, const ChunkRecord& chunk,
                   const std::string& where) {
   for (std::uint32_t i = 0; i < chunk.level_count; ++i) {
@@ -167,6 +194,7 @@ void check_model_records(FaultLog& log, const BundleParts& parts) {
       const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];
       const std::string where = label(parts, "model", model.name) + ", chunk " + std::to_string(j);
       check_chunk(log, parts, chunk, where);
+      check_grid(log, parts, model, chunk, where);
       check_levels(log, parts, chunk, where);
     }
   }

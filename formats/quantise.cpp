@@ -7,6 +7,9 @@
 namespace modar {
 namespace {
 
+/// From one signed 8-bit code to the next, in the mean of both decodings.
+constexpr double kSnorm8Step = (2.0 / 255.0 + 1.0 / 127.0) / 2.0;
+
 /// What ES 2.0 and ES 3 make of c, in the middle.
 double snorm8_mean(int c) {
   const double es2 = (2.0 * c + 1.0) / 255.0;
@@ -74,8 +77,7 @@ float half_to_float(std::uint16_t half) {
 
 std::int8_t float_to_snorm8(float value) {
   const double wanted = clamped(value, -1.0, 1.0);
-  const double step = (2.0 / 255.0 + 1.0 / 127.0) / 2.0;
-  int best = static_cast<int>(std::floor((wanted - 0.5 / 255.0) / step));
+  int best = static_cast<int>(std::floor((wanted - 0.5 / 255.0) / kSnorm8Step));
   best = best < -128 ? -128 : (best > 127 ? 127 : best);
   // The mean of both decodings bends at -127, so the neighbour above decides by distance.
   if (best < 127 &&
@@ -100,7 +102,7 @@ std::array<std::int8_t, 2> normal_to_oct8(const std::array<double, 3>& normal) {
     y = (1.0 - std::fabs(unfolded)) * (y < 0 ? -1.0 : 1.0);
   }
   const auto below = [](double wanted) {
-    const int c = static_cast<int>(std::floor((wanted * 255.0 - 1.0) / 2.0));
+    const int c = static_cast<int>(std::floor((wanted - 0.5 / 255.0) / kSnorm8Step));
     return c < -128 ? -128 : (c > 126 ? 126 : c);
   };
   const int x0 = below(x);

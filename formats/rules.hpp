@@ -50,6 +50,7 @@ enum class Rule : std::uint8_t {
   kChunkBounds,
   kChunkOutside,
   kChunkCone,
+  kChunkGrid,
   kLevelOrder,
   kIndexRange,
   kNotFinite,

@@ -56,6 +56,21 @@ constexpr CorruptCase kCases[] = {
      [] { return changed(model_content(), [](auto& c) { c.chunks[1].bounds_max[0] = 1.5f; }); }},
     {"CHUNK_CONE",
      [] { return changed(model_content(), [](auto& c) { c.chunks[0].cone_axis[2] = 0.5f; }); }},
+    {"CHUNK_GRID",
+     [] {
+       return changed(model_content(), [](auto& c) {
+         // Halves read as integers: the box is wide enough for all of them.
+         c.layouts[0].attributes[0].type = static_cast<std::uint8_t>(ComponentType::kI16);
+         for (ChunkRecord& chunk : c.chunks) {
+           chunk.position_step = 0x1p-15f;
+           for (int i = 0; i < 3; ++i) {
+             chunk.bounds_min[i] = -1;
+             chunk.bounds_max[i] = 1;
+           }
+         }
+         c.chunks[1].position_offset[0] = 0x1p-17f;
+       });
+     }},
     {"LEVEL_ORDER",
      [] { return changed(model_content(), [](auto& c) { c.levels[0].error = 0.125f; }); }},
     {"LEVEL_INDEX",

@@ -129,7 +129,7 @@ TEST(Oct8, IsAsGoodAsTheBestOfAllCodes) {
     }
     const auto code = modar::normal_to_oct8(n);
     // The codes round a direction nearly always hold the best of all.
-    EXPECT_LE(worse_degrees(code[0], code[1], n), best + 0.3) << i;
+    EXPECT_LE(worse_degrees(code[0], code[1], n), best + 0.2) << i;
     EXPECT_LT(worse_degrees(code[0], code[1], n), 1.5) << i;
   }
   for (const auto& n : {std::array<double, 3>{0, 0, 0}, {NAN, 0, 0}}) {
