@@ -11,6 +11,7 @@
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/read_model.hpp"
 #include "bake/texture_stage.hpp"
+#include "formats/statement.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/features.hpp"
 
@@ -279,6 +280,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
     return tl::unexpected(added.error());
   }
   content.meta = bundle_meta(request);
+  content.statement = statement_of(content);
   return content;
 }
 

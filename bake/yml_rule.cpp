@@ -37,6 +37,24 @@ std::string difference(std::string_view yml, const FeatureView& twin) {
   return {};
 }
 
+/// True if text and twin agree, or there is no text.
+bool check_pair(const BundleView& bundle, std::uint32_t pattern, const ParameterSetRecord& set,
+                const IssueSink& sink) {
+  const std::string_view yml = bundle.feature_yml(pattern, set.id);
+  if (yml.empty()) return true;
+  const std::string detail = difference(yml, bundle.features(pattern, set.id));
+  if (detail.empty()) return true;
+  Issue issue;
+  issue.kind = yml_issue_kind();
+  issue.where = "pattern '" + std::string(bundle.name(bundle.patterns()[pattern].name)) + "', " +
+                std::string(bundle.name(set.name));
+  issue.offset =
+      static_cast<std::uint64_t>(yml.data() - reinterpret_cast<const char*>(bundle.bytes().data()));
+  issue.detail = detail;
+  sink(issue);
+  return false;
+}
+
 }  // namespace
 
 bool check_yml_twins(std::span<const std::byte> bytes, const IssueSink& sink) {
@@ -45,23 +63,21 @@ bool check_yml_twins(std::span<const std::byte> bytes, const IssueSink& sink) {
   bool good = true;
   for (std::uint32_t p = 0; p < bundle->patterns().size(); ++p) {
     for (std::uint32_t s = 0; s < bundle->parameter_sets().size(); ++s) {
-      const ParameterSetRecord& set = bundle->parameter_sets()[s];
-      const std::string_view yml = bundle->feature_yml(p, set.id);
-      if (yml.empty()) continue;
-      const std::string detail = difference(yml, bundle->features(p, set.id));
-      if (detail.empty()) continue;
-      good = false;
-      Issue issue;
-      issue.kind = yml_issue_kind();
-      issue.where = "pattern '" + std::string(bundle->name(bundle->patterns()[p].name)) + "', " +
-                    std::string(bundle->name(set.name));
-      issue.offset =
-          static_cast<std::uint64_t>(yml.data() - reinterpret_cast<const char*>(bytes.data()));
-      issue.detail = detail;
-      sink(issue);
+      good = check_pair(*bundle, p, bundle->parameter_sets()[s], sink) && good;
     }
   }
   return good;
+}
+
+bool check_yml_twin(std::span<const std::byte> bytes, std::uint32_t pattern, std::uint32_t set_id,
+                    const IssueSink& sink) {
+  const Result<BundleView> bundle = BundleView::open(bytes);
+  if (!bundle || pattern >= bundle->patterns().size()) return false;
+  for (std::uint32_t s = 0; s < bundle->parameter_sets().size(); ++s) {
+    const ParameterSetRecord& set = bundle->parameter_sets()[s];
+    if (set.id == set_id) return check_pair(*bundle, pattern, set, sink);
+  }
+  return false;
 }
 
 }  // namespace modar

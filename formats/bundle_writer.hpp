@@ -38,6 +38,8 @@ struct ExtraSection {
 struct BundleContent {
   std::string names;  ///< filled by intern()
   std::string meta;   ///< JSON text
+  /// What statement_of() makes of all the rest at last, or empty.
+  std::string statement;
   std::vector<ModelRecord> models;
   std::vector<ChunkRecord> chunks;
   std::vector<LevelRecord> levels;

@@ -16,8 +16,11 @@ void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes) {
   // Payloads are read through records, so these have to be clean; a wrong hash does no harm.
   if (log.errors() != damaged) return;
   check_model_records(log, parts);
-  check_geometry(log, parts, hashes);
-  check_textures(log, parts);
+  StatementCheck statement(log, parts);
+  statement.records();
+  check_geometry(log, parts, hashes, statement);
+  check_textures(log, parts, statement);
+  statement.finish();
   check_patterns(log, parts);
 }
 

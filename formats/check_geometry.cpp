@@ -63,7 +63,7 @@ class GeometryCheck {
     if (surely_good(layout, scan, chunk, level)) return;
     const auto* indices =
         reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset);
-    wrong_index_ = degenerate_ = not_finite_ = normal_ = outside_ = Tally();
+    wrong_index_ = degenerate_ = not_finite_ = normal_ = outside_ = padding_ = Tally();
     for (std::uint32_t i = 0; i < level.index_count; ++i) {
       const std::uint16_t index = indices[i];
       if (index >= level.vertex_count) {
@@ -87,6 +87,7 @@ class GeometryCheck {
     tell(Rule::kNotFinite, not_finite_, where, "vertices are not finite");
     tell(Rule::kNormalLength, normal_, where, "normals are not of unit length");
     tell(Rule::kChunkBounds, outside_, where, "vertices lie outside of the chunk's box");
+    tell(Rule::kVertexPadding, padding_, where, "vertices have padding that is not zero");
     tell(Rule::kDegenerateTriangles, degenerate_, where, "triangles use a vertex twice");
   }
 
@@ -105,7 +106,7 @@ class GeometryCheck {
     const VertexScan::Extent extent =
         scan.scan(parts_.vertices.subspan(static_cast<std::size_t>(level.vertex_offset),
                                           std::size_t{level.vertex_count} * layout.stride));
-    return extent.finite && extent.unit_normals &&
+    return extent.finite && extent.unit_normals && extent.clean_padding &&
            inside(chunk, {extent.low[0], extent.low[1], extent.low[2], 0.0}) &&
            inside(chunk, {extent.high[0], extent.high[1], extent.high[2], 0.0});
   }
@@ -120,10 +121,12 @@ class GeometryCheck {
   }
 
   void check_vertex(const LayoutRecord& layout, const ChunkRecord& chunk, const std::byte* vertex) {
+    std::array<bool, kMaxVertexStride> owned{};
     for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
       const AttributeRecord& attribute = layout.attributes[i];
       const std::uint32_t size = component_bytes(attribute.type);
       const std::byte* place = vertex + attribute.offset;
+      std::fill_n(owned.begin() + attribute.offset, size * attribute.components, true);
       std::array<double, 4> value{};
       bool finite = true;
       for (std::uint32_t c = 0; c < attribute.components; ++c) {
@@ -140,6 +143,10 @@ class GeometryCheck {
           normal_.hit(offset_of(parts_, place));
         }
       }
+    }
+    for (std::uint32_t i = 0; i < layout.stride; ++i) {
+      if (!owned[i] && vertex[i] != std::byte{0})
+        return padding_.hit(offset_of(parts_, vertex + i));
     }
   }
 
@@ -171,11 +178,13 @@ class GeometryCheck {
   Tally not_finite_;
   Tally normal_;
   Tally outside_;
+  Tally padding_;
 };
 
 }  // namespace
 
-void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes) {
+void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes,
+                    StatementCheck& statement) {
   GeometryCheck check(log, parts);
   for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
     const ModelRecord& model = parts.models[i];
@@ -189,6 +198,7 @@ void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashe
           return label(parts, "model", model.name) + ", chunk " + std::to_string(j) + ", level " +
                  std::to_string(k);
         });
+        statement.level(chunk.first_level + k, layout.stride);
         // Hashed while the caches still hold it.
         hashes.vertices.read_to(level.vertex_offset +
                                 std::uint64_t{level.vertex_count} * layout.stride);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "formats/bundle_view.hpp"
 #include "formats/rules.hpp"
@@ -53,11 +54,34 @@ struct BufferHashes {
 /// Counts, placements, boxes, cones, order of levels, materials, bytes that nothing refers to.
 void check_model_records(FaultLog& log, const BundleParts& parts);
 
+/// Holds the statement against the bundle, line by line in its order. Does nothing where there is
+/// no statement.
+class StatementCheck {
+ public:
+  /// Both must outlive this.
+  StatementCheck(FaultLog& log, const BundleParts& parts);
+  void records();
+  void level(std::uint32_t index, std::uint32_t stride);
+  void texture_level(std::uint32_t index, std::span<const std::byte> data);
+  /// Nothing may follow.
+  void finish();
+
+ private:
+  void expect(std::string_view line, const char* subject, std::uint32_t index);
+
+  FaultLog& log_;
+  const BundleParts& parts_;
+  const SectionEntry* entry_;
+  std::string_view text_;
+  std::size_t read_ = 0;
+};
+
 /// Every index and every vertex that one refers to. Time grows with the index buffer.
-void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes);
+void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes,
+                    StatementCheck& statement);
 
 /// Sides, overlaps and gaps of textures.
-void check_textures(FaultLog& log, const BundleParts& parts);
+void check_textures(FaultLog& log, const BundleParts& parts, StatementCheck& statement);
 
 /// Parameter sets, keypoints, descriptors, feature texts.
 void check_patterns(FaultLog& log, const BundleParts& parts);

@@ -58,13 +58,16 @@ void check_blocks(FaultLog& log, const BundleParts& parts, const TextureRecord& 
 
 }  // namespace
 
-void check_textures(FaultLog& log, const BundleParts& parts) {
+void check_textures(FaultLog& log, const BundleParts& parts, StatementCheck& statement) {
   for (std::uint32_t i = 0; i < parts.textures.size(); ++i) {
     const TextureRecord& texture = parts.textures[i];
     check_sides(log, parts, texture);
     // A texture has at least one level, and a clean structure has bytes for it.
-    check_blocks(log, parts, texture,
-                 *find_section(parts.sections, SectionType::kTextureData, i, 0));
+    const SectionEntry& data = *find_section(parts.sections, SectionType::kTextureData, i, 0);
+    check_blocks(log, parts, texture, data);
+    for (std::uint32_t j = 0; j < texture.level_count; ++j) {
+      statement.texture_level(texture.first_level + j, section_bytes(parts, data));
+    }
   }
 }
 

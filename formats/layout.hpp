@@ -30,6 +30,7 @@ inline constexpr std::uint64_t kGpuAlignment = 4096;
 enum class SectionType : std::uint32_t {
   kNames = 1,           ///< UTF-8 names, back to back
   kMeta = 2,            ///< JSON text: how the bundle was baked
+  kStatement = 3,       ///< JSON lines that follow from the rest: see statement.hpp
   kModels = 16,         ///< table of ModelRecord
   kChunks = 17,         ///< table of ChunkRecord
   kLevels = 18,         ///< table of LevelRecord

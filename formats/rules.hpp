@@ -65,6 +65,8 @@ enum class Rule : std::uint8_t {
   kDescriptorLength,
   kFeaturesMissing,
   kFeatureYml,
+  kStatement,
+  kVertexPadding,
   kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV
   kUnreferencedVertices,
   kUnreferencedIndices,

@@ -119,7 +119,7 @@ TABLES = {
     64: ("scenes", Record("pattern:I model:I scale:f offset:3f rotation:4f reserved:2I")),
 }
 KEYPOINT = struct.Struct("<5f2i")
-SINGLES = {1: 1, 2: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}}  # type: flags
+SINGLES = {1: 1, 2: 0, 3: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}}  # type: flags
 OWNED = {256: 1, 257: 0, 514: 3}
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Reads and checks a ModAR bundle, written from formats/bundle.md alone: a second opinion on ours.
 
-Usage: read_bundle.py FILE... [--json] [--full]
+Usage: read_bundle.py FILE... [--json] [--full] [--scenes]
   --json  print what was decoded of one file; --full adds every position, normal, uv, colour, index
+  --scenes  print a line for each file: a digest of the scene that was decoded, or why there is none
 Exit: 0 good, 1 usage, 2 a file cannot be read, 3 a bundle is invalid or unsupported.
 """
 import json
@@ -10,6 +11,7 @@ import math
 import struct
 import sys
 
+from bundle_statement import check_statement
 from bundle_bytes import (ATTRIBUTE, COMPONENTS, FEATURES, KEYPOINT, NO_OFFSET, NONE, Bundle, Fault,
                           digest, need)
 
@@ -185,6 +187,12 @@ def decode_level(bundle, layout, chunk, level, full):
         out[SEMANTICS[part["semantic"]]] = digest(struct.pack(f"<{len(flat)}d", *flat))
         if full:
             out[SEMANTICS[part["semantic"]] + "_values"] = values
+    owned = {part["offset"] + byte for part in layout["attributes"]
+             for byte in range(struct.calcsize(f"{part['components']}{COMPONENTS[part['type']]}"))}
+    stride, first = layout["stride"], level["vertex_offset"]
+    for byte in set(range(stride)) - owned:
+        column = bundle.vertices[first + byte:first + level["vertex_count"] * stride:stride]
+        need(not any(column[i] for i in used), "VERTEX_PADDING", at)
     out["indices"] = digest(struct.pack(f"<{len(indices)}H", *indices))
     return {**out, "indices_values": indices} if full else out
 
@@ -304,6 +312,7 @@ def check(bundle, full):
     check_textures(bundle)
     check_patterns(bundle)
     features = read_features(bundle)
+    check_statement(bundle)
     for model in tables["models"]:
         layout = tables["layouts"][model["layout"]]
         for chunk in tables["chunks"][model["first_chunk"]:][:model["chunk_count"]]:
@@ -316,6 +325,12 @@ def check(bundle, full):
     meta = bundle.payload.get((2, NONE, 0), b"").decode("utf-8", "replace")
     return {"format": {"major": 1, "minor": bundle.header["minor"]}, "bytes": len(bundle.data),
             "meta": meta, "sections": bundle.sections, **tables, "features": features}
+
+
+def scene_digest(decoded):
+    """Of everything that is drawn or recognised: not of where it lies in the file or how it was made."""
+    scene = {key: value for key, value in decoded.items() if key not in ("bytes", "meta", "sections")}
+    return digest(json.dumps(scene, sort_keys=True).encode())
 
 
 def read(path, full):
@@ -336,7 +351,7 @@ def main(arguments):
     if options & {"--help", "-h"}:
         print(__doc__)
         return 0
-    if not files or options - {"--json", "--full"} or ("--json" in options and len(files) > 1):
+    if not files or options - {"--json", "--full", "--scenes"} or ("--json" in options and len(files) > 1):
         print(__doc__, file=sys.stderr)
         return 1
     worst = 0
@@ -344,7 +359,9 @@ def main(arguments):
         prefix = f"{path}: " if len(files) > 1 else ""
         bundle, decoded, code, words = read(path, "--full" in options)
         worst = max(worst, code)
-        if code != 0:
+        if "--scenes" in options:
+            print(scene_digest(decoded) if code == 0 else words.replace("\n", " "))
+        elif code != 0:
             print(prefix + words, file=sys.stderr)
         elif "--json" in options:
             print(json.dumps(decoded, indent=1, ensure_ascii=False, allow_nan=False))

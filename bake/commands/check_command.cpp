@@ -45,6 +45,7 @@ int run_check(const CheckCommand& command) {
     std::fputs(issues_markdown().c_str(), stdout);
     return static_cast<int>(ExitCode::kOk);
   }
+  if (command.mutations > 0) return run_mutate(command);
   Result<MappedFile> file = MappedFile::open(command.bundle);
   if (!file) return print_error(file.error());
 

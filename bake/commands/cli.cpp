@@ -136,7 +136,19 @@ CLI::App* add_check(CLI::App& app, CheckCommand& check) {
   bundle->excludes(list);
   sub->add_flag("--json", check.json, "Print verdict and issues as JSON");
   sub->add_flag("--warnings-as-errors", check.warnings_as_errors, "A warning makes the bundle bad");
-  sub->footer(example("  modar check spider.modar\n") + "A bad bundle answers 3.\n");
+  CLI::Option* mutate =
+      sub->add_option("--mutate", check.mutations,
+                      "Prove the checker instead: damage N copies of the bundle, count those found")
+          ->type_name("N")
+          ->check(CLI::PositiveNumber);
+  sub->add_option("--seed", check.seed, "Which mutations")->needs(mutate)->capture_default_str();
+  sub->add_option("--second-reader", check.second_reader,
+                  "scripts/read_bundle.py: tells which survivors changed nothing")
+      ->type_name("FILE")
+      ->needs(mutate);
+  sub->footer(example("  modar check spider.modar\n  modar check --mutate 100000 --second-reader "
+                      "scripts/read_bundle.py spider.modar\n") +
+              "A bad bundle answers 3, and so does a proof that misses its goals.\n");
   return sub;
 }
 

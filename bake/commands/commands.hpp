@@ -27,7 +27,10 @@ struct CheckCommand {
   std::string bundle;
   bool json = false;
   bool warnings_as_errors = false;
-  bool list_issues = false;  ///< print ISSUES.md instead
+  bool list_issues = false;     ///< print ISSUES.md instead
+  std::uint64_t mutations = 0;  ///< damage copies of the bundle instead: `--mutate`
+  std::uint64_t seed = 1;
+  std::string second_reader;  ///< scripts/read_bundle.py, to tell harmless mutations
 };
 
 struct InspectCommand {
@@ -47,6 +50,7 @@ struct BenchCommand {
 int run_bake(const BakeCommand& command);
 int run_rectify(const RectifyCommand& command);
 int run_check(const CheckCommand& command);
+int run_mutate(const CheckCommand& command);
 int run_inspect(const InspectCommand& command);
 int run_bench(const BenchCommand& command);
 

@@ -1,4 +1,5 @@
 // Damage to payloads of bundles that open.
+#include "formats/statement.hpp"
 #include "tests/corrupt/cases.hpp"
 
 namespace modar::test {
@@ -118,6 +119,14 @@ constexpr CorruptCase kCases[] = {
      [] {
        return changed(pattern_content(), [](auto& c) { c.features[0][1].yml = "keypoints: 9\n"; });
      }},
+    {"STATEMENT_DIFFERS",
+     [] {
+       return changed(model_content(), [](auto& c) {
+         c.statement = statement_of(c);
+         c.materials[0].diffuse[1] = 0.25f;
+       });
+     }},
+    {"VERTEX_PADDING", [] { return vertex_damage(6, std::byte{1}, std::byte{0}); }},
     {"PATTERN_YML_DIFFERS",
      [] {
        return changed(pattern_content(), [](auto& c) {

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "formats/field_table.hpp"
 #include "formats/layout.hpp"
 
 namespace {
@@ -148,6 +149,26 @@ TEST(SpecTable, SpecificationAndStructsAreTheSame) {
   }
 }
 
+TEST(SpecTable, FieldTableHoldsEveryField) {
+  auto code = compiled();
+  code.erase("NameRef");
+  ASSERT_EQ(modar::record_infos().size(), code.size());
+  for (const modar::RecordInfo& record : modar::record_infos()) {
+    ASSERT_TRUE(code.contains(record.name)) << record.name;
+    const Struct& expected = code.at(record.name);
+    EXPECT_EQ(record.size, expected.size) << record.name;
+    ASSERT_EQ(record.fields.size(), expected.fields.size()) << record.name;
+    for (std::size_t i = 0; i < expected.fields.size(); ++i) {
+      const modar::FieldInfo& field = record.fields[i];
+      EXPECT_EQ(field.name, expected.fields[i].name) << record.name;
+      EXPECT_EQ(field.offset, expected.fields[i].offset) << record.name << "." << field.name;
+      EXPECT_EQ(field.count * modar::field_element_bytes(field.type), expected.fields[i].size)
+          << record.name << "." << field.name;
+      EXPECT_EQ(field.reserved, expected.fields[i].name.starts_with("reserved"));
+    }
+  }
+}
+
 TEST(SpecTable, FieldsLeaveNoHoles) {
   for (const auto& [name, record] : compiled()) {
     std::size_t end = 0;
@@ -170,6 +191,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
   using modar::SectionType;
   const std::map<SectionType, std::string> names = {{SectionType::kNames, "names"},
                                                     {SectionType::kMeta, "meta"},
+                                                    {SectionType::kStatement, "statement"},
                                                     {SectionType::kModels, "models"},
                                                     {SectionType::kChunks, "chunks"},
                                                     {SectionType::kLevels, "levels"},

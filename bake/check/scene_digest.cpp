@@ -1,0 +1,112 @@
+// Hashes a bundle through BundleView, as a renderer and a tracker read it.
+#include "bake/check/scene_digest.hpp"
+
+#include <string_view>
+
+#include "formats/bundle_view.hpp"
+#include "formats/field_table.hpp"
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace modar {
+namespace {
+
+class Digest {
+ public:
+  Digest() { XXH64_reset(&state_, 0); }
+  void add(const void* bytes, std::size_t size) {
+    if (size > 0) XXH64_update(&state_, bytes, size);
+  }
+  void add(std::string_view text) {
+    const std::uint64_t size = text.size();
+    add(&size, sizeof size);
+    add(text.data(), text.size());
+  }
+  void add(std::span<const std::byte> bytes) { add(bytes.data(), bytes.size()); }
+  [[nodiscard]] std::uint64_t value() const { return XXH64_digest(&state_); }
+
+ private:
+  XXH64_state_t state_;
+};
+
+template <class T>
+void add_table(Digest& digest, const BundleView& view, const char* name, const Table<T>& table) {
+  const RecordInfo& info = record_info(name);
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    const auto* record = reinterpret_cast<const std::byte*>(&table[i]);
+    for (const FieldInfo& field : info.fields) {
+      if (field.reserved) continue;
+      if (field.type == FieldType::kName) {
+        digest.add(view.name(*reinterpret_cast<const NameRef*>(record + field.offset)));
+      } else {
+        digest.add(record + field.offset, field.count * field_element_bytes(field.type));
+      }
+    }
+  }
+}
+
+std::size_t component_size(std::uint8_t type) {
+  switch (static_cast<ComponentType>(type)) {
+    case ComponentType::kI8:
+    case ComponentType::kU8:
+      return 1;
+    case ComponentType::kF32:
+      return 4;
+    default:
+      return 2;
+  }
+}
+
+void add_level(Digest& digest, const BundleView& view, const LayoutRecord& layout,
+               const LevelRecord& level) {
+  const std::byte* vertex = view.vertices().data() + level.vertex_offset;
+  for (std::uint32_t i = 0; i < level.vertex_count; ++i, vertex += layout.stride) {
+    for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
+      const AttributeRecord& attribute = layout.attributes[a];
+      digest.add(vertex + attribute.offset, attribute.components * component_size(attribute.type));
+    }
+  }
+  digest.add(view.indices().data() + level.index_offset, 2 * std::size_t{level.index_count});
+}
+
+}  // namespace
+
+std::uint64_t scene_digest(std::span<const std::byte> bytes) {
+  const Result<BundleView> opened = BundleView::open(bytes);
+  if (!opened) return 0;
+  const BundleView& view = *opened;
+  Digest digest;
+  digest.add(&view.header().minor, sizeof(view.header().minor));
+  add_table(digest, view, "ModelRecord", view.models());
+  add_table(digest, view, "ChunkRecord", view.chunks());
+  add_table(digest, view, "LevelRecord", view.levels());
+  add_table(digest, view, "MaterialRecord", view.materials());
+  add_table(digest, view, "LayoutRecord", view.layouts());
+  add_table(digest, view, "TextureRecord", view.textures());
+  add_table(digest, view, "TextureLevelRecord", view.texture_levels());
+  add_table(digest, view, "PatternRecord", view.patterns());
+  add_table(digest, view, "ParameterSetRecord", view.parameter_sets());
+  add_table(digest, view, "SceneRecord", view.scenes());
+  for (std::uint32_t m = 0; m < view.models().size(); ++m) {
+    const ModelRecord& model = view.models()[m];
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const ChunkRecord& chunk = view.chunks()[model.first_chunk + c];
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        add_level(digest, view, view.layouts()[model.layout], view.levels()[chunk.first_level + l]);
+      }
+    }
+  }
+  for (std::uint32_t t = 0; t < view.textures().size(); ++t) digest.add(view.texture_data(t));
+  for (const SectionEntry& entry : view.sections()) {
+    const auto type = static_cast<SectionType>(entry.type);
+    if (type != SectionType::kFeatureTwin && type != SectionType::kFeatureYml) continue;
+    digest.add(&entry.type, sizeof entry.type);
+    digest.add(&entry.owner, sizeof entry.owner);
+    digest.add(&entry.variant, sizeof entry.variant);
+    digest.add(view.section(type, entry.owner, entry.variant));
+  }
+  return digest.value();
+}
+
+}  // namespace modar
