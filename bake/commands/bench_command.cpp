@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/commands/bench_rows.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/terminal.hpp"
@@ -21,6 +22,7 @@ using BenchResult = Result<std::vector<BenchRow>>;
 
 struct Bench {
   const char* name;
+  bool needs_inputs;
   const char* inputs;  ///< what its arguments are
   const char* summary;
   std::function<BenchResult(const BenchCommand&)> run;
@@ -76,10 +78,13 @@ BenchResult bench_etc1_rows(const BenchCommand& command) {
 
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
-      {"load", "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
+      {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
        bench_load},
-      {"etc1", "IMAGE... [--crop SIDE]", "our ETC1 encoder against Android's libetc1",
+      {"etc1", true, "IMAGE... [--crop SIDE]", "our ETC1 encoder against Android's libetc1",
        bench_etc1_rows},
+      {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
+       "our pose loop against the article's method, on the same frames",
+       [](const BenchCommand& command) { return bench_pose_rows(command.pose); }},
   };
   return all;
 }
@@ -89,7 +94,7 @@ const std::vector<Bench>& benches() {
 int run_bench(const BenchCommand& command) {
   for (const Bench& bench : benches()) {
     if (command.name != bench.name) continue;
-    if (command.inputs.empty()) {
+    if (bench.needs_inputs && command.inputs.empty()) {
       return print_error({ExitCode::kUsage, "bench.inputs", command.name, "it needs input files",
                           std::string("modar bench ") + bench.name + " " + bench.inputs});
     }

@@ -170,8 +170,24 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
       ->type_name("NAME");
   sub->add_option("inputs", bench.inputs, "Its input files");
   sub->add_option("--crop", bench.crop, "etc1: side of the centre crop, in pixels");
+  PoseBenchCommand& pose = bench.pose;
+  sub->add_option("--patterns", pose.patterns, "pose: folder of pattern pictures, or one picture");
+  sub->add_option("--backgrounds", pose.backgrounds, "pose: folder of photos without a pattern");
+  sub->add_option("--video", pose.video, "pose: a video as well");
+  sub->add_option("--truth", pose.truth, "pose: corners of the video's pattern (CSV)");
+  sub->add_option("--video-pattern", pose.video_pattern,
+                  "pose: picture of the video's pattern (default: pattern.png beside the video)");
+  sub->add_option("--frames", pose.frames, "pose: rendered frames a band and pattern")
+      ->check(CLI::Range(1, 100000));
+  sub->add_option("--parameters", pose.parameters,
+                  "pose: set of the article's method, none: ours alone");
+  sub->add_option("--only", pose.only, "pose: bands whose name holds this text");
+  sub->add_option("--seed", pose.seed, "pose: of the rendered frames");
+  sub->add_flag("--quiet", pose.quiet, "No progress bar");
   sub->add_flag("--json", bench.json, "Print the rows as JSON");
-  sub->footer(example("  modar bench load spider.modar --json\n"));
+  sub->footer(
+      example("  modar bench load spider.modar --json\n"
+              "  modar bench pose --patterns patterns --backgrounds photos --frames 100 --json\n"));
   return sub;
 }
 

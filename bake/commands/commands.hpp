@@ -39,10 +39,25 @@ struct InspectCommand {
   bool json = false;
 };
 
+/// `modar bench pose`.
+struct PoseBenchCommand {
+  std::string patterns;                 ///< a folder of pictures, or one
+  std::string backgrounds;              ///< the same
+  std::string video;                    ///< empty: none
+  std::string truth;                    ///< CSV of the video's corners; empty: it shows no pattern
+  std::string video_pattern;            ///< picture of what the video shows; empty: see VideoBench
+  std::string parameters = "orb-2000";  ///< set of the article's method; "none": ours alone
+  std::string only;                     ///< bands whose name holds this text
+  int frames = 100;                     ///< a band and pattern
+  unsigned seed = 1;
+  bool quiet = false;
+};
+
 struct BenchCommand {
   std::string name;
   std::vector<std::string> inputs;
   unsigned crop = 0;  ///< etc1: side of the centre crop in pixels, 0: whole images
+  PoseBenchCommand pose;
   bool json = false;
 };
 

@@ -10,6 +10,7 @@
 
 #include "bake/pattern/loop_patches.hpp"
 #include "bake/pattern/view_render.hpp"
+#include "bake/texture/parallel.hpp"
 #include "formats/loop_record.hpp"
 #include "modar/loop_features.hpp"
 
@@ -78,8 +79,9 @@ LoopDetectOptions generous() {
   return options;
 }
 
-void add_candidates(const std::vector<GrayPicture>& levels, const AffineView& view,
-                    std::vector<Candidate>& candidates) {
+std::vector<Candidate> candidates_of(const std::vector<GrayPicture>& levels,
+                                     const AffineView& view) {
+  std::vector<Candidate> candidates;
   const GrayPicture picture = render_view(levels, view, nullptr);
   const auto describer = LoopDescriber::create(picture.width, picture.height, generous());
   describer->set_frame(picture.view());
@@ -101,23 +103,27 @@ void add_candidates(const std::vector<GrayPicture>& levels, const AffineView& vi
     candidate.dark = feature.dark;
     candidates.push_back(candidate);
   }
+  return candidates;
 }
 
-std::vector<Candidate> find_candidates(const std::vector<GrayPicture>& levels) {
-  std::vector<Candidate> candidates;
+std::vector<Candidate> find_candidates(const std::vector<GrayPicture>& levels, unsigned jobs) {
+  std::vector<AffineView> views;
   Random random(1);
   double scale = 1.0;
   for (int k = 0; k < kScales; ++k, scale /= kScaleStep) {
     // Directions get denser with the tilt (Yu & Morel, "ASIFT", 2011).
     for (const auto& [tilt, directions] : {std::pair{1.0, 2}, {1.5, 4}, {2.1, 6}, {2.9, 8}}) {
       for (int i = 0; i < directions; ++i) {
-        const AffineView view =
-            make_view(levels[0].width, levels[0].height, scale, tilt, kPi * i / directions,
-                      random.uniform(0.0, 2 * kPi), kMargin);
-        add_candidates(levels, view, candidates);
+        views.push_back(make_view(levels[0].width, levels[0].height, scale, tilt,
+                                  kPi * i / directions, random.uniform(0.0, 2 * kPi), kMargin));
       }
     }
   }
+  std::vector<std::vector<Candidate>> found(views.size());
+  parallel_rows(static_cast<std::uint32_t>(views.size()), jobs,
+                [&](std::uint32_t i) { found[i] = candidates_of(levels, views[i]); });
+  std::vector<Candidate> candidates;
+  for (const auto& some : found) candidates.insert(candidates.end(), some.begin(), some.end());
   return candidates;
 }
 
@@ -182,8 +188,15 @@ class Grid {
   std::vector<std::vector<std::uint32_t>> cells_;
 };
 
-void run_trial(const std::vector<GrayPicture>& levels, Random& random, const Grid& grid,
-               const std::vector<Candidate>& candidates, Trials& trials) {
+/// What a random view shows of the pattern: a hit list of (candidate, feature of the view).
+struct TrialView {
+  std::uint32_t features = 0;
+  std::vector<std::pair<std::uint32_t, Hit>> hits;
+};
+
+TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, const Grid& grid,
+                    const std::vector<Candidate>& candidates) {
+  Random random(seed);
   const double scale = std::exp(random.uniform(std::log(0.3), std::log(2.0)));
   const double tilt = 1.0 / std::cos(random.uniform(0.0, 70.0) * kPi / 180.0);
   const AffineView view =
@@ -195,12 +208,12 @@ void run_trial(const std::vector<GrayPicture>& levels, Random& random, const Gri
   const auto describer = LoopDescriber::create(picture.width, picture.height, LoopDetectOptions{});
   describer->set_frame(picture.view());
   const double mean_scale = scale / std::sqrt(tilt);
+  TrialView trial;
   for (const LoopFeature& feature : describer->features()) {
     const auto place =
         to_pattern(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     if (!within(levels[0].view(), place)) continue;
-    const auto id = static_cast<std::uint32_t>(trials.view_of.size());
-    trials.view_of.push_back(trials.views);
+    const std::uint32_t id = trial.features++;
     const double radius = std::min(kNear * (1 << feature.level) / mean_scale, 16.0);
     grid.near(place[0], place[1], radius, [&](std::uint32_t i) {
       const Candidate& candidate = candidates[i];
@@ -209,10 +222,28 @@ void run_trial(const std::vector<GrayPicture>& levels, Random& random, const Gri
       if (candidate.dark != feature.dark || dx * dx + dy * dy > radius * radius) return;
       const int bits = distance(candidate.code, feature.code);
       if (bits > kRepeats) return;
-      trials.hits[i].push_back({id, static_cast<float>(kRepeats + 8 - bits) / (kRepeats + 8)});
+      trial.hits.push_back({i, {id, static_cast<float>(kRepeats + 8 - bits) / (kRepeats + 8)}});
     });
   }
-  ++trials.views;
+  return trial;
+}
+
+Trials run_trials(const std::vector<GrayPicture>& levels, const std::vector<Candidate>& candidates,
+                  std::uint32_t count, unsigned jobs) {
+  const Grid grid(levels[0].view(), candidates);
+  std::vector<TrialView> views(count);
+  parallel_rows(count, jobs,
+                [&](std::uint32_t i) { views[i] = run_trial(levels, 1000 + i, grid, candidates); });
+  Trials trials;
+  trials.hits.resize(candidates.size());
+  for (const TrialView& view : views) {
+    const auto first = static_cast<std::uint32_t>(trials.view_of.size());
+    for (const auto& [candidate, hit] : view.hits) {
+      trials.hits[candidate].push_back({first + hit.feature, hit.value});
+    }
+    trials.view_of.insert(trials.view_of.end(), view.features, trials.views++);
+  }
+  return trials;
 }
 
 /// Greedy cover: each step takes the candidate that adds most to the trials' matches, where a view
@@ -345,14 +376,8 @@ Result<std::vector<std::byte>> bake_loop_record(const GrayImage& pattern,
                 "give another size");
   }
   const std::vector<GrayPicture> levels = halved(pattern);
-  const std::vector<Candidate> candidates = find_candidates(levels);
-  const Grid grid(pattern, candidates);
-  Trials trials;
-  trials.hits.resize(candidates.size());
-  Random random(2);
-  for (std::uint32_t i = 0; i < options.trial_views; ++i) {
-    run_trial(levels, random, grid, candidates, trials);
-  }
+  const std::vector<Candidate> candidates = find_candidates(levels, options.jobs);
+  const Trials trials = run_trials(levels, candidates, options.trial_views, options.jobs);
   const std::vector<std::uint32_t> chosen = choose(trials, options.features);
   if (chosen.size() < 8) {
     return fail(ExitCode::kInvalidInput, "pattern.no-features", "",

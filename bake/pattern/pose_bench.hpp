@@ -27,13 +27,16 @@ struct PoseBenchOptions {
 /// One method on one band, over all patterns.
 struct PoseBenchRow {
   std::string band;
-  std::string method;  ///< "paper" or "ours"
+  std::string method;     ///< "paper" or "ours"
+  bool sequence = false;  ///< frames followed each other, and were tracked
   int frames = 0;
-  int recognised = 0;    ///< on frames without the pattern: false recognitions
-  int right = 0;         ///< mean error of the four corners under 5 pixels
-  double error_px = 0;   ///< median over the right ones
-  double jitter_px = 0;  ///< tracking: rms change of the corners' error from frame to frame
-  double ms = 0;         ///< thread-CPU milliseconds a frame, mean
+  int without_pattern = 0;  ///< of the frames
+  int false_found = 0;      ///< recognitions in those
+  int recognised = 0;       ///< recognitions in the others
+  int right = 0;            ///< mean error of the four corners under 5 pixels
+  double error_px = 0;      ///< median over the right ones
+  double jitter_px = 0;     ///< tracking: rms change of the corners' error from frame to frame
+  double ms = 0;            ///< thread-CPU milliseconds a frame, mean
   double stages_ms[4] = {0, 0, 0, 0};  ///< wall: detect, describe, match, homography
 };
 
@@ -45,7 +48,24 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
 
 /// Tracking: sequences of `frames` frames of a hand-held path. speed: 1 is a calm hand; blur:
 /// pixels of motion blur for each pixel of motion.
-Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options, double speed,
-                                                 double blur, const PoseBenchProgress& progress);
+Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options,
+                                                 const std::string& name, double speed, double blur,
+                                                 const PoseBenchProgress& progress);
+
+/// A real video. truth: lines "frame ok ... x0 y0 x1 y1 x2 y2 x3 y3" parted by blanks, '#' starts
+/// a comment, ok is 1 where the pattern shows and the last eight numbers are its corners; empty:
+/// the video shows no pattern, and every recognition is false. pattern: its picture; empty:
+/// pattern.png beside the video, else all patterns of the options at once.
+struct VideoBench {
+  std::string video;
+  std::string truth;
+  std::string pattern;
+};
+
+/// Tracking over a video, with a default camera. Errors: kIo "bench.video", kInvalidInput
+/// "bench.truth".
+Result<std::vector<PoseBenchRow>> bench_video(const PoseBenchOptions& options,
+                                              const VideoBench& video,
+                                              const PoseBenchProgress& progress);
 
 }  // namespace modar

@@ -82,21 +82,13 @@ void warp(const GrayImage& pattern, const std::array<glm::dvec2, 4>& corners, do
   cv::resize(fine, mask, size, 0, 0, cv::INTER_AREA);
 }
 
-void light_and_noise(cv::Mat& frame, Random& random) {
-  const double gain = random.uniform(0.6, 1.25);
-  const double bias = random.uniform(-20.0, 20.0);
-  const double slope_x = random.uniform(-0.2, 0.2) / frame.cols;
-  const double slope_y = random.uniform(-0.2, 0.2) / frame.rows;
+void light_and_noise(cv::Mat& frame, const SceneLight& with, Random& random) {
   for (int y = 0; y < frame.rows; ++y) {
     std::uint8_t* row = frame.ptr(y);
     for (int x = 0; x < frame.cols; ++x) {
-      const double light = gain + slope_x * (x - frame.cols / 2) + slope_y * (y - frame.rows / 2);
-      // Three uniforms are near enough to a normal distribution, and quick.
-      const std::uint64_t bits = random.next();
-      const double noise = static_cast<double>(bits & 0xFFFF) +
-                           static_cast<double>((bits >> 16) & 0xFFFF) +
-                           static_cast<double>((bits >> 32) & 0xFFFF) - 1.5 * 65535;
-      const double seen = light * row[x] + bias + kNoise * 2.0 / 65535 * noise;
+      const double light = with.gain + with.slope_x * (static_cast<double>(x) / frame.cols - 0.5) +
+                           with.slope_y * (static_cast<double>(y) / frame.rows - 0.5);
+      const double seen = light * row[x] + with.bias + kNoise * random.normal();
       row[x] = static_cast<std::uint8_t>(std::clamp(seen + 0.5, 0.0, 255.0));
     }
   }
@@ -160,9 +152,20 @@ Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& ca
   return pose;
 }
 
+SceneLight draw_light(Random& random) {
+  SceneLight light;
+  light.gain = random.uniform(0.6, 1.25);
+  light.bias = random.uniform(-20.0, 20.0);
+  light.slope_x = random.uniform(-0.2, 0.2);
+  light.slope_y = random.uniform(-0.2, 0.2);
+  light.focus = random.uniform(0.4, 0.9);
+  return light;
+}
+
 SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
                         const GrayPicture& background, const SceneBand& band, Random& random,
-                        double blur, double blur_angle) {
+                        const SceneLight* light, MotionBlur blur) {
+  const SceneLight shining = light != nullptr ? *light : draw_light(random);
   SceneFrame scene;
   scene.pose = pose;
   scene.picture = background;
@@ -183,9 +186,9 @@ SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Po
       }
     }
   }
-  cv::GaussianBlur(frame, frame, cv::Size(5, 5), random.uniform(0.4, 0.9));
-  if (blur > 1.0) cv::filter2D(frame, frame, -1, motion_kernel(blur, blur_angle));
-  light_and_noise(frame, random);
+  cv::GaussianBlur(frame, frame, cv::Size(5, 5), shining.focus);
+  if (blur.length > 1.0) cv::filter2D(frame, frame, -1, motion_kernel(blur.length, blur.angle));
+  light_and_noise(frame, shining, random);
   return scene;
 }
 

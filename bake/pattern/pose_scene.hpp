@@ -40,11 +40,27 @@ struct SceneFrame {
 Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
                Random& random);
 
-/// Renders the pattern at the pose over the background, with other light, mild blur and noise of
-/// standard deviation 3. blur: additional motion blur in pixels, along `blur_angle` (radians).
+/// Light on the pattern and its surroundings: grey * gain + bias, the gain with a slope over the
+/// frame's sides.
+struct SceneLight {
+  double gain = 1;
+  double bias = 0;
+  double slope_x = 0;
+  double slope_y = 0;
+  double focus = 0.65;  ///< standard deviation of the lens blur, pixels
+};
+SceneLight draw_light(Random& random);
+
+struct MotionBlur {
+  double length = 0;  ///< pixels
+  double angle = 0;   ///< radians
+};
+
+/// Renders the pattern at the pose over the background, with mild blur and noise of standard
+/// deviation 3. light: null draws one.
 SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
                         const GrayPicture& background, const SceneBand& band, Random& random,
-                        double blur = 0, double blur_angle = 0);
+                        const SceneLight* light = nullptr, MotionBlur blur = {});
 
 /// A photo as a background of that size. Errors: those of read_image().
 Result<GrayPicture> load_background(const std::string& path, int width, int height);

@@ -9,22 +9,43 @@ namespace {
 
 constexpr int kMostSamples = 6;  // on a side of a footprint
 
-double bilinear(const GrayPicture& picture, double x, double y) {
-  x = std::clamp(x, 0.0, static_cast<double>(picture.width - 1));
-  y = std::clamp(y, 0.0, static_cast<double>(picture.height - 1));
-  const int x0 = std::min(static_cast<int>(x), std::max(picture.width - 2, 0));
-  const int y0 = std::min(static_cast<int>(y), std::max(picture.height - 2, 0));
-  const int x1 = std::min(x0 + 1, picture.width - 1);
-  const int y1 = std::min(y0 + 1, picture.height - 1);
-  const double fx = x - x0;
-  const double fy = y - y0;
-  const auto at = [&](int column, int row) {
-    return static_cast<double>(
-        picture.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(picture.width) +
-                       static_cast<std::size_t>(column)]);
+/// A level with the picture's border repeated where a sample falls outside of it.
+float bilinear(const GrayPicture& picture, float x, float y) {
+  x = std::clamp(x, 0.0f, static_cast<float>(picture.width - 1));
+  y = std::clamp(y, 0.0f, static_cast<float>(picture.height - 1));
+  const int x0 = std::min(static_cast<int>(x), picture.width - 2);
+  const int y0 = std::min(static_cast<int>(y), picture.height - 2);
+  const float fx = x - static_cast<float>(x0);
+  const float fy = y - static_cast<float>(y0);
+  const std::uint8_t* p =
+      picture.pixels.data() + static_cast<std::ptrdiff_t>(y0) * picture.width + x0;
+  const float top = p[0] + fx * static_cast<float>(p[1] - p[0]);
+  const std::uint8_t* q = p + picture.width;
+  const float bottom = q[0] + fx * static_cast<float>(q[1] - q[0]);
+  return top + fy * (bottom - top);
+}
+
+/// Places of a pixel's samples around its centre, in pixels of the level.
+struct Footprint {
+  std::vector<std::array<float, 2>> offsets;
+};
+
+Footprint footprint_of(const std::array<double, 4>& inverse, double factor) {
+  const auto samples = [factor](double dx, double dy) {
+    return std::clamp(static_cast<int>(std::ceil(std::hypot(dx, dy) / factor)), 1, kMostSamples);
   };
-  return (1 - fy) * ((1 - fx) * at(x0, y0) + fx * at(x1, y0)) +
-         fy * ((1 - fx) * at(x0, y1) + fx * at(x1, y1));
+  const int across = samples(inverse[0], inverse[2]);
+  const int down = samples(inverse[1], inverse[3]);
+  Footprint footprint;
+  for (int v = 0; v < down; ++v) {
+    for (int u = 0; u < across; ++u) {
+      const double x = (u + 0.5) / across - 0.5;
+      const double y = (v + 0.5) / down - 0.5;
+      footprint.offsets.push_back({static_cast<float>((inverse[0] * x + inverse[1] * y) / factor),
+                                   static_cast<float>((inverse[2] * x + inverse[3] * y) / factor)});
+    }
+  }
+  return footprint;
 }
 
 }  // namespace
@@ -42,9 +63,11 @@ double Random::uniform(double low, double high) {
 }
 
 double Random::normal() {
-  double sum = -6.0;
-  for (int i = 0; i < 12; ++i) sum += uniform(0.0, 1.0);
-  return sum;
+  // Three uniforms of 16 bits, whose sum has the variance 1/4.
+  const std::uint64_t bits = next();
+  const auto sum =
+      static_cast<double>((bits & 0xFFFF) + ((bits >> 16) & 0xFFFF) + ((bits >> 32) & 0xFFFF));
+  return 2.0 * (sum / 65536.0 - 1.5);
 }
 
 AffineView make_view(int picture_width, int picture_height, double scale, double tilt,
@@ -117,34 +140,33 @@ GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView
     factor *= 2;
   }
   const GrayPicture& from = levels[level];
-  const auto samples = [factor](double dx, double dy) {
-    return std::clamp(static_cast<int>(std::ceil(std::hypot(dx, dy) / factor)), 1, kMostSamples);
-  };
-  const int across = samples(inverse[0], inverse[2]);
-  const int down = samples(inverse[1], inverse[3]);
+  const Footprint footprint = footprint_of(inverse, factor);
+  const float share = 1.0f / static_cast<float>(footprint.offsets.size());
+  const float right = static_cast<float>(levels[0].width / factor) - 0.5f;
+  const float bottom = static_cast<float>(levels[0].height / factor) - 0.5f;
   GrayPicture out;
   out.width = view.width;
   out.height = view.height;
-  out.pixels.reserve(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+  out.pixels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+  std::uint8_t* pixel = out.pixels.data();
   for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      double sum = 0.0;
-      for (int s = 0; s < across * down; ++s) {
-        const double u = x + (s % across + 0.5) / across - 0.5 - view.offset[0];
-        const double v = y + (static_cast<int>(s / across) + 0.5) / down - 0.5 - view.offset[1];
-        const double px = inverse[0] * u + inverse[1] * v;
-        const double py = inverse[2] * u + inverse[3] * v;
-        const bool inside =
-            px >= -0.5 && py >= -0.5 && px <= levels[0].width - 0.5 && py <= levels[0].height - 0.5;
-        if (!inside && background != nullptr) {
-          sum += background->pixels[static_cast<std::size_t>(y) *
-                                        static_cast<std::size_t>(background->width) +
-                                    static_cast<std::size_t>(x)];
-        } else {
-          sum += bilinear(from, (px + 0.5) / factor - 0.5, (py + 0.5) / factor - 0.5);
-        }
+    for (int x = 0; x < out.width; ++x, ++pixel) {
+      const double u = x - view.offset[0];
+      const double v = y - view.offset[1];
+      const auto px = static_cast<float>((inverse[0] * u + inverse[1] * v + 0.5) / factor - 0.5);
+      const auto py = static_cast<float>((inverse[2] * u + inverse[3] * v + 0.5) / factor - 0.5);
+      const float behind =
+          background != nullptr
+              ? background->pixels[static_cast<std::size_t>(pixel - out.pixels.data())]
+              : 0.0f;
+      float sum = 0.0f;
+      for (const auto& offset : footprint.offsets) {
+        const float sx = px + offset[0];
+        const float sy = py + offset[1];
+        const bool outside = sx < -0.5f || sy < -0.5f || sx > right || sy > bottom;
+        sum += outside && background != nullptr ? behind : bilinear(from, sx, sy);
       }
-      out.pixels.push_back(static_cast<std::uint8_t>(sum / (across * down) + 0.5));
+      *pixel = static_cast<std::uint8_t>(sum * share + 0.5f);
     }
   }
   return out;

@@ -15,7 +15,7 @@ class Random {
   explicit Random(std::uint64_t seed) : state_(seed) {}
   std::uint64_t next();
   double uniform(double low, double high);
-  /// Mean 0, standard deviation 1 (sum of twelve uniforms).
+  /// Mean 0, standard deviation 1, within +-3: the sum of three uniforms.
   double normal();
 
  private:
@@ -46,7 +46,7 @@ struct GrayPicture {
 std::vector<GrayPicture> halved(const GrayImage& picture);
 
 /// Renders a view. Outside of the picture: its border pixels where `background` is null, else the
-/// background (at least of the view's size).
+/// background, which has the view's size.
 GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView& view,
                         const GrayPicture* background);
 

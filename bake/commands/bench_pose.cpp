@@ -1,0 +1,164 @@
+// `modar bench pose`: our loop beside the article's method on rendered frames of known pose and on
+// a video with its truth.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "bake/commands/bench_rows.hpp"
+#include "bake/commands/terminal.hpp"
+#include "bake/pattern/pose_bench.hpp"
+#include "modar/features.hpp"
+
+namespace modar {
+namespace {
+
+/// Bands of the tracking part: what it is called, speed of the hand, blur for each pixel of motion.
+struct Path {
+  const char* name;
+  double speed;
+  double blur;
+};
+constexpr Path kPaths[] = {
+    {"tracking", 1.0, 0.0}, {"tracking fast", 3.0, 0.5}, {"tracking x10", 10.0, 0.0}};
+
+/// The pictures of a folder in the order of their names, or the file itself.
+Result<std::vector<std::string>> pictures_of(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> paths;
+  std::error_code failed;
+  if (fs::is_regular_file(path, failed)) return std::vector<std::string>{path};
+  for (const auto& entry : fs::directory_iterator(path, failed)) {
+    std::string ending = entry.path().extension().string();
+    for (char& letter : ending) {
+      if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+    }
+    if (ending == ".png" || ending == ".jpg" || ending == ".jpeg") {
+      paths.push_back(entry.path().string());
+    }
+  }
+  if (failed || paths.empty()) {
+    return fail(ExitCode::kIo, "bench.folder", path, "no pictures can be read here",
+                "name a folder with PNG or JPEG files, or one such file");
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+double percent(int part, int whole) {
+  return whole > 0 ? 100.0 * part / whole : 0.0;
+}
+
+/// Rows of one band: ours and, where it ran, the article's.
+void add_rows(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  for (const PoseBenchRow& ours : measured) {
+    if (ours.method != "ours") continue;
+    const PoseBenchRow* paper = nullptr;
+    for (const PoseBenchRow& other : measured) {
+      if (other.band == ours.band && other.method == "paper") paper = &other;
+    }
+    const auto add = [&](const std::string& what, auto&& value) {
+      const double reference = paper != nullptr ? value(*paper) : kNone;
+      const double own = value(ours);
+      rows.push_back(
+          {what + " " + ours.band, own, reference, reference != 0.0 ? own / reference : kNone});
+    };
+    if (ours.without_pattern > 0) {
+      add("false_pct",
+          [](const PoseBenchRow& row) { return percent(row.false_found, row.without_pattern); });
+    }
+    if (ours.frames > ours.without_pattern) {
+      const auto with = [](const PoseBenchRow& row) { return row.frames - row.without_pattern; };
+      add("recognised_pct",
+          [&](const PoseBenchRow& row) { return percent(row.recognised, with(row)); });
+      add("right_pct", [&](const PoseBenchRow& row) { return percent(row.right, with(row)); });
+      add("error_px", [](const PoseBenchRow& row) { return row.error_px; });
+    }
+    if (ours.sequence) add("jitter_px", [](const PoseBenchRow& row) { return row.jitter_px; });
+    add("cpu_ms", [](const PoseBenchRow& row) { return row.ms; });
+  }
+}
+
+/// Stages over all rendered bands, weighted by their frames.
+void add_stages(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
+  constexpr const char* kNames[4] = {"detect_ms", "describe_ms", "match_ms", "geometry_ms"};
+  for (std::size_t stage = 0; stage < 4; ++stage) {
+    double sums[2] = {0, 0};
+    double frames[2] = {0, 0};
+    for (const PoseBenchRow& row : measured) {
+      if (row.sequence) continue;
+      const std::size_t method = row.method == "ours" ? 0 : 1;
+      sums[method] += row.stages_ms[stage] * row.frames;
+      frames[method] += row.frames;
+    }
+    const double ours = sums[0] / std::max(frames[0], 1.0);
+    const double paper = frames[1] > 0 ? sums[1] / frames[1] : std::nan("");
+    rows.push_back({std::string(kNames[stage]) + " detection", ours, paper,
+                    paper > 0 ? ours / paper : std::nan("")});
+  }
+}
+
+Result<PoseBenchOptions> options_of(const PoseBenchCommand& command) {
+  PoseBenchOptions options;
+  options.frames = command.frames;
+  options.seed = command.seed;
+  options.paper_set = 0;
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    if (command.parameters == parameter_set_name(set.id)) options.paper_set = set.id;
+  }
+  if (options.paper_set == 0 && command.parameters != "none") {
+    return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
+                "there is no parameter set '" + command.parameters + "'",
+                "name one of the article's sets, or none to run ours alone");
+  }
+  for (const SceneBand& band : pose_bands()) {
+    if (band.name.find(command.only) != std::string::npos) options.bands.push_back(band);
+  }
+  auto patterns = pictures_of(command.patterns);
+  if (!patterns) return tl::unexpected(patterns.error());
+  options.patterns = std::move(*patterns);
+  auto backgrounds = pictures_of(command.backgrounds);
+  if (!backgrounds) return tl::unexpected(backgrounds.error());
+  options.backgrounds = std::move(*backgrounds);
+  return options;
+}
+
+}  // namespace
+
+Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
+  ProgressBar bar(command.quiet);
+  const auto progress = [&bar](const std::string& what, double done) { bar.show(what, done); };
+  std::vector<PoseBenchRow> measured;
+  const auto take = [&measured](Result<std::vector<PoseBenchRow>> rows) -> Result<void> {
+    if (!rows) return tl::unexpected(rows.error());
+    measured.insert(measured.end(), rows->begin(), rows->end());
+    return {};
+  };
+  auto options = options_of(command);
+  if (!options) return tl::unexpected(options.error());
+  if (!options->bands.empty()) {
+    if (auto done = take(bench_detection(*options, progress)); !done) {
+      return tl::unexpected(done.error());
+    }
+  }
+  for (const Path& path : kPaths) {
+    if (std::string(path.name).find(command.only) == std::string::npos) continue;
+    auto done = take(bench_tracking(*options, path.name, path.speed, path.blur, progress));
+    if (!done) return tl::unexpected(done.error());
+  }
+  if (!command.video.empty()) {
+    auto done = take(
+        bench_video(*options, {command.video, command.truth, command.video_pattern}, progress));
+    if (!done) return tl::unexpected(done.error());
+  }
+  bar.clear();
+  std::vector<BenchRow> rows;
+  add_rows(measured, rows);
+  add_stages(measured, rows);
+  return rows;
+}
+
+}  // namespace modar

@@ -1,0 +1,66 @@
+// What the pose benches share: patterns with their trackers, and the sums over frames.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bake/pattern/pose_bench.hpp"
+#include "bake/pattern/pose_scene.hpp"
+#include "modar/pose_loop.hpp"
+#include "modar/tracker.hpp"
+
+namespace modar {
+
+/// Patterns, their bundle and the trackers on it.
+struct Subject {
+  std::vector<GrayPicture> pictures;
+  std::vector<std::byte> bytes;
+  std::unique_ptr<PaperTracker> paper;  ///< null where options.paper_set is 0
+  std::unique_ptr<PoseLoop> ours;
+};
+
+/// track: whether ours holds patterns from frame to frame. Errors: those of reading pictures,
+/// describing and baking them.
+Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBenchOptions& options,
+                             const Camera& camera, bool track);
+
+/// What a frame truly shows.
+struct FrameTruth {
+  bool pattern = false;
+  std::array<glm::dvec2, 4> corners{};
+};
+
+/// Sums of one method on one band.
+class Tally {
+ public:
+  Tally(std::string band, const char* method, bool sequence);
+  /// ms: thread-CPU time of the frame.
+  void add(const TrackResult& result, const FrameTruth& truth, double ms);
+  /// The next frame does not follow the last one.
+  void cut() { have_last_ = false; }
+  PoseBenchRow finish();
+
+ private:
+  PoseBenchRow row_;
+  std::vector<double> errors_;
+  double change_ = 0.0;
+  int changes_ = 0;
+  bool have_last_ = false;
+  std::array<glm::dvec2, 4> last_{};
+};
+
+/// Both methods on the same frames.
+struct Tallies {
+  Tallies(const std::string& band, bool sequence)
+      : paper(band, "paper", sequence), ours(band, "ours", sequence) {}
+  Tally paper;
+  Tally ours;
+  /// Runs the subject's trackers on a frame. Errors: those of the trackers.
+  Result<void> measure(Subject& subject, const GrayImage& frame, const FrameTruth& truth);
+  /// Appends a row for each method that ran.
+  void finish(const PoseBenchOptions& options, std::vector<PoseBenchRow>& rows);
+};
+
+}  // namespace modar
