@@ -23,8 +23,12 @@ struct IssueKind {
 /// All kinds of issues, in the order of their ids in ISSUES.md.
 std::span<const IssueKind> issue_kinds();
 
-/// The text of ISSUES.md, made from issue_kinds().
+/// The text of ISSUES.md, made from issue_kinds(), to which issue_rows() of other kinds may be
+/// added.
 std::string issues_markdown();
+
+/// A row of its table for each kind.
+std::string issue_rows(std::span<const IssueKind> kinds);
 
 /// One finding: `where` names the asset ("model 'spider', chunk 3"), `offset` is the byte in the
 /// file, `detail` the numbers that were found.

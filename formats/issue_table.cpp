@@ -175,16 +175,20 @@ std::string number_text(double value) {
   return std::string(text.data(), end.ptr);
 }
 
-std::string issues_markdown() {
-  std::string text =
-      "# Issues that the checker reports\n\n"
-      "Ids are stable. An error makes a bundle bad; a warning does not.\n\n"
-      "| id | severity | what is wrong | what to do |\n|---|---|---|---|\n";
-  for (const IssueKind& kind : kIssueKinds) {
+std::string issue_rows(std::span<const IssueKind> kinds) {
+  std::string text;
+  for (const IssueKind& kind : kinds) {
     text += std::string("| ") + kind.id + " | " + severity_word(kind.severity) + " | " +
             kind.message + " | " + kind.cure + " |\n";
   }
   return text;
+}
+
+std::string issues_markdown() {
+  return "# Issues that the checker reports\n\n"
+         "Ids are stable. An error makes a bundle bad; a warning does not.\n\n"
+         "| id | severity | what is wrong | what to do |\n|---|---|---|---|\n" +
+         issue_rows(kIssueKinds);
 }
 
 }  // namespace modar

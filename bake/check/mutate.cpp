@@ -15,7 +15,7 @@ namespace {
 /// Mutated files that the second reader is asked about at a time.
 constexpr std::size_t kBatch = 64;
 
-struct Verdict {
+struct Judgement {
   bool killed = false;
   bool statement_only = false;
 };
@@ -37,13 +37,13 @@ bool features_agree(std::span<const std::byte> file, const Mutation& mutation,
   return true;
 }
 
-Verdict judge(std::span<const std::byte> file, const Mutation& mutation) {
+Judgement judge(std::span<const std::byte> file, const Mutation& mutation) {
   bool other = false;
   const IssueSink sink = [&other](const Issue& issue) {
     other = other || (issue.kind->severity == Severity::kError &&
                       std::strcmp(issue.kind->id, "STATEMENT_DIFFERS") != 0);
   };
-  Verdict verdict;
+  Judgement verdict;
   verdict.killed = !check_bundle(file, sink);
   if (!verdict.killed) verdict.killed = !features_agree(file, mutation, sink);
   verdict.statement_only = verdict.killed && !other;
@@ -97,7 +97,7 @@ class Trial {
 
   void try_one(std::uint64_t number) {
     const Mutation mutation = mutator_.next(number % 4 != 0);
-    const Verdict verdict = judge(mutator_.file(), mutation);
+    const Judgement verdict = judge(mutator_.file(), mutation);
     tally(mutation, [&](MutationTally& t) {
       ++t.tried;
       t.killed += verdict.killed ? 1 : 0;

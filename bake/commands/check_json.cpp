@@ -1,7 +1,9 @@
 // What `modar check` prints for programs.
 #include "bake/commands/check_json.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 namespace modar {
 namespace {
@@ -15,7 +17,102 @@ Json tally_json(const MutationTally& tally) {
           {"rate", tally.rate()}};
 }
 
+std::string message_of(const Issue& issue) {
+  std::string message = issue.kind->message;
+  if (!issue.detail.empty()) message += ": " + issue.detail;
+  return message;
+}
+
+/// Foreign bytes that are no UTF-8 are replaced, never thrown at.
+std::string dump(const Json& document) {
+  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+/// A path as a relative reference of RFC 3986: all but unreserved characters and slashes escaped.
+std::string uri_of(const std::string& path) {
+  constexpr char kDigits[] = "0123456789ABCDEF";
+  const std::string plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/";
+  std::string uri;
+  for (const char letter : path) {
+    if (plain.find(letter) != std::string::npos) {
+      uri += letter;
+      continue;
+    }
+    const auto byte = static_cast<unsigned char>(letter);
+    uri += {'%', kDigits[byte >> 4], kDigits[byte & 15]};
+  }
+  return uri;
+}
+
+const char* sarif_level(Severity severity) {
+  return severity == Severity::kInfo ? "note" : severity_name(severity);
+}
+
+Json sarif_rules(const std::vector<const IssueKind*>& kinds) {
+  Json rules = Json::array();
+  for (const IssueKind* kind : kinds) {
+    rules.push_back({{"id", kind->id},
+                     {"shortDescription", {{"text", kind->message}}},
+                     {"help", {{"text", kind->cure}}},
+                     {"defaultConfiguration", {{"level", sarif_level(kind->severity)}}}});
+  }
+  return rules;
+}
+
+Json sarif_result(const WeighedIssue& weighed, const std::string& uri, std::size_t rule) {
+  const Issue& issue = weighed.issue;
+  const Json place = {{"artifactLocation", {{"uri", uri}}},
+                      {"region", {{"byteOffset", issue.offset}, {"byteLength", 1}}}};
+  return {{"ruleId", issue.kind->id},
+          {"ruleIndex", rule},
+          {"level", sarif_level(weighed.severity)},
+          {"message", {{"text", message_of(issue) + "; " + issue.kind->cure}}},
+          {"locations",
+           {{{"physicalLocation", place}, {"logicalLocations", {{{"name", issue.where}}}}}}}};
+}
+
 }  // namespace
+
+std::string check_json(const Verdict& verdict, const std::string& device) {
+  Json list = Json::array();
+  for (const WeighedIssue& weighed : verdict.issues()) {
+    const Issue& issue = weighed.issue;
+    list.push_back({{"id", issue.kind->id},
+                    {"severity", severity_name(weighed.severity)},
+                    {"where", issue.where},
+                    {"offset", issue.offset},
+                    {"message", message_of(issue)},
+                    {"cure", issue.kind->cure}});
+  }
+  Json left_out = Json::object();
+  for (const auto& [id, count] : verdict.left_out()) left_out[id] = count;
+  return dump({{"verdict", verdict.good() ? "good" : "bad"},
+               {"errors", verdict.errors()},
+               {"warnings", verdict.warnings()},
+               {"device", device.empty() ? Json(nullptr) : Json(device)},
+               {"issues", list},
+               {"left_out", left_out}});
+}
+
+std::string check_sarif(const Verdict& verdict, const std::string& path,
+                        const std::string& tool_version) {
+  const std::vector<const IssueKind*> kinds = all_issue_kinds();
+  Json results = Json::array();
+  for (const WeighedIssue& weighed : verdict.issues()) {
+    const auto rule = std::find(kinds.begin(), kinds.end(), weighed.issue.kind);
+    results.push_back(
+        sarif_result(weighed, uri_of(path), static_cast<std::size_t>(rule - kinds.begin())));
+  }
+  const Json driver = {
+      {"name", "modar check"}, {"version", tool_version}, {"rules", sarif_rules(kinds)}};
+  return dump({{"$schema", "https://json.schemastore.org/sarif-2.1.0.json"},
+               {"version", "2.1.0"},
+               {"runs",
+                {{{"tool", {{"driver", driver}}},
+                  {"invocations", {{{"executionSuccessful", true}}}},
+                  {"artifacts", {{{"location", {{"uri", uri_of(path)}}}}}},
+                  {"results", results}}}}});
+}
 
 std::string mutation_json(const MutationReport& report) {
   Json kinds = Json::object();
@@ -45,7 +142,7 @@ std::string mutation_json(const MutationReport& report) {
         {"by_kind", kinds},
         {"by_field", fields},
         {"survivors", survivors}}}};
-  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump(document);
 }
 
 }  // namespace modar

@@ -4,8 +4,17 @@
 #include <string>
 
 #include "bake/check/mutate.hpp"
+#include "bake/check/verdict.hpp"
 
 namespace modar {
+
+/// `modar check --json`; its schema is bake/commands/check.schema.json. device: empty for none.
+std::string check_json(const Verdict& verdict, const std::string& device);
+
+/// `modar check --sarif`: SARIF 2.1.0 for systems that show findings beside code.
+/// path: of the bundle, as the user wrote it.
+std::string check_sarif(const Verdict& verdict, const std::string& path,
+                        const std::string& tool_version);
 
 /// `modar check --mutate N --json`.
 std::string mutation_json(const MutationReport& report);

@@ -134,7 +134,16 @@ CLI::App* add_check(CLI::App& app, CheckCommand& check) {
   CLI::Option* list = sub->add_flag("--list-issues", check.list_issues,
                                     "Print all kinds of issues with their cures (ISSUES.md)");
   bundle->excludes(list);
-  sub->add_flag("--json", check.json, "Print verdict and issues as JSON");
+  CLI::Option* json = sub->add_flag("--json", check.json, "Print verdict and issues as JSON");
+  sub->add_flag("--sarif", check.sarif, "Print them as SARIF 2.1.0, for CI systems")
+      ->excludes(json);
+  sub->add_option("--device", check.device,
+                  "Hold the bundle against a device too: " + device_profile_names())
+      ->type_name("NAME");
+  sub->add_option("--severity", check.severities,
+                  "Weigh a kind of issue anew: ID=error, warning, info or ignore; repeatable")
+      ->type_name("ID=SEVERITY")
+      ->allow_extra_args(false);
   sub->add_flag("--warnings-as-errors", check.warnings_as_errors, "A warning makes the bundle bad");
   CLI::Option* mutate =
       sub->add_option("--mutate", check.mutations,
@@ -146,7 +155,8 @@ CLI::App* add_check(CLI::App& app, CheckCommand& check) {
                   "scripts/read_bundle.py: tells which survivors changed nothing")
       ->type_name("FILE")
       ->needs(mutate);
-  sub->footer(example("  modar check spider.modar\n  modar check --mutate 100000 --second-reader "
+  sub->footer(example("  modar check spider.modar --device mali400\n  modar check --mutate 100000 "
+                      "--second-reader "
                       "scripts/read_bundle.py spider.modar\n") +
               "A bad bundle answers 3, and so does a proof that misses its goals.\n");
   return sub;
@@ -263,6 +273,7 @@ int parse_and_run(int argc, char** argv) {
       return print_error(
           {ExitCode::kUsage, "cli.bundle", "check", "no bundle is named", "modar check BUNDLE"});
     }
+    check.tool_version = MODAR_VERSION;
     return run_check(check);
   }
   if (inspect_sub->parsed()) return run_inspect(inspect);

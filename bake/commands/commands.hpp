@@ -27,6 +27,10 @@ struct CheckCommand {
   std::string bundle;
   bool json = false;
   bool warnings_as_errors = false;
+  bool sarif = false;
+  std::vector<std::string> severities;  ///< "ID=warning": weighed anew
+  std::string device;                   ///< profile that the bundle is held against; empty: none
+  std::string tool_version;
   bool list_issues = false;     ///< print ISSUES.md instead
   std::uint64_t mutations = 0;  ///< damage copies of the bundle instead: `--mutate`
   std::uint64_t seed = 1;

@@ -157,12 +157,6 @@ const char* severity_name(FindingSeverity severity) {
                                                  : "error";
 }
 
-const char* severity_name(Severity severity) {
-  return severity == Severity::kInfo      ? "info"
-         : severity == Severity::kWarning ? "warning"
-                                          : "error";
-}
-
 }  // namespace
 
 std::string inspect_json(const BundleView& bundle) {
@@ -192,28 +186,6 @@ std::string bake_json(const BundleView& bundle, const Report& report, const Proc
                {"findings", findings},
                {"cpu_seconds", cost.cpu_seconds},
                {"peak_rss_bytes", cost.peak_rss_bytes}});
-}
-
-std::string check_json(bool good, const std::vector<Issue>& issues) {
-  std::size_t errors = 0;
-  std::size_t warnings = 0;
-  Json list = Json::array();
-  for (const Issue& issue : issues) {
-    if (issue.kind->severity == Severity::kError) ++errors;
-    if (issue.kind->severity == Severity::kWarning) ++warnings;
-    std::string message = issue.kind->message;
-    if (!issue.detail.empty()) message += ": " + issue.detail;
-    list.push_back({{"id", issue.kind->id},
-                    {"severity", severity_name(issue.kind->severity)},
-                    {"where", issue.where},
-                    {"offset", issue.offset},
-                    {"message", message},
-                    {"cure", issue.kind->cure}});
-  }
-  return dump({{"verdict", good ? "good" : "bad"},
-               {"errors", errors},
-               {"warnings", warnings},
-               {"issues", list}});
 }
 
 std::string rectify_json(const std::string& path, std::uint32_t width, std::uint32_t height,

@@ -7,7 +7,6 @@
 #include "bake/commands/terminal.hpp"
 #include "bake/report.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/check.hpp"
 
 namespace modar {
 
@@ -16,9 +15,6 @@ std::string inspect_json(const BundleView& bundle);
 
 /// `modar bake --json`: inspect's document under "bundle", stages, findings, cost.
 std::string bake_json(const BundleView& bundle, const Report& report, const ProcessCost& cost);
-
-/// `modar check --json`.
-std::string check_json(bool good, const std::vector<Issue>& issues);
 
 /// `modar pattern rectify --json`.
 std::string rectify_json(const std::string& path, std::uint32_t width, std::uint32_t height,

@@ -1,0 +1,53 @@
+// What a check found, as the user wants it weighed: severities changed, repeats counted.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/check.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// An issue with the severity that it has in this run.
+struct WeighedIssue {
+  Issue issue;
+  Severity severity = Severity::kError;
+};
+
+class Verdict {
+ public:
+  static constexpr std::size_t kMaxRepeats = 20;  ///< issues of one kind that are listed
+
+  /// "ID=error", "ID=warning", "ID=info" or "ID=ignore". Errors: kUsage "check.severity".
+  Result<void> override_severity(const std::string& text);
+  void set_warnings_as_errors() { warnings_as_errors_ = true; }
+
+  void add(const Issue& issue);
+
+  [[nodiscard]] bool good() const { return errors_ == 0; }
+  [[nodiscard]] std::size_t errors() const { return errors_; }  ///< all, listed or not
+  [[nodiscard]] std::size_t warnings() const { return warnings_; }
+  [[nodiscard]] const std::vector<WeighedIssue>& issues() const { return issues_; }
+  /// How many of a kind were found but not listed, by id.
+  [[nodiscard]] std::map<std::string, std::size_t> left_out() const;
+
+ private:
+  std::map<std::string, std::optional<Severity>> overrides_;  // nothing: ignored
+  bool warnings_as_errors_ = false;
+  std::vector<WeighedIssue> issues_;
+  std::map<std::string, std::size_t> counts_;
+  std::size_t errors_ = 0;
+  std::size_t warnings_ = 0;
+};
+
+/// Every kind of issue that `modar check` knows: those of formats/, then those of the workstation.
+std::vector<const IssueKind*> all_issue_kinds();
+
+/// "error", "warning", "info".
+const char* severity_name(Severity severity);
+
+}  // namespace modar

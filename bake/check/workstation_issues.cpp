@@ -1,0 +1,45 @@
+// The table of issues that only a workstation can find.
+#include "bake/check/workstation_issues.hpp"
+
+#include <cstddef>
+#include <iterator>
+
+namespace modar {
+namespace {
+
+constexpr IssueKind kKinds[] = {
+    {"DEVICE_TEXTURE_SIZE", Severity::kError, "A texture is larger than the device can hold",
+     "bake with --device, or with a smaller --max-texture"},
+    {"DEVICE_ATTRIBUTES", Severity::kError,
+     "A vertex layout has more attributes than the device can fetch",
+     "leave colours or texture coordinates out of the source"},
+    {"DEVICE_UNIFORMS", Severity::kError,
+     "The shaders need more uniform vectors than the device has",
+     "this device cannot run the player; choose another"},
+    {"DEVICE_GPU_MEMORY", Severity::kError,
+     "Models and textures do not fit into the memory that one app should plan for",
+     "bake with --device, smaller textures, or fewer models in one bundle"},
+    {"DEVICE_RAM", Severity::kError, "The bundle is larger than half of the device's memory",
+     "split it into several bundles"},
+    {"DEVICE_STORAGE", Severity::kError, "The bundle takes more than half of the device's storage",
+     "split it, or ship it compressed with smaller textures"},
+    {"DEVICE_HALF_FLOAT", Severity::kWarning,
+     "The device has no half-float vertices: the player widens them when it uploads them",
+     "nothing, if twice the memory for these attributes is there"},
+    {"DEVICE_ETC1", Severity::kWarning,
+     "The device has no ETC1 textures: the player decodes them when it uploads them",
+     "nothing, if six times the memory for textures is there"},
+};
+static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
+
+}  // namespace
+
+std::span<const IssueKind> workstation_issue_kinds() {
+  return kKinds;
+}
+
+const IssueKind& workstation_issue_kind(WorkstationRule rule) {
+  return kKinds[static_cast<std::size_t>(rule)];
+}
+
+}  // namespace modar

@@ -1,0 +1,122 @@
+// Rules on devices, against devices that are made for one breach each.
+#include "bake/check/device_rules.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bake/check/verdict.hpp"
+#include "bake/check/workstation_issues.hpp"
+#include "tests/formats/support.hpp"
+
+namespace {
+
+using namespace modar;
+using namespace modar::test;
+
+/// Holds golden_content() with ease.
+DeviceProfile roomy() {
+  DeviceProfile device = *find_device_profile("desktop");
+  device.name = "made";
+  device.es_version = 20;
+  device.extensions = " GL_OES_compressed_ETC1_RGB8_texture GL_OES_vertex_half_float ";
+  return device;
+}
+
+std::vector<std::string> findings(const Bytes& bytes, const DeviceProfile& device) {
+  std::vector<std::string> found;
+  const auto view = BundleView::open(bytes);
+  bool errors = false;
+  const bool good = check_device(*view, device, [&](const Issue& issue) {
+    errors = errors || issue.kind->severity == Severity::kError;
+    EXPECT_LT(issue.offset, bytes.size());
+    found.push_back(std::string(issue.kind->id) + " " + issue.where);
+  });
+  EXPECT_EQ(good, !errors);
+  return found;
+}
+
+using Lines = std::vector<std::string>;
+
+TEST(Device, ARoomyOneHoldsEverything) {
+  EXPECT_EQ(findings(encode(golden_content()), roomy()), Lines());
+}
+
+TEST(Device, EachBreachIsNamedWithItsAsset) {
+  const Bytes bytes = encode(golden_content());
+  DeviceProfile device = roomy();
+  device.max_texture_size = 4;  // the texture has 8 x 4 pixels
+  EXPECT_EQ(findings(bytes, device), Lines{"DEVICE_TEXTURE_SIZE texture 'body.png'"});
+  device = roomy();
+  device.max_vertex_attributes = 2;  // all three layouts have 3
+  EXPECT_EQ(findings(bytes, device),
+            (Lines{"DEVICE_ATTRIBUTES model 'half'", "DEVICE_ATTRIBUTES model 'integer'",
+                   "DEVICE_ATTRIBUTES model 'float'"}));
+  device = roomy();
+  device.max_vertex_uniform_vectors = 8;
+  EXPECT_EQ(findings(bytes, device), Lines{"DEVICE_UNIFORMS shaders"});
+  device = roomy();
+  device.extensions = " GL_OES_compressed_ETC1_RGB8_texture ";
+  EXPECT_EQ(findings(bytes, device), Lines{"DEVICE_HALF_FLOAT model 'half'"});
+  device.extensions = " GL_OES_vertex_half_float ";
+  EXPECT_EQ(findings(bytes, device), Lines{"DEVICE_ETC1 texture 'body.png'"});
+  device.extensions = " ";
+  device.es_version = 30;  // has both in its core
+  EXPECT_EQ(findings(bytes, device), Lines());
+}
+
+TEST(Device, MemoryIsHeldAgainstWhatTheBundleTakes) {
+  BundleContent content = texture_content();
+  content.texture_data[0].resize(3u << 20);
+  const Bytes bytes = encode(content);
+  DeviceProfile device = roomy();
+  device.gpu_memory_mib = 3;
+  EXPECT_EQ(findings(bytes, device), Lines());
+  device.gpu_memory_mib = 2;
+  ASSERT_EQ(findings(bytes, device).size(), 1u);
+  EXPECT_TRUE(
+      findings(bytes, device)[0].starts_with("DEVICE_GPU_MEMORY texture 'body.png' with 31"));
+  // Without ETC1 the same blocks take six times the room.
+  device.extensions = " ";
+  device.gpu_memory_mib = 17;
+  EXPECT_EQ(findings(bytes, device).size(), 2u);
+  device.gpu_memory_mib = 18;
+  EXPECT_EQ(findings(bytes, device).size(), 1u);
+  device = roomy();
+  device.ram_mib = 6;
+  EXPECT_TRUE(findings(bytes, device).at(0).starts_with("DEVICE_RAM "));
+  device = roomy();
+  device.storage_mib = 6;
+  EXPECT_TRUE(findings(bytes, device).at(0).starts_with("DEVICE_STORAGE "));
+}
+
+TEST(Verdict, CountsAllButListsTwentyOfAKind) {
+  Verdict verdict;
+  const IssueKind& kind = workstation_issue_kind(WorkstationRule::kDeviceEtc1);
+  for (int i = 0; i < 50; ++i) verdict.add({&kind, "texture", 0, ""});
+  EXPECT_TRUE(verdict.good());
+  EXPECT_EQ(verdict.warnings(), 50u);
+  EXPECT_EQ(verdict.issues().size(), 20u);
+  EXPECT_EQ(verdict.left_out().at("DEVICE_ETC1"), 30u);
+  Verdict strict;
+  strict.set_warnings_as_errors();
+  strict.add({&kind, "texture", 0, ""});
+  EXPECT_FALSE(strict.good());
+  Verdict deaf;
+  ASSERT_TRUE(deaf.override_severity("DEVICE_ETC1=ignore"));
+  deaf.add({&kind, "texture", 0, ""});
+  EXPECT_TRUE(deaf.issues().empty());
+}
+
+TEST(Verdict, IdsOfAllKindsDiffer) {
+  std::set<std::string> ids;
+  for (const IssueKind* kind : all_issue_kinds()) {
+    EXPECT_TRUE(ids.insert(kind->id).second) << kind->id;
+    EXPECT_NE(std::string(kind->message), "");
+    EXPECT_NE(std::string(kind->cure), "");
+  }
+}
+
+}  // namespace

@@ -1,0 +1,113 @@
+"""`modar check` from the outside: verdicts, documents that keep their schemas, severities, devices, the proof."""
+import json
+import shutil
+import unittest
+
+import jsonschema
+
+from programs import POTTERY, ROOT, ProgramTest
+
+OURS = json.loads((ROOT / "bake" / "commands" / "check.schema.json").read_text())
+SARIF = json.loads((ROOT / "tests" / "cli" / "sarif.schema.json").read_text())
+CORRUPT = sorted((ROOT / "tests" / "corrupt").glob("*.modar"))
+GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
+
+
+class Check(ProgramTest):
+    def check(self, code, *arguments):
+        done = self.modar("check", *arguments)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return done.stdout
+
+    def bundle(self):
+        path = self.folder / "pottery.modar"
+        done = self.modar("bake", "--model", POTTERY, "--max-texture", 64, "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return path
+
+    def test_every_corrupt_bundle_gives_documents_that_keep_their_schemas(self):
+        for path in CORRUPT:
+            with self.subTest(path.stem):
+                expected = path.with_suffix(".txt").read_text().splitlines()
+                bad = expected[-1] == "bad" or path.stem == "PATTERN_YML_DIFFERS"
+                ours = json.loads(self.check(3 if bad else 0, path, "--json"))
+                jsonschema.validate(ours, OURS)
+                self.assertEqual(ours["verdict"], "bad" if bad else "good")
+                self.assertIn(path.stem, [issue["id"] for issue in ours["issues"]])
+        # The two documents are made of one list: a few tell for all, and starting the program takes time.
+        for path in CORRUPT[::6]:
+            with self.subTest(path.stem):
+                ours = json.loads(self.modar("check", path, "--json").stdout)
+                sarif = json.loads(self.modar("check", path, "--sarif").stdout)
+                jsonschema.validate(sarif, SARIF)
+                run = sarif["runs"][0]
+                self.assertEqual([result["ruleId"] for result in run["results"]],
+                                 [issue["id"] for issue in ours["issues"]])
+                for result in run["results"]:
+                    rule = run["tool"]["driver"]["rules"][result["ruleIndex"]]
+                    self.assertEqual(rule["id"], result["ruleId"])
+
+    def test_verdict_comes_first_and_each_issue_takes_one_line(self):
+        lines = self.check(3, ROOT / "tests" / "corrupt" / "MODEL_COUNTS.modar").splitlines()
+        self.assertTrue(lines[0].endswith("MODEL_COUNTS.modar: BAD"), lines[0])
+        self.assertTrue(lines[1].startswith("error MODEL_COUNTS model 'octahedron' (byte "), lines[1])
+        self.assertIn("; bake the bundle again", lines[1])
+
+    def test_paths_in_sarif_are_uris(self):
+        odd = self.folder / "a b%é.modar"
+        shutil.copy(GOLDEN, odd)
+        sarif = json.loads(self.check(0, odd, "--sarif"))
+        jsonschema.validate(sarif, SARIF)
+        uri = sarif["runs"][0]["artifacts"][0]["location"]["uri"]
+        self.assertTrue(uri.endswith("/a%20b%25%C3%A9.modar"), uri)
+
+    def test_severities_are_weighed_anew(self):
+        bad = ROOT / "tests" / "corrupt" / "MODEL_COUNTS.modar"
+        warned = json.loads(self.check(0, bad, "--json", "--severity", "MODEL_COUNTS=warning"))
+        self.assertEqual((warned["errors"], warned["warnings"]), (0, 1))
+        self.check(3, bad, "--severity", "MODEL_COUNTS=warning", "--warnings-as-errors")
+        ignored = json.loads(self.check(0, bad, "--json", "--severity", "MODEL_COUNTS=ignore"))
+        self.assertEqual(ignored["issues"], [])
+        warning = ROOT / "tests" / "corrupt" / "MODEL_PLACEMENT.modar"
+        self.check(0, warning)
+        self.check(3, warning, "--warnings-as-errors")
+        self.check(3, warning, "--severity", "MODEL_PLACEMENT=error")
+        for wrong in ("NO_SUCH_ID=error", "MODEL_COUNTS=loud", "MODEL_COUNTS"):
+            self.assert_fails(self.modar("check", bad, "--severity", wrong), 1, "check.severity")
+
+    def test_device_breaches_name_the_asset(self):
+        path = self.bundle()
+        good = json.loads(self.check(0, path, "--json", "--device", "desktop"))
+        self.assertEqual((good["device"], good["issues"]), ("desktop", []))
+        poor = json.loads(self.check(0, path, "--json", "--device", "noext"))
+        jsonschema.validate(poor, OURS)
+        self.assertEqual({(i["id"], i["where"]) for i in poor["issues"]},
+                         {("DEVICE_ETC1", "texture 'pottery.png'"), ("DEVICE_HALF_FLOAT", "model 'pottery'")})
+        self.assert_fails(self.modar("check", path, "--device", "brick"), 1, "device.unknown", "mali400")
+
+    def test_the_proof_keeps_its_schema_and_its_goals(self):
+        path = self.bundle()
+        text = self.check(0, path, "--mutate", 2000, "--json", "--second-reader",
+                          ROOT / "scripts" / "read_bundle.py")
+        proof = json.loads(text)
+        jsonschema.validate(proof, OURS)
+        self.assertEqual(proof["mutation"]["n"], 2000)
+        self.assertEqual(proof["mutation"]["rate_unhashed"], 1)
+        self.assertGreaterEqual(proof["mutation"]["rate_rehashed"], 0.995)
+        self.assertEqual(text, self.check(0, path, "--mutate", 2000, "--json", "--second-reader",
+                                          ROOT / "scripts" / "read_bundle.py"))
+        bad = ROOT / "tests" / "corrupt" / "MODEL_COUNTS.modar"
+        self.assert_fails(self.modar("check", bad, "--mutate", 10), 3, "mutate.bad")
+
+    def test_schemas_refuse_what_is_wrong(self):
+        good = {"verdict": "good", "errors": 0, "warnings": 0, "device": None, "issues": [], "left_out": {}}
+        jsonschema.validate(good, OURS)
+        for change in ({"verdict": "fine"}, {"errors": 1}, {"issues": [{"id": "X"}]}):
+            with self.assertRaises(jsonschema.ValidationError):
+                jsonschema.validate({**good, **change}, OURS)
+        with self.assertRaises(jsonschema.ValidationError):
+            jsonschema.validate({"version": "2.1.0", "runs": [{"tool": {}, "results": []}]}, SARIF)
+
+
+if __name__ == "__main__":
+    unittest.main()
