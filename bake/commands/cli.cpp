@@ -11,6 +11,7 @@
 
 #include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
+#include "bake/commands/ship_command.hpp"
 #include "bake/commands/terminal.hpp"
 #include "modar/device_profile.hpp"
 
@@ -259,6 +260,10 @@ int parse_and_run(int argc, char** argv) {
   const CLI::App* check_sub = add_check(app, check);
   const CLI::App* inspect_sub = add_inspect(app, inspect);
   const CLI::App* bench_sub = add_bench(app, bench);
+  CLI::App* ship_sub =
+      app.add_subcommand("ship", "Releases for devices: keygen, publish, rotate, prune, plan");
+  ship_sub->prefix_command();  // it has a command line of its own
+  ship_sub->set_help_flag();
 
   try {
     app.parse(argc, argv);
@@ -278,6 +283,7 @@ int parse_and_run(int argc, char** argv) {
   }
   if (inspect_sub->parsed()) return run_inspect(inspect);
   if (bench_sub->parsed()) return run_bench(bench);
+  if (ship_sub->parsed()) return run_ship(ship_sub->remaining());
   return static_cast<int>(ExitCode::kUsage);
 }
 

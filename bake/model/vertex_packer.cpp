@@ -17,6 +17,7 @@ namespace {
 
 /// How far uv may leave [0,1] and still count as inside: half a texel at 4096, as exporters leave.
 constexpr double kUvSlack = 1e-4;
+constexpr std::uint16_t kMinusZero = 0x8000;
 constexpr double kDegrees = 57.29577951308232;
 
 }  // namespace
@@ -136,6 +137,7 @@ glm::vec3 VertexPacker::put_half(const glm::dvec3& p, std::byte* bytes) {
   glm::vec3 decoded;
   for (int i = 0; i < 3; ++i) {
     halves[i] = float_to_half(static_cast<float>(p[i]));
+    if (halves[i] == kMinusZero) halves[i] = 0;  // one point, one spelling
     decoded[i] = half_to_float(halves[i]);
   }
   std::memcpy(bytes, halves, sizeof halves);

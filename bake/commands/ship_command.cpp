@@ -1,0 +1,233 @@
+#include "bake/commands/ship_command.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <optional>
+
+#include "bake/commands/ship_json.hpp"
+#include "bake/commands/terminal.hpp"
+#include "bake/ship/keys.hpp"
+#include "bake/ship/release_folder.hpp"
+#include "formats/atomic_file.hpp"
+#include "modar/digest.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::int64_t kDay = 86400;
+
+Result<std::string> read_text(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    return fail(ExitCode::kIo, "io.open", path, std::strerror(errno), "check the path");
+  }
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+std::string first_line(const std::string& text) {
+  const std::string line = text.substr(0, text.find('\n'));
+  return line.ends_with('\r') ? line.substr(0, line.size() - 1) : line;
+}
+
+/// Asks on the terminal, without showing what is typed.
+Result<std::string> ask_pass_phrase() {
+  if (::isatty(STDIN_FILENO) == 0) {
+    return fail(ExitCode::kUsage, "key.pass-phrase", "", "the secret key is encrypted",
+                "give its pass phrase with --pass-phrase-file");
+  }
+  std::fputs("Pass phrase: ", stderr);
+  termios shown{};
+  ::tcgetattr(STDIN_FILENO, &shown);
+  termios hidden = shown;
+  hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+  ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &hidden);
+  std::string line;
+  for (int c = std::getchar(); c != EOF && c != '\n'; c = std::getchar()) {
+    line += static_cast<char>(c);
+  }
+  ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &shown);
+  std::fputc('\n', stderr);
+  return line;
+}
+
+Result<SecretKey> load_key(const std::string& path, const std::string& pass_phrase_file) {
+  const auto text = read_text(path);
+  if (!text) return tl::unexpected(text.error());
+  std::string pass_phrase;
+  if (!pass_phrase_file.empty()) {
+    const auto file = read_text(pass_phrase_file);
+    if (!file) return tl::unexpected(file.error());
+    pass_phrase = first_line(*file);
+  } else if (needs_pass_phrase(*text)) {
+    const auto asked = ask_pass_phrase();
+    if (!asked) return asked.map([](const std::string&) { return SecretKey(); });
+    pass_phrase = *asked;
+  }
+  auto key = parse_secret_key(*text, pass_phrase);
+  if (!key) key.error().where = path;
+  return key;
+}
+
+/// A file that only its owner may read. Errors: kIo.
+Result<void> write_secret(const std::string& path, const std::string& text) {
+  const mode_t mask = ::umask(0077);
+  auto written = write_file(path, std::string_view(text));
+  ::umask(mask);
+  if (written && ::chmod(path.c_str(), S_IRUSR | S_IWUSR) != 0) {
+    return fail(ExitCode::kIo, "io.write", path, std::strerror(errno), "see that it is yours");
+  }
+  return written;
+}
+
+/// "NAME=ace2,mali400" into the request. Errors: kUsage "ship.for".
+Result<void> take_devices(const std::string& text, PublishRequest& request) {
+  const std::size_t equals = text.find('=');
+  const std::string name = text.substr(0, equals);
+  std::string rest = equals == std::string::npos ? "" : text.substr(equals + 1);
+  while (!rest.empty()) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    const std::string device = rest.substr(0, comma);
+    if (find_device_profile(device) == nullptr) {
+      return fail(ExitCode::kUsage, "ship.for", device, "there is no such device profile",
+                  "choose of " + device_profile_names());
+    }
+    request.devices[name].push_back(device);
+    rest.erase(0, comma + 1);
+  }
+  if (request.devices[name].empty()) {
+    return fail(ExitCode::kUsage, "ship.for", text, "it names no device",
+                "write it as --for vase=ace2,mali400");
+  }
+  return {};
+}
+
+}  // namespace
+
+int run_keygen(const KeygenCommand& command) {
+  const std::string public_file = command.out + ".pub";
+  if (!command.force &&
+      (::access(command.out.c_str(), F_OK) == 0 || ::access(public_file.c_str(), F_OK) == 0)) {
+    return print_error({ExitCode::kUsage, "key.exists", command.out, "a key is there already",
+                        "choose another name, or --force to lose it"});
+  }
+  std::string pass_phrase;
+  if (!command.pass_phrase_file.empty()) {
+    const auto text = read_text(command.pass_phrase_file);
+    if (!text) return print_error(text.error());
+    pass_phrase = first_line(*text);
+  }
+  const auto key = make_key();
+  if (!key) return print_error(key.error());
+  const auto text = secret_key_text(*key, pass_phrase);
+  if (!text) return print_error(text.error());
+  auto written = write_secret(command.out, *text).and_then([&] {
+    return write_file(public_file, std::string_view(public_key_text(key->public_key)));
+  });
+  if (!written) return print_error(written.error());
+  std::printf("%s\n%s\n", command.out.c_str(), public_file.c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_publish(ShipPublishCommand& command) {
+  const auto key = load_key(command.key_file, command.pass_phrase_file);
+  if (!key) return print_error(key.error());
+  for (const std::string& text : command.devices) {
+    if (auto taken = take_devices(text, command.request); !taken) return print_error(taken.error());
+  }
+  command.request.expires = std::time(nullptr) + kDay * command.valid_days;
+  if (!command.expires.empty()) {
+    const auto time = parse_time(command.expires);
+    if (!time) {
+      return print_error({ExitCode::kUsage, "ship.expires", "--expires " + command.expires,
+                          time.error().cause, "write it as 2027-01-31T00:00:00Z"});
+    }
+    command.request.expires = *time;
+  }
+  ProgressBar bar(command.quiet || command.json);
+  Report stages;
+  stages.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
+  const auto report = publish(command.request, *key, stages);
+  bar.clear();
+  if (!report) return print_error(report.error());
+  if (command.json) {
+    std::fputs(publish_json(*report).c_str(), stdout);
+  } else if (!command.quiet) {
+    std::fprintf(stderr, "release %llu, until %s: %s added to %s\n",
+                 static_cast<unsigned long long>(report->release.version),
+                 time_text(report->release.expires).c_str(),
+                 human_bytes(report->added_bytes).c_str(), command.request.folder.c_str());
+    for (const ReleaseBundle& bundle : report->release.bundles) {
+      std::fprintf(stderr, "  %s: %s installed, %s to download in %u pieces\n", bundle.name.c_str(),
+                   human_bytes(bundle.size).c_str(), human_bytes(bundle.download_size).c_str(),
+                   bundle.pieces);
+    }
+  }
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_rotate(const RotateCommand& command) {
+  const auto key = load_key(command.key_file, command.pass_phrase_file);
+  if (!key) return print_error(key.error());
+  const auto next_text = read_text(command.next_key);
+  if (!next_text) return print_error(next_text.error());
+  const auto next = parse_public_key(*next_text);
+  if (!next) return print_error(next.error());
+  const auto folder = ReleaseFolder::open(command.folder);
+  if (!folder) return print_error(folder.error());
+  if (auto added = folder->add_key(*next, *key); !added) return print_error(added.error());
+  std::fprintf(stderr, "link %u of the chain: devices follow to key %s\n", folder->key_links(),
+               to_hex(next->id).c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_prune(const PruneCommand& command) {
+  const auto folder = ReleaseFolder::open(command.folder);
+  if (!folder) return print_error(folder.error());
+  const auto freed = folder->prune(command.keep);
+  if (!freed) return print_error(freed.error());
+  if (command.json) {
+    std::fputs(prune_json(*freed, folder->versions()).c_str(), stdout);
+  } else {
+    std::fprintf(stderr, "%s freed\n", human_bytes(*freed).c_str());
+  }
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_plan(const PlanCommand& command) {
+  const Link* link = find_link(command.link);
+  if (link == nullptr) {
+    return print_error({ExitCode::kUsage, "ship.link", command.link, "there is no such network",
+                        "choose of 2g, 3g, 4g, wifi"});
+  }
+  const DeviceProfile* device =
+      command.device.empty() ? nullptr : find_device_profile(command.device);
+  if (!command.device.empty() && device == nullptr) {
+    return print_error({ExitCode::kUsage, "ship.device", command.device,
+                        "there is no such device profile", "choose of " + device_profile_names()});
+  }
+  const auto plan =
+      plan_update(command.old_bundle, command.new_bundle, *link, device, command.recipe);
+  if (!plan) return print_error(plan.error());
+  const double minutes = (plan->transfer_s + plan->install_s) / 60;
+  if (command.json) {
+    std::fputs(plan_json(*plan, *link, command.device, minutes).c_str(), stdout);
+    return static_cast<int>(ExitCode::kOk);
+  }
+  std::printf("update: %s in %u pieces (everything: %s)\n", human_bytes(plan->update_bytes).c_str(),
+              plan->update_pieces, human_bytes(plan->full_bytes).c_str());
+  std::printf("%s: %.1f minutes (%.0f s on the network, %.0f s to install)\n", link->name, minutes,
+              plan->transfer_s, plan->install_s);
+  std::printf("free space that it needs: %s\n", human_bytes(plan->storage_bytes).c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
+}  // namespace modar

@@ -1,0 +1,60 @@
+// `modar ship`: keys, releases, what an update costs. ship_cli.cpp fills the options.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bake/ship/publish.hpp"
+
+namespace modar {
+
+struct KeygenCommand {
+  std::string out;
+  std::string pass_phrase_file;
+  bool force = false;
+};
+
+struct ShipPublishCommand {
+  PublishRequest request;
+  std::string key_file;
+  std::string pass_phrase_file;
+  std::string expires;  ///< a time, or empty
+  unsigned valid_days = 365;
+  std::vector<std::string> devices;  ///< NAME=PROFILE[,PROFILE]
+  bool quiet = false;
+  bool json = false;
+};
+
+struct RotateCommand {
+  std::string folder;
+  std::string key_file;
+  std::string pass_phrase_file;
+  std::string next_key;  ///< file of the public key that follows
+};
+
+struct PruneCommand {
+  std::string folder;
+  std::size_t keep = 2;
+  bool json = false;
+};
+
+struct PlanCommand {
+  std::string old_bundle;
+  std::string new_bundle;
+  std::string link = "2g";
+  std::string device;
+  RecipeOptions recipe;
+  bool json = false;
+};
+
+int run_keygen(const KeygenCommand& command);
+int run_publish(ShipPublishCommand& command);
+int run_rotate(const RotateCommand& command);
+int run_prune(const PruneCommand& command);
+int run_plan(const PlanCommand& command);
+
+/// `modar ship ARGUMENT...`, with a command line of its own. Answers the exit code.
+int run_ship(std::vector<std::string> arguments);
+
+}  // namespace modar

@@ -1,0 +1,17 @@
+// The --json documents of `modar ship`. The keys are a contract (json.md).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bake/ship/publish.hpp"
+
+namespace modar {
+
+std::string publish_json(const PublishReport& report);
+std::string prune_json(std::uint64_t freed_bytes, const std::vector<std::uint64_t>& releases);
+std::string plan_json(const UpdatePlan& plan, const Link& link, const std::string& device,
+                      double minutes);
+
+}  // namespace modar

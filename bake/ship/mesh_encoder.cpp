@@ -1,0 +1,290 @@
+#include "bake/ship/mesh_encoder.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <string_view>
+
+#include <zstd.h>
+
+#include "formats/vertex_streams.hpp"
+#include "modar/mesh_transport.hpp"
+
+namespace modar {
+namespace {
+
+constexpr int kZstdLevel = 19;
+
+/// Values of one attribute that differ in their bytes, and the value of each vertex.
+DracoInput distinct_values(const VertexStream& stream, std::span<const std::byte> vertices,
+                           std::size_t stride) {
+  DracoInput input;
+  input.components = stream.attribute.components;
+  const std::size_t size = std::size_t{input.components} * stream.component_bytes();
+  std::map<std::string_view, std::uint32_t> known;
+  for (std::size_t at = 0; at < vertices.size(); at += stride) {
+    const std::byte* vertex = vertices.data() + at;
+    const std::string_view key(reinterpret_cast<const char*>(vertex + stream.attribute.offset),
+                               size);
+    const auto [entry, fresh] = known.emplace(key, static_cast<std::uint32_t>(known.size()));
+    input.value_of_vertex.push_back(entry->second);
+    if (!fresh) continue;
+    for (std::uint32_t c = 0; c < input.components; ++c) {
+      input.values.push_back(stream.load(vertex, c));
+    }
+  }
+  return input;
+}
+
+/// Triangles that Draco keeps, and those that it would drop for having a corner twice.
+struct SplitTriangles {
+  std::vector<std::uint16_t> kept;
+  std::vector<std::uint16_t> loose;
+};
+
+SplitTriangles split_triangles(std::span<const std::uint16_t> indices,
+                               const DracoInput& positions) {
+  SplitTriangles split;
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    const auto at = [&](std::size_t c) { return positions.value_of_vertex[indices[i + c]]; };
+    const bool keeps = at(0) != at(1) && at(1) != at(2) && at(2) != at(0);
+    auto& list = keeps ? split.kept : split.loose;
+    list.insert(list.end(), indices.begin() + static_cast<std::ptrdiff_t>(i),
+                indices.begin() + static_cast<std::ptrdiff_t>(i) + 3);
+  }
+  return split;
+}
+
+/// Values of every attribute in the order in which Draco will give them back. The order hangs on
+/// the connectivity alone, so it is found by sending the values' numbers in place of the values.
+std::optional<std::vector<std::vector<std::uint32_t>>> travelling_order(
+    std::span<const DracoInput> attributes, std::span<const std::uint16_t> indices,
+    std::uint32_t vertex_count) {
+  std::vector<DracoInput> numbers(attributes.begin(), attributes.end());
+  for (DracoInput& input : numbers) {
+    const std::size_t count = input.values.size() / input.components;
+    if (input.kind != DracoInput::Kind::kPosition) input.kind = DracoInput::Kind::kOther;
+    const std::uint32_t components = input.kind == DracoInput::Kind::kPosition ? 3 : 1;
+    input.components = components;
+    input.values.assign(components * count, 0);
+    for (std::size_t v = 0; v < count; ++v) {
+      input.values[v * components] = static_cast<std::int32_t>(v);
+    }
+  }
+  const auto buffer = encode_draco(numbers, indices, vertex_count, 0);
+  if (!buffer) return std::nullopt;
+  const auto decoded = decode_draco(*buffer);
+  if (!decoded || decoded->attributes.size() != attributes.size()) return std::nullopt;
+  std::vector<std::vector<std::uint32_t>> order(attributes.size());
+  for (std::size_t a = 0; a < attributes.size(); ++a) {
+    const DracoValues& values = decoded->attributes[a];
+    for (std::size_t v = 0; v < values.values.size(); v += values.components) {
+      order[a].push_back(static_cast<std::uint32_t>(values.values[v]));
+    }
+  }
+  return order;
+}
+
+/// Collects bits, lowest first.
+class BitWriter {
+ public:
+  void write(std::uint32_t value, int count) {
+    for (int i = 0; i < count; ++i, ++bit_) {
+      if (bit_ % 8 == 0) bytes_.push_back(std::byte{0});
+      bytes_.back() |= static_cast<std::byte>((value >> i & 1u) << bit_ % 8);
+    }
+  }
+  [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::size_t bit_ = 0;
+};
+
+std::vector<std::byte> squeeze(const std::vector<std::byte>& bytes) {
+  if (bytes.empty()) return {};
+  std::vector<std::byte> packed(ZSTD_compressBound(bytes.size()));
+  packed.resize(
+      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kZstdLevel));
+  return packed;
+}
+
+/// A chunk on its way: what Draco gets, and what goes beside it.
+class MeshObjectMaker {
+ public:
+  MeshObjectMaker(std::span<const std::byte> vertices, std::span<const std::uint16_t> indices,
+                  const LayoutRecord& layout, std::vector<VertexStream> streams)
+      : vertices_(vertices), layout_(layout), streams_(std::move(streams)) {
+    for (const VertexStream& stream : streams_) {
+      exact_.push_back(distinct_values(stream, vertices_, layout_.stride));
+      exact_.back().kind = kind_of(stream.kind);
+    }
+    triangles_ = split_triangles(indices, exact_.front());
+  }
+
+  std::optional<std::vector<std::byte>> make(int normal_bits) {
+    const auto vertex_count = static_cast<std::uint32_t>(vertices_.size() / layout_.stride);
+    if (triangles_.kept.empty()) return std::nullopt;
+    if (order_.empty()) {
+      auto order = travelling_order(exact_, triangles_.kept, vertex_count);
+      if (!order) return std::nullopt;
+      order_ = std::move(*order);
+    }
+    std::vector<DracoInput> inputs = exact_;
+    for (std::size_t a = 0; a < streams_.size(); ++a) {
+      if (streams_[a].kind == VertexStream::Kind::kNormal) aim_normals(inputs[a], normal_bits);
+    }
+    if (streams_.front().kind == VertexStream::Kind::kHalfPosition && !coarsen(inputs.front())) {
+      return std::nullopt;
+    }
+    const auto draco = encode_draco(inputs, triangles_.kept, vertex_count, normal_bits);
+    if (!draco) return std::nullopt;
+    const std::vector<std::byte> fine = fine_parts();
+    const auto beside = corrections(*draco, normal_bits);
+    if (!beside) return std::nullopt;
+    return join(*draco, fine, squeeze(*beside), normal_bits);
+  }
+
+  [[nodiscard]] bool has_normals() const {
+    return std::any_of(streams_.begin(), streams_.end(),
+                       [](const VertexStream& s) { return s.kind == VertexStream::Kind::kNormal; });
+  }
+
+ private:
+  static DracoInput::Kind kind_of(VertexStream::Kind kind) {
+    switch (kind) {
+      case VertexStream::Kind::kHalfPosition:
+      case VertexStream::Kind::kPosition:
+        return DracoInput::Kind::kPosition;
+      case VertexStream::Kind::kNormal:
+        return DracoInput::Kind::kNormal;
+      case VertexStream::Kind::kUv:
+        return DracoInput::Kind::kUv;
+      default:
+        return DracoInput::Kind::kOther;
+    }
+  }
+
+  /// Where a place of the map gives a normal's exact bytes, points it at that place.
+  static void aim_normals(DracoInput& normals, int bits) {
+    for (std::size_t i = 0; i + 2 < normals.values.size(); i += 3) {
+      std::int32_t* n = normals.values.data() + i;
+      const auto aimed =
+          octahedral_of_snorm8({static_cast<std::int8_t>(n[0]), static_cast<std::int8_t>(n[1]),
+                                static_cast<std::int8_t>(n[2])},
+                               bits);
+      for (std::size_t c = 0; c < 3; ++c) n[c] = aimed[c];
+    }
+  }
+
+  static bool coarsen(DracoInput& positions) {
+    for (std::int32_t& value : positions.values) {
+      const auto parts = split_half(static_cast<std::uint16_t>(value));
+      if (!parts) return false;
+      value = parts->coarse;
+    }
+    return true;
+  }
+
+  [[nodiscard]] std::vector<std::byte> fine_parts() const {
+    BitWriter bits;
+    if (streams_.front().kind != VertexStream::Kind::kHalfPosition) return {};
+    for (const std::uint32_t v : order_.front()) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        const auto parts = split_half(static_cast<std::uint16_t>(exact_.front().values[3 * v + c]));
+        const int count = fine_bits(parts->coarse);
+        bits.write(parts->fine >> (13 - count), count);
+      }
+    }
+    return bits.bytes();
+  }
+
+  /// Three planes of what the octahedral map misses, then the loose triangles.
+  [[nodiscard]] std::optional<std::vector<std::byte>> corrections(
+      const std::vector<std::byte>& draco, int normal_bits) const {
+    std::vector<std::byte> bytes;
+    for (std::size_t a = 0; a < streams_.size(); ++a) {
+      if (streams_[a].kind != VertexStream::Kind::kNormal) continue;
+      const auto decoded = decode_draco(draco);
+      if (!decoded) return std::nullopt;
+      const std::vector<std::int32_t>& map = decoded->attributes[a].values;
+      const std::size_t count = order_[a].size();
+      if (map.size() != 2 * count) return std::nullopt;
+      bytes.resize(3 * count);
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto near = snorm8_of_octahedral(map[2 * i], map[2 * i + 1], normal_bits);
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::int32_t exact = exact_[a].values[3 * order_[a][i] + c];
+          bytes[c * count + i] = static_cast<std::byte>(exact - near[c]);
+        }
+      }
+    }
+    for (const std::uint16_t v : triangles_.loose) {
+      const auto vertex = vertices_.subspan(v * std::size_t{layout_.stride}, layout_.stride);
+      bytes.insert(bytes.end(), vertex.begin(), vertex.end());
+    }
+    return bytes;
+  }
+
+  [[nodiscard]] std::vector<std::byte> join(const std::vector<std::byte>& draco,
+                                            const std::vector<std::byte>& fine,
+                                            const std::vector<std::byte>& beside,
+                                            int normal_bits) const {
+    MeshObjectHeader header{};
+    header.version = 1;
+    header.attribute_count = static_cast<std::uint8_t>(layout_.attribute_count);
+    header.normal_bits = static_cast<std::uint8_t>(has_normals() ? normal_bits : 0);
+    header.stride = layout_.stride;
+    header.draco_size = static_cast<std::uint32_t>(draco.size());
+    header.fine_size = static_cast<std::uint32_t>(fine.size());
+    header.corrections_size = static_cast<std::uint32_t>(beside.size());
+    header.loose_triangles = static_cast<std::uint32_t>(triangles_.loose.size() / 3);
+    std::vector<std::byte> object;
+    const auto append = [&](std::span<const std::byte> bytes) {
+      object.insert(object.end(), bytes.begin(), bytes.end());
+    };
+    append(std::as_bytes(std::span(&header, 1)));
+    append(std::as_bytes(std::span(layout_.attributes, layout_.attribute_count)));
+    append(draco);
+    append(fine);
+    append(beside);
+    return object;
+  }
+
+  std::span<const std::byte> vertices_;
+  const LayoutRecord& layout_;
+  std::vector<VertexStream> streams_;
+  std::vector<DracoInput> exact_;  // the integers that the bytes are
+  SplitTriangles triangles_;
+  std::vector<std::vector<std::uint32_t>> order_;
+};
+
+bool restores(std::span<const std::byte> object, std::span<const std::byte> vertices,
+              std::span<const std::uint16_t> indices) {
+  const auto chunk = decode_mesh_object(object);
+  return chunk &&
+         std::equal(chunk->vertices.begin(), chunk->vertices.end(), vertices.begin(),
+                    vertices.end()) &&
+         std::equal(chunk->indices.begin(), chunk->indices.end(), indices.begin(), indices.end());
+}
+
+}  // namespace
+
+std::optional<std::vector<std::byte>> encode_mesh_object(std::span<const std::byte> vertices,
+                                                         std::span<const std::uint16_t> indices,
+                                                         const LayoutRecord& layout) {
+  auto streams = plan_streams(layout.stride, std::span(layout.attributes, layout.attribute_count));
+  if (!streams || vertices.empty()) return std::nullopt;
+  MeshObjectMaker maker(vertices, indices, layout, std::move(*streams));
+  std::optional<std::vector<std::byte>> best;
+  for (const int bits : {8, 9, 10}) {
+    auto object = maker.make(bits);
+    if (!object) return std::nullopt;
+    if (!best || object->size() < best->size()) best = std::move(object);
+    if (!maker.has_normals()) break;
+  }
+  if (!restores(*best, vertices, indices)) return std::nullopt;
+  return best;
+}
+
+}  // namespace modar

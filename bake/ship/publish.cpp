@@ -1,0 +1,167 @@
+#include "bake/ship/publish.hpp"
+
+#include <filesystem>
+
+#include "bake/ship/release_folder.hpp"
+#include "formats/check.hpp"
+#include "modar/digest.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+/// A good bundle, mapped.
+struct OpenBundle {
+  MappedFile file;
+  BundleView view;
+};
+
+Result<OpenBundle> open_bundle(const std::string& path) {
+  auto file = MappedFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  Issue first;
+  const bool good = check_bundle(file->bytes(), [&](const Issue& issue) {
+    if (first.kind == nullptr && issue.kind->severity == Severity::kError) first = issue;
+  });
+  if (!good) {
+    return fail(ExitCode::kInvalidInput, "ship.bad-bundle", path,
+                first.kind == nullptr ? "it breaks a rule"
+                                      : std::string(first.kind->id) + " " + first.where,
+                "see `modar check " + path + "`, and bake it again");
+  }
+  const auto view = BundleView::open(file->bytes());
+  if (!view) return tl::unexpected(view.error());
+  return OpenBundle{std::move(*file), *view};
+}
+
+ReleaseBundle describe(const std::string& name, const PublishedBundle& made) {
+  ReleaseBundle bundle;
+  bundle.name = name;
+  bundle.recipe = made.recipe_id;
+  bundle.recipe_size = static_cast<std::uint32_t>(made.recipe_object.size());
+  bundle.recipe_raw_size = static_cast<std::uint32_t>(made.recipe.size());
+  bundle.download_size = made.download_size;
+  const auto recipe = open_recipe(made.recipe);
+  bundle.size = recipe->header.bundle_size;
+  bundle.pieces = recipe->header.piece_count;
+  std::copy_n(recipe->header.bundle_hash, bundle.hash.size(), bundle.hash.begin());
+  return bundle;
+}
+
+Result<std::uint64_t> next_version(const ReleaseFolder& folder, std::uint64_t wanted) {
+  const auto versions = folder.versions();
+  const std::uint64_t newest = versions.empty() ? 0 : versions.back();
+  if (wanted == 0) return newest + 1;
+  if (wanted > newest) return wanted;
+  return fail(ExitCode::kUsage, "ship.version", std::to_string(wanted),
+              "release " + std::to_string(newest) + " was published already",
+              "choose a greater number, or none");
+}
+
+// Rates and delays that browsers' tools and WebPageTest use for these networks.
+constexpr std::array<Link, 4> kLinks = {
+    {{"2g", 280e3, 0.8, "WebPageTest profile 2G: 280 kbit/s down, 800 ms"},
+     {"3g", 1.6e6, 0.3, "WebPageTest profile 3G: 1.6 Mbit/s down, 300 ms"},
+     {"4g", 9e6, 0.17, "WebPageTest profile 4G: 9 Mbit/s down, 170 ms"},
+     {"wifi", 30e6, 0.04, "a shared access point: 30 Mbit/s down, 40 ms"}}};
+
+/// Headers of a request and its answer.
+constexpr double kRequestBytes = 500;
+constexpr double kRequestsAtOnce = 4;
+/// Decoding, hashing and checking, bytes of the bundle a second: 800 MHz Cortex-A9, one core, at a
+/// twentieth of what the desk's processor does; flash of that class writes 8 MB a second.
+constexpr double kInstallBytesPerSecond = 4e6;
+constexpr double kFlashBytesPerSecond = 8e6;
+
+}  // namespace
+
+Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report) {
+  auto folder = ReleaseFolder::open(request.folder);
+  if (!folder) return tl::unexpected(folder.error());
+  PublishReport done;
+  const auto version = next_version(*folder, request.version);
+  if (!version) return tl::unexpected(version.error());
+  done.release.version = *version;
+  done.release.expires = request.expires;
+  for (const std::string& path : request.bundles) {
+    StageTimer timer(report, "publish " + path);
+    const auto bundle = open_bundle(path);
+    if (!bundle) return tl::unexpected(bundle.error());
+    const auto made = make_recipe(bundle->view, request.recipe);
+    if (!made) return tl::unexpected(made.error());
+    const auto added = folder->add_objects(*made);
+    if (!added) return tl::unexpected(added.error());
+    done.added_bytes += *added;
+    const std::string name = std::filesystem::path(path).stem().string();
+    done.release.bundles.push_back(describe(name, *made));
+    if (const auto devices = request.devices.find(name); devices != request.devices.end()) {
+      done.release.bundles.back().devices = devices->second;
+    }
+    for (const auto& [form, totals] : made->forms) {
+      done.forms[form].pieces += totals.pieces;
+      done.forms[form].raw_bytes += totals.raw_bytes;
+      done.forms[form].stored_bytes += totals.stored_bytes;
+    }
+    timer.done(bundle->view.bytes().size(), made->download_size);
+  }
+  // What a device would refuse is not published.
+  if (const auto readable = parse_release(release_text(done.release)); !readable) {
+    return fail(ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
+                "name each bundle's file with letters, digits, '.', '_' and '-', no two alike");
+  }
+  if (auto added = folder->add_release(done.release, key); !added) {
+    return tl::unexpected(added.error());
+  }
+  return done;
+}
+
+std::span<const Link> links() {
+  return kLinks;
+}
+
+const Link* find_link(std::string_view name) {
+  for (const Link& link : kLinks) {
+    if (name == link.name) return &link;
+  }
+  return nullptr;
+}
+
+Result<UpdatePlan> plan_update(const std::string& old_bundle, const std::string& new_bundle,
+                               const Link& link, const DeviceProfile* device,
+                               const RecipeOptions& options) {
+  const auto before = open_bundle(old_bundle);
+  if (!before) return tl::unexpected(before.error());
+  const auto after = open_bundle(new_bundle);
+  if (!after) return tl::unexpected(after.error());
+  const auto old_recipe = make_recipe(before->view, options);
+  if (!old_recipe) return tl::unexpected(old_recipe.error());
+  const auto new_recipe = make_recipe(after->view, options);
+  if (!new_recipe) return tl::unexpected(new_recipe.error());
+
+  UpdatePlan plan;
+  Release release;
+  release.version = 1;
+  release.bundles.push_back(describe("bundle", *new_recipe));
+  const std::uint64_t documents = release_text(release).size() + new_recipe->recipe_object.size();
+  plan.full_bytes = release_text(release).size() + new_recipe->download_size;
+  plan.update_bytes = documents;
+  for (const auto& [id, object] : new_recipe->objects) {
+    if (old_recipe->objects.contains(id)) continue;
+    plan.update_bytes += object.size();
+    ++plan.update_pieces;
+  }
+  // Four documents come one after another, the pieces side by side.
+  const double requests = 4 + plan.update_pieces / kRequestsAtOnce;
+  plan.transfer_s =
+      (static_cast<double>(plan.update_bytes) + kRequestBytes * (4.0 + plan.update_pieces)) * 8 /
+          link.bits_per_second +
+      requests * link.round_trip_s;
+  const auto size = static_cast<double>(after->view.bytes().size());
+  const double cores = device == nullptr ? 1 : device->cores;
+  plan.install_s =
+      size / (kInstallBytesPerSecond * std::max(1.0, cores / 2)) + size / kFlashBytesPerSecond;
+  plan.storage_bytes = after->view.bytes().size() + plan.update_bytes;
+  return plan;
+}
+
+}  // namespace modar

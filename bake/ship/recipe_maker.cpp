@@ -1,0 +1,327 @@
+#include "bake/ship/recipe_maker.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+#include <optional>
+
+#include <zstd.h>
+
+#include "bake/ship/content_pieces.hpp"
+#include "bake/ship/limited_process.hpp"
+#include "bake/ship/mesh_encoder.hpp"
+#include "bake/texture/parallel.hpp"
+#include "formats/feature_text.hpp"
+#include "modar/digest.hpp"
+#include "modar/piece.hpp"
+
+namespace modar {
+namespace {
+
+constexpr int kZstdLevel = 19;
+constexpr std::uint64_t kMaxPatternPiece = 4u << 20;
+
+std::vector<std::byte> zstd(std::span<const std::byte> bytes) {
+  std::vector<std::byte> packed(ZSTD_compressBound(bytes.size()));
+  packed.resize(
+      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kZstdLevel));
+  return packed;
+}
+
+std::vector<std::byte> split_halves(std::span<const std::byte> blocks) {
+  std::vector<std::byte> halves(blocks.size());
+  const std::size_t count = blocks.size() / 8;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::memcpy(halves.data() + 4 * i, blocks.data() + 8 * i, 4);
+    std::memcpy(halves.data() + 4 * (count + i), blocks.data() + 8 * i + 4, 4);
+  }
+  return halves;
+}
+
+/// One piece on its way to the recipe.
+struct Draft {
+  PieceRecord record{};
+  std::vector<std::byte> raw;  ///< only where it is not a stretch of the bundle
+  std::vector<std::byte> stored;
+  bool blocks = false;  ///< of ETC1
+};
+
+/// A chunk of a model that may travel as a mesh: where its vertices and indices lie.
+struct ChunkPlace {
+  std::uint64_t vertices = 0;  ///< byte in the bundle
+  std::uint64_t vertex_bytes = 0;
+  std::uint64_t indices = 0;
+  std::uint32_t index_bytes = 0;
+  std::uint16_t index_base = 0;
+  const LayoutRecord* layout = nullptr;
+};
+
+std::uint64_t place_in(const BundleView& bundle, std::span<const std::byte> section) {
+  return static_cast<std::uint64_t>(section.data() - bundle.bytes().data());
+}
+
+std::vector<ChunkPlace> chunk_places(const BundleView& bundle) {
+  std::vector<ChunkPlace> places;
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const ModelRecord& model = bundle.models()[m];
+    const LayoutRecord& layout = bundle.layouts()[model.layout];
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+      const LevelRecord& level = bundle.levels()[chunk.first_level];
+      if (level.index_count == 0) continue;
+      const auto bytes = bundle.indices().subspan(level.index_offset, 2ull * level.index_count);
+      std::vector<std::uint16_t> indices(level.index_count);
+      std::memcpy(indices.data(), bytes.data(), bytes.size());
+      const auto [low, high] = std::minmax_element(indices.begin(), indices.end());
+      ChunkPlace place;
+      place.vertices = place_in(bundle, bundle.vertices()) + level.vertex_offset +
+                       std::uint64_t{*low} * layout.stride;
+      place.vertex_bytes = (std::uint64_t{*high} - *low + 1) * layout.stride;
+      place.indices = place_in(bundle, bytes);
+      place.index_bytes = static_cast<std::uint32_t>(bytes.size());
+      place.index_base = *low;
+      place.layout = &layout;
+      places.push_back(place);
+    }
+  }
+  return places;
+}
+
+std::vector<std::uint16_t> local_indices(const BundleView& bundle, const ChunkPlace& place) {
+  std::vector<std::uint16_t> indices(place.index_bytes / 2);
+  std::memcpy(indices.data(), bundle.bytes().data() + place.indices, place.index_bytes);
+  for (std::uint16_t& index : indices) index = static_cast<std::uint16_t>(index - place.index_base);
+  return indices;
+}
+
+/// A stretch of the bundle that some piece covers.
+struct Covered {
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+};
+
+class RecipeMaker {
+ public:
+  RecipeMaker(const BundleView& bundle, const RecipeOptions& options)
+      : bundle_(bundle), options_(options) {}
+
+  Result<PublishedBundle> make() {
+    if (options_.geometry) draft_meshes();
+    draft_texts();
+    draft_rest();
+    parallel_rows(static_cast<std::uint32_t>(drafts_.size()), options_.jobs,
+                  [&](std::uint32_t i) { pack(drafts_[i]); });
+    std::sort(drafts_.begin(), drafts_.end(),
+              [](const Draft& a, const Draft& b) { return a.record.offset < b.record.offset; });
+    return finish();
+  }
+
+ private:
+  [[nodiscard]] std::span<const std::byte> at(std::uint64_t offset, std::uint64_t size) const {
+    return bundle_.bytes().subspan(offset, size);
+  }
+
+  void cover(std::uint64_t begin, std::uint64_t size) { covered_.push_back({begin, begin + size}); }
+
+  void draft_meshes() {
+    const std::vector<ChunkPlace> places = chunk_places(bundle_);
+    const auto objects = run_limited(places.size(), options_.jobs, {}, [&](std::size_t i) {
+      const ChunkPlace& place = places[i];
+      return encode_mesh_object(at(place.vertices, place.vertex_bytes),
+                                local_indices(bundle_, place), *place.layout);
+    });
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (!objects[i] || overlaps(places[i])) continue;
+      Draft draft;
+      const ChunkPlace& place = places[i];
+      draft.record.form = static_cast<std::uint8_t>(PieceForm::kMesh);
+      draft.record.offset = place.vertices;
+      draft.record.second_offset = place.indices;
+      draft.record.second_size = place.index_bytes;
+      draft.record.index_base = place.index_base;
+      draft.record.raw_size = static_cast<std::uint32_t>(place.vertex_bytes + place.index_bytes);
+      const auto vertices = at(place.vertices, place.vertex_bytes);
+      const auto indices = local_indices(bundle_, place);
+      const auto index_bytes = std::as_bytes(std::span(indices));
+      draft.raw.assign(vertices.begin(), vertices.end());
+      draft.raw.insert(draft.raw.end(), index_bytes.begin(), index_bytes.end());
+      draft.stored = *objects[i];
+      if (zstd(draft.raw).size() <= draft.stored.size()) continue;  // tiny: cheaper as it is
+      cover(place.vertices, place.vertex_bytes);
+      cover(place.indices, place.index_bytes);
+      drafts_.push_back(std::move(draft));
+    }
+  }
+
+  [[nodiscard]] bool overlaps(const ChunkPlace& place) const {
+    return std::any_of(covered_.begin(), covered_.end(), [&](const Covered& c) {
+      return (place.vertices < c.end && c.begin < place.vertices + place.vertex_bytes) ||
+             (place.indices < c.end && c.begin < place.indices + place.index_bytes);
+    });
+  }
+
+  /// Texts that their twins give.
+  void draft_texts() {
+    for (const SectionEntry& entry : bundle_.sections()) {
+      if (entry.type != static_cast<std::uint32_t>(SectionType::kFeatureYml)) continue;
+      const auto twin = bundle_.section(SectionType::kFeatureTwin, entry.owner, entry.variant);
+      const auto text = at(entry.offset, entry.size);
+      const std::string made = feature_text(bundle_.features(entry.owner, entry.variant));
+      const auto made_bytes = std::as_bytes(std::span(made));
+      if (twin.empty() || text.empty() ||
+          !std::equal(text.begin(), text.end(), made_bytes.begin(), made_bytes.end())) {
+        continue;
+      }
+      Draft draft;
+      draft.record.form = static_cast<std::uint8_t>(PieceForm::kFeatureText);
+      draft.record.offset = entry.offset;
+      draft.record.second_offset = place_in(bundle_, twin);
+      draft.record.second_size = static_cast<std::uint32_t>(twin.size());
+      draft.record.raw_size = static_cast<std::uint32_t>(text.size());
+      cover(entry.offset, entry.size);
+      drafts_.push_back(std::move(draft));
+    }
+  }
+
+  /// All other bytes, section by section; those between sections are zero.
+  void draft_rest() {
+    std::uint64_t payload = bundle_.bytes().size();
+    for (const SectionEntry& entry : bundle_.sections()) {
+      if (entry.type >= 256) payload = std::min(payload, entry.offset);
+    }
+    draft_gaps(0, payload, Cut::kContent);
+    const auto sections = bundle_.sections();
+    for (std::size_t i = 0; i < sections.size();) {
+      const SectionEntry& entry = sections[i];
+      std::uint64_t end = entry.offset + entry.size;
+      ++i;
+      if (entry.type < 256) continue;
+      if (entry.type == static_cast<std::uint32_t>(SectionType::kFeatureTwin)) {
+        // The sets of one pattern share most of their descriptors: they travel as one piece.
+        while (i < sections.size() && sections[i].type == entry.type &&
+               sections[i].owner == entry.owner &&
+               sections[i].offset + sections[i].size - entry.offset <= kMaxPatternPiece) {
+          end = sections[i].offset + sections[i].size;
+          ++i;
+        }
+        draft_gaps(entry.offset, end, Cut::kWhole);
+        continue;
+      }
+      const bool texture = entry.type == static_cast<std::uint32_t>(SectionType::kTextureData);
+      draft_gaps(entry.offset, end, texture ? Cut::kBlocks : Cut::kContent);
+    }
+  }
+
+  enum class Cut { kContent, kBlocks, kWhole };
+
+  /// What nothing covers yet between two places.
+  void draft_gaps(std::uint64_t begin, std::uint64_t end, Cut cut) {
+    std::sort(covered_.begin(), covered_.end(),
+              [](const Covered& a, const Covered& b) { return a.begin < b.begin; });
+    for (const Covered& covered : covered_) {
+      if (covered.end <= begin || covered.begin >= end) continue;
+      draft_bytes(begin, covered.begin, cut);
+      begin = covered.end;
+    }
+    draft_bytes(begin, end, cut);
+  }
+
+  void draft_bytes(std::uint64_t begin, std::uint64_t end, Cut cut) {
+    if (begin >= end) return;
+    const auto bytes = at(begin, end - begin);
+    const bool whole = cut == Cut::kWhole && bytes.size() <= kMaxPatternPiece;
+    const std::vector<std::size_t> sizes =
+        whole ? std::vector{bytes.size()} : content_pieces(bytes, cut == Cut::kBlocks ? 8 : 1);
+    for (const std::size_t size : sizes) {
+      const auto raw = at(begin, size);
+      Draft draft;
+      draft.record.offset = begin;
+      draft.record.raw_size = static_cast<std::uint32_t>(size);
+      draft.blocks = cut == Cut::kBlocks;
+      const bool zero =
+          std::all_of(raw.begin(), raw.end(), [](std::byte b) { return b == std::byte{0}; });
+      if (!zero) drafts_.push_back(std::move(draft));
+      begin += size;
+    }
+  }
+
+  [[nodiscard]] std::span<const std::byte> raw_of(const Draft& draft) const {
+    return draft.raw.empty() ? at(draft.record.offset, draft.record.raw_size) : draft.raw;
+  }
+
+  /// Chooses the smallest form, states hash and sizes.
+  void pack(Draft& draft) const {
+    const auto raw = raw_of(draft);
+    draft.record.raw_hash = raw_hash(raw);
+    if (draft.record.form == 0) {
+      draft.stored = zstd(raw);
+      draft.record.form = static_cast<std::uint8_t>(PieceForm::kZstd);
+      if (draft.blocks && raw.size() % 8 == 0) {
+        auto halves = zstd(split_halves(raw));
+        if (halves.size() < draft.stored.size()) {
+          draft.stored = std::move(halves);
+          draft.record.form = static_cast<std::uint8_t>(PieceForm::kZstdHalves);
+        }
+      }
+      if (draft.stored.size() >= raw.size()) {
+        draft.stored.assign(raw.begin(), raw.end());
+        draft.record.form = static_cast<std::uint8_t>(PieceForm::kStored);
+      }
+    }
+    draft.record.stored_size = static_cast<std::uint32_t>(draft.stored.size());
+    if (draft.stored.empty()) return;
+    const ObjectId id = object_id(draft.stored);
+    std::copy(id.begin(), id.end(), draft.record.id);
+  }
+
+  Result<PublishedBundle> finish() {
+    PublishedBundle out;
+    RecipeHeader header{};
+    std::copy(kRecipeMagic.begin(), kRecipeMagic.end(), header.magic);
+    header.version = kRecipeVersion;
+    header.piece_count = static_cast<std::uint32_t>(drafts_.size());
+    header.bundle_size = bundle_.bytes().size();
+    const BundleHash hash = bundle_hash(bundle_.bytes());
+    std::copy(hash.begin(), hash.end(), header.bundle_hash);
+    const auto append = [&](std::span<const std::byte> bytes) {
+      out.recipe.insert(out.recipe.end(), bytes.begin(), bytes.end());
+    };
+    append(std::as_bytes(std::span(&header, 1)));
+    for (Draft& draft : drafts_) {
+      const auto stored = draft.stored.empty()
+                              ? at(draft.record.second_offset, draft.record.second_size)
+                              : std::span<const std::byte>(draft.stored);
+      if (!decode_piece(draft.record, stored)) {
+        return fail(ExitCode::kInternal, "ship.piece",
+                    "byte " + std::to_string(draft.record.offset),
+                    "a piece does not decode to what it was made of", "report this as a bug");
+      }
+      append(std::as_bytes(std::span(&draft.record, 1)));
+      FormTotals& totals = out.forms[static_cast<PieceForm>(draft.record.form)];
+      ++totals.pieces;
+      totals.raw_bytes += draft.record.raw_size;
+      totals.stored_bytes += draft.record.stored_size;
+      if (!draft.stored.empty()) {
+        out.objects.emplace(std::to_array(draft.record.id), std::move(draft.stored));
+      }
+    }
+    out.recipe_object = zstd(out.recipe);
+    out.recipe_id = object_id(out.recipe_object);
+    out.download_size = out.recipe_object.size();
+    for (const auto& [id, object] : out.objects) out.download_size += object.size();
+    return out;
+  }
+
+  const BundleView& bundle_;
+  const RecipeOptions& options_;
+  std::vector<Draft> drafts_;
+  std::vector<Covered> covered_;
+};
+
+}  // namespace
+
+Result<PublishedBundle> make_recipe(const BundleView& bundle, const RecipeOptions& options) {
+  return RecipeMaker(bundle, options).make();
+}
+
+}  // namespace modar

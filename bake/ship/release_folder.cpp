@@ -1,0 +1,187 @@
+#include "bake/ship/release_folder.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "formats/atomic_file.hpp"
+#include "modar/digest.hpp"
+#include "modar/piece.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<std::string> read_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return std::nullopt;
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+Result<void> make_folders(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) {
+    return fail(ExitCode::kIo, "io.create", path.string(), error.message(),
+                "see that the folder can be written");
+  }
+  return {};
+}
+
+/// The number in "12.json"; 0 for other names.
+std::uint64_t number_of(const fs::path& path) {
+  if (path.extension() != ".json") return 0;
+  const std::string stem = path.stem().string();
+  std::uint64_t number = 0;
+  const auto parsed = std::from_chars(stem.data(), stem.data() + stem.size(), number);
+  return parsed.ec == std::errc() && parsed.ptr == stem.data() + stem.size() ? number : 0;
+}
+
+std::vector<std::uint64_t> numbers_in(const fs::path& folder) {
+  std::vector<std::uint64_t> numbers;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (const std::uint64_t number = number_of(entry.path()); number != 0) {
+      numbers.push_back(number);
+    }
+  }
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+}  // namespace
+
+ReleaseFolder::ReleaseFolder(std::string path, int lock) : path_(std::move(path)), lock_(lock) {}
+
+ReleaseFolder::ReleaseFolder(ReleaseFolder&& other) noexcept
+    : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
+
+ReleaseFolder::~ReleaseFolder() {
+  if (lock_ >= 0) ::close(lock_);
+}
+
+Result<ReleaseFolder> ReleaseFolder::open(const std::string& path) {
+  for (const char* folder : {"/releases", "/keys", "/objects"}) {
+    if (auto made = make_folders(path + folder); !made) return tl::unexpected(made.error());
+  }
+  const std::string lock = path + "/.lock";
+  const int descriptor = ::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor < 0) {
+    return fail(ExitCode::kIo, "io.create", lock, std::strerror(errno),
+                "see that the folder can be written");
+  }
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    ::close(descriptor);
+    return fail(kExitLocked, "ship.locked", path, "another publisher is at work on it",
+                "wait until it ends");
+  }
+  return ReleaseFolder(path, descriptor);
+}
+
+std::vector<std::uint64_t> ReleaseFolder::versions() const {
+  return numbers_in(path_ + "/releases");
+}
+
+Result<Release> ReleaseFolder::release(std::uint64_t version) const {
+  const std::string path = path_ + "/releases/" + std::to_string(version) + ".json";
+  const auto text = read_text(path);
+  if (!text) {
+    return fail(ExitCode::kIo, "io.open", path, "it cannot be read", "publish the release again");
+  }
+  return parse_release(*text);
+}
+
+std::uint32_t ReleaseFolder::key_links() const {
+  const auto numbers = numbers_in(path_ + "/keys");
+  return numbers.empty() ? 0 : static_cast<std::uint32_t>(numbers.back());
+}
+
+Result<std::uint64_t> ReleaseFolder::add_objects(const PublishedBundle& bundle) const {
+  std::uint64_t added = 0;
+  const auto add = [&](const ObjectId& id, std::span<const std::byte> bytes) -> Result<void> {
+    const fs::path path = path_ + "/objects/" + object_path(id);
+    // Names are hashes of the content: what is there in full length is the same.
+    std::error_code error;
+    if (fs::file_size(path, error) == bytes.size() && !error) return {};
+    if (auto made = make_folders(path.parent_path()); !made) return made;
+    added += bytes.size();
+    return write_file(path.string(), bytes);
+  };
+  for (const auto& [id, bytes] : bundle.objects) {
+    if (auto done = add(id, bytes); !done) return tl::unexpected(done.error());
+  }
+  if (auto done = add(bundle.recipe_id, bundle.recipe_object); !done) {
+    return tl::unexpected(done.error());
+  }
+  return added;
+}
+
+Result<void> ReleaseFolder::add_release(const Release& release, const SecretKey& key) const {
+  const std::string number = std::to_string(release.version);
+  const std::string path = path_ + "/releases/" + number + ".json";
+  const std::string text = release_text(release);
+  const std::string signature = sign(key, text, "modar release " + number);
+  return write_file(path + ".minisig", std::string_view(signature))
+      .and_then([&] { return write_file(path, std::string_view(text)); })
+      .and_then([&] { return write_file(path_ + "/latest", std::string_view(number + "\n")); });
+}
+
+Result<void> ReleaseFolder::add_key(const PublicKey& next, const SecretKey& key) const {
+  const KeyLink link{key_links() + 1, public_key_line(next)};
+  const std::string path = path_ + "/keys/" + std::to_string(link.serial) + ".json";
+  const std::string text = key_link_text(link);
+  const std::string signature = sign(key, text, "modar key " + std::to_string(link.serial));
+  return write_file(path + ".minisig", std::string_view(signature)).and_then([&] {
+    return write_file(path, std::string_view(text));
+  });
+}
+
+Result<std::uint64_t> ReleaseFolder::prune(std::size_t keep) const {
+  std::vector<std::uint64_t> all = versions();
+  const std::size_t gone = all.size() > keep ? all.size() - keep : 0;
+  std::set<std::string> needed;
+  for (std::size_t i = gone; i < all.size(); ++i) {
+    const auto kept = release(all[i]);
+    if (!kept) return tl::unexpected(kept.error());
+    for (const ReleaseBundle& bundle : kept->bundles) {
+      needed.insert(to_hex(bundle.recipe));
+      const auto stored = read_text(path_ + "/objects/" + object_path(bundle.recipe));
+      if (!stored) {
+        return fail(ExitCode::kIo, "ship.recipe", object_path(bundle.recipe),
+                    "a recipe of a kept release is missing", "publish that release again");
+      }
+      auto raw = unpack_zstd(std::as_bytes(std::span(*stored)), bundle.recipe_raw_size);
+      if (!raw) return tl::unexpected(raw.error());
+      const auto recipe = open_recipe(*raw);
+      if (!recipe) return tl::unexpected(recipe.error());
+      for (const PieceRecord& piece : recipe->pieces) needed.insert(to_hex(piece.id));
+    }
+  }
+  std::uint64_t bytes = 0;
+  std::error_code error;
+  // Documents first: no document that stands names an object that is gone.
+  for (std::size_t i = 0; i < gone; ++i) {
+    const std::string path = path_ + "/releases/" + std::to_string(all[i]) + ".json";
+    fs::remove(path, error);
+    fs::remove(path + ".minisig", error);
+  }
+  for (const auto& entry : fs::recursive_directory_iterator(path_ + "/objects", error)) {
+    if (!entry.is_regular_file() || needed.contains(entry.path().filename().string())) continue;
+    bytes += entry.file_size();
+    fs::remove(entry.path(), error);
+  }
+  return bytes;
+}
+
+}  // namespace modar

@@ -1,0 +1,50 @@
+// The folder that a publisher fills and any server or USB stick can serve:
+//
+//   latest                       number of the newest release
+//   releases/N.json(.minisig)    release documents
+//   keys/S.json(.minisig)        the chain of keys
+//   objects/ab/abcdef...         pieces and recipes, by the BLAKE2b of their bytes
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bake/ship/keys.hpp"
+#include "bake/ship/recipe_maker.hpp"
+#include "modar/release.hpp"
+
+namespace modar {
+
+/// Holds the folder's lock while it lives, so that two publishers never meet.
+class ReleaseFolder {
+ public:
+  /// Creates what is missing. Errors: kIo; kExitLocked "ship.locked".
+  static Result<ReleaseFolder> open(const std::string& path);
+  ReleaseFolder(ReleaseFolder&& other) noexcept;
+  ReleaseFolder& operator=(ReleaseFolder&&) = delete;
+  ~ReleaseFolder();
+
+  /// Numbers of the releases, rising.
+  [[nodiscard]] std::vector<std::uint64_t> versions() const;
+  [[nodiscard]] Result<Release> release(std::uint64_t version) const;
+  /// Links of the chain of keys.
+  [[nodiscard]] std::uint32_t key_links() const;
+
+  /// Writes the objects that are not there; answers how many bytes that were.
+  Result<std::uint64_t> add_objects(const PublishedBundle& bundle) const;
+  /// Writes and signs the document, then points `latest` at it.
+  Result<void> add_release(const Release& release, const SecretKey& key) const;
+  /// Appends `next` to the chain, signed by `key`.
+  Result<void> add_key(const PublicKey& next, const SecretKey& key) const;
+  /// Removes all but the `keep` newest releases, then the objects that no release needs; answers
+  /// how many bytes that were.
+  Result<std::uint64_t> prune(std::size_t keep) const;
+
+ private:
+  ReleaseFolder(std::string path, int lock);
+  std::string path_;
+  int lock_ = -1;
+};
+
+}  // namespace modar

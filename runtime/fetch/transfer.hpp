@@ -1,0 +1,67 @@
+// Files from a server or a folder, by libcurl: several at once, resumed where they broke off,
+// retried with growing waits.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/error.hpp"
+#include "formats/recipe.hpp"
+
+namespace modar::fetch {
+
+struct TransferOptions {
+  std::string url;                     ///< http://, https://, file:// or a folder
+  unsigned parallel = 4;               ///< transfers at once
+  std::uint64_t bytes_per_second = 0;  ///< of all together; 0: as fast as it goes
+  unsigned attempts = 8;               ///< in a row that bring nothing, then it gives up
+  double first_wait_s = 0.5;           ///< before the second attempt; doubles up to max_wait_s
+  double max_wait_s = 30;
+  double stall_s = 30;  ///< a transfer that brings nothing for so long is broken off
+};
+
+/// One object to bring.
+struct Wanted {
+  ObjectId id{};
+  std::uint64_t size = 0;  ///< bytes
+  std::string path;        ///< below the URL
+  std::string file;        ///< where it goes; `file`.part while it comes
+};
+
+struct TransferStats {
+  std::uint64_t bytes = 0;  ///< of bodies that came, useful or not
+  std::uint32_t retries = 0;
+  std::uint32_t corrupt = 0;  ///< objects that came whole and wrong, and were thrown away
+};
+
+class Transfers {
+ public:
+  /// Errors: kUsage "fetch.url"; kInternal "fetch.curl".
+  static Result<Transfers> create(const TransferOptions& options);
+  Transfers(Transfers&&) noexcept;
+  Transfers& operator=(Transfers&&) = delete;
+  ~Transfers();
+
+  /// A small file as text, at most `limit` bytes.
+  /// Errors: kExitNetwork "fetch.network"; kExitMixed "fetch.missing" (the server has no such
+  /// file).
+  Result<std::string> text(const std::string& path, std::size_t limit);
+
+  /// Brings objects into their files, each verified by its id. `on_bytes` hears of what came since
+  /// it was last called (negative: that was thrown away). Errors: as text(); kIo "io.*".
+  Result<void> objects(std::span<const Wanted> wanted,
+                       const std::function<void(std::int64_t)>& on_bytes);
+
+  [[nodiscard]] const TransferStats& stats() const;
+
+ private:
+  struct State;
+  explicit Transfers(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace modar::fetch

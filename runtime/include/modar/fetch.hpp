@@ -1,0 +1,64 @@
+// Installs releases on the device. `modar-fetch` is this and a command line; an app may call it on
+// a thread of its own.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "formats/error.hpp"
+#include "modar/signature.hpp"
+
+namespace modar {
+
+struct FetchProgress {
+  std::uint64_t bytes_done = 0;  ///< of what has to be downloaded
+  std::uint64_t bytes_total = 0;
+  double seconds_left = -1;  ///< -1: not known yet
+};
+
+struct FetchOptions {
+  std::string url;    ///< http://, https://, file:// or a folder that `modar ship publish` filled
+  std::string store;  ///< folder of the installed bundles; made where it is missing
+  std::string trusted_key;             ///< text of K.pub
+  std::string device;                  ///< only bundles for this profile; empty: for any
+  std::vector<std::string> bundles;    ///< only these; empty: all
+  unsigned parallel = 4;               ///< pieces at once
+  std::uint64_t bytes_per_second = 0;  ///< cap; 0: none
+  unsigned attempts = 8;               ///< in a row that bring nothing, then it gives up
+  double first_wait_s = 0.5;           ///< before the second attempt, then twice as long each time
+  double stall_s = 30;                 ///< a silent connection is broken off after this
+  std::function<void(const FetchProgress&)> progress;  ///< may be empty
+};
+
+struct FetchReport {
+  std::uint64_t version = 0;
+  bool changed = false;                ///< false: this release was installed already
+  std::vector<std::string> bundles;    ///< paths of the installed bundles
+  std::uint64_t downloaded_bytes = 0;  ///< bodies of all answers
+  std::uint64_t reused_bytes = 0;      ///< raw bytes taken from bundles installed before
+  std::uint32_t downloaded_pieces = 0;
+  std::uint32_t reused_pieces = 0;
+  std::uint32_t retries = 0;
+  std::uint32_t corrupt_pieces = 0;  ///< thrown away and fetched again
+};
+
+/// Brings the store up to the server's release. Whatever happens, on whatever line it is killed,
+/// the release in use stays whole; the next call goes on with what came. Errors: kExitWrongKey,
+/// kExitRollBack, kExitExpired, kExitMixed, kExitNoSpace, kExitLocked, kExitNetwork,
+/// kExitBadBundle; kIo; kUnsupported "fetch.device" (nothing for this device).
+Result<FetchReport> fetch_release(const FetchOptions& options);
+
+struct StoreReport {
+  std::uint64_t version = 0;         ///< of the release in use
+  std::vector<std::string> bundles;  ///< paths
+  bool fell_back = false;            ///< the release in use was damaged: the one before it is now
+};
+
+/// Reads every installed bundle, holds it against its signed hash and the rules of a good bundle,
+/// and falls back to the release before where one is damaged.
+/// Errors: kExitLocked; kExitBadBundle "store.damaged" (no good release is left); kIo.
+Result<StoreReport> verify_store(const std::string& store);
+
+}  // namespace modar
