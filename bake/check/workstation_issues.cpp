@@ -29,6 +29,17 @@ constexpr IssueKind kKinds[] = {
     {"DEVICE_ETC1", Severity::kWarning,
      "The device has no ETC1 textures: the player decodes them when it uploads them",
      "nothing, if six times the memory for textures is there"},
+    {"SOURCE_MISSING", Severity::kWarning, "No file of --source is this asset's source",
+     "name all files that the bundle was baked from"},
+    {"SOURCE_BYTES", Severity::kInfo, "Baked again, this asset has other bytes",
+     "nothing, if the source, the options or this program changed since; what differs is measured"},
+    {"SOURCE_SURFACE", Severity::kError,
+     "A model lies farther from its source than the bundle states",
+     "bake it again from this source; if it comes back, report the baker"},
+    {"SOURCE_COLOUR", Severity::kError, "Colours differ from those of the source",
+     "bake it again from this source"},
+    {"SOURCE_COUNTS", Severity::kError, "Counts differ from those of the source",
+     "bake it again from this source"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 

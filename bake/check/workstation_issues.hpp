@@ -19,6 +19,11 @@ enum class WorkstationRule : std::uint8_t {
   kDeviceStorage,
   kDeviceHalfFloat,
   kDeviceEtc1,
+  kSourceMissing,
+  kSourceBytes,
+  kSourceSurface,
+  kSourceColour,
+  kSourceCounts,
   kCount
 };
 

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "bake/bundle_builder.hpp"
+#include "bake/check/reproduce.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/terminal.hpp"
@@ -78,6 +79,13 @@ int run_bake(const BakeCommand& command) {
   if (!file) return print_error(file.error());
   Result<BundleView> bundle = BundleView::open(file->bytes());
   if (!bundle) return print_error(bundle.error());
+  if (command.prove_reproducible) {
+    bar.show("bake again", 0);
+    auto proven = prove_reproducible(command.request, command.words, file->bytes());
+    bar.clear();
+    if (!proven) return print_error(proven.error());
+    if (!command.quiet) std::fprintf(stderr, "a second bake elsewhere gave the same bytes\n");
+  }
   writing.done(content->models.size() + content->patterns.size(), file->bytes().size());
   bar.clear();
   if (!command.quiet) print_summary(*bundle, report, command.output);

@@ -44,6 +44,19 @@ std::string uri_of(const std::string& path) {
   return uri;
 }
 
+Json source_json(const SourceFit& fit) {
+  Json models = Json::array();
+  for (const ModelFit& model : fit.models) {
+    models.push_back({{"name", model.name},
+                      {"same_bytes", model.same_bytes},
+                      {"stated_error", model.stated_error},
+                      {"source_to_bundle", model.source_to_bundle},
+                      {"bundle_to_source", model.bundle_to_source},
+                      {"colour_error", model.colour_error}});
+  }
+  return {{"models", models}, {"same", fit.same}, {"different", fit.different}};
+}
+
 const char* sarif_level(Severity severity) {
   return severity == Severity::kInfo ? "note" : severity_name(severity);
 }
@@ -73,7 +86,7 @@ Json sarif_result(const WeighedIssue& weighed, const std::string& uri, std::size
 
 }  // namespace
 
-std::string check_json(const Verdict& verdict, const std::string& device) {
+std::string check_json(const Verdict& verdict, const CheckExtras& extras) {
   Json list = Json::array();
   for (const WeighedIssue& weighed : verdict.issues()) {
     const Issue& issue = weighed.issue;
@@ -86,12 +99,14 @@ std::string check_json(const Verdict& verdict, const std::string& device) {
   }
   Json left_out = Json::object();
   for (const auto& [id, count] : verdict.left_out()) left_out[id] = count;
-  return dump({{"verdict", verdict.good() ? "good" : "bad"},
-               {"errors", verdict.errors()},
-               {"warnings", verdict.warnings()},
-               {"device", device.empty() ? Json(nullptr) : Json(device)},
-               {"issues", list},
-               {"left_out", left_out}});
+  Json document = {{"verdict", verdict.good() ? "good" : "bad"},
+                   {"errors", verdict.errors()},
+                   {"warnings", verdict.warnings()},
+                   {"device", extras.device.empty() ? Json(nullptr) : Json(extras.device)},
+                   {"issues", list},
+                   {"left_out", left_out}};
+  if (extras.source) document["source"] = source_json(*extras.source);
+  return dump(document);
 }
 
 std::string check_sarif(const Verdict& verdict, const std::string& path,

@@ -1,15 +1,23 @@
 // The documents of `modar check`. Their keys are a contract (json.md).
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "bake/check/mutate.hpp"
+#include "bake/check/source_check.hpp"
 #include "bake/check/verdict.hpp"
 
 namespace modar {
 
-/// `modar check --json`; its schema is bake/commands/check.schema.json. device: empty for none.
-std::string check_json(const Verdict& verdict, const std::string& device);
+/// What a bundle was held against besides the rules on its bytes.
+struct CheckExtras {
+  std::string device;  ///< empty: none
+  std::optional<SourceFit> source;
+};
+
+/// `modar check --json`; its schema is bake/commands/check.schema.json.
+std::string check_json(const Verdict& verdict, const CheckExtras& extras);
 
 /// `modar check --sarif`: SARIF 2.1.0 for systems that show findings beside code.
 /// path: of the bundle, as the user wrote it.

@@ -86,6 +86,8 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   sub->add_option("-o,--output", bake.output, "The bundle to write")
       ->required()
       ->type_name("OUT.modar");
+  sub->add_flag("--prove-reproducible", bake.prove_reproducible,
+                "Bake again with other threads, paths, locale, time zone; compare the bytes");
   add_geometry_options(*sub, bake.request, texts);
   add_texture_options(*sub, bake.request.textures);
   sub->add_option(
@@ -141,6 +143,9 @@ CLI::App* add_check(CLI::App& app, CheckCommand& check) {
   sub->add_option("--device", check.device,
                   "Hold the bundle against a device too: " + device_profile_names())
       ->type_name("NAME");
+  sub->add_option("--source", check.sources,
+                  "Bake these models and pattern images again and compare; measure what differs")
+      ->type_name("FILE");
   sub->add_option("--severity", check.severities,
                   "Weigh a kind of issue anew: ID=error, warning, info or ignore; repeatable")
       ->type_name("ID=SEVERITY")
@@ -156,7 +161,8 @@ CLI::App* add_check(CLI::App& app, CheckCommand& check) {
                   "scripts/read_bundle.py: tells which survivors changed nothing")
       ->type_name("FILE")
       ->needs(mutate);
-  sub->footer(example("  modar check spider.modar --device mali400\n  modar check --mutate 100000 "
+  sub->footer(example("  modar check spider.modar --device mali400 --source spider.obj cover.png\n "
+                      " modar check --mutate 100000 "
                       "--second-reader "
                       "scripts/read_bundle.py spider.modar\n") +
               "A bad bundle answers 3, and so does a proof that misses its goals.\n");
@@ -271,6 +277,7 @@ int parse_and_run(int argc, char** argv) {
     return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
                                 : static_cast<int>(ExitCode::kUsage);
   }
+  bake.words.assign(argv + 1, argv + argc);
   if (bake_sub->parsed()) return bake_from_texts(bake, bake_texts);
   if (rectify_sub->parsed()) return rectify_from_texts(rectify, corners);
   if (check_sub->parsed()) {
@@ -279,6 +286,7 @@ int parse_and_run(int argc, char** argv) {
           {ExitCode::kUsage, "cli.bundle", "check", "no bundle is named", "modar check BUNDLE"});
     }
     check.tool_version = MODAR_VERSION;
+    check.jobs = bake.request.jobs;
     return run_check(check);
   }
   if (inspect_sub->parsed()) return run_inspect(inspect);

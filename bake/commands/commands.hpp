@@ -12,6 +12,8 @@ namespace modar {
 struct BakeCommand {
   BakeRequest request;
   std::string output;
+  bool prove_reproducible = false;
+  std::vector<std::string> words;  ///< the command line, from "bake" on
   bool quiet = false;
   bool json = false;
 };
@@ -29,7 +31,9 @@ struct CheckCommand {
   bool warnings_as_errors = false;
   bool sarif = false;
   std::vector<std::string> severities;  ///< "ID=warning": weighed anew
-  std::string device;                   ///< profile that the bundle is held against; empty: none
+  std::vector<std::string> sources;     ///< models and pattern images to hold the bundle against
+  unsigned jobs = 1;
+  std::string device;  ///< profile that the bundle is held against; empty: none
   std::string tool_version;
   bool list_issues = false;     ///< print ISSUES.md instead
   std::uint64_t mutations = 0;  ///< damage copies of the bundle instead: `--mutate`

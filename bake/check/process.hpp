@@ -1,0 +1,32 @@
+// Other programs that a check runs, and a folder for what it hands them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace modar {
+
+/// A folder of our own under the system's temporary one, removed with all that is in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder();
+  /// Empty where it could not be made.
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+struct ProcessRequest {
+  std::vector<std::string> words;        ///< the program, looked up in PATH, and its arguments
+  std::vector<std::string> environment;  ///< "NAME=value"; empty: ours
+  std::string output;                    ///< file that stdout goes to; empty: nowhere
+};
+
+/// Runs it to its end. Answers its exit code, or -1 where it could not be started or was killed.
+int run_process(const ProcessRequest& request);
+
+}  // namespace modar

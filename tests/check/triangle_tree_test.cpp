@@ -1,0 +1,65 @@
+// The tree finds what trying every triangle finds; nearest points are nearest by a fine raster.
+#include "bake/check/triangle_tree.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include <glm/geometric.hpp>
+
+namespace {
+
+using namespace modar;
+
+glm::dvec3 draw(std::mt19937& random) {
+  const auto one = [&random] { return static_cast<double>(random() % 2001) / 1000.0 - 1.0; };
+  return {one(), one(), one()};
+}
+
+TEST(TriangleTree, NearestPointsOfATriangleBeatARaster) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    const glm::dvec3 a = draw(random);
+    const glm::dvec3 b = draw(random);
+    const glm::dvec3 c = trial % 10 == 0 ? a : draw(random);  // some have no area
+    const glm::dvec3 p = 2.0 * draw(random);
+    double least = 1e9;
+    constexpr int kSteps = 100;
+    for (int i = 0; i <= kSteps; ++i) {
+      for (int j = 0; j + i <= kSteps; ++j) {
+        const glm::dvec3 q = a + (b - a) * (double(i) / kSteps) + (c - a) * (double(j) / kSteps);
+        least = std::min(least, glm::length(q - p));
+      }
+    }
+    const double found = glm::length(nearest_on_triangle(p, a, b, c) - p);
+    EXPECT_LE(found, least + 1e-12);
+    EXPECT_GE(found, least - 0.05);  // the raster is that coarse
+  }
+}
+
+TEST(TriangleTree, FindsWhatTryingAllFinds) {
+  std::mt19937 random(4);
+  for (const std::size_t count : {1u, 4u, 5u, 300u}) {
+    std::vector<glm::dvec3> positions;
+    std::vector<Triangle> triangles;
+    for (std::uint32_t t = 0; t < count; ++t) {
+      const glm::dvec3 at = draw(random);
+      for (int corner = 0; corner < 3; ++corner) positions.push_back(at + 0.1 * draw(random));
+      triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+    }
+    const TriangleTree tree(positions, triangles);
+    for (int trial = 0; trial < 200; ++trial) {
+      const glm::dvec3 p = 1.5 * draw(random);
+      double least = 1e9;
+      for (const Triangle& t : triangles) {
+        least = std::min(least, glm::length(nearest_on_triangle(p, positions[t[0]], positions[t[1]],
+                                                                positions[t[2]]) -
+                                            p));
+      }
+      EXPECT_EQ(tree.nearest(p).distance, least);
+    }
+  }
+}
+
+}  // namespace
