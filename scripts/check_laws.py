@@ -35,7 +35,7 @@ THIRD_PARTIES = {
     "sodium.h": (r"runtime/fetch/(digest|signature)\.cpp", r"bake/ship/keys\.cpp"),
     "zstd.h": (r"runtime/fetch/(piece|mesh_object)\.cpp",
                r"bake/ship/(mesh_encoder|recipe_maker)\.cpp", r"tests/.*"),
-    "curl/": (r"runtime/fetch/transfer\.cpp",),
+    "curl/": (r"runtime/fetch/(transfer|server_address)\.cpp",),
     "SDL": (r"runtime/play/desk_.*\.cpp",),
     "Eigen/": (r"(runtime|bake)/.*\.cpp", r"tests/.*"),
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include <curl/curl.h>
@@ -13,6 +14,7 @@
 #include "modar/digest.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/signature.hpp"
+#include "server_address.hpp"
 
 namespace modar::fetch {
 namespace {
@@ -21,24 +23,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr long kConnectSeconds = 15;
 constexpr std::size_t kPatience = 3;  ///< answers "no such file" before it is believed
-
-/// "/media/usb" and "media/usb" to a file URL; other URLs lose their last slash.
-std::string base_url(const std::string& url) {
-  std::string base = url;
-  while (base.size() > 1 && base.back() == '/') base.pop_back();
-  if (base.find("://") != std::string::npos) return base;
-  char* absolute = ::realpath(base.c_str(), nullptr);
-  if (absolute == nullptr) return {};
-  CURLU* parts = curl_url();
-  curl_url_set(parts, CURLUPART_SCHEME, "file", 0);
-  curl_url_set(parts, CURLUPART_PATH, absolute, CURLU_URLENCODE);
-  char* text = nullptr;
-  if (curl_url_get(parts, CURLUPART_URL, &text, 0) == CURLUE_OK) base = text;
-  curl_free(text);
-  curl_url_cleanup(parts);
-  std::free(absolute);
-  return base;
-}
 
 class TransferLoop;
 
@@ -72,7 +56,9 @@ enum class Outcome { kDone, kAgain, kFailed };
 class TransferLoop {
  public:
   explicit TransferLoop(TransferOptions options)
-      : options_(std::move(options)), base_(base_url(options_.url)), multi_(curl_multi_init()) {}
+      : options_(std::move(options)),
+        base_(server_address(options_.url)),
+        multi_(curl_multi_init()) {}
   TransferLoop(const TransferLoop&) = delete;
   TransferLoop& operator=(const TransferLoop&) = delete;
   ~TransferLoop() {
@@ -98,6 +84,7 @@ class TransferLoop {
   Outcome again(Transfer& transfer, const std::string& cause);
   Outcome missing(Transfer& transfer);
   void discard(Transfer& transfer);
+  void hold_cap() const;
   void tell(std::int64_t bytes) const {
     if (on_bytes_ != nullptr && bytes != 0) (*on_bytes_)(bytes);
   }
@@ -107,6 +94,7 @@ class TransferLoop {
   CURLM* multi_ = nullptr;
   std::vector<CURL*> idle_;
   TransferStats stats_;
+  Clock::time_point begin_ = Clock::now();
   const std::function<void(std::int64_t)>* on_bytes_ = nullptr;
 };
 
@@ -167,13 +155,8 @@ void set_common(CURL* handle, const TransferOptions& options) {
   curl_easy_setopt(handle, CURLOPT_LOW_SPEED_LIMIT, 1L);
   curl_easy_setopt(handle, CURLOPT_LOW_SPEED_TIME,
                    std::max(1L, static_cast<long>(std::ceil(options.stall_s))));
-  if (options.bytes_per_second != 0) {
-    const std::uint64_t share =
-        std::max<std::uint64_t>(1, options.bytes_per_second / std::max(1u, options.parallel));
-    curl_easy_setopt(handle, CURLOPT_MAX_RECV_SPEED_LARGE, static_cast<curl_off_t>(share));
-    // Small reads keep the cap smooth on slow links.
-    curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 4096L);
-  }
+  // Small reads keep the cap smooth on slow links.
+  if (options.bytes_per_second != 0) curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 2048L);
 }
 
 /// Opens the part file and counts what it holds from an earlier attempt or run.
@@ -298,6 +281,17 @@ Outcome TransferLoop::finish(Transfer& transfer, CURLcode code) {
   return outcome;
 }
 
+/// Waits until what came is no more than the cap allows; what a server sends meanwhile fills the
+/// socket, and then the server waits, too.
+void TransferLoop::hold_cap() const {
+  if (options_.bytes_per_second == 0) return;
+  const double allowed = std::chrono::duration<double>(Clock::now() - begin_).count();
+  const double taken =
+      static_cast<double>(stats_.bytes) / static_cast<double>(options_.bytes_per_second);
+  const double ahead = std::min(1.0, taken - allowed);
+  if (ahead > 0) std::this_thread::sleep_for(std::chrono::duration<double>(ahead));
+}
+
 Result<void> TransferLoop::run(std::vector<std::unique_ptr<Transfer>>& transfers,
                                const std::function<void(std::int64_t)>* on_bytes) {
   on_bytes_ = on_bytes;
@@ -320,6 +314,7 @@ Result<void> TransferLoop::run(std::vector<std::unique_ptr<Transfer>>& transfers
         error = next.error;
       }
     }
+    hold_cap();
     int running = 0;
     curl_multi_perform(multi_, &running);
     int left = 0;

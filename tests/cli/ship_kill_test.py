@@ -1,0 +1,88 @@
+"""Kills modar-fetch at the system calls that touch the store: the old or the new release stays whole."""
+import collections
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import unittest
+
+from programs import BIN
+from ship_files import ShipTest, soak
+
+CALLS = ["openat", "mkdir", "unlink", "rename", "symlink", "link", "pwrite64", "write", "ftruncate", "fsync", "chmod"]
+
+
+def strace_works():
+    if not shutil.which("strace"):
+        return False
+    return subprocess.run(["strace", "-o", "/dev/null", "true"], capture_output=True).returncode == 0
+
+
+@unittest.skipUnless(strace_works(), "strace cannot trace here")
+class Kill(ShipTest):
+    def setUp(self):
+        super().setUp()
+        self.publish(self.shop.old)
+        self.fetch_json()
+        self.publish(self.shop.new)
+        self.before = self.folder / "before"
+        shutil.copytree(self.store, self.before, symlinks=True)
+
+    def restore(self):
+        shutil.rmtree(self.store)
+        shutil.copytree(self.before, self.store, symlinks=True)
+
+    def traced(self, *options):
+        return subprocess.run(["strace", "-f", "-qq", *options, BIN / "modar-fetch", self.site, "--store", self.store,
+                               "--trust", self.trust, "--quiet"], capture_output=True, text=True,
+                              env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0"})
+
+    def points(self):
+        """Occurrences of each call that touch the store: (call, number among the calls of that name)."""
+        log = self.folder / "strace.log"
+        done = self.traced("-y", "-o", log, "-e", "trace=" + ",".join(CALLS))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        counts = collections.Counter()
+        points = []
+        for line in log.read_text().splitlines():
+            found = re.search(r"\b(\w+)\(", line)
+            if not found or found.group(1) not in CALLS:
+                continue
+            counts[found.group(1)] += 1
+            if str(self.store) in line:
+                points.append((found.group(1), counts[found.group(1)]))
+        return points
+
+    def assert_whole(self, point):
+        """What is in use opens, verifies, and is the old or the new release."""
+        done = subprocess.run([BIN / "modar-fetch", "--store", self.store, "--verify", "--json"], capture_output=True,
+                              text=True)
+        self.assertEqual(done.returncode, 0, f"{point}: {done.stderr}")
+        self.assertIn('"fell_back": false', done.stdout, point)
+        data = (self.store / "museum.modar").read_bytes()
+        self.assertIn(data, (self.shop.old.read_bytes(), self.shop.new.read_bytes()), point)
+        return data == self.shop.new.read_bytes()
+
+    def test_killed_at_every_call_the_store_stays_whole(self):
+        points = self.points()
+        self.assertGreater(len(points), 40)
+        if not soak():
+            # Each kind of call, and every seventh point; `--soak` takes all.
+            kinds = {call: i for i, (call, _) in reversed(list(enumerate(points)))}
+            points = [p for i, p in enumerate(points) if i % 7 == 0 or i in kinds.values() or i >= len(points) - 8]
+        installed = 0
+        for call, number in points:
+            self.restore()
+            done = self.traced("-o", "/dev/null", "-e", f"inject={call}:signal=KILL:when={number}")
+            self.assertNotEqual(done.returncode, 0, (call, number))
+            installed += self.assert_whole((call, number))
+            report = self.fetch_json()
+            self.assertEqual(report["version"], 2)
+            self.assert_installed(self.shop.new)
+        self.assertLess(installed, len(points), "every kill came after the switch")
+        print(f"{len(points)} points, {installed} after the switch")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,124 @@
+"""`modar-fetch` over a real nginx, over lines that break, and from servers that misbehave."""
+import pathlib
+import subprocess
+import time
+import unittest
+
+from programs import BIN
+from servers import NGINX, BreakingLine, Nginx, RudeServer
+from ship_files import ShipTest, soak
+
+
+@unittest.skipUnless(NGINX, "nginx is not installed")
+class RealServer(ShipTest):
+    def setUp(self):
+        super().setUp()
+        self.publish(self.shop.old)
+        self.nginx = Nginx(self.site, self.folder / "nginx")
+        self.addCleanup(self.nginx.stop)
+
+    def requests(self, status):
+        return [line for line in self.nginx.log.read_text().splitlines() if f'" {status} ' in line]
+
+    def test_installs_and_updates(self):
+        self.fetch_json(self.nginx.url())
+        self.publish(self.shop.new)
+        report = self.fetch_json(self.nginx.url())
+        self.assertTrue(report["changed"])
+        self.assert_installed(self.shop.new)
+
+    def test_resumes_in_the_middle_of_a_piece(self):
+        line = BreakingLine(self.nginx.port, seed=1, most=12000)
+        self.addCleanup(line.stop)
+        report = self.fetch_json(f"http://127.0.0.1:{line.port}/plain", "--attempts", "200")
+        self.assert_installed(self.shop.old)
+        self.assertGreater(line.breaks, 2)
+        self.assertGreater(report["retries"], 0)
+        self.assertGreater(len(self.requests(206)), 0)
+        # What came before a break is not fetched again, but for what was on its way in the pipe.
+        whole = sum(p.stat().st_size for p in (self.site / "objects").rglob("*") if p.is_file())
+        self.assertLess(report["downloaded_bytes"], 2 * whole)
+
+    def test_a_server_without_ranges_works_too(self):
+        line = BreakingLine(self.nginx.port, seed=3, most=200000)
+        self.addCleanup(line.stop)
+        self.fetch_json(f"http://127.0.0.1:{line.port}/noranges", "--attempts", "1000")
+        self.assert_installed(self.shop.old)
+        self.assertEqual(self.requests(206), [])
+
+    def test_an_interrupted_fetch_goes_on_where_it_stopped(self):
+        command = [BIN / "modar-fetch", self.nginx.url("slow"), "--store", self.store,
+                   "--trust", self.trust, "--parallel", "1"]
+        first = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        pieces = self.store / "pieces"
+        for _ in range(400):
+            came = sum(p.stat().st_size for p in pieces.glob("*")) if pieces.exists() else 0
+            if came > 20000:
+                break
+            time.sleep(0.02)
+        first.kill()
+        first.wait()
+        report = self.fetch_json(self.nginx.url())
+        whole = sum(p.stat().st_size for p in (self.site / "objects").rglob("*") if p.is_file())
+        self.assertLess(report["downloaded_bytes"], whole - 10000)
+        self.assert_installed(self.shop.old)
+
+    def test_the_cap_holds(self):
+        whole = sum(p.stat().st_size for p in (self.site / "objects").rglob("*") if p.is_file())
+        rate = whole // 3
+        begin = time.monotonic()
+        self.fetch_json(self.nginx.url(), "--limit-rate", str(rate))
+        self.assertGreater(time.monotonic() - begin, 1.0)
+        self.assert_installed(self.shop.old)
+
+    def test_errors_that_last_are_told(self):
+        begin = time.monotonic()
+        self.assert_fails(self.fetch(self.nginx.url("broken"), "--attempts", "2"), 16, "fetch.network", "500")
+        self.assert_fails(self.fetch(self.nginx.url("nothing")), 13, "fetch.missing")
+        self.nginx.stop()
+        self.assert_fails(self.fetch(self.nginx.url(), "--attempts", "2"), 16, "fetch.network", "again")
+        self.assertLess(time.monotonic() - begin, 60)
+
+    @unittest.skipUnless(soak(), "2G takes its time; soak runs it")
+    def test_2g_with_breaks(self):
+        line = BreakingLine(self.nginx.port, seed=5, most=60000)
+        self.addCleanup(line.stop)
+        self.publish(self.shop.new)
+        self.fetch_json(f"http://127.0.0.1:{line.port}/slow", "--attempts", "1000")
+        self.assert_installed(self.shop.new)
+
+
+class RudeServers(ShipTest):
+    def fetch_from(self, rude, *options):
+        self.publish(self.shop.old)
+        server = RudeServer(self.site, rude)
+        self.addCleanup(server.stop)
+        return self.fetch(server.url(), "--json", *options)
+
+    def expect_recovery(self, rude):
+        done = self.fetch_from(rude)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assert_installed(self.shop.old)
+
+    def test_each_rudeness_is_survived(self):
+        for way in ("garbage", "short", "long", "416", "404", "500"):
+            with self.subTest(way):
+                self.store = self.folder / f"store-{way}"
+                self.expect_recovery(lambda path, attempt: way if "objects" in path and attempt == 1 else None)
+
+    def test_rude_documents_are_survived_or_refused(self):
+        for way in ("404", "416", "500", "short"):
+            with self.subTest(way):
+                self.store = self.folder / f"store-{way}"
+                self.expect_recovery(lambda path, attempt: way if path == "/latest" and attempt == 1 else None)
+        done = self.fetch_from(lambda path, attempt: "garbage" if path.endswith(".json") else None)
+        self.assertEqual(done.returncode, 10, done.stderr)
+
+    def test_garbage_for_ever_gives_up(self):
+        done = self.fetch_from(lambda path, _: "garbage" if "objects" in path else None, "--attempts", "2")
+        self.assert_fails(done, 16, "fetch.network", "not what was published")
+        self.assertFalse((pathlib.Path(self.store) / "museum.modar").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
