@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "bake/model/mesh_levels.hpp"
 #include "bake/model/packed_mesh.hpp"
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/read_model.hpp"
@@ -128,6 +129,13 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   chunk_options.max_side = plan->max_side;
   Result<ChunkedMesh> chunked = chunk(std::move(mesh), chunk_options, report);
   if (!chunked) return tl::unexpected(chunked.error());
+  LevelOptions level_options;
+  level_options.levels = request.levels;
+  level_options.positions = plan->kind;
+  level_options.jobs = request.jobs;
+  if (auto made = make_levels(*chunked, level_options, report); !made) {
+    return tl::unexpected(made.error());
+  }
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
   pack_options.positions = plan->kind;

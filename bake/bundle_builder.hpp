@@ -49,6 +49,7 @@ struct BakeRequest {
   double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
   MaxError max_error;
   std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
+  std::uint32_t levels = 4;               ///< of detail a chunk, the finest counted
   std::string device;                     ///< profile that it is planned for; empty: none
   unsigned jobs = 1;                      ///< the bytes do not depend on it
   std::string tool_version;

@@ -13,6 +13,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/commands/ship_command.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/model/mesh_levels.hpp"
 #include "modar/device_profile.hpp"
 
 #ifndef MODAR_VERSION
@@ -71,6 +72,14 @@ void add_geometry_options(CLI::App& sub, BakeRequest& request, BakeTexts& texts)
          "Store them as half or int16 (else: int16 where --max-error needs it)")
       ->transform(CLI::CheckedTransformer(kinds).description(""))
       ->type_name("LAYOUT");
+  CLI::Option* levels =
+      sub.add_option("--lods", request.levels,
+                     "Levels of detail, the finest counted, each of half the triangles before it")
+          ->check(CLI::Range(1u, kMaxLevels))
+          ->capture_default_str();
+  sub.add_flag_callback(
+         "--no-lods", [&request] { request.levels = 1; }, "The finest level only")
+      ->excludes(levels);
 }
 
 CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {

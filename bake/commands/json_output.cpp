@@ -242,6 +242,7 @@ std::string bundle_meta(const BakeRequest& request) {
                {"patterns", patterns},
                {"options",
                 {{"device", request.device},
+                 {"lods", request.levels},
                  {"max_error", request.max_error.value},
                  {"max_error_unit", max_error_unit(request.max_error)},
                  {"positions", positions_name(request)},

@@ -8,12 +8,19 @@
 
 namespace modar {
 
+/// A coarser level of a chunk: triangles over the chunk's vertices.
+struct ChunkLevel {
+  std::vector<std::uint16_t> indices;
+  double error = 0;  ///< model space: bounds the distance from level 0, and of level 0 from it
+};
+
 /// One chunk: local vertex i is vertex `vertices[i]` of the TriMesh; triangles index `vertices`.
 /// Triangles are in file order, vertices in that of their first use: pack() orders the final bytes.
 struct Chunk {
   std::uint32_t material = 0;
   std::vector<std::uint32_t> vertices;
   std::vector<std::uint16_t> indices;
+  std::vector<ChunkLevel> coarser;  ///< levels 1 and up; errors never fall
 };
 
 struct ChunkedMesh {

@@ -1,6 +1,9 @@
 // Packs chunk by chunk: bytes, boxes and cones, order, records.
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -26,27 +29,55 @@ MaterialRecord material_record(const SourceMaterial& source) {
   return m;
 }
 
+/// Coarse triangles in the numbers of the packed vertices, in the order of chunk_order.hpp. Those
+/// of which two vertices became one are left out: they had no area.
+class LevelOrderer {
+ public:
+  std::vector<std::uint16_t> order(const std::vector<std::uint16_t>& indices,
+                                   const ChunkOrderer& places, std::size_t vertex_count) {
+    for (std::size_t v = numbers_.size(); v < vertex_count; ++v) {
+      numbers_.push_back(static_cast<std::uint16_t>(v));
+    }
+    std::vector<std::uint16_t> ordered;
+    ordered.reserve(indices.size());
+    for (std::size_t i = 0; i < indices.size(); i += 3) {
+      const std::array<std::uint16_t, 3> t = {
+          places.place(indices[i]), places.place(indices[i + 1]), places.place(indices[i + 2])};
+      if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+      ordered.insert(ordered.end(), t.begin(), t.end());
+    }
+    // Vertices stay where level 0 has them: each is told by its number.
+    const auto numbers = std::span<const std::uint16_t>(numbers_).first(vertex_count);
+    const auto old = orderer_.order(std::as_bytes(numbers), sizeof numbers_[0], ordered);
+    for (std::uint16_t& index : ordered) index = old[index];
+    return ordered;
+  }
+
+ private:
+  ChunkOrderer orderer_;
+  std::vector<std::uint16_t> numbers_;
+};
+
 /// Puts chunks in order and behind each other. Chunks that follow each other share one range of
-/// vertices, hence one set-up of attributes, as long as 16 bits reach all of it.
+/// vertices, hence one set-up of attributes, as long as 16 bits reach all of it. Their indices of
+/// one level lie side by side: chunks of equal level can be drawn in one call.
 class ChunkAppender {
  public:
   explicit ChunkAppender(PackedMesh& out) : out_(out) {}
 
-  /// vertices: as packed. indices: into them; put in order.
-  void append(std::span<const std::byte> vertices, std::vector<std::uint16_t> indices) {
+  /// vertices: as packed. chunk: its indices and levels count in them. Answers its level count.
+  std::uint32_t append(std::span<const std::byte> vertices, const Chunk& chunk) {
     const std::size_t stride = out_.layout.stride;
+    std::vector<std::uint16_t> indices = chunk.indices;
     const auto order = orderer_.order(vertices, out_.layout.stride, indices);
     if (range_size_ + order.size() > kMaxChunkVertices) close_range();
-    LevelRecord level{};
-    level.vertex_offset = range_begin_;
-    level.index_offset = out_.indices.size();
-    level.index_count = static_cast<std::uint32_t>(indices.size());
-    out_.levels.push_back(level);
-    for (std::uint16_t& index : indices) {
-      index = static_cast<std::uint16_t>(index + range_size_);
+    const std::size_t first = out_.levels.size();
+    add_level(0, 0.0, indices);
+    for (const ChunkLevel& level : chunk.coarser) {
+      const auto coarse = level_orderer_.order(level.indices, orderer_, order.size());
+      if (coarse.empty()) break;
+      add_level(out_.levels.size() - first, level.error, coarse);
     }
-    const auto bytes = std::as_bytes(std::span(indices));
-    out_.indices.insert(out_.indices.end(), bytes.begin(), bytes.end());
     for (const std::uint16_t old : order) {
       const auto vertex = vertices.subspan(old * stride, stride);
       out_.vertices.insert(out_.vertices.end(), vertex.begin(), vertex.end());
@@ -54,6 +85,7 @@ class ChunkAppender {
     range_size_ += static_cast<std::uint32_t>(order.size());
     out_.record.vertex_count += order.size();
     out_.record.triangle_count += indices.size() / 3;
+    return static_cast<std::uint32_t>(out_.levels.size() - first);
   }
 
   /// States the size of the open range in its levels, and opens the next.
@@ -65,18 +97,64 @@ class ChunkAppender {
     range_size_ = 0;
   }
 
+  /// Closes the last range and puts the indices of coarser levels behind those of level 0.
+  void finish() {
+    close_range();
+    for (std::size_t depth = 0; depth < coarser_.size(); ++depth) {
+      for (const auto& [level, offset] : coarser_[depth].levels) {
+        out_.levels[level].index_offset = out_.indices.size() + offset;
+      }
+      out_.indices.insert(out_.indices.end(), coarser_[depth].indices.begin(),
+                          coarser_[depth].indices.end());
+    }
+  }
+
  private:
+  /// Indices of all levels of one depth, and where each level's begin.
+  struct Depth {
+    std::vector<std::byte> indices;
+    std::vector<std::pair<std::size_t, std::size_t>> levels;
+  };
+
+  void add_level(std::size_t depth, double error, std::vector<std::uint16_t> indices) {
+    for (std::uint16_t& index : indices) index = static_cast<std::uint16_t>(index + range_size_);
+    if (depth > coarser_.size()) coarser_.emplace_back();
+    std::vector<std::byte>& to = depth == 0 ? out_.indices : coarser_[depth - 1].indices;
+    LevelRecord level{};
+    level.vertex_offset = range_begin_;
+    level.index_offset = to.size();
+    level.index_count = static_cast<std::uint32_t>(indices.size());
+    if (depth > 0) {
+      level.error = std::nextafter(static_cast<float>(error), 4.0f);  // never below the truth
+      coarser_[depth - 1].levels.emplace_back(out_.levels.size(), to.size());
+    }
+    out_.levels.push_back(level);
+    const auto bytes = std::as_bytes(std::span(indices));
+    to.insert(to.end(), bytes.begin(), bytes.end());
+  }
+
   PackedMesh& out_;
   ChunkOrderer orderer_;
+  LevelOrderer level_orderer_;
+  std::vector<Depth> coarser_;     // from level 1 on
   std::uint64_t range_begin_ = 0;  // bytes
   std::uint32_t range_size_ = 0;   // vertices
   std::size_t first_level_ = 0;    // of the open range
 };
 
+/// Triangles of all levels: what a box and a cone have to hold for.
+std::vector<std::uint16_t> all_indices(const Chunk& chunk) {
+  std::vector<std::uint16_t> indices = chunk.indices;
+  for (const ChunkLevel& level : chunk.coarser) {
+    indices.insert(indices.end(), level.indices.begin(), level.indices.end());
+  }
+  return indices;
+}
+
 ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
                          std::uint32_t first_level, const std::vector<glm::vec3>& decoded) {
   ChunkRecord record{};
-  const ChunkBounds bounds = chunk_bounds(decoded, chunk.indices);
+  const ChunkBounds bounds = chunk_bounds(decoded, all_indices(chunk));
   for (int i = 0; i < 3; ++i) {
     record.bounds_min[i] = bounds.low[i];
     record.bounds_max[i] = bounds.high[i];
@@ -93,7 +171,6 @@ ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRang
   }
   record.material = chunk.material;
   record.first_level = first_level;
-  record.level_count = 1;
   return record;
 }
 
@@ -108,7 +185,6 @@ void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
   record.source_face_count = mesh.source_face_count;
   record.chunk_count = static_cast<std::uint32_t>(chunked.chunks.size());
   record.material_count = static_cast<std::uint32_t>(mesh.materials.size());
-  record.level_count = 1;
 }
 
 }  // namespace
@@ -144,9 +220,11 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
     packer.pack(chunk, grids[c], uv, texture_side[chunk.material], bytes.data(), decoded);
     out.chunks.push_back(
         chunk_record(chunk, grids[c], uv, static_cast<std::uint32_t>(out.levels.size()), decoded));
-    appender.append(bytes, chunk.indices);
+    ChunkRecord& record = out.chunks.back();
+    record.level_count = appender.append(bytes, chunk);
+    out.record.level_count = std::max(out.record.level_count, record.level_count);
   }
-  appender.close_range();
+  appender.finish();
   packer.write_errors(out.record);
   timer.done(out.record.triangle_count, out.vertices.size() + out.indices.size(),
              out.record.position_error_max);

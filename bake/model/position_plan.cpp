@@ -66,13 +66,21 @@ int grid_index(double coordinate, double step) {
 double half_error(const TriMesh& mesh) {
   double greatest = 0;
   for (const glm::dvec3& p : mesh.positions) {
-    glm::dvec3 error;
-    for (int i = 0; i < 3; ++i) {
-      error[i] = static_cast<double>(half_to_float(float_to_half(static_cast<float>(p[i])))) - p[i];
-    }
+    const glm::dvec3 error = decoded_position(p, PositionKind::kHalf, {}) - p;
     greatest = std::max(greatest, glm::dot(error, error));
   }
   return std::sqrt(greatest);
+}
+
+glm::dvec3 decoded_position(const glm::dvec3& position, PositionKind kind, const ChunkGrid& grid) {
+  glm::dvec3 decoded;
+  for (int i = 0; i < 3; ++i) {
+    decoded[i] =
+        kind == PositionKind::kHalf
+            ? static_cast<double>(half_to_float(float_to_half(static_cast<float>(position[i]))))
+            : grid.step * grid_index(position[i], grid.step);
+  }
+  return decoded;
 }
 
 Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& request) {

@@ -49,4 +49,7 @@ std::vector<ChunkGrid> make_grids(const ChunkedMesh& chunked, PositionKind kind)
 /// The point of the grid nearest to a coordinate, in steps.
 int grid_index(double coordinate, double step);
 
+/// What a position decodes to, in model space.
+glm::dvec3 decoded_position(const glm::dvec3& position, PositionKind kind, const ChunkGrid& grid);
+
 }  // namespace modar

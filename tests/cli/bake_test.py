@@ -40,14 +40,14 @@ class Bake(ProgramTest):
     def test_models_only_and_patterns_only_are_legal(self):
         for arguments in (["--model", STATUE], ["--pattern", COVER]):
             out = self.folder / "one.modar"
-            done = self.modar("bake", *arguments, "-o", out)
+            done = self.modar("bake", *arguments, "--no-lods", "-o", out)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(self.modar("check", out).returncode, 0)
 
     def test_models_are_merged_in_the_same_buffers(self):
         out = self.folder / "two.modar"
         report = self.modar_json("bake", "--model", POTTERY, STATUE, "--pattern", COVER, "--scene",
-                                 "cover=statue,scale=0.5,up=z", "-o", out)
+                                 "cover=statue,scale=0.5,up=z", "--no-lods", "-o", out)
         self.assertEqual([m["name"] for m in report["bundle"]["models"]], ["pottery", "statue"])
         self.assertEqual(report["bundle"]["scenes"][0]["scale"], 0.5)
         self.assertGreater(report["cpu_seconds"], 0)
@@ -58,7 +58,7 @@ class Bake(ProgramTest):
         out = self.folder / "fine.modar"
 
         def baked(*options):
-            done = self.modar("bake", "--model", STATUE, "-o", out, "--no-mipmaps", *options)
+            done = self.modar("bake", "--model", STATUE, "-o", out, "--no-lods", *options)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(self.modar("check", out).returncode, 0)
             return self.modar_json("inspect", out)["models"][0]
@@ -76,6 +76,22 @@ class Bake(ProgramTest):
         self.assert_fails(done, 1, "--unit")
         done = self.modar("bake", "--model", STATUE, "-o", out, "--max-error", "0.01%", "--positions", "half")
         self.assert_fails(done, 5, "half floats")
+
+    def test_levels_of_detail_are_made_unless_told_not_to(self):
+        def model(*options):
+            out = self.folder / "levels.modar"
+            done = self.modar("bake", "--model", POTTERY, "--no-mipmaps", "-o", out, *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(self.modar("check", out).returncode, 0)
+            return self.modar_json("inspect", out)["models"][0]
+
+        plain, two, more = model("--no-lods"), model("--lods", 2), model()
+        self.assertEqual([plain["lods"], two["lods"]], [1, 2])
+        self.assertGreater(more["lods"], 2)
+        self.assertLess(plain["bytes"], two["bytes"])
+        self.assertLess(two["bytes"], more["bytes"])
+        self.assertEqual(plain["bytes_per_triangle"], more["bytes_per_triangle"])
+        self.assert_fails(self.modar("bake", "--model", POTTERY, "--lods", 99, "-o", "x.modar"), 1, "--lods")
 
     def test_a_device_profile_bounds_the_textures(self):
         out = self.folder / "small.modar"

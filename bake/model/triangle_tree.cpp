@@ -1,0 +1,124 @@
+// Median-split boxes, searched nearest box first.
+#include "bake/model/triangle_tree.hpp"
+
+#include <algorithm>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace modar {
+namespace {
+
+constexpr std::uint32_t kLeaf = 4;
+
+double square(const glm::dvec3& v) {
+  return glm::dot(v, v);
+}
+
+double box_distance_square(const glm::dvec3& p, const glm::dvec3& low, const glm::dvec3& high) {
+  return square(glm::max(glm::max(low - p, p - high), glm::dvec3(0.0)));
+}
+
+double segment_distance_square(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
+  const glm::dvec3 ab = b - a;
+  const double length = square(ab);
+  const double t = length > 0 ? std::clamp(glm::dot(p - a, ab) / length, 0.0, 1.0) : 0.0;
+  return square(p - (a + t * ab));
+}
+
+}  // namespace
+
+double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
+  const glm::dvec3 ab = t[1] - t[0];
+  const glm::dvec3 ac = t[2] - t[0];
+  const glm::dvec3 n = glm::cross(ab, ac);
+  const double area = square(n);
+  const glm::dvec3 ap = p - t[0];
+  if (area > 0) {
+    const double height = glm::dot(ap, n);
+    const double plane = height * height / area;
+    if (plane >= best) return plane;
+    const double v = glm::dot(glm::cross(ap, ac), n);
+    const double w = glm::dot(glm::cross(ab, ap), n);
+    if (v >= 0 && w >= 0 && v + w <= area) return plane;
+  }
+  return std::min({segment_distance_square(p, t[0], t[1]), segment_distance_square(p, t[1], t[2]),
+                   segment_distance_square(p, t[2], t[0])});
+}
+
+TriangleTree::TriangleTree(std::span<const glm::dvec3> positions,
+                           std::span<const std::uint16_t> indices) {
+  triangles_.reserve(indices.size() / 3);
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    triangles_.push_back(
+        {positions[indices[i]], positions[indices[i + 1]], positions[indices[i + 2]]});
+  }
+  nodes_.reserve(triangles_.size());
+  nodes_.emplace_back();
+  build(0, 0, static_cast<std::uint32_t>(triangles_.size()));
+}
+
+void TriangleTree::set_box(Node& node, std::uint32_t first, std::uint32_t count) const {
+  node.low = node.high = triangles_[first][0];
+  for (std::uint32_t t = first; t < first + count; ++t) {
+    for (const glm::dvec3& corner : triangles_[t]) {
+      node.low = glm::min(node.low, corner);
+      node.high = glm::max(node.high, corner);
+    }
+  }
+}
+
+void TriangleTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
+  set_box(nodes_[node], first, count);
+  if (count <= kLeaf) {
+    nodes_[node].first = first;
+    nodes_[node].count = count;
+    return;
+  }
+  const glm::dvec3 side = nodes_[node].high - nodes_[node].low;
+  const int axis = side.x >= side.y && side.x >= side.z ? 0 : (side.y >= side.z ? 1 : 2);
+  const auto begin = triangles_.begin() + first;
+  std::nth_element(begin, begin + count / 2, begin + count, [axis](const auto& a, const auto& b) {
+    return a[0][axis] + a[1][axis] + a[2][axis] < b[0][axis] + b[1][axis] + b[2][axis];
+  });
+  const auto left = static_cast<std::uint32_t>(nodes_.size());
+  nodes_[node].first = left;
+  nodes_.resize(nodes_.size() + 2);
+  build(left, first, count / 2);
+  build(left + 1, first + count / 2, count - count / 2);
+}
+
+double TriangleTree::nearest(const glm::dvec3& point, double enough) {
+  double best = distance_square(point, triangles_[last_]);
+  if (best <= enough) return best;
+  struct Entry {
+    std::uint32_t node;
+    double distance;
+  };
+  std::array<Entry, 64> stack;  // the tree is at most 2 * 17 deep: 16-bit chunks
+  std::size_t size = 0;
+  stack[size++] = {0, box_distance_square(point, nodes_[0].low, nodes_[0].high)};
+  while (size > 0) {
+    const Entry entry = stack[--size];
+    if (entry.distance >= best) continue;
+    const Node& node = nodes_[entry.node];
+    for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
+      const double distance = distance_square(point, triangles_[t], best);
+      if (distance >= best) continue;
+      best = distance;
+      last_ = t;
+      if (best <= enough) return best;
+    }
+    if (node.count != 0) continue;
+    const Node& left = nodes_[node.first];
+    const Node& right = nodes_[node.first + 1];
+    Entry near{node.first, box_distance_square(point, left.low, left.high)};
+    Entry far{node.first + 1, box_distance_square(point, right.low, right.high)};
+    if (far.distance < near.distance) std::swap(near, far);
+    stack[size++] = far;
+    stack[size++] = near;
+  }
+  return best;
+}
+
+}  // namespace modar

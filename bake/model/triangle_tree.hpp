@@ -1,0 +1,46 @@
+// A tree of boxes over triangles: which one is nearest to a point?
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+namespace modar {
+
+/// Square of the distance of a point from a triangle (Ericson, "Real-Time Collision Detection",
+/// 5.1.5). Flat triangles give the distance of one of their corners or edges. Where it is not below
+/// `best`, any number that is not.
+double distance_square(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle,
+                       double best = std::numeric_limits<double>::infinity());
+
+class TriangleTree {
+ public:
+  /// At least one triangle.
+  TriangleTree(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
+
+  /// Square of the distance of the nearest triangle; where some triangle is within `enough` (a
+  /// square), that of any such triangle. Remembers the answer: neighbours ask for it again.
+  double nearest(const glm::dvec3& point, double enough);
+  /// The triangle that nearest() answered last.
+  [[nodiscard]] const std::array<glm::dvec3, 3>& last() const { return triangles_[last_]; }
+
+ private:
+  struct Node {
+    glm::dvec3 low;
+    glm::dvec3 high;
+    std::uint32_t first = 0;  // leaf: triangle; else the left child, the right one behind it
+    std::uint32_t count = 0;  // of triangles, 0: no leaf
+  };
+  void build(std::uint32_t node, std::uint32_t first, std::uint32_t count);
+  void set_box(Node& node, std::uint32_t first, std::uint32_t count) const;
+
+  std::vector<Node> nodes_;
+  std::vector<std::array<glm::dvec3, 3>> triangles_;
+  std::uint32_t last_ = 0;
+};
+
+}  // namespace modar
