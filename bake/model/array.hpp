@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdlib>
 #include <cstring>
 #include <initializer_list>
 #include <type_traits>
@@ -14,6 +13,10 @@ namespace modar {
 namespace detail {
 /// Throws std::bad_alloc; ends the program where exceptions are off.
 [[noreturn]] void out_of_memory();
+/// Memory of `size` bytes with the first bytes of `block` (nullptr: none), which had `old_size`.
+/// Large blocks are whole pages, moved by remapping and huge where the system has such.
+void* resize_block(void* block, std::size_t old_size, std::size_t size);
+void free_block(void* block, std::size_t size);
 }  // namespace detail
 
 /// Like std::vector for trivially copyable elements, but for two things that large models need:
@@ -39,7 +42,7 @@ class Array {
     swap(other);
     return *this;
   }
-  ~Array() { std::free(data_); }
+  ~Array() { detail::free_block(static_cast<void*>(data_), capacity_ * sizeof(T)); }
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
@@ -98,6 +101,8 @@ class Array {
     static_assert(sizeof(T) % sizeof(U) == 0 && alignof(T) == alignof(U));
     constexpr std::size_t kEach = sizeof(T) / sizeof(U);
     Array result;
+    // The capacity has to stay the block's size in bytes.
+    small.reallocate((small.capacity_ + kEach - 1) / kEach * kEach);
     result.size_ = small.size_ / kEach;
     result.capacity_ = small.capacity_ / kEach;
     result.data_ = reinterpret_cast<T*>(std::exchange(small.data_, nullptr));
@@ -120,9 +125,8 @@ class Array {
 
   void reallocate(std::size_t capacity) {
     if (capacity > static_cast<std::size_t>(-1) / 2 / sizeof(T)) detail::out_of_memory();
-    void* const grown = std::realloc(static_cast<void*>(data_), capacity * sizeof(T));
-    if (grown == nullptr) detail::out_of_memory();
-    data_ = static_cast<T*>(grown);
+    data_ = static_cast<T*>(detail::resize_block(static_cast<void*>(data_), capacity_ * sizeof(T),
+                                                 capacity * sizeof(T)));
     capacity_ = capacity;
   }
 

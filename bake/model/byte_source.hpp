@@ -1,14 +1,40 @@
 // Bytes by offset, from a file or from memory.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <string>
 #include <string_view>
+#include <utility>
 
 namespace modar {
 
-/// A file is read rather than mapped: one that shrinks meanwhile gives fewer bytes, where a map
-/// would end the program, and the pages read count for nobody's memory. Safe for several threads.
+/// A stretch of a file in memory for as long as this lives.
+class MappedStretch {
+ public:
+  MappedStretch() = default;
+  MappedStretch(void* pages, std::size_t page_bytes, std::string_view text)
+      : pages_(pages), page_bytes_(page_bytes), text_(text) {}
+  MappedStretch(MappedStretch&& other) noexcept { *this = std::move(other); }
+  MappedStretch& operator=(MappedStretch&& other) noexcept {
+    std::swap(pages_, other.pages_);
+    std::swap(page_bytes_, other.page_bytes_);
+    std::swap(text_, other.text_);
+    return *this;
+  }
+  MappedStretch(const MappedStretch&) = delete;
+  MappedStretch& operator=(const MappedStretch&) = delete;
+  ~MappedStretch();
+
+  [[nodiscard]] std::string_view text() const { return text_; }
+
+ private:
+  void* pages_ = nullptr;
+  std::size_t page_bytes_ = 0;
+  std::string_view text_;
+};
+
+/// Safe for several threads. A large file is never in memory as a whole: stretches of it are mapped
+/// (which spares a copy, half the cost of a plain read) or read.
 class ByteSource {
  public:
   explicit ByteSource(std::string_view text) : text_(text), size_(text.size()) {}
@@ -16,6 +42,9 @@ class ByteSource {
   ByteSource(int descriptor, std::uint64_t size) : descriptor_(descriptor), size_(size) {}
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// The bytes [offset, offset + count), fewer at the end; empty where they cannot be mapped, or
+  /// where the file has shrunk, so that a page behind its end would end the program.
+  [[nodiscard]] MappedStretch map(std::uint64_t offset, std::size_t count) const;
   /// Copies up to `count` bytes from `offset` to `out`. Returns how many, -1 where reading failed.
   std::int64_t read(std::uint64_t offset, std::size_t count, char* out) const;
 

@@ -1,5 +1,6 @@
 // Splits a mesh into chunks along a kd tree over its triangles.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -12,8 +13,30 @@
 namespace modar {
 namespace {
 
-/// Vertices a triangle that a large piece of a closed mesh has, with what its border adds.
-constexpr double kVerticesPerTriangle = 0.52;
+/// A triangle and its centre, counted along each axis in 65,536ths of [-1,1]: finer than the
+/// triangles of any model that has to be split.
+struct Item {
+  std::array<std::uint16_t, 3> centre;
+  std::uint16_t unused = 0;
+  std::uint32_t triangle = 0;
+};
+
+Item make_item(const TriMesh& mesh, std::uint32_t triangle) {
+  const auto& t = mesh.triangles[triangle];
+  const glm::dvec3 sum = mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]];
+  Item item;
+  item.triangle = triangle;
+  for (int i = 0; i < 3; ++i) {
+    const double at = std::clamp((sum[i] / 3.0 + 1.0) * 32768.0, 0.0, 65535.0);
+    item.centre[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(at);
+  }
+  return item;
+}
+
+/// A piece that is surely too large is split before its vertices are counted.
+constexpr double kSurely = 1.25;
+/// What borders add to the vertices of a piece, and some room for uneven halves.
+constexpr double kMargin = 1.055;
 
 class ChunkBuilder {
  public:
@@ -22,65 +45,77 @@ class ChunkBuilder {
         max_vertices_(options.max_vertices),
         max_side_(options.max_side),
         chunks_(chunks),
-        local_(mesh.positions.size(), kNoIndex) {}
+        local_(mesh.positions.size(), kNoIndex),
+        vertices_per_triangle_(static_cast<double>(mesh.positions.size()) /
+                               static_cast<double>(mesh.triangles.size())) {}
 
-  /// Triangles of one material, in any order that the caller can repeat. Answers false where one
-  /// of them is longer than a chunk may be.
-  bool split(std::span<std::uint32_t> triangles, std::uint32_t material) {
-    const double guess = static_cast<double>(triangles.size()) * kVerticesPerTriangle;
-    double vertices = guess;
-    if (guess < 4.0 * max_vertices_) {
-      const std::uint32_t count = number_vertices(triangles);
+  /// Triangles of one material in the order of the file. Answers false where one of them is longer
+  /// than a chunk may be.
+  bool split(std::span<Item> items, std::uint32_t material) {
+    double vertices = static_cast<double>(items.size()) * vertices_per_triangle_;
+    if (vertices < kSurely * max_vertices_) {
+      const std::uint32_t count = number_vertices(items);
       if (count <= max_vertices_ && fits()) {
-        emit(triangles, material);
+        emit(items, material);
         return true;
       }
       forget_vertices();
       vertices = count;
     }
-    if (triangles.size() == 1) return false;
-    const double pieces = std::max(2.0, std::ceil(vertices * 1.02 / max_vertices_));
+    if (items.size() == 1) return false;
+    const double pieces = std::max(2.0, std::ceil(vertices * kMargin / max_vertices_));
     const double share = std::floor(pieces / 2) / pieces;
-    auto middle = static_cast<std::size_t>(static_cast<double>(triangles.size()) * share);
-    middle = std::clamp<std::size_t>(middle, 1, triangles.size() - 1);
-    partition(triangles, middle);
-    return split(triangles.first(middle), material) && split(triangles.subspan(middle), material);
+    auto middle = static_cast<std::size_t>(static_cast<double>(items.size()) * share);
+    middle = std::clamp<std::size_t>(middle, 1, items.size() - 1);
+    partition(items, middle);
+    return split(items.first(middle), material) && split(items.subspan(middle), material);
   }
 
  private:
-  /// Three times the centre of a triangle.
-  [[nodiscard]] glm::dvec3 centre(std::uint32_t triangle) const {
-    const auto& t = mesh_.triangles[triangle];
-    return mesh_.positions[t[0]] + mesh_.positions[t[1]] + mesh_.positions[t[2]];
+  /// The axis along which the centres spread most.
+  static std::size_t longest_axis(std::span<const Item> items) {
+    std::array<std::uint16_t, 3> low = items[0].centre;
+    std::array<std::uint16_t, 3> high = low;
+    for (const Item& item : items) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        low[i] = std::min(low[i], item.centre[i]);
+        high[i] = std::max(high[i], item.centre[i]);
+      }
+    }
+    const auto side = [&](std::size_t i) { return high[i] - low[i]; };
+    return side(0) >= side(1) && side(0) >= side(2) ? 0 : (side(1) >= side(2) ? 1 : 2);
   }
 
-  /// Puts the `middle` triangles that lie lowest along the longest side of the box in front.
-  void partition(std::span<std::uint32_t> triangles, std::size_t middle) {
-    glm::dvec3 low(4.0);
-    glm::dvec3 high(-4.0);
-    for (const std::uint32_t t : triangles) {
-      const glm::dvec3 c = centre(t);
-      low = glm::min(low, c);
-      high = glm::max(high, c);
+  /// Puts the `middle` triangles that lie lowest along the longest side of their box in front, both
+  /// parts in the order of the file; of equally low ones the first in the file.
+  void partition(std::span<Item> items, std::size_t middle) {
+    const std::size_t axis = longest_axis(items);
+    histogram_.assign(65536, 0);
+    for (const Item& item : items) ++histogram_[item.centre[axis]];
+    std::size_t left = middle;
+    std::uint32_t border = 0;
+    while (histogram_[border] <= left) left -= histogram_[border++];
+    behind_.resize(0);
+    behind_.reserve(items.size() - middle);
+    std::size_t kept = 0;
+    for (const Item& item : items) {
+      const std::uint16_t at = item.centre[axis];
+      const bool front = at < border || (at == border && left > 0);
+      if (front && at == border) --left;
+      if (front) {
+        items[kept++] = item;
+      } else {
+        behind_.push_back(item);
+      }
     }
-    const glm::dvec3 side = high - low;
-    const int axis = side.x >= side.y && side.x >= side.z ? 0 : (side.y >= side.z ? 1 : 2);
-    keys_.clear();
-    keys_.reserve(triangles.size());
-    for (const std::uint32_t t : triangles) keys_.push_back({centre(t)[axis], t});
-    std::nth_element(keys_.begin(), keys_.begin() + static_cast<std::ptrdiff_t>(middle),
-                     keys_.end());
-    // In file order on both sides, so that the result does not hang on the library's selection.
-    for (std::size_t i = 0; i < keys_.size(); ++i) triangles[i] = keys_[i].second;
-    std::sort(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(middle));
-    std::sort(triangles.begin() + static_cast<std::ptrdiff_t>(middle), triangles.end());
+    std::copy(behind_.begin(), behind_.end(), items.begin() + static_cast<std::ptrdiff_t>(kept));
   }
 
   /// Numbers the vertices of these triangles by first use; stops one past the limit.
-  std::uint32_t number_vertices(std::span<const std::uint32_t> triangles) {
+  std::uint32_t number_vertices(std::span<const Item> items) {
     used_.clear();
-    for (const std::uint32_t t : triangles) {
-      for (const std::uint32_t v : mesh_.triangles[t]) {
+    for (const Item& item : items) {
+      for (const std::uint32_t v : mesh_.triangles[item.triangle]) {
         if (local_[v] != kNoIndex) continue;
         local_[v] = static_cast<std::uint32_t>(used_.size());
         used_.push_back(v);
@@ -107,12 +142,12 @@ class ChunkBuilder {
     used_.clear();
   }
 
-  void emit(std::span<const std::uint32_t> triangles, std::uint32_t material) {
+  void emit(std::span<const Item> items, std::uint32_t material) {
     Chunk& chunk = chunks_.emplace_back();
     chunk.material = material;
-    chunk.indices.reserve(3 * triangles.size());
-    for (const std::uint32_t t : triangles) {
-      for (const std::uint32_t v : mesh_.triangles[t]) {
+    chunk.indices.reserve(3 * items.size());
+    for (const Item& item : items) {
+      for (const std::uint32_t v : mesh_.triangles[item.triangle]) {
         chunk.indices.push_back(static_cast<std::uint16_t>(local_[v]));
       }
     }
@@ -126,7 +161,9 @@ class ChunkBuilder {
   std::vector<Chunk>& chunks_;
   std::vector<std::uint32_t> local_;  // of each vertex, kNoIndex outside the chunk at hand
   std::vector<std::uint32_t> used_;
-  std::vector<std::pair<double, std::uint32_t>> keys_;
+  double vertices_per_triangle_;
+  std::vector<std::uint32_t> histogram_;
+  Array<Item> behind_;
 };
 
 }  // namespace
@@ -148,14 +185,15 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
   std::vector<std::uint32_t> begins(result.mesh.materials.size() + 1, 0);
   for (const std::uint32_t m : result.mesh.triangle_material) ++begins[m + 1];
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
-  std::vector<std::uint32_t> triangles(result.mesh.triangles.size());
+  Array<Item> items(result.mesh.triangles.size());
   std::vector<std::uint32_t> next(begins.begin(), begins.end() - 1);
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    triangles[next[result.mesh.triangle_material[t]]++] = t;
+  for (std::uint32_t t = 0; t < items.size(); ++t) {
+    items[next[result.mesh.triangle_material[t]]++] = make_item(result.mesh, t);
   }
   ChunkBuilder builder(result.mesh, options, result.chunks);
   for (std::uint32_t m = 0; m + 1 < begins.size(); ++m) {
-    const auto part = std::span(triangles).subspan(begins[m], begins[m + 1] - begins[m]);
+    const auto part =
+        std::span(items.data(), items.size()).subspan(begins[m], begins[m + 1] - begins[m]);
     if (!part.empty() && !builder.split(part, m)) {
       return fail(ExitCode::kUnsupported, "model.max-error", result.mesh.name,
                   "a triangle is too long for the grid that the asked error needs",

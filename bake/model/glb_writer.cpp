@@ -127,7 +127,6 @@ void GlbBuilder::add_materials() {
     for (const auto& [texture, index] : textures_) {
       if (texture != source.texture) continue;
       pbr.baseColorTexture.index = index;
-      std::fill_n(pbr.baseColorFactor.begin(), 3, 1.0);
       blend = blend || (bundle_.textures()[texture].flags & kTextureAlpha) != 0;
     }
     if (blend) material.alphaMode = "BLEND";

@@ -3,16 +3,13 @@
 #include <array>
 #include <optional>
 
+#include "bake/model/ascii.hpp"
 #include "bake/model/map_path.hpp"
 #include "bake/model/number_parser.hpp"
 #include "bake/model/obj_reader.hpp"
 
 namespace modar {
 namespace {
-
-bool is_blank(char c) {
-  return c == ' ' || c == '\t' || c == '\v' || c == '\f' || c == '\0';
-}
 
 /// One statement, its continued lines joined, and where the next begins.
 std::string take_statement(std::string_view text, std::size_t& at, std::uint64_t& line) {

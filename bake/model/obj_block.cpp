@@ -6,12 +6,12 @@
 
 #include "bake/model/ascii.hpp"
 #include "bake/model/number_parser.hpp"
+#include "bake/model/plain_obj.hpp"
 
 namespace modar {
 namespace {
 
 constexpr std::uint32_t kTooLarge = 0x7FFFFFFFu;  // no file of ours has so many elements
-constexpr std::uint32_t kMaxFaceCorners = 0x00FFFFFFu;
 
 class BlockParser {
  public:
@@ -105,6 +105,13 @@ class BlockParser {
   }
 
   void statement() {
+    if (limits_ == nullptr) {
+      if (const char* const next = take_plain_statement(p_, block_)) {
+        p_ = next;
+        ++line_;
+        return;
+      }
+    }
     skip_blanks();
     const char c = *p_;
     const char next = p_[1];
@@ -139,9 +146,7 @@ class BlockParser {
   }
 
   void colour(const glm::dvec3& rgb) {
-    while (block_.colours.size() + 1 < block_.positions.size()) {
-      block_.colours.push(glm::vec3(std::numeric_limits<float>::quiet_NaN()));
-    }
+    fill_colours(block_);
     const auto finite = [](double x) { return std::isfinite(x) ? static_cast<float>(x) : 0.0f; };
     block_.colours.push({finite(rgb.x), finite(rgb.y), finite(rgb.z)});
   }
@@ -274,9 +279,7 @@ class BlockParser {
     if (keep) {
       block_.face_corners.push(count);
     } else {
-      block_.corner_positions.pop(count);
-      block_.corner_uvs.pop(count);
-      block_.corner_normals.pop(count);
+      pop_corners(block_, count);
       block_.relative.resize(relative);
     }
     end_statement();

@@ -99,9 +99,6 @@ struct ObjBlock {
   NoteTallies notes{};
   ObjCounts highest;  ///< greatest absolute index of a corner, plus one
   std::uint64_t lines = 0;
-  std::string text;         ///< the bytes, padded; filled by whoever reads
-  std::size_t first = 0;    ///< byte of `text` where the block's own statements begin
-  bool unfinished = false;  ///< the text lacked the last line's end, which was added
 };
 
 /// Set for the second, careful pass over a file with bad indices: every corner is held against them
@@ -111,8 +108,8 @@ struct ObjLimits {
   ObjCounts total;   ///< elements of the whole file
 };
 
-/// Parses text that consists of whole statements, padded by kTextPadding bytes after a final '\n'.
-/// limits: nullptr in the fast pass, where indices are resolved later.
+/// Parses text that consists of whole statements, the last byte a '\n'; kTextPadding bytes of
+/// whatever follow it. limits: nullptr in the fast pass, where indices are resolved later.
 void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block);
 
 /// The first end of a statement whose last byte lies in [from, size): one past a '\n' that no

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <mutex>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -23,6 +25,14 @@ constexpr std::uint64_t kContext = 3;
 
 enum class LoadResult { kLoaded, kEmpty, kFailed, kTooLarge };
 
+/// The text of one block: mapped, or in a buffer of its own where it ends the file or is very long.
+struct BlockText {
+  std::string_view text;    ///< whole statements, padded
+  bool unfinished = false;  ///< it lacked the last line's end, which was added
+  MappedStretch mapped;
+  std::string buffer;
+};
+
 /// Loads the statements that begin in block `index`, that is behind a statement's end that lies
 /// behind the block's begin, up to the end of the last of them. A statement longer than a block
 /// belongs to the block where it begins; the blocks in its middle are empty.
@@ -34,41 +44,64 @@ class BlockLoader {
     return (source_.size() - start_ + kBlockBytes - 1) / kBlockBytes;
   }
 
-  LoadResult load(std::uint64_t index, ObjBlock& block) const {
+  LoadResult load(std::uint64_t index, BlockText& block) const {
     const std::uint64_t begin = start_ + index * kBlockBytes;
     const std::uint64_t end = std::min(begin + kBlockBytes, source_.size());
     const std::uint64_t from = index == 0 ? begin : begin - kContext;
-    std::string& text = block.text;
-    text.resize(static_cast<std::size_t>(end - from) + kTextPadding + 1);
-    const std::int64_t got = source_.read(from, static_cast<std::size_t>(end - from), text.data());
-    if (got < 0) return LoadResult::kFailed;
-    text.resize(static_cast<std::size_t>(got));
-    std::size_t first = 0;
-    if (index != 0) {
-      first = first_statement_end(text, static_cast<std::size_t>(kContext) - 1);
-      if (first == 0) return LoadResult::kEmpty;
+    const auto size = static_cast<std::size_t>(end - from);
+    block.unfinished = false;
+    block.mapped = source_.map(from, size + kSlack + kTextPadding);
+    const std::string_view seen = block.mapped.text();
+    if (seen.size() == size + kSlack + kTextPadding) {
+      std::size_t first = 0;
+      if (!find_first(index, seen.substr(0, size), first)) return LoadResult::kEmpty;
+      const std::size_t last = first_statement_end(seen.substr(0, size + kSlack), size - 1);
+      if (last != 0) return cut(seen, first, last, block);
     }
-    if (const LoadResult rest = load_to_statement_end(end, text); rest != LoadResult::kLoaded) {
-      return rest;
-    }
-    if (first >= text.size()) return LoadResult::kEmpty;
-    block.first = first;
-    if (text.back() != '\n') {
-      text += '\n';
-      block.unfinished = true;
-    } else {
-      block.unfinished = false;
-    }
-    text.append(kTextPadding, '\0');
-    return LoadResult::kLoaded;
+    return load_copy(index, from, end, block);
   }
 
  private:
+  /// Mapped behind a block to find the end of its last statement.
+  static constexpr std::size_t kSlack = 4096;
+
+  /// Where the block's own statements begin; false where none does.
+  static bool find_first(std::uint64_t index, std::string_view text, std::size_t& first) {
+    first = index == 0 ? 0 : first_statement_end(text, static_cast<std::size_t>(kContext) - 1);
+    return index == 0 || first != 0;
+  }
+
+  static LoadResult cut(std::string_view text, std::size_t first, std::size_t last,
+                        BlockText& block) {
+    if (first >= last) return LoadResult::kEmpty;
+    block.text = text.substr(first, last - first);
+    return LoadResult::kLoaded;
+  }
+
+  LoadResult load_copy(std::uint64_t index, std::uint64_t from, std::uint64_t end,
+                       BlockText& block) const {
+    std::string& text = block.buffer;
+    text.resize(static_cast<std::size_t>(end - from));
+    const std::int64_t got = source_.read(from, text.size(), text.data());
+    if (got < 0) return LoadResult::kFailed;
+    text.resize(static_cast<std::size_t>(got));
+    std::size_t first = 0;
+    if (text.empty() || !find_first(index, text, first)) return LoadResult::kEmpty;
+    if (const LoadResult rest = load_to_statement_end(end, text); rest != LoadResult::kLoaded) {
+      return rest;
+    }
+    block.unfinished = text.back() != '\n';
+    if (block.unfinished) text += '\n';
+    const std::size_t last = text.size();
+    text.append(kTextPadding, '\0');
+    return cut(text, first, block.unfinished && first + 1 == last ? first : last, block);
+  }
+
   /// `text` ends at `end` of the source; goes on to the first statement end at or behind its last
   /// byte, which the next block will find as well.
   LoadResult load_to_statement_end(std::uint64_t end, std::string& text) const {
     std::size_t look = text.size() - 1;
-    std::uint64_t step = 4096;
+    std::uint64_t step = kSlack;
     while (true) {
       if (const std::size_t at = first_statement_end(text, look); at != 0) {
         text.resize(at);
@@ -155,15 +188,15 @@ Result<void> read_obj_blocks(const ByteSource& source, const std::string& label,
   LoadResult worst = LoadResult::kLoaded;  // guarded by the queue's turn
   const auto work = [&] {
     ObjBlock block;
+    BlockText loading;
     while (const auto index = queue.next()) {
-      const LoadResult loaded = loader.load(*index, block);
+      const LoadResult loaded = loader.load(*index, loading);
       ObjLimits limits;
       if (totals != nullptr) limits = {assembler.counts(), *totals};
       if (loaded == LoadResult::kLoaded) {
-        parse_obj_block(block.text.data() + block.first,
-                        block.text.size() - kTextPadding - block.first,
+        parse_obj_block(loading.text.data(), loading.text.size(),
                         totals != nullptr ? &limits : nullptr, block);
-        if (block.unfinished) --block.lines;
+        if (loading.unfinished) --block.lines;
       }
       const bool good = queue.in_turn(*index, [&] {
         if (loaded == LoadResult::kEmpty) return true;
