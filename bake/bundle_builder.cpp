@@ -183,11 +183,17 @@ Result<ModelSides> add_models(const BakeRequest& request, BundleContent& content
   return sides;
 }
 
-Result<void> add_pattern(const PatternRequest& request, BundleContent& content, Report& report) {
-  Result<PatternFeatures> baked = bake_pattern(request.path, request.width_mm, report);
+Result<void> add_pattern(const PatternRequest& request, const LoopBakeOptions& loop,
+                         BundleContent& content, Report& report) {
+  Result<PatternFeatures> baked = bake_pattern(request.path, request.width_mm, loop, report);
   if (!baked) return tl::unexpected(baked.error());
   PatternRecord record = baked->record;
   record.name = content.intern(baked->name);
+  ExtraSection section;
+  section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
+  section.owner = static_cast<std::uint32_t>(content.patterns.size());
+  section.bytes = std::move(baked->loop_record);
+  content.extra.push_back(std::move(section));
   content.patterns.push_back(record);
   content.features.push_back(std::move(baked->features));
   return {};
@@ -279,8 +285,10 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
       content.parameter_sets.push_back(named);
     }
   }
+  LoopBakeOptions loop = request.loop;
+  loop.jobs = request.jobs;
   for (const PatternRequest& pattern : request.patterns) {
-    if (auto added = add_pattern(pattern, content, report); !added) {
+    if (auto added = add_pattern(pattern, loop, content, report); !added) {
       return tl::unexpected(added.error());
     }
   }

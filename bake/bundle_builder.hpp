@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bake/model/position_plan.hpp"
+#include "bake/pattern/loop_bake.hpp"
 #include "bake/report.hpp"
 #include "bake/texture/etc1_texture.hpp"
 #include "formats/bundle_writer.hpp"
@@ -52,6 +53,7 @@ struct BakeRequest {
   std::uint32_t levels = 4;               ///< of detail a chunk, the finest counted
   std::string device;                     ///< profile that it is planned for; empty: none
   unsigned jobs = 1;                      ///< the bytes do not depend on it
+  LoopBakeOptions loop;                   ///< of patterns; its jobs are those above
   std::string tool_version;
 };
 

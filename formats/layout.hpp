@@ -43,6 +43,7 @@ enum class SectionType : std::uint32_t {
   kScenes = 64,         ///< table of SceneRecord
   kFeatureTwin = 256,   ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
   kFeatureYml = 257,    ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
+  kLoopRecord = 258,    ///< owner: pattern, variant: 0; see loop_record.hpp
   kVertices = 512,      ///< GPU: merged vertex buffer of all models
   kIndices = 513,       ///< GPU: merged 16-bit index buffer of all models
   kTextureData = 514,   ///< GPU: owner: texture; ETC1 blocks of all its levels

@@ -6,7 +6,6 @@
 
 namespace modar {
 
-inline constexpr std::uint32_t kLoopRecordSection = 258;
 inline constexpr std::uint32_t kLoopBlockCodes = 32;  ///< codes in a block
 inline constexpr std::uint32_t kLoopCodeBytes = 32;   ///< 256 bits
 inline constexpr std::uint32_t kMaxLoopFeatures = 65536;

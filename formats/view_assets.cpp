@@ -184,6 +184,11 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
       } else if (type == SectionType::kFeatureTwin) {
         check_twin(check, parts, entry, parts.parameter_sets[set]);
       }
+    } else if (type == SectionType::kLoopRecord) {
+      if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
+        check.fault(Rule::kSectionOwner, &entry.owner,
+                    "pattern " + std::to_string(entry.owner) + " is not there");
+      }
     }
   }
 }

@@ -35,6 +35,7 @@ constexpr KnownType kKnownTypes[] = {
     {SectionType::kScenes, kSectionRequired, false},
     {SectionType::kFeatureTwin, kSectionRequired, true},
     {SectionType::kFeatureYml, 0, true},
+    {SectionType::kLoopRecord, 0, true},
     {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
     {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
     {SectionType::kTextureData, kSectionRequired | kSectionGpu, true},

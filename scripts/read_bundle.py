@@ -277,6 +277,9 @@ def read_features(bundle):
             need(owner < len(tables["textures"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
         if kind in (256, 257):
             need(owner < len(tables["patterns"]) and variant in sets, "BUNDLE_SECTION_OWNER", 0)
+        if kind == 258:
+            need(owner < len(tables["patterns"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+            read_loop_record(data)
         if kind == 257:
             need((256, owner, variant) in bundle.payload and data.startswith(b"%YAML:1.0"),
                  "FEATURE_TEXT", 0)
@@ -285,6 +288,30 @@ def read_features(bundle):
             out.append(read_twin(bundle, tables["patterns"][owner], sets[variant], data))
             out[-1].update(pattern=owner, set_id=variant, yml=digest(text) if text else None)
     return out
+
+
+def read_loop_record(data):
+    """The record of the pose loop: counts, offsets, places inside of the image."""
+    def good(condition, what):
+        need(condition, "LOOP_RECORD", 0, what)
+
+    good(len(data) >= 128, "too small")
+    (version, count, bright, patch_count, width, height, levels, zero, features, codes, patches,
+     pixels) = struct.unpack_from("<8I4Q", data)
+    good(version == 1 and zero == 0 and not any(data[64:128]), "header")
+    good(count % 32 == bright % 32 == 0 and bright <= count <= 65536 and patch_count <= 4096, "counts")
+    good(1 <= width <= 1023 and 1 <= height <= 1023 and 1 <= levels <= 8, "image")
+    good(codes % 64 == features % 2 == patches % 2 == 0, "alignment")
+    image = sum((width >> level) * (height >> level) for level in range(levels))
+    good(min(width, height) >> (levels - 1) >= 1, "levels")
+    for at, size in ((features, 12 * count), (codes, 32 * count), (patches, 8 * patch_count), (pixels, image)):
+        good(128 <= at and at + size <= len(data), "an array leaves the section")
+    for x, y in struct.iter_unpack("<2H8x", data[features:features + 12 * count]):
+        good(x <= 64 * width and y <= 64 * height, "a feature lies outside of the image")
+    last = 0
+    for x, y, level, _ in struct.iter_unpack("<4H", data[patches:patches + 8 * patch_count]):
+        good(x <= 64 * width and y <= 64 * height and last <= level < levels, "a patch")
+        last = level
 
 
 def read_twin(bundle, pattern, chosen, data):

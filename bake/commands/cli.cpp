@@ -103,6 +103,9 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
          "--device", texts.device,
          "Plan for a device: its texture size and GPU memory (" + device_profile_names() + ")")
       ->type_name("NAME");
+  sub->add_option("--loop-views", bake.request.loop.trial_views,
+                  "Random views that try a pattern's features: fewer bake faster, more hold better")
+      ->check(CLI::Range(1, 10000));
   sub->add_option("--jobs", bake.request.jobs, "Threads; the bytes do not depend on it")
       ->check(CLI::Range(1u, 256u))
       ->capture_default_str();

@@ -33,7 +33,8 @@ Result<FeatureContent> describe(const GrayImage& image, const ParameterSetRecord
 
 }  // namespace
 
-Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm, Report& report) {
+Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
+                                     const LoopBakeOptions& loop, Report& report) {
   StageTimer timer(report, "pattern");
   bool shrunk = false;
   const auto picture = load_pattern(path, shrunk);
@@ -66,6 +67,12 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm, R
                 "the picture holds " + std::to_string(found) + " features, too few to recognise it",
                 "take a larger, sharper picture with more texture");
   }
+  auto record = bake_loop_record(grey, loop);
+  if (!record) {
+    record.error().where = path;
+    return tl::unexpected(record.error());
+  }
+  out.loop_record = std::move(*record);
   timer.done(picture->pixels.size(), found);
   return out;
 }

@@ -13,15 +13,15 @@ namespace modar {
 
 struct LoopBakeOptions {
   std::uint32_t features = 3000;         ///< descriptors kept, at most
-  std::uint32_t trial_views = 240;       ///< random renderings that show which ones repeat
+  std::uint32_t trial_views = 120;       ///< random renderings that show which ones repeat
   std::uint32_t patches_per_level = 64;  ///< at most
   unsigned jobs = 1;                     ///< threads; the bytes do not depend on it
   [[nodiscard]] Result<void> validate() const;
 };
 
-/// The bytes of a kLoopRecordSection. pattern: 8-bit grey, at most 1023 pixels a side. The same
-/// picture gives the same bytes on every machine.
-/// Errors: kInvalidInput "pattern.loop-size"; "pattern.no-features" where nothing repeats.
+/// The bytes of a SectionType::kLoopRecord section. pattern: 8-bit grey, at most 1023 pixels a
+/// side. The same picture gives the same bytes on every machine. Errors: kInvalidInput
+/// "pattern.loop-size"; "pattern.no-features" where nothing repeats.
 Result<std::vector<std::byte>> bake_loop_record(const GrayImage& pattern,
                                                 const LoopBakeOptions& options);
 

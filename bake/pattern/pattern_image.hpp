@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/pattern/loop_bake.hpp"
 #include "bake/report.hpp"
 #include "bake/texture/etc1_texture.hpp"
 #include "formats/bundle_writer.hpp"
@@ -45,11 +46,13 @@ struct PatternFeatures {
   std::string name;
   PatternRecord record{};                ///< lacks its name
   std::vector<FeatureContent> features;  ///< one a parameter set, in order of set id
+  std::vector<std::byte> loop_record;    ///< a section of type kLoopRecord
 };
 
 /// Describes an image file under the article's four parameter sets, with YML and twin.
 /// Errors: those of read_image(); kInvalidInput "pattern.no-features" where the default set finds
 /// fewer than its min_matches.
-Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm, Report& report);
+Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
+                                     const LoopBakeOptions& loop, Report& report);
 
 }  // namespace modar

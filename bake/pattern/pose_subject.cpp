@@ -46,7 +46,7 @@ Result<void> add_pattern(const GrayImage& pattern, std::uint32_t set_id, BundleC
   auto loop = bake_loop_record(pattern, LoopBakeOptions{});
   if (!loop) return tl::unexpected(loop.error());
   ExtraSection section;
-  section.type = kLoopRecordSection;
+  section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
   section.owner = static_cast<std::uint32_t>(content.patterns.size());
   section.bytes = std::move(*loop);
   content.extra.push_back(std::move(section));

@@ -1,4 +1,4 @@
-// The article's tracker as a step of the pipeline.
+// Our loop, and the article's tracker, as a step of the pipeline.
 #include <memory>
 
 #include "vision.hpp"
@@ -12,6 +12,7 @@ struct State {
   Camera camera;
   std::unique_ptr<PaperTracker> tracker;
   std::shared_ptr<const SpotPattern> spot;  ///< tracked in place of the bundle's patterns
+  TrackStep ours;                           ///< empty: the article's method alone
 
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
@@ -21,6 +22,7 @@ struct State {
         spot = std::move(made);
       }
     }
+    if (ours && !spot) return ours(job);
     if (!tracker || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
       auto created =
@@ -42,7 +44,8 @@ struct State {
 }  // namespace
 
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
-  const auto state = std::make_shared<State>(State{bundle, options, {}, nullptr, nullptr});
+  const auto state = std::make_shared<State>(State{bundle, options, {}, nullptr, nullptr, {}});
+  if (options.ours) state->ours = our_vision(bundle, options.camera);
   return TrackStep([state](Job& job) { return state->step(job); });
 }
 

@@ -98,7 +98,8 @@ Result<Camera> read_camera_file(const std::string& path) {
   return left_out("camera.unsupported", path, "camera files");
 }
 
-Result<TrackStep> open_vision(const BundleView& /*bundle*/, const VisionOptions& /*options*/) {
+Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
+  if (options.ours) return our_vision(bundle, options.camera);
   return left_out("method.unsupported", "--method paper", "the article's method");
 }
 

@@ -146,9 +146,12 @@ Result<void> validate(const PlayOptions& options) {
   if (!options.golden.empty() && (options.realtime || !options.record.empty())) {
     return usage("usage.conflict", "--golden", "it replays every frame, and records none");
   }
-  if (options.method != "paper") {
+  if (!options.method.empty() && options.method != "ours" && options.method != "paper") {
     return usage("usage.method", "--method",
-                 "'" + options.method + "' is no method; there is 'paper'");
+                 "'" + options.method + "' is no method; there are 'ours' and 'paper'");
+  }
+  if (options.method == "ours" && !options.parameters.empty()) {
+    return usage("usage.conflict", "--parameters", "the sets are those of --method paper");
   }
   return {};
 }
@@ -228,8 +231,10 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
   --json              one JSON line a frame and a summary, to standard output
   --camera FILE.yml   camera matrix and distortion as OpenCV writes them
                       (default: focal length = width of the frame)
-  --method paper      how patterns are found
-  --parameters SET    orb-2000 (default), orb-500, brisk-3 or brisk-2, as baked
+  --method METHOD     how patterns are found: ours (default where the bundle has records for it),
+                      or paper, the article's
+  --parameters SET    of --method paper, which it implies: orb-2000 (default), orb-500, brisk-3 or
+                      brisk-2, as baked
   --device NAME       acts as this device: masks what its OpenGL ES lacks
   --realtime          plays a file at its own speed and drops frames that come too early
   --gpu-budget SIZE   keeps at most so much in GL, nearest and visible first (64M, 1G)

@@ -22,7 +22,7 @@ struct PlayOptions {
   std::string golden;  ///< folder of a recording to replay; empty: none
   std::string qos;     ///< file; empty: none
   std::string camera_file;
-  std::string method = "paper";
+  std::string method;            ///< "ours", "paper"; empty: see choose_method()
   std::string parameters;        ///< empty: orb-2000 where the bundle has it, else its first
   std::string device;            ///< empty: the context as it is
   double tolerance = 0.5;        ///< pixels; of --golden

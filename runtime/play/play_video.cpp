@@ -16,13 +16,14 @@ namespace {
 /// What the command line and, of a replay, the recording ask for.
 struct Plan {
   std::string input;
+  std::string method;
   std::string parameters;
   std::optional<Camera> camera;
   std::optional<GoldenCheck> golden;
 };
 
 Result<Plan> make_plan(const PlayOptions& options, const BundleView& bundle) {
-  Plan plan{options.input, options.parameters, std::nullopt, std::nullopt};
+  Plan plan{options.input, options.method, options.parameters, std::nullopt, std::nullopt};
   if (!options.golden.empty()) {
     Result<Recording> recording = read_recording(options.golden);
     if (!recording) return tl::unexpected(recording.error());
@@ -31,6 +32,7 @@ Result<Plan> make_plan(const PlayOptions& options, const BundleView& bundle) {
       std::fprintf(stderr, "modar-play: the recording was made with another bundle\n");
     }
     plan.input = options.golden + "/frames";
+    if (plan.method.empty() && plan.parameters.empty()) plan.method = head.method;
     if (plan.parameters.empty()) plan.parameters = head.parameters;
     if (head.camera.width > 0) plan.camera = head.camera;
     plan.golden.emplace(std::move(*recording), options.tolerance);
@@ -53,13 +55,16 @@ TrackStep with_grey_of_rgb(TrackStep track) {
 
 }  // namespace
 
-Result<int> play_video(const PlayOptions& options, const BundleView& bundle) {
-  Result<Plan> plan = make_plan(options, bundle);
+Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
+  Result<Plan> plan = make_plan(asked, bundle);
   if (!plan) return tl::unexpected(plan.error());
+  PlayOptions options = asked;
+  options.method = choose_method(bundle, plan->method, plan->parameters);
   const Result<std::uint32_t> set = choose_parameter_set(bundle, plan->parameters);
   if (!set) return tl::unexpected(set.error());
   SpotSlot spot;
-  Result<TrackStep> track = open_vision(bundle, {*set, plan->camera, &spot});
+  Result<TrackStep> track =
+      open_vision(bundle, {options.method == "ours", *set, plan->camera, &spot});
   if (!track) return tl::unexpected(track.error());
   auto source = open_frame_source(plan->input);
   if (!source) return tl::unexpected(source.error());

@@ -1,7 +1,52 @@
 // Parameters and camera of the vision thread, whatever the tracker.
 #include "vision.hpp"
 
+#include <memory>
+
+#include "modar/pose_loop.hpp"
+
 namespace modar {
+namespace {
+
+struct OurVision {
+  const BundleView& bundle;
+  std::optional<Camera> calibrated;
+  Camera camera;
+  std::unique_ptr<PoseLoop> loop;
+
+  Result<void> step(Job& job) {
+    const Frame& frame = job.frame;
+    if (!loop || camera.width != frame.width || camera.height != frame.height) {
+      camera = camera_for(calibrated, frame.width, frame.height);
+      auto created = PoseLoop::create(bundle, camera);
+      if (!created) return tl::unexpected(created.error());
+      loop = std::move(*created);
+    }
+    const std::int64_t before = now_ns();
+    if (auto done = loop->step(frame.gray_image(), job.track); !done) return done;
+    job.track_ms = ms_since(before);
+    job.camera = camera;
+    job.spot = nullptr;
+    return {};
+  }
+};
+
+}  // namespace
+
+TrackStep our_vision(const BundleView& bundle, const std::optional<Camera>& camera) {
+  const auto state = std::make_shared<OurVision>(OurVision{bundle, camera, {}, nullptr});
+  return [state](Job& job) { return state->step(job); };
+}
+
+std::string choose_method(const BundleView& bundle, const std::string& method,
+                          const std::string& parameters) {
+  if (!method.empty()) return method;
+  if (!parameters.empty()) return "paper";
+  for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
+    if (!bundle.section(SectionType::kLoopRecord, i).empty()) return "ours";
+  }
+  return "paper";
+}
 
 Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& name) {
   const Table<ParameterSetRecord> sets = bundle.parameter_sets();

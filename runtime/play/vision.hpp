@@ -12,10 +12,16 @@
 namespace modar {
 
 struct VisionOptions {
+  bool ours = true;                 ///< our pose loop; false: the article's method
   std::uint32_t parameter_set = 0;  ///< id, see choose_parameter_set()
   std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
   SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
 };
+
+/// The method that is meant: the named one; "paper" where parameters of it are named or no pattern
+/// has a record for our loop, else "ours".
+std::string choose_method(const BundleView& bundle, const std::string& method,
+                          const std::string& parameters);
 
 /// The id of the bundle's parameter set of that name; of an empty name: "orb-2000" where it is
 /// there, else the first. Errors: kUsage "parameters.unknown" (lists what the bundle has),
@@ -28,9 +34,13 @@ const ParameterSetRecord& parameter_set(const BundleView& bundle, std::uint32_t 
 /// The camera for frames of that size.
 Camera camera_for(const std::optional<Camera>& calibrated, int width, int height);
 
-/// The article's method as a step of the pipeline. The bundle's bytes must outlive it. A frame of
-/// another size than the one before sets the tracker up anew.
-/// Errors: those of PaperTracker; kUnsupported "method.unsupported" in a build without OpenCV.
+/// Our loop or the article's method as a step of the pipeline; patterns made on the spot are found
+/// by the article's. The bundle's bytes must outlive it. A frame of another size than the one
+/// before sets the tracker up anew. Errors: those of PoseLoop and PaperTracker; kUnsupported
+/// "method.unsupported" for the article's method in a build without OpenCV.
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
+
+/// Our loop alone. Errors: those of PoseLoop.
+TrackStep our_vision(const BundleView& bundle, const std::optional<Camera>& camera);
 
 }  // namespace modar

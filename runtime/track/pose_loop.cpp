@@ -117,7 +117,7 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   std::size_t most_codes = 0;
   const std::uint32_t count = bundle.patterns().size();
   for (std::uint32_t i = 0; i < count; ++i) {
-    const auto bytes = bundle.section(static_cast<SectionType>(kLoopRecordSection), i);
+    const auto bytes = bundle.section(SectionType::kLoopRecord, i);
     if (bytes.empty()) continue;
     auto pattern = loop::view_loop_record(bytes, i);
     if (!pattern) return tl::unexpected(pattern.error());

@@ -3,7 +3,7 @@ import os
 import shutil
 import unittest
 
-from programs import COVER, POTTERY, ROOT, STATUE, ProgramTest
+from programs import COVER, POTTERY, QUICK, ROOT, STATUE, ProgramTest
 
 
 class Bake(ProgramTest):
@@ -32,13 +32,13 @@ class Bake(ProgramTest):
                                               (2, {"LC_ALL": "de_DE.UTF-8", "TZ": "Asia/Tokyo"}),
                                               (8, {"LANG": "tr_TR.UTF-8", "HOME": "/nowhere"})]):
             out = self.folder / f"again{number}.modar"
-            done = self.modar("bake", "--model", elsewhere / "pottery.obj", "--pattern", "cover.png", "-o", out,
+            done = self.modar("bake", "--model", elsewhere / "pottery.obj", "--pattern", "cover.png", "-o", out, *QUICK,
                               "--jobs", jobs, "--quiet", "--no-lods", env=env, cwd=elsewhere)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(out.read_bytes(), reference, f"jobs {jobs}, {env}")
 
     def test_models_only_and_patterns_only_are_legal(self):
-        for arguments in (["--model", STATUE], ["--pattern", COVER]):
+        for arguments in (["--model", STATUE], ["--pattern", COVER, *QUICK]):
             out = self.folder / "one.modar"
             done = self.modar("bake", *arguments, "--no-lods", "-o", out)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -47,7 +47,7 @@ class Bake(ProgramTest):
     def test_models_are_merged_in_the_same_buffers(self):
         out = self.folder / "two.modar"
         report = self.modar_json("bake", "--model", POTTERY, STATUE, "--pattern", COVER, "--scene",
-                                 "cover=statue,scale=0.5,up=z", "--no-lods", "-o", out)
+                                 "cover=statue,scale=0.5,up=z", "--no-lods", "-o", out, *QUICK)
         self.assertEqual([m["name"] for m in report["bundle"]["models"]], ["pottery", "statue"])
         self.assertEqual(report["bundle"]["scenes"][0]["scale"], 0.5)
         self.assertGreater(report["cpu_seconds"], 0)

@@ -2,7 +2,7 @@
 import struct
 import unittest
 
-from programs import COVER, ProgramTest
+from programs import COVER, QUICK, ProgramTest
 
 
 def png_size(path):
@@ -22,7 +22,7 @@ class Rectify(ProgramTest):
     def test_the_width_travels_with_the_image(self):
         self.assertEqual(self.rectify("10,10,300,40,310,600,20,650", "--width-mm", "200").returncode, 0)
         bundle = self.folder / "b.modar"
-        self.assertEqual(self.modar("bake", "--pattern", "out.png", "-o", bundle).returncode, 0)
+        self.assertEqual(self.modar("bake", "--pattern", "out.png", "-o", bundle, *QUICK).returncode, 0)
         self.assertAlmostEqual(self.modar_json("inspect", bundle)["patterns"][0]["width_mm"], 200, delta=0.5)
 
     def test_corners_that_are_none(self):

@@ -204,6 +204,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
                                                     {SectionType::kScenes, "scenes"},
                                                     {SectionType::kFeatureTwin, "feature twin"},
                                                     {SectionType::kFeatureYml, "feature text"},
+                                                    {SectionType::kLoopRecord, "loop record"},
                                                     {SectionType::kVertices, "vertices"},
                                                     {SectionType::kIndices, "indices"},
                                                     {SectionType::kTextureData, "texture data"}};

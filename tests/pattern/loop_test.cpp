@@ -45,7 +45,7 @@ std::vector<std::byte> bundle_with(std::vector<std::byte> section) {
   content.patterns.push_back(pattern);
   content.features.emplace_back();
   ExtraSection extra;
-  extra.type = kLoopRecordSection;
+  extra.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
   extra.owner = 0;
   extra.bytes = std::move(section);
   content.extra.push_back(std::move(extra));
