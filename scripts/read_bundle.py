@@ -292,26 +292,21 @@ def read_features(bundle):
 
 def read_loop_record(data):
     """The record of the pose loop: counts, offsets, places inside of the image."""
-    def good(condition, what):
-        need(condition, "LOOP_RECORD", 0, what)
-
-    good(len(data) >= 128, "too small")
+    need(len(data) >= 128, "LOOP_RECORD", 0, "too small")
     (version, count, bright, patch_count, width, height, levels, zero, features, codes, patches,
      pixels) = struct.unpack_from("<8I4Q", data)
-    good(version == 1 and zero == 0 and not any(data[64:128]), "header")
-    good(count % 32 == bright % 32 == 0 and bright <= count <= 65536 and patch_count <= 4096, "counts")
-    good(1 <= width <= 1023 and 1 <= height <= 1023 and 1 <= levels <= 8, "image")
-    good(codes % 64 == features % 2 == patches % 2 == 0, "alignment")
+    need(version == 1 and zero == 0 and not any(data[64:128]) and count % 32 == bright % 32 == 0 and
+         bright <= count <= 65536 and patch_count <= 4096 and 1 <= levels <= 8 and
+         max(width, height) <= 1023 and min(width, height) >> (levels - 1) >= 1 and
+         codes % 64 == features % 2 == patches % 2 == 0, "LOOP_RECORD", 0, "header")
     image = sum((width >> level) * (height >> level) for level in range(levels))
-    good(min(width, height) >> (levels - 1) >= 1, "levels")
     for at, size in ((features, 12 * count), (codes, 32 * count), (patches, 8 * patch_count), (pixels, image)):
-        good(128 <= at and at + size <= len(data), "an array leaves the section")
-    for x, y in struct.iter_unpack("<2H8x", data[features:features + 12 * count]):
-        good(x <= 64 * width and y <= 64 * height, "a feature lies outside of the image")
-    last = 0
-    for x, y, level, _ in struct.iter_unpack("<4H", data[patches:patches + 8 * patch_count]):
-        good(x <= 64 * width and y <= 64 * height and last <= level < levels, "a patch")
-        last = level
+        need(128 <= at and at + size <= len(data), "LOOP_RECORD", 0, "an array leaves the section")
+    places = [*struct.iter_unpack("<2H8x", data[features:features + 12 * count]),
+              *struct.iter_unpack("<2H4x", data[patches:patches + 8 * patch_count])]
+    need(all(x <= 64 * width and y <= 64 * height for x, y in places), "LOOP_RECORD", 0, "a place")
+    of = [level for level, in struct.iter_unpack("<4xH2x", data[patches:patches + 8 * patch_count])]
+    need(of == sorted(of) and all(level < levels for level in of), "LOOP_RECORD", 0, "levels")
 
 
 def read_twin(bundle, pattern, chosen, data):
