@@ -53,7 +53,7 @@ struct PieceRecord {
   std::uint32_t second_size;    ///< bytes: kMesh: of the indices; kFeatureText: of the twin; else 0
   std::uint16_t index_base;     ///< kMesh, else 0
   std::uint8_t form;            ///< PieceForm
-  std::uint8_t reserved[5];
+  std::uint8_t reserved[9];
 };
 static_assert(sizeof(PieceRecord) == 64);
 

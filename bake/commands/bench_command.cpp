@@ -11,6 +11,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/ship/ship_bench.hpp"
 #include "bake/texture/etc1_bench.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
@@ -76,12 +77,25 @@ BenchResult bench_etc1_rows(const BenchCommand& command) {
   return rows;
 }
 
+/// What bundles cost on the way, beside Draco, meshoptimizer's codecs and zstd.
+BenchResult bench_ship_rows(const BenchCommand& command) {
+  const auto measured = bench_ship(command.inputs, 1);
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<BenchRow> rows;
+  for (const ShipBenchRow& row : *measured) {
+    rows.push_back({row.measure, row.ours, row.reference, row.ours / row.reference});
+  }
+  return rows;
+}
+
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
       {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
        bench_load},
       {"etc1", true, "IMAGE... [--crop SIDE]", "our ETC1 encoder against Android's libetc1",
        bench_etc1_rows},
+      {"ship", true, "BUNDLE...",
+       "bytes and decoding of what travels, against Draco, meshopt and zstd", bench_ship_rows},
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
        "our pose loop against the article's method, on the same frames",
        [](const BenchCommand& command) { return bench_pose_rows(command.pose); }},

@@ -99,7 +99,7 @@ TEST(Recipe, FieldsOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.second_size = 6; }));
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.stored_size = 0; }));
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.index_base = 1; }));
-  EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.reserved[4] = 1; }));
+  EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.reserved[8] = 1; }));
 }
 
 TEST(Recipe, ABitOfAPieceIsABitTooMany) {
