@@ -179,6 +179,16 @@ std::span<const std::uint16_t> ChunkOrderer::order(std::span<const std::byte> ve
   return old_of_new_;
 }
 
+void LevelOrderer::order(std::span<std::uint16_t> indices, std::uint32_t vertex_count) {
+  for (std::size_t v = numbers_.size(); v < vertex_count; ++v) {
+    numbers_.push_back(static_cast<std::uint16_t>(v));
+  }
+  // Vertices are told by their numbers, so that none becomes another.
+  const auto numbers = std::span<const std::uint16_t>(numbers_).first(vertex_count);
+  const auto old = orderer_.order(std::as_bytes(numbers), sizeof numbers_[0], indices);
+  for (std::uint16_t& index : indices) index = old[index];
+}
+
 std::uint64_t count_cache_misses(std::span<const std::uint16_t> indices, std::uint32_t cache_size) {
   std::vector<std::uint64_t> entered(65536, 0);
   std::uint64_t misses = 0;

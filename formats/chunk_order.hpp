@@ -58,6 +58,18 @@ class ChunkOrderer {
   std::uint32_t cursor_ = 0;
 };
 
+/// Orders the triangles of a coarser level, whose vertices stay where level 0 has them.
+class LevelOrderer {
+ public:
+  /// indices: 3 a triangle, each below vertex_count (at most 65536). The result hangs on the set of
+  /// triangles alone.
+  void order(std::span<std::uint16_t> indices, std::uint32_t vertex_count);
+
+ private:
+  ChunkOrderer orderer_;
+  std::vector<std::uint16_t> numbers_;
+};
+
 /// Vertices that a first-in-first-out cache of `cache_size` entries transforms for these triangles;
 /// divided by the triangles it is the average cache miss ratio (0.5 is ideal, 3 the worst).
 std::uint64_t count_cache_misses(std::span<const std::uint16_t> indices, std::uint32_t cache_size);

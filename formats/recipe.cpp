@@ -26,7 +26,7 @@ bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t limit) {
 /// What is wrong with a piece, or nullptr.
 const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
   const auto form = static_cast<PieceForm>(piece.form);
-  if (form < PieceForm::kStored || form > PieceForm::kFeatureText) return "its form is not known";
+  if (form < PieceForm::kStored || form > PieceForm::kLevel) return "its form is not known";
   if (!is_zero(piece.reserved)) return "its reserved bytes are not zero";
   if (piece.raw_size == 0 || piece.raw_size > kMaxPieceBytes ||
       piece.stored_size > kMaxPieceBytes) {
@@ -36,7 +36,8 @@ const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
   if (!two_parts && (piece.second_offset != 0 || piece.second_size != 0)) {
     return "it has a second part that its form does not know";
   }
-  if (form != PieceForm::kMesh && piece.index_base != 0) return "it has no indices to shift";
+  if (form != PieceForm::kMesh && form != PieceForm::kLevel && piece.index_base != 0)
+    return "it has no indices to shift";
   if (!fits(piece.second_offset, piece.second_size, bundle_size)) return "it leaves the bundle";
   if (form == PieceForm::kFeatureText) {
     if (piece.stored_size != 0 || !is_zero(piece.id)) return "a derived piece has nothing stored";
@@ -46,6 +47,7 @@ const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
   if (form == PieceForm::kStored && piece.stored_size != piece.raw_size) {
     return "stored and raw size differ";
   }
+  if (form == PieceForm::kLevel && piece.raw_size % 6 != 0) return "its indices make no triangles";
   if (form == PieceForm::kZstdHalves && piece.raw_size % 8 != 0) return "it is not of ETC1 blocks";
   if (form == PieceForm::kMesh &&
       (piece.second_size >= piece.raw_size || piece.second_size % 6 != 0)) {

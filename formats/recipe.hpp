@@ -28,7 +28,8 @@ enum class PieceForm : std::uint8_t {
   kZstd = 2,        ///< a zstd frame of them
   kZstdHalves = 3,  ///< ETC1: a zstd frame of the blocks' first four bytes, then of their last four
   kMesh = 4,        ///< a mesh object (modar/mesh_transport.hpp)
-  kFeatureText = 5,  ///< nothing travels: the text of the feature twin at twin_offset
+  kFeatureText = 5,  ///< nothing travels: the text of the feature twin at second_offset
+  kLevel = 6,        ///< a coarser level's indices: zstd of meshoptimizer's index codec
 };
 
 struct RecipeHeader {
@@ -51,7 +52,7 @@ struct PieceRecord {
   std::uint32_t raw_size;       ///< bytes
   std::uint32_t stored_size;    ///< bytes; 0 for kFeatureText
   std::uint32_t second_size;    ///< bytes: kMesh: of the indices; kFeatureText: of the twin; else 0
-  std::uint16_t index_base;     ///< kMesh, else 0
+  std::uint16_t index_base;     ///< kMesh, kLevel: added to each index; else 0
   std::uint8_t form;            ///< PieceForm
   std::uint8_t reserved[9];
 };

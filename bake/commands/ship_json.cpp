@@ -19,6 +19,8 @@ const char* form_name(PieceForm form) {
       return "mesh";
     case PieceForm::kFeatureText:
       return "derived-text";
+    case PieceForm::kLevel:
+      return "level";
   }
   return "";
 }

@@ -29,34 +29,20 @@ MaterialRecord material_record(const SourceMaterial& source) {
   return m;
 }
 
-/// Coarse triangles in the numbers of the packed vertices, in the order of chunk_order.hpp. Those
-/// of which two vertices became one are left out: they had no area.
-class LevelOrderer {
- public:
-  std::vector<std::uint16_t> order(const std::vector<std::uint16_t>& indices,
-                                   const ChunkOrderer& places, std::size_t vertex_count) {
-    for (std::size_t v = numbers_.size(); v < vertex_count; ++v) {
-      numbers_.push_back(static_cast<std::uint16_t>(v));
-    }
-    std::vector<std::uint16_t> ordered;
-    ordered.reserve(indices.size());
-    for (std::size_t i = 0; i < indices.size(); i += 3) {
-      const std::array<std::uint16_t, 3> t = {
-          places.place(indices[i]), places.place(indices[i + 1]), places.place(indices[i + 2])};
-      if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-      ordered.insert(ordered.end(), t.begin(), t.end());
-    }
-    // Vertices stay where level 0 has them: each is told by its number.
-    const auto numbers = std::span<const std::uint16_t>(numbers_).first(vertex_count);
-    const auto old = orderer_.order(std::as_bytes(numbers), sizeof numbers_[0], ordered);
-    for (std::uint16_t& index : ordered) index = old[index];
-    return ordered;
+/// Coarse triangles in the numbers of the packed vertices. Those of which two vertices became one
+/// are left out: they had no area.
+std::vector<std::uint16_t> coarse_triangles(const std::vector<std::uint16_t>& indices,
+                                            const ChunkOrderer& places) {
+  std::vector<std::uint16_t> coarse;
+  coarse.reserve(indices.size());
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    const std::array<std::uint16_t, 3> t = {places.place(indices[i]), places.place(indices[i + 1]),
+                                            places.place(indices[i + 2])};
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    coarse.insert(coarse.end(), t.begin(), t.end());
   }
-
- private:
-  ChunkOrderer orderer_;
-  std::vector<std::uint16_t> numbers_;
-};
+  return coarse;
+}
 
 /// Puts chunks in order and behind each other. Chunks that follow each other share one range of
 /// vertices, hence one set-up of attributes, as long as 16 bits reach all of it. Their indices of
@@ -74,8 +60,9 @@ class ChunkAppender {
     const std::size_t first = out_.levels.size();
     add_level(0, 0.0, indices);
     for (const ChunkLevel& level : chunk.coarser) {
-      const auto coarse = level_orderer_.order(level.indices, orderer_, order.size());
+      std::vector<std::uint16_t> coarse = coarse_triangles(level.indices, orderer_);
       if (coarse.empty()) break;
+      level_orderer_.order(coarse, static_cast<std::uint32_t>(order.size()));
       add_level(out_.levels.size() - first, level.error, coarse);
     }
     for (const std::uint16_t old : order) {

@@ -33,4 +33,8 @@ std::optional<std::vector<std::byte>> encode_mesh_object(std::span<const std::by
                                                          std::span<const std::uint16_t> indices,
                                                          const LayoutRecord& layout);
 
+/// The indices of a coarser level for decode_level(), which was seen to give them back; nothing if
+/// they stand in another order than the bake's.
+std::optional<std::vector<std::byte>> encode_level(std::span<const std::uint16_t> indices);
+
 }  // namespace modar

@@ -106,7 +106,10 @@ class RecipeMaker {
       : bundle_(bundle), options_(options) {}
 
   Result<PublishedBundle> make() {
-    if (options_.geometry) draft_meshes();
+    if (options_.geometry) {
+      draft_meshes();
+      draft_levels();
+    }
     draft_texts();
     draft_rest();
     parallel_rows(static_cast<std::uint32_t>(drafts_.size()), options_.jobs,
@@ -153,11 +156,53 @@ class RecipeMaker {
     }
   }
 
+  /// Indices of coarser levels, local to the vertices of level 0.
+  void draft_levels() {
+    for (std::uint32_t c = 0; c < bundle_.chunks().size(); ++c) {
+      const ChunkRecord& chunk = bundle_.chunks()[c];
+      std::uint16_t base = 0xFFFF;
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        const LevelRecord& level = bundle_.levels()[chunk.first_level + l];
+        const auto bytes = bundle_.indices().subspan(level.index_offset, 2ull * level.index_count);
+        std::vector<std::uint16_t> indices(level.index_count);
+        std::memcpy(indices.data(), bytes.data(), bytes.size());
+        if (l == 0) {
+          for (const std::uint16_t index : indices) base = std::min(base, index);
+        } else {
+          draft_level(place_in(bundle_, bytes), base, std::move(indices));
+        }
+      }
+    }
+  }
+
+  void draft_level(std::uint64_t offset, std::uint16_t base, std::vector<std::uint16_t> indices) {
+    for (std::uint16_t& index : indices) {
+      if (index < base) return;
+      index = static_cast<std::uint16_t>(index - base);
+    }
+    const auto raw = std::as_bytes(std::span(indices));
+    const auto coded = encode_level(indices);
+    if (!coded || is_covered(offset, raw.size())) return;
+    Draft draft;
+    draft.stored = zstd(*coded);
+    if (zstd(raw).size() <= draft.stored.size()) return;
+    draft.record.form = static_cast<std::uint8_t>(PieceForm::kLevel);
+    draft.record.offset = offset;
+    draft.record.raw_size = static_cast<std::uint32_t>(raw.size());
+    draft.record.index_base = base;
+    draft.raw.assign(raw.begin(), raw.end());
+    cover(offset, raw.size());
+    drafts_.push_back(std::move(draft));
+  }
+
+  [[nodiscard]] bool is_covered(std::uint64_t begin, std::uint64_t size) const {
+    return std::any_of(covered_.begin(), covered_.end(),
+                       [&](const Covered& c) { return begin < c.end && c.begin < begin + size; });
+  }
+
   [[nodiscard]] bool overlaps(const ChunkPlace& place) const {
-    return std::any_of(covered_.begin(), covered_.end(), [&](const Covered& c) {
-      return (place.vertices < c.end && c.begin < place.vertices + place.vertex_bytes) ||
-             (place.indices < c.end && c.begin < place.indices + place.index_bytes);
-    });
+    return is_covered(place.vertices, place.vertex_bytes) ||
+           is_covered(place.indices, place.index_bytes);
   }
 
   /// Texts that their twins give.

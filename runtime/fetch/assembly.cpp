@@ -9,16 +9,20 @@
 namespace modar::fetch {
 namespace {
 
-Result<void> write_raw(OutputFile& file, const PieceRecord& piece, std::span<std::byte> raw) {
-  const std::size_t second_size =
-      static_cast<PieceForm>(piece.form) == PieceForm::kMesh ? piece.second_size : 0;
-  const auto second = raw.last(second_size);
-  for (std::size_t i = 0; i + 1 < second.size(); i += 2) {
+void shift_indices(std::span<std::byte> indices, std::uint16_t base) {
+  for (std::size_t i = 0; i + 1 < indices.size(); i += 2) {
     std::uint16_t index = 0;
-    std::memcpy(&index, second.data() + i, 2);
-    index = static_cast<std::uint16_t>(index + piece.index_base);
-    std::memcpy(second.data() + i, &index, 2);
+    std::memcpy(&index, indices.data() + i, 2);
+    index = static_cast<std::uint16_t>(index + base);
+    std::memcpy(indices.data() + i, &index, 2);
   }
+}
+
+Result<void> write_raw(OutputFile& file, const PieceRecord& piece, std::span<std::byte> raw) {
+  const auto form = static_cast<PieceForm>(piece.form);
+  const std::size_t second_size = form == PieceForm::kMesh ? piece.second_size : 0;
+  const auto second = raw.last(second_size);
+  shift_indices(form == PieceForm::kLevel ? raw : second, piece.index_base);
   if (auto done = file.write_at(piece.offset, raw.data(), raw.size() - second_size); !done) {
     return done;
   }

@@ -42,14 +42,15 @@ std::optional<std::vector<std::byte>> PieceSource::raw(const ObjectId& id) const
   const auto& [old, piece] = place->second;
   const auto bytes = old->bundle.bytes();
   const auto first = bytes.subspan(piece->offset, piece->raw_size - piece->second_size);
-  std::vector<std::byte> raw(first.begin(), first.end());
   const auto second = bytes.subspan(piece->second_offset, piece->second_size);
-  for (std::size_t i = 0; i + 1 < second.size(); i += 2) {
+  std::vector<std::byte> raw(first.begin(), first.end());
+  raw.insert(raw.end(), second.begin(), second.end());
+  const bool level = static_cast<PieceForm>(piece->form) == PieceForm::kLevel;
+  for (std::size_t i = level ? 0 : first.size(); i + 1 < raw.size(); i += 2) {
     std::uint16_t index = 0;
-    std::memcpy(&index, second.data() + i, 2);
+    std::memcpy(&index, raw.data() + i, 2);
     index = static_cast<std::uint16_t>(index - piece->index_base);
-    const auto local = std::as_bytes(std::span(&index, 1));
-    raw.insert(raw.end(), local.begin(), local.end());
+    std::memcpy(raw.data() + i, &index, 2);
   }
   if (raw_hash(raw) != piece->raw_hash) return std::nullopt;
   return raw;

@@ -59,6 +59,17 @@ Result<std::vector<std::byte>> text_bytes(std::span<const std::byte> twin) {
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }
 
+Result<std::vector<std::byte>> level_bytes(const PieceRecord& piece,
+                                           std::span<const std::byte> stored) {
+  const auto size = ZSTD_getFrameContentSize(stored.data(), stored.size());
+  const auto buffer = unpack_zstd(stored, size <= kMaxPieceBytes ? size : 0);
+  if (!buffer) return tl::unexpected(buffer.error());
+  const auto indices = decode_level(*buffer, piece.raw_size / 2);
+  if (!indices) return tl::unexpected(indices.error());
+  const auto bytes = std::as_bytes(std::span(*indices));
+  return std::vector<std::byte>(bytes.begin(), bytes.end());
+}
+
 Result<std::vector<std::byte>> raw_bytes(const PieceRecord& piece,
                                          std::span<const std::byte> stored) {
   switch (static_cast<PieceForm>(piece.form)) {
@@ -72,6 +83,8 @@ Result<std::vector<std::byte>> raw_bytes(const PieceRecord& piece,
       return mesh_bytes(stored);
     case PieceForm::kFeatureText:
       return text_bytes(stored);
+    case PieceForm::kLevel:
+      return level_bytes(piece, stored);
   }
   return fail(ExitCode::kUnsupported, "piece.form", "piece", "its form is not known",
               "use a newer modar-fetch");

@@ -1,15 +1,25 @@
 """Keys, bundles and releases for the tests of shipping."""
+import functools
 import json
+import math
 import os
 import pathlib
 import shutil
-import struct
 import subprocess
 import tempfile
 
-from programs import BIN, COVER, POTTERY, ROOT, ProgramTest
+from programs import BIN, COVER, ProgramTest
 
-BUST = ROOT / "assets" / "models" / "bust.obj"
+
+def sheet(path, side, wave):
+    """A wavy sheet of 2 * side * side triangles, as OBJ."""
+    lines = [f"v {x} {y} {3 * math.sin(x * wave) * math.cos(y * 0.3)}" for y in range(side + 1) for x in range(side + 1)]
+    for y in range(side):
+        for x in range(side):
+            a = y * (side + 1) + x + 1
+            lines.append(f"f {a} {a + 1} {a + side + 2} {a + side + 1}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
 
 
 def run(*arguments):
@@ -26,9 +36,14 @@ class Shop:
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="modar-ship-"))
         self.key = self.folder / "test.key"
         run(BIN / "modar", "ship", "keygen", "--out", self.key)
-        self.old = self.bake("old", "--model", POTTERY)
-        self.new = self.bake("new", "--model", POTTERY, "--model", BUST)
-        self.pattern = self.bake("pattern", "--pattern", COVER)
+        first = sheet(self.folder / "first.obj", 60, 0.4)
+        second = sheet(self.folder / "second.obj", 45, 0.7)
+        self.old = self.bake("old", "--model", first)
+        self.new = self.bake("new", "--model", first, "--model", second)
+
+    @functools.cached_property
+    def pattern(self):
+        return self.bake("pattern", "--pattern", COVER)
 
     def bake(self, name, *arguments):
         bundle = self.folder / name / "museum.modar"

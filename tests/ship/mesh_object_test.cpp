@@ -152,6 +152,27 @@ TEST(MeshObject, RestoresWhatNoEditorWouldMake) {
   }
 }
 
+TEST(MeshObject, LevelsComeBackInTheirOrder) {
+  Mesh mesh = sheet(full_layout(), 30);
+  mesh.order();
+  std::vector<std::uint16_t> indices;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 9) {
+    indices.insert(indices.end(), {mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]});
+  }
+  EXPECT_FALSE(encode_level(indices)) << "not in the bake's order";
+  LevelOrderer orderer;
+  orderer.order(indices, 65536);
+  const auto buffer = encode_level(indices);
+  ASSERT_TRUE(buffer);
+  EXPECT_LT(buffer->size(), 2 * indices.size());
+  const auto back = decode_level(*buffer, indices.size());
+  ASSERT_TRUE(back);
+  EXPECT_EQ(*back, indices);
+  for (std::size_t size = 0; size < buffer->size(); ++size) {
+    EXPECT_FALSE(decode_level(std::span(*buffer).first(size), indices.size()));
+  }
+}
+
 TEST(MeshObject, RefusesAnotherOrderThanTheBakes) {
   Mesh mesh = sheet(full_layout(), 6);
   mesh.order();

@@ -115,7 +115,7 @@ TEST(Mutations, RecipesAndPieces) {
     const std::string bytes =
         mutated(std::string(reinterpret_cast<const char*>(stored.data()), stored.size()), random);
     PieceRecord other = piece;
-    if (random() % 4 == 0) other.form = static_cast<std::uint8_t>(1 + random() % 5);
+    if (random() % 4 == 0) other.form = static_cast<std::uint8_t>(1 + random() % 6);
     if (const auto raw = decode_piece(other, as_bytes(bytes))) {
       ASSERT_EQ(raw->size(), piece.raw_size);
     }

@@ -51,6 +51,11 @@ struct DracoMesh {
 /// to a chunk's limits. Errors: kInvalidInput "mesh.draco".
 Result<DracoMesh> decode_draco(std::span<const std::byte> buffer);
 
+/// The indices of a coarser level, in the order of LevelOrderer, from meshoptimizer's index codec.
+/// Errors: kInvalidInput "mesh.level".
+Result<std::vector<std::uint16_t>> decode_level(std::span<const std::byte> buffer,
+                                                std::size_t index_count);
+
 /// The chunk of a mesh object. Errors: kInvalidInput "mesh.*".
 Result<MeshBytes> decode_mesh_object(std::span<const std::byte> object);
 
