@@ -1,4 +1,5 @@
 // Reads the options of a bake back from the meta text that bundle_meta() wrote.
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +10,8 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr std::uint32_t kLeastTextureSide = 4;  // as the command line has it
+
 /// Takes a key over where it is there and of that type: the text may be anyone's.
 template <class T>
 void take(const Json& options, const char* key, T& value) {
@@ -18,6 +21,11 @@ void take(const Json& options, const char* key, T& value) {
     if (found->is_boolean()) value = found->get<bool>();
   } else if constexpr (std::is_same_v<T, std::string>) {
     if (found->is_string()) value = found->get<std::string>();
+  } else if constexpr (std::is_integral_v<T>) {
+    // Numbers beyond the type would be cast to anything.
+    if (found->is_number_integer() && *found >= 0 && *found <= std::numeric_limits<T>::max()) {
+      value = found->get<T>();
+    }
   } else {
     if (found->is_number()) value = found->get<T>();
   }
@@ -38,7 +46,9 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
     request.textures.effort = static_cast<Etc1Effort>(effort);
   }
   take(options, "perceptual", request.textures.perceptual);
-  take(options, "max_texture", request.textures.max_side);
+  std::uint32_t side = request.textures.max_side;
+  take(options, "max_texture", side);
+  if (side >= kLeastTextureSide && side <= kMaxTextureSide) request.textures.max_side = side;
   take(options, "mipmaps", request.textures.mipmaps);
   take(options, "unit_metres", request.unit_metres);
   take(options, "max_error", request.max_error.value);

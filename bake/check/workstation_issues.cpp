@@ -40,6 +40,10 @@ constexpr IssueKind kKinds[] = {
      "bake it again from this source"},
     {"SOURCE_COUNTS", Severity::kError, "Counts differ from those of the source",
      "bake it again from this source"},
+    {"POSE_RANGE", Severity::kWarning, "A pattern is missed in easy views",
+     "use a picture with more texture, evenly spread, or a larger print"},
+    {"VISUAL_DIFFERS", Severity::kError, "A model does not look like its source",
+     "look at the picture of the worst view; bake with larger textures or a smaller --max-error"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 

@@ -24,6 +24,8 @@ enum class WorkstationRule : std::uint8_t {
   kSourceSurface,
   kSourceColour,
   kSourceCounts,
+  kPoseRange,
+  kVisualDiffers,
   kCount
 };
 

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "bake/check/device_rules.hpp"
 #include "bake/check/verdict.hpp"
@@ -76,6 +77,60 @@ Result<SourceFit> against_sources(const BundleView& bundle, const CheckCommand& 
   return check_source(bundle, request, sink, report);
 }
 
+Result<std::vector<PatternRange>> with_the_devices_eye(const BundleView& bundle,
+                                                       const CheckCommand& command,
+                                                       const IssueSink& sink) {
+  PoseCheckOptions options;
+  for (const std::string& path : command.sources) {
+    if (!is_model(path)) options.pictures.push_back(path);
+  }
+  ProgressBar bar(command.json || command.sarif);
+  options.views = command.pose_views;
+  options.progress = [&bar](double done) { bar.show("pose", done); };
+  return check_poses(bundle, options, sink);
+}
+
+Result<std::vector<ModelLook>> beside_sources(const BundleView& bundle, const CheckCommand& command,
+                                              const IssueSink& sink) {
+  std::error_code error;
+  std::filesystem::create_directories(command.visual, error);
+  if (error) {
+    return fail(ExitCode::kIo, "check.folder", command.visual, error.message(),
+                "name a folder that can be made");
+  }
+  VisualOptions options;
+  for (const std::string& path : command.sources) {
+    if (is_model(path)) options.models.push_back(path);
+  }
+  options.picture_folder = command.visual;
+  options.jobs = command.jobs;
+  ProgressBar bar(command.json || command.sarif);
+  options.progress = [&bar](double done) { bar.show("look", done); };
+  return check_looks(bundle, options, sink);
+}
+
+void print_looks(const std::vector<ModelLook>& looks) {
+  for (const ModelLook& look : looks) {
+    if (!look.judged) {
+      std::printf("model '%s': translucent, its looks are not judged\n", look.name.c_str());
+      continue;
+    }
+    std::printf("model '%s': SSIM %.4f, worst %.4f; colour off by %.2f, worst %.2f; see %s\n",
+                look.name.c_str(), look.ssim_mean, look.ssim_worst, look.delta_e_mean,
+                look.delta_e_worst, look.picture.c_str());
+  }
+}
+
+void print_ranges(const std::vector<PatternRange>& ranges) {
+  for (const PatternRange& range : ranges) {
+    std::printf(
+        "pattern '%s': found (%s) at %.2g to %.2g times its picture's area, tilted up to "
+        "%.0f degrees; off by %.2f pixels, %.2f degrees, %.2f %% of the distance\n",
+        range.name.c_str(), range.method.c_str(), range.area_low, range.area_high, range.tilt_deg,
+        range.corner_px, range.rotation_deg, range.translation_percent);
+  }
+}
+
 void print_fit(const SourceFit& fit) {
   for (const ModelFit& model : fit.models) {
     std::printf(
@@ -120,6 +175,16 @@ int run_check(const CheckCommand& command) {
       if (!fit) return print_error(fit.error());
       extras.source = std::move(*fit);
     }
+    if (!command.visual.empty()) {
+      Result<std::vector<ModelLook>> looks = beside_sources(*bundle, command, sink);
+      if (!looks) return print_error(looks.error());
+      extras.looks = std::move(*looks);
+    }
+    if (command.pose) {
+      Result<std::vector<PatternRange>> ranges = with_the_devices_eye(*bundle, command, sink);
+      if (!ranges) return print_error(ranges.error());
+      extras.poses = std::move(*ranges);
+    }
   }
 
   if (command.sarif) {
@@ -129,6 +194,8 @@ int run_check(const CheckCommand& command) {
   } else {
     print_issues(command.bundle, verdict);
     if (extras.source) print_fit(*extras.source);
+    print_looks(extras.looks);
+    print_ranges(extras.poses);
   }
   return static_cast<int>(verdict.good() ? ExitCode::kOk : ExitCode::kInvalidInput);
 }

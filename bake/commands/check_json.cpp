@@ -57,6 +57,47 @@ Json source_json(const SourceFit& fit) {
   return {{"models", models}, {"same", fit.same}, {"different", fit.different}};
 }
 
+Json poses_json(const std::vector<PatternRange>& ranges) {
+  Json list = Json::array();
+  for (const PatternRange& range : ranges) {
+    Json steps = Json::array();
+    for (const PoseStep& step : range.steps) {
+      steps.push_back({{"area", step.area},
+                       {"tilt_deg", step.tilt_deg},
+                       {"views", step.views},
+                       {"right", step.right},
+                       {"corner_px", step.corner_px},
+                       {"rotation_deg", step.rotation_deg},
+                       {"translation_percent", step.translation_percent}});
+    }
+    list.push_back({{"pattern", range.name},
+                    {"method", range.method},
+                    {"area_low", range.area_low},
+                    {"area_high", range.area_high},
+                    {"tilt_deg", range.tilt_deg},
+                    {"corner_px", range.corner_px},
+                    {"rotation_deg", range.rotation_deg},
+                    {"translation_percent", range.translation_percent},
+                    {"steps", steps}});
+  }
+  return list;
+}
+
+Json looks_json(const std::vector<ModelLook>& looks) {
+  Json list = Json::array();
+  for (const ModelLook& look : looks) {
+    list.push_back({{"model", look.name},
+                    {"judged", look.judged},
+                    {"ssim_mean", look.ssim_mean},
+                    {"ssim_worst", look.ssim_worst},
+                    {"delta_e_mean", look.delta_e_mean},
+                    {"delta_e_worst", look.delta_e_worst},
+                    {"worst_view", look.worst_view},
+                    {"picture", look.picture.empty() ? Json(nullptr) : Json(look.picture)}});
+  }
+  return list;
+}
+
 const char* sarif_level(Severity severity) {
   return severity == Severity::kInfo ? "note" : severity_name(severity);
 }
@@ -106,6 +147,8 @@ std::string check_json(const Verdict& verdict, const CheckExtras& extras) {
                    {"issues", list},
                    {"left_out", left_out}};
   if (extras.source) document["source"] = source_json(*extras.source);
+  if (!extras.poses.empty()) document["poses"] = poses_json(extras.poses);
+  if (!extras.looks.empty()) document["looks"] = looks_json(extras.looks);
   return dump(document);
 }
 

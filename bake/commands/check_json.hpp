@@ -5,8 +5,10 @@
 #include <string>
 
 #include "bake/check/mutate.hpp"
+#include "bake/check/pose_check.hpp"
 #include "bake/check/source_check.hpp"
 #include "bake/check/verdict.hpp"
+#include "bake/check/visual_check.hpp"
 
 namespace modar {
 
@@ -14,6 +16,8 @@ namespace modar {
 struct CheckExtras {
   std::string device;  ///< empty: none
   std::optional<SourceFit> source;
+  std::vector<PatternRange> poses;
+  std::vector<ModelLook> looks;
 };
 
 /// `modar check --json`; its schema is bake/commands/check.schema.json.

@@ -155,9 +155,24 @@ CLI::App* add_check(CLI::App& app, CheckCommand& check) {
   sub->add_option("--device", check.device,
                   "Hold the bundle against a device too: " + device_profile_names())
       ->type_name("NAME");
-  sub->add_option("--source", check.sources,
-                  "Bake these models and pattern images again and compare; measure what differs")
-      ->type_name("FILE");
+  CLI::Option* source =
+      sub->add_option(
+             "--source", check.sources,
+             "Bake these models and pattern images again and compare; measure what differs")
+          ->type_name("FILE");
+  CLI::Option* pose =
+      sub->add_flag("--pose", check.pose,
+                    "Track the patterns of --source in rendered views: errors and working range")
+          ->needs(source);
+  sub->add_option("--pose-views", check.pose_views, "Views of each size and tilt")
+      ->needs(pose)
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  sub->add_option("--visual", check.visual,
+                  "Render the models of --source and of the bundle from 12 sides and compare; the "
+                  "worst view of each goes to DIR")
+      ->type_name("DIR")
+      ->needs(source);
   sub->add_option("--severity", check.severities,
                   "Weigh a kind of issue anew: ID=error, warning, info or ignore; repeatable")
       ->type_name("ID=SEVERITY")

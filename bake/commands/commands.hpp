@@ -31,6 +31,9 @@ struct CheckCommand {
   bool warnings_as_errors = false;
   bool sarif = false;
   std::vector<std::string> severities;  ///< "ID=warning": weighed anew
+  std::string visual;                   ///< folder for pictures of worst views; empty: no look
+  int pose_views = 6;                   ///< of each size and tilt
+  bool pose = false;                    ///< measure the patterns' working ranges
   std::vector<std::string> sources;     ///< models and pattern images to hold the bundle against
   unsigned jobs = 1;
   std::string device;  ///< profile that the bundle is held against; empty: none

@@ -1,5 +1,7 @@
 """`modar check` from the outside: verdicts, documents that keep their schemas, severities, devices, the proof."""
 import json
+import os
+import pathlib
 import shutil
 import unittest
 
@@ -130,6 +132,39 @@ class Check(ProgramTest):
         self.assertIn("SOURCE_COUNTS", [issue["id"] for issue in found["issues"]])
         other = self.with_sources(0, path, POTTERY.parent / "statue.obj")
         self.assertIn("SOURCE_MISSING", [issue["id"] for issue in other["issues"]])
+
+    def test_models_are_looked_at_beside_their_sources(self):
+        path = self.folder / "pottery.modar"
+        done = self.modar("bake", "--model", POTTERY, "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        looks = json.loads(self.check(0, path, "--json", "--source", POTTERY, "--visual", self.folder / "looks"))
+        jsonschema.validate(looks, OURS)
+        look = looks["looks"][0]
+        self.assertGreater(look["ssim_worst"], 0.97)
+        self.assertLess(look["delta_e_worst"], 4)
+        self.assertEqual(pathlib.Path(look["picture"]).read_bytes()[1:4], b"PNG")
+        for file in POTTERY.parent.glob("pottery.*"):
+            shutil.copy(file, self.folder)
+        material = self.folder / "pottery.mtl"
+        material.write_text(material.read_text().replace("Kd 1 1 1", "Kd 1 0.6 1"))
+        other = json.loads(self.check(3, path, "--json", "--source", self.folder / "pottery.obj", "--visual",
+                                      self.folder / "looks"))
+        self.assertIn("VISUAL_DIFFERS", [issue["id"] for issue in other["issues"]])
+
+    @unittest.skipUnless(os.environ.get("MODAR_SOAK") == "1", "a minute under ASan: with --soak")
+    def test_patterns_are_tracked_in_rendered_views(self):
+        path = self.folder / "cover.modar"
+        done = self.modar("bake", "--pattern", COVER, "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        document = json.loads(self.check(0, path, "--json", "--source", COVER, "--pose", "--pose-views", 1))
+        jsonschema.validate(document, OURS)
+        pose = document["poses"][0]
+        self.assertEqual(len(pose["steps"]), 14)
+        front = next(s for s in pose["steps"] if s["area"] == 1 and s["tilt_deg"] == 0)
+        self.assertEqual((front["views"], front["right"]), (1, 1))
+        self.assertLess(front["corner_px"], 5)
+        self.assertLess(pose["rotation_deg"], 3)
+        self.assertLess(pose["area_low"], 1)
 
     def test_bakes_are_proven_to_be_reproducible(self):
         out = self.folder / "a.modar"

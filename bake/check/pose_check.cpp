@@ -1,0 +1,259 @@
+// Sweeps size and tilt.
+#include "bake/check/pose_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "bake/bundle_builder.hpp"
+#include "bake/check/workstation_issues.hpp"
+#include "bake/pattern/pattern_picture.hpp"
+#include "bake/pattern/pose_scene.hpp"
+#include "modar/pose_loop.hpp"
+#include "modar/tracker.hpp"
+
+namespace modar {
+namespace {
+
+constexpr double kRightPixels = 5.0;
+constexpr double kDegrees = 57.29577951308232;
+constexpr double kAreas[] = {0.1, 0.16, 0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0};
+constexpr double kTilts[] = {15, 30, 45, 60, 70};
+constexpr double kExpectedTilt = 30;
+
+/// Either tracker, stepping over unrelated frames.
+class Eye {
+ public:
+  static Result<Eye> open(const BundleView& bundle, const Camera& camera) {
+    Eye eye;
+    const bool records = std::any_of(
+        bundle.sections().begin(), bundle.sections().end(), [](const SectionEntry& entry) {
+          return entry.type == static_cast<std::uint32_t>(SectionType::kLoopRecord);
+        });
+    if (records) {
+      PoseLoopOptions options;
+      options.track = false;
+      auto ours = PoseLoop::create(bundle, camera, options);
+      if (!ours) return tl::unexpected(ours.error());
+      eye.ours_ = std::move(*ours);
+      return eye;
+    }
+    const std::uint32_t set = bundle.parameter_sets().empty() ? 0 : bundle.parameter_sets()[0].id;
+    auto paper = PaperTracker::create(bundle, set, camera);
+    if (!paper) return tl::unexpected(paper.error());
+    eye.paper_ = std::move(*paper);
+    return eye;
+  }
+  [[nodiscard]] const char* method() const { return ours_ ? "ours" : "paper"; }
+  Result<TrackResult> step(const GrayImage& frame) {
+    return ours_ ? ours_->step(frame) : paper_->step(frame);
+  }
+
+ private:
+  std::unique_ptr<PoseLoop> ours_;
+  std::unique_ptr<PaperTracker> paper_;
+};
+
+/// Smooth blotches with texture of every size, so that there is something to be mistaken for.
+GrayPicture made_background(int width, int height, Random& random) {
+  GrayPicture picture{width, height, {}};
+  std::vector<double> sum(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 128);
+  for (int cell = 256; cell >= 4; cell /= 2) {
+    const int columns = width / cell + 2;
+    const int rows = height / cell + 2;
+    std::vector<double> knots(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    for (double& knot : knots) knot = random.uniform(-1, 1) * std::sqrt(cell) * 4;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const double u = 1.0 * (x % cell) / cell;
+        const double v = 1.0 * (y % cell) / cell;
+        const auto knot = [&](int i, int j) {
+          return knots[static_cast<std::size_t>((y / cell + j) * columns + x / cell + i)];
+        };
+        sum[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+            static_cast<std::size_t>(x)] += (knot(0, 0) * (1 - u) + knot(1, 0) * u) * (1 - v) +
+                                            (knot(0, 1) * (1 - u) + knot(1, 1) * u) * v;
+      }
+    }
+  }
+  for (const double value : sum) {
+    picture.pixels.push_back(static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0)));
+  }
+  return picture;
+}
+
+class PatternSweep {
+ public:
+  PatternSweep(Eye& eye, std::uint32_t pattern, GrayPicture picture, const Camera& camera,
+               const PoseCheckOptions& options)
+      : eye_(eye),
+        pattern_(pattern),
+        picture_(std::move(picture)),
+        camera_(camera),
+        options_(options),
+        random_(options.seed + 7919 * pattern),
+        background_(made_background(camera.width, camera.height, random_)) {}
+
+  Result<PoseStep> step(double area, double tilt) {
+    PoseStep step;
+    step.area = area;
+    step.tilt_deg = tilt;
+    SceneBand band;
+    band.area_low = band.area_high = area;
+    band.tilt_low = band.tilt_high = tilt;
+    for (; step.views < options_.views; ++step.views) {
+      const Pose pose = draw_pose(band, picture_.view(), camera_, random_);
+      const SceneFrame scene =
+          render_scene(picture_.view(), camera_, pose, background_, band, random_);
+      const Result<TrackResult> seen = eye_.step(scene.picture.view());
+      if (!seen) return tl::unexpected(seen.error());
+      add(step, scene, *seen);
+    }
+    if (step.right > 0) {
+      step.corner_px /= step.right;
+      step.rotation_deg /= step.right;
+      step.translation_percent /= step.right;
+    }
+    return step;
+  }
+
+ private:
+  void add(PoseStep& step, const SceneFrame& truth, const TrackResult& seen) const {
+    for (const Sighting& sighting : seen.visible) {
+      if (sighting.pattern != pattern_) continue;
+      double off = 0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        off += glm::length(sighting.corners[i] - truth.corners[i]) / 4;
+      }
+      if (!(off < kRightPixels)) return;
+      const glm::dmat3 turn = glm::transpose(truth.pose.rotation) * sighting.pose.rotation;
+      ++step.right;
+      step.corner_px += off;
+      step.rotation_deg += glm::length(rotation_vector(turn)) * kDegrees;
+      step.translation_percent += 100 *
+                                  glm::length(sighting.pose.translation - truth.pose.translation) /
+                                  glm::length(truth.pose.translation);
+      return;
+    }
+  }
+
+  Eye& eye_;
+  std::uint32_t pattern_;
+  GrayPicture picture_;
+  Camera camera_;
+  const PoseCheckOptions& options_;
+  Random random_;
+  GrayPicture background_;
+};
+
+bool works(const PoseStep& step) {
+  return 4 * step.right >= 3 * step.views;
+}
+
+/// The range around the picture's own size without a gap, and the mean errors.
+void sum_up(PatternRange& range) {
+  const auto first_tilted = std::find_if(range.steps.begin(), range.steps.end(),
+                                         [](const PoseStep& s) { return s.tilt_deg > 0; });
+  const auto own = std::find_if(range.steps.begin(), first_tilted,
+                                [](const PoseStep& s) { return s.area == 1.0; });
+  range.tilt_deg = -1;
+  if (own != first_tilted && works(*own)) {
+    auto low = own;
+    while (low != range.steps.begin() && works(*std::prev(low))) --low;
+    auto high = own;
+    while (std::next(high) != first_tilted && works(*std::next(high))) ++high;
+    range.area_low = low->area;
+    range.area_high = high->area;
+    range.tilt_deg = 0;
+    for (auto step = first_tilted; step != range.steps.end() && works(*step); ++step) {
+      range.tilt_deg = step->tilt_deg;
+    }
+  }
+  int right = 0;
+  for (const PoseStep& step : range.steps) {
+    right += step.right;
+    range.corner_px += step.right * step.corner_px;
+    range.rotation_deg += step.right * step.rotation_deg;
+    range.translation_percent += step.right * step.translation_percent;
+  }
+  if (right == 0) return;
+  range.corner_px /= right;
+  range.rotation_deg /= right;
+  range.translation_percent /= right;
+}
+
+/// Steps of size from the front, then of tilt at the picture's own size.
+constexpr std::size_t kSteps = std::size(kAreas) + std::size(kTilts);
+
+Result<PatternRange> sweep_pattern(PatternSweep& sweep, const std::function<void()>& stepped) {
+  PatternRange range;
+  for (std::size_t i = 0; i < kSteps; ++i) {
+    const bool front = i < std::size(kAreas);
+    Result<PoseStep> step =
+        front ? sweep.step(kAreas[i], 0) : sweep.step(1.0, kTilts[i - std::size(kAreas)]);
+    if (!step) return tl::unexpected(step.error());
+    range.steps.push_back(*step);
+    stepped();
+  }
+  sum_up(range);
+  return range;
+}
+
+void tell(const BundleView& bundle, const PatternRecord& record, const IssueSink& sink,
+          WorkstationRule rule, std::string detail) {
+  sink(Issue{&workstation_issue_kind(rule),
+             "pattern '" + std::string(bundle.name(record.name)) + "'",
+             static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(&record) -
+                                        bundle.bytes().data()),
+             std::move(detail)});
+}
+
+}  // namespace
+
+Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
+                                              const PoseCheckOptions& options,
+                                              const IssueSink& sink) {
+  std::vector<PatternRange> ranges;
+  if (bundle.patterns().empty()) return ranges;
+  const Camera camera = default_camera(options.width, options.height);
+  Result<Eye> eye = Eye::open(bundle, camera);
+  if (!eye) return tl::unexpected(eye.error());
+  double done = 0;
+  const auto stepped = [&] {
+    done += 1.0 / (kSteps * static_cast<double>(bundle.patterns().size()));
+    if (options.progress) options.progress(done);
+  };
+  for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
+    const PatternRecord& record = bundle.patterns()[p];
+    const auto path = std::find_if(
+        options.pictures.begin(), options.pictures.end(),
+        [&](const std::string& file) { return file_stem(file) == bundle.name(record.name); });
+    if (path == options.pictures.end()) {
+      tell(bundle, record, sink, WorkstationRule::kSourceMissing,
+           "its picture is needed to render views of it");
+      continue;
+    }
+    bool shrunk = false;
+    Result<GrayPicture> picture = load_pattern(*path, shrunk);
+    if (!picture) return tl::unexpected(picture.error());
+    PatternSweep sweep(*eye, p, std::move(*picture), camera, options);
+    Result<PatternRange> range = sweep_pattern(sweep, stepped);
+    if (!range) return tl::unexpected(range.error());
+    range->name = bundle.name(record.name);
+    range->method = eye->method();
+    if (range->tilt_deg < kExpectedTilt) {
+      tell(bundle, record, sink, WorkstationRule::kPoseRange,
+           range->tilt_deg < 0
+               ? "it is missed from the front"
+               : "it is found up to a tilt of " +
+                     std::to_string(static_cast<int>(range->tilt_deg)) + " degrees");
+    }
+    ranges.push_back(std::move(*range));
+  }
+  return ranges;
+}
+
+}  // namespace modar

@@ -1,0 +1,29 @@
+// A slow renderer in double precision that shares no code with the device's: what a model should
+// look like, from its source and its uncompressed pictures.
+#pragma once
+
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+
+#include "bake/model/tri_mesh.hpp"
+#include "bake/texture/etc1_texture.hpp"
+#include "modar/camera.hpp"
+#include "modar/renderer.hpp"
+
+namespace modar {
+
+/// A material's picture as mip levels; no levels: it has none.
+struct SoftTexture {
+  std::vector<RgbaImage> levels;
+  bool repeat = false;
+};
+
+/// Draws a mesh over the clear colour of `options`, lit like shaders/model.vert lights vertices,
+/// with perspective-correct attributes and trilinear textures; opaque. to_eye: mesh space to GL eye
+/// space. textures: one a material. Pixels are sampled at their centres.
+RgbaImage render_softly(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
+                        const Camera& camera, const glm::dmat4& to_eye,
+                        const RenderOptions& options);
+
+}  // namespace modar

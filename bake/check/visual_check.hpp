@@ -1,0 +1,50 @@
+// Models of a bundle as the device shows them, beside their sources.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bake/texture/etc1_texture.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct VisualOptions {
+  std::vector<std::string> models;  ///< source files, by their stems
+  std::string picture_folder;       ///< the worst view of each model goes there; empty: nowhere
+  int side = 512;                   ///< of a view, pixels
+  double least_ssim = 0.9;          ///< gates, over what shows the model
+  double greatest_delta_e = 4.0;
+  unsigned jobs = 1;
+  std::function<void(double done)> progress;  ///< may be empty
+};
+
+/// The views of one model: from the 12 corners of an icosahedron.
+struct ModelLook {
+  std::string name;
+  bool judged = false;  ///< false: it is translucent, which the reference does not draw
+  double ssim_mean = 1;
+  double ssim_worst = 1;
+  double delta_e_mean = 0;   ///< CIE 1976, mean over the model's pixels, then over the views
+  double delta_e_worst = 0;  ///< of the worst view
+  int worst_view = 0;
+  std::string picture;  ///< source and bundle side by side; empty: not written
+};
+
+/// Mean CIE 1976 colour difference over the pixels where both images differ from `clear`; 0 where
+/// there are none: outlines are for SSIM to judge. Images of one size, sRGB.
+double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
+                    const std::array<std::uint8_t, 3>& clear);
+
+/// Renders sources in double precision from uncompressed pictures and the bundle by the real
+/// renderer, off-screen. Models whose source is not there are left out. Reports VISUAL_DIFFERS.
+/// Errors: those of reading sources; kUnsupported "gl.*"; kIo where a picture cannot be written.
+Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const VisualOptions& options,
+                                           const IssueSink& sink);
+
+}  // namespace modar

@@ -1,0 +1,28 @@
+// libFuzzer target: any text as an MTL file gives materials whose numbers are finite, and findings
+// that tell where.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "bake/model/obj_reader.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  std::vector<modar::Finding> findings;
+  const auto materials =
+      modar::parse_mtl({reinterpret_cast<const char*>(data), size}, "/nowhere", "fuzz", findings);
+  for (const modar::SourceMaterial& m : materials) {
+    for (const glm::vec3& colour : {m.ambient, m.diffuse, m.specular, m.emission}) {
+      for (int i = 0; i < 3; ++i) {
+        if (!std::isfinite(colour[i])) std::abort();
+      }
+    }
+    if (!std::isfinite(m.shininess) || !std::isfinite(m.opacity)) std::abort();
+    if (!m.diffuse_map.empty() || !m.alpha_map.empty()) std::abort();  // nothing lies there
+  }
+  for (const modar::Finding& finding : findings) {
+    if (finding.id.empty() || finding.message.empty()) std::abort();
+  }
+  return 0;
+}
