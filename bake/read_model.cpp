@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "bake/model/gltf_reader.hpp"
 #include "bake/model/obj_reader.hpp"
 
 namespace modar {
@@ -14,10 +15,11 @@ Result<SourceModel> read_model(const std::string& path, unsigned jobs) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
   if (extension == ".obj") return read_obj(path, {jobs});
+  if (extension == ".gltf" || extension == ".glb") return read_gltf(path);
   return fail(ExitCode::kUnsupported, "model.format", path,
               extension.empty() ? "the file has no extension that names its format"
                                 : "files of the kind '" + extension + "' are not read",
-              "convert it to Wavefront OBJ (.obj)");
+              "convert it to Wavefront OBJ (.obj) or glTF 2.0 (.gltf, .glb)");
 }
 
 }  // namespace modar

@@ -84,7 +84,7 @@ void add_geometry_options(CLI::App& sub, BakeRequest& request, BakeTexts& texts)
 
 CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   CLI::App* sub = app.add_subcommand("bake", "Models and pattern images to one bundle");
-  sub->add_option("--model", bake.request.models, "OBJ files")->type_name("FILE");
+  sub->add_option("--model", bake.request.models, "OBJ, glTF or GLB files")->type_name("FILE");
   sub->add_option("--pattern", texts.patterns,
                   "Images of flat things, frontal; :WIDTHmm tells the printed width")
       ->type_name("FILE[:WIDTHmm]");

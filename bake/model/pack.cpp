@@ -26,6 +26,7 @@ MaterialRecord material_record(const SourceMaterial& source) {
   m.shininess = source.shininess;
   m.opacity = source.opacity;
   m.texture = kNone;
+  m.flags = source.two_sided ? kMaterialTwoSided : 0u;
   return m;
 }
 

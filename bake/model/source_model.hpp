@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,8 @@ struct SourceMaterial {
   float opacity = 1.0f;
   std::string diffuse_map;
   std::string alpha_map;
+  bool two_sided = false;
+  std::shared_ptr<const void> keeper;  ///< of temporary files that the maps are in, or nothing
 };
 
 /// One corner of a face: indices into the arrays of the model, kNoIndex where it has none.

@@ -1,0 +1,33 @@
+// Checked access to the arrays of a glTF file. Internal to the glTF reader.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "bake/model/tinygltf_library.hpp"
+
+namespace modar {
+
+/// Elements of one accessor as doubles. tinygltf holds none of its numbers against the buffers.
+class GltfAccessor {
+ public:
+  /// Answers false where the accessor does not exist, is sparse, or leaves its buffer. Without a
+  /// buffer view all elements are zero, as glTF has it.
+  bool open(const tinygltf::Model& gltf, int index);
+
+  [[nodiscard]] std::size_t size() const { return count_; }
+  [[nodiscard]] std::size_t components() const { return components_; }
+  /// element < size(), component < components(). Normalised integers become [0,1] or [-1,1].
+  [[nodiscard]] double at(std::size_t element, std::size_t component) const;
+
+ private:
+  const unsigned char* bytes_ = nullptr;
+  std::size_t count_ = 0;
+  std::size_t components_ = 0;
+  std::size_t stride_ = 0;
+  std::size_t size_ = 0;  // of a component
+  int type_ = 0;
+  bool normalised_ = false;
+};
+
+}  // namespace modar
