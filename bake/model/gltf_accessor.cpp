@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "bake/model/tinygltf_library.hpp"
+
 namespace modar {
 namespace {
 

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "bake/model/tinygltf_library.hpp"
+namespace tinygltf {
+class Model;
+}  // namespace tinygltf
 
 namespace modar {
 

@@ -14,6 +14,8 @@
 
 #include "formats/atomic_file.hpp"
 
+#include "bake/model/tinygltf_library.hpp"
+
 namespace modar {
 namespace {
 

@@ -5,7 +5,11 @@
 #include <vector>
 
 #include "bake/model/source_model.hpp"
-#include "bake/model/tinygltf_library.hpp"
+
+namespace tinygltf {
+struct Image;
+class Model;
+}  // namespace tinygltf
 
 namespace modar {
 

@@ -14,6 +14,7 @@
 
 #include "bake/model/gltf_accessor.hpp"
 #include "bake/model/gltf_materials.hpp"
+#include "bake/model/tinygltf_library.hpp"
 
 namespace modar {
 namespace {
