@@ -10,7 +10,8 @@ import unittest
 from programs import BIN
 from ship_files import ShipTest, soak
 
-CALLS = ["openat", "mkdir", "unlink", "rename", "symlink", "link", "pwrite64", "write", "ftruncate", "fsync", "chmod"]
+CALLS = ["openat", "mkdir", "unlink", "rename", "symlink", "link", "pwrite64", "write", "ftruncate", "fsync", "close",
+         "newfstatat", "readlink", "getdents64", "statfs", "flock", "mmap", "read"]
 
 
 def strace_works():
@@ -66,11 +67,11 @@ class Kill(ShipTest):
 
     def test_killed_at_every_call_the_store_stays_whole(self):
         points = self.points()
-        self.assertGreater(len(points), 40)
+        self.assertGreater(len(points), 200)
         if not soak():
-            # Each kind of call, and every seventh point; `--soak` takes all.
+            # Each kind of call, and every twentieth point; `--soak` takes all.
             kinds = {call: i for i, (call, _) in reversed(list(enumerate(points)))}
-            points = [p for i, p in enumerate(points) if i % 7 == 0 or i in kinds.values() or i >= len(points) - 8]
+            points = [p for i, p in enumerate(points) if i % 20 == 0 or i in kinds.values() or i >= len(points) - 8]
         installed = 0
         for call, number in points:
             self.restore()

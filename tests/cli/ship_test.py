@@ -1,13 +1,11 @@
 """`modar ship` and `modar-fetch` over folders: releases, keys, what is refused, what is reused."""
 import json
-import os
-import pathlib
 import shutil
 import stat
 import subprocess
 import unittest
 
-from programs import ROOT
+from programs import BIN, ROOT
 from ship_files import ShipTest, soak
 
 
@@ -311,6 +309,19 @@ class Store(ShipTest):
         self.publish(self.shop.old)
         self.fetch_json()
         self.assertEqual(sorted(p.name for p in self.store.glob("*.modar")), ["museum.modar"])
+
+
+class Programs(unittest.TestCase):
+    @unittest.skipUnless(shutil.which("nm"), "nm is not installed")
+    def test_the_device_links_decoders_alone(self):
+        def symbols(program):
+            return subprocess.run(["nm", "-C", BIN / program], capture_output=True, text=True, check=True).stdout
+        fetch = symbols("modar-fetch")
+        self.assertIn("draco::Decoder", fetch)
+        for encoder in ("draco::ExpertEncoder", "draco::MeshEncoder"):
+            self.assertNotIn(encoder, fetch)
+            self.assertIn(encoder, symbols("modar"))
+        self.assertNotIn("draco::", symbols("modar-play"))
 
 
 class Plan(ShipTest):
