@@ -17,14 +17,8 @@ constexpr float kFlat = 4.0f;       // variance below which nothing is to be see
 constexpr float kHeld = 0.7f;       // correlation of a patch that fits
 constexpr double kSettled = 0.002;  // pixels of the level
 
-struct Sample {
-  float value = 0;
-  float gx = 0;
-  float gy = 0;
-};
-
-/// Bilinear value and its derivatives; the caller keeps 0 <= x < width - 1, 0 <= y < height - 1.
-inline Sample sample(const GrayImage& image, float x, float y) {
+/// Bilinear value; the caller keeps 0 <= x < width - 1, 0 <= y < height - 1.
+inline float sample(const GrayImage& image, float x, float y) {
   const int column = static_cast<int>(x);
   const int row = static_cast<int>(y);
   const float fx = x - static_cast<float>(column);
@@ -36,10 +30,12 @@ inline Sample sample(const GrayImage& image, float x, float y) {
   const float d = p[image.stride + 1];
   const float top = a + fx * (b - a);
   const float bottom = c + fx * (d - c);
-  return {top + fy * (bottom - top), (b - a) + fy * ((d - c) - (b - a)), bottom - top};
+  return top + fy * (bottom - top);
 }
 
-/// Sums over a patch: template t, image i, image gradient (x, y).
+/// Sums over a patch: template t and its gradient (x, y), image i. The gradient is the template's,
+/// which has no noise: an image's own noise in both the gradient and the difference would pull
+/// towards the middle between pixels.
 struct Sums {
   float t = 0, tt = 0, i = 0, ii = 0, ti = 0;
   float x = 0, y = 0, xx = 0, xy = 0, yy = 0, tx = 0, ty = 0, ix = 0, iy = 0;
@@ -66,32 +62,36 @@ Sums sum_patch(const GrayImage& templates, int column, int row, const GrayImage&
   Sums s;
   for (int v = -kHalf; v <= kHalf; ++v) {
     const std::uint8_t* t_row = templates.pixels + (row + v) * templates.stride + column;
+    const float fv = static_cast<float>(v);
+    const float left = place.x + fv * place.down.x;
+    const float top = place.y + fv * place.down.y;
     for (int u = -kHalf; u <= kHalf; ++u) {
       const float fu = static_cast<float>(u);
-      const float fv = static_cast<float>(v);
-      const Sample seen = sample(image, place.x + fu * place.right.x + fv * place.down.x,
-                                 place.y + fu * place.right.y + fv * place.down.y);
+      const float seen = sample(image, left + fu * place.right.x, top + fu * place.right.y);
       const float t = t_row[u];
+      const float gx = 0.5f * static_cast<float>(t_row[u + 1] - t_row[u - 1]);
+      const float gy =
+          0.5f * static_cast<float>(t_row[u + templates.stride] - t_row[u - templates.stride]);
       s.t += t;
       s.tt += t * t;
-      s.i += seen.value;
-      s.ii += seen.value * seen.value;
-      s.ti += t * seen.value;
-      s.x += seen.gx;
-      s.y += seen.gy;
-      s.xx += seen.gx * seen.gx;
-      s.xy += seen.gx * seen.gy;
-      s.yy += seen.gy * seen.gy;
-      s.tx += t * seen.gx;
-      s.ty += t * seen.gy;
-      s.ix += seen.value * seen.gx;
-      s.iy += seen.value * seen.gy;
+      s.i += seen;
+      s.ii += seen * seen;
+      s.ti += t * seen;
+      s.x += gx;
+      s.y += gy;
+      s.xx += gx * gx;
+      s.xy += gx * gy;
+      s.yy += gy * gy;
+      s.tx += t * gx;
+      s.ty += t * gy;
+      s.ix += seen * gx;
+      s.iy += seen * gy;
     }
   }
   return s;
 }
 
-/// What a patch says of its own displacement: g d = e, g already by its weight.
+/// What a patch says of its own displacement, in template pixels: g d = e, both by its weight.
 struct Pull {
   float xx = 0, xy = 0, yy = 0;
   float ex = 0, ey = 0;
@@ -108,13 +108,24 @@ Pull pull_of(const Sums& s, float forgiving) {
   pull.correlation = (s.ti * inverse - s.t * inverse * s.i * inverse) / std::sqrt(var_t * var_i);
   const float miss = (1.0f - pull.correlation) / forgiving;
   if (miss >= 1.0f) return pull;
-  const float weight = (1.0f - miss * miss) * (1.0f - miss * miss) / var_i;
+  // The template is brought to the image's contrast, its gradient too.
+  const float weight = (1.0f - miss * miss) * (1.0f - miss * miss) / var_t;
   pull.xx = weight * (s.xx - s.x * s.x * inverse);
   pull.xy = weight * (s.xy - s.x * s.y * inverse);
   pull.yy = weight * (s.yy - s.y * s.y * inverse);
-  pull.ex = weight * (gain * (s.tx - s.t * s.x * inverse) - (s.ix - s.i * s.x * inverse));
-  pull.ey = weight * (gain * (s.ty - s.t * s.y * inverse) - (s.iy - s.i * s.y * inverse));
+  pull.ex = weight * ((s.tx - s.t * s.x * inverse) - (s.ix - s.i * s.x * inverse) / gain);
+  pull.ey = weight * ((s.ty - s.t * s.y * inverse) - (s.iy - s.i * s.y * inverse) / gain);
   return pull;
+}
+
+/// Image pixels of a patch to template pixels.
+Eigen::Matrix2d to_template(const PatchPlace& place) {
+  const glm::dvec2 right(place.right);
+  const glm::dvec2 down(place.down);
+  const double inverse = 1.0 / (right.x * down.y - right.y * down.x);
+  Eigen::Matrix2d m;
+  m << down.y * inverse, -down.x * inverse, -right.y * inverse, right.x * inverse;
+  return m;
 }
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -160,8 +171,8 @@ Pass pass_over(const LoopPattern& pattern, const Camera& camera, const GrayImage
     const glm::dvec2 centre{record.x / 64.0 - 0.5, record.y / 64.0 - 0.5};
     const int column = static_cast<int>(record.x / (64.0 * grow));
     const int row = static_cast<int>(record.y / (64.0 * grow));
-    if (column < kHalf || row < kHalf || column >= templates.width - kHalf ||
-        row >= templates.height - kHalf) {
+    if (column <= kHalf || row <= kHalf || column >= templates.width - kHalf - 1 ||
+        row >= templates.height - kHalf - 1) {
       continue;
     }
     bool ahead = false;
@@ -175,7 +186,8 @@ Pass pass_over(const LoopPattern& pattern, const Camera& camera, const GrayImage
     ++pass.fit.visible;
     const Pull pull = pull_of(sum_patch(templates, column, row, image, place), forgiving);
     if (pull.correlation >= kHeld) ++pass.fit.held;
-    const auto j = pose_jacobian(camera, pose, pattern.to_world(centre), shrink);
+    const Eigen::Matrix<double, 2, 6> j =
+        to_template(place) * pose_jacobian(camera, pose, pattern.to_world(centre), shrink);
     Eigen::Matrix2d g;
     g << static_cast<double>(pull.xx), static_cast<double>(pull.xy), static_cast<double>(pull.xy),
         static_cast<double>(pull.yy);
@@ -283,10 +295,10 @@ Verdict verify(const LoopPattern& pattern, const PlaneMap& map,
       complete = ahead && x >= 0.0 && y >= 0.0 && x < image.width - 1 && y < image.height - 1;
       if (!complete) break;
       const auto at = static_cast<std::size_t>(k);
-      seen[at] = sample(image, static_cast<float>(x), static_cast<float>(y)).value;
+      seen[at] = sample(image, static_cast<float>(x), static_cast<float>(y));
       const double tx = std::clamp(u * template_shrink - 0.5, 0.0, templates.width - 1.001);
       const double ty = std::clamp(v * template_shrink - 0.5, 0.0, templates.height - 1.001);
-      drawn[at] = sample(templates, static_cast<float>(tx), static_cast<float>(ty)).value;
+      drawn[at] = sample(templates, static_cast<float>(tx), static_cast<float>(ty));
     }
     if (!complete) continue;
     float contrast = 0;

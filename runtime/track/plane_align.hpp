@@ -16,6 +16,7 @@ struct Fit {
   int visible = 0;  ///< patches that project into the frame
   int held = 0;     ///< of those, patches that correlate well
   int level = 0;    ///< pyramid level that was looked at
+  [[nodiscard]] double share() const { return visible > 0 ? 1.0 * held / visible : 0.0; }
   [[nodiscard]] bool good() const { return held >= 6 && held * 10 >= visible * 3; }
 };
 

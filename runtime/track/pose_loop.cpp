@@ -22,10 +22,12 @@ using loop::PlaneMap;
 
 constexpr int kFewestInliers = 8;
 constexpr int kFewestMatches = 6;
-constexpr int kRightCells = 8;       // cells that must show the pattern
-constexpr int kRightPercent = 30;    // of the textured ones in view
-constexpr double kSmallSide = 24.0;  // pixels of the coarsest level that tracking starts on
-constexpr double kMostZoom = 1.35;   // of the distance, from one frame to the next
+constexpr int kRightCells = 8;        // cells that must show the pattern
+constexpr int kRightPercent = 30;     // of the textured ones in view
+constexpr double kSmallSide = 24.0;   // pixels of the coarsest level that tracking starts on
+constexpr double kMostZoom = 1.35;    // of the distance, from one frame to the next
+constexpr double kFalling = 0.85;     // of the share of patches that a coarser level holds
+constexpr double kSuspicious = 0.75;  // of the share that the frames before held
 
 class Clock {
  public:
@@ -47,6 +49,7 @@ struct Track {
   bool moving = false;  ///< two poses in sequence tell a motion
   Pose pose;
   Pose before;
+  double share = 1;  ///< of the patches in view, how many hold; of the frames before
   Reason lost = Reason::kNoFeatures;
 };
 
@@ -96,6 +99,7 @@ struct PoseLoop::State {
   void step(const GrayImage& frame, TrackResult& result);
   bool follow(Track& track, Sighting& sighting);
   bool settle(const LoopPattern& pattern, Pose& pose, bool thorough, Fit& fit) const;
+  int percent_right(const LoopPattern& pattern, const Pose& pose) const;
   bool shows(const LoopPattern& pattern, const Pose& pose, int percent) const;
   Reason search(Track& track, std::span<const LoopFeature> features, Sighting& sighting,
                 TrackTimes& times);
@@ -208,11 +212,16 @@ bool PoseLoop::State::report(const Track& track, Sighting& sighting) const {
          loop::plausible(sighting.corners);
 }
 
-/// Photometric check: enough cells of the pattern look as they should.
-bool PoseLoop::State::shows(const LoopPattern& pattern, const Pose& pose, int percent) const {
+/// Photometric check: how many of the textured cells in view look as they should; 0 where too few
+/// do to tell.
+int PoseLoop::State::percent_right(const LoopPattern& pattern, const Pose& pose) const {
   const loop::Verdict verdict =
       loop::verify(pattern, loop::map_of_pose(pattern, camera, pose), describer->pyramid());
-  return verdict.right >= kRightCells && verdict.right * 100 >= verdict.cells * percent;
+  return verdict.right >= kRightCells ? verdict.right * 100 / verdict.cells : 0;
+}
+
+bool PoseLoop::State::shows(const LoopPattern& pattern, const Pose& pose, int percent) const {
+  return percent_right(pattern, pose) >= percent;
 }
 
 /// From a coarse level, on which the pattern is still some tens of pixels large, to the finest.
@@ -241,7 +250,8 @@ bool PoseLoop::State::settle(const LoopPattern& pattern, Pose& pose, bool thorou
     const Fit now = loop::align(pattern, camera, pyramid, level, thorough ? 6 : 3, next);
     const double zoom = next.translation.z / depth;
     if (!(zoom < kMostZoom && zoom * kMostZoom > 1.0)) return false;
-    if (now.good()) {
+    // Under blur fine patches hold along the motion only, and pull away from what coarse ones say.
+    if (now.good() && (!found || now.share() >= kFalling * fit.share())) {
       held = pose = next;
       fit = now;
       found = true;
@@ -253,7 +263,7 @@ bool PoseLoop::State::settle(const LoopPattern& pattern, Pose& pose, bool thorou
   }
   pose = held;
   if (!found || fit.level == best.frame_level) return found;
-  return fit.held * 2 >= fit.visible && shows(pattern, pose, 2 * kRightPercent);
+  return shows(pattern, pose, kRightPercent);
 }
 
 bool PoseLoop::State::follow(Track& track, Sighting& sighting) {
@@ -261,14 +271,23 @@ bool PoseLoop::State::follow(Track& track, Sighting& sighting) {
   Pose pose = predicted;
   Fit fit;
   bool found = settle(track.pattern, pose, false, fit);
-  if (!found) {
-    pose = predicted;
-    found = settle(track.pattern, pose, true, fit) && shows(track.pattern, pose, kRightPercent);
+  if (!found || fit.share() < kSuspicious * track.share) {
+    // From further away: where the motion says, then where it was, whichever shows more.
+    int best = found ? percent_right(track.pattern, pose) : kRightPercent - 1;
+    for (int attempt = 0; attempt < (track.moving ? 2 : 1); ++attempt) {
+      Pose tried = attempt == 0 ? predicted : track.pose;
+      Fit now;
+      if (!settle(track.pattern, tried, true, now)) continue;
+      const int right = percent_right(track.pattern, tried);
+      if (right <= best) continue;
+      best = right;
+      pose = tried;
+      fit = now;
+      found = true;
+      if (fit.share() >= kSuspicious * track.share) break;
+    }
   }
-  if (!found && track.moving) {
-    pose = track.pose;
-    found = settle(track.pattern, pose, true, fit) && shows(track.pattern, pose, kRightPercent);
-  }
+  if (found) track.share = 0.8 * track.share + 0.2 * fit.share();
   const Track last = track;
   track.before = track.pose;
   track.pose = pose;
@@ -311,6 +330,7 @@ Reason PoseLoop::State::search(Track& track, std::span<const LoopFeature> featur
   track.pose = candidate.pose;
   track.moving = false;
   track.held = true;
+  track.share = 1.0;
   return Reason::kVisible;
 }
 
