@@ -318,9 +318,8 @@ class Programs(unittest.TestCase):
             return subprocess.run(["nm", "-C", BIN / program], capture_output=True, text=True, check=True).stdout
         fetch = symbols("modar-fetch")
         self.assertIn("draco::Decoder", fetch)
-        for encoder in ("draco::ExpertEncoder", "draco::MeshEncoder"):
-            self.assertNotIn(encoder, fetch)
-            self.assertIn(encoder, symbols("modar"))
+        self.assertNotIn("draco::ExpertEncoder", fetch)
+        self.assertIn("draco::ExpertEncoder", symbols("modar"))
         self.assertNotIn("draco::", symbols("modar-play"))
 
 
