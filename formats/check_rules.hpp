@@ -67,6 +67,7 @@ class StatementCheck {
   void finish();
 
  private:
+  void loop_records();
   void expect(std::string_view line, const char* subject, std::uint32_t index);
 
   FaultLog& log_;

@@ -60,6 +60,14 @@ void StatementCheck::records() {
     expect(feature_line({twin.owner, twin.variant, header.count, text != nullptr ? text->size : 0}),
            "features", twin.owner);
   }
+  loop_records();
+}
+
+void StatementCheck::loop_records() {
+  for (const SectionEntry& entry : parts_.sections) {
+    if (entry.type != static_cast<std::uint32_t>(SectionType::kLoopRecord)) continue;
+    expect(loop_line(entry.owner, section_bytes(parts_, entry)), "loop record", entry.owner);
+  }
 }
 
 void StatementCheck::level(std::uint32_t index, std::uint32_t stride) {

@@ -167,6 +167,20 @@ std::string feature_line(const FeatureFact& fact) {
   return line + "}";
 }
 
+std::string loop_line(std::uint32_t pattern, std::span<const std::byte> record) {
+  std::string line = "{\"loop_record\":";
+  append(line, pattern);
+  line += ",\"bytes\":";
+  append(line, std::uint64_t{record.size()});
+  std::array<std::uint64_t, 4> sums{};
+  // An odd byte at the end would be half a word: records end with pixels of any number.
+  add_array_sums(record.first(record.size() / 2 * 2), sums);
+  append_sums(line, "sums", sums);
+  line += ",\"last\":";
+  append(line, record.empty() ? 0u : std::to_integer<std::uint32_t>(record.back()));
+  return line + "}";
+}
+
 std::string level_line(const BundleParts& parts, std::uint32_t level, std::uint32_t stride) {
   const LevelRecord& record = parts.levels[level];
   std::string line = "{\"level_sums\":";
@@ -211,6 +225,11 @@ std::string statement_of(const BundleContent& content) {
     for (const FeatureContent& features : content.features[p]) {
       add(feature_line({p, features.set_id, static_cast<std::uint32_t>(features.keypoints.size()),
                         features.yml.size()}));
+    }
+  }
+  for (const ExtraSection& extra : content.extra) {
+    if (extra.type == static_cast<std::uint32_t>(SectionType::kLoopRecord)) {
+      add(loop_line(extra.owner, extra.bytes));
     }
   }
   for (const ModelRecord& model : content.models) {

@@ -33,6 +33,9 @@ void state_records(const BundleParts& parts, std::uint16_t minor, const Statemen
 /// "{"features":...}".
 std::string feature_line(const FeatureFact& fact);
 
+/// Size and sums of a pattern's loop record.
+std::string loop_line(std::uint32_t pattern, std::span<const std::byte> record);
+
 /// Sums of a level's vertices and indices; vertices are left out where the level uses few of them,
 /// so that the time taken follows the indices.
 std::string level_line(const BundleParts& parts, std::uint32_t level, std::uint32_t stride);

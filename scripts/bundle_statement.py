@@ -50,6 +50,14 @@ def feature_lines(bundle):
                    ("count", struct.unpack_from("<I", data)[0], "I"), ("text_bytes", len(text), "Q")]
 
 
+def loop_lines(bundle):
+    for (kind, owner, _), data in bundle.payload.items():
+        if kind == 258:
+            words = struct.unpack(f"<{len(data) // 2}H", data[:len(data) // 2 * 2])
+            yield [("loop_record", owner, "I"), ("bytes", len(data), "Q"),
+                   ("sums", [sum(words[i::4]) for i in range(4)], "Q"), ("last", data[-1], "B")]
+
+
 def level_lines(bundle):
     tables = bundle.tables
     for model in tables["models"]:
@@ -86,6 +94,7 @@ def lines_of(bundle):
         for index, row in enumerate(bundle.tables[table]):
             yield list(record_pairs(table, record, index, row))
     yield from feature_lines(bundle)
+    yield from loop_lines(bundle)
     yield from level_lines(bundle)
     yield from texture_lines(bundle)
 

@@ -141,6 +141,8 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
       return out.add("statement", FieldType::kU8, all);
     case SectionType::kFeatureYml:
       return out.add("feature text", FieldType::kU8, all);
+    case SectionType::kLoopRecord:
+      return out.add("loop record", FieldType::kU8, all);
     case SectionType::kTextureData:
       return out.add("texture block", FieldType::kU64, {entry.offset, 8, entry.size / 8});
     case SectionType::kFeatureTwin:

@@ -100,7 +100,10 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
   for (std::uint32_t t = 0; t < view.textures().size(); ++t) digest.add(view.texture_data(t));
   for (const SectionEntry& entry : view.sections()) {
     const auto type = static_cast<SectionType>(entry.type);
-    if (type != SectionType::kFeatureTwin && type != SectionType::kFeatureYml) continue;
+    if (type != SectionType::kFeatureTwin && type != SectionType::kFeatureYml &&
+        type != SectionType::kLoopRecord) {
+      continue;
+    }
     digest.add(&entry.type, sizeof entry.type);
     digest.add(&entry.owner, sizeof entry.owner);
     digest.add(&entry.variant, sizeof entry.variant);
