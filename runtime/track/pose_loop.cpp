@@ -22,8 +22,10 @@ using loop::PlaneMap;
 
 constexpr int kFewestInliers = 8;
 constexpr int kFewestMatches = 6;
-constexpr int kRightCells = 8;        // cells that must show the pattern
-constexpr int kRightPercent = 30;     // of the textured ones in view
+constexpr int kRightCells = 8;     // cells that must show the pattern
+constexpr int kRightPercent = 30;  // of the textured ones in view
+constexpr int kMapInliers = 16;    // where no pose fits, and the map alone must convince
+constexpr int kMapPercent = 50;
 constexpr double kSmallSide = 24.0;   // pixels of the coarsest level that tracking starts on
 constexpr double kMostZoom = 1.35;    // of the distance, from one frame to the next
 constexpr double kFalling = 0.85;     // of the share of patches that a coarser level holds
@@ -104,6 +106,7 @@ struct PoseLoop::State {
   Reason search(Track& track, std::span<const LoopFeature> features, Sighting& sighting,
                 TrackTimes& times);
   bool report(const Track& track, Sighting& sighting) const;
+  Reason by_map(const Track& track, const loop::PlaneFind& found, Sighting& sighting) const;
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -266,6 +269,22 @@ bool PoseLoop::State::settle(const LoopPattern& pattern, Pose& pose, bool thorou
   return shows(pattern, pose, kRightPercent);
 }
 
+/// A wrong focal length bends every pose, while the plane's own map still tells where it lies: its
+/// corners, with the nearest pose, where much more speaks for it than a pose needs.
+Reason PoseLoop::State::by_map(const Track& track, const loop::PlaneFind& found,
+                               Sighting& sighting) const {
+  const PlaneMap map{found.homography, loop::bending(camera)};
+  const loop::Verdict verdict = loop::verify(track.pattern, map, describer->pyramid());
+  const bool right = found.inliers >= kMapInliers && verdict.right >= 2 * kRightCells &&
+                     verdict.right * 100 >= verdict.cells * kMapPercent;
+  sighting.pattern = track.pattern.index;
+  sighting.pose = track.pose;
+  return right && loop::map_corners(track.pattern, map, sighting.corners) &&
+                 loop::plausible(sighting.corners)
+             ? Reason::kVisible
+             : Reason::kFailedVerification;
+}
+
 bool PoseLoop::State::follow(Track& track, Sighting& sighting) {
   const Pose predicted = track.moving ? continued(track.before, track.pose) : track.pose;
   Pose pose = predicted;
@@ -324,9 +343,9 @@ Reason PoseLoop::State::search(Track& track, std::span<const LoopFeature> featur
   if (settle(track.pattern, refined, false, fit)) candidate.pose = refined;
   const bool right = shows(track.pattern, candidate.pose, kRightPercent);
   times.homography += clock.lap();
-  if (!right || !report(candidate, sighting)) return Reason::kFailedVerification;
   sighting.matches = found.matches;
   sighting.inliers = found.inliers;
+  if (!right || !report(candidate, sighting)) return by_map(candidate, found, sighting);
   track.pose = candidate.pose;
   track.moving = false;
   track.held = true;
