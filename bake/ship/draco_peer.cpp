@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 
 #include <draco/compression/decode.h>
 #include <draco/compression/encode.h>
@@ -93,12 +92,6 @@ double grid_rms(int bits) {
   return step / std::sqrt(12.0) * std::sqrt(3.0);
 }
 
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 }  // namespace
 
 DracoPeer encode_with_draco(const BundleView& bundle, std::uint32_t model) {
@@ -119,12 +112,12 @@ DracoPeer encode_with_draco(const BundleView& bundle, std::uint32_t model) {
   draco::EncoderBuffer buffer;
   if (!encoder.EncodeMeshToBuffer(mesh, &buffer).ok()) return peer;
   peer.bytes = buffer.size();
-  const double begin = cpu_seconds();
+  const double begin = thread_seconds();
   draco::DecoderBuffer input;
   input.Init(buffer.data(), buffer.size());
   draco::Decoder decoder;
   const bool decoded = decoder.DecodeMeshFromBuffer(&input).ok();
-  peer.decode_s = decoded ? cpu_seconds() - begin : 0;
+  peer.decode_s = decoded ? thread_seconds() - begin : 0;
   return peer;
 }
 

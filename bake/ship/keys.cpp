@@ -77,14 +77,6 @@ bool read_record(std::string_view text, Record& record) {
          record[5] == '2';
 }
 
-std::string base64(std::span<const std::uint8_t> bytes) {
-  std::string text(sodium_base64_ENCODED_LEN(bytes.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
-  sodium_bin2base64(text.data(), text.size(), bytes.data(), bytes.size(),
-                    sodium_base64_VARIANT_ORIGINAL);
-  text.pop_back();
-  return text;
-}
-
 }  // namespace
 
 Result<SecretKey> make_key() {
@@ -119,7 +111,7 @@ Result<std::string> secret_key_text(const SecretKey& key, const std::string& pas
                 "free memory, or leave the pass phrase out");
   }
   return std::string("untrusted comment: minisign ") +
-         (pass_phrase.empty() ? "unencrypted" : "encrypted") + " secret key\n" + base64(record) +
+         (pass_phrase.empty() ? "unencrypted" : "encrypted") + " secret key\n" + to_base64(record) +
          "\n";
 }
 

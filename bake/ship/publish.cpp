@@ -68,8 +68,8 @@ constexpr std::array<Link, 4> kLinks = {
 /// Headers of a request and its answer.
 constexpr double kRequestBytes = 500;
 constexpr double kRequestsAtOnce = 4;
-/// Decoding, hashing and checking, bytes of the bundle a second: 800 MHz Cortex-A9, one core, at a
-/// twentieth of what the desk's processor does; flash of that class writes 8 MB a second.
+/// Assumed, not measured on a phone: bytes of the bundle a second that an 800 MHz Cortex-A9
+/// decodes, hashes and checks, and that flash of its class writes.
 constexpr double kInstallBytesPerSecond = 4e6;
 constexpr double kFlashBytesPerSecond = 8e6;
 

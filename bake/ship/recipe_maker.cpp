@@ -106,10 +106,8 @@ class RecipeMaker {
       : bundle_(bundle), options_(options) {}
 
   Result<PublishedBundle> make() {
-    if (options_.geometry) {
-      draft_meshes();
-      draft_levels();
-    }
+    draft_meshes();
+    draft_levels();
     draft_texts();
     draft_rest();
     parallel_rows(static_cast<std::uint32_t>(drafts_.size()), options_.jobs,
@@ -126,12 +124,25 @@ class RecipeMaker {
 
   void cover(std::uint64_t begin, std::uint64_t size) { covered_.push_back({begin, begin + size}); }
 
+  /// A chunk's vertices, then its local indices.
+  [[nodiscard]] std::vector<std::byte> mesh_raw(const ChunkPlace& place) const {
+    const auto vertices = at(place.vertices, place.vertex_bytes);
+    const auto indices = local_indices(bundle_, place);
+    const auto index_bytes = std::as_bytes(std::span(indices));
+    std::vector<std::byte> raw(vertices.begin(), vertices.end());
+    raw.insert(raw.end(), index_bytes.begin(), index_bytes.end());
+    return raw;
+  }
+
   void draft_meshes() {
     const std::vector<ChunkPlace> places = chunk_places(bundle_);
     const auto objects = run_limited(places.size(), options_.jobs, {}, [&](std::size_t i) {
       const ChunkPlace& place = places[i];
-      return encode_mesh_object(at(place.vertices, place.vertex_bytes),
-                                local_indices(bundle_, place), *place.layout);
+      auto object = encode_mesh_object(at(place.vertices, place.vertex_bytes),
+                                       local_indices(bundle_, place), *place.layout);
+      // A tiny chunk is cheaper as it is.
+      if (object && zstd(mesh_raw(place)).size() <= object->size()) object.reset();
+      return object;
     });
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (!objects[i] || overlaps(places[i])) continue;
@@ -143,13 +154,8 @@ class RecipeMaker {
       draft.record.second_size = place.index_bytes;
       draft.record.index_base = place.index_base;
       draft.record.raw_size = static_cast<std::uint32_t>(place.vertex_bytes + place.index_bytes);
-      const auto vertices = at(place.vertices, place.vertex_bytes);
-      const auto indices = local_indices(bundle_, place);
-      const auto index_bytes = std::as_bytes(std::span(indices));
-      draft.raw.assign(vertices.begin(), vertices.end());
-      draft.raw.insert(draft.raw.end(), index_bytes.begin(), index_bytes.end());
+      draft.raw = mesh_raw(place);
       draft.stored = *objects[i];
-      if (zstd(draft.raw).size() <= draft.stored.size()) continue;  // tiny: cheaper as it is
       cover(place.vertices, place.vertex_bytes);
       cover(place.indices, place.index_bytes);
       drafts_.push_back(std::move(draft));

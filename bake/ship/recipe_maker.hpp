@@ -18,8 +18,7 @@ struct FormTotals {
 };
 
 struct RecipeOptions {
-  unsigned jobs = 1;     ///< processes and threads; the pieces do not depend on it
-  bool geometry = true;  ///< false: chunks travel as other bytes do
+  unsigned jobs = 1;  ///< processes and threads; the pieces do not depend on it
 };
 
 /// Everything that has to lie on a server for one bundle.

@@ -58,12 +58,6 @@ GeometryPeers measure_peers(const BundleView& bundle, const ModelRecord& model) 
   return peers;
 }
 
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 /// CPU seconds to decode all pieces, and what mesh objects cost.
 struct DecodeCost {
   double seconds = 0;
@@ -78,9 +72,9 @@ DecodeCost measure_decoding(const PublishedBundle& made, std::span<const std::by
     const auto stored = piece.stored_size == 0
                             ? bundle.subspan(piece.second_offset, piece.second_size)
                             : std::span<const std::byte>(made.objects.at(std::to_array(piece.id)));
-    const double begin = cpu_seconds();
+    const double begin = thread_seconds();
     const bool good = decode_piece(piece, stored).has_value();
-    const double spent = good ? cpu_seconds() - begin : 0;
+    const double spent = good ? thread_seconds() - begin : 0;
     cost.seconds += spent;
     if (static_cast<PieceForm>(piece.form) != PieceForm::kMesh) continue;
     cost.mesh_seconds += spent;
@@ -90,6 +84,12 @@ DecodeCost measure_decoding(const PublishedBundle& made, std::span<const std::by
 }
 
 }  // namespace
+
+double thread_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 Result<std::vector<ShipBenchRow>> bench_ship(const std::vector<std::string>& files, unsigned jobs) {
   std::vector<ShipBenchRow> rows;

@@ -9,15 +9,6 @@
 namespace modar::fetch {
 namespace {
 
-void shift_indices(std::span<std::byte> indices, std::uint16_t base) {
-  for (std::size_t i = 0; i + 1 < indices.size(); i += 2) {
-    std::uint16_t index = 0;
-    std::memcpy(&index, indices.data() + i, 2);
-    index = static_cast<std::uint16_t>(index + base);
-    std::memcpy(indices.data() + i, &index, 2);
-  }
-}
-
 Result<void> write_raw(OutputFile& file, const PieceRecord& piece, std::span<std::byte> raw) {
   const auto form = static_cast<PieceForm>(piece.form);
   const std::size_t second_size = form == PieceForm::kMesh ? piece.second_size : 0;

@@ -16,6 +16,15 @@ Result<RecipeView> unpack_recipe(std::span<const std::byte> stored, std::size_t 
   return open_recipe(std::as_bytes(std::span(bytes)).first(raw->size()));
 }
 
+void shift_indices(std::span<std::byte> indices, std::uint16_t base) {
+  for (std::size_t i = 0; i + 1 < indices.size(); i += 2) {
+    std::uint16_t index = 0;
+    std::memcpy(&index, indices.data() + i, 2);
+    index = static_cast<std::uint16_t>(index + base);
+    std::memcpy(indices.data() + i, &index, 2);
+  }
+}
+
 void PieceSource::add(const InstalledRelease& installed) {
   for (const ReleaseBundle& bundle : installed.release.bundles) {
     const std::string path = installed.folder + "/" + bundle.name;
@@ -46,12 +55,8 @@ std::optional<std::vector<std::byte>> PieceSource::raw(const ObjectId& id) const
   std::vector<std::byte> raw(first.begin(), first.end());
   raw.insert(raw.end(), second.begin(), second.end());
   const bool level = static_cast<PieceForm>(piece->form) == PieceForm::kLevel;
-  for (std::size_t i = level ? 0 : first.size(); i + 1 < raw.size(); i += 2) {
-    std::uint16_t index = 0;
-    std::memcpy(&index, raw.data() + i, 2);
-    index = static_cast<std::uint16_t>(index - piece->index_base);
-    std::memcpy(raw.data() + i, &index, 2);
-  }
+  shift_indices(std::span(raw).subspan(level ? 0 : first.size()),
+                static_cast<std::uint16_t>(-piece->index_base));
   if (raw_hash(raw) != piece->raw_hash) return std::nullopt;
   return raw;
 }

@@ -36,4 +36,7 @@ class PieceSource {
 Result<RecipeView> unpack_recipe(std::span<const std::byte> stored, std::size_t raw_size,
                                  std::vector<std::uint64_t>& bytes);
 
+/// Adds `base` to each 16-bit index, modulo 65536: a piece's indices are local to its chunk.
+void shift_indices(std::span<std::byte> indices, std::uint16_t base);
+
 }  // namespace modar::fetch

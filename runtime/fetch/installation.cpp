@@ -178,8 +178,8 @@ class Installation {
     for (const Assembly& assembly : assemblies_) {
       if (!link_old_bundle(assembly, report)) {
         if (auto built = build_bundle(assembly, report); !built) return built;
+        if (auto good = verify_bundle(assembly.file, assembly.bundle); !good) return good;
       }
-      if (auto good = verify_bundle(assembly.file, assembly.bundle); !good) return good;
       if (auto kept = write_file(slot_ + "/" + assembly.bundle.name + ".recipe",
                                  std::string_view(assembly.recipe_stored));
           !kept) {

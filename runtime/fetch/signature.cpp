@@ -34,6 +34,13 @@ bool from_base64(std::string_view text, std::span<std::uint8_t> out) {
          length == out.size();
 }
 
+tl::unexpected<Error> bad_text(const char* cause) {
+  return fail(ExitCode::kInvalidInput, "signature.text", "signature", cause,
+              "fetch it again, or sign the release again");
+}
+
+}  // namespace
+
 std::string to_base64(std::span<const std::uint8_t> bytes) {
   std::string text(sodium_base64_ENCODED_LEN(bytes.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
   sodium_bin2base64(text.data(), text.size(), bytes.data(), bytes.size(),
@@ -41,13 +48,6 @@ std::string to_base64(std::span<const std::uint8_t> bytes) {
   text.pop_back();
   return text;
 }
-
-tl::unexpected<Error> bad_text(const char* cause) {
-  return fail(ExitCode::kInvalidInput, "signature.text", "signature", cause,
-              "fetch it again, or sign the release again");
-}
-
-}  // namespace
 
 Result<PublicKey> parse_public_key(std::string_view text) {
   std::string_view line = take_line(text);

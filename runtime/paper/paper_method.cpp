@@ -55,22 +55,6 @@ Target make_target(const PatternRecord& record, std::uint32_t index, const Featu
   return target;
 }
 
-/// How far a pattern came, for the reason that a frame answers.
-int progress(Reason reason) {
-  switch (reason) {
-    case Reason::kVisible:
-      return 5;
-    case Reason::kFailedVerification:
-      return 4;
-    case Reason::kNoGeometry:
-      return 3;
-    case Reason::kFewMatches:
-      return 2;
-    default:
-      return 1;
-  }
-}
-
 bool finite(const std::array<glm::dvec2, 4>& corners) {
   for (const glm::dvec2& corner : corners) {
     if (!std::isfinite(corner.x) || !std::isfinite(corner.y)) return false;

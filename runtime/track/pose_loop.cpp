@@ -70,24 +70,6 @@ Pose continued(const Pose& before, const Pose& now) {
   return next;
 }
 
-int rank(Reason reason) {
-  switch (reason) {
-    case Reason::kVisible:
-      return 6;
-    case Reason::kLostByBlur:
-    case Reason::kOutOfView:
-      return 5;
-    case Reason::kFailedVerification:
-      return 4;
-    case Reason::kNoGeometry:
-      return 3;
-    case Reason::kFewMatches:
-      return 2;
-    default:
-      return 1;
-  }
-}
-
 }  // namespace
 
 struct PoseLoop::State {
@@ -199,8 +181,8 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
     const Reason reason =
         features.empty() ? Reason::kNoFeatures : search(track, features, sighting, result.times);
     if (reason == Reason::kVisible) result.visible.push_back(sighting);
-    const Reason told = rank(track.lost) > rank(reason) ? track.lost : reason;
-    if (rank(told) > rank(result.reason)) result.reason = told;
+    const Reason told = progress(track.lost) > progress(reason) ? track.lost : reason;
+    if (progress(told) > progress(result.reason)) result.reason = told;
     track.lost = Reason::kNoFeatures;
   }
   std::sort(result.visible.begin(), result.visible.end(),

@@ -1,4 +1,4 @@
-// The words for why nothing is visible.
+// The words for why nothing is visible, and how far that is from visible.
 #include "modar/tracker.hpp"
 
 namespace modar {
@@ -21,6 +21,24 @@ const char* to_string(Reason reason) {
       return "out of view";
   }
   return "unknown";
+}
+
+int progress(Reason reason) {
+  switch (reason) {
+    case Reason::kVisible:
+      return 6;
+    case Reason::kLostByBlur:
+    case Reason::kOutOfView:
+      return 5;
+    case Reason::kFailedVerification:
+      return 4;
+    case Reason::kNoGeometry:
+      return 3;
+    case Reason::kFewMatches:
+      return 2;
+    default:
+      return 1;
+  }
 }
 
 }  // namespace modar

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -30,6 +31,9 @@ struct PublicKey {
 Result<PublicKey> parse_public_key(std::string_view text);
 /// minisign's base64 line.
 std::string public_key_line(const PublicKey& key);
+
+/// As minisign's files hold bytes.
+std::string to_base64(std::span<const std::uint8_t> bytes);
 
 /// A detached minisign signature, split up.
 struct Signature {

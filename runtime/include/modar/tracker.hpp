@@ -28,6 +28,8 @@ enum class Reason : std::uint8_t {
 };
 /// "visible", "no features", "few matches", ...
 const char* to_string(Reason reason);
+/// How far a pattern came before that reason: of several patterns the frame answers the farthest's.
+int progress(Reason reason);
 
 /// A pattern measured in this frame.
 struct Sighting {
