@@ -1,7 +1,9 @@
 // The constant part of every rule, the log of what broke them, and the text of ISSUES.md.
 #include <array>
-#include <charconv>
 #include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <string_view>
 
 #include "formats/check.hpp"
 #include "formats/rules.hpp"
@@ -169,10 +171,25 @@ void FaultLog::add(Rule rule, std::uint64_t offset, std::string where, std::stri
                  kind.message + (": " + detail), kind.cure};
 }
 
+/// The fewest digits that read back the same. Not std::to_chars: its tables for floating point
+/// weigh 130 KB, a quarter of the player. printf and strtod know the same decimal point, which
+/// becomes '.'.
 std::string number_text(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
-  return std::string(text.data(), end.ptr);
+  std::array<char, 40> text{};
+  constexpr int kExact = 17;  // digits tell any double apart
+  for (int digits = 1; digits <= kExact; ++digits) {
+    std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+    if (std::strtod(text.data(), nullptr) == value) break;
+  }
+  constexpr std::string_view kOurs = "0123456789+-einfa";
+  std::string answer;
+  bool in_point = false;
+  for (const char letter : std::string_view(text.data())) {
+    const bool ours = kOurs.find(letter) != std::string_view::npos;
+    if (ours || !in_point) answer += ours ? letter : '.';
+    in_point = !ours;
+  }
+  return answer;
 }
 
 std::string issue_rows(std::span<const IssueKind> kinds) {

@@ -1,0 +1,87 @@
+#!/usr/bin/env python3
+"""Holds the built programs and libraries of the device against their committed ceilings, and tells
+which symbols grew since those were written.
+
+  scripts/size.py [--build build/device] [--ceilings scripts/size_ceilings.json] [--most 20] [--json]
+  scripts/size.py --update      writes the sizes of today; ceilings stay as they are
+
+A program weighs what `strip` leaves of it (libc, EGL and GLES are the phone's own), a library the
+code and data that its objects hold before a linker leaves anything out. Data goes to stdout. Exits 2
+where something is not built, 3 where something is above its ceiling.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+LEAST = 512  # bytes: smaller symbols are not kept one by one
+
+
+def output_of(*command):
+    return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True).stdout
+
+
+def weight(path):
+    """Bytes of a stripped program, or of the sections that an archive's objects would load."""
+    if path.suffix == ".a":
+        return int(output_of("size", "-t", path).splitlines()[-1].split()[3])
+    with tempfile.TemporaryDirectory() as folder:
+        stripped = pathlib.Path(folder) / path.name
+        output_of("strip", "-o", stripped, path)
+        return stripped.stat().st_size
+
+
+def symbols(path):
+    """Bytes of each symbol; those of one name are added up."""
+    sizes = {}
+    for line in output_of("nm", "-C", "-S", "--radix=d", path).splitlines():
+        words = line.split(maxsplit=3)
+        if len(words) == 4 and words[1].isdigit() and words[2] not in "bB":
+            sizes[words[3]] = sizes.get(words[3], 0) + int(words[1])
+    return {name: size for name, size in sorted(sizes.items()) if size >= LEAST}
+
+
+def grown(before, now, most):
+    """[(bytes more, symbol)], the most first; what is new grew from nothing."""
+    more = [(size - before.get(name, 0), name) for name, size in now.items()]
+    return sorted((row for row in more if row[0] > 0), key=lambda row: (-row[0], row[1]))[:most]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "device")
+    parser.add_argument("--ceilings", type=pathlib.Path, default=ROOT / "scripts" / "size_ceilings.json")
+    parser.add_argument("--most", type=int, default=20, help="symbols to name for each target")
+    parser.add_argument("--update", action="store_true")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    targets = json.loads(options.ceilings.read_text())
+    rows = []
+    for name, target in targets.items():
+        path = options.build / name
+        if not path.exists():
+            print(f"size.py: {path} is not built; cmake --build --preset device builds it", file=sys.stderr)
+            return 2
+        now = symbols(path)
+        rows.append({"target": name, "bytes": weight(path), "ceiling": target["ceiling"], "was": target["bytes"],
+                     "grown": grown(target["symbols"], now, options.most)})
+        target.update(bytes=rows[-1]["bytes"], symbols=now)
+    if options.update:
+        options.ceilings.write_text(json.dumps(targets, indent=1) + "\n")
+        return 0
+    if options.json:
+        print(json.dumps(rows, indent=1))
+    else:
+        for row in rows:
+            print(f"{row['target']}: {row['bytes']} of {row['ceiling']} bytes, {row['bytes'] - row['was']:+d}")
+            if row["bytes"] > row["was"]:
+                for more, symbol in row["grown"]:
+                    print(f"  {more:+7d}  {symbol[:140]}")
+    return 3 if any(row["bytes"] > row["ceiling"] for row in rows) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
