@@ -43,4 +43,13 @@ bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
   return log.clean();
 }
 
+std::string first_error(std::span<const std::byte> bytes) {
+  std::string error;
+  check_bundle(bytes, [&error](const Issue& issue) {
+    if (issue.kind->severity != Severity::kError || !error.empty()) return;
+    error = std::string(issue.kind->id) + " " + issue.where;
+  });
+  return error;
+}
+
 }  // namespace modar

@@ -52,4 +52,7 @@ struct CheckOptions {
 bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
                   const CheckOptions& options = {});
 
+/// The first error that check_bundle() finds, as "ID where"; empty for a good bundle.
+std::string first_error(std::span<const std::byte> bytes);
+
 }  // namespace modar

@@ -71,7 +71,8 @@ def include_violations(path, name):
     target = name.split("/")[0]
     if room == "formats":
         fine = standard_header(name) or target == "formats" or name in ("tl/expected.hpp", "xxhash.h")
-        posix = name in ("fcntl.h", "unistd.h", "sys/stat.h", "sys/types.h", "sys/mman.h")
+        posix = name in (
+            "fcntl.h", "unistd.h", "sys/file.h", "sys/mman.h", "sys/stat.h", "sys/types.h")
         if not fine and not posix:
             yield f"formats/ includes the standard library, tl/expected.hpp and xxhash.h only, not '{name}'"
     if room == "runtime" and target == "bake":

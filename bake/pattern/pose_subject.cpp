@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include <glm/geometric.hpp>
 
 #include "bake/pattern/loop_bake.hpp"
 #include "bake/pattern/pattern_picture.hpp"
+#include "bake/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/loop_record.hpp"
@@ -18,12 +18,6 @@ namespace modar {
 namespace {
 
 constexpr double kRight = 5.0;  // pixels
-
-double thread_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
 
 Result<void> add_pattern(const GrayImage& pattern, std::uint32_t set_id, BundleContent& content) {
   PatternRecord record{};
@@ -78,9 +72,9 @@ Result<std::vector<std::byte>> bundle_of(const std::vector<GrayPicture>& picture
 
 template <class Method>
 Result<void> run(Method& method, const GrayImage& frame, const FrameTruth& truth, Tally& tally) {
-  const double start = thread_ms();
+  const double start = thread_seconds();
   auto result = method.step(frame);
-  const double ms = thread_ms() - start;
+  const double ms = 1e3 * (thread_seconds() - start);
   if (!result) return tl::unexpected(result.error());
   tally.add(*result, truth, ms);
   return {};

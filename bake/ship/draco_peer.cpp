@@ -8,6 +8,7 @@
 
 #include "bake/model/vertex_decoder.hpp"
 #include "bake/ship/ship_bench.hpp"
+#include "bake/thread_clock.hpp"
 
 namespace modar {
 namespace {

@@ -19,14 +19,8 @@ struct OpenBundle {
 Result<OpenBundle> open_bundle(const std::string& path) {
   auto file = MappedFile::open(path);
   if (!file) return tl::unexpected(file.error());
-  Issue first;
-  const bool good = check_bundle(file->bytes(), [&](const Issue& issue) {
-    if (first.kind == nullptr && issue.kind->severity == Severity::kError) first = issue;
-  });
-  if (!good) {
-    return fail(ExitCode::kInvalidInput, "ship.bad-bundle", path,
-                first.kind == nullptr ? "it breaks a rule"
-                                      : std::string(first.kind->id) + " " + first.where,
+  if (const std::string error = first_error(file->bytes()); !error.empty()) {
+    return fail(ExitCode::kInvalidInput, "ship.bad-bundle", path, error,
                 "see `modar check " + path + "`, and bake it again");
   }
   const auto view = BundleView::open(file->bytes());

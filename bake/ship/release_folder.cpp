@@ -1,12 +1,7 @@
 #include "bake/ship/release_folder.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <charconv>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -62,31 +57,18 @@ std::vector<std::uint64_t> numbers_in(const fs::path& folder) {
 
 }  // namespace
 
-ReleaseFolder::ReleaseFolder(std::string path, int lock) : path_(std::move(path)), lock_(lock) {}
-
-ReleaseFolder::ReleaseFolder(ReleaseFolder&& other) noexcept
-    : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
-
-ReleaseFolder::~ReleaseFolder() {
-  if (lock_ >= 0) ::close(lock_);
-}
+ReleaseFolder::ReleaseFolder(std::string path, FolderLock lock)
+    : path_(std::move(path)), lock_(std::move(lock)) {}
 
 Result<ReleaseFolder> ReleaseFolder::open(const std::string& path) {
   for (const char* folder : {"/releases", "/keys", "/objects"}) {
     if (auto made = make_folders(path + folder); !made) return tl::unexpected(made.error());
   }
-  const std::string lock = path + "/.lock";
-  const int descriptor = ::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (descriptor < 0) {
-    return fail(ExitCode::kIo, "io.create", lock, std::strerror(errno),
-                "see that the folder can be written");
-  }
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-    ::close(descriptor);
-    return fail(kExitLocked, "ship.locked", path, "another publisher is at work on it",
-                "wait until it ends");
-  }
-  return ReleaseFolder(path, descriptor);
+  auto lock = FolderLock::take(
+      path + "/.lock", {kExitLocked, "ship.locked", path, "another publisher is at work on it",
+                        "wait until it ends"});
+  if (!lock) return tl::unexpected(lock.error());
+  return ReleaseFolder(path, std::move(*lock));
 }
 
 std::vector<std::uint64_t> ReleaseFolder::versions() const {

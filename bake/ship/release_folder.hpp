@@ -12,6 +12,7 @@
 
 #include "bake/ship/keys.hpp"
 #include "bake/ship/recipe_maker.hpp"
+#include "formats/folder_lock.hpp"
 #include "modar/release.hpp"
 
 namespace modar {
@@ -21,9 +22,6 @@ class ReleaseFolder {
  public:
   /// Creates what is missing. Errors: kIo; kExitLocked "ship.locked".
   static Result<ReleaseFolder> open(const std::string& path);
-  ReleaseFolder(ReleaseFolder&& other) noexcept;
-  ReleaseFolder& operator=(ReleaseFolder&&) = delete;
-  ~ReleaseFolder();
 
   /// Numbers of the releases, rising.
   [[nodiscard]] std::vector<std::uint64_t> versions() const;
@@ -42,9 +40,9 @@ class ReleaseFolder {
   Result<std::uint64_t> prune(std::size_t keep) const;
 
  private:
-  ReleaseFolder(std::string path, int lock);
+  ReleaseFolder(std::string path, FolderLock lock);
   std::string path_;
-  int lock_ = -1;
+  FolderLock lock_;
 };
 
 }  // namespace modar

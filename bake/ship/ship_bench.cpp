@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 
 #include <meshoptimizer.h>
 #include <zstd.h>
 
 #include "bake/ship/recipe_maker.hpp"
+#include "bake/thread_clock.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/piece.hpp"
 
@@ -84,12 +84,6 @@ DecodeCost measure_decoding(const PublishedBundle& made, std::span<const std::by
 }
 
 }  // namespace
-
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 Result<std::vector<ShipBenchRow>> bench_ship(const std::vector<std::string>& files, unsigned jobs) {
   std::vector<ShipBenchRow> rows;

@@ -28,7 +28,4 @@ struct DracoPeer {
 /// Normals at 9 bits (as exact as 3 signed bytes), uv at 16. Level 0 of the model's chunks.
 DracoPeer encode_with_draco(const BundleView& bundle, std::uint32_t model);
 
-/// CPU seconds of this thread.
-double thread_seconds();
-
 }  // namespace modar

@@ -2,11 +2,11 @@
 #include "bake/texture/etc1_bench.hpp"
 
 #include <algorithm>
-#include <ctime>
 #include <utility>
 
 #include "bake/texture/etc1_reference.hpp"
 #include "bake/texture/etc1_texture.hpp"
+#include "bake/thread_clock.hpp"
 
 namespace modar {
 namespace {
@@ -15,12 +15,6 @@ struct Figures {
   double db = 0;
   double mpix_s = 0;
 };
-
-double thread_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 RgbaImage centre_crop(const RgbaImage& image, std::uint32_t crop) {
   const std::uint32_t width = crop == 0 ? image.width : std::min(crop, image.width);

@@ -80,15 +80,10 @@ Result<void> verify_bundle(const std::string& file, const ReleaseBundle& bundle)
     return fail(kExitBadBundle, "store.hash", file, "it is not what was signed",
                 "run modar-fetch again");
   }
-  Issue first;
-  const bool good = check_bundle(mapped->bytes(), [&](const Issue& issue) {
-    if (first.kind == nullptr && issue.kind->severity == Severity::kError) first = issue;
-  });
-  if (good) return {};
-  return fail(
-      kExitBadBundle, "store.rules", file,
-      first.kind == nullptr ? "it breaks a rule" : std::string(first.kind->id) + " " + first.where,
-      "tell the publisher: `modar check` finds it before publishing");
+  const std::string error = first_error(mapped->bytes());
+  if (error.empty()) return {};
+  return fail(kExitBadBundle, "store.rules", file, error,
+              "tell the publisher: `modar check` finds it before publishing");
 }
 
 }  // namespace modar::fetch

@@ -1,11 +1,5 @@
 #include "store.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include <rapidjson/document.h>
@@ -30,37 +24,23 @@ bool ends_with_extension(const std::string& name) {
 
 }  // namespace
 
-Store::Store(std::string path, int lock) : path_(std::move(path)), lock_(lock) {}
-
-Store::Store(Store&& other) noexcept
-    : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
-
-Store::~Store() {
-  if (lock_ >= 0) ::close(lock_);
-}
+Store::Store(std::string path, FolderLock lock) : path_(std::move(path)), lock_(std::move(lock)) {}
 
 Result<Store> Store::open(const std::string& path) {
   for (const std::string& folder :
        {path, path + "/slots", path + "/slots/a", path + "/slots/b", path + "/pieces"}) {
     if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   }
-  const std::string lock = path + "/lock";
-  const int descriptor = ::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (descriptor < 0) {
-    return fail(ExitCode::kIo, "io.create", lock, std::strerror(errno),
-                "see that the store's folder can be written");
-  }
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-    ::close(descriptor);
-    return fail(kExitLocked, "store.locked", path, "another fetch is at work on this store",
-                "wait until it ends");
-  }
+  auto lock = FolderLock::take(
+      path + "/lock", {kExitLocked, "store.locked", path, "another fetch is at work on this store",
+                       "wait until it ends"});
+  if (!lock) return tl::unexpected(lock.error());
   // What a fetch that was cut off was writing.
   for (const std::string& name : list_folder(path)) {
     if (!name.ends_with(".tmp") && !name.ends_with(".new")) continue;
     if (auto gone = remove_file(path + "/" + name); !gone) return tl::unexpected(gone.error());
   }
-  return Store(path, descriptor);
+  return Store(path, std::move(*lock));
 }
 
 StoreState Store::state() const {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "formats/error.hpp"
+#include "formats/folder_lock.hpp"
 #include "modar/release.hpp"
 #include "modar/signature.hpp"
 
@@ -38,9 +39,6 @@ class Store {
   /// Creates what is missing and takes the lock, which is held until the object goes.
   /// Errors: kIo; kExitLocked "store.locked".
   static Result<Store> open(const std::string& path);
-  Store(Store&& other) noexcept;
-  Store& operator=(Store&&) = delete;
-  ~Store();
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::string pieces() const { return path_ + "/pieces"; }
@@ -62,9 +60,9 @@ class Store {
   [[nodiscard]] std::vector<std::string> bundle_paths(const Release& release) const;
 
  private:
-  Store(std::string path, int lock);
+  Store(std::string path, FolderLock lock);
   std::string path_;
-  int lock_ = -1;
+  FolderLock lock_;
 };
 
 /// Reads the release in a slot, whether it is in use or not.
