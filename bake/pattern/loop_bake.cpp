@@ -163,29 +163,43 @@ class Grid {
       : columns_(pattern.width / kSquare + 1),
         cells_(static_cast<std::size_t>(columns_ * (pattern.height / kSquare + 1))) {
     for (std::uint32_t i = 0; i < candidates.size(); ++i) {
-      cells_[index(square(candidates[i].x), square(candidates[i].y))].push_back(i);
+      const Candidate& candidate = candidates[i];
+      cells_[index(square(candidate.x), square(candidate.y))].push_back(
+          {candidate.x, candidate.y, i, candidate.dark});
     }
   }
+  /// Visits the candidates of that polarity within the radius.
   template <class Visit>
-  void near(double x, double y, double radius, Visit&& visit) const {
+  void near(double x, double y, double radius, std::uint8_t dark, Visit&& visit) const {
     const int rows = static_cast<int>(cells_.size()) / columns_;
     for (int row = std::max(0, square(y - radius)); row <= std::min(rows - 1, square(y + radius));
          ++row) {
       for (int column = std::max(0, square(x - radius));
            column <= std::min(columns_ - 1, square(x + radius)); ++column) {
-        for (const std::uint32_t i : cells_[index(column, row)]) visit(i);
+        for (const Entry& entry : cells_[index(column, row)]) {
+          const double dx = entry.x - x;
+          const double dy = entry.y - y;
+          if (entry.dark == dark && dx * dx + dy * dy <= radius * radius) visit(entry.candidate);
+        }
       }
     }
   }
 
  private:
   static constexpr int kSquare = 4;
+  /// What decides on a visit lies together: most candidates are looked at no further.
+  struct Entry {
+    double x;
+    double y;
+    std::uint32_t candidate;
+    std::uint8_t dark;
+  };
   static int square(double value) { return static_cast<int>(std::floor((value + 0.5) / kSquare)); }
   [[nodiscard]] std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row * columns_ + column);
   }
   int columns_;
-  std::vector<std::vector<std::uint32_t>> cells_;
+  std::vector<std::vector<Entry>> cells_;
 };
 
 /// What a random view shows of the pattern: a hit list of (candidate, feature of the view).
@@ -215,12 +229,8 @@ TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, 
     if (!within(levels[0].view(), place)) continue;
     const std::uint32_t id = trial.features++;
     const double radius = std::min(kNear * (1 << feature.level) / mean_scale, 16.0);
-    grid.near(place[0], place[1], radius, [&](std::uint32_t i) {
-      const Candidate& candidate = candidates[i];
-      const double dx = candidate.x - place[0];
-      const double dy = candidate.y - place[1];
-      if (candidate.dark != feature.dark || dx * dx + dy * dy > radius * radius) return;
-      const int bits = distance(candidate.code, feature.code);
+    grid.near(place[0], place[1], radius, feature.dark, [&](std::uint32_t i) {
+      const int bits = distance(candidates[i].code, feature.code);
       if (bits > kRepeats) return;
       trial.hits.push_back({i, {id, static_cast<float>(kRepeats + 8 - bits) / (kRepeats + 8)}});
     });

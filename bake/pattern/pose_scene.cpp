@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <opencv2/imgproc.hpp>
@@ -15,10 +16,7 @@ namespace modar {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kOversampling = 3;
-constexpr double kNoise = 3.0;
 
-/// Ideal pixels of the pattern's corners; the bench's cameras have no distortion.
 std::array<glm::dvec2, 4> corners_of(const GrayImage& pattern, const Camera& camera,
                                      const Pose& pose) {
   auto corners = pattern_corners(pattern.width, pattern.height);
@@ -44,51 +42,159 @@ cv::Mat as_mat(const GrayImage& image) {
           static_cast<std::size_t>(image.stride)};
 }
 
-/// Pattern and coverage, supersampled and averaged, in frame pixels.
-void warp(const GrayImage& pattern, const std::array<glm::dvec2, 4>& corners, double covered,
-          int side, cv::Size size, cv::Mat& picture, cv::Mat& mask) {
-  std::array<cv::Point2f, 4> from;
-  std::array<cv::Point2f, 4> to;
+/// Samples a side of a frame's pixel: fewer where the picture is enlarged, and smooth.
+int oversampling_of(double linear) {
+  return linear < 1.0 ? 3 : 2;
+}
+
+/// The part of a frame that shows the pattern.
+struct Shown {
+  cv::Rect place;
+  cv::Mat picture;
+  cv::Mat mask;  ///< 255 where nothing of the background shows
+};
+
+/// Pixels of the frame around the pattern's outline, which a lens bends.
+cv::Rect place_of(const GrayImage& pattern, const Camera& camera, const Pose& pose) {
+  constexpr int kPoints = 8;  // a side
+  const auto world = pattern_corners(pattern.width, pattern.height);
+  double low_x = camera.width;
+  double low_y = camera.height;
+  double high_x = 0;
+  double high_y = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (int k = 0; k < kPoints; ++k) {
+      const glm::dvec2 p = glm::mix(world[i], world[(i + 1) % 4], 1.0 * k / kPoints);
+      const glm::dvec2 at = project(camera, pose.rotation * glm::dvec3(p, 0.0) + pose.translation);
+      low_x = std::min(low_x, at.x);
+      low_y = std::min(low_y, at.y);
+      high_x = std::max(high_x, at.x);
+      high_y = std::max(high_y, at.y);
+    }
+  }
+  constexpr int kRoom = 3;
+  const int x0 = std::max(0, static_cast<int>(std::floor(low_x)) - kRoom);
+  const int y0 = std::max(0, static_cast<int>(std::floor(low_y)) - kRoom);
+  const int x1 = std::min(camera.width, static_cast<int>(std::ceil(high_x)) + kRoom + 1);
+  const int y1 = std::min(camera.height, static_cast<int>(std::ceil(high_y)) + kRoom + 1);
+  return x1 > x0 && y1 > y0 ? cv::Rect(x0, y0, x1 - x0, y1 - y0) : cv::Rect();
+}
+
+/// Where each fine pixel of the place looks in the pattern's picture, through the camera's lens.
+/// map: picture pixels to fine ideal pixels of the place. The lens is worked out on a grid of every
+/// fourth pixel; between, it is linear to a thousandth of a pixel.
+cv::Mat lens_map(const Camera& camera, const cv::Rect& place, const cv::Mat& map,
+                 int oversampling) {
+  constexpr int kStep = 4;
+  const int columns = place.width / kStep + 2;
+  cv::Mat knots(place.height / kStep + 2, columns, CV_64FC2);
+  for (int y = 0; y < knots.rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const glm::dvec2 p =
+          undistort(camera, {1.0 * place.x + kStep * x - 0.5, 1.0 * place.y + kStep * y - 0.5});
+      knots.at<cv::Vec2d>(y, x) = {(p.x + 0.5 - place.x) * oversampling - 0.5,
+                                   (p.y + 0.5 - place.y) * oversampling - 0.5};
+    }
+  }
+  const cv::Matx33d back = cv::Matx33d(map).inv();
+  cv::Mat out(place.height * oversampling, place.width * oversampling, CV_32FC2);
+  const double fine = 1.0 / (kStep * oversampling);
+  for (int y = 0; y < out.rows; ++y) {
+    const double v = (y + 0.5) * fine;
+    const auto* top = knots.ptr<cv::Vec2d>(static_cast<int>(v));
+    const double fy = v - std::floor(v);
+    for (int x = 0; x < out.cols; ++x) {
+      const double u = (x + 0.5) * fine;
+      const auto* p = top + static_cast<int>(u);
+      const double fx = u - std::floor(u);
+      const cv::Vec2d at = (p[0] * (1 - fx) + p[1] * fx) * (1 - fy) +
+                           (p[columns] * (1 - fx) + p[columns + 1] * fx) * fy;
+      const cv::Vec3d from = back * cv::Vec3d(at[0], at[1], 1);
+      out.at<cv::Vec2f>(y, x) = {static_cast<float>(from[0] / from[2]),
+                                 static_cast<float>(from[1] / from[2])};
+    }
+  }
+  return out;
+}
+
+/// The picture with the share `covered` hidden from one side.
+cv::Mat uncovered(cv::Size size, double covered, int side) {
+  cv::Mat shown(size, CV_8UC1, cv::Scalar(255));
+  const int cut_x = static_cast<int>(std::lround(size.width * covered));
+  const int cut_y = static_cast<int>(std::lround(size.height * covered));
+  const std::array<cv::Rect, 4> hidden = {cv::Rect(0, 0, cut_x, size.height),
+                                          {size.width - cut_x, 0, cut_x, size.height},
+                                          {0, 0, size.width, cut_y},
+                                          {0, size.height - cut_y, size.width, cut_y}};
+  if (covered > 0) shown(hidden[static_cast<std::size_t>(side)]).setTo(0);
+  return shown;
+}
+
+/// Pattern and coverage, supersampled and averaged, where the frame shows them.
+Shown show(const GrayImage& pattern, const Camera& camera, const Pose& pose, double covered,
+           int side) {
+  Shown shown;
+  shown.place = place_of(pattern, camera, pose);
+  if (shown.place.empty()) return shown;
+  Camera ideal = camera;
+  ideal.distortion = {};
+  const auto corners = corners_of(pattern, ideal, pose);
   // Where the pattern shrinks, its own pixels are averaged first.
   cv::Mat source = as_mat(pattern);
   double linear =
-      std::sqrt(area_of(corners) / (static_cast<double>(pattern.width) * pattern.height));
-  while (linear * kOversampling < 0.7) {
+      std::sqrt(std::abs(area_of(corners)) / (static_cast<double>(pattern.width) * pattern.height));
+  const int oversampling = oversampling_of(linear);
+  while (linear * oversampling < 0.7 && std::min(source.cols, source.rows) >= 4) {
     cv::resize(source, source, cv::Size(source.cols / 2, source.rows / 2), 0, 0, cv::INTER_AREA);
     linear *= 2;
   }
   const float w = static_cast<float>(source.cols);
   const float h = static_cast<float>(source.rows);
-  from = {cv::Point2f{-0.5f, -0.5f}, {w - 0.5f, -0.5f}, {w - 0.5f, h - 0.5f}, {-0.5f, h - 0.5f}};
+  const std::array<cv::Point2f, 4> from = {
+      cv::Point2f{-0.5f, -0.5f}, {w - 0.5f, -0.5f}, {w - 0.5f, h - 0.5f}, {-0.5f, h - 0.5f}};
+  std::array<cv::Point2f, 4> to;
   for (std::size_t i = 0; i < 4; ++i) {
-    to[i] = {static_cast<float>((corners[i].x + 0.5) * kOversampling - 0.5),
-             static_cast<float>((corners[i].y + 0.5) * kOversampling - 0.5)};
+    to[i] = {static_cast<float>((corners[i].x - shown.place.x + 0.5) * oversampling - 0.5),
+             static_cast<float>((corners[i].y - shown.place.y + 0.5) * oversampling - 0.5)};
   }
-  cv::Mat shown(source.size(), CV_8UC1, cv::Scalar(255));
-  const int cut_x = static_cast<int>(std::lround(source.cols * covered));
-  const int cut_y = static_cast<int>(std::lround(source.rows * covered));
-  const std::array<cv::Rect, 4> hidden = {cv::Rect(0, 0, cut_x, source.rows),
-                                          {source.cols - cut_x, 0, cut_x, source.rows},
-                                          {0, 0, source.cols, cut_y},
-                                          {0, source.rows - cut_y, source.cols, cut_y}};
-  if (covered > 0) shown(hidden[static_cast<std::size_t>(side)]).setTo(0);
   const cv::Mat map = cv::getPerspectiveTransform(from.data(), to.data());
-  const cv::Size large(size.width * kOversampling, size.height * kOversampling);
-  cv::Mat fine;
-  cv::warpPerspective(source, fine, map, large, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  cv::resize(fine, picture, size, 0, 0, cv::INTER_AREA);
-  cv::warpPerspective(shown, fine, map, large, cv::INTER_NEAREST, cv::BORDER_CONSTANT,
-                      cv::Scalar(0));
-  cv::resize(fine, mask, size, 0, 0, cv::INTER_AREA);
+  const cv::Size large = shown.place.size() * oversampling;
+  const bool bent = camera.distortion != ideal.distortion;
+  const cv::Mat bends = bent ? lens_map(camera, shown.place, map, oversampling) : cv::Mat();
+  const auto warp = [&](const cv::Mat& what, int sampling, int border, cv::Mat& out) {
+    cv::Mat fine;
+    if (bent) {
+      cv::remap(what, fine, bends, cv::noArray(), sampling, border, cv::Scalar(0));
+    } else {
+      cv::warpPerspective(what, fine, map, large, sampling, border, cv::Scalar(0));
+    }
+    cv::resize(fine, out, shown.place.size(), 0, 0, cv::INTER_AREA);
+  };
+  warp(source, cv::INTER_LINEAR, cv::BORDER_REPLICATE, shown.picture);
+  warp(uncovered(source.size(), covered, side), cv::INTER_NEAREST, cv::BORDER_CONSTANT, shown.mask);
+  return shown;
+}
+
+void lay_over(const Shown& shown, cv::Mat& frame) {
+  for (int y = 0; y < shown.place.height; ++y) {
+    const std::uint8_t* mask = shown.mask.ptr(y);
+    const std::uint8_t* picture = shown.picture.ptr(y);
+    std::uint8_t* row = frame.ptr(shown.place.y + y) + shown.place.x;
+    for (int x = 0; x < shown.place.width; ++x) {
+      const int m = mask[x];
+      row[x] = static_cast<std::uint8_t>((m * picture[x] + (255 - m) * row[x] + 127) / 255);
+    }
+  }
 }
 
 void light_and_noise(cv::Mat& frame, const SceneLight& with, Random& random) {
+  const double step = with.slope_x / frame.cols;
   for (int y = 0; y < frame.rows; ++y) {
     std::uint8_t* row = frame.ptr(y);
-    for (int x = 0; x < frame.cols; ++x) {
-      const double light = with.gain + with.slope_x * (static_cast<double>(x) / frame.cols - 0.5) +
-                           with.slope_y * (static_cast<double>(y) / frame.rows - 0.5);
-      const double seen = light * row[x] + with.bias + kNoise * random.normal();
+    double light =
+        with.gain - 0.5 * with.slope_x + with.slope_y * (static_cast<double>(y) / frame.rows - 0.5);
+    for (int x = 0; x < frame.cols; ++x, light += step) {
+      const double seen = light * row[x] + with.bias + with.noise * random.normal();
       row[x] = static_cast<std::uint8_t>(std::clamp(seen + 0.5, 0.0, 255.0));
     }
   }
@@ -174,17 +280,7 @@ SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Po
     scene.corners = corners_of(pattern, camera, pose);
     const double covered = random.uniform(band.covered_low, band.covered_high);
     const int side = static_cast<int>(random.uniform(0, 4));
-    cv::Mat picture;
-    cv::Mat mask;
-    warp(pattern, scene.corners, covered, side, frame.size(), picture, mask);
-    for (int y = 0; y < frame.rows; ++y) {
-      for (int x = 0; x < frame.cols; ++x) {
-        const int m = mask.at<std::uint8_t>(y, x);
-        std::uint8_t& grey = frame.at<std::uint8_t>(y, x);
-        grey = static_cast<std::uint8_t>(
-            (m * picture.at<std::uint8_t>(y, x) + (255 - m) * grey + 127) / 255);
-      }
-    }
+    lay_over(show(pattern, camera, pose, covered, side), frame);
   }
   cv::GaussianBlur(frame, frame, cv::Size(5, 5), shining.focus);
   if (blur.length > 1.0) cv::filter2D(frame, frame, -1, motion_kernel(blur.length, blur.angle));

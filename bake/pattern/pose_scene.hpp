@@ -48,6 +48,7 @@ struct SceneLight {
   double slope_x = 0;
   double slope_y = 0;
   double focus = 0.65;  ///< standard deviation of the lens blur, pixels
+  double noise = 3;     ///< standard deviation, grey values
 };
 SceneLight draw_light(Random& random);
 
@@ -56,8 +57,8 @@ struct MotionBlur {
   double angle = 0;   ///< radians
 };
 
-/// Renders the pattern at the pose over the background, with mild blur and noise of standard
-/// deviation 3. light: null draws one.
+/// Renders the pattern at the pose through the camera's lens over the background, then blurs, lights
+/// and adds noise. light: null draws one.
 SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
                         const GrayPicture& background, const SceneBand& band, Random& random,
                         const SceneLight* light = nullptr, MotionBlur blur = {});

@@ -9,25 +9,44 @@ namespace {
 
 constexpr int kMostSamples = 6;  // on a side of a footprint
 
-/// A level with the picture's border repeated where a sample falls outside of it.
-float bilinear(const GrayPicture& picture, float x, float y) {
-  x = std::clamp(x, 0.0f, static_cast<float>(picture.width - 1));
-  y = std::clamp(y, 0.0f, static_cast<float>(picture.height - 1));
-  const int x0 = std::min(static_cast<int>(x), picture.width - 2);
-  const int y0 = std::min(static_cast<int>(y), picture.height - 2);
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
+// Places in a level are fixed-point numbers with 16 bits after the point, so that every machine
+// renders the same bytes.
+constexpr double kOne = 65536.0;
+
+std::int32_t fixed(double value) {
+  return static_cast<std::int32_t>(std::lround(value * kOne));
+}
+
+/// A weighted sum of four pixels with 16 bits after the point. (x0, y0) and its neighbours to the
+/// right and below are in the picture.
+std::int32_t bilinear(const GrayPicture& picture, int x0, int y0, std::int32_t fx,
+                      std::int32_t fy) {
   const std::uint8_t* p =
       picture.pixels.data() + static_cast<std::ptrdiff_t>(y0) * picture.width + x0;
-  const float top = p[0] + fx * static_cast<float>(p[1] - p[0]);
   const std::uint8_t* q = p + picture.width;
-  const float bottom = q[0] + fx * static_cast<float>(q[1] - q[0]);
-  return top + fy * (bottom - top);
+  const std::int32_t top = (p[0] << 8) + fx * (p[1] - p[0]);
+  const std::int32_t bottom = (q[0] << 8) + fx * (q[1] - q[0]);
+  return (top << 8) + fy * (bottom - top);
+}
+
+std::int32_t sample_inside(const GrayPicture& picture, std::int32_t x, std::int32_t y) {
+  return bilinear(picture, x >> 16, y >> 16, (x >> 8) & 255, (y >> 8) & 255);
+}
+
+/// The same with the picture's border repeated where the place lies outside of it.
+std::int32_t sample_anywhere(const GrayPicture& picture, std::int32_t x, std::int32_t y) {
+  x = std::clamp(x, 0, (picture.width - 1) << 16);
+  y = std::clamp(y, 0, (picture.height - 1) << 16);
+  const int x0 = std::min(x >> 16, picture.width - 2);
+  const int y0 = std::min(y >> 16, picture.height - 2);
+  return bilinear(picture, x0, y0, (x - (x0 << 16)) >> 8, (y - (y0 << 16)) >> 8);
 }
 
 /// Places of a pixel's samples around its centre, in pixels of the level.
 struct Footprint {
-  std::vector<std::array<float, 2>> offsets;
+  std::vector<std::array<std::int32_t, 2>> offsets;
+  std::int32_t reach_x = 0;  ///< of the offsets
+  std::int32_t reach_y = 0;
 };
 
 Footprint footprint_of(const std::array<double, 4>& inverse, double factor) {
@@ -41,12 +60,56 @@ Footprint footprint_of(const std::array<double, 4>& inverse, double factor) {
     for (int u = 0; u < across; ++u) {
       const double x = (u + 0.5) / across - 0.5;
       const double y = (v + 0.5) / down - 0.5;
-      footprint.offsets.push_back({static_cast<float>((inverse[0] * x + inverse[1] * y) / factor),
-                                   static_cast<float>((inverse[2] * x + inverse[3] * y) / factor)});
+      const std::int32_t dx = fixed((inverse[0] * x + inverse[1] * y) / factor);
+      const std::int32_t dy = fixed((inverse[2] * x + inverse[3] * y) / factor);
+      footprint.offsets.push_back({dx, dy});
+      footprint.reach_x = std::max(footprint.reach_x, std::abs(dx));
+      footprint.reach_y = std::max(footprint.reach_y, std::abs(dy));
     }
   }
   return footprint;
 }
+
+/// Takes the samples of single pixels out of one level.
+class Sampler {
+ public:
+  Sampler(const GrayPicture& level, const GrayPicture& finest, const std::array<double, 4>& inverse,
+          double factor)
+      : level_(level),
+        footprint_(footprint_of(inverse, factor)),
+        count_(static_cast<std::int32_t>(footprint_.offsets.size())),
+        right_(fixed(finest.width / factor - 0.5)),
+        bottom_(fixed(finest.height / factor - 0.5)) {}
+
+  /// behind: grey outside of the picture, -1: its border pixels.
+  [[nodiscard]] std::uint8_t pixel(std::int32_t x, std::int32_t y, int behind) const {
+    const bool inside = x >= footprint_.reach_x && y >= footprint_.reach_y &&
+                        x < ((level_.width - 1) << 16) - footprint_.reach_x &&
+                        y < ((level_.height - 1) << 16) - footprint_.reach_y;
+    std::int32_t sum = 0;
+    for (const auto& [dx, dy] : footprint_.offsets) {
+      if (inside) {
+        sum += sample_inside(level_, x + dx, y + dy);
+      } else if (behind >= 0 && outside(x + dx, y + dy)) {
+        sum += behind << 16;
+      } else {
+        sum += sample_anywhere(level_, x + dx, y + dy);
+      }
+    }
+    return static_cast<std::uint8_t>((sum / count_ + 0x8000) >> 16);
+  }
+
+ private:
+  [[nodiscard]] bool outside(std::int32_t x, std::int32_t y) const {
+    return x < -0x8000 || y < -0x8000 || x > right_ || y > bottom_;
+  }
+
+  const GrayPicture& level_;
+  Footprint footprint_;
+  std::int32_t count_;
+  std::int32_t right_;
+  std::int32_t bottom_;
+};
 
 }  // namespace
 
@@ -139,34 +202,27 @@ GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView
     ++level;
     factor *= 2;
   }
-  const GrayPicture& from = levels[level];
-  const Footprint footprint = footprint_of(inverse, factor);
-  const float share = 1.0f / static_cast<float>(footprint.offsets.size());
-  const float right = static_cast<float>(levels[0].width / factor) - 0.5f;
-  const float bottom = static_cast<float>(levels[0].height / factor) - 0.5f;
+  const Sampler sampler(levels[level], levels[0], inverse, factor);
+  // The place of a pixel is stepped along a row with 32 bits after the point.
+  constexpr double kFine = 4294967296.0;
+  const std::int64_t step_x = std::llround(inverse[0] / factor * kFine);
+  const std::int64_t step_y = std::llround(inverse[2] / factor * kFine);
   GrayPicture out;
   out.width = view.width;
   out.height = view.height;
   out.pixels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-  std::uint8_t* pixel = out.pixels.data();
+  std::size_t pixel = 0;
   for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x, ++pixel) {
-      const double u = x - view.offset[0];
-      const double v = y - view.offset[1];
-      const auto px = static_cast<float>((inverse[0] * u + inverse[1] * v + 0.5) / factor - 0.5);
-      const auto py = static_cast<float>((inverse[2] * u + inverse[3] * v + 0.5) / factor - 0.5);
-      const float behind =
-          background != nullptr
-              ? background->pixels[static_cast<std::size_t>(pixel - out.pixels.data())]
-              : 0.0f;
-      float sum = 0.0f;
-      for (const auto& offset : footprint.offsets) {
-        const float sx = px + offset[0];
-        const float sy = py + offset[1];
-        const bool outside = sx < -0.5f || sy < -0.5f || sx > right || sy > bottom;
-        sum += outside && background != nullptr ? behind : bilinear(from, sx, sy);
-      }
-      *pixel = static_cast<std::uint8_t>(sum * share + 0.5f);
+    const double u = -view.offset[0];
+    const double v = y - view.offset[1];
+    std::int64_t px =
+        std::llround(((inverse[0] * u + inverse[1] * v + 0.5) / factor - 0.5) * kFine);
+    std::int64_t py =
+        std::llround(((inverse[2] * u + inverse[3] * v + 0.5) / factor - 0.5) * kFine);
+    for (int x = 0; x < out.width; ++x, ++pixel, px += step_x, py += step_y) {
+      const int behind = background != nullptr ? background->pixels[pixel] : -1;
+      out.pixels[pixel] = sampler.pixel(static_cast<std::int32_t>(px >> 16),
+                                        static_cast<std::int32_t>(py >> 16), behind);
     }
   }
   return out;
