@@ -30,3 +30,7 @@ set_source_files_properties(${play_threads_tests} PROPERTIES COMPILE_OPTIONS "-f
 add_test(NAME cli_play COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/play_test.py)
 set_tests_properties(cli_play PROPERTIES TIMEOUT 600 ENVIRONMENT
   "MODAR_SOURCE_DIR=${CMAKE_SOURCE_DIR};MODAR_BIN_DIR=${CMAKE_BINARY_DIR}/bin;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0")
+
+add_test(NAME cli_app COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/app_test.py)
+set_tests_properties(cli_app PROPERTIES TIMEOUT 600 ENVIRONMENT
+  "MODAR_SOURCE_DIR=${CMAKE_SOURCE_DIR};MODAR_BIN_DIR=${CMAKE_BINARY_DIR}/bin;MODAR_SANITIZE=${MODAR_SANITIZE};LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0")

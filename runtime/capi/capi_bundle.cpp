@@ -1,0 +1,89 @@
+// modar.h: bundles, their names and scenes.
+#include <memory>
+#include <new>
+#include <utility>
+
+#include "modar/renderer.hpp"
+#include "runtime/capi/handles.hpp"
+
+using modar::hand_over;
+
+namespace {
+
+modar_bundle* opened(modar::MappedFile file, std::span<const std::byte> bytes, modar_error* error) {
+  auto view = modar::BundleView::open(bytes);
+  if (!view) {
+    hand_over(view.error(), error);
+    return nullptr;
+  }
+  return new modar_bundle{std::move(file), *view};
+}
+
+/// strlcpy's contract.
+size_t copy_name(std::string_view name, char* text, size_t size) {
+  if (text != nullptr && size > 0) {
+    const size_t length = std::min(name.size(), size - 1);
+    std::memcpy(text, name.data(), length);
+    text[length] = '\0';
+  }
+  return name.size();
+}
+
+}  // namespace
+
+modar_bundle* modar_bundle_open(const char* path, modar_error* error) {
+  if (path == nullptr) {
+    hand_over(modar::missing("path"), error);
+    return nullptr;
+  }
+  auto file = modar::MappedFile::open(path);
+  if (!file) {
+    hand_over(file.error(), error);
+    return nullptr;
+  }
+  const std::span<const std::byte> bytes = file->bytes();
+  return opened(std::move(*file), bytes, error);
+}
+
+modar_bundle* modar_bundle_open_bytes(const void* bytes, size_t size, modar_error* error) {
+  if (bytes == nullptr) {
+    hand_over(modar::missing("bytes"), error);
+    return nullptr;
+  }
+  return opened({}, {static_cast<const std::byte*>(bytes), size}, error);
+}
+
+void modar_bundle_close(modar_bundle* bundle) {
+  delete bundle;
+}
+
+uint32_t modar_model_count(const modar_bundle* bundle) {
+  return bundle->view.models().size();
+}
+
+uint32_t modar_pattern_count(const modar_bundle* bundle) {
+  return bundle->view.patterns().size();
+}
+
+uint32_t modar_scene_count(const modar_bundle* bundle) {
+  return bundle->view.scenes().size();
+}
+
+size_t modar_model_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
+  if (index >= bundle->view.models().size()) return 0;
+  return copy_name(bundle->view.name(bundle->view.models()[index].name), text, size);
+}
+
+size_t modar_pattern_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
+  if (index >= bundle->view.patterns().size()) return 0;
+  return copy_name(bundle->view.name(bundle->view.patterns()[index].name), text, size);
+}
+
+int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scene) {
+  if (index >= bundle->view.scenes().size()) return 0;
+  const modar::SceneRecord& record = bundle->view.scenes()[index];
+  scene->pattern = record.pattern;
+  scene->model = record.model;
+  modar::copy_matrix(modar::scene_matrix(record), scene->place);
+  return 1;
+}

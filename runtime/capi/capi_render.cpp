@@ -1,0 +1,148 @@
+// modar.h: contexts and the renderer. Nothing of the tracker: programs may draw alone.
+#include <memory>
+#include <vector>
+
+#include "modar/renderer.hpp"
+#include "runtime/capi/handles.hpp"
+
+static_assert(MODAR_NV21 == static_cast<int>(modar::PictureFormat::kNv21));
+static_assert(MODAR_NV12 == static_cast<int>(modar::PictureFormat::kNv12));
+static_assert(MODAR_I420 == static_cast<int>(modar::PictureFormat::kI420));
+
+struct modar_context {
+  std::unique_ptr<modar::GlContext> context;
+};
+
+struct modar_renderer {
+  modar::BundleView view;
+  std::string device;
+  std::uint64_t gpu_bytes = 0;
+  std::unique_ptr<modar::Renderer> renderer;
+  std::vector<modar::DrawItem> items;
+  std::size_t picture_bytes = 0;
+};
+
+namespace {
+
+modar::Result<modar::GlCaps> caps_for(const std::string& device, std::uint64_t gpu_bytes) {
+  modar::GlCaps caps = modar::probe_gl_caps();
+  if (!device.empty()) {
+    auto masked = modar::mask_gl_caps(caps, device);
+    if (!masked) return masked;
+    caps = *masked;
+  }
+  if (gpu_bytes > 0) caps.gpu_memory = gpu_bytes;
+  return caps;
+}
+
+modar::CameraPicture picture_of(const modar_picture& picture) {
+  modar::CameraPicture ours;
+  ours.format = static_cast<modar::PictureFormat>(picture.format);
+  ours.width = picture.width;
+  ours.height = picture.height;
+  std::copy_n(picture.planes, ours.planes.size(), ours.planes.begin());
+  std::copy_n(picture.strides, ours.strides.size(), ours.strides.begin());
+  ours.full_range = picture.full_range != 0;
+  if (picture.row_count > 0) {
+    ours.first_row = picture.first_row;
+    ours.row_count = picture.row_count;
+  }
+  return ours;
+}
+
+}  // namespace
+
+modar_context* modar_context_create(modar_error* error) {
+  auto context = modar::GlContext::create_offscreen();
+  if (!context) {
+    modar::hand_over(context.error(), error);
+    return nullptr;
+  }
+  return new modar_context{std::move(*context)};
+}
+
+void modar_context_destroy(modar_context* context) {
+  delete context;
+}
+
+modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* device,
+                                      uint64_t gpu_bytes, modar_error* error) {
+  if (bundle == nullptr) {
+    modar::hand_over(modar::missing("bundle"), error);
+    return nullptr;
+  }
+  auto made = std::make_unique<modar_renderer>();
+  made->view = bundle->view;
+  made->device = device == nullptr ? "" : device;
+  made->gpu_bytes = gpu_bytes;
+  const auto caps = caps_for(made->device, gpu_bytes);
+  if (!caps) {
+    modar::hand_over(caps.error(), error);
+    return nullptr;
+  }
+  auto renderer = modar::Renderer::create(bundle->view, *caps);
+  if (!renderer) {
+    modar::hand_over(renderer.error(), error);
+    return nullptr;
+  }
+  made->renderer = std::move(*renderer);
+  return made.release();
+}
+
+void modar_renderer_destroy(modar_renderer* renderer) {
+  delete renderer;
+}
+
+int modar_renderer_restore(modar_renderer* renderer, modar_error* error) {
+  const auto caps = caps_for(renderer->device, renderer->gpu_bytes);
+  if (!caps) return modar::hand_over(caps.error(), error);
+  return modar::hand_over(renderer->renderer->restore(*caps), error);
+}
+
+int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar_error* error) {
+  const auto done = renderer->renderer->resize(width, height);
+  if (!done) return modar::hand_over(done, error);
+  renderer->picture_bytes =
+      std::size_t{4} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  return 0;
+}
+
+void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive) {
+  modar::RenderOptions options;
+  options.light = glm::make_vec3(direction);
+  options.exclusive_context = exclusive != 0;
+  renderer->renderer->set_options(options);
+}
+
+void modar_renderer_render(modar_renderer* renderer, const modar_picture* picture,
+                           const modar_camera* camera, const float projection[16],
+                           const modar_item* items, size_t count) {
+  renderer->items.clear();
+  for (size_t i = 0; i < count; ++i) {
+    if (items[i].model >= renderer->view.models().size()) continue;
+    renderer->items.push_back({items[i].model, glm::make_mat4(items[i].to_eye)});
+  }
+  glm::mat4 matrix(1.0f);
+  if (projection != nullptr) {
+    matrix = glm::make_mat4(projection);
+  } else if (camera != nullptr && !renderer->items.empty()) {
+    const modar::DepthRange range = modar::depth_range(renderer->view, renderer->items);
+    matrix = modar::gl_projection(modar::camera_of(*camera), range.near_plane, range.far_plane);
+  }
+  renderer->renderer->render(picture == nullptr ? modar::CameraPicture() : picture_of(*picture),
+                             matrix, renderer->items);
+}
+
+void modar_renderer_show(modar_renderer* renderer, int window_width, int window_height) {
+  renderer->renderer->blit_to_window(window_width, window_height);
+}
+
+void modar_renderer_read_rgba(modar_renderer* renderer, uint8_t* rgba) {
+  renderer->renderer->read_pixels({rgba, renderer->picture_bytes});
+}
+
+modar_render_stats modar_renderer_stats(const modar_renderer* renderer) {
+  const modar::RenderStats& stats = renderer->renderer->stats();
+  return {stats.draw_calls,    stats.state_changes, stats.chunks_drawn,
+          stats.chunks_culled, stats.triangles,     stats.bytes_uploaded};
+}

@@ -1,0 +1,39 @@
+/* overlay BUNDLE WIDTH HEIGHT < frames.nv21 > pictures.rgba: the bundle's first scene over frames. */
+#include <modar/modar.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static int fail(const modar_error* e) {
+  fprintf(stderr, "overlay: %s: %s; %s [%s]\n", e->where, e->cause, e->cure, e->code);
+  return e->exit_code;
+}
+int main(int argc, char** argv) {
+  modar_error error;
+  if (argc < 4) return fputs("overlay BUNDLE WIDTH HEIGHT\n", stderr), 1;
+  modar_camera camera = modar_camera_default(atoi(argv[2]), atoi(argv[3]));
+  size_t width = (size_t)camera.width, pixels = width * (size_t)camera.height;
+  modar_context* context = modar_context_create(&error); /* an app with a surface has its own */
+  modar_bundle* bundle = context ? modar_bundle_open(argv[1], &error) : NULL;
+  modar_tracker* tracker = bundle ? modar_tracker_create(bundle, &camera, &error) : NULL;
+  modar_renderer* renderer = tracker ? modar_renderer_create(bundle, NULL, 0, &error) : NULL;
+  if (!renderer || modar_renderer_resize(renderer, camera.width, camera.height, &error)) return fail(&error);
+  uint8_t* frame = malloc(pixels * 3 / 2);
+  uint8_t* rgba = malloc(pixels * 4);
+  modar_picture picture = {MODAR_NV21, camera.width, camera.height, {frame, frame + pixels},
+                           {camera.width, camera.width}, 1, 0, 0};
+  modar_scene scene = {0};
+  modar_scene_at(bundle, 0, &scene);
+  while (fread(frame, pixels * 3 / 2, 1, stdin) == 1) {
+    modar_pose pose = {0};
+    modar_item item;
+    if (modar_tracker_step(tracker, frame, width, &error)) return fail(&error);
+    int seen = modar_tracker_pose(tracker, scene.pattern, &pose);
+    if (seen) modar_item_place(&item, &scene, &pose);
+    fprintf(stderr, "%d %g %g %g\n", seen, pose.translation[0], pose.translation[1], pose.translation[2]);
+    modar_renderer_render(renderer, &picture, &camera, NULL, &item, seen ? 1 : 0);
+    modar_renderer_read_rgba(renderer, rgba);
+    fwrite(rgba, 4, pixels, stdout);
+  }
+  free(frame), free(rgba), modar_renderer_destroy(renderer), modar_tracker_destroy(tracker);
+  return modar_bundle_close(bundle), modar_context_destroy(context), 0;
+}

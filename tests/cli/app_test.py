@@ -1,0 +1,162 @@
+"""The runtime in a project of somebody else's: installed, found by CMake and pkg-config, called from C."""
+import csv
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+from programs import BIN, COVER, ROOT, ProgramTest
+
+BUILD = BIN.parent
+SANITIZE = os.environ.get("MODAR_SANITIZE", "")
+FLAGS = [f"-fsanitize={SANITIZE}"] if SANITIZE else []
+WIDTH, HEIGHT, FRAMES = 480, 360, 6
+
+# Draws and never tracks; told by its arguments.
+DRAW_ALONE = r"""
+#include <modar/modar.h>
+#include <stdio.h>
+#include <string.h>
+int main(int argc, char** argv) {
+  modar_error e;
+  modar_camera camera = modar_camera_default(64, 48);
+  static uint8_t rgba[64 * 48 * 4];
+  char name[4] = "";
+  if (argc < 3) return 9;
+  if (modar_bundle_open("none.modar", &e) || e.exit_code != 2 || strcmp(e.code, "io.open")) return 10;
+  if (modar_bundle_open(NULL, NULL) || modar_bundle_open_bytes(NULL, 1, NULL)) return 11;
+  if (modar_renderer_create(NULL, NULL, 0, &e) || strcmp(e.code, "capi.null")) return 12;
+  modar_context* context = modar_context_create(&e);
+  modar_bundle* bundle = modar_bundle_open(argv[1], &e);
+  if (!context || !bundle) return 13;
+  if (modar_model_name(bundle, 0, name, sizeof name) != 7 || strcmp(name, "pot")) return 14;
+  if (modar_model_name(bundle, 1, name, sizeof name) || modar_scene_at(bundle, 7, NULL)) return 15;
+  if (modar_renderer_create(bundle, "nokia", 0, &e) || e.exit_code != 1) return 16;
+  modar_renderer* renderer = modar_renderer_create(bundle, argv[2], 0, &e);
+  if (!renderer || modar_renderer_resize(renderer, 64, 48, &e)) return 17;
+  modar_item items[2] = {{0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -4, 1}}, {99, {0}}};
+  modar_renderer_render(renderer, NULL, &camera, NULL, items, 2);
+  modar_renderer_read_rgba(renderer, rgba);
+  modar_render_stats stats = modar_renderer_stats(renderer);
+  int lit = 0;
+  for (size_t i = 0; i < sizeof rgba; i += 4) lit += rgba[i] > 0;
+  printf("%d %d\n", stats.draw_calls, lit);
+  if (modar_renderer_restore(renderer, &e)) return 18;
+  modar_renderer_destroy(renderer);
+  modar_bundle_close(bundle);
+  modar_context_destroy(context);
+  return 0;
+}
+"""
+
+
+def run(*command, **options):
+    return subprocess.run([str(word) for word in command], capture_output=True, **options)
+
+
+class App(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.prefix = pathlib.Path(tempfile.mkdtemp(prefix="modar-prefix-"))
+        cls.addClassCleanup(shutil.rmtree, cls.prefix, ignore_errors=True)
+        done = run("cmake", "--install", BUILD, "--prefix", cls.prefix, "--component", "development", text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+    def build_example(self):
+        """A copy of runtime/example, far from our tree."""
+        project = self.folder / "project"
+        shutil.copytree(ROOT / "runtime" / "example", project)
+        flags = " ".join(["-std=c99 -Wall -Wextra -Wpedantic -Werror", *FLAGS])
+        done = run("cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}",
+                   f"-DCMAKE_C_FLAGS={flags}", f"-DCMAKE_EXE_LINKER_FLAGS={' '.join(FLAGS)}", text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        done = run("cmake", "--build", project / "build", text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return project / "build" / "overlay"
+
+    def clip(self):
+        """Frames of our cover in NV21, where its corners truly are, and the frames in RGB."""
+        folder = self.folder / "clip"
+        run("/usr/bin/python3", ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", FRAMES, "--size",
+            f"{WIDTH}x{HEIGHT}", folder, check=True)
+        with (folder / "truth.csv").open() as file:
+            truth = list(csv.DictReader(file))
+        frames = {}
+        for form in ("nv21", "rgb24"):
+            done = run("ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", folder / "*.png", "-vf",
+                       "scale=out_range=full", "-pix_fmt", form, "-f", "rawvideo", "-", check=True)
+            frames[form] = done.stdout
+        return truth, frames["nv21"], frames["rgb24"]
+
+    def assert_overlay(self, frame, rgba, rgb, centre):
+        """A model in the middle of the pattern, the camera's picture in the frame's corners."""
+        def far(x, y):
+            i = y * WIDTH + x
+            return max(abs(rgba[4 * i + c] - rgb[3 * i + c]) for c in range(3))
+
+        size = 20
+        ring = [far(x, y) for x in (*range(size), *range(WIDTH - size, WIDTH)) for y in range(size)]
+        self.assertLess(sum(ring) / len(ring), 6, f"the picture of frame {frame}")
+        if centre is None:
+            return
+        x, y = (round(v) for v in centre)
+        middle = [far(u, v) for u in range(x - 4, x + 5) for v in range(y - 4, y + 5)]
+        self.assertGreater(sum(middle) / len(middle), 20, f"the model of frame {frame}")
+
+    def test_the_example_of_forty_lines(self):
+        self.assertLessEqual(len((ROOT / "runtime" / "example" / "overlay.c").read_text().splitlines()), 40)
+        overlay, bundle = self.build_example(), self.bake_demo()
+        self.assertEqual(run(overlay).returncode, 1)
+        # A program that gives up leaves its memory to the system.
+        done = run(overlay, COVER, WIDTH, HEIGHT, env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0"}, text=True)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("bundle.magic", done.stderr)
+        truth, nv21, rgb = self.clip()
+        done = run(overlay, bundle, WIDTH, HEIGHT, input=nv21)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = done.stderr.decode().splitlines()
+        self.assertEqual(len(lines), FRAMES)
+        self.assertEqual(len(done.stdout), FRAMES * WIDTH * HEIGHT * 4)
+        found = 0
+        for k, (line, row) in enumerate(zip(lines, truth)):
+            seen, x, y, z = (float(word) for word in line.split())
+            centre = None
+            if seen:
+                # The three floats put the pattern's middle where the diagonals of its corners meet.
+                found += 1
+                centre = WIDTH * x / z + (WIDTH - 1) / 2, WIDTH * y / z + (HEIGHT - 1) / 2
+                self.assertLess(abs(centre[0] - diagonals(row)[0]) + abs(centre[1] - diagonals(row)[1]), 3)
+            self.assert_overlay(k, done.stdout[k * WIDTH * HEIGHT * 4:], rgb[k * WIDTH * HEIGHT * 3:], centre)
+        self.assertGreaterEqual(found, FRAMES - 2)
+
+    def test_drawing_alone_carries_no_tracker(self):
+        bundle = self.bake_demo()
+        (self.folder / "draw.c").write_text(DRAW_ALONE)
+        flags = run("pkg-config", "--cflags", "--libs", "modar", check=True, text=True,
+                    env={**os.environ, "PKG_CONFIG_PATH": str(next(self.prefix.rglob("pkgconfig")))}).stdout.split()
+        done = run("cc", "-Wall", "-Wextra", "-Werror", *FLAGS, "-o", self.folder / "draw", self.folder / "draw.c",
+                   *flags, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for device in ("desktop", "noext"):
+            done = run(self.folder / "draw", bundle, device, cwd=self.folder, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            calls, lit = (int(word) for word in done.stdout.split())
+            self.assertEqual(calls, 1)
+            self.assertGreater(lit, 64 * 48 // 20)
+        symbols = run("nm", "-C", self.folder / "draw", text=True, check=True).stdout
+        carried = [part for part in ("modar::Renderer::render", "PoseLoop", "refine_pose") if part in symbols]
+        self.assertEqual(carried, ["modar::Renderer::render"])
+
+
+def diagonals(row):
+    """Where the diagonals of a row of truth.csv meet."""
+    x0, y0, x1, y1, x2, y2, x3, y3 = (float(row[key]) for key in list(row)[1:9])
+    ax, ay, bx, by = x2 - x0, y2 - y0, x3 - x1, y3 - y1
+    s = ((x1 - x0) * by - (y1 - y0) * bx) / (ax * by - ay * bx)
+    return x0 + s * ax, y0 + s * ay
+
+
+if __name__ == "__main__":
+    unittest.main()
