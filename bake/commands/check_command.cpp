@@ -1,14 +1,13 @@
 // `modar check`: is this bundle good? Verdict first, then one line an issue.
-#include <cstdio>
-#include <filesystem>
-#include <string>
-#include <system_error>
+#include "bake/commands/check_command.hpp"
 
+#include <cstdio>
+#include <string>
+
+#include "bake/check/device_file.hpp"
 #include "bake/check/device_rules.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/check/workstation_issues.hpp"
-#include "bake/commands/check_json.hpp"
-#include "bake/commands/commands.hpp"
 #include "bake/commands/terminal.hpp"
 #include "bake/yml_rule.hpp"
 #include "formats/bundle_view.hpp"
@@ -45,70 +44,6 @@ Result<void> weigh(const CheckCommand& command, Verdict& verdict) {
   return {};
 }
 
-Result<const DeviceProfile*> named_device(const std::string& name) {
-  const DeviceProfile* device = name.empty() ? nullptr : find_device_profile(name);
-  if (device == nullptr && !name.empty()) {
-    return fail(ExitCode::kUsage, "device.unknown", name, "there is no profile of that name",
-                "choose one of " + device_profile_names());
-  }
-  return device;
-}
-
-bool is_model(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  return extension == ".obj" || extension == ".OBJ" || extension == ".glb" || extension == ".gltf";
-}
-
-Result<SourceFit> against_sources(const BundleView& bundle, const CheckCommand& command,
-                                  const IssueSink& sink) {
-  BakeRequest request;
-  for (const std::string& path : command.sources) {
-    if (is_model(path)) {
-      request.models.push_back(path);
-    } else {
-      request.patterns.push_back({path, 0.0});
-    }
-  }
-  read_bake_options(bundle.meta(), request);
-  request.jobs = command.jobs;
-  ProgressBar bar(command.json || command.sarif);
-  Report report;
-  report.progress = [&bar](const std::string& stage, double done) { bar.show(stage, done); };
-  return check_source(bundle, request, sink, report);
-}
-
-Result<std::vector<PatternRange>> with_the_devices_eye(const BundleView& bundle,
-                                                       const CheckCommand& command,
-                                                       const IssueSink& sink) {
-  PoseCheckOptions options;
-  for (const std::string& path : command.sources) {
-    if (!is_model(path)) options.pictures.push_back(path);
-  }
-  ProgressBar bar(command.json || command.sarif);
-  options.views = command.pose_views;
-  options.progress = [&bar](double done) { bar.show("pose", done); };
-  return check_poses(bundle, options, sink);
-}
-
-Result<std::vector<ModelLook>> beside_sources(const BundleView& bundle, const CheckCommand& command,
-                                              const IssueSink& sink) {
-  std::error_code error;
-  std::filesystem::create_directories(command.visual, error);
-  if (error) {
-    return fail(ExitCode::kIo, "check.folder", command.visual, error.message(),
-                "name a folder that can be made");
-  }
-  VisualOptions options;
-  for (const std::string& path : command.sources) {
-    if (is_model(path)) options.models.push_back(path);
-  }
-  options.picture_folder = command.visual;
-  options.jobs = command.jobs;
-  ProgressBar bar(command.json || command.sarif);
-  options.progress = [&bar](double done) { bar.show("look", done); };
-  return check_looks(bundle, options, sink);
-}
-
 void print_looks(const std::vector<ModelLook>& looks) {
   for (const ModelLook& look : looks) {
     if (!look.judged) {
@@ -123,6 +58,11 @@ void print_looks(const std::vector<ModelLook>& looks) {
 
 void print_ranges(const std::vector<PatternRange>& ranges) {
   for (const PatternRange& range : ranges) {
+    if (range.tilt_deg < 0) {
+      std::printf("pattern '%s': not found (%s), not even from the front at its picture's size\n",
+                  range.name.c_str(), range.method.c_str());
+      continue;
+    }
     std::printf(
         "pattern '%s': found (%s) at %.2g to %.2g times its picture's area, tilted up to "
         "%.0f degrees; off by %.2f pixels, %.2f degrees, %.2f %% of the distance\n",
@@ -147,7 +87,7 @@ void print_fit(const SourceFit& fit) {
 
 }  // namespace
 
-int run_check(const CheckCommand& command) {
+int run_check(const CheckCommand& command, SourceStages stages) {
   if (command.list_issues) {
     print_all_kinds();
     return static_cast<int>(ExitCode::kOk);
@@ -155,7 +95,8 @@ int run_check(const CheckCommand& command) {
   if (command.mutations > 0) return run_mutate(command);
   Verdict verdict;
   if (auto weighed = weigh(command, verdict); !weighed) return print_error(weighed.error());
-  const Result<const DeviceProfile*> device = named_device(command.device);
+  DeviceFile from_file;
+  const Result<const DeviceProfile*> device = choose_device(command.device, from_file);
   if (!device) return print_error(device.error());
   Result<MappedFile> file = MappedFile::open(command.bundle);
   if (!file) return print_error(file.error());
@@ -166,24 +107,14 @@ int run_check(const CheckCommand& command) {
   // The text twin needs OpenCV's parser, so this rule stands outside of formats/.
   if (sound) sound = check_yml_twins(file->bytes(), sink);
   CheckExtras extras;
-  extras.device = command.device;
+  if (*device != nullptr) extras.device = (*device)->name;
   if (sound) {
     const Result<BundleView> bundle = BundleView::open(file->bytes());
     if (*device != nullptr) check_device(*bundle, **device, sink);
     if (!command.sources.empty()) {
-      Result<SourceFit> fit = against_sources(*bundle, command, sink);
-      if (!fit) return print_error(fit.error());
-      extras.source = std::move(*fit);
-    }
-    if (!command.visual.empty()) {
-      Result<std::vector<ModelLook>> looks = beside_sources(*bundle, command, sink);
-      if (!looks) return print_error(looks.error());
-      extras.looks = std::move(*looks);
-    }
-    if (command.pose) {
-      Result<std::vector<PatternRange>> ranges = with_the_devices_eye(*bundle, command, sink);
-      if (!ranges) return print_error(ranges.error());
-      extras.poses = std::move(*ranges);
+      if (auto done = stages(*bundle, command, sink, extras); !done) {
+        return print_error(done.error());
+      }
     }
   }
 

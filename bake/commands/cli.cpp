@@ -3,13 +3,13 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <map>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "bake/commands/arguments.hpp"
+#include "bake/commands/check_command.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/ship_command.hpp"
 #include "bake/commands/terminal.hpp"
@@ -143,59 +143,6 @@ CLI::App* add_rectify(CLI::App& pattern, RectifyCommand& rectify, std::string& c
   return sub;
 }
 
-CLI::App* add_check(CLI::App& app, CheckCommand& check) {
-  CLI::App* sub = app.add_subcommand("check", "Prove that a bundle is good");
-  CLI::Option* bundle = sub->add_option("bundle", check.bundle, "The bundle")->type_name("BUNDLE");
-  CLI::Option* list = sub->add_flag("--list-issues", check.list_issues,
-                                    "Print all kinds of issues with their cures (ISSUES.md)");
-  bundle->excludes(list);
-  CLI::Option* json = sub->add_flag("--json", check.json, "Print verdict and issues as JSON");
-  sub->add_flag("--sarif", check.sarif, "Print them as SARIF 2.1.0, for CI systems")
-      ->excludes(json);
-  sub->add_option("--device", check.device,
-                  "Hold the bundle against a device too: " + device_profile_names())
-      ->type_name("NAME");
-  CLI::Option* source =
-      sub->add_option(
-             "--source", check.sources,
-             "Bake these models and pattern images again and compare; measure what differs")
-          ->type_name("FILE");
-  CLI::Option* pose =
-      sub->add_flag("--pose", check.pose,
-                    "Track the patterns of --source in rendered views: errors and working range")
-          ->needs(source);
-  sub->add_option("--pose-views", check.pose_views, "Views of each size and tilt")
-      ->needs(pose)
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  sub->add_option("--visual", check.visual,
-                  "Render the models of --source and of the bundle from 12 sides and compare; the "
-                  "worst view of each goes to DIR")
-      ->type_name("DIR")
-      ->needs(source);
-  sub->add_option("--severity", check.severities,
-                  "Weigh a kind of issue anew: ID=error, warning, info or ignore; repeatable")
-      ->type_name("ID=SEVERITY")
-      ->allow_extra_args(false);
-  sub->add_flag("--warnings-as-errors", check.warnings_as_errors, "A warning makes the bundle bad");
-  CLI::Option* mutate =
-      sub->add_option("--mutate", check.mutations,
-                      "Prove the checker instead: damage N copies of the bundle, count those found")
-          ->type_name("N")
-          ->check(CLI::PositiveNumber);
-  sub->add_option("--seed", check.seed, "Which mutations")->needs(mutate)->capture_default_str();
-  sub->add_option("--second-reader", check.second_reader,
-                  "scripts/read_bundle.py: tells which survivors changed nothing")
-      ->type_name("FILE")
-      ->needs(mutate);
-  sub->footer(example("  modar check spider.modar --device mali400 --source spider.obj cover.png\n "
-                      " modar check --mutate 100000 "
-                      "--second-reader "
-                      "scripts/read_bundle.py spider.modar\n") +
-              "A bad bundle answers 3, and so does a proof that misses its goals.\n");
-  return sub;
-}
-
 CLI::App* add_inspect(CLI::App& app, InspectCommand& inspect) {
   CLI::App* sub = app.add_subcommand("inspect", "Show what a bundle holds, or take it out");
   sub->add_option("bundle", inspect.bundle, "The bundle")->required()->type_name("BUNDLE");
@@ -281,7 +228,6 @@ int parse_and_run(int argc, char** argv) {
   BakeCommand bake;
   bake.request.jobs = std::max(1u, std::thread::hardware_concurrency());
   BakeTexts bake_texts;
-  CheckCommand check;
   InspectCommand inspect;
   BenchCommand bench;
   RectifyCommand rectify;
@@ -290,7 +236,9 @@ int parse_and_run(int argc, char** argv) {
   CLI::App* pattern_sub = app.add_subcommand("pattern", "Work on pattern images");
   pattern_sub->require_subcommand(1);
   const CLI::App* rectify_sub = add_rectify(*pattern_sub, rectify, corners);
-  const CLI::App* check_sub = add_check(app, check);
+  CLI::App* check_sub = app.add_subcommand("check", "Prove that a bundle is good");
+  check_sub->prefix_command();  // it has a command line of its own
+  check_sub->set_help_flag();
   const CLI::App* inspect_sub = add_inspect(app, inspect);
   const CLI::App* bench_sub = add_bench(app, bench);
   CLI::App* ship_sub =
@@ -307,15 +255,7 @@ int parse_and_run(int argc, char** argv) {
   bake.words.assign(argv + 1, argv + argc);
   if (bake_sub->parsed()) return bake_from_texts(bake, bake_texts);
   if (rectify_sub->parsed()) return rectify_from_texts(rectify, corners);
-  if (check_sub->parsed()) {
-    if (check.bundle.empty() && !check.list_issues) {
-      return print_error(
-          {ExitCode::kUsage, "cli.bundle", "check", "no bundle is named", "modar check BUNDLE"});
-    }
-    check.tool_version = MODAR_VERSION;
-    check.jobs = bake.request.jobs;
-    return run_check(check);
-  }
+  if (check_sub->parsed()) return run_check_line(check_sub->remaining(), check_against_sources);
   if (inspect_sub->parsed()) return run_inspect(inspect);
   if (bench_sub->parsed()) return run_bench(bench);
   if (ship_sub->parsed()) return run_ship(ship_sub->remaining());
@@ -325,12 +265,7 @@ int parse_and_run(int argc, char** argv) {
 }  // namespace
 
 int run_modar(int argc, char** argv) {
-  try {
-    return parse_and_run(argc, argv);
-  } catch (const std::exception& error) {
-    return print_error({ExitCode::kInternal, "modar.bug", "", error.what(),
-                        "this is a bug of ours: please report it with the command line"});
-  }
+  return guarded([&] { return parse_and_run(argc, argv); });
 }
 
 }  // namespace modar

@@ -25,25 +25,6 @@ struct RectifyCommand {
   bool json = false;
 };
 
-struct CheckCommand {
-  std::string bundle;
-  bool json = false;
-  bool warnings_as_errors = false;
-  bool sarif = false;
-  std::vector<std::string> severities;  ///< "ID=warning": weighed anew
-  std::string visual;                   ///< folder for pictures of worst views; empty: no look
-  int pose_views = 6;                   ///< of each size and tilt
-  bool pose = false;                    ///< measure the patterns' working ranges
-  std::vector<std::string> sources;     ///< models and pattern images to hold the bundle against
-  unsigned jobs = 1;
-  std::string device;  ///< profile that the bundle is held against; empty: none
-  std::string tool_version;
-  bool list_issues = false;     ///< print ISSUES.md instead
-  std::uint64_t mutations = 0;  ///< damage copies of the bundle instead: `--mutate`
-  std::uint64_t seed = 1;
-  std::string second_reader;  ///< scripts/read_bundle.py, to tell harmless mutations
-};
-
 struct InspectCommand {
   std::string bundle;
   std::string extract;  ///< folder for GLB, PKM, YML; empty: none
@@ -75,8 +56,6 @@ struct BenchCommand {
 /// Each prints data to stdout and words to stderr, and answers the exit code.
 int run_bake(const BakeCommand& command);
 int run_rectify(const RectifyCommand& command);
-int run_check(const CheckCommand& command);
-int run_mutate(const CheckCommand& command);
 int run_inspect(const InspectCommand& command);
 int run_bench(const BenchCommand& command);
 

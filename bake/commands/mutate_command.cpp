@@ -3,8 +3,7 @@
 #include <string>
 
 #include "bake/check/mutate.hpp"
-#include "bake/commands/check_json.hpp"
-#include "bake/commands/commands.hpp"
+#include "bake/commands/check_command.hpp"
 #include "bake/commands/terminal.hpp"
 #include "modar/mapped_file.hpp"
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <exception>
 
 namespace modar {
 
@@ -35,6 +36,15 @@ void ProgressBar::clear() {
 int print_error(const Error& error) {
   std::fprintf(stderr, "modar: error: %s\n", to_line(error).c_str());
   return static_cast<int>(error.exit);
+}
+
+int guarded(const std::function<int()>& work) {
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    return print_error({ExitCode::kInternal, "modar.bug", "", error.what(),
+                        "this is a bug of ours: please report it with the command line"});
+  }
 }
 
 void print_finding(const Finding& finding) {

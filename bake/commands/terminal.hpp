@@ -28,6 +28,9 @@ class ProgressBar {
 
 /// "modar: error: where: cause; cure [code]" on stderr. Answers the exit code.
 int print_error(const Error& error);
+/// What a program does between its first and last line. An exception that nobody caught is told as
+/// a bug of ours.
+int guarded(const std::function<int()>& work);
 /// "warning: file:line: message; cure [id]" on stderr.
 void print_finding(const Finding& finding);
 

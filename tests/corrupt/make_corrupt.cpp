@@ -1,4 +1,5 @@
 // Writes every damaged bundle and the report that it has to give: ID.modar and ID.txt in a folder.
+// Reports of its folder workstation/ take the whole program: tests/cli/corrupt_test.py --write.
 // Whoever runs it reads the difference of the reports before committing them.
 #include <cstdio>
 #include <string>
@@ -28,6 +29,10 @@ int main(int count, char** arguments) {
     for (const modar::test::CorruptCase& made : cases) {
       if (!write_case(arguments[1], made)) return 2;
     }
+  }
+  for (const modar::test::CorruptCase& made : modar::test::workstation_cases()) {
+    const std::string path = std::string(arguments[1]) + "/workstation/" + made.id + ".modar";
+    if (!modar::write_file(path, made.make())) return 2;
   }
   return 0;
 }

@@ -1,0 +1,54 @@
+// `modar check`: its options, and what it runs. check_cli.cpp fills the options.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bake/commands/check_json.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct CheckCommand {
+  std::string bundle;
+  bool json = false;
+  bool warnings_as_errors = false;
+  bool sarif = false;
+  std::vector<std::string> severities;  ///< "ID=warning": weighed anew
+  std::string visual;                   ///< folder for pictures of worst views; empty: no look
+  int pose_views = 6;                   ///< of each size and tilt
+  bool pose = false;                    ///< measure the patterns' working ranges
+  std::vector<std::string> sources;     ///< models and pattern images to hold the bundle against
+  unsigned jobs = 1;
+  std::string device;  ///< profile that the bundle is held against, or its file; empty: none
+  std::string tool_version;
+  bool list_issues = false;     ///< print ISSUES.md instead
+  std::uint64_t mutations = 0;  ///< damage copies of the bundle instead: `--mutate`
+  std::uint64_t seed = 1;
+  std::string second_reader;  ///< scripts/read_bundle.py, to tell harmless mutations
+};
+
+/// The part of a check that bakes, renders and tracks: it brings most of the workstation's
+/// libraries with it, so that the program that checks bytes alone is linked without it.
+using SourceStages = Result<void> (*)(const BundleView& bundle, const CheckCommand& command,
+                                      const IssueSink& sink, CheckExtras& extras);
+
+/// Rebakes, looks and tracks, as the command asks; command.sources is not empty.
+/// Errors: those of check_source(), check_looks() and check_poses(); kIo "check.folder".
+Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
+                                   const IssueSink& sink, CheckExtras& extras);
+
+/// True if the words behind "check" ask for what only check_against_sources() can do.
+bool needs_sources(const std::vector<std::string>& words);
+
+/// Parses the words behind "check" and runs. stages: nullptr where needs_sources() is false.
+int run_check_line(std::vector<std::string> words, SourceStages stages);
+
+/// Each prints data to stdout and words to stderr, and answers the exit code.
+int run_check(const CheckCommand& command, SourceStages stages);
+int run_mutate(const CheckCommand& command);
+
+}  // namespace modar

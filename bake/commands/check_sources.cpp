@@ -1,0 +1,87 @@
+// The part of `modar check` that bakes again, looks and tracks.
+#include <filesystem>
+#include <string>
+#include <system_error>
+
+#include "bake/commands/check_command.hpp"
+#include "bake/commands/terminal.hpp"
+
+namespace modar {
+namespace {
+
+bool is_model(const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  return extension == ".obj" || extension == ".OBJ" || extension == ".glb" || extension == ".gltf";
+}
+
+Result<SourceFit> against_sources(const BundleView& bundle, const CheckCommand& command,
+                                  const IssueSink& sink) {
+  BakeRequest request;
+  for (const std::string& path : command.sources) {
+    if (is_model(path)) {
+      request.models.push_back(path);
+    } else {
+      request.patterns.push_back({path, 0.0});
+    }
+  }
+  read_bake_options(bundle.meta(), request);
+  request.jobs = command.jobs;
+  ProgressBar bar(command.json || command.sarif);
+  Report report;
+  report.progress = [&bar](const std::string& stage, double done) { bar.show(stage, done); };
+  return check_source(bundle, request, sink, report);
+}
+
+Result<std::vector<PatternRange>> with_the_devices_eye(const BundleView& bundle,
+                                                       const CheckCommand& command,
+                                                       const IssueSink& sink) {
+  PoseCheckOptions options;
+  for (const std::string& path : command.sources) {
+    if (!is_model(path)) options.pictures.push_back(path);
+  }
+  ProgressBar bar(command.json || command.sarif);
+  options.views = command.pose_views;
+  options.progress = [&bar](double done) { bar.show("pose", done); };
+  return check_poses(bundle, options, sink);
+}
+
+Result<std::vector<ModelLook>> beside_sources(const BundleView& bundle, const CheckCommand& command,
+                                              const IssueSink& sink) {
+  std::error_code error;
+  std::filesystem::create_directories(command.visual, error);
+  if (error) {
+    return fail(ExitCode::kIo, "check.folder", command.visual, error.message(),
+                "name a folder that can be made");
+  }
+  VisualOptions options;
+  for (const std::string& path : command.sources) {
+    if (is_model(path)) options.models.push_back(path);
+  }
+  options.picture_folder = command.visual;
+  options.jobs = command.jobs;
+  ProgressBar bar(command.json || command.sarif);
+  options.progress = [&bar](double done) { bar.show("look", done); };
+  return check_looks(bundle, options, sink);
+}
+
+}  // namespace
+
+Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
+                                   const IssueSink& sink, CheckExtras& extras) {
+  Result<SourceFit> fit = against_sources(bundle, command, sink);
+  if (!fit) return tl::unexpected(fit.error());
+  extras.source = std::move(*fit);
+  if (!command.visual.empty()) {
+    Result<std::vector<ModelLook>> looks = beside_sources(bundle, command, sink);
+    if (!looks) return tl::unexpected(looks.error());
+    extras.looks = std::move(*looks);
+  }
+  if (command.pose) {
+    Result<std::vector<PatternRange>> ranges = with_the_devices_eye(bundle, command, sink);
+    if (!ranges) return tl::unexpected(ranges.error());
+    extras.poses = std::move(*ranges);
+  }
+  return {};
+}
+
+}  // namespace modar

@@ -1,0 +1,51 @@
+// Bundles that are good by their bytes, and bad for a device or beside a source.
+#include "tests/corrupt/cases.hpp"
+
+namespace modar::test {
+namespace {
+
+/// A texture of one level, without alpha; nothing repeats.
+BundleContent picture(std::uint32_t width, std::uint32_t height) {
+  BundleContent content = texture_content();
+  TextureRecord& texture = content.textures[0];
+  texture.width = width;
+  texture.height = height;
+  texture.flags = 0;
+  texture.level_count = 1;
+  content.texture_levels.resize(1);
+  TextureLevelRecord& level = content.texture_levels[0];
+  level.width = width;
+  level.height = height;
+  level.size = width / 4 * (height / 4) * 8;
+  level.alpha_offset = kNoOffset;
+  content.texture_data[0].assign(level.size, std::byte{0});
+  return content;
+}
+
+constexpr CorruptCase kCases[] = {
+    {"DEVICE_TEXTURE_SIZE", [] { return encode(picture(64, 8)); }},
+    {"DEVICE_ATTRIBUTES", [] { return encode(model_content()); }},
+    {"DEVICE_UNIFORMS", [] { return encode(model_content()); }},
+    // 256 KiB of blocks are six times as much once they are decoded.
+    {"DEVICE_GPU_MEMORY", [] { return encode(picture(1024, 512)); }},
+    // Half of the least memory, and a header.
+    {"DEVICE_RAM", [] { return encode(picture(1024, 1024)); }},
+    {"DEVICE_STORAGE", [] { return encode(picture(1024, 1024)); }},
+    {"DEVICE_HALF_FLOAT", [] { return encode(model_content()); }},
+    {"DEVICE_ETC1", [] { return encode(texture_content()); }},
+    {"SOURCE_MISSING", [] { return encode(model_content()); }},
+    {"SOURCE_BYTES", [] { return encode(model_content()); }},
+    {"SOURCE_SURFACE", [] { return encode(model_content()); }},
+    {"SOURCE_COLOUR", [] { return encode(texture_content()); }},
+    {"SOURCE_COUNTS", [] { return encode(model_content()); }},
+    {"POSE_RANGE", [] { return encode(pattern_content()); }},
+    {"VISUAL_DIFFERS", [] { return encode(model_content()); }},
+};
+
+}  // namespace
+
+std::span<const CorruptCase> workstation_cases() {
+  return kCases;
+}
+
+}  // namespace modar::test
