@@ -127,6 +127,7 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   if (!plan) return tl::unexpected(plan.error());
   ChunkOptions chunk_options;
   chunk_options.max_side = plan->max_side;
+  chunk_options.max_vertices = chunk_vertices_for(mesh.positions.size());
   Result<ChunkedMesh> chunked = chunk(std::move(mesh), chunk_options, report);
   if (!chunked) return tl::unexpected(chunked.error());
   LevelOptions level_options;

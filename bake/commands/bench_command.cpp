@@ -1,6 +1,7 @@
 // `modar bench NAME`: figures as ratios, ours and the reference side by side in one run.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <functional>
@@ -15,6 +16,7 @@
 #include "bake/texture/etc1_bench.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
+#include "modar/render_bench.hpp"
 
 namespace modar {
 namespace {
@@ -88,6 +90,25 @@ BenchResult bench_ship_rows(const BenchCommand& command) {
   return rows;
 }
 
+/// Copies of models in the article's four ways, loading and culling.
+BenchResult bench_render_rows(const BenchCommand& command) {
+  ProgressBar bar(command.pose.quiet || command.json);
+  RenderBenchOptions options;
+  options.device = command.device;
+  options.progress = [&bar](std::uint64_t done, std::uint64_t all) {
+    bar.show("drawing", static_cast<double>(done) / static_cast<double>(all));
+  };
+  const auto measured = bench_render(command.inputs, options);
+  bar.clear();
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<BenchRow> rows;
+  for (const RenderBenchRow& row : *measured) {
+    const double ratio = row.reference > 0 ? row.ours / row.reference : std::nan("");
+    rows.push_back({row.measure, row.ours, row.reference, ratio});
+  }
+  return rows;
+}
+
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
       {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
@@ -96,6 +117,9 @@ const std::vector<Bench>& benches() {
        bench_etc1_rows},
       {"ship", true, "BUNDLE...",
        "bytes and decoding of what travels, against Draco, meshopt and zstd", bench_ship_rows},
+      {"render", true, "BUNDLE... [--device NAME]",
+       "ten copies in the article's ways, loading, culling, against index rendering from arrays",
+       bench_render_rows},
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
        "our pose loop against the article's method, on the same frames",
        [](const BenchCommand& command) { return bench_pose_rows(command.pose); }},

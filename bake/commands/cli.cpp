@@ -161,6 +161,7 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
       ->type_name("NAME");
   sub->add_option("inputs", bench.inputs, "Its input files");
   sub->add_option("--crop", bench.crop, "etc1: side of the centre crop, in pixels");
+  sub->add_option("--device", bench.device, "render: draw as this device would (assets/devices)");
   PoseBenchCommand& pose = bench.pose;
   sub->add_option("--patterns", pose.patterns, "pose: folder of pattern pictures, or one picture");
   sub->add_option("--backgrounds", pose.backgrounds, "pose: folder of photos without a pattern");

@@ -48,7 +48,8 @@ struct PoseBenchCommand {
 struct BenchCommand {
   std::string name;
   std::vector<std::string> inputs;
-  unsigned crop = 0;  ///< etc1: side of the centre crop in pixels, 0: whole images
+  unsigned crop = 0;   ///< etc1: side of the centre crop in pixels, 0: whole images
+  std::string device;  ///< render: profile that masks the context; empty: none
   PoseBenchCommand pose;
   bool json = false;
 };

@@ -168,6 +168,11 @@ class ChunkBuilder {
 
 }  // namespace
 
+std::uint32_t chunk_vertices_for(std::size_t model_vertices) {
+  constexpr std::uint32_t kFinerFrom = 4;  // chunks
+  return model_vertices > kFinerFrom * std::size_t{kMaxChunkVertices} ? 16384 : kMaxChunkVertices;
+}
+
 Result<void> ChunkOptions::validate() const {
   if (max_vertices < 3 || max_vertices > kMaxChunkVertices) {
     return fail(ExitCode::kUsage, "chunk.max-vertices", "", "a chunk has 3 to 65535 vertices",

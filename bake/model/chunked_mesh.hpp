@@ -34,6 +34,11 @@ struct ChunkOptions {
   [[nodiscard]] Result<void> validate() const;
 };
 
+/// The vertices that a chunk of a model of so many should have: as many as it may, but a fourth of
+/// that where the model needs many chunks. From inside a church of 14.8 M triangles, whole chunks
+/// send 1.70 times the triangles whose boxes meet the frustum, such ones 1.26 times.
+std::uint32_t chunk_vertices_for(std::size_t model_vertices);
+
 /// Splits by material, then by a kd tree over triangle centres until every chunk fits.
 /// Takes the mesh over. Errors: kUnsupported "model.max-error" where one triangle is longer than
 /// max_side.

@@ -25,6 +25,9 @@ Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const Pla
   auto renderer = Renderer::create(bundle, caps);
   if (!renderer) return tl::unexpected(renderer.error());
   screen->renderer_ = std::move(*renderer);
+  RenderOptions drawing;
+  drawing.exclusive_context = true;
+  screen->renderer_->set_options(drawing);
   return screen;
 }
 

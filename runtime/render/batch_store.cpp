@@ -20,11 +20,12 @@ bool holds(const Batch& batch, std::span<const BatchPart> parts) {
 }  // namespace
 
 const Batch* BatchStore::find(std::uint32_t layout, std::span<const BatchPart> parts,
-                              std::uint32_t slots, GlState& gl) {
+                              std::uint32_t slots, bool client_arrays, GlState& gl) {
   ++uses_;
   for (Batch& batch : batches_) {
     // A batch made for more slots than this program has would name slots that it lacks.
-    if (batch.layout != layout || !holds(batch, parts)) continue;
+    if (batch.layout != layout || batch.client.empty() == client_arrays) continue;
+    if (!holds(batch, parts)) continue;
     if (batch.places.back().first_slot + batch.places.back().copies > slots) continue;
     batch.last_used = uses_;
     return &batch;
@@ -37,7 +38,12 @@ const Batch* BatchStore::find(std::uint32_t layout, std::span<const BatchPart> p
     bytes += one * part.copies;
   }
   if (!make_room(bytes, gl)) return nullptr;
-  batches_.push_back(make(layout, parts, gl));
+  batches_.push_back(make(layout, parts));
+  if (client_arrays) {
+    keep_in_memory(batches_.back());
+  } else {
+    upload(batches_.back(), gl);
+  }
   batches_.back().last_used = uses_;
   return &batches_.back();
 }
@@ -48,30 +54,44 @@ bool BatchStore::make_room(std::uint64_t bytes, GlState& gl) {
   return true;
 }
 
-Batch BatchStore::make(std::uint32_t layout, std::span<const BatchPart> parts, GlState& gl) {
+Batch BatchStore::make(std::uint32_t layout, std::span<const BatchPart> parts) {
   vertex_bytes_.clear();
   slot_bytes_.clear();
   index_bytes_.clear();
   Batch batch;
   batch.layout = layout;
   for (const BatchPart& part : parts) write_part(part, layout, batch);
-  const std::size_t index_size = index_bytes_.size() * sizeof index_bytes_[0];
+  batch.bytes =
+      vertex_bytes_.size() + slot_bytes_.size() + index_bytes_.size() * sizeof index_bytes_[0];
+  return batch;
+}
+
+void BatchStore::upload(Batch& batch, GlState& gl) {
+  const GLsizeiptr vertex_size = static_cast<GLsizeiptr>(vertex_bytes_.size());
+  const GLsizeiptr slot_size = static_cast<GLsizeiptr>(slot_bytes_.size());
   batch.slots_offset = vertex_bytes_.size();
-  batch.bytes = vertex_bytes_.size() + slot_bytes_.size() + index_size;
   glGenBuffers(1, &batch.vertices);
   gl.bind_array_buffer(batch.vertices);
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertex_bytes_.size() + slot_bytes_.size()),
-               nullptr, GL_STATIC_DRAW);
-  glBufferSubData(GL_ARRAY_BUFFER, 0, static_cast<GLsizeiptr>(vertex_bytes_.size()),
-                  vertex_bytes_.data());
-  glBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(batch.slots_offset),
-                  static_cast<GLsizeiptr>(slot_bytes_.size()), slot_bytes_.data());
+  glBufferData(GL_ARRAY_BUFFER, vertex_size + slot_size, nullptr, GL_STATIC_DRAW);
+  glBufferSubData(GL_ARRAY_BUFFER, 0, vertex_size, vertex_bytes_.data());
+  glBufferSubData(GL_ARRAY_BUFFER, vertex_size, slot_size, slot_bytes_.data());
   glGenBuffers(1, &batch.indices);
   gl.bind_index_buffer(batch.indices);
-  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(index_size), index_bytes_.data(),
-               GL_STATIC_DRAW);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER,
+               static_cast<GLsizeiptr>(index_bytes_.size() * sizeof index_bytes_[0]),
+               index_bytes_.data(), GL_STATIC_DRAW);
   uploaded_bytes_ += batch.bytes;
-  return batch;
+}
+
+void BatchStore::keep_in_memory(Batch& batch) const {
+  batch.client = vertex_bytes_;
+  const auto slots = std::as_bytes(std::span(slot_bytes_));
+  batch.client.insert(batch.client.end(), slots.begin(), slots.end());
+  const auto indices = std::as_bytes(std::span(index_bytes_));
+  batch.client.insert(batch.client.end(), indices.begin(), indices.end());
+  batch.vertices_offset = reinterpret_cast<std::uintptr_t>(batch.client.data());
+  batch.slots_offset = batch.vertices_offset + vertex_bytes_.size();
+  batch.indices_offset = batch.slots_offset + slot_bytes_.size();
 }
 
 void BatchStore::write_part(const BatchPart& part, std::uint32_t layout, Batch& batch) {

@@ -31,15 +31,19 @@ struct BatchPart {
 struct BatchPlace {
   std::uint32_t first_slot = 0;
   std::uint32_t copies = 0;
-  std::uintptr_t index_offset = 0;  ///< bytes
+  std::uintptr_t index_offset = 0;  ///< bytes from the batch's first index
   MeshRange mesh;
 };
 
 /// One batch in GL: vertices of format.stride bytes, the slot stream behind them, and indices.
+/// Without GL buffers, the names are 0 and the offsets addresses in `client`.
 struct Batch {
   GLuint vertices = 0;
   GLuint indices = 0;
-  std::uintptr_t slots_offset = 0;  ///< bytes into `vertices`: 4 a vertex, the slot in the first
+  std::uintptr_t vertices_offset = 0;
+  std::uintptr_t slots_offset = 0;  ///< 4 bytes a vertex, the slot in the first
+  std::uintptr_t indices_offset = 0;
+  std::vector<std::byte> client;
   std::uint32_t layout = 0;
   std::uint64_t bytes = 0;
   std::uint64_t last_used = 0;
@@ -58,14 +62,16 @@ class BatchStore {
   /// together have at most kBatchVertices vertices and `slots` copies. The answer lives until the
   /// next call; nullptr where the budget has no room for it.
   const Batch* find(std::uint32_t layout, std::span<const BatchPart> parts, std::uint32_t slots,
-                    GlState& gl);
+                    bool client_arrays, GlState& gl);
   void release(GlState& gl);
 
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }
 
  private:
-  Batch make(std::uint32_t layout, std::span<const BatchPart> parts, GlState& gl);
+  Batch make(std::uint32_t layout, std::span<const BatchPart> parts);
+  void upload(Batch& batch, GlState& gl);
+  void keep_in_memory(Batch& batch) const;
   void write_part(const BatchPart& part, std::uint32_t layout, Batch& batch);
   bool make_room(std::uint64_t bytes, GlState& gl);
   void destroy_oldest(GlState& gl);

@@ -147,6 +147,14 @@ void GeometryStore::fill(const Range& range, GLenum target, std::uint64_t offset
 bool GeometryStore::use(std::uint32_t level, GlState& gl, LevelPlace& place) {
   Range& vertices = vertex_ranges_[level_vertices_[level]];
   Range& indices = index_ranges_[level];
+  if (client_arrays_) {
+    const auto address = [](std::span<const std::byte> section, std::uint64_t offset) {
+      return reinterpret_cast<std::uintptr_t>(section.data() + offset);
+    };
+    place = {0, 0, address(bundle_.vertices(), vertices.source),
+             address(bundle_.indices(), indices.source)};
+    return true;
+  }
   if (!streams_) {
     place = {whole_vertices_, whole_indices_, vertices.gpu_offset, indices.gpu_offset};
     return true;

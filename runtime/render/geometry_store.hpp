@@ -33,6 +33,10 @@ class GeometryStore {
   /// Deletes the GL buffers.
   void release(GlState& gl);
 
+  /// From now on use() answers addresses in the mapped bytes, and 0 for the buffers.
+  void set_client_arrays(bool wanted) { client_arrays_ = wanted && !rewrites_ && !streams_; }
+  [[nodiscard]] bool client_arrays() const { return client_arrays_; }
+
   /// Starts a frame: what is used from here on is not evicted before the next one.
   void begin_frame() { ++frame_; }
   /// Makes a level resident and answers where; false if the budget holds no room beside what this
@@ -82,6 +86,7 @@ class GeometryStore {
   GLuint whole_indices_ = 0;
   bool streams_ = false;
   bool rewrites_ = false;
+  bool client_arrays_ = false;
 };
 
 }  // namespace modar

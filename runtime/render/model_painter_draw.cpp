@@ -111,13 +111,18 @@ void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
   job.gl.bind_index_buffer(place.index_buffer);
   glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(piece.mesh.index_count), GL_UNSIGNED_SHORT,
                  index_pointer(place.index_offset));
+  if (job.geometry.client_arrays()) {
+    job.stats.bytes_uploaded +=
+        std::uint64_t{piece.mesh.index_count} * 2 +
+        std::uint64_t{piece.mesh.vertex_count} * formats_[piece.layout].stride;
+  }
   ++job.stats.draw_calls;
   job.stats.triangles += piece.mesh.index_count / 3;
   job.stats.chunks_drawn += piece.chunks;
 }
 
 bool ModelPainter::draw_instances(const PaintJob& job, std::span<const Piece> pieces) {
-  if (!extensions_.instancing()) return false;
+  if (!extensions_.instancing() || job.geometry.client_arrays()) return false;
   ProgramState* state = program(pieces[0].program, SlotKind::kAttributes, job.gl);
   LevelPlace place;
   if (state == nullptr || !job.geometry.use(pieces[0].mesh.level, job.gl, place)) return false;
@@ -183,7 +188,8 @@ bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
   }
   const std::uint64_t before = batches_.uploaded_bytes();
   const Batch* batch =
-      batches_.find(pieces[0].layout, parts_, static_cast<std::uint32_t>(slot_count_), job.gl);
+      batches_.find(pieces[0].layout, parts_, static_cast<std::uint32_t>(slot_count_),
+                    job.geometry.client_arrays(), job.gl);
   if (batch == nullptr) return false;
   job.stats.bytes_uploaded += batches_.uploaded_bytes() - before;
   slots_.clear();
@@ -204,10 +210,13 @@ bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
   glUniform4fv(state.program.slots, static_cast<GLsizei>(slots_.size() * 4),
                glm::value_ptr(slots_[0][0]));
   job.stats.bytes_uploaded += slots_.size() * sizeof(Slot);
-  set_attributes(pieces[0].layout, batch->vertices, 0, 1u << kAttributeSlot, job.gl);
+  set_attributes(pieces[0].layout, batch->vertices, batch->vertices_offset, 1u << kAttributeSlot,
+                 job.gl);
   job.gl.set_attribute(kAttributeSlot,
                        {batch->vertices, 1, GL_UNSIGNED_BYTE, GL_FALSE, 4, batch->slots_offset});
   job.gl.bind_index_buffer(batch->indices);
+  // Without a buffer, the driver takes all of them again.
+  job.stats.bytes_uploaded += batch->client.size();
   draw_runs(job, *batch);
   return true;
 }
@@ -230,7 +239,7 @@ void ModelPainter::draw_runs(const PaintJob& job, const Batch& batch) {
       flush();
       continue;
     }
-    if (count == 0) start = place.index_offset;
+    if (count == 0) start = batch.indices_offset + place.index_offset;
     count += part->copies * place.mesh.index_count;
     if (part->copies < place.copies) flush();
   }

@@ -97,6 +97,7 @@ struct Renderer::State {
     stats = RenderStats();
     if (!options.exclusive_context) gl.reset();
     gl.changes = 0;
+    geometry.set_client_arrays(options.client_arrays);
     uploaded_before = geometry.uploaded_bytes();
     evicted_before = geometry.evictions();
   }

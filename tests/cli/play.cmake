@@ -31,6 +31,9 @@ add_test(NAME cli_play COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/
 set_tests_properties(cli_play PROPERTIES TIMEOUT 600 ENVIRONMENT
   "MODAR_SOURCE_DIR=${CMAKE_SOURCE_DIR};MODAR_BIN_DIR=${CMAKE_BINARY_DIR}/bin;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0")
 
+add_test(NAME cli_gl_calls COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/gl_calls_test.py)
+set_tests_properties(cli_gl_calls PROPERTIES TIMEOUT 600 ENVIRONMENT
+  "MODAR_SOURCE_DIR=${CMAKE_SOURCE_DIR};MODAR_BIN_DIR=${CMAKE_BINARY_DIR}/bin")
 add_test(NAME cli_app COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/app_test.py)
 set_tests_properties(cli_app PROPERTIES TIMEOUT 600 ENVIRONMENT
   "MODAR_SOURCE_DIR=${CMAKE_SOURCE_DIR};MODAR_BIN_DIR=${CMAKE_BINARY_DIR}/bin;MODAR_SANITIZE=${MODAR_SANITIZE};LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0")

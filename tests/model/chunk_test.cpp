@@ -176,5 +176,11 @@ TEST(Chunk, OptionsAreHeldToTheirRange) {
   }
 }
 
+TEST(Chunk, LargeModelsHaveFinerChunks) {
+  EXPECT_EQ(chunk_vertices_for(3), 65535u);
+  EXPECT_EQ(chunk_vertices_for(4 * 65535), 65535u);
+  EXPECT_EQ(chunk_vertices_for(4 * 65535 + 1), 16384u);
+}
+
 }  // namespace
 }  // namespace modar

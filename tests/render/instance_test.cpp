@@ -189,5 +189,26 @@ TEST_F(InstanceTest, NoRoomForBatchesMeansOneCallEach) {
   EXPECT_EQ(compare(content, caps, scattered(10, 1)).draw_calls, 10);
 }
 
+TEST_F(InstanceTest, ClientArraysDrawTheSameAndSendTheVerticesEachTime) {
+  if (!probe_gl_caps().half_float_vertices) GTEST_SKIP() << "halves are rewritten here";
+  const BundleContent content = models(1);
+  const MappedBundle bundle(content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, without_instances());
+  ASSERT_TRUE(renderer);
+  const Camera camera = default_camera(160, 120);
+  const std::vector<DrawItem> items = scattered(10, 1);
+  const std::vector<std::uint8_t> expected = draw(*renderer, camera, items);
+  const std::uint64_t mesh = content.vertices.size() + content.indices.size();
+  for (const bool together : {false, true}) {
+    RenderOptions options = flat_light();
+    options.client_arrays = true;
+    options.instancing = together;
+    renderer->set_options(options);
+    EXPECT_TRUE(expected == draw(*renderer, camera, items));
+    EXPECT_EQ(renderer->stats().draw_calls, together ? 1 : 10);
+    EXPECT_GT(renderer->stats().bytes_uploaded, 10 * mesh);
+  }
+}
+
 }  // namespace
 }  // namespace modar

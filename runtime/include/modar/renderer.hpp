@@ -78,6 +78,10 @@ struct RenderOptions {
   glm::vec4 clear_colour{0.0f, 0.0f, 0.0f, 1.0f};
   /// Nobody else draws in the context between frames: what is set then stays set.
   bool exclusive_context = false;
+  /// Vertices and indices are handed in from the mapped bytes in every draw call, without GL
+  /// buffers: what benchmarks compare with. Only where the layouts need no rewriting and all
+  /// geometry fits.
+  bool client_arrays = false;
   bool instancing = true;   ///< items of one mesh or material share draw calls
   float lod_pixels = 1.0f;  ///< a level of detail may be off by so much on the screen
 };
