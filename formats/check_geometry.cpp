@@ -2,49 +2,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+#include <limits>
+#include <utility>
 
 #include "formats/check_rules.hpp"
-#include "formats/quantise.hpp"
+#include "formats/component.hpp"
+#include "formats/cone_check.hpp"
 #include "formats/validate.hpp"
 #include "formats/vertex_scan.hpp"
 
 namespace modar {
 namespace {
-
-template <class T>
-T load(const std::byte* place) {
-  T value;
-  std::memcpy(&value, place, sizeof(T));
-  return value;
-}
-
-/// A component as OpenGL ES 2.0 hands it to a shader (bundle.md, Decoding).
-double component(const std::byte* place, std::uint8_t type, bool normalised) {
-  switch (static_cast<ComponentType>(type)) {
-    case ComponentType::kHalf:
-      return static_cast<double>(half_to_float(load<std::uint16_t>(place)));
-    case ComponentType::kF32:
-      return static_cast<double>(load<float>(place));
-    case ComponentType::kI16: {
-      const double c = load<std::int16_t>(place);
-      return normalised ? (2.0 * c + 1.0) / 65535.0 : c;
-    }
-    case ComponentType::kU16: {
-      const double c = load<std::uint16_t>(place);
-      return normalised ? c / 65535.0 : c;
-    }
-    case ComponentType::kI8: {
-      const double c = load<std::int8_t>(place);
-      return normalised ? (2.0 * c + 1.0) / 255.0 : c;
-    }
-    case ComponentType::kU8: {
-      const double c = load<std::uint8_t>(place);
-      return normalised ? c / 255.0 : c;
-    }
-  }
-  return 0.0;
-}
 
 double length_tolerance(std::uint8_t type) {
   const std::uint32_t bytes = component_bytes(type);
@@ -60,7 +28,7 @@ class GeometryCheck {
   template <class Where>
   void check_level(const LayoutRecord& layout, const VertexScan& scan, const ChunkRecord& chunk,
                    const LevelRecord& level, Where where) {
-    if (surely_good(layout, scan, chunk, level)) return;
+    if (surely_good(layout, scan, chunk, level)) return check_cone(layout, chunk, level, where);
     const auto* indices =
         reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset);
     wrong_index_ = degenerate_ = not_finite_ = normal_ = outside_ = padding_ = Tally();
@@ -89,13 +57,57 @@ class GeometryCheck {
     tell(Rule::kChunkBounds, outside_, where, "vertices lie outside of the chunk's box");
     tell(Rule::kVertexPadding, padding_, where, "vertices have padding that is not zero");
     tell(Rule::kDegenerateTriangles, degenerate_, where, "triangles use a vertex twice");
+    if (wrong_index_.count + not_finite_.count > 0) {
+      extent_.broken = true;
+    } else {
+      check_cone(layout, chunk, level, where);
+    }
+  }
+
+  /// After all levels of a chunk: its box is no larger than what they hold.
+  template <class Where>
+  void finish_chunk(const ChunkRecord& chunk, Where where) {
+    const Extent extent = std::exchange(extent_, Extent());
+    if (extent.broken || extent.low[0] > extent.high[0]) return;
+    bool tight = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      tight = tight && static_cast<double>(chunk.bounds_min[axis]) >= extent.low[axis] - kSlack &&
+              static_cast<double>(chunk.bounds_max[axis]) <= extent.high[axis] + kSlack;
+    }
+    if (tight) return;
+    log_.add(Rule::kChunkLoose, offset_of(parts_, &chunk), where(),
+             "its vertices reach from " + text(extent.low) + " to " + text(extent.high));
   }
 
  private:
+  /// Of boxes: f32 rounds what f64 has decoded.
+  static constexpr double kSlack = 1e-6;
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+  /// Of the decoded positions of a chunk's levels.
+  struct Extent {
+    std::array<double, 3> low = {kFar, kFar, kFar};
+    std::array<double, 3> high = {-kFar, -kFar, -kFar};
+    bool broken = false;  ///< some vertex has no place
+  };
+
+  static std::string text(const std::array<double, 3>& point) {
+    return number_text(point[0]) + " " + number_text(point[1]) + " " + number_text(point[2]);
+  }
+
+  template <class Where>
+  void check_cone(const LayoutRecord& layout, const ChunkRecord& chunk, const LevelRecord& level,
+                  Where where) {
+    const ConeCheck::Outside outside = cones_.look(parts_, layout, chunk, level);
+    if (outside.count == 0) return;
+    log_.add(Rule::kChunkCone,
+             offset_of(parts_, parts_.indices.data() + level.index_offset + 2ull * outside.first),
+             where(), std::to_string(outside.count) + " triangles face out of the cone");
+  }
+
   /// A quick look at all indices and at all vertices, used or not. Levels that use few of many
   /// vertices are left to the slow look, which takes no longer than their indices.
   [[nodiscard]] bool surely_good(const LayoutRecord& layout, const VertexScan& scan,
-                                 const ChunkRecord& chunk, const LevelRecord& level) const {
+                                 const ChunkRecord& chunk, const LevelRecord& level) {
     if (!scan.possible() || level.vertex_count == 0 || level.vertex_count > level.index_count) {
       return false;
     }
@@ -106,9 +118,15 @@ class GeometryCheck {
     const VertexScan::Extent extent =
         scan.scan(parts_.vertices.subspan(static_cast<std::size_t>(level.vertex_offset),
                                           std::size_t{level.vertex_count} * layout.stride));
-    return extent.finite && extent.unit_normals && extent.clean_padding &&
-           inside(chunk, {extent.low[0], extent.low[1], extent.low[2], 0.0}) &&
-           inside(chunk, {extent.high[0], extent.high[1], extent.high[2], 0.0});
+    const auto low = place(chunk, {extent.low[0], extent.low[1], extent.low[2], 0.0});
+    const auto high = place(chunk, {extent.high[0], extent.high[1], extent.high[2], 0.0});
+    const bool good = extent.finite && extent.unit_normals && extent.clean_padding &&
+                      inside(chunk, low) && inside(chunk, high);
+    if (good) {
+      widen(low);
+      widen(high);
+    }
+    return good;
   }
 
   /// True the first time.
@@ -136,7 +154,9 @@ class GeometryCheck {
       if (!finite) {
         not_finite_.hit(offset_of(parts_, place));
       } else if (attribute.semantic == static_cast<std::uint8_t>(Semantic::kPosition)) {
-        if (!inside(chunk, value)) outside_.hit(offset_of(parts_, place));
+        const auto position = this->place(chunk, value);
+        widen(position);
+        if (!inside(chunk, position)) outside_.hit(offset_of(parts_, place));
       } else if (attribute.semantic == static_cast<std::uint8_t>(Semantic::kNormal)) {
         const double square = value[0] * value[0] + value[1] * value[1] + value[2] * value[2];
         if (std::fabs(std::sqrt(square) - 1.0) > length_tolerance(attribute.type)) {
@@ -150,14 +170,29 @@ class GeometryCheck {
     }
   }
 
-  static bool inside(const ChunkRecord& chunk, const std::array<double, 4>& attribute) {
-    constexpr double kSlack = 1e-6;
+  /// The attribute in model space.
+  static std::array<double, 3> place(const ChunkRecord& chunk,
+                                     const std::array<double, 4>& attribute) {
+    std::array<double, 3> position{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double position = static_cast<double>(chunk.position_offset[axis]) +
-                              static_cast<double>(chunk.position_step) * attribute[axis];
+      position[axis] = static_cast<double>(chunk.position_offset[axis]) +
+                       static_cast<double>(chunk.position_step) * attribute[axis];
+    }
+    return position;
+  }
+
+  void widen(const std::array<double, 3>& position) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      extent_.low[axis] = std::min(extent_.low[axis], position[axis]);
+      extent_.high[axis] = std::max(extent_.high[axis], position[axis]);
+    }
+  }
+
+  static bool inside(const ChunkRecord& chunk, const std::array<double, 3>& position) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
       // Written so that NaN fails.
-      if (!(position >= static_cast<double>(chunk.bounds_min[axis]) - kSlack &&
-            position <= static_cast<double>(chunk.bounds_max[axis]) + kSlack)) {
+      if (!(position[axis] >= static_cast<double>(chunk.bounds_min[axis]) - kSlack &&
+            position[axis] <= static_cast<double>(chunk.bounds_max[axis]) + kSlack)) {
         return false;
       }
     }
@@ -179,6 +214,8 @@ class GeometryCheck {
   Tally normal_;
   Tally outside_;
   Tally padding_;
+  Extent extent_;
+  ConeCheck cones_;
 };
 
 }  // namespace
@@ -192,18 +229,20 @@ void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashe
     const VertexScan scan(layout);
     for (std::uint32_t j = 0; j < model.chunk_count; ++j) {
       const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];
+      const auto where = [&] {
+        return label(parts, "model", model.name) + ", chunk " + std::to_string(j);
+      };
       for (std::uint32_t k = 0; k < chunk.level_count; ++k) {
         const LevelRecord& level = parts.levels[chunk.first_level + k];
-        check.check_level(layout, scan, chunk, level, [&] {
-          return label(parts, "model", model.name) + ", chunk " + std::to_string(j) + ", level " +
-                 std::to_string(k);
-        });
+        check.check_level(layout, scan, chunk, level,
+                          [&] { return where() + ", level " + std::to_string(k); });
         statement.level(chunk.first_level + k, layout.stride);
         // Hashed while the caches still hold it.
         hashes.vertices.read_to(level.vertex_offset +
                                 std::uint64_t{level.vertex_count} * layout.stride);
         hashes.indices.read_to(level.index_offset + 2ull * level.index_count);
       }
+      check.finish_chunk(chunk, where);
     }
   }
 }

@@ -1,6 +1,8 @@
 // Rules on the records of models, chunks, levels and materials.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "formats/check_rules.hpp"
 #include "formats/validate.hpp"
@@ -35,17 +37,58 @@ void check_counts(FaultLog& log, const BundleParts& parts, const ModelRecord& mo
   }
 }
 
+/// The diagonal of the box of all chunks, and how much of it may be errors: packed positions lie up
+/// to one beside the source's, coarser levels up to theirs beside level 0. Both in source units.
+std::pair<double, double> decoded_diagonal(const BundleParts& parts, const ModelRecord& model) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  std::array<double, 3> low = {kFar, kFar, kFar};
+  std::array<double, 3> high = {-kFar, -kFar, -kFar};
+  double coarsest = 0.0;
+  for (std::uint32_t i = 0; i < model.chunk_count; ++i) {
+    const ChunkRecord& chunk = parts.chunks[model.first_chunk + i];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], wide(chunk.bounds_min[axis]));
+      high[axis] = std::max(high[axis], wide(chunk.bounds_max[axis]));
+    }
+    const LevelRecord& last = parts.levels[chunk.first_level + chunk.level_count - 1];
+    coarsest = std::max(coarsest, wide(last.error));
+  }
+  if (model.chunk_count == 0) return {0.0, 0.0};
+  const double diagonal =
+      model.scale * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  // Each end of each side may be off.
+  return {diagonal, 2.0 * std::sqrt(3.0) * (model.position_error_max + model.scale * coarsest)};
+}
+
 /// A box whose largest side is 2 s has a diagonal between 2 s and 2 s sqrt(3).
 void check_placement(FaultLog& log, const BundleParts& parts, const ModelRecord& model) {
+  constexpr double kRounding = 1e-6;
   const double side = 2.0 * model.scale;
+  const auto [decoded, slack] = decoded_diagonal(parts, model);
   const bool point = model.diagonal == 0.0 && model.scale == 1.0;
-  if (point || (model.diagonal >= side * (1.0 - 1e-6) &&
-                model.diagonal <= side * std::sqrt(3.0) * (1.0 + 1e-6))) {
+  const bool box = model.diagonal >= side * (1.0 - kRounding) &&
+                   model.diagonal <= side * std::sqrt(3.0) * (1.0 + kRounding);
+  if ((point || box) && decoded <= model.diagonal * (1.0 + kRounding) + slack) return;
+  log.add(Rule::kModelPlacement, offset_of(parts, &model.scale), label(parts, "model", model.name),
+          "its largest side is " + number_text(side) + ", its diagonal " +
+              number_text(model.diagonal) + ", that of its chunks " + number_text(decoded));
+}
+
+void check_errors(FaultLog& log, const BundleParts& parts, const ModelRecord& model) {
+  constexpr double kRounding = 1.0 + 1e-6;
+  if (model.position_error_rms <= model.position_error_max * kRounding &&
+      wide(model.normal_error_rms_deg) <= wide(model.normal_error_max_deg) * kRounding &&
+      wide(model.uv_error_rms_texels) <= wide(model.uv_error_max_texels) * kRounding) {
     return;
   }
-  log.add(
-      Rule::kModelPlacement, offset_of(parts, &model.scale), label(parts, "model", model.name),
-      "its largest side is " + number_text(side) + ", its diagonal " + number_text(model.diagonal));
+  log.add(Rule::kModelErrors, offset_of(parts, &model.position_error_max),
+          label(parts, "model", model.name),
+          "means and greatest: positions " + number_text(model.position_error_rms) + " and " +
+              number_text(model.position_error_max) + ", normals " +
+              number_text(wide(model.normal_error_rms_deg)) + " and " +
+              number_text(wide(model.normal_error_max_deg)) + " degrees, uvs " +
+              number_text(wide(model.uv_error_rms_texels)) + " and " +
+              number_text(wide(model.uv_error_max_texels)) + " texels");
 }
 
 void check_chunk(FaultLog& log, const BundleParts& parts, const ChunkRecord& chunk,
@@ -189,6 +232,7 @@ void check_model_records(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
     const ModelRecord& model = parts.models[i];
     check_placement(log, parts, model);
+    check_errors(log, parts, model);
     check_counts(log, parts, model);
     for (std::uint32_t j = 0; j < model.chunk_count; ++j) {
       const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];

@@ -9,22 +9,32 @@
 namespace modar {
 namespace {
 
+bool is_orb(const ParameterSetRecord& set) {
+  return set.detector == static_cast<std::uint32_t>(Detector::kFastOrb);
+}
+
+/// What the device's detectors take, too: a set that they refuse is not to travel.
 bool can_run(const ParameterSetRecord& set) {
   const bool common = set.min_matches >= 4 && set.min_inliers >= 4 && set.ransac_threshold > 0.0f &&
                       set.max_distance > 0 && set.max_distance <= set.descriptor_bits;
-  if (set.detector == static_cast<std::uint32_t>(Detector::kFastOrb)) {
-    return common && set.max_features >= 1 && set.scale_factor >= 1.0f && set.level_count >= 1 &&
-           set.level_count <= 32 && set.first_level < set.level_count && set.wta_k >= 2 &&
-           set.wta_k <= 4 && set.patch_size >= 2 && set.fast_threshold >= 1 &&
-           set.fast_threshold <= 255;
+  if (is_orb(set)) {
+    return common && set.max_features >= 1 && set.max_features <= 100000 &&
+           set.scale_factor > 1.0f && set.scale_factor <= 4.0f && set.level_count >= 1 &&
+           set.level_count <= 16 && set.edge_threshold <= 1024 &&
+           set.first_level < set.level_count && set.wta_k >= 2 && set.wta_k <= 4 &&
+           set.patch_size >= 2 && set.patch_size <= 255 && set.fast_threshold >= 1 &&
+           set.fast_threshold <= 255 && set.agast_threshold == 0 && set.octaves == 0 &&
+           set.pattern_scale == 0.0f;
   }
-  return common && set.agast_threshold >= 1 && set.agast_threshold <= 255 && set.octaves <= 16 &&
-         set.pattern_scale > 0.0f;
+  return common && set.agast_threshold >= 1 && set.agast_threshold <= 255 && set.octaves <= 8 &&
+         set.pattern_scale >= 0.1f && set.pattern_scale <= 10.0f && set.max_features == 0 &&
+         set.scale_factor == 0.0f && set.level_count == 0 && set.edge_threshold == 0 &&
+         set.first_level == 0 && set.wta_k == 0 && set.harris == 0 && set.patch_size == 0 &&
+         set.fast_threshold == 0;
 }
 
 void check_parameter_set(FaultLog& log, const BundleParts& parts, const ParameterSetRecord& set) {
-  const bool orb = set.detector == static_cast<std::uint32_t>(Detector::kFastOrb);
-  const std::uint32_t bits = orb ? 256 : 512;
+  const std::uint32_t bits = is_orb(set) ? 256 : 512;
   if (set.descriptor_bits != bits) {
     log.add(
         Rule::kDescriptorLength, offset_of(parts, &set.descriptor_bits),
@@ -37,8 +47,11 @@ void check_parameter_set(FaultLog& log, const BundleParts& parts, const Paramete
   }
 }
 
-void check_twin(FaultLog& log, const BundleParts& parts, const PatternRecord& pattern,
+void check_twin(FaultLog& log, const BundleParts& parts, const ParameterSetRecord& set,
                 const SectionEntry& entry, const std::string& where) {
+  const PatternRecord& pattern = parts.patterns[entry.owner];
+  constexpr std::uint32_t kAny = 1u << 31;
+  const std::uint32_t octaves = is_orb(set) ? set.level_count : kAny;
   const std::span<const std::byte> bytes = section_bytes(parts, entry);
   const auto& header = *reinterpret_cast<const FeatureHeader*>(bytes.data());
   const std::span keypoints(
@@ -49,7 +62,8 @@ void check_twin(FaultLog& log, const BundleParts& parts, const PatternRecord& pa
   for (const KeypointRecord& k : keypoints) {
     // Comparisons are written so that NaN fails.
     if (!(k.size > 0.0f && std::isfinite(k.size) && std::fabs(k.angle) <= 360.0f &&
-          std::isfinite(k.response) && k.octave >= 0 && std::isfinite(k.x) && std::isfinite(k.y))) {
+          std::isfinite(k.response) && static_cast<std::uint32_t>(k.octave) < octaves &&
+          std::isfinite(k.x) && std::isfinite(k.y))) {
       values.hit(offset_of(parts, &k));
     } else if (!(k.x >= 0.0f && k.y >= 0.0f &&
                  static_cast<double>(k.x) <= static_cast<double>(pattern.width) &&
@@ -120,7 +134,7 @@ void check_patterns(FaultLog& log, const BundleParts& parts) {
     const std::string where = label(parts, "pattern", pattern.name) + ", " +
                               label(parts, "parameter set", parts.parameter_sets[set].name);
     if (type == SectionType::kFeatureTwin) {
-      check_twin(log, parts, pattern, entry, where);
+      check_twin(log, parts, parts.parameter_sets[set], entry, where);
     } else {
       check_text(log, parts, entry, where);
     }

@@ -8,13 +8,16 @@
 namespace modar {
 namespace {
 
+/// Above what one wrong step in the largest texture gives.
+constexpr double kMaxPsnr = 140.0;
+
 std::uint64_t etc1_bytes(std::uint32_t width, std::uint32_t height) {
   return (std::uint64_t{width} + 3) / 4 * ((std::uint64_t{height} + 3) / 4) * 8;
 }
 
 void check_texture(const RecordCheck& check, const TextureRecord& texture) {
   check.name(texture.name);
-  check.number(texture.psnr_db, "psnr_db");
+  check.number(texture.psnr_db, "psnr_db", 0.0, kMaxPsnr);
   check.number(texture.ssim, "ssim", -1.0, 1.0);
   check.flags(texture.flags, kTextureAlpha | kTextureRepeat);
   check.reserved(texture.reserved, sizeof(texture.reserved));
@@ -41,7 +44,7 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
 void check_texture_level(const RecordCheck& check, const TextureRecord& texture,
                          const TextureLevelRecord& level, std::uint32_t number,
                          std::uint64_t data_size) {
-  check.number(level.psnr_db, "psnr_db");
+  check.number(level.psnr_db, "psnr_db", 0.0, kMaxPsnr);
   check.number(level.ssim, "ssim", -1.0, 1.0);
   check.reserved(&level.reserved, sizeof(level.reserved));
   const std::uint32_t width = std::max(1u, number < 32 ? texture.width >> number : 0u);

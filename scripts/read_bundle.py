@@ -17,6 +17,9 @@ from bundle_bytes import (ATTRIBUTE, COMPONENTS, FEATURES, KEYPOINT, NO_OFFSET, 
 
 SEMANTICS = {1: "positions", 2: "normals", 3: "uvs", 4: "colours", 5: "normals"}
 WIDTHS = {1: (3, 4), 2: (3,), 3: (2,), 4: (4,), 5: (2,)}
+OF_ORB = ("max_features", "scale_factor", "level_count", "edge_threshold", "first_level", "wta_k", "harris",
+          "patch_size", "fast_threshold")
+OF_BRISK = ("agast_threshold", "octaves", "pattern_scale")
 LENGTH_STEP = {1: 0.02, 2: 2e-3, 4: 1e-4}  # by bytes of a component
 
 
@@ -92,6 +95,9 @@ def check_model(bundle, model):
     at_least(model, 0, "diagonal", "unit_metres", *errors)
     need(model["scale"] > 0, "BUNDLE_NUMBER", at, "scale")
     need(max(model[name] for name in errors if name.endswith("_deg")) <= 180, "BUNDLE_NUMBER", at)
+    for name in errors:
+        if "_rms" in name:
+            need(model[name] <= model[name.replace("_rms", "_max")] * (1 + 1e-6), "MODEL_ERRORS", at)
     need(model["layout"] < len(tables["layouts"]), "BUNDLE_MODEL_RANGE", at, "layout")
     materials = range(model["first_material"], model["first_material"] + model["material_count"])
     need(materials.stop <= len(tables["materials"]), "BUNDLE_MODEL_RANGE", at, "materials")
@@ -111,6 +117,40 @@ def check_model(bundle, model):
          model["vertex_count"] <= sum(level["vertex_count"] for level in finest) and
          model["level_count"] == max((chunk["level_count"] for chunk in chunks), default=0),
          "MODEL_COUNTS", at)
+    check_placement(model, chunks, tables["levels"])
+
+
+def check_placement(model, chunks, levels):
+    side, diagonal, at = 2 * model["scale"], model["diagonal"], model["at"]
+    point = diagonal == 0 and model["scale"] == 1
+    need(point or side * (1 - 1e-6) <= diagonal <= side * math.sqrt(3) * (1 + 1e-6), "MODEL_PLACEMENT", at)
+    if not chunks:
+        return
+    sides = [max(chunk["bounds_max"][axis] for chunk in chunks) - min(chunk["bounds_min"][axis] for chunk in chunks)
+             for axis in range(3)]
+    coarsest = max(levels[chunk["first_level"] + chunk["level_count"] - 1]["error"] for chunk in chunks)
+    slack = 2 * math.sqrt(3) * (model["position_error_max"] + model["scale"] * coarsest)
+    need(model["scale"] * math.hypot(*sides) <= diagonal * (1 + 1e-6) + slack, "MODEL_PLACEMENT", at)
+
+
+def check_tight(chunk, levels):
+    """Box and cone are those of the decoded triangles."""
+    at, places = chunk["at"], [place for level in levels for place in level.pop("used")]
+    triangles = [triangle for level in levels for triangle in level.pop("triangles")]
+    for axis, (low, high) in enumerate(zip(chunk["bounds_min"], chunk["bounds_max"])):
+        if places:
+            need(low >= min(p[axis] for p in places) - 1e-6 and high <= max(p[axis] for p in places) + 1e-6,
+                 "CHUNK_LOOSE", at)
+    if chunk["cone_cutoff"] > 1:
+        return
+    cone, sine = chunk["cone_axis"], chunk["cone_cutoff"] + 1e-3
+    least = max(0.0, 1 - sine * sine) * sum(c * c for c in cone)
+    for a, b, c in triangles:
+        a, b, c = ([struct.unpack("<f", struct.pack("<f", v))[0] for v in p] for p in (a, b, c))
+        u, v = [q - p for p, q in zip(a, b)], [q - p for p, q in zip(a, c)]
+        n = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+        along = sum(p * q for p, q in zip(n, cone))
+        need(along >= 0 and along * along >= least * sum(p * p for p in n), "CHUNK_CONE", at)
 
 
 def check_chunk(chunk, materials):
@@ -179,6 +219,8 @@ def decode_level(bundle, layout, chunk, level, full):
             box = list(zip(chunk["bounds_min"], chunk["bounds_max"]))
             need(all(low - 1e-6 <= v <= high + 1e-6 for i in used
                      for v, (low, high) in zip(values[i], box)), "CHUNK_BOUNDS", at)
+            out["used"] = [values[i] for i in used]
+            out["triangles"] = [tuple(values[i] for i in indices[t:t + 3]) for t in range(0, len(indices), 3)]
         if part["semantic"] == 2:
             step = LENGTH_STEP[struct.calcsize(COMPONENTS[part["type"]])]
             need(all(abs(math.sqrt(sum(v * v for v in values[i])) - 1) <= step for i in used),
@@ -205,7 +247,7 @@ def check_textures(bundle):
         width, height, at = row["width"], row["height"], row["at"]
         flags_known(bundle, row, 3)
         need(row["format"] == 1, "BUNDLE_ENUM", at, "format")
-        need(-1 <= row["ssim"] <= 1, "BUNDLE_NUMBER", at, "ssim")
+        need(-1 <= row["ssim"] <= 1 and 0 <= row["psnr_db"] <= 140, "BUNDLE_NUMBER", at, "quality")
         need(1 <= min(width, height) and max(width, height) <= 8192 and
              row["level_count"] in (1, max(width, height).bit_length()) and
              min(row["source_width"], row["source_height"]) >= 1, "BUNDLE_TEXTURE_RANGE", at)
@@ -221,7 +263,7 @@ def check_textures(bundle):
                  (row["flags"] & 1 or level["alpha_offset"] == NO_OFFSET) and
                  all(p % 8 == 0 and p + level["size"] <= len(data) for p in places),
                  "BUNDLE_TEXTURE_LEVEL", level["at"])
-            need(-1 <= level["ssim"] <= 1, "BUNDLE_NUMBER", level["at"], "ssim")
+            need(-1 <= level["ssim"] <= 1 and 0 <= level["psnr_db"] <= 140, "BUNDLE_NUMBER", level["at"], "quality")
             ranges += [(place, place + level["size"]) for place in places]
             blocks = [digest(data[place:place + level["size"]]) for place in places]
             level["blocks"], level["alpha_blocks"] = (blocks + [None])[:2]
@@ -239,13 +281,16 @@ def check_parameter_set(row):
     good = row["min_matches"] >= 4 and row["min_inliers"] >= 4 and row["ransac_threshold"] > 0
     good = good and 0 < row["max_distance"] <= bits
     if orb:
-        good = (good and row["max_features"] >= 1 and row["scale_factor"] >= 1 and
-                1 <= row["level_count"] <= 32 and row["first_level"] < row["level_count"] and
-                2 <= row["wta_k"] <= 4 and row["patch_size"] >= 2 and
-                1 <= row["fast_threshold"] <= 255)
+        good = (good and 1 <= row["max_features"] <= 100000 and 1 < row["scale_factor"] <= 4 and
+                1 <= row["level_count"] <= 16 and row["first_level"] < row["level_count"] and
+                2 <= row["wta_k"] <= 4 and 2 <= row["patch_size"] <= 255 and
+                1 <= row["fast_threshold"] <= 255 and row["edge_threshold"] <= 1024)
     else:
-        good = (good and 1 <= row["agast_threshold"] <= 255 and row["octaves"] <= 16 and
-                row["pattern_scale"] > 0)
+        good = (good and 1 <= row["agast_threshold"] <= 255 and row["octaves"] <= 8 and
+                0.1 <= struct.unpack("<f", struct.pack("<f", row["pattern_scale"]))[0] + 1e-8 and
+                row["pattern_scale"] <= 10)
+    others = OF_BRISK if orb else OF_ORB
+    good = good and not any(row[name] for name in others)
     need(good, "PARAMETER_VALUES", at)
 
 
@@ -319,9 +364,10 @@ def read_twin(bundle, pattern, chosen, data):
          head["descriptor_bytes"] * 8 == chosen["descriptor_bits"] and
          len(data) == first + count * head["descriptor_bytes"], "BUNDLE_FEATURES", 0)
     need(not any(data[end:first]), "SECTION_PADDING", 0, "before descriptors")
+    octaves = chosen["level_count"] if chosen["detector"] == 1 else 2**31
     for x, y, size, angle, response, octave, _ in KEYPOINT.iter_unpack(data[32:end]):
         need(all(map(math.isfinite, (x, y, size, angle, response))) and size > 0 and
-             -360 <= angle <= 360 and octave >= 0, "KEYPOINT_VALUES", 0)
+             -360 <= angle <= 360 and 0 <= octave < octaves, "KEYPOINT_VALUES", 0)
         need(0 <= x <= pattern["width"] and 0 <= y <= pattern["height"], "KEYPOINT_OUTSIDE", 0)
     return {"count": count, "descriptor_bytes": head["descriptor_bytes"],
             "keypoints": digest(data[32:end]), "descriptors": digest(data[first:])}
@@ -340,6 +386,7 @@ def check(bundle, full):
         for chunk in tables["chunks"][model["first_chunk"]:][:model["chunk_count"]]:
             for level in tables["levels"][chunk["first_level"]:][:chunk["level_count"]]:
                 level.update(decode_level(bundle, layout, chunk, level, full))
+            check_tight(chunk, tables["levels"][chunk["first_level"]:][:chunk["level_count"]])
     for row in (row for rows in [bundle.sections, *tables.values()] for row in rows):
         del row["at"], row["dirty"]
     for section in bundle.sections:

@@ -29,16 +29,20 @@ class BlockParser {
     if (tally.count++ == 0) tally.first_line = line_;
   }
 
+  /// Bytes of a backslash and the line end that it continues, a lone '\r' (very old files) too; 0
+  /// where there is none.
+  [[nodiscard]] std::size_t continuation() const {
+    if (*p_ != '\\' || !is_line_end(p_[1]) || p_ + 1 >= end_) return 0;
+    return p_[1] == '\r' && p_[2] == '\n' ? 3 : 2;
+  }
+
   /// Skips blanks and continued line ends.
   void skip_blanks() {
     while (true) {
       if (is_blank(*p_) && p_ < end_) {
         ++p_;
-      } else if (*p_ == '\\' && p_[1] == '\n') {
-        p_ += 2;
-        ++line_;
-      } else if (*p_ == '\\' && p_[1] == '\r' && p_[2] == '\n') {
-        p_ += 3;
+      } else if (const std::size_t bytes = continuation(); bytes > 0) {
+        p_ += bytes;
         ++line_;
       } else {
         return;
@@ -77,7 +81,7 @@ class BlockParser {
 
   void skip_token() {
     while (p_ < end_ && !is_blank(*p_) && !is_line_end(*p_)) {
-      if (*p_ == '\\' && is_line_end(p_[1])) return;
+      if (continuation() > 0) return;
       ++p_;
     }
   }
@@ -290,7 +294,7 @@ class BlockParser {
     std::string text;
     skip_blanks();
     while (p_ < end_ && !is_line_end(*p_)) {
-      if (*p_ == '\\' && (p_[1] == '\n' || (p_[1] == '\r' && p_[2] == '\n'))) {
+      if (continuation() > 0) {
         skip_blanks();
         text += ' ';
         continue;

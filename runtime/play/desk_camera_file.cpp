@@ -24,6 +24,18 @@ cv::FileNode first_of(const cv::FileStorage& file, std::initializer_list<const c
   return {};
 }
 
+/// OpenCV makes room for what a matrix states before it looks at its data.
+bool is_small(const cv::FileNode& matrix) {
+  constexpr int kMaxSide = 16;
+  for (const char* side : {"rows", "cols"}) {
+    const cv::FileNode node = matrix[side];
+    if (!node.isInt() || static_cast<int>(node) < 1 || static_cast<int>(node) > kMaxSide) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /// A matrix node, or a plain sequence of numbers, as one column of doubles.
 cv::Mat numbers(const cv::FileNode& node) {
   cv::Mat values;
@@ -31,7 +43,7 @@ cv::Mat numbers(const cv::FileNode& node) {
     std::vector<double> list;
     node >> list;
     values = cv::Mat(list, true);
-  } else if (!node.empty()) {
+  } else if (node.isMap() && is_small(node)) {
     node >> values;
   }
   if (values.empty() || values.channels() != 1) return {};

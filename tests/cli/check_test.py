@@ -76,10 +76,10 @@ class Check(ProgramTest):
         self.check(3, bad, "--severity", "MODEL_COUNTS=warning", "--warnings-as-errors")
         ignored = json.loads(self.check(0, bad, "--json", "--severity", "MODEL_COUNTS=ignore"))
         self.assertEqual(ignored["issues"], [])
-        warning = ROOT / "tests" / "corrupt" / "MODEL_PLACEMENT.modar"
+        warning = ROOT / "tests" / "corrupt" / "CHUNK_GRID.modar"
         self.check(0, warning)
         self.check(3, warning, "--warnings-as-errors")
-        self.check(3, warning, "--severity", "MODEL_PLACEMENT=error")
+        self.check(3, warning, "--severity", "CHUNK_GRID=error")
         for wrong in ("NO_SUCH_ID=error", "MODEL_COUNTS=loud", "MODEL_COUNTS"):
             self.assert_fails(self.modar("check", bad, "--severity", wrong), 1, "check.severity")
 

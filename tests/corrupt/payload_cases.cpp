@@ -51,8 +51,14 @@ constexpr CorruptCase kCases[] = {
      [] { return changed(model_content(), [](auto& c) { c.models[0].diagonal = 1; }); }},
     {"MODEL_COUNTS",
      [] { return changed(model_content(), [](auto& c) { c.models[0].triangle_count = 7; }); }},
+    {"MODEL_ERRORS",
+     [] { return changed(model_content(), [](auto& c) { c.models[0].position_error_rms = 1; }); }},
     {"CHUNK_BOUNDS",
      [] { return changed(model_content(), [](auto& c) { c.chunks[0].bounds_max[0] = 0.5f; }); }},
+    {"CHUNK_LOOSE",
+     [] {
+       return changed(model_content(), [](auto& c) { c.chunks[1].bounds_min[2] = -1.0005f; });
+     }},
     {"CHUNK_OUTSIDE",
      [] { return changed(model_content(), [](auto& c) { c.chunks[1].bounds_max[0] = 1.5f; }); }},
     {"CHUNK_CONE",
@@ -60,16 +66,18 @@ constexpr CorruptCase kCases[] = {
     {"CHUNK_GRID",
      [] {
        return changed(model_content(), [](auto& c) {
-         // Halves read as integers: the box is wide enough for all of them.
+         // Halves read as integers: 1 becomes 15360, -1 becomes -17408.
          c.layouts[0].attributes[0].type = static_cast<std::uint8_t>(ComponentType::kI16);
          for (ChunkRecord& chunk : c.chunks) {
            chunk.position_step = 0x1p-15f;
            for (int i = 0; i < 3; ++i) {
-             chunk.bounds_min[i] = -1;
-             chunk.bounds_max[i] = 1;
+             chunk.bounds_min[i] = chunk.bounds_min[i] < 0 ? -17408 * 0x1p-15f : 0;
+             chunk.bounds_max[i] = chunk.bounds_max[i] > 0 ? 15360 * 0x1p-15f : 0;
            }
          }
          c.chunks[1].position_offset[0] = 0x1p-17f;
+         c.chunks[1].bounds_min[0] += 0x1p-17f;
+         c.chunks[1].bounds_max[0] += 0x1p-17f;
        });
      }},
     {"LEVEL_ORDER",

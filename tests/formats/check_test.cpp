@@ -62,6 +62,27 @@ TEST(Check, NoFlippedBitGoesUnseen) {
   }
 }
 
+/// The faces of an octahedron lean atan(sqrt 2) out of its axis: the sine is sqrt(2/3).
+TEST(Check, ConesHoldTheNormalsOfTheirTriangles) {
+  const auto said = [](float cutoff, bool turned) {
+    BundleContent content = model_content();
+    content.chunks[0].cone_cutoff = cutoff;
+    if (turned) std::swap(content.indices[0], content.indices[2]);  // one triangle of level 0
+    return report(encode(content));
+  };
+  EXPECT_EQ(said(0.8165f, false), std::vector<std::string>{"good"});
+  EXPECT_EQ(said(2.0f, true), std::vector<std::string>{"good"});
+  EXPECT_EQ(said(0.81f, false),
+            (std::vector<std::string>{"error CHUNK_CONE model 'octahedron', chunk 0, level 0 (byte "
+                                      "8192): 4 triangles face out of the cone",
+                                      "error CHUNK_CONE model 'octahedron', chunk 0, level 1 (byte "
+                                      "8216): 2 triangles face out of the cone",
+                                      "bad"}));
+  EXPECT_EQ(said(0.8165f, true).front(),
+            "error CHUNK_CONE model 'octahedron', chunk 0, level 0 (byte 8192): 1 triangles face "
+            "out of the cone");
+}
+
 TEST(Check, GivesBackEveryByteOfTheGreatBuffersOnceAndInOrder) {
   BundleContent content = model_content();
   // Great enough for several releases; bytes that no level refers to are read, too.

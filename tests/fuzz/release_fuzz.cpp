@@ -1,0 +1,36 @@
+// libFuzzer target: any text as what a server hands to a device before anything is trusted: a
+// release, a link of keys, a public key, a signature, a time.
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "modar/release.hpp"
+#include "modar/signature.hpp"
+#include "tests/fuzz/need.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace modar;
+  using test::need;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  if (const auto release = parse_release(text)) {
+    need(release->version >= 1 && !release->bundles.empty());
+    // What is believed is written and read again as the same.
+    const std::string written = release_text(*release);
+    const auto again = parse_release(written);
+    need(again.has_value() && release_text(*again) == written);
+  } else {
+    test::need_told(release.error());
+  }
+  if (const auto link = parse_key_link(text)) {
+    const auto again = parse_key_link(key_link_text(*link));
+    need(again.has_value() && again->serial == link->serial && again->key == link->key);
+  }
+  const auto key = parse_public_key(text);
+  if (key) need(*parse_public_key(public_key_line(*key)) == *key);
+  if (const auto signature = parse_signature(text)) {
+    // Nobody has signed with a key of zeros.
+    need(!verify_signature(text, *signature, key.value_or(PublicKey{})).has_value());
+  }
+  if (const auto time = parse_time(text)) need(parse_time(time_text(*time)) == *time);
+  return 0;
+}
