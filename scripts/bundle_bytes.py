@@ -214,3 +214,22 @@ class Bundle:
             return self.names[begin:begin + length].decode("utf-8")
         except UnicodeDecodeError:
             raise Fault("BUNDLE_NAME", row["at"], "cut inside a character") from None
+
+
+def follow(rows, first, count, size, rule):
+    """Ranges follow each other and cover the table."""
+    end = 0
+    for row in rows:
+        need(row[first] == end and end + row[count] <= size, rule, row["at"], first)
+        end += row[count]
+    need(end == size, rule, 0, f"{size - end} records without an owner")
+
+
+def flags_known(bundle, row, known):
+    need(not bundle.strict or row["flags"] & ~known == 0, "BUNDLE_RESERVED", row["at"], "flags")
+
+
+def at_least(row, low, *names):
+    for name in names:
+        values = row[name] if isinstance(row[name], list) else [row[name]]
+        need(all(value >= low for value in values), "BUNDLE_NUMBER", row["at"], name)

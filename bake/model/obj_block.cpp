@@ -29,8 +29,7 @@ class BlockParser {
     if (tally.count++ == 0) tally.first_line = line_;
   }
 
-  /// Bytes of a backslash and the line end that it continues, a lone '\r' (very old files) too; 0
-  /// where there is none.
+  /// Bytes of a backslash and the line end that it continues, a lone '\r' too; else 0.
   [[nodiscard]] std::size_t continuation() const {
     if (*p_ != '\\' || !is_line_end(p_[1]) || p_ + 1 >= end_) return 0;
     return p_[1] == '\r' && p_[2] == '\n' ? 3 : 2;
@@ -39,14 +38,11 @@ class BlockParser {
   /// Skips blanks and continued line ends.
   void skip_blanks() {
     while (true) {
-      if (is_blank(*p_) && p_ < end_) {
-        ++p_;
-      } else if (const std::size_t bytes = continuation(); bytes > 0) {
-        p_ += bytes;
-        ++line_;
-      } else {
-        return;
-      }
+      while (is_blank(*p_) && p_ < end_) ++p_;
+      const std::size_t bytes = continuation();
+      if (bytes == 0) return;
+      p_ += bytes;
+      ++line_;
     }
   }
 
@@ -59,10 +55,8 @@ class BlockParser {
       ++line_;
       return;
     }
-    while (p_ < end_ && !is_line_end(*p_)) {
-      // A comment's backslash continues nothing.
-      ++p_;
-    }
+    // A comment's backslash continues nothing.
+    while (p_ < end_ && !is_line_end(*p_)) ++p_;
     if (p_ >= end_) return;
     if (*p_ == '\r' && p_[1] == '\n') ++p_;
     ++p_;

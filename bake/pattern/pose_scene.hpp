@@ -57,8 +57,8 @@ struct MotionBlur {
   double angle = 0;   ///< radians
 };
 
-/// Renders the pattern at the pose through the camera's lens over the background, then blurs, lights
-/// and adds noise. light: null draws one.
+/// Renders the pattern at the pose through the camera's lens over the background, then blurs,
+/// lights and adds noise. light: null draws one.
 SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
                         const GrayPicture& background, const SceneBand& band, Random& random,
                         const SceneLight* light = nullptr, MotionBlur blur = {});

@@ -1,11 +1,16 @@
 // Reads calibration files through OpenCV, and catches what it throws.
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
 #include "camera_file.hpp"
+#include "modar/mapped_file.hpp"
 
 namespace modar {
 namespace {
@@ -66,6 +71,33 @@ void read_size(const cv::FileStorage& file, Camera& camera) {
   }
 }
 
+/// OpenCV's XML parser follows null pointers where tags do not close each other: only elements that
+/// nest go there.
+bool nests(std::string_view xml) {
+  std::vector<std::string_view> open;
+  while (!xml.empty()) {
+    const std::size_t start = xml.find('<');
+    if (start == std::string_view::npos) break;
+    const std::size_t end = xml.find('>', start);
+    if (end == std::string_view::npos) return false;
+    const std::string_view tag = xml.substr(start + 1, end - start - 1);
+    xml.remove_prefix(end + 1);
+    if (tag.starts_with("?xml") && tag.ends_with('?')) continue;
+    if (tag.starts_with("!--") && tag.ends_with("--")) continue;
+    const bool closes = tag.starts_with('/');
+    const std::string_view name = tag.substr(closes ? 1 : 0, tag.find(' '));
+    const bool plain = !name.empty() && tag.find_first_of("<&!?\n") == std::string_view::npos &&
+                       std::count(tag.begin(), tag.end(), '"') % 2 == 0 && !tag.ends_with('/');
+    if (!plain || (closes && (open.empty() || open.back() != name))) return false;
+    if (closes) {
+      open.pop_back();
+    } else {
+      open.push_back(name);
+    }
+  }
+  return open.empty();
+}
+
 Result<Camera> read(const cv::FileStorage& file, const std::string& path) {
   const cv::Mat k =
       numbers(first_of(file, {"camera_matrix", "cameraMatrix", "Camera_Matrix", "K"}));
@@ -105,11 +137,18 @@ Result<Camera> read(const cv::FileStorage& file, const std::string& path) {
 Result<Camera> read_camera_file(const std::string& path) {
   try {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    const cv::FileStorage file(path, cv::FileStorage::READ);
-    if (!file.isOpened()) {
+    const Result<MappedFile> bytes = MappedFile::open(path);
+    if (!bytes) {
       return fail(ExitCode::kIo, "camera.open", path, "the camera file cannot be opened",
                   "check the path");
     }
+    const std::string text(reinterpret_cast<const char*>(bytes->bytes().data()),
+                           bytes->bytes().size());
+    if (text.starts_with('<') && !nests(text)) {
+      return bad("camera.syntax", path, "its XML elements do not nest");
+    }
+    const cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    if (!file.isOpened()) return bad("camera.syntax", path, "OpenCV cannot read it");
     return read(file, path);
   } catch (const std::exception& error) {
     return bad("camera.syntax", path, std::string("OpenCV cannot read it: ") + error.what());
