@@ -8,6 +8,7 @@
 
 #include "formats/error.hpp"
 #include "modar/image.hpp"
+#include "modar/renderer.hpp"
 
 namespace modar {
 
@@ -19,13 +20,20 @@ struct Frame {
   std::int64_t arrived_ns = 0;  ///< steady clock when it was complete
   int width = 0;
   int height = 0;
-  std::vector<std::uint8_t> rgb;   ///< 3 * width * height, top row first
-  std::vector<std::uint8_t> gray;  ///< width * height
+  PictureFormat format = PictureFormat::kRgb;  ///< kRgb: the picture is in rgb, else in yuv
+  bool full_range = true;                      ///< of yuv: luma from 0 to 255
+  std::vector<std::uint8_t> yuv;   ///< planes as the camera gave them, sides even; the GPU converts
+  std::vector<std::uint8_t> rgb;   ///< 3 * width * height, top row first; see make_rgb()
+  std::vector<std::uint8_t> gray;  ///< width * height; empty where the first plane of yuv is it
 
   [[nodiscard]] RgbImage rgb_image() const {
     return {rgb.data(), width, height, std::ptrdiff_t{3} * width};
   }
-  [[nodiscard]] GrayImage gray_image() const { return {gray.data(), width, height, width}; }
+  [[nodiscard]] GrayImage gray_image() const {
+    return {gray.empty() ? yuv.data() : gray.data(), width, height, width};
+  }
+  /// What is drawn behind the models.
+  [[nodiscard]] CameraPicture picture() const;
 };
 
 struct SourceInfo {

@@ -48,6 +48,7 @@ Result<Plan> make_plan(const PlayOptions& options, const BundleView& bundle) {
 /// Recordings and replays look at the grey of the recorded picture, not at the camera's own.
 TrackStep with_grey_of_rgb(TrackStep track) {
   return [track = std::move(track)](Job& job) {
+    make_rgb(job.frame);
     gray_from_rgb(job.frame);
     return track(job);
   };

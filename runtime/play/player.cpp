@@ -7,6 +7,7 @@
 #include "json_lines.hpp"
 #include "play.hpp"
 #include "vision.hpp"
+#include "yuv.hpp"
 
 namespace modar {
 namespace {
@@ -103,7 +104,7 @@ Result<bool> Player::show(const Job& job) {
   follow_spot(job);
   FrameReport report = begin_report(job);
   const std::int64_t before = now_ns();
-  screen_->draw(job.frame.rgb_image(), job.camera, items_);
+  screen_->draw(job.frame.picture(), job.camera, items_);
   const bool painted = screen_->has_window() && (controls_.display() || controls_.outline());
   if (painted || !sinks_.empty()) screen_->picture();
   report.at(Stage::kRender) = ms_since(before);
@@ -246,7 +247,7 @@ Result<void> Player::hold(const Job& job) {
 Result<void> Player::show_frozen(const Job& job) {
   constexpr Colour kMark{255, 208, 64};
   constexpr double kArm = 9;
-  screen_->draw(job.frame.rgb_image(), job.camera, {});
+  screen_->draw(job.frame.picture(), job.camera, {});
   screen_->picture();
   const Canvas canvas = screen_->canvas();
   for (const glm::dvec2 corner : controls_.corners()) {
@@ -262,8 +263,10 @@ Result<void> Player::show_frozen(const Job& job) {
 
 /// What goes wrong is told and ends nothing: the user may click again.
 void Player::make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corners) {
-  auto pattern = make_spot_pattern(job.frame.rgb_image(), corners,
-                                   parameter_set(bundle_, setup_.parameter_set));
+  Frame frame = job.frame;
+  make_rgb(frame);
+  auto pattern =
+      make_spot_pattern(frame.rgb_image(), corners, parameter_set(bundle_, setup_.parameter_set));
   if (!pattern) {
     std::fprintf(stderr, "modar-play: %s\n", to_line(pattern.error()).c_str());
     return;

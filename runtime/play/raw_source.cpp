@@ -152,6 +152,7 @@ class RawSource final : public FrameSource {
                     "the header's size or colour space is not that of its frames");
       }
     }
+    bytes_.resize(frame_bytes(raw_.format));  // the frame's old buffer may be in its place
     const Result<std::size_t> got = read_some({bytes_.data(), bytes_.size()});
     if (!got) return tl::unexpected(got.error());
     if (stopped_ || (*got == 0 && !raw_.y4m)) return false;
@@ -161,7 +162,7 @@ class RawSource final : public FrameSource {
                       " of " + std::to_string(bytes_.size()) + " bytes",
                   "check the size that was told, or the program that writes them");
     }
-    fill_frame(frame, raw_.format, bytes_);
+    take_frame(frame, raw_.format, bytes_);
     frame.index = next_;
     frame.time_s = static_cast<double>(next_) / raw_.fps;
     ++next_;

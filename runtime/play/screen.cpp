@@ -41,7 +41,7 @@ Result<void> Screen::resize(int width, int height) {
   return {};
 }
 
-void Screen::draw(const RgbImage& background, const Camera& camera,
+void Screen::draw(const CameraPicture& background, const Camera& camera,
                   std::span<const DrawItem> items) {
   glm::mat4 projection(1.0f);
   if (!items.empty()) {

@@ -28,7 +28,7 @@ class Screen {
   /// Sets the picture's size; nothing happens where it stands already.
   Result<void> resize(int width, int height);
   /// Draws the background and the items as the camera sees them.
-  void draw(const RgbImage& background, const Camera& camera, std::span<const DrawItem> items);
+  void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items);
   /// Reads the picture back. The canvas of the same pixels may be painted on.
   RgbaImage picture();
   Canvas canvas();

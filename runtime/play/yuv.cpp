@@ -2,6 +2,7 @@
 #include "yuv.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace modar {
 namespace {
@@ -85,12 +86,17 @@ Row row_of(const YuvFormat& format, const std::uint8_t* bytes, int row) {
   return {y, nullptr, nullptr, 1, 0, 0};
 }
 
-void convert_row(const Row& row, const Weights& weights, int width, std::uint8_t* rgb,
-                 std::uint8_t* gray) {
+void convert_luma(const Row& row, const Weights& weights, int width, std::uint8_t* gray) {
+  for (int i = 0; i < width; ++i) {
+    const auto x = static_cast<std::size_t>(i);
+    gray[x] = rounded(weights.y * (row.y[x * row.y_step] - weights.offset));
+  }
+}
+
+void convert_row(const Row& row, const Weights& weights, int width, std::uint8_t* rgb) {
   for (int i = 0; i < width; ++i) {
     const auto x = static_cast<std::size_t>(i);
     const int luma = weights.y * (row.y[x * row.y_step] - weights.offset);
-    gray[x] = rounded(luma);
     const std::size_t at = (x >> row.shift) * row.step;
     const int u = row.u == nullptr ? 0 : row.u[at] - 128;
     const int v = row.v == nullptr ? 0 : row.v[at] - 128;
@@ -100,7 +106,73 @@ void convert_row(const Row& row, const Weights& weights, int width, std::uint8_t
   }
 }
 
+/// How the renderer calls a layout; kRgb where it cannot draw it.
+PictureFormat picture_format(YuvLayout layout) {
+  switch (layout) {
+    case YuvLayout::kNv21:
+      return PictureFormat::kNv21;
+    case YuvLayout::kNv12:
+      return PictureFormat::kNv12;
+    case YuvLayout::kI420:
+      return PictureFormat::kI420;
+    default:
+      return PictureFormat::kRgb;
+  }
+}
+
+YuvLayout layout_of(PictureFormat format) {
+  if (format == PictureFormat::kNv21) return YuvLayout::kNv21;
+  return format == PictureFormat::kNv12 ? YuvLayout::kNv12 : YuvLayout::kI420;
+}
+
+void set_size(Frame& frame, const YuvFormat& format) {
+  frame.width = format.width;
+  frame.height = format.height;
+}
+
+std::size_t pixels_of(const Frame& frame) {
+  return static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+}
+
+void fill_rgb(Frame& frame, const YuvFormat& format, std::span<const std::uint8_t> bytes) {
+  frame.rgb.resize(3 * pixels_of(frame));
+  const Weights& weights = format.full_range ? kFull : kVideo;
+  const std::size_t stride = 3 * static_cast<std::size_t>(format.width);
+  for (int row = 0; row < format.height; ++row) {
+    convert_row(row_of(format, bytes.data(), row), weights, format.width,
+                &frame.rgb[static_cast<std::size_t>(row) * stride]);
+  }
+}
+
+void fill_gray(Frame& frame, const YuvFormat& format, std::span<const std::uint8_t> bytes) {
+  frame.gray.resize(pixels_of(frame));
+  const Weights& weights = format.full_range ? kFull : kVideo;
+  const auto width = static_cast<std::size_t>(format.width);
+  for (int row = 0; row < format.height; ++row) {
+    convert_luma(row_of(format, bytes.data(), row), weights, format.width,
+                 &frame.gray[static_cast<std::size_t>(row) * width]);
+  }
+}
+
 }  // namespace
+
+CameraPicture Frame::picture() const {
+  CameraPicture picture;
+  picture.format = format;
+  picture.width = width;
+  picture.height = height;
+  picture.full_range = full_range;
+  if (format == PictureFormat::kRgb) {
+    picture.planes[0] = rgb.data();
+    picture.strides[0] = std::ptrdiff_t{3} * width;
+    return picture;
+  }
+  const bool pairs = format != PictureFormat::kI420;
+  const std::size_t luma = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  picture.planes = {yuv.data(), yuv.data() + luma, pairs ? nullptr : yuv.data() + luma / 4 * 5};
+  picture.strides = {width, pairs ? width : width / 2, pairs ? 0 : width / 2};
+  return picture;
+}
 
 std::size_t frame_bytes(const YuvFormat& format) {
   const auto w = static_cast<std::size_t>(format.width);
@@ -123,18 +195,31 @@ std::size_t frame_bytes(const YuvFormat& format) {
 }
 
 void fill_frame(Frame& frame, const YuvFormat& format, std::span<const std::uint8_t> bytes) {
-  frame.width = format.width;
-  frame.height = format.height;
-  const auto w = static_cast<std::size_t>(format.width);
-  const std::size_t pixels = w * static_cast<std::size_t>(format.height);
-  frame.rgb.resize(3 * pixels);
-  frame.gray.resize(pixels);
-  const Weights& weights = format.full_range ? kFull : kVideo;
-  for (int row = 0; row < format.height; ++row) {
-    const std::size_t first = static_cast<std::size_t>(row) * w;
-    convert_row(row_of(format, bytes.data(), row), weights, format.width, &frame.rgb[3 * first],
-                &frame.gray[first]);
+  set_size(frame, format);
+  frame.format = PictureFormat::kRgb;
+  fill_rgb(frame, format, bytes);
+  fill_gray(frame, format, bytes);
+}
+
+void take_frame(Frame& frame, const YuvFormat& format, std::vector<std::uint8_t>& bytes) {
+  const PictureFormat drawn = picture_format(format.layout);
+  if (drawn == PictureFormat::kRgb || format.width % 2 != 0 || format.height % 2 != 0) {
+    fill_frame(frame, format, bytes);
+    return;
   }
+  set_size(frame, format);
+  frame.format = drawn;
+  frame.full_range = format.full_range;
+  frame.rgb.clear();
+  frame.gray.clear();
+  if (!format.full_range) fill_gray(frame, format, bytes);
+  std::swap(frame.yuv, bytes);
+}
+
+void make_rgb(Frame& frame) {
+  if (frame.format == PictureFormat::kRgb || !frame.rgb.empty()) return;
+  fill_rgb(frame, {layout_of(frame.format), frame.width, frame.height, frame.full_range},
+           frame.yuv);
 }
 
 void gray_from_rgb(Frame& frame) {

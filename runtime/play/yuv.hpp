@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "frame_source.hpp"
 
@@ -32,6 +33,14 @@ std::size_t frame_bytes(const YuvFormat& format);
 /// Fills the frame's size, rgb and gray by ITU-R BT.601, the nearest chroma sample each; grey is Y
 /// brought to the full range. bytes.size() >= frame_bytes(format).
 void fill_frame(Frame& frame, const YuvFormat& format, std::span<const std::uint8_t> bytes);
+
+/// Makes the bytes the frame's by swapping them in, where the renderer can draw the layout (NV21,
+/// NV12, I420 with even sides): no pixel is converted, and grey is the luma plane itself where it
+/// has the full range. Other layouts go through fill_frame().
+void take_frame(Frame& frame, const YuvFormat& format, std::vector<std::uint8_t>& bytes);
+
+/// Fills rgb of a frame that has only yuv; nothing where it is there already.
+void make_rgb(Frame& frame);
 
 /// Grey from R, G, B by the weights of BT.601: what a recorded frame is replayed with.
 void gray_from_rgb(Frame& frame);

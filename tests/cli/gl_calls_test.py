@@ -81,6 +81,8 @@ class GlCalls(ProgramTest):
             dump = self.trace(bundle, "--input", clip, "--device", device, "--outline", "--out", f"pictures-{device}")
             self.assertEqual(strangers(dump, set(profile["extensions"])), {}, device)
             self.assertEqual(dump.count("glGetError("), 0, "no storm of glGetError")
+            self.assertIn("glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, 160, 120, GL_LUMINANCE_ALPHA", dump,
+                          "chroma goes to the GPU as the camera gave it")
 
     def test_extensions_of_this_context_alone(self):
         dump = self.trace(self.bake_demo(), "--turntable", "2", "--size", "96x64", "--out", "turn",

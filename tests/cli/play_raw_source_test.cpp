@@ -48,6 +48,56 @@ TEST(Yuv, VideoRangeFramesAreWhatOpenCvMakesOfThem) {
   }
 }
 
+TEST(Yuv, WhatTheGpuDrawsIsHandedOnUntouched) {
+  const std::pair<YuvLayout, PictureFormat> layouts[] = {{YuvLayout::kNv21, PictureFormat::kNv21},
+                                                         {YuvLayout::kNv12, PictureFormat::kNv12},
+                                                         {YuvLayout::kI420, PictureFormat::kI420}};
+  for (const auto& [layout, drawn] : layouts) {
+    for (const bool full : {true, false}) {
+      const YuvFormat format{layout, 16, 12, full};
+      const std::string text = video_bytes(frame_bytes(format), 7);
+      std::vector<std::uint8_t> bytes(text.begin(), text.end());
+      const std::uint8_t* const at = bytes.data();
+      Frame frame;
+      frame.rgb.assign(5, 1);  // of an earlier frame
+      frame.gray.assign(5, 1);
+      take_frame(frame, format, bytes);
+      EXPECT_EQ(frame.yuv.data(), at) << "the planes are not copied";
+      const CameraPicture picture = frame.picture();
+      EXPECT_EQ(picture.format, drawn);
+      EXPECT_EQ(picture.full_range, full);
+      EXPECT_EQ(picture.planes[0], at);
+      EXPECT_EQ(picture.planes[1], at + 16 * 12);
+      EXPECT_EQ(picture.strides[1], drawn == PictureFormat::kI420 ? 8 : 16);
+      if (drawn == PictureFormat::kI420) {
+        EXPECT_EQ(picture.planes[2], at + 16 * 12 + 8 * 6);
+      }
+      EXPECT_EQ(frame.gray_image().pixels == at, full) << "full-range luma is the grey";
+      Frame converted;
+      fill_frame(converted, format, view(text));
+      for (std::size_t i = 0; i < converted.gray.size(); ++i) {
+        ASSERT_EQ(frame.gray_image().pixels[i], converted.gray[i]);
+      }
+      make_rgb(frame);
+      EXPECT_EQ(frame.rgb, converted.rgb);
+    }
+  }
+}
+
+TEST(Yuv, OddSidesAndOtherLayoutsAreConverted) {
+  for (const YuvFormat& format :
+       {YuvFormat{YuvLayout::kNv21, 15, 12, true}, YuvFormat{YuvLayout::kYuyv, 16, 12, false}}) {
+    const std::string text = video_bytes(frame_bytes(format), 7);
+    std::vector<std::uint8_t> bytes(text.begin(), text.end());
+    Frame frame;
+    take_frame(frame, format, bytes);
+    EXPECT_EQ(frame.picture().format, PictureFormat::kRgb);
+    EXPECT_EQ(frame.picture().planes[0], frame.rgb.data());
+    EXPECT_EQ(frame.gray_image().pixels, frame.gray.data());
+    EXPECT_EQ(frame.rgb.size(), 3u * static_cast<unsigned>(format.width * format.height));
+  }
+}
+
 TEST(Yuv, FullRangeFollowsTheDefinitionOfJpeg) {
   // JFIF: R = Y + 1.402 (Cr - 128), G = Y - 0.344136 (Cb - 128) - 0.714136 (Cr - 128), ...
   const std::uint8_t y = 120;

@@ -41,6 +41,10 @@ std::int8_t snorm8(double value) {
   return static_cast<std::int8_t>(std::lround(value * 127.0));
 }
 
+bool is_i16(Layout layout) {
+  return layout == Layout::kI16Coloured || layout == Layout::kI16OctLit;
+}
+
 }  // namespace
 
 double on_half_grid(double value) {
@@ -76,6 +80,12 @@ std::uint32_t SceneMaker::add_layout(Layout layout) {
     case Layout::kOctLit:
       record.stride = 16;
       set(attribute(Semantic::kPosition, ComponentType::kHalf, 3, 0, 0));
+      set(attribute(Semantic::kNormalOct, ComponentType::kI8, 2, 1, 8));
+      set(attribute(Semantic::kColour, ComponentType::kU8, 4, 1, 12));
+      break;
+    case Layout::kI16OctLit:  // what the baker packs where half floats are not exact enough
+      record.stride = 16;
+      set(attribute(Semantic::kPosition, ComponentType::kI16, 3, 0, 0));
       set(attribute(Semantic::kNormalOct, ComponentType::kI8, 2, 1, 8));
       set(attribute(Semantic::kColour, ComponentType::kU8, 4, 1, 12));
       break;
@@ -138,7 +148,7 @@ void SceneMaker::append_vertex(std::uint32_t layout, const Triangle& triangle, s
   for (int axis = 0; axis < 3; ++axis) {
     if (kind == Layout::kF32Coloured) {
       put(out, static_cast<float>(p[axis]));
-    } else if (kind == Layout::kI16Coloured) {
+    } else if (is_i16(kind)) {
       put(out, static_cast<std::int16_t>(std::lround(p[axis] * 512.0)));
     } else {
       put(out, half_bits(p[axis]));
@@ -155,7 +165,7 @@ void SceneMaker::append_vertex(std::uint32_t layout, const Triangle& triangle, s
     for (int axis = 0; axis < 3; ++axis) put(out, snorm8(triangle.normal[axis]));
     put(out, std::int8_t{0});
   }
-  if (kind == Layout::kOctLit) {
+  if (kind == Layout::kOctLit || kind == Layout::kI16OctLit) {
     const glm::dvec3 n =
         triangle.normal /
         (std::abs(triangle.normal.x) + std::abs(triangle.normal.y) + std::abs(triangle.normal.z));
@@ -184,7 +194,7 @@ std::uint32_t SceneMaker::add_model(std::uint32_t layout, const std::vector<Chun
   std::uint64_t base = content.vertices.size();
   for (const Chunk& chunk : chunks) {
     ChunkRecord record{};
-    record.position_step = layouts_[layout] == Layout::kI16Coloured ? 1.0f / 512.0f : 1.0f;
+    record.position_step = is_i16(layouts_[layout]) ? 1.0f / 512.0f : 1.0f;
     record.uv_scale[0] = record.uv_scale[1] = 1.0f;
     record.material = chunk.material;
     record.first_level = static_cast<std::uint32_t>(content.levels.size());

@@ -32,7 +32,15 @@ struct Triangle {
   glm::dvec3 normal{0.0, 0.0, 1.0};
 };
 
-enum class Layout { kHalfColoured, kHalfTextured, kHalfLit, kI16Coloured, kF32Coloured, kOctLit };
+enum class Layout {
+  kHalfColoured,
+  kHalfTextured,
+  kHalfLit,
+  kI16Coloured,
+  kF32Coloured,
+  kOctLit,
+  kI16OctLit
+};
 
 /// Rounds a coordinate to one that half floats hold exactly in [-1,1].
 double on_half_grid(double value);

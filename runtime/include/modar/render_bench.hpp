@@ -16,7 +16,7 @@ struct RenderBenchOptions {
   std::string device;     ///< profile that masks the context; empty: none
   int most_copies = 10;   ///< the curve goes from 1 to this
   int frames = 20;        ///< drawn frames a point of the curve; medians count
-  int idle_frames = 100;  ///< frames a point where nothing is rasterised
+  int idle_frames = 100;  ///< frames a point where nothing is rasterised; 0: no cpu_ms
   int width = 480;        ///< pixels
   int height = 800;
   /// Models with more triangles have no curve: a software rasteriser would draw for hours.
@@ -40,9 +40,10 @@ struct RenderBenchRow {
 /// rasterises nothing: Mesa's no-op driver, in a child process; left out where Mesa is not the
 /// driver). "MODEL x10 WAY gain_low_end" and "gain_mid_range": how often our frame time of
 /// index_arrays holds that of the way, and the article's.
-/// Then, a bundle (by its path): open_ms; load_cpu_ms (buffers into GL, against memcpy of the same
-/// bytes); bytes in GL by kind; and, a model, triangles sent from inside it against those whose own
-/// boxes meet the frustum. Call it before anything else of this process has opened a GL context.
+/// Then, a bundle (by its path): open_ms; load_cpu_ms (buffers into GL) and
+/// driver_cpu_ms (glBufferData of the same bytes alone), both against memcpy; bytes in GL by kind;
+/// and, a model, triangles sent from inside it against those whose own boxes meet the frustum. Call
+/// it before anything else of this process has opened a GL context.
 /// Errors: those of MappedFile, BundleView, GlContext and Renderer; kUsage "device.unknown".
 Result<std::vector<RenderBenchRow>> bench_render(std::span<const std::string> bundle_paths,
                                                  const RenderBenchOptions& options);
