@@ -224,8 +224,16 @@ Result<std::uint32_t> find_by_name(const std::vector<std::string>& paths, const 
               std::string("name one of: ") + (known.empty() ? "(none)" : known));
 }
 
-Result<void> add_scenes(const BakeRequest& request, const std::vector<std::string>& pattern_paths,
-                        const ModelSides& sides, BundleContent& content) {
+/// A scene with the indices of what it names.
+struct KnownScene {
+  SceneRequest scene;
+  std::uint32_t pattern = 0;
+  std::uint32_t model = 0;
+};
+
+/// Before anything is baked: a name that is written wrong costs no minutes.
+Result<std::vector<KnownScene>> find_scenes(const BakeRequest& request,
+                                            const std::vector<std::string>& pattern_paths) {
   std::vector<SceneRequest> scenes = request.scenes;
   if (scenes.empty() && request.models.size() == 1 && pattern_paths.size() == 1) {
     SceneRequest scene;
@@ -233,14 +241,15 @@ Result<void> add_scenes(const BakeRequest& request, const std::vector<std::strin
     scene.model = file_stem(request.models[0]);
     scenes.push_back(scene);
   }
+  std::vector<KnownScene> known;
   for (const SceneRequest& scene : scenes) {
     const Result<std::uint32_t> pattern = find_by_name(pattern_paths, scene.pattern, "pattern");
     if (!pattern) return tl::unexpected(pattern.error());
     const Result<std::uint32_t> model = find_by_name(request.models, scene.model, "model");
     if (!model) return tl::unexpected(model.error());
-    content.scenes.push_back(place_scene(scene, *pattern, *model, sides[*model]));
+    known.push_back({scene, *pattern, *model});
   }
-  return {};
+  return known;
 }
 
 }  // namespace
@@ -276,6 +285,9 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
     return tl::unexpected(unique.error());
   }
 
+  const Result<std::vector<KnownScene>> scenes = find_scenes(request, pattern_paths);
+  if (!scenes) return tl::unexpected(scenes.error());
+
   BundleContent content;
   const Result<ModelSides> sides = add_models(request, content, report);
   if (!sides) return tl::unexpected(sides.error());
@@ -293,8 +305,9 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
       return tl::unexpected(added.error());
     }
   }
-  if (auto added = add_scenes(request, pattern_paths, *sides, content); !added) {
-    return tl::unexpected(added.error());
+  for (const KnownScene& known : *scenes) {
+    content.scenes.push_back(
+        place_scene(known.scene, known.pattern, known.model, (*sides)[known.model]));
   }
   content.meta = bundle_meta(request);
   content.statement = statement_of(content);

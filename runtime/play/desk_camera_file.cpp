@@ -71,8 +71,26 @@ void read_size(const cv::FileStorage& file, Camera& camera) {
   }
 }
 
-/// OpenCV's XML parser follows null pointers where tags do not close each other: only elements that
-/// nest go there.
+bool is_word(std::string_view text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
+  });
+}
+
+/// "K", or "K type_id="opencv-matrix"": as FileStorage writes them. Fills the name.
+bool is_plain_tag(std::string_view tag, std::string_view& name) {
+  constexpr std::string_view kType = " type_id=\"";
+  name = tag.substr(0, tag.find(' '));
+  if (!is_word(name)) return false;
+  tag.remove_prefix(name.size());
+  if (tag.empty()) return true;
+  if (!tag.starts_with(kType) || !tag.ends_with('"') || tag.size() <= kType.size()) return false;
+  return is_word(tag.substr(kType.size(), tag.size() - kType.size() - 1));
+}
+
+/// OpenCV's XML parser follows null pointers where tags are odd or do not close each other: only
+/// elements that nest go there.
 bool nests(std::string_view xml) {
   std::vector<std::string_view> open;
   while (!xml.empty()) {
@@ -85,10 +103,9 @@ bool nests(std::string_view xml) {
     if (tag.starts_with("?xml") && tag.ends_with('?')) continue;
     if (tag.starts_with("!--") && tag.ends_with("--")) continue;
     const bool closes = tag.starts_with('/');
-    const std::string_view name = tag.substr(closes ? 1 : 0, tag.find(' '));
-    const bool plain = !name.empty() && tag.find_first_of("<&!?\n") == std::string_view::npos &&
-                       std::count(tag.begin(), tag.end(), '"') % 2 == 0 && !tag.ends_with('/');
-    if (!plain || (closes && (open.empty() || open.back() != name))) return false;
+    std::string_view name;
+    if (!is_plain_tag(tag.substr(closes ? 1 : 0), name)) return false;
+    if (closes && (open.empty() || open.back() != name)) return false;
     if (closes) {
       open.pop_back();
     } else {

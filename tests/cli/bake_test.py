@@ -28,8 +28,7 @@ class Bake(ProgramTest):
         elsewhere = self.folder / "another place"
         shutil.copytree(POTTERY.parent, elsewhere)
         shutil.copy(COVER, elsewhere)
-        for number, (jobs, env) in enumerate([(1, {"LC_ALL": "C", "TZ": "UTC"}),
-                                              (2, {"LC_ALL": "de_DE.UTF-8", "TZ": "Asia/Tokyo"}),
+        for number, (jobs, env) in enumerate([(1, {"LC_ALL": "de_DE.UTF-8", "TZ": "Asia/Tokyo"}),
                                               (8, {"LANG": "tr_TR.UTF-8", "HOME": "/nowhere"})]):
             out = self.folder / f"again{number}.modar"
             done = self.modar("bake", "--model", elsewhere / "pottery.obj", "--pattern", "cover.png", "-o", out, *QUICK,
