@@ -1,6 +1,6 @@
 // A window through SDL2 with an OpenGL ES 2.0 context.
 #include <algorithm>
-
+#include <utility>
 #include <vector>
 
 #include <SDL.h>
@@ -14,6 +14,7 @@ struct Window::State {
   SDL_GLContext context = nullptr;
   std::vector<UserAct> acts;
   glm::dvec2 picture{1.0};  ///< its size
+  bool lost = false;
 
   State() = default;
   State(const State&) = delete;
@@ -127,7 +128,9 @@ std::span<const UserAct> Window::acts(std::chrono::milliseconds limit) {
                                : SDL_PollEvent(&event);
   for (; more != 0; more = SDL_PollEvent(&event)) {
     UserAct act;
-    if (event.type == SDL_QUIT) {
+    if (event.type == SDL_RENDER_DEVICE_RESET || event.type == SDL_APP_DIDENTERFOREGROUND) {
+      state_->lost = true;
+    } else if (event.type == SDL_QUIT) {
       state_->acts.push_back({Act::kQuit, {}});
     } else if (event.type == SDL_KEYDOWN && act_of(event.key.keysym.sym, act.act)) {
       state_->acts.push_back(act);
@@ -150,6 +153,18 @@ int Window::height() const {
   int height = 0;
   SDL_GL_GetDrawableSize(state_->window, nullptr, &height);
   return height;
+}
+
+bool Window::take_loss() {
+  return std::exchange(state_->lost, false);
+}
+
+Result<void> Window::renew() {
+  SDL_GL_DeleteContext(state_->context);
+  state_->context = SDL_GL_CreateContext(state_->window);
+  if (state_->context == nullptr) return no_window();
+  SDL_GL_SetSwapInterval(1);
+  return {};
 }
 
 void Window::swap() {

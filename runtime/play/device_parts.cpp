@@ -119,6 +119,12 @@ int Window::width() const {
 int Window::height() const {
   return 0;
 }
+bool Window::take_loss() {
+  return false;
+}
+Result<void> Window::renew() {
+  return left_out("window.unsupported", "--window", "the window");
+}
 void Window::swap() {}
 
 }  // namespace modar

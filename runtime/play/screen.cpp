@@ -4,7 +4,7 @@
 namespace modar {
 
 Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const PlayOptions& options) {
-  std::unique_ptr<Screen> screen(new Screen(bundle));
+  std::unique_ptr<Screen> screen(new Screen(bundle, options));
   if (options.window) {
     auto window = Window::open("modar-play");
     if (!window) return tl::unexpected(window.error());
@@ -14,15 +14,8 @@ Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const Pla
     if (!context) return tl::unexpected(context.error());
     screen->context_ = std::move(*context);
   }
-  GlCaps& caps = screen->caps_;
-  caps = probe_gl_caps();
-  if (!options.device.empty()) {
-    Result<GlCaps> masked = mask_gl_caps(caps, options.device);
-    if (!masked) return tl::unexpected(masked.error());
-    caps = *masked;
-  }
-  if (options.gpu_budget > 0) caps.gpu_memory = options.gpu_budget;
-  auto renderer = Renderer::create(bundle, caps);
+  if (auto read = screen->read_caps(); !read) return tl::unexpected(read.error());
+  auto renderer = Renderer::create(bundle, screen->caps_);
   if (!renderer) return tl::unexpected(renderer.error());
   screen->renderer_ = std::move(*renderer);
   RenderOptions drawing;
@@ -31,7 +24,23 @@ Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const Pla
   return screen;
 }
 
+Result<void> Screen::read_caps() {
+  caps_ = probe_gl_caps();
+  if (!options_.device.empty()) {
+    Result<GlCaps> masked = mask_gl_caps(caps_, options_.device);
+    if (!masked) return tl::unexpected(masked.error());
+    caps_ = *masked;
+  }
+  if (options_.gpu_budget > 0) caps_.gpu_memory = options_.gpu_budget;
+  return {};
+}
+
 Result<void> Screen::resize(int width, int height) {
+  if (window_ && window_->take_loss()) {
+    if (auto renewed = window_->renew(); !renewed) return renewed;
+    if (auto read = read_caps(); !read) return read;
+    if (auto restored = renderer_->restore(caps_); !restored) return restored;
+  }
   if (width == width_ && height == height_) return {};
   if (auto sized = renderer_->resize(width, height); !sized) return sized;
   width_ = width;

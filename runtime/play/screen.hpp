@@ -19,13 +19,15 @@ namespace modar {
 
 class Screen {
  public:
-  /// Opens the context that the options ask for on this thread, and uploads the bundle.
+  /// Opens the context that the options ask for on this thread, and uploads the bundle. Both
+  /// outlive it.
   /// Errors: those of GlContext, Window, mask_gl_caps() and Renderer.
   static Result<std::unique_ptr<Screen>> open(const BundleView& bundle, const PlayOptions& options);
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  /// Sets the picture's size; nothing happens where it stands already.
+  /// Sets the picture's size; nothing happens where it stands already. Where the window's context
+  /// was lost, makes everything anew in another one first.
   Result<void> resize(int width, int height);
   /// Draws the background and the items as the camera sees them.
   void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items);
@@ -45,9 +47,12 @@ class Screen {
   [[nodiscard]] const GlCaps& caps() const { return caps_; }
 
  private:
-  explicit Screen(const BundleView& bundle) : bundle_(bundle) {}
+  Screen(const BundleView& bundle, const PlayOptions& options)
+      : bundle_(bundle), options_(options) {}
+  Result<void> read_caps();
 
   const BundleView& bundle_;
+  const PlayOptions& options_;
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<Window> window_;
   std::unique_ptr<Renderer> renderer_;  ///< goes before its context

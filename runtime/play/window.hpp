@@ -27,6 +27,12 @@ class Window {
   std::span<const UserAct> acts(std::chrono::milliseconds limit);
   [[nodiscard]] int width() const;  ///< of the framebuffer, pixels
   [[nodiscard]] int height() const;
+  /// True once after the system took the context's contents away (a phone that slept, a driver that
+  /// was reset).
+  bool take_loss();
+  /// Puts a new context in the place of the lost one and makes it current. Errors: kUnsupported
+  /// "window.unsupported".
+  Result<void> renew();
   /// Brings what was drawn to the display.
   void swap();
 

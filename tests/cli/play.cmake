@@ -17,7 +17,7 @@ set(play_tests
   play_v4l2_test.cpp
   play_window_test.cpp)
 find_package(SDL2 REQUIRED)
-modar_test(play_test SOURCES ${play_tests}
+modar_test(play_test SOURCES ${play_tests} ${CMAKE_SOURCE_DIR}/runtime/play/screen.cpp
   LIBRARIES modar_play_desk SDL2::SDL2 opencv_core opencv_imgproc opencv_imgcodecs opencv_videoio)
 target_include_directories(play_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
 # The device's classes have no run-time types for UBSan to look at.

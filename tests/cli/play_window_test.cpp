@@ -5,10 +5,13 @@
 #include <cstdlib>
 #include <map>
 
+#include <GLES2/gl2.h>
 #include <SDL.h>
 #include <gtest/gtest.h>
 
+#include "formats/bundle_writer.hpp"
 #include "modar/gl_context.hpp"
+#include "screen.hpp"
 
 namespace modar {
 namespace {
@@ -92,6 +95,44 @@ TEST_F(WindowTest, ClicksAreInPixelsOfThePicture) {
   // The picture's middle lies between its pixels 159 and 160, 119 and 120.
   EXPECT_NEAR(acts[0].at.x, 159.5, 1.0);
   EXPECT_NEAR(acts[0].at.y, 119.5, 1.0);
+}
+
+TEST_F(WindowTest, ALostContextIsMadeAnewAndShowsTheSame) {
+  window_.reset();
+  BundleContent content;
+  content.meta = "{}";
+  const std::vector<std::byte> bytes = encode_bundle(content).value();
+  const BundleView bundle = BundleView::open(bytes).value();
+  PlayOptions options;
+  options.window = true;
+  auto screen = Screen::open(bundle, options);
+  ASSERT_TRUE(screen) << to_line(screen.error());
+  std::vector<std::uint8_t> rgb(3 * 16 * 12);
+  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<std::uint8_t>(i * 7);
+  CameraPicture picture;
+  picture.width = 16;
+  picture.height = 12;
+  picture.planes[0] = rgb.data();
+  picture.strides[0] = 3 * 16;
+  const auto drawn = [&] {
+    EXPECT_TRUE((*screen)->resize(16, 12));
+    (*screen)->draw(picture, default_camera(16, 12), {});
+    const RgbaImage seen = (*screen)->picture();
+    return std::vector<std::uint8_t>(seen.pixels.begin(), seen.pixels.end());
+  };
+  const std::vector<std::uint8_t> before = drawn();
+  ASSERT_EQ(before[4], rgb[3]);
+  for (const std::uint32_t loss : {SDL_RENDER_DEVICE_RESET, SDL_APP_DIDENTERFOREGROUND}) {
+    constexpr GLuint kMark = 4242;  // a name that only the context of before knows
+    glBindBuffer(GL_ARRAY_BUFFER, kMark);
+    ASSERT_TRUE(glIsBuffer(kMark));
+    SDL_Event event{};
+    event.type = loss;
+    SDL_PushEvent(&event);
+    EXPECT_TRUE((*screen)->acts(milliseconds(0)).empty());
+    EXPECT_EQ(drawn(), before);
+    EXPECT_FALSE(glIsBuffer(kMark));
+  }
 }
 
 TEST_F(WindowTest, WaitsNoLongerThanItIsTold) {
