@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/model/mesh_levels.hpp"
+#include "bake/model/mesh_topology.hpp"
 #include "bake/model/packed_mesh.hpp"
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/read_model.hpp"
@@ -43,6 +44,15 @@ void fold_constant(const std::array<std::uint8_t, 4>& rgba, MaterialRecord& mate
   material.opacity *= static_cast<float>(rgba[3]) / 255.0f;
 }
 
+/// The first model's bytes are taken over as they are: large ones are not copied.
+void append_bytes(std::vector<std::byte> bytes, std::vector<std::byte>& to) {
+  if (to.empty()) {
+    to = std::move(bytes);
+  } else {
+    to.insert(to.end(), bytes.begin(), bytes.end());
+  }
+}
+
 /// Appends a model's records and bytes, shifting what counts from the model's own start.
 void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
                  BundleContent& content) {
@@ -71,8 +81,8 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
     if (textures[m].constant) fold_constant(textures[m].rgba, material);
     content.materials.push_back(material);
   }
-  content.vertices.insert(content.vertices.end(), packed.vertices.begin(), packed.vertices.end());
-  content.indices.insert(content.indices.end(), packed.indices.begin(), packed.indices.end());
+  append_bytes(std::move(packed.vertices), content.vertices);
+  append_bytes(std::move(packed.indices), content.indices);
   // Keeps the next model's vertices on a 4-byte boundary.
   content.indices.resize((content.indices.size() + 3) / 4 * 4);
   content.models.push_back(record);
@@ -93,6 +103,12 @@ Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& re
   reading.done(source->positions.size(), source->face_count());
   Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
   if (!mesh) return tl::unexpected(mesh.error());
+  if (request.topology) {
+    TopologyOptions options;
+    options.jobs = request.jobs;
+    options.half_edge_bytes = request.memory_bytes / 4;
+    report.topologies.push_back(measure_topology(*mesh, options, report));
+  }
   WeldedModel welded{std::move(*mesh), {}};
   welded.uses = collect_textures(welded.mesh, textures);
   return welded;
@@ -140,6 +156,7 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
   pack_options.positions = plan->kind;
+  pack_options.jobs = request.jobs;
   return pack(*chunked, texture_sides, pack_options, report);
 }
 
@@ -309,7 +326,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
     content.scenes.push_back(
         place_scene(known.scene, known.pattern, known.model, (*sides)[known.model]));
   }
-  content.meta = bundle_meta(request);
+  content.meta = bundle_meta(request, report.topologies);
   content.statement = statement_of(content);
   return content;
 }

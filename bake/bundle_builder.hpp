@@ -51,9 +51,11 @@ struct BakeRequest {
   MaxError max_error;
   std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
   std::uint32_t levels = 4;               ///< of detail a chunk, the finest counted
-  std::string device;                     ///< profile that it is planned for; empty: none
-  unsigned jobs = 1;                      ///< the bytes do not depend on it
-  LoopBakeOptions loop;                   ///< of patterns; its jobs are those above
+  bool topology = true;                   ///< measure and state each model's
+  std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
+  std::string device;              ///< profile that it is planned for; empty: none
+  unsigned jobs = 1;               ///< the bytes do not depend on it
+  LoopBakeOptions loop;            ///< of patterns; its jobs are those above
   std::string tool_version;
 };
 
@@ -72,7 +74,8 @@ SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std:
                         const std::array<double, 3>& model_sides);
 
 /// JSON of the kMeta section: tool, options and source file names, without folders or times.
-std::string bundle_meta(const BakeRequest& request);
+/// topologies: none, or one a model.
+std::string bundle_meta(const BakeRequest& request, const std::vector<MeshTopology>& topologies);
 
 /// "dir/spider.obj" -> "spider".
 std::string file_stem(const std::string& path);

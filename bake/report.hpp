@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "bake/model/topology.hpp"
+
 namespace modar {
 
 enum class FindingSeverity : std::uint8_t { kInfo, kWarning, kError };
@@ -36,6 +38,7 @@ struct StageReport {
 struct Report {
   std::vector<StageReport> stages;
   std::vector<Finding> findings;
+  std::vector<MeshTopology> topologies;  ///< one a model, where they were asked for
   /// Called when a stage begins or moves on: its name and how much of it is done (0 to 1). May be
   /// empty.
   std::function<void(const std::string& stage, double done)> progress;

@@ -12,6 +12,10 @@ namespace {
 
 /// Entries of the cache that is planned for: the smallest that phones of the class have.
 constexpr std::uint32_t kCacheSize = 16;
+/// Vertices are sorted by counting on their first bits, then by comparison in their few.
+constexpr unsigned kBucketShift = 64 - 12;
+constexpr std::size_t kBuckets = std::size_t{1} << (64 - kBucketShift);
+constexpr std::uint64_t kOut = ~std::uint64_t{0};  ///< no corners: they have 48 bits
 constexpr std::uint32_t kNoVertex = 0xFFFFFFFFu;
 
 }  // namespace
@@ -19,23 +23,37 @@ constexpr std::uint32_t kNoVertex = 0xFFFFFFFFu;
 void ChunkOrderer::rank_vertices(std::span<const std::byte> vertices, std::uint32_t stride) {
   const std::size_t count = vertices.size() / stride;
   const std::size_t head_bytes = std::min<std::size_t>(stride, 8);
-  keys_.resize(count);
+  unsorted_.resize(count);
+  buckets_.assign(kBuckets + 1, 0);
   for (std::size_t v = 0; v < count; ++v) {
     std::uint64_t head = 0;
     for (std::size_t i = 0; i < head_bytes; ++i) {
       head = head << 8 | std::to_integer<std::uint64_t>(vertices[v * stride + i]);
     }
-    keys_[v] = {head, static_cast<std::uint32_t>(v)};
+    // Of short strides the head has fewer bytes: they are its highest.
+    head <<= 8 * (8 - head_bytes);
+    unsorted_[v] = {head, static_cast<std::uint32_t>(v)};
+    ++buckets_[(head >> kBucketShift) + 1];
   }
+  for (std::size_t b = 0; b < kBuckets; ++b) buckets_[b + 1] += buckets_[b];
+  keys_.resize(count);
+  for (const Key& key : unsorted_) keys_[buckets_[key.head >> kBucketShift]++] = key;
   const auto compare = [&](const Key& a, const Key& b) {
     return std::memcmp(vertices.data() + std::size_t{a.vertex} * stride,
                        vertices.data() + std::size_t{b.vertex} * stride, stride);
   };
-  std::sort(keys_.begin(), keys_.end(), [&](const Key& a, const Key& b) {
+  const auto before = [&](const Key& a, const Key& b) {
     if (a.head != b.head) return a.head < b.head;
     const int bytes = compare(a, b);
     return bytes != 0 ? bytes < 0 : a.vertex < b.vertex;
-  });
+  };
+  // Each bucket now says where the next one begins.
+  std::size_t begin = 0;
+  for (std::size_t b = 0; b < kBuckets; ++b) {
+    std::sort(keys_.begin() + static_cast<std::ptrdiff_t>(begin),
+              keys_.begin() + static_cast<std::ptrdiff_t>(buckets_[b]), before);
+    begin = buckets_[b];
+  }
   rank_.resize(count);
   vertex_of_rank_.clear();
   for (std::size_t i = 0; i < count; ++i) {
@@ -80,13 +98,13 @@ void ChunkOrderer::sort_triangles(std::span<std::uint16_t> indices) {
 }
 
 void ChunkOrderer::link_triangles(std::span<const std::uint16_t> indices) {
-  live_.assign(distinct_, 0);
-  for (const std::uint16_t v : indices) ++live_[v];
+  places_.assign(distinct_, Place());
+  for (const std::uint16_t v : indices) ++places_[v].live;
   first_.resize(distinct_ + 1);
   std::uint32_t sum = 0;
   for (std::uint32_t v = 0; v < distinct_; ++v) {
     first_[v] = sum;
-    sum += live_[v];
+    sum += places_[v].live;
   }
   first_[distinct_] = sum;
   around_.resize(indices.size());
@@ -102,49 +120,55 @@ void ChunkOrderer::link_triangles(std::span<const std::uint16_t> indices) {
 std::uint32_t ChunkOrderer::next_fan(std::size_t ring_begin) {
   std::uint32_t best = kNoVertex;
   std::uint32_t best_age = 0;
-  for (std::size_t i = ring_begin; i < ordered_.size(); ++i) {
+  for (std::size_t i = ring_begin; i < ordered_count_; ++i) {
     const std::uint32_t v = ordered_[i];
-    if (live_[v] == 0) continue;
-    const std::uint32_t age = time_ - entered_[v];
-    const std::uint32_t rank = age + 2 * live_[v] <= kCacheSize ? age + 1 : 1;
+    const Place place = places_[v];
+    if (place.live == 0) continue;
+    const std::uint32_t age = time_ - place.entered;
+    const std::uint32_t rank = age + 2 * place.live <= kCacheSize ? age + 1 : 1;
     if (rank > best_age) {
       best = v;
       best_age = rank;
     }
   }
   if (best != kNoVertex) return best;
-  while (!recent_.empty()) {
-    const std::uint16_t v = recent_.back();
-    recent_.pop_back();
-    if (live_[v] != 0) return v;
+  while (recent_count_ != 0) {
+    const std::uint16_t v = recent_[--recent_count_];
+    if (places_[v].live != 0) return v;
   }
   for (; cursor_ < distinct_; ++cursor_) {
-    if (live_[cursor_] != 0) return cursor_;
+    if (places_[cursor_].live != 0) return cursor_;
   }
   return kNoVertex;
 }
 
 void ChunkOrderer::order_triangles(std::span<const std::uint16_t> indices) {
-  entered_.assign(distinct_, 0);
-  done_.assign(indices.size() / 3, 0);
-  recent_.clear();
-  ordered_.clear();
-  ordered_.reserve(indices.size());
+  // One look at a triangle tells both whether it is out and what it is.
+  waiting_.resize(indices.size() / 3);
+  for (std::size_t t = 0; t < waiting_.size(); ++t) {
+    waiting_[t] = std::uint64_t{indices[3 * t]} | std::uint64_t{indices[3 * t + 1]} << 16 |
+                  std::uint64_t{indices[3 * t + 2]} << 32;
+  }
+  recent_.resize(indices.size());
+  ordered_.resize(indices.size());
+  recent_count_ = ordered_count_ = 0;
   time_ = kCacheSize + 1;
   cursor_ = 0;
   std::uint32_t fan = next_fan(0);
   while (fan != kNoVertex) {
-    const std::size_t ring_begin = ordered_.size();
+    const std::size_t ring_begin = ordered_count_;
     for (std::uint32_t k = first_[fan]; k < first_[fan + 1]; ++k) {
-      const std::uint32_t triangle = around_[k];
-      if (done_[triangle] != 0) continue;
-      done_[triangle] = 1;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const std::uint16_t v = indices[3 * std::size_t{triangle} + c];
-        ordered_.push_back(v);
-        recent_.push_back(v);
-        --live_[v];
-        if (time_ - entered_[v] > kCacheSize) entered_[v] = time_++;
+      std::uint64_t& waiting = waiting_[around_[k]];
+      const std::uint64_t corners = waiting;
+      if (corners == kOut) continue;
+      waiting = kOut;
+      for (unsigned c = 0; c < 3; ++c) {
+        const auto v = static_cast<std::uint16_t>(corners >> (16 * c));
+        ordered_[ordered_count_++] = v;
+        recent_[recent_count_++] = v;
+        Place& place = places_[v];
+        --place.live;
+        if (time_ - place.entered > kCacheSize) place.entered = time_++;
       }
     }
     fan = next_fan(ring_begin);

@@ -40,18 +40,26 @@ class ChunkOrderer {
     std::uint64_t head;  // the first bytes of the vertex, compared as a number
     std::uint32_t vertex;
   };
+  struct Place {
+    std::uint32_t live = 0;     // triangles that are not out yet
+    std::uint32_t entered = 0;  // when the vertex last entered the cache
+  };
+  std::vector<Key> unsorted_;
   std::vector<Key> keys_;
+  std::vector<std::uint32_t> buckets_;
   std::vector<std::uint16_t> rank_;            // of each old vertex: its place among distinct bytes
   std::vector<std::uint16_t> vertex_of_rank_;  // the lowest old number with those bytes
   std::vector<std::uint64_t> triangles_;       // canonical: lowest rank first, then sorted
   std::uint32_t distinct_ = 0;
-  std::vector<std::uint32_t> first_;    // of each vertex: where its triangles begin in around_
-  std::vector<std::uint32_t> around_;   // triangles by vertex
-  std::vector<std::uint32_t> live_;     // triangles of each vertex that are not out yet
-  std::vector<std::uint32_t> entered_;  // of each vertex: when it last entered the cache
-  std::vector<std::uint8_t> done_;      // of each triangle
-  std::vector<std::uint16_t> recent_;   // vertices seen, latest last: where to go at a dead end
+  std::vector<std::uint32_t> first_;   // of each vertex: where its triangles begin in around_
+  std::vector<std::uint32_t> around_;  // triangles by vertex
+  std::vector<Place> places_;          // of each vertex
+  std::vector<std::uint64_t>
+      waiting_;                        // of each triangle: its corners, 16 bits each; all ones: out
+  std::vector<std::uint16_t> recent_;  // vertices seen, latest last: where to go at a dead end
   std::vector<std::uint16_t> ordered_;  // the new triangles
+  std::size_t recent_count_ = 0;
+  std::size_t ordered_count_ = 0;
   std::vector<std::uint16_t> old_of_new_;
   std::vector<std::uint32_t> new_of_old_;
   std::uint32_t time_ = 0;

@@ -17,6 +17,23 @@ double snorm8_mean(int c) {
   return (es2 + es3) / 2.0;
 }
 
+/// What signed codes decode to under ES 2.0 and under ES 3, by code + 128.
+struct SnormTables {
+  std::array<double, 256> es2{};
+  std::array<double, 256> es3{};
+};
+
+constexpr SnormTables make_snorm_tables() {
+  SnormTables tables;
+  for (int c = -128; c < 128; ++c) {
+    const auto at = static_cast<std::size_t>(c + 128);
+    tables.es2[at] = (2 * c + 1) / 255.0;
+    tables.es3[at] = c < -127 ? -1.0 : c / 127.0;
+  }
+  return tables;
+}
+constexpr SnormTables kSnorm = make_snorm_tables();
+
 /// Square of the cosine between a unit vector and what octahedral coordinates decode to.
 double oct_cosine_square(double x, double y, const std::array<double, 3>& n) {
   const double z = 1.0 - std::fabs(x) - std::fabs(y);
@@ -113,9 +130,11 @@ std::array<std::int8_t, 2> normal_to_oct8(const std::array<double, 3>& normal) {
   for (int k = 0; k < 4; ++k) {
     const int cx = x0 + (k & 1);
     const int cy = y0 + (k >> 1);
-    const double es2 = oct_cosine_square((2 * cx + 1) / 255.0, (2 * cy + 1) / 255.0, normal);
-    const double es3 =
-        oct_cosine_square(cx < -127 ? -1.0 : cx / 127.0, cy < -127 ? -1.0 : cy / 127.0, normal);
+    const auto ix = static_cast<std::size_t>(cx + 128);
+    const auto iy = static_cast<std::size_t>(cy + 128);
+    const double es2 = oct_cosine_square(kSnorm.es2[ix], kSnorm.es2[iy], normal);
+    if (es2 <= best) continue;
+    const double es3 = oct_cosine_square(kSnorm.es3[ix], kSnorm.es3[iy], normal);
     const double worse = es2 < es3 ? es2 : es3;
     if (worse > best) {
       best = worse;

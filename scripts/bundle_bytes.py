@@ -127,6 +127,7 @@ COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 class Bundle:
     def __init__(self, data):
         self.data, self.sections, self.payload, self.tables = data, [], {}, {}
+        self.warnings = []
         self.read_header()
         self.read_sections()
         self.names = self.payload.get((1, NONE, 0), b"")

@@ -85,6 +85,20 @@ def check_model(bundle, model):
          model["level_count"] == max((chunk["level_count"] for chunk in chunks), default=0),
          "MODEL_COUNTS", at)
     check_placement(model, chunks, tables["levels"])
+    check_grid(bundle, model, chunks)
+
+
+def check_grid(bundle, model, chunks):
+    """Warns where a vertex of two chunks would decode to two points."""
+    kinds = [(part["type"], part["normalised"]) for part in bundle.tables["layouts"][model["layout"]]["attributes"]
+             if part["semantic"] == 1]
+    if not kinds or kinds[0][0] in (1, 6) or kinds[0][1]:
+        return
+    for chunk in chunks:
+        step = chunk["position_step"]
+        if (step != chunks[0]["position_step"] or math.frexp(step)[0] != 0.5 or
+                any(math.fmod(offset, step) for offset in chunk["position_offset"])):
+            bundle.warnings.append(f"CHUNK_GRID at byte {chunk['at']}: borders may crack")
 
 
 def check_placement(model, chunks, levels):

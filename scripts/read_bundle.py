@@ -210,6 +210,8 @@ def main(arguments):
         prefix = f"{path}: " if len(files) > 1 else ""
         bundle, decoded, code, words = read(path, "--full" in options)
         worst = max(worst, code)
+        for warning in bundle.warnings if code == 0 else []:
+            print(f"{prefix}warning: {warning}", file=sys.stderr)
         if "--scenes" in options:
             print(scene_digest(decoded) if code == 0 else words.replace("\n", " "))
         elif code != 0:

@@ -50,6 +50,7 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   take(options, "max_texture", side);
   if (side >= kLeastTextureSide && side <= kMaxTextureSide) request.textures.max_side = side;
   take(options, "mipmaps", request.textures.mipmaps);
+  take(options, "topology", request.topology);
   take(options, "unit_metres", request.unit_metres);
   take(options, "max_error", request.max_error.value);
   const std::map<std::string, MaxError::Unit> units = {{"any", MaxError::Unit::kAny},

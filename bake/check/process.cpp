@@ -3,9 +3,11 @@
 
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
@@ -37,7 +39,7 @@ TemporaryFolder::~TemporaryFolder() {
   if (!path_.empty()) fs::remove_all(path_, ignored);
 }
 
-int run_process(const ProcessRequest& request) {
+ProcessOutcome run_measured(const ProcessRequest& request) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   const std::string output = request.output.empty() ? "/dev/null" : request.output;
@@ -46,12 +48,27 @@ int run_process(const ProcessRequest& request) {
   const std::vector<char*> arguments = pointers(request.words);
   const std::vector<char*> variables = pointers(request.environment);
   pid_t child = 0;
+  const auto start = std::chrono::steady_clock::now();
   const int failed = ::posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(),
                                     request.environment.empty() ? environ : variables.data());
   posix_spawn_file_actions_destroy(&actions);
+  ProcessOutcome outcome;
   int status = 0;
-  if (failed != 0 || ::waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
-  return WEXITSTATUS(status);
+  rusage usage{};
+  if (failed != 0 || ::wait4(child, &status, 0, &usage) != child || !WIFEXITED(status)) {
+    return outcome;
+  }
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+  outcome.exit = WEXITSTATUS(status);
+  outcome.cpu_seconds = static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+                        1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  outcome.wall_seconds = wall.count();
+  outcome.peak_rss_bytes = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+  return outcome;
+}
+
+int run_process(const ProcessRequest& request) {
+  return run_measured(request).exit;
 }
 
 }  // namespace modar

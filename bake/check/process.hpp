@@ -1,6 +1,7 @@
 // Other programs that a check runs, and a folder for what it hands them.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,17 @@ struct ProcessRequest {
   std::vector<std::string> environment;  ///< "NAME=value"; empty: ours
   std::string output;                    ///< file that stdout goes to; empty: nowhere
 };
+
+/// What a program that has ended took: exit code (as run_process() answers it), processor time of
+/// user and system together, greatest resident size.
+struct ProcessOutcome {
+  int exit = -1;
+  double cpu_seconds = 0;
+  double wall_seconds = 0;
+  std::uint64_t peak_rss_bytes = 0;
+};
+
+ProcessOutcome run_measured(const ProcessRequest& request);
 
 /// Runs it to its end. Answers its exit code, or -1 where it could not be started or was killed.
 int run_process(const ProcessRequest& request);

@@ -1,6 +1,7 @@
 // `modar bake`: OBJ models and pattern images to one bundle.
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <system_error>
 
@@ -9,6 +10,8 @@
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/commands/topology_json.hpp"
+#include "bake/model/memory_limit.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -25,6 +28,9 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
                  static_cast<unsigned long long>(model.triangle_count),
                  static_cast<unsigned long long>(model.vertex_count), model.chunk_count,
                  model.position_error_max, model.diagonal);
+    if (const auto topology = stated_topology(bundle, m)) {
+      std::fprintf(stderr, "        %s\n", topology_words(*topology).c_str());
+    }
   }
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
     const TextureRecord& texture = bundle.textures()[t];
@@ -50,6 +56,15 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
                human_bytes(bundle.bytes().size()).c_str(), ms / 1000);
 }
 
+/// Says so where the limit was passed.
+void report_memory(const BakeRequest& request, Report& report) {
+  const std::uint64_t peak = process_cost().peak_rss_bytes;
+  if (request.memory_bytes == 0 || peak <= request.memory_bytes) return;
+  report.findings.push_back({"bake.memory", FindingSeverity::kWarning, "--memory", 0,
+                             "the bake took " + human_bytes(peak) + ", more than was asked",
+                             "fewer --jobs, smaller textures or several bundles take less"});
+}
+
 }  // namespace
 
 int run_bake(const BakeCommand& command) {
@@ -61,12 +76,20 @@ int run_bake(const BakeCommand& command) {
                           "name a folder that can be made"});
     }
   }
+  std::unique_ptr<MemoryLimit> limit;
+  if (command.request.memory_bytes != 0) {
+    const auto folder = std::filesystem::absolute(command.output).parent_path();
+    auto started = MemoryLimit::start(folder.string(), command.request.memory_bytes);
+    if (!started) return print_error(started.error());
+    limit = std::move(*started);
+  }
   ProgressBar bar(command.quiet);
   Report report;
   report.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
 
   Result<BundleContent> content = build_bundle(command.request, report);
   bar.clear();
+  report_memory(command.request, report);
   if (!command.quiet) {
     for (const Finding& finding : report.findings) print_finding(finding);
   }

@@ -120,6 +120,10 @@ const std::vector<Bench>& benches() {
       {"render", true, "BUNDLE... [--device NAME]",
        "ten copies in the article's ways, loading, culling, against index rendering from arrays",
        bench_render_rows},
+      {"model", false, "SCAN [--big] | --obj FILE",
+       "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "
+       "gltfpack, Draco and the goals",
+       [](const BenchCommand& command) { return bench_model_rows(command.inputs, command.model); }},
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
        "our pose loop against the article's method, on the same frames",
        [](const BenchCommand& command) { return bench_pose_rows(command.pose); }},

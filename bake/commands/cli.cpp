@@ -80,6 +80,7 @@ void add_geometry_options(CLI::App& sub, BakeRequest& request, BakeTexts& texts)
   sub.add_flag_callback(
          "--no-lods", [&request] { request.levels = 1; }, "The finest level only")
       ->excludes(levels);
+  sub.add_flag("!--no-topology", request.topology, "Do not measure the models' topology");
 }
 
 CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
@@ -109,6 +110,10 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   sub->add_option("--jobs", bake.request.jobs, "Threads; the bytes do not depend on it")
       ->check(CLI::Range(1u, 256u))
       ->capture_default_str();
+  sub->add_option("--memory", bake.request.memory_bytes,
+                  "Hold the process there (1G, 800M): large arrays live in files beside the bundle")
+      ->transform(CLI::AsSizeValue(true))
+      ->type_name("SIZE");
   sub->add_flag("--quiet", bake.quiet, "No progress, no summary, no findings on stderr");
   sub->add_flag("--json", bake.json, "Print what was baked, stages and findings as JSON");
   sub->footer(
@@ -162,6 +167,11 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
   sub->add_option("inputs", bench.inputs, "Its input files");
   sub->add_option("--crop", bench.crop, "etc1: side of the centre crop, in pixels");
   sub->add_option("--device", bench.device, "render: draw as this device would (assets/devices)");
+  sub->add_option("--obj", bench.model.obj, "model: measure this OBJ instead of making one");
+  sub->add_flag("--big", bench.model.big, "model: of 14.6 million triangles, some minutes");
+  sub->add_option("--jobs", bench.model.jobs, "model: threads of our own runs")
+      ->check(CLI::Range(1u, 256u))
+      ->capture_default_str();
   PoseBenchCommand& pose = bench.pose;
   sub->add_option("--patterns", pose.patterns, "pose: folder of pattern pictures, or one picture");
   sub->add_option("--backgrounds", pose.backgrounds, "pose: folder of photos without a pattern");
@@ -179,6 +189,7 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
   sub->add_flag("--json", bench.json, "Print the rows as JSON");
   sub->footer(
       example("  modar bench load spider.modar --json\n"
+              "  modar bench model scan.obj --big --json\n"
               "  modar bench pose --patterns patterns --backgrounds photos --frames 100 --json\n"));
   return sub;
 }
@@ -231,6 +242,7 @@ int parse_and_run(int argc, char** argv) {
   BakeTexts bake_texts;
   InspectCommand inspect;
   BenchCommand bench;
+  bench.model.jobs = bake.request.jobs;
   RectifyCommand rectify;
   std::string corners;
   const CLI::App* bake_sub = add_bake(app, bake, bake_texts);

@@ -45,12 +45,20 @@ struct PoseBenchCommand {
   bool quiet = false;
 };
 
+/// `modar bench model`.
+struct ModelBenchCommand {
+  std::string obj;    ///< measured as it is; empty: one is made from the input scan
+  bool big = false;   ///< made at the size of the article's CHURCH
+  unsigned jobs = 1;  ///< of our own runs
+};
+
 struct BenchCommand {
   std::string name;
   std::vector<std::string> inputs;
   unsigned crop = 0;   ///< etc1: side of the centre crop in pixels, 0: whole images
   std::string device;  ///< render: profile that masks the context; empty: none
   PoseBenchCommand pose;
+  ModelBenchCommand model;
   bool json = false;
 };
 

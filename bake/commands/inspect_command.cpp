@@ -5,6 +5,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/commands/topology_json.hpp"
 #include "bake/extract.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
@@ -24,6 +25,9 @@ void print_models(const BundleView& bundle) {
                 static_cast<unsigned long long>(model.vertex_count), model.chunk_count,
                 model.level_count, model.diagonal, model.position_error_max,
                 model.diagonal > 0 ? model.position_error_max / model.diagonal : 0.0);
+    if (const auto topology = stated_topology(bundle, m)) {
+      std::printf("  %s\n", topology_words(*topology).c_str());
+    }
   }
 }
 

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "bake/bundle_builder.hpp"
+#include "bake/commands/topology_json.hpp"
 
 namespace modar {
 namespace {
@@ -54,7 +56,14 @@ std::uint64_t model_bytes(const BundleView& bundle, const ModelRecord& model) {
   return bytes;
 }
 
-Json model_json(const BundleView& bundle, const ModelRecord& model) {
+Json topology_json(const MeshTopology& topology) {
+  Json json = Json::object();
+  for (const auto& [key, value] : topology_figures(topology)) json[key] = value;
+  return json;
+}
+
+Json model_json(const BundleView& bundle, std::uint32_t index) {
+  const ModelRecord& model = bundle.models()[index];
   const std::uint64_t bytes = model_bytes(bundle, model);
   std::uint64_t indices = 0;
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
@@ -67,6 +76,7 @@ Json model_json(const BundleView& bundle, const ModelRecord& model) {
   for (std::uint32_t m = 0; m < model.material_count; ++m) {
     materials.push_back(bundle.name(bundle.materials()[model.first_material + m].name));
   }
+  const std::optional<MeshTopology> topology = stated_topology(bundle, index);
   return {{"name", bundle.name(model.name)},
           {"vertices", model.vertex_count},
           {"triangles", model.triangle_count},
@@ -88,7 +98,8 @@ Json model_json(const BundleView& bundle, const ModelRecord& model) {
           {"normal_error_max_deg", number(model.normal_error_max_deg)},
           {"normal_error_rms_deg", number(model.normal_error_rms_deg)},
           {"uv_error_max_texels", number(model.uv_error_max_texels)},
-          {"uv_error_rms_texels", number(model.uv_error_rms_texels)}};
+          {"uv_error_rms_texels", number(model.uv_error_rms_texels)},
+          {"topology", topology ? topology_json(*topology) : Json(nullptr)}};
 }
 
 Json texture_json(const BundleView& bundle, std::uint32_t index) {
@@ -125,7 +136,7 @@ Json pattern_json(const BundleView& bundle, std::uint32_t index) {
 Json inspect_document(const BundleView& bundle) {
   Json models = Json::array();
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    models.push_back(model_json(bundle, bundle.models()[m]));
+    models.push_back(model_json(bundle, m));
   }
   Json textures = Json::array();
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
@@ -181,11 +192,29 @@ std::string bake_json(const BundleView& bundle, const Report& report, const Proc
                         {"message", finding.message},
                         {"cure", finding.cure}});
   }
+  Json half_edges = Json::array();
+  for (const MeshTopology& topology : report.topologies) {
+    if (!topology.half_edges) continue;
+    half_edges.push_back({{"model", topology.model},
+                          {"boundary_loops", topology.half_edges->boundary_loops},
+                          {"copied_faces", topology.half_edges->copied_faces},
+                          {"copied_vertices", topology.half_edges->copied_vertices}});
+  }
   return dump({{"bundle", inspect_document(bundle)},
+               {"half_edges", half_edges},
                {"stages", stages},
                {"findings", findings},
                {"cpu_seconds", cost.cpu_seconds},
                {"peak_rss_bytes", cost.peak_rss_bytes}});
+}
+
+double bytes_per_triangle_of(const std::string& report) {
+  const auto document = nlohmann::json::parse(report, nullptr, false);
+  const auto value = nlohmann::json::json_pointer("/bundle/models/0/bytes_per_triangle");
+  if (!document.is_object() || !document.contains(value) || !document[value].is_number()) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  return document[value].get<double>();
 }
 
 std::string rectify_json(const std::string& path, std::uint32_t width, std::uint32_t height,
@@ -227,12 +256,18 @@ const char* positions_name(const BakeRequest& request) {
 
 }  // namespace
 
-std::string bundle_meta(const BakeRequest& request) {
+std::string bundle_meta(const BakeRequest& request, const std::vector<MeshTopology>& topologies) {
   const auto name = [](const std::string& path) {
     return std::filesystem::path(path).filename().string();
   };
   Json models = Json::array();
-  for (const std::string& path : request.models) models.push_back({{"file", name(path)}});
+  for (const std::string& path : request.models) {
+    Json model = {{"file", name(path)}};
+    if (models.size() < topologies.size()) {
+      model["topology"] = topology_json(topologies[models.size()]);
+    }
+    models.push_back(std::move(model));
+  }
   Json patterns = Json::array();
   for (const PatternRequest& pattern : request.patterns) {
     patterns.push_back({{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}});
@@ -246,6 +281,7 @@ std::string bundle_meta(const BakeRequest& request) {
                  {"max_error", request.max_error.value},
                  {"max_error_unit", max_error_unit(request.max_error)},
                  {"positions", positions_name(request)},
+                 {"topology", request.topology},
                  {"effort", static_cast<int>(request.textures.effort)},
                  {"perceptual", request.textures.perceptual},
                  {"max_texture", request.textures.max_side},

@@ -16,6 +16,9 @@ std::string inspect_json(const BundleView& bundle);
 /// `modar bake --json`: inspect's document under "bundle", stages, findings, cost.
 std::string bake_json(const BundleView& bundle, const Report& report, const ProcessCost& cost);
 
+/// Of the first model in what bake_json() gave; not finite where there is none.
+double bytes_per_triangle_of(const std::string& report);
+
 /// `modar pattern rectify --json`.
 std::string rectify_json(const std::string& path, std::uint32_t width, std::uint32_t height,
                          double width_mm);

@@ -6,6 +6,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <new>
 
 namespace modar {
 
@@ -41,6 +42,10 @@ int print_error(const Error& error) {
 int guarded(const std::function<int()>& work) {
   try {
     return work();
+  } catch (const std::bad_alloc&) {
+    return print_error({ExitCode::kIo, "modar.memory", "",
+                        "there is not enough memory, or not enough room on the disk for --memory",
+                        "free some, or give `modar bake` a --memory below what the machine has"});
   } catch (const std::exception& error) {
     return print_error({ExitCode::kInternal, "modar.bug", "", error.what(),
                         "this is a bug of ours: please report it with the command line"});

@@ -195,6 +195,7 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
   for (std::uint32_t t = 0; t < items.size(); ++t) {
     items[next[result.mesh.triangle_material[t]]++] = make_item(result.mesh, t);
   }
+  result.mesh.triangle_material.release();  // chunks say it from here on
   ChunkBuilder builder(result.mesh, options, result.chunks);
   for (std::uint32_t m = 0; m + 1 < begins.size(); ++m) {
     const auto part =
@@ -206,6 +207,7 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
     }
   }
   timer.done(result.mesh.triangles.size(), result.chunks.size());
+  result.mesh.triangles.release();
   return result;
 }
 

@@ -24,7 +24,7 @@ struct Chunk {
 };
 
 struct ChunkedMesh {
-  TriMesh mesh;
+  TriMesh mesh;  ///< without its triangles and their materials, which the chunks hold
   std::vector<Chunk> chunks;
 };
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace tinygltf {
 class Model;
@@ -13,8 +14,8 @@ namespace modar {
 /// Elements of one accessor as doubles. tinygltf holds none of its numbers against the buffers.
 class GltfAccessor {
  public:
-  /// Answers false where the accessor does not exist, is sparse, or leaves its buffer. Without a
-  /// buffer view all elements are zero, as glTF has it.
+  /// Answers false where the accessor does not exist or leaves its buffer. Without a buffer view
+  /// all elements are zero, as glTF has it; those that a sparse accessor lists are then replaced.
   bool open(const tinygltf::Model& gltf, int index);
 
   [[nodiscard]] std::size_t size() const { return count_; }
@@ -23,6 +24,8 @@ class GltfAccessor {
   [[nodiscard]] double at(std::size_t element, std::size_t component) const;
 
  private:
+  bool replace_sparse(const tinygltf::Model& gltf, int index);
+
   const unsigned char* bytes_ = nullptr;
   std::size_t count_ = 0;
   std::size_t components_ = 0;
@@ -30,6 +33,7 @@ class GltfAccessor {
   std::size_t size_ = 0;  // of a component
   int type_ = 0;
   bool normalised_ = false;
+  std::vector<double> replaced_;  // all elements, where some are sparse
 };
 
 }  // namespace modar

@@ -14,6 +14,7 @@
 
 #include "bake/model/gltf_accessor.hpp"
 #include "bake/model/gltf_materials.hpp"
+#include "bake/model/gltf_uv.hpp"
 #include "bake/model/tinygltf_library.hpp"
 
 namespace modar {
@@ -114,6 +115,7 @@ class SceneReader {
       return {};
     }
     if (!primitive.targets.empty()) ++morphs_;
+    const GltfUv placing = gltf_uv(gltf_, primitive.material);
     GltfAccessor positions;
     GltfAccessor normals;
     GltfAccessor uvs;
@@ -124,9 +126,9 @@ class SceneReader {
     bool has_colours = false;
     if (!open(primitive, "POSITION", 0, 3, positions, there) ||
         !open(primitive, "NORMAL", positions.size(), 3, normals, has_normals) ||
-        !open(primitive, uv_name(primitive), positions.size(), 2, uvs, has_uvs) ||
+        !open(primitive, placing.attribute, positions.size(), 2, uvs, has_uvs) ||
         !open(primitive, "COLOR_0", positions.size(), 3, colours, has_colours)) {
-      return wrong("gltf.accessor", "an accessor leaves its buffer, is sparse or has no sense");
+      return wrong("gltf.accessor", "an accessor leaves its buffer, or has no sense");
     }
     if (!there) return {};
     if (model_.positions.size() + positions.size() >= kNoIndex) {
@@ -138,8 +140,9 @@ class SceneReader {
       model_.positions.push_back(glm::dvec3(to_scene * glm::dvec4(vector(positions, v), 1.0)));
       model_.normals.push_back(has_normals ? glm::vec3(turn * vector(normals, v)) : glm::vec3(0));
       // OBJ, whose sense SourceModel has, counts v from below.
-      model_.uvs.push_back(has_uvs ? glm::dvec2(uvs.at(v, 0), 1.0 - uvs.at(v, 1))
-                                   : glm::dvec2(0.0));
+      const glm::dvec2 uv =
+          has_uvs ? placing.apply({uvs.at(v, 0), uvs.at(v, 1)}) : glm::dvec2(0.0, 1.0);
+      model_.uvs.push_back({uv.x, 1.0 - uv.y});
       glm::vec3 colour(1.0f);
       for (int i = 0; has_colours && i < 3; ++i) {
         colour[i] = static_cast<float>(srgb_of_linear(colours.at(v, static_cast<std::size_t>(i))));
@@ -154,16 +157,6 @@ class SceneReader {
 
   static glm::dvec3 vector(const GltfAccessor& accessor, std::size_t v) {
     return {accessor.at(v, 0), accessor.at(v, 1), accessor.at(v, 2)};
-  }
-
-  [[nodiscard]] std::string uv_name(const tinygltf::Primitive& primitive) const {
-    int set = 0;
-    if (primitive.material >= 0 &&
-        static_cast<std::size_t>(primitive.material) < gltf_.materials.size()) {
-      set = gltf_.materials[static_cast<std::size_t>(primitive.material)]
-                .pbrMetallicRoughness.baseColorTexture.texCoord;
-    }
-    return "TEXCOORD_" + std::to_string(set);
   }
 
   void begin_material(int material) {

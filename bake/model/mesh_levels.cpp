@@ -101,15 +101,17 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
                       static_cast<double>(first + count) / static_cast<double>(mesh.chunks.size()));
     }
   }
+  std::uint64_t fine = 0;
   std::uint64_t triangles = 0;
   double error = 0;
   for (const Chunk& chunk : mesh.chunks) {
+    fine += chunk.indices.size() / 3;
     for (const ChunkLevel& level : chunk.coarser) {
       triangles += level.indices.size() / 3;
       error = std::max(error, level.error);
     }
   }
-  timer.done(mesh.mesh.triangles.size(), triangles, error * mesh.mesh.placement.scale);
+  timer.done(fine, triangles, error * mesh.mesh.placement.scale);
   return {};
 }
 

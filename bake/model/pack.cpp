@@ -1,7 +1,9 @@
 // Packs chunk by chunk: bytes, boxes and cones, order, records.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <cstring>
 #include <span>
 #include <utility>
 
@@ -10,10 +12,13 @@
 #include "bake/model/chunk_bounds.hpp"
 #include "bake/model/packed_mesh.hpp"
 #include "bake/model/vertex_packer.hpp"
+#include "bake/texture/parallel.hpp"
 #include "formats/chunk_order.hpp"
 
 namespace modar {
 namespace {
+
+constexpr unsigned kWave = 4;  ///< chunks a thread between two joins
 
 MaterialRecord material_record(const SourceMaterial& source) {
   MaterialRecord m{};
@@ -45,35 +50,105 @@ std::vector<std::uint16_t> coarse_triangles(const std::vector<std::uint16_t>& in
   return coarse;
 }
 
-/// Puts chunks in order and behind each other. Chunks that follow each other share one range of
+/// One chunk in its final bytes, but for where it will stand.
+struct PackedChunk {
+  std::vector<std::byte> vertices;                 ///< in their final order
+  std::vector<std::vector<std::uint16_t>> levels;  ///< indices, the finest first
+  std::vector<double> level_errors;
+  ChunkRecord record{};  ///< lacks first_level
+  PackErrors errors;
+};
+
+/// Triangles of all levels: what a box and a cone have to hold for.
+std::vector<std::uint16_t> all_indices(const Chunk& chunk) {
+  std::vector<std::uint16_t> indices = chunk.indices;
+  for (const ChunkLevel& level : chunk.coarser) {
+    indices.insert(indices.end(), level.indices.begin(), level.indices.end());
+  }
+  return indices;
+}
+
+ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
+                         const std::vector<glm::vec3>& decoded) {
+  ChunkRecord record{};
+  const ChunkBounds bounds = chunk_bounds(decoded, all_indices(chunk));
+  for (int i = 0; i < 3; ++i) {
+    record.bounds_min[i] = bounds.low[i];
+    record.bounds_max[i] = bounds.high[i];
+    record.cone_axis[i] = bounds.cone_axis[i];
+  }
+  record.cone_cutoff = bounds.cone_cutoff;
+  record.position_step = static_cast<float>(grid.step);
+  for (int i = 0; i < 3; ++i) {
+    record.position_offset[i] = static_cast<float>(grid.middle[i]) * record.position_step;
+  }
+  for (int i = 0; i < 2; ++i) {
+    record.uv_offset[i] = uv.offset[i];
+    record.uv_scale[i] = uv.scale[i];
+  }
+  record.material = chunk.material;
+  return record;
+}
+
+/// Packs one chunk after another; what it needs on the way it keeps between them.
+class ChunkPacker {
+ public:
+  ChunkPacker(const TriMesh& mesh, const VertexOffsets& offsets, PositionKind kind)
+      : packer_(mesh, offsets, kind), stride_(offsets.stride) {}
+
+  void pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
+            std::uint32_t texture_side, PackedChunk& out) {
+    bytes_.assign(chunk.vertices.size() * stride_, std::byte{0});
+    packer_.pack(chunk, grid, uv, texture_side, bytes_.data(), decoded_);
+    out.errors = packer_.errors();
+    out.record = chunk_record(chunk, grid, uv, decoded_);
+    std::vector<std::uint16_t>& finest = out.levels.emplace_back(chunk.indices);
+    out.level_errors.push_back(0.0);
+    const auto order = orderer_.order(bytes_, stride_, finest);
+    out.vertices.resize(order.size() * stride_);
+    for (std::size_t v = 0; v < order.size(); ++v) {
+      std::memcpy(out.vertices.data() + v * stride_, bytes_.data() + order[v] * stride_, stride_);
+    }
+    for (const ChunkLevel& level : chunk.coarser) {
+      std::vector<std::uint16_t> coarse = coarse_triangles(level.indices, orderer_);
+      if (coarse.empty()) break;
+      level_orderer_.order(coarse, static_cast<std::uint32_t>(order.size()));
+      out.levels.push_back(std::move(coarse));
+      out.level_errors.push_back(level.error);
+    }
+    out.record.level_count = static_cast<std::uint32_t>(out.levels.size());
+  }
+
+ private:
+  VertexPacker packer_;
+  std::uint16_t stride_;
+  ChunkOrderer orderer_;
+  LevelOrderer level_orderer_;
+  std::vector<std::byte> bytes_;
+  std::vector<glm::vec3> decoded_;
+};
+
+/// Puts chunks behind each other. Chunks that follow each other share one range of
 /// vertices, hence one set-up of attributes, as long as 16 bits reach all of it. Their indices of
 /// one level lie side by side: chunks of equal level can be drawn in one call.
 class ChunkAppender {
  public:
   explicit ChunkAppender(PackedMesh& out) : out_(out) {}
 
-  /// vertices: as packed. chunk: its indices and levels count in them. Answers its level count.
-  std::uint32_t append(std::span<const std::byte> vertices, const Chunk& chunk) {
-    const std::size_t stride = out_.layout.stride;
-    std::vector<std::uint16_t> indices = chunk.indices;
-    const auto order = orderer_.order(vertices, out_.layout.stride, indices);
-    if (range_size_ + order.size() > kMaxChunkVertices) close_range();
-    const std::size_t first = out_.levels.size();
-    add_level(0, 0.0, indices);
-    for (const ChunkLevel& level : chunk.coarser) {
-      std::vector<std::uint16_t> coarse = coarse_triangles(level.indices, orderer_);
-      if (coarse.empty()) break;
-      level_orderer_.order(coarse, static_cast<std::uint32_t>(order.size()));
-      add_level(out_.levels.size() - first, level.error, coarse);
+  void append(PackedChunk& chunk) {
+    const auto vertices = static_cast<std::uint32_t>(chunk.vertices.size() / out_.layout.stride);
+    if (range_size_ + vertices > kMaxChunkVertices) close_range();
+    chunk.record.first_level = static_cast<std::uint32_t>(out_.levels.size());
+    out_.chunks.push_back(chunk.record);
+    for (std::size_t depth = 0; depth < chunk.levels.size(); ++depth) {
+      add_level(depth, chunk.level_errors[depth], chunk.levels[depth]);
     }
-    for (const std::uint16_t old : order) {
-      const auto vertex = vertices.subspan(old * stride, stride);
-      out_.vertices.insert(out_.vertices.end(), vertex.begin(), vertex.end());
-    }
-    range_size_ += static_cast<std::uint32_t>(order.size());
-    out_.record.vertex_count += order.size();
-    out_.record.triangle_count += indices.size() / 3;
-    return static_cast<std::uint32_t>(out_.levels.size() - first);
+    out_.vertices.insert(out_.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
+    range_size_ += vertices;
+    ModelRecord& record = out_.record;
+    record.vertex_count += vertices;
+    record.triangle_count += chunk.levels[0].size() / 3;
+    record.level_count = std::max(record.level_count, chunk.record.level_count);
   }
 
   /// States the size of the open range in its levels, and opens the next.
@@ -104,9 +179,10 @@ class ChunkAppender {
     std::vector<std::pair<std::size_t, std::size_t>> levels;
   };
 
-  void add_level(std::size_t depth, double error, std::vector<std::uint16_t> indices) {
+  /// Shifts the indices to where the chunk stands in its range.
+  void add_level(std::size_t depth, double error, std::vector<std::uint16_t>& indices) {
     for (std::uint16_t& index : indices) index = static_cast<std::uint16_t>(index + range_size_);
-    if (depth > coarser_.size()) coarser_.emplace_back();
+    if (coarser_.size() < depth) coarser_.resize(depth);
     std::vector<std::byte>& to = depth == 0 ? out_.indices : coarser_[depth - 1].indices;
     LevelRecord level{};
     level.vertex_offset = range_begin_;
@@ -122,45 +198,11 @@ class ChunkAppender {
   }
 
   PackedMesh& out_;
-  ChunkOrderer orderer_;
-  LevelOrderer level_orderer_;
   std::vector<Depth> coarser_;     // from level 1 on
   std::uint64_t range_begin_ = 0;  // bytes
   std::uint32_t range_size_ = 0;   // vertices
   std::size_t first_level_ = 0;    // of the open range
 };
-
-/// Triangles of all levels: what a box and a cone have to hold for.
-std::vector<std::uint16_t> all_indices(const Chunk& chunk) {
-  std::vector<std::uint16_t> indices = chunk.indices;
-  for (const ChunkLevel& level : chunk.coarser) {
-    indices.insert(indices.end(), level.indices.begin(), level.indices.end());
-  }
-  return indices;
-}
-
-ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
-                         std::uint32_t first_level, const std::vector<glm::vec3>& decoded) {
-  ChunkRecord record{};
-  const ChunkBounds bounds = chunk_bounds(decoded, all_indices(chunk));
-  for (int i = 0; i < 3; ++i) {
-    record.bounds_min[i] = bounds.low[i];
-    record.bounds_max[i] = bounds.high[i];
-    record.cone_axis[i] = bounds.cone_axis[i];
-  }
-  record.cone_cutoff = bounds.cone_cutoff;
-  record.position_step = static_cast<float>(grid.step);
-  for (int i = 0; i < 3; ++i) {
-    record.position_offset[i] = static_cast<float>(grid.middle[i]) * record.position_step;
-  }
-  for (int i = 0; i < 2; ++i) {
-    record.uv_offset[i] = uv.offset[i];
-    record.uv_scale[i] = uv.scale[i];
-  }
-  record.material = chunk.material;
-  record.first_level = first_level;
-  return record;
-}
 
 void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
                        ModelRecord& record) {
@@ -173,6 +215,12 @@ void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
   record.source_face_count = mesh.source_face_count;
   record.chunk_count = static_cast<std::uint32_t>(chunked.chunks.size());
   record.material_count = static_cast<std::uint32_t>(mesh.materials.size());
+}
+
+std::size_t index_count(const ChunkedMesh& chunked) {
+  std::size_t count = 0;
+  for (const Chunk& chunk : chunked.chunks) count += chunk.indices.size();
+  return count;
 }
 
 }  // namespace
@@ -194,26 +242,37 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   out.sources = mesh.materials;
   const std::vector<bool> repeats = repeating_materials(chunked);
   out.vertices.reserve(mesh.positions.size() * offsets.stride);
-  out.indices.reserve(mesh.triangles.size() * 6);
+  out.indices.reserve(index_count(chunked) * sizeof(std::uint16_t));
 
-  VertexPacker packer(mesh, offsets, options.positions);
   const std::vector<ChunkGrid> grids = make_grids(chunked, options.positions);
   ChunkAppender appender(out);
-  std::vector<std::byte> bytes;
-  std::vector<glm::vec3> decoded;
-  for (std::size_t c = 0; c < chunked.chunks.size(); ++c) {
-    const Chunk& chunk = chunked.chunks[c];
-    const UvRange uv = uv_range(mesh, chunk, repeats[chunk.material]);
-    bytes.assign(chunk.vertices.size() * offsets.stride, std::byte{0});
-    packer.pack(chunk, grids[c], uv, texture_side[chunk.material], bytes.data(), decoded);
-    out.chunks.push_back(
-        chunk_record(chunk, grids[c], uv, static_cast<std::uint32_t>(out.levels.size()), decoded));
-    ChunkRecord& record = out.chunks.back();
-    record.level_count = appender.append(bytes, chunk);
-    out.record.level_count = std::max(out.record.level_count, record.level_count);
+  PackErrors errors;
+  const unsigned jobs = std::max(1u, options.jobs);
+  std::vector<ChunkPacker> packers(jobs, ChunkPacker(mesh, offsets, options.positions));
+  // A wave of chunks at a time, a few for each thread; they are joined in order.
+  const std::size_t wave = std::size_t{kWave} * jobs;
+  for (std::size_t first = 0; first < chunked.chunks.size(); first += wave) {
+    const std::size_t count = std::min(wave, chunked.chunks.size() - first);
+    std::vector<PackedChunk> packed(count);
+    std::atomic<std::size_t> next{0};
+    parallel_rows(jobs, jobs, [&](std::uint32_t thread) {
+      for (std::size_t i = next++; i < count; i = next++) {
+        const Chunk& chunk = chunked.chunks[first + i];
+        const UvRange uv = uv_range(mesh, chunk, repeats[chunk.material]);
+        packers[thread].pack(chunk, grids[first + i], uv, texture_side[chunk.material], packed[i]);
+      }
+    });
+    for (PackedChunk& chunk : packed) {
+      errors.add(chunk.errors);
+      appender.append(chunk);
+    }
+    if (report.progress) {
+      report.progress(
+          "pack", static_cast<double>(first + count) / static_cast<double>(chunked.chunks.size()));
+    }
   }
   appender.finish();
-  packer.write_errors(out.record);
+  errors.write(mesh.placement.scale, out.record);
   timer.done(out.record.triangle_count, out.vertices.size() + out.indices.size(),
              out.record.position_error_max);
   return out;

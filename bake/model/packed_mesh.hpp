@@ -29,6 +29,7 @@ struct PackedMesh {
 struct PackOptions {
   double unit_metres = 0.0;  ///< metres in a source unit; 0: unknown
   PositionKind positions = PositionKind::kHalf;
+  unsigned jobs = 1;  ///< threads; the bytes do not depend on it
 };
 
 /// Quantises (positions as asked, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes

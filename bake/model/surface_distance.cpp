@@ -64,7 +64,7 @@ void cut(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal, 
 
 class Bounder {
  public:
-  explicit Bounder(TriangleTree& tree) : tree_(tree) {}
+  explicit Bounder(LevelTree& tree) : tree_(tree) {}
 
   /// Finds a distance that occurs.
   void probe(const Piece& piece) {
@@ -168,7 +168,7 @@ class Bounder {
 
   [[nodiscard]] double limit() const { return std::max(kDistanceFloor, kSlack * lower_); }
 
-  TriangleTree& tree_;
+  LevelTree& tree_;
   double lower_ = 0;
   double bound_ = 0;
   std::vector<Piece> pieces_;
@@ -199,7 +199,7 @@ std::vector<std::size_t> changed(std::span<const std::uint16_t> from,
 
 double surface_distance(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> from,
                         std::span<const std::uint16_t> to) {
-  TriangleTree tree(positions, to);
+  LevelTree tree(positions, to);
   Bounder bounder(tree);
   const std::vector<std::size_t> triangles = changed(from, to);
   const auto piece = [&](std::size_t i) {

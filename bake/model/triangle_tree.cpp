@@ -46,8 +46,8 @@ double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, 
                    segment_distance_square(p, t[2], t[0])});
 }
 
-TriangleTree::TriangleTree(std::span<const glm::dvec3> positions,
-                           std::span<const std::uint16_t> indices) {
+LevelTree::LevelTree(std::span<const glm::dvec3> positions,
+                     std::span<const std::uint16_t> indices) {
   triangles_.reserve(indices.size() / 3);
   for (std::size_t i = 0; i < indices.size(); i += 3) {
     triangles_.push_back(
@@ -58,7 +58,7 @@ TriangleTree::TriangleTree(std::span<const glm::dvec3> positions,
   build(0, 0, static_cast<std::uint32_t>(triangles_.size()));
 }
 
-void TriangleTree::set_box(Node& node, std::uint32_t first, std::uint32_t count) const {
+void LevelTree::set_box(Node& node, std::uint32_t first, std::uint32_t count) const {
   node.low = node.high = triangles_[first][0];
   for (std::uint32_t t = first; t < first + count; ++t) {
     for (const glm::dvec3& corner : triangles_[t]) {
@@ -68,7 +68,7 @@ void TriangleTree::set_box(Node& node, std::uint32_t first, std::uint32_t count)
   }
 }
 
-void TriangleTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
+void LevelTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
   set_box(nodes_[node], first, count);
   if (count <= kLeaf) {
     nodes_[node].first = first;
@@ -88,7 +88,7 @@ void TriangleTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t 
   build(left + 1, first + count / 2, count - count / 2);
 }
 
-double TriangleTree::nearest(const glm::dvec3& point, double enough) {
+double LevelTree::nearest(const glm::dvec3& point, double enough) {
   double best = distance_square(point, triangles_[last_]);
   if (best <= enough) return best;
   struct Entry {

@@ -17,10 +17,10 @@ namespace modar {
 double distance_square(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle,
                        double best = std::numeric_limits<double>::infinity());
 
-class TriangleTree {
+class LevelTree {
  public:
   /// At least one triangle.
-  TriangleTree(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
+  LevelTree(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
 
   /// Square of the distance of the nearest triangle; where some triangle is within `enough` (a
   /// square), that of any such triangle. Remembers the answer: neighbours ask for it again.

@@ -63,6 +63,21 @@ double ErrorTally::rms() const {
   return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));
 }
 
+void PackErrors::add(const PackErrors& other) {
+  position.add(other.position);
+  normal.add(other.normal);
+  uv.add(other.uv);
+}
+
+void PackErrors::write(double scale, ModelRecord& record) const {
+  record.position_error_max = position.greatest * scale;
+  record.position_error_rms = position.rms() * scale;
+  record.normal_error_max_deg = static_cast<float>(normal.greatest);
+  record.normal_error_rms_deg = static_cast<float>(normal.rms());
+  record.uv_error_max_texels = static_cast<float>(uv.greatest);
+  record.uv_error_rms_texels = static_cast<float>(uv.rms());
+}
+
 UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats) {
   UvRange range;
   if (mesh.uvs.empty()) return range;
@@ -105,6 +120,7 @@ std::vector<bool> repeating_materials(const ChunkedMesh& chunked) {
 void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
                         std::uint32_t texture_side, std::byte* bytes,
                         std::vector<glm::vec3>& decoded) {
+  errors_ = PackErrors();
   decoded.resize(chunk.vertices.size());
   for (std::size_t i = 0; i < chunk.vertices.size(); ++i, bytes += offsets_.stride) {
     const std::uint32_t v = chunk.vertices[i];
@@ -117,19 +133,10 @@ void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange
       decoded[i] = put_int16(p, grid, bytes);
       put_oct(n, bytes + offsets_.normal);
     }
-    position_.add(glm::length(glm::dvec3(decoded[i]) - p));
+    errors_.position.add(glm::length(glm::dvec3(decoded[i]) - p));
     if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
     if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
   }
-}
-
-void VertexPacker::write_errors(ModelRecord& record) const {
-  record.position_error_max = position_.greatest * mesh_.placement.scale;
-  record.position_error_rms = position_.rms() * mesh_.placement.scale;
-  record.normal_error_max_deg = static_cast<float>(normal_.greatest);
-  record.normal_error_rms_deg = static_cast<float>(normal_.rms());
-  record.uv_error_max_texels = static_cast<float>(uv_.greatest);
-  record.uv_error_rms_texels = static_cast<float>(uv_.rms());
 }
 
 glm::vec3 VertexPacker::put_half(const glm::dvec3& p, std::byte* bytes) {
@@ -177,9 +184,14 @@ void VertexPacker::put_oct(const glm::dvec3& n, std::byte* bytes) {
 }
 
 void VertexPacker::add_normal_error(const glm::dvec3& decoded, const glm::dvec3& n) {
-  // Small angles drown in an arc cosine.
-  const double angle = std::atan2(glm::length(glm::cross(decoded, n)), glm::dot(decoded, n));
-  normal_.add(angle * kDegrees);
+  // Small angles drown in an arc cosine, and nearly all are small: the first terms of the arc
+  // sine's series hold nine digits.
+  const double sine = glm::length(glm::cross(decoded, n)) / glm::length(decoded);
+  const double square = sine * sine;
+  const double angle = glm::dot(decoded, n) > 0 && sine < 0.05
+                           ? sine * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0)))
+                           : std::atan2(sine, glm::dot(decoded, n) / glm::length(decoded));
+  errors_.normal.add(angle * kDegrees);
 }
 
 void VertexPacker::put_uv(const glm::dvec2& uv, const UvRange& range, std::uint32_t texture_side,
@@ -194,7 +206,7 @@ void VertexPacker::put_uv(const glm::dvec2& uv, const UvRange& range, std::uint3
     error[i] = offset + scale * static_cast<double>(unorm16_to_float(values[i])) - wanted;
   }
   std::memcpy(bytes, values, sizeof values);
-  if (texture_side != 0) uv_.add(glm::length(error) * texture_side);
+  if (texture_side != 0) errors_.uv.add(glm::length(error) * texture_side);
 }
 
 }  // namespace modar

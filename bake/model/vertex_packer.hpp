@@ -51,7 +51,23 @@ struct ErrorTally {
     squares += error * error;
     ++count;
   }
+  void add(const ErrorTally& other) {
+    greatest = other.greatest > greatest ? other.greatest : greatest;
+    squares += other.squares;
+    count += other.count;
+  }
   [[nodiscard]] double rms() const;
+};
+
+/// What decoding the packed bytes was measured to be off by: model space, degrees, texels.
+struct PackErrors {
+  ErrorTally position;
+  ErrorTally normal;
+  ErrorTally uv;
+
+  void add(const PackErrors& other);
+  /// In source units, degrees and texels.
+  void write(double scale, ModelRecord& record) const;
 };
 
 /// Writes vertices and measures what their bytes decode to.
@@ -65,8 +81,8 @@ class VertexPacker {
   void pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
             std::uint32_t texture_side, std::byte* bytes, std::vector<glm::vec3>& decoded);
 
-  /// In source units, degrees and texels.
-  void write_errors(ModelRecord& record) const;
+  /// Of the last call of pack().
+  [[nodiscard]] const PackErrors& errors() const { return errors_; }
 
  private:
   glm::vec3 put_half(const glm::dvec3& p, std::byte* bytes);
@@ -80,9 +96,7 @@ class VertexPacker {
   const TriMesh& mesh_;
   VertexOffsets offsets_;
   PositionKind kind_;
-  ErrorTally position_;
-  ErrorTally normal_;
-  ErrorTally uv_;
+  PackErrors errors_;
 };
 
 }  // namespace modar

@@ -36,6 +36,38 @@ class Bake(ProgramTest):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(out.read_bytes(), reference, f"jobs {jobs}, {env}")
 
+    def test_memory_changes_no_byte(self):
+        bundles = []
+        for options in ([], ["--memory", "200M"]):
+            out = self.folder / f"memory{len(options)}.modar"
+            done = self.modar("bake", "--model", STATUE, "--no-lods", "-o", out, *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            bundles.append(out.read_bytes())
+        self.assertEqual(bundles[0], bundles[1])
+        self.assertEqual([file.name for file in self.folder.glob(".*")], [])
+        self.assert_fails(self.modar("bake", "--model", STATUE, "-o", self.folder / "x.modar", "--memory", "1M"), 5,
+                          "--memory")
+
+    def test_the_shape_of_models_is_told(self):
+        out = self.folder / "shape.modar"
+        report = self.modar_json("bake", "--model", STATUE, "--no-lods", "-o", out)
+        shape = report["bundle"]["models"][0]["topology"]
+        faces = [[int(corner.split("/")[0]) for corner in line.split()[1:]]
+                 for line in STATUE.read_text().splitlines() if line.startswith("f ")]
+        edges = {}
+        for face in faces:
+            for a, b in zip(face, face[1:] + face[:1]):
+                edges.setdefault(frozenset((a, b)), []).append(a < b)
+        self.assertEqual(shape["triangles"], len(faces))  # the file holds triangles only
+        self.assertEqual(shape["edges"], len(edges))
+        self.assertEqual(shape["boundary_edges"], sum(len(uses) == 1 for uses in edges.values()))
+        self.assertEqual(shape["non_manifold_edges"], sum(len(uses) > 2 for uses in edges.values()))
+        self.assertEqual(shape["euler"], len({v for face in faces for v in face}) - len(edges) + len(faces))
+        self.assertEqual([h["model"] for h in report["half_edges"]], ["statue"])
+        self.assertIn("boundary loops", self.modar("inspect", out).stdout)
+        without = self.modar_json("bake", "--model", STATUE, "--no-lods", "--no-topology", "-o", out)
+        self.assertIsNone(without["bundle"]["models"][0]["topology"])
+
     def test_models_only_and_patterns_only_are_legal(self):
         for arguments in (["--model", STATUE], ["--pattern", COVER, *QUICK]):
             out = self.folder / "one.modar"

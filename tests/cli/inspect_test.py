@@ -44,6 +44,13 @@ class Inspect(ProgramTest):
         self.assertEqual([m["vertex_count"] for m in theirs["models"]], [m["vertices"] for m in ours["models"]])
 
 
+    def test_the_second_reader_warns_of_grids(self):
+        done = subprocess.run(["python3", ROOT / "scripts" / "read_bundle.py", ROOT / "tests/corrupt/CHUNK_GRID.modar"],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("warning: CHUNK_GRID", done.stderr)
+
+
 class Extract(ProgramTest):
     def setUp(self):
         super().setUp()
@@ -60,6 +67,37 @@ class Extract(ProgramTest):
                         for m in document["meshes"] for p in m["primitives"])
         self.assertEqual(triangles, 3296)  # Table 3 of the article: POTTERY
         self.assertEqual(len(document["images"]), 1)
+
+    def test_the_glb_bakes_to_the_same_model(self):
+        source = self.modar_json("inspect", self.bake_demo())["models"][0]
+        out = self.folder / "again.modar"
+        report = self.modar_json("bake", "--model", self.out / "pottery.glb", "--no-lods", "--max-texture", "16", "-o",
+                                 out)
+        again = report["bundle"]["models"][0]
+        for key in ("triangles", "vertices", "chunks", "layout"):
+            self.assertEqual(again[key], source[key], key)
+        # Twice rounded to halves, floats between.
+        bound = 2.1 * source["position_error_max"]
+        self.assertAlmostEqual(again["diagonal"], source["diagonal"], delta=2 * bound)
+        self.assertAlmostEqual(again["scale"], source["scale"], delta=bound)
+        for a, b in zip(again["center"], source["center"]):
+            self.assertAlmostEqual(a, b, delta=bound)
+
+        def points(model, bundle):
+            done = subprocess.run(["python3", ROOT / "scripts" / "read_bundle.py", bundle, "--json", "--full"],
+                                  capture_output=True, text=True, check=True)
+            values = json.loads(done.stdout)["levels"][0]["positions_values"]
+            return [[c + model["scale"] * v for c, v in zip(model["center"], p)] for p in values]
+
+        theirs = points(again, out)
+        cells = {}
+        for p in theirs:
+            cells.setdefault(tuple(round(x / (4 * bound)) for x in p), []).append(p)
+        for p in points(source, self.bake_demo("source.modar"))[::7]:
+            cell = tuple(round(x / (4 * bound)) for x in p)
+            near = [q for dx in (-1, 0, 1) for dy in (-1, 0, 1) for dz in (-1, 0, 1)
+                    for q in cells.get((cell[0] + dx, cell[1] + dy, cell[2] + dz), [])]
+            self.assertTrue(any(sum((a - b) ** 2 for a, b in zip(p, q)) <= bound ** 2 for q in near), p)
 
     def test_etc1tool_reads_the_textures(self):
         if shutil.which("etc1tool") is None:

@@ -1,6 +1,7 @@
 // Stands in for libFuzzer where it is not linked: runs a target over files, and over copies of them
 // that are damaged in a repeatable way.
-//   NAME_replay COPIES FILE|FOLDER...
+//   NAME_replay COPIES[:SOAK] FILE|FOLDER...
+// SOAK: copies of each file where MODAR_SOAK is set in the environment.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -81,10 +82,14 @@ void run(const Bytes& bytes) {
 
 int main(int count, char** arguments) {
   if (count < 3) {
-    std::fprintf(stderr, "usage: %s COPIES FILE|FOLDER...\n", arguments[0]);
+    std::fprintf(stderr, "usage: %s COPIES[:SOAK] FILE|FOLDER...\n", arguments[0]);
     return 1;
   }
-  const unsigned long copies = std::strtoul(arguments[1], nullptr, 10);
+  char* end = nullptr;
+  unsigned long copies = std::strtoul(arguments[1], &end, 10);
+  if (*end == ':' && std::getenv("MODAR_SOAK") != nullptr) {
+    copies = std::strtoul(end + 1, nullptr, 10);
+  }
   const std::vector<fs::path> files = files_of(count, arguments);
   std::mt19937_64 random(1);
   for (const fs::path& path : files) {

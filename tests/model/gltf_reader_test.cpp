@@ -122,6 +122,61 @@ TEST_F(Gltf, BrokenFilesAreErrors) {
   EXPECT_EQ(read_gltf("/no/such.glb").error().code, "gltf.open");
 }
 
+TEST_F(Gltf, SparseAccessorsReplaceWhatTheyList) {
+  const auto file = [&](const char* base, int index) {
+    // The base's third vertex moves to (5, 6, 7); without a base the others are zero, bar the
+    // second.
+    const std::string bytes = one_triangle() +
+                              raw<std::uint8_t>({1, static_cast<std::uint8_t>(index), 0, 0}) +
+                              raw<float>({4, 0, 1, 5, 6, 7});
+    return read(std::string(R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+        {"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":2},
+        {"buffer":0,"byteOffset":48,"byteLength":24}],
+        "accessors":[{)") +
+                    base + R"("componentType":5126,"count":3,"type":"VEC3",
+        "sparse":{"count":2,"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":3}}},
+        {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+        "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+                bytes);
+  };
+  const auto over = file("\"bufferView\":0,", 2);
+  ASSERT_TRUE(over) << to_line(over.error());
+  EXPECT_EQ(over->positions[0], glm::dvec3(0, 0, 0));
+  EXPECT_EQ(over->positions[1], glm::dvec3(4, 0, 1));
+  EXPECT_EQ(over->positions[2], glm::dvec3(5, 6, 7));
+  const auto alone = file("", 2);
+  ASSERT_TRUE(alone) << to_line(alone.error());
+  EXPECT_EQ(alone->positions[0], glm::dvec3(0, 0, 0));
+  EXPECT_EQ(alone->positions[2], glm::dvec3(5, 6, 7));
+  EXPECT_FALSE(file("", 3)) << "an element that is not there";
+}
+
+TEST_F(Gltf, TextureTransformsMoveTheUv) {
+  const auto model = read(std::string(R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+      {"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":24}],
+      "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+      {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"},
+      {"bufferView":2,"componentType":5126,"count":3,"type":"VEC2"}],
+      "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"extensions":
+      {"KHR_texture_transform":{"offset":[0.5,0.25],"rotation":1.5707963267948966,"scale":[2,4],
+      "texCoord":1}}}}}],
+      "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_1":2},"indices":1,"material":0}]}],
+      "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])"),
+                          one_triangle() + raw<float>({0, 0, 1, 0, 0, 1}));
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->uvs.size(), 3u);
+  // Scaled, then a quarter turn counter-clockwise as the image is seen, v down: to the right goes
+  // up.
+  const auto expect = [&](std::size_t v, double x, double down) {
+    EXPECT_NEAR(model->uvs[v].x, x, 1e-12) << v;
+    EXPECT_NEAR(model->uvs[v].y, 1.0 - down, 1e-12) << v;
+  };
+  expect(0, 0.5, 0.25);
+  expect(1, 0.5, 0.25 - 2);
+  expect(2, 0.5 + 4, 0.25);
+}
+
 TEST_F(Gltf, DracoPrimitivesAreWhatTheEncoderWasGiven) {
   constexpr int kSide = 12;
   draco::TriangleSoupMeshBuilder builder;

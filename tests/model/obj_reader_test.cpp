@@ -168,6 +168,12 @@ TEST(ObjReader, ContinuedLinesTabsAndCarriageReturns) {
   EXPECT_EQ(parse("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r").face_count(), 1u);
 }
 
+TEST(ObjReader, ABackslashBeforeALoneCarriageReturnContinues) {
+  // Found by mutation: the second face was read for ever.
+  const SourceModel model = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 \\\r3\nf 3 2 1\n");
+  EXPECT_EQ(model.face_count(), 3u);
+}
+
 TEST(ObjReader, LinesAreCountedThroughContinuationsAndComments) {
   const SourceModel m = parse(
       "# ends in a backslash \\\nv 0 0 0\nv 1 \\\n0 \\\n0\nv 0 1 0\n\nf 1 2 3\n"
