@@ -112,10 +112,10 @@ std::vector<Candidate> find_candidates(const std::vector<GrayPicture>& levels, u
   double scale = 1.0;
   for (int k = 0; k < kScales; ++k, scale /= kScaleStep) {
     // Directions get denser with the tilt (Yu & Morel, "ASIFT", 2011).
-    for (const auto& [tilt, directions] : {std::pair{1.0, 2}, {1.5, 4}, {2.1, 6}, {2.9, 8}}) {
-      for (int i = 0; i < directions; ++i) {
-        views.push_back(make_view(levels[0].width, levels[0].height, scale, tilt,
-                                  kPi * i / directions, random.uniform(0.0, 2 * kPi), kMargin));
+    for (const auto& [tilt, turns] : {std::pair{1.0, 2}, {1.5, 4}, {2.1, 6}, {2.9, 8}, {4.1, 11}}) {
+      for (int i = 0; i < turns; ++i) {
+        views.push_back(make_view(levels[0].width, levels[0].height, scale, tilt, kPi * i / turns,
+                                  random.uniform(0.0, 2 * kPi), kMargin));
       }
     }
   }
@@ -212,7 +212,7 @@ TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, 
                     const std::vector<Candidate>& candidates) {
   Random random(seed);
   const double scale = std::exp(random.uniform(std::log(0.3), std::log(2.0)));
-  const double tilt = 1.0 / std::cos(random.uniform(0.0, 70.0) * kPi / 180.0);
+  const double tilt = 1.0 / std::cos(random.uniform(0.0, 77.0) * kPi / 180.0);
   const AffineView view =
       make_view(levels[0].width, levels[0].height, scale, tilt, random.uniform(0.0, kPi),
                 random.uniform(0.0, 2 * kPi), kMargin + 8);

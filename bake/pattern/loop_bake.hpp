@@ -12,10 +12,10 @@
 namespace modar {
 
 struct LoopBakeOptions {
-  std::uint32_t features = 3000;         ///< descriptors kept, at most
-  std::uint32_t trial_views = 120;       ///< random renderings that show which ones repeat
-  std::uint32_t patches_per_level = 64;  ///< at most
-  unsigned jobs = 1;                     ///< threads; the bytes do not depend on it
+  std::uint32_t features = 3000;          ///< descriptors kept, at most
+  std::uint32_t trial_views = 120;        ///< random renderings that show which ones repeat
+  std::uint32_t patches_per_level = 256;  ///< at most
+  unsigned jobs = 1;                      ///< threads; the bytes do not depend on it
   [[nodiscard]] Result<void> validate() const;
 };
 

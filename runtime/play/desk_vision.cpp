@@ -45,7 +45,7 @@ struct State {
 
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
   const auto state = std::make_shared<State>(State{bundle, options, {}, nullptr, nullptr, {}});
-  if (options.ours) state->ours = our_vision(bundle, options.camera);
+  if (options.ours) state->ours = our_vision(bundle, options);
   return TrackStep([state](Job& job) { return state->step(job); });
 }
 

@@ -99,7 +99,7 @@ Result<Camera> read_camera_file(const std::string& path) {
 }
 
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
-  if (options.ours) return our_vision(bundle, options.camera);
+  if (options.ours) return our_vision(bundle, options);
   return left_out("method.unsupported", "--method paper", "the article's method");
 }
 

@@ -18,14 +18,15 @@ enum class Stage : std::uint8_t {
   kMatch,
   kHomography,
   kPose,
-  kTrack,    ///< the whole of the vision thread's work
-  kRender,   ///< draw calls and reading the picture back
-  kSink,     ///< writing pictures
-  kLatency,  ///< from the complete frame to its picture; of files: vision and rendering
+  kTrack,      ///< the whole of the vision thread's work
+  kRender,     ///< draw calls and reading the picture back
+  kSink,       ///< writing pictures
+  kSmoothing,  ///< no time that was spent: how far smoothed poses lag
+  kLatency,    ///< from the complete frame to its picture; of files: vision and rendering
 };
-inline constexpr std::array<const char*, 10> kStageNames = {
-    "read", "detect", "describe", "match", "homography",
-    "pose", "track",  "render",   "sink",  "latency"};
+inline constexpr std::array<const char*, 11> kStageNames = {
+    "read",  "detect", "describe", "match",     "homography", "pose",
+    "track", "render", "sink",     "smoothing", "latency"};
 using StageTimes = std::array<double, kStageNames.size()>;  ///< milliseconds
 
 enum class Shown : std::uint8_t {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "semaphore.hpp"
+#include "runtime/platform/semaphore.hpp"
 
 namespace modar {
 

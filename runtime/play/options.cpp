@@ -48,6 +48,11 @@ bool set_tolerance(PlayOptions& options, std::string_view text) {
   return parse_decimal(text, options.tolerance);
 }
 
+bool set_smooth(PlayOptions& options, std::string_view text) {
+  return parse_decimal(text, options.smooth_ms) && options.smooth_ms >= 0.0 &&
+         options.smooth_ms <= 1000.0;
+}
+
 bool set_gpu_budget(PlayOptions& options, std::string_view text) {
   options.gpu_budget = parse_bytes(text);
   return options.gpu_budget > 0;
@@ -73,10 +78,11 @@ struct ValueOption {
   bool (*set)(PlayOptions&, std::string_view);
   const char* expected;
 };
-constexpr std::array<ValueOption, 4> kValues = {{
+constexpr std::array<ValueOption, 5> kValues = {{
     {"turntable", set_turntable, "a number of frames (1 to 100000)"},
     {"size", set_size, "a size like 640x480"},
     {"tolerance", set_tolerance, "a number of pixels like 0.5"},
+    {"smooth", set_smooth, "a number of milliseconds (0 to 1000)"},
     {"gpu-budget", set_gpu_budget, "an amount of memory like 64M"},
 }};
 
@@ -237,6 +243,8 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
                       brisk-2, as baked
   --device NAME       acts as this device: masks what its OpenGL ES lacks
   --realtime          plays a file at its own speed and drops frames that come too early
+  --smooth MS         takes the trembling out of resting models, which may then lag by so much
+                      (default 0: off; the JSON's ms.smoothing tells each frame's)
   --gpu-budget SIZE   keeps at most so much in GL, nearest and visible first (64M, 1G)
   --record FOLDER     keeps frames and poses
   --golden FOLDER     replays a recording and compares: exit code 10 where it differs

@@ -26,6 +26,7 @@ struct PlayOptions {
   std::string parameters;        ///< empty: orb-2000 where the bundle has it, else its first
   std::string device;            ///< empty: the context as it is
   double tolerance = 0.5;        ///< pixels; of --golden
+  double smooth_ms = 0;          ///< latency that smoothing may add; 0: off
   std::uint64_t gpu_budget = 0;  ///< bytes; 0: the device's
   int turntable = 0;             ///< frames of a turn; 0: no turntable
   int width = 640;               ///< of turntable pictures

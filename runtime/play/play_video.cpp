@@ -63,14 +63,16 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   options.method = choose_method(bundle, plan->method, plan->parameters);
   const Result<std::uint32_t> set = choose_parameter_set(bundle, plan->parameters);
   if (!set) return tl::unexpected(set.error());
-  SpotSlot spot;
-  Result<TrackStep> track =
-      open_vision(bundle, {options.method == "ours", *set, plan->camera, &spot});
-  if (!track) return tl::unexpected(track.error());
   auto source = open_frame_source(plan->input);
   if (!source) return tl::unexpected(source.error());
-
   const SourceInfo info = (*source)->info();
+  // Only where frames may be dropped may a result depend on time.
+  const bool newest = info.live || options.realtime;
+  SpotSlot spot;
+  Result<TrackStep> track =
+      open_vision(bundle, {options.method == "ours", *set, plan->camera, &spot, newest});
+  if (!track) return tl::unexpected(track.error());
+
   Player player(options, bundle);
   const std::string name(bundle.name(parameter_set(bundle, *set).name));
   if (auto opened = player.open({info, *set, name, plan->camera.value_or(Camera{}), &spot});
@@ -85,7 +87,7 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
 
   PipelineOptions how;
   how.paced = options.realtime && !info.live;
-  if (info.live || options.realtime) how.delivery = Delivery::kNewest;
+  if (newest) how.delivery = Delivery::kNewest;
   how.idle = [&player] { return player.idle(); };
   catch_interrupts();
   const Result<PipelineCounts> counts = run_pipeline(

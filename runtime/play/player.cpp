@@ -50,6 +50,7 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
       bundle_(bundle),
       names_(pattern_names(bundle)),
       hysteresis_(names_.size()),
+      smoother_(names_.size(), options.smooth_ms),
       controls_(bundle, options.outline, options.osd || options.window),
       progress_(!options.quiet) {
   items_.reserve(std::max(bundle.scenes().size(), bundle.patterns().size()));
@@ -139,6 +140,7 @@ void Player::follow_spot(const Job& job) {
   spot_ = job.spot;
   names_ = pattern_names(spot_ ? spot_->view : bundle_);
   hysteresis_ = Hysteresis(names_.size());
+  smoother_ = PoseSmoother(names_.size(), options_.smooth_ms);
 }
 
 /// Hysteresis, what to draw, and all of the report that stands before drawing.
@@ -158,7 +160,9 @@ FrameReport Player::begin_report(const Job& job) {
   report.at(Stage::kPose) = job.track.times.pose;
   report.at(Stage::kTrack) = job.track_ms;
 
-  const auto states = hysteresis_.step(report.visible);
+  drawn_.assign(report.visible.begin(), report.visible.end());
+  report.at(Stage::kSmoothing) = smoother_.step(report.time_s, drawn_);
+  const auto states = hysteresis_.step(drawn_);
   if (spot_) {
     controls_.collect_spot(states, items_);
   } else {

@@ -11,6 +11,7 @@
 #include "display.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
+#include "modar/pose_smoother.hpp"
 #include "pipeline.hpp"
 #include "progress.hpp"
 #include "qos_log.hpp"
@@ -67,6 +68,8 @@ class Player {
   PlayerSetup setup_;
   std::vector<std::string> names_;  ///< of the patterns that are looked for
   Hysteresis hysteresis_;
+  PoseSmoother smoother_;
+  std::vector<Sighting> drawn_;  ///< what is seen, at smoothed poses
   Controls controls_;
   Progress progress_;
   RateMeter rate_;

@@ -10,7 +10,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
 #include "modar/image.hpp"
-#include "semaphore.hpp"
+#include "runtime/platform/semaphore.hpp"
 
 namespace modar {
 

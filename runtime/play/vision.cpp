@@ -10,15 +10,17 @@ namespace {
 
 struct OurVision {
   const BundleView& bundle;
-  std::optional<Camera> calibrated;
+  VisionOptions options;
   Camera camera;
   std::unique_ptr<PoseLoop> loop;
 
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
     if (!loop || camera.width != frame.width || camera.height != frame.height) {
-      camera = camera_for(calibrated, frame.width, frame.height);
-      auto created = PoseLoop::create(bundle, camera);
+      camera = camera_for(options.camera, frame.width, frame.height);
+      PoseLoopOptions how;
+      how.apart = options.apart;
+      auto created = PoseLoop::create(bundle, camera, how);
       if (!created) return tl::unexpected(created.error());
       loop = std::move(*created);
     }
@@ -33,8 +35,8 @@ struct OurVision {
 
 }  // namespace
 
-TrackStep our_vision(const BundleView& bundle, const std::optional<Camera>& camera) {
-  const auto state = std::make_shared<OurVision>(OurVision{bundle, camera, {}, nullptr});
+TrackStep our_vision(const BundleView& bundle, const VisionOptions& options) {
+  const auto state = std::make_shared<OurVision>(OurVision{bundle, options, {}, nullptr});
   return [state](Job& job) { return state->step(job); };
 }
 

@@ -16,6 +16,7 @@ struct VisionOptions {
   std::uint32_t parameter_set = 0;  ///< id, see choose_parameter_set()
   std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
   SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
+  bool apart = false;               ///< our loop searches on a thread of its own (PoseLoopOptions)
 };
 
 /// The method that is meant: the named one; "paper" where parameters of it are named or no pattern
@@ -40,7 +41,7 @@ Camera camera_for(const std::optional<Camera>& calibrated, int width, int height
 /// "method.unsupported" for the article's method in a build without OpenCV.
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
 
-/// Our loop alone. Errors: those of PoseLoop.
-TrackStep our_vision(const BundleView& bundle, const std::optional<Camera>& camera);
+/// Our loop alone, of `options` camera and apart. Errors: those of PoseLoop.
+TrackStep our_vision(const BundleView& bundle, const VisionOptions& options);
 
 }  // namespace modar

@@ -43,7 +43,7 @@ void CornerFinder::flush(std::vector<Corner>& corners) {
 void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<Corner>& corners) {
   const int count = image.width - 2 * kLoopBorder;
   if (count <= 0 || image.height <= 2 * kLoopBorder) return;
-  const Kernels& run = kernels();
+  const Kernels& run = kernels(options_.simd);
   // One pixel before the range is compared with too, and never is a corner.
   const auto row_at = [&](int slot) {
     return rows_.data() + static_cast<std::size_t>(slot) * static_cast<std::size_t>(pitch_) +

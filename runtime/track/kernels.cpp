@@ -6,6 +6,9 @@
   (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 // Every target passes here anew, so the order of these two is fixed.
 #include "kernels.hpp"
+
+#include <algorithm>
+
 #include "hwy/foreach_target.h"
 #include "hwy/highway.h"
 
@@ -195,8 +198,80 @@ int distances(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t 
   return smallest;
 }
 
+/// The image's grey values under the patch, row by row, then zeros.
+void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrdiff_t stride,
+                  float* out) {
+  constexpr int kSide = 2 * kPatchHalf + 1;
+  for (int v = 0; v < kSide; ++v) {
+    const float fv = static_cast<float>(v - kPatchHalf);
+    const float left = place.x + fv * place.down_x;
+    const float top = place.y + fv * place.down_y;
+    for (int u = 0; u < kSide; ++u) {
+      const float fu = static_cast<float>(u - kPatchHalf);
+      const float x = left + fu * place.right_x;
+      const float y = top + fu * place.right_y;
+      const int column = static_cast<int>(x);
+      const int row = static_cast<int>(y);
+      const float fx = x - static_cast<float>(column);
+      const float fy = y - static_cast<float>(row);
+      const std::uint8_t* p = pixels + row * stride + column;
+      const float a = p[0];
+      const float b = p[1];
+      const float c = p[stride];
+      const float d = p[stride + 1];
+      const float upper = a + fx * (b - a);
+      const float lower = c + fx * (d - c);
+      out[v * kSide + u] = upper + fy * (lower - upper);
+    }
+  }
+  for (int i = kSide * kSide; i < kPatchPixels; ++i) out[i] = 0.0f;
+}
+
+float sum_of_four(const float* lanes) {
+  return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+}
+
+PatchSums patch_sums(const PatchTemplate& patch, const PatchPlace& place,
+                     const std::uint8_t* pixels, std::ptrdiff_t stride) {
+  alignas(16) float seen[kPatchPixels];
+  sample_patch(place, pixels, stride, seen);
+  alignas(16) float lanes[5][4] = {};
+#if HWY_TARGET != HWY_SCALAR
+  const hn::FixedTag<float, 4> d;
+  auto i = hn::Zero(d);
+  auto ii = hn::Zero(d);
+  auto ti = hn::Zero(d);
+  auto ix = hn::Zero(d);
+  auto iy = hn::Zero(d);
+  for (int k = 0; k < kPatchPixels; k += 4) {
+    const auto grey = hn::Load(d, seen + k);
+    i = hn::Add(i, grey);
+    ii = hn::Add(ii, hn::Mul(grey, grey));
+    ti = hn::Add(ti, hn::Mul(grey, hn::Load(d, patch.grey + k)));
+    ix = hn::Add(ix, hn::Mul(grey, hn::Load(d, patch.right + k)));
+    iy = hn::Add(iy, hn::Mul(grey, hn::Load(d, patch.down + k)));
+  }
+  hn::Store(i, d, lanes[0]);
+  hn::Store(ii, d, lanes[1]);
+  hn::Store(ti, d, lanes[2]);
+  hn::Store(ix, d, lanes[3]);
+  hn::Store(iy, d, lanes[4]);
+#else
+  for (int k = 0; k < kPatchPixels; ++k) {
+    const int lane = k & 3;
+    lanes[0][lane] += seen[k];
+    lanes[1][lane] += seen[k] * seen[k];
+    lanes[2][lane] += seen[k] * patch.grey[k];
+    lanes[3][lane] += seen[k] * patch.right[k];
+    lanes[4][lane] += seen[k] * patch.down[k];
+  }
+#endif
+  return {sum_of_four(lanes[0]), sum_of_four(lanes[1]), sum_of_four(lanes[2]),
+          sum_of_four(lanes[3]), sum_of_four(lanes[4])};
+}
+
 constexpr Kernels table(const char* name) {
-  return {name, halve_row, blur_columns, blur_row, corner_scores, peaks, distances};
+  return {name, halve_row, blur_columns, blur_row, corner_scores, peaks, distances, patch_sums};
 }
 
 }  // namespace modar::loop::HWY_NAMESPACE
@@ -251,8 +326,10 @@ std::span<const Kernels> all_kernels() {
 #endif
 }
 
-const Kernels& kernels() {
-  return all_kernels().back();
+const Kernels& kernels(int level) {
+  const auto all = all_kernels();
+  const std::size_t last = all.size() - 1;
+  return all[level < 0 ? last : std::min(static_cast<std::size_t>(level), last)];
 }
 
 }  // namespace modar::loop

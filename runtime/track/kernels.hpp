@@ -12,6 +12,30 @@ inline constexpr int kSlack = 64;       ///< elements past a range that kernels 
 inline constexpr int kBlockCodes = 32;  ///< codes in a block; byte k of all of them lies together
 inline constexpr int kCodeBytes = 32;   ///< 256 bits
 
+inline constexpr int kPatchHalf = 4;     ///< a tracking patch is 9x9 pixels
+inline constexpr int kPatchPixels = 84;  ///< of those 81, filled up to whole vectors
+
+/// A pattern's patch for alignment: grey values and half differences to the right and down, row by
+/// row; the filling is zero. The gradient is the template's, which has no noise: an image's own
+/// noise in both the gradient and the difference would pull towards the middle between pixels.
+struct PatchTemplate {
+  alignas(16) float grey[kPatchPixels];
+  alignas(16) float right[kPatchPixels];
+  alignas(16) float down[kPatchPixels];
+};
+
+/// Where a patch lies in an image: its centre, and the steps of a template's pixel.
+struct PatchPlace {
+  float x = 0, y = 0;
+  float right_x = 1, right_y = 0;
+  float down_x = 0, down_y = 1;
+};
+
+/// Sums over a patch of the image alone, squared, and times the template's three.
+struct PatchSums {
+  float i = 0, ii = 0, ti = 0, ix = 0, iy = 0;
+};
+
 struct Kernels {
   const char* name;
   /// out[i] = mean of the 2x2 pixels at 2 * i, rounded. Reads 2 * count pixels of both rows, no
@@ -37,10 +61,14 @@ struct Kernels {
   /// throughout.
   int (*distances)(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t block_count,
                    int reach, std::uint8_t* out);
+  /// Samples the image bilinearly under a patch that lies inside with a pixel to spare. Its sums
+  /// are added in the same order at every level: four partial ones, each of every fourth pixel.
+  PatchSums (*patch_sums)(const PatchTemplate& patch, const PatchPlace& place,
+                          const std::uint8_t* pixels, std::ptrdiff_t stride);
 };
 
-/// The best level that this processor has.
-const Kernels& kernels();
+/// A level that this processor has: an index into all_kernels(), clamped; -1: the best.
+const Kernels& kernels(int level = -1);
 /// Every level that this processor has, best last.
 std::span<const Kernels> all_kernels();
 

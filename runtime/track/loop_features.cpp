@@ -153,7 +153,7 @@ std::unique_ptr<LoopDescriber> LoopDescriber::create(int width, int height,
 void LoopDescriber::set_frame(const GrayImage& frame) {
   State& state = *state_;
   state.levels[0] = frame;
-  const loop::Kernels& run = loop::kernels();
+  const loop::Kernels& run = loop::kernels(state.options.simd);
   for (std::size_t level = 1; level < state.levels.size(); ++level) {
     const GrayImage& from = state.levels[level - 1];
     GrayImage& to = state.levels[level];
@@ -173,7 +173,7 @@ std::span<const GrayImage> LoopDescriber::pyramid() const {
 
 void LoopDescriber::State::smooth_level(std::size_t level) {
   const GrayImage& image = levels[level];
-  const loop::Kernels& run = loop::kernels();
+  const loop::Kernels& run = loop::kernels(options.simd);
   std::uint16_t* sums = columns.data() + kSlack;
   for (int y = 2; y < image.height - 2; ++y) {
     const std::uint8_t* rows[5];

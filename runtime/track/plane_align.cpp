@@ -1,4 +1,4 @@
-// Patch-wise Gauss-Newton alignment of a plane, and the photometric check of a detection.
+// Patch-wise Gauss-Newton alignment of a plane.
 #include "plane_align.hpp"
 
 #include <algorithm>
@@ -7,88 +7,24 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 namespace modar::loop {
 namespace {
 
-constexpr int kHalf = 4;  // a patch is 9x9 pixels
-constexpr float kCount = (2 * kHalf + 1) * (2 * kHalf + 1);
-constexpr float kFlat = 4.0f;       // variance below which nothing is to be seen
-constexpr float kHeld = 0.7f;       // correlation of a patch that fits
-constexpr double kSettled = 0.002;  // pixels of the level
-
-/// Bilinear value; the caller keeps 0 <= x < width - 1, 0 <= y < height - 1.
-inline float sample(const GrayImage& image, float x, float y) {
-  const int column = static_cast<int>(x);
-  const int row = static_cast<int>(y);
-  const float fx = x - static_cast<float>(column);
-  const float fy = y - static_cast<float>(row);
-  const std::uint8_t* p = image.pixels + row * image.stride + column;
-  const float a = p[0];
-  const float b = p[1];
-  const float c = p[image.stride];
-  const float d = p[image.stride + 1];
-  const float top = a + fx * (b - a);
-  const float bottom = c + fx * (d - c);
-  return top + fy * (bottom - top);
-}
-
-/// Sums over a patch: template t and its gradient (x, y), image i. The gradient is the template's,
-/// which has no noise: an image's own noise in both the gradient and the difference would pull
-/// towards the middle between pixels.
-struct Sums {
-  float t = 0, tt = 0, i = 0, ii = 0, ti = 0;
-  float x = 0, y = 0, xx = 0, xy = 0, yy = 0, tx = 0, ty = 0, ix = 0, iy = 0;
-};
-
-/// Where a patch lies in a pyramid level: its centre, and the steps of a template pixel.
-struct PatchPlace {
-  float x = 0;
-  float y = 0;
-  glm::vec2 right{};
-  glm::vec2 down{};
-};
+constexpr float kCount = (2 * kPatchHalf + 1) * (2 * kPatchHalf + 1);
+constexpr float kFlat = 4.0f;      // variance below which nothing is to be seen
+constexpr float kHeld = 0.7f;      // correlation of a patch that fits
+constexpr float kPlain = 30.0f;    // variance below which noise tells a patch's worth
+constexpr double kSettled = 0.05;  // pixels of the level
+constexpr std::size_t kFew = 40;   // patches that are enough on the way
 
 bool inside(const PatchPlace& place, const GrayImage& image) {
-  const float reach_x = kHalf * (std::abs(place.right.x) + std::abs(place.down.x)) + 1.0f;
-  const float reach_y = kHalf * (std::abs(place.right.y) + std::abs(place.down.y)) + 1.0f;
+  const float reach_x = kPatchHalf * (std::abs(place.right_x) + std::abs(place.down_x)) + 1.0f;
+  const float reach_y = kPatchHalf * (std::abs(place.right_y) + std::abs(place.down_y)) + 1.0f;
   return place.x - reach_x >= 0.0f && place.y - reach_y >= 0.0f &&
          place.x + reach_x < static_cast<float>(image.width - 1) &&
          place.y + reach_y < static_cast<float>(image.height - 1);
-}
-
-Sums sum_patch(const GrayImage& templates, int column, int row, const GrayImage& image,
-               const PatchPlace& place) {
-  Sums s;
-  for (int v = -kHalf; v <= kHalf; ++v) {
-    const std::uint8_t* t_row = templates.pixels + (row + v) * templates.stride + column;
-    const float fv = static_cast<float>(v);
-    const float left = place.x + fv * place.down.x;
-    const float top = place.y + fv * place.down.y;
-    for (int u = -kHalf; u <= kHalf; ++u) {
-      const float fu = static_cast<float>(u);
-      const float seen = sample(image, left + fu * place.right.x, top + fu * place.right.y);
-      const float t = t_row[u];
-      const float gx = 0.5f * static_cast<float>(t_row[u + 1] - t_row[u - 1]);
-      const float gy =
-          0.5f * static_cast<float>(t_row[u + templates.stride] - t_row[u - templates.stride]);
-      s.t += t;
-      s.tt += t * t;
-      s.i += seen;
-      s.ii += seen * seen;
-      s.ti += t * seen;
-      s.x += gx;
-      s.y += gy;
-      s.xx += gx * gx;
-      s.xy += gx * gy;
-      s.yy += gy * gy;
-      s.tx += t * gx;
-      s.ty += t * gy;
-      s.ix += seen * gx;
-      s.iy += seen * gy;
-    }
-  }
-  return s;
 }
 
 /// What a patch says of its own displacement, in template pixels: g d = e, both by its weight.
@@ -98,38 +34,52 @@ struct Pull {
   float correlation = 0;
 };
 
-Pull pull_of(const Sums& s, float forgiving) {
+Pull pull_of(const Patch& p, const PatchSums& s, float forgiving) {
   Pull pull;
   const float inverse = 1.0f / kCount;
-  const float var_t = s.tt * inverse - s.t * inverse * s.t * inverse;
+  const float var_t = p.tt * inverse - p.t * inverse * p.t * inverse;
   const float var_i = s.ii * inverse - s.i * inverse * s.i * inverse;
   if (var_t < kFlat || var_i < kFlat * 0.25f) return pull;
   const float gain = std::sqrt(var_i / var_t);
-  pull.correlation = (s.ti * inverse - s.t * inverse * s.i * inverse) / std::sqrt(var_t * var_i);
+  pull.correlation = (s.ti * inverse - p.t * inverse * s.i * inverse) / std::sqrt(var_t * var_i);
   const float miss = (1.0f - pull.correlation) / forgiving;
   if (miss >= 1.0f) return pull;
   // The template is brought to the image's contrast, its gradient too.
-  const float weight = (1.0f - miss * miss) * (1.0f - miss * miss) / var_t;
-  pull.xx = weight * (s.xx - s.x * s.x * inverse);
-  pull.xy = weight * (s.xy - s.x * s.y * inverse);
-  pull.yy = weight * (s.yy - s.y * s.y * inverse);
-  pull.ex = weight * ((s.tx - s.t * s.x * inverse) - (s.ix - s.i * s.x * inverse) / gain);
-  pull.ey = weight * ((s.ty - s.t * s.y * inverse) - (s.iy - s.i * s.y * inverse) / gain);
+  const float weight = (1.0f - miss * miss) * (1.0f - miss * miss) / (var_t + kPlain);
+  pull.xx = weight * (p.xx - p.x * p.x * inverse);
+  pull.xy = weight * (p.xy - p.x * p.y * inverse);
+  pull.yy = weight * (p.yy - p.y * p.y * inverse);
+  pull.ex = weight * ((p.tx - p.t * p.x * inverse) - (s.ix - s.i * p.x * inverse) / gain);
+  pull.ey = weight * ((p.ty - p.t * p.y * inverse) - (s.iy - s.i * p.y * inverse) / gain);
   return pull;
 }
 
+/// Tukey's weight by the displacement that a patch itself asks for, once the others have settled: a
+/// patch on the edge of what hides the pattern correlates well enough, but pulls elsewhere.
+void distrust(Pull& pull) {
+  constexpr float kFar = 1.2f;  // template pixels
+  // A trace of stiffness: a patch of one edge knows nothing along it.
+  const float stiff = 0.1f * (pull.xx + pull.yy);
+  const float xx = pull.xx + stiff;
+  const float yy = pull.yy + stiff;
+  const float determinant = xx * yy - pull.xy * pull.xy;
+  if (!(determinant > 0.0f)) return;
+  const float dx = (yy * pull.ex - pull.xy * pull.ey) / determinant;
+  const float dy = (xx * pull.ey - pull.xy * pull.ex) / determinant;
+  const float far = std::min(1.0f, (dx * dx + dy * dy) / (kFar * kFar));
+  const float weight = (1.0f - far) * (1.0f - far);
+  for (float* part : {&pull.xx, &pull.xy, &pull.yy, &pull.ex, &pull.ey}) *part *= weight;
+}
+
 /// Image pixels of a patch to template pixels.
-Eigen::Matrix2d to_template(const PatchPlace& place) {
-  const glm::dvec2 right(place.right);
-  const glm::dvec2 down(place.down);
-  const double inverse = 1.0 / (right.x * down.y - right.y * down.x);
+Eigen::Matrix2d to_template(const glm::dmat2& d) {
+  const double inverse = 1.0 / (d[0].x * d[1].y - d[0].y * d[1].x);
   Eigen::Matrix2d m;
-  m << down.y * inverse, -down.x * inverse, -right.y * inverse, right.x * inverse;
+  m << d[1].y * inverse, -d[1].x * inverse, -d[0].y * inverse, d[0].x * inverse;
   return m;
 }
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 /// Derivative of a world point's pixel by a small turn on the left and a shift.
 Eigen::Matrix<double, 2, 6> pose_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 world,
@@ -151,43 +101,53 @@ void apply(const Vector6& change, Pose& pose) {
   pose.translation += glm::dvec3(change(3), change(4), change(5));
 }
 
-/// One pass over the patches: normal equations and how well they fit.
+/// One pass over the patches: normal equations of N parameters and how well the patches fit.
+template <int N>
 struct Pass {
-  Matrix6 jtj = Matrix6::Zero();
-  Vector6 jtr = Vector6::Zero();
+  Eigen::Matrix<double, N, N> jtj = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> jtr = Eigen::Matrix<double, N, 1>::Zero();
   Fit fit;
 };
 
-Pass pass_over(const LoopPattern& pattern, const Camera& camera, const GrayImage& image,
-               const Resolution& at, float forgiving, const Pose& pose) {
-  Pass pass;
-  pass.fit.level = at.frame_level;
-  const PlaneMap map = map_of_pose(pattern, camera, pose);
-  const GrayImage& templates = pattern.levels[static_cast<std::size_t>(at.pattern_level)];
-  const double shrink = 1.0 / static_cast<double>(1 << at.frame_level);
-  const double grow = static_cast<double>(1 << at.pattern_level);
-  for (const LoopPatchRecord& record :
-       pattern.patches[static_cast<std::size_t>(at.pattern_level)]) {
-    const glm::dvec2 centre{record.x / 64.0 - 0.5, record.y / 64.0 - 0.5};
-    const int column = static_cast<int>(record.x / (64.0 * grow));
-    const int row = static_cast<int>(record.y / (64.0 * grow));
-    if (column <= kHalf || row <= kHalf || column >= templates.width - kHalf - 1 ||
-        row >= templates.height - kHalf - 1) {
-      continue;
-    }
+/// The patches of the level at hand, and every how many of them is looked at.
+struct View {
+  const GrayImage* image;
+  const Kernels* kernels;
+  Resolution at;
+  std::span<const Patch> patches;
+  std::size_t stride = 1;
+  bool settled = false;  ///< the pose is right to a fraction of a pixel
+};
+
+/// jacobian(centre, seen): derivative of a pattern pixel's place in the level by the parameters.
+template <int N, class Jacobian>
+Pass<N> pass_over(const View& view, const PlaneMap& map, float forgiving, Jacobian&& jacobian) {
+  Pass<N> pass;
+  pass.fit.level = view.at.frame_level;
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  const double grow = static_cast<double>(1 << view.at.pattern_level);
+  for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
+    const Patch& patch = view.patches[i];
     bool ahead = false;
-    const glm::dvec2 seen = map.at(centre, ahead);
+    const glm::dvec2 seen = map.at(patch.centre, ahead);
     if (!ahead) continue;
-    const glm::dmat2 d = map.derivative(centre) * (grow * shrink);
+    const glm::dmat2 d = map.derivative(patch.centre) * (grow * shrink);
     const PatchPlace place{static_cast<float>((seen.x + 0.5) * shrink - 0.5),
-                           static_cast<float>((seen.y + 0.5) * shrink - 0.5), glm::vec2(d[0]),
-                           glm::vec2(d[1])};
-    if (!inside(place, image)) continue;
+                           static_cast<float>((seen.y + 0.5) * shrink - 0.5),
+                           static_cast<float>(d[0].x),
+                           static_cast<float>(d[0].y),
+                           static_cast<float>(d[1].x),
+                           static_cast<float>(d[1].y)};
+    if (!inside(place, *view.image)) continue;
     ++pass.fit.visible;
-    const Pull pull = pull_of(sum_patch(templates, column, row, image, place), forgiving);
+    const PatchSums sums =
+        view.kernels->patch_sums(patch.pixels, place, view.image->pixels, view.image->stride);
+    Pull pull = pull_of(patch, sums, forgiving);
     if (pull.correlation >= kHeld) ++pass.fit.held;
-    const Eigen::Matrix<double, 2, 6> j =
-        to_template(place) * pose_jacobian(camera, pose, pattern.to_world(centre), shrink);
+    pass.fit.likeness += static_cast<double>(std::max(0.0f, pull.correlation));
+    if (view.settled) distrust(pull);
+    if (pull.xx == 0.0f && pull.yy == 0.0f) continue;
+    const Eigen::Matrix<double, 2, N> j = to_template(d) * jacobian(patch.centre, seen);
     Eigen::Matrix2d g;
     g << static_cast<double>(pull.xx), static_cast<double>(pull.xy), static_cast<double>(pull.xy),
         static_cast<double>(pull.yy);
@@ -195,24 +155,18 @@ Pass pass_over(const LoopPattern& pattern, const Camera& camera, const GrayImage
     pass.jtr +=
         j.transpose() * Eigen::Vector2d(static_cast<double>(pull.ex), static_cast<double>(pull.ey));
   }
+  if (pass.fit.visible > 0) pass.fit.likeness /= pass.fit.visible;
   return pass;
 }
 
-float correlation(std::span<const float> a, std::span<const float> b, float& contrast) {
-  float sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    sa += a[i];
-    sb += b[i];
-    saa += a[i] * a[i];
-    sbb += b[i] * b[i];
-    sab += a[i] * b[i];
-  }
-  const float n = static_cast<float>(a.size());
-  const float va = saa / n - sa / n * sa / n;
-  const float vb = sbb / n - sb / n * sb / n;
-  contrast = va;
-  if (!(va > 0.0f) || !(vb > 0.25f)) return 0.0f;
-  return (sab / n - sa / n * sb / n) / std::sqrt(va * vb);
+/// Gauss-Newton with a trace of damping; false where the equations tell nothing.
+template <int N>
+bool solve(Pass<N>& pass, Eigen::Matrix<double, N, 1>& change) {
+  const double trace = pass.jtj.trace();
+  if (pass.fit.visible < 4 || !(trace > 0.0)) return false;
+  pass.jtj.diagonal().array() += 1e-9 * trace;
+  change = pass.jtj.ldlt().solve(pass.jtr);
+  return change.allFinite();
 }
 
 }  // namespace
@@ -228,86 +182,137 @@ Resolution finest(const LoopPattern& pattern, const PlaneMap& map, int frame_lev
   return out;
 }
 
-Fit align(const LoopPattern& pattern, const Camera& camera, std::span<const GrayImage> pyramid,
-          int frame_level, int steps, Pose& pose) {
-  const Resolution best =
-      finest(pattern, map_of_pose(pattern, camera, pose), static_cast<int>(pyramid.size()));
-  const Resolution at{frame_level, best.pattern_level + frame_level - best.frame_level};
+namespace {
+
+/// The view of a level for a map; no patches where the pattern has no image for it.
+View view_of(const LoopPattern& pattern, const Scene& scene, int frame_level, const PlaneMap& map) {
+  const Resolution best = finest(pattern, map, static_cast<int>(scene.pyramid.size()));
+  View view{&scene.pyramid[static_cast<std::size_t>(frame_level)],
+            &scene.kernels,
+            {frame_level, best.pattern_level + frame_level - best.frame_level},
+            {}};
+  if (view.at.pattern_level < 0 || view.at.pattern_level >= pattern.level_count) return view;
+  view.patches = scene.patches.of(pattern, view.at.pattern_level);
+  view.stride = std::max<std::size_t>(1, view.patches.size() / kFew);
+  return view;
+}
+
+/// Puts smeared patches in the place of the sharp ones, where the smear is worth it.
+void smear(const LoopPattern& pattern, const Scene& scene, const Pose& pose, View& view) {
+  constexpr double kLeast = 1.0;  // pixels of the level
+  if (scene.smear == nullptr || scene.smear->share <= 0.0) return;
+  const PlaneMap now = map_of_pose(pattern, scene.camera, pose);
+  const PlaneMap then = map_of_pose(pattern, scene.camera, scene.smear->before);
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  const double grow = static_cast<double>(1 << view.at.pattern_level);
+  std::vector<Patch>& smeared = scene.patches.room();
+  for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
+    const Patch& patch = view.patches[i];
+    bool ahead = false;
+    bool was_ahead = false;
+    const glm::dvec2 way = now.at(patch.centre, ahead) - then.at(patch.centre, was_ahead);
+    if (!ahead || !was_ahead) continue;
+    const glm::dvec2 motion = scene.smear->share * shrink * way;
+    if (glm::length(motion) < kLeast) {
+      smeared.push_back(patch);
+      continue;
+    }
+    const Eigen::Vector2d turned = to_template(now.derivative(patch.centre) * (grow * shrink)) *
+                                   Eigen::Vector2d(motion.x, motion.y);
+    PatchCache::smear(pattern, view.at.pattern_level, patch, {turned.x(), turned.y()},
+                      smeared.emplace_back());
+  }
+  view.patches = smeared;
+  view.stride = 1;
+}
+
+/// One step of Gauss-Newton on the pose. Answers the pixels of the level that it moved by; negative
+/// where it could not.
+double step_pose(const LoopPattern& pattern, const Scene& scene, const View& view, float forgiving,
+                 Pose& pose, Fit& fit) {
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  Pass<6> pass =
+      pass_over<6>(view, map_of_pose(pattern, scene.camera, pose), forgiving,
+                   [&](glm::dvec2 centre, glm::dvec2) {
+                     return pose_jacobian(scene.camera, pose, pattern.to_world(centre), shrink);
+                   });
+  fit = pass.fit;
+  Vector6 change;
+  if (!solve(pass, change) || change.head<3>().norm() > 0.5) return -1.0;
+  Pose next = pose;
+  apply(change, next);
+  if (!(next.translation.z > 0.0)) return -1.0;
+  pose = next;
+  return std::sqrt(change.dot(pass.jtj * change) / pass.jtj.trace()) * scene.camera.fx;
+}
+
+}  // namespace
+
+Fit align(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps, bool precise,
+          Pose& pose) {
+  View view = view_of(pattern, scene, frame_level, map_of_pose(pattern, scene.camera, pose));
   Fit fit;
   fit.level = frame_level;
-  if (at.pattern_level < 0 || at.pattern_level >= pattern.level_count) return fit;
-  const GrayImage& image = pyramid[static_cast<std::size_t>(frame_level)];
-  for (int step = 0; step <= steps; ++step) {
+  if (view.patches.empty()) return fit;
+  const View sharp = view;
+  smear(pattern, scene, pose, view);
+  double moved = 0.0;
+  for (int step = 0; step < steps; ++step) {
     // While the pose is still off, patches that hardly correlate pull in the right direction too.
-    const float forgiving = step == 0 ? 1.0f : 0.7f;
-    Pass pass = pass_over(pattern, camera, image, at, forgiving, pose);
-    fit = pass.fit;
-    if (step == steps || fit.visible < 4) break;
-    const double trace = pass.jtj.trace();
-    if (!(trace > 0.0)) break;
-    pass.jtj.diagonal().array() += 1e-9 * trace;
-    const Vector6 change = pass.jtj.ldlt().solve(pass.jtr);
-    if (!change.allFinite() || change.head<3>().norm() > 0.5) break;
-    apply(change, pose);
-    if (!(pose.translation.z > 0.0)) break;
-    const double moved = std::sqrt(change.dot(pass.jtj * change) / trace) * camera.fx;
-    if (moved < kSettled && step > 0) steps = step + 1;
+    moved = step_pose(pattern, scene, view, step == 0 ? 1.0f : 0.7f, pose, fit);
+    if (moved < kSettled) break;
+  }
+  if (precise) {
+    view = sharp;
+    // Smeared ones are made anew in each frame: half of them will do.
+    view.stride = scene.smear != nullptr ? 2 : 1;
+    smear(pattern, scene, pose, view);
+  }
+  for (int step = 0; step < (precise ? 4 : 1) && moved >= 0.0; ++step) {
+    // What was held is known of the pose before the step: a pose that is judged by it lies near.
+    moved = step_pose(pattern, scene, view, 0.7f, pose, fit);
+    if (view.settled || (!precise && moved < kSettled)) break;
+    view.settled = precise && moved < kSettled;
   }
   return fit;
 }
 
-Verdict verify(const LoopPattern& pattern, const PlaneMap& map,
-               std::span<const GrayImage> pyramid) {
-  constexpr int kCells = 8;
-  constexpr int kSide = 6;
-  constexpr float kTextured = 16.0f;
-  constexpr float kRight = 0.5f;
-  const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
-  const double step =
-      std::max(pattern.width(), pattern.height()) / static_cast<double>(kCells * kSide);
-  const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
-  const auto level_of = [](double pixels, int count) {
-    return std::clamp(static_cast<int>(std::lround(std::log2(std::max(pixels, 1.0)))), 0,
-                      count - 1);
+Fit look(const LoopPattern& pattern, const Scene& scene, int frame_level, const Pose& pose) {
+  Pose unchanged = pose;
+  return align(pattern, scene, frame_level, 0, false, unchanged);
+}
+
+Fit align_map(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps,
+              PlaneMap& map) {
+  View view = view_of(pattern, scene, frame_level, map);
+  view.stride = 1;
+  Fit fit;
+  fit.level = frame_level;
+  if (view.patches.empty()) return fit;
+  const Camera& camera = scene.camera;
+  const double scale = camera.fx / static_cast<double>(1 << frame_level);
+  const auto jacobian = [&](glm::dvec2, glm::dvec2 seen) {
+    const double u = (seen.x - camera.cx) / camera.fx;
+    const double v = (seen.y - camera.cy) / camera.fx;
+    Eigen::Matrix<double, 2, 8> j;
+    j << 1, u, v, 0, 0, 0, u * u, u * v, 0, 0, 0, 1, u, v, u * v, v * v;
+    return Eigen::Matrix<double, 2, 8>(scale * j);
   };
-  const auto pattern_level = static_cast<std::size_t>(level_of(step, pattern.level_count));
-  const auto frame_level =
-      static_cast<std::size_t>(level_of(step * scale, static_cast<int>(pyramid.size())));
-  const GrayImage& templates = pattern.levels[pattern_level];
-  const GrayImage& image = pyramid[frame_level];
-  const double template_shrink = 1.0 / static_cast<double>(1u << pattern_level);
-  const double shrink = 1.0 / static_cast<double>(1u << frame_level);
-  Verdict verdict;
-  std::array<float, kSide * kSide> drawn{};
-  std::array<float, kSide * kSide> seen{};
-  for (int cell = 0; cell < kCells * kCells; ++cell) {
-    bool complete = true;
-    for (int k = 0; k < kSide * kSide && complete; ++k) {
-      const double u =
-          ((cell % kCells) * kSide + k % kSide + 0.5) / (kCells * kSide) * pattern.width();
-      const double v =
-          (static_cast<int>(cell / kCells) * kSide + static_cast<int>(k / kSide) + 0.5) /
-          (kCells * kSide) * pattern.height();
-      bool ahead = false;
-      const glm::dvec2 p = map.at({u - 0.5, v - 0.5}, ahead);
-      const double x = (p.x + 0.5) * shrink - 0.5;
-      const double y = (p.y + 0.5) * shrink - 0.5;
-      complete = ahead && x >= 0.0 && y >= 0.0 && x < image.width - 1 && y < image.height - 1;
-      if (!complete) break;
-      const auto at = static_cast<std::size_t>(k);
-      seen[at] = sample(image, static_cast<float>(x), static_cast<float>(y));
-      const double tx = std::clamp(u * template_shrink - 0.5, 0.0, templates.width - 1.001);
-      const double ty = std::clamp(v * template_shrink - 0.5, 0.0, templates.height - 1.001);
-      drawn[at] = sample(templates, static_cast<float>(tx), static_cast<float>(ty));
-    }
-    if (!complete) continue;
-    float contrast = 0;
-    const float fit = correlation(drawn, seen, contrast);
-    if (contrast < kTextured) continue;
-    ++verdict.cells;
-    if (fit >= kRight) ++verdict.right;
+  glm::dmat3 k(1.0);
+  k[0][0] = k[1][1] = camera.fx;
+  k[2] = {camera.cx, camera.cy, 1.0};
+  for (int step = 0; step <= steps; ++step) {
+    Pass<8> pass = pass_over<8>(view, map, step == 0 ? 1.0f : 0.7f, jacobian);
+    fit = pass.fit;
+    Eigen::Matrix<double, 8, 1> e;
+    if (step == steps || !solve(pass, e) || e.norm() > 0.5) break;
+    glm::dmat3 change(1.0);
+    change[0] = {1.0 + e(1), e(4), -e(6)};
+    change[1] = {e(2), 1.0 + e(5), -e(7)};
+    change[2] = {e(0), e(3), 1.0};
+    map.homography = k * change * glm::inverse(k) * map.homography;
   }
-  return verdict;
+  return fit;
 }
 
 }  // namespace modar::loop

@@ -11,18 +11,6 @@ namespace {
 
 constexpr double kSmallestArea = 300.0;  // square pixels
 
-double root_mean_square(const Camera& camera, const Pose& pose, std::span<const glm::dvec2> world,
-                        std::span<const glm::dvec2> ideal) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < world.size(); ++i) {
-    const glm::dvec3 p = pose.rotation * glm::dvec3(world[i], 0.0) + pose.translation;
-    const glm::dvec2 seen{camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
-    const glm::dvec2 miss = seen - ideal[i];
-    sum += glm::dot(miss, miss);
-  }
-  return std::sqrt(sum / static_cast<double>(world.size()));
-}
-
 /// The pose whose plane leans the other way about the line of sight to the pattern's centre.
 Pose mirrored(const Pose& pose) {
   const glm::dvec3 sight = glm::normalize(pose.translation);
@@ -38,6 +26,18 @@ Pose mirrored(const Pose& pose) {
 }
 
 }  // namespace
+
+double misfit(const Camera& camera, const Pose& pose, std::span<const glm::dvec2> world,
+              std::span<const glm::dvec2> ideal) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < world.size(); ++i) {
+    const glm::dvec3 p = pose.rotation * glm::dvec3(world[i], 0.0) + pose.translation;
+    const glm::dvec2 seen{camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
+    const glm::dvec2 miss = seen - ideal[i];
+    sum += glm::dot(miss, miss);
+  }
+  return std::sqrt(sum / static_cast<double>(world.size()));
+}
 
 glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& ahead) const {
   const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);
@@ -102,16 +102,22 @@ bool plausible(const std::array<glm::dvec2, 4>& corners) {
   return area > kSmallestArea;
 }
 
+std::optional<Pose> nearest_pose(const LoopPattern& pattern, const Camera& camera,
+                                 const PlaneMap& map) {
+  const auto pose =
+      pose_from_homography(camera, map.homography * glm::inverse(pattern.world_from_pixels()));
+  return pose ? std::optional(*pose) : std::nullopt;
+}
+
 bool fit_pose(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
               std::span<const glm::dvec2> world, std::span<const glm::dvec2> ideal,
               FittedPose& fitted) {
-  const auto start =
-      pose_from_homography(camera, homography * glm::inverse(pattern.world_from_pixels()));
+  const auto start = nearest_pose(pattern, camera, {homography, nullptr});
   if (!start) return false;
   fitted.pose = refine_pose(camera, world, ideal, *start);
-  fitted.rms = root_mean_square(camera, fitted.pose, world, ideal);
+  fitted.rms = misfit(camera, fitted.pose, world, ideal);
   const Pose other = refine_pose(camera, world, ideal, mirrored(fitted.pose));
-  const double other_rms = root_mean_square(camera, other, world, ideal);
+  const double other_rms = misfit(camera, other, world, ideal);
   if (other_rms < fitted.rms) fitted = {other, other_rms};
   // The plane's face, not its back, must look at the camera.
   return glm::dot(fitted.pose.rotation[2], fitted.pose.translation) < 0.0;

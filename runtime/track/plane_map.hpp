@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include <glm/mat2x2.hpp>
 #include <glm/mat3x3.hpp>
@@ -38,6 +39,10 @@ bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
 /// or smaller than a thumbnail.
 bool plausible(const std::array<glm::dvec2, 4>& corners);
 
+/// Root mean square distance of projected points from where they are seen, pixels.
+double misfit(const Camera& camera, const Pose& pose, std::span<const glm::dvec2> world,
+              std::span<const glm::dvec2> ideal);
+
 /// Poses that explain the points, the best first: from the homography, and its mirror image about
 /// the line of sight where that explains them as well (Collins & Bartoli, "Infinitesimal
 /// plane-based pose estimation", 2014, discuss the two). Refined over all points. rms: pixels.
@@ -48,5 +53,9 @@ struct FittedPose {
 bool fit_pose(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
               std::span<const glm::dvec2> world, std::span<const glm::dvec2> ideal,
               FittedPose& fitted);
+
+/// The camera's pose that comes nearest to a map; none where the plane lies not before the camera.
+std::optional<Pose> nearest_pose(const LoopPattern& pattern, const Camera& camera,
+                                 const PlaneMap& map);
 
 }  // namespace modar::loop

@@ -10,8 +10,6 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "kernels.hpp"
-
 namespace modar::loop {
 namespace {
 
@@ -20,7 +18,6 @@ constexpr int kHalfBits = 44;       // of the first half of a code
 constexpr int kRatio = 90;          // percent of the second best that lies elsewhere
 constexpr double kElsewhere = 6.0;  // pattern pixels
 constexpr std::size_t kHypotheses = 96;
-constexpr int kFits = 3;
 constexpr std::size_t kFewest = 6;
 
 glm::dvec2 place(const LoopFeatureRecord& record) {
@@ -65,8 +62,10 @@ glm::dmat3 unscaled(const glm::dmat3& h, const Scaling& from, const Scaling& to)
 
 }  // namespace
 
-PlaneMatcher::PlaneMatcher(const Camera& camera, std::size_t most_features, std::size_t most_codes)
-    : camera_(camera), distances_(most_codes + kSlack) {
+PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t most_features,
+                           std::size_t most_codes)
+    : camera_(camera), kernels_(kernels), distances_(most_codes + kSlack) {
+  for (PlaneFind& find : finds_) find.mask.reserve(most_features);
   matches_.reserve(most_features);
   mask_.reserve(most_features);
   explained_.reserve(most_features);
@@ -96,14 +95,13 @@ bool PlaneMatcher::unique(const LoopPattern& pattern, std::size_t first, std::si
 
 void PlaneMatcher::match(const LoopPattern& pattern, std::span<const LoopFeature> features) {
   matches_.clear();
-  const Kernels& run = kernels();
   const Camera* lens = camera_.distortion == std::array<double, 5>{} ? nullptr : &camera_;
   for (const LoopFeature& feature : features) {
     const std::size_t first = feature.dark != 0 ? pattern.bright_count : 0;
     const std::size_t last = feature.dark != 0 ? pattern.features.size() : pattern.bright_count;
     if (first == last) continue;
-    const int best = run.distances(feature.code.data(), pattern.codes + first * kCodeBytes,
-                                   (last - first) / kBlockCodes, kHalfBits, distances_.data());
+    const int best = kernels_.distances(feature.code.data(), pattern.codes + first * kCodeBytes,
+                                        (last - first) / kBlockCodes, kHalfBits, distances_.data());
     std::size_t at = 0;
     if (best > kMostBits || !unique(pattern, first, last - first, best, at)) continue;
     const LoopFeatureRecord& record = pattern.features[at];
@@ -253,13 +251,10 @@ std::size_t PlaneMatcher::fit(const PlaneMatch& hypothesis, glm::dmat3& homograp
   return collect(homography, 3.0, mask_);
 }
 
-PlaneFind PlaneMatcher::find(const LoopPattern& pattern, std::span<const LoopFeature> features) {
-  PlaneFind best;
-  inlier_world_.clear();
-  inlier_ideal_.clear();
+std::span<const PlaneFind> PlaneMatcher::find(const LoopPattern& pattern,
+                                              std::span<const LoopFeature> features) {
   match(pattern, features);
-  best.matches = static_cast<int>(matches_.size());
-  if (matches_.size() < kFewest) return best;
+  if (matches_.size() < kFewest) return {};
   mask_.assign(matches_.size(), 0);
   explained_.assign(matches_.size(), 0);
   supporters_.assign(matches_.size(), 0);
@@ -275,7 +270,8 @@ PlaneFind PlaneMatcher::find(const LoopPattern& pattern, std::span<const LoopFea
     supporters_[i] =
         static_cast<std::uint8_t>(std::min<std::size_t>(support(matches_[i], nullptr), 255));
   }
-  for (int attempt = 0; attempt < kFits; ++attempt) {
+  std::size_t count = 0;
+  while (count < finds_.size()) {
     std::uint32_t chosen = order_.front();
     int votes = -1;
     for (const std::uint32_t i : order_) {
@@ -285,22 +281,26 @@ PlaneFind PlaneMatcher::find(const LoopPattern& pattern, std::span<const LoopFea
       }
     }
     if (votes < static_cast<int>(kFewest)) break;
-    glm::dmat3 homography(1.0);
-    const std::size_t inliers = fit(matches_[chosen], homography);
+    PlaneFind& find = finds_[count++];
+    find.inliers = static_cast<int>(fit(matches_[chosen], find.homography));
+    find.mask.assign(mask_.begin(), mask_.end());
     explained_[chosen] = 1;
     for (std::size_t i = 0; i < mask_.size(); ++i) explained_[i] |= mask_[i];
-    if (static_cast<int>(inliers) <= best.inliers) continue;
-    best.inliers = static_cast<int>(inliers);
-    best.homography = homography;
-    inlier_world_.clear();
-    inlier_ideal_.clear();
-    for (std::size_t i = 0; i < mask_.size(); ++i) {
-      if (mask_[i] == 0) continue;
-      inlier_world_.push_back(pattern.to_world(matches_[i].pattern));
-      inlier_ideal_.push_back(matches_[i].ideal);
+    for (std::size_t i = count - 1; i > 0 && finds_[i - 1].inliers < finds_[i].inliers; --i) {
+      std::swap(finds_[i - 1], finds_[i]);
     }
   }
-  return best;
+  return std::span(finds_).first(count);
+}
+
+void PlaneMatcher::choose(const LoopPattern& pattern, const PlaneFind& find) {
+  inlier_world_.clear();
+  inlier_ideal_.clear();
+  for (std::size_t i = 0; i < find.mask.size(); ++i) {
+    if (find.mask[i] == 0) continue;
+    inlier_world_.push_back(pattern.to_world(matches_[i].pattern));
+    inlier_ideal_.push_back(matches_[i].ideal);
+  }
 }
 
 }  // namespace modar::loop

@@ -1,6 +1,7 @@
 // From a frame's features to the homography of one pattern. Internal to runtime/track.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 
+#include "kernels.hpp"
 #include "loop_pattern.hpp"
 #include "modar/camera.hpp"
 #include "modar/loop_features.hpp"
@@ -24,19 +26,25 @@ struct PlaneMatch {
   int distance = 0;      ///< bits
 };
 
+/// A homography that some of the matches agree with.
 struct PlaneFind {
-  int matches = 0;
   int inliers = 0;
   glm::dmat3 homography{1.0};  ///< pattern pixels to ideal pixels
+  std::vector<std::uint8_t> mask;
 };
 
 /// Buffers for the search; allocates nothing after construction.
 class PlaneMatcher {
  public:
-  PlaneMatcher(const Camera& camera, std::size_t most_features, std::size_t most_codes);
-  /// Answers how far it came; inliers are 0 where there is no homography.
-  PlaneFind find(const LoopPattern& pattern, std::span<const LoopFeature> features);
-  /// World and ideal points of the inliers of the last find().
+  PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t most_features,
+               std::size_t most_codes);
+  /// The homographies that most matches speak for, the best first; valid until the next call.
+  std::span<const PlaneFind> find(const LoopPattern& pattern,
+                                  std::span<const LoopFeature> features);
+  /// Matches of the last find().
+  [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
+  /// Collects the points of a find's inliers for inlier_world() and inlier_ideal().
+  void choose(const LoopPattern& pattern, const PlaneFind& find);
   [[nodiscard]] std::span<const glm::dvec2> inlier_world() const { return inlier_world_; }
   [[nodiscard]] std::span<const glm::dvec2> inlier_ideal() const { return inlier_ideal_; }
 
@@ -52,6 +60,8 @@ class PlaneMatcher {
                       std::vector<std::uint8_t>& mask) const;
 
   Camera camera_;
+  const Kernels& kernels_;
+  std::array<PlaneFind, 4> finds_;
   std::vector<PlaneMatch> matches_;
   std::vector<std::uint8_t> distances_;
   std::vector<std::uint8_t> mask_;

@@ -2,93 +2,79 @@
 #include "modar/pose_loop.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <vector>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "formats/loop_record.hpp"
-#include "plane_align.hpp"
-#include "plane_matcher.hpp"
+#include "lap_clock.hpp"
+#include "motion.hpp"
+#include "seeker.hpp"
 
 namespace modar {
 namespace {
 
+using loop::Finding;
 using loop::Fit;
 using loop::LoopPattern;
 using loop::PlaneMap;
+using loop::Want;
 
-constexpr int kFewestInliers = 8;
-constexpr int kFewestMatches = 6;
-constexpr int kRightCells = 8;     // cells that must show the pattern
-constexpr int kRightPercent = 30;  // of the textured ones in view
-constexpr int kMapInliers = 16;    // where no pose fits, and the map alone must convince
-constexpr int kMapPercent = 50;
-constexpr double kSmallSide = 24.0;   // pixels of the coarsest level that tracking starts on
-constexpr double kMostZoom = 1.35;    // of the distance, from one frame to the next
-constexpr double kFalling = 0.85;     // of the share of patches that a coarser level holds
 constexpr double kSuspicious = 0.75;  // of the share that the frames before held
-
-class Clock {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const std::chrono::duration<double, std::milli> ms = now - last_;
-    last_ = now;
-    return ms.count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
+constexpr double kBlurringWay = 4.0;  // pixels from frame to frame
+constexpr double kFarWay = 80.0;      // the same: what moves so far was not even found
+constexpr double kClearer = 0.02;     // likeness that smeared templates must gain
+constexpr double kUnclear = 0.96;     // of the likeness before
+constexpr double kForgetting = 0.99;  // of that, a frame
+constexpr int kLately = 60;           // frames for which a lost pattern is looked for first
 
 /// What is known of a pattern from frame to frame.
 struct Track {
-  LoopPattern pattern;
   bool held = false;
+  bool by_map = false;  ///< no pose of the camera explains it: its own map is followed
   bool moving = false;  ///< two poses in sequence tell a motion
   Pose pose;
   Pose before;
-  double share = 1;  ///< of the patches in view, how many hold; of the frames before
-  Reason lost = Reason::kNoFeatures;
+  PlaneMap map;         ///< where by_map
+  double share = 1;     ///< of the patches in view, how many hold; of the frames before
+  double likeness = 0;  ///< of the patches, of the sharp frames before
+  int since_lost = kLately;
+  Reason told = Reason::kNoFeatures;  ///< by the last search
 };
-
-/// The pose that continues the motion from `before` to `now`.
-Pose continued(const Pose& before, const Pose& now) {
-  const glm::dmat3 turn = now.rotation * glm::transpose(before.rotation);
-  Pose next;
-  // Squared up again: a pose fed back frame by frame would double its rounding error each time.
-  const glm::dmat3 turned = turn * now.rotation;
-  next.rotation[0] = glm::normalize(turned[0]);
-  next.rotation[1] =
-      glm::normalize(turned[1] - next.rotation[0] * glm::dot(next.rotation[0], turned[1]));
-  next.rotation[2] = glm::cross(next.rotation[0], next.rotation[1]);
-  next.translation = now.translation + (now.translation - before.translation);
-  if (!(next.translation.z > 0.0)) return now;
-  return next;
-}
 
 }  // namespace
 
 struct PoseLoop::State {
   Camera camera;
   PoseLoopOptions options;
-  std::vector<Track> tracks;
-  std::unique_ptr<LoopDescriber> describer;
-  std::unique_ptr<loop::PlaneMatcher> matcher;
+  std::vector<LoopPattern> patterns;
+  std::vector<Track> tracks;  ///< one a pattern
+  std::unique_ptr<LoopDescriber> eye;
+  std::unique_ptr<loop::PatchCache> patches = std::make_unique<loop::PatchCache>();
+  std::unique_ptr<loop::PatternSearch> search;  ///< on the caller's thread, or
+  std::unique_ptr<loop::Seeker> seeker;         ///< on its own
+  std::vector<Want> wants;
+  loop::Findings findings;
   int frames_to_search = 0;
+  double smear = 0;    ///< share of a frame's time that the shutter is open, as blur tells
+  bool stale = false;  ///< what the seeker finds was asked for before a reset
 
   void step(const GrayImage& frame, TrackResult& result);
-  bool follow(Track& track, Sighting& sighting);
-  bool settle(const LoopPattern& pattern, Pose& pose, bool thorough, Fit& fit) const;
-  int percent_right(const LoopPattern& pattern, const Pose& pose) const;
-  bool shows(const LoopPattern& pattern, const Pose& pose, int percent) const;
-  Reason search(Track& track, std::span<const LoopFeature> features, Sighting& sighting,
-                TrackTimes& times);
-  bool report(const Track& track, Sighting& sighting) const;
-  Reason by_map(const Track& track, const loop::PlaneFind& found, Sighting& sighting) const;
+  [[nodiscard]] loop::Scene scene() const {
+    return {camera, eye->pyramid(), loop::kernels(options.detect.simd), *patches};
+  }
+  void follow_all(TrackResult& result);
+  bool follow(const LoopPattern& pattern, Track& track, Sighting& sighting);
+  bool unsmear(const LoopPattern& pattern, const Track& track, const Pose& predicted, Pose& pose,
+               Fit& fit);
+  bool follow_pose(const LoopPattern& pattern, Track& track, Fit& fit);
+  bool find_again(const LoopPattern& pattern, const Track& track, const Pose& predicted, Pose& pose,
+                  Fit& fit) const;
+  bool report(const LoopPattern& pattern, const Track& track, Sighting& sighting) const;
+  bool due(bool any_held);
+  void adopt(TrackResult& result);
+  bool take_up(const LoopPattern& pattern, Track& track, const Finding& finding,
+               Sighting& sighting) const;
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -103,30 +89,35 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   auto state = std::make_unique<State>();
   state->camera = camera;
   state->options = options;
-  std::size_t most_codes = 0;
   const std::uint32_t count = bundle.patterns().size();
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto bytes = bundle.section(SectionType::kLoopRecord, i);
     if (bytes.empty()) continue;
     auto pattern = loop::view_loop_record(bytes, i);
     if (!pattern) return tl::unexpected(pattern.error());
-    most_codes = std::max(most_codes, pattern->features.size());
-    state->tracks.emplace_back().pattern = *pattern;
+    state->patterns.push_back(*pattern);
   }
-  if (state->tracks.empty()) {
+  if (state->patterns.empty()) {
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
                 "the bundle holds no pattern with a record for this loop",
                 "bake it with a pattern");
   }
-  state->describer = LoopDescriber::create(camera.width, camera.height, options.detect);
-  state->matcher = std::make_unique<loop::PlaneMatcher>(
-      camera, static_cast<std::size_t>(options.detect.max_features), most_codes);
+  state->tracks.resize(state->patterns.size());
+  state->wants.resize(state->patterns.size());
+  state->findings.patterns.resize(state->patterns.size());
+  state->eye = LoopDescriber::create(camera.width, camera.height, options.detect);
+  if (options.apart) {
+    state->seeker = std::make_unique<loop::Seeker>(camera, state->patterns, options.detect);
+  } else {
+    state->search = std::make_unique<loop::PatternSearch>(camera, state->patterns, options.detect);
+  }
   return std::unique_ptr<PoseLoop>(new PoseLoop(std::move(state)));
 }
 
 void PoseLoop::reset() {
-  for (Track& track : state_->tracks) track.held = track.moving = false;
+  for (Track& track : state_->tracks) track = {};
   state_->frames_to_search = 0;
+  state_->stale = state_->seeker != nullptr && !state_->seeker->idle();
 }
 
 Result<TrackResult> PoseLoop::step(const GrayImage& frame) {
@@ -149,190 +140,235 @@ Result<void> PoseLoop::step(const GrayImage& frame, TrackResult& result) {
   return {};
 }
 
+/// Whether this frame is searched for the patterns that are not held; sets what is wanted.
+bool PoseLoop::State::due(bool any_held) {
+  bool missing = false;
+  bool lately = false;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    Track& track = tracks[i];
+    const bool lost = track.since_lost < kLately;
+    wants[i] = track.held ? Want::kNo : lost ? Want::kFirst : Want::kYes;
+    missing = missing || !track.held;
+    lately = lately || (!track.held && lost);
+  }
+  --frames_to_search;
+  // While one is tracked there is no haste to find others, but for those that were there just now.
+  if (!missing || (any_held && !lately && frames_to_search > 0)) return false;
+  if (seeker != nullptr && !seeker->idle()) return false;
+  frames_to_search = options.search_every;
+  return true;
+}
+
 void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   result.visible.clear();
+  result.visible.reserve(tracks.size());
   result.reason = Reason::kNoFeatures;
   result.features = 0;
   result.times = {};
-  Clock clock;
-  describer->set_frame(frame);
-  bool any_held = false;
-  bool all_held = true;
-  for (Track& track : tracks) {
-    Sighting sighting;
-    track.held = track.held && options.track;
-    if (track.held && follow(track, sighting)) {
-      result.visible.push_back(sighting);
-      any_held = true;
-    } else {
-      all_held = false;
-    }
+  loop::LapClock clock;
+  eye->set_frame(frame);
+  follow_all(result);
+  if (seeker != nullptr && seeker->take(findings, wants)) {
+    if (!stale) adopt(result);
+    stale = false;
   }
   result.times.pose = clock.lap();
-  if (any_held) result.reason = Reason::kVisible;
-  if (all_held || (any_held && --frames_to_search > 0)) return;
-  frames_to_search = options.search_every;
-  const auto features = describer->features();
-  result.features = static_cast<int>(features.size());
-  result.times.detect = clock.lap();
-  for (Track& track : tracks) {
-    if (track.held) continue;
-    Sighting sighting;
-    const Reason reason =
-        features.empty() ? Reason::kNoFeatures : search(track, features, sighting, result.times);
-    if (reason == Reason::kVisible) result.visible.push_back(sighting);
-    const Reason told = progress(track.lost) > progress(reason) ? track.lost : reason;
-    if (progress(told) > progress(result.reason)) result.reason = told;
-    track.lost = Reason::kNoFeatures;
+  if (due(!result.visible.empty())) {
+    if (seeker != nullptr) {
+      seeker->start(frame, wants);
+    } else {
+      search->run(*eye, wants, findings);
+      adopt(result);
+    }
+  }
+  for (const Track& track : tracks) {
+    const Reason reason = track.held ? Reason::kVisible : track.told;
+    if (progress(reason) > progress(result.reason)) result.reason = reason;
   }
   std::sort(result.visible.begin(), result.visible.end(),
             [](const Sighting& a, const Sighting& b) { return a.pattern < b.pattern; });
 }
 
-bool PoseLoop::State::report(const Track& track, Sighting& sighting) const {
-  sighting.pattern = track.pattern.index;
-  sighting.pose = track.pose;
-  return loop::map_corners(track.pattern, loop::map_of_pose(track.pattern, camera, track.pose),
-                           sighting.corners) &&
-         loop::plausible(sighting.corners);
-}
-
-/// Photometric check: how many of the textured cells in view look as they should; 0 where too few
-/// do to tell.
-int PoseLoop::State::percent_right(const LoopPattern& pattern, const Pose& pose) const {
-  const loop::Verdict verdict =
-      loop::verify(pattern, loop::map_of_pose(pattern, camera, pose), describer->pyramid());
-  return verdict.right >= kRightCells ? verdict.right * 100 / verdict.cells : 0;
-}
-
-bool PoseLoop::State::shows(const LoopPattern& pattern, const Pose& pose, int percent) const {
-  return percent_right(pattern, pose) >= percent;
-}
-
-/// From a coarse level, on which the pattern is still some tens of pixels large, to the finest.
-/// Answers true where the finest level holds, or under blur a coarser one that the whole picture
-/// confirms.
-bool PoseLoop::State::settle(const LoopPattern& pattern, Pose& pose, bool thorough,
-                             Fit& fit) const {
-  const auto pyramid = describer->pyramid();
-  const int levels = static_cast<int>(pyramid.size());
-  const loop::Resolution best =
-      loop::finest(pattern, loop::map_of_pose(pattern, camera, pose), levels);
-  int coarsest = best.frame_level;
-  const int most = thorough ? 4 : 2;
-  double side =
-      std::max(pattern.width(), pattern.height()) / static_cast<double>(1 << best.pattern_level);
-  while (coarsest + 1 < levels && coarsest - best.frame_level < most && side > 2 * kSmallSide &&
-         best.pattern_level + coarsest + 1 - best.frame_level < pattern.level_count) {
-    ++coarsest;
-    side *= 0.5;
-  }
-  const double depth = pose.translation.z;
-  Pose held = pose;
-  bool found = false;
-  for (int level = coarsest; level >= best.frame_level; --level) {
-    Pose next = pose;
-    const Fit now = loop::align(pattern, camera, pyramid, level, thorough ? 6 : 3, next);
-    const double zoom = next.translation.z / depth;
-    if (!(zoom < kMostZoom && zoom * kMostZoom > 1.0)) return false;
-    // Under blur fine patches hold along the motion only, and pull away from what coarse ones say.
-    if (now.good() && (!found || now.share() >= kFalling * fit.share())) {
-      held = pose = next;
-      fit = now;
-      found = true;
+void PoseLoop::State::follow_all(TrackResult& result) {
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    Track& track = tracks[i];
+    Sighting sighting;
+    if (!track.held) {
+      track.since_lost = std::min(track.since_lost + 1, kLately);
       continue;
     }
-    // Blur takes the fine levels first: what a coarser one held stays.
-    if (found) break;
-    pose = next;
-  }
-  pose = held;
-  if (!found || fit.level == best.frame_level) return found;
-  return shows(pattern, pose, kRightPercent);
-}
-
-/// A wrong focal length bends every pose, while the plane's own map still tells where it lies: its
-/// corners, with the nearest pose, where much more speaks for it than a pose needs.
-Reason PoseLoop::State::by_map(const Track& track, const loop::PlaneFind& found,
-                               Sighting& sighting) const {
-  const PlaneMap map{found.homography, loop::bending(camera)};
-  const loop::Verdict verdict = loop::verify(track.pattern, map, describer->pyramid());
-  const bool right = found.inliers >= kMapInliers && verdict.right >= 2 * kRightCells &&
-                     verdict.right * 100 >= verdict.cells * kMapPercent;
-  sighting.pattern = track.pattern.index;
-  sighting.pose = track.pose;
-  return right && loop::map_corners(track.pattern, map, sighting.corners) &&
-                 loop::plausible(sighting.corners)
-             ? Reason::kVisible
-             : Reason::kFailedVerification;
-}
-
-bool PoseLoop::State::follow(Track& track, Sighting& sighting) {
-  const Pose predicted = track.moving ? continued(track.before, track.pose) : track.pose;
-  Pose pose = predicted;
-  Fit fit;
-  bool found = settle(track.pattern, pose, false, fit);
-  if (!found || fit.share() < kSuspicious * track.share) {
-    // From further away: where the motion says, then where it was, whichever shows more.
-    int best = found ? percent_right(track.pattern, pose) : kRightPercent - 1;
-    for (int attempt = 0; attempt < (track.moving ? 2 : 1); ++attempt) {
-      Pose tried = attempt == 0 ? predicted : track.pose;
-      Fit now;
-      if (!settle(track.pattern, tried, true, now)) continue;
-      const int right = percent_right(track.pattern, tried);
-      if (right <= best) continue;
-      best = right;
-      pose = tried;
-      fit = now;
-      found = true;
-      if (fit.share() >= kSuspicious * track.share) break;
+    track.held = options.track && follow(patterns[i], track, sighting);
+    if (track.held) {
+      result.visible.push_back(sighting);
+    } else {
+      track.since_lost = options.track ? 0 : kLately;
     }
   }
-  if (found) track.share = 0.8 * track.share + 0.2 * fit.share();
-  const Track last = track;
+}
+
+bool PoseLoop::State::report(const LoopPattern& pattern, const Track& track,
+                             Sighting& sighting) const {
+  sighting.pattern = pattern.index;
+  sighting.pose = track.pose;
+  const PlaneMap map = track.by_map ? track.map : loop::map_of_pose(pattern, camera, track.pose);
+  return loop::map_corners(pattern, map, sighting.corners) && loop::plausible(sighting.corners);
+}
+
+/// From further away: where the motion says, then where it was, whichever shows more.
+bool PoseLoop::State::find_again(const LoopPattern& pattern, const Track& track,
+                                 const Pose& predicted, Pose& pose, Fit& fit) const {
+  bool found = fit.held > 0;
+  int best = found ? loop::percent_right(pattern, scene(), pose) : loop::kRightPercent - 1;
+  for (int attempt = 0; attempt < (track.moving ? 2 : 1); ++attempt) {
+    Pose tried = attempt == 0 ? predicted : track.pose;
+    Fit now;
+    if (!loop::settle(pattern, scene(), true, tried, now)) continue;
+    const int right = loop::percent_right(pattern, scene(), tried);
+    if (right <= best) continue;
+    best = right;
+    pose = tried;
+    fit = now;
+    found = true;
+    if (fit.share() >= kSuspicious * track.share) break;
+  }
+  return found;
+}
+
+/// Where a moving pattern is seen less clearly than before: whether it is blurred by that motion,
+/// how much, and where it lies with templates that are blurred alike. Answers whether that fits
+/// better.
+bool PoseLoop::State::unsmear(const LoopPattern& pattern, const Track& track, const Pose& predicted,
+                              Pose& pose, Fit& fit) {
+  const auto corner = [&](const Pose& at) {
+    bool ahead = false;
+    return loop::map_of_pose(pattern, camera, at)
+        .at({0.5 * pattern.width(), 0.5 * pattern.height()}, ahead);
+  };
+  const double way = glm::length(corner(pose) - corner(track.pose));
+  if (!track.moving || !(fit.held > 0) || way < kBlurringWay || way > kFarWay) return false;
+  if (smear == 0.0 && fit.likeness > kUnclear * track.likeness) return false;
+  loop::Smear how{track.pose, 0.0};
+  loop::Scene blurred = scene();
+  blurred.smear = &how;
+  // On a level where a wrong place of a few pixels matters little.
+  const int level = loop::finest(pattern, loop::map_of_pose(pattern, camera, pose),
+                                 static_cast<int>(blurred.pyramid.size()))
+                        .frame_level +
+                    1;
+  if (level >= static_cast<int>(blurred.pyramid.size())) return false;
+  double best = 0.0;
+  double likeness = loop::look(pattern, scene(), level, pose).likeness + kClearer;
+  for (int quarter = 1; quarter <= 4; ++quarter) {
+    how.share = 0.25 * quarter;
+    const double now = loop::look(pattern, blurred, level, pose).likeness;
+    if (now <= likeness) continue;
+    likeness = now;
+    best = how.share;
+  }
+  smear = best;
+  how.share = best;
+  if (best == 0.0) return false;
+  Pose tried = predicted;
+  Fit seen;
+  if (!loop::settle(pattern, blurred, false, tried, seen) || seen.likeness <= fit.likeness) {
+    return false;
+  }
+  pose = tried;
+  fit = seen;
+  return true;
+}
+
+bool PoseLoop::State::follow_pose(const LoopPattern& pattern, Track& track, Fit& fit) {
+  const Pose predicted = track.moving ? loop::continued(track.before, track.pose) : track.pose;
+  Pose pose = predicted;
+  bool found = loop::settle(pattern, scene(), false, pose, fit);
+  const bool unsmeared = unsmear(pattern, track, predicted, pose, fit);
+  found = found || unsmeared;
+  if (!unsmeared && fit.likeness > track.likeness) track.likeness = fit.likeness;
+  track.likeness *= kForgetting;
+  if (!found || (!unsmeared && fit.share() < kSuspicious * track.share)) {
+    const Fit seen = fit;
+    if (!found) fit = {};
+    found = find_again(pattern, track, predicted, pose, fit);
+    if (!found) fit = seen;
+  }
+  if (!found) return false;
+  track.share = 0.8 * track.share + 0.2 * fit.share();
   track.before = track.pose;
   track.pose = pose;
-  track.moving = found;
-  track.held = found && report(track, sighting);
-  if (track.held) {
+  track.moving = true;
+  return true;
+}
+
+bool PoseLoop::State::follow(const LoopPattern& pattern, Track& track, Sighting& sighting) {
+  const Track last = track;
+  Fit fit;
+  bool found = false;
+  if (track.by_map) {
+    found = loop::settle_map(pattern, scene(), track.map, fit);
+    const auto pose = loop::nearest_pose(pattern, camera, track.map);
+    found = found && pose.has_value();
+    if (found) track.pose = *pose;
+  } else {
+    found = follow_pose(pattern, track, fit);
+  }
+  if (found && report(pattern, track, sighting)) {
     sighting.matches = fit.visible;
     sighting.inliers = fit.held;
     return true;
   }
-  track.lost = fit.visible < 6 ? Reason::kOutOfView : Reason::kLostByBlur;
-  track.pose = last.pose;
+  track = last;
   track.moving = false;
+  const Pose expected = last.moving ? loop::continued(last.before, last.pose) : last.pose;
+  const PlaneMap map = last.by_map ? last.map : loop::map_of_pose(pattern, camera, expected);
+  track.told = loop::in_view(pattern, map, camera) ? Reason::kLostByBlur : Reason::kOutOfView;
   return false;
 }
 
-Reason PoseLoop::State::search(Track& track, std::span<const LoopFeature> features,
-                               Sighting& sighting, TrackTimes& times) {
-  Clock clock;
-  const loop::PlaneFind found = matcher->find(track.pattern, features);
-  times.match += clock.lap();
-  if (found.matches < kFewestMatches) return Reason::kFewMatches;
-  if (found.inliers < kFewestInliers) return Reason::kNoGeometry;
-  loop::FittedPose fitted;
-  if (!loop::fit_pose(track.pattern, camera, found.homography, matcher->inlier_world(),
-                      matcher->inlier_ideal(), fitted)) {
-    times.homography += clock.lap();
-    return Reason::kFailedVerification;
+/// Answers whether a finding is visible in the present frame.
+bool PoseLoop::State::take_up(const LoopPattern& pattern, Track& track, const Finding& finding,
+                              Sighting& sighting) const {
+  Track next;
+  next.pose = finding.pose;
+  next.by_map = finding.by_map;
+  next.map = finding.map;
+  sighting.matches = finding.matches;
+  sighting.inliers = finding.inliers;
+  if (seeker != nullptr) {
+    // It was found in a frame that has gone by.
+    Fit fit;
+    const bool here =
+        next.by_map ? loop::settle_map(pattern, scene(), next.map, fit)
+                    : loop::settle(pattern, scene(), true, next.pose, fit) &&
+                          loop::percent_right(pattern, scene(), next.pose) >= loop::kRightPercent;
+    if (!here) return false;
   }
-  Track candidate = track;
-  candidate.pose = fitted.pose;
-  Fit fit;
-  Pose refined = fitted.pose;
-  if (settle(track.pattern, refined, false, fit)) candidate.pose = refined;
-  const bool right = shows(track.pattern, candidate.pose, kRightPercent);
-  times.homography += clock.lap();
-  sighting.matches = found.matches;
-  sighting.inliers = found.inliers;
-  if (!right || !report(candidate, sighting)) return by_map(candidate, found, sighting);
-  track.pose = candidate.pose;
-  track.moving = false;
-  track.held = true;
-  track.share = 1.0;
-  return Reason::kVisible;
+  if (!report(pattern, next, sighting)) return false;
+  next.held = true;
+  track = next;
+  return true;
+}
+
+/// Takes what a search found into the tracks and the frame's result.
+void PoseLoop::State::adopt(TrackResult& result) {
+  result.features = findings.features;
+  result.times.detect = findings.times.detect;
+  result.times.match = findings.times.match;
+  result.times.homography = findings.times.homography;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    Track& track = tracks[i];
+    if (wants[i] == Want::kNo || track.held) continue;
+    const Finding& finding = findings.patterns[i];
+    Sighting sighting;
+    if (finding.reason == Reason::kVisible && take_up(patterns[i], track, finding, sighting)) {
+      result.visible.push_back(sighting);
+      continue;
+    }
+    const Reason reason =
+        finding.reason == Reason::kVisible ? Reason::kFailedVerification : finding.reason;
+    // In the frame that lost it, what it was lost by tells more.
+    if (track.since_lost > 0 || progress(reason) > progress(track.told)) track.told = reason;
+  }
 }
 
 }  // namespace modar

@@ -7,71 +7,19 @@
 #include <glm/geometric.hpp>
 
 #include "bake/pattern/loop_bake.hpp"
-#include "bake/pattern/pose_scene.hpp"
-#include "formats/bundle_writer.hpp"
 #include "formats/loop_record.hpp"
 #include "modar/pose_loop.hpp"
+#include "tests/pattern/loop_samples.hpp"
 #include "tests/track/synthetic.hpp"
 
 namespace modar {
 namespace {
 
-const cv::Mat& picture() {
-  static const cv::Mat kPicture = test::textured_picture(300, 240, 31);
-  return kPicture;
-}
-
-const std::vector<std::byte>& record() {
-  static const std::vector<std::byte> kRecord = [] {
-    LoopBakeOptions options;
-    options.features = 1200;
-    options.trial_views = 40;
-    auto baked = bake_loop_record(test::gray(picture()), options);
-    EXPECT_TRUE(baked) << to_line(baked.error());
-    return *baked;
-  }();
-  return kRecord;
-}
-
-std::vector<std::byte> bundle_with(std::vector<std::byte> section) {
-  BundleContent content;
-  PatternRecord pattern{};
-  pattern.name = content.intern("p");
-  pattern.width = 300;
-  pattern.height = 240;
-  pattern.half_width = 1.0f;
-  pattern.half_height = 0.8f;
-  pattern.score = -1;
-  content.patterns.push_back(pattern);
-  content.features.emplace_back();
-  ExtraSection extra;
-  extra.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
-  extra.owner = 0;
-  extra.bytes = std::move(section);
-  content.extra.push_back(std::move(extra));
-  return test::bundle_bytes(content);
-}
-
-double worst_corner(const Sighting& sighting, const SceneFrame& scene) {
-  double worst = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    worst = std::max(worst, glm::length(sighting.corners[i] - scene.corners[i]));
-  }
-  return worst;
-}
-
-GrayPicture plain(int width, int height, std::uint8_t grey) {
-  return {width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height), grey)};
-}
-
-GrayPicture clutter(int width, int height, std::uint32_t seed) {
-  const cv::Mat drawn = test::textured_picture(width, height, seed);
-  return {width, height, {drawn.datastart, drawn.dataend}};
-}
+using namespace test;  // the samples
 
 TEST(PoseLoop, FindsThePatternWhereItIs) {
   const Camera camera = default_camera(640, 480);
-  const auto bytes = bundle_with(record());
+  const auto bytes = bundle_with({record()});
   PoseLoopOptions options;
   options.track = false;
   auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera, options);
@@ -101,7 +49,7 @@ TEST(PoseLoop, FindsThePatternWhereItIs) {
 
 TEST(PoseLoop, TracksAPathAndTellsWhenThePatternIsGone) {
   const Camera camera = default_camera(640, 480);
-  const auto bytes = bundle_with(record());
+  const auto bytes = bundle_with({record()});
   auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
   ASSERT_TRUE(loop);
   SceneBand band;
@@ -109,15 +57,7 @@ TEST(PoseLoop, TracksAPathAndTellsWhenThePatternIsGone) {
   const GrayPicture background = clutter(640, 480, 77);
   TrackResult result;
   const auto pose_at = [](int i) {
-    const test::View view =
-        test::look_at(2.6 + 0.02 * i, 10 + 0.5 * i, 20, 3.0 * i, 0.02 * i, -0.01 * i);
-    Pose pose;
-    for (int row = 0; row < 3; ++row) {
-      pose.translation[row] = view.translation[row];
-      for (int column = 0; column < 3; ++column)
-        pose.rotation[column][row] = view.rotation(row, column);
-    }
-    return pose;
+    return pose_of(look_at(2.6 + 0.02 * i, 10 + 0.5 * i, 20, 3.0 * i, 0.02 * i, -0.01 * i));
   };
   for (int i = 0; i < 20; ++i) {
     const SceneFrame scene =
@@ -141,7 +81,7 @@ TEST(PoseLoop, TracksAPathAndTellsWhenThePatternIsGone) {
 
 TEST(PoseLoop, NeverSeesThePatternInClutter) {
   const Camera camera = default_camera(640, 480);
-  const auto bytes = bundle_with(record());
+  const auto bytes = bundle_with({record()});
   auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
   ASSERT_TRUE(loop);
   for (std::uint32_t i = 0; i < 30; ++i) {
@@ -153,7 +93,7 @@ TEST(PoseLoop, NeverSeesThePatternInClutter) {
 }
 
 TEST(PoseLoop, FramesOfAnySizeStrideAndContentDoNoHarm) {
-  const auto bytes = bundle_with(record());
+  const auto bytes = bundle_with({record()});
   cv::RNG random(6);
   for (const cv::Size& size :
        {cv::Size(1, 1), {5, 300}, {300, 5}, {36, 36}, {37, 37}, {63, 41}, {129, 97}}) {
@@ -195,12 +135,12 @@ TEST(PoseLoop, RecordsCutShortOrOfAnotherVersionAreRefused) {
   for (std::size_t size = 0; size < record().size(); size += size < 200 ? 1 : 4093) {
     auto section = record();
     section.resize(size);
-    const auto bytes = bundle_with(section);
+    const auto bytes = bundle_with({section});
     EXPECT_FALSE(PoseLoop::create(BundleView::open(bytes).value(), camera)) << size;
   }
   auto other = record();
   other[0] = std::byte{99};
-  const auto bytes = bundle_with(other);
+  const auto bytes = bundle_with({other});
   const auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
   ASSERT_FALSE(loop);
   EXPECT_EQ(loop.error().code, "tracker.record-version");
@@ -226,7 +166,7 @@ TEST(PoseLoop, DamagedRecordsDoNoHarm) {
       const int at = damage.uniform(4, last);
       section[static_cast<std::size_t>(at)] = static_cast<std::byte>(damage.uniform(0, 256));
     }
-    const auto bytes = bundle_with(section);
+    const auto bytes = bundle_with({section});
     auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
     if (!loop) continue;
     EXPECT_TRUE((*loop)->step(scene.picture.view()));

@@ -16,6 +16,9 @@ struct PoseLoopOptions {
   LoopDetectOptions detect;
   bool track = true;      ///< false: every frame is searched anew
   int search_every = 10;  ///< frames between searches for further patterns while one is tracked
+  /// Searches on a thread of its own, on the newest frame, while tracking goes on: no frame waits,
+  /// but what is found depends on time. False: the same frames always give the same results.
+  bool apart = false;
 };
 
 /// Reads the patterns' loop records (section type 258) from the bundle's mapped bytes, which must

@@ -1,0 +1,136 @@
+// Cuts patches out of a pattern's picture.
+#include "patch_cache.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bilinear.hpp"
+
+namespace modar::loop {
+namespace {
+
+void add_sums(Patch& patch) {
+  for (int k = 0; k < kPatchPixels; ++k) {
+    const float t = patch.pixels.grey[k];
+    const float gx = patch.pixels.right[k];
+    const float gy = patch.pixels.down[k];
+    patch.t += t;
+    patch.tt += t * t;
+    patch.x += gx;
+    patch.y += gy;
+    patch.xx += gx * gx;
+    patch.xy += gx * gy;
+    patch.yy += gy * gy;
+    patch.tx += t * gx;
+    patch.ty += t * gy;
+  }
+}
+
+/// False where the patch reaches over the picture's border.
+bool cut(const GrayImage& picture, const LoopPatchRecord& record, int level, Patch& patch) {
+  constexpr int kSide = 2 * kPatchHalf + 1;
+  const double grow = static_cast<double>(1 << level);
+  const int column = static_cast<int>(record.x / (64.0 * grow));
+  const int row = static_cast<int>(record.y / (64.0 * grow));
+  if (column <= kPatchHalf || row <= kPatchHalf || column >= picture.width - kPatchHalf - 1 ||
+      row >= picture.height - kPatchHalf - 1) {
+    return false;
+  }
+  patch = {};
+  patch.centre = {(column + 0.5) * grow - 0.5, (row + 0.5) * grow - 0.5};
+  for (int v = 0; v < kSide; ++v) {
+    const std::uint8_t* from =
+        picture.pixels + (row + v - kPatchHalf) * picture.stride + column - kPatchHalf;
+    for (int u = 0; u < kSide; ++u, ++from) {
+      const int k = v * kSide + u;
+      patch.pixels.grey[k] = from[0];
+      patch.pixels.right[k] = 0.5f * static_cast<float>(from[1] - from[-1]);
+      patch.pixels.down[k] =
+          0.5f * static_cast<float>(from[picture.stride] - from[-picture.stride]);
+    }
+  }
+  add_sums(patch);
+  return true;
+}
+
+/// Beyond the border that of the border.
+float sample_inside(const GrayImage& picture, float x, float y) {
+  return sample(picture, std::clamp(x, 0.0f, static_cast<float>(picture.width) - 1.001f),
+                std::clamp(y, 0.0f, static_cast<float>(picture.height) - 1.001f));
+}
+
+}  // namespace
+
+std::vector<Patch>& PatchCache::room() {
+  room_.clear();
+  return room_;
+}
+
+void PatchCache::smear(const LoopPattern& pattern, int level, const Patch& patch, glm::dvec2 motion,
+                       Patch& smeared) {
+  constexpr int kSide = 2 * kPatchHalf + 1;
+  constexpr int kWide = kSide + 2;  // a pixel more on each side, for the differences
+  constexpr int kMostTaps = 16;
+  const GrayImage& picture = pattern.levels[static_cast<std::size_t>(level)];
+  const double grow = static_cast<double>(1 << level);
+  const auto x0 = static_cast<float>((patch.centre.x + 0.5) / grow - 0.5) - kPatchHalf - 1;
+  const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - 1;
+  const int taps =
+      std::clamp(static_cast<int>(std::ceil(std::hypot(motion.x, motion.y))), 2, kMostTaps);
+  std::array<float, kWide * kWide> grey{};
+  for (int tap = 0; tap < taps; ++tap) {
+    const double share = (tap + 0.5) / taps - 0.5;
+    const float left = x0 + static_cast<float>(share * motion.x);
+    const float top = y0 + static_cast<float>(share * motion.y);
+    for (int v = 0; v < kWide; ++v) {
+      for (int u = 0; u < kWide; ++u) {
+        grey[static_cast<std::size_t>(v * kWide + u)] +=
+            sample_inside(picture, left + static_cast<float>(u), top + static_cast<float>(v));
+      }
+    }
+  }
+  smeared = {};
+  smeared.centre = patch.centre;
+  const float inverse = 1.0f / static_cast<float>(taps);
+  for (int v = 0; v < kSide; ++v) {
+    for (int u = 0; u < kSide; ++u) {
+      const float* at = grey.data() + (v + 1) * kWide + u + 1;
+      const int k = v * kSide + u;
+      smeared.pixels.grey[k] = inverse * at[0];
+      smeared.pixels.right[k] = 0.5f * inverse * (at[1] - at[-1]);
+      smeared.pixels.down[k] = 0.5f * inverse * (at[kWide] - at[-kWide]);
+    }
+  }
+  add_sums(smeared);
+}
+
+PatchCache::PatchCache() {
+  room_.reserve(kMostPatches);
+  for (Slot& slot : slots_) slot.patches.reserve(kMostPatches);
+}
+
+std::span<const Patch> PatchCache::of(const LoopPattern& pattern, int level) {
+  ++now_;
+  Slot* oldest = slots_.data();
+  for (Slot& slot : slots_) {
+    if (slot.level == level && slot.pattern == pattern.index) {
+      slot.used = now_;
+      return slot.patches;
+    }
+    if (slot.used < oldest->used) oldest = &slot;
+  }
+  oldest->pattern = pattern.index;
+  oldest->level = level;
+  oldest->used = now_;
+  oldest->patches.clear();
+  Patch patch;
+  for (const LoopPatchRecord& record : pattern.patches[static_cast<std::size_t>(level)]) {
+    if (oldest->patches.size() == kMostPatches) break;
+    if (cut(pattern.levels[static_cast<std::size_t>(level)], record, level, patch)) {
+      oldest->patches.push_back(patch);
+    }
+  }
+  return oldest->patches;
+}
+
+}  // namespace modar::loop

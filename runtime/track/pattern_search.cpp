@@ -1,0 +1,161 @@
+// Features, which patterns to match, their homographies, poses and checks.
+#include "pattern_search.hpp"
+
+#include <algorithm>
+
+#include "lap_clock.hpp"
+
+namespace modar::loop {
+namespace {
+
+constexpr int kFewestInliers = 6;
+constexpr int kFewestMatches = 6;
+constexpr int kConvincing = 60;        // percent of the cells: no other place is tried
+constexpr int kUnsettledPercent = 45;  // where the patches do not hold
+constexpr double kMostMisfit = 1.5;    // of what the features alone leave
+constexpr int kMapGain = 20;           // percent that the map shows more than the best pose
+constexpr int kMapInliers = 16;        // where no pose fits, and the map alone must convince
+constexpr std::size_t kVoted = 2;      // patterns a frame that are matched in full by their votes,
+constexpr std::size_t kMatched = 3;    // and with the one whose turn it is
+
+std::size_t most_codes(std::span<const LoopPattern> patterns) {
+  std::size_t most = 0;
+  for (const LoopPattern& pattern : patterns) most = std::max(most, pattern.features.size());
+  return most;
+}
+
+}  // namespace
+
+PatternSearch::PatternSearch(const Camera& camera, std::span<const LoopPattern> patterns,
+                             const LoopDetectOptions& options)
+    : camera_(camera),
+      kernels_(kernels(options.simd)),
+      patterns_(patterns),
+      matcher_(camera, kernels_, static_cast<std::size_t>(options.max_features),
+               most_codes(patterns)) {
+  chosen_.reserve(patterns.size());
+}
+
+/// Leaves in chosen_ the patterns to match in full.
+void PatternSearch::choose(std::span<const LoopFeature> features, std::span<const Want> wants) {
+  chosen_.clear();
+  for (std::uint32_t i = 0; i < patterns_.size(); ++i) {
+    if (wants[i] != Want::kNo) chosen_.push_back(i);
+  }
+  if (chosen_.size() <= kMatched) return;
+  if (!index_) index_ = std::make_unique<CodeIndex>(patterns_);
+  const std::span<const std::uint16_t> votes = index_->vote(features);
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
+    if (wants[a] != wants[b]) return wants[a] == Want::kFirst;
+    return votes[a] != votes[b] ? votes[a] > votes[b] : a < b;
+  };
+  std::partial_sort(chosen_.begin(), chosen_.begin() + kVoted, chosen_.end(), before);
+  const auto since = [this](std::uint32_t i) {
+    const auto count = static_cast<std::uint32_t>(patterns_.size());
+    return (i + count - turn_) % count;
+  };
+  const auto next =
+      std::min_element(chosen_.begin() + kVoted, chosen_.end(),
+                       [&](std::uint32_t a, std::uint32_t b) { return since(a) < since(b); });
+  turn_ = (*next + 1) % static_cast<std::uint32_t>(patterns_.size());
+  std::iter_swap(chosen_.begin() + kVoted, next);
+  chosen_.resize(kMatched);
+}
+
+void PatternSearch::run(LoopDescriber& eye, std::span<const Want> wants, Findings& findings) {
+  LapClock clock;
+  findings.patterns.resize(patterns_.size());
+  findings.times = {};
+  const auto features = eye.features();
+  findings.features = static_cast<int>(features.size());
+  findings.times.detect = clock.lap();
+  for (std::size_t i = 0; i < patterns_.size(); ++i) {
+    if (wants[i] == Want::kNo) continue;
+    findings.patterns[i] = {};
+    // Those that the index does not choose have few matches, as far as it can tell.
+    if (!features.empty()) findings.patterns[i].reason = Reason::kFewMatches;
+  }
+  if (features.empty()) return;
+  choose(features, wants);
+  findings.times.match = clock.lap();
+  const Scene scene{camera_, eye.pyramid(), kernels_, patches_};
+  for (const std::uint32_t i : chosen_) {
+    findings.patterns[i] = find(patterns_[i], scene, features, findings.times);
+  }
+}
+
+Finding PatternSearch::find(const LoopPattern& pattern, const Scene& scene,
+                            std::span<const LoopFeature> features, TrackTimes& times) {
+  LapClock clock;
+  Finding finding;
+  const auto finds = matcher_.find(pattern, features);
+  finding.matches = matcher_.matches();
+  times.match += clock.lap();
+  finding.reason = finding.matches < kFewestMatches ? Reason::kFewMatches : Reason::kNoGeometry;
+  int best = kRightPercent - 1;
+  for (const PlaneFind& found : finds) {
+    if (found.inliers < kFewestInliers || best >= kConvincing) break;
+    if (finding.reason == Reason::kNoGeometry) finding.reason = Reason::kFailedVerification;
+    find_pose(pattern, scene, found, best, finding);
+  }
+  // Where a pose shows part of the pattern only, its map may show all of it.
+  if (finding.reason == Reason::kFailedVerification ||
+      (finding.reason == Reason::kVisible && best < kConvincing)) {
+    find_map(pattern, scene, finds.front(), best + kMapGain, finding);
+  }
+  times.homography += clock.lap();
+  return finding;
+}
+
+/// Replaces the finding where the picture shows more of the pattern here than `best` percent.
+void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
+                              const PlaneFind& found, int& best, Finding& finding) {
+  matcher_.choose(pattern, found);
+  FittedPose fitted;
+  if (!fit_pose(pattern, camera_, found.homography, matcher_.inlier_world(),
+                matcher_.inlier_ideal(), fitted)) {
+    return;
+  }
+  Fit fit;
+  Pose refined = fitted.pose;
+  bool settled = settle(pattern, scene, false, refined, fit);
+  if (!settled) {
+    refined = fitted.pose;
+    settled = settle(pattern, scene, true, refined, fit);
+  }
+  // Patches on the edge of what hides the rest can pull a pose away from what all features say.
+  const double misfit_after =
+      misfit(camera_, refined, matcher_.inlier_world(), matcher_.inlier_ideal());
+  if (settled && misfit_after < kMostMisfit * fitted.rms + 1.0) fitted.pose = refined;
+  const int right = percent_right(pattern, scene, fitted.pose);
+  std::array<glm::dvec2, 4> corners;
+  if (right <= best || (!settled && right < kUnsettledPercent) ||
+      !map_corners(pattern, map_of_pose(pattern, camera_, fitted.pose), corners) ||
+      !plausible(corners)) {
+    return;
+  }
+  best = right;
+  finding.reason = Reason::kVisible;
+  finding.pose = fitted.pose;
+  finding.inliers = found.inliers;
+}
+
+/// A wrong focal length bends every pose, while the plane's own map still tells where it lies: its
+/// corners, with the nearest pose, where much more speaks for it than a pose needs.
+void PatternSearch::find_map(const LoopPattern& pattern, const Scene& scene, const PlaneFind& found,
+                             int better, Finding& finding) const {
+  if (found.inliers < kMapInliers) return;
+  PlaneMap map{found.homography, bending(camera_)};
+  if (map_percent(pattern, scene, map) < better) return;
+  Fit fit;
+  PlaneMap refined = map;
+  if (settle_map(pattern, scene, refined, fit)) map = refined;
+  std::array<glm::dvec2, 4> corners;
+  const auto pose = nearest_pose(pattern, camera_, map);
+  if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) {
+    return;
+  }
+  finding = {Reason::kVisible, *pose, true, map, finding.matches, found.inliers};
+}
+
+}  // namespace modar::loop

@@ -1,0 +1,28 @@
+// Brings a pose near a pattern to its place in the frame, and judges it by the picture. Internal to
+// runtime/track.
+#pragma once
+
+#include <span>
+
+#include "plane_align.hpp"
+
+namespace modar::loop {
+
+/// Share of the textured cells in view that a pose must show to be believed.
+inline constexpr int kRightPercent = 30;
+
+/// From a coarse level, on which the pattern is still some tens of pixels large, to the finest.
+/// Answers true where the finest level holds, or under blur a coarser one that the whole picture
+/// confirms. thorough: from further away, with more steps.
+bool settle(const LoopPattern& pattern, const Scene& scene, bool thorough, Pose& pose, Fit& fit);
+
+/// Photometric check: percentage of the textured cells in view that look as they should; 0 where
+/// too few do to tell.
+int percent_right(const LoopPattern& pattern, const Scene& scene, const Pose& pose);
+
+/// The same two for a plane's own map, where a wrong focal length bends every pose: it must
+/// convince by itself, so its percentage is 0 where not much more speaks for it.
+bool settle_map(const LoopPattern& pattern, const Scene& scene, PlaneMap& map, Fit& fit);
+int map_percent(const LoopPattern& pattern, const Scene& scene, const PlaneMap& map);
+
+}  // namespace modar::loop

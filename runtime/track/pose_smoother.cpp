@@ -1,0 +1,71 @@
+// The 1 Euro filter on a pose: one speed, and so one cut-off, for all six parameters.
+#include "modar/pose_smoother.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace modar {
+namespace {
+
+constexpr double kLivelySpeed = 0.05;   // radians a second that halve the latency
+constexpr double kSpeedMemory_s = 0.1;  // time constant of the speed's own filter
+constexpr double kLongestGap_s = 0.5;   // between frames; after it the motion is unknown
+
+glm::dvec3 turn_between(const Pose& from, const Pose& to) {
+  return rotation_vector(to.rotation * glm::transpose(from.rotation));
+}
+
+double share(double seconds, double constant) {
+  return seconds / (seconds + constant);
+}
+
+}  // namespace
+
+PoseSmoother::PoseSmoother(std::size_t pattern_count, double greatest_ms)
+    : states_(pattern_count), greatest_s_(std::clamp(greatest_ms, 0.0, 1000.0) * 1e-3) {}
+
+/// Answers the latency in seconds.
+double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
+  const double seconds = time_s - state.time_s;
+  const bool fresh = !state.known || !(seconds > 0.0) || seconds > kLongestGap_s;
+  const Pose raw = pose;
+  double latency = 0.0;
+  if (fresh) {
+    state.speed = 0.0;
+    state.smooth = raw;
+  } else {
+    const double depth = std::max(raw.translation.z, 1e-9);
+    const double moved = glm::length(turn_between(state.raw, raw)) +
+                         glm::length(raw.translation - state.raw.translation) / depth;
+    state.speed += share(seconds, kSpeedMemory_s) * (moved / seconds - state.speed);
+    latency = greatest_s_ / (1.0 + state.speed / kLivelySpeed);
+    const double part = share(seconds, latency);
+    state.smooth.rotation =
+        rotation_matrix(part * turn_between(state.smooth, raw)) * state.smooth.rotation;
+    state.smooth.translation += part * (raw.translation - state.smooth.translation);
+  }
+  state.known = true;
+  state.time_s = time_s;
+  state.raw = raw;
+  pose = state.smooth;
+  return latency;
+}
+
+double PoseSmoother::step(double time_s, std::span<Sighting> visible) {
+  if (greatest_s_ == 0.0) return 0.0;
+  double slowest = 0.0;
+  for (State& state : states_) state.seen = false;
+  for (Sighting& sighting : visible) {
+    if (sighting.pattern >= states_.size()) continue;
+    State& state = states_[sighting.pattern];
+    state.seen = true;
+    slowest = std::max(slowest, smooth(time_s, state, sighting.pose));
+  }
+  for (State& state : states_) state.known = state.known && state.seen;
+  return slowest * 1e3;
+}
+
+}  // namespace modar
