@@ -10,8 +10,8 @@
 namespace modar {
 namespace {
 
-/// Elements of a sparse accessor: more are taken for a damaged count.
-constexpr std::size_t kMostSparse = std::size_t{1} << 26;
+/// Elements that no buffer has to back, so that a file of a few bytes may ask for any number.
+constexpr std::size_t kMostUnbacked = std::size_t{1} << 24;
 
 template <class T>
 double load(const unsigned char* at) {
@@ -63,6 +63,7 @@ bool GltfAccessor::open(const tinygltf::Model& gltf, int index) {
         place(gltf, accessor.bufferView, accessor.byteOffset, count_, components_ * size_, stride_);
     if (bytes_ == nullptr) return false;
   }
+  if (bytes_ == nullptr && count_ > kMostUnbacked) return false;
   return !accessor.sparse.isSparse || replace_sparse(gltf, index);
 }
 
@@ -70,9 +71,8 @@ bool GltfAccessor::replace_sparse(const tinygltf::Model& gltf, int index) {
   const auto& sparse = gltf.accessors[static_cast<std::size_t>(index)].sparse;
   const int index_size =
       tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(sparse.indices.componentType));
-  // Without a buffer view the count is what the file says: no more than it could be of use.
   if (sparse.count < 0 || static_cast<std::size_t>(sparse.count) > count_ || index_size <= 0 ||
-      sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0 || count_ > kMostSparse) {
+      sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0 || count_ > kMostUnbacked) {
     return false;
   }
   GltfAccessor indices;

@@ -113,6 +113,13 @@ TEST_F(Gltf, BrokenFilesAreErrors) {
   const auto beyond = read(much + mesh + scene, one_triangle());
   ASSERT_FALSE(beyond);
   EXPECT_EQ(beyond.error().code, "gltf.accessor");
+  // Billions of zeros out of nothing.
+  std::string nothing = kOneTriangle;
+  nothing.replace(nothing.find("{\"bufferView\":0,\"componentType\":5126,\"count\":3"), 46,
+                  "{\"componentType\":5126,\"count\":3000000000");
+  const auto zeros = read(nothing + mesh + scene, one_triangle());
+  ASSERT_FALSE(zeros);
+  EXPECT_EQ(zeros.error().code, "gltf.accessor");
   // A node that is its own child.
   EXPECT_FALSE(read(kOneTriangle + mesh + R"("nodes":[{"mesh":0,"children":[0]}],)" +
                         R"("scenes":[{"nodes":[0]}])",
