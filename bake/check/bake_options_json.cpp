@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bake/check/source_check.hpp"
+#include "bake/model/mesh_levels.hpp"
 
 namespace modar {
 namespace {
@@ -49,6 +50,9 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   std::uint32_t side = request.textures.max_side;
   take(options, "max_texture", side);
   if (side >= kLeastTextureSide && side <= kMaxTextureSide) request.textures.max_side = side;
+  std::uint32_t levels = request.levels;
+  take(options, "lods", levels);
+  if (levels >= 1 && levels <= kMaxLevels) request.levels = levels;
   take(options, "mipmaps", request.textures.mipmaps);
   take(options, "topology", request.topology);
   take(options, "unit_metres", request.unit_metres);

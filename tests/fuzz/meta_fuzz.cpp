@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "bake/check/source_check.hpp"
+#include "bake/model/mesh_levels.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   modar::BakeRequest request;
@@ -13,5 +14,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (request.textures.effort > modar::Etc1Effort::kBest) std::abort();
   const std::uint32_t side = request.textures.max_side;
   if (side < 4 || side > modar::kMaxTextureSide) std::abort();
+  if (request.levels < 1 || request.levels > modar::kMaxLevels) std::abort();
   return 0;
 }
