@@ -2,8 +2,10 @@
 // image.
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "formats/check_rules.hpp"
+#include "formats/loop_view.hpp"
 #include "formats/validate.hpp"
 
 namespace modar {
@@ -99,6 +101,20 @@ void check_text(FaultLog& log, const BundleParts& parts, const SectionEntry& ent
   }
 }
 
+void check_loop_record(FaultLog& log, const BundleParts& parts, const PatternRecord& pattern,
+                       const SectionEntry& entry) {
+  const std::string where = label(parts, "pattern", pattern.name) + ", loop record";
+  LoopRecordView view;
+  if (const auto fault = view_loop_record(section_bytes(parts, entry), view)) {
+    log.add(Rule::kLoopRecord, entry.offset + fault->offset, where, fault->cause);
+  } else if (view.header.describer_version != kLoopDescriber) {
+    log.add(Rule::kLoopRecord, entry.offset, where, "its describer's version is unknown");
+  } else if (view.header.width != pattern.width || view.header.height != pattern.height) {
+    log.add(Rule::kLoopRecord, entry.offset + offsetof(LoopRecordHeader, width), where,
+            "its image has another size than the pattern");
+  }
+}
+
 /// The twins of a pattern lie side by side in the section table.
 void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index) {
   constexpr auto kTwin = static_cast<std::uint32_t>(SectionType::kFeatureTwin);
@@ -128,6 +144,9 @@ void check_patterns(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.patterns.size(); ++i) check_findable(log, parts, i);
   for (const SectionEntry& entry : parts.sections) {
     const auto type = static_cast<SectionType>(entry.type);
+    if (type == SectionType::kLoopRecord) {
+      check_loop_record(log, parts, parts.patterns[entry.owner], entry);
+    }
     if (type != SectionType::kFeatureTwin && type != SectionType::kFeatureYml) continue;
     const PatternRecord& pattern = parts.patterns[entry.owner];
     const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry.variant);

@@ -44,7 +44,8 @@ struct RecordInfo {
   std::span<const FieldInfo> fields;
 };
 
-/// All structs of bundle.md but NameRef; those of tables come first, by section type.
+/// All structs of bundle.md but NameRef and those of loop records; those of tables come first, by
+/// section type.
 std::span<const RecordInfo> record_infos();
 
 /// The one of that name, which must be there.

@@ -106,6 +106,8 @@ constexpr IssueKind kIssueKinds[] = {
      "use a pattern with more texture"},
     {"FEATURE_TEXT", Severity::kError,
      "A feature text is no OpenCV FileStorage or has no mapped twin", kRebake},
+    {"LOOP_RECORD", Severity::kError, "A pattern's record for the pose loop cannot be read",
+     kRebake},
     {"STATEMENT_DIFFERS", Severity::kError,
      "The statement says something else than the records or payloads", kRebake},
     {"VERTEX_PADDING", Severity::kError, "Bytes of a vertex that no attribute has are not zero",

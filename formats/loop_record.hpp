@@ -6,6 +6,7 @@
 
 namespace modar {
 
+inline constexpr std::uint32_t kLoopDescriber = 1;    ///< the one version of the describer so far
 inline constexpr std::uint32_t kLoopBlockCodes = 32;  ///< codes in a block
 inline constexpr std::uint32_t kLoopCodeBytes = 32;   ///< 256 bits
 inline constexpr std::uint32_t kMaxLoopFeatures = 65536;

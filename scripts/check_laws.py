@@ -28,7 +28,7 @@ THIRD_PARTIES = {
     "draco/": (r"(bake|runtime)/[a-z_/]*draco[a-z_]*\.cpp", r"tests/.*"),
     "tiny_gltf": (r"bake/model/(glb|gltf)_[a-z_]*\.cpp", r"bake/model/tinygltf_library\.[ch]pp", r"tests/.*"),
     "bake/model/tinygltf_library": (r"bake/model/[a-z_]*gl(b|tf)[a-z_]*\.cpp",),
-    "CLI/": (r"bake/commands/((ship|check)_)?cli\.cpp",),
+    "CLI/": (r"bake/commands/((calibrate|check|pattern|ship)_)?cli\.cpp",),
     "nlohmann/": (r"bake/[a-z_/]*json[a-z_]*\.cpp", r"tests/.*"),
     "rapidjson/": (r"runtime/play/(json_lines|qos_log|recording)\.cpp",
                    r"runtime/fetch/(main|release|store)\.cpp", r"tests/.*"),

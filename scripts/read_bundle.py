@@ -106,7 +106,7 @@ def read_features(bundle):
             need(owner < len(tables["patterns"]) and variant in sets, "BUNDLE_SECTION_OWNER", 0)
         if kind == 258:
             need(owner < len(tables["patterns"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
-            read_loop_record(data)
+            read_loop_record(data, tables["patterns"][owner])
         if kind == 257:
             need((256, owner, variant) in bundle.payload and data.startswith(b"%YAML:1.0"),
                  "FEATURE_TEXT", 0)
@@ -117,14 +117,15 @@ def read_features(bundle):
     return out
 
 
-def read_loop_record(data):
+def read_loop_record(data, pattern):
     """The record of the pose loop: counts, offsets, places inside of the image."""
     need(len(data) >= 128, "LOOP_RECORD", 0, "too small")
     (version, count, bright, patch_count, width, height, levels, zero, features, codes, patches,
      pixels) = struct.unpack_from("<8I4Q", data)
     need(version == 1 and zero == 0 and not any(data[64:128]) and count % 32 == bright % 32 == 0 and
          bright <= count <= 65536 and patch_count <= 4096 and 1 <= levels <= 8 and
-         max(width, height) <= 1023 and min(width, height) >> (levels - 1) >= 1 and
+         max(width, height) <= 1023 and
+         (width, height) == (pattern["width"], pattern["height"]) and min(width, height) >> (levels - 1) >= 1 and
          codes % 64 == features % 2 == patches % 2 == 0, "LOOP_RECORD", 0, "header")
     image = sum((width >> level) * (height >> level) for level in range(levels))
     for at, size in ((features, 12 * count), (codes, 32 * count), (patches, 8 * patch_count), (pixels, image)):

@@ -57,34 +57,6 @@ class Eye {
   std::unique_ptr<PaperTracker> paper_;
 };
 
-/// Smooth blotches with texture of every size, so that there is something to be mistaken for.
-GrayPicture made_background(int width, int height, Random& random) {
-  GrayPicture picture{width, height, {}};
-  std::vector<double> sum(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 128);
-  for (int cell = 256; cell >= 4; cell /= 2) {
-    const int columns = width / cell + 2;
-    const int rows = height / cell + 2;
-    std::vector<double> knots(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-    for (double& knot : knots) knot = random.uniform(-1, 1) * std::sqrt(cell) * 4;
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {
-        const double u = 1.0 * (x % cell) / cell;
-        const double v = 1.0 * (y % cell) / cell;
-        const auto knot = [&](int i, int j) {
-          return knots[static_cast<std::size_t>((y / cell + j) * columns + x / cell + i)];
-        };
-        sum[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-            static_cast<std::size_t>(x)] += (knot(0, 0) * (1 - u) + knot(1, 0) * u) * (1 - v) +
-                                            (knot(0, 1) * (1 - u) + knot(1, 1) * u) * v;
-      }
-    }
-  }
-  for (const double value : sum) {
-    picture.pixels.push_back(static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0)));
-  }
-  return picture;
-}
-
 class PatternSweep {
  public:
   PatternSweep(Eye& eye, std::uint32_t pattern, GrayPicture picture, const Camera& camera,

@@ -2,14 +2,15 @@
 // a video with its truth.
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "bake/commands/bench_rows.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/pattern/pattern_picture.hpp"
 #include "bake/pattern/pose_bench.hpp"
+#include "bake/pattern/score_bench.hpp"
 #include "modar/features.hpp"
 
 namespace modar {
@@ -23,29 +24,6 @@ struct Path {
 };
 constexpr Path kPaths[] = {
     {"tracking", 1.0, 0.0}, {"tracking fast", 3.0, 0.5}, {"tracking x10", 10.0, 0.0}};
-
-/// The pictures of a folder in the order of their names, or the file itself.
-Result<std::vector<std::string>> pictures_of(const std::string& path) {
-  namespace fs = std::filesystem;
-  std::vector<std::string> paths;
-  std::error_code failed;
-  if (fs::is_regular_file(path, failed)) return std::vector<std::string>{path};
-  for (const auto& entry : fs::directory_iterator(path, failed)) {
-    std::string ending = entry.path().extension().string();
-    for (char& letter : ending) {
-      if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
-    }
-    if (ending == ".png" || ending == ".jpg" || ending == ".jpeg") {
-      paths.push_back(entry.path().string());
-    }
-  }
-  if (failed || paths.empty()) {
-    return fail(ExitCode::kIo, "bench.folder", path, "no pictures can be read here",
-                "name a folder with PNG or JPEG files, or one such file");
-  }
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
 
 double percent(int part, int whole) {
   return whole > 0 ? 100.0 * part / whole : 0.0;
@@ -105,6 +83,7 @@ Result<PoseBenchOptions> options_of(const PoseBenchCommand& command) {
   PoseBenchOptions options;
   options.frames = command.frames;
   options.seed = command.seed;
+  options.clutter_frames = command.clutter;
   options.paper_set = 0;
   for (const ParameterSetRecord& set : paper_parameter_sets()) {
     if (command.parameters == parameter_set_name(set.id)) options.paper_set = set.id;
@@ -126,6 +105,32 @@ Result<PoseBenchOptions> options_of(const PoseBenchCommand& command) {
   return options;
 }
 
+/// Scores beside working ranges, and how well their orders agree.
+Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
+                                         const PoseBenchProgress& progress) {
+  const auto scores = bench_scores(options, progress);
+  if (!scores) return tl::unexpected(scores.error());
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<BenchRow> rows;
+  std::vector<double> of_score[3];  // all, the half that it was tuned on, the other
+  std::vector<double> of_range[3];
+  for (const ScoreBenchRow& one : *scores) {
+    rows.push_back({"score " + one.name, 1.0 * one.score, one.range(), kNone});
+    rows.push_back({"farthest " + one.name, one.farthest, kNone, kNone});
+    rows.push_back({"tilt_deg " + one.name, one.tilt_deg, kNone, kNone});
+    for (const std::size_t group : {std::size_t{0}, one.tuned ? std::size_t{1} : std::size_t{2}}) {
+      of_score[group].push_back(one.score);
+      of_range[group].push_back(one.range());
+    }
+  }
+  constexpr const char* kGroups[] = {"all", "tuned", "other"};
+  for (std::size_t group = 0; group < 3; ++group) {
+    rows.push_back({std::string("rank_correlation ") + kGroups[group],
+                    rank_correlation(of_score[group], of_range[group]), kNone, kNone});
+  }
+  return rows;
+}
+
 }  // namespace
 
 Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
@@ -139,6 +144,11 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
   };
   auto options = options_of(command);
   if (!options) return tl::unexpected(options.error());
+  if (command.scores || command.tables) {
+    auto rows = command.scores ? score_rows(*options, progress) : article_rows(*options, progress);
+    bar.clear();
+    return rows;
+  }
   if (!options->bands.empty()) {
     if (auto done = take(bench_detection(*options, progress)); !done) {
       return tl::unexpected(done.error());

@@ -6,12 +6,14 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
+#include "bake/pattern/pose_bench.hpp"
 #include "formats/error.hpp"
 
 namespace modar {
 
 /// `modar bench pose`: a row a measure and band; the reference is the article's method. Values that
-/// do not apply are not finite. Errors: kIo "bench.folder"; those of reading pictures and videos.
+/// do not apply are not finite. Errors: kIo "pictures.folder"; those of reading pictures and
+/// videos.
 Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command);
 
 /// `modar bench model`: reading and baking a large OBJ beside other programs, each measurement in a
@@ -20,5 +22,11 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command);
 /// modar-workshop; those of making the file.
 Result<std::vector<BenchRow>> bench_model_rows(const std::vector<std::string>& scans,
                                                const ModelBenchCommand& command);
+
+/// `modar bench pose --tables`: the article's Tables 6 to 8 and what it says of accuracy
+/// (reference) beside its method and ours on these frames ("ours" is what was measured here; of
+/// Tables 7 and 8 the reference is a phone). Errors: those of bench_detection().
+Result<std::vector<BenchRow>> article_rows(const PoseBenchOptions& options,
+                                           const PoseBenchProgress& progress);
 
 }  // namespace modar

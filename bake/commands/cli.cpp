@@ -107,6 +107,7 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   sub->add_option("--loop-views", bake.request.loop.trial_views,
                   "Random views that try a pattern's features: fewer bake faster, more hold better")
       ->check(CLI::Range(1, 10000));
+  sub->add_flag("!--no-score", bake.request.loop.score, "Do not score the patterns");
   sub->add_option("--jobs", bake.request.jobs, "Threads; the bytes do not depend on it")
       ->check(CLI::Range(1u, 256u))
       ->capture_default_str();
@@ -119,32 +120,6 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   sub->footer(
       example("  modar bake --model spider.obj --pattern box.png:210mm"
               " --scene box=spider,up=y,scale=0.8 -o spider.modar\n"));
-  return sub;
-}
-
-CLI::App* add_rectify(CLI::App& pattern, RectifyCommand& rectify, std::string& corners) {
-  CLI::App* sub =
-      pattern.add_subcommand("rectify", "A frontal picture from a photo and four corners");
-  sub->add_option("photo", rectify.photo, "The photo")->required()->type_name("PHOTO");
-  sub->add_option("--corners", corners,
-                  "Pixels of the top-left, top-right, bottom-right and bottom-left corner")
-      ->required()
-      ->type_name("x,y,x,y,x,y,x,y");
-  sub->add_option("--width-mm", rectify.options.width_mm, "Physical width of the thing")
-      ->check(CLI::PositiveNumber);
-  sub->add_option("--height-mm", rectify.options.height_mm,
-                  "Physical height; without it the aspect ratio comes from the perspective")
-      ->check(CLI::PositiveNumber);
-  sub->add_option("--max-side", rectify.options.max_side, "Longest side of the result, in pixels")
-      ->check(CLI::Range(16u, kMaxTextureSide))
-      ->capture_default_str();
-  sub->add_option("-o,--output", rectify.output, "The PNG to write")
-      ->required()
-      ->type_name("IMAGE");
-  sub->add_flag("--json", rectify.json, "Print the image's size as JSON");
-  sub->footer(
-      example("  modar pattern rectify photo.jpg --corners 212,80,905,131,870,640,190,602"
-              " --width-mm 210 -o cover.png\n"));
   return sub;
 }
 
@@ -181,6 +156,12 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
                   "pose: picture of the video's pattern (default: pattern.png beside the video)");
   sub->add_option("--frames", pose.frames, "pose: rendered frames a band and pattern")
       ->check(CLI::Range(1, 100000));
+  sub->add_option("--clutter", pose.clutter, "pose: frames without a pattern, in all")
+      ->check(CLI::Range(1, 10000000));
+  sub->add_flag("--tables", pose.tables,
+                "pose: the article's Tables 6 to 8 and accuracy beside its four sets and ours");
+  sub->add_flag("--scores", pose.scores,
+                "pose: the patterns' scores beside their working ranges, and how well they agree");
   sub->add_option("--parameters", pose.parameters,
                   "pose: set of the article's method, none: ours alone");
   sub->add_option("--only", pose.only, "pose: bands whose name holds this text");
@@ -224,13 +205,6 @@ int bake_from_texts(BakeCommand& bake, const BakeTexts& texts) {
   return run_bake(bake);
 }
 
-int rectify_from_texts(RectifyCommand& rectify, const std::string& corners) {
-  const Result<std::array<PixelPoint, 4>> parsed = parse_corners(corners);
-  if (!parsed) return print_error(parsed.error());
-  rectify.options.corners = *parsed;
-  return run_rectify(rectify);
-}
-
 int parse_and_run(int argc, char** argv) {
   CLI::App app("modar: bakes models and patterns for augmented reality on old phones");
   app.set_version_flag("--version", std::string("modar ") + MODAR_VERSION);
@@ -243,12 +217,9 @@ int parse_and_run(int argc, char** argv) {
   InspectCommand inspect;
   BenchCommand bench;
   bench.model.jobs = bake.request.jobs;
-  RectifyCommand rectify;
-  std::string corners;
   const CLI::App* bake_sub = add_bake(app, bake, bake_texts);
-  CLI::App* pattern_sub = app.add_subcommand("pattern", "Work on pattern images");
-  pattern_sub->require_subcommand(1);
-  const CLI::App* rectify_sub = add_rectify(*pattern_sub, rectify, corners);
+  CLI::App* pattern_sub =
+      app.add_subcommand("pattern", "Work on pattern images: rectify, score, simulate, confusion");
   CLI::App* check_sub = app.add_subcommand("check", "Prove that a bundle is good");
   check_sub->prefix_command();  // it has a command line of its own
   check_sub->set_help_flag();
@@ -256,8 +227,12 @@ int parse_and_run(int argc, char** argv) {
   const CLI::App* bench_sub = add_bench(app, bench);
   CLI::App* ship_sub =
       app.add_subcommand("ship", "Releases for devices: keygen, publish, rotate, prune, plan");
-  ship_sub->prefix_command();  // it has a command line of its own
-  ship_sub->set_help_flag();
+  CLI::App* calibrate_sub =
+      app.add_subcommand("calibrate", "A camera file from a chessboard or any pattern, filmed");
+  for (CLI::App* sub : {pattern_sub, ship_sub, calibrate_sub}) {
+    sub->prefix_command();  // it has a command line of its own
+    sub->set_help_flag();
+  }
 
   try {
     app.parse(argc, argv);
@@ -267,10 +242,11 @@ int parse_and_run(int argc, char** argv) {
   }
   bake.words.assign(argv + 1, argv + argc);
   if (bake_sub->parsed()) return bake_from_texts(bake, bake_texts);
-  if (rectify_sub->parsed()) return rectify_from_texts(rectify, corners);
+  if (pattern_sub->parsed()) return run_pattern(pattern_sub->remaining());
   if (check_sub->parsed()) return run_check_line(check_sub->remaining(), check_against_sources);
   if (inspect_sub->parsed()) return run_inspect(inspect);
   if (bench_sub->parsed()) return run_bench(bench);
+  if (calibrate_sub->parsed()) return run_calibrate(calibrate_sub->remaining());
   if (ship_sub->parsed()) return run_ship(ship_sub->remaining());
   return static_cast<int>(ExitCode::kUsage);
 }

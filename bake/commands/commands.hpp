@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "bake/bundle_builder.hpp"
+#include "bake/pattern/confusion.hpp"
 #include "bake/pattern/pattern_image.hpp"
+#include "bake/pattern/simulate.hpp"
 
 namespace modar {
 
@@ -25,6 +27,31 @@ struct RectifyCommand {
   bool json = false;
 };
 
+struct ScoreCommand {
+  std::vector<std::string> patterns;  ///< image files
+  std::string overlay_folder;         ///< empty: none
+  unsigned jobs = 1;                  ///< threads; the scores do not depend on it
+  bool json = false;
+};
+
+struct ConfusionCommand {
+  std::vector<std::string> inputs;  ///< bundles and image files
+  std::string photos;               ///< folder; empty: none
+  ConfusionOptions options;
+  bool quiet = false;
+  bool json = false;
+};
+
+struct SimulateCommand {
+  std::vector<std::string> patterns;  ///< image files
+  std::string camera_file;            ///< empty: the default camera
+  std::string backgrounds;            ///< folder; empty: made ones
+  std::string picture_folder;         ///< of contact sheets; empty: none
+  SimulateOptions options;
+  bool quiet = false;
+  bool json = false;
+};
+
 struct InspectCommand {
   std::string bundle;
   std::string extract;  ///< folder for GLB, PKM, YML; empty: none
@@ -41,6 +68,9 @@ struct PoseBenchCommand {
   std::string parameters = "orb-2000";  ///< set of the article's method; "none": ours alone
   std::string only;                     ///< bands whose name holds this text
   int frames = 100;                     ///< a band and pattern
+  int clutter = 0;                      ///< frames without a pattern, in all; 0: as the others
+  bool tables = false;                  ///< print the article's tables instead
+  bool scores = false;                  ///< hold scores against working ranges instead
   unsigned seed = 1;
   bool quiet = false;
 };
@@ -65,6 +95,13 @@ struct BenchCommand {
 /// Each prints data to stdout and words to stderr, and answers the exit code.
 int run_bake(const BakeCommand& command);
 int run_rectify(const RectifyCommand& command);
+int run_confusion(ConfusionCommand& command);
+int run_score(const ScoreCommand& command);
+int run_simulate(SimulateCommand& command);
+/// `modar pattern ARGUMENT...`, with a command line of its own.
+int run_pattern(std::vector<std::string> arguments);
+/// `modar calibrate ARGUMENT...`, the same.
+int run_calibrate(std::vector<std::string> arguments);
 int run_inspect(const InspectCommand& command);
 int run_bench(const BenchCommand& command);
 

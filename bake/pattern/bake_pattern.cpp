@@ -1,8 +1,10 @@
 // A pattern's picture to its record and its features under every parameter set of the article.
+#include <algorithm>
 #include <string_view>
 
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/pattern/pattern_picture.hpp"
+#include "bake/pattern/score.hpp"
 #include "modar/features.hpp"
 #include "modar/pose.hpp"
 
@@ -29,6 +31,23 @@ Result<FeatureContent> describe(const GrayImage& image, const ParameterSetRecord
   content.descriptors = std::move(features->descriptors);
   content.yml = std::move(*yml);
   return content;
+}
+
+Result<void> add_score(const std::string& path, const GrayImage& grey, unsigned jobs,
+                       PatternFeatures& out, Report& report) {
+  const auto score = score_pattern(grey, out.loop_record, jobs);
+  if (!score) return tl::unexpected(score.error());
+  out.record.score = static_cast<float>(score->score);
+  out.record.score_version = kScoreVersion;
+  const auto worst =
+      std::min_element(score->causes.begin(), score->causes.end(),
+                       [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
+  const bool weak = score->score < kWeakScore;
+  report.findings.push_back({weak ? "pattern.weak" : "pattern.score",
+                             weak ? FindingSeverity::kWarning : FindingSeverity::kInfo, path, 0,
+                             "the pattern scores " + std::to_string(score->score) + " of 100",
+                             weak ? worst->advice : ""});
+  return {};
 }
 
 }  // namespace
@@ -73,6 +92,11 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
     return tl::unexpected(record.error());
   }
   out.loop_record = std::move(*record);
+  if (loop.score) {
+    if (auto done = add_score(path, grey, loop.jobs, out, report); !done) {
+      return tl::unexpected(done.error());
+    }
+  }
   timer.done(picture->pixels.size(), found);
   return out;
 }

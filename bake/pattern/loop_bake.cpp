@@ -3,11 +3,11 @@
 #include "bake/pattern/loop_bake.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <queue>
 
+#include "bake/pattern/described_view.hpp"
 #include "bake/pattern/loop_patches.hpp"
 #include "bake/pattern/view_render.hpp"
 #include "bake/texture/parallel.hpp"
@@ -46,50 +46,21 @@ struct Trials {
   std::uint32_t views = 0;
 };
 
-int distance(const std::array<std::uint8_t, 32>& a, const std::array<std::uint8_t, 32>& b) {
-  int bits = 0;
-  for (std::size_t i = 0; i < 32; i += 8) {
-    std::uint64_t x = 0;
-    std::uint64_t y = 0;
-    std::memcpy(&x, a.data() + i, 8);
-    std::memcpy(&y, b.data() + i, 8);
-    bits += std::popcount(x ^ y);
-  }
-  return bits;
-}
-
-/// Pattern coordinates of a place in a view.
-std::array<double, 2> to_pattern(const AffineView& view, double x, double y) {
-  const auto& a = view.linear;
-  const double determinant = a[0] * a[3] - a[1] * a[2];
-  const double u = x - view.offset[0];
-  const double v = y - view.offset[1];
-  return {(a[3] * u - a[1] * v) / determinant, (a[0] * v - a[2] * u) / determinant};
-}
-
 bool within(const GrayImage& pattern, const std::array<double, 2>& p) {
   return p[0] >= -0.5 && p[1] >= -0.5 && p[0] < pattern.width - 0.5 && p[1] < pattern.height - 0.5;
-}
-
-LoopDetectOptions generous() {
-  LoopDetectOptions options;
-  options.cell = 32;
-  options.per_cell = 16;
-  options.max_features = 20000;
-  return options;
 }
 
 std::vector<Candidate> candidates_of(const std::vector<GrayPicture>& levels,
                                      const AffineView& view) {
   std::vector<Candidate> candidates;
   const GrayPicture picture = render_view(levels, view, nullptr);
-  const auto describer = LoopDescriber::create(picture.width, picture.height, generous());
+  const auto describer = LoopDescriber::create(picture.width, picture.height, generous_detection());
   describer->set_frame(picture.view());
   for (const LoopFeature& feature : describer->features()) {
     // Coarser levels show what views of smaller scale show.
     if (feature.level != 0) continue;
     const auto place =
-        to_pattern(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
+        to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     if (!within(levels[0].view(), place)) continue;
     Candidate candidate;
     candidate.x = place[0];
@@ -114,8 +85,9 @@ std::vector<Candidate> find_candidates(const std::vector<GrayPicture>& levels, u
     // Directions get denser with the tilt (Yu & Morel, "ASIFT", 2011).
     for (const auto& [tilt, turns] : {std::pair{1.0, 2}, {1.5, 4}, {2.1, 6}, {2.9, 8}, {4.1, 11}}) {
       for (int i = 0; i < turns; ++i) {
-        views.push_back(make_view(levels[0].width, levels[0].height, scale, tilt, kPi * i / turns,
-                                  random.uniform(0.0, 2 * kPi), kMargin));
+        views.push_back(make_view(levels[0].width, levels[0].height, scale, tilt,
+                                  turn_of(kPi * i / turns), turn_of(random.uniform(0.0, 2 * kPi)),
+                                  kMargin));
       }
     }
   }
@@ -125,25 +97,6 @@ std::vector<Candidate> find_candidates(const std::vector<GrayPicture>& levels, u
   std::vector<Candidate> candidates;
   for (const auto& some : found) candidates.insert(candidates.end(), some.begin(), some.end());
   return candidates;
-}
-
-GrayPicture clutter(Random& random, int width, int height) {
-  GrayPicture picture;
-  picture.width = width;
-  picture.height = height;
-  picture.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 128);
-  for (int i = 0; i < width * height / 400; ++i) {
-    const int x0 = static_cast<int>(random.uniform(0, width));
-    const int y0 = static_cast<int>(random.uniform(0, height));
-    const int x1 = std::min(width, x0 + static_cast<int>(random.uniform(2, 24)));
-    const int y1 = std::min(height, y0 + static_cast<int>(random.uniform(2, 24)));
-    const auto grey = static_cast<std::uint8_t>(random.uniform(0, 256));
-    for (int y = y0; y < y1; ++y) {
-      std::fill_n(picture.pixels.begin() + static_cast<std::ptrdiff_t>(y) * width + x0, x1 - x0,
-                  grey);
-    }
-  }
-  return picture;
 }
 
 /// What a camera adds: other light and noise.
@@ -213,10 +166,11 @@ TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, 
   Random random(seed);
   const double scale = std::exp(random.uniform(std::log(0.3), std::log(2.0)));
   const double tilt = 1.0 / std::cos(random.uniform(0.0, 77.0) * kPi / 180.0);
+  const Turn direction = turn_of(random.uniform(0.0, kPi));
+  const Turn rotation = turn_of(random.uniform(0.0, 2 * kPi));
   const AffineView view =
-      make_view(levels[0].width, levels[0].height, scale, tilt, random.uniform(0.0, kPi),
-                random.uniform(0.0, 2 * kPi), kMargin + 8);
-  const GrayPicture background = clutter(random, view.width, view.height);
+      make_view(levels[0].width, levels[0].height, scale, tilt, direction, rotation, kMargin + 8);
+  const GrayPicture background = made_clutter(random, view.width, view.height);
   GrayPicture picture = render_view(levels, view, &background);
   disturb(random, picture);
   const auto describer = LoopDescriber::create(picture.width, picture.height, LoopDetectOptions{});
@@ -225,12 +179,12 @@ TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, 
   TrialView trial;
   for (const LoopFeature& feature : describer->features()) {
     const auto place =
-        to_pattern(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
+        to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     if (!within(levels[0].view(), place)) continue;
     const std::uint32_t id = trial.features++;
     const double radius = std::min(kNear * (1 << feature.level) / mean_scale, 16.0);
     grid.near(place[0], place[1], radius, feature.dark, [&](std::uint32_t i) {
-      const int bits = distance(candidates[i].code, feature.code);
+      const int bits = code_distance(candidates[i].code, feature.code);
       if (bits > kRepeats) return;
       trial.hits.push_back({i, {id, static_cast<float>(kRepeats + 8 - bits) / (kRepeats + 8)}});
     });

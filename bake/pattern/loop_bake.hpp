@@ -15,6 +15,7 @@ struct LoopBakeOptions {
   std::uint32_t features = 3000;          ///< descriptors kept, at most
   std::uint32_t trial_views = 120;        ///< random renderings that show which ones repeat
   std::uint32_t patches_per_level = 256;  ///< at most
+  bool score = true;                      ///< bake_pattern() scores the picture, too
   unsigned jobs = 1;                      ///< threads; the bytes do not depend on it
   [[nodiscard]] Result<void> validate() const;
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include <opencv2/imgproc.hpp>
 
@@ -55,6 +56,28 @@ Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
   } catch (const std::exception& thrown) {
     return fail(ExitCode::kInternal, "pattern.opencv", path, thrown.what(), "report this as a bug");
   }
+}
+
+Result<std::vector<std::string>> pictures_of(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> paths;
+  std::error_code failed;
+  if (fs::is_regular_file(path, failed)) return std::vector<std::string>{path};
+  for (const auto& entry : fs::directory_iterator(path, failed)) {
+    std::string ending = entry.path().extension().string();
+    for (char& letter : ending) {
+      if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+    }
+    if (ending == ".png" || ending == ".jpg" || ending == ".jpeg") {
+      paths.push_back(entry.path().string());
+    }
+  }
+  if (failed || paths.empty()) {
+    return fail(ExitCode::kIo, "pictures.folder", path, "no pictures can be read here",
+                "name a folder with PNG or JPEG files, or one such file");
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
 }
 
 }  // namespace modar

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "bake/pattern/view_render.hpp"
 #include "bake/texture/etc1_texture.hpp"
@@ -15,5 +16,8 @@ GrayPicture grey_of(const RgbaImage& image);
 Result<GrayPicture> load_grey(const std::string& path);
 /// The same, its longer side at most 720 pixels. shrunk: whether it was made smaller.
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
+/// The PNG and JPEG files of a folder in the order of their names, or the file itself. Errors: kIo
+/// "pictures.folder" where there is none.
+Result<std::vector<std::string>> pictures_of(const std::string& path);
 
 }  // namespace modar

@@ -12,18 +12,19 @@
 namespace modar {
 namespace {
 
-Result<std::vector<GrayPicture>> load_backgrounds(const PoseBenchOptions& options) {
-  std::vector<GrayPicture> backgrounds;
-  for (const std::string& path : options.backgrounds) {
-    auto background = load_background(path, options.width, options.height);
-    if (!background) return tl::unexpected(background.error());
-    backgrounds.push_back(std::move(*background));
-  }
-  if (backgrounds.empty() || options.patterns.empty()) {
+Result<std::vector<GrayPicture>> backgrounds_of(const PoseBenchOptions& options) {
+  if (options.backgrounds.empty() || options.patterns.empty()) {
     return fail(ExitCode::kUsage, "bench.input", "", "the bench needs patterns and backgrounds",
                 "give folders with pictures");
   }
-  return backgrounds;
+  return load_backgrounds(options.backgrounds, options.width, options.height);
+}
+
+/// Of one band and pattern.
+int frames_of(const PoseBenchOptions& options, const SceneBand& band) {
+  if (band.pattern || options.clutter_frames == 0) return options.frames;
+  const int patterns = static_cast<int>(options.patterns.size());
+  return (options.clutter_frames + patterns - 1) / patterns;
 }
 
 /// A hand's path: slow sines of all six parameters about a pose.
@@ -78,10 +79,21 @@ Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const Gray
 
 }  // namespace
 
+Result<std::vector<GrayPicture>> load_backgrounds(const std::vector<std::string>& paths, int width,
+                                                  int height) {
+  std::vector<GrayPicture> backgrounds;
+  for (const std::string& path : paths) {
+    auto background = load_background(path, width, height);
+    if (!background) return tl::unexpected(background.error());
+    backgrounds.push_back(std::move(*background));
+  }
+  return backgrounds;
+}
+
 Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& options,
                                                   const PoseBenchProgress& progress) {
   cv::setNumThreads(1);
-  const auto backgrounds = load_backgrounds(options);
+  const auto backgrounds = backgrounds_of(options);
   if (!backgrounds) return tl::unexpected(backgrounds.error());
   const Camera camera = default_camera(options.width, options.height);
   const std::vector<SceneBand> bands = options.bands.empty() ? pose_bands() : options.bands;
@@ -93,9 +105,12 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
     const GrayImage picture = subject->pictures[0].view();
     for (std::size_t b = 0; b < bands.size(); ++b) {
       Random random(options.seed + 1000003 * p + 7919 * b);
-      for (int i = 0; i < options.frames; ++i) {
-        const GrayPicture& background =
+      const int frames = frames_of(options, bands[b]);
+      for (int i = 0; i < frames; ++i) {
+        const GrayPicture& photo =
             (*backgrounds)[static_cast<std::size_t>(random.next() % backgrounds->size())];
+        // Without a pattern, the photo alone has to make the frames differ.
+        const GrayPicture background = bands[b].pattern ? photo : another_view(photo, random);
         const Pose pose = draw_pose(bands[b], picture, camera, random);
         const SceneFrame scene = render_scene(picture, camera, pose, background, bands[b], random);
         auto done =
@@ -117,7 +132,7 @@ Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options
                                                  const std::string& name, double speed, double blur,
                                                  const PoseBenchProgress& progress) {
   cv::setNumThreads(1);
-  const auto backgrounds = load_backgrounds(options);
+  const auto backgrounds = backgrounds_of(options);
   if (!backgrounds) return tl::unexpected(backgrounds.error());
   Tallies tallies(name, true);
   for (std::size_t p = 0; p < options.patterns.size(); ++p) {

@@ -16,6 +16,7 @@ struct PoseBenchOptions {
   std::vector<std::string> patterns;     ///< image files
   std::vector<std::string> backgrounds;  ///< image files
   int frames = 100;                      ///< a band and pattern
+  int clutter_frames = 0;                ///< without a pattern, in all; 0: frames a pattern
   int width = 1280;
   int height = 720;
   std::uint32_t paper_set = 1;  ///< the article's parameter set; 0: without the article's method
@@ -39,6 +40,10 @@ struct PoseBenchRow {
   double ms = 0;            ///< thread-CPU milliseconds a frame, mean
   double stages_ms[4] = {0, 0, 0, 0};  ///< wall: detect, describe, match, homography
 };
+
+/// Pictures as backgrounds of frames of that size. Errors: those of read_image().
+Result<std::vector<GrayPicture>> load_backgrounds(const std::vector<std::string>& paths, int width,
+                                                  int height);
 
 using PoseBenchProgress = std::function<void(const std::string& what, double done)>;
 

@@ -187,19 +187,6 @@ void lay_over(const Shown& shown, cv::Mat& frame) {
   }
 }
 
-void light_and_noise(cv::Mat& frame, const SceneLight& with, Random& random) {
-  const double step = with.slope_x / frame.cols;
-  for (int y = 0; y < frame.rows; ++y) {
-    std::uint8_t* row = frame.ptr(y);
-    double light =
-        with.gain - 0.5 * with.slope_x + with.slope_y * (static_cast<double>(y) / frame.rows - 0.5);
-    for (int x = 0; x < frame.cols; ++x, light += step) {
-      const double seen = light * row[x] + with.bias + with.noise * random.normal();
-      row[x] = static_cast<std::uint8_t>(std::clamp(seen + 0.5, 0.0, 255.0));
-    }
-  }
-}
-
 cv::Mat motion_kernel(double length, double angle) {
   const int side = 2 * static_cast<int>(std::ceil(length / 2)) + 1;
   cv::Mat kernel(side, side, CV_32F, cv::Scalar(0));
@@ -234,7 +221,7 @@ Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& ca
   const double area = std::exp(random.uniform(std::log(band.area_low), std::log(band.area_high)));
   const double tilt = random.uniform(band.tilt_low, band.tilt_high) * kPi / 180.0;
   const double axis = random.uniform(0.0, 2 * kPi);
-  const double roll = random.uniform(0.0, 2 * kPi);
+  const double roll = random.uniform(band.roll_low, band.roll_high) * kPi / 180.0;
   glm::dmat3 frontal(1.0);
   frontal[1][1] = frontal[2][2] = -1.0;
   Pose pose;
@@ -268,10 +255,9 @@ SceneLight draw_light(Random& random) {
   return light;
 }
 
-SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
+SceneFrame render_still(const GrayImage& pattern, const Camera& camera, const Pose& pose,
                         const GrayPicture& background, const SceneBand& band, Random& random,
-                        const SceneLight* light, MotionBlur blur) {
-  const SceneLight shining = light != nullptr ? *light : draw_light(random);
+                        double focus, MotionBlur blur) {
   SceneFrame scene;
   scene.pose = pose;
   scene.picture = background;
@@ -282,10 +268,76 @@ SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Po
     const int side = static_cast<int>(random.uniform(0, 4));
     lay_over(show(pattern, camera, pose, covered, side), frame);
   }
-  cv::GaussianBlur(frame, frame, cv::Size(5, 5), shining.focus);
+  cv::GaussianBlur(frame, frame, cv::Size(5, 5), focus);
   if (blur.length > 1.0) cv::filter2D(frame, frame, -1, motion_kernel(blur.length, blur.angle));
-  light_and_noise(frame, shining, random);
   return scene;
+}
+
+void expose(const GrayPicture& still, const SceneLight& light, Random& random,
+            GrayPicture& picture) {
+  picture.width = still.width;
+  picture.height = still.height;
+  picture.pixels.resize(still.pixels.size());
+  const double step = light.slope_x / still.width;
+  std::size_t i = 0;
+  for (int y = 0; y < still.height; ++y) {
+    double gain = light.gain - 0.5 * light.slope_x +
+                  light.slope_y * (static_cast<double>(y) / still.height - 0.5);
+    for (int x = 0; x < still.width; ++x, ++i, gain += step) {
+      const double seen = gain * still.pixels[i] + light.bias + light.noise * random.normal();
+      picture.pixels[i] = static_cast<std::uint8_t>(std::clamp(seen + 0.5, 0.0, 255.0));
+    }
+  }
+}
+
+SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
+                        const GrayPicture& background, const SceneBand& band, Random& random,
+                        const SceneLight* light, MotionBlur blur) {
+  const SceneLight shining = light != nullptr ? *light : draw_light(random);
+  SceneFrame scene =
+      render_still(pattern, camera, pose, background, band, random, shining.focus, blur);
+  expose(scene.picture, shining, random, scene.picture);
+  return scene;
+}
+
+GrayPicture another_view(const GrayPicture& photo, Random& random) {
+  const cv::Point2f centre(static_cast<float>(random.uniform(0.3, 0.7) * photo.width),
+                           static_cast<float>(random.uniform(0.3, 0.7) * photo.height));
+  const double angle = random.uniform(0, 360);
+  const double scale = std::exp(random.uniform(std::log(0.7), std::log(2.0)));
+  const cv::Mat map = cv::getRotationMatrix2D(centre, angle, scale);
+  GrayPicture view{photo.width, photo.height, std::vector<std::uint8_t>(photo.pixels.size())};
+  cv::Mat out(view.height, view.width, CV_8UC1, view.pixels.data());
+  cv::warpAffine(as_mat(photo.view()), out, map, out.size(), cv::INTER_LINEAR,
+                 cv::BORDER_REFLECT_101);
+  return view;
+}
+
+GrayPicture made_background(int width, int height, Random& random) {
+  GrayPicture picture{width, height, {}};
+  std::vector<double> sum(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 128);
+  for (int cell = 256; cell >= 4; cell /= 2) {
+    const int columns = width / cell + 2;
+    const int rows = height / cell + 2;
+    std::vector<double> knots(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    for (double& knot : knots) knot = random.uniform(-1, 1) * std::sqrt(cell) * 4;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const double u = 1.0 * (x % cell) / cell;
+        const double v = 1.0 * (y % cell) / cell;
+        const auto knot = [&](int i, int j) {
+          return knots[static_cast<std::size_t>((y / cell + j) * columns + x / cell + i)];
+        };
+        sum[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+            static_cast<std::size_t>(x)] += (knot(0, 0) * (1 - u) + knot(1, 0) * u) * (1 - v) +
+                                            (knot(0, 1) * (1 - u) + knot(1, 1) * u) * v;
+      }
+    }
+  }
+  for (const double value : sum) {
+    picture.pixels.push_back(static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0)));
+  }
+  return picture;
 }
 
 Result<GrayPicture> load_background(const std::string& path, int width, int height) {

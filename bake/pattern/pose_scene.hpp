@@ -25,6 +25,8 @@ struct SceneBand {
   double covered_low = 0;  ///< share of the pattern behind something else
   double covered_high = 0;
   bool pattern = true;  ///< false: the photo alone
+  double roll_low = 0;  ///< degrees in the picture's plane
+  double roll_high = 360;
 };
 
 /// The bands of the article's experiments and beyond, as bench tables print them.
@@ -36,7 +38,7 @@ struct SceneFrame {
   std::array<glm::dvec2, 4> corners{};  ///< of the truth, as in Sighting
 };
 
-/// Draws a pose of the band: any roll, the pattern's centre in the frame.
+/// Draws a pose of the band, the pattern's centre in the frame.
 Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
                Random& random);
 
@@ -62,6 +64,20 @@ struct MotionBlur {
 SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
                         const GrayPicture& background, const SceneBand& band, Random& random,
                         const SceneLight* light = nullptr, MotionBlur blur = {});
+
+/// The same frame before light and noise, which expose() adds: several exposures of one view.
+SceneFrame render_still(const GrayImage& pattern, const Camera& camera, const Pose& pose,
+                        const GrayPicture& background, const SceneBand& band, Random& random,
+                        double focus, MotionBlur blur);
+void expose(const GrayPicture& still, const SceneLight& light, Random& random,
+            GrayPicture& picture);
+
+/// A background where no photo is at hand: smooth blotches with texture of every size, so that
+/// there is something to be mistaken for.
+GrayPicture made_background(int width, int height, Random& random);
+
+/// The photo turned, scaled and moved at random, mirrored beyond its borders.
+GrayPicture another_view(const GrayPicture& photo, Random& random);
 
 /// A photo as a background of that size. Errors: those of read_image().
 Result<GrayPicture> load_background(const std::string& path, int width, int height);

@@ -6,7 +6,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/pattern/loop_bake.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "bake/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
@@ -19,7 +18,9 @@ namespace {
 
 constexpr double kRight = 5.0;  // pixels
 
-Result<void> add_pattern(const GrayImage& pattern, std::uint32_t set_id, BundleContent& content) {
+/// loop_record: of the pattern.
+void add_record(const GrayImage& pattern, std::vector<std::byte> loop_record,
+                BundleContent& content) {
   PatternRecord record{};
   record.name = content.intern("pattern " + std::to_string(content.patterns.size()));
   record.width = static_cast<std::uint32_t>(pattern.width);
@@ -28,24 +29,40 @@ Result<void> add_pattern(const GrayImage& pattern, std::uint32_t set_id, BundleC
   record.half_width = static_cast<float>(corners[1].x);
   record.half_height = static_cast<float>(corners[1].y);
   record.score = -1.0f;
-  auto& described = content.features.emplace_back();
+  content.features.emplace_back();
+  ExtraSection section;
+  section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
+  section.owner = static_cast<std::uint32_t>(content.patterns.size());
+  section.bytes = std::move(loop_record);
+  content.extra.push_back(std::move(section));
+  content.patterns.push_back(record);
+}
+
+Result<void> add_pattern(const GrayImage& pattern, std::uint32_t set_id,
+                         const LoopBakeOptions& options, BundleContent& content) {
+  auto loop = bake_loop_record(pattern, options);
+  if (!loop) return tl::unexpected(loop.error());
+  add_record(pattern, std::move(*loop), content);
   for (const ParameterSetRecord& set : content.parameter_sets) {
     auto features = describe_image(pattern, set);
     if (!features) return tl::unexpected(features.error());
     auto yml = features_to_yml(*features);
     if (!yml) return tl::unexpected(yml.error());
-    described.push_back({set_id, features->descriptor_bytes, std::move(features->keypoints),
-                         std::move(features->descriptors), std::move(*yml)});
+    content.features.back().push_back({set_id, features->descriptor_bytes,
+                                       std::move(features->keypoints),
+                                       std::move(features->descriptors), std::move(*yml)});
   }
-  auto loop = bake_loop_record(pattern, LoopBakeOptions{});
-  if (!loop) return tl::unexpected(loop.error());
-  ExtraSection section;
-  section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
-  section.owner = static_cast<std::uint32_t>(content.patterns.size());
-  section.bytes = std::move(*loop);
-  content.extra.push_back(std::move(section));
-  content.patterns.push_back(record);
   return {};
+}
+
+Result<std::vector<std::byte>> bytes_of(const BundleContent& content) {
+  std::vector<std::byte> bytes;
+  const auto written = write_bundle(content, [&](std::span<const std::byte> part) {
+    bytes.insert(bytes.end(), part.begin(), part.end());
+    return true;
+  });
+  if (!written) return tl::unexpected(written.error());
+  return bytes;
 }
 
 Result<std::vector<std::byte>> bundle_of(const std::vector<GrayPicture>& pictures,
@@ -57,17 +74,11 @@ Result<std::vector<std::byte>> bundle_of(const std::vector<GrayPicture>& picture
     content.parameter_sets.push_back(set);
   }
   for (const GrayPicture& picture : pictures) {
-    if (auto added = add_pattern(picture.view(), set_id, content); !added) {
+    if (auto added = add_pattern(picture.view(), set_id, {}, content); !added) {
       return tl::unexpected(added.error());
     }
   }
-  std::vector<std::byte> bytes;
-  const auto written = write_bundle(content, [&](std::span<const std::byte> part) {
-    bytes.insert(bytes.end(), part.begin(), part.end());
-    return true;
-  });
-  if (!written) return tl::unexpected(written.error());
-  return bytes;
+  return bytes_of(content);
 }
 
 template <class Method>
@@ -90,6 +101,22 @@ double corner_error(const Sighting& sighting, const FrameTruth& truth) {
 }
 
 }  // namespace
+
+Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
+                                                 const LoopBakeOptions& options) {
+  BundleContent content;
+  if (auto added = add_pattern(pattern, 0, options, content); !added) {
+    return tl::unexpected(added.error());
+  }
+  return bytes_of(content);
+}
+
+Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
+                                                std::vector<std::byte> record) {
+  BundleContent content;
+  add_record(pattern, std::move(record), content);
+  return bytes_of(content);
+}
 
 Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBenchOptions& options,
                              const Camera& camera, bool track) {
@@ -118,6 +145,10 @@ Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBe
     subject.ours = std::move(*ours);
   }
   return subject;
+}
+
+bool is_right(const Sighting& sighting, const FrameTruth& truth) {
+  return corner_error(sighting, truth) < kRight;
 }
 
 Tally::Tally(std::string band, const char* method, bool sequence) {

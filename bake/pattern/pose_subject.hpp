@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/pattern/loop_bake.hpp"
 #include "bake/pattern/pose_bench.hpp"
 #include "bake/pattern/pose_scene.hpp"
 #include "modar/pose_loop.hpp"
@@ -21,6 +22,14 @@ struct Subject {
   std::unique_ptr<PoseLoop> ours;
 };
 
+/// A bundle that holds that pattern's loop record alone. Errors: those of bake_loop_record().
+Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
+                                                 const LoopBakeOptions& options);
+
+/// The same with a record that is there already.
+Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
+                                                std::vector<std::byte> record);
+
 /// track: whether ours holds patterns from frame to frame. Errors: those of reading pictures,
 /// describing and baking them.
 Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBenchOptions& options,
@@ -31,6 +40,9 @@ struct FrameTruth {
   bool pattern = false;
   std::array<glm::dvec2, 4> corners{};
 };
+
+/// Whether the mean error of the four corners is under 5 pixels.
+bool is_right(const Sighting& sighting, const FrameTruth& truth);
 
 /// Sums of one method on one band.
 class Tally {

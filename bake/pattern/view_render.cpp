@@ -51,7 +51,8 @@ struct Footprint {
 
 Footprint footprint_of(const std::array<double, 4>& inverse, double factor) {
   const auto samples = [factor](double dx, double dy) {
-    return std::clamp(static_cast<int>(std::ceil(std::hypot(dx, dy) / factor)), 1, kMostSamples);
+    return std::clamp(static_cast<int>(std::ceil(std::sqrt(dx * dx + dy * dy) / factor)), 1,
+                      kMostSamples);
   };
   const int across = samples(inverse[0], inverse[2]);
   const int down = samples(inverse[1], inverse[3]);
@@ -133,17 +134,19 @@ double Random::normal() {
   return 2.0 * (sum / 65536.0 - 1.5);
 }
 
+Turn turn_of(double radians) {
+  return {std::cos(radians), std::sin(radians)};
+}
+
 AffineView make_view(int picture_width, int picture_height, double scale, double tilt,
-                     double direction, double rotation, int margin) {
-  const double c = std::cos(direction);
-  const double s = std::sin(direction);
+                     Turn direction, Turn rotation, int margin) {
+  const auto [c, s] = direction;
   const double along = scale / tilt;
   // Compression along (c, s) and none across.
   const double xx = along * c * c + scale * s * s;
   const double xy = (along - scale) * c * s;
   const double yy = along * s * s + scale * c * c;
-  const double cr = std::cos(rotation);
-  const double sr = std::sin(rotation);
+  const auto [cr, sr] = rotation;
   AffineView view;
   view.linear = {cr * xx - sr * xy, cr * xy - sr * yy, sr * xx + cr * xy, sr * xy + cr * yy};
   const double half_width = 0.5 * picture_width;
@@ -184,6 +187,25 @@ std::vector<GrayPicture> halved(const GrayImage& picture) {
     levels.push_back(std::move(to));
   }
   return levels;
+}
+
+GrayPicture made_clutter(Random& random, int width, int height) {
+  GrayPicture picture;
+  picture.width = width;
+  picture.height = height;
+  picture.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 128);
+  for (int i = 0; i < width * height / 400; ++i) {
+    const int x0 = static_cast<int>(random.uniform(0, width));
+    const int y0 = static_cast<int>(random.uniform(0, height));
+    const int x1 = std::min(width, x0 + static_cast<int>(random.uniform(2, 24)));
+    const int y1 = std::min(height, y0 + static_cast<int>(random.uniform(2, 24)));
+    const auto grey = static_cast<std::uint8_t>(random.uniform(0, 256));
+    for (int y = y0; y < y1; ++y) {
+      std::fill_n(picture.pixels.begin() + static_cast<std::ptrdiff_t>(y) * width + x0, x1 - x0,
+                  grey);
+    }
+  }
+  return picture;
 }
 
 GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView& view,

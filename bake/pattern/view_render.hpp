@@ -30,10 +30,18 @@ struct AffineView {
   int height = 0;
 };
 
-/// A view scaled by `scale`, compressed by `tilt` (>= 1) along `direction`, then rotated; angles in
-/// radians. It shows the whole picture with `margin` pixels around.
+/// The cosine and the sine of an angle.
+struct Turn {
+  double cosine = 1;
+  double sine = 0;
+};
+Turn turn_of(double radians);
+
+/// A view scaled by `scale`, compressed by `tilt` (>= 1) along `direction`, then rotated. It shows
+/// the whole picture with `margin` pixels around. Sums and products only: turns of rational numbers
+/// give the same view on every machine.
 AffineView make_view(int picture_width, int picture_height, double scale, double tilt,
-                     double direction, double rotation, int margin);
+                     Turn direction, Turn rotation, int margin);
 
 struct GrayPicture {
   int width = 0;
@@ -44,6 +52,9 @@ struct GrayPicture {
 
 /// The picture and its halves, down to a side of 8.
 std::vector<GrayPicture> halved(const GrayImage& picture);
+
+/// Boxes of random greys, as a background.
+GrayPicture made_clutter(Random& random, int width, int height);
 
 /// Renders a view. Outside of the picture: its border pixels where `background` is null, else the
 /// background, which has the view's size.

@@ -2,11 +2,11 @@
 // as PPM.
 #include <cstdio>
 
-#include "camera_file.hpp"
 #include "display.hpp"
 #include "formats/atomic_file.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
+#include "modar/camera_file.hpp"
 #include "picture_file.hpp"
 #include "raw_source.hpp"
 #include "v4l2_source.hpp"

@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <optional>
 
-#include "camera_file.hpp"
+#include "modar/camera_file.hpp"
 #include "pipeline.hpp"
 #include "play.hpp"
 #include "player.hpp"

@@ -33,6 +33,6 @@ struct LoopPattern {
 /// Views a section's bytes, which must outlive the pattern. Every count and offset is checked, and
 /// every feature and patch lies within the image, so that nothing later needs to look again.
 /// Errors: kInvalidInput "tracker.record"; kUnsupported "tracker.record-version".
-Result<LoopPattern> view_loop_record(std::span<const std::byte> bytes, std::uint32_t index);
+Result<LoopPattern> view_loop_pattern(std::span<const std::byte> bytes, std::uint32_t index);
 
 }  // namespace modar::loop

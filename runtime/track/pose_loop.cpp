@@ -93,7 +93,7 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto bytes = bundle.section(SectionType::kLoopRecord, i);
     if (bytes.empty()) continue;
-    auto pattern = loop::view_loop_record(bytes, i);
+    auto pattern = loop::view_loop_pattern(bytes, i);
     if (!pattern) return tl::unexpected(pattern.error());
     state->patterns.push_back(*pattern);
   }

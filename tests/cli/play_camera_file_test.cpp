@@ -1,5 +1,5 @@
 // Calibration files as OpenCV's own programs write them.
-#include "camera_file.hpp"
+#include "modar/camera_file.hpp"
 
 #include <gtest/gtest.h>
 

@@ -15,7 +15,7 @@ COVER = ROOT / "assets" / "patterns" / "cover.png"
 
 
 # Few views of a pattern: enough for tests.
-QUICK = ["--loop-views", "8"]
+QUICK = ["--loop-views", "8", "--no-score"]
 
 
 class ProgramTest(unittest.TestCase):

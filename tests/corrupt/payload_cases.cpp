@@ -1,4 +1,7 @@
 // Damage to payloads of bundles that open.
+#include <cstring>
+
+#include "formats/loop_record.hpp"
 #include "formats/statement.hpp"
 #include "tests/corrupt/cases.hpp"
 
@@ -121,6 +124,28 @@ constexpr CorruptCase kCases[] = {
            features.descriptors.resize(3 * features.descriptor_bytes);
            features.yml.clear();
          }
+       });
+     }},
+    {"LOOP_RECORD",
+     [] {
+       return changed(pattern_content(), [](auto& c) {
+         // Two patches, the second of a finer level than the first.
+         LoopRecordHeader header{};
+         header.describer_version = 1;
+         header.patch_count = 2;
+         header.width = 64;
+         header.height = 48;
+         header.level_count = 2;
+         header.codes_offset = header.features_offset = header.patches_offset = sizeof header;
+         header.pixels_offset = sizeof header + 2 * sizeof(LoopPatchRecord);
+         const LoopPatchRecord patches[2] = {{640, 640, 1, 0}, {640, 640, 0, 0}};
+         ExtraSection section;
+         section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
+         section.owner = 0;
+         section.bytes.resize(header.pixels_offset + 64 * 48 + 32 * 24);
+         std::memcpy(section.bytes.data(), &header, sizeof header);
+         std::memcpy(section.bytes.data() + sizeof header, patches, sizeof patches);
+         c.extra.push_back(section);
        });
      }},
     {"FEATURE_TEXT",

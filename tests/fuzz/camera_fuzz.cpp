@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "runtime/play/camera_file.hpp"
+#include "modar/camera_file.hpp"
 #include "tests/fuzz/input_file.hpp"
 #include "tests/fuzz/need.hpp"
 

@@ -204,6 +204,7 @@ LoopBakeOptions quick() {
   LoopBakeOptions options;
   options.features = 300;
   options.trial_views = 8;
+  options.score = false;
   return options;
 }
 

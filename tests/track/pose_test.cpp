@@ -142,6 +142,39 @@ TEST(Pose, ClosedFormFindsThePoseThatMadeTheHomography) {
   }
 }
 
+// The article's Eq. 3 to 5 step by step, with OpenCV's inverse and SVD, on corners that no exact
+// pose explains.
+TEST(Pose, ClosedFormIsTheArticlesByOpenCvsSvd) {
+  const Camera camera = pinhole();
+  const Quad world = pattern_corners(400, 300);
+  cv::RNG random(3);
+  for (int trial = 0; trial < 30; ++trial) {
+    const test::View view =
+        test::look_at(random.uniform(2.0, 6.0), random.uniform(-60.0, 60.0),
+                      random.uniform(0.0, 180.0), random.uniform(-180.0, 180.0));
+    auto noisy = test::true_corners(cv::Mat(300, 400, CV_8UC1), view, camera);
+    for (auto& p : noisy) p += cv::Point2d(random.gaussian(1.5), random.gaussian(1.5));
+    const auto h = homography_from_points(world, quad_of(noisy));
+    ASSERT_TRUE(h);
+    const cv::Mat g = test::camera_matrix(camera).inv() * to_mat(*h);
+    double lambda = 1.0 / cv::norm(g.col(0));
+    if (g.at<double>(2, 2) < 0) lambda = -lambda;  // the pattern lies before the camera
+    cv::Mat r(3, 3, CV_64F);
+    cv::Mat(lambda * g.col(0)).copyTo(r.col(0));
+    cv::Mat(lambda * g.col(1)).copyTo(r.col(1));
+    r.col(0).cross(r.col(1)).copyTo(r.col(2));
+    const cv::SVD svd(r);
+    const cv::Mat nearest = svd.u * svd.vt;
+    ASSERT_NEAR(cv::determinant(nearest), 1.0, 1e-9);
+    const auto pose = pose_from_homography(camera, *h);
+    ASSERT_TRUE(pose);
+    EXPECT_LT(difference(pose->rotation, nearest), 1e-9) << trial;
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(pose->translation[axis], lambda * g.at<double>(axis, 2), 1e-9) << trial;
+    }
+  }
+}
+
 TEST(Pose, AMirroredPatternStillGetsARotation) {
   const Quad world = pattern_corners(4, 3);
   const Quad mirrored = {glm::dvec2{800, 200}, {400, 210}, {390, 500}, {820, 520}};

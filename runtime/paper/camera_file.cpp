@@ -9,7 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
-#include "camera_file.hpp"
+#include "modar/camera_file.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {

@@ -1,0 +1,124 @@
+// `modar calibrate`: its command line, and what it prints.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "bake/commands/commands.hpp"
+#include "bake/commands/pattern_json.hpp"
+#include "bake/commands/terminal.hpp"
+#include "bake/pattern/pattern_picture.hpp"
+
+namespace modar {
+namespace {
+
+struct CalibrateCommand {
+  CalibrateOptions options;
+  std::string board;  ///< "9x6", empty: none
+  std::string output;
+  bool quiet = false;
+  bool json = false;
+};
+
+void add_options(CLI::App& app, CalibrateCommand& command) {
+  app.add_option("inputs", command.options.inputs, "Pictures, folders of them, videos")
+      ->required()
+      ->type_name("VIDEO|IMAGE|DIR...");
+  CLI::Option* board =
+      app.add_option("--board", command.board, "A chessboard of that many inner corners")
+          ->type_name("COLUMNSxROWS");
+  app.add_option("--pattern", command.options.pattern,
+                 "Any pattern instead: its picture, or a bundle whose first one it is")
+      ->type_name("IMAGE|BUNDLE")
+      ->excludes(board);
+  app.add_option("--views", command.options.most_views, "Most views to calibrate from")
+      ->check(CLI::Range(5, 1000))
+      ->capture_default_str();
+  app.add_option("-o,--output", command.output, "The camera file to write (OpenCV's YML)")
+      ->required()
+      ->type_name("CAMERA.yml");
+  app.add_flag("--quiet", command.quiet, "No progress bar");
+  app.add_flag("--json", command.json, "Print the camera as JSON");
+  app.footer(
+      "\nShow the plane large and sharp, tilted by 30 to 50 degrees to every side.\n"
+      "\nExample:\n"
+      "  modar calibrate photos --board 9x6 -o phone.yml\n"
+      "  modar calibrate walk.mp4 --pattern cover.png -o phone.yml\n"
+      "  modar-play vase.modar --input camera --camera phone.yml\n"
+      "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 the views do not\n"
+      "tell the camera, 4 a bug of ours.\n");
+}
+
+/// Options that are texts, read; folders become their pictures.
+Result<void> complete(CalibrateCommand& command) {
+  CalibrateOptions& options = command.options;
+  if (command.board.empty() == options.pattern.empty()) {
+    return fail(ExitCode::kUsage, "calibrate.plane", "calibrate", "no plane is named to look for",
+                "give --board 9x6 or --pattern IMAGE");
+  }
+  char cross = 0;
+  char more = 0;
+  if (!command.board.empty() &&
+      (std::sscanf(command.board.c_str(), "%d%c%d%c", &options.board_columns, &cross,
+                   &options.board_rows, &more) != 3 ||
+       cross != 'x' || std::min(options.board_columns, options.board_rows) < 3 ||
+       std::max(options.board_columns, options.board_rows) > 100)) {
+    return fail(ExitCode::kUsage, "calibrate.board", command.board, "this is no size of a board",
+                "count the inner corners: --board 9x6");
+  }
+  std::vector<std::string> files;
+  for (const std::string& input : options.inputs) {
+    std::error_code failed;
+    if (!std::filesystem::is_directory(input, failed)) {
+      files.push_back(input);
+      continue;
+    }
+    const auto pictures = pictures_of(input);
+    if (!pictures) return tl::unexpected(pictures.error());
+    files.insert(files.end(), pictures->begin(), pictures->end());
+  }
+  options.inputs = std::move(files);
+  return {};
+}
+
+int run(CalibrateCommand& command) {
+  if (auto done = complete(command); !done) return print_error(done.error());
+  ProgressBar bar(command.quiet);
+  const auto calibration = calibrate(
+      command.options, [&](const std::string& what, double done) { bar.show(what, done); });
+  bar.clear();
+  if (!calibration) return print_error(calibration.error());
+  if (auto wrote = write_camera_file(*calibration, command.output); !wrote) {
+    return print_error(wrote.error());
+  }
+  if (command.json) {
+    std::fputs(calibration_json(*calibration).c_str(), stdout);
+  } else {
+    const Camera& camera = calibration->camera;
+    std::printf(
+        "focal length %.2f x %.2f (+- %.2f), centre %.2f, %.2f, of %d x %d pixels; %d of %d frames,"
+        " %.3f pixels rms\n",
+        camera.fx, camera.fy, calibration->focal_spread, camera.cx, camera.cy, camera.width,
+        camera.height, calibration->views, calibration->frames, calibration->rms_px);
+  }
+  return static_cast<int>(ExitCode::kOk);
+}
+
+}  // namespace
+
+int run_calibrate(std::vector<std::string> arguments) {
+  CLI::App app("modar calibrate: a camera's focal length, centre and distortion",
+               "modar calibrate");
+  CalibrateCommand command;
+  add_options(app, command);
+  try {
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
+    app.parse(arguments);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
+                                : static_cast<int>(ExitCode::kUsage);
+  }
+  return run(command);
+}
+
+}  // namespace modar

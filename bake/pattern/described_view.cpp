@@ -1,0 +1,37 @@
+// Features of rendered views, brought back to the picture.
+#include "bake/pattern/described_view.hpp"
+
+#include <bit>
+#include <cstring>
+
+namespace modar {
+
+int code_distance(const LoopCode& a, const LoopCode& b) {
+  int bits = 0;
+  for (std::size_t i = 0; i < 32; i += 8) {
+    std::uint64_t x = 0;
+    std::uint64_t y = 0;
+    std::memcpy(&x, a.data() + i, 8);
+    std::memcpy(&y, b.data() + i, 8);
+    bits += std::popcount(x ^ y);
+  }
+  return bits;
+}
+
+std::array<double, 2> to_picture(const AffineView& view, double x, double y) {
+  const auto& a = view.linear;
+  const double determinant = a[0] * a[3] - a[1] * a[2];
+  const double u = x - view.offset[0];
+  const double v = y - view.offset[1];
+  return {(a[3] * u - a[1] * v) / determinant, (a[0] * v - a[2] * u) / determinant};
+}
+
+LoopDetectOptions generous_detection() {
+  LoopDetectOptions options;
+  options.cell = 32;
+  options.per_cell = 16;
+  options.max_features = 20000;
+  return options;
+}
+
+}  // namespace modar

@@ -1,0 +1,169 @@
+// Least squares for one over the squared focal length, over homographies of detected patterns.
+#include "modar/focal_finder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "kernels.hpp"
+#include "loop_pattern.hpp"
+#include "modar/camera.hpp"
+#include "modar/loop_features.hpp"
+#include "plane_matcher.hpp"
+
+namespace modar {
+namespace {
+
+using loop::LoopPattern;
+
+constexpr int kInliers = 40;  // of a view that counts
+constexpr double kPerspective =
+    0.06;  // of the two axes' vanishing terms, below which nothing shows
+constexpr int kFewestViews = 8;
+constexpr int kMostViews = 256;
+constexpr double kSure = 0.01;
+
+/// a * x = b for x = 1 / f^2: an axis of the plane is as long as the other, and at right angles.
+struct Constraint {
+  double a = 0;
+  double b = 0;
+};
+
+/// Both constraints of a view. homography: world (ModAR Eq. 1) to pixels from the frame's middle.
+std::array<Constraint, 2> constraints_of(const glm::dmat3& homography, double unit) {
+  // In units of the frame's width the first two rows and the last are of one size.
+  glm::dvec3 h1 = homography[0];
+  glm::dvec3 h2 = homography[1];
+  for (glm::dvec3* h : {&h1, &h2}) {
+    h->x /= unit;
+    h->y /= unit;
+  }
+  const double scale = 1.0 / std::sqrt(h1.x * h1.x + h1.y * h1.y + h2.x * h2.x + h2.y * h2.y);
+  h1 *= scale;
+  h2 *= scale;
+  return {{{h1.x * h2.x + h1.y * h2.y, -h1.z * h2.z},
+           {0.5 * (h1.x * h1.x + h1.y * h1.y - h2.x * h2.x - h2.y * h2.y),
+            0.5 * (h2.z * h2.z - h1.z * h1.z)}}};
+}
+
+}  // namespace
+
+struct FocalFinder::State {
+  double unit = 0;  ///< frame width
+  double middle_x = 0;
+  double middle_y = 0;
+  std::vector<LoopPattern> patterns;
+  std::unique_ptr<LoopDescriber> describer;
+  std::unique_ptr<loop::PlaneMatcher> matcher;
+  std::vector<Constraint> constraints;  ///< two a view
+
+  /// x = 1 / f^2 in squared units, and its standard deviation.
+  [[nodiscard]] bool solve(double& x, double& deviation) const;
+};
+
+bool FocalFinder::State::solve(double& x, double& deviation) const {
+  // Twice: the second time without views that the first cannot explain.
+  double limit = 1e9;
+  for (int pass = 0; pass < 2; ++pass) {
+    double aa = 0;
+    double ab = 0;
+    int count = 0;
+    for (const Constraint& c : constraints) {
+      if (pass > 0 && std::abs(c.a * x - c.b) > limit) continue;
+      aa += c.a * c.a;
+      ab += c.a * c.b;
+      ++count;
+    }
+    if (count < kFewestViews || !(aa > 0)) return false;
+    const double best = ab / aa;
+    double rest = 0;
+    for (const Constraint& c : constraints) {
+      const double off = c.a * best - c.b;
+      if (pass == 0 || std::abs(c.a * x - c.b) <= limit) rest += off * off;
+    }
+    x = best;
+    deviation = std::sqrt(rest / (count - 1) / aa);
+    limit = 2.5 * std::sqrt(rest / count);
+  }
+  return x > 0;
+}
+
+FocalFinder::FocalFinder(std::unique_ptr<State> state) : state_(std::move(state)) {}
+FocalFinder::~FocalFinder() = default;
+
+Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundle, int width,
+                                                         int height) {
+  if (width < 1 || height < 1 || width > 16384 || height > 16384) {
+    return fail(ExitCode::kInvalidInput, "tracker.frame-size", "", "the frames have no size",
+                "give 1 to 16384 pixels a side");
+  }
+  auto state = std::make_unique<State>();
+  state->unit = width;
+  state->middle_x = 0.5 * (width - 1);
+  state->middle_y = 0.5 * (height - 1);
+  std::size_t most_codes = 0;
+  for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
+    const auto bytes = bundle.section(SectionType::kLoopRecord, i);
+    if (bytes.empty()) continue;
+    auto pattern = loop::view_loop_pattern(bytes, i);
+    if (!pattern) return tl::unexpected(pattern.error());
+    most_codes = std::max(most_codes, pattern->features.size());
+    state->patterns.push_back(*pattern);
+  }
+  if (state->patterns.empty()) {
+    return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
+                "the bundle holds no pattern with a record for this loop",
+                "bake it with a pattern");
+  }
+  const LoopDetectOptions detect;
+  state->describer = LoopDescriber::create(width, height, detect);
+  state->matcher = std::make_unique<loop::PlaneMatcher>(
+      default_camera(width, height), loop::kernels(), static_cast<std::size_t>(detect.max_features),
+      most_codes);
+  state->constraints.reserve(2 * kMostViews);
+  return std::unique_ptr<FocalFinder>(new FocalFinder(std::move(state)));
+}
+
+bool FocalFinder::look(const GrayImage& frame) {
+  State& state = *state_;
+  state.describer->set_frame(frame);
+  const auto features = state.describer->features();
+  bool added = false;
+  for (const LoopPattern& pattern : state.patterns) {
+    if (state.constraints.size() + 2 > 2 * kMostViews) return added;
+    const auto finds = state.matcher->find(pattern, features);
+    if (finds.empty() || finds[0].inliers < kInliers) continue;
+    glm::dmat3 centre(1.0);
+    centre[2] = {-state.middle_x, -state.middle_y, 1.0};
+    const glm::dmat3 from_world =
+        centre * finds[0].homography * glm::inverse(pattern.world_from_pixels());
+    const glm::dmat3 homography = from_world * (1.0 / from_world[2][2]);
+    if (std::hypot(homography[0].z, homography[1].z) < kPerspective) continue;
+    for (const Constraint& constraint : constraints_of(homography, state.unit)) {
+      state.constraints.push_back(constraint);
+    }
+    added = true;
+  }
+  return added;
+}
+
+int FocalFinder::views() const {
+  return static_cast<int>(state_->constraints.size() / 2);
+}
+
+std::optional<double> FocalFinder::focal() const {
+  double x = 0;
+  double deviation = 0;
+  if (views() < kFewestViews || !state_->solve(x, deviation)) return std::nullopt;
+  // f = x^(-1/2): its relative deviation is half of that of x.
+  if (!(0.5 * deviation < kSure * x)) return std::nullopt;
+  const double focal = state_->unit / std::sqrt(x);
+  const bool plausible = focal > 0.3 * state_->unit && focal < 6 * state_->unit;
+  return plausible ? std::optional<double>(focal) : std::nullopt;
+}
+
+}  // namespace modar

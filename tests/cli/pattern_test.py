@@ -1,0 +1,67 @@
+"""`modar pattern score|simulate|confusion` and `modar calibrate`: what they print, write and refuse."""
+import unittest
+
+from programs import COVER, QUICK, ProgramTest
+
+CAMERA = """%YAML:1.0
+---
+image_width: 208
+image_height: 156
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 220., 0., 104., 0., 220., 77., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ -0.1, 0., 0., 0., 0. ]
+"""
+CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur"]
+
+
+class Pattern(ProgramTest):
+    def test_the_score_is_stored_and_printed_with_causes(self):
+        one, = self.modar_json("pattern", "score", COVER, "--overlay", self.folder, "--jobs", "2")
+        self.assertEqual((one["name"], one["version"]), ("cover", 1))
+        self.assertTrue(0 <= one["score"] <= 100)
+        self.assertEqual([cause["id"] for cause in one["causes"]], CAUSES)
+        self.assertTrue((self.folder / "cover.png").read_bytes().startswith(b"\x89PNG"))
+        baked = self.modar("bake", "--pattern", COVER, "-o", "b.modar", "--jobs", "1", "--quiet")
+        self.assertEqual(baked.returncode, 0, baked.stderr)
+        self.assertEqual(self.modar_json("inspect", "b.modar")["patterns"][0]["score"], one["score"])
+
+    def test_simulate_tells_bands_and_a_range(self):
+        (self.folder / "camera.yml").write_text(CAMERA)
+        one, = self.modar_json("pattern", "simulate", COVER, "--camera", "camera.yml", "--views", "1", "--width-mm",
+                               "200", "--picture", self.folder)
+        self.assertEqual([band["name"] for band in one["bands"]],
+                         ["distance", "tilt", "rotation", "blur", "light", "noise", "occlusion"])
+        for band in one["bands"]:
+            for value in band["values"]:
+                self.assertEqual(value["frames"], 2)
+        self.assertIn("printed 20 cm wide, this camera recognises it from", one["sentence"])
+        self.assertLess(one["nearest_mm"], one["farthest_mm"])
+        self.assertTrue((self.folder / "cover.png").read_bytes().startswith(b"\x89PNG"))
+
+    def test_confusion_of_a_bundle_with_itself(self):
+        done = self.modar("bake", "--pattern", COVER, "-o", "b.modar", "--quiet", *QUICK)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        alone = self.modar_json("pattern", "confusion", "b.modar", "--views", "2")
+        self.assertEqual(alone["false_recognitions"], 0)
+        self.assertEqual(alone["patterns"], [{"name": "cover", "recognised": 2, "taken_for": {}, "in_photos": 0}])
+        twice = self.modar("pattern", "confusion", "b.modar", "b.modar", "--views", "2")
+        self.assertEqual(twice.returncode, 3)
+        self.assertIn("false recognitions: 4", twice.stdout)
+
+    def test_calibrate_says_what_is_missing(self):
+        self.assert_fails(self.modar("calibrate", COVER, "-o", "c.yml"), 1, "--board")
+        self.assert_fails(self.modar("calibrate", COVER, "--board", "9", "-o", "c.yml"), 1, "9x6")
+        self.assert_fails(self.modar("calibrate", COVER, "--board", "9x6", "-o", "c.yml"), 3, "5 are needed")
+        self.assert_fails(self.modar("calibrate", "nothing.mp4", "--board", "9x6", "-o", "c.yml"), 2)
+        self.assertFalse((self.folder / "c.yml").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()

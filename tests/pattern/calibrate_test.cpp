@@ -1,0 +1,210 @@
+// Calibration against cameras that are known, and against OpenCV's own of real photos.
+#include "bake/pattern/calibrate.hpp"
+
+#include <filesystem>
+
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "bake/pattern/pose_scene.hpp"
+#include "bake/pattern/pose_subject.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/camera_file.hpp"
+#include "modar/focal_finder.hpp"
+#include "tests/track/synthetic.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Calibrate : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("modar_calibrate_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
+
+  /// Views of a flat picture, with noise, as PNG files.
+  std::vector<std::string> film(const cv::Mat& picture, const Camera& camera, int views,
+                                double tilt) {
+    cv::RNG random(4);
+    std::vector<std::string> files;
+    for (int i = 0; i < views; ++i) {
+      const test::View view = test::look_at(2.7, tilt, 360.0 * i / views, 17.0 * i,
+                                            0.3 * std::cos(2.0 * i), 0.25 * std::sin(3.0 * i));
+      cv::Mat frame = test::render(picture, view, camera,
+                                   cv::Mat(camera.height, camera.width, CV_8UC1, cv::Scalar(150)));
+      cv::Mat noise(frame.size(), CV_16SC1);
+      random.fill(noise, cv::RNG::NORMAL, 0, 3);
+      cv::add(frame, noise, frame, cv::noArray(), CV_8U);
+      files.push_back(path("view" + std::to_string(i) + ".png"));
+      EXPECT_TRUE(cv::imwrite(files.back(), frame));
+    }
+    return files;
+  }
+
+  fs::path folder_;
+};
+
+Camera bent_camera() {
+  Camera camera = default_camera(480, 360);
+  camera.fx = camera.fy = 530;
+  camera.cx = 247;
+  camera.cy = 175;
+  camera.distortion = {-0.15, 0.06, 0, 0, 0};
+  return camera;
+}
+
+cv::Mat chessboard(int columns, int rows, int square) {
+  cv::Mat board((rows + 3) * square, (columns + 3) * square, CV_8UC1, cv::Scalar(255));
+  for (int y = 0; y <= rows; ++y) {
+    for (int x = 0; x <= columns; ++x) {
+      if ((x + y) % 2 == 0) {
+        cv::rectangle(board, {(x + 1) * square, (y + 1) * square, square, square}, cv::Scalar(0),
+                      cv::FILLED);
+      }
+    }
+  }
+  return board;
+}
+
+void expect_camera(const Calibration& calibration, const Camera& truth) {
+  EXPECT_NEAR(calibration.camera.fx, truth.fx, 0.01 * truth.fx);
+  EXPECT_NEAR(calibration.camera.fy, truth.fy, 0.01 * truth.fy);
+  EXPECT_NEAR(calibration.camera.cx, truth.cx, 6);
+  EXPECT_NEAR(calibration.camera.cy, truth.cy, 6);
+  EXPECT_NEAR(calibration.camera.distortion[0], truth.distortion[0], 0.05);
+  EXPECT_LT(calibration.rms_px, 0.6);
+}
+
+TEST_F(Calibrate, FromAChessboardThroughABentLens) {
+  CalibrateOptions options;
+  options.inputs = film(chessboard(7, 5, 30), bent_camera(), 8, 35);
+  options.board_columns = 7;
+  options.board_rows = 5;
+  const auto calibration = calibrate(options, {});
+  ASSERT_TRUE(calibration) << to_line(calibration.error());
+  EXPECT_EQ(calibration->frames, 8);
+  EXPECT_GE(calibration->views, 7);
+  expect_camera(*calibration, bent_camera());
+}
+
+TEST_F(Calibrate, FromAnyPatternThroughABentLens) {
+  const cv::Mat picture = test::textured_picture(320, 260, 12);
+  ASSERT_TRUE(cv::imwrite(path("pattern.png"), picture));
+  CalibrateOptions options;
+  options.inputs = film(picture, bent_camera(), 9, 38);
+  options.pattern = path("pattern.png");
+  const auto calibration = calibrate(options, {});
+  ASSERT_TRUE(calibration) << to_line(calibration.error());
+  EXPECT_GE(calibration->views, 7);
+  expect_camera(*calibration, bent_camera());
+
+  // What is written is what the player reads.
+  ASSERT_TRUE(write_camera_file(*calibration, path("camera.yml")));
+  const auto camera = read_camera_file(path("camera.yml"));
+  ASSERT_TRUE(camera) << to_line(camera.error());
+  EXPECT_EQ(camera->width, 480);
+  EXPECT_EQ(camera->height, 360);
+  EXPECT_NEAR(camera->fx, calibration->camera.fx, 1e-9);
+  EXPECT_NEAR(camera->distortion[0], calibration->camera.distortion[0], 1e-12);
+}
+
+TEST_F(Calibrate, SaysWhatIsMissing) {
+  CalibrateOptions options;
+  options.board_columns = 7;
+  options.board_rows = 5;
+  options.inputs = film(chessboard(7, 5, 30), bent_camera(), 3, 35);
+  const auto few = calibrate(options, {});
+  ASSERT_FALSE(few);
+  EXPECT_EQ(few.error().code, "calibrate.few-views");
+  options.inputs = film(chessboard(7, 5, 30), bent_camera(), 5, 0);
+  const auto frontal = calibrate(options, {});
+  ASSERT_FALSE(frontal);
+  EXPECT_EQ(frontal.error().code, "calibrate.weak");
+  cv::imwrite(path("other.png"), cv::Mat(100, 100, CV_8UC1, cv::Scalar(9)));
+  options.inputs.push_back(path("other.png"));
+  EXPECT_EQ(calibrate(options, {}).error().code, "calibrate.size");
+  options.inputs = {path("nowhere.mp4")};
+  EXPECT_EQ(calibrate(options, {}).error().code, "calibrate.input");
+}
+
+TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
+  const cv::Mat image = test::textured_picture(320, 260, 12);
+  LoopBakeOptions bake;
+  bake.trial_views = 40;
+  const auto bytes = bundle_of_pattern(test::gray(image), bake);
+  ASSERT_TRUE(bytes) << to_line(bytes.error());
+  const auto bundle = BundleView::open(*bytes);
+  ASSERT_TRUE(bundle);
+  for (const double truth : {520.0, 840.0}) {
+    auto finder = FocalFinder::create(*bundle, 640, 480);
+    ASSERT_TRUE(finder) << to_line(finder.error());
+    Camera camera = default_camera(640, 480);
+    camera.fx = camera.fy = truth;
+    Random random(9);
+    const GrayPicture background = made_background(640, 480, random);
+    SceneBand band;
+    band.area_low = 0.8;
+    band.area_high = 1.6;
+    band.tilt_low = 20;
+    band.tilt_high = 50;
+    for (int i = 0; i < 60 && !(*finder)->focal(); ++i) {
+      const Pose pose = draw_pose(band, test::gray(image), camera, random);
+      const SceneFrame scene =
+          render_scene(test::gray(image), camera, pose, background, band, random);
+      (*finder)->look(scene.picture.view());
+    }
+    ASSERT_TRUE((*finder)->focal()) << truth << " after " << (*finder)->views() << " views";
+    EXPECT_NEAR(*(*finder)->focal(), truth, 0.02 * truth);
+  }
+}
+
+TEST(FocalFinder, FrontalViewsTellNothing) {
+  const cv::Mat image = test::textured_picture(320, 260, 12);
+  LoopBakeOptions bake;
+  bake.trial_views = 20;
+  const auto bytes = bundle_of_pattern(test::gray(image), bake);
+  ASSERT_TRUE(bytes);
+  auto finder = FocalFinder::create(BundleView::open(*bytes).value(), 640, 480);
+  ASSERT_TRUE(finder);
+  const Camera camera = default_camera(640, 480);
+  Random random(9);
+  const GrayPicture background = made_background(640, 480, random);
+  SceneBand band;
+  band.tilt_high = 1;
+  for (int i = 0; i < 10; ++i) {
+    const Pose pose = draw_pose(band, test::gray(image), camera, random);
+    (*finder)->look(
+        render_scene(test::gray(image), camera, pose, background, band, random).picture.view());
+  }
+  EXPECT_FALSE((*finder)->focal());
+}
+
+TEST_F(Calibrate, RealPhotosAsOpenCvHasThem) {
+  const std::string data = test::shared_data();
+  if (data.empty()) GTEST_SKIP() << "there is no shared data";
+  const auto known = read_camera_file(data + "/calib/left_intrinsics.yml");
+  ASSERT_TRUE(known) << to_line(known.error());
+  CalibrateOptions options;
+  for (const auto& entry : fs::directory_iterator(data + "/calib")) {
+    if (entry.path().extension() == ".jpg") options.inputs.push_back(entry.path());
+  }
+  options.board_columns = 9;
+  options.board_rows = 6;
+  const auto calibration = calibrate(options, {});
+  ASSERT_TRUE(calibration) << to_line(calibration.error());
+  EXPECT_NEAR(calibration->camera.fx, known->fx, 0.01 * known->fx);
+  EXPECT_NEAR(calibration->camera.fy, known->fy, 0.01 * known->fy);
+  EXPECT_NEAR(calibration->camera.cx, known->cx, 5);
+}
+
+}  // namespace
+}  // namespace modar
