@@ -118,10 +118,11 @@ void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
   }
   Fit fit;
   Pose refined = fitted.pose;
-  bool settled = settle(pattern, scene, false, refined, fit);
-  if (!settled) {
+  bool settled = settle(pattern, scene, Reach::kNear, refined, fit);
+  for (const Reach reach : {Reach::kFrame, Reach::kFar}) {
+    if (settled) break;
     refined = fitted.pose;
-    settled = settle(pattern, scene, true, refined, fit);
+    settled = settle(pattern, scene, reach, refined, fit);
   }
   // Patches on the edge of what hides the rest can pull a pose away from what all features say.
   const double misfit_after =

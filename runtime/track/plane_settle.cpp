@@ -27,16 +27,20 @@ int coarsest_level(const LoopPattern& pattern, const Resolution& best, int level
 
 }  // namespace
 
-bool settle(const LoopPattern& pattern, const Scene& scene, bool thorough, Pose& pose, Fit& fit) {
+bool settle(const LoopPattern& pattern, const Scene& scene, Reach reach, Pose& pose, Fit& fit) {
+  const bool far = reach == Reach::kFar;
   const int levels = static_cast<int>(scene.pyramid.size());
   const Resolution best = finest(pattern, map_of_pose(pattern, scene.camera, pose), levels);
-  const int coarsest = coarsest_level(pattern, best, levels, thorough ? 4 : 2);
+  const int coarsest = coarsest_level(pattern, best, levels,
+                                      far                      ? 4
+                                      : reach == Reach::kFrame ? 2
+                                                               : 0);
   const double depth = pose.translation.z;
   Pose held = pose;
   bool found = false;
   for (int level = coarsest; level >= best.frame_level; --level) {
     Pose next = pose;
-    const Fit now = align(pattern, scene, level, thorough ? 5 : 2, level == best.frame_level, next);
+    const Fit now = align(pattern, scene, level, far ? 5 : 2, level == best.frame_level, next);
     const double zoom = next.translation.z / depth;
     if (!(zoom < kMostZoom && zoom * kMostZoom > 1.0)) return false;
     // Under blur fine patches hold along the motion only, and pull away from what coarse ones say.

@@ -2,6 +2,7 @@
 // runtime/track.
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "plane_align.hpp"
@@ -11,10 +12,15 @@ namespace modar::loop {
 /// Share of the textured cells in view that a pose must show to be believed.
 inline constexpr int kRightPercent = 30;
 
+/// How far away the pose may be, and so how coarse a level it starts on and how many steps it
+/// takes. Coarse patches reach over the edge of whatever hides a part of the pattern: the nearer
+/// the better.
+enum class Reach : std::uint8_t { kNear, kFrame, kFar };
+
 /// From a coarse level, on which the pattern is still some tens of pixels large, to the finest.
 /// Answers true where the finest level holds, or under blur a coarser one that the whole picture
-/// confirms. thorough: from further away, with more steps.
-bool settle(const LoopPattern& pattern, const Scene& scene, bool thorough, Pose& pose, Fit& fit);
+/// confirms.
+bool settle(const LoopPattern& pattern, const Scene& scene, Reach reach, Pose& pose, Fit& fit);
 
 /// Photometric check: percentage of the textured cells in view that look as they should; 0 where
 /// too few do to tell.

@@ -222,7 +222,7 @@ bool PoseLoop::State::find_again(const LoopPattern& pattern, const Track& track,
   for (int attempt = 0; attempt < (track.moving ? 2 : 1); ++attempt) {
     Pose tried = attempt == 0 ? predicted : track.pose;
     Fit now;
-    if (!loop::settle(pattern, scene(), true, tried, now)) continue;
+    if (!loop::settle(pattern, scene(), loop::Reach::kFar, tried, now)) continue;
     const int right = loop::percent_right(pattern, scene(), tried);
     if (right <= best) continue;
     best = right;
@@ -270,7 +270,8 @@ bool PoseLoop::State::unsmear(const LoopPattern& pattern, const Track& track, co
   if (best == 0.0) return false;
   Pose tried = predicted;
   Fit seen;
-  if (!loop::settle(pattern, blurred, false, tried, seen) || seen.likeness <= fit.likeness) {
+  if (!loop::settle(pattern, blurred, loop::Reach::kFrame, tried, seen) ||
+      seen.likeness <= fit.likeness) {
     return false;
   }
   pose = tried;
@@ -281,7 +282,7 @@ bool PoseLoop::State::unsmear(const LoopPattern& pattern, const Track& track, co
 bool PoseLoop::State::follow_pose(const LoopPattern& pattern, Track& track, Fit& fit) {
   const Pose predicted = track.moving ? loop::continued(track.before, track.pose) : track.pose;
   Pose pose = predicted;
-  bool found = loop::settle(pattern, scene(), false, pose, fit);
+  bool found = loop::settle(pattern, scene(), loop::Reach::kFrame, pose, fit);
   const bool unsmeared = unsmear(pattern, track, predicted, pose, fit);
   found = found || unsmeared;
   if (!unsmeared && fit.likeness > track.likeness) track.likeness = fit.likeness;
@@ -339,7 +340,7 @@ bool PoseLoop::State::take_up(const LoopPattern& pattern, Track& track, const Fi
     Fit fit;
     const bool here =
         next.by_map ? loop::settle_map(pattern, scene(), next.map, fit)
-                    : loop::settle(pattern, scene(), true, next.pose, fit) &&
+                    : loop::settle(pattern, scene(), loop::Reach::kFar, next.pose, fit) &&
                           loop::percent_right(pattern, scene(), next.pose) >= loop::kRightPercent;
     if (!here) return false;
   }
