@@ -1,11 +1,19 @@
 // The device's build has no exceptions, yet libstdc++ brings the machinery to throw, to demangle
 // and to print them: 200 KB that could only end the program. These end it at once.
 //
-// operator new may be replaced by anybody; the other names are libstdc++'s own hooks, which its
-// headers call where another library would throw.
+// operator new may be replaced by anybody; std::__throw_*() are libstdc++'s own hooks, which its
+// headers call where another library would throw; std::terminate() and the names of the C++ ABI are
+// what its threads and guarded statics refer to: left to the library, they bring the whole stack
+// unwinder (33 KB), which has nothing to read here, for our objects carry no unwind tables.
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <new>
+
+#ifdef __GLIBCXX__
+#include <cxxabi.h>
+#include <unwind.h>
+#endif
 
 namespace {
 
@@ -32,6 +40,9 @@ void operator delete(void* memory, std::size_t /*size*/) noexcept {
 
 #ifdef __GLIBCXX__
 namespace std {
+void terminate() noexcept {
+  give_up("terminate");
+}
 void __throw_bad_alloc() {
   give_up("allocation");
 }
@@ -57,9 +68,32 @@ void __throw_system_error(int /*error*/) {
   give_up("thread");
 }
 }  // namespace std
-namespace __gnu_cxx {
-void __verbose_terminate_handler() {
-  give_up("terminate");
+
+extern "C" {
+void* __cxxabiv1::__cxa_allocate_exception(std::size_t /*size*/) noexcept {
+  give_up("throw");
 }
-}  // namespace __gnu_cxx
+void __cxxabiv1::__cxa_free_exception(void* /*exception*/) noexcept {
+  give_up("throw");
+}
+void __cxxabiv1::__cxa_throw(void* /*exception*/, std::type_info* /*type*/, void (*)(void*)) {
+  give_up("throw");
+}
+void __cxxabiv1::__cxa_rethrow() {
+  give_up("throw");
+}
+void* __cxxabiv1::__cxa_begin_catch(void* /*exception*/) noexcept {
+  give_up("catch");
+}
+void __cxxabiv1::__cxa_end_catch() {
+  give_up("catch");
+}
+void _Unwind_Resume(_Unwind_Exception* /*exception*/) {
+  give_up("unwind");
+}
+/// Tables of libstdc++'s own functions name it; without an unwinder nobody calls it.
+void __gxx_personality_v0() {
+  give_up("unwind");
+}
+}
 #endif
