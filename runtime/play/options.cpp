@@ -90,9 +90,10 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 8> kSwitches = {{{"json", &PlayOptions::json},
+constexpr std::array<SwitchOption, 9> kSwitches = {{{"json", &PlayOptions::json},
                                                     {"window", &PlayOptions::window},
                                                     {"realtime", &PlayOptions::realtime},
+                                                    {"find-focal", &PlayOptions::find_focal},
                                                     {"outline", &PlayOptions::outline},
                                                     {"osd", &PlayOptions::osd},
                                                     {"quiet", &PlayOptions::quiet},
@@ -151,6 +152,13 @@ Result<void> validate(const PlayOptions& options) {
   }
   if (!options.golden.empty() && (options.realtime || !options.record.empty())) {
     return usage("usage.conflict", "--golden", "it replays every frame, and records none");
+  }
+  if (options.find_focal && !(options.golden.empty() && options.record.empty())) {
+    return usage("usage.conflict", "--find-focal",
+                 "a recording has one camera from its first frame on; give --camera FILE.yml");
+  }
+  if (options.find_focal && !options.camera_file.empty()) {
+    return usage("usage.conflict", "--find-focal", "--camera tells the focal length already");
   }
   if (!options.method.empty() && options.method != "ours" && options.method != "paper") {
     return usage("usage.method", "--method",
@@ -237,6 +245,8 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
   --json              one JSON line a frame and a summary, to standard output
   --camera FILE.yml   camera matrix and distortion as OpenCV writes them
                       (default: focal length = width of the frame)
+  --find-focal        instead (off by default): measures the focal length on tilted views of the
+                      patterns while playing, and goes on with it; see also modar calibrate
   --method METHOD     how patterns are found: ours (default where the bundle has records for it),
                       or paper, the article's
   --parameters SET    of --method paper, which it implies: orb-2000 (default), orb-500, brisk-3 or

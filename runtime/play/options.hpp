@@ -33,6 +33,7 @@ struct PlayOptions {
   int height = 480;
   bool json = false;
   bool window = false;
+  bool find_focal = false;
   bool realtime = false;
   bool outline = false;
   bool osd = false;

@@ -63,14 +63,19 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   options.method = choose_method(bundle, plan->method, plan->parameters);
   const Result<std::uint32_t> set = choose_parameter_set(bundle, plan->parameters);
   if (!set) return tl::unexpected(set.error());
+  if (options.find_focal && options.method != "ours") {
+    return fail(ExitCode::kUsage, "usage.conflict", "--find-focal",
+                "it looks with our loop's records, not with the article's method",
+                "leave --method and --parameters out, and bake the pattern with this modar");
+  }
   auto source = open_frame_source(plan->input);
   if (!source) return tl::unexpected(source.error());
   const SourceInfo info = (*source)->info();
   // Only where frames may be dropped may a result depend on time.
   const bool newest = info.live || options.realtime;
   SpotSlot spot;
-  Result<TrackStep> track =
-      open_vision(bundle, {options.method == "ours", *set, plan->camera, &spot, newest});
+  Result<TrackStep> track = open_vision(
+      bundle, {options.method == "ours", *set, plan->camera, &spot, newest, options.find_focal});
   if (!track) return tl::unexpected(track.error());
 
   Player player(options, bundle);

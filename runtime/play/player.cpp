@@ -103,6 +103,7 @@ Result<bool> Player::show(const Job& job) {
     return tl::unexpected(sized.error());
   }
   follow_spot(job);
+  if (options_.find_focal && !options_.quiet) tell_focal(job.camera);
   FrameReport report = begin_report(job);
   const std::int64_t before = now_ns();
   screen_->draw(job.frame.picture(), job.camera, items_);
@@ -141,6 +142,17 @@ void Player::follow_spot(const Job& job) {
   names_ = pattern_names(spot_ ? spot_->view : bundle_);
   hysteresis_ = Hysteresis(names_.size());
   smoother_ = PoseSmoother(names_.size(), options_.smooth_ms);
+}
+
+/// The vision thread has measured the focal length of frames of this size: says so once.
+void Player::tell_focal(const Camera& camera) {
+  if (camera.fx == told_focal_ || camera.fx == default_camera(camera.width, camera.height).fx) {
+    return;
+  }
+  told_focal_ = camera.fx;
+  progress_.end();
+  std::fprintf(stderr, "modar-play: the focal length is %.1f pixels, from frame %llu on\n",
+               camera.fx, static_cast<unsigned long long>(stats_.frames()));
 }
 
 /// Hysteresis, what to draw, and all of the report that stands before drawing.

@@ -3,19 +3,48 @@
 
 #include <memory>
 
+#include "modar/focal_finder.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {
 namespace {
+
+constexpr int kLookEvery = 5;  // frames between looks for the focal length
 
 struct OurVision {
   const BundleView& bundle;
   VisionOptions options;
   Camera camera;
   std::unique_ptr<PoseLoop> loop;
+  std::unique_ptr<FocalFinder> finder;
+  int frames_to_look = 0;
+
+  /// Once the focal length is known, it is the camera's, and the next loop starts with it.
+  Result<void> look(const Frame& frame) {
+    if (--frames_to_look > 0) return {};
+    frames_to_look = kLookEvery;
+    if (!finder) {
+      auto created = FocalFinder::create(bundle, frame.width, frame.height);
+      if (!created) return tl::unexpected(created.error());
+      finder = std::move(*created);
+    }
+    const std::optional<double> focal =
+        finder->look(frame.gray_image()) ? finder->focal() : std::nullopt;
+    if (!focal) return {};
+    options.camera = default_camera(frame.width, frame.height);
+    options.camera->fx = options.camera->fy = *focal;
+    finder.reset();
+    loop.reset();
+    return {};
+  }
 
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
+    const std::int64_t before = now_ns();
+    if (camera.width != frame.width || camera.height != frame.height) finder.reset();
+    if (options.find_focal && !options.camera) {
+      if (auto looked = look(frame); !looked) return looked;
+    }
     if (!loop || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
       PoseLoopOptions how;
@@ -24,7 +53,6 @@ struct OurVision {
       if (!created) return tl::unexpected(created.error());
       loop = std::move(*created);
     }
-    const std::int64_t before = now_ns();
     if (auto done = loop->step(frame.gray_image(), job.track); !done) return done;
     job.track_ms = ms_since(before);
     job.camera = camera;
@@ -36,7 +64,8 @@ struct OurVision {
 }  // namespace
 
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options) {
-  const auto state = std::make_shared<OurVision>(OurVision{bundle, options, {}, nullptr});
+  const auto state =
+      std::make_shared<OurVision>(OurVision{bundle, options, {}, nullptr, nullptr, 0});
   return [state](Job& job) { return state->step(job); };
 }
 

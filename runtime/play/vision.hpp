@@ -17,6 +17,7 @@ struct VisionOptions {
   std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
   SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
   bool apart = false;               ///< our loop searches on a thread of its own (PoseLoopOptions)
+  bool find_focal = false;          ///< without a camera, ours measures the focal length it has
 };
 
 /// The method that is meant: the named one; "paper" where parameters of it are named or no pattern
@@ -41,7 +42,9 @@ Camera camera_for(const std::optional<Camera>& calibrated, int width, int height
 /// "method.unsupported" for the article's method in a build without OpenCV.
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
 
-/// Our loop alone, of `options` camera and apart. Errors: those of PoseLoop.
+/// Our loop alone, of `options` camera, apart and find_focal: a FocalFinder looks at every fifth
+/// frame until it knows the focal length; from then on that is the jobs' camera. Errors: those of
+/// PoseLoop.
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options);
 
 }  // namespace modar

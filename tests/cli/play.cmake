@@ -1,5 +1,5 @@
 # The player's parts, and the player from the outside.
-find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs videoio)
+find_package(OpenCV REQUIRED COMPONENTS calib3d core imgproc imgcodecs videoio)
 set(play_tests
   play_camera_file_test.cpp
   play_controls_test.cpp
@@ -15,10 +15,11 @@ set(play_tests
   play_sinks_test.cpp
   play_source_test.cpp
   play_v4l2_test.cpp
+  play_vision_test.cpp
   play_window_test.cpp)
 find_package(SDL2 REQUIRED)
-modar_test(play_test SOURCES ${play_tests} ${CMAKE_SOURCE_DIR}/runtime/play/screen.cpp
-  LIBRARIES modar_play_desk SDL2::SDL2 opencv_core opencv_imgproc opencv_imgcodecs opencv_videoio)
+modar_test(play_test SOURCES ${play_tests} ${CMAKE_SOURCE_DIR}/runtime/play/screen.cpp ../track/synthetic.cpp
+  LIBRARIES modar_play_desk modar_pattern SDL2::SDL2 opencv_calib3d opencv_core opencv_imgproc opencv_imgcodecs opencv_videoio)
 target_include_directories(play_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
 # The device's classes have no run-time types for UBSan to look at.
 set_source_files_properties(${play_tests} PROPERTIES COMPILE_OPTIONS "-fno-sanitize=vptr")
