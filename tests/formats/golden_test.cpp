@@ -88,7 +88,7 @@ TEST(SecondReader, AgreesOnEveryCorruptFile) {
     const std::string theirs = line.substr(0, line.find(':'));
     const auto ours = report(read_file(path));
     if (ours.back() == "good") {
-      EXPECT_EQ(theirs, "good") << kind.id;
+      EXPECT_NE(answer.text.find(path + ": good"), std::string::npos) << kind.id << ": " << line;
       continue;
     }
     EXPECT_TRUE(std::any_of(
