@@ -320,7 +320,7 @@ class Programs(unittest.TestCase):
         self.assertIn("draco::Decoder", fetch)
         self.assertNotIn("draco::ExpertEncoder", fetch)
         self.assertIn("draco::ExpertEncoder", symbols(BIN.parent / "libexec/modar/modar-workshop"))
-        self.assertNotIn("draco::", symbols("modar-play"))
+        self.assertNotIn("draco::", symbols(BIN / "modar-play"))
 
 
 class Plan(ShipTest):
