@@ -90,8 +90,9 @@ BenchResult bench_ship_rows(const BenchCommand& command) {
   return rows;
 }
 
-/// Copies of models in the article's four ways, loading and culling.
+/// Copies of models in the article's four ways, loading and culling; or the player on a video.
 BenchResult bench_render_rows(const BenchCommand& command) {
+  if (!command.pose.video.empty()) return bench_display_rows(command);
   ProgressBar bar(command.pose.quiet || command.json);
   RenderBenchOptions options;
   options.device = command.device;
@@ -117,8 +118,10 @@ const std::vector<Bench>& benches() {
        bench_etc1_rows},
       {"ship", true, "BUNDLE...",
        "bytes and decoding of what travels, against Draco, meshopt and zstd", bench_ship_rows},
-      {"render", true, "BUNDLE... [--device NAME]",
-       "ten copies in the article's ways, loading, culling, against index rendering from arrays",
+      {"render", true, "BUNDLE... [--device NAME] [--video FILE]",
+       "ten copies in the article's ways, loading, culling, against index rendering from arrays; "
+       "or "
+       "the player on a video, against the article's Table 9",
        bench_render_rows},
       {"model", false, "SCAN [--big] | --obj FILE",
        "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "

@@ -6,6 +6,7 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
+#include "bake/commands/play_json.hpp"
 #include "bake/pattern/pose_bench.hpp"
 #include "formats/error.hpp"
 
@@ -28,5 +29,14 @@ Result<std::vector<BenchRow>> bench_model_rows(const std::vector<std::string>& s
 /// Tables 7 and 8 the reference is a phone). Errors: those of bench_detection().
 Result<std::vector<BenchRow>> article_rows(const PoseBenchOptions& options,
                                            const PoseBenchProgress& progress);
+
+/// `modar bench render BUNDLE... --video FILE`: the article's Table 9 (reference) beside the
+/// player, which runs the video at its own speed, headless, in a process of its own. Errors: those
+/// of MappedFile and BundleView; kUsage "bench.scene"; kIo and kInvalidInput "bench.play".
+Result<std::vector<BenchRow>> bench_display_rows(const BenchCommand& command);
+
+/// Its rows of one run. model: decides which of the article's columns is the reference; of others
+/// the reference is not finite.
+std::vector<BenchRow> display_rows(const std::string& model, const PlayedRun& run);
 
 }  // namespace modar

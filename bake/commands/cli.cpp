@@ -150,7 +150,7 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
   PoseBenchCommand& pose = bench.pose;
   sub->add_option("--patterns", pose.patterns, "pose: folder of pattern pictures, or one picture");
   sub->add_option("--backgrounds", pose.backgrounds, "pose: folder of photos without a pattern");
-  sub->add_option("--video", pose.video, "pose: a video as well");
+  sub->add_option("--video", pose.video, "pose: a video as well; render: the player on it instead");
   sub->add_option("--truth", pose.truth, "pose: corners of the video's pattern (CSV)");
   sub->add_option("--video-pattern", pose.video_pattern,
                   "pose: picture of the video's pattern (default: pattern.png beside the video)");

@@ -71,6 +71,20 @@ class Play(ProgramTest):
         other = self.play(bundle, "--golden", "kept", "--quiet", "--parameters", "brisk-3", "--tolerance", "0")
         self.assertEqual(other.returncode, 10, other.stdout + other.stderr)
 
+    def test_a_video_is_played_beside_the_article_s_table_9(self):
+        bundle, clip = self.bake_demo(), self.clip()
+        done = self.modar("bench", "render", bundle, "--video", clip, "--json")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        rows = {row["measure"]: row for row in json.loads(done.stdout)}
+        article = {"recognition_fps": (25, 30), "display_fps": (17, 23), "display_s": (18, 12), "stutters": (0, 0)}
+        for figure, values in article.items():
+            for device, value in zip(("low_end", "mid_range"), values):
+                self.assertEqual(rows[f"pottery table9_{figure}_{device}"]["reference"], value)
+        self.assertEqual(rows["pottery pictures"]["ours"] + rows["pottery dropped_frames"]["ours"], 12)
+        done = self.modar("bench", "render", bundle, "--video", "none.mp4")
+        self.assert_fails(done, 2, "modar-play")
+        self.assertIn("none.mp4", done.stderr)
+
     def test_two_runs_give_the_same_poses_and_pictures(self):
         bundle, clip = self.bake_demo(), self.clip(4)
         runs = []
