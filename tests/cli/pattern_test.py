@@ -1,7 +1,7 @@
 """`modar pattern score|simulate|confusion` and `modar calibrate`: what they print, write and refuse."""
 import unittest
 
-from programs import COVER, QUICK, ProgramTest
+from programs import COVER, QUICK, ROOT, ProgramTest
 
 CAMERA = """%YAML:1.0
 ---
@@ -18,23 +18,25 @@ distortion_coefficients: !!opencv-matrix
    dt: d
    data: [ -0.1, 0., 0., 0., 0. ]
 """
+# Less than a third of the cover, and of the time to bake it.
+GAME = ROOT / "assets" / "patterns" / "game.png"
 CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur"]
 
 
 class Pattern(ProgramTest):
     def test_the_score_is_stored_and_printed_with_causes(self):
-        one, = self.modar_json("pattern", "score", COVER, "--overlay", self.folder, "--jobs", "2")
-        self.assertEqual((one["name"], one["version"]), ("cover", 1))
+        one, = self.modar_json("pattern", "score", GAME, "--overlay", self.folder, "--jobs", "2")
+        self.assertEqual((one["name"], one["version"]), ("game", 1))
         self.assertTrue(0 <= one["score"] <= 100)
         self.assertEqual([cause["id"] for cause in one["causes"]], CAUSES)
-        self.assertTrue((self.folder / "cover.png").read_bytes().startswith(b"\x89PNG"))
-        baked = self.modar("bake", "--pattern", COVER, "-o", "b.modar", "--jobs", "1", "--quiet")
+        self.assertTrue((self.folder / "game.png").read_bytes().startswith(b"\x89PNG"))
+        baked = self.modar("bake", "--pattern", GAME, "-o", "b.modar", "--jobs", "1", "--quiet")
         self.assertEqual(baked.returncode, 0, baked.stderr)
         self.assertEqual(self.modar_json("inspect", "b.modar")["patterns"][0]["score"], one["score"])
 
     def test_simulate_tells_bands_and_a_range(self):
         (self.folder / "camera.yml").write_text(CAMERA)
-        one, = self.modar_json("pattern", "simulate", COVER, "--camera", "camera.yml", "--views", "1", "--width-mm",
+        one, = self.modar_json("pattern", "simulate", GAME, "--camera", "camera.yml", "--views", "1", "--width-mm",
                                "200", "--picture", self.folder)
         self.assertEqual([band["name"] for band in one["bands"]],
                          ["distance", "tilt", "rotation", "blur", "light", "noise", "occlusion"])
@@ -43,7 +45,7 @@ class Pattern(ProgramTest):
                 self.assertEqual(value["frames"], 2)
         self.assertIn("printed 20 cm wide, this camera recognises it from", one["sentence"])
         self.assertLess(one["nearest_mm"], one["farthest_mm"])
-        self.assertTrue((self.folder / "cover.png").read_bytes().startswith(b"\x89PNG"))
+        self.assertTrue((self.folder / "game.png").read_bytes().startswith(b"\x89PNG"))
 
     def test_confusion_of_a_bundle_with_itself(self):
         done = self.modar("bake", "--pattern", COVER, "-o", "b.modar", "--quiet", *QUICK)

@@ -139,7 +139,7 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
 TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
   const cv::Mat image = test::textured_picture(320, 260, 12);
   LoopBakeOptions bake;
-  bake.trial_views = 40;
+  bake.trial_views = 12;
   const auto bytes = bundle_of_pattern(test::gray(image), bake);
   ASSERT_TRUE(bytes) << to_line(bytes.error());
   const auto bundle = BundleView::open(*bytes);
@@ -170,7 +170,7 @@ TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
 TEST(FocalFinder, FrontalViewsTellNothing) {
   const cv::Mat image = test::textured_picture(320, 260, 12);
   LoopBakeOptions bake;
-  bake.trial_views = 20;
+  bake.trial_views = 8;
   const auto bytes = bundle_of_pattern(test::gray(image), bake);
   ASSERT_TRUE(bytes);
   auto finder = FocalFinder::create(BundleView::open(*bytes).value(), 640, 480);
