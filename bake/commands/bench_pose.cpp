@@ -8,6 +8,7 @@
 
 #include "bake/commands/bench_rows.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/pattern/many_bench.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "bake/pattern/pose_bench.hpp"
 #include "bake/pattern/score_bench.hpp"
@@ -131,6 +132,20 @@ Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
   return rows;
 }
 
+Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options,
+                                        const PoseBenchProgress& progress) {
+  const auto measured = bench_many(options, progress);
+  if (!measured) return tl::unexpected(measured.error());
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<BenchRow> rows;
+  for (const ManyBenchRow& row : *measured) {
+    const bool held = row.reference > 0;
+    rows.push_back({row.measure + " x" + std::to_string(row.patterns), row.value,
+                    held ? row.reference : kNone, held ? row.value / row.reference : kNone});
+  }
+  return rows;
+}
+
 }  // namespace
 
 Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
@@ -144,8 +159,10 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
   };
   auto options = options_of(command);
   if (!options) return tl::unexpected(options.error());
-  if (command.scores || command.tables) {
-    auto rows = command.scores ? score_rows(*options, progress) : article_rows(*options, progress);
+  if (command.scores || command.tables || command.many) {
+    auto rows = command.many     ? many_rows(*options, progress)
+                : command.scores ? score_rows(*options, progress)
+                                 : article_rows(*options, progress);
     bar.clear();
     return rows;
   }

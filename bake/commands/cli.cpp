@@ -162,6 +162,9 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
                 "pose: the article's Tables 6 to 8 and accuracy beside its four sets and ours");
   sub->add_flag("--scores", pose.scores,
                 "pose: the patterns' scores beside their working ranges, and how well they agree");
+  sub->add_flag(
+      "--many", pose.many,
+      "pose: 1, 10 and 50 patterns at once: detection, set-up, return from behind things");
   sub->add_option("--parameters", pose.parameters,
                   "pose: set of the article's method, none: ours alone");
   sub->add_option("--only", pose.only, "pose: bands whose name holds this text");

@@ -71,6 +71,7 @@ struct PoseBenchCommand {
   int clutter = 0;                      ///< frames without a pattern, in all; 0: as the others
   bool tables = false;                  ///< print the article's tables instead
   bool scores = false;                  ///< hold scores against working ranges instead
+  bool many = false;                    ///< measure bundles of many patterns instead
   unsigned seed = 1;
   bool quiet = false;
 };

@@ -118,6 +118,15 @@ Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
   return bytes_of(content);
 }
 
+Result<std::vector<std::byte>> bundle_of_records(std::span<const GrayPicture> patterns,
+                                                 std::span<const std::vector<std::byte>> records) {
+  BundleContent content;
+  for (std::size_t i = 0; i < patterns.size(); ++i) {
+    add_record(patterns[i].view(), records[i], content);
+  }
+  return bytes_of(content);
+}
+
 Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBenchOptions& options,
                              const Camera& camera, bool track) {
   Subject subject;

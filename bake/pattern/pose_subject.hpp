@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,10 @@ Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
 /// The same with a record that is there already.
 Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
                                                 std::vector<std::byte> record);
+
+/// A bundle of patterns with their records, one each.
+Result<std::vector<std::byte>> bundle_of_records(std::span<const GrayPicture> patterns,
+                                                 std::span<const std::vector<std::byte>> records);
 
 /// track: whether ours holds patterns from frame to frame. Errors: those of reading pictures,
 /// describing and baking them.
