@@ -2,11 +2,11 @@
 #include "bake/extract.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <string_view>
 #include <system_error>
 
 #include "bake/model/glb_writer.hpp"
+#include "bake/output_folder.hpp"
 #include "bake/texture/etc1_texture.hpp"
 #include "bake/texture/texture_files.hpp"
 #include "formats/atomic_file.hpp"
@@ -129,12 +129,7 @@ Result<void> Extraction::models() {
 
 Result<std::vector<std::string>> extract_bundle(const BundleView& bundle,
                                                 const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) {
-    return fail(ExitCode::kIo, "extract.folder", folder, error.message(),
-                "name a folder that can be made");
-  }
+  if (auto made = make_output_folder(folder); !made) return tl::unexpected(made.error());
   Extraction extraction(bundle, folder);
   for (const auto& step : {&Extraction::models, &Extraction::textures, &Extraction::patterns}) {
     if (auto done = (extraction.*step)(); !done) return tl::unexpected(done.error());

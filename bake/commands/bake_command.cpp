@@ -12,6 +12,7 @@
 #include "bake/commands/terminal.hpp"
 #include "bake/commands/topology_json.hpp"
 #include "bake/model/memory_limit.hpp"
+#include "bake/output_folder.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -69,12 +70,7 @@ void report_memory(const BakeRequest& request, Report& report) {
 
 int run_bake(const BakeCommand& command) {
   if (const std::string& folder = command.request.textures.picture_folder; !folder.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) {
-      return print_error({ExitCode::kIo, "bake.folder", folder, error.message(),
-                          "name a folder that can be made"});
-    }
+    if (auto made = make_output_folder(folder); !made) return print_error(made.error());
   }
   std::unique_ptr<MemoryLimit> limit;
   if (command.request.memory_bytes != 0) {

@@ -37,7 +37,7 @@ using SourceStages = Result<void> (*)(const BundleView& bundle, const CheckComma
                                       const IssueSink& sink, CheckExtras& extras);
 
 /// Rebakes, looks and tracks, as the command asks; command.sources is not empty.
-/// Errors: those of check_source(), check_looks() and check_poses(); kIo "check.folder".
+/// Errors: those of check_source(), check_looks() and check_poses(); kIo "io.folder".
 Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
                                    const IssueSink& sink, CheckExtras& extras);
 

@@ -5,6 +5,7 @@
 
 #include "bake/commands/check_command.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/output_folder.hpp"
 
 namespace modar {
 namespace {
@@ -47,12 +48,7 @@ Result<std::vector<PatternRange>> with_the_devices_eye(const BundleView& bundle,
 
 Result<std::vector<ModelLook>> beside_sources(const BundleView& bundle, const CheckCommand& command,
                                               const IssueSink& sink) {
-  std::error_code error;
-  std::filesystem::create_directories(command.visual, error);
-  if (error) {
-    return fail(ExitCode::kIo, "check.folder", command.visual, error.message(),
-                "name a folder that can be made");
-  }
+  if (auto made = make_output_folder(command.visual); !made) return tl::unexpected(made.error());
   VisualOptions options;
   for (const std::string& path : command.sources) {
     if (is_model(path)) options.models.push_back(path);

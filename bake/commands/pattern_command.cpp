@@ -6,6 +6,7 @@
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/pattern_json.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/output_folder.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "modar/camera_file.hpp"
 
@@ -34,6 +35,11 @@ int run_rectify(const RectifyCommand& command) {
 }
 
 int run_score(const ScoreCommand& command) {
+  if (!command.overlay_folder.empty()) {
+    if (auto made = make_output_folder(command.overlay_folder); !made) {
+      return print_error(made.error());
+    }
+  }
   std::vector<NamedScore> scores;
   for (const std::string& path : command.patterns) {
     bool shrunk = false;
@@ -146,6 +152,11 @@ int run_confusion(ConfusionCommand& command) {
 
 int run_simulate(SimulateCommand& command) {
   if (auto done = complete(command); !done) return print_error(done.error());
+  if (!command.picture_folder.empty()) {
+    if (auto made = make_output_folder(command.picture_folder); !made) {
+      return print_error(made.error());
+    }
+  }
   ProgressBar bar(command.quiet);
   std::vector<Simulation> simulations;
   for (const std::string& path : command.patterns) {

@@ -25,11 +25,11 @@ CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur
 
 class Pattern(ProgramTest):
     def test_the_score_is_stored_and_printed_with_causes(self):
-        one, = self.modar_json("pattern", "score", GAME, "--overlay", self.folder, "--jobs", "2")
+        one, = self.modar_json("pattern", "score", GAME, "--overlay", "overlays", "--jobs", "2")
         self.assertEqual((one["name"], one["version"]), ("game", 1))
         self.assertTrue(0 <= one["score"] <= 100)
         self.assertEqual([cause["id"] for cause in one["causes"]], CAUSES)
-        self.assertTrue((self.folder / "game.png").read_bytes().startswith(b"\x89PNG"))
+        self.assertTrue((self.folder / "overlays/game.png").read_bytes().startswith(b"\x89PNG"))
         baked = self.modar("bake", "--pattern", GAME, "-o", "b.modar", "--jobs", "1", "--quiet")
         self.assertEqual(baked.returncode, 0, baked.stderr)
         self.assertEqual(self.modar_json("inspect", "b.modar")["patterns"][0]["score"], one["score"])
@@ -37,7 +37,7 @@ class Pattern(ProgramTest):
     def test_simulate_tells_bands_and_a_range(self):
         (self.folder / "camera.yml").write_text(CAMERA)
         one, = self.modar_json("pattern", "simulate", GAME, "--camera", "camera.yml", "--views", "1", "--width-mm",
-                               "200", "--picture", self.folder)
+                               "200", "--picture", "sheets")
         self.assertEqual([band["name"] for band in one["bands"]],
                          ["distance", "tilt", "rotation", "blur", "light", "noise", "occlusion"])
         for band in one["bands"]:
@@ -45,7 +45,7 @@ class Pattern(ProgramTest):
                 self.assertEqual(value["frames"], 2)
         self.assertIn("printed 20 cm wide, this camera recognises it from", one["sentence"])
         self.assertLess(one["nearest_mm"], one["farthest_mm"])
-        self.assertTrue((self.folder / "game.png").read_bytes().startswith(b"\x89PNG"))
+        self.assertTrue((self.folder / "sheets/game.png").read_bytes().startswith(b"\x89PNG"))
 
     def test_confusion_of_a_bundle_with_itself(self):
         done = self.modar("bake", "--pattern", COVER, "-o", "b.modar", "--quiet", *QUICK)
