@@ -26,8 +26,10 @@ void play(const std::string& input) {
     if (!*more) return;
     const auto pixels =
         static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
-    need(pixels > 0 && frame.index == i && frame.rgb.size() == 3 * pixels &&
-         frame.gray.size() == pixels);
+    need(pixels > 0 && frame.index == i);
+    need(frame.format == PictureFormat::kRgb ? frame.rgb.size() == 3 * pixels
+                                             : frame.yuv.size() == pixels + pixels / 2);
+    need(frame.gray.empty() ? frame.format != PictureFormat::kRgb : frame.gray.size() == pixels);
   }
 }
 
