@@ -147,4 +147,11 @@ Result<MaxError> parse_max_error(const std::string& text) {
               "as 2mm");
 }
 
+std::string example(const std::string& text, const std::string& codes) {
+  return "\nExample:\n" + text +
+         "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
+         "4 a bug of ours, 5 not supported" +
+         codes + ".\n";
+}
+
 }  // namespace modar

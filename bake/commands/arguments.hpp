@@ -1,4 +1,4 @@
-// The text forms that options take: scenes, corners, lengths.
+// The text forms that options take: scenes, corners, lengths; and the foot of every --help.
 #pragma once
 
 #include <array>
@@ -27,5 +27,9 @@ Result<double> parse_unit(const std::string& text);
 /// "0.002" (source units), "0.01%" (of the model's diagonal) or "2mm" (a unit of parse_unit).
 /// Errors: kUsage "cli.max-error".
 Result<MaxError> parse_max_error(const std::string& text);
+
+/// The foot of a command's --help: `text`, an example, and the exit codes, to which `codes` adds a
+/// command's own (", 15 ...").
+std::string example(const std::string& text, const std::string& codes = "");
 
 }  // namespace modar

@@ -23,14 +23,6 @@
 namespace modar {
 namespace {
 
-constexpr const char* kExitCodes =
-    "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
-    "4 a bug of ours, 5 not supported.\n";
-
-std::string example(const std::string& text) {
-  return "\nExample:\n" + text + kExitCodes;
-}
-
 /// Options as text, before they are parsed into a command.
 struct BakeTexts {
   std::vector<std::string> patterns;

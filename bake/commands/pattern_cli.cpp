@@ -12,14 +12,6 @@
 namespace modar {
 namespace {
 
-constexpr const char* kExitCodes =
-    "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
-    "4 a bug of ours, 5 not supported.\n";
-
-std::string example(const std::string& text) {
-  return "\nExample:\n" + text + kExitCodes;
-}
-
 CLI::App* add_rectify(CLI::App& app, RectifyCommand& rectify, std::string& corners) {
   CLI::App* sub = app.add_subcommand("rectify", "A frontal picture from a photo and four corners");
   sub->add_option("photo", rectify.photo, "The photo")->required()->type_name("PHOTO");

@@ -3,18 +3,15 @@
 #include <algorithm>
 #include <thread>
 
+#include "bake/commands/arguments.hpp"
 #include "bake/commands/ship_command.hpp"
 #include "bake/commands/terminal.hpp"
 
 namespace modar {
 namespace {
 
-constexpr const char* kExitCodes =
-    "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
-    "4 a bug of ours, 5 not supported, 15 another publisher is at work on the folder.\n";
-
-std::string example(const std::string& text) {
-  return "\nExample:\n" + text + kExitCodes;
+std::string ship_example(const std::string& text) {
+  return example(text, ", 15 another publisher is at work on the folder");
 }
 
 void add_key_options(CLI::App& sub, std::string& key, std::string& pass_phrase_file) {
@@ -33,7 +30,7 @@ CLI::App* add_keygen(CLI::App& app, KeygenCommand& keygen) {
                   "Encrypt the secret key with the file's first line")
       ->type_name("FILE");
   sub->add_flag("--force", keygen.force, "Write over a key that is there");
-  sub->footer(example("  modar ship keygen --out museum.key\n"));
+  sub->footer(ship_example("  modar ship keygen --out museum.key\n"));
   return sub;
 }
 
@@ -63,7 +60,7 @@ CLI::App* add_publish(CLI::App& app, ShipPublishCommand& publish) {
       ->capture_default_str();
   sub->add_flag("--quiet", publish.quiet, "No progress, no summary");
   sub->add_flag("--json", publish.json, "Print the release and what was written as JSON");
-  sub->footer(example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));
+  sub->footer(ship_example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));
   return sub;
 }
 
@@ -76,7 +73,8 @@ CLI::App* add_rotate(CLI::App& app, RotateCommand& rotate) {
   sub->add_option("--next", rotate.next_key, "The new public key; publish with its secret one then")
       ->required()
       ->type_name("NEW.pub");
-  sub->footer(example("  modar ship rotate --to /var/www/ar --key old.key --next new.key.pub\n"));
+  sub->footer(
+      ship_example("  modar ship rotate --to /var/www/ar --key old.key --next new.key.pub\n"));
   return sub;
 }
 
@@ -87,7 +85,7 @@ CLI::App* add_prune(CLI::App& app, PruneCommand& prune) {
       ->check(CLI::Range(1u, 1000000u))
       ->capture_default_str();
   sub->add_flag("--json", prune.json, "Print what was freed as JSON");
-  sub->footer(example("  modar ship prune --to /var/www/ar --keep 3\n"));
+  sub->footer(ship_example("  modar ship prune --to /var/www/ar --keep 3\n"));
   return sub;
 }
 
@@ -105,7 +103,7 @@ CLI::App* add_plan(CLI::App& app, PlanCommand& plan) {
       ->type_name("NAME");
   sub->add_option("--jobs", plan.recipe.jobs, "Processes")->check(CLI::Range(1u, 256u));
   sub->add_flag("--json", plan.json, "Print as JSON");
-  sub->footer(example("  modar ship plan old.modar new.modar --link 2g --device ace2\n") +
+  sub->footer(ship_example("  modar ship plan old.modar new.modar --link 2g --device ace2\n") +
               "A device on a cable needs no release: `adb push NAME.modar /sdcard/modar/`.\n");
   return sub;
 }

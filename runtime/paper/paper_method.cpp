@@ -1,5 +1,4 @@
 // The article's pose loop, frame by frame: match, RANSAC, Levenberg-Marquardt, corners, pose.
-#include <chrono>
 #include <cmath>
 #include <vector>
 
@@ -10,23 +9,10 @@
 #include "modar/features.hpp"
 #include "modar/tracker.hpp"
 #include "opencv_bridge.hpp"
+#include "runtime/platform/lap_clock.hpp"
 
 namespace modar {
 namespace {
-
-/// Milliseconds since it was made or asked last.
-class Clock {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const std::chrono::duration<double, std::milli> ms = now - last_;
-    last_ = now;
-    return ms.count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 struct Target {
   std::uint32_t pattern = 0;
@@ -136,7 +122,7 @@ Result<TrackResult> PaperTracker::State::step(const GrayImage& frame) {
   TrackResult result;
   if (paper::too_small_for_features(parameters, frame.width, frame.height)) return result;
   const cv::Mat pixels = paper::view_of(frame);
-  Clock clock;
+  LapClock clock;
   engine->detect(pixels, keypoints);
   result.times.detect = clock.lap();
   engine->compute(pixels, keypoints, descriptors);
@@ -154,7 +140,7 @@ Result<TrackResult> PaperTracker::State::step(const GrayImage& frame) {
 }
 
 Reason PaperTracker::State::find(const Target& target, Sighting& sighting, TrackTimes& times) {
-  Clock clock;
+  LapClock clock;
   matcher.match(target.descriptors, descriptors, matches);
   from.clear();
   to.clear();

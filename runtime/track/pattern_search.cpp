@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "lap_clock.hpp"
+#include "runtime/platform/lap_clock.hpp"
 
 namespace modar::loop {
 namespace {

@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "lap_clock.hpp"
 #include "motion.hpp"
+#include "runtime/platform/lap_clock.hpp"
 #include "seeker.hpp"
 
 namespace modar {
@@ -165,7 +165,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   result.reason = Reason::kNoFeatures;
   result.features = 0;
   result.times = {};
-  loop::LapClock clock;
+  LapClock clock;
   eye->set_frame(frame);
   follow_all(result);
   if (seeker != nullptr && seeker->take(findings, wants)) {

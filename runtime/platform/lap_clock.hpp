@@ -1,12 +1,13 @@
-// Milliseconds from one stage's end to the next one's. Internal to runtime/track.
+// Milliseconds from one stage's end to the next one's.
 #pragma once
 
 #include <chrono>
 
-namespace modar::loop {
+namespace modar {
 
 class LapClock {
  public:
+  /// Milliseconds since it was made or asked last.
   double lap() {
     const auto now = std::chrono::steady_clock::now();
     const std::chrono::duration<double, std::milli> ms = now - last_;
@@ -18,4 +19,4 @@ class LapClock {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace modar::loop
+}  // namespace modar
