@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <set>
 #include <string>
 
@@ -13,6 +12,7 @@
 #include "formats/check.hpp"
 #include "formats/statement.hpp"
 #include "tests/formats/support.hpp"
+#include "tests/soak.hpp"
 
 namespace {
 
@@ -27,9 +27,8 @@ Bytes stated_bundle() {
 }
 
 TEST(Mutate, ReachesItsGoals) {
-  const char* soak = std::getenv("MODAR_SOAK");
   MutateOptions options;
-  options.count = soak != nullptr && std::string(soak) == "1" ? 100000 : 6000;
+  options.count = modar::testing::soak() ? 100000 : 6000;
   options.second_reader = source_path("scripts/read_bundle.py");
   const auto report = mutate_bundle(stated_bundle(), options);
   ASSERT_TRUE(report) << to_line(report.error());

@@ -1,7 +1,7 @@
 // Stands in for libFuzzer where it is not linked: runs a target over files, and over copies of them
 // that are damaged in a repeatable way.
 //   NAME_replay COPIES[:SOAK] FILE|FOLDER...
-// SOAK: copies of each file where MODAR_SOAK is set in the environment.
+// SOAK: copies of each file under `scripts/test.sh --soak`.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -12,6 +12,8 @@
 #include <random>
 #include <string>
 #include <vector>
+
+#include "tests/soak.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
@@ -87,7 +89,7 @@ int main(int count, char** arguments) {
   }
   char* end = nullptr;
   unsigned long copies = std::strtoul(arguments[1], &end, 10);
-  if (*end == ':' && std::getenv("MODAR_SOAK") != nullptr) {
+  if (*end == ':' && modar::testing::soak()) {
     copies = std::strtoul(end + 1, nullptr, 10);
   }
   const std::vector<fs::path> files = files_of(count, arguments);

@@ -2,7 +2,6 @@
 // hundred thousand of them; a million under MODAR_SOAK=1.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <random>
@@ -14,14 +13,13 @@
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
 #include "tests/formats/support.hpp"
+#include "tests/soak.hpp"
 
 namespace modar {
 namespace {
 
 int rounds(int share) {
-  const char* soak = std::getenv("MODAR_SOAK");
-  const bool all = soak != nullptr && std::strcmp(soak, "1") == 0;
-  return (all ? 1'000'000 : 100'000) / share;
+  return (testing::soak() ? 1'000'000 : 100'000) / share;
 }
 
 /// Flips, overwrites, inserts, removes and repeats.
