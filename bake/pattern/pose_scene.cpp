@@ -27,6 +27,14 @@ std::array<glm::dvec2, 4> corners_of(const GrayImage& pattern, const Camera& cam
   return corners;
 }
 
+/// The turn that takes the camera's axis to a line of sight.
+glm::dmat3 towards(const glm::dvec3& sight) {
+  const glm::dvec3 axis(-sight.y, sight.x, 0);
+  const double across = std::hypot(axis.x, axis.y);
+  if (across <= 0) return glm::dmat3(1.0);
+  return rotation_matrix(axis * (std::atan2(across, sight.z) / across));
+}
+
 double area_of(const std::array<glm::dvec2, 4>& c) {
   double area = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -224,22 +232,26 @@ Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& ca
   const double roll = random.uniform(band.roll_low, band.roll_high) * kPi / 180.0;
   glm::dmat3 frontal(1.0);
   frontal[1][1] = frontal[2][2] = -1.0;
-  Pose pose;
-  pose.rotation = rotation_matrix({0, 0, roll}) *
-                  rotation_matrix({tilt * std::cos(axis), tilt * std::sin(axis), 0}) * frontal;
+  const glm::dmat3 turned = rotation_matrix({0, 0, roll}) *
+                            rotation_matrix({tilt * std::cos(axis), tilt * std::sin(axis), 0}) *
+                            frontal;
   // The centre lies where a pattern of that size stays in the frame, or in its middle.
   const double side = std::sqrt(area * pattern.width * pattern.height);
   const double room_x = std::max(0.05 * camera.width, 0.5 * (camera.width - 1.3 * side));
   const double room_y = std::max(0.05 * camera.height, 0.5 * (camera.height - 1.3 * side));
   const double u = random.uniform(-room_x, room_x) / camera.fx;
   const double v = random.uniform(-room_y, room_y) / camera.fy;
+  Pose pose;
+  pose.rotation = towards({u, v, 1}) * turned;
+  // The nearest corner stays before the camera.
+  const double nearest = 1.2 * std::hypot(pose.rotation[0].z, pose.rotation[1].z) + 0.2;
   double depth = 2 * camera.fx / side;
   for (int i = 0; i < 12; ++i) {
     pose.translation = {u * depth, v * depth, depth};
     const double now =
         area_of(corners_of(pattern, camera, pose)) / (1.0 * pattern.width * pattern.height);
     depth = now > 0 ? depth * std::sqrt(now / area) : depth * 1.5;
-    depth = std::max(depth, 1.2 * std::sin(tilt) + 0.2);
+    depth = std::max(depth, nearest);
   }
   pose.translation = {u * depth, v * depth, depth};
   return pose;

@@ -20,12 +20,12 @@ struct SceneBand {
   std::string name;
   double area_low = 0.4;  ///< of the pattern in the frame to the pattern's image
   double area_high = 4.0;
-  double tilt_low = 0;  ///< degrees between the line of sight and the pattern's normal
+  double tilt_low = 0;  ///< degrees from the pattern's normal to the line of sight to its centre
   double tilt_high = 45;
   double covered_low = 0;  ///< share of the pattern behind something else
   double covered_high = 0;
   bool pattern = true;  ///< false: the photo alone
-  double roll_low = 0;  ///< degrees in the picture's plane
+  double roll_low = 0;  ///< degrees about the line of sight
   double roll_high = 360;
 };
 
@@ -38,7 +38,8 @@ struct SceneFrame {
   std::array<glm::dvec2, 4> corners{};  ///< of the truth, as in Sighting
 };
 
-/// Draws a pose of the band, the pattern's centre in the frame.
+/// Draws a pose of the band, the pattern's centre in the frame. Tilts are what the eye sees: a
+/// pattern at the frame's side that lies parallel to the sensor is tilted.
 Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
                Random& random);
 

@@ -1,10 +1,14 @@
 // Our own pose loop from end to end: a record baked from a picture, frames rendered by the bench's
 // renderer, and input that means harm.
+#include <cmath>
 #include <cstring>
 
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <glm/trigonometric.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "bake/pattern/loop_bake.hpp"
 #include "formats/loop_record.hpp"
@@ -16,6 +20,39 @@ namespace modar {
 namespace {
 
 using namespace test;  // the samples
+
+// Bands mean what the eye sees: the tilt to the line of sight, wherever the pattern stands.
+TEST(Scene, PosesHaveTheTiltAndTheAreaOfTheirBand) {
+  const Camera camera = default_camera(640, 480);
+  SceneBand band;
+  band.area_low = 0.2;
+  band.area_high = 0.3;
+  band.tilt_low = 60;
+  band.tilt_high = 70;
+  Random random(12);
+  double farthest = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Pose pose = draw_pose(band, test::gray(picture()), camera, random);
+    const glm::dvec3 sight = glm::normalize(pose.translation);
+    const double tilt =
+        glm::degrees(std::acos(std::abs(glm::dot(sight, glm::normalize(pose.rotation[2])))));
+    EXPECT_GT(tilt, 60 - 1e-6) << i;
+    EXPECT_LT(tilt, 70 + 1e-6) << i;
+    EXPECT_NEAR(glm::determinant(pose.rotation), 1, 1e-9);
+    std::vector<cv::Point2f> outline;
+    for (const glm::dvec2 corner : {glm::dvec2{-1, 0.8}, {1, 0.8}, {1, -0.8}, {-1, -0.8}}) {
+      const glm::dvec3 p = pose.rotation * glm::dvec3(corner, 0) + pose.translation;
+      ASSERT_GT(p.z, 0);
+      const glm::dvec2 at = project(camera, p);
+      outline.emplace_back(static_cast<float>(at.x), static_cast<float>(at.y));
+    }
+    const double area = cv::contourArea(outline, true) / (300.0 * 240.0);
+    EXPECT_GT(area, 0.2 - 1e-3) << i;
+    EXPECT_LT(area, 0.3 + 1e-3) << i;
+    farthest = std::max(farthest, std::abs(sight.x));
+  }
+  EXPECT_GT(farthest, 0.2);  // not in the middle alone
+}
 
 TEST(PoseLoop, FindsThePatternWhereItIs) {
   const Camera camera = default_camera(640, 480);
