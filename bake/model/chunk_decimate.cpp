@@ -1,27 +1,208 @@
-// OpenMesh's quadric decimater on one chunk.
+// OpenMesh's decimater on one chunk, with a mesh and a module that answer it fast.
 #include "bake/model/chunk_decimate.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+// Needs the traits of vectors above.
+#include <OpenMesh/Core/Geometry/QuadricT.hh>
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
-#include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
-#include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
+#include <OpenMesh/Tools/Decimater/ModBaseT.hh>
+
+#include "bake/model/landings.hpp"
+#include "bake/model/source_model.hpp"
 
 namespace modar {
 namespace {
 
-/// No face may turn by more in one collapse.
-constexpr float kMaxTurnDegrees = 60.0f;
+/// Square of the cosine of 60 degrees: no face may turn by more in one collapse.
+constexpr double kLeastTurn = 0.25;
 
 struct Traits : OpenMesh::DefaultTraitsDouble {
   VertexAttributes(OpenMesh::Attributes::Status);
   EdgeAttributes(OpenMesh::Attributes::Status);
   HalfedgeAttributes(OpenMesh::Attributes::PrevHalfedge | OpenMesh::Attributes::Status);
-  FaceAttributes(OpenMesh::Attributes::Status | OpenMesh::Attributes::Normal);
+  FaceAttributes(OpenMesh::Attributes::Status);
 };
-using Mesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+using Kernel = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+
+std::size_t at(OpenMesh::BaseHandle handle) {
+  return static_cast<std::size_t>(handle.idx());
+}
+
+/// The tests of a collapse that the decimater asks for most, which OpenMesh's library answers
+/// through asserts that compare names of properties: half of the time of a decimation.
+class Mesh : public Kernel {
+ public:
+  /// That of TriConnectivity, for a vertex v0 that is inside the surface (others are locked).
+  bool is_collapse_ok(HalfedgeHandle v0v1) {
+    if (status(edge_handle(v0v1)).deleted()) return false;
+    const VertexHandle v0 = from_vertex_handle(v0v1);
+    const VertexHandle v1 = to_vertex_handle(v0v1);
+    if (status(v0).deleted() || status(v1).deleted()) return false;
+    mark_ring(v0);
+    // The two triangles that vanish have a common neighbour each; with another, the surface folds.
+    std::size_t common = 0;
+    HalfedgeHandle h = opposite_halfedge_handle(v0v1);
+    const HalfedgeHandle first = h;
+    do {
+      if (marks_[at(to_vertex_handle(h))] == mark_) ++common;
+      h = opposite_halfedge_handle(prev_halfedge_handle(h));
+    } while (h != first);
+    return common == 2;
+  }
+
+  HalfedgeHandle find_halfedge(VertexHandle from, VertexHandle to) const {
+    const HalfedgeHandle first = halfedge_handle(from);
+    HalfedgeHandle h = first;
+    do {
+      if (to_vertex_handle(h) == to) return h;
+      h = opposite_halfedge_handle(prev_halfedge_handle(h));
+    } while (h != first);
+    return HalfedgeHandle();
+  }
+
+  void collapse(HalfedgeHandle v0v1) {
+    marked_ = VertexHandle();
+    Kernel::collapse(v0v1);
+  }
+
+ private:
+  void mark_ring(VertexHandle v) {
+    if (v == marked_) return;
+    marked_ = v;
+    marks_.resize(n_vertices());
+    ++mark_;
+    const HalfedgeHandle first = halfedge_handle(v);
+    HalfedgeHandle h = first;
+    do {
+      marks_[at(to_vertex_handle(h))] = mark_;
+      h = opposite_halfedge_handle(prev_halfedge_handle(h));
+    } while (h != first);
+  }
+
+  std::vector<std::uint32_t> marks_;  // mark_ where a vertex is a neighbour of marked_
+  std::uint32_t mark_ = 0;
+  VertexHandle marked_;
+};
 using Decimater = OpenMesh::Decimater::DecimaterT<Mesh>;
+
+/// Planes of triangles, each as heavy as its area: squares of distances from them.
+struct Planes {
+  OpenMesh::Geometry::Quadricd squares;
+  double area = 0;
+};
+
+/// The price of a collapse: squares of distances from all planes that its vertices stand for
+/// (Garland and Heckbert).
+class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
+ public:
+  using Base = OpenMesh::Decimater::ModBaseT<Mesh>;
+  using Handle = OpenMesh::Decimater::ModHandleT<Quadrics>;
+  DECIMATER_MODNAME(Quadrics)
+
+  explicit Quadrics(Mesh& mesh) : Base(mesh, false) {}
+
+  /// max_error: see decimate_chunk(). ours: of each vertex. Both must outlive the module.
+  void set(double max_error, std::span<const std::uint16_t> ours, Landings& landings) {
+    max_square_ = max_error * max_error;
+    ours_ = ours;
+    landings_ = &landings;
+  }
+
+  void initialize() override {
+    planes_.assign(mesh().n_vertices(), {});
+    for (const auto face : mesh().faces()) {
+      std::array<Mesh::VertexHandle, 3> v;
+      std::size_t count = 0;
+      for (const auto corner : mesh().fv_range(face)) v[count++] = corner;
+      const Mesh::Point& origin = mesh().point(v[0]);
+      const Mesh::Point normal = (mesh().point(v[1]) - origin) % (mesh().point(v[2]) - origin);
+      const double twice = normal.norm();
+      if (!(twice > 0)) continue;
+      Planes plane{{normal / twice, origin}, 0.5 * twice};
+      plane.squares *= plane.area;
+      for (const auto corner : v) add(planes_[at(corner)], plane);
+    }
+  }
+
+  /// The decimater looks for the cheapest collapse of one vertex after another: what costs no less
+  /// than one that this vertex has is not looked into.
+  float collapse_priority(const CollapseInfo& info) override {
+    if (info.v0 != vertex_) {
+      vertex_ = info.v0;
+      least_ = std::numeric_limits<float>::max();
+    }
+    const Planes& from = planes_[at(info.v0)];
+    const Planes& to = planes_[at(info.v1)];
+    const double squares = std::max(0.0, from.squares(info.p1) + to.squares(info.p1));
+    if (squares > max_square_ * (from.area + to.area)) return ILLEGAL_COLLAPSE;
+    const auto price = static_cast<float>(squares);
+    if (price >= least_ || turns(info)) return ILLEGAL_COLLAPSE;
+    least_ = price;
+    return price;
+  }
+
+  void preprocess_collapse(const CollapseInfo& info) override {
+    star_.clear();
+    landings_->lift_vertex(ours_[at(info.v0)]);
+    for (const auto face : mesh().vf_range(info.v0)) {
+      landings_->lift(static_cast<std::uint32_t>(face.idx()));
+      if (face != info.fl && face != info.fr) star_.push_back(face);
+    }
+  }
+
+  void postprocess_collapse(const CollapseInfo& info) override {
+    vertex_ = Mesh::VertexHandle();
+    add(planes_[at(info.v1)], planes_[at(info.v0)]);
+    faces_.clear();
+    for (const auto face : star_) {
+      LandingFace& landing = faces_.emplace_back();
+      landing.face = static_cast<std::uint32_t>(face.idx());
+      std::size_t count = 0;
+      for (const auto v : mesh().fv_range(face)) landing.corners[count++] = ours_[at(v)];
+    }
+    landings_->settle(faces_);
+  }
+
+ private:
+  static void add(Planes& to, const Planes& planes) {
+    to.squares += planes.squares;
+    to.area += planes.area;
+  }
+
+  /// Would a triangle that stays turn too far, or lose its area?
+  bool turns(const CollapseInfo& info) {
+    Mesh& m = mesh();
+    const Mesh::HalfedgeHandle first = m.halfedge_handle(info.v0);
+    Mesh::HalfedgeHandle h = first;
+    do {
+      const Mesh::FaceHandle face = m.face_handle(h);
+      if (face != info.fl && face != info.fr) {
+        const Mesh::Point& a = m.point(m.to_vertex_handle(h));
+        const Mesh::Point& b = m.point(m.to_vertex_handle(m.next_halfedge_handle(h)));
+        const Mesh::Point before = (a - info.p0) % (b - info.p0);
+        const Mesh::Point after = (a - info.p1) % (b - info.p1);
+        const double dot = before | after;
+        if (!(dot > 0) || dot * dot < kLeastTurn * before.sqrnorm() * after.sqrnorm()) return true;
+      }
+      h = m.opposite_halfedge_handle(m.prev_halfedge_handle(h));
+    } while (h != first);
+    return false;
+  }
+
+  std::vector<Planes> planes_;  // of each vertex
+  double max_square_ = 0;
+  Mesh::VertexHandle vertex_;  // the one whose collapses are priced
+  float least_ = 0;
+  std::span<const std::uint16_t> ours_;
+  Landings* landings_ = nullptr;
+  std::vector<Mesh::FaceHandle> star_;  // what stays of the triangles around a vertex that goes
+  std::vector<LandingFace> faces_;      // the same, afterwards
+};
 
 /// A mesh of OpenMesh's, and which of our vertices each of its own is.
 struct HalfEdges {
@@ -39,6 +220,7 @@ Mesh::VertexHandle add_vertex(HalfEdges& edges, std::span<const glm::dvec3> posi
 void build(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices,
            HalfEdges& edges) {
   Mesh& mesh = edges.mesh;
+  mesh.reserve(positions.size(), indices.size() / 2, indices.size() / 3);
   for (std::size_t v = 0; v < positions.size(); ++v) {
     add_vertex(edges, positions, static_cast<std::uint16_t>(v));
   }
@@ -53,53 +235,83 @@ void build(std::span<const glm::dvec3> positions, std::span<const std::uint16_t>
   }
 }
 
-std::vector<std::uint16_t> remaining(const HalfEdges& edges) {
-  std::vector<std::uint16_t> indices;
-  for (const auto face : edges.mesh.faces()) {
-    if (edges.mesh.status(face).deleted()) continue;
-    for (const auto v : edges.mesh.fv_range(face)) {
-      indices.push_back(edges.ours[static_cast<std::size_t>(v.idx())]);
+CoarserTriangles remaining(const HalfEdges& edges, const Landings& landings, std::size_t vertices) {
+  CoarserTriangles result;
+  const Mesh& mesh = edges.mesh;
+  result.nearby.assign(vertices, kNoIndex);
+  std::vector<std::uint32_t> numbers(mesh.n_faces(), kNoIndex);
+  for (const auto face : mesh.faces()) {
+    if (mesh.status(face).deleted()) continue;
+    const auto number = static_cast<std::uint32_t>(result.indices.size() / 3);
+    numbers[at(face)] = number;
+    for (const auto v : mesh.fv_range(face)) {
+      result.indices.push_back(edges.ours[at(v)]);
+      result.nearby[edges.ours[at(v)]] = number;
     }
   }
-  return indices;
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const std::uint32_t face = landings.face_of(static_cast<std::uint16_t>(v));
+    if (face != kNoIndex) result.nearby[v] = numbers[face];
+  }
+  return result;
 }
+
+/// Keeps what is left whenever a target is reached, so that one run makes all levels.
+class Snapshots : public OpenMesh::Decimater::Observer {
+ public:
+  Snapshots(const HalfEdges& edges, const Landings& landings, std::size_t vertices,
+            std::span<const std::size_t> targets)
+      : Observer(1), edges_(edges), landings_(landings), vertices_(vertices), targets_(targets) {}
+
+  /// A collapse inside the surface takes two triangles.
+  void notify(std::size_t collapses) override {
+    while (taken.size() < targets_.size() &&
+           edges_.mesh.n_faces() <= targets_[taken.size()] + 2 * collapses) {
+      take();
+    }
+  }
+
+  void take() { taken.push_back(remaining(edges_, landings_, vertices_)); }
+
+  std::vector<CoarserTriangles> taken;
+
+ private:
+  const HalfEdges& edges_;
+  const Landings& landings_;
+  std::size_t vertices_;
+  std::span<const std::size_t> targets_;
+};
 
 }  // namespace
 
-std::vector<std::vector<std::uint16_t>> decimate_chunk(std::span<const glm::dvec3> positions,
-                                                       std::span<const std::uint16_t> indices,
-                                                       std::span<const std::uint8_t> locked,
-                                                       std::span<const std::size_t> targets,
-                                                       double max_error) {
+std::vector<CoarserTriangles> decimate_chunk(std::span<const glm::dvec3> positions,
+                                             std::span<const std::uint16_t> indices,
+                                             std::span<const std::uint8_t> locked,
+                                             std::span<const std::size_t> targets,
+                                             double max_error) {
   // OpenMesh tells stderr of every face that it refuses.
   omerr().disable();
   HalfEdges edges;
   build(positions, indices, edges);
   Mesh& mesh = edges.mesh;
   for (const auto v : mesh.vertices()) {
-    const auto ours = edges.ours[static_cast<std::size_t>(v.idx())];
+    const auto ours = edges.ours[at(v)];
     if (locked[ours] != 0 || mesh.is_boundary(v) || !mesh.is_manifold(v)) {
       mesh.status(v).set_locked(true);
     }
   }
-  mesh.update_face_normals();
   Decimater decimater(mesh);
-  OpenMesh::Decimater::ModQuadricT<Mesh>::Handle quadric;
-  OpenMesh::Decimater::ModNormalFlippingT<Mesh>::Handle turn;
-  decimater.add(quadric);
-  decimater.add(turn);
-  decimater.module(quadric).set_max_err(max_error * max_error, false);
-  decimater.module(turn).set_max_normal_deviation(kMaxTurnDegrees);
-  std::vector<std::vector<std::uint16_t>> results;
-  if (!decimater.initialize()) return results;
-  std::size_t alive = mesh.n_faces();
-  for (const std::size_t target : targets) {
-    // The decimater counts from all faces, those that it took out before among them.
-    if (target < alive) decimater.decimate_to_faces(0, mesh.n_faces() - (alive - target));
-    results.push_back(remaining(edges));
-    alive = results.back().size() / 3;
-  }
-  return results;
+  Quadrics::Handle quadrics;
+  decimater.add(quadrics);
+  Landings landings(positions, mesh.n_faces());
+  decimater.module(quadrics).set(max_error, edges.ours, landings);
+  Snapshots snapshots(edges, landings, positions.size(), targets);
+  decimater.set_observer(&snapshots);
+  if (targets.empty() || !decimater.initialize()) return {};
+  decimater.decimate_to_faces(0, targets.back());
+  // What could be done where a target was out of reach.
+  if (snapshots.taken.size() < targets.size()) snapshots.take();
+  return std::move(snapshots.taken);
 }
 
 }  // namespace modar

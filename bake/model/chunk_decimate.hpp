@@ -9,17 +9,25 @@
 
 namespace modar {
 
+/// A coarser level: triangles, and where vertices are on them.
+struct CoarserTriangles {
+  std::vector<std::uint16_t> indices;
+  /// Of each vertex a triangle that it is a corner of or, where it was taken out, that lies where
+  /// the surface around it was; kNoIndex where no triangle used it.
+  std::vector<std::uint32_t> nearby;
+};
+
 /// Collapses edges in the order of quadric errors (Garland and Heckbert, "Surface simplification
 /// using quadric error metrics", 1997; OpenMesh's decimater). Every collapse keeps one of its two
 /// vertices as it is, so that the result indexes the same vertices. Kept as they are: vertices that
 /// are `locked`, the border of the mesh (seams of uv and normals are one: their vertices differ),
 /// and what is not manifold. targets: falling numbers of triangles. max_error: no collapse whose
-/// vertex lies farther from the planes that it stands for (root of the sum of squares). Answers one
-/// list of indices for each target that was reached or come near to.
-std::vector<std::vector<std::uint16_t>> decimate_chunk(std::span<const glm::dvec3> positions,
-                                                       std::span<const std::uint16_t> indices,
-                                                       std::span<const std::uint8_t> locked,
-                                                       std::span<const std::size_t> targets,
-                                                       double max_error);
+/// vertex lies farther from the planes that it stands for (root of the mean square, by area).
+/// Answers one level for each target that was reached, and one more that came near to the next.
+std::vector<CoarserTriangles> decimate_chunk(std::span<const glm::dvec3> positions,
+                                             std::span<const std::uint16_t> indices,
+                                             std::span<const std::uint8_t> locked,
+                                             std::span<const std::size_t> targets,
+                                             double max_error);
 
 }  // namespace modar

@@ -64,15 +64,18 @@ void level_chunk(const TriMesh& mesh, const Array<std::uint32_t>& owners, const 
   }
   double error = 0;
   std::size_t before = chunk.indices.size();
-  for (auto& indices : decimate_chunk(positions, chunk.indices, locked, targets,
-                                      kMaxCollapse * diagonal_of(positions))) {
+  LevelSurface finest(positions, chunk.indices);
+  const std::vector<std::uint32_t> on_finest = finest.triangles_of_vertices();
+  for (auto& [indices, nearby] : decimate_chunk(positions, chunk.indices, locked, targets,
+                                                kMaxCollapse * diagonal_of(positions))) {
     if (indices.empty() ||
         static_cast<double>(indices.size()) > kWorthwhile * static_cast<double>(before)) {
       break;
     }
     before = indices.size();
-    error = std::max({error, surface_distance(positions, chunk.indices, indices),
-                      surface_distance(positions, indices, chunk.indices)});
+    LevelSurface coarser(positions, indices);
+    error = surface_distance(finest, coarser, nearby, error);
+    error = surface_distance(coarser, finest, on_finest, error);
     chunk.coarser.push_back({std::move(indices), error});
   }
 }

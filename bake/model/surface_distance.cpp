@@ -4,27 +4,31 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
 
-#include "bake/model/triangle_tree.hpp"
+#include "bake/model/source_model.hpp"
 
 namespace modar {
 namespace {
 
-constexpr double kSlack = 1.5;     ///< of the bound over a distance that was found
-constexpr std::size_t kProbe = 8;  ///< one triangle of so many is looked at first
+constexpr double kSlack = 1.5;  ///< of the bound over a distance that was found
 
 constexpr double kSliver = 1e-9;  ///< model space: narrower parts are not cut off
 /// Pieces of one triangle; the rest is bounded as it is, by more than it need be.
 constexpr std::size_t kMostPieces = 2000;
+/// Pieces of one triangle that go from neighbour to neighbour; the rest is searched for.
+constexpr std::size_t kMostSteps = 1500;
 
 /// A convex piece of a triangle.
 struct Piece {
   static constexpr std::size_t kMost = 8;
   std::array<glm::dvec3, kMost> corners;
   std::size_t count = 0;
+  std::uint32_t target = kNoIndex;  ///< the triangle to try next, kNoIndex: search for one
+  std::uint32_t before = kNoIndex;  ///< the one that it was cut off by
 
   void add(const glm::dvec3& corner) { corners[count++] = corner; }
   [[nodiscard]] std::span<const glm::dvec3> all() const { return {corners.data(), count}; }
@@ -40,6 +44,7 @@ struct Piece {
 void cut(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal, Piece& behind,
          Piece& before) {
   behind.count = before.count = 0;
+  behind.target = before.target = kNoIndex;
   double low = 0;
   double high = 0;
   for (std::size_t i = 0; i < piece.count; ++i) {
@@ -64,37 +69,94 @@ void cut(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal, 
 
 class Bounder {
  public:
-  explicit Bounder(LevelTree& tree) : tree_(tree) {}
+  Bounder(LevelSurface& to, double least) : to_(to), least_(least), bound_(least) {}
 
-  /// Finds a distance that occurs.
-  void probe(const Piece& piece) {
-    for (const glm::dvec3& corner : piece.all()) {
-      lower_ = std::max(lower_, std::sqrt(tree_.nearest(corner, lower_ * lower_)));
+  /// Learns how far the farthest of some points lies, whose squared distances are at most these.
+  void probe(std::vector<std::pair<double, std::uint16_t>> points) {
+    std::make_heap(points.begin(), points.end());
+    while (!points.empty() && points.front().first > std::max(lower_ * lower_, limit_square())) {
+      const glm::dvec3& point = to_.position(points.front().second);
+      lower_ = std::max(lower_, std::sqrt(to_.tree().nearest(point, lower_ * lower_)));
+      std::pop_heap(points.begin(), points.end());
+      points.pop_back();
     }
   }
 
-  /// Grows the bound to hold for every point of the triangle.
-  void cover(const Piece& whole) {
+  /// Grows the bound to hold for every point of the triangle; `nearby` are tried first.
+  void cover(Piece whole, const std::array<std::uint32_t, 3>& nearby) {
+    for (const std::uint32_t near : nearby) {
+      if (near != kNoIndex && accept_by(whole, to_.triangle(near))) return;
+      if (whole.target == kNoIndex) whole.target = near;
+    }
     pieces_.assign(1, whole);
     std::size_t pieces = 0;
     while (!pieces_.empty()) {
       const Piece piece = pieces_.back();
       pieces_.pop_back();
-      if (!accept(piece, ++pieces > kMostPieces)) divide(piece);
+      if (piece.target != kNoIndex && pieces < kMostSteps) {
+        ++pieces;
+        step(piece);
+      } else if (!accept(piece, ++pieces > kMostPieces)) {
+        divide(piece);
+      }
     }
   }
 
   [[nodiscard]] double bound() const { return bound_; }
 
  private:
+  /// Is the piece near enough to one triangle? The distance from it is convex, so that the corners
+  /// bound the piece.
+  bool accept_by(const Piece& piece, const std::array<glm::dvec3, 3>& t) {
+    double greatest = 0;
+    const double most = limit_square();
+    for (const glm::dvec3& corner : piece.all()) {
+      greatest = std::max(greatest, distance_square(corner, t));
+      if (greatest > most) return false;
+    }
+    bound_ = std::max(bound_, std::sqrt(greatest));
+    return true;
+  }
+
+  /// Cuts off what lies beyond the edges of the piece's target and hands it to the neighbours
+  /// there.
+  void step(Piece piece) {
+    const std::uint32_t target = piece.target;
+    const std::array<glm::dvec3, 3> t = to_.triangle(target);
+    if (accept_by(piece, t)) return;
+    const std::uint32_t came_from = std::exchange(piece.before, target);
+    piece.target = kNoIndex;
+    const glm::dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
+    if (!(glm::dot(normal, normal) > 0)) {
+      pieces_.push_back(piece);
+      return;
+    }
+    Piece outside;
+    Piece inside;
+    for (std::size_t i = 0; i < 3 && piece.count < Piece::kMost; ++i) {
+      cut(piece, t[i], glm::normalize(glm::cross(t[(i + 1) % 3] - t[i], normal)), inside, outside);
+      if (outside.count < 3) continue;
+      outside.before = target;
+      outside.target = to_.neighbour(target, i);
+      // Over an edge that two triangles meet in, a piece may lie beside both.
+      if (outside.target == came_from) outside.target = kNoIndex;
+      if (outside.target != kNoIndex || !accept_by(outside, t)) pieces_.push_back(outside);
+      if (inside.count < 3) return;
+      piece.corners = inside.corners;
+      piece.count = inside.count;
+    }
+    if (!accept_by(piece, t)) pieces_.push_back(piece);
+  }
+
   bool accept(const Piece& piece, bool at_once) {
+    LevelTree& tree = to_.tree();
     const glm::dvec3 middle = piece.middle();
     double radius = 0;
     for (const glm::dvec3& corner : piece.all()) {
       radius = std::max(radius, glm::length(corner - middle));
     }
     const double room = std::max(0.0, limit() - radius);
-    const double distance = std::sqrt(tree_.nearest(middle, room * room));
+    const double distance = std::sqrt(tree.nearest(middle, room * room));
     // What is found within the room need not be the nearest: it proves no distance.
     if (distance > room) lower_ = std::max(lower_, distance);
     // Within the radius no point is farther off than so.
@@ -104,11 +166,10 @@ class Bounder {
     return true;
   }
 
-  /// The distance from one triangle is convex, so that the corners bound the piece.
-  [[nodiscard]] double corner_bound(const Piece& piece) const {
+  [[nodiscard]] double corner_bound(const Piece& piece) {
     double greatest = 0;
     for (const glm::dvec3& corner : piece.all()) {
-      greatest = std::max(greatest, distance_square(corner, tree_.last()));
+      greatest = std::max(greatest, distance_square(corner, to_.tree().last()));
     }
     return std::sqrt(greatest);
   }
@@ -116,7 +177,7 @@ class Bounder {
   /// Parts what lies over the nearest triangle, which is mostly done with then, from what lies
   /// beside it.
   void divide(Piece piece) {
-    const std::array<glm::dvec3, 3> t = tree_.last();
+    const std::array<glm::dvec3, 3> t = to_.tree().last();
     const glm::dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
     if (!(glm::dot(normal, normal) > 0)) return halve(piece);
     Piece outside;
@@ -166,11 +227,13 @@ class Bounder {
     }
   }
 
-  [[nodiscard]] double limit() const { return std::max(kDistanceFloor, kSlack * lower_); }
+  [[nodiscard]] double limit() const { return std::max({kDistanceFloor, least_, kSlack * lower_}); }
+  [[nodiscard]] double limit_square() const { return limit() * limit(); }
 
-  LevelTree& tree_;
+  LevelSurface& to_;
+  double least_;
   double lower_ = 0;
-  double bound_ = 0;
+  double bound_;
   std::vector<Piece> pieces_;
 };
 
@@ -197,18 +260,27 @@ std::vector<std::size_t> changed(std::span<const std::uint16_t> from,
 
 }  // namespace
 
-double surface_distance(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> from,
-                        std::span<const std::uint16_t> to) {
-  LevelTree tree(positions, to);
-  Bounder bounder(tree);
-  const std::vector<std::size_t> triangles = changed(from, to);
-  const auto piece = [&](std::size_t i) {
+double surface_distance(const LevelSurface& from, LevelSurface& to,
+                        std::span<const std::uint32_t> nearby, double least) {
+  Bounder bounder(to, least);
+  const std::span<const std::uint16_t> corners = from.indices();
+  const std::vector<std::size_t> triangles = changed(corners, to.indices());
+  std::vector<std::pair<double, std::uint16_t>> probes;
+  std::vector<bool> probed(nearby.size(), false);
+  for (const std::size_t i : triangles) {
+    for (std::size_t k = i; k < i + 3; ++k) {
+      const std::uint16_t v = corners[k];
+      if (nearby[v] == kNoIndex || probed[v]) continue;
+      probed[v] = true;
+      probes.emplace_back(distance_square(from.position(v), to.triangle(nearby[v])), v);
+    }
+  }
+  bounder.probe(std::move(probes));
+  for (const std::size_t i : triangles) {
     Piece whole;
-    for (std::size_t k = 0; k < 3; ++k) whole.add(positions[from[i + k]]);
-    return whole;
-  };
-  for (std::size_t k = 0; k < triangles.size(); k += kProbe) bounder.probe(piece(triangles[k]));
-  for (const std::size_t i : triangles) bounder.cover(piece(i));
+    for (std::size_t k = i; k < i + 3; ++k) whole.add(from.position(corners[k]));
+    bounder.cover(whole, {nearby[corners[i]], nearby[corners[i + 1]], nearby[corners[i + 2]]});
+  }
   return bounder.bound();
 }
 

@@ -10,6 +10,8 @@ namespace modar {
 namespace {
 
 constexpr std::uint32_t kLeaf = 4;
+/// Of the squared lengths of two sides: triangles of a lesser squared area have no plane.
+constexpr double kFlat = 1e-18;
 
 double square(const glm::dvec3& v) {
   return glm::dot(v, v);
@@ -34,16 +36,37 @@ double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, 
   const glm::dvec3 n = glm::cross(ab, ac);
   const double area = square(n);
   const glm::dvec3 ap = p - t[0];
-  if (area > 0) {
-    const double height = glm::dot(ap, n);
-    const double plane = height * height / area;
-    if (plane >= best) return plane;
-    const double v = glm::dot(glm::cross(ap, ac), n);
-    const double w = glm::dot(glm::cross(ab, ap), n);
-    if (v >= 0 && w >= 0 && v + w <= area) return plane;
+  if (!(area > kFlat * square(ab) * square(ac))) {
+    return std::min({segment_distance_square(p, t[0], t[1]), segment_distance_square(p, t[1], t[2]),
+                     segment_distance_square(p, t[2], t[0])});
   }
-  return std::min({segment_distance_square(p, t[0], t[1]), segment_distance_square(p, t[1], t[2]),
-                   segment_distance_square(p, t[2], t[0])});
+  const double height = glm::dot(ap, n);
+  const double plane = height * height / area;
+  if (plane >= best) return plane;
+  // The region of the corner, edge or inside that is nearest to the point.
+  const double ab_ap = glm::dot(ab, ap);
+  const double ac_ap = glm::dot(ac, ap);
+  if (ab_ap <= 0 && ac_ap <= 0) return square(ap);
+  const glm::dvec3 bp = p - t[1];
+  const double ab_bp = glm::dot(ab, bp);
+  const double ac_bp = glm::dot(ac, bp);
+  if (ab_bp >= 0 && ac_bp <= ab_bp) return square(bp);
+  if (ab_ap >= 0 && ab_bp <= 0 && ab_ap * ac_bp <= ab_bp * ac_ap) {
+    return square(ap - ab * (ab_ap / (ab_ap - ab_bp)));
+  }
+  const glm::dvec3 cp = p - t[2];
+  const double ab_cp = glm::dot(ab, cp);
+  const double ac_cp = glm::dot(ac, cp);
+  if (ac_cp >= 0 && ab_cp <= ac_cp) return square(cp);
+  if (ac_ap >= 0 && ac_cp <= 0 && ab_cp * ac_ap <= ab_ap * ac_cp) {
+    return square(ap - ac * (ac_ap / (ac_ap - ac_cp)));
+  }
+  const double from_b = ac_bp - ab_bp;
+  const double from_c = ab_cp - ac_cp;
+  if (from_b >= 0 && from_c >= 0 && ab_bp * ac_cp <= ab_cp * ac_bp) {
+    return square(bp - (t[2] - t[1]) * (from_b / (from_b + from_c)));
+  }
+  return plane;
 }
 
 LevelTree::LevelTree(std::span<const glm::dvec3> positions,

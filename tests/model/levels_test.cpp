@@ -222,14 +222,22 @@ TEST(Levels, DistancesOfKnownSurfaces) {
   const std::vector<glm::dvec3> p = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 0.5}};
   const std::vector<std::uint16_t> flat = {0, 1, 2, 0, 2, 3};
   const std::vector<std::uint16_t> roof = {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4};
-  const double up = surface_distance(p, roof, flat);
-  EXPECT_GE(up, 0.5);
-  EXPECT_LE(up, 0.75);
-  // From the square's middle to a roof of 45 degrees.
-  const double down = surface_distance(p, flat, roof);
-  EXPECT_GE(down, 0.5 * std::sqrt(0.5));
-  EXPECT_LE(down, 0.75 * std::sqrt(0.5));
-  EXPECT_LE(surface_distance(p, flat, flat), kDistanceFloor);
+  LevelSurface low(p, flat);
+  LevelSurface high(p, roof);
+  // Known, not known and wrong: the hints change the way, never the answer's truth.
+  for (const std::uint32_t near : {1u, kNoIndex, 0u}) {
+    const std::vector<std::uint32_t> nearby(p.size(), near);
+    const double up = surface_distance(high, low, nearby, 0);
+    EXPECT_GE(up, 0.5);
+    EXPECT_LE(up, 0.75);
+    // From the square's middle to a roof of 45 degrees.
+    const double down = surface_distance(low, high, nearby, 0);
+    EXPECT_GE(down, 0.5 * std::sqrt(0.5));
+    EXPECT_LE(down, 0.75 * std::sqrt(0.5));
+    EXPECT_LE(surface_distance(low, low, nearby, 0), kDistanceFloor);
+    // What is below the least that a caller asks for is not told apart.
+    EXPECT_EQ(surface_distance(low, high, nearby, 2.0), 2.0);
+  }
 }
 
 TEST(Levels, ThreeTrianglesAtAnEdgeAreKept) {
@@ -240,7 +248,8 @@ TEST(Levels, ThreeTrianglesAtAnEdgeAreKept) {
   const std::vector<std::size_t> targets = {1};
   const auto result = decimate_chunk(p, fan, free, targets, 1.0);
   ASSERT_EQ(result.size(), 1u);
-  EXPECT_EQ(result[0].size(), 9u);
+  EXPECT_EQ(result[0].indices.size(), 9u);
+  EXPECT_EQ(result[0].nearby.size(), p.size());
 }
 
 TEST(Levels, ThreadsChangeNothing) {
