@@ -96,10 +96,12 @@ int run(CalibrateCommand& command) {
   } else {
     const Camera& camera = calibration->camera;
     std::printf(
-        "focal length %.2f x %.2f (+- %.2f), centre %.2f, %.2f, of %d x %d pixels; %d of %d frames,"
+        "focal length %.2f x %.2f (+- %.2f), centre %.2f, %.2f%s, of %d x %d pixels; %d of %d "
+        "frames,"
         " %.3f pixels rms\n",
-        camera.fx, camera.fy, calibration->focal_spread, camera.cx, camera.cy, camera.width,
-        camera.height, calibration->views, calibration->frames, calibration->rms_px);
+        camera.fx, camera.fy, calibration->focal_spread, camera.cx, camera.cy,
+        calibration->principal_point_assumed ? " (assumed)" : "", camera.width, camera.height,
+        calibration->views, calibration->frames, calibration->rms_px);
   }
   return static_cast<int>(ExitCode::kOk);
 }

@@ -93,6 +93,7 @@ std::string calibration_json(const Calibration& calibration) {
                {"cy", camera.cy},
                {"distortion", camera.distortion},
                {"focal_spread", calibration.focal_spread},
+               {"principal_point", calibration.principal_point_assumed ? "assumed" : "measured"},
                {"rms_px", calibration.rms_px},
                {"views", calibration.views},
                {"frames", calibration.frames}});

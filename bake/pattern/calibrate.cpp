@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -24,6 +25,8 @@ constexpr std::size_t kFewestViews = 5;
 constexpr int kFewestTilted = 3;
 constexpr double kTilted = 0.97;   // cosine of 14 degrees
 constexpr double kWeakest = 0.03;  // spread of the focal length
+constexpr double kOneSide = 8.0;   // degrees: see Tilts; less tells no focal length
+constexpr double kOneAxis = 4.0;   // degrees: less tells no principal point
 constexpr int kVideoSteps = 120;   // frames of a video that are looked at
 constexpr double kOutlier = 3.0;   // times the median error of a view
 
@@ -141,6 +144,33 @@ std::vector<PlanePoints> spread_out(std::vector<PlanePoints> views, int most) {
   return kept;
 }
 
+/// How the planes' normals scatter about their mean, in degrees: standard deviations along the
+/// direction in which they scatter most, and across. Zhang's method lives on it: from planes that
+/// are all but parallel a solver makes up a principal point, and is sure of it.
+struct Tilts {
+  double along = 0;
+  double across = 0;
+};
+
+Tilts tilts_of(const std::vector<cv::Vec3d>& normals) {
+  cv::Vec2d mean(0, 0);
+  const double share = 1.0 / static_cast<double>(normals.size());
+  for (const cv::Vec3d& normal : normals) mean += share * cv::Vec2d(normal[0], normal[1]);
+  double xx = 0;
+  double yy = 0;
+  double xy = 0;
+  for (const cv::Vec3d& normal : normals) {
+    const cv::Vec2d off = cv::Vec2d(normal[0], normal[1]) - mean;
+    xx += share * off[0] * off[0];
+    yy += share * off[1] * off[1];
+    xy += share * off[0] * off[1];
+  }
+  const double middle = 0.5 * (xx + yy);
+  const double half = std::hypot(0.5 * (xx - yy), xy);
+  constexpr double kDegrees = 57.29577951308232;
+  return {kDegrees * std::sqrt(middle + half), kDegrees * std::sqrt(std::max(0.0, middle - half))};
+}
+
 struct Solved {
   cv::Mat matrix;
   cv::Mat distortion;
@@ -148,9 +178,12 @@ struct Solved {
   double focal_spread = 0;
   std::vector<double> view_rms;
   int tilted = 0;  ///< views of a plane that is not square to the line of sight
+  Tilts tilts;
 };
 
-Solved solve(const std::vector<PlanePoints>& views, const cv::Size& size, bool board) {
+/// centred: the principal point stays in the frame's middle.
+Solved solve(const std::vector<PlanePoints>& views, const cv::Size& size, bool board,
+             bool centred) {
   std::vector<std::vector<cv::Point3f>> plane;
   std::vector<std::vector<cv::Point2f>> pixels;
   for (const PlanePoints& view : views) {
@@ -165,8 +198,9 @@ Solved solve(const std::vector<PlanePoints>& views, const cv::Size& size, bool b
   }
   Solved solved;
   solved.matrix = cv::Mat::eye(3, 3, CV_64F);
-  const int flags =
+  int flags =
       board ? 0 : cv::CALIB_FIX_ASPECT_RATIO | cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K3;
+  if (centred) flags |= cv::CALIB_FIX_PRINCIPAL_POINT;
   cv::Mat rotations;
   cv::Mat translations;
   cv::Mat spread;
@@ -175,11 +209,15 @@ Solved solve(const std::vector<PlanePoints>& views, const cv::Size& size, bool b
   solved.rms = cv::calibrateCamera(plane, pixels, size, solved.matrix, solved.distortion, rotations,
                                    translations, spread, pose_spread, errors, flags);
   solved.focal_spread = std::max(spread.at<double>(0), spread.at<double>(1));
+  std::vector<cv::Vec3d> normals;
   for (int i = 0; i < static_cast<int>(views.size()); ++i) {
     cv::Mat rotation;
     cv::Rodrigues(rotations.row(i).reshape(1, 3), rotation);
-    solved.tilted += std::abs(rotation.at<double>(2, 2)) < kTilted ? 1 : 0;
+    const cv::Vec3d normal(rotation.col(2));
+    normals.push_back(normal[2] < 0 ? -normal : normal);
+    solved.tilted += std::abs(normal[2]) < kTilted ? 1 : 0;
   }
+  solved.tilts = tilts_of(normals);
   solved.view_rms.assign(errors.begin<double>(), errors.end<double>());
   return solved;
 }
@@ -197,20 +235,29 @@ std::vector<PlanePoints> without_outliers(const std::vector<PlanePoints>& views,
   return kept;
 }
 
-Result<Calibration> calibrated(Gathered gathered, int most_views, bool board) {
-  std::vector<PlanePoints> views = spread_out(std::move(gathered.views), most_views);
-  if (views.size() < kFewestViews) {
-    return fail(ExitCode::kInvalidInput, "calibrate.few-views", "",
-                "the plane was found in " + std::to_string(views.size()) + " of " +
-                    std::to_string(gathered.frames) + " frames, 5 are needed",
-                "show all of it, sharp and large, from more sides");
+/// Errors: kInvalidInput "calibrate.weak".
+Result<Solved> trusted(Solved solved) {
+  const char* cure =
+      "tilt the plane by 30 to 50 degrees, to every side, near and large in the frame";
+  // Without tilts the solver's own spread means nothing: distance and focal length are one.
+  if (solved.tilted < kFewestTilted ||
+      !(solved.focal_spread <= kWeakest * solved.matrix.at<double>(0, 0))) {
+    return fail(ExitCode::kInvalidInput, "calibrate.weak", "",
+                "the views are too alike to tell the focal length", cure);
   }
-  Solved solved = solve(views, gathered.size, board);
-  const std::vector<PlanePoints> kept = without_outliers(views, solved);
-  if (kept.size() < views.size() && kept.size() >= kFewestViews) {
-    views = kept;
-    solved = solve(views, gathered.size, board);
+  if (solved.tilts.along < kOneSide) {
+    char cause[120];
+    std::snprintf(cause, sizeof cause,
+                  "all views are tilted to the same side: they scatter by %.1f degrees, %.0f are "
+                  "needed",
+                  solved.tilts.along, kOneSide);
+    return fail(ExitCode::kInvalidInput, "calibrate.weak", "", cause, cure);
   }
+  return solved;
+}
+
+Calibration calibration_of(const Solved& solved, const Gathered& gathered, int views,
+                           bool centred) {
   Calibration out;
   out.camera.width = gathered.size.width;
   out.camera.height = gathered.size.height;
@@ -222,16 +269,30 @@ Result<Calibration> calibrated(Gathered gathered, int most_views, bool board) {
     out.camera.distortion[i] = solved.distortion.at<double>(static_cast<int>(i));
   }
   out.frames = gathered.frames;
-  out.views = static_cast<int>(views.size());
+  out.views = views;
   out.rms_px = solved.rms;
   out.focal_spread = solved.focal_spread;
-  // Without tilts the solver's own spread means nothing: distance and focal length are one.
-  if (solved.tilted < kFewestTilted || !(out.focal_spread <= kWeakest * out.camera.fx)) {
-    return fail(ExitCode::kInvalidInput, "calibrate.weak", "",
-                "the views are too alike to tell the focal length",
-                "tilt the plane by 30 to 50 degrees, to every side, near and large in the frame");
-  }
+  out.principal_point_assumed = centred;
   return out;
+}
+
+Result<Calibration> calibrated(Gathered gathered, int most_views, bool board) {
+  std::vector<PlanePoints> views = spread_out(std::move(gathered.views), most_views);
+  if (views.size() < kFewestViews) {
+    return fail(ExitCode::kInvalidInput, "calibrate.few-views", "",
+                "the plane was found in " + std::to_string(views.size()) + " of " +
+                    std::to_string(gathered.frames) + " frames, 5 are needed",
+                "show all of it, sharp and large, from more sides");
+  }
+  Solved solved = solve(views, gathered.size, board, false);
+  std::vector<PlanePoints> kept = without_outliers(views, solved);
+  const bool fewer = kept.size() < views.size() && kept.size() >= kFewestViews;
+  if (fewer) views = std::move(kept);
+  const bool centred = solved.tilts.across < kOneAxis;
+  if (fewer || centred) solved = solve(views, gathered.size, board, centred);
+  auto good = trusted(std::move(solved));
+  if (!good) return tl::unexpected(good.error());
+  return calibration_of(*good, gathered, static_cast<int>(views.size()), centred);
 }
 
 }  // namespace

@@ -21,10 +21,11 @@ struct CalibrateOptions {
 
 struct Calibration {
   Camera camera;
-  int frames = 0;           ///< that were looked at
-  int views = 0;            ///< in which board or pattern was found and used
-  double rms_px = 0;        ///< reprojection error over all points
-  double focal_spread = 0;  ///< standard deviation of the focal length, pixels
+  int frames = 0;                        ///< that were looked at
+  int views = 0;                         ///< in which board or pattern was found and used
+  double rms_px = 0;                     ///< reprojection error over all points
+  double focal_spread = 0;               ///< standard deviation of the focal length, pixels
+  bool principal_point_assumed = false;  ///< in the middle: the views were tilted about one axis
 };
 
 /// Finds board or pattern in each frame and calibrates from the plane's views (Zhang, "A flexible
@@ -32,7 +33,7 @@ struct Calibration {
 /// k1 k2 p1 p2 k3; from a pattern: one focal length for both axes, cx, cy and k1 k2.
 /// Errors: kIo "calibrate.input"; kInvalidInput "calibrate.size" (frames of different sizes),
 /// "calibrate.few-views" (fewer than 5 views), "calibrate.weak" (views too alike to tell the focal
-/// length to 3 %); those of reading pictures and of the loop.
+/// length to 3 %, or all tilted to the same side); those of reading pictures and of the loop.
 Result<Calibration> calibrate(const CalibrateOptions& options, const PoseBenchProgress& progress);
 
 /// The camera as OpenCV's YML, for modar-play --camera. Errors: those of write_file().

@@ -31,14 +31,19 @@ class Calibrate : public testing::Test {
 
   [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
 
+  enum class Tilted { kToAllSides, kAboutOneAxis, kToOneSide };
+
   /// Views of a flat picture, with noise, as PNG files.
   std::vector<std::string> film(const cv::Mat& picture, const Camera& camera, int views,
-                                double tilt) {
+                                double tilt, Tilted sides = Tilted::kToAllSides) {
     cv::RNG random(4);
     std::vector<std::string> files;
     for (int i = 0; i < views; ++i) {
-      const test::View view = test::look_at(2.7, tilt, 360.0 * i / views, 17.0 * i,
-                                            0.3 * std::cos(2.0 * i), 0.25 * std::sin(3.0 * i));
+      const double roll = 17.0 * i;
+      const double axis = sides == Tilted::kToAllSides ? 360.0 * i / views : 70.0 - roll;
+      const double share = sides == Tilted::kAboutOneAxis ? 2.0 * i / (views - 1) - 1 : 1;
+      const test::View view = test::look_at(2.7, tilt * share, axis, roll, 0.3 * std::cos(2.0 * i),
+                                            0.25 * std::sin(3.0 * i));
       cv::Mat frame = test::render(picture, view, camera,
                                    cv::Mat(camera.height, camera.width, CV_8UC1, cv::Scalar(150)));
       cv::Mat noise(frame.size(), CV_16SC1);
@@ -93,6 +98,7 @@ TEST_F(Calibrate, FromAChessboardThroughABentLens) {
   ASSERT_TRUE(calibration) << to_line(calibration.error());
   EXPECT_EQ(calibration->frames, 8);
   EXPECT_GE(calibration->views, 7);
+  EXPECT_FALSE(calibration->principal_point_assumed);
   expect_camera(*calibration, bent_camera());
 }
 
@@ -117,6 +123,21 @@ TEST_F(Calibrate, FromAnyPatternThroughABentLens) {
   EXPECT_NEAR(camera->distortion[0], calibration->camera.distortion[0], 1e-12);
 }
 
+TEST_F(Calibrate, TiltsAboutOneAxisTellTheFocalLengthAndNoPrincipalPoint) {
+  Camera camera = bent_camera();
+  camera.cx = 0.5 * (camera.width - 1);
+  camera.cy = 0.5 * (camera.height - 1);
+  CalibrateOptions options;
+  options.inputs = film(chessboard(7, 5, 30), camera, 8, 45, Tilted::kAboutOneAxis);
+  options.board_columns = 7;
+  options.board_rows = 5;
+  const auto calibration = calibrate(options, {});
+  ASSERT_TRUE(calibration) << to_line(calibration.error());
+  EXPECT_TRUE(calibration->principal_point_assumed);
+  EXPECT_DOUBLE_EQ(calibration->camera.cx, camera.cx);
+  expect_camera(*calibration, camera);
+}
+
 TEST_F(Calibrate, SaysWhatIsMissing) {
   CalibrateOptions options;
   options.board_columns = 7;
@@ -129,6 +150,13 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
   const auto frontal = calibrate(options, {});
   ASSERT_FALSE(frontal);
   EXPECT_EQ(frontal.error().code, "calibrate.weak");
+  // A solver makes up a camera that fits such views well.
+  options.inputs = film(chessboard(7, 5, 30), bent_camera(), 6, 50, Tilted::kToOneSide);
+  const auto one_side = calibrate(options, {});
+  ASSERT_FALSE(one_side);
+  EXPECT_EQ(one_side.error().code, "calibrate.weak");
+  EXPECT_NE(one_side.error().cause.find("to the same side"), std::string::npos)
+      << one_side.error().cause;
   cv::imwrite(path("other.png"), cv::Mat(100, 100, CV_8UC1, cv::Scalar(9)));
   options.inputs.push_back(path("other.png"));
   EXPECT_EQ(calibrate(options, {}).error().code, "calibrate.size");
