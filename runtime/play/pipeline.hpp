@@ -11,6 +11,7 @@
 #include "frame_source.hpp"
 #include "mailbox.hpp"
 #include "modar/camera.hpp"
+#include "modar/focal_finder.hpp"
 #include "modar/tracker.hpp"
 
 namespace modar {
@@ -23,6 +24,7 @@ struct Job {
   Camera camera;  ///< of this frame's size
   TrackResult track;
   double track_ms = 0;
+  FocalProgress focal;                      ///< of the search for it, while it goes on
   std::shared_ptr<const SpotPattern> spot;  ///< what `track` is about; null: the bundle's patterns
 };
 

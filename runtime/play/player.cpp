@@ -103,7 +103,7 @@ Result<bool> Player::show(const Job& job) {
     return tl::unexpected(sized.error());
   }
   follow_spot(job);
-  if (options_.find_focal && !options_.quiet) tell_focal(job.camera);
+  if (options_.find_focal && !options_.quiet) tell_focal(job);
   FrameReport report = begin_report(job);
   const std::int64_t before = now_ns();
   screen_->draw(job.frame.picture(), job.camera, items_);
@@ -145,7 +145,9 @@ void Player::follow_spot(const Job& job) {
 }
 
 /// The vision thread has measured the focal length of frames of this size: says so once.
-void Player::tell_focal(const Camera& camera) {
+void Player::tell_focal(const Job& job) {
+  const Camera& camera = job.camera;
+  focal_ = job.focal;
   if (camera.fx == told_focal_ || camera.fx == default_camera(camera.width, camera.height).fx) {
     return;
   }
@@ -153,6 +155,31 @@ void Player::tell_focal(const Camera& camera) {
   progress_.end();
   std::fprintf(stderr, "modar-play: the focal length is %.1f pixels, from frame %llu on\n",
                camera.fx, static_cast<unsigned long long>(stats_.frames()));
+}
+
+/// The run is over, and --find-focal has found nothing: what it would have needed.
+void Player::tell_focal_unknown() const {
+  char seen[120];
+  if (focal_.deviation > 0 && focal_.scatter_deg < FocalProgress::kScatter) {
+    std::snprintf(
+        seen, sizeof seen,
+        "all %d views are tilted to the same side: they scatter by %.1f degrees, %.0f are needed",
+        focal_.views, focal_.scatter_deg, FocalProgress::kScatter);
+  } else if (focal_.deviation > 0) {
+    std::snprintf(seen, sizeof seen, "%d views tell it to %.1f %%, 1 %% is needed", focal_.views,
+                  100 * focal_.deviation);
+  } else if (focal_.views + focal_.faint > 0) {
+    std::snprintf(seen, sizeof seen,
+                  "%d views tell something and %d are too frontal or too far, %d are needed",
+                  focal_.views, focal_.faint, FocalProgress::kFewestViews);
+  } else {
+    std::snprintf(seen, sizeof seen, "no pattern was seen well enough");
+  }
+  std::fprintf(
+      stderr,
+      "modar-play: the focal length stays unknown: %s (in %d looks); tilt a pattern by 30 to 50 "
+      "degrees, to every side, large in the frame, or use `modar calibrate`\n",
+      seen, focal_.looks);
 }
 
 /// Hysteresis, what to draw, and all of the report that stands before drawing.
@@ -297,6 +324,7 @@ Result<int> Player::finish(const PipelineCounts& counts) {
                 "nothing half-made was left; start it again");
   }
   stats_.set_dropped(counts.dropped);
+  if (options_.find_focal && !options_.quiet && told_focal_ == 0) tell_focal_unknown();
   const std::string summary = summary_line(stats_);
   for (const auto& sink : sinks_) {
     if (auto done = sink->finish(summary); !done) return tl::unexpected(done.error());

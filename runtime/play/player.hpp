@@ -62,7 +62,8 @@ class Player {
   Result<void> show_frozen(const Job& job);
   void make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corners);
   [[nodiscard]] std::string summary_text() const;
-  void tell_focal(const Camera& camera);
+  void tell_focal(const Job& job);
+  void tell_focal_unknown() const;
 
   const PlayOptions& options_;
   const BundleView& bundle_;
@@ -75,6 +76,7 @@ class Player {
   Progress progress_;
   RateMeter rate_;
   double told_focal_ = 0;  ///< pixels, of --find-focal; 0: none yet
+  FocalProgress focal_;
   RunStats stats_;
   std::unique_ptr<Screen> screen_;
   std::vector<std::unique_ptr<FrameSink>> sinks_;

@@ -18,6 +18,7 @@ struct OurVision {
   std::unique_ptr<PoseLoop> loop;
   std::unique_ptr<FocalFinder> finder;
   int frames_to_look = 0;
+  FocalProgress focal;
 
   /// Once the focal length is known, it is the camera's, and the next loop starts with it.
   Result<void> look(const Frame& frame) {
@@ -28,11 +29,12 @@ struct OurVision {
       if (!created) return tl::unexpected(created.error());
       finder = std::move(*created);
     }
-    const std::optional<double> focal =
-        finder->look(frame.gray_image()) ? finder->focal() : std::nullopt;
-    if (!focal) return {};
+    const bool added = finder->look(frame.gray_image());
+    focal = finder->progress();
+    const std::optional<double> found = added ? finder->focal() : std::nullopt;
+    if (!found) return {};
     options.camera = default_camera(frame.width, frame.height);
-    options.camera->fx = options.camera->fy = *focal;
+    options.camera->fx = options.camera->fy = *found;
     finder.reset();
     loop.reset();
     return {};
@@ -56,6 +58,7 @@ struct OurVision {
     if (auto done = loop->step(frame.gray_image(), job.track); !done) return done;
     job.track_ms = ms_since(before);
     job.camera = camera;
+    job.focal = focal;
     job.spot = nullptr;
     return {};
   }
@@ -65,7 +68,7 @@ struct OurVision {
 
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options) {
   const auto state =
-      std::make_shared<OurVision>(OurVision{bundle, options, {}, nullptr, nullptr, 0});
+      std::make_shared<OurVision>(OurVision{bundle, options, {}, nullptr, nullptr, 0, {}});
   return [state](Job& job) { return state->step(job); };
 }
 

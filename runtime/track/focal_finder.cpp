@@ -8,24 +8,24 @@
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "kernels.hpp"
 #include "loop_pattern.hpp"
 #include "modar/camera.hpp"
 #include "modar/loop_features.hpp"
 #include "plane_matcher.hpp"
+#include "plane_settle.hpp"
 
 namespace modar {
 namespace {
 
 using loop::LoopPattern;
 
-constexpr int kInliers = 40;  // of a view that counts
+constexpr int kInliers = 15;  // of a find that is worth aligning
 constexpr double kPerspective =
     0.06;  // of the two axes' vanishing terms, below which nothing shows
-constexpr int kFewestViews = 8;
 constexpr int kMostViews = 256;
-constexpr double kSure = 0.01;
 
 /// a * x = b for x = 1 / f^2: an axis of the plane is as long as the other, and at right angles.
 struct Constraint {
@@ -54,16 +54,43 @@ std::array<Constraint, 2> constraints_of(const glm::dmat3& homography, double un
 
 struct FocalFinder::State {
   double unit = 0;  ///< frame width
-  double middle_x = 0;
-  double middle_y = 0;
+  Camera camera;    ///< the default: only its principal point matters
   std::vector<LoopPattern> patterns;
   std::unique_ptr<LoopDescriber> describer;
   std::unique_ptr<loop::PlaneMatcher> matcher;
+  loop::PatchCache patches;
   std::vector<Constraint> constraints;  ///< two a view
+  std::vector<glm::dvec3> horizons;     ///< of the views: vanishing lines, pixels from the middle
+  int looks = 0;
+  int faint = 0;
 
   /// x = 1 / f^2 in squared units, and its standard deviation.
   [[nodiscard]] bool solve(double& x, double& deviation) const;
+  [[nodiscard]] double scatter_deg(double focal) const;
 };
+
+/// As FocalProgress has it.
+double FocalFinder::State::scatter_deg(double focal) const {
+  glm::dvec2 sum(0);
+  double xx = 0;
+  double xy = 0;
+  double yy = 0;
+  for (const glm::dvec3& line : horizons) {
+    // Through K, a vanishing line is its plane's normal.
+    glm::dvec3 normal = glm::normalize(glm::dvec3(line.x * focal, line.y * focal, line.z));
+    if (normal.z < 0) normal = -normal;
+    sum += glm::dvec2(normal);
+    xx += normal.x * normal.x;
+    xy += normal.x * normal.y;
+    yy += normal.y * normal.y;
+  }
+  const double share = 1.0 / static_cast<double>(horizons.size());
+  xx = share * xx - share * share * sum.x * sum.x;
+  xy = share * xy - share * share * sum.x * sum.y;
+  yy = share * yy - share * share * sum.y * sum.y;
+  const double most = 0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy);
+  return glm::degrees(std::sqrt(std::max(0.0, most)));
+}
 
 bool FocalFinder::State::solve(double& x, double& deviation) const {
   // Twice: the second time without views that the first cannot explain.
@@ -78,7 +105,7 @@ bool FocalFinder::State::solve(double& x, double& deviation) const {
       ab += c.a * c.b;
       ++count;
     }
-    if (count < kFewestViews || !(aa > 0)) return false;
+    if (count < FocalProgress::kFewestViews || !(aa > 0)) return false;
     const double best = ab / aa;
     double rest = 0;
     for (const Constraint& c : constraints) {
@@ -103,8 +130,7 @@ Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundl
   }
   auto state = std::make_unique<State>();
   state->unit = width;
-  state->middle_x = 0.5 * (width - 1);
-  state->middle_y = 0.5 * (height - 1);
+  state->camera = default_camera(width, height);
   std::size_t most_codes = 0;
   for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
     const auto bytes = bundle.section(SectionType::kLoopRecord, i);
@@ -122,46 +148,64 @@ Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundl
   const LoopDetectOptions detect;
   state->describer = LoopDescriber::create(width, height, detect);
   state->matcher = std::make_unique<loop::PlaneMatcher>(
-      default_camera(width, height), loop::kernels(), static_cast<std::size_t>(detect.max_features),
-      most_codes);
+      state->camera, loop::kernels(), static_cast<std::size_t>(detect.max_features), most_codes);
   state->constraints.reserve(2 * kMostViews);
+  state->horizons.reserve(kMostViews);
   return std::unique_ptr<FocalFinder>(new FocalFinder(std::move(state)));
 }
 
 bool FocalFinder::look(const GrayImage& frame) {
   State& state = *state_;
+  ++state.looks;
   state.describer->set_frame(frame);
   const auto features = state.describer->features();
+  const loop::Scene scene{state.camera, state.describer->pyramid(), loop::kernels(), state.patches};
   bool added = false;
   for (const LoopPattern& pattern : state.patterns) {
-    if (state.constraints.size() + 2 > 2 * kMostViews) return added;
+    if (state.horizons.size() == kMostViews) return added;
     const auto finds = state.matcher->find(pattern, features);
     if (finds.empty() || finds[0].inliers < kInliers) continue;
+    loop::PlaneMap map{finds[0].homography};
+    loop::Fit fit;
+    if (!loop::settle_map(pattern, scene, map, fit)) continue;
     glm::dmat3 centre(1.0);
-    centre[2] = {-state.middle_x, -state.middle_y, 1.0};
+    centre[2] = {-state.camera.cx, -state.camera.cy, 1.0};
     const glm::dmat3 from_world =
-        centre * finds[0].homography * glm::inverse(pattern.world_from_pixels());
+        centre * map.homography * glm::inverse(pattern.world_from_pixels());
     const glm::dmat3 homography = from_world * (1.0 / from_world[2][2]);
-    if (std::hypot(homography[0].z, homography[1].z) < kPerspective) continue;
+    if (std::hypot(homography[0].z, homography[1].z) < kPerspective) {
+      ++state.faint;
+      continue;
+    }
     for (const Constraint& constraint : constraints_of(homography, state.unit)) {
       state.constraints.push_back(constraint);
     }
+    state.horizons.push_back(glm::cross(homography[0], homography[1]));
     added = true;
   }
   return added;
 }
 
-int FocalFinder::views() const {
-  return static_cast<int>(state_->constraints.size() / 2);
+FocalProgress FocalFinder::progress() const {
+  FocalProgress progress{state_->looks, state_->faint, static_cast<int>(state_->horizons.size())};
+  double x = 0;
+  double deviation = 0;
+  // f = x^(-1/2): its relative deviation is half of that of x.
+  if (!state_->solve(x, deviation)) return progress;
+  progress.deviation = 0.5 * deviation / x;
+  progress.scatter_deg = state_->scatter_deg(state_->unit / std::sqrt(x));
+  return progress;
 }
 
 std::optional<double> FocalFinder::focal() const {
   double x = 0;
   double deviation = 0;
-  if (views() < kFewestViews || !state_->solve(x, deviation)) return std::nullopt;
-  // f = x^(-1/2): its relative deviation is half of that of x.
-  if (!(0.5 * deviation < kSure * x)) return std::nullopt;
+  if (state_->horizons.size() < FocalProgress::kFewestViews || !state_->solve(x, deviation) ||
+      !(0.5 * deviation < FocalProgress::kSure * x)) {
+    return std::nullopt;
+  }
   const double focal = state_->unit / std::sqrt(x);
+  if (state_->scatter_deg(focal) < FocalProgress::kScatter) return std::nullopt;
   const bool plausible = focal > 0.3 * state_->unit && focal < 6 * state_->unit;
   return plausible ? std::optional<double>(focal) : std::nullopt;
 }

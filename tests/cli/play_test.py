@@ -47,6 +47,15 @@ class Play(ProgramTest):
                                       stderr=subprocess.PIPE, text=True)
             self.assertEqual(done.returncode, 2, done.stderr)
 
+    def test_a_focal_length_that_stays_unknown_is_told_with_the_reason(self):
+        bundle = self.bake_demo()
+        paper = self.play(bundle, "--input", COVER, "--find-focal", "--method", "paper")
+        self.assert_fails(paper, 1, "the article's method")
+        done = self.play(bundle, "--input", COVER, "--find-focal")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("the focal length stays unknown: 0 views tell something and 1 are too frontal", done.stderr)
+        self.assertNotIn("focal", self.play(bundle, "--input", COVER, "--find-focal", "--quiet").stderr)
+
     def test_a_run_with_every_output_and_its_replay(self):
         bundle, clip = self.bake_demo(), self.clip()
         done = self.play(bundle, "--input", clip, "--json", "--outline", "--osd", "--out", "pictures", "--report",

@@ -190,8 +190,8 @@ TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
           render_scene(test::gray(image), camera, pose, background, band, random);
       (*finder)->look(scene.picture.view());
     }
-    ASSERT_TRUE((*finder)->focal()) << truth << " after " << (*finder)->views() << " views";
-    EXPECT_NEAR(*(*finder)->focal(), truth, 0.02 * truth);
+    ASSERT_TRUE((*finder)->focal()) << truth << " after " << (*finder)->progress().views << " views";
+    EXPECT_NEAR(*(*finder)->focal(), truth, 0.01 * truth);
   }
 }
 
@@ -214,6 +214,11 @@ TEST(FocalFinder, FrontalViewsTellNothing) {
         render_scene(test::gray(image), camera, pose, background, band, random).picture.view());
   }
   EXPECT_FALSE((*finder)->focal());
+  const FocalProgress progress = (*finder)->progress();
+  EXPECT_EQ(progress.looks, 10);
+  EXPECT_EQ(progress.faint, 10);
+  EXPECT_EQ(progress.views, 0);
+  EXPECT_EQ(progress.deviation, 0);
 }
 
 TEST_F(Calibrate, RealPhotosAsOpenCvHasThem) {
