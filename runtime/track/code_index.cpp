@@ -1,127 +1,169 @@
-// Hash tables over sampled bits of all patterns' codes.
+// Inverted file of all patterns' codes, and the agreement of a frame's features on a place.
 #include "code_index.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
-
-#include "kernels.hpp"
+#include <cmath>
 
 namespace modar::loop {
 namespace {
 
-constexpr std::size_t kTables = 8;
-constexpr unsigned kKeyBits = 14;  // and one for the corner's polarity
-constexpr std::size_t kKeys = std::size_t{1} << (kKeyBits + 1);
-constexpr std::size_t kIndexed = 512;  // codes of a pattern and polarity
-constexpr int kSampleBits = 9;         // of 32: those of one place differ in some 5, chance in 16
+constexpr std::size_t kIndexed = 128;    // codes of a pattern and polarity
+constexpr int kFarthest = 60;            // bits; no code further away says anything
+constexpr std::size_t kHypotheses = 64;  // votes of a pattern that the others are held against
+constexpr std::uint32_t kNobody = ~0u;
+constexpr unsigned kWordBits = 20;  // of a word's number, below its distance
+constexpr int kWholeReach = 255;    // of Kernels::distances(): leaves nothing out
+constexpr std::size_t kBlockBytes = std::size_t{kBlockCodes} * kCodeBytes;
 
-using Code = std::array<std::uint8_t, kCodeBytes>;
+using Code = CodeIndex::Code;
 
-/// Which 14 and 32 bits of a code each table looks at: a fixed shuffle of all 256.
-struct Bits {
-  std::array<std::uint8_t, kKeyBits> key{};
-  std::array<std::uint8_t, 32> sample{};
-};
-
-std::array<Bits, kTables> shuffled_bits() {
-  std::array<Bits, kTables> tables{};
-  std::array<std::uint8_t, 256> order{};
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint8_t>(i);
-  std::uint64_t state = 0x9E3779B97F4A7C15ull;
-  for (Bits& bits : tables) {
-    for (std::size_t i = order.size() - 1; i > 0; --i) {
-      state = state * 6364136223846793005ull + 1442695040888963407ull;
-      std::swap(order[i], order[static_cast<std::size_t>(state >> 33) % (i + 1)]);
-    }
-    std::copy_n(order.begin(), kKeyBits, bits.key.begin());
-    std::copy_n(order.begin() + kKeyBits, bits.sample.size(), bits.sample.begin());
-  }
-  return tables;
+Code code_at(const std::uint8_t* blocks, std::size_t i) {
+  const std::uint8_t* block = blocks + i / kBlockCodes * kBlockBytes + i % kBlockCodes;
+  Code code;
+  for (std::size_t k = 0; k < code.size(); ++k) code[k] = block[k * kBlockCodes];
+  return code;
 }
 
-template <std::size_t N>
-std::uint32_t gather(const Code& code, const std::array<std::uint8_t, N>& bits) {
-  std::uint32_t out = 0;
-  for (const std::uint8_t bit : bits) {
-    out = out << 1 | ((static_cast<std::uint32_t>(code[bit / 8]) >> (bit % 8)) & 1u);
-  }
-  return out;
+void put_code(const Code& code, std::size_t i, std::uint8_t* blocks) {
+  std::uint8_t* block = blocks + i / kBlockCodes * kBlockBytes + i % kBlockCodes;
+  for (std::size_t k = 0; k < code.size(); ++k) block[k * kBlockCodes] = code[k];
 }
 
-const std::array<Bits, kTables>& table_bits() {
-  static const std::array<Bits, kTables> kBits = shuffled_bits();
-  return kBits;
+std::size_t position_of(std::span<const std::uint8_t> distances, int wanted) {
+  std::size_t at = 0;
+  while (at + 1 < distances.size() && distances[at] != wanted) ++at;
+  return at;
 }
 
-std::uint32_t key_of(const Code& code, bool dark, const Bits& bits) {
-  return gather(code, bits.key) << 1 | (dark ? 1u : 0u);
-}
-
-/// Calls visit(code, dark) for the codes of a pattern that the index holds.
-template <class Visit>
-void each_code(const LoopPattern& pattern, Visit&& visit) {
-  for (const bool dark : {false, true}) {
-    const std::size_t first = dark ? pattern.bright_count : 0;
-    const std::size_t last = dark ? pattern.features.size() : pattern.bright_count;
-    for (std::size_t i = first; i < std::min(last, first + kIndexed); ++i) {
-      const std::uint8_t* block = pattern.codes + i / kBlockCodes * kBlockCodes * kCodeBytes;
-      Code code;
-      for (std::size_t k = 0; k < code.size(); ++k) {
-        code[k] = block[k * kBlockCodes + i % kBlockCodes];
-      }
-      visit(code, dark);
-    }
-  }
+/// Where a pattern's features of a polarity begin and end.
+std::array<std::size_t, 2> range_of(const LoopPattern& pattern, bool dark) {
+  if (dark) return {pattern.bright_count, pattern.features.size()};
+  return {0, pattern.bright_count};
 }
 
 }  // namespace
 
-CodeIndex::CodeIndex(std::span<const LoopPattern> patterns)
-    : tables_(kTables), votes_(patterns.size()), voted_(patterns.size()) {
-  for (std::size_t t = 0; t < kTables; ++t) {
-    const Bits& bits = table_bits()[t];
-    Table& table = tables_[t];
-    table.starts.assign(kKeys + 1, 0);
-    const auto count = [&](const Code& code, bool dark) {
-      ++table.starts[key_of(code, dark, bits) + 1];
-    };
-    for (const LoopPattern& pattern : patterns) each_code(pattern, count);
-    for (std::size_t key = 0; key < kKeys; ++key) table.starts[key + 1] += table.starts[key];
-    table.entries.resize(table.starts[kKeys]);
-    std::vector<std::uint32_t> next(table.starts.begin(), table.starts.end() - 1);
-    for (std::uint32_t p = 0; p < patterns.size(); ++p) {
-      each_code(patterns[p], [&](const Code& code, bool dark) {
-        table.entries[next[key_of(code, dark, bits)]++] = {gather(code, bits.sample), p};
-      });
+CodeIndex::CodeIndex(std::span<const LoopPattern> patterns, const Kernels& kernels,
+                     std::size_t most_features)
+    : patterns_(patterns), kernels_(kernels), support_(patterns.size()) {
+  votes_.reserve(most_features);
+  build(groups_[0], false);
+  build(groups_[1], true);
+}
+
+void CodeIndex::build(Group& group, bool dark) {
+  std::vector<Code> codes;
+  std::vector<std::uint32_t> owners;
+  for (std::uint32_t p = 0; p < patterns_.size(); ++p) {
+    const auto [first, last] = range_of(patterns_[p], dark);
+    for (std::size_t i = first; i < std::min(last, first + kIndexed); ++i) {
+      codes.push_back(code_at(patterns_[p].codes, i));
+      owners.push_back(p * static_cast<std::uint32_t>(kIndexed) +
+                       static_cast<std::uint32_t>(i - first));
     }
   }
+  if (codes.empty()) return;
+  // As many words as make comparing with them and with some of their lists cost about the same.
+  const double balanced = std::sqrt(2.0 * static_cast<double>(codes.size()));
+  const std::size_t words = (static_cast<std::size_t>(balanced) / kBlockCodes + 1) * kBlockCodes;
+  group.words.resize(words * kCodeBytes);
+  for (std::size_t w = 0; w < words; ++w) {
+    put_code(codes[w * codes.size() / words], w, group.words.data());
+  }
+  distances_.resize(std::max(distances_.size(), words + kSlack));
+  std::vector<std::vector<std::uint32_t>> lists(words);
+  for (std::uint32_t i = 0; i < codes.size(); ++i) {
+    const int least = kernels_.distances(codes[i].data(), group.words.data(), words / kBlockCodes,
+                                         kWholeReach, distances_.data());
+    lists[position_of({distances_.data(), words}, least)].push_back(i);
+  }
+  for (const std::vector<std::uint32_t>& list : lists) {
+    group.starts.push_back(static_cast<std::uint32_t>(group.owners.size() / kBlockCodes));
+    const std::size_t filled = (list.size() + kBlockCodes - 1) / kBlockCodes * kBlockCodes;
+    group.codes.resize((group.owners.size() + filled) * kCodeBytes);
+    for (std::size_t k = 0; k < filled; ++k) {
+      const std::uint32_t i = list[std::min(k, list.size() - 1)];  // filled up by its last
+      put_code(codes[i], group.owners.size(), group.codes.data());
+      group.owners.push_back(owners[i]);
+    }
+    distances_.resize(std::max(distances_.size(), filled + kSlack));
+  }
+  group.starts.push_back(static_cast<std::uint32_t>(group.owners.size() / kBlockCodes));
+  group.codes.shrink_to_fit();
+  group.owners.shrink_to_fit();
+}
+
+/// The words nearest to a code that have any codes, by distance and number, then kNobody.
+std::array<std::uint32_t, CodeIndex::kProbes> CodeIndex::near_words(const Group& group,
+                                                                    const Code& code) {
+  const std::size_t words = group.starts.size() - 1;
+  kernels_.distances(code.data(), group.words.data(), words / kBlockCodes, kWholeReach,
+                     distances_.data());
+  std::array<std::uint32_t, kProbes> near;
+  near.fill(kNobody);
+  for (std::uint32_t w = 0; w < words; ++w) {
+    std::uint32_t key = std::uint32_t{distances_[w]} << kWordBits | w;
+    if (key >= near.back() || group.starts[w] == group.starts[w + 1]) continue;
+    for (std::uint32_t& other : near) {
+      if (key < other) std::swap(key, other);
+    }
+  }
+  return near;
+}
+
+/// The owner of the nearest code in the lists of the nearest words; kNobody where none is near.
+std::uint32_t CodeIndex::nearest_owner(const Group& group, const Code& code) {
+  std::uint32_t owner = kNobody;
+  int best = kFarthest + 1;
+  for (const std::uint32_t key : near_words(group, code)) {
+    if (key == kNobody) break;
+    const std::uint32_t word = key & ((1u << kWordBits) - 1);
+    const std::size_t first = std::size_t{group.starts[word]} * kBlockCodes;
+    const std::size_t blocks = group.starts[word + 1] - group.starts[word];
+    const int least = kernels_.distances(code.data(), group.codes.data() + first * kCodeBytes,
+                                         blocks, best, distances_.data());
+    if (least >= best) continue;
+    best = least;
+    owner = group.owners[first + position_of({distances_.data(), blocks * kBlockCodes}, least)];
+  }
+  return owner;
+}
+
+/// The most votes of a pattern that agree on a place.
+std::uint16_t CodeIndex::agreeing(std::span<const Vote> votes) {
+  std::uint16_t most = 0;
+  const std::size_t stride = votes.size() / kHypotheses + 1;
+  for (std::size_t i = 0; i < votes.size(); i += stride) {
+    const auto count = std::count_if(votes.begin(), votes.end(), [&](const Vote& other) {
+      return agrees(votes[i].match, other.match);
+    });
+    most = std::max(most, static_cast<std::uint16_t>(count));
+  }
+  return most;
 }
 
 std::span<const std::uint16_t> CodeIndex::vote(std::span<const LoopFeature> features) {
-  std::fill(votes_.begin(), votes_.end(), std::uint16_t{0});
-  std::fill(voted_.begin(), voted_.end(), 0u);
-  std::uint32_t now = 0;
-  for (const LoopFeature& feature : features) {
-    ++now;
-    for (std::size_t t = 0; t < kTables; ++t) {
-      const Bits& bits = table_bits()[t];
-      const Table& table = tables_[t];
-      const std::uint32_t key = key_of(feature.code, feature.dark != 0, bits);
-      const std::uint32_t last = table.starts[key + 1];
-      if (table.starts[key] == last) continue;
-      const std::uint32_t sample = gather(feature.code, bits.sample);
-      for (std::uint32_t i = table.starts[key]; i < last; ++i) {
-        const Entry& entry = table.entries[i];
-        if (std::popcount(entry.sample ^ sample) > kSampleBits || voted_[entry.pattern] == now) {
-          continue;
-        }
-        voted_[entry.pattern] = now;
-        ++votes_[entry.pattern];
-      }
-    }
+  votes_.clear();
+  for (const LoopFeature& feature : features.first(std::min(features.size(), votes_.capacity()))) {
+    const bool dark = feature.dark != 0;
+    const Group& group = groups_[dark ? 1 : 0];
+    if (group.starts.empty()) continue;
+    const std::uint32_t owner = nearest_owner(group, feature.code);
+    if (owner == kNobody) continue;
+    const std::uint32_t p = owner / kIndexed;
+    const std::size_t at = range_of(patterns_[p], dark)[0] + owner % kIndexed;
+    votes_.push_back({p, match_of(patterns_[p].features[at], feature)});
   }
-  return votes_;
+  std::sort(votes_.begin(), votes_.end(),
+            [](const Vote& a, const Vote& b) { return a.pattern < b.pattern; });
+  std::fill(support_.begin(), support_.end(), std::uint16_t{0});
+  for (auto first = votes_.begin(); first != votes_.end();) {
+    const auto last = std::find_if(
+        first, votes_.end(), [&](const Vote& vote) { return vote.pattern != first->pattern; });
+    support_[first->pattern] = agreeing({first, last});
+    first = last;
+  }
+  return support_;
 }
 
 }  // namespace modar::loop

@@ -2,38 +2,59 @@
 // to. Internal to runtime/track.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "kernels.hpp"
 #include "loop_pattern.hpp"
 #include "modar/loop_features.hpp"
+#include "plane_matcher.hpp"
 
 namespace modar::loop {
 
-/// Locality-sensitive hashing by bit sampling (Indyk & Motwani, 1998): codes that agree in the bits
-/// of one of a few tables are compared by 32 further bits. A frame's features are looked up once,
-/// whatever the number of patterns; what the look-up costs grows with chance neighbours only.
+/// An inverted file (Sivic & Zisserman, "Video Google", 2003) over binary codes, whose words are
+/// some of the codes themselves. A feature is compared with the words and with the codes of the few
+/// nearest of them, so that its cost grows with the square root of the patterns' number. It speaks
+/// for the pattern that holds the nearest code of all, and of a pattern count only features that
+/// agree in place and shape.
 class CodeIndex {
  public:
-  /// Takes the most repeatable codes of each pattern (each group's first). The memory is
-  /// proportional to the patterns; nothing is allocated later.
-  explicit CodeIndex(std::span<const LoopPattern> patterns);
-  /// For each pattern, how many of the features look like one of its own.
+  using Code = std::array<std::uint8_t, kCodeBytes>;
+
+  /// Takes the most repeatable codes of each pattern (each group's first), some 9 KB a pattern.
+  /// Nothing is allocated later. The patterns must outlive it.
+  CodeIndex(std::span<const LoopPattern> patterns, const Kernels& kernels,
+            std::size_t most_features);
+  /// For each pattern, how many of the features show it at one place.
   std::span<const std::uint16_t> vote(std::span<const LoopFeature> features);
 
  private:
-  struct Entry {
-    std::uint32_t sample = 0;
+  static constexpr std::size_t kProbes = 4;  ///< words whose codes a feature is compared with
+
+  /// Codes of one polarity, in blocks as Kernels::distances() takes them.
+  struct Group {
+    std::vector<std::uint8_t> words;
+    std::vector<std::uint32_t> starts;  ///< by word, in blocks, and the end
+    std::vector<std::uint8_t> codes;
+    std::vector<std::uint32_t> owners;  ///< by code: pattern and feature
+  };
+  struct Vote {
     std::uint32_t pattern = 0;
+    PlaneMatch match;
   };
-  struct Table {
-    std::vector<std::uint32_t> starts;  ///< by key, one more than there are keys
-    std::vector<Entry> entries;
-  };
-  std::vector<Table> tables_;
-  std::vector<std::uint16_t> votes_;
-  std::vector<std::uint32_t> voted_;  ///< by pattern: the last feature that voted for it, plus one
+  void build(Group& group, bool dark);
+  std::array<std::uint32_t, kProbes> near_words(const Group& group, const Code& code);
+  std::uint32_t nearest_owner(const Group& group, const Code& code);
+  static std::uint16_t agreeing(std::span<const Vote> votes);
+
+  std::span<const LoopPattern> patterns_;
+  const Kernels& kernels_;
+  std::array<Group, 2> groups_;  ///< bright, dark
+  std::vector<std::uint8_t> distances_;
+  std::vector<Vote> votes_;
+  std::vector<std::uint16_t> support_;
 };
 
 }  // namespace modar::loop

@@ -15,8 +15,11 @@ constexpr int kUnsettledPercent = 45;  // where the patches do not hold
 constexpr double kMostMisfit = 1.5;    // of what the features alone leave
 constexpr int kMapGain = 20;           // percent that the map shows more than the best pose
 constexpr int kMapInliers = 16;        // where no pose fits, and the map alone must convince
-constexpr std::size_t kVoted = 2;      // patterns a frame that are matched in full by their votes,
-constexpr std::size_t kMatched = 3;    // and with the one whose turn it is
+// Of many patterns, those are matched in full
+constexpr std::uint16_t kClearVotes = 4;  // that so many features speak for (chance: two or three),
+constexpr std::ptrdiff_t kMostClear = 4;  // at most so many a frame;
+constexpr std::size_t kGuessed = 2;       // where none is found, these at least, by their votes,
+constexpr std::size_t kMatched = 3;       // and with them the one whose turn it is.
 
 std::size_t most_codes(std::span<const LoopPattern> patterns) {
   std::size_t most = 0;
@@ -36,30 +39,36 @@ PatternSearch::PatternSearch(const Camera& camera, std::span<const LoopPattern> 
   chosen_.reserve(patterns.size());
 }
 
-/// Leaves in chosen_ the patterns to match in full.
+/// Leaves in chosen_ the patterns to match in full; the first clear_ of them are likely there.
 void PatternSearch::choose(std::span<const LoopFeature> features, std::span<const Want> wants) {
   chosen_.clear();
   for (std::uint32_t i = 0; i < patterns_.size(); ++i) {
     if (wants[i] != Want::kNo) chosen_.push_back(i);
   }
+  clear_ = chosen_.size();
   if (chosen_.size() <= kMatched) return;
-  if (!index_) index_ = std::make_unique<CodeIndex>(patterns_);
+  if (!index_) index_ = std::make_unique<CodeIndex>(patterns_, kernels_, matcher_.most_features());
   const std::span<const std::uint16_t> votes = index_->vote(features);
+  const auto is_clear = [&](std::uint32_t i) { return votes[i] >= kClearVotes; };
   const auto before = [&](std::uint32_t a, std::uint32_t b) {
+    if (is_clear(a) != is_clear(b)) return is_clear(a);
     if (wants[a] != wants[b]) return wants[a] == Want::kFirst;
     return votes[a] != votes[b] ? votes[a] > votes[b] : a < b;
   };
-  std::partial_sort(chosen_.begin(), chosen_.begin() + kVoted, chosen_.end(), before);
+  const auto first = chosen_.begin();
+  std::partial_sort(first, first + kMostClear, chosen_.end(), before);
+  clear_ = static_cast<std::size_t>(std::find_if_not(first, first + kMostClear, is_clear) - first);
+  const auto turn = first + static_cast<std::ptrdiff_t>(std::max(clear_, kGuessed));
+  if (turn == chosen_.end()) return;
   const auto since = [this](std::uint32_t i) {
     const auto count = static_cast<std::uint32_t>(patterns_.size());
     return (i + count - turn_) % count;
   };
-  const auto next =
-      std::min_element(chosen_.begin() + kVoted, chosen_.end(),
-                       [&](std::uint32_t a, std::uint32_t b) { return since(a) < since(b); });
+  const auto next = std::min_element(
+      turn, chosen_.end(), [&](std::uint32_t a, std::uint32_t b) { return since(a) < since(b); });
   turn_ = (*next + 1) % static_cast<std::uint32_t>(patterns_.size());
-  std::iter_swap(chosen_.begin() + kVoted, next);
-  chosen_.resize(kMatched);
+  std::iter_swap(turn, next);
+  chosen_.erase(turn + 1, chosen_.end());
 }
 
 void PatternSearch::run(LoopDescriber& eye, std::span<const Want> wants, Findings& findings) {
@@ -79,8 +88,11 @@ void PatternSearch::run(LoopDescriber& eye, std::span<const Want> wants, Finding
   choose(features, wants);
   findings.times.match = clock.lap();
   const Scene scene{camera_, eye.pyramid(), kernels_, patches_};
-  for (const std::uint32_t i : chosen_) {
-    findings.patterns[i] = find(patterns_[i], scene, features, findings.times);
+  bool found = false;
+  for (std::size_t k = 0; k < chosen_.size() && (k < clear_ || !found); ++k) {
+    Finding& finding = findings.patterns[chosen_[k]];
+    finding = find(patterns_[chosen_[k]], scene, features, findings.times);
+    found = found || finding.reason == Reason::kVisible;
   }
 }
 

@@ -38,7 +38,8 @@ struct Findings {
 };
 
 /// Features of the frame are found once. Where many patterns are wanted, an index over all of them
-/// tells which few are worth matching in full; of the others one each time has its turn.
+/// tells which few are worth matching in full; where none of those is there, one of the others has
+/// its turn.
 class PatternSearch {
  public:
   /// The patterns must outlive it. With more than a few of them, the first run() builds the index.
@@ -63,6 +64,7 @@ class PatternSearch {
   PlaneMatcher matcher_;
   std::unique_ptr<CodeIndex> index_;
   std::vector<std::uint32_t> chosen_;
+  std::size_t clear_ = 0;   ///< the first of them, which are matched whatever is found
   std::uint32_t turn_ = 0;  ///< the pattern whose turn is next
 };
 

@@ -62,6 +62,31 @@ glm::dmat3 unscaled(const glm::dmat3& h, const Scaling& from, const Scaling& to)
 
 }  // namespace
 
+PlaneMatch match_of(const LoopFeatureRecord& record, const LoopFeature& feature) {
+  PlaneMatch match;
+  match.pattern = place(record);
+  match.ideal = {static_cast<double>(feature.x), static_cast<double>(feature.y)};
+  match.sigma = static_cast<double>(1 << feature.level);
+  // Back from the oriented patch to the frame: turn by the feature's angle, grow by its level.
+  const double c = static_cast<double>(feature.cosine) * match.sigma / 4096.0;
+  const double s = static_cast<double>(feature.sine) * match.sigma / 4096.0;
+  const std::int16_t* w = record.warp;
+  match.affine[0] = {c * w[0] - s * w[2], s * w[0] + c * w[2]};
+  match.affine[1] = {c * w[1] - s * w[3], s * w[1] + c * w[3]};
+  return match;
+}
+
+bool agrees(const PlaneMatch& hypothesis, const PlaneMatch& other) {
+  const glm::dmat2& a = hypothesis.affine;
+  const glm::dvec2 away = a * (other.pattern - hypothesis.pattern);
+  const glm::dvec2 miss = away + hypothesis.ideal - other.ideal;
+  const double reach = 4.0 * other.sigma + 0.25 * glm::length(away);
+  if (!(glm::dot(miss, miss) < reach * reach)) return false;
+  const glm::dmat2 gap = other.affine - a;
+  const double size = glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]);
+  return glm::dot(gap[0], gap[0]) + glm::dot(gap[1], gap[1]) < 0.36 * size;
+}
+
 PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t most_features,
                            std::size_t most_codes)
     : camera_(camera), kernels_(kernels), distances_(most_codes + kSlack) {
@@ -104,19 +129,9 @@ void PlaneMatcher::match(const LoopPattern& pattern, std::span<const LoopFeature
                                         (last - first) / kBlockCodes, kHalfBits, distances_.data());
     std::size_t at = 0;
     if (best > kMostBits || !unique(pattern, first, last - first, best, at)) continue;
-    const LoopFeatureRecord& record = pattern.features[at];
-    PlaneMatch& match = matches_.emplace_back();
-    match.pattern = place(record);
-    match.ideal = {static_cast<double>(feature.x), static_cast<double>(feature.y)};
+    PlaneMatch& match = matches_.emplace_back(match_of(pattern.features[at], feature));
     if (lens != nullptr) match.ideal = undistort(*lens, match.ideal);
-    match.sigma = static_cast<double>(1 << feature.level);
     match.distance = best;
-    // Back from the oriented patch to the frame: turn by the feature's angle, grow by its level.
-    const double c = static_cast<double>(feature.cosine) * match.sigma / 4096.0;
-    const double s = static_cast<double>(feature.sine) * match.sigma / 4096.0;
-    const std::int16_t* w = record.warp;
-    match.affine[0] = {c * w[0] - s * w[2], s * w[0] + c * w[2]};
-    match.affine[1] = {c * w[1] - s * w[3], s * w[1] + c * w[3]};
   }
 }
 
@@ -124,20 +139,10 @@ void PlaneMatcher::match(const LoopPattern& pattern, std::span<const LoopFeature
 std::size_t PlaneMatcher::support(const PlaneMatch& hypothesis,
                                   std::vector<std::uint8_t>* mask) const {
   std::size_t count = 0;
-  const auto& a = hypothesis.affine;
-  const double size = glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]);
   for (std::size_t i = 0; i < matches_.size(); ++i) {
-    const PlaneMatch& other = matches_[i];
-    const glm::dvec2 away = a * (other.pattern - hypothesis.pattern);
-    const glm::dvec2 miss = away + hypothesis.ideal - other.ideal;
-    const double reach = 4.0 * other.sigma + 0.25 * glm::length(away);
-    bool agrees = glm::dot(miss, miss) < reach * reach;
-    if (agrees) {
-      const glm::dmat2 gap = other.affine - a;
-      agrees = glm::dot(gap[0], gap[0]) + glm::dot(gap[1], gap[1]) < 0.36 * size;
-    }
-    count += agrees ? 1 : 0;
-    if (mask != nullptr) (*mask)[i] = agrees ? 1 : 0;
+    const bool one = agrees(hypothesis, matches_[i]);
+    count += one ? 1 : 0;
+    if (mask != nullptr) (*mask)[i] = one ? 1 : 0;
   }
   return count;
 }

@@ -26,6 +26,11 @@ struct PlaneMatch {
   int distance = 0;      ///< bits
 };
 
+/// Of a feature that looks like a pattern's: its place as if the lens did not bend, no distance.
+PlaneMatch match_of(const LoopFeatureRecord& record, const LoopFeature& feature);
+/// Whether a match lies where another one's affine map says, in a like shape.
+bool agrees(const PlaneMatch& hypothesis, const PlaneMatch& other);
+
 /// A homography that some of the matches agree with.
 struct PlaneFind {
   int inliers = 0;
@@ -41,6 +46,7 @@ class PlaneMatcher {
   /// The homographies that most matches speak for, the best first; valid until the next call.
   std::span<const PlaneFind> find(const LoopPattern& pattern,
                                   std::span<const LoopFeature> features);
+  [[nodiscard]] std::size_t most_features() const { return matches_.capacity(); }
   /// Matches of the last find().
   [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
   /// Collects the points of a find's inliers for inlier_world() and inlier_ideal().

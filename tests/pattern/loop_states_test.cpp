@@ -120,28 +120,6 @@ TEST(PoseLoopStates, ComesBackWithinThreeFramesOfATotalOcclusion) {
   EXPECT_LE(frames, 3);
 }
 
-std::vector<std::byte> many_patterns(int count, std::size_t at) {
-  // Distinct records cost seconds each: the others share three, none of which shows.
-  static const std::vector<std::vector<std::byte>> kOthers = {
-      record_of(textured_picture(300, 240, 901)), record_of(textured_picture(300, 240, 902))};
-  std::vector<std::vector<std::byte>> records;
-  for (int i = 0; i < count; ++i) records.push_back(kOthers[static_cast<std::size_t>(i) % 2]);
-  records[at] = record();
-  return bundle_with(records);
-}
-
-// Of many patterns the index has to name the one that shows: its turn alone would take longer.
-TEST(PoseLoopStates, TheIndexFindsOneOfManyAtOnce) {
-  const auto bundle = many_patterns(12, 9);
-  auto loop = loop_of(bundle);
-  TrackResult result;
-  const SceneFrame scene = frame_of(near_view(), background());
-  ASSERT_TRUE(loop->step(scene.picture.view(), result));
-  ASSERT_EQ(result.visible.size(), 1u);
-  EXPECT_EQ(result.visible[0].pattern, 9u);
-  EXPECT_LT(worst_corner(result.visible[0], scene), 1.0);
-}
-
 TEST(PoseLoopStates, TracksSeveralPatternsAtOnce) {
   const cv::Mat other = textured_picture(300, 240, 901);
   const auto bundle = bundle_with({record_of(other), record()});
