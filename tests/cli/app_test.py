@@ -1,4 +1,4 @@
-"""The runtime in a project of somebody else's: installed, found by CMake and pkg-config, called from C."""
+"""What is installed: programs that run from there; the runtime, found by CMake and pkg-config, called from C."""
 import csv
 import os
 import pathlib
@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 import unittest
 
-from programs import BIN, COVER, ROOT, ProgramTest
+from programs import BIN, COVER, POTTERY, ROOT, ProgramTest
 
 BUILD = BIN.parent
 SANITIZE = os.environ.get("MODAR_SANITIZE", "")
@@ -130,6 +130,16 @@ class App(ProgramTest):
                 self.assertLess(abs(centre[0] - diagonals(row)[0]) + abs(centre[1] - diagonals(row)[1]), 3)
             self.assert_overlay(k, done.stdout[k * WIDTH * HEIGHT * 4:], rgb[k * WIDTH * HEIGHT * 3:], centre)
         self.assertGreaterEqual(found, FRAMES - 2)
+
+    def test_installed_programs_run(self):
+        place = self.folder / "usr"
+        done = run("cmake", "--install", BUILD, "--prefix", place, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        bundle = self.folder / "installed.modar"
+        for command in (["modar", "bake", "--model", POTTERY, "-o", bundle], ["modar", "check", bundle],
+                        ["modar-play", "--help"], ["modar-fetch", "--help"]):
+            done = run(place / "bin" / command[0], *command[1:], text=True)
+            self.assertEqual(done.returncode, 0, f"{command}: {done.stderr}")
 
     def test_drawing_alone_carries_no_tracker(self):
         bundle = self.bake_demo()
