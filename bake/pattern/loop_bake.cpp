@@ -21,6 +21,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kLargestSide = 1023;
 constexpr double kScaleStep = 1.2599210498948732;  // three views an octave
 constexpr int kScales = 7;
+constexpr double kLogSmallest = -1.2039728043259361;  // of the trials' scales: 0.3
+constexpr double kLogLargest = 0.69314718055994531;   // 2
 constexpr int kMargin = 24;       // pixels around a rendered pattern: a patch and the border
 constexpr int kNear = 3;          // view pixels between a trial's feature and a candidate
 constexpr int kRepeats = 64;      // bits: a candidate within this of a trial's feature repeats it
@@ -164,8 +166,8 @@ struct TrialView {
 TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, const Grid& grid,
                     const std::vector<Candidate>& candidates) {
   Random random(seed);
-  const double scale = std::exp(random.uniform(std::log(0.3), std::log(2.0)));
-  const double tilt = 1.0 / std::cos(random.uniform(0.0, 77.0) * kPi / 180.0);
+  const double scale = exp_of(random.uniform(kLogSmallest, kLogLargest));
+  const double tilt = 1.0 / turn_of(random.uniform(0.0, 77.0) * kPi / 180.0).cosine;
   const Turn direction = turn_of(random.uniform(0.0, kPi));
   const Turn rotation = turn_of(random.uniform(0.0, 2 * kPi));
   const AffineView view =

@@ -57,7 +57,9 @@ std::vector<Place> spread(const std::vector<Place>& places, std::uint32_t count,
     kept.clear();
     for (const Place& place : places) {
       const bool free = std::none_of(kept.begin(), kept.end(), [&](const Place& other) {
-        return std::hypot(place.x - other.x, place.y - other.y) < apart;
+        const double dx = place.x - other.x;
+        const double dy = place.y - other.y;
+        return dx * dx + dy * dy < apart * apart;
       });
       if (free) kept.push_back(place);
       if (kept.size() == count) return kept;

@@ -135,7 +135,36 @@ double Random::normal() {
 }
 
 Turn turn_of(double radians) {
-  return {std::cos(radians), std::sin(radians)};
+  constexpr double kQuarter = 1.57079632679489661923;
+  const double quarters = std::floor(radians / kQuarter + 0.5);
+  const double x = radians - quarters * kQuarter;
+  const double xx = x * x;
+  double cosine = 1;
+  double sine = 1;
+  // Taylor's series, from the smallest term on: |x| is at most an eighth of a turn.
+  for (int k = 18; k > 0; k -= 2) {
+    cosine = 1 - cosine * xx / (k * (k - 1));
+    sine = 1 - sine * xx / (k * (k + 1));
+  }
+  sine *= x;
+  switch (static_cast<int>(quarters) & 3) {
+    case 0:
+      return {cosine, sine};
+    case 1:
+      return {-sine, cosine};
+    case 2:
+      return {-cosine, -sine};
+    default:
+      return {sine, -cosine};
+  }
+}
+
+double exp_of(double x) {
+  const double eighth = x / 8;
+  double power = 1;
+  for (int k = 18; k > 0; --k) power = 1 + power * eighth / k;
+  for (int i = 0; i < 3; ++i) power *= power;
+  return power;
 }
 
 AffineView make_view(int picture_width, int picture_height, double scale, double tilt,

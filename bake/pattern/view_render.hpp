@@ -35,7 +35,11 @@ struct Turn {
   double cosine = 1;
   double sine = 0;
 };
+/// By sums and products alone, as exp_of(): a library's sine may differ in its last bit from
+/// machine to machine, and baked bytes must not. Right to about 1e-15. radians: within +-1000.
 Turn turn_of(double radians);
+/// e to the power x, right to about 1e-15 of it. x: within +-4.
+double exp_of(double x);
 
 /// A view scaled by `scale`, compressed by `tilt` (>= 1) along `direction`, then rotated. It shows
 /// the whole picture with `margin` pixels around. Sums and products only: turns of rational numbers
