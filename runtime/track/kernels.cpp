@@ -8,6 +8,7 @@
 #include "kernels.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include "hwy/foreach_target.h"
 #include "hwy/highway.h"
@@ -198,32 +199,66 @@ int distances(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t 
   return smallest;
 }
 
+/// Where a patch's pixels lie around its centre, row by row; the filling lies on it.
+struct PatchOffsets {
+  alignas(16) float right[kPatchPixels] = {};
+  alignas(16) float down[kPatchPixels] = {};
+  constexpr PatchOffsets() {
+    constexpr int kSide = 2 * kPatchHalf + 1;
+    for (int k = 0; k < kSide * kSide; ++k) {
+      right[k] = static_cast<float>(k % kSide - kPatchHalf);
+      down[k] = static_cast<float>(k / kSide - kPatchHalf);
+    }
+  }
+};
+
 /// The image's grey values under the patch, row by row, then zeros.
 void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrdiff_t stride,
                   float* out) {
-  constexpr int kSide = 2 * kPatchHalf + 1;
-  for (int v = 0; v < kSide; ++v) {
-    const float fv = static_cast<float>(v - kPatchHalf);
-    const float left = place.x + fv * place.down_x;
-    const float top = place.y + fv * place.down_y;
-    for (int u = 0; u < kSide; ++u) {
-      const float fu = static_cast<float>(u - kPatchHalf);
-      const float x = left + fu * place.right_x;
-      const float y = top + fu * place.right_y;
-      const int column = static_cast<int>(x);
-      const int row = static_cast<int>(y);
-      const float fx = x - static_cast<float>(column);
-      const float fy = y - static_cast<float>(row);
-      const std::uint8_t* p = pixels + row * stride + column;
-      const float a = p[0];
-      const float b = p[1];
-      const float c = p[stride];
-      const float d = p[stride + 1];
-      const float upper = a + fx * (b - a);
-      const float lower = c + fx * (d - c);
-      out[v * kSide + u] = upper + fy * (lower - upper);
+  static constexpr PatchOffsets kAt;
+  const hn::CappedTag<float, 4> d;
+  const hn::RebindToSigned<decltype(d)> whole;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  for (int k = 0; k < kPatchPixels; k += lanes) {
+    const auto fu = hn::Load(d, kAt.right + k);
+    const auto fv = hn::Load(d, kAt.down + k);
+    const auto at = [&](float centre, float right, float down) {
+      return hn::Add(hn::Add(hn::Set(d, centre), hn::Mul(fv, hn::Set(d, down))),
+                     hn::Mul(fu, hn::Set(d, right)));
+    };
+    const auto x = at(place.x, place.right_x, place.down_x);
+    const auto y = at(place.y, place.right_y, place.down_y);
+    const auto column = hn::ConvertTo(whole, x);
+    const auto row = hn::ConvertTo(whole, y);
+    alignas(16) std::int32_t columns[4];
+    alignas(16) std::int32_t rows[4];
+    hn::Store(column, whole, columns);
+    hn::Store(row, whole, rows);
+    // A lane holds the four neighbours of its place, a byte each.
+    alignas(16) std::int32_t four[4];
+    for (int i = 0; i < lanes; ++i) {
+      const std::uint8_t* p = pixels + rows[i] * stride + columns[i];
+      std::uint16_t upper;
+      std::uint16_t lower;
+      std::memcpy(&upper, p, sizeof upper);
+      std::memcpy(&lower, p + stride, sizeof lower);
+      four[i] = static_cast<std::int32_t>(upper | static_cast<std::uint32_t>(lower) << 16);
     }
+    const hn::RebindToUnsigned<decltype(d)> bits;
+    const auto bytes = hn::BitCast(bits, hn::Load(whole, four));
+    const auto low = hn::Set(bits, 255u);
+    const auto grey = [&](auto value) { return hn::ConvertTo(d, hn::BitCast(whole, value)); };
+    const auto a = grey(hn::And(bytes, low));
+    const auto b = grey(hn::And(hn::ShiftRight<8>(bytes), low));
+    const auto c = grey(hn::And(hn::ShiftRight<16>(bytes), low));
+    const auto e = grey(hn::ShiftRight<24>(bytes));
+    const auto fx = hn::Sub(x, hn::ConvertTo(d, column));
+    const auto fy = hn::Sub(y, hn::ConvertTo(d, row));
+    const auto upper = hn::Add(a, hn::Mul(fx, hn::Sub(b, a)));
+    const auto lower = hn::Add(c, hn::Mul(fx, hn::Sub(e, c)));
+    hn::Store(hn::Add(upper, hn::Mul(fy, hn::Sub(lower, upper))), d, out + k);
   }
+  constexpr int kSide = 2 * kPatchHalf + 1;
   for (int i = kSide * kSide; i < kPatchPixels; ++i) out[i] = 0.0f;
 }
 

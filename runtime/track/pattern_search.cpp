@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "plane_grow.hpp"
 #include "runtime/platform/lap_clock.hpp"
 
 namespace modar::loop {
@@ -10,9 +11,13 @@ namespace {
 
 constexpr int kFewestInliers = 6;
 constexpr int kFewestMatches = 6;
-constexpr int kConvincing = 60;        // percent of the cells: no other place is tried
 constexpr int kUnsettledPercent = 45;  // where the patches do not hold
 constexpr double kMostMisfit = 1.5;    // of what the features alone leave
+constexpr double kMirrored = 1.5;      // the same, of two mirror images
+constexpr int kApartLoss = 8;          // what a place that features deny must show more
+constexpr double kUnhidden = 0.85;     // share of patches that hold where nothing hides any
+constexpr int kManyInliers = 16;       // features that speak for a place by themselves,
+constexpr int kLeastPercent = 20;      // so that little of the pattern need show there
 constexpr int kMapGain = 20;           // percent that the map shows more than the best pose
 constexpr int kMapInliers = 16;        // where no pose fits, and the map alone must convince
 // Of many patterns, those are matched in full
@@ -104,53 +109,88 @@ Finding PatternSearch::find(const LoopPattern& pattern, const Scene& scene,
   finding.matches = matcher_.matches();
   times.match += clock.lap();
   finding.reason = finding.matches < kFewestMatches ? Reason::kFewMatches : Reason::kNoGeometry;
-  int best = kRightPercent - 1;
+  Place best;
   for (const PlaneFind& found : finds) {
-    if (found.inliers < kFewestInliers || best >= kConvincing) break;
+    if (found.inliers < kFewestInliers || best.whole) break;
+    if (finding.reason == Reason::kVisible && 2 * found.inliers < finding.inliers) break;
     if (finding.reason == Reason::kNoGeometry) finding.reason = Reason::kFailedVerification;
     find_pose(pattern, scene, found, best, finding);
   }
   // Where a pose shows part of the pattern only, its map may show all of it.
   if (finding.reason == Reason::kFailedVerification ||
-      (finding.reason == Reason::kVisible && best < kConvincing)) {
-    find_map(pattern, scene, finds.front(), best + kMapGain, finding);
+      (finding.reason == Reason::kVisible && !best.whole)) {
+    find_map(pattern, scene, finds.front(), best.right + kMapGain, finding);
   }
   times.homography += clock.lap();
   return finding;
 }
 
-/// Replaces the finding where the picture shows more of the pattern here than `best` percent.
-void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
-                              const PlaneFind& found, int& best, Finding& finding) {
-  matcher_.choose(pattern, found);
-  FittedPose fitted;
-  if (!fit_pose(pattern, camera_, found.homography, matcher_.inlier_world(),
-                matcher_.inlier_ideal(), fitted)) {
-    return;
-  }
+/// Where the patches alone settle from a start, and how well that shows the pattern.
+PatternSearch::Place PatternSearch::settled(const LoopPattern& pattern, const Scene& scene,
+                                            Reach reach, const Pose& start) const {
+  Place place;
+  place.pose = start;
   Fit fit;
-  Pose refined = fitted.pose;
-  bool settled = settle(pattern, scene, Reach::kNear, refined, fit);
-  for (const Reach reach : {Reach::kFrame, Reach::kFar}) {
-    if (settled) break;
-    refined = fitted.pose;
-    settled = settle(pattern, scene, reach, refined, fit);
+  place.settled = settle(pattern, scene, reach, place.pose, fit);
+  place.right = percent_right(pattern, scene, place.pose);
+  place.value = place.right;
+  if (!place.settled) return place;
+  const int levels = static_cast<int>(scene.pyramid.size());
+  const Resolution best = finest(pattern, map_of_pose(pattern, camera_, place.pose), levels);
+  place.fine = fit.level == best.frame_level;
+  place.whole = place.fine && fit.share() >= kUnhidden;
+  place.value += static_cast<int>((place.fine ? 100.0 : 50.0) * fit.likeness);
+  return place;
+}
+
+/// Brings a start to its place: by the features and by the patches as far as they are known from
+/// them, then by the patches alone; from further away where that does not hold.
+PatternSearch::Place PatternSearch::bring(const LoopPattern& pattern, const Scene& scene,
+                                          Pose start) const {
+  const PlanePoints points = matcher_.inliers();
+  grow(pattern, scene, points, start);
+  const double before = misfit(camera_, start, points);
+  Place best;
+  for (const Reach reach : {Reach::kNear, Reach::kFrame, Reach::kFar}) {
+    Place place = settled(pattern, scene, reach, start);
+    // Patches on the edge of what hides the rest can pull a pose away from what all features say.
+    if (misfit(camera_, place.pose, points) > kMostMisfit * before + 1.0) place.value -= kApartLoss;
+    if (reach == Reach::kNear || place.value > best.value) best = place;
+    if (best.fine) break;
   }
-  // Patches on the edge of what hides the rest can pull a pose away from what all features say.
-  const double misfit_after =
-      misfit(camera_, refined, matcher_.inlier_world(), matcher_.inlier_ideal());
-  if (settled && misfit_after < kMostMisfit * fitted.rms + 1.0) fitted.pose = refined;
-  const int right = percent_right(pattern, scene, fitted.pose);
-  std::array<glm::dvec2, 4> corners;
-  if (right <= best || (!settled && right < kUnsettledPercent) ||
-      !map_corners(pattern, map_of_pose(pattern, camera_, fitted.pose), corners) ||
-      !plausible(corners)) {
-    return;
+  return best;
+}
+
+/// Replaces the finding where the picture shows more of the pattern here than `best` tells.
+void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
+                              const PlaneFind& found, Place& best, Finding& finding) {
+  matcher_.choose(pattern, found);
+  std::array<Pose, 2> starts;
+  const int count = fit_poses(pattern, camera_, found.homography, matcher_.inliers(), starts);
+  if (count == 0) return;
+  const auto consider = [&](const Place& place) {
+    const bool many = found.inliers >= kManyInliers;
+    const bool enough = place.right >= (many ? kLeastPercent : kRightPercent);
+    std::array<glm::dvec2, 4> corners;
+    if (place.value <= best.value || !enough ||
+        (!place.settled && !many && place.right < kUnsettledPercent) ||
+        !map_corners(pattern, map_of_pose(pattern, camera_, place.pose), corners) ||
+        !plausible(corners)) {
+      return;
+    }
+    best = place;
+    finding.reason = Reason::kVisible;
+    finding.pose = place.pose;
+    finding.inliers = found.inliers;
+  };
+  consider(settled(pattern, scene, Reach::kNear, starts[0]));
+  const double least = misfit(camera_, starts[0], matcher_.inliers());
+  for (int i = 0; i < count && !best.whole; ++i) {
+    const Pose& start = starts[static_cast<std::size_t>(i)];
+    // Of two mirror images the features may rule one out.
+    if (misfit(camera_, start, matcher_.inliers()) > kMirrored * least + 0.5) continue;
+    consider(bring(pattern, scene, start));
   }
-  best = right;
-  finding.reason = Reason::kVisible;
-  finding.pose = fitted.pose;
-  finding.inliers = found.inliers;
 }
 
 /// A wrong focal length bends every pose, while the plane's own map still tells where it lies: its

@@ -52,8 +52,20 @@ class PatternSearch {
   void choose(std::span<const LoopFeature> features, std::span<const Want> wants);
   Finding find(const LoopPattern& pattern, const Scene& scene,
                std::span<const LoopFeature> features, TrackTimes& times);
-  void find_pose(const LoopPattern& pattern, const Scene& scene, const PlaneFind& found, int& best,
-                 Finding& finding);
+  /// Where a start leads to.
+  struct Place {
+    Pose pose;
+    int right = 0;         ///< percent
+    int value = 0;         ///< what speaks for it
+    bool settled = false;  ///< the patches hold,
+    bool fine = false;     ///< on the finest level,
+    bool whole = false;    ///< nearly all of them
+  };
+  [[nodiscard]] Place settled(const LoopPattern& pattern, const Scene& scene, Reach reach,
+                              const Pose& start) const;
+  [[nodiscard]] Place bring(const LoopPattern& pattern, const Scene& scene, Pose start) const;
+  void find_pose(const LoopPattern& pattern, const Scene& scene, const PlaneFind& found,
+                 Place& best, Finding& finding);
   void find_map(const LoopPattern& pattern, const Scene& scene, const PlaneFind& found, int better,
                 Finding& finding) const;
 

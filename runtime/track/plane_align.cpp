@@ -9,64 +9,20 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "plane_pull.hpp"
+
 namespace modar::loop {
 namespace {
 
-constexpr float kCount = (2 * kPatchHalf + 1) * (2 * kPatchHalf + 1);
-constexpr float kFlat = 4.0f;      // variance below which nothing is to be seen
-constexpr float kHeld = 0.7f;      // correlation of a patch that fits
-constexpr float kPlain = 30.0f;    // variance below which noise tells a patch's worth
-constexpr double kSettled = 0.05;  // pixels of the level
-constexpr std::size_t kFew = 40;   // patches that are enough on the way
-
-bool inside(const PatchPlace& place, const GrayImage& image) {
-  const float reach_x = kPatchHalf * (std::abs(place.right_x) + std::abs(place.down_x)) + 1.0f;
-  const float reach_y = kPatchHalf * (std::abs(place.right_y) + std::abs(place.down_y)) + 1.0f;
-  return place.x - reach_x >= 0.0f && place.y - reach_y >= 0.0f &&
-         place.x + reach_x < static_cast<float>(image.width - 1) &&
-         place.y + reach_y < static_cast<float>(image.height - 1);
-}
-
-/// What a patch says of its own displacement, in template pixels: g d = e, both by its weight.
-struct Pull {
-  float xx = 0, xy = 0, yy = 0;
-  float ex = 0, ey = 0;
-  float correlation = 0;
-};
-
-Pull pull_of(const Patch& p, const PatchSums& s, float forgiving) {
-  Pull pull;
-  const float inverse = 1.0f / kCount;
-  const float var_t = p.tt * inverse - p.t * inverse * p.t * inverse;
-  const float var_i = s.ii * inverse - s.i * inverse * s.i * inverse;
-  if (var_t < kFlat || var_i < kFlat * 0.25f) return pull;
-  const float gain = std::sqrt(var_i / var_t);
-  pull.correlation = (s.ti * inverse - p.t * inverse * s.i * inverse) / std::sqrt(var_t * var_i);
-  const float miss = (1.0f - pull.correlation) / forgiving;
-  if (miss >= 1.0f) return pull;
-  // The template is brought to the image's contrast, its gradient too.
-  const float weight = (1.0f - miss * miss) * (1.0f - miss * miss) / (var_t + kPlain);
-  pull.xx = weight * (p.xx - p.x * p.x * inverse);
-  pull.xy = weight * (p.xy - p.x * p.y * inverse);
-  pull.yy = weight * (p.yy - p.y * p.y * inverse);
-  pull.ex = weight * ((p.tx - p.t * p.x * inverse) - (s.ix - s.i * p.x * inverse) / gain);
-  pull.ey = weight * ((p.ty - p.t * p.y * inverse) - (s.iy - s.i * p.y * inverse) / gain);
-  return pull;
-}
+constexpr double kSettled = 0.1;  // pixels of the level
+constexpr std::size_t kFew = 40;  // patches that are enough on the way
 
 /// Tukey's weight by the displacement that a patch itself asks for, once the others have settled: a
 /// patch on the edge of what hides the pattern correlates well enough, but pulls elsewhere.
 void distrust(Pull& pull) {
   constexpr float kFar = 1.2f;  // template pixels
-  // A trace of stiffness: a patch of one edge knows nothing along it.
-  const float stiff = 0.1f * (pull.xx + pull.yy);
-  const float xx = pull.xx + stiff;
-  const float yy = pull.yy + stiff;
-  const float determinant = xx * yy - pull.xy * pull.xy;
-  if (!(determinant > 0.0f)) return;
-  const float dx = (yy * pull.ex - pull.xy * pull.ey) / determinant;
-  const float dy = (xx * pull.ey - pull.xy * pull.ex) / determinant;
-  const float far = std::min(1.0f, (dx * dx + dy * dy) / (kFar * kFar));
+  const glm::vec2 way = way_of(pull);
+  const float far = std::min(1.0f, glm::dot(way, way) / (kFar * kFar));
   const float weight = (1.0f - far) * (1.0f - far);
   for (float* part : {&pull.xx, &pull.xy, &pull.yy, &pull.ex, &pull.ey}) *part *= weight;
 }
@@ -81,24 +37,13 @@ Eigen::Matrix2d to_template(const glm::dmat2& d) {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-/// Derivative of a world point's pixel by a small turn on the left and a shift.
 Eigen::Matrix<double, 2, 6> pose_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 world,
                                           double scale) {
-  const glm::dvec3 turned = pose.rotation * glm::dvec3(world, 0.0);
-  const glm::dvec3 p = turned + pose.translation;
-  const double fx = scale * camera.fx / p.z;
-  const double fy = scale * camera.fy / p.z;
-  const double x = p.x / p.z;
-  const double y = p.y / p.z;
+  const PoseSlope slope = pose_slope(camera, pose, world, scale);
   Eigen::Matrix<double, 2, 6> j;
-  j << -fx * x * turned.y, fx * (turned.z + x * turned.x), -fx * turned.y, fx, 0, -fx * x,
-      -fy * (turned.z + y * turned.y), fy * y * turned.x, fy * turned.x, 0, fy, -fy * y;
+  j.row(0) = Eigen::Map<const Eigen::Matrix<double, 1, 6>>(slope.x.data());
+  j.row(1) = Eigen::Map<const Eigen::Matrix<double, 1, 6>>(slope.y.data());
   return j;
-}
-
-void apply(const Vector6& change, Pose& pose) {
-  pose.rotation = rotation_matrix({change(0), change(1), change(2)}) * pose.rotation;
-  pose.translation += glm::dvec3(change(3), change(4), change(5));
 }
 
 /// One pass over the patches: normal equations of N parameters and how well the patches fit.
@@ -109,45 +54,22 @@ struct Pass {
   Fit fit;
 };
 
-/// The patches of the level at hand, and every how many of them is looked at.
-struct View {
-  const GrayImage* image;
-  const Kernels* kernels;
-  Resolution at;
-  std::span<const Patch> patches;
-  std::size_t stride = 1;
-  bool settled = false;  ///< the pose is right to a fraction of a pixel
-};
-
 /// jacobian(centre, seen): derivative of a pattern pixel's place in the level by the parameters.
 template <int N, class Jacobian>
 Pass<N> pass_over(const View& view, const PlaneMap& map, float forgiving, Jacobian&& jacobian) {
   Pass<N> pass;
   pass.fit.level = view.at.frame_level;
-  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
-  const double grow = static_cast<double>(1 << view.at.pattern_level);
   for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
     const Patch& patch = view.patches[i];
-    bool ahead = false;
-    const glm::dvec2 seen = map.at(patch.centre, ahead);
-    if (!ahead) continue;
-    const glm::dmat2 d = map.derivative(patch.centre) * (grow * shrink);
-    const PatchPlace place{static_cast<float>((seen.x + 0.5) * shrink - 0.5),
-                           static_cast<float>((seen.y + 0.5) * shrink - 0.5),
-                           static_cast<float>(d[0].x),
-                           static_cast<float>(d[0].y),
-                           static_cast<float>(d[1].x),
-                           static_cast<float>(d[1].y)};
-    if (!inside(place, *view.image)) continue;
+    Glance at;
+    if (!glance(view, map, patch, forgiving, at)) continue;
     ++pass.fit.visible;
-    const PatchSums sums =
-        view.kernels->patch_sums(patch.pixels, place, view.image->pixels, view.image->stride);
-    Pull pull = pull_of(patch, sums, forgiving);
+    Pull& pull = at.pull;
     if (pull.correlation >= kHeld) ++pass.fit.held;
     pass.fit.likeness += static_cast<double>(std::max(0.0f, pull.correlation));
     if (view.settled) distrust(pull);
     if (pull.xx == 0.0f && pull.yy == 0.0f) continue;
-    const Eigen::Matrix<double, 2, N> j = to_template(d) * jacobian(patch.centre, seen);
+    const Eigen::Matrix<double, 2, N> j = to_template(at.slope) * jacobian(patch.centre, at.seen);
     Eigen::Matrix2d g;
     g << static_cast<double>(pull.xx), static_cast<double>(pull.xy), static_cast<double>(pull.xy),
         static_cast<double>(pull.yy);
@@ -184,19 +106,6 @@ Resolution finest(const LoopPattern& pattern, const PlaneMap& map, int frame_lev
 
 namespace {
 
-/// The view of a level for a map; no patches where the pattern has no image for it.
-View view_of(const LoopPattern& pattern, const Scene& scene, int frame_level, const PlaneMap& map) {
-  const Resolution best = finest(pattern, map, static_cast<int>(scene.pyramid.size()));
-  View view{&scene.pyramid[static_cast<std::size_t>(frame_level)],
-            &scene.kernels,
-            {frame_level, best.pattern_level + frame_level - best.frame_level},
-            {}};
-  if (view.at.pattern_level < 0 || view.at.pattern_level >= pattern.level_count) return view;
-  view.patches = scene.patches.of(pattern, view.at.pattern_level);
-  view.stride = std::max<std::size_t>(1, view.patches.size() / kFew);
-  return view;
-}
-
 /// Puts smeared patches in the place of the sharp ones, where the smear is worth it.
 void smear(const LoopPattern& pattern, const Scene& scene, const Pose& pose, View& view) {
   constexpr double kLeast = 1.0;  // pixels of the level
@@ -226,8 +135,8 @@ void smear(const LoopPattern& pattern, const Scene& scene, const Pose& pose, Vie
   view.stride = 1;
 }
 
-/// One step of Gauss-Newton on the pose. Answers the pixels of the level that it moved by; negative
-/// where it could not.
+/// One step of Gauss-Newton on the pose. Answers the pixels of the level that its corners moved by;
+/// negative where it could not.
 double step_pose(const LoopPattern& pattern, const Scene& scene, const View& view, float forgiving,
                  Pose& pose, Fit& fit) {
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
@@ -239,18 +148,16 @@ double step_pose(const LoopPattern& pattern, const Scene& scene, const View& vie
   fit = pass.fit;
   Vector6 change;
   if (!solve(pass, change) || change.head<3>().norm() > 0.5) return -1.0;
-  Pose next = pose;
-  apply(change, next);
-  if (!(next.translation.z > 0.0)) return -1.0;
-  pose = next;
-  return std::sqrt(change.dot(pass.jtj * change) / pass.jtj.trace()) * scene.camera.fx;
+  std::array<double, 6> by{};
+  Eigen::Map<Vector6>(by.data()) = change;
+  return move(pattern, scene.camera, shrink, by, pose);
 }
 
 }  // namespace
 
 Fit align(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps, bool precise,
           Pose& pose) {
-  View view = view_of(pattern, scene, frame_level, map_of_pose(pattern, scene.camera, pose));
+  View view = view_of(pattern, scene, frame_level, map_of_pose(pattern, scene.camera, pose), kFew);
   Fit fit;
   fit.level = frame_level;
   if (view.patches.empty()) return fit;
@@ -268,7 +175,7 @@ Fit align(const LoopPattern& pattern, const Scene& scene, int frame_level, int s
     view.stride = scene.smear != nullptr ? 2 : 1;
     smear(pattern, scene, pose, view);
   }
-  for (int step = 0; step < (precise ? 4 : 1) && moved >= 0.0; ++step) {
+  for (int step = 0; step < (precise ? 10 : 1) && moved >= 0.0; ++step) {
     // What was held is known of the pose before the step: a pose that is judged by it lies near.
     moved = step_pose(pattern, scene, view, 0.7f, pose, fit);
     if (view.settled || (!precise && moved < kSettled)) break;
@@ -284,7 +191,7 @@ Fit look(const LoopPattern& pattern, const Scene& scene, int frame_level, const 
 
 Fit align_map(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps,
               PlaneMap& map) {
-  View view = view_of(pattern, scene, frame_level, map);
+  View view = view_of(pattern, scene, frame_level, map, kFew);
   view.stride = 1;
   Fit fit;
   fit.level = frame_level;

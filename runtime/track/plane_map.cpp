@@ -27,18 +27,6 @@ Pose mirrored(const Pose& pose) {
 
 }  // namespace
 
-double misfit(const Camera& camera, const Pose& pose, std::span<const glm::dvec2> world,
-              std::span<const glm::dvec2> ideal) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < world.size(); ++i) {
-    const glm::dvec3 p = pose.rotation * glm::dvec3(world[i], 0.0) + pose.translation;
-    const glm::dvec2 seen{camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
-    const glm::dvec2 miss = seen - ideal[i];
-    sum += glm::dot(miss, miss);
-  }
-  return std::sqrt(sum / static_cast<double>(world.size()));
-}
-
 glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& ahead) const {
   const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);
   ahead = p.z > 1e-12;
@@ -109,18 +97,20 @@ std::optional<Pose> nearest_pose(const LoopPattern& pattern, const Camera& camer
   return pose ? std::optional(*pose) : std::nullopt;
 }
 
-bool fit_pose(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
-              std::span<const glm::dvec2> world, std::span<const glm::dvec2> ideal,
-              FittedPose& fitted) {
+int fit_poses(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
+              const PlanePoints& points, std::array<Pose, 2>& poses) {
   const auto start = nearest_pose(pattern, camera, {homography, nullptr});
-  if (!start) return false;
-  fitted.pose = refine_pose(camera, world, ideal, *start);
-  fitted.rms = misfit(camera, fitted.pose, world, ideal);
-  const Pose other = refine_pose(camera, world, ideal, mirrored(fitted.pose));
-  const double other_rms = misfit(camera, other, world, ideal);
-  if (other_rms < fitted.rms) fitted = {other, other_rms};
-  // The plane's face, not its back, must look at the camera.
-  return glm::dot(fitted.pose.rotation[2], fitted.pose.translation) < 0.0;
+  if (!start) return 0;
+  const Pose first = refine_pose(camera, points.world, points.ideal, *start);
+  int count = 0;
+  for (const Pose& pose :
+       {first, refine_pose(camera, points.world, points.ideal, mirrored(first))}) {
+    // The plane's face, not its back, must look at the camera.
+    if (glm::dot(pose.rotation[2], pose.translation) < 0.0) {
+      poses[static_cast<std::size_t>(count++)] = pose;
+    }
+  }
+  return count;
 }
 
 }  // namespace modar::loop

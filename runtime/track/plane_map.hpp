@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 
 #include <glm/mat2x2.hpp>
 #include <glm/mat3x3.hpp>
@@ -14,6 +15,14 @@
 #include "modar/pose.hpp"
 
 namespace modar::loop {
+
+/// Features that agree with a place: on the pattern's plane, in the frame, and the pixels that the
+/// frame's place is good to.
+struct PlanePoints {
+  std::span<const glm::dvec2> world;
+  std::span<const glm::dvec2> ideal;
+  std::span<const double> sigma;
+};
 
 /// homography: pattern pixels to ideal pixels (of a pinhole without distortion).
 struct PlaneMap {
@@ -39,20 +48,12 @@ bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
 /// or smaller than a thumbnail.
 bool plausible(const std::array<glm::dvec2, 4>& corners);
 
-/// Root mean square distance of projected points from where they are seen, pixels.
-double misfit(const Camera& camera, const Pose& pose, std::span<const glm::dvec2> world,
-              std::span<const glm::dvec2> ideal);
-
-/// Poses that explain the points, the best first: from the homography, and its mirror image about
-/// the line of sight where that explains them as well (Collins & Bartoli, "Infinitesimal
-/// plane-based pose estimation", 2014, discuss the two). Refined over all points. rms: pixels.
-struct FittedPose {
-  Pose pose;
-  double rms = 0;
-};
-bool fit_pose(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
-              std::span<const glm::dvec2> world, std::span<const glm::dvec2> ideal,
-              FittedPose& fitted);
+/// Poses that explain the points: from the homography, refined over all points, and its mirror
+/// image about the line of sight, which from few points looks much the same (Collins & Bartoli,
+/// "Infinitesimal plane-based pose estimation", 2014, discuss the two). Those whose face looks away
+/// are left out. Answers how many.
+int fit_poses(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
+              const PlanePoints& points, std::array<Pose, 2>& poses);
 
 /// The camera's pose that comes nearest to a map; none where the plane lies not before the camera.
 std::optional<Pose> nearest_pose(const LoopPattern& pattern, const Camera& camera,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -19,6 +20,7 @@ constexpr int kRatio = 90;          // percent of the second best that lies else
 constexpr double kElsewhere = 6.0;  // pattern pixels
 constexpr std::size_t kHypotheses = 96;
 constexpr std::size_t kFewest = 6;
+constexpr int kAttempts = 8;  // votes that are followed up
 
 glm::dvec2 place(const LoopFeatureRecord& record) {
   return {record.x / 64.0 - 0.5, record.y / 64.0 - 0.5};
@@ -98,21 +100,28 @@ PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels, std::si
   order_.reserve(most_features);
   inlier_world_.reserve(most_features);
   inlier_ideal_.reserve(most_features);
+  inlier_sigma_.reserve(most_features);
 }
 
 /// Lowe's ratio test, where a second best at the same place of the pattern (from another view) is
 /// no rival. Answers the best one's index.
 bool PlaneMatcher::unique(const LoopPattern& pattern, std::size_t first, std::size_t count,
                           int best, std::size_t& at) const {
-  const int limit = best * 100 / kRatio;
-  at = count;
-  for (std::size_t i = 0; i < count && at == count; ++i) {
-    if (distances_[i] == best) at = i;
-  }
+  const auto limit = static_cast<std::uint8_t>(best * 100 / kRatio);
+  const auto* nearest =
+      static_cast<const std::uint8_t*>(std::memchr(distances_.data(), best, count));
+  at = static_cast<std::size_t>(nearest - distances_.data());
   const glm::dvec2 here = place(pattern.features[first + at]);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (distances_[i] > limit) continue;
-    if (glm::length(place(pattern.features[first + i]) - here) > kElsewhere) return false;
+  // Few of a block's codes are that near, and most blocks hold none.
+  for (std::size_t block = 0; block < count; block += kBlockCodes) {
+    const std::uint8_t* distances = distances_.data() + block;
+    unsigned any = 0;
+    for (std::size_t i = 0; i < kBlockCodes; ++i) any |= distances[i] <= limit ? 1u : 0u;
+    if (any == 0) continue;
+    for (std::size_t i = 0; i < kBlockCodes; ++i) {
+      if (distances[i] > limit) continue;
+      if (glm::length(place(pattern.features[first + block + i]) - here) > kElsewhere) return false;
+    }
   }
   at += first;
   return true;
@@ -276,7 +285,7 @@ std::span<const PlaneFind> PlaneMatcher::find(const LoopPattern& pattern,
         static_cast<std::uint8_t>(std::min<std::size_t>(support(matches_[i], nullptr), 255));
   }
   std::size_t count = 0;
-  while (count < finds_.size()) {
+  for (int attempt = 0; attempt < kAttempts && count < finds_.size(); ++attempt) {
     std::uint32_t chosen = order_.front();
     int votes = -1;
     for (const std::uint32_t i : order_) {
@@ -286,11 +295,18 @@ std::span<const PlaneFind> PlaneMatcher::find(const LoopPattern& pattern,
       }
     }
     if (votes < static_cast<int>(kFewest)) break;
-    PlaneFind& find = finds_[count++];
+    PlaneFind& find = finds_[count];
     find.inliers = static_cast<int>(fit(matches_[chosen], find.homography));
     find.mask.assign(mask_.begin(), mask_.end());
     explained_[chosen] = 1;
-    for (std::size_t i = 0; i < mask_.size(); ++i) explained_[i] |= mask_[i];
+    int fresh = 0;
+    for (std::size_t i = 0; i < mask_.size(); ++i) {
+      fresh += mask_[i] & ~explained_[i];
+      explained_[i] |= mask_[i];
+    }
+    // Most votes left over by a find lead back to it.
+    if (4 * fresh < find.inliers || find.inliers == 0) continue;
+    ++count;
     for (std::size_t i = count - 1; i > 0 && finds_[i - 1].inliers < finds_[i].inliers; --i) {
       std::swap(finds_[i - 1], finds_[i]);
     }
@@ -301,10 +317,12 @@ std::span<const PlaneFind> PlaneMatcher::find(const LoopPattern& pattern,
 void PlaneMatcher::choose(const LoopPattern& pattern, const PlaneFind& find) {
   inlier_world_.clear();
   inlier_ideal_.clear();
+  inlier_sigma_.clear();
   for (std::size_t i = 0; i < find.mask.size(); ++i) {
     if (find.mask[i] == 0) continue;
     inlier_world_.push_back(pattern.to_world(matches_[i].pattern));
     inlier_ideal_.push_back(matches_[i].ideal);
+    inlier_sigma_.push_back(matches_[i].sigma);
   }
 }
 

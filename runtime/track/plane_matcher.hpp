@@ -13,6 +13,7 @@
 #include "loop_pattern.hpp"
 #include "modar/camera.hpp"
 #include "modar/loop_features.hpp"
+#include "plane_map.hpp"
 
 namespace modar::loop {
 
@@ -49,10 +50,11 @@ class PlaneMatcher {
   [[nodiscard]] std::size_t most_features() const { return matches_.capacity(); }
   /// Matches of the last find().
   [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
-  /// Collects the points of a find's inliers for inlier_world() and inlier_ideal().
+  /// Collects the points of a find's inliers for inliers().
   void choose(const LoopPattern& pattern, const PlaneFind& find);
-  [[nodiscard]] std::span<const glm::dvec2> inlier_world() const { return inlier_world_; }
-  [[nodiscard]] std::span<const glm::dvec2> inlier_ideal() const { return inlier_ideal_; }
+  [[nodiscard]] PlanePoints inliers() const {
+    return {inlier_world_, inlier_ideal_, inlier_sigma_};
+  }
 
  private:
   void match(const LoopPattern& pattern, std::span<const LoopFeature> features);
@@ -76,6 +78,7 @@ class PlaneMatcher {
   std::vector<std::uint32_t> order_;
   std::vector<glm::dvec2> inlier_world_;
   std::vector<glm::dvec2> inlier_ideal_;
+  std::vector<double> inlier_sigma_;
 };
 
 }  // namespace modar::loop

@@ -40,7 +40,7 @@ bool settle(const LoopPattern& pattern, const Scene& scene, Reach reach, Pose& p
   bool found = false;
   for (int level = coarsest; level >= best.frame_level; --level) {
     Pose next = pose;
-    const Fit now = align(pattern, scene, level, far ? 5 : 2, level == best.frame_level, next);
+    const Fit now = align(pattern, scene, level, 10, level == best.frame_level, next);
     const double zoom = next.translation.z / depth;
     if (!(zoom < kMostZoom && zoom * kMostZoom > 1.0)) return false;
     // Under blur fine patches hold along the motion only, and pull away from what coarse ones say.

@@ -13,6 +13,7 @@
 #include "bake/pattern/loop_bake.hpp"
 #include "formats/loop_record.hpp"
 #include "modar/pose_loop.hpp"
+#include "runtime/track/plane_grow.hpp"
 #include "tests/pattern/loop_samples.hpp"
 #include "tests/track/synthetic.hpp"
 
@@ -82,6 +83,50 @@ TEST(PoseLoop, FindsThePatternWhereItIs) {
                 0.02 * pose.translation.z);
   }
   EXPECT_GE(found, kFrames - 1);
+}
+
+// Features in a corner leave the other corners uncertain by many pixels: the patches must take the
+// pose up from there, though half of them is hidden.
+TEST(PoseLoop, GrowsAPoseFromTheFeaturesOfOneCorner) {
+  const Camera camera = default_camera(640, 480);
+  const auto pattern = loop::view_loop_pattern(record(), 0);
+  ASSERT_TRUE(pattern) << to_line(pattern.error());
+  SceneBand band;
+  band.area_low = 0.8;
+  band.area_high = 1.2;
+  band.covered_low = band.covered_high = 0.5;
+  const auto describer = LoopDescriber::create(camera.width, camera.height, {});
+  loop::PatchCache patches;
+  Random random(6);
+  int grown_from_far = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Pose pose = draw_pose(band, test::gray(picture()), camera, random);
+    const SceneFrame scene =
+        render_scene(test::gray(picture()), camera, pose,
+                     clutter(640, 480, static_cast<std::uint32_t>(300 + i)), band, random);
+    describer->set_frame(scene.picture.view());
+    std::vector<glm::dvec2> world, seen;
+    for (int k = 0; k < 12; ++k) {
+      world.emplace_back(random.uniform(-0.8, 0.0), random.uniform(-0.6, 0.0));
+      seen.push_back(
+          project(camera, pose.rotation * glm::dvec3(world.back(), 0.0) + pose.translation) +
+          1.5 * glm::dvec2(random.normal(), random.normal()));
+    }
+    const std::vector<double> sigma(world.size(), 1.5);
+    const Pose start = refine_pose(camera, world, seen, pose);
+    Pose grown = start;
+    loop::grow(*pattern, {camera, describer->pyramid(), loop::kernels(), patches},
+               {world, seen, sigma}, grown);
+    const auto error = [&](const Pose& at) {
+      Sighting sighting;
+      EXPECT_TRUE(
+          loop::map_corners(*pattern, loop::map_of_pose(*pattern, camera, at), sighting.corners));
+      return worst_corner(sighting, scene);
+    };
+    grown_from_far += error(start) > 10.0 && error(grown) < 2.0 ? 1 : 0;
+    EXPECT_LT(error(grown), std::max(2.0, error(start))) << i;
+  }
+  EXPECT_GE(grown_from_far, 4);
 }
 
 TEST(PoseLoop, TracksAPathAndTellsWhenThePatternIsGone) {
