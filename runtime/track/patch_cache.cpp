@@ -26,30 +26,57 @@ void add_sums(Patch& patch) {
   }
 }
 
-/// False where the patch reaches over the picture's border.
+constexpr int kSide = 2 * kPatchHalf + 1;
+constexpr int kRing = 2;  // pixels around a patch: one for the smoothing, one for the differences
+constexpr int kWide = kSide + 2 * kRing;
+using Surroundings = std::array<float, kWide * kWide>;
+
+/// 1 2 1 along one direction, where both neighbours are at hand.
+void smooth(const float* from, int step, int first, int last, float* to) {
+  for (int k = first; k < last; ++k) {
+    to[k] = 0.25f * (from[k - step] + 2.0f * from[k] + from[k + step]);
+  }
+}
+
+/// Smooths as a lens does, about, and takes the differences. A template sharper than its picture is
+/// drawn aside by what lies on the patch's edge, each patch its own way: a steady error of the
+/// pose.
+void fill(const Surroundings& grey, Patch& patch) {
+  constexpr int kAll = kWide * kWide;
+  Surroundings rows{};
+  Surroundings both{};
+  smooth(grey.data(), 1, 1, kAll - 1, rows.data());
+  smooth(rows.data(), kWide, kWide, kAll - kWide, both.data());
+  for (int v = 0; v < kSide; ++v) {
+    for (int u = 0; u < kSide; ++u) {
+      const float* at = both.data() + (v + kRing) * kWide + u + kRing;
+      const int k = v * kSide + u;
+      patch.pixels.grey[k] = at[0];
+      patch.pixels.right[k] = 0.5f * (at[1] - at[-1]);
+      patch.pixels.down[k] = 0.5f * (at[kWide] - at[-kWide]);
+    }
+  }
+  add_sums(patch);
+}
+
+/// False where the patch or its ring reaches over the picture's border.
 bool cut(const GrayImage& picture, const LoopPatchRecord& record, int level, Patch& patch) {
-  constexpr int kSide = 2 * kPatchHalf + 1;
+  constexpr int kReach = kPatchHalf + kRing;
   const double grow = static_cast<double>(1 << level);
   const int column = static_cast<int>(record.x / (64.0 * grow));
   const int row = static_cast<int>(record.y / (64.0 * grow));
-  if (column <= kPatchHalf || row <= kPatchHalf || column >= picture.width - kPatchHalf - 1 ||
-      row >= picture.height - kPatchHalf - 1) {
+  if (column < kReach || row < kReach || column >= picture.width - kReach ||
+      row >= picture.height - kReach) {
     return false;
   }
   patch = {};
   patch.centre = {(column + 0.5) * grow - 0.5, (row + 0.5) * grow - 0.5};
-  for (int v = 0; v < kSide; ++v) {
-    const std::uint8_t* from =
-        picture.pixels + (row + v - kPatchHalf) * picture.stride + column - kPatchHalf;
-    for (int u = 0; u < kSide; ++u, ++from) {
-      const int k = v * kSide + u;
-      patch.pixels.grey[k] = from[0];
-      patch.pixels.right[k] = 0.5f * static_cast<float>(from[1] - from[-1]);
-      patch.pixels.down[k] =
-          0.5f * static_cast<float>(from[picture.stride] - from[-picture.stride]);
-    }
+  Surroundings grey;
+  for (int v = 0; v < kWide; ++v) {
+    std::copy_n(picture.pixels + (row + v - kReach) * picture.stride + column - kReach, kWide,
+                grey.begin() + v * kWide);
   }
-  add_sums(patch);
+  fill(grey, patch);
   return true;
 }
 
@@ -68,16 +95,14 @@ std::vector<Patch>& PatchCache::room() {
 
 void PatchCache::smear(const LoopPattern& pattern, int level, const Patch& patch, glm::dvec2 motion,
                        Patch& smeared) {
-  constexpr int kSide = 2 * kPatchHalf + 1;
-  constexpr int kWide = kSide + 2;  // a pixel more on each side, for the differences
   constexpr int kMostTaps = 16;
   const GrayImage& picture = pattern.levels[static_cast<std::size_t>(level)];
   const double grow = static_cast<double>(1 << level);
-  const auto x0 = static_cast<float>((patch.centre.x + 0.5) / grow - 0.5) - kPatchHalf - 1;
-  const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - 1;
+  const auto x0 = static_cast<float>((patch.centre.x + 0.5) / grow - 0.5) - kPatchHalf - kRing;
+  const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - kRing;
   const int taps =
       std::clamp(static_cast<int>(std::ceil(std::hypot(motion.x, motion.y))), 2, kMostTaps);
-  std::array<float, kWide * kWide> grey{};
+  Surroundings grey{};
   for (int tap = 0; tap < taps; ++tap) {
     const double share = (tap + 0.5) / taps - 0.5;
     const float left = x0 + static_cast<float>(share * motion.x);
@@ -91,17 +116,8 @@ void PatchCache::smear(const LoopPattern& pattern, int level, const Patch& patch
   }
   smeared = {};
   smeared.centre = patch.centre;
-  const float inverse = 1.0f / static_cast<float>(taps);
-  for (int v = 0; v < kSide; ++v) {
-    for (int u = 0; u < kSide; ++u) {
-      const float* at = grey.data() + (v + 1) * kWide + u + 1;
-      const int k = v * kSide + u;
-      smeared.pixels.grey[k] = inverse * at[0];
-      smeared.pixels.right[k] = 0.5f * inverse * (at[1] - at[-1]);
-      smeared.pixels.down[k] = 0.5f * inverse * (at[kWide] - at[-kWide]);
-    }
-  }
-  add_sums(smeared);
+  for (float& sum : grey) sum /= static_cast<float>(taps);
+  fill(grey, smeared);
 }
 
 PatchCache::PatchCache() {

@@ -1,5 +1,6 @@
 // Our own pose loop from end to end: a record baked from a picture, frames rendered by the bench's
 // renderer, and input that means harm.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -138,6 +139,7 @@ TEST(PoseLoop, TracksAPathAndTellsWhenThePatternIsGone) {
   Random random(5);
   const GrayPicture background = clutter(640, 480, 77);
   TrackResult result;
+  std::vector<double> errors;
   const auto pose_at = [](int i) {
     return pose_of(look_at(2.6 + 0.02 * i, 10 + 0.5 * i, 20, 3.0 * i, 0.02 * i, -0.01 * i));
   };
@@ -146,12 +148,16 @@ TEST(PoseLoop, TracksAPathAndTellsWhenThePatternIsGone) {
         render_scene(test::gray(picture()), camera, pose_at(i), background, band, random);
     ASSERT_TRUE((*loop)->step(scene.picture.view(), result));
     ASSERT_EQ(result.visible.size(), 1u) << i << " " << to_string(result.reason);
-    EXPECT_LT(worst_corner(result.visible[0], scene), 1.0) << i;
+    errors.push_back(worst_corner(result.visible[0], scene));
+    EXPECT_LT(errors.back(), 1.0) << i;
     // Once it is held, nothing searches for it.
     if (i > 0) {
       EXPECT_EQ(result.features, 0);
     }
   }
+  // Templates sharper than what a lens shows would be off by four times as much.
+  std::nth_element(errors.begin(), errors.begin() + 10, errors.end());
+  EXPECT_LT(errors[10], 0.06);
   ASSERT_TRUE((*loop)->step(background.view(), result));
   EXPECT_TRUE(result.visible.empty());
   EXPECT_NE(result.reason, Reason::kVisible);
