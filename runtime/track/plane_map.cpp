@@ -25,6 +25,17 @@ Pose mirrored(const Pose& pose) {
   return other;
 }
 
+/// Pixels; corners clockwise on the screen.
+double area_of(const std::array<glm::dvec2, 4>& corners) {
+  double area = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 a = corners[i];
+    const glm::dvec2 b = corners[(i + 1) % 4];
+    area += 0.5 * (a.x * b.y - b.x * a.y);
+  }
+  return area;
+}
+
 }  // namespace
 
 glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& ahead) const {
@@ -78,16 +89,29 @@ bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
 }
 
 bool plausible(const std::array<glm::dvec2, 4>& corners) {
-  double area = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
     const glm::dvec2 a = corners[i];
     const glm::dvec2 b = corners[(i + 1) % 4];
     const glm::dvec2 c = corners[(i + 2) % 4];
     // y points down: the order of the corners is clockwise on the screen.
     if (!((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) > 0.0)) return false;
-    area += 0.5 * (a.x * b.y - b.x * a.y);
   }
-  return area > kSmallestArea;
+  return area_of(corners) > kSmallestArea;
+}
+
+bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
+  const auto holds_middle = [](const std::array<glm::dvec2, 4>& outline,
+                               const std::array<glm::dvec2, 4>& other) {
+    const glm::dvec2 middle = 0.25 * (other[0] + other[1] + other[2] + other[3]);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const glm::dvec2 from = outline[i];
+      const glm::dvec2 side = outline[(i + 1) % 4] - from;
+      if (side.x * (middle.y - from.y) - side.y * (middle.x - from.x) < 0.0) return false;
+    }
+    return true;
+  };
+  const double ratio = area_of(a) / area_of(b);
+  return ratio > 0.5 && ratio < 2.0 && holds_middle(a, b) && holds_middle(b, a);
 }
 
 std::optional<Pose> nearest_pose(const LoopPattern& pattern, const Camera& camera,

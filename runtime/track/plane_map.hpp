@@ -48,6 +48,10 @@ bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
 /// or smaller than a thumbnail.
 bool plausible(const std::array<glm::dvec2, 4>& corners);
 
+/// Whether two outlines mean one thing of the scene: each holds the other's middle, and neither is
+/// twice as large. A card on a poster is another thing. Both: plausible().
+bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b);
+
 /// Poses that explain the points: from the homography, refined over all points, and its mirror
 /// image about the line of sight, which from few points looks much the same (Collins & Bartoli,
 /// "Infinitesimal plane-based pose estimation", 2014, discuss the two). Those whose face looks away

@@ -75,6 +75,7 @@ struct PoseLoop::State {
   void adopt(TrackResult& result);
   bool take_up(const LoopPattern& pattern, Track& track, const Finding& finding,
                Sighting& sighting) const;
+  bool prevails(std::size_t i, const Sighting& sighting, TrackResult& result);
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -350,6 +351,26 @@ bool PoseLoop::State::take_up(const LoopPattern& pattern, Track& track, const Fi
   return true;
 }
 
+/// Prints of one series share so much that one is taken for the other: of those that claim the same
+/// place, the frame decides. Answers whether pattern i, new, stays; others may yield to it.
+bool PoseLoop::State::prevails(std::size_t i, const Sighting& sighting, TrackResult& result) {
+  const auto percent_of = [this](std::size_t which) {
+    const Track& track = tracks[which];
+    return track.by_map ? loop::map_percent(patterns[which], scene(), track.map)
+                        : loop::percent_right(patterns[which], scene(), track.pose);
+  };
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    Sighting rival;
+    const bool other = k != i && tracks[k].held && report(patterns[k], tracks[k], rival);
+    if (!other || !loop::same_place(rival.corners, sighting.corners)) continue;
+    if (percent_of(i) <= percent_of(k)) return false;
+    tracks[k] = {};
+    tracks[k].told = Reason::kFailedVerification;
+    std::erase_if(result.visible, [&](const Sighting& s) { return s.pattern == rival.pattern; });
+  }
+  return true;
+}
+
 /// Takes what a search found into the tracks and the frame's result.
 void PoseLoop::State::adopt(TrackResult& result) {
   result.features = findings.features;
@@ -361,10 +382,13 @@ void PoseLoop::State::adopt(TrackResult& result) {
     if (wants[i] == Want::kNo || track.held) continue;
     const Finding& finding = findings.patterns[i];
     Sighting sighting;
-    if (finding.reason == Reason::kVisible && take_up(patterns[i], track, finding, sighting)) {
+    const bool here =
+        finding.reason == Reason::kVisible && take_up(patterns[i], track, finding, sighting);
+    if (here && prevails(i, sighting, result)) {
       result.visible.push_back(sighting);
       continue;
     }
+    if (here) track = {};
     const Reason reason =
         finding.reason == Reason::kVisible ? Reason::kFailedVerification : finding.reason;
     // In the frame that lost it, what it was lost by tells more.

@@ -145,6 +145,27 @@ TEST(PoseLoopStates, TracksSeveralPatternsAtOnce) {
   }
 }
 
+// Two prints of one series: the left half is the same, and each alone is taken for the other.
+TEST(PoseLoopStates, OfTwoPatternsThatClaimOnePlaceTheFrameDecides) {
+  cv::Mat sister = textured_picture(300, 240, 555);
+  picture()(cv::Rect(0, 0, 165, 240)).copyTo(sister(cv::Rect(0, 0, 165, 240)));
+  const auto of_sister = record_of(sister);
+  const SceneFrame scene = frame_of(near_view(), background());
+  ASSERT_EQ(reason_for(*loop_of(bundle_with({of_sister})), scene.picture), Reason::kVisible)
+      << "alone she is recognised, else this test tests nothing";
+  for (const bool first : {true, false}) {
+    const auto bundle =
+        first ? bundle_with({record(), of_sister}) : bundle_with({of_sister, record()});
+    auto loop = loop_of(bundle);
+    TrackResult result;
+    for (int i = 0; i < 12; ++i) {
+      ASSERT_TRUE(loop->step(scene.picture.view(), result));
+      ASSERT_EQ(result.visible.size(), 1u) << i;
+      EXPECT_EQ(result.visible[0].pattern, first ? 0u : 1u);
+    }
+  }
+}
+
 // A camera of a wrong focal length: no pose fits, the plane's own map does, and it is followed.
 TEST(PoseLoopStates, APlaneThatNoPoseExplainsIsFollowedByItsMap) {
   Camera wrong = default_camera(kWidth, kHeight);
