@@ -150,6 +150,7 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   level_options.levels = request.levels;
   level_options.positions = plan->kind;
   level_options.jobs = request.jobs;
+  level_options.texture_sides = texture_sides;
   if (auto made = make_levels(*chunked, level_options, report); !made) {
     return tl::unexpected(made.error());
   }
@@ -326,7 +327,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
     content.scenes.push_back(
         place_scene(known.scene, known.pattern, known.model, (*sides)[known.model]));
   }
-  content.meta = bundle_meta(request, report.topologies);
+  content.meta = bundle_meta(request, report);
   content.statement = statement_of(content);
   return content;
 }

@@ -34,11 +34,18 @@ struct StageReport {
   double max_error = 0;
 };
 
+/// What a model's levels of detail are off by, the worst of all.
+struct LevelFigures {
+  double position_error_max = 0;   ///< source units: bounds the distance from level 0
+  double uv_shift_max_texels = 0;  ///< at vertices of level 0 that were taken out
+};
+
 /// Collects the stream. Not thread-safe: stages report from the thread that called them.
 struct Report {
   std::vector<StageReport> stages;
   std::vector<Finding> findings;
   std::vector<MeshTopology> topologies;  ///< one a model, where they were asked for
+  std::vector<LevelFigures> levels;      ///< one a model, where levels were asked for
   /// Called when a stage begins or moves on: its name and how much of it is done (0 to 1). May be
   /// empty.
   std::function<void(const std::string& stage, double done)> progress;

@@ -28,6 +28,9 @@ void print_models(const BundleView& bundle) {
     if (const auto topology = stated_topology(bundle, m)) {
       std::printf("  %s\n", topology_words(*topology).c_str());
     }
+    if (const auto levels = stated_levels(bundle, m)) {
+      std::printf("  %s\n", level_words(*levels).c_str());
+    }
   }
 }
 

@@ -62,6 +62,11 @@ Json topology_json(const MeshTopology& topology) {
   return json;
 }
 
+Json level_json(const LevelFigures& levels) {
+  return {{"position_error_max", number(levels.position_error_max)},
+          {"uv_shift_max_texels", number(levels.uv_shift_max_texels)}};
+}
+
 Json model_json(const BundleView& bundle, std::uint32_t index) {
   const ModelRecord& model = bundle.models()[index];
   const std::uint64_t bytes = model_bytes(bundle, model);
@@ -77,6 +82,7 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
     materials.push_back(bundle.name(bundle.materials()[model.first_material + m].name));
   }
   const std::optional<MeshTopology> topology = stated_topology(bundle, index);
+  const std::optional<LevelFigures> levels = stated_levels(bundle, index);
   return {{"name", bundle.name(model.name)},
           {"vertices", model.vertex_count},
           {"triangles", model.triangle_count},
@@ -99,7 +105,8 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
           {"normal_error_rms_deg", number(model.normal_error_rms_deg)},
           {"uv_error_max_texels", number(model.uv_error_max_texels)},
           {"uv_error_rms_texels", number(model.uv_error_rms_texels)},
-          {"topology", topology ? topology_json(*topology) : Json(nullptr)}};
+          {"topology", topology ? topology_json(*topology) : Json(nullptr)},
+          {"levels", levels ? level_json(*levels) : Json(nullptr)}};
 }
 
 Json texture_json(const BundleView& bundle, std::uint32_t index) {
@@ -256,15 +263,18 @@ const char* positions_name(const BakeRequest& request) {
 
 }  // namespace
 
-std::string bundle_meta(const BakeRequest& request, const std::vector<MeshTopology>& topologies) {
+std::string bundle_meta(const BakeRequest& request, const Report& report) {
   const auto name = [](const std::string& path) {
     return std::filesystem::path(path).filename().string();
   };
   Json models = Json::array();
   for (const std::string& path : request.models) {
     Json model = {{"file", name(path)}};
-    if (models.size() < topologies.size()) {
-      model["topology"] = topology_json(topologies[models.size()]);
+    if (models.size() < report.topologies.size()) {
+      model["topology"] = topology_json(report.topologies[models.size()]);
+    }
+    if (models.size() < report.levels.size()) {
+      model["levels"] = level_json(report.levels[models.size()]);
     }
     models.push_back(std::move(model));
   }

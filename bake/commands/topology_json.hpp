@@ -1,4 +1,4 @@
-// Topology of models, as the bundle's meta text states it.
+// Topology and levels of models, as the bundle's meta text states them.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "bake/model/topology.hpp"
+#include "bake/report.hpp"
 #include "formats/bundle_view.hpp"
 
 namespace modar {
@@ -20,5 +20,11 @@ std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint3
 
 /// "3 components, 1 boundary loop, ...": for people.
 std::string topology_words(const MeshTopology& topology);
+
+/// What the bundle says of a model's levels; nothing where it has none or was baked by others.
+std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_t model);
+
+/// "levels of detail: ...": for people.
+std::string level_words(const LevelFigures& levels);
 
 }  // namespace modar

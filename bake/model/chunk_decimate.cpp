@@ -12,7 +12,6 @@
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModBaseT.hh>
 
-#include "bake/model/landings.hpp"
 #include "bake/model/source_model.hpp"
 
 namespace modar {
@@ -96,8 +95,11 @@ struct Planes {
   double area = 0;
 };
 
-/// The price of a collapse: squares of distances from all planes that its vertices stand for
-/// (Garland and Heckbert).
+/// What the texture's shift counts in the price of a collapse beside the surface's own.
+constexpr double kShiftWeight = 0.25;
+
+/// Prices and judges collapses: squares of distances from all planes that the vertices stand for
+/// (Garland and Heckbert), and of the texture's shift.
 class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
  public:
   using Base = OpenMesh::Decimater::ModBaseT<Mesh>;
@@ -106,9 +108,11 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
 
   explicit Quadrics(Mesh& mesh) : Base(mesh, false) {}
 
-  /// max_error: see decimate_chunk(). ours: of each vertex. Both must outlive the module.
-  void set(double max_error, std::span<const std::uint16_t> ours, Landings& landings) {
-    max_square_ = max_error * max_error;
+  /// ours: of each vertex. All but the limits must outlive the module.
+  void set(const ChunkVertices& vertices, const DecimateLimits& limits,
+           std::span<const std::uint16_t> ours, Landings& landings) {
+    vertices_ = vertices;
+    limits_ = limits;
     ours_ = ours;
     landings_ = &landings;
   }
@@ -138,33 +142,33 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
     }
     const Planes& from = planes_[at(info.v0)];
     const Planes& to = planes_[at(info.v1)];
-    const double squares = std::max(0.0, from.squares(info.p1) + to.squares(info.p1));
-    if (squares > max_square_ * (from.area + to.area)) return ILLEGAL_COLLAPSE;
-    const auto price = static_cast<float>(squares);
-    if (price >= least_ || turns(info)) return ILLEGAL_COLLAPSE;
-    least_ = price;
-    return price;
+    double price = std::max(0.0, from.squares(info.p1) + to.squares(info.p1));
+    if (price > limits_.max_error * limits_.max_error * (from.area + to.area) ||
+        static_cast<float>(price) >= least_ || turns(info)) {
+      return ILLEGAL_COLLAPSE;
+    }
+    if (!vertices_.uvs.empty()) {
+      const double shift = shift_after(info);
+      if (shift > limits_.max_uv_shift) return ILLEGAL_COLLAPSE;
+      const double slide = shift * limits_.length_of_uv;
+      price += kShiftWeight * from.area * slide * slide;
+      if (static_cast<float>(price) >= least_) return ILLEGAL_COLLAPSE;
+    }
+    least_ = static_cast<float>(price);
+    return least_;
   }
 
   void preprocess_collapse(const CollapseInfo& info) override {
-    star_.clear();
     landings_->lift_vertex(ours_[at(info.v0)]);
     for (const auto face : mesh().vf_range(info.v0)) {
       landings_->lift(static_cast<std::uint32_t>(face.idx()));
-      if (face != info.fl && face != info.fr) star_.push_back(face);
     }
+    collect(info);
   }
 
   void postprocess_collapse(const CollapseInfo& info) override {
     vertex_ = Mesh::VertexHandle();
     add(planes_[at(info.v1)], planes_[at(info.v0)]);
-    faces_.clear();
-    for (const auto face : star_) {
-      LandingFace& landing = faces_.emplace_back();
-      landing.face = static_cast<std::uint32_t>(face.idx());
-      std::size_t count = 0;
-      for (const auto v : mesh().fv_range(face)) landing.corners[count++] = ours_[at(v)];
-    }
     landings_->settle(faces_);
   }
 
@@ -174,34 +178,66 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
     to.area += planes.area;
   }
 
-  /// Would a triangle that stays turn too far, or lose its area?
-  bool turns(const CollapseInfo& info) {
-    Mesh& m = mesh();
+  /// Calls back with each triangle around v0 that stays, and its corners beside v0, in order; ends
+  /// where the answer is false.
+  template <typename Callback>
+  void around(const CollapseInfo& info, const Callback& callback) {
+    const Mesh& m = mesh();
     const Mesh::HalfedgeHandle first = m.halfedge_handle(info.v0);
     Mesh::HalfedgeHandle h = first;
     do {
       const Mesh::FaceHandle face = m.face_handle(h);
-      if (face != info.fl && face != info.fr) {
-        const Mesh::Point& a = m.point(m.to_vertex_handle(h));
-        const Mesh::Point& b = m.point(m.to_vertex_handle(m.next_halfedge_handle(h)));
-        const Mesh::Point before = (a - info.p0) % (b - info.p0);
-        const Mesh::Point after = (a - info.p1) % (b - info.p1);
-        const double dot = before | after;
-        if (!(dot > 0) || dot * dot < kLeastTurn * before.sqrnorm() * after.sqrnorm()) return true;
+      if (face != info.fl && face != info.fr &&
+          !callback(face, m.to_vertex_handle(h), m.to_vertex_handle(m.next_halfedge_handle(h)))) {
+        return;
       }
       h = m.opposite_halfedge_handle(m.prev_halfedge_handle(h));
     } while (h != first);
-    return false;
+  }
+
+  /// Would a triangle that stays turn too far, or lose its area?
+  bool turns(const CollapseInfo& info) {
+    bool found = false;
+    around(info, [&](Mesh::FaceHandle, Mesh::VertexHandle v, Mesh::VertexHandle w) {
+      const Mesh::Point& a = mesh().point(v);
+      const Mesh::Point& b = mesh().point(w);
+      const Mesh::Point before = (a - info.p0) % (b - info.p0);
+      const Mesh::Point after = (a - info.p1) % (b - info.p1);
+      const double dot = before | after;
+      found = !(dot > 0) || dot * dot < kLeastTurn * before.sqrnorm() * after.sqrnorm();
+      return !found;
+    });
+    return found;
+  }
+
+  /// The triangles that stay, as they are after the collapse.
+  void collect(const CollapseInfo& info) {
+    faces_.clear();
+    around(info, [&](Mesh::FaceHandle face, Mesh::VertexHandle v, Mesh::VertexHandle w) {
+      faces_.push_back({static_cast<std::uint32_t>(face.idx()),
+                        {ours_[at(info.v1)], ours_[at(v)], ours_[at(w)]}});
+      return true;
+    });
+  }
+
+  /// The uv_shift that the collapse may lead to: that of v0, beside what its triangles are off by.
+  double shift_after(const CollapseInfo& info) {
+    double before = 0;
+    for (const auto face : mesh().vf_range(info.v0)) {
+      before = std::max(before, landings_->uv_shift(static_cast<std::uint32_t>(face.idx())));
+    }
+    collect(info);
+    return before + uv_shift_of(vertices_, ours_[at(info.v0)], faces_);
   }
 
   std::vector<Planes> planes_;  // of each vertex
-  double max_square_ = 0;
-  Mesh::VertexHandle vertex_;  // the one whose collapses are priced
-  float least_ = 0;
+  ChunkVertices vertices_;
+  DecimateLimits limits_;
   std::span<const std::uint16_t> ours_;
   Landings* landings_ = nullptr;
-  std::vector<Mesh::FaceHandle> star_;  // what stays of the triangles around a vertex that goes
-  std::vector<LandingFace> faces_;      // the same, afterwards
+  Mesh::VertexHandle vertex_;  // the one whose collapses are priced
+  float least_ = 0;
+  std::vector<LandingFace> faces_;  // what stays of the triangles around a vertex that goes
 };
 
 /// A mesh of OpenMesh's, and which of our vertices each of its own is.
@@ -249,6 +285,10 @@ CoarserTriangles remaining(const HalfEdges& edges, const Landings& landings, std
       result.nearby[edges.ours[at(v)]] = number;
     }
   }
+  for (std::uint32_t face = 0; face < numbers.size(); ++face) {
+    if (numbers[face] == kNoIndex) continue;
+    result.uv_shift = std::max(result.uv_shift, landings.uv_shift(face));
+  }
   for (std::size_t v = 0; v < vertices; ++v) {
     const std::uint32_t face = landings.face_of(static_cast<std::uint16_t>(v));
     if (face != kNoIndex) result.nearby[v] = numbers[face];
@@ -284,15 +324,15 @@ class Snapshots : public OpenMesh::Decimater::Observer {
 
 }  // namespace
 
-std::vector<CoarserTriangles> decimate_chunk(std::span<const glm::dvec3> positions,
+std::vector<CoarserTriangles> decimate_chunk(const ChunkVertices& vertices,
                                              std::span<const std::uint16_t> indices,
                                              std::span<const std::uint8_t> locked,
                                              std::span<const std::size_t> targets,
-                                             double max_error) {
+                                             const DecimateLimits& limits) {
   // OpenMesh tells stderr of every face that it refuses.
   omerr().disable();
   HalfEdges edges;
-  build(positions, indices, edges);
+  build(vertices.positions, indices, edges);
   Mesh& mesh = edges.mesh;
   for (const auto v : mesh.vertices()) {
     const auto ours = edges.ours[at(v)];
@@ -303,9 +343,9 @@ std::vector<CoarserTriangles> decimate_chunk(std::span<const glm::dvec3> positio
   Decimater decimater(mesh);
   Quadrics::Handle quadrics;
   decimater.add(quadrics);
-  Landings landings(positions, mesh.n_faces());
-  decimater.module(quadrics).set(max_error, edges.ours, landings);
-  Snapshots snapshots(edges, landings, positions.size(), targets);
+  Landings landings(vertices, mesh.n_faces());
+  decimater.module(quadrics).set(vertices, limits, edges.ours, landings);
+  Snapshots snapshots(edges, landings, vertices.positions.size(), targets);
   decimater.set_observer(&snapshots);
   if (targets.empty() || !decimater.initialize()) return {};
   decimater.decimate_to_faces(0, targets.back());

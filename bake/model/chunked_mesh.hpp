@@ -11,7 +11,8 @@ namespace modar {
 /// A coarser level of a chunk: triangles over the chunk's vertices.
 struct ChunkLevel {
   std::vector<std::uint16_t> indices;
-  double error = 0;  ///< model space: bounds the distance from level 0, and of level 0 from it
+  double error = 0;     ///< model space: bounds the distance from level 0, and of level 0 from it
+  double uv_shift = 0;  ///< texels: greatest shift of the texture at a vertex of level 0
 };
 
 /// One chunk: local vertex i is vertex `vertices[i]` of the TriMesh; triangles index `vertices`.

@@ -1,42 +1,74 @@
 // Lists of vertices, one a triangle.
 #include "bake/model/landings.hpp"
 
+#include <algorithm>
 #include <limits>
+
+#include <glm/geometric.hpp>
 
 #include "bake/model/source_model.hpp"
 #include "bake/model/triangle_tree.hpp"
 
 namespace modar {
+namespace {
 
-Landings::Landings(std::span<const glm::dvec3> positions, std::size_t faces)
-    : positions_(positions),
-      face_of_(positions.size(), kNoIndex),
+struct Landing {
+  const LandingFace* face = nullptr;
+  Foot foot;
+};
+
+Landing nearest_of(const ChunkVertices& vertices, std::uint16_t vertex,
+                   std::span<const LandingFace> faces) {
+  Landing nearest;
+  for (const LandingFace& face : faces) {
+    const auto& [a, b, c] = face.corners;
+    const Foot foot =
+        nearest_foot(vertices.positions[vertex],
+                     {vertices.positions[a], vertices.positions[b], vertices.positions[c]});
+    if (nearest.face == nullptr || foot.square < nearest.foot.square) nearest = {&face, foot};
+  }
+  return nearest;
+}
+
+double shift_at(const ChunkVertices& vertices, std::uint16_t vertex, const Landing& landing) {
+  const auto& [a, b, c] = landing.face->corners;
+  const std::span<const glm::dvec2> uvs = vertices.uvs;
+  const glm::dvec2 there =
+      uvs[a] + landing.foot.b * (uvs[b] - uvs[a]) + landing.foot.c * (uvs[c] - uvs[a]);
+  return glm::length(there - uvs[vertex]);
+}
+
+}  // namespace
+
+double uv_shift_of(const ChunkVertices& vertices, std::uint16_t vertex,
+                   std::span<const LandingFace> faces) {
+  return shift_at(vertices, vertex, nearest_of(vertices, vertex, faces));
+}
+
+Landings::Landings(const ChunkVertices& vertices, std::size_t faces)
+    : vertices_(vertices),
+      face_of_(vertices.positions.size(), kNoIndex),
       first_(faces, kNoIndex),
-      next_(positions.size(), kNoIndex) {}
+      next_(vertices.positions.size(), kNoIndex),
+      uv_shifts_(faces, 0.0) {}
 
 void Landings::lift(std::uint32_t face) {
   for (std::uint32_t v = first_[face]; v != kNoIndex; v = next_[v]) {
     hand_.push_back(static_cast<std::uint16_t>(v));
   }
   first_[face] = kNoIndex;
+  uv_shifts_[face] = 0;
 }
 
 void Landings::settle(std::span<const LandingFace> faces) {
   for (const std::uint16_t vertex : hand_) {
-    double best = std::numeric_limits<double>::infinity();
-    std::uint32_t nearest = faces.front().face;
-    for (const LandingFace& face : faces) {
-      const double distance = distance_square(
-          positions_[vertex],
-          {positions_[face.corners[0]], positions_[face.corners[1]], positions_[face.corners[2]]},
-          best);
-      if (distance >= best) continue;
-      best = distance;
-      nearest = face.face;
-    }
-    face_of_[vertex] = nearest;
-    next_[vertex] = first_[nearest];
-    first_[nearest] = vertex;
+    const Landing landing = nearest_of(vertices_, vertex, faces);
+    const std::uint32_t face = landing.face->face;
+    face_of_[vertex] = face;
+    next_[vertex] = first_[face];
+    first_[face] = vertex;
+    if (vertices_.uvs.empty()) continue;
+    uv_shifts_[face] = std::max(uv_shifts_[face], shift_at(vertices_, vertex, landing));
   }
   hand_.clear();
 }

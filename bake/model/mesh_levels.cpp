@@ -20,6 +20,8 @@ constexpr std::size_t kFewTriangles = 24;  ///< not worth a coarser level
 constexpr double kWorthwhile = 0.8;
 /// Of the chunk's diagonal: a collapse that moves the surface by more spoils even a coarse level.
 constexpr double kMaxCollapse = 0.03;
+/// Of the chunk's diagonal: so far may a texture slide.
+constexpr double kMaxSlide = 0.01;
 constexpr std::size_t kStretch = 8;  ///< chunks between two words to the progress bar
 
 /// The chunk that uses each source position, kShared where there are several.
@@ -46,6 +48,32 @@ double diagonal_of(std::span<const glm::dvec3> positions) {
   return glm::length(high - low);
 }
 
+/// uvs in texels, and how far they may be off. Empty where no texture shows it.
+std::vector<glm::dvec2> texels_of(const TriMesh& mesh, const Chunk& chunk,
+                                  std::span<const glm::dvec3> positions,
+                                  std::span<const std::uint32_t> sides, DecimateLimits& limits) {
+  if (mesh.uvs.empty() || chunk.material >= sides.size() || sides[chunk.material] == 0) return {};
+  std::vector<glm::dvec2> texels;
+  for (const std::uint32_t v : chunk.vertices) {
+    texels.push_back(mesh.uvs[v] * static_cast<double>(sides[chunk.material]));
+  }
+  double area = 0;
+  double texel_area = 0;
+  for (std::size_t i = 0; i < chunk.indices.size(); i += 3) {
+    const std::uint16_t* t = &chunk.indices[i];
+    area += glm::length(
+        glm::cross(positions[t[1]] - positions[t[0]], positions[t[2]] - positions[t[0]]));
+    const glm::dvec2 ab = texels[t[1]] - texels[t[0]];
+    const glm::dvec2 ac = texels[t[2]] - texels[t[0]];
+    texel_area += std::abs(ab.x * ac.y - ab.y * ac.x);
+  }
+  // One colour everywhere: nothing can slide.
+  if (!(texel_area > 0)) return {};
+  limits.length_of_uv = std::sqrt(area / texel_area);
+  limits.max_uv_shift = kMaxSlide * diagonal_of(positions) / limits.length_of_uv;
+  return texels;
+}
+
 /// Fills one chunk's coarser levels.
 void level_chunk(const TriMesh& mesh, const Array<std::uint32_t>& owners, const ChunkGrid& grid,
                  const LevelOptions& options, Chunk& chunk) {
@@ -66,8 +94,12 @@ void level_chunk(const TriMesh& mesh, const Array<std::uint32_t>& owners, const 
   std::size_t before = chunk.indices.size();
   LevelSurface finest(positions, chunk.indices);
   const std::vector<std::uint32_t> on_finest = finest.triangles_of_vertices();
-  for (auto& [indices, nearby] : decimate_chunk(positions, chunk.indices, locked, targets,
-                                                kMaxCollapse * diagonal_of(positions))) {
+  DecimateLimits limits;
+  limits.max_error = kMaxCollapse * diagonal_of(positions);
+  const std::vector<glm::dvec2> texels =
+      texels_of(mesh, chunk, positions, options.texture_sides, limits);
+  for (auto& [indices, nearby, uv_shift] :
+       decimate_chunk({positions, texels}, chunk.indices, locked, targets, limits)) {
     if (indices.empty() ||
         static_cast<double>(indices.size()) > kWorthwhile * static_cast<double>(before)) {
       break;
@@ -76,7 +108,7 @@ void level_chunk(const TriMesh& mesh, const Array<std::uint32_t>& owners, const 
     LevelSurface coarser(positions, indices);
     error = surface_distance(finest, coarser, nearby, error);
     error = surface_distance(coarser, finest, on_finest, error);
-    chunk.coarser.push_back({std::move(indices), error});
+    chunk.coarser.push_back({std::move(indices), error, uv_shift});
   }
 }
 
@@ -106,15 +138,19 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
   }
   std::uint64_t fine = 0;
   std::uint64_t triangles = 0;
+  LevelFigures figures;
   double error = 0;
   for (const Chunk& chunk : mesh.chunks) {
     fine += chunk.indices.size() / 3;
     for (const ChunkLevel& level : chunk.coarser) {
       triangles += level.indices.size() / 3;
       error = std::max(error, level.error);
+      figures.uv_shift_max_texels = std::max(figures.uv_shift_max_texels, level.uv_shift);
     }
   }
-  timer.done(fine, triangles, error * mesh.mesh.placement.scale);
+  figures.position_error_max = error * mesh.mesh.placement.scale;
+  timer.done(fine, triangles, figures.position_error_max);
+  report.levels.push_back(figures);
   return {};
 }
 

@@ -21,52 +21,73 @@ double box_distance_square(const glm::dvec3& p, const glm::dvec3& low, const glm
   return square(glm::max(glm::max(low - p, p - high), glm::dvec3(0.0)));
 }
 
-double segment_distance_square(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
+/// How far along the segment from a to b its nearest point is, 0 to 1.
+double along_segment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
   const glm::dvec3 ab = b - a;
   const double length = square(ab);
-  const double t = length > 0 ? std::clamp(glm::dot(p - a, ab) / length, 0.0, 1.0) : 0.0;
-  return square(p - (a + t * ab));
+  return length > 0 ? std::clamp(glm::dot(p - a, ab) / length, 0.0, 1.0) : 0.0;
 }
 
-}  // namespace
+Foot foot_of_flat(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
+  const double ab = along_segment(p, t[0], t[1]);
+  const double ac = along_segment(p, t[0], t[2]);
+  const double bc = along_segment(p, t[1], t[2]);
+  return std::min({Foot{square(p - glm::mix(t[0], t[1], ab)), ab, 0.0},
+                   Foot{square(p - glm::mix(t[0], t[2], ac)), 0.0, ac},
+                   Foot{square(p - glm::mix(t[1], t[2], bc)), 1.0 - bc, bc}},
+                  [](const Foot& x, const Foot& y) { return x.square < y.square; });
+}
 
-double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
+/// Where the distance is not below `best`, the distance from the plane may do.
+inline Foot foot_of(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
   const glm::dvec3 ab = t[1] - t[0];
   const glm::dvec3 ac = t[2] - t[0];
   const glm::dvec3 n = glm::cross(ab, ac);
   const double area = square(n);
   const glm::dvec3 ap = p - t[0];
-  if (!(area > kFlat * square(ab) * square(ac))) {
-    return std::min({segment_distance_square(p, t[0], t[1]), segment_distance_square(p, t[1], t[2]),
-                     segment_distance_square(p, t[2], t[0])});
-  }
+  if (!(area > kFlat * square(ab) * square(ac))) return foot_of_flat(p, t);
   const double height = glm::dot(ap, n);
   const double plane = height * height / area;
-  if (plane >= best) return plane;
+  if (plane >= best) return {plane, 0, 0};
   // The region of the corner, edge or inside that is nearest to the point.
   const double ab_ap = glm::dot(ab, ap);
   const double ac_ap = glm::dot(ac, ap);
-  if (ab_ap <= 0 && ac_ap <= 0) return square(ap);
+  if (ab_ap <= 0 && ac_ap <= 0) return {square(ap), 0, 0};
   const glm::dvec3 bp = p - t[1];
   const double ab_bp = glm::dot(ab, bp);
   const double ac_bp = glm::dot(ac, bp);
-  if (ab_bp >= 0 && ac_bp <= ab_bp) return square(bp);
-  if (ab_ap >= 0 && ab_bp <= 0 && ab_ap * ac_bp <= ab_bp * ac_ap) {
-    return square(ap - ab * (ab_ap / (ab_ap - ab_bp)));
+  if (ab_bp >= 0 && ac_bp <= ab_bp) return {square(bp), 1, 0};
+  const double of_c = ab_ap * ac_bp - ab_bp * ac_ap;
+  if (ab_ap >= 0 && ab_bp <= 0 && of_c <= 0) {
+    const double b = ab_ap / (ab_ap - ab_bp);
+    return {square(ap - ab * b), b, 0};
   }
   const glm::dvec3 cp = p - t[2];
   const double ab_cp = glm::dot(ab, cp);
   const double ac_cp = glm::dot(ac, cp);
-  if (ac_cp >= 0 && ab_cp <= ac_cp) return square(cp);
-  if (ac_ap >= 0 && ac_cp <= 0 && ab_cp * ac_ap <= ab_ap * ac_cp) {
-    return square(ap - ac * (ac_ap / (ac_ap - ac_cp)));
+  if (ac_cp >= 0 && ab_cp <= ac_cp) return {square(cp), 0, 1};
+  const double of_b = ab_cp * ac_ap - ab_ap * ac_cp;
+  if (ac_ap >= 0 && ac_cp <= 0 && of_b <= 0) {
+    const double c = ac_ap / (ac_ap - ac_cp);
+    return {square(ap - ac * c), 0, c};
   }
   const double from_b = ac_bp - ab_bp;
   const double from_c = ab_cp - ac_cp;
   if (from_b >= 0 && from_c >= 0 && ab_bp * ac_cp <= ab_cp * ac_bp) {
-    return square(bp - (t[2] - t[1]) * (from_b / (from_b + from_c)));
+    const double c = from_b / (from_b + from_c);
+    return {square(bp - (t[2] - t[1]) * c), 1 - c, c};
   }
-  return plane;
+  return {plane, of_b / area, of_c / area};
+}
+
+}  // namespace
+
+double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
+  return foot_of(p, t, best).square;
+}
+
+Foot nearest_foot(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
+  return foot_of(p, t, std::numeric_limits<double>::infinity());
 }
 
 LevelTree::LevelTree(std::span<const glm::dvec3> positions,

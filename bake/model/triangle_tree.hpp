@@ -17,6 +17,15 @@ namespace modar {
 double distance_square(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle,
                        double best = std::numeric_limits<double>::infinity());
 
+/// The point of a triangle that is nearest to another: corner 0 + b (corner 1 - corner 0) + c
+/// (corner 2 - corner 0).
+struct Foot {
+  double square = 0;  ///< of the distance
+  double b = 0;
+  double c = 0;
+};
+Foot nearest_foot(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle);
+
 class LevelTree {
  public:
   /// At least one triangle.

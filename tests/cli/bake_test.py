@@ -119,6 +119,11 @@ class Bake(ProgramTest):
         plain, two, more = model("--no-lods"), model("--lods", 2), model()
         self.assertEqual([plain["lods"], two["lods"]], [1, 2])
         self.assertGreater(more["lods"], 2)
+        self.assertIsNone(plain["levels"])
+        # What coarser levels are off by is stated: more where there are more, and the texture slides.
+        self.assertLess(two["levels"]["position_error_max"], more["levels"]["position_error_max"])
+        self.assertGreater(two["levels"]["uv_shift_max_texels"], 0)
+        self.assertLessEqual(two["levels"]["uv_shift_max_texels"], more["levels"]["uv_shift_max_texels"])
         self.assertLess(plain["bytes"], two["bytes"])
         self.assertLess(two["bytes"], more["bytes"])
         self.assertEqual(plain["bytes_per_triangle"], more["bytes_per_triangle"])

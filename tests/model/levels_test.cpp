@@ -8,6 +8,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <span>
 
 #include <glm/geometric.hpp>
 
@@ -25,11 +26,14 @@ using testing::grid;
 using testing::parse;
 using testing::welded;
 
-ChunkedMesh levelled(const TriMesh& mesh, std::uint32_t max_vertices, unsigned jobs = 2) {
+/// texture_side: pixels of the texture of every material, 0: none.
+ChunkedMesh levelled(const TriMesh& mesh, std::uint32_t max_vertices, unsigned jobs = 2,
+                     std::uint32_t texture_side = 0) {
   ChunkedMesh split = chunked(mesh, max_vertices);
   Report report;
   LevelOptions options;
   options.jobs = jobs;
+  options.texture_sides.assign(mesh.materials.size(), texture_side);
   EXPECT_TRUE(make_levels(split, options, report));
   return split;
 }
@@ -246,10 +250,78 @@ TEST(Levels, ThreeTrianglesAtAnEdgeAreKept) {
   const std::vector<std::uint16_t> fan = {0, 1, 2, 0, 1, 3, 0, 1, 4};
   const std::vector<std::uint8_t> free(p.size(), 0);
   const std::vector<std::size_t> targets = {1};
-  const auto result = decimate_chunk(p, fan, free, targets, 1.0);
+  const auto result = decimate_chunk({p, {}}, fan, free, targets, {1.0, 0.0, 0.0});
   ASSERT_EQ(result.size(), 1u);
   EXPECT_EQ(result[0].indices.size(), 9u);
   EXPECT_EQ(result[0].nearby.size(), p.size());
+}
+
+/// uv of the triangles of a flat level at a point, by searching all of them.
+glm::dvec2 uv_at(const TriMesh& mesh, const Chunk& chunk, std::span<const std::uint16_t> indices,
+                 const glm::dvec2& p) {
+  const auto area = [](const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  };
+  glm::dvec2 best(0.0);
+  double least_outside = 1e9;
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    std::array<std::uint32_t, 3> v{};
+    std::array<glm::dvec2, 3> at;
+    for (std::size_t k = 0; k < 3; ++k) {
+      v[k] = chunk.vertices[indices[i + k]];
+      at[k] = glm::dvec2(mesh.positions[v[k]]);
+    }
+    const double whole = area(at[0], at[1], at[2]);
+    if (std::abs(whole) < 1e-6) continue;  // along the border
+    const std::array<double, 3> share = {area(p, at[1], at[2]) / whole,
+                                         area(at[0], p, at[2]) / whole,
+                                         area(at[0], at[1], p) / whole};
+    const double outside = -*std::min_element(share.begin(), share.end());
+    if (outside >= least_outside) continue;
+    least_outside = outside;
+    best = share[0] * mesh.uvs[v[0]] + share[1] * mesh.uvs[v[1]] + share[2] * mesh.uvs[v[2]];
+  }
+  EXPECT_LT(least_outside, 0.05);
+  return best;
+}
+
+TEST(Levels, TexturesSlideNoFartherThanStated) {
+  // Flat, so that the surface alone forbids nothing, under a texture that is sheared unevenly.
+  constexpr std::uint32_t kSide = 1024;
+  constexpr double kRounding =
+      1.0;  // texels: half floats move the vertices that levels are made of
+  TriMesh mesh = welded(parse(grid(40, 1)));
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    mesh.positions[v].z = 0;
+    glm::dvec2& uv = mesh.uvs[v];
+    uv = {uv.x + 0.12 * std::sin(14 * uv.y + 6 * uv.x), uv.y + 0.05 * uv.x * uv.x};
+  }
+  const auto greatest_shift = [&](const ChunkedMesh& split, std::size_t level) {
+    const Chunk& chunk = split.chunks[0];
+    double greatest = 0;
+    for (const std::uint32_t v : chunk.vertices) {
+      const glm::dvec2 there = uv_at(split.mesh, chunk, chunk.coarser[level].indices,
+                                     glm::dvec2(split.mesh.positions[v]));
+      greatest = std::max(greatest, kSide * glm::length(there - split.mesh.uvs[v]));
+    }
+    return greatest;
+  };
+  const ChunkedMesh bounded = levelled(mesh, 65535, 2, kSide);
+  ASSERT_EQ(bounded.chunks.size(), 1u);
+  ASSERT_GE(bounded.chunks[0].coarser.size(), 2u);
+  // The grid is 28 by 40: 1 % of its diagonal, in texels of an even texture of its area.
+  const double bound = 0.01 * std::hypot(28, 40) / std::sqrt(28.0 * 40) * kSide;
+  for (std::size_t l = 0; l < bounded.chunks[0].coarser.size(); ++l) {
+    const double stated = bounded.chunks[0].coarser[l].uv_shift;
+    EXPECT_NEAR(greatest_shift(bounded, l), stated, kRounding) << "level " << l + 1;
+    EXPECT_LE(stated, 1.05 * bound) << "level " << l + 1;
+    EXPECT_GT(stated, 0.02 * bound) << "level " << l + 1;
+  }
+  // Without a texture nothing is stated, and the uvs are off by far more.
+  const ChunkedMesh free = levelled(mesh, 65535, 2, 0);
+  ASSERT_GE(free.chunks[0].coarser.size(), 2u);
+  EXPECT_EQ(free.chunks[0].coarser[1].uv_shift, 0);
+  EXPECT_GT(greatest_shift(free, 1), 2 * greatest_shift(bounded, 1));
 }
 
 TEST(Levels, ThreadsChangeNothing) {
