@@ -85,6 +85,7 @@ Result<PoseBenchOptions> options_of(const PoseBenchCommand& command) {
   options.frames = command.frames;
   options.seed = command.seed;
   options.clutter_frames = command.clutter;
+  options.many = command.many;
   options.paper_set = 0;
   for (const ParameterSetRecord& set : paper_parameter_sets()) {
     if (command.parameters == parameter_set_name(set.id)) options.paper_set = set.id;
@@ -159,8 +160,8 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
   };
   auto options = options_of(command);
   if (!options) return tl::unexpected(options.error());
-  if (command.scores || command.tables || command.many) {
-    auto rows = command.many     ? many_rows(*options, progress)
+  if (command.scores || command.tables || command.many > 0) {
+    auto rows = command.many > 0 ? many_rows(*options, progress)
                 : command.scores ? score_rows(*options, progress)
                                  : article_rows(*options, progress);
     bar.clear();

@@ -155,8 +155,8 @@ CLI::App* add_bench(CLI::App& app, BenchCommand& bench) {
   sub->add_flag("--scores", pose.scores,
                 "pose: the patterns' scores beside their working ranges, and how well they agree");
   sub->add_flag(
-      "--many", pose.many,
-      "pose: 1, 10 and 50 patterns at once: detection, set-up, return from behind things");
+      "--many{50}", pose.many,
+      "pose: 1, 10 and 50 (--many=N: N) patterns: detection, set-up, return from behind things");
   sub->add_option("--parameters", pose.parameters,
                   "pose: set of the article's method, none: ours alone");
   sub->add_option("--only", pose.only, "pose: bands whose name holds this text");

@@ -71,7 +71,7 @@ struct PoseBenchCommand {
   int clutter = 0;                      ///< frames without a pattern, in all; 0: as the others
   bool tables = false;                  ///< print the article's tables instead
   bool scores = false;                  ///< hold scores against working ranges instead
-  bool many = false;                    ///< measure bundles of many patterns instead
+  int many = 0;                         ///< measure bundles of 1 to so many patterns instead
   unsigned seed = 1;
   bool quiet = false;
 };

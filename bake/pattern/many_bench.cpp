@@ -16,8 +16,7 @@
 namespace modar {
 namespace {
 
-constexpr std::size_t kCounts[] = {1, 10, 50};
-constexpr std::size_t kMost = 50;
+constexpr std::size_t kSome = 10;
 constexpr std::size_t kOfPicture = 8;  // quarters, and those mirrored
 constexpr int kSettle = 5;             // frames before a pattern is hidden
 constexpr int kHidden = 10;
@@ -41,6 +40,7 @@ struct Many {
   std::vector<GrayPicture> pictures;
   std::vector<std::vector<std::byte>> records;
 
+  [[nodiscard]] std::size_t size() const { return pictures.size(); }
   [[nodiscard]] Result<std::vector<std::byte>> bundle(std::size_t count) const {
     return bundle_of_records({pictures.data(), count}, {records.data(), count});
   }
@@ -48,9 +48,10 @@ struct Many {
 
 Result<Many> make_many(const PoseBenchOptions& options, const PoseBenchProgress& progress) {
   const std::size_t files = options.patterns.size();
-  if (files * kOfPicture < kMost || options.backgrounds.empty()) {
+  const auto most = static_cast<std::size_t>(options.many);
+  if (most < 2 || files * kOfPicture < most || options.backgrounds.empty()) {
     return fail(ExitCode::kUsage, "bench.input", "--many",
-                "fifty patterns are made of at least seven pictures, and shown over photos",
+                "two or more patterns, eight at most of each picture, are shown over photos",
                 "give folders with more pictures");
   }
   std::vector<GrayPicture> whole;
@@ -61,12 +62,12 @@ Result<Many> make_many(const PoseBenchOptions& options, const PoseBenchProgress&
     whole.push_back(std::move(*picture));
   }
   Many many;
-  for (std::size_t i = 0; i < kMost; ++i) {
+  for (std::size_t i = 0; i < most; ++i) {
     many.pictures.push_back(quarter_of(whole[i % files], i / files));
   }
-  std::vector<Result<std::vector<std::byte>>> baked(kMost);
+  std::vector<Result<std::vector<std::byte>>> baked(most);
   if (progress) progress("baking", 0.0);
-  parallel_rows(kMost, std::thread::hardware_concurrency(),
+  parallel_rows(static_cast<std::uint32_t>(most), std::thread::hardware_concurrency(),
                 [&](std::uint32_t i) { baked[i] = bake_loop_record(many.pictures[i].view(), {}); });
   for (auto& record : baked) {
     if (!record) return tl::unexpected(record.error());
@@ -84,48 +85,107 @@ SceneBand easy_band() {
   return band;
 }
 
-/// Searches alone, on the same frames for each count.
-Result<void> measure_detection(const Many& many, const std::vector<SceneFrame>& frames,
-                               const Camera& camera, std::vector<ManyBenchRow>& rows) {
+/// Frames that each show one pattern, drawn when they are asked for.
+class Frames {
+ public:
+  Frames(const Many& many, const std::vector<GrayPicture>& backgrounds,
+         const PoseBenchOptions& options)
+      : many_(many), backgrounds_(backgrounds), options_(options) {}
+
+  /// Frame i, which shows that pattern.
+  [[nodiscard]] SceneFrame at(int i, std::size_t pattern) const {
+    Random random(options_.seed + static_cast<std::uint64_t>(i));
+    const SceneBand band = easy_band();
+    const GrayImage picture = many_.pictures[pattern].view();
+    const Camera camera = default_camera(options_.width, options_.height);
+    const Pose pose = draw_pose(band, picture, camera, random);
+    const GrayPicture& photo = backgrounds_[static_cast<std::size_t>(i) % backgrounds_.size()];
+    return render_scene(picture, camera, pose, photo, band, random);
+  }
+  [[nodiscard]] int count() const { return options_.frames; }
+
+ private:
+  const Many& many_;
+  const std::vector<GrayPicture>& backgrounds_;
+  const PoseBenchOptions& options_;
+};
+
+/// What searches made of frames.
+struct Searched {
+  double seconds = 0;
+  int right = 0;
+  int others = 0;  ///< recognitions of what was not shown
+
+  Result<void> add(PoseLoop& loop, const SceneFrame& frame, std::uint32_t shown) {
+    TrackResult seen;
+    const double start = thread_seconds();
+    if (auto done = loop.step(frame.picture.view(), seen); !done) return done;
+    seconds += thread_seconds() - start;
+    for (const Sighting& each : seen.visible) {
+      right += each.pattern == shown && is_right(each, {true, frame.corners}) ? 1 : 0;
+      others += each.pattern != shown ? 1 : 0;
+    }
+    return {};
+  }
+};
+
+/// A loop that searches every frame anew.
+Result<std::unique_ptr<PoseLoop>> searcher(std::span<const std::byte> bytes, const Camera& camera) {
+  PoseLoopOptions how;
+  how.track = false;
+  return PoseLoop::create(BundleView::open(bytes).value(), camera, how);
+}
+
+/// Searches in bundles of 1, 10 and 50 patterns, which are shown in turn, beside searches on the
+/// same frames for the pattern that they show alone.
+Result<void> measure_detection(const Many& many, const Frames& frames, const Camera& camera,
+                               const PoseBenchProgress& progress, std::vector<ManyBenchRow>& rows) {
   double with_one = 0;
-  for (const std::size_t count : kCounts) {
+  for (const std::size_t count : {std::size_t{1}, kSome, many.size()}) {
+    if (count == kSome && many.size() <= kSome) continue;
     const auto bytes = many.bundle(count);
     if (!bytes) return tl::unexpected(bytes.error());
-    PoseLoopOptions how;
-    how.track = false;
-    auto loop = PoseLoop::create(BundleView::open(*bytes).value(), camera, how);
+    const auto loop = searcher(*bytes, camera);
     if (!loop) return tl::unexpected(loop.error());
-    double seconds = 0;
-    int right = 0;
-    int others = 0;
-    TrackResult seen;
-    for (const SceneFrame& frame : frames) {
-      const double start = thread_seconds();
-      if (auto done = (*loop)->step(frame.picture.view(), seen); !done) return done;
-      seconds += thread_seconds() - start;
-      for (const Sighting& each : seen.visible) {
-        right += each.pattern == 0 && is_right(each, {true, frame.corners}) ? 1 : 0;
-        others += each.pattern != 0 ? 1 : 0;
-      }
+    Searched all;
+    Searched alone;
+    for (int i = 0; i < frames.count(); ++i) {
+      const std::size_t shown = static_cast<std::size_t>(i) % count;
+      const SceneFrame frame = frames.at(i, shown);
+      if (auto done = all.add(**loop, frame, static_cast<std::uint32_t>(shown)); !done) return done;
+      const auto single = bundle_of_record(many.pictures[shown].view(), many.records[shown]);
+      if (!single) return tl::unexpected(single.error());
+      const auto one = searcher(*single, camera);
+      if (!one) return tl::unexpected(one.error());
+      if (auto done = alone.add(**one, frame, 0); !done) return done;
+      if (progress) progress("detection x" + std::to_string(count), (i + 1.0) / frames.count());
     }
-    const double all = static_cast<double>(frames.size());
-    const double ms = 1e3 * seconds / all;
+    const double ms = 1e3 * all.seconds / frames.count();
+    const double percent = 100.0 / frames.count();
     if (count == 1) with_one = ms;
     const int patterns = static_cast<int>(count);
     rows.push_back({"detection cpu_ms", patterns, ms, with_one * patterns});
-    rows.push_back({"detection right_pct", patterns, 100.0 * right / all, 0});
-    rows.push_back({"detection others", patterns, 1.0 * others, 0});
+    rows.push_back({"detection right_pct", patterns, percent * all.right, percent * alone.right});
+    rows.push_back({"detection others", patterns, 1.0 * all.others, 0});
   }
   return {};
 }
 
-/// From mapped bytes to a loop that takes frames: median time, and what it holds on the heap.
-Result<void> measure_ready(std::span<const std::byte> bytes, const Camera& camera,
-                           std::vector<ManyBenchRow>& rows) {
+double heap_bytes() {
+  const struct mallinfo2 now = mallinfo2();
+  return static_cast<double>(now.uordblks + now.hblkhd);
+}
+
+/// From mapped bytes to a loop that takes frames: median time, and what it holds on the heap; what
+/// it holds once it has searched a frame, and what that first one takes.
+Result<void> measure_ready(std::span<const std::byte> bytes, int patterns, const Camera& camera,
+                           const SceneFrame& frame, std::vector<ManyBenchRow>& rows) {
   std::vector<double> times;
   double held = 0;
+  double searching = 0;
+  double first = 0;
   for (int i = 0; i < 5; ++i) {
-    const struct mallinfo2 before = mallinfo2();
+    const double before = heap_bytes();
     const auto start = std::chrono::steady_clock::now();
     const auto bundle = BundleView::open(bytes);
     if (!bundle) return tl::unexpected(bundle.error());
@@ -133,13 +193,19 @@ Result<void> measure_ready(std::span<const std::byte> bytes, const Camera& camer
     if (!loop) return tl::unexpected(loop.error());
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     times.push_back(ms.count());
-    const struct mallinfo2 after = mallinfo2();
-    held = static_cast<double>(after.uordblks + after.hblkhd) -
-           static_cast<double>(before.uordblks + before.hblkhd);
+    held = heap_bytes() - before;
+    const double stepped = thread_seconds();
+    if (const auto seen = (*loop)->step(frame.picture.view()); !seen) {
+      return tl::unexpected(seen.error());
+    }
+    first = 1e3 * (thread_seconds() - stepped);
+    searching = heap_bytes() - before;
   }
   std::nth_element(times.begin(), times.begin() + 2, times.end());
-  rows.push_back({"ready_ms", kMost, times[2], 0});
-  rows.push_back({"ready_heap_bytes", kMost, held, 0});
+  rows.push_back({"ready_ms", patterns, times[2], 0});
+  rows.push_back({"ready_heap_bytes", patterns, held, 0});
+  rows.push_back({"first_search cpu_ms", patterns, first, 0});
+  rows.push_back({"searching_heap_bytes", patterns, searching, 0});
   return {};
 }
 
@@ -148,9 +214,9 @@ class Return {
  public:
   Return(const Many& many, const GrayPicture& background, const Camera& camera, bool beside,
          std::uint64_t seed)
-      : many_(many), background_(background), camera_(camera), random_(seed) {
-    patterns_[0] = random_.next() % kMost;
-    patterns_[1] = (patterns_[0] + 1 + random_.next() % (kMost - 1)) % kMost;
+      : many_(many), camera_(camera), random_(seed) {
+    patterns_[0] = random_.next() % many.size();
+    patterns_[1] = (patterns_[0] + 1 + random_.next() % (many.size() - 1)) % many.size();
     const std::size_t shown = beside ? 2 : 1;
     for (std::size_t k = 0; k < shown; ++k) {
       Pose pose = draw_pose(band_, picture(k), camera_, random_);
@@ -159,6 +225,11 @@ class Return {
       pose.translation.y = 0;
       poses_.push_back(pose);
     }
+    // Drawn once, exposed in each frame.
+    hidden_ = beside ? drawn(1, background).picture : background;
+    SceneFrame all = drawn(0, hidden_);
+    shown_ = std::move(all.picture);
+    corners_ = all.corners;
   }
 
   /// Frames until the pattern is right again, 1: at once; kPatience where it never is; 0 where it
@@ -184,16 +255,12 @@ class Return {
   [[nodiscard]] GrayImage picture(std::size_t k) const {
     return many_.pictures[patterns_[k]].view();
   }
+  SceneFrame drawn(std::size_t k, const GrayPicture& behind) {
+    return render_still(picture(k), camera_, poses_[k], behind, band_, random_, 0.5, {});
+  }
   Result<void> show(PoseLoop& loop, bool first, TrackResult& seen) {
-    SceneFrame scene;
-    scene.picture = background_;
-    for (std::size_t k = first ? 0 : 1; k < poses_.size(); ++k) {
-      const GrayPicture behind = std::move(scene.picture);
-      scene = render_still(picture(k), camera_, poses_[k], behind, band_, random_, 0.5, {});
-      if (k == 0) corners_ = scene.corners;
-    }
     GrayPicture exposed;
-    expose(scene.picture, {}, random_, exposed);
+    expose(first ? shown_ : hidden_, {}, random_, exposed);
     return loop.step(exposed.view(), seen);
   }
   [[nodiscard]] bool is_back(const TrackResult& seen) const {
@@ -203,12 +270,13 @@ class Return {
   }
 
   const Many& many_;
-  const GrayPicture& background_;
   Camera camera_;
   Random random_;
   SceneBand band_ = easy_band();
   std::size_t patterns_[2] = {0, 0};
   std::vector<Pose> poses_;
+  GrayPicture shown_;
+  GrayPicture hidden_;  ///< without the first pattern
   std::array<glm::dvec2, 4> corners_{};
 };
 
@@ -234,10 +302,11 @@ Result<void> measure_return(const Many& many, std::span<const std::byte> bytes,
       times += *frames > 0 ? 1 : 0;
       if (progress) progress("return", (beside ? 0.5 : 0.0) + 0.5 * (i + 1) / options.frames);
     }
+    const int patterns = static_cast<int>(many.size());
     const std::string name = beside ? "return_beside " : "return_alone ";
-    rows.push_back({name + "mean_frames", kMost, sum / std::max(times, 1), 0});
-    rows.push_back({name + "worst_frames", kMost, 1.0 * worst, 0});
-    rows.push_back({name + "times", kMost, 1.0 * times, 0});
+    rows.push_back({name + "mean_frames", patterns, sum / std::max(times, 1), 0});
+    rows.push_back({name + "worst_frames", patterns, 1.0 * worst, 0});
+    rows.push_back({name + "times", patterns, 1.0 * times, 1.0 * options.frames});
   }
   return {};
 }
@@ -251,22 +320,16 @@ Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
   const auto backgrounds = load_backgrounds(options.backgrounds, options.width, options.height);
   if (!backgrounds) return tl::unexpected(backgrounds.error());
   const Camera camera = default_camera(options.width, options.height);
-  Random random(options.seed);
-  const SceneBand band = easy_band();
-  std::vector<SceneFrame> frames;
-  for (int i = 0; i < options.frames; ++i) {
-    const GrayImage picture = many->pictures[0].view();
-    const GrayPicture& photo = (*backgrounds)[static_cast<std::size_t>(i) % backgrounds->size()];
-    const Pose pose = draw_pose(band, picture, camera, random);
-    frames.push_back(render_scene(picture, camera, pose, photo, band, random));
-  }
-  const auto bytes = many->bundle(kMost);
+  const Frames frames(*many, *backgrounds, options);
+  const auto bytes = many->bundle(many->size());
   if (!bytes) return tl::unexpected(bytes.error());
   std::vector<ManyBenchRow> rows;
-  if (auto done = measure_detection(*many, frames, camera, rows); !done) {
+  if (auto done = measure_detection(*many, frames, camera, progress, rows); !done) {
     return tl::unexpected(done.error());
   }
-  if (auto done = measure_ready(*bytes, camera, rows); !done) return tl::unexpected(done.error());
+  if (auto done = measure_ready(*bytes, options.many, camera, frames.at(0, 0), rows); !done) {
+    return tl::unexpected(done.error());
+  }
   auto done = measure_return(*many, *bytes, *backgrounds, options, progress, rows);
   if (!done) return tl::unexpected(done.error());
   return rows;

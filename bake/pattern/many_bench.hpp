@@ -13,12 +13,14 @@ struct ManyBenchRow {
   std::string measure;
   int patterns = 0;
   double value = 0;
-  double reference = 0;  ///< detection: the time with one pattern, times `patterns`; 0: none
+  /// Detection: the time with one pattern, times `patterns`, or what a search for the shown pattern
+  /// alone gets right; returns: how often a pattern was hidden; 0: none.
+  double reference = 0;
 };
 
-/// Detection, set-up and return with 1, 10 and 50 patterns: quarters of the options' pictures, and
-/// their mirror images, which no loop takes for one another. Single thread; options.frames: frames
-/// of each count, all showing the first pattern, and times that a pattern is hidden. Measures as in
+/// Detection, set-up and return with 1, 10 and options.many patterns: quarters of the options'
+/// pictures, and their mirror images. Single thread; options.frames: frames of each count, which
+/// show the patterns in turn, and times that a pattern is hidden. Measures as in
 /// bake/commands/json.md. Errors: kUsage "bench.input" for fewer than seven pictures or no
 /// background; those of baking and of the loop.
 Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,

@@ -21,6 +21,7 @@ struct PoseBenchOptions {
   int height = 720;
   std::uint32_t paper_set = 1;  ///< the article's parameter set; 0: without the article's method
   bool ours = true;
+  int many = 50;  ///< bench_many(): patterns in the greatest bundle, 2 or more
   std::uint64_t seed = 1;
   std::vector<SceneBand> bands;  ///< empty: pose_bands()
 };

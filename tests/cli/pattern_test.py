@@ -57,6 +57,23 @@ class Pattern(ProgramTest):
         self.assertEqual(twice.returncode, 3)
         self.assertIn("false recognitions: 4", twice.stdout)
 
+    def test_bench_of_many_patterns_prints_each_measure(self):
+        rows = self.modar_json("bench", "pose", "--many=2", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
+                               "--quiet")
+        found = {row["measure"]: row for row in rows}
+        self.assertEqual(set(found), {
+            *(f"detection {what} x{count}" for what in ("cpu_ms", "right_pct", "others") for count in (1, 2)),
+            "ready_ms x2", "ready_heap_bytes x2", "first_search cpu_ms x2", "searching_heap_bytes x2",
+            *(f"return_{how} {what} x2" for how in ("alone", "beside")
+              for what in ("mean_frames", "worst_frames", "times"))})
+        for count in (1, 2):
+            self.assertEqual(found[f"detection right_pct x{count}"]["ours"], 100)
+            self.assertEqual(found[f"detection others x{count}"]["ours"], 0)
+        self.assertEqual(found["return_alone times x2"]["reference"], 1)
+        few = self.modar("bench", "pose", "--many", "--patterns", GAME, "--backgrounds", COVER)
+        self.assertEqual(few.returncode, 1)
+        self.assertIn("eight at most of each picture", few.stderr)
+
     def test_calibrate_says_what_is_missing(self):
         self.assert_fails(self.modar("calibrate", COVER, "-o", "c.yml"), 1, "--board")
         self.assert_fails(self.modar("calibrate", COVER, "--board", "9", "-o", "c.yml"), 1, "9x6")
