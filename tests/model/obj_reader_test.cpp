@@ -209,6 +209,55 @@ TEST(ObjReader, ColoursOfSomeOrAllVertices) {
   EXPECT_TRUE(parse("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").colours.empty());
 }
 
+TEST(ObjReader, LinesPointsAndCurvesAreSkippedAndTheirLinesNamed) {
+  const SourceModel m = parse(kTriangle +
+                              "g a b\no thing\np 1 2\nf 1 2 3\nl 1 2 3\nl 2 3\n"
+                              "cstype bezier\ndeg 3\ncurv 0 1 1 2 3\nend\nf 3 2 1\n");
+  EXPECT_EQ(position_indices(m), (std::vector<std::uint32_t>{0, 1, 2, 2, 1, 0}));
+  EXPECT_EQ(findings(m),
+            (std::multiset<std::string>{"obj.points:6", "obj.lines:8", "obj.free-form:10"}));
+}
+
+TEST(ObjReader, LinesOfAnyLength) {
+  // A face of so many corners in a line of 1.4 MB, and a comment that is longer than any block.
+  constexpr std::uint32_t kCorners = 200000;
+  std::string text = "#" + std::string(9'000'000, 'x') + "\n";
+  std::string face = "f";
+  for (std::uint32_t i = 1; i <= kCorners; ++i) {
+    text += "v " + std::to_string(i) + " 0 1\n";
+    face += " " + std::to_string(i);
+  }
+  const SourceModel m = parse(text + face + "\nnonsense\n");
+  ASSERT_EQ(m.face_count(), 1u);
+  EXPECT_EQ(m.face_size(0), kCorners);
+  EXPECT_EQ(m.corner(kCorners - 1).position, kCorners - 1);
+  EXPECT_EQ(m.positions[kCorners - 1], glm::dvec3(kCorners, 0, 1));
+  EXPECT_EQ(findings(m), (std::multiset<std::string>{"obj.unknown:200003"}));
+}
+
+TEST(ObjReader, EveryFindingNamesFileLineCauseAndCure) {
+  const SourceModel m =
+      parse(kTriangle +
+            "vt 0 0\nf 1 2 3\nf 1 2 9\nf 0 1 2\nf 1 2\nf 1/7 2/1 3/1\nf /1 /1 /1\n"
+            "f 1 2 x\nv nan 0 0\nv 1 0x 2\nv 5\nv 0 0 0 0.5\nv 1 1 1 255 0 0\nl 1 2\n"
+            "p 1\ncurv 0 1 1 2\nblah\nf 1 2 3\n");
+  std::set<std::string> ids;
+  for (const Finding& f : m.findings) {
+    ids.insert(f.id);
+    EXPECT_EQ(f.file, "test.obj") << f.id;
+    EXPECT_FALSE(f.message.empty()) << f.id;
+    EXPECT_FALSE(f.cure.empty()) << f.id;
+    // Colours are judged over all vertices.
+    EXPECT_EQ(f.line == 0, f.id == "obj.partial-colours" || f.id == "obj.byte-colours") << f.id;
+  }
+  for (const char* id :
+       {"obj.index-range", "obj.zero-index", "obj.short-face", "obj.attribute-range",
+        "obj.no-position", "obj.bad-number", "obj.not-finite", "obj.short-vertex", "obj.weight",
+        "obj.lines", "obj.points", "obj.free-form", "obj.unknown", "obj.partial-colours"}) {
+    EXPECT_TRUE(ids.contains(id)) << id;
+  }
+}
+
 TEST(ObjReader, SmoothingGroupsAndMaterialsApplyToWhatFollows) {
   const SourceModel m = parse(kTriangle +
                               "f 1 2 3\ns 1\nusemtl a\nf 1 2 3\ns off\nusemtl b c \nf 1 2 3\n"
