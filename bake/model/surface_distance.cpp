@@ -30,7 +30,10 @@ struct Piece {
   std::uint32_t target = kNoIndex;  ///< the triangle to try next, kNoIndex: search for one
   std::uint32_t before = kNoIndex;  ///< the one that it was cut off by
 
-  void add(const glm::dvec3& corner) { corners[count++] = corner; }
+  /// A convex piece with room for a corner more never needs two; rounding may think so.
+  void add(const glm::dvec3& corner) {
+    if (count < kMost) corners[count++] = corner;
+  }
   [[nodiscard]] std::span<const glm::dvec3> all() const { return {corners.data(), count}; }
   [[nodiscard]] glm::dvec3 middle() const {
     glm::dvec3 sum(0.0);
@@ -38,6 +41,13 @@ struct Piece {
     return sum / static_cast<double>(count);
   }
 };
+
+/// Who is as near as a sliver is on the plane: rounding would have a piece without area cross it
+/// again and again, and gain a corner each time.
+double off_plane(const glm::dvec3& p, const glm::dvec3& point, const glm::dvec3& normal) {
+  const double off = glm::dot(p - point, normal);
+  return std::abs(off) < kSliver ? 0.0 : off;
+}
 
 /// The parts of a piece on either side of a plane through `point`, whose normal has unit length: at
 /// most one corner more each.
@@ -50,8 +60,8 @@ void cut(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal, 
   for (std::size_t i = 0; i < piece.count; ++i) {
     const glm::dvec3& a = piece.corners[i];
     const glm::dvec3& b = piece.corners[i + 1 == piece.count ? 0 : i + 1];
-    const double at_a = glm::dot(a - point, normal);
-    const double at_b = glm::dot(b - point, normal);
+    const double at_a = off_plane(a, point, normal);
+    const double at_b = off_plane(b, point, normal);
     low = std::min(low, at_a);
     high = std::max(high, at_a);
     if (at_a <= 0) behind.add(a);

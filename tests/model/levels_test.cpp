@@ -10,6 +10,7 @@
 #include <set>
 #include <span>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "bake/model/chunk_decimate.hpp"
@@ -241,6 +242,54 @@ TEST(Levels, DistancesOfKnownSurfaces) {
     EXPECT_LE(surface_distance(low, low, nearby, 0), kDistanceFloor);
     // What is below the least that a caller asks for is not told apart.
     EXPECT_EQ(surface_distance(low, high, nearby, 2.0), 2.0);
+  }
+}
+
+TEST(Levels, DistancesOfTrianglesWithoutArea) {
+  // As half floats leave the finest scans: corners fall together or on one line.
+  constexpr std::uint16_t kSide = 9;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(-0.6, 0.6);
+  for (int round = 0; round < 40; ++round) {
+    std::vector<glm::dvec3> p;
+    const glm::dvec3 along(uniform(random), uniform(random), uniform(random));
+    const glm::dvec3 across(uniform(random), uniform(random), uniform(random));
+    for (std::uint16_t v = 0; v < kSide * kSide; ++v) {
+      const glm::dvec3 at =
+          static_cast<double>(v % kSide) * along + static_cast<double>(v / kSide) * across;
+      // Every third of them no lattice, but a line through one.
+      p.push_back((round % 3 == 0 ? at * 0.7 : glm::round(at)) * 0x1p-11 * 7.0 + glm::dvec3(0.3));
+    }
+    // The two ways to cut the grid's squares.
+    std::vector<std::uint16_t> one;
+    std::vector<std::uint16_t> other;
+    for (std::uint16_t y = 0; y + 1 < kSide; ++y) {
+      for (std::uint16_t x = 0; x + 1 < kSide; ++x) {
+        const auto a = static_cast<std::uint16_t>(y * kSide + x);
+        const auto b = static_cast<std::uint16_t>(a + 1);
+        const auto c = static_cast<std::uint16_t>(a + kSide);
+        const auto d = static_cast<std::uint16_t>(c + 1);
+        one.insert(one.end(), {a, b, d, a, d, c});
+        other.insert(other.end(), {a, b, c, b, d, c});
+      }
+    }
+    LevelSurface from(p, one);
+    LevelSurface to(p, other);
+    double exact = 0;  // at the middles of the diagonals
+    for (std::size_t i = 0; i < one.size(); i += 6) {
+      const glm::dvec3 middle = 0.5 * (p[one[i]] + p[one[i + 2]]);
+      double least = 1e9;
+      for (std::uint32_t t = 0; t < other.size() / 3; ++t) {
+        least = std::min(least, distance_square(middle, to.triangle(t)));
+      }
+      exact = std::max(exact, std::sqrt(least));
+    }
+    for (const std::vector<std::uint32_t>& nearby :
+         {to.triangles_of_vertices(), std::vector<std::uint32_t>(p.size(), kNoIndex)}) {
+      const double bound = surface_distance(from, to, nearby, 0);
+      EXPECT_GE(bound, exact - 1e-12);
+      EXPECT_LE(bound, std::max(kDistanceFloor, 1.5 * 7 * 0x1p-11 * 1.8));
+    }
   }
 }
 
