@@ -1,16 +1,8 @@
-// tinyobjloader, built with doubles as our reader parses them (Debian's library has floats).
+// How long tinyobjloader takes.
 #include "bake/bench/probe_peers.hpp"
 
 #ifdef MODAR_HAVE_TINYOBJ
-#define TINYOBJLOADER_USE_DOUBLE
-#define TINYOBJLOADER_IMPLEMENTATION
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wshadow"
-#pragma GCC diagnostic ignored "-Wconversion"
-#pragma GCC diagnostic ignored "-Wsign-conversion"
-#pragma GCC diagnostic ignored "-Wold-style-cast"
-#include <tiny_obj_loader.h>
-#pragma GCC diagnostic pop
+#include "bake/bench/tinyobj_library.hpp"
 #endif
 
 namespace modar {

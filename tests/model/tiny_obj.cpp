@@ -1,15 +1,7 @@
-// The one file that holds tinyobjloader (Debian's library is built with floats).
-#define TINYOBJLOADER_USE_DOUBLE
-#define TINYOBJLOADER_IMPLEMENTATION
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wshadow"
-#pragma GCC diagnostic ignored "-Wconversion"
-#pragma GCC diagnostic ignored "-Wsign-conversion"
-#pragma GCC diagnostic ignored "-Wold-style-cast"
-#include <tiny_obj_loader.h>
-#pragma GCC diagnostic pop
-
+// tinyobjloader's arrays as ours are.
 #include "tests/model/tiny_obj.hpp"
+
+#include "bake/bench/tinyobj_library.hpp"
 
 namespace modar::testing {
 
