@@ -107,7 +107,8 @@ void print_confusion(const Confusion& confusion) {
     }
     std::printf("\n");
   }
-  std::printf("false recognitions: %d\n", confusion.false_recognitions());
+  std::printf("false recognitions: %d, each asked for alone; %d with all in one bundle\n",
+              confusion.false_recognitions(), confusion.together);
 }
 
 /// Options that are files, read.

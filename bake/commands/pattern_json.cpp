@@ -57,6 +57,7 @@ std::string confusion_json(const Confusion& confusion) {
   return dump({{"views", confusion.views},
                {"photo_views", confusion.photo_views},
                {"false_recognitions", confusion.false_recognitions()},
+               {"false_together", confusion.together},
                {"patterns", patterns}});
 }
 

@@ -117,6 +117,31 @@ Result<std::vector<int>> ask_all(const std::vector<NamedPattern>& patterns,
   return out;
 }
 
+/// A bundle of all of them, as an app would have it.
+Result<std::vector<std::byte>> project_of(const std::vector<NamedPattern>& patterns) {
+  std::vector<GrayPicture> pictures;
+  std::vector<std::vector<std::byte>> records;
+  for (const NamedPattern& pattern : patterns) {
+    const auto bundle = BundleView::open(pattern.bundle);
+    if (!bundle) return tl::unexpected(bundle.error());
+    const auto record = bundle->section(SectionType::kLoopRecord, 0, 0);
+    pictures.push_back(pattern.picture);
+    records.emplace_back(record.begin(), record.end());
+  }
+  return bundle_of_records(pictures, records);
+}
+
+/// Recognitions of others than the one that is shown (nobody: patterns.size()).
+Result<int> ask_together(PoseLoop& loop, const std::vector<GrayPicture>& views, std::size_t shown) {
+  int others = 0;
+  TrackResult seen;
+  for (const GrayPicture& view : views) {
+    if (auto done = loop.step(view.view(), seen); !done) return tl::unexpected(done.error());
+    for (const Sighting& each : seen.visible) others += each.pattern != shown ? 1 : 0;
+  }
+  return others;
+}
+
 }  // namespace
 
 Result<std::vector<NamedPattern>> read_patterns(const std::vector<std::string>& paths,
@@ -148,6 +173,20 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   confusion.views = options.views;
   confusion.photo_views = options.views * static_cast<int>(options.photos.size());
   confusion.in_photos.assign(patterns.size(), 0);
+  const auto project = project_of(patterns);
+  if (!project) return tl::unexpected(project.error());
+  PoseLoopOptions how;
+  how.track = false;
+  auto loop = PoseLoop::create(BundleView::open(*project).value(),
+                               default_camera(options.width, options.height), how);
+  if (!loop) return tl::unexpected(loop.error());
+  const auto ask = [&](const std::vector<GrayPicture>& views,
+                       std::size_t shown) -> Result<std::vector<int>> {
+    const auto others = ask_together(**loop, views, shown);
+    if (!others) return tl::unexpected(others.error());
+    confusion.together += *others;
+    return ask_all(patterns, views, options);
+  };
   Random random(options.seed);
   const GrayPicture background = made_background(options.width, options.height, random);
   const double all = static_cast<double>(patterns.size() + options.photos.size());
@@ -157,7 +196,8 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   };
   for (const NamedPattern& shown : patterns) {
     confusion.names.push_back(shown.name);
-    const auto counts = ask_all(patterns, easy_views(shown, options, background, random), options);
+    const std::size_t index = confusion.names.size() - 1;
+    const auto counts = ask(easy_views(shown, options, background, random), index);
     if (!counts) return tl::unexpected(counts.error());
     confusion.recognised.insert(confusion.recognised.end(), counts->begin(), counts->end());
     stepped();
@@ -165,7 +205,7 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   for (const std::string& path : options.photos) {
     const auto photo = load_background(path, options.width, options.height);
     if (!photo) return tl::unexpected(photo.error());
-    const auto counts = ask_all(patterns, photo_views(*photo, options.views, random), options);
+    const auto counts = ask(photo_views(*photo, options.views, random), patterns.size());
     if (!counts) return tl::unexpected(counts.error());
     for (std::size_t i = 0; i < counts->size(); ++i) confusion.in_photos[i] += (*counts)[i];
     stepped();

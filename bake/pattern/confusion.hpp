@@ -42,7 +42,10 @@ struct Confusion {
   std::vector<int> recognised;
   int photo_views = 0;
   std::vector<int> in_photos;  ///< recognitions in views of photos, a pattern
-  /// Recognitions of a pattern that was not there.
+  /// Recognitions of a pattern that was not there, in all the views, by a device that knows all of
+  /// them: of patterns that claim one place it believes the one that the frame shows.
+  int together = 0;
+  /// Recognitions of a pattern that was not there, where each was asked for alone.
   [[nodiscard]] int false_recognitions() const;
 };
 
