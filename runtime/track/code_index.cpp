@@ -45,8 +45,11 @@ std::array<std::size_t, 2> range_of(const LoopPattern& pattern, bool dark) {
 
 CodeIndex::CodeIndex(std::span<const LoopPattern> patterns, const Kernels& kernels,
                      std::size_t most_features)
-    : patterns_(patterns), kernels_(kernels), support_(patterns.size()) {
-  votes_.reserve(most_features);
+    : patterns_(patterns),
+      kernels_(kernels),
+      votes_(most_features),
+      last_(patterns.size()),
+      support_(patterns.size()) {
   build(groups_[0], false);
   build(groups_[1], true);
 }
@@ -129,22 +132,27 @@ std::uint32_t CodeIndex::nearest_owner(const Group& group, const Code& code) {
   return owner;
 }
 
-/// The most votes of a pattern that agree on a place.
-std::uint16_t CodeIndex::agreeing(std::span<const Vote> votes) {
+/// The most votes of a pattern that agree on a place; last: its last vote.
+std::uint16_t CodeIndex::agreeing(std::uint32_t last, std::size_t count) const {
   std::uint16_t most = 0;
-  const std::size_t stride = votes.size() / kHypotheses + 1;
-  for (std::size_t i = 0; i < votes.size(); i += stride) {
-    const auto count = std::count_if(votes.begin(), votes.end(), [&](const Vote& other) {
-      return agrees(votes[i].match, other.match);
-    });
-    most = std::max(most, static_cast<std::uint16_t>(count));
+  const std::size_t stride = count / kHypotheses + 1;
+  std::size_t k = 0;
+  for (std::uint32_t i = last; i != kNobody; i = votes_[i].before, ++k) {
+    if (k % stride != 0) continue;
+    std::uint16_t agree = 0;
+    for (std::uint32_t j = last; j != kNobody; j = votes_[j].before) {
+      if (agrees(votes_[i].match, votes_[j].match)) ++agree;
+    }
+    most = std::max(most, agree);
   }
   return most;
 }
 
 std::span<const std::uint16_t> CodeIndex::vote(std::span<const LoopFeature> features) {
-  votes_.clear();
-  for (const LoopFeature& feature : features.first(std::min(features.size(), votes_.capacity()))) {
+  std::fill(support_.begin(), support_.end(), std::uint16_t{0});
+  std::fill(last_.begin(), last_.end(), kNobody);
+  std::uint32_t count = 0;
+  for (const LoopFeature& feature : features.first(std::min(features.size(), votes_.size()))) {
     const bool dark = feature.dark != 0;
     const Group& group = groups_[dark ? 1 : 0];
     if (group.starts.empty()) continue;
@@ -152,17 +160,11 @@ std::span<const std::uint16_t> CodeIndex::vote(std::span<const LoopFeature> feat
     if (owner == kNobody) continue;
     const std::uint32_t p = owner / kIndexed;
     const std::size_t at = range_of(patterns_[p], dark)[0] + owner % kIndexed;
-    votes_.push_back({p, match_of(patterns_[p].features[at], feature)});
+    votes_[count] = {last_[p], match_of(patterns_[p].features[at], feature)};
+    last_[p] = count++;
+    ++support_[p];
   }
-  std::sort(votes_.begin(), votes_.end(),
-            [](const Vote& a, const Vote& b) { return a.pattern < b.pattern; });
-  std::fill(support_.begin(), support_.end(), std::uint16_t{0});
-  for (auto first = votes_.begin(); first != votes_.end();) {
-    const auto last = std::find_if(
-        first, votes_.end(), [&](const Vote& vote) { return vote.pattern != first->pattern; });
-    support_[first->pattern] = agreeing({first, last});
-    first = last;
-  }
+  for (std::size_t p = 0; p < support_.size(); ++p) support_[p] = agreeing(last_[p], support_[p]);
   return support_;
 }
 

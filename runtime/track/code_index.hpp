@@ -41,19 +41,20 @@ class CodeIndex {
     std::vector<std::uint32_t> owners;  ///< by code: pattern and feature
   };
   struct Vote {
-    std::uint32_t pattern = 0;
+    std::uint32_t before = 0;  ///< the same pattern's vote before this one
     PlaneMatch match;
   };
   void build(Group& group, bool dark);
   std::array<std::uint32_t, kProbes> near_words(const Group& group, const Code& code);
   std::uint32_t nearest_owner(const Group& group, const Code& code);
-  static std::uint16_t agreeing(std::span<const Vote> votes);
+  [[nodiscard]] std::uint16_t agreeing(std::uint32_t last, std::size_t count) const;
 
   std::span<const LoopPattern> patterns_;
   const Kernels& kernels_;
   std::array<Group, 2> groups_;  ///< bright, dark
   std::vector<std::uint8_t> distances_;
   std::vector<Vote> votes_;
+  std::vector<std::uint32_t> last_;  ///< by pattern: its last vote
   std::vector<std::uint16_t> support_;
 };
 

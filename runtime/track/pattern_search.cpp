@@ -22,6 +22,8 @@ constexpr int kMapGain = 20;           // percent that the map shows more than t
 constexpr int kMapInliers = 16;        // where no pose fits, and the map alone must convince
 // Of many patterns, those are matched in full
 constexpr std::uint16_t kClearVotes = 4;  // that so many features speak for (chance: two or three),
+constexpr int kShadowed = 6;              // and no fewer than this part of the most: a shared frame
+                                          // or logo speaks for a pattern that is not there;
 constexpr std::ptrdiff_t kMostClear = 4;  // at most so many a frame;
 constexpr std::size_t kGuessed = 2;       // where none is found, these at least, by their votes,
 constexpr std::size_t kMatched = 3;       // and with them the one whose turn it is.
@@ -54,7 +56,9 @@ void PatternSearch::choose(std::span<const LoopFeature> features, std::span<cons
   if (chosen_.size() <= kMatched) return;
   if (!index_) index_ = std::make_unique<CodeIndex>(patterns_, kernels_, matcher_.most_features());
   const std::span<const std::uint16_t> votes = index_->vote(features);
-  const auto is_clear = [&](std::uint32_t i) { return votes[i] >= kClearVotes; };
+  const int most = *std::max_element(votes.begin(), votes.end());
+  const int least = std::max<int>(kClearVotes, (most + kShadowed - 1) / kShadowed);
+  const auto is_clear = [&](std::uint32_t i) { return votes[i] >= least; };
   const auto before = [&](std::uint32_t a, std::uint32_t b) {
     if (is_clear(a) != is_clear(b)) return is_clear(a);
     if (wants[a] != wants[b]) return wants[a] == Want::kFirst;
