@@ -95,5 +95,17 @@ void _Unwind_Resume(_Unwind_Exception* /*exception*/) {
 void __gxx_personality_v0() {
   give_up("unwind");
 }
+#ifdef __ARM_EABI_UNWINDER__
+// What the tables and landing pads of 32-bit ARM name besides.
+void __cxa_end_cleanup() {
+  give_up("unwind");
+}
+void __aeabi_unwind_cpp_pr0() {
+  give_up("unwind");
+}
+void __aeabi_unwind_cpp_pr1() {
+  give_up("unwind");
+}
+#endif
 }
 #endif

@@ -1,0 +1,65 @@
+// What the pose loop sees in raw grey frames, to the last bit: scripts/foreign.sh compares what
+// this prints on two kinds of processor. Usage: pose_bits BUNDLE WIDTH HEIGHT < FRAMES
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "formats/bundle_view.hpp"
+#include "modar/pose_loop.hpp"
+
+namespace modar {
+namespace {
+
+std::vector<std::byte> contents(const char* path) {
+  std::vector<std::byte> bytes;
+  std::FILE* file = std::fopen(path, "rb");
+  if (file == nullptr) return bytes;
+  std::byte chunk[65536];
+  for (std::size_t got = 0; (got = std::fread(chunk, 1, sizeof chunk, file)) > 0;) {
+    bytes.insert(bytes.end(), chunk, chunk + got);
+  }
+  std::fclose(file);
+  return bytes;
+}
+
+void print(int frame, const TrackResult& result) {
+  std::printf("%d reason %d features %d\n", frame, static_cast<int>(result.reason),
+              result.features);
+  for (const Sighting& each : result.visible) {
+    std::printf(" pattern %u inliers %d matches %d", each.pattern, each.inliers, each.matches);
+    for (const glm::dvec2& corner : each.corners) std::printf(" %a %a", corner.x, corner.y);
+    for (int i = 0; i < 3; ++i) std::printf(" %a", each.pose.translation[i]);
+    std::printf("\n");
+  }
+}
+
+int give_up(const std::string& why) {
+  std::fprintf(stderr, "pose_bits: %s\n", why.c_str());
+  return 1;
+}
+
+int run(const char* path, int width, int height) {
+  const std::vector<std::byte> bytes = contents(path);
+  const auto bundle = BundleView::open(bytes);
+  if (!bundle) return give_up(to_line(bundle.error()));
+  const auto loop = PoseLoop::create(*bundle, default_camera(width, height));
+  if (!loop) return give_up(to_line(loop.error()));
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width) *
+                                   static_cast<std::size_t>(height));
+  for (int frame = 0; std::fread(pixels.data(), 1, pixels.size(), stdin) == pixels.size();
+       ++frame) {
+    const auto result = (*loop)->step({pixels.data(), width, height, width});
+    if (!result) return give_up(to_line(result.error()));
+    print(frame, *result);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace modar
+
+int main(int count, char** words) {
+  if (count != 4) return modar::give_up("give BUNDLE WIDTH HEIGHT, and grey frames on stdin");
+  return modar::run(words[1], std::atoi(words[2]), std::atoi(words[3]));
+}
