@@ -14,8 +14,10 @@ constexpr int kFewestMatches = 6;
 constexpr int kUnsettledPercent = 45;  // where the patches do not hold
 constexpr double kMostMisfit = 1.5;    // of what the features alone leave
 constexpr double kMirrored = 1.5;      // the same, of two mirror images
+constexpr double kFarMisfit = 3.0;     // where it is another place altogether
 constexpr int kApartLoss = 8;          // what a place that features deny must show more
 constexpr double kUnhidden = 0.85;     // share of patches that hold where nothing hides any
+constexpr double kAll = 0.95;          // where the mirror image cannot be the right one
 constexpr int kManyInliers = 16;       // features that speak for a place by themselves,
 constexpr int kLeastPercent = 20;      // so that little of the pattern need show there
 constexpr int kMapGain = 20;           // percent that the map shows more than the best pose
@@ -143,7 +145,11 @@ PatternSearch::Place PatternSearch::settled(const LoopPattern& pattern, const Sc
   const Resolution best = finest(pattern, map_of_pose(pattern, camera_, place.pose), levels);
   place.fine = fit.level == best.frame_level;
   place.whole = place.fine && fit.share() >= kUnhidden;
-  place.value += static_cast<int>((place.fine ? 100.0 : 50.0) * fit.likeness);
+  place.all = place.fine && fit.share() >= kAll;
+  // The patches of the finest level tell two places apart that show as many cells.
+  place.value =
+      static_cast<int>(place.fine ? 0.5 * place.right + 100.0 * (fit.share() + fit.likeness)
+                                  : place.right + 50.0 * fit.likeness);
   return place;
 }
 
@@ -158,7 +164,9 @@ PatternSearch::Place PatternSearch::bring(const LoopPattern& pattern, const Scen
   for (const Reach reach : {Reach::kNear, Reach::kFrame, Reach::kFar}) {
     Place place = settled(pattern, scene, reach, start);
     // Patches on the edge of what hides the rest can pull a pose away from what all features say.
-    if (misfit(camera_, place.pose, points) > kMostMisfit * before + 1.0) place.value -= kApartLoss;
+    const double after = misfit(camera_, place.pose, points);
+    if (after > kMostMisfit * before + 1.0) place.value -= kApartLoss;
+    if (after > kFarMisfit * (before + 1.0)) place.value = 0;
     if (reach == Reach::kNear || place.value > best.value) best = place;
     if (best.fine) break;
   }
@@ -188,11 +196,16 @@ void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
     finding.inliers = found.inliers;
   };
   consider(settled(pattern, scene, Reach::kNear, starts[0]));
+  // Of two mirror images the features may rule one out; where they do not, each shows much of the
+  // pattern, and both are tried.
   const double least = misfit(camera_, starts[0], matcher_.inliers());
-  for (int i = 0; i < count && !best.whole; ++i) {
-    const Pose& start = starts[static_cast<std::size_t>(i)];
-    // Of two mirror images the features may rule one out.
-    if (misfit(camera_, start, matcher_.inliers()) > kMirrored * least + 0.5) continue;
+  const auto likely = [&](std::size_t i) {
+    return misfit(camera_, starts[i], matcher_.inliers()) <= kMirrored * least + 0.5;
+  };
+  const bool told = count == 1 || !likely(1) || best.all;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count) && !(best.whole && told); ++i) {
+    const Pose& start = starts[i];
+    if (!likely(i)) continue;
     consider(bring(pattern, scene, start));
   }
 }

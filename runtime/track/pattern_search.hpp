@@ -59,7 +59,8 @@ class PatternSearch {
     int value = 0;         ///< what speaks for it
     bool settled = false;  ///< the patches hold,
     bool fine = false;     ///< on the finest level,
-    bool whole = false;    ///< nearly all of them
+    bool whole = false;    ///< most of them,
+    bool all = false;      ///< nearly all
   };
   [[nodiscard]] Place settled(const LoopPattern& pattern, const Scene& scene, Reach reach,
                               const Pose& start) const;

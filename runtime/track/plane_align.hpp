@@ -19,7 +19,10 @@ struct Fit {
   int level = 0;        ///< pyramid level that was looked at
   double likeness = 0;  ///< mean correlation of the visible patches
   [[nodiscard]] double share() const { return visible > 0 ? 1.0 * held / visible : 0.0; }
-  [[nodiscard]] bool good() const { return held >= 6 && held * 10 >= visible * 3; }
+  /// Of many patches fewer need hold: most may lie in the half that something hides.
+  [[nodiscard]] bool good() const {
+    return held >= 6 && (held * 10 >= visible * 3 || (held >= 30 && held * 5 >= visible));
+  }
 };
 
 /// The finest pyramid level on which the pattern's image is not magnified, and the level of the
