@@ -155,8 +155,10 @@ bool check_place(const RecordCheck& check, const SectionEntry& entry, std::uint6
   return true;
 }
 
-template <class T>
-bool find_table(FaultLog& log, const BundleParts& parts, SectionType type, Table<T>& table) {
+/// The header of a table whose records have `size` bytes, if it has the right shape; its records
+/// follow it. nullptr and true: the bundle has no such table.
+bool find_header(FaultLog& log, const BundleParts& parts, SectionType type, std::size_t size,
+                 const TableHeader*& found) {
   const SectionEntry* entry = find_section(parts.sections, type, kNone, 0);
   if (entry == nullptr) return true;
   const std::span<const std::byte> bytes = section_bytes(parts, *entry);
@@ -167,10 +169,10 @@ bool find_table(FaultLog& log, const BundleParts& parts, SectionType type, Table
   };
   if (bytes.size() < sizeof(TableHeader)) return refuse("it is too small for a table's header");
   const auto& header = *reinterpret_cast<const TableHeader*>(bytes.data());
-  if (header.stride < sizeof(T) || header.stride % 8 != 0 ||
-      (header.stride != sizeof(T) && !newer_minor(parts))) {
+  if (header.stride < size || header.stride % 8 != 0 ||
+      (header.stride != size && !newer_minor(parts))) {
     return refuse("its records have " + std::to_string(header.stride) + " bytes, not " +
-                  std::to_string(sizeof(T)));
+                  std::to_string(size));
   }
   // Neither factor exceeds 32 bits, so the product cannot overflow.
   if (std::uint64_t{header.count} * header.stride != bytes.size() - sizeof(TableHeader)) {
@@ -181,7 +183,17 @@ bool find_table(FaultLog& log, const BundleParts& parts, SectionType type, Table
     log.add(Rule::kReserved, entry->offset + offsetof(TableHeader, reserved),
             "section type " + std::to_string(entry->type), "a reserved field is not zero");
   }
-  table = Table<T>(bytes.data() + sizeof(TableHeader), header.count, header.stride);
+  found = &header;
+  return true;
+}
+
+template <class T>
+bool find_table(FaultLog& log, const BundleParts& parts, SectionType type, Table<T>& table) {
+  const TableHeader* header = nullptr;
+  if (!find_header(log, parts, type, sizeof(T), header)) return false;
+  if (header != nullptr) {
+    table = Table<T>(reinterpret_cast<const std::byte*>(header + 1), header->count, header->stride);
+  }
   return true;
 }
 

@@ -12,6 +12,7 @@
 
 #include "hwy/foreach_target.h"
 #include "hwy/highway.h"
+#include "patch_offsets.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace modar::loop::HWY_NAMESPACE {
@@ -199,29 +200,15 @@ int distances(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t 
   return smallest;
 }
 
-/// Where a patch's pixels lie around its centre, row by row; the filling lies on it.
-struct PatchOffsets {
-  alignas(16) float right[kPatchPixels] = {};
-  alignas(16) float down[kPatchPixels] = {};
-  constexpr PatchOffsets() {
-    constexpr int kSide = 2 * kPatchHalf + 1;
-    for (int k = 0; k < kSide * kSide; ++k) {
-      right[k] = static_cast<float>(k % kSide - kPatchHalf);
-      down[k] = static_cast<float>(k / kSide - kPatchHalf);
-    }
-  }
-};
-
 /// The image's grey values under the patch, row by row, then zeros.
 void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrdiff_t stride,
                   float* out) {
-  static constexpr PatchOffsets kAt;
   const hn::CappedTag<float, 4> d;
   const hn::RebindToSigned<decltype(d)> whole;
   const int lanes = static_cast<int>(hn::Lanes(d));
   for (int k = 0; k < kPatchPixels; k += lanes) {
-    const auto fu = hn::Load(d, kAt.right + k);
-    const auto fv = hn::Load(d, kAt.down + k);
+    const auto fu = hn::Load(d, kPatchOffsets.right + k);
+    const auto fv = hn::Load(d, kPatchOffsets.down + k);
     const auto at = [&](float centre, float right, float down) {
       return hn::Add(hn::Add(hn::Set(d, centre), hn::Mul(fv, hn::Set(d, down))),
                      hn::Mul(fu, hn::Set(d, right)));

@@ -1,5 +1,6 @@
-// The integer loops over pixels and bits that take most of a frame's time, one table a SIMD level.
-// All levels give the same bits: the loops hold integers only.
+// The loops over pixels and bits that take most of a frame's time, one table a SIMD level. All
+// levels give the same bits: the loops hold integers, or floats of which no two are summed across
+// lanes in an order of the level's own.
 #pragma once
 
 #include <cstddef>

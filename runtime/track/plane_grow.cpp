@@ -49,6 +49,13 @@ glm::dvec2 miss_of(const Camera& camera, const Pose& pose, const PlanePoints& po
          glm::dvec2{camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
 }
 
+/// Adds what two rows tell: g weighs them, e is their pull by those weights.
+void add(const Slope& slope, const Eigen::Matrix2d& g, const Eigen::Vector2d& e, Known& known) {
+  const Slope weighed = g * slope;
+  known.weight += slope.transpose() * weighed;
+  known.pull += slope.transpose() * e;
+}
+
 /// spread: of the points, in their sigmas.
 void add_points(const Camera& camera, const Pose& pose, const PlanePoints& points, double spread,
                 Known& known) {
@@ -57,9 +64,8 @@ void add_points(const Camera& camera, const Pose& pose, const PlanePoints& point
     const double sigma = spread * points.sigma[i];
     const double far = glm::length(miss) / sigma;
     const double weight = std::min(1.0, 1.5 / std::max(far, 1e-9)) / (sigma * sigma);
-    const Slope slope = slope_of(camera, pose, points.world[i], 1.0);
-    known.weight += weight * slope.transpose() * slope;
-    known.pull += weight * slope.transpose() * Eigen::Vector2d(miss.x, miss.y);
+    add(slope_of(camera, pose, points.world[i], 1.0), weight * Eigen::Matrix2d::Identity(),
+        weight * Eigen::Vector2d(miss.x, miss.y), known);
   }
 }
 
@@ -81,7 +87,7 @@ void add_patches(const LoopPattern& pattern, const Scene& scene, const View& vie
     Glance at;
     if (!glance(view, map, patch, 1.0f, at) || at.pull.correlation < kSeen) continue;
     const Pull& pull = at.pull;
-    const double mean = 0.5 * static_cast<double>(pull.xx + pull.yy);
+    const double mean = 0.5 * static_cast<double>(pull.xx + pull.yy) * (kTold * kTold);
     if (!(mean > 0.0)) continue;
     Eigen::Matrix2d g;
     g << static_cast<double>(pull.xx), static_cast<double>(pull.xy), static_cast<double>(pull.xy),
@@ -93,8 +99,7 @@ void add_patches(const LoopPattern& pattern, const Scene& scene, const View& vie
           kOutlier * (std::sqrt(unsure) + kTold))) {
       continue;
     }
-    known.weight += slope.transpose() * g * slope / (kTold * kTold);
-    known.pull += slope.transpose() * e / (kTold * kTold);
+    add(slope, g, e, known);
     ++known.patches;
   }
 }
@@ -107,7 +112,8 @@ double step(const LoopPattern& pattern, const Camera& camera, Known& known, Pose
   const Eigen::LDLT<Matrix6> solver(known.weight);
   const Vector6 change = solver.solve(known.pull);
   if (!change.allFinite() || change.head<3>().norm() > 0.5) return -1.0;
-  spread = solver.solve(Matrix6::Identity());
+  // A column at a time: a solver of whole matrices would bring 9 KB of Eigen to the device.
+  for (int k = 0; k < 6; ++k) spread.col(k) = solver.solve(Vector6(Vector6::Unit(k)));
   std::array<double, 6> by{};
   Eigen::Map<Vector6>(by.data()) = change;
   return move(pattern, camera, 1.0, by, pose);

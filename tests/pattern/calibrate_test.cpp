@@ -190,7 +190,8 @@ TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
           render_scene(test::gray(image), camera, pose, background, band, random);
       (*finder)->look(scene.picture.view());
     }
-    ASSERT_TRUE((*finder)->focal()) << truth << " after " << (*finder)->progress().views << " views";
+    ASSERT_TRUE((*finder)->focal())
+        << truth << " after " << (*finder)->progress().views << " views";
     EXPECT_NEAR(*(*finder)->focal(), truth, 0.01 * truth);
   }
 }
