@@ -2,7 +2,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 
 #include "bake/commands/commands.hpp"
 #include "bake/commands/pattern_json.hpp"
@@ -66,19 +65,7 @@ Result<void> complete(CalibrateCommand& command) {
     return fail(ExitCode::kUsage, "calibrate.board", command.board, "this is no size of a board",
                 "count the inner corners: --board 9x6");
   }
-  std::vector<std::string> files;
-  for (const std::string& input : options.inputs) {
-    std::error_code failed;
-    if (!std::filesystem::is_directory(input, failed)) {
-      files.push_back(input);
-      continue;
-    }
-    const auto pictures = pictures_of(input);
-    if (!pictures) return tl::unexpected(pictures.error());
-    files.insert(files.end(), pictures->begin(), pictures->end());
-  }
-  options.inputs = std::move(files);
-  return {};
+  return open_folders(options.inputs);
 }
 
 int run(CalibrateCommand& command) {

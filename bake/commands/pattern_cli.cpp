@@ -8,6 +8,7 @@
 #include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/terminal.hpp"
+#include "bake/pattern/pattern_picture.hpp"
 
 namespace modar {
 namespace {
@@ -40,9 +41,9 @@ CLI::App* add_rectify(CLI::App& app, RectifyCommand& rectify, std::string& corne
 CLI::App* add_score(CLI::App& app, ScoreCommand& score) {
   CLI::App* sub =
       app.add_subcommand("score", "0 to 100: how well pictures serve as patterns, and what to do");
-  sub->add_option("patterns", score.patterns, "Pattern pictures")
+  sub->add_option("patterns", score.patterns, "Pattern pictures, or folders of them")
       ->required()
-      ->type_name("IMAGE...");
+      ->type_name("IMAGE|DIR...");
   sub->add_option(
          "--overlay", score.overlay_folder,
          "Write NAME.png of each: features that hold (green), that hold at times (orange), "
@@ -58,9 +59,9 @@ CLI::App* add_score(CLI::App& app, ScoreCommand& score) {
 CLI::App* add_simulate(CLI::App& app, SimulateCommand& simulate) {
   CLI::App* sub = app.add_subcommand(
       "simulate", "How far, tilted, dark, blurred or covered a pattern may be: the device's loop");
-  sub->add_option("patterns", simulate.patterns, "Pattern pictures")
+  sub->add_option("patterns", simulate.patterns, "Pattern pictures, or folders of them")
       ->required()
-      ->type_name("IMAGE...");
+      ->type_name("IMAGE|DIR...");
   sub->add_option("--camera", simulate.camera_file,
                   "Calibration of the camera (OpenCV's YML): intrinsics and resolution")
       ->type_name("FILE");
@@ -89,9 +90,10 @@ CLI::App* add_simulate(CLI::App& app, SimulateCommand& simulate) {
 CLI::App* add_confusion(CLI::App& app, ConfusionCommand& confusion) {
   CLI::App* sub = app.add_subcommand(
       "confusion", "Is a pattern taken for another, or seen in photos without it?");
-  sub->add_option("inputs", confusion.inputs, "Bundles and pattern pictures, all of a project")
+  sub->add_option("inputs", confusion.inputs,
+                  "Bundles, pattern pictures and folders of them: all of a project")
       ->required()
-      ->type_name("BUNDLE|IMAGE...");
+      ->type_name("BUNDLE|IMAGE|DIR...");
   sub->add_option("--backgrounds", confusion.photos, "A folder of photos without a pattern")
       ->type_name("DIR");
   sub->add_option("--views", confusion.options.views, "Of each pattern and photo")
@@ -136,6 +138,10 @@ int run_pattern(std::vector<std::string> arguments) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
                                 : static_cast<int>(ExitCode::kUsage);
+  }
+  for (std::vector<std::string>* inputs :
+       {&score.patterns, &simulate.patterns, &confusion.inputs}) {
+    if (auto done = open_folders(*inputs); !done) return print_error(done.error());
   }
   if (rectify_sub->parsed()) return rectify_from_texts(rectify, corners);
   if (score_sub->parsed()) return run_score(score);

@@ -80,4 +80,20 @@ Result<std::vector<std::string>> pictures_of(const std::string& path) {
   return paths;
 }
 
+Result<void> open_folders(std::vector<std::string>& paths) {
+  std::vector<std::string> files;
+  for (const std::string& path : paths) {
+    std::error_code failed;
+    if (!std::filesystem::is_directory(path, failed)) {
+      files.push_back(path);
+      continue;
+    }
+    const auto pictures = pictures_of(path);
+    if (!pictures) return tl::unexpected(pictures.error());
+    files.insert(files.end(), pictures->begin(), pictures->end());
+  }
+  paths = std::move(files);
+  return {};
+}
+
 }  // namespace modar

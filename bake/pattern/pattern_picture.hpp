@@ -19,5 +19,7 @@ Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
 /// The PNG and JPEG files of a folder in the order of their names, or the file itself. Errors: kIo
 /// "pictures.folder" where there is none.
 Result<std::vector<std::string>> pictures_of(const std::string& path);
+/// The paths with its pictures in each folder's place. Errors: those of pictures_of().
+Result<void> open_folders(std::vector<std::string>& paths);
 
 }  // namespace modar

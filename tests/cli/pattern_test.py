@@ -1,4 +1,5 @@
 """`modar pattern score|simulate|confusion` and `modar calibrate`: what they print, write and refuse."""
+import shutil
 import unittest
 
 from programs import COVER, QUICK, ROOT, ProgramTest
@@ -25,7 +26,12 @@ CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur
 
 class Pattern(ProgramTest):
     def test_the_score_is_stored_and_printed_with_causes(self):
-        one, = self.modar_json("pattern", "score", GAME, "--overlay", "overlays", "--jobs", "2")
+        project = self.folder / "project"
+        project.mkdir()
+        self.assert_fails(self.modar("pattern", "score", project), 2, "project")
+        shutil.copy(GAME, project)
+        (project / "notes.txt").write_text("no picture")
+        one, = self.modar_json("pattern", "score", project, "--overlay", "overlays", "--jobs", "2")
         self.assertEqual((one["name"], one["version"]), ("game", 1))
         self.assertTrue(0 <= one["score"] <= 100)
         self.assertEqual([cause["id"] for cause in one["causes"]], CAUSES)
