@@ -11,17 +11,18 @@ namespace {
 
 constexpr int kFewestInliers = 6;
 constexpr int kFewestMatches = 6;
-constexpr int kUnsettledPercent = 45;  // where the patches do not hold
-constexpr double kMostMisfit = 1.5;    // of what the features alone leave
-constexpr double kMirrored = 1.5;      // the same, of two mirror images
-constexpr double kFarMisfit = 3.0;     // where it is another place altogether
-constexpr int kApartLoss = 8;          // what a place that features deny must show more
-constexpr double kUnhidden = 0.85;     // share of patches that hold where nothing hides any
-constexpr double kAll = 0.95;          // where the mirror image cannot be the right one
-constexpr int kManyInliers = 16;       // features that speak for a place by themselves,
-constexpr int kLeastPercent = 20;      // so that little of the pattern need show there
-constexpr int kMapGain = 20;           // percent that the map shows more than the best pose
-constexpr int kMapInliers = 16;        // where no pose fits, and the map alone must convince
+constexpr int kVaguePercent = 60;     // where the finest patches do not hold, which in clutter
+constexpr double kVagueMisfit = 3.0;  // they never did; and what the features then may leave
+constexpr double kMostMisfit = 1.5;   // of what the features alone leave
+constexpr double kMirrored = 1.5;     // the same, of two mirror images
+constexpr double kFarMisfit = 3.0;    // where it is another place altogether
+constexpr int kApartLoss = 8;         // what a place that features deny must show more
+constexpr double kUnhidden = 0.85;    // share of patches that hold where nothing hides any
+constexpr double kAll = 0.95;         // where the mirror image cannot be the right one
+constexpr int kManyInliers = 16;      // features that speak for a place by themselves, so that
+constexpr int kLeastPercent = 20;     // less of the pattern need show there
+constexpr int kMapGain = 20;          // percent that the map shows more than the best pose
+constexpr int kMapInliers = 16;       // where no pose fits, and the map alone must convince
 // Of many patterns, those are matched in full
 constexpr std::uint16_t kClearVotes = 4;  // that so many features speak for (chance: two or three),
 constexpr int kShadowed = 6;              // and no fewer than this part of the most: a shared frame
@@ -180,12 +181,15 @@ void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
   std::array<Pose, 2> starts;
   const int count = fit_poses(pattern, camera_, found.homography, matcher_.inliers(), starts);
   if (count == 0) return;
+  const bool many = found.inliers >= kManyInliers;
+  const auto convinces = [&](const Place& place) {
+    if (place.fine) return place.right >= (many ? kLeastPercent : kRightPercent);
+    return place.right >= (many ? kRightPercent : kVaguePercent) &&
+           misfit(camera_, place.pose, matcher_.inliers()) <= kVagueMisfit;
+  };
   const auto consider = [&](const Place& place) {
-    const bool many = found.inliers >= kManyInliers;
-    const bool enough = place.right >= (many ? kLeastPercent : kRightPercent);
     std::array<glm::dvec2, 4> corners;
-    if (place.value <= best.value || !enough ||
-        (!place.settled && !many && place.right < kUnsettledPercent) ||
+    if (place.value <= best.value || !convinces(place) ||
         !map_corners(pattern, map_of_pose(pattern, camera_, place.pose), corners) ||
         !plausible(corners)) {
       return;
