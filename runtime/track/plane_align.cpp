@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "plane_pull.hpp"
+#include "symmetric_solver.hpp"
 
 namespace modar::loop {
 namespace {
@@ -87,7 +87,7 @@ bool solve(Pass<N>& pass, Eigen::Matrix<double, N, 1>& change) {
   const double trace = pass.jtj.trace();
   if (pass.fit.visible < 4 || !(trace > 0.0)) return false;
   pass.jtj.diagonal().array() += 1e-9 * trace;
-  change = pass.jtj.ldlt().solve(pass.jtr);
+  change = solve_symmetric(pass.jtj, pass.jtr);
   return change.allFinite();
 }
 

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "plane_pull.hpp"
+#include "symmetric_solver.hpp"
 
 namespace modar::loop {
 namespace {
@@ -109,11 +109,10 @@ void add_patches(const LoopPattern& pattern, const Scene& scene, const View& vie
 double step(const LoopPattern& pattern, const Camera& camera, Known& known, Pose& pose,
             Matrix6& spread) {
   known.weight.diagonal().array() += 1e-9 * known.weight.trace();
-  const Eigen::LDLT<Matrix6> solver(known.weight);
-  const Vector6 change = solver.solve(known.pull);
+  const Vector6 change = solve_symmetric(known.weight, known.pull);
   if (!change.allFinite() || change.head<3>().norm() > 0.5) return -1.0;
-  // A column at a time: a solver of whole matrices would bring 9 KB of Eigen to the device.
-  for (int k = 0; k < 6; ++k) spread.col(k) = solver.solve(Vector6(Vector6::Unit(k)));
+  spread.setIdentity();
+  for (int k = 0; k < 6; ++k) solve_decomposed(6, known.weight.data(), spread.col(k).data());
   std::array<double, 6> by{};
   Eigen::Map<Vector6>(by.data()) = change;
   return move(pattern, camera, 1.0, by, pose);

@@ -5,11 +5,12 @@
 #include <cmath>
 #include <cstring>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+
+#include "symmetric_solver.hpp"
 
 namespace modar::loop {
 namespace {
@@ -239,7 +240,7 @@ bool PlaneMatcher::fit_homography(std::span<const std::uint8_t> mask,
   // A trace of damping keeps the perspective of few or crowded points near none.
   normal(6, 6) += 1e-3 * normal(0, 0);
   normal(7, 7) += 1e-3 * normal(1, 1);
-  const Vector8 h = normal.ldlt().solve(right);
+  const Vector8 h = solve_symmetric(normal, right);
   if (!h.allFinite()) return false;
   glm::dmat3 m;
   m[0] = {h(0), h(3), h(6)};

@@ -5,11 +5,12 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <glm/geometric.hpp>
+
+#include "symmetric_solver.hpp"
 
 namespace modar {
 namespace {
@@ -193,7 +194,7 @@ Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
   for (int step = 0; step < kRefineSteps; ++step) {
     Matrix6 damped = now.jtj;
     damped.diagonal() *= 1.0 + damping;
-    const Vector6 change = damped.ldlt().solve(-now.jtr);
+    const Vector6 change = solve_symmetric(damped, Vector6(-now.jtr));
     if (!change.allFinite()) break;
     const Eigen::Matrix3d next_rotation = exponential(change.head<3>()) * rotation;
     const Eigen::Vector3d next_translation = translation + change.tail<3>();

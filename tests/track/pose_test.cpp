@@ -1,6 +1,7 @@
 // ModAR Eq. 1 to 6 against OpenCV, and what has no pose.
 #include "modar/pose.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -8,6 +9,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "runtime/track/symmetric_solver.hpp"
 #include "synthetic.hpp"
 
 namespace modar {
@@ -294,6 +296,36 @@ TEST(Pose, GlViewAndProjectionDrawAPointWhereOpenCvSeesIt) {
       gl_projection(camera, 0.1, 100.0) * gl_view(pose) * glm::vec4(0.4f, -0.6f, 0.8f, 1.0f);
   EXPECT_NEAR(0.5 * static_cast<double>(clip.x / clip.w + 1) * 1280 - 0.5, pixel[0].x, 2e-3);
   EXPECT_NEAR(0.5 * static_cast<double>(1 - clip.y / clip.w) * 720 - 0.5, pixel[0].y, 2e-3);
+}
+
+TEST(SymmetricSolver, SolvesAsOpenCvAndLeavesOutWhatNothingTells) {
+  cv::RNG random(5);
+  for (const int n : {1, 3, 6, 8}) {
+    cv::Mat rows(n + 4, n, CV_64F);
+    random.fill(rows, cv::RNG::NORMAL, 0, 3);
+    cv::Mat a = rows.t() * rows;
+    cv::Mat right(n, 1, CV_64F);
+    random.fill(right, cv::RNG::NORMAL, 0, 1);
+    cv::Mat expected;
+    cv::solve(a, right, expected, cv::DECOMP_SVD);
+    cv::Mat solved = right.clone();
+    decompose(n, a.ptr<double>());  // by rows or columns: it is symmetric
+    solve_decomposed(n, a.ptr<double>(), solved.ptr<double>());
+    EXPECT_LT(cv::norm(solved, expected), 1e-10 * cv::norm(expected)) << n;
+  }
+  // The second unknown is twice the first, as far as these equations tell.
+  std::array<double, 9> a = {1, 2, 0, 2, 4, 0, 0, 0, 5};
+  std::array<double, 3> x = {3, 6, 10};
+  decompose(3, a.data());
+  solve_decomposed(3, a.data(), x.data());
+  EXPECT_EQ(x, (std::array<double, 3>{3, 0, 2}));
+  for (const double bad : {std::nan(""), HUGE_VAL}) {
+    a = {1, 0, 0, 0, bad, 0, 0, 0, 1};
+    x = {1, 1, 1};
+    decompose(3, a.data());
+    solve_decomposed(3, a.data(), x.data());
+    EXPECT_TRUE(std::isnan(x[1]));
+  }
 }
 
 }  // namespace
