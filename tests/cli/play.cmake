@@ -18,17 +18,14 @@ set(play_tests
   play_vision_test.cpp
   play_window_test.cpp)
 find_package(SDL2 REQUIRED)
-modar_test(play_test SOURCES ${play_tests} ${CMAKE_SOURCE_DIR}/runtime/play/screen.cpp ../track/synthetic.cpp
-  LIBRARIES modar_play_desk modar_pattern SDL2::SDL2 opencv_calib3d opencv_core opencv_imgproc opencv_imgcodecs opencv_videoio)
+modar_test(play_test SOURCES ${play_tests} ${CMAKE_SOURCE_DIR}/runtime/play/screen.cpp
+  LIBRARIES test_pictures modar_play_desk modar_pattern SDL2::SDL2 opencv_calib3d opencv_core opencv_imgproc opencv_imgcodecs opencv_videoio)
 target_include_directories(play_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
-# The device's classes have no run-time types for UBSan to look at.
-set_source_files_properties(${play_tests} PROPERTIES COMPILE_OPTIONS "-fno-sanitize=vptr")
 
 # Apart, so that ThreadSanitizer sees our threads and nobody else's.
 set(play_threads_tests play_mailbox_test.cpp play_pipeline_test.cpp)
 modar_test(play_threads_test SOURCES ${play_threads_tests} LIBRARIES modar_play)
 target_include_directories(play_threads_test PRIVATE ${CMAKE_SOURCE_DIR}/runtime/play)
-set_source_files_properties(${play_threads_tests} PROPERTIES COMPILE_OPTIONS "-fno-sanitize=vptr")
 
 add_test(NAME cli_play COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/play_test.py)
 set_tests_properties(cli_play PROPERTIES TIMEOUT 600 ENVIRONMENT
