@@ -11,8 +11,10 @@ namespace {
 
 constexpr int kFewestInliers = 6;
 constexpr int kFewestMatches = 6;
-constexpr int kVaguePercent = 60;     // where the finest patches do not hold, which in clutter
-constexpr double kVagueMisfit = 3.0;  // they never did; and what the features then may leave
+// Where the finest patches do not hold, which in clutter they never did:
+constexpr int kVaguePercent = 60;     // so much must show,
+constexpr int kVagueCells = 24;       // in so many cells: a few smooth ones look alike anywhere;
+constexpr double kVagueMisfit = 3.0;  // and what the features then may leave
 constexpr double kMostMisfit = 1.5;   // of what the features alone leave
 constexpr double kMirrored = 1.5;     // the same, of two mirror images
 constexpr double kFarMisfit = 3.0;    // where it is another place altogether
@@ -184,7 +186,8 @@ void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
   const bool many = found.inliers >= kManyInliers;
   const auto convinces = [&](const Place& place) {
     if (place.fine) return place.right >= (many ? kLeastPercent : kRightPercent);
-    return place.right >= (many ? kRightPercent : kVaguePercent) &&
+    return percent_right(pattern, scene, place.pose, kVagueCells) >=
+               (many ? kRightPercent : kVaguePercent) &&
            misfit(camera_, place.pose, matcher_.inliers()) <= kVagueMisfit;
   };
   const auto consider = [&](const Place& place) {

@@ -6,7 +6,6 @@
 namespace modar::loop {
 namespace {
 
-constexpr int kRightCells = 8;       // cells that must show the pattern
 constexpr int kMapPercent = 50;      // where no pose fits, and the map alone must convince
 constexpr double kSmallSide = 24.0;  // pixels of the coarsest level that tracking starts on
 constexpr double kMostZoom = 1.35;   // of the distance, from one frame to the next
@@ -59,9 +58,10 @@ bool settle(const LoopPattern& pattern, const Scene& scene, Reach reach, Pose& p
   return percent_right(pattern, scene, pose) >= kRightPercent;
 }
 
-int percent_right(const LoopPattern& pattern, const Scene& scene, const Pose& pose) {
+int percent_right(const LoopPattern& pattern, const Scene& scene, const Pose& pose,
+                  int fewest_cells) {
   const Verdict verdict = verify(pattern, map_of_pose(pattern, scene.camera, pose), scene.pyramid);
-  return verdict.right >= kRightCells ? verdict.right * 100 / verdict.cells : 0;
+  return verdict.right >= fewest_cells ? verdict.right * 100 / verdict.cells : 0;
 }
 
 bool settle_map(const LoopPattern& pattern, const Scene& scene, PlaneMap& map, Fit& fit) {

@@ -11,6 +11,8 @@ namespace modar::loop {
 
 /// Share of the textured cells in view that a pose must show to be believed.
 inline constexpr int kRightPercent = 30;
+/// And in how many cells at least.
+inline constexpr int kRightCells = 8;
 
 /// How far away the pose may be, and so how coarse a level it starts on and how many steps it
 /// takes. Coarse patches reach over the edge of whatever hides a part of the pattern: the nearer
@@ -23,8 +25,9 @@ enum class Reach : std::uint8_t { kNear, kFrame, kFar };
 bool settle(const LoopPattern& pattern, const Scene& scene, Reach reach, Pose& pose, Fit& fit);
 
 /// Photometric check: percentage of the textured cells in view that look as they should; 0 where
-/// too few do to tell.
-int percent_right(const LoopPattern& pattern, const Scene& scene, const Pose& pose);
+/// fewer do than `fewest_cells`.
+int percent_right(const LoopPattern& pattern, const Scene& scene, const Pose& pose,
+                  int fewest_cells = kRightCells);
 
 /// The same two for a plane's own map, where a wrong focal length bends every pose: it must
 /// convince by itself, so its percentage is 0 where not much more speaks for it.
