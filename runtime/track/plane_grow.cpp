@@ -111,8 +111,7 @@ double step(const LoopPattern& pattern, const Camera& camera, Known& known, Pose
   known.weight.diagonal().array() += 1e-9 * known.weight.trace();
   const Vector6 change = solve_symmetric(known.weight, known.pull);
   if (!change.allFinite() || change.head<3>().norm() > 0.5) return -1.0;
-  spread.setIdentity();
-  for (int k = 0; k < 6; ++k) solve_decomposed(6, known.weight.data(), spread.col(k).data());
+  spread = solve_symmetric(known.weight, Matrix6(Matrix6::Identity()));
   std::array<double, 6> by{};
   Eigen::Map<Vector6>(by.data()) = change;
   return move(pattern, camera, 1.0, by, pose);

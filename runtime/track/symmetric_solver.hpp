@@ -3,21 +3,15 @@
 
 namespace modar {
 
-/// Cholesky's decomposition A = L D L^T in place. a: n x n, symmetric; its lower triangle (by
-/// columns) is read, and holds L and D afterwards. What the equations do not tell (a pivot that is
-/// nothing beside its diagonal) is solved as 0; what is not finite stays so.
-/// One loop for all sizes: a solver of Eigen's for each brought 14 KB to the device.
-void decompose(int n, double* a);
+/// Solves A X = B by Eigen's L D L^T, one for all sizes up to 8: one for each size and file brought
+/// 14 KB to the device. a: n x n, symmetric. x: `columns` right sides of n numbers, then their
+/// solutions. What the equations do not tell is solved as 0; what is not finite makes no number.
+void solve_symmetric(int n, int columns, const double* a, double* x);
 
-/// x: the right side, then the solution. a: of decompose().
-void solve_decomposed(int n, const double* a, double* x);
-
-/// Both for Eigen's or other fixed matrices by columns; overwrites `a`, answers the solution.
-template <class Matrix, class Vector>
-Vector solve_symmetric(Matrix& a, Vector x) {
-  const int n = static_cast<int>(x.size());
-  decompose(n, a.data());
-  solve_decomposed(n, a.data(), x.data());
+/// The same for Eigen's or other matrices of fixed size by columns; answers the solutions.
+template <class Matrix, class Right>
+Right solve_symmetric(const Matrix& a, Right x) {
+  solve_symmetric(static_cast<int>(x.rows()), static_cast<int>(x.cols()), a.data(), x.data());
   return x;
 }
 
