@@ -133,8 +133,8 @@ std::uint32_t CodeIndex::nearest_owner(const Group& group, const Code& code) {
 }
 
 /// The most votes of a pattern that agree on a place; last: its last vote.
-std::uint16_t CodeIndex::agreeing(std::uint32_t last, std::size_t count) const {
-  std::uint16_t most = 0;
+CodeIndex::Support CodeIndex::agreeing(std::uint32_t last, std::size_t count) const {
+  Support most;
   const std::size_t stride = count / kHypotheses + 1;
   std::size_t k = 0;
   for (std::uint32_t i = last; i != kNobody; i = votes_[i].before, ++k) {
@@ -143,13 +143,13 @@ std::uint16_t CodeIndex::agreeing(std::uint32_t last, std::size_t count) const {
     for (std::uint32_t j = last; j != kNobody; j = votes_[j].before) {
       if (agrees(votes_[i].match, votes_[j].match)) ++agree;
     }
-    most = std::max(most, agree);
+    if (agree > most.votes) most = {agree, votes_[i].match};
   }
   return most;
 }
 
-std::span<const std::uint16_t> CodeIndex::vote(std::span<const LoopFeature> features) {
-  std::fill(support_.begin(), support_.end(), std::uint16_t{0});
+std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const LoopFeature> features) {
+  std::fill(support_.begin(), support_.end(), Support{});
   std::fill(last_.begin(), last_.end(), kNobody);
   std::uint32_t count = 0;
   for (const LoopFeature& feature : features.first(std::min(features.size(), votes_.size()))) {
@@ -162,9 +162,11 @@ std::span<const std::uint16_t> CodeIndex::vote(std::span<const LoopFeature> feat
     const std::size_t at = range_of(patterns_[p], dark)[0] + owner % kIndexed;
     votes_[count] = {last_[p], match_of(patterns_[p].features[at], feature)};
     last_[p] = count++;
-    ++support_[p];
+    ++support_[p].votes;
   }
-  for (std::size_t p = 0; p < support_.size(); ++p) support_[p] = agreeing(last_[p], support_[p]);
+  for (std::size_t p = 0; p < support_.size(); ++p) {
+    support_[p] = agreeing(last_[p], support_[p].votes);
+  }
   return support_;
 }
 

@@ -27,8 +27,13 @@ class CodeIndex {
   /// Nothing is allocated later. The patterns must outlive it.
   CodeIndex(std::span<const LoopPattern> patterns, const Kernels& kernels,
             std::size_t most_features);
-  /// For each pattern, how many of the features show it at one place.
-  std::span<const std::uint16_t> vote(std::span<const LoopFeature> features);
+  /// What speaks for a pattern.
+  struct Support {
+    std::uint16_t votes = 0;  ///< features that show it at one place,
+    PlaneMatch place;         ///< as one of them tells it
+  };
+  /// One a pattern, valid until the next call.
+  std::span<const Support> vote(std::span<const LoopFeature> features);
 
  private:
   static constexpr std::size_t kProbes = 4;  ///< words whose codes a feature is compared with
@@ -47,7 +52,7 @@ class CodeIndex {
   void build(Group& group, bool dark);
   std::array<std::uint32_t, kProbes> near_words(const Group& group, const Code& code);
   std::uint32_t nearest_owner(const Group& group, const Code& code);
-  [[nodiscard]] std::uint16_t agreeing(std::uint32_t last, std::size_t count) const;
+  [[nodiscard]] Support agreeing(std::uint32_t last, std::size_t count) const;
 
   std::span<const LoopPattern> patterns_;
   const Kernels& kernels_;
@@ -55,7 +60,7 @@ class CodeIndex {
   std::vector<std::uint8_t> distances_;
   std::vector<Vote> votes_;
   std::vector<std::uint32_t> last_;  ///< by pattern: its last vote
-  std::vector<std::uint16_t> support_;
+  std::vector<Support> support_;
 };
 
 }  // namespace modar::loop

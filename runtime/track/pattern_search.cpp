@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <glm/matrix.hpp>
+
 #include "plane_grow.hpp"
 #include "runtime/platform/lap_clock.hpp"
 
@@ -27,8 +29,9 @@ constexpr int kMapGain = 20;          // percent that the map shows more than th
 constexpr int kMapInliers = 16;       // where no pose fits, and the map alone must convince
 // Of many patterns, those are matched in full
 constexpr std::uint16_t kClearVotes = 4;  // that so many features speak for (chance: two or three),
-constexpr int kShadowed = 6;              // and no fewer than this part of the most: a shared frame
-                                          // or logo speaks for a pattern that is not there;
+constexpr int kShadowed = 6;              // and no fewer than this part of those for another there:
+                                          // a shared frame or logo speaks for what it is not;
+constexpr double kMargin = 0.25;          // of the pattern's size;
 constexpr std::ptrdiff_t kMostClear = 4;  // at most so many a frame;
 constexpr std::size_t kGuessed = 2;       // where none is found, these at least, by their votes,
 constexpr std::size_t kMatched = 3;       // and with them the one whose turn it is.
@@ -37,6 +40,14 @@ std::size_t most_codes(std::span<const LoopPattern> patterns) {
   std::size_t most = 0;
   for (const LoopPattern& pattern : patterns) most = std::max(most, pattern.features.size());
   return most;
+}
+
+/// Whether a pattern lies where another one shows; with a margin, as one vote tells its outline.
+bool covers(const LoopPattern& pattern, const PlaneMatch& place, const PlaneMatch& other) {
+  const glm::dvec2 size(pattern.width(), pattern.height());
+  const glm::dvec2 at =
+      (glm::inverse(place.affine) * (other.ideal - place.ideal) + place.pattern) / size;
+  return std::min(at.x, at.y) > -kMargin && std::max(at.x, at.y) < 1.0 + kMargin;
 }
 
 }  // namespace
@@ -49,6 +60,7 @@ PatternSearch::PatternSearch(const Camera& camera, std::span<const LoopPattern> 
       matcher_(camera, kernels_, static_cast<std::size_t>(options.max_features),
                most_codes(patterns)) {
   chosen_.reserve(patterns.size());
+  is_clear_.resize(patterns.size());
 }
 
 /// Leaves in chosen_ the patterns to match in full; the first clear_ of them are likely there.
@@ -60,14 +72,21 @@ void PatternSearch::choose(std::span<const LoopFeature> features, std::span<cons
   clear_ = chosen_.size();
   if (chosen_.size() <= kMatched) return;
   if (!index_) index_ = std::make_unique<CodeIndex>(patterns_, kernels_, matcher_.most_features());
-  const std::span<const std::uint16_t> votes = index_->vote(features);
-  const int most = *std::max_element(votes.begin(), votes.end());
-  const int least = std::max<int>(kClearVotes, (most + kShadowed - 1) / kShadowed);
-  const auto is_clear = [&](std::uint32_t i) { return votes[i] >= least; };
+  const std::span<const CodeIndex::Support> support = index_->vote(features);
+  for (const std::uint32_t i : chosen_) {
+    const CodeIndex::Support& one = support[i];
+    is_clear_[i] = one.votes >= kClearVotes ? 1 : 0;
+    for (std::size_t k = 0; k < support.size() && is_clear_[i] != 0; ++k) {
+      const bool more = support[k].votes > kShadowed * one.votes;
+      if (more && covers(patterns_[k], support[k].place, one.place)) is_clear_[i] = 0;
+    }
+  }
+  const auto is_clear = [&](std::uint32_t i) { return is_clear_[i] != 0; };
   const auto before = [&](std::uint32_t a, std::uint32_t b) {
     if (is_clear(a) != is_clear(b)) return is_clear(a);
     if (wants[a] != wants[b]) return wants[a] == Want::kFirst;
-    return votes[a] != votes[b] ? votes[a] > votes[b] : a < b;
+    if (support[a].votes != support[b].votes) return support[a].votes > support[b].votes;
+    return a < b;
   };
   const auto first = chosen_.begin();
   std::partial_sort(first, first + kMostClear, chosen_.end(), before);

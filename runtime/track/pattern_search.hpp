@@ -77,8 +77,9 @@ class PatternSearch {
   PlaneMatcher matcher_;
   std::unique_ptr<CodeIndex> index_;
   std::vector<std::uint32_t> chosen_;
-  std::size_t clear_ = 0;   ///< the first of them, which are matched whatever is found
-  std::uint32_t turn_ = 0;  ///< the pattern whose turn is next
+  std::vector<std::uint8_t> is_clear_;  ///< by pattern
+  std::size_t clear_ = 0;               ///< the first of them, which are matched whatever is found
+  std::uint32_t turn_ = 0;              ///< the pattern whose turn is next
 };
 
 }  // namespace modar::loop
