@@ -105,11 +105,13 @@ std::optional<LoopFault> view_loop_record(std::span<const std::byte> bytes, Loop
   const auto* base = bytes.data();
   view.features = {reinterpret_cast<const LoopFeatureRecord*>(base + header.features_offset),
                    header.feature_count};
-  view.codes = {reinterpret_cast<const std::uint8_t*>(base + header.codes_offset), arrays[1].size};
+  // Within the section, so that they fit the address space of 32 bits, too.
+  view.codes = {reinterpret_cast<const std::uint8_t*>(base + header.codes_offset),
+                static_cast<std::size_t>(arrays[1].size)};
   view.patches = {reinterpret_cast<const LoopPatchRecord*>(base + header.patches_offset),
                   header.patch_count};
   view.pixels = {reinterpret_cast<const std::uint8_t*>(base + header.pixels_offset),
-                 arrays[3].size};
+                 static_cast<std::size_t>(arrays[3].size)};
   if (auto fault = check_places(header, view.features, header.features_offset,
                                 "a feature lies outside of the image")) {
     return fault;
