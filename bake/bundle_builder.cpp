@@ -202,9 +202,22 @@ Result<ModelSides> add_models(const BakeRequest& request, BundleContent& content
   return sides;
 }
 
+/// Those that the request asks for.
+void add_parameter_sets(const BakeRequest& request, BundleContent& content) {
+  const std::vector<std::string>& asked = request.parameters;
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    const char* name = parameter_set_name(set.id);
+    if (!asked.empty() && std::find(asked.begin(), asked.end(), name) == asked.end()) continue;
+    ParameterSetRecord named = set;
+    named.name = content.intern(name);
+    content.parameter_sets.push_back(named);
+  }
+}
+
 Result<void> add_pattern(const PatternRequest& request, const LoopBakeOptions& loop,
                          BundleContent& content, Report& report) {
-  Result<PatternFeatures> baked = bake_pattern(request.path, request.width_mm, loop, report);
+  Result<PatternFeatures> baked =
+      bake_pattern(request.path, request.width_mm, content.parameter_sets, loop, report);
   if (!baked) return tl::unexpected(baked.error());
   PatternRecord record = baked->record;
   record.name = content.intern(baked->name);
@@ -309,13 +322,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
   BundleContent content;
   const Result<ModelSides> sides = add_models(request, content, report);
   if (!sides) return tl::unexpected(sides.error());
-  if (!request.patterns.empty()) {
-    for (const ParameterSetRecord& set : paper_parameter_sets()) {
-      ParameterSetRecord named = set;
-      named.name = content.intern(parameter_set_name(set.id));
-      content.parameter_sets.push_back(named);
-    }
-  }
+  if (!request.patterns.empty()) add_parameter_sets(request, content);
   LoopBakeOptions loop = request.loop;
   loop.jobs = request.jobs;
   for (const PatternRequest& pattern : request.patterns) {

@@ -56,6 +56,9 @@ struct BakeRequest {
   std::string device;              ///< profile that it is planned for; empty: none
   unsigned jobs = 1;               ///< the bytes do not depend on it
   LoopBakeOptions loop;            ///< of patterns; its jobs are those above
+  /// The article's parameter sets to describe patterns with; empty: all; "none": our loop's record
+  /// alone.
+  std::vector<std::string> parameters;
   std::string tool_version;
 };
 

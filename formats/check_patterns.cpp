@@ -117,6 +117,10 @@ void check_loop_record(FaultLog& log, const BundleParts& parts, const PatternRec
 
 /// The twins of a pattern lie side by side in the section table.
 void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index) {
+  const auto recorded = [index](const SectionEntry& entry) {
+    return static_cast<SectionType>(entry.type) == SectionType::kLoopRecord && entry.owner == index;
+  };
+  if (std::any_of(parts.sections.begin(), parts.sections.end(), recorded)) return;
   constexpr auto kTwin = static_cast<std::uint32_t>(SectionType::kFeatureTwin);
   const auto first =
       std::lower_bound(parts.sections.begin(), parts.sections.end(), index,
@@ -132,7 +136,8 @@ void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index
   }
   const PatternRecord& pattern = parts.patterns[index];
   log.add(Rule::kFeaturesMissing, offset_of(parts, &pattern), label(parts, "pattern", pattern.name),
-          "no parameter set found as many features as it wants matches");
+          "it has no record for the pose loop, and no parameter set found as many features as it "
+          "wants matches");
 }
 
 }  // namespace

@@ -50,9 +50,9 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
       counts += " " + std::string(bundle.name(set.name)) + "=" +
                 std::to_string(bundle.features(p, set.id).keypoints.size());
     }
-    std::fprintf(stderr, "pattern %-16s %u x %u, keypoints%s\n",
+    std::fprintf(stderr, "pattern %-16s %u x %u%s%s\n",
                  std::string(bundle.name(pattern.name)).c_str(), pattern.width, pattern.height,
-                 counts.c_str());
+                 counts.empty() ? "" : ", keypoints", counts.c_str());
   }
   double ms = 0;
   for (const StageReport& stage : report.stages) ms += stage.ms;

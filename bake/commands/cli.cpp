@@ -15,6 +15,7 @@
 #include "bake/commands/terminal.hpp"
 #include "bake/model/mesh_levels.hpp"
 #include "modar/device_profile.hpp"
+#include "modar/features.hpp"
 
 #ifndef MODAR_VERSION
 #error "CMake defines MODAR_VERSION"
@@ -75,6 +76,23 @@ void add_geometry_options(CLI::App& sub, BakeRequest& request, BakeTexts& texts)
   sub.add_flag("!--no-topology", request.topology, "Do not measure the models' topology");
 }
 
+void add_pattern_options(CLI::App& sub, BakeRequest& request) {
+  sub.add_option("--loop-views", request.loop.trial_views,
+                 "Random views that try a pattern's features: fewer bake faster, more hold better")
+      ->check(CLI::Range(1, 10000));
+  std::vector<std::string> sets = {"none"};
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    sets.emplace_back(parameter_set_name(set.id));
+  }
+  sub.add_option("--parameters", request.parameters,
+                 "The article's sets to store beside our record of a pattern, as YML and mapped: " +
+                     CLI::detail::join(sets, ", ") + " (default: all)")
+      ->delimiter(',')
+      ->check(CLI::IsMember(sets).description(""))
+      ->type_name("SET,SET");
+  sub.add_flag("!--no-score", request.loop.score, "Do not score the patterns");
+}
+
 CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
   CLI::App* sub = app.add_subcommand("bake", "Models and pattern images to one bundle");
   sub->add_option("--model", bake.request.models, "OBJ, glTF or GLB files")->type_name("FILE");
@@ -96,10 +114,7 @@ CLI::App* add_bake(CLI::App& app, BakeCommand& bake, BakeTexts& texts) {
          "--device", texts.device,
          "Plan for a device: its texture size and GPU memory (" + device_profile_names() + ")")
       ->type_name("NAME");
-  sub->add_option("--loop-views", bake.request.loop.trial_views,
-                  "Random views that try a pattern's features: fewer bake faster, more hold better")
-      ->check(CLI::Range(1, 10000));
-  sub->add_flag("!--no-score", bake.request.loop.score, "Do not score the patterns");
+  add_pattern_options(*sub, bake.request);
   sub->add_option("--jobs", bake.request.jobs, "Threads; the bytes do not depend on it")
       ->check(CLI::Range(1u, 256u))
       ->capture_default_str();

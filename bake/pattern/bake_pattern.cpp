@@ -53,6 +53,7 @@ Result<void> add_score(const std::string& path, const GrayImage& grey, unsigned 
 }  // namespace
 
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
+                                     std::span<const ParameterSetRecord> sets,
                                      const LoopBakeOptions& loop, Report& report) {
   StageTimer timer(report, "pattern");
   bool shrunk = false;
@@ -74,14 +75,13 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
   out.record.half_width = static_cast<float>(corners[1].x);
   out.record.half_height = static_cast<float>(corners[1].y);
   out.record.score = -1.0f;
-  const auto sets = paper_parameter_sets();
   for (const ParameterSetRecord& parameters : sets) {
     auto content = describe(grey, parameters);
     if (!content) return tl::unexpected(content.error());
     out.features.push_back(std::move(*content));
   }
-  const std::size_t found = out.features.front().keypoints.size();
-  if (found < sets.front().min_matches) {
+  const std::size_t found = sets.empty() ? 0 : out.features.front().keypoints.size();
+  if (!sets.empty() && found < sets.front().min_matches) {
     return fail(ExitCode::kInvalidInput, "pattern.no-features", path,
                 "the picture holds " + std::to_string(found) + " features, too few to recognise it",
                 "take a larger, sharper picture with more texture");

@@ -45,14 +45,15 @@ double read_width_mm(const std::string& path);
 struct PatternFeatures {
   std::string name;
   PatternRecord record{};                ///< lacks its name
-  std::vector<FeatureContent> features;  ///< one a parameter set, in order of set id
+  std::vector<FeatureContent> features;  ///< one a parameter set, in their order
   std::vector<std::byte> loop_record;    ///< a section of type kLoopRecord
 };
 
-/// Describes an image file under the article's four parameter sets, with YML and twin.
-/// Errors: those of read_image(); kInvalidInput "pattern.no-features" where the default set finds
-/// fewer than its min_matches.
+/// Describes an image file for our loop, and under the article's parameter sets with YML and twin.
+/// Errors: those of read_image() and bake_loop_record(); kInvalidInput "pattern.no-features" where
+/// the first set finds fewer than its min_matches.
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
+                                     std::span<const ParameterSetRecord> sets,
                                      const LoopBakeOptions& loop, Report& report);
 
 }  // namespace modar

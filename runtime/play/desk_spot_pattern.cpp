@@ -42,7 +42,8 @@ cv::Mat rectified(const RgbImage& frame, const std::array<glm::dvec2, 4>& corner
   return flat;
 }
 
-Result<BundleContent> content_of(const cv::Mat& flat, const ParameterSetRecord& parameters) {
+Result<BundleContent> content_of(const cv::Mat& flat, const ParameterSetRecord& asked) {
+  const ParameterSetRecord& parameters = asked.id == 0 ? paper_parameter_sets().front() : asked;
   Result<Features> features = describe_image(
       {flat.data, flat.cols, flat.rows, static_cast<std::ptrdiff_t>(flat.step)}, parameters);
   if (!features) return tl::unexpected(features.error());

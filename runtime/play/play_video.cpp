@@ -61,7 +61,7 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   if (!plan) return tl::unexpected(plan.error());
   PlayOptions options = asked;
   options.method = choose_method(bundle, plan->method, plan->parameters);
-  const Result<std::uint32_t> set = choose_parameter_set(bundle, plan->parameters);
+  const Result<std::uint32_t> set = choose_parameter_set(bundle, options.method, plan->parameters);
   if (!set) return tl::unexpected(set.error());
   if (options.find_focal && options.method != "ours") {
     return fail(ExitCode::kUsage, "usage.conflict", "--find-focal",

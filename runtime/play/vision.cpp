@@ -82,11 +82,14 @@ std::string choose_method(const BundleView& bundle, const std::string& method,
   return "paper";
 }
 
-Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& name) {
+Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& method,
+                                           const std::string& name) {
   const Table<ParameterSetRecord> sets = bundle.parameter_sets();
   if (sets.empty()) {
+    if (method == "ours") return 0;
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
-                "the bundle holds no described pattern", "bake it with --pattern IMAGE");
+                "the bundle holds no pattern that the article's method can look for",
+                "bake it with --pattern IMAGE, and without --parameters none");
   }
   const std::string_view wanted = name.empty() ? std::string_view("orb-2000") : name;
   std::string known;
@@ -101,13 +104,12 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
               "the bundle has no parameter set '" + name + "'", "it has: " + known);
 }
 
-const ParameterSetRecord& parameter_set(const BundleView& bundle, std::uint32_t id) {
+ParameterSetRecord parameter_set(const BundleView& bundle, std::uint32_t id) {
   const Table<ParameterSetRecord> sets = bundle.parameter_sets();
-  std::uint32_t found = 0;
   for (std::uint32_t i = 0; i < sets.size(); ++i) {
-    if (sets[i].id == id) found = i;
+    if (sets[i].id == id) return sets[i];
   }
-  return sets[found];
+  return {};
 }
 
 Camera camera_for(const std::optional<Camera>& calibrated, int width, int height) {

@@ -26,12 +26,14 @@ std::string choose_method(const BundleView& bundle, const std::string& method,
                           const std::string& parameters);
 
 /// The id of the bundle's parameter set of that name; of an empty name: "orb-2000" where it is
-/// there, else the first. Errors: kUsage "parameters.unknown" (lists what the bundle has),
-/// kInvalidInput "tracker.no-patterns" where it has none at all.
-Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& name);
+/// there, else the first; 0 where it has none and the method is "ours", which needs none. Errors:
+/// kUsage "parameters.unknown" (lists what the bundle has), kInvalidInput "tracker.no-patterns"
+/// where the article's method has none.
+Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& method,
+                                           const std::string& name);
 
-/// The record of a set that is there.
-const ParameterSetRecord& parameter_set(const BundleView& bundle, std::uint32_t id);
+/// The record of a set that is there; of id 0 an empty one.
+ParameterSetRecord parameter_set(const BundleView& bundle, std::uint32_t id);
 
 /// The camera for frames of that size.
 Camera camera_for(const std::optional<Camera>& calibrated, int width, int height);

@@ -36,6 +36,27 @@ class Bake(ProgramTest):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(out.read_bytes(), reference, f"jobs {jobs}, {env}")
 
+    def test_the_articles_sets_can_stay_at_home(self):
+        whole = self.bake_demo()
+        sizes = []
+        for sets, expected in (("none", []), ("orb-500,brisk-2", ["orb-500", "brisk-2"])):
+            out = self.folder / f"{expected}.modar"
+            done = self.modar("bake", "--pattern", COVER, "-o", out, *QUICK, "--parameters", sets)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(self.modar_json("check", out)["issues"], [])
+            pattern = self.modar_json("inspect", out)["patterns"][0]
+            self.assertEqual(sorted(pattern["keypoints"]), sorted(expected))
+            self.modar("inspect", out, "--extract", self.folder / sets)
+            self.assertEqual(len(list((self.folder / sets).rglob("*.yml"))), len(expected))
+            sizes.append(out.stat().st_size)
+        self.assertLess(sizes[0], sizes[1])
+        self.assertLess(sizes[1], whole.stat().st_size)
+        self.assert_fails(self.modar("bake", "--pattern", COVER, "-o", self.folder / "x.modar", "--parameters", "sift"),
+                          1, "--parameters")
+        bare = self.folder / "[].modar"
+        self.assert_fails(self.run_program("modar-play", bare, "--input", COVER, "--method", "paper"), 3, "--parameters none")
+        self.assertEqual(self.run_program("modar-play", bare, "--input", COVER).returncode, 0)
+
     def test_memory_changes_no_byte(self):
         bundles = []
         for options in ([], ["--memory", "200M"]):

@@ -212,7 +212,7 @@ TEST(BakePattern, HoldsTheFourSetsTwiceAndTheNormalisedSize) {
   const RemoveAtEnd file{temporary("speckled.png")};
   ASSERT_TRUE(cv::imwrite(file.path, speckled(400, 300)));
   Report report;
-  const auto baked = bake_pattern(file.path, 120.0, quick(), report);
+  const auto baked = bake_pattern(file.path, 120.0, paper_parameter_sets(), quick(), report);
   ASSERT_TRUE(baked) << to_line(baked.error());
   EXPECT_EQ(baked->record.width, 400u);
   EXPECT_EQ(baked->record.height, 300u);
@@ -239,7 +239,7 @@ TEST(BakePattern, LargePicturesAreBroughtToThePatternsOfTheArticle) {
   const RemoveAtEnd file{temporary("large.png")};
   ASSERT_TRUE(cv::imwrite(file.path, speckled(1440, 1000)));
   Report report;
-  const auto baked = bake_pattern(file.path, 0.0, quick(), report);
+  const auto baked = bake_pattern(file.path, 0.0, paper_parameter_sets(), quick(), report);
   ASSERT_TRUE(baked) << to_line(baked.error());
   EXPECT_EQ(baked->record.width, 720u);
   EXPECT_EQ(baked->record.height, 500u);
@@ -255,19 +255,24 @@ TEST(BakePattern, TakesTheWidthThatThePngStates) {
   RgbaImage image{300, 300, {rgba.data, rgba.data + rgba.total() * 4}};
   ASSERT_TRUE(write_pattern_png(image, 150.0, file.path));
   Report report;
-  EXPECT_DOUBLE_EQ(bake_pattern(file.path, 0.0, quick(), report).value().record.width_mm, 150.0);
-  EXPECT_DOUBLE_EQ(bake_pattern(file.path, 99.0, quick(), report).value().record.width_mm, 99.0);
+  EXPECT_DOUBLE_EQ(
+      bake_pattern(file.path, 0.0, paper_parameter_sets(), quick(), report).value().record.width_mm,
+      150.0);
+  EXPECT_DOUBLE_EQ(bake_pattern(file.path, 99.0, paper_parameter_sets(), quick(), report)
+                       .value()
+                       .record.width_mm,
+                   99.0);
 }
 
 TEST(BakePattern, APictureWithoutTextureIsRefused) {
   const RemoveAtEnd file{temporary("blank.png")};
   ASSERT_TRUE(cv::imwrite(file.path, cv::Mat(300, 300, CV_8UC3, cv::Scalar(200, 200, 200))));
   Report report;
-  const auto baked = bake_pattern(file.path, 0.0, quick(), report);
+  const auto baked = bake_pattern(file.path, 0.0, paper_parameter_sets(), quick(), report);
   ASSERT_FALSE(baked);
   EXPECT_EQ(baked.error().code, "pattern.no-features");
   EXPECT_EQ(baked.error().where, file.path);
-  EXPECT_FALSE(bake_pattern("/nowhere/at/all.png", 0.0, quick(), report));
+  EXPECT_FALSE(bake_pattern("/nowhere/at/all.png", 0.0, paper_parameter_sets(), quick(), report));
 }
 
 }  // namespace
