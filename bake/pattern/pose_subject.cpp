@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kRight = 5.0;  // pixels
 
-/// loop_record: of the pattern.
+/// loop_record: of the pattern; empty: none.
 void add_record(const GrayImage& pattern, std::vector<std::byte> loop_record,
                 BundleContent& content) {
   PatternRecord record{};
@@ -30,19 +30,26 @@ void add_record(const GrayImage& pattern, std::vector<std::byte> loop_record,
   record.half_height = static_cast<float>(corners[1].y);
   record.score = -1.0f;
   content.features.emplace_back();
-  ExtraSection section;
-  section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
-  section.owner = static_cast<std::uint32_t>(content.patterns.size());
-  section.bytes = std::move(loop_record);
-  content.extra.push_back(std::move(section));
+  if (!loop_record.empty()) {
+    ExtraSection section;
+    section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
+    section.owner = static_cast<std::uint32_t>(content.patterns.size());
+    section.bytes = std::move(loop_record);
+    content.extra.push_back(std::move(section));
+  }
   content.patterns.push_back(record);
 }
 
+/// loop: null for a pattern without a record of ours, which takes most of the time.
 Result<void> add_pattern(const GrayImage& pattern, std::uint32_t set_id,
-                         const LoopBakeOptions& options, BundleContent& content) {
-  auto loop = bake_loop_record(pattern, options);
-  if (!loop) return tl::unexpected(loop.error());
-  add_record(pattern, std::move(*loop), content);
+                         const LoopBakeOptions* loop, BundleContent& content) {
+  std::vector<std::byte> record;
+  if (loop != nullptr) {
+    auto baked = bake_loop_record(pattern, *loop);
+    if (!baked) return tl::unexpected(baked.error());
+    record = std::move(*baked);
+  }
+  add_record(pattern, std::move(record), content);
   for (const ParameterSetRecord& set : content.parameter_sets) {
     auto features = describe_image(pattern, set);
     if (!features) return tl::unexpected(features.error());
@@ -66,7 +73,8 @@ Result<std::vector<std::byte>> bytes_of(const BundleContent& content) {
 }
 
 Result<std::vector<std::byte>> bundle_of(const std::vector<GrayPicture>& pictures,
-                                         std::uint32_t set_id) {
+                                         std::uint32_t set_id, bool ours) {
+  const LoopBakeOptions loop;
   BundleContent content;
   for (ParameterSetRecord set : paper_parameter_sets()) {
     if (set.id != set_id) continue;
@@ -74,7 +82,7 @@ Result<std::vector<std::byte>> bundle_of(const std::vector<GrayPicture>& picture
     content.parameter_sets.push_back(set);
   }
   for (const GrayPicture& picture : pictures) {
-    if (auto added = add_pattern(picture.view(), set_id, {}, content); !added) {
+    if (auto added = add_pattern(picture.view(), set_id, ours ? &loop : nullptr, content); !added) {
       return tl::unexpected(added.error());
     }
   }
@@ -105,7 +113,7 @@ double corner_error(const Sighting& sighting, const FrameTruth& truth) {
 Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
                                                  const LoopBakeOptions& options) {
   BundleContent content;
-  if (auto added = add_pattern(pattern, 0, options, content); !added) {
+  if (auto added = add_pattern(pattern, 0, &options, content); !added) {
     return tl::unexpected(added.error());
   }
   return bytes_of(content);
@@ -136,7 +144,7 @@ Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBe
     if (!picture) return tl::unexpected(picture.error());
     subject.pictures.push_back(std::move(*picture));
   }
-  auto bytes = bundle_of(subject.pictures, options.paper_set);
+  auto bytes = bundle_of(subject.pictures, options.paper_set, options.ours);
   if (!bytes) return tl::unexpected(bytes.error());
   subject.bytes = std::move(*bytes);
   const auto bundle = BundleView::open(subject.bytes);

@@ -63,6 +63,30 @@ class Pattern(ProgramTest):
         self.assertEqual(twice.returncode, 3)
         self.assertIn("false recognitions: 4", twice.stdout)
 
+    def test_bench_prints_the_article_s_tables_beside_ours(self):
+        rows = self.modar_json("bench", "pose", "--tables", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
+                               "--quiet")
+        found = {row["measure"]: row for row in rows}
+        article = {"orb-2000": (1094.8, 86, 93), "orb-500": (453.7, 69, 88), "brisk-3": (485.7, 2425, 97),
+                   "brisk-2": (473.5, 2296, 95)}  # mean of Table 6, first of Table 7, accuracy from afar
+        bands = ("area 0.4-0.9", "area 0.9-4")
+        stages = ("detect", "describe", "match", "homography")
+        self.assertEqual(set(found), {
+            *(f"table6_features {name}" for name in article),
+            *(f"table{table}_{stage}_ms {name}" for table in (7, 8) for stage in stages for name in (*article, "ours")),
+            *(f"{what}_pct {band} {name}" for what in ("accuracy", "right") for band in bands
+              for name in (*article, "ours")),
+            *(f"cpu_ms {name}" for name in (*article, "ours"))})
+        for name, (features, milliseconds, accuracy) in article.items():
+            self.assertAlmostEqual(found[f"table6_features {name}"]["reference"], features, delta=0.1)
+            self.assertEqual(found[f"table7_detect_ms {name}"]["reference"], milliseconds)
+            self.assertEqual(found[f"accuracy_pct {bands[0]} {name}"]["reference"], accuracy)
+            self.assertGreater(found[f"table8_detect_ms {name}"]["ours"], 0)
+        self.assertLessEqual(found["table6_features orb-500"]["ours"], 500)
+        for band in bands:
+            self.assertEqual(found[f"accuracy_pct {band} ours"]["ours"], 100)
+            self.assertEqual(found[f"right_pct {band} ours"]["ours"], 100)
+
     def test_bench_of_many_patterns_prints_each_measure(self):
         rows = self.modar_json("bench", "pose", "--many=2", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
                                "--quiet")
