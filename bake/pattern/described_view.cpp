@@ -1,22 +1,7 @@
 // Features of rendered views, brought back to the picture.
 #include "bake/pattern/described_view.hpp"
 
-#include <bit>
-#include <cstring>
-
 namespace modar {
-
-int code_distance(const LoopCode& a, const LoopCode& b) {
-  int bits = 0;
-  for (std::size_t i = 0; i < 32; i += 8) {
-    std::uint64_t x = 0;
-    std::uint64_t y = 0;
-    std::memcpy(&x, a.data() + i, 8);
-    std::memcpy(&y, b.data() + i, 8);
-    bits += std::popcount(x ^ y);
-  }
-  return bits;
-}
 
 std::array<double, 2> to_picture(const AffineView& view, double x, double y) {
   const auto& a = view.linear;

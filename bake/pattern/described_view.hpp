@@ -12,9 +12,6 @@ namespace modar {
 
 using LoopCode = std::array<std::uint8_t, 32>;
 
-/// Bits in which two codes differ.
-int code_distance(const LoopCode& a, const LoopCode& b);
-
 /// Picture coordinates of a place in a view.
 std::array<double, 2> to_picture(const AffineView& view, double x, double y);
 

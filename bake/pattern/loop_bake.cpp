@@ -9,6 +9,7 @@
 
 #include "bake/pattern/described_view.hpp"
 #include "bake/pattern/loop_patches.hpp"
+#include "bake/pattern/view_kernel.hpp"
 #include "bake/pattern/view_render.hpp"
 #include "bake/texture/parallel.hpp"
 #include "formats/loop_record.hpp"
@@ -52,8 +53,7 @@ bool within(const GrayImage& pattern, const std::array<double, 2>& p) {
   return p[0] >= -0.5 && p[1] >= -0.5 && p[0] < pattern.width - 0.5 && p[1] < pattern.height - 0.5;
 }
 
-std::vector<Candidate> candidates_of(const std::vector<GrayPicture>& levels,
-                                     const AffineView& view) {
+std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const AffineView& view) {
   std::vector<Candidate> candidates;
   const GrayPicture picture = render_view(levels, view, nullptr);
   const auto describer = LoopDescriber::create(picture.width, picture.height, generous_detection());
@@ -79,7 +79,7 @@ std::vector<Candidate> candidates_of(const std::vector<GrayPicture>& levels,
   return candidates;
 }
 
-std::vector<Candidate> find_candidates(const std::vector<GrayPicture>& levels, unsigned jobs) {
+std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels, unsigned jobs) {
   std::vector<AffineView> views;
   Random random(1);
   double scale = 1.0;
@@ -116,28 +116,32 @@ class Grid {
  public:
   Grid(const GrayImage& pattern, const std::vector<Candidate>& candidates)
       : columns_(pattern.width / kSquare + 1),
-        cells_(static_cast<std::size_t>(columns_ * (pattern.height / kSquare + 1))) {
+        rows_(pattern.height / kSquare + 1),
+        cells_(static_cast<std::size_t>(2 * columns_ * rows_)) {
     for (std::uint32_t i = 0; i < candidates.size(); ++i) {
       const Candidate& candidate = candidates[i];
-      cells_[index(square(candidate.x), square(candidate.y))].push_back(
-          {candidate.x, candidate.y, i, candidate.dark});
+      cells_[index(square(candidate.x), square(candidate.y), candidate.dark)].push_back(
+          {candidate.x, candidate.y, i});
+      codes_.push_back(candidate.code);
     }
   }
-  /// Visits the candidates of that polarity within the radius.
-  template <class Visit>
-  void near(double x, double y, double radius, std::uint8_t dark, Visit&& visit) const {
-    const int rows = static_cast<int>(cells_.size()) / columns_;
-    for (int row = std::max(0, square(y - radius)); row <= std::min(rows - 1, square(y + radius));
+  /// The candidates of the feature's polarity within the radius, and their codes' distances to its.
+  void near(double x, double y, double radius, const LoopFeature& feature,
+            std::vector<std::uint32_t>& which, std::vector<int>& bits) const {
+    which.clear();
+    for (int row = std::max(0, square(y - radius)); row <= std::min(rows_ - 1, square(y + radius));
          ++row) {
       for (int column = std::max(0, square(x - radius));
            column <= std::min(columns_ - 1, square(x + radius)); ++column) {
-        for (const Entry& entry : cells_[index(column, row)]) {
+        for (const Entry& entry : cells_[index(column, row, feature.dark)]) {
           const double dx = entry.x - x;
           const double dy = entry.y - y;
-          if (entry.dark == dark && dx * dx + dy * dy <= radius * radius) visit(entry.candidate);
+          if (dx * dx + dy * dy <= radius * radius) which.push_back(entry.candidate);
         }
       }
     }
+    bits.resize(which.size());
+    code_distances(feature.code, codes_.data(), which.data(), which.size(), bits.data());
   }
 
  private:
@@ -147,14 +151,15 @@ class Grid {
     double x;
     double y;
     std::uint32_t candidate;
-    std::uint8_t dark;
   };
   static int square(double value) { return static_cast<int>(std::floor((value + 0.5) / kSquare)); }
-  [[nodiscard]] std::size_t index(int column, int row) const {
-    return static_cast<std::size_t>(row * columns_ + column);
+  [[nodiscard]] std::size_t index(int column, int row, int dark) const {
+    return static_cast<std::size_t>((dark * rows_ + row) * columns_ + column);
   }
   int columns_;
+  int rows_;
   std::vector<std::vector<Entry>> cells_;
+  std::vector<LoopCode> codes_;
 };
 
 /// What a random view shows of the pattern: a hit list of (candidate, feature of the view).
@@ -163,8 +168,7 @@ struct TrialView {
   std::vector<std::pair<std::uint32_t, Hit>> hits;
 };
 
-TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, const Grid& grid,
-                    const std::vector<Candidate>& candidates) {
+TrialView run_trial(const std::vector<ViewLevel>& levels, std::uint64_t seed, const Grid& grid) {
   Random random(seed);
   const double scale = exp_of(random.uniform(kLogSmallest, kLogLargest));
   const double tilt = 1.0 / turn_of(random.uniform(0.0, 77.0) * kPi / 180.0).cosine;
@@ -179,27 +183,30 @@ TrialView run_trial(const std::vector<GrayPicture>& levels, std::uint64_t seed, 
   describer->set_frame(picture.view());
   const double mean_scale = scale / std::sqrt(tilt);
   TrialView trial;
+  std::vector<std::uint32_t> which;
+  std::vector<int> bits;
   for (const LoopFeature& feature : describer->features()) {
     const auto place =
         to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     if (!within(levels[0].view(), place)) continue;
     const std::uint32_t id = trial.features++;
     const double radius = std::min(kNear * (1 << feature.level) / mean_scale, 16.0);
-    grid.near(place[0], place[1], radius, feature.dark, [&](std::uint32_t i) {
-      const int bits = code_distance(candidates[i].code, feature.code);
-      if (bits > kRepeats) return;
-      trial.hits.push_back({i, {id, static_cast<float>(kRepeats + 8 - bits) / (kRepeats + 8)}});
-    });
+    grid.near(place[0], place[1], radius, feature, which, bits);
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      if (bits[i] > kRepeats) continue;
+      trial.hits.push_back(
+          {which[i], {id, static_cast<float>(kRepeats + 8 - bits[i]) / (kRepeats + 8)}});
+    }
   }
   return trial;
 }
 
-Trials run_trials(const std::vector<GrayPicture>& levels, const std::vector<Candidate>& candidates,
+Trials run_trials(const std::vector<ViewLevel>& levels, const std::vector<Candidate>& candidates,
                   std::uint32_t count, unsigned jobs) {
   const Grid grid(levels[0].view(), candidates);
   std::vector<TrialView> views(count);
   parallel_rows(count, jobs,
-                [&](std::uint32_t i) { views[i] = run_trial(levels, 1000 + i, grid, candidates); });
+                [&](std::uint32_t i) { views[i] = run_trial(levels, 1000 + i, grid); });
   Trials trials;
   trials.hits.resize(candidates.size());
   for (const TrialView& view : views) {
@@ -282,7 +289,7 @@ void put(std::vector<std::byte>& bytes, std::uint64_t offset, const T& value) {
   std::memcpy(bytes.data() + offset, &value, sizeof value);
 }
 
-std::vector<std::byte> assemble(const std::vector<GrayPicture>& levels,
+std::vector<std::byte> assemble(const std::vector<ViewLevel>& levels,
                                 const std::vector<Candidate>& candidates,
                                 std::vector<std::uint32_t> chosen,
                                 const std::vector<LoopPatchRecord>& patches) {
@@ -314,7 +321,7 @@ std::vector<std::byte> assemble(const std::vector<GrayPicture>& levels,
   for (std::size_t i = 0; i < patches.size(); ++i) {
     put(bytes, header.patches_offset + i * sizeof(LoopPatchRecord), patches[i]);
   }
-  for (const GrayPicture& level : levels) {
+  for (const ViewLevel& level : levels) {
     const auto pixels = std::as_bytes(std::span(level.pixels));
     bytes.insert(bytes.end(), pixels.begin(), pixels.end());
   }
@@ -341,7 +348,7 @@ Result<std::vector<std::byte>> bake_loop_record(const GrayImage& pattern,
                 "the picture is smaller than 32 or larger than 1023 pixels on a side",
                 "give another size");
   }
-  const std::vector<GrayPicture> levels = halved(pattern);
+  const std::vector<ViewLevel> levels = view_levels(pattern);
   const std::vector<Candidate> candidates = find_candidates(levels, options.jobs);
   const Trials trials = run_trials(levels, candidates, options.trial_views, options.jobs);
   const std::vector<std::uint32_t> chosen = choose(trials, options.features);

@@ -70,7 +70,7 @@ std::vector<Place> spread(const std::vector<Place>& places, std::uint32_t count,
 
 }  // namespace
 
-std::vector<LoopPatchRecord> choose_patches(const std::vector<GrayPicture>& levels,
+std::vector<LoopPatchRecord> choose_patches(const std::vector<ViewLevel>& levels,
                                             std::uint32_t count) {
   std::vector<LoopPatchRecord> patches;
   for (std::size_t level = 0; level < levels.size(); ++level) {

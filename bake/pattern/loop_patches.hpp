@@ -10,7 +10,7 @@
 namespace modar {
 
 /// At most `count` patches a level, spread over the picture, by level and then by score.
-std::vector<LoopPatchRecord> choose_patches(const std::vector<GrayPicture>& levels,
+std::vector<LoopPatchRecord> choose_patches(const std::vector<ViewLevel>& levels,
                                             std::uint32_t count);
 
 }  // namespace modar

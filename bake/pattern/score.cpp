@@ -6,6 +6,7 @@
 
 #include "bake/pattern/described_view.hpp"
 #include "bake/pattern/pose_subject.hpp"
+#include "bake/pattern/view_kernel.hpp"
 #include "bake/texture/parallel.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
@@ -34,6 +35,13 @@ struct Known {
 constexpr Turn kTurns[] = {{1, 0}, {0.8, 0.6},  {5.0 / 13, 12.0 / 13},
                            {0, 1}, {-0.6, 0.8}, {-12.0 / 13, 5.0 / 13}};
 
+/// Those of one polarity.
+struct KnownSide {
+  std::vector<std::array<double, 2>> places;
+  std::vector<LoopCode> codes;
+};
+using KnownFeatures = std::array<KnownSide, 2>;
+
 struct TestView {
   AffineView view;
   double scale;  ///< view pixels a picture pixel along its least compressed direction
@@ -54,7 +62,7 @@ struct Found {
   int ambiguous = 0;                        ///< repeated, but elsewhere just as well
 };
 
-std::vector<Known> describe(const std::vector<GrayPicture>& levels, const AffineView& view) {
+std::vector<Known> describe(const std::vector<ViewLevel>& levels, const AffineView& view) {
   const GrayPicture picture = render_view(levels, view, nullptr);
   const auto describer = LoopDescriber::create(picture.width, picture.height, generous_detection());
   describer->set_frame(picture.view());
@@ -70,7 +78,7 @@ std::vector<Known> describe(const std::vector<GrayPicture>& levels, const Affine
 }
 
 /// Some of what the bake describes: several scales, upright and tilted.
-std::vector<Known> known_features(const std::vector<GrayPicture>& levels, unsigned jobs) {
+KnownFeatures known_features(const std::vector<ViewLevel>& levels, unsigned jobs) {
   std::vector<AffineView> views;
   double scale = 1;
   for (int k = 0; k < 4; ++k, scale *= 0.64) {
@@ -82,8 +90,13 @@ std::vector<Known> known_features(const std::vector<GrayPicture>& levels, unsign
   std::vector<std::vector<Known>> found(views.size());
   parallel_rows(static_cast<std::uint32_t>(views.size()), jobs,
                 [&](std::uint32_t i) { found[i] = describe(levels, views[i]); });
-  std::vector<Known> known;
-  for (const auto& some : found) known.insert(known.end(), some.begin(), some.end());
+  KnownFeatures known;
+  for (const auto& some : found) {
+    for (const Known& one : some) {
+      known[one.dark].places.push_back({one.x, one.y});
+      known[one.dark].codes.push_back(one.code);
+    }
+  }
   return known;
 }
 
@@ -111,26 +124,28 @@ void disturb(std::uint64_t seed, GrayPicture& picture) {
   }
 }
 
-Found find_again(const std::vector<GrayPicture>& levels, const TestView& test,
-                 const std::vector<Known>& known, std::uint64_t seed) {
+Found find_again(const std::vector<ViewLevel>& levels, const TestView& test,
+                 const KnownFeatures& known, std::uint64_t seed) {
   GrayPicture picture = render_view(levels, test.view, nullptr);
   disturb(seed, picture);
   const auto describer = LoopDescriber::create(picture.width, picture.height, LoopDetectOptions{});
   describer->set_frame(picture.view());
   Found found;
+  std::vector<int> bits;
   for (const LoopFeature& feature : describer->features()) {
     const auto place =
         to_picture(test.view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     const double radius = kNear * (1 << feature.level) / test.scale;
     int here = 256;
     int elsewhere = 256;
-    for (const Known& other : known) {
-      if (other.dark != feature.dark) continue;
-      const int bits = code_distance(other.code, feature.code);
-      const double dx = other.x - place[0];
-      const double dy = other.y - place[1];
+    const KnownSide& side = known[feature.dark];
+    bits.resize(side.codes.size());
+    code_distances(feature.code, side.codes.data(), nullptr, side.codes.size(), bits.data());
+    for (std::size_t i = 0; i < bits.size(); ++i) {
+      const double dx = side.places[i][0] - place[0];
+      const double dy = side.places[i][1] - place[1];
       int& least = dx * dx + dy * dy <= radius * radius ? here : elsewhere;
-      least = std::min(least, bits);
+      least = std::min(least, bits[i]);
     }
     if (here > kRepeats) continue;
     // As the device's matcher: the second best counts where it lies elsewhere.
@@ -180,7 +195,7 @@ double edge_energy(const GrayPicture& picture) {
 }
 
 /// A sharp picture has nearly as much to show at its own size as halved; a blurred one far less.
-double sharpness_of(const std::vector<GrayPicture>& levels) {
+double sharpness_of(const std::vector<ViewLevel>& levels) {
   const double halved = levels.size() > 1 ? edge_energy(levels[1]) : 0;
   return halved > 0 ? edge_energy(levels[0]) / halved : 0;
 }
@@ -232,7 +247,7 @@ std::vector<Rung> ladder() {
 }
 
 /// A frame with the pattern in its middle over clutter.
-GrayPicture climb_frame(const std::vector<GrayPicture>& levels, const AffineView& view,
+GrayPicture climb_frame(const std::vector<ViewLevel>& levels, const AffineView& view,
                         std::uint64_t seed) {
   Random random(seed);
   const GrayPicture background = made_clutter(random, view.width, view.height);
@@ -268,8 +283,8 @@ FrameTruth truth_of(const GrayPicture& picture, const AffineView& view) {
 }
 
 /// How many views of a rung are right.
-Result<int> climb(const std::vector<GrayPicture>& levels, const BundleView& bundle,
-                  const Rung& rung, std::uint64_t seed) {
+Result<int> climb(const std::vector<ViewLevel>& levels, const BundleView& bundle, const Rung& rung,
+                  std::uint64_t seed) {
   // From so far away that a view is affine.
   const int side = frame_side(rung);
   Camera camera = default_camera(side, side);
@@ -291,8 +306,8 @@ Result<int> climb(const std::vector<GrayPicture>& levels, const BundleView& bund
 }
 
 /// Share of the ladder's views that are right.
-Result<double> climbed(const std::vector<GrayPicture>& levels,
-                       std::span<const std::byte> loop_record, unsigned jobs) {
+Result<double> climbed(const std::vector<ViewLevel>& levels, std::span<const std::byte> loop_record,
+                       unsigned jobs) {
   const auto bytes = bundle_of_record(levels[0].view(), {loop_record.begin(), loop_record.end()});
   if (!bytes) return tl::unexpected(bytes.error());
   const auto bundle = BundleView::open(*bytes);
@@ -318,8 +333,8 @@ struct FeatureTrial {
   double ambiguous = 0;
 };
 
-FeatureTrial try_features(const std::vector<GrayPicture>& levels, unsigned jobs) {
-  const std::vector<Known> known = known_features(levels, jobs);
+FeatureTrial try_features(const std::vector<ViewLevel>& levels, unsigned jobs) {
+  const KnownFeatures known = known_features(levels, jobs);
   const std::vector<TestView> views = feature_views(levels[0]);
   std::vector<Found> found(views.size());
   parallel_rows(static_cast<std::uint32_t>(views.size()), jobs,
@@ -343,7 +358,7 @@ ScoreCause cause(const char* id, int value, const char* advice) {
 
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> loop_record,
                                    unsigned jobs) {
-  const std::vector<GrayPicture> levels = halved(pattern);
+  const std::vector<ViewLevel> levels = view_levels(pattern);
   const auto share = climbed(levels, loop_record, jobs);
   if (!share) return tl::unexpected(share.error());
   FeatureTrial trial = try_features(levels, jobs);

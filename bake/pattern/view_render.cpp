@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+
+#include "bake/pattern/view_kernel.hpp"
 
 namespace modar {
 namespace {
@@ -29,11 +32,7 @@ std::int32_t bilinear(const GrayPicture& picture, int x0, int y0, std::int32_t f
   return (top << 8) + fy * (bottom - top);
 }
 
-std::int32_t sample_inside(const GrayPicture& picture, std::int32_t x, std::int32_t y) {
-  return bilinear(picture, x >> 16, y >> 16, (x >> 8) & 255, (y >> 8) & 255);
-}
-
-/// The same with the picture's border repeated where the place lies outside of it.
+/// Of the place (x, y), the picture's border repeated where it lies outside.
 std::int32_t sample_anywhere(const GrayPicture& picture, std::int32_t x, std::int32_t y) {
   x = std::clamp(x, 0, (picture.width - 1) << 16);
   y = std::clamp(y, 0, (picture.height - 1) << 16);
@@ -71,46 +70,83 @@ Footprint footprint_of(const std::array<double, 4>& inverse, double factor) {
   return footprint;
 }
 
-/// Takes the samples of single pixels out of one level.
+/// Takes the samples of a row's pixels out of one level.
 class Sampler {
  public:
-  Sampler(const GrayPicture& level, const GrayPicture& finest, const std::array<double, 4>& inverse,
+  Sampler(const ViewLevel& level, const GrayPicture& finest, const std::array<double, 4>& inverse,
           double factor)
       : level_(level),
         footprint_(footprint_of(inverse, factor)),
-        count_(static_cast<std::int32_t>(footprint_.offsets.size())),
+        samples_{level.quads.data(), level.width, level.height, footprint_.offsets},
         right_(fixed(finest.width / factor - 0.5)),
         bottom_(fixed(finest.height / factor - 0.5)) {}
 
-  /// behind: grey outside of the picture, -1: its border pixels.
-  [[nodiscard]] std::uint8_t pixel(std::int32_t x, std::int32_t y, int behind) const {
-    const bool inside = x >= footprint_.reach_x && y >= footprint_.reach_y &&
-                        x < ((level_.width - 1) << 16) - footprint_.reach_x &&
-                        y < ((level_.height - 1) << 16) - footprint_.reach_y;
-    std::int32_t sum = 0;
-    for (const auto& [dx, dy] : footprint_.offsets) {
-      if (inside) {
-        sum += sample_inside(level_, x + dx, y + dy);
-      } else if (behind >= 0 && outside(x + dx, y + dy)) {
-        sum += behind << 16;
+  /// x, y: the centres of the row's pixels, each stepping one way all along. behind: greys outside
+  /// of the picture, null: its border pixels.
+  void row(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
+           const std::uint8_t* behind, std::uint8_t* out) const {
+    if (behind == nullptr) return sample_pixels(samples_, x.data(), y.data(), x.size(), out);
+    for (std::size_t first = 0; first < x.size(); first += kRun) {
+      const std::size_t count = std::min(kRun, x.size() - first);
+      const std::size_t last = first + count - 1;
+      if (inside(x[first], y[first]) && inside(x[last], y[last])) {
+        sample_pixels(samples_, x.data() + first, y.data() + first, count, out + first);
+      } else if (beside(x[first], x[last], footprint_.reach_x, right_) ||
+                 beside(y[first], y[last], footprint_.reach_y, bottom_)) {
+        std::copy_n(behind + first, count, out + first);
       } else {
-        sum += sample_anywhere(level_, x + dx, y + dy);
+        for (std::size_t i = first; i <= last; ++i) out[i] = pixel(x[i], y[i], behind[i]);
       }
     }
-    return static_cast<std::uint8_t>((sum / count_ + 0x8000) >> 16);
   }
 
  private:
+  static constexpr std::size_t kRun = 16;  // pixels that are looked at together
+
+  /// All samples of a pixel lie in the picture.
+  [[nodiscard]] bool inside(std::int32_t x, std::int32_t y) const {
+    return x >= footprint_.reach_x && y >= footprint_.reach_y &&
+           x < ((level_.width - 1) << 16) - footprint_.reach_x &&
+           y < ((level_.height - 1) << 16) - footprint_.reach_y;
+  }
+  /// All samples of the pixels from one place to another lie on the same side of the picture.
+  static bool beside(std::int32_t from, std::int32_t to, std::int32_t reach, std::int32_t end) {
+    return std::max(from, to) + reach < -0x8000 || std::min(from, to) - reach > end;
+  }
   [[nodiscard]] bool outside(std::int32_t x, std::int32_t y) const {
     return x < -0x8000 || y < -0x8000 || x > right_ || y > bottom_;
   }
+  [[nodiscard]] std::uint8_t pixel(std::int32_t x, std::int32_t y, std::uint8_t behind) const {
+    std::int32_t sum = 0;
+    for (const auto& [dx, dy] : footprint_.offsets) {
+      sum += outside(x + dx, y + dy) ? behind << 16 : sample_anywhere(level_, x + dx, y + dy);
+    }
+    const auto count = static_cast<std::int32_t>(footprint_.offsets.size());
+    return static_cast<std::uint8_t>((sum / count + 0x8000) >> 16);
+  }
 
-  const GrayPicture& level_;
+  const ViewLevel& level_;
   Footprint footprint_;
-  std::int32_t count_;
+  ViewSamples samples_;
   std::int32_t right_;
   std::int32_t bottom_;
 };
+
+/// The words that sample_pixels() reads.
+std::vector<std::uint32_t> quads_of(const GrayPicture& level) {
+  std::vector<std::uint32_t> quads(level.pixels.size());
+  for (int y = 0; y + 1 < level.height; ++y) {
+    const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(level.width);
+    const std::uint8_t* p = level.pixels.data() + first;
+    const std::uint8_t* q = p + level.width;
+    for (int x = 0; x + 1 < level.width; ++x) {
+      quads[first + static_cast<std::size_t>(x)] =
+          static_cast<std::uint32_t>(p[x] | p[x + 1] << 8 | q[x] << 16) |
+          static_cast<std::uint32_t>(q[x + 1]) << 24;
+    }
+  }
+  return quads;
+}
 
 }  // namespace
 
@@ -218,6 +254,15 @@ std::vector<GrayPicture> halved(const GrayImage& picture) {
   return levels;
 }
 
+std::vector<ViewLevel> view_levels(const GrayImage& picture) {
+  std::vector<ViewLevel> levels;
+  for (GrayPicture& level : halved(picture)) {
+    std::vector<std::uint32_t> quads = quads_of(level);
+    levels.push_back({std::move(level), std::move(quads)});
+  }
+  return levels;
+}
+
 GrayPicture made_clutter(Random& random, int width, int height) {
   GrayPicture picture;
   picture.width = width;
@@ -237,7 +282,7 @@ GrayPicture made_clutter(Random& random, int width, int height) {
   return picture;
 }
 
-GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView& view,
+GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& view,
                         const GrayPicture* background) {
   const auto& a = view.linear;
   const double determinant = a[0] * a[3] - a[1] * a[2];
@@ -261,8 +306,10 @@ GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView
   GrayPicture out;
   out.width = view.width;
   out.height = view.height;
-  out.pixels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-  std::size_t pixel = 0;
+  const auto width = static_cast<std::size_t>(out.width);
+  out.pixels.resize(width * static_cast<std::size_t>(out.height));
+  std::vector<std::int32_t> xs(width);
+  std::vector<std::int32_t> ys(width);
   for (int y = 0; y < out.height; ++y) {
     const double u = -view.offset[0];
     const double v = y - view.offset[1];
@@ -270,11 +317,13 @@ GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView
         std::llround(((inverse[0] * u + inverse[1] * v + 0.5) / factor - 0.5) * kFine);
     std::int64_t py =
         std::llround(((inverse[2] * u + inverse[3] * v + 0.5) / factor - 0.5) * kFine);
-    for (int x = 0; x < out.width; ++x, ++pixel, px += step_x, py += step_y) {
-      const int behind = background != nullptr ? background->pixels[pixel] : -1;
-      out.pixels[pixel] = sampler.pixel(static_cast<std::int32_t>(px >> 16),
-                                        static_cast<std::int32_t>(py >> 16), behind);
+    for (std::size_t x = 0; x < width; ++x, px += step_x, py += step_y) {
+      xs[x] = static_cast<std::int32_t>(px >> 16);
+      ys[x] = static_cast<std::int32_t>(py >> 16);
     }
+    const std::size_t first = width * static_cast<std::size_t>(y);
+    sampler.row(xs, ys, background != nullptr ? background->pixels.data() + first : nullptr,
+                out.pixels.data() + first);
   }
   return out;
 }

@@ -57,12 +57,19 @@ struct GrayPicture {
 /// The picture and its halves, down to a side of 8.
 std::vector<GrayPicture> halved(const GrayImage& picture);
 
+/// A halved picture, and beside each pixel its neighbours, as rendering reads them.
+struct ViewLevel : GrayPicture {
+  std::vector<std::uint32_t> quads;  ///< see ViewSamples
+};
+/// Those of halved().
+std::vector<ViewLevel> view_levels(const GrayImage& picture);
+
 /// Boxes of random greys, as a background.
 GrayPicture made_clutter(Random& random, int width, int height);
 
 /// Renders a view. Outside of the picture: its border pixels where `background` is null, else the
 /// background, which has the view's size.
-GrayPicture render_view(const std::vector<GrayPicture>& levels, const AffineView& view,
+GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& view,
                         const GrayPicture* background);
 
 }  // namespace modar

@@ -1,15 +1,20 @@
 // Scores, trials and simulations of patterns, and the figures that sum them up.
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
 #include "bake/pattern/confusion.hpp"
+#include "bake/pattern/described_view.hpp"
 #include "bake/pattern/loop_bake.hpp"
 #include "bake/pattern/pose_subject.hpp"
 #include "bake/pattern/score.hpp"
 #include "bake/pattern/score_bench.hpp"
 #include "bake/pattern/simulate.hpp"
+#include "bake/pattern/view_kernel.hpp"
+#include "bake/pattern/view_render.hpp"
+#include "bake/texture/etc1_kernel.hpp"
 #include "tests/track/synthetic.hpp"
 
 namespace modar {
@@ -62,6 +67,91 @@ TEST(Views, TurnAndScaleAsTheLibraryDoes) {
   const Turn quarter = turn_of(1.57079632679489661923);
   EXPECT_EQ(quarter.sine, 1.0);
   EXPECT_EQ(quarter.cosine, 0.0);
+}
+
+/// A view's pixel by floating point: the mean of samples over its footprint, bilinear, the
+/// picture's border repeated.
+double mean_of_footprint(const cv::Mat& image, const AffineView& view, int x, int y) {
+  constexpr int kSide = 24;
+  const cv::Matx22d linear(view.linear.data());
+  const cv::Matx22d inverse = linear.inv();
+  double sum = 0;
+  for (int v = 0; v < kSide; ++v) {
+    for (int u = 0; u < kSide; ++u) {
+      const cv::Vec2d place = inverse * cv::Vec2d(x + (u + 0.5) / kSide - 0.5 - view.offset[0],
+                                                  y + (v + 0.5) / kSide - 0.5 - view.offset[1]);
+      const double px = std::clamp(place[0], 0.0, image.cols - 1.0);
+      const double py = std::clamp(place[1], 0.0, image.rows - 1.0);
+      const int left = std::min(static_cast<int>(px), image.cols - 2);
+      const int top = std::min(static_cast<int>(py), image.rows - 2);
+      const auto at = [&](int dx, int dy) { return image.at<std::uint8_t>(top + dy, left + dx); };
+      const double fx = px - left;
+      const double upper = at(0, 0) + fx * (at(1, 0) - at(0, 0));
+      const double lower = at(0, 1) + fx * (at(1, 1) - at(0, 1));
+      sum += upper + (py - top) * (lower - upper);
+    }
+  }
+  return sum / (kSide * kSide);
+}
+
+/// A view of picture(), tilted twofold along a diagonal, and a background for it.
+AffineView tilted_view() {
+  return make_view(picture().cols, picture().rows, 0.9, 2.0, turn_of(0.7), turn_of(2.1), 9);
+}
+
+TEST(Views, ShowTheMeanOfEachPixelsFootprint) {
+  const auto levels = view_levels(test::gray(picture()));
+  const AffineView view = tilted_view();
+  const GrayPicture rendered = render_view(levels, view, nullptr);
+  double sum = 0;
+  int pixels = 0;
+  for (int y = 0; y < view.height; y += 5) {
+    for (int x = 0; x < view.width; x += 5, ++pixels) {
+      const auto i = static_cast<std::size_t>(y * view.width + x);
+      sum += std::abs(rendered.pixels[i] - mean_of_footprint(picture(), view, x, y));
+    }
+  }
+  EXPECT_LT(sum / pixels, 0.2);  // of 255; other roundings and fewer samples
+}
+
+TEST(Views, ABackgroundShowsAroundThePictureAndNowhereElse) {
+  const auto levels = view_levels(test::gray(picture()));
+  const AffineView view = tilted_view();
+  const GrayPicture plain = render_view(levels, view, nullptr);
+  GrayPicture behind = plain;
+  std::fill(behind.pixels.begin(), behind.pixels.end(), std::uint8_t{7});
+  const GrayPicture over = render_view(levels, view, &behind);
+  const cv::Matx22d inverse = cv::Matx22d(view.linear.data()).inv();
+  for (int y = 0; y < view.height; ++y) {
+    for (int x = 0; x < view.width; ++x) {
+      const cv::Vec2d at = inverse * cv::Vec2d(x - view.offset[0], y - view.offset[1]);
+      // Distance from the border in picture pixels, positive within; a footprint reaches 2 of them.
+      const double depth = std::min(std::min(at[0] + 0.5, picture().cols - 0.5 - at[0]),
+                                    std::min(at[1] + 0.5, picture().rows - 0.5 - at[1]));
+      const auto i = static_cast<std::size_t>(y * view.width + x);
+      if (std::abs(depth) < 4) continue;
+      ASSERT_EQ(over.pixels[i], depth > 0 ? plain.pixels[i] : 7) << x << " " << y;
+    }
+  }
+}
+
+TEST(Views, AreTheSameAtEverySimdLevel) {
+  const auto levels = view_levels(test::gray(picture()));
+  const GrayPicture best = render_view(levels, tilted_view(), nullptr);
+  const LoopCode code{1, 2, 255};
+  const std::array<LoopCode, 3> codes{LoopCode{}, LoopCode{1, 2, 254}, LoopCode{1, 3, 255, 7}};
+  for (const std::int64_t level : etc1_simd_levels()) {
+    force_etc1_simd_level(level);
+    EXPECT_EQ(render_view(levels, tilted_view(), nullptr).pixels, best.pixels)
+        << etc1_simd_name(level);
+    std::vector<int> bits(3);
+    code_distances(code, codes.data(), nullptr, 3, bits.data());
+    EXPECT_EQ(bits, (std::vector{10, 1, 4})) << etc1_simd_name(level);
+    const std::uint32_t which[] = {2, 0};
+    code_distances(code, codes.data(), which, 2, bits.data());
+    EXPECT_EQ(bits, (std::vector{4, 10, 4})) << etc1_simd_name(level);
+  }
+  force_etc1_simd_level(0);
 }
 
 TEST(Score, IsTheSameOnAnyNumberOfThreads) {

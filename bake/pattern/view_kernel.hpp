@@ -1,0 +1,36 @@
+// The two loops that baking a pattern spends most of its time in, compiled for each SIMD level. All
+// sums are of integers, so that every level gives the same bytes.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace modar {
+
+/// What the pixels of a view are sampled from.
+struct ViewSamples {
+  /// A word a pixel of the level, row by row: the pixel, its right neighbour, the one below and
+  /// that one's right neighbour, from the lowest byte on. In the last column and row nothing is
+  /// read.
+  const std::uint32_t* quads = nullptr;
+  int width = 0;
+  int height = 0;
+  /// Places of a pixel's samples around its centre: at most 36, in pixels of the level, 16 bits
+  /// after the point.
+  std::span<const std::array<std::int32_t, 2>> offsets;
+};
+
+/// The means of the samples of `count` pixels, bilinear, the level's border repeated around it.
+/// x, y: centres in pixels of the level, 16 bits after the point. out: `count` greys.
+void sample_pixels(const ViewSamples& samples, const std::int32_t* x, const std::int32_t* y,
+                   std::size_t count, std::uint8_t* out);
+
+/// Hamming distances of a 256-bit code to `count` of the codes at `codes`: out[i] is that to
+/// codes[which[i]], or to codes[i] where `which` is null.
+void code_distances(const std::array<std::uint8_t, 32>& code,
+                    const std::array<std::uint8_t, 32>* codes, const std::uint32_t* which,
+                    std::size_t count, int* out);
+
+}  // namespace modar
