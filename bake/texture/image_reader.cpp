@@ -1,6 +1,7 @@
 // Image files to 8-bit RGBA through OpenCV, their headers held against limits first.
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <memory>
 
@@ -91,6 +92,31 @@ int flags_of(ImageFormat format) {
   return format == ImageFormat::kJpeg ? cv::IMREAD_COLOR : cv::IMREAD_UNCHANGED;
 }
 
+/// A PNG without its colour profile: OpenCV uses none, and libpng tells stderr what it thinks of
+/// those that it doubts. Bytes after a damaged chunk stay as they are.
+std::vector<std::byte> without_profile(std::span<const std::byte> png) {
+  constexpr std::size_t kSignature = 8;
+  constexpr std::size_t kAround = 12;  // length, type and checksum of a chunk
+  std::vector<std::byte> kept;
+  kept.reserve(png.size());
+  std::size_t first = 0;
+  for (std::size_t at = kSignature; at + kAround <= png.size();) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      length = length << 8 | std::to_integer<std::size_t>(png[at + i]);
+    if (length > png.size() - at - kAround) break;
+    const std::size_t next = at + kAround + length;
+    if (std::memcmp(png.data() + at + 4, "iCCP", 4) == 0) {
+      kept.insert(kept.end(), png.begin() + static_cast<std::ptrdiff_t>(first),
+                  png.begin() + static_cast<std::ptrdiff_t>(at));
+      first = next;
+    }
+    at = next;
+  }
+  kept.insert(kept.end(), png.begin() + static_cast<std::ptrdiff_t>(first), png.end());
+  return kept;
+}
+
 cv::Mat decode(std::span<const std::byte> bytes, ImageFormat format) {
   // OpenCV wants a matrix, and leaves these bytes alone.
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
@@ -114,7 +140,9 @@ Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::stri
                   "the JPEG data is damaged (" + damage + ")", "export the image again");
     }
   }
-  const cv::Mat mat = decode(bytes, header->format);
+  const bool png = header->format == ImageFormat::kPng;
+  const cv::Mat mat =
+      png ? decode(without_profile(bytes), header->format) : decode(bytes, header->format);
   const auto is_side = [&header](int side) {
     const auto value = static_cast<std::uint32_t>(side);
     return value == header->width || value == header->height;
@@ -123,7 +151,7 @@ Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::stri
     return fail(ExitCode::kInvalidInput, "image.decode", name, "the image data is damaged",
                 "export the image again");
   }
-  const bool own = header->format == ImageFormat::kPng || header->format == ImageFormat::kWebp;
+  const bool own = png || header->format == ImageFormat::kWebp;
   const unsigned orientation = own ? header->orientation : 1;
   if (mat.depth() == CV_8U) return upright(to_rgba<std::uint8_t>(mat), orientation);
   if (mat.depth() == CV_16U) return upright(to_rgba<std::uint16_t>(mat), orientation);

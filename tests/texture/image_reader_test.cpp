@@ -211,5 +211,21 @@ TEST(ImageReader, CorruptFilesGiveErrorsAndValidOnesPixels) {
   }
 }
 
+// As photo shops leave them: libpng would write to stderr, and it is not our words.
+TEST(ImageReader, APngsColourProfileIsPassedOverInSilence) {
+  const cv::Mat picture(5, 7, CV_8UC3, cv::Scalar(10, 20, 30));
+  Bytes bytes = encoded(picture, ".png");
+  // Behind the signature and the header: length, type, a profile that is none, a checksum that is
+  // none.
+  const Bytes profile = Bytes{} + std::initializer_list<unsigned>{0,   0, 0, 3, 'i', 'C', 'C', 'P',
+                                                                  'x', 0, 0, 1, 2,   3,   4};
+  bytes.insert(bytes.begin() + 33, profile.begin(), profile.end());
+  testing::internal::CaptureStderr();
+  const Result<RgbaImage> image = decode_image(bytes, "profile.png");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_TRUE(image) << to_line(image.error());
+  EXPECT_EQ(cv::norm(to_mat(*image), picture, cv::NORM_INF), 0);
+}
+
 }  // namespace
 }  // namespace modar
