@@ -21,6 +21,7 @@ constexpr int kTestRadius = 14;  // pixels of a level; turned and rounded it sta
 constexpr int kMomentRadius = 14;
 constexpr int kPyramidLevels = kLoopLevels + 2;
 constexpr int kSmallestSide = 16;
+constexpr int kSure = 40;  // score of a corner that noise and light leave where it is
 
 struct Point {
   int x = 0;
@@ -108,10 +109,12 @@ struct LoopDescriber::State {
   std::vector<std::int32_t> moment_offsets;
   loop::CornerFinder finder;
   std::vector<Corner> corners;
+  std::vector<std::uint8_t> weights;  ///< of the corners, where there are too many
   std::vector<LoopFeature> features;
 
   State(int width, const LoopDetectOptions& with) : options(with), finder(width, with) {}
   void smooth_level(std::size_t level);
+  void weigh();
   void strongest();
   void describe(const Corner& corner);
 };
@@ -146,6 +149,7 @@ std::unique_ptr<LoopDescriber> LoopDescriber::create(int width, int height,
     }
   }
   state->corners.reserve(cells * static_cast<std::size_t>(options.per_cell));
+  state->weights.reserve(state->corners.capacity());
   state->features.reserve(static_cast<std::size_t>(options.max_features));
   return std::unique_ptr<LoopDescriber>(new LoopDescriber(std::move(state)));
 }
@@ -184,11 +188,38 @@ void LoopDescriber::State::smooth_level(std::size_t level) {
   }
 }
 
+/// Scores decide up to the one that makes a corner sure; of sure ones the best of each cell go
+/// first. So what has the greatest contrast, a page of print, cannot take all features of a frame.
+/// Cells lie side by side in `corners`.
+void LoopDescriber::State::weigh() {
+  const auto cell_of = [this](const Corner& corner) {
+    return std::array<int, 3>{corner.level, corner.y / options.cell, corner.x / options.cell};
+  };
+  weights.clear();
+  for (std::size_t first = 0, last = 0; first < corners.size(); first = last) {
+    const auto cell = cell_of(corners[first]);
+    while (last < corners.size() && cell_of(corners[last]) == cell) ++last;
+    for (std::size_t i = first; i < last; ++i) {
+      int rank = 0;
+      for (std::size_t k = first; k < last; ++k) {
+        rank +=
+            corners[k].score > corners[i].score || (corners[k].score == corners[i].score && k < i)
+                ? 1
+                : 0;
+      }
+      const int score = corners[i].score;
+      weights.push_back(static_cast<std::uint8_t>(
+          score < kSure ? score : std::clamp(kSure + options.per_cell - rank, kSure, 255)));
+    }
+  }
+}
+
 void LoopDescriber::State::strongest() {
   const std::size_t most = static_cast<std::size_t>(options.max_features);
   if (corners.size() <= most) return;
+  weigh();
   std::array<std::size_t, 256> histogram{};
-  for (const Corner& corner : corners) ++histogram[corner.score];
+  for (const std::uint8_t weight : weights) ++histogram[weight];
   std::size_t above = 0;
   int cut = 255;
   while (cut > 0 && above + histogram[static_cast<std::size_t>(cut)] <= most) {
@@ -197,10 +228,10 @@ void LoopDescriber::State::strongest() {
   }
   std::size_t ties = most - above;
   std::size_t kept = 0;
-  for (const Corner& corner : corners) {
-    if (corner.score < cut || (corner.score == cut && ties == 0)) continue;
-    if (corner.score == cut) --ties;
-    corners[kept++] = corner;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (weights[i] < cut || (weights[i] == cut && ties == 0)) continue;
+    if (weights[i] == cut) --ties;
+    corners[kept++] = corners[i];
   }
   corners.resize(kept);
 }

@@ -56,6 +56,27 @@ TEST(Scene, PosesHaveTheTiltAndTheAreaOfTheirBand) {
   EXPECT_GT(farthest, 0.2);  // not in the middle alone
 }
 
+// A page of digits took every feature of a frame, and no pattern on it was ever found.
+TEST(LoopFeatures, PrintLeavesRoomForAPictureOnIt) {
+  cv::Mat frame(480 / 4, 640 / 4, CV_8UC1);
+  cv::RNG noise(3);
+  noise.fill(frame, cv::RNG::UNIFORM, 0, 256);
+  cv::resize(frame > 127, frame, {640, 480}, 0, 0, cv::INTER_NEAREST);
+  const cv::Rect place(224, 144, 192, 192);
+  const cv::Mat paler = 0.6 * test::textured_picture(place.width, place.height, 7) + 50;
+  paler.copyTo(frame(place));
+  LoopDetectOptions options;
+  options.max_features = 400;
+  const auto describer = LoopDescriber::create(frame.cols, frame.rows, options);
+  describer->set_frame(test::gray(frame));
+  const auto features = describer->features();
+  EXPECT_EQ(features.size(), 400u);
+  const auto inside = std::count_if(features.begin(), features.end(), [&](const LoopFeature& f) {
+    return place.contains(cv::Point(static_cast<int>(f.x), static_cast<int>(f.y)));
+  });
+  EXPECT_GT(inside, 0.25 * 400 * place.area() / frame.size().area());
+}
+
 TEST(PoseLoop, FindsThePatternWhereItIs) {
   const Camera camera = default_camera(640, 480);
   const auto bytes = bundle_with({record()});
