@@ -144,7 +144,9 @@ Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBe
     if (!picture) return tl::unexpected(picture.error());
     subject.pictures.push_back(std::move(*picture));
   }
-  auto bytes = bundle_of(subject.pictures, options.paper_set, options.ours);
+  // Callers that want neither method run loops of their own over the bytes.
+  const bool paper_alone = options.paper_set != 0 && !options.ours;
+  auto bytes = bundle_of(subject.pictures, options.paper_set, !paper_alone);
   if (!bytes) return tl::unexpected(bytes.error());
   subject.bytes = std::move(*bytes);
   const auto bundle = BundleView::open(subject.bytes);
