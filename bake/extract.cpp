@@ -2,6 +2,7 @@
 #include "bake/extract.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <string_view>
 #include <system_error>
 
@@ -48,9 +49,10 @@ class Extraction {
 };
 
 std::string Extraction::path_for(const std::string& stem, const std::string& extension) {
-  std::string path = folder_ + "/" + stem + extension;
+  const std::filesystem::path folder(folder_);
+  std::string path = folder / (stem + extension);
   for (int copy = 2; std::find(files_.begin(), files_.end(), path) != files_.end(); ++copy) {
-    path = folder_ + "/" + stem + "-" + std::to_string(copy) + extension;
+    path = folder / (stem + "-" + std::to_string(copy) + extension);
   }
   files_.push_back(path);
   return path;

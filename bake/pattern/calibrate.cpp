@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -307,6 +308,7 @@ Result<Calibration> calibrate(const CalibrateOptions& options, const PoseBenchPr
   }
   try {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     auto gathered = gather(options, board ? nullptr : &patterns.at(0), progress);
     if (!gathered) return tl::unexpected(gathered.error());
     return calibrated(std::move(*gathered), options.most_views, board);
