@@ -117,10 +117,7 @@ void check_loop_record(FaultLog& log, const BundleParts& parts, const PatternRec
 
 /// The twins of a pattern lie side by side in the section table.
 void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index) {
-  const auto recorded = [index](const SectionEntry& entry) {
-    return static_cast<SectionType>(entry.type) == SectionType::kLoopRecord && entry.owner == index;
-  };
-  if (std::any_of(parts.sections.begin(), parts.sections.end(), recorded)) return;
+  if (find_section(parts.sections, SectionType::kLoopRecord, index, 0) != nullptr) return;
   constexpr auto kTwin = static_cast<std::uint32_t>(SectionType::kFeatureTwin);
   const auto first =
       std::lower_bound(parts.sections.begin(), parts.sections.end(), index,

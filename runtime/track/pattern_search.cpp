@@ -205,9 +205,9 @@ void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
   const bool many = found.inliers >= kManyInliers;
   const auto convinces = [&](const Place& place) {
     if (place.fine) return place.right >= (many ? kLeastPercent : kRightPercent);
-    return percent_right(pattern, scene, place.pose, kVagueCells) >=
-               (many ? kRightPercent : kVaguePercent) &&
-           misfit(camera_, place.pose, matcher_.inliers()) <= kVagueMisfit;
+    return place.right >= (many ? kRightPercent : kVaguePercent) &&
+           misfit(camera_, place.pose, matcher_.inliers()) <= kVagueMisfit &&
+           percent_right(pattern, scene, place.pose, kVagueCells) > 0;
   };
   const auto consider = [&](const Place& place) {
     std::array<glm::dvec2, 4> corners;

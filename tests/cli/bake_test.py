@@ -40,7 +40,7 @@ class Bake(ProgramTest):
         whole = self.bake_demo()
         sizes = []
         for sets, expected in (("none", []), ("orb-500,brisk-2", ["orb-500", "brisk-2"])):
-            out = self.folder / f"{expected}.modar"
+            out = self.folder / f"{sets}.modar"
             done = self.modar("bake", "--pattern", COVER, "-o", out, *QUICK, "--parameters", sets)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(self.modar_json("check", out)["issues"], [])
@@ -53,7 +53,7 @@ class Bake(ProgramTest):
         self.assertLess(sizes[1], whole.stat().st_size)
         self.assert_fails(self.modar("bake", "--pattern", COVER, "-o", self.folder / "x.modar", "--parameters", "sift"),
                           1, "--parameters")
-        bare = self.folder / "[].modar"
+        bare = self.folder / "none.modar"
         self.assert_fails(self.run_program("modar-play", bare, "--input", COVER, "--method", "paper"), 3, "--parameters none")
         self.assertEqual(self.run_program("modar-play", bare, "--input", COVER).returncode, 0)
 

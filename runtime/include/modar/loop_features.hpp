@@ -20,11 +20,10 @@ inline constexpr int kLoopLevels = 4;
 inline constexpr int kLoopBorder = 18;
 
 struct LoopDetectOptions {
-  int threshold = 14;  ///< grey values; lower finds more corners and more noise
-  int cell = 64;       ///< pixels of a level; features are spread over such squares
-  int per_cell = 12;   ///< most features of a cell, the strongest
-  int max_features =
-      1500;       ///< most features of a frame; beyond a score, the best of each cell first
+  int threshold = 14;       ///< grey values; lower finds more corners and more noise
+  int cell = 64;            ///< pixels of a level; features are spread over such squares
+  int per_cell = 12;        ///< most features of a cell, the strongest
+  int max_features = 1500;  ///< of a frame: the strongest, and of the sure ones each cell's best
   int simd = -1;  ///< level of instructions, 0: the least that this program was built with;
                   ///< -1: the best that the processor has. All give the same bits
 };
