@@ -8,16 +8,19 @@
 #include <string>
 #include <vector>
 
-#include "bake/model/topology.hpp"
+#include "bake/topology_figures.hpp"
 
 namespace modar {
 
-enum class FindingSeverity : std::uint8_t { kInfo, kWarning, kError };
+/// Told when a stage begins or moves on: its name and how much of it is done (0 to 1).
+using ProgressCallback = std::function<void(const std::string& stage, double done)>;
+
+enum class DiagnosticSeverity : std::uint8_t { kInfo, kWarning, kError };
 
 /// Something in the input that a person may want to know or mend; the bake goes on.
-struct Finding {
+struct Diagnostic {
   std::string id;  ///< stable, "obj.missing-mtl"
-  FindingSeverity severity = FindingSeverity::kWarning;
+  DiagnosticSeverity severity = DiagnosticSeverity::kWarning;
   std::string file;        ///< as the user named it
   std::uint64_t line = 0;  ///< 1 for the first; 0: the whole file
   std::string message;
@@ -43,12 +46,10 @@ struct LevelFigures {
 /// Collects the stream. Not thread-safe: stages report from the thread that called them.
 struct Report {
   std::vector<StageReport> stages;
-  std::vector<Finding> findings;
+  std::vector<Diagnostic> findings;
   std::vector<MeshTopology> topologies;  ///< one a model, where they were asked for
   std::vector<LevelFigures> levels;      ///< one a model, where levels were asked for
-  /// Called when a stage begins or moves on: its name and how much of it is done (0 to 1). May be
-  /// empty.
-  std::function<void(const std::string& stage, double done)> progress;
+  ProgressCallback progress;             ///< may be empty
 };
 
 /// Times a stage: begins it in the constructor, records it when done() is called.

@@ -47,7 +47,7 @@ std::span<const std::byte> BundleView::texture_data(std::uint32_t texture) const
 }
 
 FeatureView BundleView::features(std::uint32_t pattern, std::uint32_t set_id) const {
-  const std::span<const std::byte> bytes = section(SectionType::kFeatureTwin, pattern, set_id);
+  const std::span<const std::byte> bytes = section(SectionType::kMappedFeatures, pattern, set_id);
   if (bytes.empty()) return {};
   const auto& header = *reinterpret_cast<const FeatureHeader*>(bytes.data());
   FeatureView view;

@@ -97,7 +97,7 @@ class SectionList {
         header.keypoints_offset + features.keypoints.size() * sizeof(KeypointRecord);
     header.descriptors_offset = align(end, 16);
     feature_headers_.push_back(header);
-    add(SectionType::kFeatureTwin, pattern, features.set_id,
+    add(SectionType::kMappedFeatures, pattern, features.set_id,
         {bytes_of(feature_headers_.back()), std::as_bytes(std::span(features.keypoints)),
          Bytes(kZeros).first(header.descriptors_offset - end), Bytes(features.descriptors)});
     if (!features.yml.empty()) {

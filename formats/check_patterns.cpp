@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "formats/check_rules.hpp"
-#include "formats/loop_view.hpp"
+#include "formats/tracker_record_view.hpp"
 #include "formats/validate.hpp"
 
 namespace modar {
@@ -95,7 +95,7 @@ void check_text(FaultLog& log, const BundleParts& parts, const SectionEntry& ent
   if (!text.starts_with("%YAML:1.0")) {
     log.add(Rule::kFeatureYml, entry.offset, where, "it does not start with %YAML:1.0");
   }
-  if (find_section(parts.sections, SectionType::kFeatureTwin, entry.owner, entry.variant) ==
+  if (find_section(parts.sections, SectionType::kMappedFeatures, entry.owner, entry.variant) ==
       nullptr) {
     log.add(Rule::kFeatureYml, entry.offset, where, "it has no mapped twin");
   }
@@ -104,21 +104,21 @@ void check_text(FaultLog& log, const BundleParts& parts, const SectionEntry& ent
 void check_loop_record(FaultLog& log, const BundleParts& parts, const PatternRecord& pattern,
                        const SectionEntry& entry) {
   const std::string where = label(parts, "pattern", pattern.name) + ", loop record";
-  LoopRecordView view;
-  if (const auto fault = view_loop_record(section_bytes(parts, entry), view)) {
-    log.add(Rule::kLoopRecord, entry.offset + fault->offset, where, fault->cause);
-  } else if (view.header.describer_version != kLoopDescriber) {
-    log.add(Rule::kLoopRecord, entry.offset, where, "its describer's version is unknown");
+  TrackerRecordView view;
+  if (const auto fault = view_tracker_record(section_bytes(parts, entry), view)) {
+    log.add(Rule::kTrackerRecord, entry.offset + fault->offset, where, fault->cause);
+  } else if (view.header.describer_version != kFeatureExtractor) {
+    log.add(Rule::kTrackerRecord, entry.offset, where, "its describer's version is unknown");
   } else if (view.header.width != pattern.width || view.header.height != pattern.height) {
-    log.add(Rule::kLoopRecord, entry.offset + offsetof(LoopRecordHeader, width), where,
+    log.add(Rule::kTrackerRecord, entry.offset + offsetof(TrackerRecordHeader, width), where,
             "its image has another size than the pattern");
   }
 }
 
 /// The twins of a pattern lie side by side in the section table.
 void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index) {
-  if (find_section(parts.sections, SectionType::kLoopRecord, index, 0) != nullptr) return;
-  constexpr auto kTwin = static_cast<std::uint32_t>(SectionType::kFeatureTwin);
+  if (find_section(parts.sections, SectionType::kTrackerRecord, index, 0) != nullptr) return;
+  constexpr auto kTwin = static_cast<std::uint32_t>(SectionType::kMappedFeatures);
   const auto first =
       std::lower_bound(parts.sections.begin(), parts.sections.end(), index,
                        [](const SectionEntry& entry, std::uint32_t owner) {
@@ -146,15 +146,15 @@ void check_patterns(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.patterns.size(); ++i) check_findable(log, parts, i);
   for (const SectionEntry& entry : parts.sections) {
     const auto type = static_cast<SectionType>(entry.type);
-    if (type == SectionType::kLoopRecord) {
+    if (type == SectionType::kTrackerRecord) {
       check_loop_record(log, parts, parts.patterns[entry.owner], entry);
     }
-    if (type != SectionType::kFeatureTwin && type != SectionType::kFeatureYml) continue;
+    if (type != SectionType::kMappedFeatures && type != SectionType::kFeatureYml) continue;
     const PatternRecord& pattern = parts.patterns[entry.owner];
     const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry.variant);
     const std::string where = label(parts, "pattern", pattern.name) + ", " +
                               label(parts, "parameter set", parts.parameter_sets[set].name);
-    if (type == SectionType::kFeatureTwin) {
+    if (type == SectionType::kMappedFeatures) {
       check_twin(log, parts, parts.parameter_sets[set], entry, where);
     } else {
       check_text(log, parts, entry, where);

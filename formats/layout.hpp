@@ -28,25 +28,25 @@ inline constexpr std::uint64_t kGpuAlignment = 4096;
 /// Section types. 1-255 are tables and small text, 256 and up are payloads, so that everything that
 /// opening a bundle reads lies in its first pages.
 enum class SectionType : std::uint32_t {
-  kNames = 1,           ///< UTF-8 names, back to back
-  kMeta = 2,            ///< JSON text: how the bundle was baked
-  kStatement = 3,       ///< JSON lines that follow from the rest: see statement.hpp
-  kModels = 16,         ///< table of ModelRecord
-  kChunks = 17,         ///< table of ChunkRecord
-  kLevels = 18,         ///< table of LevelRecord
-  kMaterials = 19,      ///< table of MaterialRecord
-  kLayouts = 20,        ///< table of LayoutRecord
-  kTextures = 32,       ///< table of TextureRecord
-  kTextureLevels = 33,  ///< table of TextureLevelRecord
-  kPatterns = 48,       ///< table of PatternRecord
-  kParameterSets = 49,  ///< table of ParameterSetRecord
-  kScenes = 64,         ///< table of SceneRecord
-  kFeatureTwin = 256,   ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
-  kFeatureYml = 257,    ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
-  kLoopRecord = 258,    ///< owner: pattern, variant: 0; see loop_record.hpp
-  kVertices = 512,      ///< GPU: merged vertex buffer of all models
-  kIndices = 513,       ///< GPU: merged 16-bit index buffer of all models
-  kTextureData = 514,   ///< GPU: owner: texture; ETC1 blocks of all its levels
+  kNames = 1,             ///< UTF-8 names, back to back
+  kMeta = 2,              ///< JSON text: how the bundle was baked
+  kStatement = 3,         ///< JSON lines that follow from the rest: see statement.hpp
+  kModels = 16,           ///< table of ModelRecord
+  kChunks = 17,           ///< table of ChunkRecord
+  kLevels = 18,           ///< table of LevelRecord
+  kMaterials = 19,        ///< table of MaterialRecord
+  kLayouts = 20,          ///< table of LayoutRecord
+  kTextures = 32,         ///< table of TextureRecord
+  kTextureLevels = 33,    ///< table of TextureLevelRecord
+  kPatterns = 48,         ///< table of PatternRecord
+  kParameterSets = 49,    ///< table of ParameterSetRecord
+  kScenes = 64,           ///< table of SceneRecord
+  kMappedFeatures = 256,  ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
+  kFeatureYml = 257,      ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
+  kTrackerRecord = 258,   ///< owner: pattern, variant: 0; see loop_record.hpp
+  kVertices = 512,        ///< GPU: merged vertex buffer of all models
+  kIndices = 513,         ///< GPU: merged 16-bit index buffer of all models
+  kTextureData = 514,     ///< GPU: owner: texture; ETC1 blocks of all its levels
 };
 
 enum SectionFlags : std::uint16_t {
@@ -296,7 +296,7 @@ struct SceneRecord {
 };
 static_assert(sizeof(SceneRecord) == 48);
 
-/// Start of a kFeatureTwin section.
+/// Start of a kMappedFeatures section.
 struct FeatureHeader {
   std::uint32_t count;
   std::uint32_t descriptor_bytes;

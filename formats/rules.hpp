@@ -67,7 +67,7 @@ enum class Rule : std::uint8_t {
   kDescriptorLength,
   kFeaturesMissing,
   kFeatureYml,
-  kLoopRecord,
+  kTrackerRecord,
   kStatement,
   kVertexPadding,
   kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV

@@ -178,16 +178,16 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
         check.fault(Rule::kSectionOwner, &entry.owner,
                     "texture " + std::to_string(entry.owner) + " is not there");
       }
-    } else if (type == SectionType::kFeatureTwin || type == SectionType::kFeatureYml) {
+    } else if (type == SectionType::kMappedFeatures || type == SectionType::kFeatureYml) {
       const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry.variant);
       if (entry.owner >= parts.patterns.size() || set == kNone) {
         check.fault(Rule::kSectionOwner, &entry.owner,
                     "pattern " + std::to_string(entry.owner) + " or parameter set " +
                         std::to_string(entry.variant) + " is not there");
-      } else if (type == SectionType::kFeatureTwin) {
+      } else if (type == SectionType::kMappedFeatures) {
         check_twin(check, parts, entry, parts.parameter_sets[set]);
       }
-    } else if (type == SectionType::kLoopRecord) {
+    } else if (type == SectionType::kTrackerRecord) {
       if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
         check.fault(Rule::kSectionOwner, &entry.owner,
                     "pattern " + std::to_string(entry.owner) + " is not there");

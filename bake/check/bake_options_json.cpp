@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bake/check/source_check.hpp"
-#include "bake/model/mesh_levels.hpp"
+#include "bake/mesh/lod/mesh_levels.hpp"
 
 namespace modar {
 namespace {

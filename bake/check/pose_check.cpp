@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
 #include "bake/check/workstation_issues.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "bake/pattern/pose_scene.hpp"
@@ -31,7 +31,7 @@ class Eye {
     Eye eye;
     const bool records = std::any_of(
         bundle.sections().begin(), bundle.sections().end(), [](const SectionEntry& entry) {
-          return entry.type == static_cast<std::uint32_t>(SectionType::kLoopRecord);
+          return entry.type == static_cast<std::uint32_t>(SectionType::kTrackerRecord);
         });
     if (records) {
       PoseLoopOptions options;
@@ -94,19 +94,19 @@ class PatternSweep {
 
  private:
   void add(PoseStep& step, const SceneFrame& truth, const TrackResult& seen) const {
-    for (const Sighting& sighting : seen.visible) {
-      if (sighting.pattern != pattern_) continue;
+    for (const Detection& detection : seen.visible) {
+      if (detection.pattern != pattern_) continue;
       double off = 0;
       for (std::size_t i = 0; i < 4; ++i) {
-        off += glm::length(sighting.corners[i] - truth.corners[i]) / 4;
+        off += glm::length(detection.corners[i] - truth.corners[i]) / 4;
       }
       if (!(off < kRightPixels)) return;
-      const glm::dmat3 turn = glm::transpose(truth.pose.rotation) * sighting.pose.rotation;
+      const glm::dmat3 turn = glm::transpose(truth.pose.rotation) * detection.pose.rotation;
       ++step.right;
       step.corner_px += off;
       step.rotation_deg += glm::length(rotation_vector(turn)) * kDegrees;
       step.translation_percent += 100 *
-                                  glm::length(sighting.pose.translation - truth.pose.translation) /
+                                  glm::length(detection.pose.translation - truth.pose.translation) /
                                   glm::length(truth.pose.translation);
       return;
     }

@@ -7,7 +7,7 @@
 #include <map>
 #include <system_error>
 
-#include "bake/check/process.hpp"
+#include "bake/process.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {

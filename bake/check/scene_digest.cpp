@@ -100,8 +100,8 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
   for (std::uint32_t t = 0; t < view.textures().size(); ++t) digest.add(view.texture_data(t));
   for (const SectionEntry& entry : view.sections()) {
     const auto type = static_cast<SectionType>(entry.type);
-    if (type != SectionType::kFeatureTwin && type != SectionType::kFeatureYml &&
-        type != SectionType::kLoopRecord) {
+    if (type != SectionType::kMappedFeatures && type != SectionType::kFeatureYml &&
+        type != SectionType::kTrackerRecord) {
       continue;
     }
     digest.add(&entry.type, sizeof entry.type);

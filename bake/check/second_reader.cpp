@@ -3,7 +3,7 @@
 
 #include <fstream>
 
-#include "bake/check/process.hpp"
+#include "bake/process.hpp"
 #include "formats/atomic_file.hpp"
 
 namespace modar {

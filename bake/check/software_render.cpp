@@ -181,9 +181,9 @@ class Canvas {
 
 }  // namespace
 
-RgbaImage render_softly(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
-                        const Camera& camera, const glm::dmat4& to_eye,
-                        const RenderOptions& options) {
+RgbaImage render_reference(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
+                           const Camera& camera, const glm::dmat4& to_eye,
+                           const RenderOptions& options) {
   return Canvas(mesh, textures, camera, to_eye, options).draw();
 }
 

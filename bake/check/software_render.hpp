@@ -6,8 +6,8 @@
 
 #include <glm/mat4x4.hpp>
 
-#include "bake/model/tri_mesh.hpp"
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/image/image.hpp"
+#include "bake/mesh/tri_mesh.hpp"
 #include "modar/camera.hpp"
 #include "modar/renderer.hpp"
 
@@ -22,8 +22,8 @@ struct SoftTexture {
 /// Draws a mesh over the clear colour of `options`, lit like shaders/model.vert lights vertices,
 /// with perspective-correct attributes and trilinear textures; opaque. to_eye: mesh space to GL eye
 /// space. textures: one a material. Pixels are sampled at their centres.
-RgbaImage render_softly(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
-                        const Camera& camera, const glm::dmat4& to_eye,
-                        const RenderOptions& options);
+RgbaImage render_reference(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
+                           const Camera& camera, const glm::dmat4& to_eye,
+                           const RenderOptions& options);
 
 }  // namespace modar

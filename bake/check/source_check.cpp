@@ -11,10 +11,10 @@
 
 #include "bake/check/triangle_tree.hpp"
 #include "bake/check/workstation_issues.hpp"
-#include "bake/model/tri_mesh.hpp"
-#include "bake/model/vertex_decoder.hpp"
-#include "bake/read_model.hpp"
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/import/read_model.hpp"
+#include "bake/mesh/pack/vertex_decoder.hpp"
+#include "bake/mesh/tri_mesh.hpp"
+#include "bake/texture/texture.hpp"
 
 namespace modar {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 

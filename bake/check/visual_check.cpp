@@ -10,10 +10,10 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
 #include "bake/check/software_render.hpp"
 #include "bake/check/workstation_issues.hpp"
-#include "bake/read_model.hpp"
+#include "bake/import/read_model.hpp"
 #include "bake/texture/texture_quality.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"
@@ -183,7 +183,7 @@ class Looker {
       const glm::dmat4 to_eye =
           glm::lookAt(kDistance * glm::normalize(views[view]), glm::dvec3(0.0),
                       std::fabs(views[view].x) > 1 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0));
-      const RgbaImage wanted = render_softly(mesh, textures, camera_, to_eye, render_);
+      const RgbaImage wanted = render_reference(mesh, textures, camera_, to_eye, render_);
       const RgbaImage shown = draw(index, to_eye);
       const Crop crop = shown_part(wanted, shown, clear_);
       if (crop.right <= crop.left) continue;

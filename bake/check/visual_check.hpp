@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/image/image.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/error.hpp"

@@ -4,7 +4,7 @@
 #include <array>
 #include <string>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
 #include "bake/pattern/pattern_image.hpp"
 #include "formats/error.hpp"
 

@@ -5,14 +5,14 @@
 #include <string>
 #include <system_error>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
+#include "bake/bundle/topology_json.hpp"
 #include "bake/check/reproduce.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
-#include "bake/commands/terminal.hpp"
-#include "bake/commands/topology_json.hpp"
-#include "bake/model/memory_limit.hpp"
+#include "bake/memory/memory_limit.hpp"
 #include "bake/output_folder.hpp"
+#include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -64,7 +64,7 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
 void report_memory(const BakeRequest& request, Report& report) {
   const std::uint64_t peak = process_cost().peak_rss_bytes;
   if (request.memory_bytes == 0 || peak <= request.memory_bytes) return;
-  report.findings.push_back({"bake.memory", FindingSeverity::kWarning, "--memory", 0,
+  report.findings.push_back({"bake.memory", DiagnosticSeverity::kWarning, "--memory", 0,
                              "the bake took " + human_bytes(peak) + ", more than was asked",
                              "fewer --jobs, smaller textures or several bundles take less"});
 }
@@ -90,7 +90,7 @@ int run_bake(const BakeCommand& command) {
   bar.clear();
   report_memory(command.request, report);
   if (!command.quiet) {
-    for (const Finding& finding : report.findings) print_finding(finding);
+    for (const Diagnostic& finding : report.findings) print_diagnostic(finding);
   }
   if (!content) return print_error(content.error());
   StageTimer writing(report, "write");

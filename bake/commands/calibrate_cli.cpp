@@ -5,8 +5,8 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/commands/pattern_json.hpp"
-#include "bake/commands/terminal.hpp"
 #include "bake/pattern/pattern_picture.hpp"
+#include "bake/terminal.hpp"
 
 namespace modar {
 namespace {

@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "bake/commands/check_command.hpp"
-#include "bake/commands/terminal.hpp"
+#include "bake/terminal.hpp"
 #include "modar/device_profile.hpp"
 
 #ifndef MODAR_VERSION

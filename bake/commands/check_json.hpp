@@ -4,11 +4,11 @@
 #include <optional>
 #include <string>
 
-#include "bake/check/mutate.hpp"
 #include "bake/check/pose_check.hpp"
 #include "bake/check/source_check.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/check/visual_check.hpp"
+#include "bake/lab/mutate.hpp"
 
 namespace modar {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bake/commands/check_command.hpp"
-#include "bake/commands/terminal.hpp"
+#include "bake/terminal.hpp"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <system_error>
 
 #include "bake/commands/check_command.hpp"
-#include "bake/commands/terminal.hpp"
 #include "bake/output_folder.hpp"
+#include "bake/terminal.hpp"
 
 namespace modar {
 namespace {

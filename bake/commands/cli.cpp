@@ -12,8 +12,8 @@
 #include "bake/commands/check_command.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/ship_command.hpp"
-#include "bake/commands/terminal.hpp"
-#include "bake/model/mesh_levels.hpp"
+#include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/terminal.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/features.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
 #include "bake/pattern/confusion.hpp"
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/pattern/simulate.hpp"

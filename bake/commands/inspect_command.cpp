@@ -2,11 +2,11 @@
 #include <cstdio>
 #include <string>
 
+#include "bake/bundle/topology_json.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
-#include "bake/commands/terminal.hpp"
-#include "bake/commands/topology_json.hpp"
-#include "bake/extract.hpp"
+#include "bake/export/extract.hpp"
+#include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 

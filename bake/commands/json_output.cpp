@@ -7,23 +7,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "bake/bundle_builder.hpp"
-#include "bake/commands/topology_json.hpp"
+#include "bake/bundle/bundle_builder.hpp"
+#include "bake/bundle/topology_json.hpp"
+#include "bake/json.hpp"
 
 namespace modar {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-/// JSON has no infinities: they become null.
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
-/// Foreign bytes that are no UTF-8 are replaced, never thrown at.
-std::string dump(const Json& json) {
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
-}
 
 const char* layout_name(const LayoutRecord& layout) {
   for (std::uint16_t a = 0; a < layout.attribute_count; ++a) {
@@ -56,17 +45,6 @@ std::uint64_t model_bytes(const BundleView& bundle, const ModelRecord& model) {
   return bytes;
 }
 
-Json topology_json(const MeshTopology& topology) {
-  Json json = Json::object();
-  for (const auto& [key, value] : topology_figures(topology)) json[key] = value;
-  return json;
-}
-
-Json level_json(const LevelFigures& levels) {
-  return {{"position_error_max", number(levels.position_error_max)},
-          {"uv_shift_max_texels", number(levels.uv_shift_max_texels)}};
-}
-
 Json model_json(const BundleView& bundle, std::uint32_t index) {
   const ModelRecord& model = bundle.models()[index];
   const std::uint64_t bytes = model_bytes(bundle, model);
@@ -93,18 +71,18 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
           {"materials", materials},
           {"bytes", bytes},
           {"bytes_per_triangle",
-           number(static_cast<double>(level0) / static_cast<double>(model.triangle_count))},
+           json_number(static_cast<double>(level0) / static_cast<double>(model.triangle_count))},
           {"layout", layout_name(bundle.layouts()[model.layout])},
           {"center", {model.center[0], model.center[1], model.center[2]}},
-          {"scale", number(model.scale)},
-          {"diagonal", number(model.diagonal)},
-          {"unit_metres", number(model.unit_metres)},
-          {"position_error_max", number(model.position_error_max)},
-          {"position_error_rms", number(model.position_error_rms)},
-          {"normal_error_max_deg", number(model.normal_error_max_deg)},
-          {"normal_error_rms_deg", number(model.normal_error_rms_deg)},
-          {"uv_error_max_texels", number(model.uv_error_max_texels)},
-          {"uv_error_rms_texels", number(model.uv_error_rms_texels)},
+          {"scale", json_number(model.scale)},
+          {"diagonal", json_number(model.diagonal)},
+          {"unit_metres", json_number(model.unit_metres)},
+          {"position_error_max", json_number(model.position_error_max)},
+          {"position_error_rms", json_number(model.position_error_rms)},
+          {"normal_error_max_deg", json_number(model.normal_error_max_deg)},
+          {"normal_error_rms_deg", json_number(model.normal_error_rms_deg)},
+          {"uv_error_max_texels", json_number(model.uv_error_max_texels)},
+          {"uv_error_rms_texels", json_number(model.uv_error_rms_texels)},
           {"topology", topology ? topology_json(*topology) : Json(nullptr)},
           {"levels", levels ? level_json(*levels) : Json(nullptr)}};
 }
@@ -118,8 +96,8 @@ Json texture_json(const BundleView& bundle, std::uint32_t index) {
           {"source_height", texture.source_height},
           {"levels", texture.level_count},
           {"bytes", bundle.texture_data(index).size()},
-          {"psnr_db", number(texture.psnr_db)},
-          {"ssim", number(texture.ssim)},
+          {"psnr_db", json_number(texture.psnr_db)},
+          {"ssim", json_number(texture.ssim)},
           {"alpha", (texture.flags & kTextureAlpha) != 0},
           {"repeat", (texture.flags & kTextureRepeat) != 0}};
 }
@@ -129,14 +107,14 @@ Json pattern_json(const BundleView& bundle, std::uint32_t index) {
   Json keypoints = Json::object();
   for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
     const ParameterSetRecord& set = bundle.parameter_sets()[s];
-    if (bundle.section(SectionType::kFeatureTwin, index, set.id).empty()) continue;
+    if (bundle.section(SectionType::kMappedFeatures, index, set.id).empty()) continue;
     keypoints[std::string(bundle.name(set.name))] = bundle.features(index, set.id).keypoints.size();
   }
   return {{"name", bundle.name(pattern.name)},
           {"width", pattern.width},
           {"height", pattern.height},
-          {"width_mm", number(pattern.width_mm)},
-          {"score", pattern.score < 0 ? Json(nullptr) : number(pattern.score)},
+          {"width_mm", json_number(pattern.width_mm)},
+          {"score", pattern.score < 0 ? Json(nullptr) : json_number(pattern.score)},
           {"keypoints", keypoints}};
 }
 
@@ -158,7 +136,7 @@ Json inspect_document(const BundleView& bundle) {
     const SceneRecord& scene = bundle.scenes()[s];
     scenes.push_back({{"pattern", bundle.name(bundle.patterns()[scene.pattern].name)},
                       {"model", bundle.name(bundle.models()[scene.model].name)},
-                      {"scale", number(scene.scale)},
+                      {"scale", json_number(scene.scale)},
                       {"offset", {scene.offset[0], scene.offset[1], scene.offset[2]}}});
   }
   return {{"format", {{"major", bundle.header().major}, {"minor", bundle.header().minor}}},
@@ -169,29 +147,29 @@ Json inspect_document(const BundleView& bundle) {
           {"scenes", scenes}};
 }
 
-const char* severity_name(FindingSeverity severity) {
-  return severity == FindingSeverity::kInfo      ? "info"
-         : severity == FindingSeverity::kWarning ? "warning"
-                                                 : "error";
+const char* severity_name(DiagnosticSeverity severity) {
+  return severity == DiagnosticSeverity::kInfo      ? "info"
+         : severity == DiagnosticSeverity::kWarning ? "warning"
+                                                    : "error";
 }
 
 }  // namespace
 
 std::string inspect_json(const BundleView& bundle) {
-  return dump(inspect_document(bundle));
+  return json_text(inspect_document(bundle));
 }
 
 std::string bake_json(const BundleView& bundle, const Report& report, const ProcessCost& cost) {
   Json stages = Json::array();
   for (const StageReport& stage : report.stages) {
     stages.push_back({{"name", stage.name},
-                      {"ms", number(stage.ms)},
+                      {"ms", json_number(stage.ms)},
                       {"in", stage.in},
                       {"out", stage.out},
-                      {"max_error", number(stage.max_error)}});
+                      {"max_error", json_number(stage.max_error)}});
   }
   Json findings = Json::array();
-  for (const Finding& finding : report.findings) {
+  for (const Diagnostic& finding : report.findings) {
     findings.push_back({{"id", finding.id},
                         {"severity", severity_name(finding.severity)},
                         {"file", finding.file},
@@ -207,12 +185,12 @@ std::string bake_json(const BundleView& bundle, const Report& report, const Proc
                           {"copied_faces", topology.half_edges->copied_faces},
                           {"copied_vertices", topology.half_edges->copied_vertices}});
   }
-  return dump({{"bundle", inspect_document(bundle)},
-               {"half_edges", half_edges},
-               {"stages", stages},
-               {"findings", findings},
-               {"cpu_seconds", cost.cpu_seconds},
-               {"peak_rss_bytes", cost.peak_rss_bytes}});
+  return json_text({{"bundle", inspect_document(bundle)},
+                    {"half_edges", half_edges},
+                    {"stages", stages},
+                    {"findings", findings},
+                    {"cpu_seconds", cost.cpu_seconds},
+                    {"peak_rss_bytes", cost.peak_rss_bytes}});
 }
 
 double bytes_per_triangle_of(const std::string& report) {
@@ -226,77 +204,18 @@ double bytes_per_triangle_of(const std::string& report) {
 
 std::string rectify_json(const std::string& path, std::uint32_t width, std::uint32_t height,
                          double width_mm) {
-  return dump({{"image", path}, {"width", width}, {"height", height}, {"width_mm", width_mm}});
+  return json_text({{"image", path}, {"width", width}, {"height", height}, {"width_mm", width_mm}});
 }
 
 std::string bench_json(const std::vector<BenchRow>& rows) {
   Json list = Json::array();
   for (const BenchRow& row : rows) {
     list.push_back({{"measure", row.measure},
-                    {"ours", number(row.ours)},
-                    {"reference", number(row.reference)},
-                    {"ratio", number(row.ratio)}});
+                    {"ours", json_number(row.ours)},
+                    {"reference", json_number(row.reference)},
+                    {"ratio", json_number(row.ratio)}});
   }
-  return dump(list);
-}
-
-namespace {
-
-const char* max_error_unit(const MaxError& error) {
-  switch (error.unit) {
-    case MaxError::Unit::kAny:
-      return "any";
-    case MaxError::Unit::kSource:
-      return "source";
-    case MaxError::Unit::kPercent:
-      return "percent";
-    case MaxError::Unit::kMetres:
-      break;
-  }
-  return "metres";
-}
-
-const char* positions_name(const BakeRequest& request) {
-  if (!request.positions) return "auto";
-  return *request.positions == PositionKind::kHalf ? "half" : "int16";
-}
-
-}  // namespace
-
-std::string bundle_meta(const BakeRequest& request, const Report& report) {
-  const auto name = [](const std::string& path) {
-    return std::filesystem::path(path).filename().string();
-  };
-  Json models = Json::array();
-  for (const std::string& path : request.models) {
-    Json model = {{"file", name(path)}};
-    if (models.size() < report.topologies.size()) {
-      model["topology"] = topology_json(report.topologies[models.size()]);
-    }
-    if (models.size() < report.levels.size()) {
-      model["levels"] = level_json(report.levels[models.size()]);
-    }
-    models.push_back(std::move(model));
-  }
-  Json patterns = Json::array();
-  for (const PatternRequest& pattern : request.patterns) {
-    patterns.push_back({{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}});
-  }
-  return dump({{"tool", "modar " + request.tool_version},
-               {"models", models},
-               {"patterns", patterns},
-               {"options",
-                {{"device", request.device},
-                 {"lods", request.levels},
-                 {"max_error", request.max_error.value},
-                 {"max_error_unit", max_error_unit(request.max_error)},
-                 {"positions", positions_name(request)},
-                 {"topology", request.topology},
-                 {"effort", static_cast<int>(request.textures.effort)},
-                 {"perceptual", request.textures.perceptual},
-                 {"max_texture", request.textures.max_side},
-                 {"mipmaps", request.textures.mipmaps},
-                 {"unit_metres", request.unit_metres}}}});
+  return json_text(list);
 }
 
 }  // namespace modar

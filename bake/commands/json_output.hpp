@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "bake/commands/terminal.hpp"
 #include "bake/report.hpp"
+#include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 
 namespace modar {

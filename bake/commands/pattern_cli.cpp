@@ -7,8 +7,8 @@
 
 #include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
-#include "bake/commands/terminal.hpp"
 #include "bake/pattern/pattern_picture.hpp"
+#include "bake/terminal.hpp"
 
 namespace modar {
 namespace {

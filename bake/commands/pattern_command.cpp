@@ -1,13 +1,13 @@
 // `modar pattern`: what its commands do, one after the other.
 #include <cstdio>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/json_output.hpp"
 #include "bake/commands/pattern_json.hpp"
-#include "bake/commands/terminal.hpp"
 #include "bake/output_folder.hpp"
 #include "bake/pattern/pattern_picture.hpp"
+#include "bake/terminal.hpp"
 #include "modar/camera_file.hpp"
 
 namespace modar {
@@ -45,9 +45,9 @@ int run_score(const ScoreCommand& command) {
     bool shrunk = false;
     const auto picture = load_pattern(path, shrunk);
     if (!picture) return print_error(picture.error());
-    LoopBakeOptions loop;
+    TrackerRecordOptions loop;
     loop.jobs = command.jobs;
-    auto score = bake_loop_record(picture->view(), loop).and_then([&](const auto& record) {
+    auto score = bake_tracker_record(picture->view(), loop).and_then([&](const auto& record) {
       return score_pattern(picture->view(), record, command.jobs);
     });
     if (!score) {

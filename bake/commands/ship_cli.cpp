@@ -5,7 +5,7 @@
 
 #include "bake/commands/arguments.hpp"
 #include "bake/commands/ship_command.hpp"
-#include "bake/commands/terminal.hpp"
+#include "bake/terminal.hpp"
 
 namespace modar {
 namespace {

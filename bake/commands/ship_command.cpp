@@ -14,9 +14,9 @@
 #include <optional>
 
 #include "bake/commands/ship_json.hpp"
-#include "bake/commands/terminal.hpp"
 #include "bake/ship/keys.hpp"
 #include "bake/ship/release_folder.hpp"
+#include "bake/terminal.hpp"
 #include "formats/atomic_file.hpp"
 #include "modar/digest.hpp"
 

@@ -33,9 +33,9 @@ Result<FeatureContent> describe(const GrayImage& image, const ParameterSetRecord
   return content;
 }
 
-Result<void> add_score(const std::string& path, const GrayImage& grey, unsigned jobs,
+Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned jobs,
                        PatternFeatures& out, Report& report) {
-  const auto score = score_pattern(grey, out.loop_record, jobs);
+  const auto score = score_pattern(gray, out.loop_record, jobs);
   if (!score) return tl::unexpected(score.error());
   out.record.score = static_cast<float>(score->score);
   out.record.score_version = kScoreVersion;
@@ -44,8 +44,8 @@ Result<void> add_score(const std::string& path, const GrayImage& grey, unsigned 
                        [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
   const bool weak = score->score < kWeakScore;
   report.findings.push_back({weak ? "pattern.weak" : "pattern.score",
-                             weak ? FindingSeverity::kWarning : FindingSeverity::kInfo, path, 0,
-                             "the pattern scores " + std::to_string(score->score) + " of 100",
+                             weak ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, path,
+                             0, "the pattern scores " + std::to_string(score->score) + " of 100",
                              weak ? worst->advice : ""});
   return {};
 }
@@ -54,29 +54,29 @@ Result<void> add_score(const std::string& path, const GrayImage& grey, unsigned 
 
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                      std::span<const ParameterSetRecord> sets,
-                                     const LoopBakeOptions& loop, Report& report) {
+                                     const TrackerRecordOptions& loop, Report& report) {
   StageTimer timer(report, "pattern");
   bool shrunk = false;
   const auto picture = load_pattern(path, shrunk);
   if (!picture) return tl::unexpected(picture.error());
-  const GrayImage grey = picture->view();
+  const GrayImage gray = picture->view();
   if (shrunk) {
-    report.findings.push_back({"pattern.resized", FindingSeverity::kInfo, path, 0,
-                               "the picture was made smaller, to " + std::to_string(grey.width) +
-                                   "x" + std::to_string(grey.height) + " pixels",
+    report.findings.push_back({"pattern.resized", DiagnosticSeverity::kInfo, path, 0,
+                               "the picture was made smaller, to " + std::to_string(gray.width) +
+                                   "x" + std::to_string(gray.height) + " pixels",
                                ""});
   }
   PatternFeatures out;
   out.name = base_name(path);
-  out.record.width = static_cast<std::uint32_t>(grey.width);
-  out.record.height = static_cast<std::uint32_t>(grey.height);
+  out.record.width = static_cast<std::uint32_t>(gray.width);
+  out.record.height = static_cast<std::uint32_t>(gray.height);
   out.record.width_mm = width_mm > 0 ? width_mm : read_width_mm(path);
-  const auto corners = pattern_corners(grey.width, grey.height);
+  const auto corners = pattern_corners(gray.width, gray.height);
   out.record.half_width = static_cast<float>(corners[1].x);
   out.record.half_height = static_cast<float>(corners[1].y);
   out.record.score = -1.0f;
   for (const ParameterSetRecord& parameters : sets) {
-    auto content = describe(grey, parameters);
+    auto content = describe(gray, parameters);
     if (!content) return tl::unexpected(content.error());
     out.features.push_back(std::move(*content));
   }
@@ -86,14 +86,14 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                 "the picture holds " + std::to_string(found) + " features, too few to recognise it",
                 "take a larger, sharper picture with more texture");
   }
-  auto record = bake_loop_record(grey, loop);
+  auto record = bake_tracker_record(gray, loop);
   if (!record) {
     record.error().where = path;
     return tl::unexpected(record.error());
   }
   out.loop_record = std::move(*record);
   if (loop.score) {
-    if (auto done = add_score(path, grey, loop.jobs, out, report); !done) {
+    if (auto done = add_score(path, gray, loop.jobs, out, report); !done) {
       return tl::unexpected(done.error());
     }
   }

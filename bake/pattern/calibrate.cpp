@@ -51,11 +51,11 @@ Result<void> look_at_video(const std::string& path, const Look& look) {
   }
   const int count = static_cast<int>(capture.get(cv::CAP_PROP_FRAME_COUNT));
   const int step = std::max(1, count / kVideoSteps);
-  cv::Mat grey;
+  cv::Mat gray;
   for (int frame = 0; !picture.empty(); ++frame) {
     if (frame % step == 0) {
-      cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
-      look({grey.data, grey.cols, grey.rows, static_cast<std::ptrdiff_t>(grey.step[0])});
+      cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
+      look({gray.data, gray.cols, gray.rows, static_cast<std::ptrdiff_t>(gray.step[0])});
     }
     if (!capture.read(picture)) break;
   }
@@ -115,13 +115,13 @@ class Gatherer {
 };
 
 Result<Gathered> gather(const CalibrateOptions& options, const NamedPattern* pattern,
-                        const PoseBenchProgress& progress) {
+                        const ProgressCallback& progress) {
   Gathered gathered;
   Gatherer gatherer(options, pattern, gathered);
   double done = 0;
   for (const std::string& path : options.inputs) {
     if (is_picture(path)) {
-      const auto picture = load_grey(path);
+      const auto picture = load_gray(path);
       if (!picture) return tl::unexpected(picture.error());
       gatherer.look(path, picture->view());
     } else if (auto looked =
@@ -298,7 +298,7 @@ Result<Calibration> calibrated(Gathered gathered, int most_views, bool board) {
 
 }  // namespace
 
-Result<Calibration> calibrate(const CalibrateOptions& options, const PoseBenchProgress& progress) {
+Result<Calibration> calibrate(const CalibrateOptions& options, const ProgressCallback& progress) {
   const bool board = options.board_columns > 0;
   std::vector<NamedPattern> patterns;
   if (!board) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/pattern/pose_bench.hpp"
+#include "bake/lab/pose_bench.hpp"
 #include "formats/error.hpp"
 #include "modar/camera.hpp"
 
@@ -34,7 +34,7 @@ struct Calibration {
 /// Errors: kIo "calibrate.input"; kInvalidInput "calibrate.size" (frames of different sizes),
 /// "calibrate.few-views" (fewer than 5 views), "calibrate.weak" (views too alike to tell the focal
 /// length to 3 %, or all tilted to the same side); those of reading pictures and of the loop.
-Result<Calibration> calibrate(const CalibrateOptions& options, const PoseBenchProgress& progress);
+Result<Calibration> calibrate(const CalibrateOptions& options, const ProgressCallback& progress);
 
 /// The camera as OpenCV's YML, for modar-play --camera. Errors: those of write_file().
 Result<void> write_camera_file(const Calibration& calibration, const std::string& path);

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <filesystem>
 
+#include "bake/parallel.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "bake/pattern/pose_subject.hpp"
-#include "bake/texture/parallel.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/loop_view.hpp"
+#include "formats/tracker_record_view.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"
 
@@ -20,7 +20,7 @@ Result<void> add_picture(const std::string& path, unsigned jobs, std::vector<Nam
   bool shrunk = false;
   auto picture = load_pattern(path, shrunk);
   if (!picture) return tl::unexpected(picture.error());
-  LoopBakeOptions options;
+  TrackerRecordOptions options;
   options.jobs = jobs;
   auto bundle = bundle_of_pattern(picture->view(), options);
   if (!bundle) {
@@ -38,9 +38,9 @@ Result<void> add_bundle(const std::string& path, std::vector<NamedPattern>& out)
   const auto bundle = BundleView::open(file->bytes());
   if (!bundle) return tl::unexpected(bundle.error());
   for (std::uint32_t i = 0; i < bundle->patterns().size(); ++i) {
-    const auto bytes = bundle->section(SectionType::kLoopRecord, i, 0);
-    LoopRecordView view;
-    if (const auto fault = view_loop_record(bytes, view)) {
+    const auto bytes = bundle->section(SectionType::kTrackerRecord, i, 0);
+    TrackerRecordView view;
+    if (const auto fault = view_tracker_record(bytes, view)) {
       return fail(ExitCode::kInvalidInput, "confusion.record", path,
                   std::string("a pattern's loop record: ") + fault->cause, "bake it again");
     }
@@ -124,7 +124,7 @@ Result<std::vector<std::byte>> project_of(const std::vector<NamedPattern>& patte
   for (const NamedPattern& pattern : patterns) {
     const auto bundle = BundleView::open(pattern.bundle);
     if (!bundle) return tl::unexpected(bundle.error());
-    const auto record = bundle->section(SectionType::kLoopRecord, 0, 0);
+    const auto record = bundle->section(SectionType::kTrackerRecord, 0, 0);
     pictures.push_back(pattern.picture);
     records.emplace_back(record.begin(), record.end());
   }
@@ -137,7 +137,7 @@ Result<int> ask_together(PoseLoop& loop, const std::vector<GrayPicture>& views, 
   TrackResult seen;
   for (const GrayPicture& view : views) {
     if (auto done = loop.step(view.view(), seen); !done) return tl::unexpected(done.error());
-    for (const Sighting& each : seen.visible) others += each.pattern != shown ? 1 : 0;
+    for (const Detection& each : seen.visible) others += each.pattern != shown ? 1 : 0;
   }
   return others;
 }
@@ -168,7 +168,7 @@ int Confusion::false_recognitions() const {
 
 Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
                                     const ConfusionOptions& options,
-                                    const PoseBenchProgress& progress) {
+                                    const ProgressCallback& progress) {
   Confusion confusion;
   confusion.views = options.views;
   confusion.photo_views = options.views * static_cast<int>(options.photos.size());

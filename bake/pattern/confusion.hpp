@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/pattern/pose_bench.hpp"
+#include "bake/lab/pose_bench.hpp"
 #include "formats/error.hpp"
 
 namespace modar {
@@ -53,6 +53,6 @@ struct Confusion {
 /// views, where a likeness shows. Errors: those of reading photos and of the loop.
 Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
                                     const ConfusionOptions& options,
-                                    const PoseBenchProgress& progress);
+                                    const ProgressCallback& progress);
 
 }  // namespace modar

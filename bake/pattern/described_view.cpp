@@ -11,8 +11,8 @@ std::array<double, 2> to_picture(const AffineView& view, double x, double y) {
   return {(a[3] * u - a[1] * v) / determinant, (a[0] * v - a[2] * u) / determinant};
 }
 
-LoopDetectOptions generous_detection() {
-  LoopDetectOptions options;
+DetectOptions generous_detection() {
+  DetectOptions options;
   options.cell = 32;
   options.per_cell = 16;
   options.max_features = 20000;

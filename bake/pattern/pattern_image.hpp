@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "bake/pattern/loop_bake.hpp"
+#include "bake/image/image.hpp"
+#include "bake/pattern/tracker_record_bake.hpp"
 #include "bake/report.hpp"
-#include "bake/texture/etc1_texture.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/error.hpp"
 
@@ -46,14 +46,14 @@ struct PatternFeatures {
   std::string name;
   PatternRecord record{};                ///< lacks its name
   std::vector<FeatureContent> features;  ///< one a parameter set, in their order
-  std::vector<std::byte> loop_record;    ///< a section of type kLoopRecord
+  std::vector<std::byte> loop_record;    ///< a section of type kTrackerRecord
 };
 
 /// Describes an image file for our loop, and under the article's parameter sets with YML and twin.
-/// Errors: those of read_image() and bake_loop_record(); kInvalidInput "pattern.no-features" where
-/// the first set finds fewer than its min_matches.
+/// Errors: those of read_image() and bake_tracker_record(); kInvalidInput "pattern.no-features"
+/// where the first set finds fewer than its min_matches.
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                      std::span<const ParameterSetRecord> sets,
-                                     const LoopBakeOptions& loop, Report& report);
+                                     const TrackerRecordOptions& loop, Report& report);
 
 }  // namespace modar

@@ -1,4 +1,4 @@
-// Reads pictures of patterns, turns them grey and brings them to size.
+// Reads pictures of patterns, turns them gray and brings them to size.
 #include "bake/pattern/pattern_picture.hpp"
 
 #include <algorithm>
@@ -16,39 +16,39 @@ constexpr int kLargestSide = 720;
 
 }  // namespace
 
-GrayPicture grey_of(const RgbaImage& image) {
-  GrayPicture grey;
-  grey.width = static_cast<int>(image.width);
-  grey.height = static_cast<int>(image.height);
-  grey.pixels.reserve(image.pixels.size() / 4);
+GrayPicture gray_of(const RgbaImage& image) {
+  GrayPicture gray;
+  gray.width = static_cast<int>(image.width);
+  gray.height = static_cast<int>(image.height);
+  gray.pixels.reserve(image.pixels.size() / 4);
   for (std::size_t i = 0; i + 3 < image.pixels.size(); i += 4) {
     const std::uint8_t* p = image.pixels.data() + i;
     // In 16-bit fixed point: the same bytes on every machine.
     const std::uint32_t luma = (19595u * p[0] + 38470u * p[1] + 7471u * p[2] + 32768u) >> 16;
-    grey.pixels.push_back(
+    gray.pixels.push_back(
         static_cast<std::uint8_t>((luma * p[3] + 255u * (255u - p[3]) + 127u) / 255u));
   }
-  return grey;
+  return gray;
 }
 
-Result<GrayPicture> load_grey(const std::string& path) {
+Result<GrayPicture> load_gray(const std::string& path) {
   const auto image = read_image(path);
   if (!image) return tl::unexpected(image.error());
-  return grey_of(*image);
+  return gray_of(*image);
 }
 
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
-  auto grey = load_grey(path);
-  if (!grey) return grey;
-  const int longest = std::max(grey->width, grey->height);
+  auto gray = load_gray(path);
+  if (!gray) return gray;
+  const int longest = std::max(gray->width, gray->height);
   shrunk = longest > kLargestSide;
-  if (!shrunk) return grey;
+  if (!shrunk) return gray;
   try {
     const double scale = static_cast<double>(kLargestSide) / longest;
-    const cv::Mat large(grey->height, grey->width, CV_8UC1, grey->pixels.data());
+    const cv::Mat large(gray->height, gray->width, CV_8UC1, gray->pixels.data());
     GrayPicture out;
-    out.width = std::max(1, static_cast<int>(std::lround(grey->width * scale)));
-    out.height = std::max(1, static_cast<int>(std::lround(grey->height * scale)));
+    out.width = std::max(1, static_cast<int>(std::lround(gray->width * scale)));
+    out.height = std::max(1, static_cast<int>(std::lround(gray->height * scale)));
     out.pixels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
     cv::Mat small(out.height, out.width, CV_8UC1, out.pixels.data());
     cv::resize(large, small, small.size(), 0, 0, cv::INTER_AREA);

@@ -37,14 +37,14 @@ void match_light(const cv::Mat& picture, const cv::Mat& mask, cv::Mat& warped) {
 
 PlanePoints board_points(const GrayImage& frame, int columns, int rows) {
   PlanePoints points;
-  const cv::Mat grey = as_mat(frame);
+  const cv::Mat gray = as_mat(frame);
   std::vector<cv::Point2f> corners;
   if (!cv::findChessboardCorners(
-          grey, {columns, rows}, corners,
+          gray, {columns, rows}, corners,
           cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK)) {
     return points;
   }
-  cv::cornerSubPix(grey, corners, {5, 5}, {-1, -1},
+  cv::cornerSubPix(gray, corners, {5, 5}, {-1, -1},
                    {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 40, 0.001});
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {

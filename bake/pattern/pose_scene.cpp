@@ -353,7 +353,7 @@ GrayPicture made_background(int width, int height, Random& random) {
 }
 
 Result<GrayPicture> load_background(const std::string& path, int width, int height) {
-  auto picture = load_grey(path);
+  auto picture = load_gray(path);
   if (!picture) return tl::unexpected(picture.error());
   const cv::Mat photo = as_mat(picture->view());
   // The frame's middle of the photo, scaled to fill it.

@@ -35,7 +35,7 @@ std::vector<SceneBand> pose_bands();
 struct SceneFrame {
   GrayPicture picture;
   Pose pose;
-  std::array<glm::dvec2, 4> corners{};  ///< of the truth, as in Sighting
+  std::array<glm::dvec2, 4> corners{};  ///< of the truth, as in Detection
 };
 
 /// Draws a pose of the band, the pattern's centre in the frame. Tilts are what the eye sees: a
@@ -43,7 +43,7 @@ struct SceneFrame {
 Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
                Random& random);
 
-/// Light on the pattern and its surroundings: grey * gain + bias, the gain with a slope over the
+/// Light on the pattern and its surroundings: gray * gain + bias, the gain with a slope over the
 /// frame's sides.
 struct SceneLight {
   double gain = 1;
@@ -51,7 +51,7 @@ struct SceneLight {
   double slope_x = 0;
   double slope_y = 0;
   double focus = 0.65;  ///< standard deviation of the lens blur, pixels
-  double noise = 3;     ///< standard deviation, grey values
+  double noise = 3;     ///< standard deviation, gray values
 };
 SceneLight draw_light(Random& random);
 

@@ -10,7 +10,7 @@
 #include "bake/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
-#include "formats/loop_record.hpp"
+#include "formats/tracker_record.hpp"
 #include "modar/features.hpp"
 
 namespace modar {
@@ -32,7 +32,7 @@ void add_record(const GrayImage& pattern, std::vector<std::byte> loop_record,
   content.features.emplace_back();
   if (!loop_record.empty()) {
     ExtraSection section;
-    section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
+    section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
     section.owner = static_cast<std::uint32_t>(content.patterns.size());
     section.bytes = std::move(loop_record);
     content.extra.push_back(std::move(section));
@@ -42,10 +42,10 @@ void add_record(const GrayImage& pattern, std::vector<std::byte> loop_record,
 
 /// loop: null for a pattern without a record of ours, which takes most of the time.
 Result<void> add_pattern(const GrayImage& pattern, std::uint32_t set_id,
-                         const LoopBakeOptions* loop, BundleContent& content) {
+                         const TrackerRecordOptions* loop, BundleContent& content) {
   std::vector<std::byte> record;
   if (loop != nullptr) {
-    auto baked = bake_loop_record(pattern, *loop);
+    auto baked = bake_tracker_record(pattern, *loop);
     if (!baked) return tl::unexpected(baked.error());
     record = std::move(*baked);
   }
@@ -74,7 +74,7 @@ Result<std::vector<std::byte>> bytes_of(const BundleContent& content) {
 
 Result<std::vector<std::byte>> bundle_of(const std::vector<GrayPicture>& pictures,
                                          std::uint32_t set_id, bool ours) {
-  const LoopBakeOptions loop;
+  const TrackerRecordOptions loop;
   BundleContent content;
   for (ParameterSetRecord set : paper_parameter_sets()) {
     if (set.id != set_id) continue;
@@ -100,10 +100,10 @@ Result<void> run(Method& method, const GrayImage& frame, const FrameTruth& truth
 }
 
 /// Mean distance of the four corners.
-double corner_error(const Sighting& sighting, const FrameTruth& truth) {
+double corner_error(const Detection& detection, const FrameTruth& truth) {
   double error = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
-    error += 0.25 * glm::length(sighting.corners[i] - truth.corners[i]);
+    error += 0.25 * glm::length(detection.corners[i] - truth.corners[i]);
   }
   return error;
 }
@@ -111,7 +111,7 @@ double corner_error(const Sighting& sighting, const FrameTruth& truth) {
 }  // namespace
 
 Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
-                                                 const LoopBakeOptions& options) {
+                                                 const TrackerRecordOptions& options) {
   BundleContent content;
   if (auto added = add_pattern(pattern, 0, &options, content); !added) {
     return tl::unexpected(added.error());
@@ -166,8 +166,8 @@ Result<Subject> make_subject(const std::vector<std::string>& paths, const PoseBe
   return subject;
 }
 
-bool is_right(const Sighting& sighting, const FrameTruth& truth) {
-  return corner_error(sighting, truth) < kRight;
+bool is_right(const Detection& detection, const FrameTruth& truth) {
+  return corner_error(detection, truth) < kRight;
 }
 
 Tally::Tally(std::string band, const char* method, bool sequence) {
@@ -192,10 +192,10 @@ void Tally::add(const TrackResult& result, const FrameTruth& truth, double ms) {
     return;
   }
   ++row_.recognised;
-  const auto better = [&](const Sighting& a, const Sighting& b) {
+  const auto better = [&](const Detection& a, const Detection& b) {
     return corner_error(a, truth) < corner_error(b, truth);
   };
-  const Sighting& seen = *std::min_element(result.visible.begin(), result.visible.end(), better);
+  const Detection& seen = *std::min_element(result.visible.begin(), result.visible.end(), better);
   const double error = corner_error(seen, truth);
   std::array<glm::dvec2, 4> miss;
   for (std::size_t i = 0; i < 4; ++i) miss[i] = seen.corners[i] - truth.corners[i];

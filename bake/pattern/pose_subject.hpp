@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "bake/pattern/loop_bake.hpp"
-#include "bake/pattern/pose_bench.hpp"
+#include "bake/lab/pose_bench.hpp"
 #include "bake/pattern/pose_scene.hpp"
+#include "bake/pattern/tracker_record_bake.hpp"
 #include "modar/pose_loop.hpp"
 #include "modar/tracker.hpp"
 
@@ -23,9 +23,9 @@ struct Subject {
   std::unique_ptr<PoseLoop> ours;
 };
 
-/// A bundle that holds that pattern's loop record alone. Errors: those of bake_loop_record().
+/// A bundle that holds that pattern's loop record alone. Errors: those of bake_tracker_record().
 Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
-                                                 const LoopBakeOptions& options);
+                                                 const TrackerRecordOptions& options);
 
 /// The same with a record that is there already.
 Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
@@ -47,7 +47,7 @@ struct FrameTruth {
 };
 
 /// Whether the mean error of the four corners is under 5 pixels.
-bool is_right(const Sighting& sighting, const FrameTruth& truth);
+bool is_right(const Detection& detection, const FrameTruth& truth);
 
 /// Sums of one method on one band.
 class Tally {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/parallel.hpp"
 #include "bake/pattern/described_view.hpp"
 #include "bake/pattern/pose_subject.hpp"
 #include "bake/pattern/view_kernel.hpp"
-#include "bake/texture/parallel.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
 
@@ -27,7 +27,7 @@ constexpr double kBest = 0.75;  // share of the ladder that patterns climb at mo
 struct Known {
   double x;
   double y;
-  LoopCode code;
+  TrackerCode code;
   std::uint8_t dark;
 };
 
@@ -38,7 +38,7 @@ constexpr Turn kTurns[] = {{1, 0}, {0.8, 0.6},  {5.0 / 13, 12.0 / 13},
 /// Those of one polarity.
 struct KnownSide {
   std::vector<std::array<double, 2>> places;
-  std::vector<LoopCode> codes;
+  std::vector<TrackerCode> codes;
 };
 using KnownFeatures = std::array<KnownSide, 2>;
 
@@ -64,10 +64,11 @@ struct Found {
 
 std::vector<Known> describe(const std::vector<ViewLevel>& levels, const AffineView& view) {
   const GrayPicture picture = render_view(levels, view, nullptr);
-  const auto describer = LoopDescriber::create(picture.width, picture.height, generous_detection());
+  const auto describer =
+      FeatureExtractor::create(picture.width, picture.height, generous_detection());
   describer->set_frame(picture.view());
   std::vector<Known> known;
-  for (const LoopFeature& feature : describer->features()) {
+  for (const TrackerFeature& feature : describer->features()) {
     const auto place =
         to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     const bool outside = place[0] < -0.5 || place[1] < -0.5 || place[0] > levels[0].width - 0.5 ||
@@ -128,11 +129,11 @@ Found find_again(const std::vector<ViewLevel>& levels, const TestView& test,
                  const KnownFeatures& known, std::uint64_t seed) {
   GrayPicture picture = render_view(levels, test.view, nullptr);
   disturb(seed, picture);
-  const auto describer = LoopDescriber::create(picture.width, picture.height, LoopDetectOptions{});
+  const auto describer = FeatureExtractor::create(picture.width, picture.height, DetectOptions{});
   describer->set_frame(picture.view());
   Found found;
   std::vector<int> bits;
-  for (const LoopFeature& feature : describer->features()) {
+  for (const TrackerFeature& feature : describer->features()) {
     const auto place =
         to_picture(test.view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     const double radius = kNear * (1 << feature.level) / test.scale;
@@ -163,7 +164,7 @@ int share_of(double value, double enough) {
   return static_cast<int>(std::clamp(100.0 * value / enough + 0.5, 0.0, 100.0));
 }
 
-/// Mean over blocks of 16x16 pixels of the standard deviation of their grey values.
+/// Mean over blocks of 16x16 pixels of the standard deviation of their gray values.
 double contrast_of(const GrayPicture& picture) {
   double sum = 0;
   int blocks = 0;
@@ -172,10 +173,10 @@ double contrast_of(const GrayPicture& picture) {
       std::int64_t first = 0;
       std::int64_t second = 0;
       for (int k = 0; k < 256; ++k) {
-        const int grey =
+        const int gray =
             picture.pixels[static_cast<std::size_t>((y + k / 16) * picture.width + x + k % 16)];
-        first += grey;
-        second += grey * grey;
+        first += gray;
+        second += gray * gray;
       }
       sum += std::sqrt(static_cast<double>(256 * second - first * first)) / 256;
     }

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "bake/image/image.hpp"
 #include "bake/pattern/view_render.hpp"
-#include "bake/texture/etc1_texture.hpp"
 #include "formats/error.hpp"
 #include "modar/image.hpp"
 

@@ -31,11 +31,11 @@ RgbaImage score_overlay(const GrayImage& pattern, const PatternScore& score) {
   image.width = static_cast<std::uint32_t>(pattern.width);
   image.height = static_cast<std::uint32_t>(pattern.height);
   image.pixels.resize(std::size_t{image.width} * image.height * 4);
-  const cv::Mat grey(pattern.height, pattern.width, CV_8UC1,
+  const cv::Mat gray(pattern.height, pattern.width, CV_8UC1,
                      const_cast<std::uint8_t*>(pattern.pixels),
                      static_cast<std::size_t>(pattern.stride));
   cv::Mat picture(pattern.height, pattern.width, CV_8UC4, image.pixels.data());
-  cv::cvtColor(grey, picture, cv::COLOR_GRAY2RGBA);
+  cv::cvtColor(gray, picture, cv::COLOR_GRAY2RGBA);
   shade(picture, score.places);
   for (const ScorePlace& place : score.places) {
     const bool good = place.held * 4 >= score.views;

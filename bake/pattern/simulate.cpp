@@ -141,7 +141,7 @@ std::string length_text(double mm) {
 }  // namespace
 
 Result<Simulation> simulate(const std::string& path, const SimulateOptions& options,
-                            const PoseBenchProgress& progress) {
+                            const ProgressCallback& progress) {
   const Camera& camera = options.camera;
   if (camera.width < 64 || camera.height < 64) {
     return fail(ExitCode::kUsage, "simulate.camera", "", "the camera file states no image size",

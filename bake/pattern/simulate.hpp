@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "bake/pattern/pose_bench.hpp"
+#include "bake/image/image.hpp"
+#include "bake/lab/pose_bench.hpp"
 #include "bake/pattern/view_trial.hpp"
-#include "bake/texture/etc1_texture.hpp"
 #include "formats/error.hpp"
 #include "modar/camera.hpp"
 
@@ -53,7 +53,7 @@ struct Simulation {
 /// Errors: those of reading pictures, baking the pattern and the loop; kUsage "simulate.camera" (a
 /// camera without a size).
 Result<Simulation> simulate(const std::string& path, const SimulateOptions& options,
-                            const PoseBenchProgress& progress);
+                            const ProgressCallback& progress);
 
 /// "printed 20 cm wide, it is recognised from 15 cm to 1.6 m and up to 62 degrees": the words after
 /// the pattern's name.

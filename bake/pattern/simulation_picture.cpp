@@ -36,10 +36,10 @@ void outline(cv::Mat& view, const std::array<glm::dvec2, 4>& corners, double sca
 void draw_value(cv::Mat& sheet, const SimulatedValue& value, int x, int y, int height) {
   const TrialOutcome& outcome = value.outcome;
   const GrayPicture& sample = outcome.sample;
-  const cv::Mat grey(sample.height, sample.width, CV_8UC1,
+  const cv::Mat gray(sample.height, sample.width, CV_8UC1,
                      const_cast<std::uint8_t*>(sample.pixels.data()));
   cv::Mat view;
-  cv::cvtColor(grey, view, cv::COLOR_GRAY2RGBA);
+  cv::cvtColor(gray, view, cv::COLOR_GRAY2RGBA);
   cv::resize(view, view, cv::Size(kWide, height), 0, 0, cv::INTER_AREA);
   const double scale = static_cast<double>(kWide) / sample.width;
   outline(view, outcome.truth, scale, kWhite);

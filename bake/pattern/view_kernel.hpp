@@ -23,7 +23,7 @@ struct ViewSamples {
 };
 
 /// The means of the samples of `count` pixels, bilinear, the level's border repeated around it.
-/// x, y: centres in pixels of the level, 16 bits after the point. out: `count` greys.
+/// x, y: centres in pixels of the level, 16 bits after the point. out: `count` grays.
 void sample_pixels(const ViewSamples& samples, const std::int32_t* x, const std::int32_t* y,
                    std::size_t count, std::uint8_t* out);
 

@@ -81,7 +81,7 @@ class Sampler {
         right_(fixed(finest.width / factor - 0.5)),
         bottom_(fixed(finest.height / factor - 0.5)) {}
 
-  /// x, y: the centres of the row's pixels, each stepping one way all along. behind: greys outside
+  /// x, y: the centres of the row's pixels, each stepping one way all along. behind: grays outside
   /// of the picture, null: its border pixels.
   void row(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
            const std::uint8_t* behind, std::uint8_t* out) const {
@@ -273,10 +273,10 @@ GrayPicture made_clutter(Random& random, int width, int height) {
     const int y0 = static_cast<int>(random.uniform(0, height));
     const int x1 = std::min(width, x0 + static_cast<int>(random.uniform(2, 24)));
     const int y1 = std::min(height, y0 + static_cast<int>(random.uniform(2, 24)));
-    const auto grey = static_cast<std::uint8_t>(random.uniform(0, 256));
+    const auto gray = static_cast<std::uint8_t>(random.uniform(0, 256));
     for (int y = y0; y < y1; ++y) {
       std::fill_n(picture.pixels.begin() + static_cast<std::ptrdiff_t>(y) * width + x0, x1 - x0,
-                  grey);
+                  gray);
     }
   }
   return picture;

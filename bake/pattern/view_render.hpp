@@ -64,7 +64,7 @@ struct ViewLevel : GrayPicture {
 /// Those of halved().
 std::vector<ViewLevel> view_levels(const GrayImage& picture);
 
-/// Boxes of random greys, as a background.
+/// Boxes of random grays, as a background.
 GrayPicture made_clutter(Random& random, int width, int height);
 
 /// Renders a view. Outside of the picture: its border pixels where `background` is null, else the

@@ -3,8 +3,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "bake/parallel.hpp"
 #include "bake/pattern/pose_subject.hpp"
-#include "bake/texture/parallel.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "bake/pattern/pose_bench.hpp"
+#include "bake/lab/pose_bench.hpp"
 #include "bake/pattern/pose_scene.hpp"
 #include "formats/error.hpp"
 #include "modar/camera.hpp"

@@ -7,7 +7,7 @@
 
 #include <zstd.h>
 
-#include "formats/vertex_streams.hpp"
+#include "formats/transport/vertex_streams.hpp"
 #include "modar/mesh_transport.hpp"
 
 namespace modar {

@@ -7,11 +7,11 @@
 
 #include <zstd.h>
 
+#include "bake/parallel.hpp"
 #include "bake/ship/content_pieces.hpp"
 #include "bake/ship/limited_process.hpp"
 #include "bake/ship/mesh_encoder.hpp"
-#include "bake/texture/parallel.hpp"
-#include "formats/feature_text.hpp"
+#include "formats/transport/feature_text.hpp"
 #include "modar/digest.hpp"
 #include "modar/piece.hpp"
 
@@ -215,7 +215,7 @@ class RecipeMaker {
   void draft_texts() {
     for (const SectionEntry& entry : bundle_.sections()) {
       if (entry.type != static_cast<std::uint32_t>(SectionType::kFeatureYml)) continue;
-      const auto twin = bundle_.section(SectionType::kFeatureTwin, entry.owner, entry.variant);
+      const auto twin = bundle_.section(SectionType::kMappedFeatures, entry.owner, entry.variant);
       const auto text = at(entry.offset, entry.size);
       const std::string made = feature_text(bundle_.features(entry.owner, entry.variant));
       const auto made_bytes = std::as_bytes(std::span(made));
@@ -247,7 +247,7 @@ class RecipeMaker {
       std::uint64_t end = entry.offset + entry.size;
       ++i;
       if (entry.type < 256) continue;
-      if (entry.type == static_cast<std::uint32_t>(SectionType::kFeatureTwin)) {
+      if (entry.type == static_cast<std::uint32_t>(SectionType::kMappedFeatures)) {
         // The sets of one pattern share most of their descriptors: they travel as one piece.
         while (i < sections.size() && sections[i].type == entry.type &&
                sections[i].owner == entry.owner &&

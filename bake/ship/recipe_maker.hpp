@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "formats/bundle_view.hpp"
-#include "formats/recipe.hpp"
+#include "formats/transport/recipe.hpp"
 
 namespace modar {
 

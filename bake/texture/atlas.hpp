@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/texture/texture.hpp"
 
 namespace modar {
 

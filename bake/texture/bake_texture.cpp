@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <charconv>
 
+#include "bake/image/resample.hpp"
 #include "bake/texture/atlas.hpp"
-#include "bake/texture/etc1_texture.hpp"
-#include "bake/texture/resample.hpp"
+#include "bake/texture/texture.hpp"
 #include "bake/texture/texture_quality.hpp"
 #include "bake/texture/texture_size.hpp"
 #include "formats/layout.hpp"
@@ -44,7 +44,7 @@ bool has_alpha(const RgbaImage& image) {
   return false;
 }
 
-/// Alpha as a grey image: the twin.
+/// Alpha as a gray image: the twin.
 RgbaImage alpha_twin(const RgbaImage& image) {
   RgbaImage twin{image.width, image.height, std::vector<std::uint8_t>(image.pixels.size(), 255)};
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
@@ -106,7 +106,7 @@ void judge(const std::string& path, const Etc1Level& level, const TextureOptions
   const bool bad_ssim = options.min_ssim > 0 && level.ssim < options.min_ssim;
   if (!bad_psnr && !bad_ssim) return;
   report.findings.push_back(
-      {"texture.quality", FindingSeverity::kWarning, path, 0,
+      {"texture.quality", DiagnosticSeverity::kWarning, path, 0,
        "compressed it has " + decimals(level.psnr_db) + " dB and SSIM " + decimals(level.ssim) +
            "; its worst block, at pixel " + std::to_string(level.worst_x) + "," +
            std::to_string(level.worst_y) + ", has " + decimals(level.worst_psnr_db) + " dB",

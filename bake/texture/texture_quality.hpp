@@ -1,7 +1,7 @@
 // How far a decoded texture is from its source.
 #pragma once
 
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/image/image.hpp"
 
 namespace modar {
 

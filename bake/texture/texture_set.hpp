@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/texture/texture.hpp"
 
 namespace modar {
 

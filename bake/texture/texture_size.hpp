@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/texture/texture.hpp"
 
 namespace modar {
 

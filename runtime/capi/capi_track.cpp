@@ -62,7 +62,7 @@ int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t strid
     pose.inliers = 0;
     if (states[i].shown) set_pose(states[i].pose, pose);
   }
-  for (const modar::Sighting& seen : tracker->result.visible) {
+  for (const modar::Detection& seen : tracker->result.visible) {
     modar_pose& pose = tracker->poses[seen.pattern];
     set_pose(seen.pose, pose);
     pose.visible = 1;

@@ -3,7 +3,7 @@
 
 #include <meshoptimizer.h>
 
-#include "formats/chunk_order.hpp"
+#include "formats/transport/chunk_order.hpp"
 #include "modar/mesh_transport.hpp"
 
 namespace modar {

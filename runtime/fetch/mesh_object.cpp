@@ -3,8 +3,8 @@
 
 #include <zstd.h>
 
-#include "formats/chunk_order.hpp"
-#include "formats/vertex_streams.hpp"
+#include "formats/transport/chunk_order.hpp"
+#include "formats/transport/vertex_streams.hpp"
 #include "modar/mesh_transport.hpp"
 
 namespace modar {

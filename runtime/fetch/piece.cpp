@@ -4,7 +4,7 @@
 
 #include <zstd.h>
 
-#include "formats/feature_text.hpp"
+#include "formats/transport/feature_text.hpp"
 #include "modar/mesh_transport.hpp"
 
 namespace modar {

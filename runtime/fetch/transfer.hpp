@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "formats/error.hpp"
-#include "formats/recipe.hpp"
+#include "formats/transport/recipe.hpp"
 
 namespace modar::fetch {
 

@@ -63,9 +63,9 @@ struct PaperTracker::State {
   std::vector<cv::Point2f> from, to;
 
   Result<TrackResult> step(const GrayImage& frame);
-  Reason find(const Target& target, Sighting& sighting, TrackTimes& times);
-  Reason homography(const Target& target, Sighting& sighting);
-  Reason pose(const Target& target, Sighting& sighting) const;
+  Reason find(const Target& target, Detection& detection, TrackTimes& times);
+  Reason homography(const Target& target, Detection& detection);
+  Reason pose(const Target& target, Detection& detection) const;
 };
 
 PaperTracker::PaperTracker(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -130,16 +130,16 @@ Result<TrackResult> PaperTracker::State::step(const GrayImage& frame) {
   result.features = static_cast<int>(keypoints.size());
   if (keypoints.empty()) return result;
   for (const Target& target : targets) {
-    Sighting sighting;
-    sighting.pattern = target.pattern;
-    const Reason reason = find(target, sighting, result.times);
+    Detection detection;
+    detection.pattern = target.pattern;
+    const Reason reason = find(target, detection, result.times);
     if (progress(reason) > progress(result.reason)) result.reason = reason;
-    if (reason == Reason::kVisible) result.visible.push_back(sighting);
+    if (reason == Reason::kVisible) result.visible.push_back(detection);
   }
   return result;
 }
 
-Reason PaperTracker::State::find(const Target& target, Sighting& sighting, TrackTimes& times) {
+Reason PaperTracker::State::find(const Target& target, Detection& detection, TrackTimes& times) {
   LapClock clock;
   matcher.match(target.descriptors, descriptors, matches);
   from.clear();
@@ -150,18 +150,18 @@ Reason PaperTracker::State::find(const Target& target, Sighting& sighting, Track
     to.push_back(keypoints[static_cast<std::size_t>(match.trainIdx)].pt);
   }
   times.match += clock.lap();
-  sighting.matches = static_cast<int>(from.size());
+  detection.matches = static_cast<int>(from.size());
   // Four points make a homography, whatever a file asks for.
   if (from.size() < std::max<std::size_t>(parameters.min_matches, 4)) return Reason::kFewMatches;
-  Reason reason = homography(target, sighting);
+  Reason reason = homography(target, detection);
   times.homography += clock.lap();
   if (reason != Reason::kVisible) return reason;
-  reason = pose(target, sighting);
+  reason = pose(target, detection);
   times.pose += clock.lap();
   return reason;
 }
 
-Reason PaperTracker::State::homography(const Target& target, Sighting& sighting) {
+Reason PaperTracker::State::homography(const Target& target, Detection& detection) {
   // OpenCV seeds this RANSAC with a constant, so a frame gives the same answer every time.
   std::vector<unsigned char> inlier;
   const double threshold = static_cast<double>(parameters.ransac_threshold);
@@ -176,7 +176,7 @@ Reason PaperTracker::State::homography(const Target& target, Sighting& sighting)
   }
   from.resize(kept);
   to.resize(kept);
-  sighting.inliers = static_cast<int>(kept);
+  detection.inliers = static_cast<int>(kept);
   if (kept < std::max<std::size_t>(parameters.min_inliers, 4)) return Reason::kNoGeometry;
   // Method 0: least squares over all points, then Levenberg-Marquardt.
   const cv::Mat refined = cv::findHomography(from, to, 0);
@@ -184,19 +184,19 @@ Reason PaperTracker::State::homography(const Target& target, Sighting& sighting)
   std::vector<cv::Point2f> corners;
   cv::perspectiveTransform(target.image_corners, corners, refined);
   for (std::size_t i = 0; i < 4; ++i) {
-    sighting.corners[i] = {static_cast<double>(corners[i].x), static_cast<double>(corners[i].y)};
+    detection.corners[i] = {static_cast<double>(corners[i].x), static_cast<double>(corners[i].y)};
   }
-  return finite(sighting.corners) ? Reason::kVisible : Reason::kFailedVerification;
+  return finite(detection.corners) ? Reason::kVisible : Reason::kFailedVerification;
 }
 
-Reason PaperTracker::State::pose(const Target& target, Sighting& sighting) const {
+Reason PaperTracker::State::pose(const Target& target, Detection& detection) const {
   std::array<glm::dvec2, 4> ideal;
-  for (std::size_t i = 0; i < 4; ++i) ideal[i] = undistort(camera, sighting.corners[i]);
+  for (std::size_t i = 0; i < 4; ++i) ideal[i] = undistort(camera, detection.corners[i]);
   const auto plane = homography_from_points(target.world_corners, ideal);
   if (!plane) return Reason::kFailedVerification;
   const auto closed_form = pose_from_homography(camera, *plane);
   if (!closed_form) return Reason::kFailedVerification;
-  sighting.pose = refine_pose(camera, target.world_corners, ideal, *closed_form);
+  detection.pose = refine_pose(camera, target.world_corners, ideal, *closed_form);
   return Reason::kVisible;
 }
 

@@ -14,9 +14,9 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "desk_v4l2_source.hpp"
 #include "frame_source.hpp"
 #include "raw_source.hpp"
-#include "v4l2_source.hpp"
 
 namespace modar {
 namespace {
@@ -28,7 +28,7 @@ tl::unexpected<Error> damaged(const std::string& path, const std::string& cause)
               "give a video or picture that other players show");
 }
 
-/// Blue, green, red (or grey) pixels into the frame's own buffers.
+/// Blue, green, red (or gray) pixels into the frame's own buffers.
 void fill(Frame& frame, const cv::Mat& picture) {
   frame.width = picture.cols;
   frame.height = picture.rows;

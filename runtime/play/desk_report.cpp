@@ -127,7 +127,7 @@ class Report final : public FrameSink {
                     0,
                     0,
                     {}};
-    for (const Sighting& seen : report.visible) {
+    for (const Detection& seen : report.visible) {
       frame.inliers = std::max(frame.inliers, seen.inliers);
       frame.matches = std::max(frame.matches, seen.matches);
       if (!frame.patterns.empty()) frame.patterns += ", ";

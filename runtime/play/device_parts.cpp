@@ -9,7 +9,6 @@
 #include "modar/camera_file.hpp"
 #include "picture_file.hpp"
 #include "raw_source.hpp"
-#include "v4l2_source.hpp"
 #include "vision.hpp"
 #include "window.hpp"
 
@@ -57,14 +56,7 @@ class PpmFolder final : public FrameSink {
 
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
   if (is_raw_input(input)) return open_raw_source(input);
-  if (input == "camera" || input.starts_with("camera:")) {
-    const Result<int> number = camera_number(input);
-    if (!number) return tl::unexpected(number.error());
-    auto device = open_video_device("/dev/video" + std::to_string(*number));
-    if (!device) return tl::unexpected(device.error());
-    return start_camera(std::move(*device), input, {});
-  }
-  return left_out("input.unsupported", input, "videos and pictures");
+  return left_out("input.unsupported", input, "videos, pictures and cameras");
 }
 
 Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, double /*fps*/) {

@@ -35,7 +35,7 @@ std::string display_text(const FrameReport& report, std::span<const std::string>
   } else if (report.state == Shown::kHidden) {
     text += ": seen once";
   }
-  for (const Sighting& seen : report.visible) {
+  for (const Detection& seen : report.visible) {
     text += "  ";
     if (seen.pattern < pattern_names.size()) text += pattern_names[seen.pattern] + " ";
     text += std::to_string(seen.inliers) + " inliers";

@@ -39,7 +39,7 @@ const char* to_string(Shown state);
 struct FrameReport {
   std::uint64_t frame = 0;
   double time_s = 0;
-  std::vector<Sighting> visible;  ///< measured in this frame, whether shown or not
+  std::vector<Detection> visible;  ///< measured in this frame, whether shown or not
   Reason reason = Reason::kNoFeatures;
   Shown state = Shown::kHidden;
   StageTimes ms{};

@@ -29,7 +29,7 @@ void rounded(Writer& writer, double value) {
   number(writer, std::round(value * 1000.0) / 1000.0);
 }
 
-void sighting(Writer& writer, const Sighting& seen, std::span<const std::string> names) {
+void detection(Writer& writer, const Detection& seen, std::span<const std::string> names) {
   writer.StartObject();
   writer.Key("pattern");
   text(writer, seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
@@ -94,7 +94,7 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
   number(writer, report.time_s);
   writer.Key("visible");
   writer.StartArray();
-  for (const Sighting& seen : report.visible) sighting(writer, seen, pattern_names);
+  for (const Detection& seen : report.visible) detection(writer, seen, pattern_names);
   writer.EndArray();
   writer.Key("reason");
   writer.String(to_string(report.reason));

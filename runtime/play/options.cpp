@@ -234,7 +234,7 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
 
   --input INPUT       frames: a video, a picture, a folder of pictures (by name), a camera,
                       - or FILE.y4m (Y4M from a pipe or file), nv21:640x480@30:FILE (raw frames,
-                      - for a pipe; i420, nv12, yuyv, grey alike)
+                      - for a pipe; i420, nv12, yuyv, gray alike)
   --out OUT           pictures into FILE.mp4, or as frame_000000.png ... into a folder
   --report FOLDER     overlay.mp4, contact_sheet.png, frames.jsonl and an index.html of them
   --window            shows the pictures in a window; its keys: Q or Escape ends, space pauses,

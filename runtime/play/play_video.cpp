@@ -45,8 +45,8 @@ Result<Plan> make_plan(const PlayOptions& options, const BundleView& bundle) {
   return plan;
 }
 
-/// Recordings and replays look at the grey of the recorded picture, not at the camera's own.
-TrackStep with_grey_of_rgb(TrackStep track) {
+/// Recordings and replays look at the gray of the recorded picture, not at the camera's own.
+TrackStep with_gray_of_rgb(TrackStep track) {
   return [track = std::move(track)](Job& job) {
     make_rgb(job.frame);
     gray_from_rgb(job.frame);
@@ -84,7 +84,7 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
       !opened) {
     return tl::unexpected(opened.error());
   }
-  if (!options.record.empty() || plan->golden) *track = with_grey_of_rgb(std::move(*track));
+  if (!options.record.empty() || plan->golden) *track = with_gray_of_rgb(std::move(*track));
   if (plan->golden) player.compare(std::move(*plan->golden));
   if (bundle.scenes().empty() && !options.quiet) {
     std::fprintf(stderr, "modar-play: no scene of the bundle binds a model to a pattern\n");

@@ -187,7 +187,7 @@ FrameReport Player::begin_report(const Job& job) {
   FrameReport report;
   report.frame = job.frame.index;
   report.time_s = job.frame.time_s;
-  for (const Sighting& seen : job.track.visible) {
+  for (const Detection& seen : job.track.visible) {
     if (spot_ || controls_.wants(seen.pattern)) report.visible.push_back(seen);
   }
   report.reason = job.track.reason;
@@ -219,7 +219,7 @@ Result<void> Player::paint(const FrameReport& report) {
   constexpr Colour kOutline{64, 255, 96};
   const Canvas canvas = screen_->canvas();
   if (controls_.outline()) {
-    for (const Sighting& seen : report.visible) draw_outline(canvas, seen.corners, kOutline);
+    for (const Detection& seen : report.visible) draw_outline(canvas, seen.corners, kOutline);
   }
   if (!controls_.display()) return {};
   // A file's pictures are the same in each run, so no clock is painted on them.

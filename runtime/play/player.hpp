@@ -71,7 +71,7 @@ class Player {
   std::vector<std::string> names_;  ///< of the patterns that are looked for
   Hysteresis hysteresis_;
   PoseSmoother smoother_;
-  std::vector<Sighting> drawn_;  ///< what is seen, at smoothed poses
+  std::vector<Detection> drawn_;  ///< what is seen, at smoothed poses
   Controls controls_;
   Progress progress_;
   RateMeter rate_;

@@ -146,26 +146,26 @@ Result<void> QosLog::add(const FrameReport& report, std::span<const std::string>
   since_s_.resize(pattern_names.size());
   last_s_ = report.time_s;
   for (std::size_t pattern = 0; pattern < seen_.size(); ++pattern) {
-    const Sighting* sighting = nullptr;
-    for (const Sighting& each : report.visible) {
-      if (each.pattern == pattern) sighting = &each;
+    const Detection* detection = nullptr;
+    for (const Detection& each : report.visible) {
+      if (each.pattern == pattern) detection = &each;
     }
-    if (seen_[pattern] == (sighting != nullptr)) continue;
+    if (seen_[pattern] == (detection != nullptr)) continue;
     rapidjson::StringBuffer buffer;
     Writer writer(buffer);
     writer.StartObject();
-    text(writer, "event", sighting != nullptr ? "found" : "lost");
+    text(writer, "event", detection != nullptr ? "found" : "lost");
     text(writer, "pattern", pattern_names[pattern]);
     count(writer, "frame", report.frame);
     number(writer, "time_s", report.time_s);
     number(writer, "after_s", report.time_s - since_s_[pattern]);
-    if (sighting != nullptr) {
-      count(writer, "inliers", static_cast<std::uint64_t>(sighting->inliers));
+    if (detection != nullptr) {
+      count(writer, "inliers", static_cast<std::uint64_t>(detection->inliers));
     } else {
       text(writer, "reason", to_string(report.reason));
     }
     writer.EndObject();
-    seen_[pattern] = sighting != nullptr;
+    seen_[pattern] = detection != nullptr;
     since_s_[pattern] = report.time_s;
     if (auto written = write(view(buffer)); !written) return written;
   }

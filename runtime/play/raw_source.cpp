@@ -28,7 +28,7 @@ constexpr std::array<Named, 5> kHeaderless = {{{"nv21", YuvLayout::kNv21, true},
                                                {"nv12", YuvLayout::kNv12, false},
                                                {"i420", YuvLayout::kI420, false},
                                                {"yuyv", YuvLayout::kYuyv, false},
-                                               {"grey", YuvLayout::kGrey, true}}};
+                                               {"grey", YuvLayout::kGray, true}}};
 /// Y4M's colour spaces of 8 bits (the C tag); where chroma sits within a pixel is left aside.
 constexpr std::array<Named, 7> kY4m = {{{"420", YuvLayout::kI420, false},
                                         {"420jpeg", YuvLayout::kI420, false},
@@ -36,7 +36,7 @@ constexpr std::array<Named, 7> kY4m = {{{"420", YuvLayout::kI420, false},
                                         {"420paldv", YuvLayout::kI420, false},
                                         {"422", YuvLayout::kI422, false},
                                         {"444", YuvLayout::kI444, false},
-                                        {"mono", YuvLayout::kGrey, false}}};
+                                        {"mono", YuvLayout::kGray, false}}};
 
 const Named* find(std::span<const Named> table, std::string_view name) {
   for (const Named& named : table) {

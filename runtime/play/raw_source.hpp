@@ -18,7 +18,7 @@ struct RawInput {
   std::string path;  ///< "-": standard input
 };
 
-/// True for "-", "FILE.y4m", "y4m:PATH", "nv21:WxH[@FPS]:PATH", and i420, nv12, yuyv, grey alike.
+/// True for "-", "FILE.y4m", "y4m:PATH", "nv21:WxH[@FPS]:PATH", and i420, nv12, yuyv, gray alike.
 bool is_raw_input(std::string_view input);
 
 /// Errors: kUsage "input.raw" where what follows the colon cannot be read.

@@ -216,7 +216,7 @@ std::string GoldenCheck::difference(const RecordedFrame& wanted, const FrameRepo
            std::to_string(wanted.visible.size());
   }
   for (std::size_t i = 0; i < wanted.visible.size(); ++i) {
-    const Sighting& seen = report.visible[i];
+    const Detection& seen = report.visible[i];
     const bool known = seen.pattern < pattern_names.size();
     if (!known || pattern_names[seen.pattern] != wanted.visible[i].pattern)
       return "another pattern";

@@ -24,7 +24,7 @@ struct RecordingHead {
 };
 
 /// A folder with frames/frame_000000.png (.ppm on the device) and poses.jsonl: the head, then the
-/// line of each frame. The grey that is tracked comes from those pictures (gray_from_rgb()), so
+/// line of each frame. The gray that is tracked comes from those pictures (gray_from_rgb()), so
 /// that a replay sees the same.
 class Recorder {
  public:

@@ -17,7 +17,7 @@ struct PageFrame {
   Shown state = Shown::kHidden;
   Reason reason = Reason::kNoFeatures;
   bool seen = false;  ///< a pattern was measured
-  int inliers = 0;    ///< greatest of the sightings
+  int inliers = 0;    ///< greatest of the detections
   int matches = 0;
   std::string patterns;  ///< names of what was seen, with commas
 };

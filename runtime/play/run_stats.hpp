@@ -24,7 +24,7 @@ class RunStats {
 
   [[nodiscard]] std::uint64_t frames() const { return times_.size(); }
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
-  [[nodiscard]] std::uint64_t visible() const { return visible_; }  ///< frames with a sighting
+  [[nodiscard]] std::uint64_t visible() const { return visible_; }  ///< frames with a detection
   [[nodiscard]] std::uint64_t late() const { return late_; }
   [[nodiscard]] std::uint64_t count(Shown state) const {
     return states_[static_cast<std::size_t>(state)];

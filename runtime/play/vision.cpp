@@ -77,7 +77,7 @@ std::string choose_method(const BundleView& bundle, const std::string& method,
   if (!method.empty()) return method;
   if (!parameters.empty()) return "paper";
   for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
-    if (!bundle.section(SectionType::kLoopRecord, i).empty()) return "ours";
+    if (!bundle.section(SectionType::kTrackerRecord, i).empty()) return "ours";
   }
   return "paper";
 }

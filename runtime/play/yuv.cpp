@@ -80,7 +80,7 @@ Row row_of(const YuvFormat& format, const std::uint8_t* bytes, int row) {
     }
     case YuvLayout::kI444:
       return {y, chroma + r * w, chroma + (h + r) * w, 1, 1, 0};
-    case YuvLayout::kGrey:
+    case YuvLayout::kGray:
       break;
   }
   return {y, nullptr, nullptr, 1, 0, 0};
@@ -188,7 +188,7 @@ std::size_t frame_bytes(const YuvFormat& format) {
       return 4 * half(format.width) * h;
     case YuvLayout::kI444:
       return 3 * w * h;
-    case YuvLayout::kGrey:
+    case YuvLayout::kGray:
       break;
   }
   return w * h;

@@ -1,4 +1,4 @@
-// From the pixels of cameras and raw video to R, G, B and grey.
+// From the pixels of cameras and raw video to R, G, B and gray.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ enum class YuvLayout : std::uint8_t {
   kI422,  ///< planes Y, U, V; chroma halved across
   kYuyv,  ///< Y0 U Y1 V in turn (most USB cameras)
   kI444,  ///< planes Y, U, V
-  kGrey,  ///< plane Y
+  kGray,  ///< plane Y
 };
 
 struct YuvFormat {
@@ -30,19 +30,19 @@ struct YuvFormat {
 /// Bytes of a frame without gaps; an odd side has one chroma sample more than its half.
 std::size_t frame_bytes(const YuvFormat& format);
 
-/// Fills the frame's size, rgb and gray by ITU-R BT.601, the nearest chroma sample each; grey is Y
+/// Fills the frame's size, rgb and gray by ITU-R BT.601, the nearest chroma sample each; gray is Y
 /// brought to the full range. bytes.size() >= frame_bytes(format).
 void fill_frame(Frame& frame, const YuvFormat& format, std::span<const std::uint8_t> bytes);
 
 /// Makes the bytes the frame's by swapping them in, where the renderer can draw the layout (NV21,
-/// NV12, I420 with even sides): no pixel is converted, and grey is the luma plane itself where it
+/// NV12, I420 with even sides): no pixel is converted, and gray is the luma plane itself where it
 /// has the full range. Other layouts go through fill_frame().
 void take_frame(Frame& frame, const YuvFormat& format, std::vector<std::uint8_t>& bytes);
 
 /// Fills rgb of a frame that has only yuv; nothing where it is there already.
 void make_rgb(Frame& frame);
 
-/// Grey from R, G, B by the weights of BT.601: what a recorded frame is replayed with.
+/// Gray from R, G, B by the weights of BT.601: what a recorded frame is replayed with.
 void gray_from_rgb(Frame& frame);
 
 }  // namespace modar

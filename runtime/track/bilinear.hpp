@@ -1,9 +1,9 @@
-// Grey values between pixels. Internal to runtime/track.
+// Gray values between pixels. Internal to runtime/track.
 #pragma once
 
 #include "modar/image.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// Bilinear value; the caller keeps 0 <= x < width - 1, 0 <= y < height - 1.
 inline float sample(const GrayImage& image, float x, float y) {
@@ -21,4 +21,4 @@ inline float sample(const GrayImage& image, float x, float y) {
   return top + fy * (bottom - top);
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 constexpr std::size_t kIndexed = 128;    // codes of a pattern and polarity
@@ -36,14 +36,14 @@ std::size_t position_of(std::span<const std::uint8_t> distances, int wanted) {
 }
 
 /// Where a pattern's features of a polarity begin and end.
-std::array<std::size_t, 2> range_of(const LoopPattern& pattern, bool dark) {
+std::array<std::size_t, 2> range_of(const TrackedPattern& pattern, bool dark) {
   if (dark) return {pattern.bright_count, pattern.features.size()};
   return {0, pattern.bright_count};
 }
 
 }  // namespace
 
-CodeIndex::CodeIndex(std::span<const LoopPattern> patterns, const Kernels& kernels,
+CodeIndex::CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
                      std::size_t most_features)
     : patterns_(patterns),
       kernels_(kernels),
@@ -148,11 +148,11 @@ CodeIndex::Support CodeIndex::agreeing(std::uint32_t last, std::size_t count) co
   return most;
 }
 
-std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const LoopFeature> features) {
+std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const TrackerFeature> features) {
   std::fill(support_.begin(), support_.end(), Support{});
   std::fill(last_.begin(), last_.end(), kNobody);
   std::uint32_t count = 0;
-  for (const LoopFeature& feature : features.first(std::min(features.size(), votes_.size()))) {
+  for (const TrackerFeature& feature : features.first(std::min(features.size(), votes_.size()))) {
     const bool dark = feature.dark != 0;
     const Group& group = groups_[dark ? 1 : 0];
     if (group.starts.empty()) continue;
@@ -170,4 +170,4 @@ std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const LoopFeature>
   return support_;
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "kernels.hpp"
-#include "loop_pattern.hpp"
-#include "modar/loop_features.hpp"
+#include "modar/tracker_features.hpp"
 #include "plane_matcher.hpp"
+#include "tracked_pattern.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// An inverted file (Sivic & Zisserman, "Video Google", 2003) over binary codes, whose words are
 /// some of the codes themselves. A feature is compared with the words and with the codes of the few
@@ -25,7 +25,7 @@ class CodeIndex {
 
   /// Takes the most repeatable codes of each pattern (each group's first), some 9 KB a pattern.
   /// Nothing is allocated later. The patterns must outlive it.
-  CodeIndex(std::span<const LoopPattern> patterns, const Kernels& kernels,
+  CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
             std::size_t most_features);
   /// What speaks for a pattern.
   struct Support {
@@ -33,7 +33,7 @@ class CodeIndex {
     PlaneMatch place;         ///< as one of them tells it
   };
   /// One a pattern, valid until the next call.
-  std::span<const Support> vote(std::span<const LoopFeature> features);
+  std::span<const Support> vote(std::span<const TrackerFeature> features);
 
  private:
   static constexpr std::size_t kProbes = 4;  ///< words whose codes a feature is compared with
@@ -54,7 +54,7 @@ class CodeIndex {
   std::uint32_t nearest_owner(const Group& group, const Code& code);
   [[nodiscard]] Support agreeing(std::uint32_t last, std::size_t count) const;
 
-  std::span<const LoopPattern> patterns_;
+  std::span<const TrackedPattern> patterns_;
   const Kernels& kernels_;
   std::array<Group, 2> groups_;  ///< bright, dark
   std::vector<std::uint8_t> distances_;
@@ -63,4 +63,4 @@ class CodeIndex {
   std::vector<Support> support_;
 };
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

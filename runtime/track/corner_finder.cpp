@@ -6,9 +6,9 @@
 
 #include "kernels.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
-CornerFinder::CornerFinder(int width, const LoopDetectOptions& options)
+CornerFinder::CornerFinder(int width, const DetectOptions& options)
     : options_(options),
       pitch_(width + 2 * kSlack),
       rows_(static_cast<std::size_t>(pitch_) * 7),
@@ -41,8 +41,8 @@ void CornerFinder::flush(std::vector<Corner>& corners) {
 }
 
 void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<Corner>& corners) {
-  const int count = image.width - 2 * kLoopBorder;
-  if (count <= 0 || image.height <= 2 * kLoopBorder) return;
+  const int count = image.width - 2 * kTrackerBorder;
+  if (count <= 0 || image.height <= 2 * kTrackerBorder) return;
   const Kernels& run = kernels(options_.simd);
   // One pixel before the range is compared with too, and never is a corner.
   const auto row_at = [&](int slot) {
@@ -51,12 +51,12 @@ void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<
   };
   std::uint8_t* peak = row_at(6);
   std::fill(rows_.begin(), rows_.end(), std::uint8_t{0});
-  const int last = image.height - kLoopBorder;
-  for (int y = kLoopBorder; y <= last; ++y) {
+  const int last = image.height - kTrackerBorder;
+  for (int y = kTrackerBorder; y <= last; ++y) {
     std::uint8_t* score = row_at(y % 3);
     std::uint8_t* bright = row_at(3 + y % 3);
     if (y < last) {
-      run.corner_scores(image.pixels + y * image.stride + kLoopBorder, image.stride,
+      run.corner_scores(image.pixels + y * image.stride + kTrackerBorder, image.stride,
                         options_.threshold, count, bright, score);
       // Kernels write past the range: what lies there is no neighbour.
       std::memset(score + count, 0, kSlack);
@@ -64,7 +64,7 @@ void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<
       std::memset(score, 0, static_cast<std::size_t>(count) + kSlack);
     }
     const int centre = y - 1;
-    if (centre < kLoopBorder) continue;
+    if (centre < kTrackerBorder) continue;
     const std::uint8_t* middle = row_at(centre % 3);
     const std::uint8_t* middle_bright = row_at(3 + centre % 3);
     run.peaks(row_at((centre + 2) % 3), middle, score, count, peak);
@@ -75,7 +75,7 @@ void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<
       if (eight == 0) continue;
       for (int x = i; x < std::min(i + 8, count); ++x) {
         if (peak[x] == 0) continue;
-        const int column = x + kLoopBorder;
+        const int column = x + kTrackerBorder;
         keep({static_cast<std::int16_t>(column), static_cast<std::int16_t>(centre), peak[x],
               static_cast<std::uint8_t>(middle_bright[x] == middle[x] ? 0 : 1), level},
              column / options_.cell);
@@ -85,4 +85,4 @@ void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<
   }
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

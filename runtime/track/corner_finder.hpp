@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "modar/image.hpp"
-#include "modar/loop_features.hpp"
+#include "modar/tracker_features.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 struct Corner {
   std::int16_t x = 0;
@@ -22,7 +22,7 @@ struct Corner {
 /// corner detection" (2006), with the score of its later implementation (greatest threshold).
 class CornerFinder {
  public:
-  CornerFinder(int width, const LoopDetectOptions& options);
+  CornerFinder(int width, const DetectOptions& options);
   /// Appends the corners of a level in the order of their rows; never beyond the capacity that the
   /// caller reserved.
   void find(const GrayImage& image, std::uint8_t level, std::vector<Corner>& corners);
@@ -31,11 +31,11 @@ class CornerFinder {
   void keep(const Corner& corner, int cell);
   void flush(std::vector<Corner>& corners);
 
-  LoopDetectOptions options_;
+  DetectOptions options_;
   int pitch_ = 0;
   std::vector<std::uint8_t> rows_;  ///< three rows of scores, three of bright scores, peaks
   std::vector<Corner> cells_;       ///< per_cell slots a cell of the current cell row
   std::vector<int> counts_;
 };
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

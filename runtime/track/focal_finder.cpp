@@ -11,16 +11,16 @@
 #include <glm/trigonometric.hpp>
 
 #include "kernels.hpp"
-#include "loop_pattern.hpp"
 #include "modar/camera.hpp"
-#include "modar/loop_features.hpp"
+#include "modar/tracker_features.hpp"
 #include "plane_matcher.hpp"
-#include "plane_settle.hpp"
+#include "refine_pose.hpp"
+#include "tracked_pattern.hpp"
 
 namespace modar {
 namespace {
 
-using loop::LoopPattern;
+using tracker::TrackedPattern;
 
 constexpr int kInliers = 15;  // of a find that is worth aligning
 constexpr double kPerspective =
@@ -55,10 +55,10 @@ std::array<Constraint, 2> constraints_of(const glm::dmat3& homography, double un
 struct FocalFinder::State {
   double unit = 0;  ///< frame width
   Camera camera;    ///< the default: only its principal point matters
-  std::vector<LoopPattern> patterns;
-  std::unique_ptr<LoopDescriber> describer;
-  std::unique_ptr<loop::PlaneMatcher> matcher;
-  loop::PatchCache patches;
+  std::vector<TrackedPattern> patterns;
+  std::unique_ptr<FeatureExtractor> describer;
+  std::unique_ptr<tracker::PlaneMatcher> matcher;
+  tracker::PatchCache patches;
   std::vector<Constraint> constraints;  ///< two a view
   std::vector<glm::dvec3> horizons;     ///< of the views: vanishing lines, pixels from the middle
   int looks = 0;
@@ -133,9 +133,9 @@ Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundl
   state->camera = default_camera(width, height);
   std::size_t most_codes = 0;
   for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
-    const auto bytes = bundle.section(SectionType::kLoopRecord, i);
+    const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
     if (bytes.empty()) continue;
-    auto pattern = loop::view_loop_pattern(bytes, i);
+    auto pattern = tracker::view_loop_pattern(bytes, i);
     if (!pattern) return tl::unexpected(pattern.error());
     most_codes = std::max(most_codes, pattern->features.size());
     state->patterns.push_back(*pattern);
@@ -145,10 +145,10 @@ Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundl
                 "the bundle holds no pattern with a record for this loop",
                 "bake it with a pattern");
   }
-  const LoopDetectOptions detect;
-  state->describer = LoopDescriber::create(width, height, detect);
-  state->matcher = std::make_unique<loop::PlaneMatcher>(
-      state->camera, loop::kernels(), static_cast<std::size_t>(detect.max_features), most_codes);
+  const DetectOptions detect;
+  state->describer = FeatureExtractor::create(width, height, detect);
+  state->matcher = std::make_unique<tracker::PlaneMatcher>(
+      state->camera, tracker::kernels(), static_cast<std::size_t>(detect.max_features), most_codes);
   state->constraints.reserve(2 * kMostViews);
   state->horizons.reserve(kMostViews);
   return std::unique_ptr<FocalFinder>(new FocalFinder(std::move(state)));
@@ -159,15 +159,16 @@ bool FocalFinder::look(const GrayImage& frame) {
   ++state.looks;
   state.describer->set_frame(frame);
   const auto features = state.describer->features();
-  const loop::Scene scene{state.camera, state.describer->pyramid(), loop::kernels(), state.patches};
+  const tracker::Scene scene{state.camera, state.describer->pyramid(), tracker::kernels(),
+                             state.patches};
   bool added = false;
-  for (const LoopPattern& pattern : state.patterns) {
+  for (const TrackedPattern& pattern : state.patterns) {
     if (state.horizons.size() == kMostViews) return added;
     const auto finds = state.matcher->find(pattern, features);
     if (finds.empty() || finds[0].inliers < kInliers) continue;
-    loop::PlaneMap map{finds[0].homography};
-    loop::Fit fit;
-    if (!loop::settle_map(pattern, scene, map, fit)) continue;
+    tracker::PlaneMap map{finds[0].homography};
+    tracker::Fit fit;
+    if (!tracker::settle_map(pattern, scene, map, fit)) continue;
     glm::dmat3 centre(1.0);
     centre[2] = {-state.camera.cx, -state.camera.cy, 1.0};
     const glm::dmat3 from_world =

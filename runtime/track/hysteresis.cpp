@@ -1,4 +1,4 @@
-// The article's two-frame rule: appear after two sightings in sequence, outlive two misses.
+// The article's two-frame rule: appear after two detections in sequence, outlive two misses.
 #include "modar/tracker.hpp"
 
 namespace modar {
@@ -12,13 +12,13 @@ constexpr int kFramesToKeep = 2;
 Hysteresis::Hysteresis(std::size_t pattern_count)
     : counters_(pattern_count), states_(pattern_count) {}
 
-std::span<const Hysteresis::State> Hysteresis::step(std::span<const Sighting> visible) {
+std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> visible) {
   for (Counter& counter : counters_) counter.state.measured = false;
-  for (const Sighting& sighting : visible) {
-    if (sighting.pattern >= counters_.size()) continue;
-    Counter& counter = counters_[sighting.pattern];
+  for (const Detection& detection : visible) {
+    if (detection.pattern >= counters_.size()) continue;
+    Counter& counter = counters_[detection.pattern];
     counter.state.measured = true;
-    counter.state.pose = sighting.pose;
+    counter.state.pose = detection.pose;
   }
   for (std::size_t i = 0; i < counters_.size(); ++i) {
     Counter& counter = counters_[i];

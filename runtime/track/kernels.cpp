@@ -15,7 +15,7 @@
 #include "patch_offsets.hpp"
 
 HWY_BEFORE_NAMESPACE();
-namespace modar::loop::HWY_NAMESPACE {
+namespace modar::tracker::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using D8 = hn::ScalableTag<std::uint8_t>;
@@ -200,7 +200,7 @@ int distances(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t 
   return smallest;
 }
 
-/// The image's grey values under the patch, row by row, then zeros.
+/// The image's gray values under the patch, row by row, then zeros.
 void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrdiff_t stride,
                   float* out) {
   const hn::CappedTag<float, 4> d;
@@ -234,11 +234,11 @@ void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrd
     const hn::RebindToUnsigned<decltype(d)> bits;
     const auto bytes = hn::BitCast(bits, hn::Load(whole, four));
     const auto low = hn::Set(bits, 255u);
-    const auto grey = [&](auto value) { return hn::ConvertTo(d, hn::BitCast(whole, value)); };
-    const auto a = grey(hn::And(bytes, low));
-    const auto b = grey(hn::And(hn::ShiftRight<8>(bytes), low));
-    const auto c = grey(hn::And(hn::ShiftRight<16>(bytes), low));
-    const auto e = grey(hn::ShiftRight<24>(bytes));
+    const auto gray = [&](auto value) { return hn::ConvertTo(d, hn::BitCast(whole, value)); };
+    const auto a = gray(hn::And(bytes, low));
+    const auto b = gray(hn::And(hn::ShiftRight<8>(bytes), low));
+    const auto c = gray(hn::And(hn::ShiftRight<16>(bytes), low));
+    const auto e = gray(hn::ShiftRight<24>(bytes));
     const auto fx = hn::Sub(x, hn::ConvertTo(d, column));
     const auto fy = hn::Sub(y, hn::ConvertTo(d, row));
     const auto upper = hn::Add(a, hn::Mul(fx, hn::Sub(b, a)));
@@ -266,12 +266,12 @@ PatchSums patch_sums(const PatchTemplate& patch, const PatchPlace& place,
   auto ix = hn::Zero(d);
   auto iy = hn::Zero(d);
   for (int k = 0; k < kPatchPixels; k += 4) {
-    const auto grey = hn::Load(d, seen + k);
-    i = hn::Add(i, grey);
-    ii = hn::Add(ii, hn::Mul(grey, grey));
-    ti = hn::Add(ti, hn::Mul(grey, hn::Load(d, patch.grey + k)));
-    ix = hn::Add(ix, hn::Mul(grey, hn::Load(d, patch.right + k)));
-    iy = hn::Add(iy, hn::Mul(grey, hn::Load(d, patch.down + k)));
+    const auto gray = hn::Load(d, seen + k);
+    i = hn::Add(i, gray);
+    ii = hn::Add(ii, hn::Mul(gray, gray));
+    ti = hn::Add(ti, hn::Mul(gray, hn::Load(d, patch.gray + k)));
+    ix = hn::Add(ix, hn::Mul(gray, hn::Load(d, patch.right + k)));
+    iy = hn::Add(iy, hn::Mul(gray, hn::Load(d, patch.down + k)));
   }
   hn::Store(i, d, lanes[0]);
   hn::Store(ii, d, lanes[1]);
@@ -283,7 +283,7 @@ PatchSums patch_sums(const PatchTemplate& patch, const PatchPlace& place,
     const int lane = k & 3;
     lanes[0][lane] += seen[k];
     lanes[1][lane] += seen[k] * seen[k];
-    lanes[2][lane] += seen[k] * patch.grey[k];
+    lanes[2][lane] += seen[k] * patch.gray[k];
     lanes[3][lane] += seen[k] * patch.right[k];
     lanes[4][lane] += seen[k] * patch.down[k];
   }
@@ -296,7 +296,7 @@ constexpr Kernels table(const char* name) {
   return {name, halve_row, blur_columns, blur_row, corner_scores, peaks, distances, patch_sums};
 }
 
-}  // namespace modar::loop::HWY_NAMESPACE
+}  // namespace modar::tracker::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
@@ -305,7 +305,7 @@ HWY_AFTER_NAMESPACE();
 #endif
 
 // Highway's own dispatch needs its shared library; these few lines need none.
-namespace modar::loop {
+namespace modar::tracker {
 
 #if HWY_ARCH_X86 && (HWY_TARGETS & HWY_SSE4) && (HWY_TARGETS & HWY_AVX2)
 namespace {
@@ -354,5 +354,5 @@ const Kernels& kernels(int level) {
   return all[level < 0 ? last : std::min(static_cast<std::size_t>(level), last)];
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker
 #endif  // HWY_ONCE

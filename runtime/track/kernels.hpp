@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-namespace modar::loop {
+namespace modar::tracker {
 
 inline constexpr int kSlack = 64;       ///< elements past a range that kernels may read or write
 inline constexpr int kBlockCodes = 32;  ///< codes in a block; byte k of all of them lies together
@@ -16,11 +16,11 @@ inline constexpr int kCodeBytes = 32;   ///< 256 bits
 inline constexpr int kPatchHalf = 4;     ///< a tracking patch is 9x9 pixels
 inline constexpr int kPatchPixels = 84;  ///< of those 81, filled up to whole vectors
 
-/// A pattern's patch for alignment: grey values and half differences to the right and down, row by
+/// A pattern's patch for alignment: gray values and half differences to the right and down, row by
 /// row; the filling is zero. The gradient is the template's, which has no noise: an image's own
 /// noise in both the gradient and the difference would pull towards the middle between pixels.
 struct PatchTemplate {
-  alignas(16) float grey[kPatchPixels];
+  alignas(16) float gray[kPatchPixels];
   alignas(16) float right[kPatchPixels];
   alignas(16) float down[kPatchPixels];
 };
@@ -73,4 +73,4 @@ const Kernels& kernels(int level = -1);
 /// Every level that this processor has, best last.
 std::span<const Kernels> all_kernels();
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

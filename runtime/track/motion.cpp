@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-namespace modar::loop {
+namespace modar::tracker {
 
 Pose continued(const Pose& before, const Pose& now) {
   const glm::dmat3 turn = now.rotation * glm::transpose(before.rotation);
@@ -20,7 +20,7 @@ Pose continued(const Pose& before, const Pose& now) {
   return next;
 }
 
-bool in_view(const LoopPattern& pattern, const PlaneMap& map, const Camera& camera) {
+bool in_view(const TrackedPattern& pattern, const PlaneMap& map, const Camera& camera) {
   constexpr int kSide = 5;
   constexpr int kFewest = 4;  // of 25 places
   int inside = 0;
@@ -34,4 +34,4 @@ bool in_view(const LoopPattern& pattern, const PlaneMap& map, const Camera& came
   return inside >= kFewest;
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -6,12 +6,12 @@
 
 #include "bilinear.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 void add_sums(Patch& patch) {
   for (int k = 0; k < kPatchPixels; ++k) {
-    const float t = patch.pixels.grey[k];
+    const float t = patch.pixels.gray[k];
     const float gx = patch.pixels.right[k];
     const float gy = patch.pixels.down[k];
     patch.t += t;
@@ -41,17 +41,17 @@ void smooth(const float* from, int step, int first, int last, float* to) {
 /// Smooths as a lens does, about, and takes the differences. A template sharper than its picture is
 /// drawn aside by what lies on the patch's edge, each patch its own way: a steady error of the
 /// pose.
-void fill(const Surroundings& grey, Patch& patch) {
+void fill(const Surroundings& gray, Patch& patch) {
   constexpr int kAll = kWide * kWide;
   Surroundings rows{};
   Surroundings both{};
-  smooth(grey.data(), 1, 1, kAll - 1, rows.data());
+  smooth(gray.data(), 1, 1, kAll - 1, rows.data());
   smooth(rows.data(), kWide, kWide, kAll - kWide, both.data());
   for (int v = 0; v < kSide; ++v) {
     for (int u = 0; u < kSide; ++u) {
       const float* at = both.data() + (v + kRing) * kWide + u + kRing;
       const int k = v * kSide + u;
-      patch.pixels.grey[k] = at[0];
+      patch.pixels.gray[k] = at[0];
       patch.pixels.right[k] = 0.5f * (at[1] - at[-1]);
       patch.pixels.down[k] = 0.5f * (at[kWide] - at[-kWide]);
     }
@@ -60,7 +60,7 @@ void fill(const Surroundings& grey, Patch& patch) {
 }
 
 /// False where the patch or its ring reaches over the picture's border.
-bool cut(const GrayImage& picture, const LoopPatchRecord& record, int level, Patch& patch) {
+bool cut(const GrayImage& picture, const TrackerPatchRecord& record, int level, Patch& patch) {
   constexpr int kReach = kPatchHalf + kRing;
   const double grow = static_cast<double>(1 << level);
   const int column = static_cast<int>(record.x / (64.0 * grow));
@@ -71,12 +71,12 @@ bool cut(const GrayImage& picture, const LoopPatchRecord& record, int level, Pat
   }
   patch = {};
   patch.centre = {(column + 0.5) * grow - 0.5, (row + 0.5) * grow - 0.5};
-  Surroundings grey;
+  Surroundings gray;
   for (int v = 0; v < kWide; ++v) {
     std::copy_n(picture.pixels + (row + v - kReach) * picture.stride + column - kReach, kWide,
-                grey.begin() + v * kWide);
+                gray.begin() + v * kWide);
   }
-  fill(grey, patch);
+  fill(gray, patch);
   return true;
 }
 
@@ -93,8 +93,8 @@ std::vector<Patch>& PatchCache::room() {
   return room_;
 }
 
-void PatchCache::smear(const LoopPattern& pattern, int level, const Patch& patch, glm::dvec2 motion,
-                       Patch& smeared) {
+void PatchCache::smear(const TrackedPattern& pattern, int level, const Patch& patch,
+                       glm::dvec2 motion, Patch& smeared) {
   constexpr int kMostTaps = 16;
   const GrayImage& picture = pattern.levels[static_cast<std::size_t>(level)];
   const double grow = static_cast<double>(1 << level);
@@ -102,22 +102,22 @@ void PatchCache::smear(const LoopPattern& pattern, int level, const Patch& patch
   const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - kRing;
   const int taps =
       std::clamp(static_cast<int>(std::ceil(std::hypot(motion.x, motion.y))), 2, kMostTaps);
-  Surroundings grey{};
+  Surroundings gray{};
   for (int tap = 0; tap < taps; ++tap) {
     const double share = (tap + 0.5) / taps - 0.5;
     const float left = x0 + static_cast<float>(share * motion.x);
     const float top = y0 + static_cast<float>(share * motion.y);
     for (int v = 0; v < kWide; ++v) {
       for (int u = 0; u < kWide; ++u) {
-        grey[static_cast<std::size_t>(v * kWide + u)] +=
+        gray[static_cast<std::size_t>(v * kWide + u)] +=
             sample_inside(picture, left + static_cast<float>(u), top + static_cast<float>(v));
       }
     }
   }
   smeared = {};
   smeared.centre = patch.centre;
-  for (float& sum : grey) sum /= static_cast<float>(taps);
-  fill(grey, smeared);
+  for (float& sum : gray) sum /= static_cast<float>(taps);
+  fill(gray, smeared);
 }
 
 PatchCache::PatchCache() {
@@ -125,7 +125,7 @@ PatchCache::PatchCache() {
   for (Slot& slot : slots_) slot.patches.reserve(kMostPatches);
 }
 
-std::span<const Patch> PatchCache::of(const LoopPattern& pattern, int level) {
+std::span<const Patch> PatchCache::of(const TrackedPattern& pattern, int level) {
   ++now_;
   Slot* oldest = slots_.data();
   for (Slot& slot : slots_) {
@@ -140,7 +140,7 @@ std::span<const Patch> PatchCache::of(const LoopPattern& pattern, int level) {
   oldest->used = now_;
   oldest->patches.clear();
   Patch patch;
-  for (const LoopPatchRecord& record : pattern.patches[static_cast<std::size_t>(level)]) {
+  for (const TrackerPatchRecord& record : pattern.patches[static_cast<std::size_t>(level)]) {
     if (oldest->patches.size() == kMostPatches) break;
     if (cut(pattern.levels[static_cast<std::size_t>(level)], record, level, patch)) {
       oldest->patches.push_back(patch);
@@ -149,4 +149,4 @@ std::span<const Patch> PatchCache::of(const LoopPattern& pattern, int level) {
   return oldest->patches;
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "kernels.hpp"
-#include "loop_pattern.hpp"
+#include "tracked_pattern.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// Patches of a level that alignment uses, at most.
 inline constexpr std::size_t kMostPatches = 256;
 
-/// A patch and what of its sums no frame changes: of its grey values, its gradient and their
+/// A patch and what of its sums no frame changes: of its gray values, its gradient and their
 /// products.
 struct Patch {
   glm::dvec2 centre{};  ///< pixels of the pattern's image
@@ -28,10 +28,10 @@ class PatchCache {
  public:
   PatchCache();
   /// Valid until the next call.
-  std::span<const Patch> of(const LoopPattern& pattern, int level);
+  std::span<const Patch> of(const TrackedPattern& pattern, int level);
   /// Makes a patch of the level as it looks where everything moves by `motion` pixels of the level
   /// while the shutter is open.
-  static void smear(const LoopPattern& pattern, int level, const Patch& patch, glm::dvec2 motion,
+  static void smear(const TrackedPattern& pattern, int level, const Patch& patch, glm::dvec2 motion,
                     Patch& smeared);
   /// Room for smeared patches, empty; valid until the next call.
   std::vector<Patch>& room();
@@ -48,4 +48,4 @@ class PatchCache {
   std::uint64_t now_ = 0;
 };
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

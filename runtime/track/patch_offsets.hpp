@@ -3,7 +3,7 @@
 
 #include "kernels.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// Where a patch's pixels lie around its centre, row by row; the filling lies on it.
 struct PatchOffsets {
@@ -20,4 +20,4 @@ struct PatchOffsets {
 
 inline constexpr PatchOffsets kPatchOffsets;
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -5,10 +5,10 @@
 
 #include <glm/matrix.hpp>
 
-#include "plane_grow.hpp"
+#include "refine_from_inliers.hpp"
 #include "runtime/platform/lap_clock.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 constexpr int kFewestInliers = 6;
@@ -36,14 +36,14 @@ constexpr std::ptrdiff_t kMostClear = 4;  // at most so many a frame;
 constexpr std::size_t kGuessed = 2;       // where none is found, these at least, by their votes,
 constexpr std::size_t kMatched = 3;       // and with them the one whose turn it is.
 
-std::size_t most_codes(std::span<const LoopPattern> patterns) {
+std::size_t most_codes(std::span<const TrackedPattern> patterns) {
   std::size_t most = 0;
-  for (const LoopPattern& pattern : patterns) most = std::max(most, pattern.features.size());
+  for (const TrackedPattern& pattern : patterns) most = std::max(most, pattern.features.size());
   return most;
 }
 
 /// Whether a pattern lies where another one shows; with a margin, as one vote tells its outline.
-bool covers(const LoopPattern& pattern, const PlaneMatch& place, const PlaneMatch& other) {
+bool covers(const TrackedPattern& pattern, const PlaneMatch& place, const PlaneMatch& other) {
   const glm::dvec2 size(pattern.width(), pattern.height());
   const glm::dvec2 at =
       (glm::inverse(place.affine) * (other.ideal - place.ideal) + place.pattern) / size;
@@ -52,8 +52,8 @@ bool covers(const LoopPattern& pattern, const PlaneMatch& place, const PlaneMatc
 
 }  // namespace
 
-PatternSearch::PatternSearch(const Camera& camera, std::span<const LoopPattern> patterns,
-                             const LoopDetectOptions& options)
+PatternSearch::PatternSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
+                             const DetectOptions& options)
     : camera_(camera),
       kernels_(kernels(options.simd)),
       patterns_(patterns),
@@ -64,7 +64,7 @@ PatternSearch::PatternSearch(const Camera& camera, std::span<const LoopPattern> 
 }
 
 /// Leaves in chosen_ the patterns to match in full; the first clear_ of them are likely there.
-void PatternSearch::choose(std::span<const LoopFeature> features, std::span<const Want> wants) {
+void PatternSearch::choose(std::span<const TrackerFeature> features, std::span<const Want> wants) {
   chosen_.clear();
   for (std::uint32_t i = 0; i < patterns_.size(); ++i) {
     if (wants[i] != Want::kNo) chosen_.push_back(i);
@@ -104,57 +104,59 @@ void PatternSearch::choose(std::span<const LoopFeature> features, std::span<cons
   chosen_.erase(turn + 1, chosen_.end());
 }
 
-void PatternSearch::run(LoopDescriber& eye, std::span<const Want> wants, Findings& findings) {
+void PatternSearch::run(FeatureExtractor& eye, std::span<const Want> wants,
+                        DetectionCandidates& candidates) {
   LapClock clock;
-  findings.patterns.resize(patterns_.size());
-  findings.times = {};
+  candidates.patterns.resize(patterns_.size());
+  candidates.times = {};
   const auto features = eye.features();
-  findings.features = static_cast<int>(features.size());
-  findings.times.detect = clock.lap();
+  candidates.features = static_cast<int>(features.size());
+  candidates.times.detect = clock.lap();
   for (std::size_t i = 0; i < patterns_.size(); ++i) {
     if (wants[i] == Want::kNo) continue;
-    findings.patterns[i] = {};
+    candidates.patterns[i] = {};
     // Those that the index does not choose have few matches, as far as it can tell.
-    if (!features.empty()) findings.patterns[i].reason = Reason::kFewMatches;
+    if (!features.empty()) candidates.patterns[i].reason = Reason::kFewMatches;
   }
   if (features.empty()) return;
   choose(features, wants);
-  findings.times.match = clock.lap();
+  candidates.times.match = clock.lap();
   const Scene scene{camera_, eye.pyramid(), kernels_, patches_};
   bool found = false;
   for (std::size_t k = 0; k < chosen_.size() && (k < clear_ || !found); ++k) {
-    Finding& finding = findings.patterns[chosen_[k]];
-    finding = find(patterns_[chosen_[k]], scene, features, findings.times);
-    found = found || finding.reason == Reason::kVisible;
+    DetectionCandidate& candidate = candidates.patterns[chosen_[k]];
+    candidate = find(patterns_[chosen_[k]], scene, features, candidates.times);
+    found = found || candidate.reason == Reason::kVisible;
   }
 }
 
-Finding PatternSearch::find(const LoopPattern& pattern, const Scene& scene,
-                            std::span<const LoopFeature> features, TrackTimes& times) {
+DetectionCandidate PatternSearch::find(const TrackedPattern& pattern, const Scene& scene,
+                                       std::span<const TrackerFeature> features,
+                                       TrackTimes& times) {
   LapClock clock;
-  Finding finding;
+  DetectionCandidate candidate;
   const auto finds = matcher_.find(pattern, features);
-  finding.matches = matcher_.matches();
+  candidate.matches = matcher_.matches();
   times.match += clock.lap();
-  finding.reason = finding.matches < kFewestMatches ? Reason::kFewMatches : Reason::kNoGeometry;
+  candidate.reason = candidate.matches < kFewestMatches ? Reason::kFewMatches : Reason::kNoGeometry;
   Place best;
   for (const PlaneFind& found : finds) {
     if (found.inliers < kFewestInliers || best.whole) break;
-    if (finding.reason == Reason::kVisible && 2 * found.inliers < finding.inliers) break;
-    if (finding.reason == Reason::kNoGeometry) finding.reason = Reason::kFailedVerification;
-    find_pose(pattern, scene, found, best, finding);
+    if (candidate.reason == Reason::kVisible && 2 * found.inliers < candidate.inliers) break;
+    if (candidate.reason == Reason::kNoGeometry) candidate.reason = Reason::kFailedVerification;
+    find_pose(pattern, scene, found, best, candidate);
   }
   // Where a pose shows part of the pattern only, its map may show all of it.
-  if (finding.reason == Reason::kFailedVerification ||
-      (finding.reason == Reason::kVisible && !best.whole)) {
-    find_map(pattern, scene, finds.front(), best.right + kMapGain, finding);
+  if (candidate.reason == Reason::kFailedVerification ||
+      (candidate.reason == Reason::kVisible && !best.whole)) {
+    find_map(pattern, scene, finds.front(), best.right + kMapGain, candidate);
   }
   times.homography += clock.lap();
-  return finding;
+  return candidate;
 }
 
 /// Where the patches alone settle from a start, and how well that shows the pattern.
-PatternSearch::Place PatternSearch::settled(const LoopPattern& pattern, const Scene& scene,
+PatternSearch::Place PatternSearch::settled(const TrackedPattern& pattern, const Scene& scene,
                                             Reach reach, const Pose& start) const {
   Place place;
   place.pose = start;
@@ -177,7 +179,7 @@ PatternSearch::Place PatternSearch::settled(const LoopPattern& pattern, const Sc
 
 /// Brings a start to its place: by the features and by the patches as far as they are known from
 /// them, then by the patches alone; from further away where that does not hold.
-PatternSearch::Place PatternSearch::bring(const LoopPattern& pattern, const Scene& scene,
+PatternSearch::Place PatternSearch::bring(const TrackedPattern& pattern, const Scene& scene,
                                           Pose start) const {
   const PlanePoints points = matcher_.inliers();
   grow(pattern, scene, points, start);
@@ -195,9 +197,9 @@ PatternSearch::Place PatternSearch::bring(const LoopPattern& pattern, const Scen
   return best;
 }
 
-/// Replaces the finding where the picture shows more of the pattern here than `best` tells.
-void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
-                              const PlaneFind& found, Place& best, Finding& finding) {
+/// Replaces the candidate where the picture shows more of the pattern here than `best` tells.
+void PatternSearch::find_pose(const TrackedPattern& pattern, const Scene& scene,
+                              const PlaneFind& found, Place& best, DetectionCandidate& candidate) {
   matcher_.choose(pattern, found);
   std::array<Pose, 2> starts;
   const int count = fit_poses(pattern, camera_, found.homography, matcher_.inliers(), starts);
@@ -217,9 +219,9 @@ void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
       return;
     }
     best = place;
-    finding.reason = Reason::kVisible;
-    finding.pose = place.pose;
-    finding.inliers = found.inliers;
+    candidate.reason = Reason::kVisible;
+    candidate.pose = place.pose;
+    candidate.inliers = found.inliers;
   };
   consider(settled(pattern, scene, Reach::kNear, starts[0]));
   // Of two mirror images the features may rule one out; where they do not, each shows much of the
@@ -238,8 +240,9 @@ void PatternSearch::find_pose(const LoopPattern& pattern, const Scene& scene,
 
 /// A wrong focal length bends every pose, while the plane's own map still tells where it lies: its
 /// corners, with the nearest pose, where much more speaks for it than a pose needs.
-void PatternSearch::find_map(const LoopPattern& pattern, const Scene& scene, const PlaneFind& found,
-                             int better, Finding& finding) const {
+void PatternSearch::find_map(const TrackedPattern& pattern, const Scene& scene,
+                             const PlaneFind& found, int better,
+                             DetectionCandidate& candidate) const {
   if (found.inliers < kMapInliers) return;
   PlaneMap map{found.homography, bending(camera_)};
   if (map_percent(pattern, scene, map) < better) return;
@@ -251,7 +254,7 @@ void PatternSearch::find_map(const LoopPattern& pattern, const Scene& scene, con
   if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) {
     return;
   }
-  finding = {Reason::kVisible, *pose, true, map, finding.matches, found.inliers};
+  candidate = {Reason::kVisible, *pose, true, map, candidate.matches, found.inliers};
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

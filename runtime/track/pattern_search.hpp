@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "code_index.hpp"
-#include "modar/loop_features.hpp"
 #include "modar/tracker.hpp"
+#include "modar/tracker_features.hpp"
 #include "plane_matcher.hpp"
-#include "plane_settle.hpp"
+#include "refine_pose.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// How much a pattern is asked for.
 enum class Want : std::uint8_t {
@@ -22,7 +22,7 @@ enum class Want : std::uint8_t {
 };
 
 /// What a search says of one pattern.
-struct Finding {
+struct DetectionCandidate {
   Reason reason = Reason::kNoFeatures;
   Pose pose;            ///< where the reason is kVisible
   bool by_map = false;  ///< no pose explains the picture, but the map does: the pose is the nearest
@@ -31,8 +31,8 @@ struct Finding {
   int inliers = 0;
 };
 
-struct Findings {
-  std::vector<Finding> patterns;  ///< of those that were not wanted: untouched
+struct DetectionCandidates {
+  std::vector<DetectionCandidate> patterns;  ///< of those that were not wanted: untouched
   int features = 0;
   TrackTimes times;  ///< detect, match and homography
 };
@@ -43,15 +43,15 @@ struct Findings {
 class PatternSearch {
  public:
   /// The patterns must outlive it. With more than a few of them, the first run() builds the index.
-  PatternSearch(const Camera& camera, std::span<const LoopPattern> patterns,
-                const LoopDetectOptions& options);
+  PatternSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
+                const DetectOptions& options);
   /// eye: holds the frame. wants: one a pattern. Allocates nothing after the first call.
-  void run(LoopDescriber& eye, std::span<const Want> wants, Findings& findings);
+  void run(FeatureExtractor& eye, std::span<const Want> wants, DetectionCandidates& candidates);
 
  private:
-  void choose(std::span<const LoopFeature> features, std::span<const Want> wants);
-  Finding find(const LoopPattern& pattern, const Scene& scene,
-               std::span<const LoopFeature> features, TrackTimes& times);
+  void choose(std::span<const TrackerFeature> features, std::span<const Want> wants);
+  DetectionCandidate find(const TrackedPattern& pattern, const Scene& scene,
+                          std::span<const TrackerFeature> features, TrackTimes& times);
   /// Where a start leads to.
   struct Place {
     Pose pose;
@@ -62,17 +62,17 @@ class PatternSearch {
     bool whole = false;    ///< most of them,
     bool all = false;      ///< nearly all
   };
-  [[nodiscard]] Place settled(const LoopPattern& pattern, const Scene& scene, Reach reach,
+  [[nodiscard]] Place settled(const TrackedPattern& pattern, const Scene& scene, Reach reach,
                               const Pose& start) const;
-  [[nodiscard]] Place bring(const LoopPattern& pattern, const Scene& scene, Pose start) const;
-  void find_pose(const LoopPattern& pattern, const Scene& scene, const PlaneFind& found,
-                 Place& best, Finding& finding);
-  void find_map(const LoopPattern& pattern, const Scene& scene, const PlaneFind& found, int better,
-                Finding& finding) const;
+  [[nodiscard]] Place bring(const TrackedPattern& pattern, const Scene& scene, Pose start) const;
+  void find_pose(const TrackedPattern& pattern, const Scene& scene, const PlaneFind& found,
+                 Place& best, DetectionCandidate& candidate);
+  void find_map(const TrackedPattern& pattern, const Scene& scene, const PlaneFind& found,
+                int better, DetectionCandidate& candidate) const;
 
   Camera camera_;
   const Kernels& kernels_;
-  std::span<const LoopPattern> patterns_;
+  std::span<const TrackedPattern> patterns_;
   PatchCache patches_;
   PlaneMatcher matcher_;
   std::unique_ptr<CodeIndex> index_;
@@ -82,4 +82,4 @@ class PatternSearch {
   std::uint32_t turn_ = 0;              ///< the pattern whose turn is next
 };
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

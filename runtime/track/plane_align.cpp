@@ -8,10 +8,10 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "plane_pull.hpp"
+#include "patch_equations.hpp"
 #include "symmetric_solver.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 constexpr double kSettled = 0.1;  // pixels of the level
@@ -93,7 +93,7 @@ bool solve(Pass<N>& pass, Eigen::Matrix<double, N, 1>& change) {
 
 }  // namespace
 
-Resolution finest(const LoopPattern& pattern, const PlaneMap& map, int frame_levels) {
+Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_levels) {
   const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
   // Frame pixels that a pattern's pixel takes up.
   const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
@@ -107,7 +107,7 @@ Resolution finest(const LoopPattern& pattern, const PlaneMap& map, int frame_lev
 namespace {
 
 /// Puts smeared patches in the place of the sharp ones, where the smear is worth it.
-void smear(const LoopPattern& pattern, const Scene& scene, const Pose& pose, View& view) {
+void smear(const TrackedPattern& pattern, const Scene& scene, const Pose& pose, View& view) {
   constexpr double kLeast = 1.0;  // pixels of the level
   if (scene.smear == nullptr || scene.smear->share <= 0.0) return;
   const PlaneMap now = map_of_pose(pattern, scene.camera, pose);
@@ -137,8 +137,8 @@ void smear(const LoopPattern& pattern, const Scene& scene, const Pose& pose, Vie
 
 /// One step of Gauss-Newton on the pose. Answers the pixels of the level that its corners moved by;
 /// negative where it could not.
-double step_pose(const LoopPattern& pattern, const Scene& scene, const View& view, float forgiving,
-                 Pose& pose, Fit& fit) {
+double step_pose(const TrackedPattern& pattern, const Scene& scene, const View& view,
+                 float forgiving, Pose& pose, Fit& fit) {
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
   Pass<6> pass =
       pass_over<6>(view, map_of_pose(pattern, scene.camera, pose), forgiving,
@@ -155,8 +155,8 @@ double step_pose(const LoopPattern& pattern, const Scene& scene, const View& vie
 
 }  // namespace
 
-Fit align(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps, bool precise,
-          Pose& pose) {
+Fit align(const TrackedPattern& pattern, const Scene& scene, int frame_level, int steps,
+          bool precise, Pose& pose) {
   View view = view_of(pattern, scene, frame_level, map_of_pose(pattern, scene.camera, pose), kFew);
   Fit fit;
   fit.level = frame_level;
@@ -184,12 +184,12 @@ Fit align(const LoopPattern& pattern, const Scene& scene, int frame_level, int s
   return fit;
 }
 
-Fit look(const LoopPattern& pattern, const Scene& scene, int frame_level, const Pose& pose) {
+Fit look(const TrackedPattern& pattern, const Scene& scene, int frame_level, const Pose& pose) {
   Pose unchanged = pose;
   return align(pattern, scene, frame_level, 0, false, unchanged);
 }
 
-Fit align_map(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps,
+Fit align_map(const TrackedPattern& pattern, const Scene& scene, int frame_level, int steps,
               PlaneMap& map) {
   View view = view_of(pattern, scene, frame_level, map, kFew);
   view.stride = 1;
@@ -222,4 +222,4 @@ Fit align_map(const LoopPattern& pattern, const Scene& scene, int frame_level, i
   return fit;
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -4,13 +4,13 @@
 
 #include <span>
 
-#include "loop_pattern.hpp"
 #include "modar/camera.hpp"
 #include "modar/pose.hpp"
 #include "patch_cache.hpp"
 #include "plane_map.hpp"
+#include "tracked_pattern.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// How a pattern's patches fit the frame.
 struct Fit {
@@ -31,7 +31,7 @@ struct Resolution {
   int frame_level = 0;
   int pattern_level = 0;
 };
-Resolution finest(const LoopPattern& pattern, const PlaneMap& map, int frame_levels);
+Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_levels);
 
 /// How the picture is smeared: each point by this share of its way from where `before` saw it. A
 /// template that is smeared alike meets its picture without the pull that blur has on a sharp one
@@ -55,15 +55,15 @@ struct Scene {
 /// has its own gain and bias and is weighted by its correlation (Tukey). The source of the idea:
 /// Baker & Matthews, "Lucas-Kanade 20 years on" (2004). Up to `steps` over some of the patches,
 /// fewer where the pose settles; then one more, or where precise, up to three over all of them.
-Fit align(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps, bool precise,
-          Pose& pose);
+Fit align(const TrackedPattern& pattern, const Scene& scene, int frame_level, int steps,
+          bool precise, Pose& pose);
 
 /// How the patches fit at a pose.
-Fit look(const LoopPattern& pattern, const Scene& scene, int frame_level, const Pose& pose);
+Fit look(const TrackedPattern& pattern, const Scene& scene, int frame_level, const Pose& pose);
 
 /// The same over the eight parameters of the plane's own map: for a pattern that no pose of the
 /// camera explains. The change of a pixel by the lens is taken as straight.
-Fit align_map(const LoopPattern& pattern, const Scene& scene, int frame_level, int steps,
+Fit align_map(const TrackedPattern& pattern, const Scene& scene, int frame_level, int steps,
               PlaneMap& map);
 
 /// Share of the pattern's textured cells (of 8x8) inside the frame that correlate with it, 0 to 1,
@@ -72,6 +72,7 @@ struct Verdict {
   int cells = 0;
   int right = 0;
 };
-Verdict verify(const LoopPattern& pattern, const PlaneMap& map, std::span<const GrayImage> pyramid);
+Verdict verify(const TrackedPattern& pattern, const PlaneMap& map,
+               std::span<const GrayImage> pyramid);
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

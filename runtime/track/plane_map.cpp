@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 constexpr double kSmallestArea = 300.0;  // square pixels
@@ -64,7 +64,7 @@ const Camera* bending(const Camera& camera) {
   return nullptr;
 }
 
-PlaneMap map_of_pose(const LoopPattern& pattern, const Camera& camera, const Pose& pose) {
+PlaneMap map_of_pose(const TrackedPattern& pattern, const Camera& camera, const Pose& pose) {
   glm::dmat3 k(1.0);
   k[0][0] = camera.fx;
   k[1][1] = camera.fy;
@@ -74,7 +74,7 @@ PlaneMap map_of_pose(const LoopPattern& pattern, const Camera& camera, const Pos
   return {k * plane * pattern.world_from_pixels(), bending(camera)};
 }
 
-bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
+bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
                  std::array<glm::dvec2, 4>& corners) {
   const double right = pattern.width() - 0.5;
   const double bottom = pattern.height() - 0.5;
@@ -114,14 +114,14 @@ bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2,
   return ratio > 0.5 && ratio < 2.0 && holds_middle(a, b) && holds_middle(b, a);
 }
 
-std::optional<Pose> nearest_pose(const LoopPattern& pattern, const Camera& camera,
+std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,
                                  const PlaneMap& map) {
   const auto pose =
       pose_from_homography(camera, map.homography * glm::inverse(pattern.world_from_pixels()));
   return pose ? std::optional(*pose) : std::nullopt;
 }
 
-int fit_poses(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
+int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dmat3& homography,
               const PlanePoints& points, std::array<Pose, 2>& poses) {
   const auto start = nearest_pose(pattern, camera, {homography, nullptr});
   if (!start) return 0;
@@ -137,4 +137,4 @@ int fit_poses(const LoopPattern& pattern, const Camera& camera, const glm::dmat3
   return count;
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -10,11 +10,11 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 
-#include "loop_pattern.hpp"
 #include "modar/camera.hpp"
 #include "modar/pose.hpp"
+#include "tracked_pattern.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// Features that agree with a place: on the pattern's plane, in the frame, and the pixels that the
 /// frame's place is good to.
@@ -38,10 +38,10 @@ struct PlaneMap {
 /// `camera` where its lens bends, else null.
 const Camera* bending(const Camera& camera);
 
-PlaneMap map_of_pose(const LoopPattern& pattern, const Camera& camera, const Pose& pose);
+PlaneMap map_of_pose(const TrackedPattern& pattern, const Camera& camera, const Pose& pose);
 
-/// Corners in the order of Sighting; false where one lies behind the camera.
-bool map_corners(const LoopPattern& pattern, const PlaneMap& map,
+/// Corners in the order of Detection; false where one lies behind the camera.
+bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
                  std::array<glm::dvec2, 4>& corners);
 
 /// False where no camera before the plane's face sees the pattern so: mirrored, bent over itself,
@@ -56,11 +56,11 @@ bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2,
 /// image about the line of sight, which from few points looks much the same (Collins & Bartoli,
 /// "Infinitesimal plane-based pose estimation", 2014, discuss the two). Those whose face looks away
 /// are left out. Answers how many.
-int fit_poses(const LoopPattern& pattern, const Camera& camera, const glm::dmat3& homography,
+int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dmat3& homography,
               const PlanePoints& points, std::array<Pose, 2>& poses);
 
 /// The camera's pose that comes nearest to a map; none where the plane lies not before the camera.
-std::optional<Pose> nearest_pose(const LoopPattern& pattern, const Camera& camera,
+std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,
                                  const PlaneMap& map);
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

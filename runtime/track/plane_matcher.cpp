@@ -12,7 +12,7 @@
 
 #include "symmetric_solver.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 constexpr int kMostBits = 72;       // a match is no further away
@@ -23,7 +23,7 @@ constexpr std::size_t kHypotheses = 96;
 constexpr std::size_t kFewest = 6;
 constexpr int kAttempts = 8;  // votes that are followed up
 
-glm::dvec2 place(const LoopFeatureRecord& record) {
+glm::dvec2 place(const TrackerFeatureRecord& record) {
   return {record.x / 64.0 - 0.5, record.y / 64.0 - 0.5};
 }
 
@@ -65,7 +65,7 @@ glm::dmat3 unscaled(const glm::dmat3& h, const Scaling& from, const Scaling& to)
 
 }  // namespace
 
-PlaneMatch match_of(const LoopFeatureRecord& record, const LoopFeature& feature) {
+PlaneMatch match_of(const TrackerFeatureRecord& record, const TrackerFeature& feature) {
   PlaneMatch match;
   match.pattern = place(record);
   match.ideal = {static_cast<double>(feature.x), static_cast<double>(feature.y)};
@@ -106,7 +106,7 @@ PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels, std::si
 
 /// Lowe's ratio test, where a second best at the same place of the pattern (from another view) is
 /// no rival. Answers the best one's index.
-bool PlaneMatcher::unique(const LoopPattern& pattern, std::size_t first, std::size_t count,
+bool PlaneMatcher::unique(const TrackedPattern& pattern, std::size_t first, std::size_t count,
                           int best, std::size_t& at) const {
   const auto limit = static_cast<std::uint8_t>(best * 100 / kRatio);
   const auto* nearest =
@@ -128,10 +128,10 @@ bool PlaneMatcher::unique(const LoopPattern& pattern, std::size_t first, std::si
   return true;
 }
 
-void PlaneMatcher::match(const LoopPattern& pattern, std::span<const LoopFeature> features) {
+void PlaneMatcher::match(const TrackedPattern& pattern, std::span<const TrackerFeature> features) {
   matches_.clear();
   const Camera* lens = camera_.distortion == std::array<double, 5>{} ? nullptr : &camera_;
-  for (const LoopFeature& feature : features) {
+  for (const TrackerFeature& feature : features) {
     const std::size_t first = feature.dark != 0 ? pattern.bright_count : 0;
     const std::size_t last = feature.dark != 0 ? pattern.features.size() : pattern.bright_count;
     if (first == last) continue;
@@ -266,8 +266,8 @@ std::size_t PlaneMatcher::fit(const PlaneMatch& hypothesis, glm::dmat3& homograp
   return collect(homography, 3.0, mask_);
 }
 
-std::span<const PlaneFind> PlaneMatcher::find(const LoopPattern& pattern,
-                                              std::span<const LoopFeature> features) {
+std::span<const PlaneFind> PlaneMatcher::find(const TrackedPattern& pattern,
+                                              std::span<const TrackerFeature> features) {
   match(pattern, features);
   if (matches_.size() < kFewest) return {};
   mask_.assign(matches_.size(), 0);
@@ -315,7 +315,7 @@ std::span<const PlaneFind> PlaneMatcher::find(const LoopPattern& pattern,
   return std::span(finds_).first(count);
 }
 
-void PlaneMatcher::choose(const LoopPattern& pattern, const PlaneFind& find) {
+void PlaneMatcher::choose(const TrackedPattern& pattern, const PlaneFind& find) {
   inlier_world_.clear();
   inlier_ideal_.clear();
   inlier_sigma_.clear();
@@ -327,4 +327,4 @@ void PlaneMatcher::choose(const LoopPattern& pattern, const PlaneFind& find) {
   }
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -10,12 +10,12 @@
 #include <glm/vec2.hpp>
 
 #include "kernels.hpp"
-#include "loop_pattern.hpp"
 #include "modar/camera.hpp"
-#include "modar/loop_features.hpp"
+#include "modar/tracker_features.hpp"
 #include "plane_map.hpp"
+#include "tracked_pattern.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 
 /// A frame's feature and the pattern's that it looks like, with the local affine map that the two
 /// orientations and scales imply.
@@ -28,7 +28,7 @@ struct PlaneMatch {
 };
 
 /// Of a feature that looks like a pattern's: its place as if the lens did not bend, no distance.
-PlaneMatch match_of(const LoopFeatureRecord& record, const LoopFeature& feature);
+PlaneMatch match_of(const TrackerFeatureRecord& record, const TrackerFeature& feature);
 /// Whether a match lies where another one's affine map says, in a like shape.
 bool agrees(const PlaneMatch& hypothesis, const PlaneMatch& other);
 
@@ -45,20 +45,20 @@ class PlaneMatcher {
   PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t most_features,
                std::size_t most_codes);
   /// The homographies that most matches speak for, the best first; valid until the next call.
-  std::span<const PlaneFind> find(const LoopPattern& pattern,
-                                  std::span<const LoopFeature> features);
+  std::span<const PlaneFind> find(const TrackedPattern& pattern,
+                                  std::span<const TrackerFeature> features);
   [[nodiscard]] std::size_t most_features() const { return matches_.capacity(); }
   /// Matches of the last find().
   [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
   /// Collects the points of a find's inliers for inliers().
-  void choose(const LoopPattern& pattern, const PlaneFind& find);
+  void choose(const TrackedPattern& pattern, const PlaneFind& find);
   [[nodiscard]] PlanePoints inliers() const {
     return {inlier_world_, inlier_ideal_, inlier_sigma_};
   }
 
  private:
-  void match(const LoopPattern& pattern, std::span<const LoopFeature> features);
-  bool unique(const LoopPattern& pattern, std::size_t first, std::size_t count, int best,
+  void match(const TrackedPattern& pattern, std::span<const TrackerFeature> features);
+  bool unique(const TrackedPattern& pattern, std::size_t first, std::size_t count, int best,
               std::size_t& at) const;
   std::size_t support(const PlaneMatch& hypothesis, std::vector<std::uint8_t>* mask) const;
   std::size_t fit(const PlaneMatch& hypothesis, glm::dmat3& homography);
@@ -81,4 +81,4 @@ class PlaneMatcher {
   std::vector<double> inlier_sigma_;
 };
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

@@ -6,7 +6,7 @@
 #include "bilinear.hpp"
 #include "plane_align.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 float correlation(std::span<const float> a, std::span<const float> b, float& contrast) {
@@ -28,7 +28,7 @@ float correlation(std::span<const float> a, std::span<const float> b, float& con
 
 }  // namespace
 
-Verdict verify(const LoopPattern& pattern, const PlaneMap& map,
+Verdict verify(const TrackedPattern& pattern, const PlaneMap& map,
                std::span<const GrayImage> pyramid) {
   constexpr int kCells = 8;
   constexpr int kSide = 6;
@@ -82,4 +82,4 @@ Verdict verify(const LoopPattern& pattern, const PlaneMap& map,
   return verdict;
 }
 
-}  // namespace modar::loop
+}  // namespace modar::tracker

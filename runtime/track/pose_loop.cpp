@@ -4,18 +4,18 @@
 #include <algorithm>
 #include <vector>
 
-#include "follower.hpp"
+#include "async_detector.hpp"
+#include "frame_tracker.hpp"
 #include "runtime/platform/lap_clock.hpp"
-#include "seeker.hpp"
 
 namespace modar {
 namespace {
 
-using loop::Finding;
-using loop::Fit;
-using loop::LoopPattern;
-using loop::Track;
-using loop::Want;
+using tracker::DetectionCandidate;
+using tracker::Fit;
+using tracker::Track;
+using tracker::TrackedPattern;
+using tracker::Want;
 
 }  // namespace
 
@@ -25,13 +25,13 @@ struct PoseLoop::State {
 
   Camera camera;
   PoseLoopOptions options;
-  std::vector<LoopPattern> patterns;
+  std::vector<TrackedPattern> patterns;
   std::vector<Track> tracks;  ///< one a pattern
-  loop::Follower follower;
-  std::unique_ptr<loop::PatternSearch> search;  ///< on the caller's thread, or
-  std::unique_ptr<loop::Seeker> seeker;         ///< on its own
+  tracker::FrameTracker follower;
+  std::unique_ptr<tracker::PatternSearch> search;  ///< on the caller's thread, or
+  std::unique_ptr<tracker::AsyncDetector> seeker;  ///< on its own
   std::vector<Want> wants;
-  loop::Findings findings;
+  tracker::DetectionCandidates candidates;
   int frames_to_search = 0;
   bool stale = false;  ///< what the seeker finds was asked for before a reset
 
@@ -39,9 +39,9 @@ struct PoseLoop::State {
   void follow_all(TrackResult& result);
   bool due(bool any_held);
   void adopt(TrackResult& result);
-  bool take_up(const LoopPattern& pattern, Track& track, const Finding& finding,
-               Sighting& sighting) const;
-  bool prevails(std::size_t i, const Sighting& sighting, TrackResult& result);
+  bool take_up(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
+               Detection& detection) const;
+  bool prevails(std::size_t i, const Detection& detection, TrackResult& result);
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -56,9 +56,9 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   auto state = std::make_unique<State>(camera, options);
   const std::uint32_t count = bundle.patterns().size();
   for (std::uint32_t i = 0; i < count; ++i) {
-    const auto bytes = bundle.section(SectionType::kLoopRecord, i);
+    const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
     if (bytes.empty()) continue;
-    auto pattern = loop::view_loop_pattern(bytes, i);
+    auto pattern = tracker::view_loop_pattern(bytes, i);
     if (!pattern) return tl::unexpected(pattern.error());
     state->patterns.push_back(*pattern);
   }
@@ -69,11 +69,13 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   }
   state->tracks.resize(state->patterns.size());
   state->wants.resize(state->patterns.size());
-  state->findings.patterns.resize(state->patterns.size());
+  state->candidates.patterns.resize(state->patterns.size());
   if (options.apart) {
-    state->seeker = std::make_unique<loop::Seeker>(camera, state->patterns, options.detect);
+    state->seeker =
+        std::make_unique<tracker::AsyncDetector>(camera, state->patterns, options.detect);
   } else {
-    state->search = std::make_unique<loop::PatternSearch>(camera, state->patterns, options.detect);
+    state->search =
+        std::make_unique<tracker::PatternSearch>(camera, state->patterns, options.detect);
   }
   return std::unique_ptr<PoseLoop>(new PoseLoop(std::move(state)));
 }
@@ -110,7 +112,7 @@ bool PoseLoop::State::due(bool any_held) {
   bool lately = false;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     Track& track = tracks[i];
-    const bool lost = track.since_lost < loop::kLately;
+    const bool lost = track.since_lost < tracker::kLately;
     wants[i] = track.held ? Want::kNo : lost ? Want::kFirst : Want::kYes;
     missing = missing || !track.held;
     lately = lately || (!track.held && lost);
@@ -132,7 +134,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   LapClock clock;
   follower.set_frame(frame);
   follow_all(result);
-  if (seeker != nullptr && seeker->take(findings, wants)) {
+  if (seeker != nullptr && seeker->take(candidates, wants)) {
     if (!stale) adopt(result);
     stale = false;
   }
@@ -141,7 +143,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
     if (seeker != nullptr) {
       seeker->start(frame, wants);
     } else {
-      search->run(follower.eye(), wants, findings);
+      search->run(follower.eye(), wants, candidates);
       adopt(result);
     }
   }
@@ -150,46 +152,47 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
     if (progress(reason) > progress(result.reason)) result.reason = reason;
   }
   std::sort(result.visible.begin(), result.visible.end(),
-            [](const Sighting& a, const Sighting& b) { return a.pattern < b.pattern; });
+            [](const Detection& a, const Detection& b) { return a.pattern < b.pattern; });
 }
 
 void PoseLoop::State::follow_all(TrackResult& result) {
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     Track& track = tracks[i];
-    Sighting sighting;
+    Detection detection;
     if (!track.held) {
-      track.since_lost = std::min(track.since_lost + 1, loop::kLately);
+      track.since_lost = std::min(track.since_lost + 1, tracker::kLately);
       continue;
     }
-    track.held = options.track && follower.follow(patterns[i], track, sighting);
+    track.held = options.track && follower.follow(patterns[i], track, detection);
     if (track.held) {
-      result.visible.push_back(sighting);
+      result.visible.push_back(detection);
     } else {
-      track.since_lost = options.track ? 0 : loop::kLately;
+      track.since_lost = options.track ? 0 : tracker::kLately;
     }
   }
 }
 
-/// Answers whether a finding is visible in the present frame.
-bool PoseLoop::State::take_up(const LoopPattern& pattern, Track& track, const Finding& finding,
-                              Sighting& sighting) const {
+/// Answers whether a candidate is visible in the present frame.
+bool PoseLoop::State::take_up(const TrackedPattern& pattern, Track& track,
+                              const DetectionCandidate& candidate, Detection& detection) const {
   Track next;
-  next.pose = finding.pose;
-  next.by_map = finding.by_map;
-  next.map = finding.map;
-  sighting.matches = finding.matches;
-  sighting.inliers = finding.inliers;
+  next.pose = candidate.pose;
+  next.by_map = candidate.by_map;
+  next.map = candidate.map;
+  detection.matches = candidate.matches;
+  detection.inliers = candidate.inliers;
   if (seeker != nullptr) {
     // It was found in a frame that has gone by.
     Fit fit;
     const bool here =
         next.by_map
-            ? loop::settle_map(pattern, follower.scene(), next.map, fit)
-            : loop::settle(pattern, follower.scene(), loop::Reach::kFar, next.pose, fit) &&
-                  loop::percent_right(pattern, follower.scene(), next.pose) >= loop::kRightPercent;
+            ? tracker::settle_map(pattern, follower.scene(), next.map, fit)
+            : tracker::settle(pattern, follower.scene(), tracker::Reach::kFar, next.pose, fit) &&
+                  tracker::percent_right(pattern, follower.scene(), next.pose) >=
+                      tracker::kRightPercent;
     if (!here) return false;
   }
-  if (!follower.report(pattern, next, sighting)) return false;
+  if (!follower.report(pattern, next, detection)) return false;
   next.held = true;
   track = next;
   return true;
@@ -197,25 +200,25 @@ bool PoseLoop::State::take_up(const LoopPattern& pattern, Track& track, const Fi
 
 /// Prints of one series share so much that one is taken for the other: of those that claim the same
 /// place, the frame decides. Answers whether pattern i, new, stays; then the others yield to it.
-bool PoseLoop::State::prevails(std::size_t i, const Sighting& sighting, TrackResult& result) {
+bool PoseLoop::State::prevails(std::size_t i, const Detection& detection, TrackResult& result) {
   const auto percent_of = [this](std::size_t which) {
     const Track& track = tracks[which];
-    return track.by_map ? loop::map_percent(patterns[which], follower.scene(), track.map)
-                        : loop::percent_right(patterns[which], follower.scene(), track.pose);
+    return track.by_map ? tracker::map_percent(patterns[which], follower.scene(), track.map)
+                        : tracker::percent_right(patterns[which], follower.scene(), track.pose);
   };
   // None yields before it is known that the new one prevails against all.
   for (const bool yields : {false, true}) {
     for (std::size_t k = 0; k < tracks.size(); ++k) {
-      Sighting rival;
+      Detection rival;
       const bool other = k != i && tracks[k].held && follower.report(patterns[k], tracks[k], rival);
-      if (!other || !loop::same_place(rival.corners, sighting.corners)) continue;
+      if (!other || !tracker::same_place(rival.corners, detection.corners)) continue;
       if (!yields) {
         if (percent_of(i) <= percent_of(k)) return false;
         continue;
       }
       tracks[k] = {};
       tracks[k].told = Reason::kFailedVerification;
-      std::erase_if(result.visible, [&](const Sighting& s) { return s.pattern == rival.pattern; });
+      std::erase_if(result.visible, [&](const Detection& s) { return s.pattern == rival.pattern; });
     }
   }
   return true;
@@ -223,25 +226,25 @@ bool PoseLoop::State::prevails(std::size_t i, const Sighting& sighting, TrackRes
 
 /// Takes what a search found into the tracks and the frame's result.
 void PoseLoop::State::adopt(TrackResult& result) {
-  result.features = findings.features;
-  result.times.detect = findings.times.detect;
-  result.times.match = findings.times.match;
-  result.times.homography = findings.times.homography;
+  result.features = candidates.features;
+  result.times.detect = candidates.times.detect;
+  result.times.match = candidates.times.match;
+  result.times.homography = candidates.times.homography;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     Track& track = tracks[i];
     if (wants[i] == Want::kNo || track.held) continue;
-    const Finding& finding = findings.patterns[i];
+    const DetectionCandidate& candidate = candidates.patterns[i];
     const Track before = track;
-    Sighting sighting;
+    Detection detection;
     const bool here =
-        finding.reason == Reason::kVisible && take_up(patterns[i], track, finding, sighting);
-    if (here && prevails(i, sighting, result)) {
-      result.visible.push_back(sighting);
+        candidate.reason == Reason::kVisible && take_up(patterns[i], track, candidate, detection);
+    if (here && prevails(i, detection, result)) {
+      result.visible.push_back(detection);
       continue;
     }
     if (here) track = before;  // if it was lost a moment ago, it is still looked for first
     const Reason reason =
-        finding.reason == Reason::kVisible ? Reason::kFailedVerification : finding.reason;
+        candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
     // In the frame that lost it, what it was lost by tells more.
     if (track.since_lost > 0 || progress(reason) > progress(track.told)) track.told = reason;
   }

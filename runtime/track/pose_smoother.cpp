@@ -54,15 +54,15 @@ double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
   return latency;
 }
 
-double PoseSmoother::step(double time_s, std::span<Sighting> visible) {
+double PoseSmoother::step(double time_s, std::span<Detection> visible) {
   if (greatest_s_ == 0.0) return 0.0;
   double slowest = 0.0;
   for (State& state : states_) state.seen = false;
-  for (Sighting& sighting : visible) {
-    if (sighting.pattern >= states_.size()) continue;
-    State& state = states_[sighting.pattern];
+  for (Detection& detection : visible) {
+    if (detection.pattern >= states_.size()) continue;
+    State& state = states_[detection.pattern];
     state.seen = true;
-    slowest = std::max(slowest, smooth(time_s, state, sighting.pose));
+    slowest = std::max(slowest, smooth(time_s, state, detection.pose));
   }
   for (State& state : states_) state.known = state.known && state.seen;
   return slowest * 1e3;

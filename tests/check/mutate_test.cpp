@@ -1,16 +1,16 @@
 // The proof of the checker is worth something only if its mutations reach everything.
-#include "bake/check/mutate.hpp"
+#include "bake/lab/mutate.hpp"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
-#include "bake/check/mutation_targets.hpp"
-#include "bake/check/mutator.hpp"
 #include "bake/check/scene_digest.hpp"
+#include "bake/lab/mutation_targets.hpp"
+#include "bake/lab/mutator.hpp"
 #include "formats/check.hpp"
-#include "formats/statement.hpp"
+#include "formats/content_summary.hpp"
 #include "tests/formats/support.hpp"
 #include "tests/soak.hpp"
 
@@ -137,7 +137,7 @@ TEST(Mutate, ASceneIsTheSameOnlyWhereAllThatIsSeenIs) {
   EXPECT_EQ(scene_digest(meta), scene);
   for (const SectionType type :
        {SectionType::kNames, SectionType::kModels, SectionType::kVertices, SectionType::kIndices,
-        SectionType::kTextureData, SectionType::kFeatureTwin, SectionType::kScenes}) {
+        SectionType::kTextureData, SectionType::kMappedFeatures, SectionType::kScenes}) {
     Bytes changed = bytes;
     const SectionEntry& entry = entry_of(changed, type);
     const std::size_t at = type == SectionType::kNames || type == SectionType::kVertices ||

@@ -3,7 +3,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
-#include "bake/bundle_builder.hpp"
+#include "bake/bundle/bundle_builder.hpp"
 
 namespace modar {
 namespace {

@@ -1,5 +1,5 @@
 // Sizes as people read them.
-#include "bake/commands/terminal.hpp"
+#include "bake/terminal.hpp"
 
 #include <gtest/gtest.h>
 

@@ -75,7 +75,7 @@ constexpr CorruptCase kCases[] = {
     {"BUNDLE_SECTION_OWNER",
      [] {
        return damaged(pattern_content(),
-                      [](Bytes& b) { entry_of(b, SectionType::kFeatureTwin).variant = 2; });
+                      [](Bytes& b) { entry_of(b, SectionType::kMappedFeatures).variant = 2; });
      }},
     {"BUNDLE_SECTION_ALIGNMENT",
      [] {
@@ -177,7 +177,7 @@ constexpr CorruptCase kCases[] = {
     {"BUNDLE_FEATURES",
      [] {
        return damaged(pattern_content(), [](Bytes& b) {
-         const std::uint64_t offset = entry_of(b, SectionType::kFeatureTwin).offset;
+         const std::uint64_t offset = entry_of(b, SectionType::kMappedFeatures).offset;
          reinterpret_cast<FeatureHeader*>(b.data() + offset)->count += 1;
        });
      }},

@@ -1,8 +1,8 @@
 // Damage to payloads of bundles that open.
 #include <cstring>
 
-#include "formats/loop_record.hpp"
-#include "formats/statement.hpp"
+#include "formats/content_summary.hpp"
+#include "formats/tracker_record.hpp"
 #include "tests/corrupt/cases.hpp"
 
 namespace modar::test {
@@ -130,17 +130,17 @@ constexpr CorruptCase kCases[] = {
      [] {
        return changed(pattern_content(), [](auto& c) {
          // Two patches, the second of a finer level than the first.
-         LoopRecordHeader header{};
+         TrackerRecordHeader header{};
          header.describer_version = 1;
          header.patch_count = 2;
          header.width = 64;
          header.height = 48;
          header.level_count = 2;
          header.codes_offset = header.features_offset = header.patches_offset = sizeof header;
-         header.pixels_offset = sizeof header + 2 * sizeof(LoopPatchRecord);
-         const LoopPatchRecord patches[2] = {{640, 640, 1, 0}, {640, 640, 0, 0}};
+         header.pixels_offset = sizeof header + 2 * sizeof(TrackerPatchRecord);
+         const TrackerPatchRecord patches[2] = {{640, 640, 1, 0}, {640, 640, 0, 0}};
          ExtraSection section;
-         section.type = static_cast<std::uint32_t>(SectionType::kLoopRecord);
+         section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
          section.owner = 0;
          section.bytes.resize(header.pixels_offset + 64 * 48 + 32 * 24);
          std::memcpy(section.bytes.data(), &header, sizeof header);

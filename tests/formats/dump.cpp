@@ -295,7 +295,7 @@ json dump_sections_and_features(const BundleView& view, json& features) {
     GET(type), GET(version), GET(flags), GET(owner), GET(variant), GET(offset), GET(size);
     out["hash"] = hex(record.hash);
     rows.push_back(out);
-    if (static_cast<SectionType>(record.type) != SectionType::kFeatureTwin) continue;
+    if (static_cast<SectionType>(record.type) != SectionType::kMappedFeatures) continue;
     const FeatureView twin = view.features(record.owner, record.variant);
     const std::string_view yml = view.feature_yml(record.owner, record.variant);
     json entry = {{"pattern", record.owner},

@@ -14,7 +14,7 @@
 
 #include "formats/field_table.hpp"
 #include "formats/layout.hpp"
-#include "formats/loop_record.hpp"
+#include "formats/tracker_record.hpp"
 
 namespace {
 
@@ -134,12 +134,12 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(FeatureHeader, F(count), F(descriptor_bytes), F(keypoints_offset),
                F(descriptors_offset), F(reserved))
   MODAR_STRUCT(KeypointRecord, F(x), F(y), F(size), F(angle), F(response), F(octave), F(class_id))
-  MODAR_STRUCT(LoopRecordHeader, F(describer_version), F(feature_count), F(bright_count),
+  MODAR_STRUCT(TrackerRecordHeader, F(describer_version), F(feature_count), F(bright_count),
                F(patch_count), F(width), F(height), F(level_count), F(reserved0),
                F(features_offset), F(codes_offset), F(patches_offset), F(pixels_offset),
                F(reserved1))
-  MODAR_STRUCT(LoopFeatureRecord, F(x), F(y), F(warp))
-  MODAR_STRUCT(LoopPatchRecord, F(x), F(y), F(level), F(score))
+  MODAR_STRUCT(TrackerFeatureRecord, F(x), F(y), F(warp))
+  MODAR_STRUCT(TrackerPatchRecord, F(x), F(y), F(level), F(score))
   return out;
 }
 
@@ -159,7 +159,8 @@ TEST(SpecTable, SpecificationAndStructsAreTheSame) {
 TEST(SpecTable, FieldTableHoldsEveryField) {
   auto code = compiled();
   // Names are values of fields; what is in a loop record is walked over as bytes.
-  for (const char* name : {"NameRef", "LoopRecordHeader", "LoopFeatureRecord", "LoopPatchRecord"}) {
+  for (const char* name :
+       {"NameRef", "TrackerRecordHeader", "TrackerFeatureRecord", "TrackerPatchRecord"}) {
     code.erase(name);
   }
   ASSERT_EQ(modar::record_infos().size(), code.size());
@@ -212,9 +213,9 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
                                                     {SectionType::kPatterns, "patterns"},
                                                     {SectionType::kParameterSets, "parameter sets"},
                                                     {SectionType::kScenes, "scenes"},
-                                                    {SectionType::kFeatureTwin, "feature twin"},
+                                                    {SectionType::kMappedFeatures, "feature twin"},
                                                     {SectionType::kFeatureYml, "feature text"},
-                                                    {SectionType::kLoopRecord, "loop record"},
+                                                    {SectionType::kTrackerRecord, "loop record"},
                                                     {SectionType::kVertices, "vertices"},
                                                     {SectionType::kIndices, "indices"},
                                                     {SectionType::kTextureData, "texture data"}};

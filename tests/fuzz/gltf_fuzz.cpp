@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "bake/model/gltf_reader.hpp"
-#include "bake/model/tri_mesh.hpp"
+#include "bake/import/gltf/gltf_reader.hpp"
+#include "bake/mesh/tri_mesh.hpp"
 #include "tests/fuzz/input_file.hpp"
 #include "tests/fuzz/need.hpp"
 

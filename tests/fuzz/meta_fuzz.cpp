@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "bake/check/source_check.hpp"
-#include "bake/model/mesh_levels.hpp"
+#include "bake/mesh/lod/mesh_levels.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   modar::BakeRequest request;

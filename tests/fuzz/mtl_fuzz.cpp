@@ -6,10 +6,10 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "bake/model/obj_reader.hpp"
+#include "bake/import/obj/obj_reader.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::vector<modar::Finding> findings;
+  std::vector<modar::Diagnostic> findings;
   const auto materials =
       modar::parse_mtl({reinterpret_cast<const char*>(data), size}, "/nowhere", "fuzz", findings);
   for (const modar::SourceMaterial& m : materials) {
@@ -21,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!std::isfinite(m.shininess) || !std::isfinite(m.opacity)) std::abort();
     if (!m.diffuse_map.empty() || !m.alpha_map.empty()) std::abort();  // nothing lies there
   }
-  for (const modar::Finding& finding : findings) {
+  for (const modar::Diagnostic& finding : findings) {
     if (finding.id.empty() || finding.message.empty()) std::abort();
   }
   return 0;

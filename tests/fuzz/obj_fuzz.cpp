@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "bake/model/obj_reader.hpp"
-#include "bake/model/tri_mesh.hpp"
+#include "bake/import/obj/obj_reader.hpp"
+#include "bake/mesh/tri_mesh.hpp"
 
 namespace {
 

@@ -31,7 +31,7 @@ class PlantedViolations(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder)
-        for room in ("formats", "bake/commands", "bake/model", "runtime/track", "tests"):
+        for room in ("formats", "bake/commands", "bake/import", "bake/mesh", "bake/lab", "runtime/track", "tests"):
             (self.folder / room).mkdir(parents=True)
 
     def assert_refused(self, path, text, expected):
@@ -57,7 +57,7 @@ class PlantedViolations(unittest.TestCase):
         self.assert_refused("runtime/track/a.cpp", "#include <opencv2/core.hpp>\n", "opencv2")
 
     def test_openmesh_stays_in_its_file(self):
-        self.assert_refused("bake/model/weld.cpp", "#include <OpenMesh/Core/IO/MeshIO.hh>\n", "OpenMesh")
+        self.assert_refused("bake/mesh/weld/weld.cpp", "#include <OpenMesh/Core/IO/MeshIO.hh>\n", "OpenMesh")
 
     def test_the_command_line_library_stays_in_its_file(self):
         self.assert_refused("bake/commands/a.cpp", "#include <CLI/CLI.hpp>\n", "CLI")

@@ -166,7 +166,7 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
 
 TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
   const cv::Mat image = test::textured_picture(320, 260, 12);
-  LoopBakeOptions bake;
+  TrackerRecordOptions bake;
   bake.trial_views = 12;
   const auto bytes = bundle_of_pattern(test::gray(image), bake);
   ASSERT_TRUE(bytes) << to_line(bytes.error());
@@ -198,7 +198,7 @@ TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
 
 TEST(FocalFinder, FrontalViewsTellNothing) {
   const cv::Mat image = test::textured_picture(320, 260, 12);
-  LoopBakeOptions bake;
+  TrackerRecordOptions bake;
   bake.trial_views = 8;
   const auto bytes = bundle_of_pattern(test::gray(image), bake);
   ASSERT_TRUE(bytes);

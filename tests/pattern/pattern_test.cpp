@@ -200,8 +200,8 @@ cv::Mat speckled(int width, int height) {
   return picture;
 }
 
-LoopBakeOptions quick() {
-  LoopBakeOptions options;
+TrackerRecordOptions quick() {
+  TrackerRecordOptions options;
   options.features = 300;
   options.trial_views = 8;
   options.score = false;

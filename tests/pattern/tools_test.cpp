@@ -5,16 +5,16 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "bake/lab/score_bench.hpp"
 #include "bake/pattern/confusion.hpp"
 #include "bake/pattern/described_view.hpp"
-#include "bake/pattern/loop_bake.hpp"
 #include "bake/pattern/pose_subject.hpp"
 #include "bake/pattern/score.hpp"
-#include "bake/pattern/score_bench.hpp"
 #include "bake/pattern/simulate.hpp"
+#include "bake/pattern/tracker_record_bake.hpp"
 #include "bake/pattern/view_kernel.hpp"
 #include "bake/pattern/view_render.hpp"
-#include "bake/texture/etc1_kernel.hpp"
+#include "bake/texture/etc1/etc1_kernel.hpp"
 #include "tests/track/synthetic.hpp"
 
 namespace modar {
@@ -25,15 +25,15 @@ const cv::Mat& picture() {
   return kPicture;
 }
 
-LoopBakeOptions quick_bake() {
-  LoopBakeOptions options;
+TrackerRecordOptions quick_bake() {
+  TrackerRecordOptions options;
   options.features = 500;
   options.trial_views = 8;
   return options;
 }
 
 PatternScore score_of(const cv::Mat& image, unsigned jobs = 1) {
-  const auto record = bake_loop_record(test::gray(image), quick_bake());
+  const auto record = bake_tracker_record(test::gray(image), quick_bake());
   EXPECT_TRUE(record) << to_line(record.error());
   if (!record) return {};
   const auto score = score_pattern(test::gray(image), *record, jobs);
@@ -138,8 +138,9 @@ TEST(Views, ABackgroundShowsAroundThePictureAndNowhereElse) {
 TEST(Views, AreTheSameAtEverySimdLevel) {
   const auto levels = view_levels(test::gray(picture()));
   const GrayPicture best = render_view(levels, tilted_view(), nullptr);
-  const LoopCode code{1, 2, 255};
-  const std::array<LoopCode, 3> codes{LoopCode{}, LoopCode{1, 2, 254}, LoopCode{1, 3, 255, 7}};
+  const TrackerCode code{1, 2, 255};
+  const std::array<TrackerCode, 3> codes{TrackerCode{}, TrackerCode{1, 2, 254},
+                                         TrackerCode{1, 3, 255, 7}};
   for (const std::int64_t level : etc1_simd_levels()) {
     force_etc1_simd_level(level);
     EXPECT_EQ(render_view(levels, tilted_view(), nullptr).pixels, best.pixels)
@@ -196,7 +197,7 @@ TEST(Score, NamesWhatIsWrongWithAPicture) {
 
 TEST(Score, APictureWithoutFeaturesHasNoRecordToScore) {
   const cv::Mat blank(120, 120, CV_8UC1, cv::Scalar(128));
-  const auto record = bake_loop_record(test::gray(blank), quick_bake());
+  const auto record = bake_tracker_record(test::gray(blank), quick_bake());
   ASSERT_FALSE(record);
   EXPECT_EQ(record.error().code, "pattern.no-features");
   EXPECT_FALSE(score_pattern(test::gray(blank), {}, 1));

@@ -1,5 +1,5 @@
 // Our text of features is the one that OpenCV's FileStorage writes.
-#include "formats/feature_text.hpp"
+#include "formats/transport/feature_text.hpp"
 
 #include <gtest/gtest.h>
 

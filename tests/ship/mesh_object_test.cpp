@@ -6,8 +6,8 @@
 #include <random>
 
 #include "bake/ship/mesh_encoder.hpp"
-#include "formats/chunk_order.hpp"
 #include "formats/quantise.hpp"
+#include "formats/transport/chunk_order.hpp"
 #include "modar/mesh_transport.hpp"
 
 namespace modar {

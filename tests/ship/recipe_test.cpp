@@ -1,5 +1,5 @@
 // Recipes of the golden bundle: complete, put together by hand, and broken in every byte.
-#include "formats/recipe.hpp"
+#include "formats/transport/recipe.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Vertices as integers and back, held against the compiler's own half type.
-#include "formats/vertex_streams.hpp"
+#include "formats/transport/vertex_streams.hpp"
 
 #include <gtest/gtest.h>
 

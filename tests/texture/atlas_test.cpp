@@ -5,7 +5,7 @@
 
 #include <set>
 
-#include "bake/texture/etc1_bench.hpp"
+#include "bake/lab/etc1_bench.hpp"
 #include "bake/texture/texture_quality.hpp"
 #include "bake/texture/texture_set.hpp"
 #include "tests/texture/texture_samples.hpp"

@@ -4,8 +4,8 @@
 #include <array>
 #include <random>
 
-#include "bake/texture/etc1_block.hpp"
-#include "bake/texture/texture_files.hpp"
+#include "bake/export/texture_files.hpp"
+#include "bake/texture/etc1/etc1_block.hpp"
 #include "tests/texture/libetc1.hpp"
 #include "tests/texture/texture_samples.hpp"
 

@@ -1,7 +1,7 @@
 // Android's libetc1 as an independent eye on ETC1 blocks.
 #pragma once
 
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/texture/texture.hpp"
 
 namespace modar::test {
 

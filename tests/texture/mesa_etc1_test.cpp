@@ -7,8 +7,8 @@
 #include <array>
 #include <random>
 
-#include "bake/texture/etc1_block.hpp"
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/texture/etc1/etc1_block.hpp"
+#include "bake/texture/texture.hpp"
 #include "modar/gl_context.hpp"
 
 namespace modar {

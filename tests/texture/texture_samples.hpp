@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/texture/etc1_texture.hpp"
+#include "bake/texture/texture.hpp"
 
 namespace modar::test {
 

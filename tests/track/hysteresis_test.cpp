@@ -1,4 +1,4 @@
-// The two-frame rule as tables: S is a frame with a sighting, a dot one without.
+// The two-frame rule as tables: S is a frame with a detection, a dot one without.
 #include <gtest/gtest.h>
 
 #include "modar/tracker.hpp"
@@ -10,7 +10,7 @@ std::string shown(const std::string& frames) {
   Hysteresis hysteresis(1);
   std::string answer;
   for (const char frame : frames) {
-    std::vector<Sighting> visible(frame == 'S' ? 1 : 0);
+    std::vector<Detection> visible(frame == 'S' ? 1 : 0);
     answer += hysteresis.step(visible)[0].shown ? '1' : '0';
   }
   return answer;
@@ -27,12 +27,12 @@ TEST(Hysteresis, FollowsTheArticlesRule) {
 
 TEST(Hysteresis, KeepsTheNewestMeasuredPoseAndSaysWhetherItIsOfThisFrame) {
   Hysteresis hysteresis(2);
-  Sighting sighting;
-  sighting.pattern = 1;
-  sighting.pose.translation = {1, 2, 3};
-  hysteresis.step({&sighting, 1});
-  sighting.pose.translation = {4, 5, 6};
-  auto states = hysteresis.step({&sighting, 1});
+  Detection detection;
+  detection.pattern = 1;
+  detection.pose.translation = {1, 2, 3};
+  hysteresis.step({&detection, 1});
+  detection.pose.translation = {4, 5, 6};
+  auto states = hysteresis.step({&detection, 1});
   EXPECT_FALSE(states[0].shown);
   EXPECT_TRUE(states[1].shown);
   EXPECT_TRUE(states[1].measured);
@@ -44,10 +44,10 @@ TEST(Hysteresis, KeepsTheNewestMeasuredPoseAndSaysWhetherItIsOfThisFrame) {
 
 TEST(Hysteresis, IgnoresPatternsThatItDoesNotKnow) {
   Hysteresis hysteresis(1);
-  Sighting sighting;
-  sighting.pattern = 9;
-  hysteresis.step({&sighting, 1});
-  EXPECT_FALSE(hysteresis.step({&sighting, 1})[0].shown);
+  Detection detection;
+  detection.pattern = 9;
+  hysteresis.step({&detection, 1});
+  EXPECT_FALSE(hysteresis.step({&detection, 1})[0].shown);
 }
 
 TEST(Reason, EveryReasonHasItsWords) {

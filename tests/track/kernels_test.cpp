@@ -13,7 +13,7 @@
 
 #include "synthetic.hpp"
 
-namespace modar::loop {
+namespace modar::tracker {
 namespace {
 
 std::vector<std::uint8_t> noise(std::size_t count, std::uint32_t seed) {
@@ -158,4 +158,4 @@ TEST(Kernels, AllLevelsGiveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace modar::loop
+}  // namespace modar::tracker

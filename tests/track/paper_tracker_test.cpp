@@ -36,22 +36,22 @@ Camera small_camera() {
   return default_camera(480, 360);
 }
 
-double corner_error(const Sighting& sighting, const std::vector<cv::Point2d>& truth) {
+double corner_error(const Detection& detection, const std::vector<cv::Point2d>& truth) {
   double sum = 0;
   for (std::size_t i = 0; i < 4; ++i) {
-    sum += std::hypot(sighting.corners[i].x - truth[i].x, sighting.corners[i].y - truth[i].y);
+    sum += std::hypot(detection.corners[i].x - truth[i].x, detection.corners[i].y - truth[i].y);
   }
   return sum / 4;
 }
 
-void expect_pose_of_solve_pnp(const Sighting& sighting, const cv::Mat& pattern,
+void expect_pose_of_solve_pnp(const Detection& detection, const cv::Mat& pattern,
                               const Camera& camera) {
   const double longest = std::max(pattern.cols, pattern.rows);
   const double w = pattern.cols / longest;
   const double h = pattern.rows / longest;
   const std::vector<cv::Point3d> world = {{-w, h, 0}, {w, h, 0}, {w, -h, 0}, {-w, -h, 0}};
   std::vector<cv::Point2d> pixels;
-  for (const glm::dvec2& corner : sighting.corners) pixels.emplace_back(corner.x, corner.y);
+  for (const glm::dvec2& corner : detection.corners) pixels.emplace_back(corner.x, corner.y);
   // An ideal pinhole's pixels by OpenCV: then both minimise the same distances.
   const cv::Mat k = test::camera_matrix(camera);
   cv::undistortPoints(
@@ -63,9 +63,9 @@ void expect_pose_of_solve_pnp(const Sighting& sighting, const cv::Mat& pattern,
   cv::Mat rotation;
   cv::Rodrigues(vector, rotation);
   for (int row = 0; row < 3; ++row) {
-    EXPECT_NEAR(sighting.pose.translation[row], translation[row], 1e-3);
+    EXPECT_NEAR(detection.pose.translation[row], translation[row], 1e-3);
     for (int column = 0; column < 3; ++column) {
-      EXPECT_NEAR(sighting.pose.rotation[column][row], rotation.at<double>(row, column), 1e-3);
+      EXPECT_NEAR(detection.pose.rotation[column][row], rotation.at<double>(row, column), 1e-3);
     }
   }
 }
@@ -88,12 +88,12 @@ TEST(PaperTracker, FindsRenderedViewsWhereTheyAre) {
       ASSERT_EQ(result->visible.size(), 1u)
           << "set " << set_id << " view " << i << ": " << to_string(result->reason);
       EXPECT_EQ(result->reason, Reason::kVisible);
-      const Sighting& sighting = result->visible[0];
-      EXPECT_LT(corner_error(sighting, test::true_corners(pattern, views[i], camera)), 2.5);
-      EXPECT_GE(sighting.matches, sighting.inliers);
-      EXPECT_GE(sighting.inliers, 8);
-      expect_pose_of_solve_pnp(sighting, pattern, camera);
-      EXPECT_NEAR(sighting.pose.translation.z, views[i].translation[2],
+      const Detection& detection = result->visible[0];
+      EXPECT_LT(corner_error(detection, test::true_corners(pattern, views[i], camera)), 2.5);
+      EXPECT_GE(detection.matches, detection.inliers);
+      EXPECT_GE(detection.inliers, 8);
+      expect_pose_of_solve_pnp(detection, pattern, camera);
+      EXPECT_NEAR(detection.pose.translation.z, views[i].translation[2],
                   0.05 * views[i].translation[2]);
     }
   }
@@ -105,8 +105,8 @@ TEST(PaperTracker, TellsPatternsApartAndGivesTheSameAnswerTwice) {
   const cv::Mat first = test::textured_picture(300, 245, 21);
   const cv::Mat second = test::textured_picture(250, 294, 22);
   Stage stage({first, second}, camera, 3);
-  const cv::Mat grey(360, 480, CV_8UC1, cv::Scalar(120));
-  const cv::Mat frame = test::render(second, test::look_at(2.8, 20, 10, 30), camera, grey);
+  const cv::Mat gray(360, 480, CV_8UC1, cv::Scalar(120));
+  const cv::Mat frame = test::render(second, test::look_at(2.8, 20, 10, 30), camera, gray);
   const auto once = stage.tracker->step(test::gray(frame));
   const auto twice = stage.tracker->step(test::gray(frame));
   ASSERT_TRUE(once && twice);

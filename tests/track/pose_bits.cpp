@@ -1,4 +1,4 @@
-// What the pose loop sees in raw grey frames, to the last bit: scripts/foreign.sh compares what
+// What the pose loop sees in raw gray frames, to the last bit: scripts/foreign.sh compares what
 // this prints on two kinds of processor. Usage: pose_bits BUNDLE WIDTH HEIGHT < FRAMES
 #include <cstdio>
 #include <cstdlib>
@@ -26,7 +26,7 @@ std::vector<std::byte> contents(const char* path) {
 void print(int frame, const TrackResult& result) {
   std::printf("%d reason %d features %d\n", frame, static_cast<int>(result.reason),
               result.features);
-  for (const Sighting& each : result.visible) {
+  for (const Detection& each : result.visible) {
     std::printf(" pattern %u inliers %d matches %d", each.pattern, each.inliers, each.matches);
     for (const glm::dvec2& corner : each.corners) std::printf(" %a %a", corner.x, corner.y);
     for (int i = 0; i < 3; ++i) std::printf(" %a", each.pose.translation[i]);
@@ -60,6 +60,6 @@ int run(const char* path, int width, int height) {
 }  // namespace modar
 
 int main(int count, char** words) {
-  if (count != 4) return modar::give_up("give BUNDLE WIDTH HEIGHT, and grey frames on stdin");
+  if (count != 4) return modar::give_up("give BUNDLE WIDTH HEIGHT, and gray frames on stdin");
   return modar::run(words[1], std::atoi(words[2]), std::atoi(words[3]));
 }

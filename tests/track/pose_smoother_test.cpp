@@ -12,11 +12,11 @@ namespace {
 
 constexpr double kFrame_s = 1.0 / 30.0;
 
-std::vector<Sighting> at(double x, double angle = 0.0) {
-  Sighting sighting;
-  sighting.pose.translation = {x, 0.0, 4.0};
-  sighting.pose.rotation = rotation_matrix({0.0, angle, 0.0});
-  return {sighting};
+std::vector<Detection> at(double x, double angle = 0.0) {
+  Detection detection;
+  detection.pose.translation = {x, 0.0, 4.0};
+  detection.pose.rotation = rotation_matrix({0.0, angle, 0.0});
+  return {detection};
 }
 
 TEST(PoseSmoother, OffItChangesNothing) {

@@ -41,20 +41,20 @@ cv::Mat textured_picture(int width, int height, std::uint32_t seed) {
     const cv::Point centre(random.uniform(0, width), random.uniform(0, height));
     const double shrink = 1.0 - 0.8 * i / count;
     const int size = 2 + static_cast<int>(random.uniform(0.0, 30.0 * shrink));
-    const cv::Scalar grey(random.uniform(0, 256));
+    const cv::Scalar gray(random.uniform(0, 256));
     switch (random.uniform(0, 3)) {
       case 0:
-        cv::circle(picture, centre, size / 2, grey, cv::FILLED, cv::LINE_AA);
+        cv::circle(picture, centre, size / 2, gray, cv::FILLED, cv::LINE_AA);
         break;
       case 1:
-        cv::rectangle(picture, centre, centre + cv::Point(size, random.uniform(2, 4 + size)), grey,
+        cv::rectangle(picture, centre, centre + cv::Point(size, random.uniform(2, 4 + size)), gray,
                       cv::FILLED);
         break;
       default:
         cv::line(
             picture, centre,
             centre + cv::Point(random.uniform(-size, size + 1), random.uniform(-size, size + 1)),
-            grey, 2, cv::LINE_AA);
+            gray, 2, cv::LINE_AA);
     }
   }
   return picture;

@@ -14,7 +14,7 @@
 
 namespace modar::test {
 
-/// A grey picture of random discs, bars and letters-like strokes on several scales.
+/// A gray picture of random discs, bars and letters-like strokes on several scales.
 cv::Mat textured_picture(int width, int height, std::uint32_t seed);
 
 /// A camera pose by a rotation matrix (row by row) and a translation, in pattern units.

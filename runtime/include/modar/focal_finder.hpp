@@ -16,8 +16,8 @@ struct FocalProgress {
   static constexpr double kSure = 0.01;
   static constexpr double kScatter = 8;
   int looks = 0;         ///< frames looked at
-  int faint = 0;         ///< sightings in them with too little perspective: too frontal or too far
-  int views = 0;         ///< sightings that tell something; kFewestViews are needed
+  int faint = 0;         ///< detections in them with too little perspective: too frontal or too far
+  int views = 0;         ///< detections that tell something; kFewestViews are needed
   double deviation = 0;  ///< of the focal length, relative; at most kSure is needed; 0: unknown
   /// Degrees, of the planes' normals about their mean, the way they scatter most; kScatter is
   /// needed: what a lens bends and a principal point off the middle pull all planes of one tilt the

@@ -6,7 +6,7 @@
 
 namespace modar {
 
-/// 8-bit grey pixels, top row first. stride: bytes from row to row, >= width.
+/// 8-bit gray pixels, top row first. stride: bytes from row to row, >= width.
 struct GrayImage {
   const std::uint8_t* pixels = nullptr;
   int width = 0;

@@ -83,7 +83,7 @@ typedef struct modar_pose {
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     modar_error* error);
 void modar_tracker_destroy(modar_tracker* tracker);
-/* One frame of the camera's size, 8 bits of grey a pixel: the luma plane of NV21. stride: bytes
+/* One frame of the camera's size, 8 bits of gray a pixel: the luma plane of NV21. stride: bytes
  * from row to row. That no pattern is in it is no error. */
 int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride,
                        modar_error* error);

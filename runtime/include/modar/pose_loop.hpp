@@ -7,13 +7,13 @@
 #include "formats/error.hpp"
 #include "modar/camera.hpp"
 #include "modar/image.hpp"
-#include "modar/loop_features.hpp"
 #include "modar/tracker.hpp"
+#include "modar/tracker_features.hpp"
 
 namespace modar {
 
 struct PoseLoopOptions {
-  LoopDetectOptions detect;
+  DetectOptions detect;
   bool track = true;      ///< false: every frame is searched anew
   int search_every = 10;  ///< frames between searches for further patterns while one is tracked
   /// Searches on a thread of its own, on the newest frame, while tracking goes on: no frame waits,
@@ -33,7 +33,7 @@ class PoseLoop {
   PoseLoop& operator=(const PoseLoop&) = delete;
   ~PoseLoop();
 
-  /// One frame of the camera's size. inliers of a sighting: features that agree where it was
+  /// One frame of the camera's size. inliers of a detection: features that agree where it was
   /// detected, patches that hold where it was tracked.
   /// Errors: kInvalidInput "tracker.frame-size".
   Result<TrackResult> step(const GrayImage& frame);

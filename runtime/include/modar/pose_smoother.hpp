@@ -20,7 +20,7 @@ class PoseSmoother {
 
   /// time_s: of the frame, rising. Changes the poses alone, not the corners. A pattern that was not
   /// among the last frame's starts anew. Answers the latency of the slowest, milliseconds.
-  double step(double time_s, std::span<Sighting> visible);
+  double step(double time_s, std::span<Detection> visible);
 
  private:
   struct State {

@@ -32,7 +32,7 @@ const char* to_string(Reason reason);
 int progress(Reason reason);
 
 /// A pattern measured in this frame.
-struct Sighting {
+struct Detection {
   std::uint32_t pattern = 0;
   std::array<glm::dvec2, 4>
       corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left
@@ -51,7 +51,7 @@ struct TrackTimes {
 };
 
 struct TrackResult {
-  std::vector<Sighting> visible;        ///< in the order of the bundle's patterns
+  std::vector<Detection> visible;       ///< in the order of the bundle's patterns
   Reason reason = Reason::kNoFeatures;  ///< of the pattern that came furthest
   int features = 0;                     ///< keypoints of the frame
   TrackTimes times;
@@ -91,12 +91,12 @@ class Hysteresis {
     bool measured = false;  ///< the pose is of this frame
     Pose pose;              ///< the newest pose that was measured
   };
-  /// Takes a frame's sightings; answers one state a pattern, valid until the next call.
-  std::span<const State> step(std::span<const Sighting> visible);
+  /// Takes a frame's detections; answers one state a pattern, valid until the next call.
+  std::span<const State> step(std::span<const Detection> visible);
 
  private:
   struct Counter {
-    int seen = 0;    ///< frames in sequence with a sighting
+    int seen = 0;    ///< frames in sequence with a detection
     int missed = 0;  ///< frames in sequence without
     State state;
   };

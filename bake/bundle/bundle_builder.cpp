@@ -1,0 +1,342 @@
+// Runs the stages over every input and merges what they give into one bundle.
+#include "bake/bundle/bundle_builder.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include <glm/geometric.hpp>
+
+#include "bake/import/read_model.hpp"
+#include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/pack/packed_mesh.hpp"
+#include "bake/mesh/topology/mesh_topology.hpp"
+#include "bake/pattern/pattern_image.hpp"
+#include "bake/texture/texture_stage.hpp"
+#include "formats/content_summary.hpp"
+#include "modar/device_profile.hpp"
+#include "modar/features.hpp"
+
+namespace modar {
+namespace {
+
+std::uint32_t layout_index(const LayoutRecord& layout, BundleContent& content) {
+  const auto same = [&](const LayoutRecord& other) {
+    return std::equal(reinterpret_cast<const std::byte*>(&layout),
+                      reinterpret_cast<const std::byte*>(&layout + 1),
+                      reinterpret_cast<const std::byte*>(&other));
+  };
+  const auto found = std::find_if(content.layouts.begin(), content.layouts.end(), same);
+  if (found != content.layouts.end()) {
+    return static_cast<std::uint32_t>(found - content.layouts.begin());
+  }
+  content.layouts.push_back(layout);
+  return static_cast<std::uint32_t>(content.layouts.size() - 1);
+}
+
+/// A texture of one colour becomes a factor of the material, which the shader multiplies alike.
+void fold_constant(const std::array<std::uint8_t, 4>& rgba, MaterialRecord& material) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const float factor = static_cast<float>(rgba[i]) / 255.0f;
+    material.diffuse[i] *= factor;
+    material.ambient[i] *= factor;
+  }
+  material.opacity *= static_cast<float>(rgba[3]) / 255.0f;
+}
+
+/// The first model's bytes are taken over as they are: large ones are not copied.
+void append_bytes(std::vector<std::byte> bytes, std::vector<std::byte>& to) {
+  if (to.empty()) {
+    to = std::move(bytes);
+  } else {
+    to.insert(to.end(), bytes.begin(), bytes.end());
+  }
+}
+
+/// Appends a model's records and bytes, shifting what counts from the model's own start.
+void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
+                 BundleContent& content) {
+  ModelRecord record = packed.record;
+  record.name = content.intern(packed.name);
+  record.layout = layout_index(packed.layout, content);
+  record.first_chunk = static_cast<std::uint32_t>(content.chunks.size());
+  record.chunk_count = static_cast<std::uint32_t>(packed.chunks.size());
+  record.first_material = static_cast<std::uint32_t>(content.materials.size());
+  record.material_count = static_cast<std::uint32_t>(packed.materials.size());
+  const auto first_level = static_cast<std::uint32_t>(content.levels.size());
+  for (ChunkRecord chunk : packed.chunks) {
+    chunk.material += record.first_material;
+    chunk.first_level += first_level;
+    content.chunks.push_back(chunk);
+  }
+  for (LevelRecord level : packed.levels) {
+    level.vertex_offset += content.vertices.size();
+    level.index_offset += content.indices.size();
+    content.levels.push_back(level);
+  }
+  for (std::size_t m = 0; m < packed.materials.size(); ++m) {
+    MaterialRecord material = packed.materials[m];
+    material.name = content.intern(packed.sources[m].name);
+    material.texture = textures[m].texture;
+    if (textures[m].constant) fold_constant(textures[m].rgba, material);
+    content.materials.push_back(material);
+  }
+  append_bytes(std::move(packed.vertices), content.vertices);
+  append_bytes(std::move(packed.indices), content.indices);
+  // Keeps the next model's vertices on a 4-byte boundary.
+  content.indices.resize((content.indices.size() + 3) / 4 * 4);
+  content.models.push_back(record);
+}
+
+/// A model that is welded and waits for its textures, which other models may share.
+struct WeldedModel {
+  TriMesh mesh;
+  std::vector<std::uint32_t> uses;  ///< of textures, one a material
+};
+
+Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& request,
+                                  TextureUses& textures, Report& report) {
+  StageTimer reading(report, "read");
+  Result<SourceModel> source = read_model(path, request.jobs);
+  if (!source) return tl::unexpected(source.error());
+  report.findings.insert(report.findings.end(), source->findings.begin(), source->findings.end());
+  reading.done(source->positions.size(), source->face_count());
+  Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
+  if (!mesh) return tl::unexpected(mesh.error());
+  if (request.topology) {
+    TopologyOptions options;
+    options.jobs = request.jobs;
+    options.half_edge_bytes = request.memory_bytes / 4;
+    report.topologies.push_back(measure_topology(*mesh, options, report));
+  }
+  WeldedModel welded{std::move(*mesh), {}};
+  welded.uses = collect_textures(welded.mesh, textures);
+  return welded;
+}
+
+/// The greatest error that is asked for, in a model's source units; 0: any.
+Result<double> max_error_of(const BakeRequest& request, const TriMesh& mesh) {
+  switch (request.max_error.unit) {
+    case MaxError::Unit::kAny:
+      return 0.0;
+    case MaxError::Unit::kSource:
+      return request.max_error.value;
+    case MaxError::Unit::kPercent:
+      return request.max_error.value / 100.0 * glm::length(mesh.source_max - mesh.source_min);
+    case MaxError::Unit::kMetres:
+      break;
+  }
+  if (!(request.unit_metres > 0)) {
+    return fail(ExitCode::kUsage, "bake.max-error-unit", "--max-error",
+                "it names a unit, and the models' own unit is not known",
+                "say it with --unit, or give the error in source units or percent");
+  }
+  return request.max_error.value / request.unit_metres;
+}
+
+/// Splits and packs a model as finely as was asked.
+Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
+                               const BakeRequest& request, Report& report) {
+  const Result<double> max_error = max_error_of(request, mesh);
+  if (!max_error) return tl::unexpected(max_error.error());
+  const Result<PositionPlan> plan = plan_positions(mesh, {request.positions, *max_error});
+  if (!plan) return tl::unexpected(plan.error());
+  ChunkOptions chunk_options;
+  chunk_options.max_side = plan->max_side;
+  chunk_options.max_vertices = chunk_vertices_for(mesh.positions.size());
+  Result<ChunkedMesh> chunked = chunk(std::move(mesh), chunk_options, report);
+  if (!chunked) return tl::unexpected(chunked.error());
+  LevelOptions level_options;
+  level_options.levels = request.levels;
+  level_options.positions = plan->kind;
+  level_options.jobs = request.jobs;
+  level_options.texture_sides = texture_sides;
+  if (auto made = make_levels(*chunked, level_options, report); !made) {
+    return tl::unexpected(made.error());
+  }
+  PackOptions pack_options;
+  pack_options.unit_metres = request.unit_metres;
+  pack_options.positions = plan->kind;
+  pack_options.jobs = request.jobs;
+  return pack(*chunked, texture_sides, pack_options, report);
+}
+
+Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& outcomes,
+                       const BakeRequest& request, BundleContent& content, Report& report) {
+  std::vector<TextureOutcome> textures(welded.uses.size());
+  std::vector<std::uint32_t> sides(welded.uses.size(), 0);
+  for (std::size_t m = 0; m < welded.uses.size(); ++m) {
+    if (welded.uses[m] != kNone) textures[m] = outcomes[welded.uses[m]];
+    sides[m] = textures[m].side;
+  }
+  Result<PackedMesh> packed = shape_model(std::move(welded.mesh), sides, request, report);
+  if (!packed) return tl::unexpected(packed.error());
+  merge_model(std::move(*packed), textures, content);
+  return {};
+}
+
+/// Side lengths of each model in source units.
+using ModelSides = std::vector<std::array<double, 3>>;
+
+Result<ModelSides> add_models(const BakeRequest& request, BundleContent& content, Report& report) {
+  ModelSides sides;
+  TextureUses textures;
+  std::vector<WeldedModel> models;
+  for (const std::string& path : request.models) {
+    Result<WeldedModel> welded = read_and_weld(path, request, textures, report);
+    if (!welded) return tl::unexpected(welded.error());
+    const glm::dvec3 box = welded->mesh.source_max - welded->mesh.source_min;
+    sides.push_back({box.x, box.y, box.z});
+    models.push_back(std::move(*welded));
+  }
+  TextureOptions options = request.textures;
+  options.jobs = request.jobs;
+  const Result<std::vector<TextureOutcome>> outcomes =
+      bake_textures(textures, options, request.texture_budget, content, report);
+  if (!outcomes) return tl::unexpected(outcomes.error());
+  for (WeldedModel& model : models) {
+    if (auto added = add_model(std::move(model), *outcomes, request, content, report); !added) {
+      return tl::unexpected(added.error());
+    }
+  }
+  return sides;
+}
+
+/// Those that the request asks for.
+void add_parameter_sets(const BakeRequest& request, BundleContent& content) {
+  const std::vector<std::string>& asked = request.parameters;
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    const char* name = parameter_set_name(set.id);
+    if (!asked.empty() && std::find(asked.begin(), asked.end(), name) == asked.end()) continue;
+    ParameterSetRecord named = set;
+    named.name = content.intern(name);
+    content.parameter_sets.push_back(named);
+  }
+}
+
+Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptions& loop,
+                         BundleContent& content, Report& report) {
+  Result<PatternFeatures> baked =
+      bake_pattern(request.path, request.width_mm, content.parameter_sets, loop, report);
+  if (!baked) return tl::unexpected(baked.error());
+  PatternRecord record = baked->record;
+  record.name = content.intern(baked->name);
+  ExtraSection section;
+  section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
+  section.owner = static_cast<std::uint32_t>(content.patterns.size());
+  section.bytes = std::move(baked->loop_record);
+  content.extra.push_back(std::move(section));
+  content.patterns.push_back(record);
+  content.features.push_back(std::move(baked->features));
+  return {};
+}
+
+Result<void> require_unique(const std::vector<std::string>& paths, const char* what) {
+  std::set<std::string> seen;
+  for (const std::string& path : paths) {
+    if (!seen.insert(file_stem(path)).second) {
+      return fail(ExitCode::kUsage, "bake.same-name", path,
+                  std::string("two ") + what + "s are named '" + file_stem(path) + "'",
+                  "rename one of the files: scenes refer to them by name");
+    }
+  }
+  return {};
+}
+
+Result<std::uint32_t> find_by_name(const std::vector<std::string>& paths, const std::string& name,
+                                   const char* what) {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (file_stem(paths[i]) == name) return static_cast<std::uint32_t>(i);
+  }
+  std::string known;
+  for (const std::string& path : paths) known += (known.empty() ? "" : ", ") + file_stem(path);
+  return fail(ExitCode::kUsage, "bake.scene-unknown", name,
+              std::string("the scene names a ") + what + " that is not baked",
+              std::string("name one of: ") + (known.empty() ? "(none)" : known));
+}
+
+/// A scene with the indices of what it names.
+struct KnownScene {
+  SceneRequest scene;
+  std::uint32_t pattern = 0;
+  std::uint32_t model = 0;
+};
+
+/// Before anything is baked: a name that is written wrong costs no minutes.
+Result<std::vector<KnownScene>> find_scenes(const BakeRequest& request,
+                                            const std::vector<std::string>& pattern_paths) {
+  std::vector<SceneRequest> scenes = request.scenes;
+  if (scenes.empty() && request.models.size() == 1 && pattern_paths.size() == 1) {
+    SceneRequest scene;
+    scene.pattern = file_stem(pattern_paths[0]);
+    scene.model = file_stem(request.models[0]);
+    scenes.push_back(scene);
+  }
+  std::vector<KnownScene> known;
+  for (const SceneRequest& scene : scenes) {
+    const Result<std::uint32_t> pattern = find_by_name(pattern_paths, scene.pattern, "pattern");
+    if (!pattern) return tl::unexpected(pattern.error());
+    const Result<std::uint32_t> model = find_by_name(request.models, scene.model, "model");
+    if (!model) return tl::unexpected(model.error());
+    known.push_back({scene, *pattern, *model});
+  }
+  return known;
+}
+
+}  // namespace
+
+std::string file_stem(const std::string& path) {
+  return std::filesystem::path(path).stem().string();
+}
+
+Result<void> plan_for_device(const std::string& device, BakeRequest& request) {
+  const DeviceProfile* profile = find_device_profile(device);
+  if (profile == nullptr) {
+    return fail(ExitCode::kUsage, "device.unknown", "--device " + device,
+                "there is no such device profile", "name one of: " + device_profile_names());
+  }
+  const auto side = static_cast<std::uint32_t>(profile->max_texture_size);
+  request.textures.max_side = std::min(request.textures.max_side, side);
+  request.texture_budget = std::uint64_t{profile->gpu_memory_mib} * 1024 * 1024 / 2;
+  request.device = device;
+  return {};
+}
+
+Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
+  if (request.models.empty() && request.patterns.empty()) {
+    return fail(ExitCode::kUsage, "bake.nothing", "", "there is neither a model nor a pattern",
+                "name files with --model and --pattern");
+  }
+  std::vector<std::string> pattern_paths;
+  for (const PatternRequest& pattern : request.patterns) pattern_paths.push_back(pattern.path);
+  if (auto unique = require_unique(request.models, "model"); !unique) {
+    return tl::unexpected(unique.error());
+  }
+  if (auto unique = require_unique(pattern_paths, "pattern"); !unique) {
+    return tl::unexpected(unique.error());
+  }
+
+  const Result<std::vector<KnownScene>> scenes = find_scenes(request, pattern_paths);
+  if (!scenes) return tl::unexpected(scenes.error());
+
+  BundleContent content;
+  const Result<ModelSides> sides = add_models(request, content, report);
+  if (!sides) return tl::unexpected(sides.error());
+  if (!request.patterns.empty()) add_parameter_sets(request, content);
+  TrackerRecordOptions loop = request.loop;
+  loop.jobs = request.jobs;
+  for (const PatternRequest& pattern : request.patterns) {
+    if (auto added = add_pattern(pattern, loop, content, report); !added) {
+      return tl::unexpected(added.error());
+    }
+  }
+  for (const KnownScene& known : *scenes) {
+    content.scenes.push_back(
+        place_scene(known.scene, known.pattern, known.model, (*sides)[known.model]));
+  }
+  content.meta = bundle_meta(request, report);
+  content.statement = statement_of(content);
+  return content;
+}
+
+}  // namespace modar

@@ -1,0 +1,86 @@
+// The bake as a whole: files in, the content of one bundle out.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bake/mesh/pack/position_plan.hpp"
+#include "bake/pattern/tracker_record_bake.hpp"
+#include "bake/report.hpp"
+#include "bake/texture/texture.hpp"
+#include "formats/bundle_writer.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// Which axis of the model points out of the pattern, towards the camera.
+enum class UpAxis : std::uint8_t { kX, kY, kZ, kMinusX, kMinusY, kMinusZ };
+
+/// A scene as the user asks for it. Names are those of files without folder and extension.
+struct SceneRequest {
+  std::string pattern;
+  std::string model;
+  double scale = 1.0;  ///< factor on: largest side of the model = largest side of the pattern
+  UpAxis up = UpAxis::kZ;
+  bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
+  std::array<double, 3> offset{};  ///< pattern units (half of its largest side), added at last
+};
+
+struct PatternRequest {
+  std::string path;
+  double width_mm = 0.0;  ///< 0: what the file states, or unknown
+};
+
+/// How far packed positions may lie from the source's, as the user says it.
+struct MaxError {
+  enum class Unit : std::uint8_t { kAny, kSource, kPercent, kMetres };
+  Unit unit = Unit::kAny;
+  double value = 0.0;  ///< source units, percent of the model's diagonal, or metres
+};
+
+struct BakeRequest {
+  std::vector<std::string> models;
+  std::vector<PatternRequest> patterns;
+  std::vector<SceneRequest> scenes;
+  TextureOptions textures;
+  std::uint64_t texture_budget = 0;  ///< GPU bytes that all textures may take; 0: any
+  double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
+  MaxError max_error;
+  std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
+  std::uint32_t levels = 4;               ///< of detail a chunk, the finest counted
+  bool topology = true;                   ///< measure and state each model's
+  std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
+  std::string device;              ///< profile that it is planned for; empty: none
+  unsigned jobs = 1;               ///< the bytes do not depend on it
+  TrackerRecordOptions loop;       ///< of patterns; its jobs are those above
+  /// The article's parameter sets to describe patterns with; empty: all; "none": our loop's record
+  /// alone.
+  std::vector<std::string> parameters;
+  std::string tool_version;
+};
+
+/// Lowers texture sizes and their budget to what a device profile allows: half of its GPU memory,
+/// so that as much is left for vertices, camera picture and framebuffers. Errors: kUsage
+/// "device.unknown" that lists the names.
+Result<void> plan_for_device(const std::string& device, BakeRequest& request);
+
+/// Runs all stages. One model and one pattern without a scene make one by themselves.
+/// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown",
+/// "bake.max-error-unit".
+Result<BundleContent> build_bundle(const BakeRequest& request, Report& report);
+
+/// The scene's record for a model whose source box has these side lengths (source units).
+SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,
+                        const std::array<double, 3>& model_sides);
+
+/// JSON of the kMeta section: tool, options and source file names, without folders or times.
+/// What the report says of the models stands beside each.
+std::string bundle_meta(const BakeRequest& request, const Report& report);
+
+/// "dir/spider.obj" -> "spider".
+std::string file_stem(const std::string& path);
+
+}  // namespace modar

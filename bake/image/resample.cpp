@@ -1,0 +1,163 @@
+// Change of size in linear light: sRGB tables and a separable filter.
+#include "bake/image/resample.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "bake/parallel.hpp"
+
+namespace modar {
+namespace {
+
+/// IEC 61966-2-1, electro-optical.
+double srgb_to_linear(double value) {
+  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
+/// Rounded to multiples of 2^-23: the last bits of pow() differ between C libraries.
+float steady(double value) {
+  return static_cast<float>(std::round(value * 0x1p23) * 0x1p-23);
+}
+
+struct SrgbTables {
+  std::array<float, 256> linear{};
+  std::array<float, 255> threshold{};  ///< linear values half-way between value k and k + 1
+  SrgbTables() {
+    for (std::size_t i = 0; i < 256; ++i) {
+      linear[i] = steady(srgb_to_linear(static_cast<double>(i) / 255));
+    }
+    for (std::size_t i = 0; i < 255; ++i) {
+      threshold[i] = steady(srgb_to_linear((static_cast<double>(i) + 0.5) / 255));
+    }
+  }
+  [[nodiscard]] std::uint8_t to_srgb(float value) const {
+    const auto above = std::upper_bound(threshold.begin(), threshold.end(), value);
+    return static_cast<std::uint8_t>(above - threshold.begin());
+  }
+};
+
+const SrgbTables& tables() {
+  static const SrgbTables instance;
+  return instance;
+}
+
+double catmull_rom(double x) {
+  x = std::abs(x);
+  if (x < 1) return (1.5 * x - 2.5) * x * x + 1;
+  if (x < 2) return ((-0.5 * x + 2.5) * x - 4) * x + 2;
+  return 0;
+}
+double tent(double x) {
+  return std::max(0.0, 1 - std::abs(x));
+}
+
+/// The source samples of one sample of the result.
+struct Taps {
+  std::vector<std::uint32_t> index;
+  std::vector<float> weight;
+};
+
+std::uint32_t beyond_edge(std::int64_t index, std::uint32_t size, bool repeat) {
+  if (!repeat) {
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(index, 0, std::int64_t{size} - 1));
+  }
+  const std::int64_t wrapped = index % size;
+  return static_cast<std::uint32_t>(wrapped < 0 ? wrapped + size : wrapped);
+}
+
+std::vector<Taps> plan(std::uint32_t from, std::uint32_t to, bool opaque, bool repeat) {
+  const double step = static_cast<double>(from) / to;
+  const double width = std::max(1.0, step);  // of one unit of the kernel, in source samples
+  const double reach = (opaque ? 2.0 : 1.0) * width;
+  std::vector<Taps> taps(to);
+  for (std::uint32_t i = 0; i < to; ++i) {
+    const double centre = (i + 0.5) * step - 0.5;
+    const auto first = static_cast<std::int64_t>(std::ceil(centre - reach));
+    const auto last = static_cast<std::int64_t>(std::floor(centre + reach));
+    double sum = 0;
+    std::vector<double> weights;
+    for (std::int64_t k = first; k <= last; ++k) {
+      const double x = (static_cast<double>(k) - centre) / width;
+      weights.push_back(opaque ? catmull_rom(x) : tent(x));
+      sum += weights.back();
+      taps[i].index.push_back(beyond_edge(k, from, repeat));
+    }
+    for (const double weight : weights) {
+      taps[i].weight.push_back(static_cast<float>(weight / sum));
+    }
+  }
+  return taps;
+}
+
+LinearImage resample_rows(const LinearImage& image, std::uint32_t height,
+                          const ResampleOptions& options) {
+  const std::vector<Taps> taps = plan(image.height, height, image.opaque, options.repeat);
+  const std::size_t stride = std::size_t{image.width} * 4;
+  LinearImage out{image.width, height, image.opaque, std::vector<float>(stride * height)};
+  parallel_rows(height, options.jobs, [&](std::uint32_t y) {
+    float* to = &out.pixels[y * stride];
+    for (std::size_t k = 0; k < taps[y].index.size(); ++k) {
+      const float* from = &image.pixels[taps[y].index[k] * stride];
+      const float weight = taps[y].weight[k];
+      for (std::size_t i = 0; i < stride; ++i) to[i] += weight * from[i];
+    }
+  });
+  return out;
+}
+
+LinearImage resample_columns(const LinearImage& image, std::uint32_t width,
+                             const ResampleOptions& options) {
+  const std::vector<Taps> taps = plan(image.width, width, image.opaque, options.repeat);
+  LinearImage out{width, image.height, image.opaque,
+                  std::vector<float>(std::size_t{width} * image.height * 4)};
+  parallel_rows(image.height, options.jobs, [&](std::uint32_t y) {
+    const float* row = &image.pixels[std::size_t{y} * image.width * 4];
+    float* to = &out.pixels[std::size_t{y} * width * 4];
+    for (std::uint32_t x = 0; x < width; ++x, to += 4) {
+      for (std::size_t k = 0; k < taps[x].index.size(); ++k) {
+        const float* from = row + std::size_t{taps[x].index[k]} * 4;
+        for (std::size_t c = 0; c < 4; ++c) to[c] += taps[x].weight[k] * from[c];
+      }
+    }
+  });
+  return out;
+}
+
+}  // namespace
+
+LinearImage to_linear(const RgbaImage& image) {
+  LinearImage out{image.width, image.height, true, std::vector<float>(image.pixels.size())};
+  const SrgbTables& table = tables();
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    const std::uint8_t alpha = image.pixels[i + 3];
+    out.opaque = out.opaque && alpha == 255;
+    const float weight = static_cast<float>(alpha) / 255 + LinearImage::kAlphaFloor;
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.pixels[i + c] = table.linear[image.pixels[i + c]] * weight;
+    }
+    out.pixels[i + 3] = static_cast<float>(alpha) / 255;
+  }
+  return out;
+}
+
+RgbaImage to_srgb(const LinearImage& image) {
+  RgbaImage out{image.width, image.height, std::vector<std::uint8_t>(image.pixels.size())};
+  const SrgbTables& table = tables();
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    const float alpha = std::clamp(image.pixels[i + 3], 0.0F, 1.0F);
+    const float weight = alpha + LinearImage::kAlphaFloor;
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.pixels[i + c] = table.to_srgb(image.pixels[i + c] / weight);
+    }
+    out.pixels[i + 3] = static_cast<std::uint8_t>(alpha * 255 + 0.5F);
+  }
+  return out;
+}
+
+LinearImage resample(const LinearImage& image, std::uint32_t width, std::uint32_t height,
+                     const ResampleOptions& options) {
+  return resample_columns(resample_rows(image, height, options), width, options);
+}
+
+}  // namespace modar

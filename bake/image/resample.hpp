@@ -1,0 +1,36 @@
+// Images in linear light, and their change of size.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bake/image/image.hpp"
+
+namespace modar {
+
+/// Linear light, top row first, four floats a pixel: red, green, blue, each times (alpha +
+/// kAlphaFloor), and alpha, all for white = 1. The floor keeps the colour of transparent pixels.
+struct LinearImage {
+  static constexpr float kAlphaFloor = 1.0F / 4096;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  bool opaque = true;  ///< alpha is 1 everywhere
+  std::vector<float> pixels;
+};
+
+/// How resample() treats the world beyond the edges, and how many threads it takes.
+struct ResampleOptions {
+  bool repeat = false;  ///< true: the image repeats; false: its edge pixels do
+  unsigned jobs = 1;    ///< the result does not depend on it
+};
+
+LinearImage to_linear(const RgbaImage& image);
+RgbaImage to_srgb(const LinearImage& image);
+
+/// The image at another size (each side 1 or more). Opaque images: Catmull-Rom's cubic, as wide as
+/// the pixels of the smaller of both sizes; others: a tent, which has no negative lobes that would
+/// take colour from where there is no alpha.
+LinearImage resample(const LinearImage& image, std::uint32_t width, std::uint32_t height,
+                     const ResampleOptions& options);
+
+}  // namespace modar

@@ -1,0 +1,149 @@
+// The part of glTF's metallic-roughness materials that our shader has.
+#include "bake/import/gltf/gltf_materials.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <system_error>
+
+#include "formats/atomic_file.hpp"
+
+#include "bake/import/gltf/tinygltf_library.hpp"
+
+namespace modar {
+namespace {
+
+/// A folder of our own that goes when the last material that needs it does.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::error_code error;
+    const auto base = std::filesystem::temp_directory_path(error);
+    std::string name = (error ? std::string("/tmp") : base.string()) + "/modar-gltf-XXXXXX";
+    if (::mkdtemp(name.data()) != nullptr) path_ = name;
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+  }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// Letters, digits, '-' and '_' of a name; `other` where nothing is left.
+std::string plain_name(const std::string& name, const std::string& other) {
+  std::string plain;
+  for (const char c : name) {
+    const bool good = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                      c == '-' || c == '_';
+    if (good && plain.size() < 64) plain += c;
+  }
+  return plain.empty() ? other : plain;
+}
+
+class MaterialReader {
+ public:
+  MaterialReader(const tinygltf::Model& gltf, std::string folder, std::string label,
+                 std::vector<Diagnostic>& findings)
+      : gltf_(gltf),
+        folder_(std::move(folder)),
+        label_(std::move(label)),
+        findings_(findings),
+        paths_(gltf.images.size()) {}
+
+  SourceMaterial read(const tinygltf::Material& source) {
+    SourceMaterial m;
+    m.name = source.name;
+    const auto& pbr = source.pbrMetallicRoughness;
+    for (int i = 0; i < 3; ++i) {
+      m.diffuse[i] = channel(pbr.baseColorFactor, i, 1.0);
+      m.emission[i] = channel(source.emissiveFactor, i, 0.0);
+    }
+    m.ambient = m.diffuse;
+    // The Phong exponent whose highlight is as wide as that of the roughness.
+    const double roughness = std::clamp(pbr.roughnessFactor, 0.05, 1.0);
+    m.shininess = static_cast<float>(std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0));
+    if (source.alphaMode == "BLEND" && pbr.baseColorFactor.size() > 3) {
+      m.opacity = static_cast<float>(std::clamp(pbr.baseColorFactor[3], 0.0, 1.0));
+    }
+    m.two_sided = source.doubleSided;
+    m.diffuse_map = image_path(pbr.baseColorTexture.index);
+    if (folder_of_images_ != nullptr) m.keeper = folder_of_images_;
+    return m;
+  }
+
+ private:
+  static float channel(const std::vector<double>& factors, int i, double other) {
+    const auto k = static_cast<std::size_t>(i);
+    return static_cast<float>(srgb_of_linear(k < factors.size() ? factors[k] : other));
+  }
+
+  std::string image_path(int texture) {
+    if (texture < 0 || static_cast<std::size_t>(texture) >= gltf_.textures.size()) return {};
+    const int source = gltf_.textures[static_cast<std::size_t>(texture)].source;
+    if (source < 0 || static_cast<std::size_t>(source) >= gltf_.images.size()) return {};
+    const auto index = static_cast<std::size_t>(source);
+    if (!paths_[index]) paths_[index] = find_image(gltf_.images[index], index);
+    return *paths_[index];
+  }
+
+  std::string find_image(const tinygltf::Image& image, std::size_t index) {
+    std::error_code error;
+    const std::string beside = folder_ + image.uri;
+    if (!image.uri.empty() && std::filesystem::is_regular_file(beside, error)) return beside;
+    if (!image.image.empty()) {
+      if (folder_of_images_ == nullptr) folder_of_images_ = std::make_shared<TemporaryFolder>();
+      const std::string path = folder_of_images_->path() + "/" +
+                               plain_name(image.name, "image" + std::to_string(index)) +
+                               (image.mimeType == "image/jpeg" ? ".jpg" : ".png");
+      const auto bytes = std::as_bytes(std::span(image.image));
+      if (!folder_of_images_->path().empty() && write_file(path, bytes)) return path;
+    }
+    findings_.push_back({"gltf.missing-image", DiagnosticSeverity::kWarning, label_, 0,
+                         "the base colour image '" + image.uri + "' is not there",
+                         "put the image beside the file under that name"});
+    return {};
+  }
+
+  const tinygltf::Model& gltf_;
+  std::string folder_;
+  std::string label_;
+  std::vector<Diagnostic>& findings_;
+  std::vector<std::optional<std::string>> paths_;
+  std::shared_ptr<TemporaryFolder> folder_of_images_;
+};
+
+}  // namespace
+
+double srgb_of_linear(double linear) {
+  const double c = std::clamp(linear, 0.0, 1.0);
+  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
+}
+
+bool keep_image_bytes(tinygltf::Image* image, int, std::string*, std::string*, int, int,
+                      const unsigned char* bytes, int size, void*) {
+  image->image.assign(bytes, bytes + std::max(size, 0));
+  return true;
+}
+
+std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const std::string& folder,
+                                           const std::string& label,
+                                           std::vector<Diagnostic>& findings) {
+  MaterialReader reader(gltf, folder, label, findings);
+  std::vector<SourceMaterial> materials;
+  for (const tinygltf::Material& m : gltf.materials) materials.push_back(reader.read(m));
+  materials.push_back(reader.read(tinygltf::Material()));
+  return materials;
+}
+
+}  // namespace modar

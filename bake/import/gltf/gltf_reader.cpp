@@ -1,0 +1,294 @@
+// Walks the scene and gathers its primitives.
+#include "bake/import/gltf/gltf_reader.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
+
+#include "bake/import/gltf/gltf_accessor.hpp"
+#include "bake/import/gltf/gltf_materials.hpp"
+#include "bake/import/gltf/gltf_uv.hpp"
+#include "bake/import/gltf/tinygltf_library.hpp"
+
+namespace modar {
+namespace {
+
+constexpr int kMaxDepth = 1000;  ///< of nodes: what a stack surely holds
+
+class SceneReader {
+ public:
+  SceneReader(const tinygltf::Model& gltf, SourceModel& model, std::string label)
+      : gltf_(gltf), model_(model), label_(std::move(label)), seen_(gltf.nodes.size()) {}
+
+  Result<void> run() {
+    for (const int node : roots()) {
+      if (auto walked = walk(node, glm::dmat4(1.0), 0); !walked) return walked;
+    }
+    finish();
+    return {};
+  }
+
+ private:
+  [[nodiscard]] std::vector<int> roots() const {
+    const int scene = gltf_.defaultScene >= 0 ? gltf_.defaultScene : 0;
+    if (static_cast<std::size_t>(scene) < gltf_.scenes.size()) {
+      return gltf_.scenes[static_cast<std::size_t>(scene)].nodes;
+    }
+    std::vector<bool> child(gltf_.nodes.size(), false);
+    for (const tinygltf::Node& node : gltf_.nodes) {
+      for (const int c : node.children) {
+        if (c >= 0 && static_cast<std::size_t>(c) < child.size()) {
+          child[static_cast<std::size_t>(c)] = true;
+        }
+      }
+    }
+    std::vector<int> nodes;
+    for (std::size_t i = 0; i < child.size(); ++i) {
+      if (!child[i]) nodes.push_back(static_cast<int>(i));
+    }
+    return nodes;
+  }
+
+  tl::unexpected<Error> wrong(const char* code, const std::string& cause) const {
+    return fail(ExitCode::kInvalidInput, code, label_, cause,
+                "check the file with the glTF validator and export it again");
+  }
+
+  static glm::dmat4 transform_of(const tinygltf::Node& node) {
+    glm::dmat4 m(1.0);
+    if (node.matrix.size() == 16) {
+      for (int i = 0; i < 16; ++i) m[i / 4][i % 4] = node.matrix[static_cast<std::size_t>(i)];
+      return m;
+    }
+    if (node.rotation.size() == 4) {
+      m = glm::mat4_cast(
+          glm::dquat(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]));
+    }
+    for (int i = 0; i < 3; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (node.scale.size() == 3) m[i] *= node.scale[k];
+      if (node.translation.size() == 3) m[3][i] = node.translation[k];
+    }
+    return m;
+  }
+
+  Result<void> walk(int index, const glm::dmat4& parent, int depth) {
+    if (index < 0 || static_cast<std::size_t>(index) >= gltf_.nodes.size() || depth > kMaxDepth ||
+        seen_[static_cast<std::size_t>(index)]) {
+      return wrong("gltf.read", "its nodes refer to nodes that are not there, or meet twice");
+    }
+    seen_[static_cast<std::size_t>(index)] = true;
+    const tinygltf::Node& node = gltf_.nodes[static_cast<std::size_t>(index)];
+    const glm::dmat4 to_scene = parent * transform_of(node);
+    if (node.skin >= 0) ++skins_;
+    if (node.mesh >= 0 && static_cast<std::size_t>(node.mesh) < gltf_.meshes.size()) {
+      for (const auto& primitive : gltf_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
+        if (auto added = add_primitive(primitive, to_scene); !added) return added;
+      }
+    }
+    for (const int child : node.children) {
+      if (auto walked = walk(child, to_scene, depth + 1); !walked) return walked;
+    }
+    return {};
+  }
+
+  /// An attribute that there may be; false where there is one and it is broken.
+  bool open(const tinygltf::Primitive& primitive, const std::string& name, std::size_t count,
+            std::size_t least_components, GltfAccessor& accessor, bool& there) const {
+    const auto found = primitive.attributes.find(name);
+    there = found != primitive.attributes.end();
+    return !there || (accessor.open(gltf_, found->second) && accessor.size() >= count &&
+                      accessor.components() >= least_components);
+  }
+
+  Result<void> add_primitive(const tinygltf::Primitive& primitive, const glm::dmat4& to_scene) {
+    const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+    if (mode < TINYGLTF_MODE_TRIANGLES) {
+      ++lines_and_points_;
+      return {};
+    }
+    if (!primitive.targets.empty()) ++morphs_;
+    const GltfUv placing = gltf_uv(gltf_, primitive.material);
+    GltfAccessor positions;
+    GltfAccessor normals;
+    GltfAccessor uvs;
+    GltfAccessor colours;
+    bool there = false;
+    bool has_normals = false;
+    bool has_uvs = false;
+    bool has_colours = false;
+    if (!open(primitive, "POSITION", 0, 3, positions, there) ||
+        !open(primitive, "NORMAL", positions.size(), 3, normals, has_normals) ||
+        !open(primitive, placing.attribute, positions.size(), 2, uvs, has_uvs) ||
+        !open(primitive, "COLOR_0", positions.size(), 3, colours, has_colours)) {
+      return wrong("gltf.accessor", "an accessor leaves its buffer, or has no sense");
+    }
+    if (!there) return {};
+    if (model_.positions.size() + positions.size() >= kNoIndex) {
+      return wrong("gltf.read", "it has more vertices than 32 bits count");
+    }
+    const auto first = static_cast<std::uint32_t>(model_.positions.size());
+    const glm::dmat3 turn = glm::transpose(glm::inverse(glm::dmat3(to_scene)));
+    for (std::size_t v = 0; v < positions.size(); ++v) {
+      model_.positions.push_back(glm::dvec3(to_scene * glm::dvec4(vector(positions, v), 1.0)));
+      model_.normals.push_back(has_normals ? glm::vec3(turn * vector(normals, v)) : glm::vec3(0));
+      // OBJ, whose sense SourceModel has, counts v from below.
+      const glm::dvec2 uv =
+          has_uvs ? placing.apply({uvs.at(v, 0), uvs.at(v, 1)}) : glm::dvec2(0.0, 1.0);
+      model_.uvs.push_back({uv.x, 1.0 - uv.y});
+      glm::vec3 colour(1.0f);
+      for (int i = 0; has_colours && i < 3; ++i) {
+        colour[i] = static_cast<float>(srgb_of_linear(colours.at(v, static_cast<std::size_t>(i))));
+      }
+      model_.colours.push_back(colour);
+    }
+    any_colours_ = any_colours_ || has_colours;
+    begin_material(primitive.material);
+    return add_triangles(primitive, mode, first, positions.size(),
+                         glm::determinant(glm::dmat3(to_scene)) < 0, has_uvs, has_normals);
+  }
+
+  static glm::dvec3 vector(const GltfAccessor& accessor, std::size_t v) {
+    return {accessor.at(v, 0), accessor.at(v, 1), accessor.at(v, 2)};
+  }
+
+  void begin_material(int material) {
+    const bool known = material >= 0 && static_cast<std::size_t>(material) < gltf_.materials.size();
+    const auto value = static_cast<std::uint32_t>(known ? static_cast<std::size_t>(material)
+                                                        : gltf_.materials.size());
+    const std::uint64_t face = model_.corner_positions.size() / 3;
+    if (!model_.material_runs.empty() && model_.material_runs.back().first_face == face) {
+      model_.material_runs.back().value = value;
+    } else if (model_.material_runs.empty() || model_.material_runs.back().value != value) {
+      model_.material_runs.push_back({face, value});
+    }
+  }
+
+  Result<void> add_triangles(const tinygltf::Primitive& primitive, int mode, std::uint32_t first,
+                             std::size_t vertices, bool mirrored, bool has_uvs, bool has_normals) {
+    GltfAccessor indices;
+    const bool indexed = primitive.indices >= 0;
+    if (indexed && !indices.open(gltf_, primitive.indices)) {
+      return wrong("gltf.accessor", "the indices of a primitive leave their buffer");
+    }
+    const std::size_t count = indexed ? indices.size() : vertices;
+    const bool list = mode == TINYGLTF_MODE_TRIANGLES;
+    const bool fan = mode == TINYGLTF_MODE_TRIANGLE_FAN;
+    for (std::size_t i = 0; i + 2 < count; i += list ? 3 : 1) {
+      std::array<std::size_t, 3> corner = {fan ? 0 : i, i + 1, i + 2};
+      // Every other triangle of a strip, and all of a mirrored node, turn round.
+      const bool odd = !list && !fan && i % 2 == 1;
+      if (odd != mirrored) std::swap(corner[1], corner[2]);
+      for (const std::size_t c : corner) {
+        const double at = indexed ? indices.at(c, 0) : static_cast<double>(c);
+        if (!(at >= 0 && at < static_cast<double>(vertices))) {
+          return wrong("gltf.accessor", "an index is beyond the vertices of its primitive");
+        }
+        const std::uint32_t v = first + static_cast<std::uint32_t>(at);
+        model_.corner_positions.push_back(v);
+        model_.corner_uvs.own.push_back(has_uvs ? v : kNoIndex);
+        model_.corner_normals.own.push_back(has_normals ? v : kNoIndex);
+      }
+    }
+    return {};
+  }
+
+  /// The cheapest form of an index plane.
+  static void settle(const Array<std::uint32_t>& positions, IndexPlane& plane) {
+    const auto missing = [](std::uint32_t index) { return index == kNoIndex; };
+    if (plane.own == positions) {
+      plane.kind = IndexPlane::Kind::kSame;
+    } else if (std::all_of(plane.own.begin(), plane.own.end(), missing)) {
+      plane.kind = IndexPlane::Kind::kAbsent;
+    } else {
+      plane.kind = IndexPlane::Kind::kOwn;
+      return;
+    }
+    plane.own.release();
+  }
+
+  void finish() {
+    settle(model_.corner_positions, model_.corner_uvs);
+    settle(model_.corner_positions, model_.corner_normals);
+    if (!any_colours_) model_.colours.release();
+    // glTF says that faces without normals are flat.
+    model_.smoothing_runs = {{0, 0}};
+    const auto add = [&](std::uint64_t count, const char* id, const std::string& what) {
+      if (count == 0) return;
+      model_.findings.push_back(
+          {id, DiagnosticSeverity::kWarning, label_, 0, std::to_string(count) + " " + what, ""});
+    };
+    add(lines_and_points_, "gltf.lines", "primitives of lines or points are left out");
+    add(skins_, "gltf.skin", "skinned nodes are baked in the pose of their nodes");
+    add(morphs_, "gltf.morph", "primitives have morph targets, which are left out");
+  }
+
+  const tinygltf::Model& gltf_;
+  SourceModel& model_;
+  std::string label_;
+  std::vector<bool> seen_;  // nodes: glTF's are trees
+  bool any_colours_ = false;
+  std::uint64_t lines_and_points_ = 0;
+  std::uint64_t skins_ = 0;
+  std::uint64_t morphs_ = 0;
+};
+
+/// All of a file; false where it cannot be read.
+bool read_bytes(const std::string& path, std::string& bytes) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return false;
+  bytes.assign(std::istreambuf_iterator<char>(file), {});
+  return !file.bad();
+}
+
+}  // namespace
+
+Result<SourceModel> read_gltf(const std::string& path) {
+  std::string bytes;
+  if (!read_bytes(path, bytes)) {
+    return fail(ExitCode::kIo, "gltf.open", path, "the file cannot be read", "check its name");
+  }
+  const std::string parent = std::filesystem::path(path).parent_path().string();
+  const std::string folder = (parent.empty() ? "." : parent) + "/";
+  tinygltf::TinyGLTF loader;
+  loader.SetImageLoader(keep_image_bytes, nullptr);
+  tinygltf::Model gltf;
+  std::string error;
+  std::string warning;
+  const auto size = static_cast<unsigned>(std::min<std::size_t>(bytes.size(), 0xFFFFFFFFu));
+  bool good = false;
+  try {
+    good = bytes.starts_with("glTF")
+               ? loader.LoadBinaryFromMemory(&gltf, &error, &warning,
+                                             reinterpret_cast<const unsigned char*>(bytes.data()),
+                                             size, folder)
+               : loader.LoadASCIIFromString(&gltf, &error, &warning, bytes.data(), size, folder);
+  } catch (const std::exception& thrown) {
+    error = thrown.what();
+  }
+  if (!good) {
+    std::replace(error.begin(), error.end(), '\n', ' ');
+    return fail(ExitCode::kInvalidInput, "gltf.read", path, "no glTF 2.0: " + error,
+                "check the file with the glTF validator and export it again");
+  }
+  SourceModel model;
+  model.name = std::filesystem::path(path).stem().string();
+  model.materials = gltf_materials(gltf, folder, path, model.findings);
+  if (auto read = SceneReader(gltf, model, path).run(); !read) {
+    return tl::unexpected(read.error());
+  }
+  if (model.corner_positions.empty()) {
+    return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it shows no triangles",
+                "export a mesh in its default scene");
+  }
+  return model;
+}
+
+}  // namespace modar

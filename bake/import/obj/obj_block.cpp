@@ -1,0 +1,398 @@
+// Parses OBJ statements. Streams over the bytes once; never looks for the end of a line first.
+#include "bake/import/obj/obj_block.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "bake/import/obj/ascii.hpp"
+#include "bake/import/obj/number_parser.hpp"
+#include "bake/import/obj/plain_obj.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::uint32_t kTooLarge = 0x7FFFFFFFu;  // no file of ours has so many elements
+
+class BlockParser {
+ public:
+  BlockParser(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block)
+      : p_(text), end_(text + size), limits_(limits), block_(block) {}
+
+  void run() {
+    while (p_ < end_) statement();
+    block_.lines = line_ - 1;
+  }
+
+ private:
+  void note(ObjNote id) {
+    NoteTally& tally = block_.notes[static_cast<std::size_t>(id)];
+    if (tally.count++ == 0) tally.first_line = line_;
+  }
+
+  /// Bytes of a backslash and the line end that it continues, a lone '\r' too; else 0.
+  [[nodiscard]] std::size_t continuation() const {
+    if (*p_ != '\\' || !is_line_end(p_[1]) || p_ + 1 >= end_) return 0;
+    return p_[1] == '\r' && p_[2] == '\n' ? 3 : 2;
+  }
+
+  /// Skips blanks and continued line ends.
+  void skip_blanks() {
+    while (true) {
+      while (is_blank(*p_) && p_ < end_) ++p_;
+      const std::size_t bytes = continuation();
+      if (bytes == 0) return;
+      p_ += bytes;
+      ++line_;
+    }
+  }
+
+  [[nodiscard]] bool at_end() const { return p_ >= end_ || is_line_end(*p_) || *p_ == '#'; }
+
+  /// Goes past the line end. A lone '\r' ends a line as well (very old files).
+  void end_statement() {
+    if (*p_ == '\n' && p_ < end_) {
+      ++p_;
+      ++line_;
+      return;
+    }
+    // A comment's backslash continues nothing.
+    while (p_ < end_ && !is_line_end(*p_)) ++p_;
+    if (p_ >= end_) return;
+    if (*p_ == '\r' && p_[1] == '\n') ++p_;
+    ++p_;
+    ++line_;
+  }
+
+  /// Skips the rest of a statement, continued lines with it.
+  void skip_statement() {
+    while (true) {
+      skip_blanks();
+      if (at_end()) break;
+      ++p_;
+    }
+    end_statement();
+  }
+
+  void skip_token() {
+    while (p_ < end_ && !is_blank(*p_) && !is_line_end(*p_)) {
+      if (continuation() > 0) return;
+      ++p_;
+    }
+  }
+
+  /// A number of the line, or nothing where the line is over.
+  bool real(double& value) {
+    skip_blanks();
+    if (at_end()) return false;
+    NumberKind kind = NumberKind::kNone;
+    p_ = take_real(p_, end_, value, kind);
+    if (kind == NumberKind::kNotFinite) {
+      note(ObjNote::kNotFinite);
+      value = std::numeric_limits<double>::quiet_NaN();
+    } else if (kind == NumberKind::kNone) {
+      note(ObjNote::kBadNumber);
+      value = 0.0;
+      skip_token();
+      return true;
+    }
+    if (!is_blank(*p_) && !at_end() && *p_ != '\\') {
+      note(ObjNote::kBadNumber);
+      skip_token();
+    }
+    return true;
+  }
+
+  void statement() {
+    if (limits_ == nullptr) {
+      if (const char* const next = take_plain_statement(p_, block_)) {
+        p_ = next;
+        ++line_;
+        return;
+      }
+    }
+    skip_blanks();
+    const char c = *p_;
+    const char next = p_[1];
+    if (c == 'v') {
+      if (is_blank(next)) return position(1);
+      if (next == 't' && is_blank(p_[2])) return uv();
+      if (next == 'n' && is_blank(p_[2])) return normal();
+    } else if (c == 'f' && is_blank(next)) {
+      return face();
+    }
+    if (at_end()) return end_statement();
+    other();
+  }
+
+  void position(std::ptrdiff_t keyword) {
+    p_ += keyword;
+    double v[8];
+    unsigned n = 0;
+    while (n < 8 && real(v[n])) ++n;
+    if (n < 3) {
+      note(ObjNote::kShortVertex);
+      for (unsigned i = n; i < 3; ++i) v[i] = 0.0;
+    }
+    block_.positions.push({v[0], v[1], v[2]});
+    if (n == 4 && v[3] != 1.0) note(ObjNote::kWeight);
+    if (n >= 6) {
+      colour({v[3], v[4], v[5]});
+    } else if (block_.colours.size() != 0) {
+      block_.colours.push(glm::vec3(std::numeric_limits<float>::quiet_NaN()));
+    }
+    skip_statement();
+  }
+
+  void colour(const glm::dvec3& rgb) {
+    fill_colours(block_);
+    const auto finite = [](double x) { return std::isfinite(x) ? static_cast<float>(x) : 0.0f; };
+    block_.colours.push({finite(rgb.x), finite(rgb.y), finite(rgb.z)});
+  }
+
+  void uv() {
+    p_ += 2;
+    glm::dvec2 value(0.0);
+    if (real(value.x)) real(value.y);
+    block_.uvs.push(value);
+    skip_statement();
+  }
+
+  void normal() {
+    p_ += 2;
+    glm::dvec3 value(0.0);
+    if (real(value.x) && real(value.y)) real(value.z);
+    block_.normals.push(glm::vec3(value));
+    skip_statement();
+  }
+
+  /// An index as it stands in the file: 0 where there is none, kTooLarge beyond what we hold.
+  std::int64_t index() {
+    const bool negative = *p_ == '-';
+    if (negative) ++p_;
+    std::uint64_t value = 0;
+    unsigned digits = 0;
+    p_ = detail::take_digits(p_, value, digits);
+    if (digits > 10 || value > kTooLarge) value = kTooLarge;
+    const auto index = static_cast<std::int64_t>(value);
+    return negative ? -index : index;
+  }
+
+  /// Index from 0 of what the file counts from 1 or, below zero, from here. local: elements of the
+  /// block so far. Answers false where it refers to nothing.
+  bool resolve(std::int64_t index, std::uint64_t local, std::uint64_t before, std::uint64_t total,
+               std::uint32_t component, std::uint64_t& highest, std::uint32_t& out) {
+    if (limits_ != nullptr) {
+      const std::int64_t here = static_cast<std::int64_t>(before + local);
+      const std::int64_t value = index > 0 ? index - 1 : here + index;
+      if (index == 0 || value < 0 || value >= static_cast<std::int64_t>(total)) return false;
+      out = static_cast<std::uint32_t>(value);
+      return true;
+    }
+    if (index > 0) {
+      const auto value = static_cast<std::uint64_t>(index);
+      highest = value > highest ? value : highest;
+      out = static_cast<std::uint32_t>(value - 1);
+    } else {
+      // Whether it exists is known once the blocks ahead are counted.
+      block_.relative.push_back(static_cast<std::uint32_t>(3 * block_.corner_positions.size()) +
+                                component);
+      out = static_cast<std::uint32_t>(
+          static_cast<std::uint64_t>(static_cast<std::int64_t>(local) + index));
+    }
+    return true;
+  }
+
+  /// One corner "v", "v/t", "v//n" or "v/t/n". Answers false where the face cannot be kept.
+  bool corner() {
+    const std::int64_t v = index();
+    std::int64_t t = 0;
+    std::int64_t n = 0;
+    bool has_t = false;
+    bool has_n = false;
+    if (*p_ == '/') {
+      ++p_;
+      has_t = is_digit(*p_) || *p_ == '-';
+      if (has_t) t = index();
+      if (*p_ == '/') {
+        ++p_;
+        has_n = is_digit(*p_) || *p_ == '-';
+        if (has_n) n = index();
+      }
+    }
+    if (v == 0) return note(ObjNote::kZeroIndex), false;
+    Corner result;
+    const ObjLimits none{};
+    const ObjLimits& limits = limits_ != nullptr ? *limits_ : none;
+    if (!resolve(v, block_.positions.size(), limits.before.positions, limits.total.positions, 0,
+                 block_.highest.positions, result.position)) {
+      return note(ObjNote::kIndexRange), false;
+    }
+    if (has_t && (t == 0 || !resolve(t, block_.uvs.size(), limits.before.uvs, limits.total.uvs, 1,
+                                     block_.highest.uvs, result.uv))) {
+      note(ObjNote::kAttributeRange);
+      result.uv = kNoIndex;
+    }
+    if (has_n &&
+        (n == 0 || !resolve(n, block_.normals.size(), limits.before.normals, limits.total.normals,
+                            2, block_.highest.normals, result.normal))) {
+      note(ObjNote::kAttributeRange);
+      result.normal = kNoIndex;
+    }
+    block_.corner_positions.push(result.position);
+    block_.corner_uvs.push(result.uv);
+    block_.corner_normals.push(result.normal);
+    return true;
+  }
+
+  void face() {
+    ++p_;
+    std::uint32_t count = 0;
+    const std::size_t relative = block_.relative.size();
+    bool keep = true;
+    while (true) {
+      skip_blanks();
+      if (at_end()) break;
+      if (is_digit(*p_) || *p_ == '-') {
+        const char* const start = p_;
+        if (corner()) {
+          ++count;
+        } else {
+          keep = false;
+        }
+        if (p_ > start && (is_blank(*p_) || at_end() || *p_ == '\\')) continue;
+      } else if (*p_ == '/') {
+        note(ObjNote::kNoPosition);
+        keep = false;
+        skip_token();
+        continue;
+      }
+      note(ObjNote::kBadNumber);
+      keep = false;
+      skip_token();
+    }
+    if (keep && (count < 3 || count > kMaxFaceCorners)) {
+      note(ObjNote::kShortFace);
+      keep = false;
+    }
+    if (keep) {
+      block_.face_corners.push(count);
+    } else {
+      pop_corners(block_, count);
+      block_.relative.resize(relative);
+    }
+    end_statement();
+  }
+
+  /// The rest of the statement as text: blanks trimmed, continued lines joined.
+  std::string rest() {
+    std::string text;
+    skip_blanks();
+    while (p_ < end_ && !is_line_end(*p_)) {
+      if (continuation() > 0) {
+        skip_blanks();
+        text += ' ';
+        continue;
+      }
+      text += *p_++;
+    }
+    while (!text.empty() && is_blank(text.back())) text.pop_back();
+    return text;
+  }
+
+  void add(ObjStatement::Kind kind, std::uint32_t group) {
+    ObjStatement s{kind, block_.face_corners.size(), line_, group, {}};
+    if (kind != ObjStatement::Kind::kSmoothing) s.text = rest();
+    block_.statements.push_back(std::move(s));
+  }
+
+  void smoothing() {
+    skip_blanks();
+    std::int64_t group = 0;
+    if (is_digit(*p_)) {
+      group = index();
+    } else if ((*p_ | 0x20) == 'o' && (p_[1] | 0x20) == 'n') {
+      group = 1;
+    }
+    add(ObjStatement::Kind::kSmoothing, static_cast<std::uint32_t>(group));
+  }
+
+  void other() {
+    const char* const start = p_;
+    skip_token();
+    const std::string_view word(start, static_cast<std::size_t>(p_ - start));
+    if (word == "usemtl") {
+      add(ObjStatement::Kind::kMaterial, 0);
+    } else if (word == "mtllib") {
+      add(ObjStatement::Kind::kLibrary, 0);
+    } else if (word == "s") {
+      smoothing();
+    } else if (word == "l") {
+      note(ObjNote::kLine);
+    } else if (word == "p") {
+      note(ObjNote::kPoint);
+    } else if (word == "v") {
+      return position(0);
+    } else if (is_free_form(word)) {
+      note(ObjNote::kFreeForm);
+    } else if (!is_harmless(word)) {
+      note(ObjNote::kUnknown);
+    }
+    skip_statement();
+  }
+
+  static bool is_free_form(std::string_view word) {
+    for (const char* known : {"vp", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf",
+                              "parm", "trim", "hole", "scrv", "sp", "end", "con"}) {
+      if (word == known) return true;
+    }
+    return false;
+  }
+
+  static bool is_harmless(std::string_view word) {
+    for (const char* known :
+         {"g", "o", "vt", "vn", "f", "mg", "bevel", "c_interp", "d_interp", "lod", "usemap",
+          "maplib", "shadow_obj", "trace_obj", "ctech", "stech", "vw"}) {
+      if (word == known) return true;
+    }
+    return false;
+  }
+
+  const char* p_;
+  const char* end_;
+  const ObjLimits* limits_;
+  ObjBlock& block_;
+  std::uint64_t line_ = 1;
+};
+
+}  // namespace
+
+void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block) {
+  // The shortest element is two bytes long ("v\n", "1 ").
+  const std::size_t most = size / 2 + 2;
+  block.positions.reset(most);
+  block.colours.reset(most);
+  block.uvs.reset(most);
+  block.normals.reset(most);
+  block.corner_positions.reset(most);
+  block.corner_uvs.reset(most);
+  block.corner_normals.reset(most);
+  block.face_corners.reset(most);
+  block.relative.clear();
+  block.statements.clear();
+  block.notes = {};
+  block.highest = {};
+  BlockParser(text, size, limits, block).run();
+}
+
+std::size_t first_statement_end(std::string_view text, std::size_t from) {
+  while (true) {
+    const std::size_t at = text.find('\n', from);
+    if (at == std::string_view::npos) return 0;
+    std::size_t before = at;
+    if (before > 0 && text[before - 1] == '\r') --before;
+    if (before == 0 || text[before - 1] != '\\') return at + 1;
+    from = at + 1;
+  }
+}
+
+}  // namespace modar

@@ -1,0 +1,119 @@
+// One stretch of OBJ text to plain arrays, knowing nothing of what stands before it: the unit of
+// work of the reader's threads.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "bake/import/source_model.hpp"
+
+namespace modar {
+
+/// Things in a file that deserve a word. Counted, with the first line of each.
+enum class ObjNote : std::uint8_t {
+  kNotFinite,       ///< nan, inf, or a number too large for a double
+  kBadNumber,       ///< something else where a number should be
+  kShortVertex,     ///< a v line with fewer than three numbers
+  kWeight,          ///< a fourth coordinate that is not 1
+  kLine,            ///< l element
+  kPoint,           ///< p element
+  kFreeForm,        ///< curves and surfaces
+  kUnknown,         ///< a keyword that no OBJ specification knows
+  kShortFace,       ///< fewer than three corners
+  kZeroIndex,       ///< a corner with index 0
+  kIndexRange,      ///< a corner that refers to no vertex of the file
+  kNoPosition,      ///< a corner without a position
+  kAttributeRange,  ///< a uv or normal index beyond the file: the attribute is left out
+  kCount
+};
+
+struct NoteTally {
+  std::uint64_t count = 0;
+  std::uint64_t first_line = 0;  ///< counted from 1 in the text that was parsed
+};
+using NoteTallies = std::array<NoteTally, static_cast<std::size_t>(ObjNote::kCount)>;
+
+/// A growing array whose room is made ahead, so that adding an element checks nothing.
+template <class T>
+class Scratch {
+ public:
+  /// Makes room for `capacity` elements in all; forgets those it holds.
+  void reset(std::size_t capacity) {
+    if (capacity > capacity_) {
+      data_ = std::make_unique_for_overwrite<T[]>(capacity);
+      capacity_ = capacity;
+    }
+    size_ = 0;
+  }
+  void push(const T& value) { data_[size_++] = value; }
+  void pop(std::size_t count) { size_ -= count; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] T* data() { return data_.get(); }
+  [[nodiscard]] const T* data() const { return data_.get(); }
+  T& operator[](std::size_t i) { return data_[i]; }
+  const T& operator[](std::size_t i) const { return data_[i]; }
+
+ private:
+  std::unique_ptr<T[]> data_;
+  std::size_t size_ = 0;
+  std::size_t capacity_ = 0;
+};
+
+/// usemtl, s or mtllib, and the face of the block before which it stands.
+struct ObjStatement {
+  enum class Kind : std::uint8_t { kMaterial, kSmoothing, kLibrary };
+  Kind kind = Kind::kMaterial;
+  std::uint64_t face = 0;
+  std::uint64_t line = 0;
+  std::uint32_t group = 0;  ///< of kSmoothing
+  std::string text;         ///< of the others, trimmed
+};
+
+/// How many of each a file has, or had before some point.
+struct ObjCounts {
+  std::uint64_t positions = 0;
+  std::uint64_t uvs = 0;
+  std::uint64_t normals = 0;
+};
+
+struct ObjBlock {
+  Scratch<glm::dvec3> positions;
+  Scratch<glm::vec3> colours;  ///< empty, or one a position, NaN where the line had none
+  Scratch<glm::dvec2> uvs;
+  Scratch<glm::vec3> normals;
+  Scratch<std::uint32_t> corner_positions;  ///< these three: see relative
+  Scratch<std::uint32_t> corner_uvs;
+  Scratch<std::uint32_t> corner_normals;
+  Scratch<std::uint32_t> face_corners;  ///< number of corners of each face
+  /// Entries (3 * corner + component) whose index counts from the start of the block (modulo 2^32).
+  std::vector<std::uint32_t> relative;
+  std::vector<ObjStatement> statements;
+  NoteTallies notes{};
+  ObjCounts highest;  ///< greatest absolute index of a corner, plus one
+  std::uint64_t lines = 0;
+};
+
+/// Set for the second, careful pass over a file with bad indices: every corner is held against them
+/// at once, so that the finding can name the line.
+struct ObjLimits {
+  ObjCounts before;  ///< elements ahead of the block
+  ObjCounts total;   ///< elements of the whole file
+};
+
+/// Parses text that consists of whole statements, the last byte a '\n'; kTextPadding bytes of
+/// whatever follow it. limits: nullptr in the fast pass, where indices are resolved later.
+void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block);
+
+/// The first end of a statement whose last byte lies in [from, size): one past a '\n' that no
+/// backslash continues; 0 where there is none.
+std::size_t first_statement_end(std::string_view text, std::size_t from);
+
+}  // namespace modar

@@ -1,0 +1,32 @@
+// Wavefront OBJ and MTL to SourceModel.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "bake/import/source_model.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct ReadOptions {
+  unsigned jobs = 1;  ///< threads; the result does not depend on it
+};
+
+/// Reads an OBJ file and the MTL files that it names. Positions are parsed in double with correct
+/// rounding. What is odd becomes a finding with its line; only what leaves nothing to read is an
+/// error: kIo "io.open"; kInvalidInput "obj.utf16", "obj.no-faces", "obj.too-large".
+Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options = {});
+
+/// The same from memory (for fuzzing and tests). folder: where mtllib names are looked up; empty:
+/// material files are not read. label: the file's name in findings.
+Result<SourceModel> parse_obj(std::string_view text, const std::string& folder,
+                              const std::string& label, const ReadOptions& options = {});
+
+/// Materials of an MTL text. Map paths are resolved against `folder` (backslashes, quotes, wrong
+/// case, options and blanks in names are dealt with). label: the file's name in findings.
+std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& folder,
+                                      const std::string& label, std::vector<Diagnostic>& findings);
+
+}  // namespace modar

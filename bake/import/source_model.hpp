@@ -1,0 +1,113 @@
+// What a model file said, unrepaired.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "bake/memory/array.hpp"
+#include "bake/report.hpp"
+
+namespace modar {
+
+/// A material as MTL or glTF names it. Paths are resolved against the file that names them, and
+/// exist; empty where there is no map or it was not found (then there is a finding).
+struct SourceMaterial {
+  std::string name;
+  glm::vec3 ambient{0.2f};
+  glm::vec3 diffuse{0.8f};
+  glm::vec3 specular{0.0f};
+  glm::vec3 emission{0.0f};
+  float shininess = 0.0f;
+  float opacity = 1.0f;
+  std::string diffuse_map;
+  std::string alpha_map;
+  bool two_sided = false;
+  std::shared_ptr<const void> keeper;  ///< of temporary files that the maps are in, or nothing
+};
+
+/// One corner of a face: indices into the arrays of the model, kNoIndex where it has none.
+inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;
+struct Corner {
+  std::uint32_t position = kNoIndex;
+  std::uint32_t uv = kNoIndex;
+  std::uint32_t normal = kNoIndex;
+};
+
+/// Smoothing of faces in a file that says nothing of it: as one group of their own.
+inline constexpr std::uint32_t kUnstatedSmoothing = 0xFFFFFFFFu;
+
+/// The uv or normal index of every corner. Most files leave an attribute out or repeat the
+/// position's index throughout; then nothing is stored.
+struct IndexPlane {
+  enum class Kind : std::uint8_t { kAbsent, kSame, kOwn };
+  Kind kind = Kind::kAbsent;
+  Array<std::uint32_t> own;  ///< of kOwn
+
+  [[nodiscard]] std::uint32_t at(std::size_t corner, std::uint32_t position) const {
+    return kind == Kind::kOwn ? own[corner] : (kind == Kind::kSame ? position : kNoIndex);
+  }
+};
+
+/// Faces from `first_face` on, up to the next run, have `value`.
+struct FaceRun {
+  std::uint64_t first_face = 0;
+  std::uint32_t value = 0;
+};
+
+/// Polygons of the file: face f has face_size(f) corners from face_first(f) on. material_runs hold
+/// indices into materials (0 is a default material where the file names none), smoothing_runs
+/// smoothing groups (0: off; kUnstatedSmoothing: the file does not say); both are ascending, the
+/// first run begins at face 0.
+struct SourceModel {
+  std::string name;  ///< the file's stem
+  Array<glm::dvec3> positions;
+  Array<glm::vec3> colours;  ///< empty, or one a position, RGB in [0,1]
+  Array<glm::dvec2> uvs;     ///< v up, as OBJ has it
+  Array<glm::vec3> normals;
+  Array<std::uint32_t> corner_positions;
+  IndexPlane corner_uvs;
+  IndexPlane corner_normals;
+  Array<std::uint32_t> first_corner;  ///< faces + 1 entries; empty where all faces are triangles
+  std::vector<FaceRun> material_runs;
+  std::vector<FaceRun> smoothing_runs;
+  std::vector<SourceMaterial> materials;
+  std::vector<Diagnostic> findings;
+
+  [[nodiscard]] std::size_t corner_count() const { return corner_positions.size(); }
+  [[nodiscard]] Corner corner(std::size_t i) const {
+    const std::uint32_t p = corner_positions[i];
+    return {p, corner_uvs.at(i, p), corner_normals.at(i, p)};
+  }
+  [[nodiscard]] std::size_t face_count() const {
+    return first_corner.empty() ? corner_count() / 3 : first_corner.size() - 1;
+  }
+  [[nodiscard]] std::size_t face_first(std::size_t f) const {
+    return first_corner.empty() ? 3 * f : first_corner[f];
+  }
+  [[nodiscard]] std::size_t face_size(std::size_t f) const {
+    return first_corner.empty() ? 3 : first_corner[f + 1] - first_corner[f];
+  }
+};
+
+/// Walks runs along rising face numbers.
+class RunCursor {
+ public:
+  explicit RunCursor(const std::vector<FaceRun>& runs) : runs_(runs) {}
+  /// The value of a face that is not below the one asked for before; 0 where there are no runs.
+  std::uint32_t at(std::size_t face) {
+    while (next_ < runs_.size() && runs_[next_].first_face <= face) value_ = runs_[next_++].value;
+    return value_;
+  }
+
+ private:
+  const std::vector<FaceRun>& runs_;
+  std::size_t next_ = 0;
+  std::uint32_t value_ = 0;
+};
+
+}  // namespace modar

@@ -1,0 +1,167 @@
+// `modar bench NAME`: figures as ratios, ours and the reference side by side in one run.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bake/commands/commands.hpp"
+#include "bake/commands/json_output.hpp"
+#include "bake/lab/bench_rows.hpp"
+#include "bake/lab/etc1_bench.hpp"
+#include "bake/lab/ship_bench.hpp"
+#include "bake/terminal.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
+#include "modar/render_bench.hpp"
+
+namespace modar {
+namespace {
+
+using BenchResult = Result<std::vector<BenchRow>>;
+
+struct Bench {
+  const char* name;
+  bool needs_inputs;
+  const char* inputs;  ///< what its arguments are
+  const char* summary;
+  std::function<BenchResult(const BenchCommand&)> run;
+};
+
+/// Median milliseconds of `repeats` runs.
+double median_ms(int repeats, const std::function<void()>& work) {
+  std::vector<double> times;
+  for (int i = 0; i < repeats; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
+    times.push_back(ms.count());
+  }
+  std::nth_element(times.begin(), times.begin() + repeats / 2, times.end());
+  return times[static_cast<std::size_t>(repeats / 2)];
+}
+
+/// Opening a bundle (map, validate headers and tables) against copying its bytes once, which is the
+/// least that any format pays that has to be read.
+BenchResult bench_load(const BenchCommand& command) {
+  std::vector<BenchRow> rows;
+  for (const std::string& path : command.inputs) {
+    Result<MappedFile> warm = MappedFile::open(path);
+    if (!warm) return tl::unexpected(warm.error());
+    std::vector<std::byte> copy(warm->bytes().size());
+    bool opened = true;
+    const double open_ms = median_ms(51, [&] {
+      Result<MappedFile> file = MappedFile::open(path);
+      opened = opened && file && BundleView::open(file->bytes());
+    });
+    if (!opened) {
+      return fail(ExitCode::kInvalidInput, "bench.bundle", path, "this is no good bundle",
+                  "see what `modar check` says of it");
+    }
+    const double copy_ms = median_ms(
+        51, [&] { std::memcpy(copy.data(), warm->bytes().data(), warm->bytes().size()); });
+    rows.push_back({"open_ms " + file_stem(path), open_ms, copy_ms, open_ms / copy_ms});
+  }
+  return rows;
+}
+
+/// Our ETC1 encoder at its three efforts beside Android's libetc1.
+BenchResult bench_etc1_rows(const BenchCommand& command) {
+  Result<std::vector<Etc1BenchRow>> measured = bench_etc1(command.inputs, command.crop);
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<BenchRow> rows;
+  for (const Etc1BenchRow& row : *measured) {
+    rows.push_back({row.measure, row.ours, row.reference, row.ratio});
+  }
+  return rows;
+}
+
+/// What bundles cost on the way, beside Draco, meshoptimizer's codecs and zstd.
+BenchResult bench_ship_rows(const BenchCommand& command) {
+  const auto measured = bench_ship(command.inputs, 1);
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<BenchRow> rows;
+  for (const ShipBenchRow& row : *measured) {
+    rows.push_back({row.measure, row.ours, row.reference, row.ours / row.reference});
+  }
+  return rows;
+}
+
+/// Copies of models in the article's four ways, loading and culling; or the player on a video.
+BenchResult bench_render_rows(const BenchCommand& command) {
+  if (!command.pose.video.empty()) return bench_display_rows(command);
+  ProgressBar bar(command.pose.quiet || command.json);
+  RenderBenchOptions options;
+  options.device = command.device;
+  options.progress = [&bar](std::uint64_t done, std::uint64_t all) {
+    bar.show("drawing", static_cast<double>(done) / static_cast<double>(all));
+  };
+  const auto measured = bench_render(command.inputs, options);
+  bar.clear();
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<BenchRow> rows;
+  for (const RenderBenchRow& row : *measured) {
+    const double ratio = row.reference > 0 ? row.ours / row.reference : std::nan("");
+    rows.push_back({row.measure, row.ours, row.reference, ratio});
+  }
+  return rows;
+}
+
+const std::vector<Bench>& benches() {
+  static const std::vector<Bench> all = {
+      {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
+       bench_load},
+      {"etc1", true, "IMAGE... [--crop SIDE]", "our ETC1 encoder against Android's libetc1",
+       bench_etc1_rows},
+      {"ship", true, "BUNDLE...",
+       "bytes and decoding of what travels, against Draco, meshopt and zstd", bench_ship_rows},
+      {"render", true, "BUNDLE... [--device NAME] [--video FILE]",
+       "ten copies in the article's ways, loading, culling, against index rendering from arrays; "
+       "or "
+       "the player on a video, against the article's Table 9",
+       bench_render_rows},
+      {"model", false, "SCAN [--big] | --obj FILE",
+       "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "
+       "gltfpack, Draco and the goals",
+       [](const BenchCommand& command) { return bench_model_rows(command.inputs, command.model); }},
+      {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
+       "our pose loop against the article's method, on the same frames",
+       [](const BenchCommand& command) { return bench_pose_rows(command.pose); }},
+  };
+  return all;
+}
+
+}  // namespace
+
+int run_bench(const BenchCommand& command) {
+  for (const Bench& bench : benches()) {
+    if (command.name != bench.name) continue;
+    if (bench.needs_inputs && command.inputs.empty()) {
+      return print_error({ExitCode::kUsage, "bench.inputs", command.name, "it needs input files",
+                          std::string("modar bench ") + bench.name + " " + bench.inputs});
+    }
+    const BenchResult rows = bench.run(command);
+    if (!rows) return print_error(rows.error());
+    if (command.json) {
+      std::fputs(bench_json(*rows).c_str(), stdout);
+      return static_cast<int>(ExitCode::kOk);
+    }
+    std::printf("%-32s %14s %14s %10s\n", "measure", "ours", "reference", "ratio");
+    for (const BenchRow& row : *rows) {
+      std::printf("%-32s %14.6g %14.6g %10.4g\n", row.measure.c_str(), row.ours, row.reference,
+                  row.ratio);
+    }
+    return static_cast<int>(ExitCode::kOk);
+  }
+  std::string names;
+  for (const Bench& bench : benches()) {
+    names += std::string("\n  ") + bench.name + " " + bench.inputs + ": " + bench.summary;
+  }
+  return print_error({ExitCode::kUsage, "bench.unknown", command.name, "there is no such bench",
+                      "there are:" + names});
+}
+
+}  // namespace modar

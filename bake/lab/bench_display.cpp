@@ -1,0 +1,157 @@
+// `modar bench render BUNDLE --video FILE`: the article's Table 9 beside a run of the player.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "bake/bundle/bundle_builder.hpp"
+#include "bake/lab/bench_rows.hpp"
+#include "bake/process.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// What the article prints of one model on one device; its dashes are no stutters.
+struct PaperSession {
+  double recognition_fps;
+  double display_fps;
+  double display_s;
+  double stutters;
+};
+struct PaperModel {
+  const char* name;
+  PaperSession low_end;
+  PaperSession mid_range;
+};
+constexpr PaperModel kPaperModels[] = {{"pottery", {25, 17, 18, 0}, {30, 23, 12, 0}},
+                                       {"bust", {26, 10, 30, 3}, {29, 20, 27, 1}},
+                                       {"statue", {28, 22, 28, 2}, {30, 25, 17, 0}},
+                                       {"church", {28, 8, 61, 3}, {30, 13, 54, 1}}};
+constexpr PaperSession kNoSession = {kUnknown, kUnknown, kUnknown, kUnknown};
+
+double ratio(double a, double b) {
+  return b > 0 ? a / b : kUnknown;
+}
+
+/// Frames a second that vision keeps up with while the pattern is seen, at most the source's own.
+double recognition_fps(const std::vector<PlayedFrame>& frames) {
+  double ms = 0;
+  double count = 0;
+  for (const PlayedFrame& frame : frames) {
+    if (!frame.recognised) continue;
+    ms += frame.track_ms;
+    ++count;
+  }
+  if (frames.empty() || count == 0) return kUnknown;
+  const auto steps = static_cast<double>(frames.back().frame - frames.front().frame);
+  const double source = ratio(steps, frames.back().time_s - frames.front().time_s);
+  const double able = ms > 0 ? 1e3 * count / ms : std::numeric_limits<double>::infinity();
+  return std::fmin(source, able);
+}
+
+/// Pictures a second of the video, over neighbours that both show a model: what was dropped between
+/// them lowers it.
+double display_fps(const std::vector<PlayedFrame>& frames) {
+  double seconds = 0;
+  double count = 0;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    if (!frames[i - 1].drawn || !frames[i].drawn) continue;
+    seconds += frames[i].time_s - frames[i - 1].time_s;
+    ++count;
+  }
+  return ratio(count, seconds);
+}
+
+/// Seconds from the camera's frame to the first picture with a model.
+double display_s(const std::vector<PlayedFrame>& frames) {
+  const auto first = std::ranges::find(frames, true, &PlayedFrame::drawn);
+  return first == frames.end() ? kUnknown : first->latency_ms / 1e3;
+}
+
+/// Plays at the video's own speed in a process of its own, without a window.
+Result<PlayedRun> play(const std::string& bundle, const BenchCommand& command) {
+  std::error_code error;
+  const auto programs = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  const TemporaryFolder folder;
+  const std::string output = folder.path() + "/lines";
+  std::vector<std::string> words = {
+      (programs / MODAR_PROGRAMS / "modar-play").lexically_normal().string(),
+      bundle,
+      "--input",
+      command.pose.video,
+      "--realtime",
+      "--json"};
+  if (!command.device.empty()) words.insert(words.end(), {"--device", command.device});
+  if (command.pose.quiet || command.json) words.emplace_back("--quiet");
+  const int code = run_process({words, {}, output});
+  if (folder.path().empty() || code != 0) {
+    return fail(ExitCode::kIo, "bench.play", words[0],
+                "it could not play the video, exit code " + std::to_string(code),
+                "look at what it says, or play the same bundle and video with it");
+  }
+  std::ifstream file(output);
+  return read_played_run({std::istreambuf_iterator<char>(file), {}});
+}
+
+/// Name of the model of the bundle's first scene.
+Result<std::string> scene_model(const std::string& path) {
+  const Result<MappedFile> file = MappedFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  const Result<BundleView> bundle = BundleView::open(file->bytes());
+  if (!bundle) return tl::unexpected(bundle.error());
+  if (bundle->scenes().empty()) {
+    return fail(ExitCode::kUsage, "bench.scene", path,
+                "no scene of the bundle binds a model to a pattern", "bake it with --scene");
+  }
+  return std::string(bundle->name(bundle->models()[bundle->scenes()[0].model].name));
+}
+
+}  // namespace
+
+std::vector<BenchRow> display_rows(const std::string& model, const PlayedRun& run) {
+  PaperSession sessions[2] = {kNoSession, kNoSession};
+  for (const PaperModel& paper : kPaperModels) {
+    if (model != paper.name) continue;
+    sessions[0] = paper.low_end;
+    sessions[1] = paper.mid_range;
+  }
+  std::vector<BenchRow> rows;
+  const auto add = [&](const std::string& figure, double ours, double reference) {
+    rows.push_back({model + " " + figure, ours, reference, ratio(ours, reference)});
+  };
+  constexpr const char* kDevices[2] = {"low_end", "mid_range"};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string device = std::string("_") + kDevices[i];
+    add("table9_recognition_fps" + device, recognition_fps(run.frames),
+        sessions[i].recognition_fps);
+    add("table9_display_fps" + device, display_fps(run.frames), sessions[i].display_fps);
+    add("table9_display_s" + device, display_s(run.frames), sessions[i].display_s);
+    add("table9_stutters" + device, static_cast<double>(run.late), sessions[i].stutters);
+  }
+  add("pictures", static_cast<double>(run.frames.size()), kUnknown);
+  add("dropped_frames", static_cast<double>(run.dropped), kUnknown);
+  return rows;
+}
+
+Result<std::vector<BenchRow>> bench_display_rows(const BenchCommand& command) {
+  std::vector<BenchRow> rows;
+  for (const std::string& path : command.inputs) {
+    const Result<std::string> model = scene_model(path);
+    if (!model) return tl::unexpected(model.error());
+    const Result<PlayedRun> run = play(path, command);
+    if (!run) return tl::unexpected(run.error());
+    const std::vector<BenchRow> more = display_rows(*model, *run);
+    rows.insert(rows.end(), more.begin(), more.end());
+  }
+  return rows;
+}
+
+}  // namespace modar

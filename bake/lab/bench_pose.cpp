@@ -1,0 +1,192 @@
+// `modar bench pose`: our loop beside the article's method on rendered frames of known pose and on
+// a video with its truth.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "bake/lab/bench_rows.hpp"
+#include "bake/lab/many_bench.hpp"
+#include "bake/lab/pose_bench.hpp"
+#include "bake/lab/score_bench.hpp"
+#include "bake/pattern/pattern_picture.hpp"
+#include "bake/terminal.hpp"
+#include "modar/features.hpp"
+
+namespace modar {
+namespace {
+
+/// Bands of the tracking part: what it is called, speed of the hand, blur for each pixel of motion.
+struct Path {
+  const char* name;
+  double speed;
+  double blur;
+};
+constexpr Path kPaths[] = {
+    {"tracking", 1.0, 0.0}, {"tracking fast", 3.0, 0.5}, {"tracking x10", 10.0, 0.0}};
+
+double percent(int part, int whole) {
+  return whole > 0 ? 100.0 * part / whole : 0.0;
+}
+
+/// Rows of one band: ours and, where it ran, the article's.
+void add_rows(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  for (const PoseBenchRow& ours : measured) {
+    if (ours.method != "ours") continue;
+    const PoseBenchRow* paper = nullptr;
+    for (const PoseBenchRow& other : measured) {
+      if (other.band == ours.band && other.method == "paper") paper = &other;
+    }
+    const auto add = [&](const std::string& what, auto&& value) {
+      const double reference = paper != nullptr ? value(*paper) : kNone;
+      const double own = value(ours);
+      rows.push_back(
+          {what + " " + ours.band, own, reference, reference != 0.0 ? own / reference : kNone});
+    };
+    if (ours.without_pattern > 0) {
+      add("false_pct",
+          [](const PoseBenchRow& row) { return percent(row.false_found, row.without_pattern); });
+    }
+    if (ours.frames > ours.without_pattern) {
+      const auto with = [](const PoseBenchRow& row) { return row.frames - row.without_pattern; };
+      add("recognised_pct",
+          [&](const PoseBenchRow& row) { return percent(row.recognised, with(row)); });
+      add("right_pct", [&](const PoseBenchRow& row) { return percent(row.right, with(row)); });
+      add("error_px", [](const PoseBenchRow& row) { return row.error_px; });
+    }
+    if (ours.sequence) add("jitter_px", [](const PoseBenchRow& row) { return row.jitter_px; });
+    add("cpu_ms", [](const PoseBenchRow& row) { return row.ms; });
+  }
+}
+
+/// Stages over all rendered bands, weighted by their frames.
+void add_stages(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
+  constexpr const char* kNames[4] = {"detect_ms", "describe_ms", "match_ms", "geometry_ms"};
+  for (std::size_t stage = 0; stage < 4; ++stage) {
+    double sums[2] = {0, 0};
+    double frames[2] = {0, 0};
+    for (const PoseBenchRow& row : measured) {
+      if (row.sequence) continue;
+      const std::size_t method = row.method == "ours" ? 0 : 1;
+      sums[method] += row.stages_ms[stage] * row.frames;
+      frames[method] += row.frames;
+    }
+    const double ours = sums[0] / std::max(frames[0], 1.0);
+    const double paper = frames[1] > 0 ? sums[1] / frames[1] : std::nan("");
+    rows.push_back({std::string(kNames[stage]) + " detection", ours, paper,
+                    paper > 0 ? ours / paper : std::nan("")});
+  }
+}
+
+Result<PoseBenchOptions> options_of(const PoseBenchCommand& command) {
+  PoseBenchOptions options;
+  options.frames = command.frames;
+  options.seed = command.seed;
+  options.clutter_frames = command.clutter;
+  options.many = command.many;
+  options.paper_set = 0;
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    if (command.parameters == parameter_set_name(set.id)) options.paper_set = set.id;
+  }
+  if (options.paper_set == 0 && command.parameters != "none") {
+    return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
+                "there is no parameter set '" + command.parameters + "'",
+                "name one of the article's sets, or none to run ours alone");
+  }
+  for (const SceneBand& band : pose_bands()) {
+    if (band.name.find(command.only) != std::string::npos) options.bands.push_back(band);
+  }
+  auto patterns = pictures_of(command.patterns);
+  if (!patterns) return tl::unexpected(patterns.error());
+  options.patterns = std::move(*patterns);
+  auto backgrounds = pictures_of(command.backgrounds);
+  if (!backgrounds) return tl::unexpected(backgrounds.error());
+  options.backgrounds = std::move(*backgrounds);
+  return options;
+}
+
+/// Scores beside working ranges, and how well their orders agree.
+Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
+                                         const ProgressCallback& progress) {
+  const auto scores = bench_scores(options, progress);
+  if (!scores) return tl::unexpected(scores.error());
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<BenchRow> rows;
+  std::vector<double> of_score[3];  // all, the half that it was tuned on, the other
+  std::vector<double> of_range[3];
+  for (const ScoreBenchRow& one : *scores) {
+    rows.push_back({"score " + one.name, 1.0 * one.score, one.range(), kNone});
+    rows.push_back({"farthest " + one.name, one.farthest, kNone, kNone});
+    rows.push_back({"tilt_deg " + one.name, one.tilt_deg, kNone, kNone});
+    for (const std::size_t group : {std::size_t{0}, one.tuned ? std::size_t{1} : std::size_t{2}}) {
+      of_score[group].push_back(one.score);
+      of_range[group].push_back(one.range());
+    }
+  }
+  constexpr const char* kGroups[] = {"all", "tuned", "other"};
+  for (std::size_t group = 0; group < 3; ++group) {
+    rows.push_back({std::string("rank_correlation ") + kGroups[group],
+                    rank_correlation(of_score[group], of_range[group]), kNone, kNone});
+  }
+  return rows;
+}
+
+Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options,
+                                        const ProgressCallback& progress) {
+  const auto measured = bench_many(options, progress);
+  if (!measured) return tl::unexpected(measured.error());
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<BenchRow> rows;
+  for (const ManyBenchRow& row : *measured) {
+    const bool held = row.reference > 0;
+    rows.push_back({row.measure + " x" + std::to_string(row.patterns), row.value,
+                    held ? row.reference : kNone, held ? row.value / row.reference : kNone});
+  }
+  return rows;
+}
+
+}  // namespace
+
+Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
+  ProgressBar bar(command.quiet);
+  const auto progress = [&bar](const std::string& what, double done) { bar.show(what, done); };
+  std::vector<PoseBenchRow> measured;
+  const auto take = [&measured](Result<std::vector<PoseBenchRow>> rows) -> Result<void> {
+    if (!rows) return tl::unexpected(rows.error());
+    measured.insert(measured.end(), rows->begin(), rows->end());
+    return {};
+  };
+  auto options = options_of(command);
+  if (!options) return tl::unexpected(options.error());
+  if (command.scores || command.tables || command.many > 0) {
+    auto rows = command.many > 0 ? many_rows(*options, progress)
+                : command.scores ? score_rows(*options, progress)
+                                 : article_rows(*options, progress);
+    bar.clear();
+    return rows;
+  }
+  if (!options->bands.empty()) {
+    if (auto done = take(bench_detection(*options, progress)); !done) {
+      return tl::unexpected(done.error());
+    }
+  }
+  for (const Path& path : kPaths) {
+    if (std::string(path.name).find(command.only) == std::string::npos) continue;
+    auto done = take(bench_tracking(*options, path.name, path.speed, path.blur, progress));
+    if (!done) return tl::unexpected(done.error());
+  }
+  if (!command.video.empty()) {
+    auto done = take(
+        bench_video(*options, {command.video, command.truth, command.video_pattern}, progress));
+    if (!done) return tl::unexpected(done.error());
+  }
+  bar.clear();
+  std::vector<BenchRow> rows;
+  add_rows(measured, rows);
+  add_stages(measured, rows);
+  return rows;
+}
+
+}  // namespace modar

@@ -1,0 +1,29 @@
+// What many patterns in one bundle cost, and how soon a pattern that was hidden is back.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bake/lab/pose_bench.hpp"
+
+namespace modar {
+
+/// One figure of a bundle of `patterns` patterns.
+struct ManyBenchRow {
+  std::string measure;
+  int patterns = 0;
+  double value = 0;
+  /// Detection: the time with one pattern, times `patterns`, or what a search for the shown pattern
+  /// alone gets right; returns: how often a pattern was hidden; 0: none.
+  double reference = 0;
+};
+
+/// Detection, set-up and return with 1, 10 and options.many patterns: quarters of the options'
+/// pictures, and their mirror images. Single thread; options.frames: frames of each count, which
+/// show the patterns in turn, and times that a pattern is hidden. Measures as in
+/// bake/commands/json.md. Errors: kUsage "bench.input" for fewer than seven pictures or no
+/// background; those of baking and of the loop.
+Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
+                                             const ProgressCallback& progress);
+
+}  // namespace modar

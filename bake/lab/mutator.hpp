@@ -1,0 +1,59 @@
+// One mutation after the other on a copy of a bundle, each taken back before the next.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bake/lab/mutation_targets.hpp"
+
+namespace modar {
+
+/// What was done to the bytes.
+struct Mutation {
+  std::string kind;
+  std::string field;
+  std::uint64_t offset = 0;
+  std::vector<std::byte> before;
+  std::vector<std::byte> after;
+  bool rehashed = false;
+};
+
+class Mutator {
+ public:
+  /// bytes: a good bundle.
+  Mutator(std::span<const std::byte> bytes, std::uint64_t seed);
+
+  /// Damages the copy in some way and tells how; the mutated file is file().
+  Mutation next(bool rehashed);
+  [[nodiscard]] std::span<const std::byte> file() const { return std::span(bytes_).first(size_); }
+  /// Takes the last mutation back.
+  void undo();
+
+ private:
+  Mutation edit_field(bool rehashed);
+  Mutation flip_bit();
+  Mutation truncate(bool rehashed);
+  Mutation extend();
+  Mutation swap_sections(bool rehashed);
+
+  std::uint64_t draw(std::uint64_t below) { return random_() % below; }
+  const char* change(const MutationField& field, std::uint64_t place);
+  void rehash(std::uint64_t from, std::uint64_t to);
+  [[nodiscard]] SectionEntry& entry(std::size_t i);
+
+  std::vector<std::byte> bytes_;  // as long as the file and what extend() may add
+  std::size_t size_ = 0;
+  std::size_t whole_ = 0;
+  std::size_t section_count_ = 0;
+  std::vector<std::byte> head_;  // header and section table as they were
+  std::vector<std::byte> saved_;
+  std::uint64_t saved_at_ = 0;
+  std::vector<MutationField> fields_;
+  std::mt19937_64 random_;
+};
+
+}  // namespace modar

@@ -1,0 +1,48 @@
+// A mesh cut into spatially compact chunks that 16-bit indices reach.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bake/mesh/tri_mesh.hpp"
+
+namespace modar {
+
+/// A coarser level of a chunk: triangles over the chunk's vertices.
+struct ChunkLevel {
+  std::vector<std::uint16_t> indices;
+  double error = 0;     ///< model space: bounds the distance from level 0, and of level 0 from it
+  double uv_shift = 0;  ///< texels: greatest shift of the texture at a vertex of level 0
+};
+
+/// One chunk: local vertex i is vertex `vertices[i]` of the TriMesh; triangles index `vertices`.
+/// Triangles are in file order, vertices in that of their first use: pack() orders the final bytes.
+struct Chunk {
+  std::uint32_t material = 0;
+  std::vector<std::uint32_t> vertices;
+  std::vector<std::uint16_t> indices;
+  std::vector<ChunkLevel> coarser;  ///< levels 1 and up; errors never fall
+};
+
+struct ChunkedMesh {
+  TriMesh mesh;  ///< without its triangles and their materials, which the chunks hold
+  std::vector<Chunk> chunks;
+};
+
+struct ChunkOptions {
+  std::uint32_t max_vertices = 65535;  ///< 3 to 65535
+  double max_side = 0.0;               ///< model space: longest side of a chunk's box; 0: any
+  [[nodiscard]] Result<void> validate() const;
+};
+
+/// The vertices that a chunk of a model of so many should have: as many as it may, but a fourth of
+/// that where the model needs many chunks. From inside a church of 14.8 M triangles, whole chunks
+/// send 1.70 times the triangles whose boxes meet the frustum, such ones 1.26 times.
+std::uint32_t chunk_vertices_for(std::size_t model_vertices);
+
+/// Splits by material, then by a kd tree over triangle centres until every chunk fits.
+/// Takes the mesh over. Errors: kUnsupported "model.max-error" where one triangle is longer than
+/// max_side.
+Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& report);
+
+}  // namespace modar

@@ -1,0 +1,281 @@
+// Packs chunk by chunk: bytes, boxes and cones, order, records.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <utility>
+
+#include <glm/geometric.hpp>
+
+#include "bake/mesh/pack/chunk_bounds.hpp"
+#include "bake/mesh/pack/packed_mesh.hpp"
+#include "bake/mesh/pack/vertex_packer.hpp"
+#include "bake/parallel.hpp"
+#include "formats/transport/chunk_order.hpp"
+
+namespace modar {
+namespace {
+
+constexpr unsigned kWave = 4;  ///< chunks a thread between two joins
+
+MaterialRecord material_record(const SourceMaterial& source) {
+  MaterialRecord m{};
+  for (int i = 0; i < 3; ++i) {
+    m.ambient[i] = source.ambient[i];
+    m.diffuse[i] = source.diffuse[i];
+    m.specular[i] = source.specular[i];
+    m.emission[i] = source.emission[i];
+  }
+  m.shininess = source.shininess;
+  m.opacity = source.opacity;
+  m.texture = kNone;
+  m.flags = source.two_sided ? kMaterialTwoSided : 0u;
+  return m;
+}
+
+/// Coarse triangles in the numbers of the packed vertices. Those of which two vertices became one
+/// are left out: they had no area.
+std::vector<std::uint16_t> coarse_triangles(const std::vector<std::uint16_t>& indices,
+                                            const ChunkOrderer& places) {
+  std::vector<std::uint16_t> coarse;
+  coarse.reserve(indices.size());
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    const std::array<std::uint16_t, 3> t = {places.place(indices[i]), places.place(indices[i + 1]),
+                                            places.place(indices[i + 2])};
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    coarse.insert(coarse.end(), t.begin(), t.end());
+  }
+  return coarse;
+}
+
+/// One chunk in its final bytes, but for where it will stand.
+struct PackedChunk {
+  std::vector<std::byte> vertices;                 ///< in their final order
+  std::vector<std::vector<std::uint16_t>> levels;  ///< indices, the finest first
+  std::vector<double> level_errors;
+  ChunkRecord record{};  ///< lacks first_level
+  PackErrors errors;
+};
+
+/// Triangles of all levels: what a box and a cone have to hold for.
+std::vector<std::uint16_t> all_indices(const Chunk& chunk) {
+  std::vector<std::uint16_t> indices = chunk.indices;
+  for (const ChunkLevel& level : chunk.coarser) {
+    indices.insert(indices.end(), level.indices.begin(), level.indices.end());
+  }
+  return indices;
+}
+
+ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
+                         const std::vector<glm::vec3>& decoded) {
+  ChunkRecord record{};
+  const ChunkBounds bounds = chunk_bounds(decoded, all_indices(chunk));
+  for (int i = 0; i < 3; ++i) {
+    record.bounds_min[i] = bounds.low[i];
+    record.bounds_max[i] = bounds.high[i];
+    record.cone_axis[i] = bounds.cone_axis[i];
+  }
+  record.cone_cutoff = bounds.cone_cutoff;
+  record.position_step = static_cast<float>(grid.step);
+  for (int i = 0; i < 3; ++i) {
+    record.position_offset[i] = static_cast<float>(grid.middle[i]) * record.position_step;
+  }
+  for (int i = 0; i < 2; ++i) {
+    record.uv_offset[i] = uv.offset[i];
+    record.uv_scale[i] = uv.scale[i];
+  }
+  record.material = chunk.material;
+  return record;
+}
+
+/// Packs one chunk after another; what it needs on the way it keeps between them.
+class ChunkPacker {
+ public:
+  ChunkPacker(const TriMesh& mesh, const VertexOffsets& offsets, PositionKind kind)
+      : packer_(mesh, offsets, kind), stride_(offsets.stride) {}
+
+  void pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
+            std::uint32_t texture_side, PackedChunk& out) {
+    bytes_.assign(chunk.vertices.size() * stride_, std::byte{0});
+    packer_.pack(chunk, grid, uv, texture_side, bytes_.data(), decoded_);
+    out.errors = packer_.errors();
+    out.record = chunk_record(chunk, grid, uv, decoded_);
+    std::vector<std::uint16_t>& finest = out.levels.emplace_back(chunk.indices);
+    out.level_errors.push_back(0.0);
+    const auto order = orderer_.order(bytes_, stride_, finest);
+    out.vertices.resize(order.size() * stride_);
+    for (std::size_t v = 0; v < order.size(); ++v) {
+      std::memcpy(out.vertices.data() + v * stride_, bytes_.data() + order[v] * stride_, stride_);
+    }
+    for (const ChunkLevel& level : chunk.coarser) {
+      std::vector<std::uint16_t> coarse = coarse_triangles(level.indices, orderer_);
+      if (coarse.empty()) break;
+      level_orderer_.order(coarse, static_cast<std::uint32_t>(order.size()));
+      out.levels.push_back(std::move(coarse));
+      out.level_errors.push_back(level.error);
+    }
+    out.record.level_count = static_cast<std::uint32_t>(out.levels.size());
+  }
+
+ private:
+  VertexPacker packer_;
+  std::uint16_t stride_;
+  ChunkOrderer orderer_;
+  LevelOrderer level_orderer_;
+  std::vector<std::byte> bytes_;
+  std::vector<glm::vec3> decoded_;
+};
+
+/// Puts chunks behind each other. Chunks that follow each other share one range of
+/// vertices, hence one set-up of attributes, as long as 16 bits reach all of it. Their indices of
+/// one level lie side by side: chunks of equal level can be drawn in one call.
+class ChunkAppender {
+ public:
+  explicit ChunkAppender(PackedMesh& out) : out_(out) {}
+
+  void append(PackedChunk& chunk) {
+    const auto vertices = static_cast<std::uint32_t>(chunk.vertices.size() / out_.layout.stride);
+    if (range_size_ + vertices > kMaxChunkVertices) close_range();
+    chunk.record.first_level = static_cast<std::uint32_t>(out_.levels.size());
+    out_.chunks.push_back(chunk.record);
+    for (std::size_t depth = 0; depth < chunk.levels.size(); ++depth) {
+      add_level(depth, chunk.level_errors[depth], chunk.levels[depth]);
+    }
+    out_.vertices.insert(out_.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
+    range_size_ += vertices;
+    ModelRecord& record = out_.record;
+    record.vertex_count += vertices;
+    record.triangle_count += chunk.levels[0].size() / 3;
+    record.level_count = std::max(record.level_count, chunk.record.level_count);
+  }
+
+  /// States the size of the open range in its levels, and opens the next.
+  void close_range() {
+    for (; first_level_ < out_.levels.size(); ++first_level_) {
+      out_.levels[first_level_].vertex_count = range_size_;
+    }
+    range_begin_ = out_.vertices.size();
+    range_size_ = 0;
+  }
+
+  /// Closes the last range and puts the indices of coarser levels behind those of level 0.
+  void finish() {
+    close_range();
+    for (std::size_t depth = 0; depth < coarser_.size(); ++depth) {
+      for (const auto& [level, offset] : coarser_[depth].levels) {
+        out_.levels[level].index_offset = out_.indices.size() + offset;
+      }
+      out_.indices.insert(out_.indices.end(), coarser_[depth].indices.begin(),
+                          coarser_[depth].indices.end());
+    }
+  }
+
+ private:
+  /// Indices of all levels of one depth, and where each level's begin.
+  struct Depth {
+    std::vector<std::byte> indices;
+    std::vector<std::pair<std::size_t, std::size_t>> levels;
+  };
+
+  /// Shifts the indices to where the chunk stands in its range.
+  void add_level(std::size_t depth, double error, std::vector<std::uint16_t>& indices) {
+    for (std::uint16_t& index : indices) index = static_cast<std::uint16_t>(index + range_size_);
+    if (coarser_.size() < depth) coarser_.resize(depth);
+    std::vector<std::byte>& to = depth == 0 ? out_.indices : coarser_[depth - 1].indices;
+    LevelRecord level{};
+    level.vertex_offset = range_begin_;
+    level.index_offset = to.size();
+    level.index_count = static_cast<std::uint32_t>(indices.size());
+    if (depth > 0) {
+      level.error = std::nextafter(static_cast<float>(error), 4.0f);  // never below the truth
+      coarser_[depth - 1].levels.emplace_back(out_.levels.size(), to.size());
+    }
+    out_.levels.push_back(level);
+    const auto bytes = std::as_bytes(std::span(indices));
+    to.insert(to.end(), bytes.begin(), bytes.end());
+  }
+
+  PackedMesh& out_;
+  std::vector<Depth> coarser_;     // from level 1 on
+  std::uint64_t range_begin_ = 0;  // bytes
+  std::uint32_t range_size_ = 0;   // vertices
+  std::size_t first_level_ = 0;    // of the open range
+};
+
+void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
+                       ModelRecord& record) {
+  const TriMesh& mesh = chunked.mesh;
+  for (int i = 0; i < 3; ++i) record.center[i] = mesh.placement.center[i];
+  record.scale = mesh.placement.scale;
+  record.diagonal = glm::length(mesh.source_max - mesh.source_min);
+  record.unit_metres = options.unit_metres;
+  record.source_vertex_count = mesh.source_vertex_count;
+  record.source_face_count = mesh.source_face_count;
+  record.chunk_count = static_cast<std::uint32_t>(chunked.chunks.size());
+  record.material_count = static_cast<std::uint32_t>(mesh.materials.size());
+}
+
+std::size_t index_count(const ChunkedMesh& chunked) {
+  std::size_t count = 0;
+  for (const Chunk& chunk : chunked.chunks) count += chunk.indices.size();
+  return count;
+}
+
+}  // namespace
+
+Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint32_t>& texture_side,
+                        const PackOptions& options, Report& report) {
+  StageTimer timer(report, "pack");
+  const TriMesh& mesh = chunked.mesh;
+  if (texture_side.size() != mesh.materials.size()) {
+    return fail(ExitCode::kInternal, "pack.texture-side", mesh.name,
+                "texture sides and materials differ in number", "report this as a bug");
+  }
+  PackedMesh out;
+  out.name = mesh.name;
+  VertexOffsets offsets;
+  out.layout = make_layout(mesh, options.positions, offsets);
+  fill_model_record(chunked, options, out.record);
+  for (const SourceMaterial& m : mesh.materials) out.materials.push_back(material_record(m));
+  out.sources = mesh.materials;
+  const std::vector<bool> repeats = repeating_materials(chunked);
+  out.vertices.reserve(mesh.positions.size() * offsets.stride);
+  out.indices.reserve(index_count(chunked) * sizeof(std::uint16_t));
+
+  const std::vector<ChunkGrid> grids = make_grids(chunked, options.positions);
+  ChunkAppender appender(out);
+  PackErrors errors;
+  const unsigned jobs = std::max(1u, options.jobs);
+  std::vector<ChunkPacker> packers(jobs, ChunkPacker(mesh, offsets, options.positions));
+  // A wave of chunks at a time, a few for each thread; they are joined in order.
+  const std::size_t wave = std::size_t{kWave} * jobs;
+  for (std::size_t first = 0; first < chunked.chunks.size(); first += wave) {
+    const std::size_t count = std::min(wave, chunked.chunks.size() - first);
+    std::vector<PackedChunk> packed(count);
+    std::atomic<std::size_t> next{0};
+    parallel_rows(jobs, jobs, [&](std::uint32_t thread) {
+      for (std::size_t i = next++; i < count; i = next++) {
+        const Chunk& chunk = chunked.chunks[first + i];
+        const UvRange uv = uv_range(mesh, chunk, repeats[chunk.material]);
+        packers[thread].pack(chunk, grids[first + i], uv, texture_side[chunk.material], packed[i]);
+      }
+    });
+    for (PackedChunk& chunk : packed) {
+      errors.add(chunk.errors);
+      appender.append(chunk);
+    }
+    if (report.progress) {
+      report.progress(
+          "pack", static_cast<double>(first + count) / static_cast<double>(chunked.chunks.size()));
+    }
+  }
+  appender.finish();
+  errors.write(mesh.placement.scale, out.record);
+  timer.done(out.record.triangle_count, out.vertices.size() + out.indices.size(),
+             out.record.position_error_max);
+  return out;
+}
+
+}  // namespace modar

@@ -1,0 +1,42 @@
+// The final bytes of a model, with the error that they were measured to have.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "bake/mesh/pack/chunked_mesh.hpp"
+#include "bake/mesh/pack/position_plan.hpp"
+#include "formats/layout.hpp"
+
+namespace modar {
+
+/// Records whose indices and offsets count from this model's own start; the bundle stage shifts
+/// them when it merges models. `record` lacks its name, its layout index and its `first_*` fields;
+/// materials keep the texture paths in `sources` (same order as `materials`), texture = kNone.
+struct PackedMesh {
+  std::string name;
+  ModelRecord record{};
+  LayoutRecord layout{};
+  std::vector<ChunkRecord> chunks;
+  std::vector<LevelRecord> levels;
+  std::vector<MaterialRecord> materials;
+  std::vector<SourceMaterial> sources;
+  std::vector<std::byte> vertices;
+  std::vector<std::byte> indices;
+};
+
+struct PackOptions {
+  double unit_metres = 0.0;  ///< metres in a source unit; 0: unknown
+  PositionKind positions = PositionKind::kHalf;
+  unsigned jobs = 1;  ///< threads; the bytes do not depend on it
+};
+
+/// Quantises (positions as asked, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes
+/// and measures the greatest and rms error; computes conservative boxes and normal cones; puts each
+/// chunk in the order of formats/chunk_order.hpp, where vertices of equal bytes become one.
+/// texture_side: pixels by which uv errors are told in texels (0: no texture), one a material.
+Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint32_t>& texture_side,
+                        const PackOptions& options, Report& report);
+
+}  // namespace modar

@@ -1,0 +1,212 @@
+// Quantises vertices, decodes them again and states the error that was found.
+#include "bake/mesh/pack/vertex_packer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "bake/mesh/pack/vertex_decoder.hpp"
+#include "formats/quantise.hpp"
+
+namespace modar {
+namespace {
+
+/// How far uv may leave [0,1] and still count as inside: half a texel at 4096, as exporters leave.
+constexpr double kUvSlack = 1e-4;
+constexpr std::uint16_t kMinusZero = 0x8000;
+constexpr double kDegrees = 57.29577951308232;
+
+}  // namespace
+
+LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets) {
+  LayoutRecord layout{};
+  const auto add = [&](Semantic semantic, ComponentType type, std::uint8_t components,
+                       bool normalised, std::uint16_t offset) {
+    AttributeRecord& a = layout.attributes[layout.attribute_count++];
+    a.semantic = static_cast<std::uint8_t>(semantic);
+    a.type = static_cast<std::uint8_t>(type);
+    a.components = components;
+    a.normalised = normalised ? 1 : 0;
+    a.offset = offset;
+  };
+  offsets = VertexOffsets{};
+  if (kind == PositionKind::kHalf) {
+    offsets.normal = 8;
+    offsets.stride = 12;
+    add(Semantic::kPosition, ComponentType::kHalf, 3, false, 0);
+    add(Semantic::kNormal, ComponentType::kI8, 3, true, offsets.normal);
+  } else {
+    offsets.normal = 6;
+    offsets.stride = 8;
+    add(Semantic::kPosition, ComponentType::kI16, 3, false, 0);
+    add(Semantic::kNormalOct, ComponentType::kI8, 2, true, offsets.normal);
+  }
+  if (!mesh.uvs.empty()) {
+    offsets.uv = offsets.stride;
+    add(Semantic::kUv, ComponentType::kU16, 2, true, offsets.uv);
+    offsets.stride = static_cast<std::uint16_t>(offsets.stride + 4);
+  }
+  if (!mesh.colours.empty()) {
+    offsets.colour = offsets.stride;
+    add(Semantic::kColour, ComponentType::kU8, 4, true, offsets.colour);
+    offsets.stride = static_cast<std::uint16_t>(offsets.stride + 4);
+  }
+  layout.stride = offsets.stride;
+  return layout;
+}
+
+double ErrorTally::rms() const {
+  return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));
+}
+
+void PackErrors::add(const PackErrors& other) {
+  position.add(other.position);
+  normal.add(other.normal);
+  uv.add(other.uv);
+}
+
+void PackErrors::write(double scale, ModelRecord& record) const {
+  record.position_error_max = position.greatest * scale;
+  record.position_error_rms = position.rms() * scale;
+  record.normal_error_max_deg = static_cast<float>(normal.greatest);
+  record.normal_error_rms_deg = static_cast<float>(normal.rms());
+  record.uv_error_max_texels = static_cast<float>(uv.greatest);
+  record.uv_error_rms_texels = static_cast<float>(uv.rms());
+}
+
+UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats) {
+  UvRange range;
+  if (mesh.uvs.empty()) return range;
+  glm::dvec2 low(mesh.uvs[chunk.vertices[0]]);
+  glm::dvec2 high(low);
+  for (const std::uint32_t v : chunk.vertices) {
+    low = glm::min(low, mesh.uvs[v]);
+    high = glm::max(high, mesh.uvs[v]);
+  }
+  for (int i = 0; i < 2; ++i) {
+    // A texture that repeats looks the same a whole number on; near 0 the device's floats are
+    // finer.
+    if (repeats) range.shift[i] = std::floor(low[i]);
+    const double from = low[i] - range.shift[i];
+    const double to = high[i] - range.shift[i];
+    if (from >= -kUvSlack && to <= 1 + kUvSlack) continue;
+    range.offset[i] = static_cast<float>(from);
+    // Rounded up, so that the far end is still reached.
+    range.scale[i] = std::nextafter(static_cast<float>(to - static_cast<double>(range.offset[i])),
+                                    std::numeric_limits<float>::infinity());
+  }
+  return range;
+}
+
+std::vector<bool> repeating_materials(const ChunkedMesh& chunked) {
+  std::vector<bool> repeats(chunked.mesh.materials.size(), false);
+  if (chunked.mesh.uvs.empty()) return repeats;
+  for (const Chunk& chunk : chunked.chunks) {
+    for (const std::uint32_t v : chunk.vertices) {
+      const glm::dvec2& uv = chunked.mesh.uvs[v];
+      if (uv.x < -kUvSlack || uv.y < -kUvSlack || uv.x > 1 + kUvSlack || uv.y > 1 + kUvSlack) {
+        repeats[chunk.material] = true;
+        break;
+      }
+    }
+  }
+  return repeats;
+}
+
+void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
+                        std::uint32_t texture_side, std::byte* bytes,
+                        std::vector<glm::vec3>& decoded) {
+  errors_ = PackErrors();
+  decoded.resize(chunk.vertices.size());
+  for (std::size_t i = 0; i < chunk.vertices.size(); ++i, bytes += offsets_.stride) {
+    const std::uint32_t v = chunk.vertices[i];
+    const glm::dvec3& p = mesh_.positions[v];
+    const glm::dvec3 n(mesh_.normals[v]);
+    if (kind_ == PositionKind::kHalf) {
+      decoded[i] = put_half(p, bytes);
+      put_normal(n, bytes + offsets_.normal);
+    } else {
+      decoded[i] = put_int16(p, grid, bytes);
+      put_oct(n, bytes + offsets_.normal);
+    }
+    errors_.position.add(glm::length(glm::dvec3(decoded[i]) - p));
+    if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
+    if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
+  }
+}
+
+glm::vec3 VertexPacker::put_half(const glm::dvec3& p, std::byte* bytes) {
+  std::uint16_t halves[3];
+  glm::vec3 decoded;
+  for (int i = 0; i < 3; ++i) {
+    halves[i] = float_to_half(static_cast<float>(p[i]));
+    if (halves[i] == kMinusZero) halves[i] = 0;  // one point, one spelling
+    decoded[i] = half_to_float(halves[i]);
+  }
+  std::memcpy(bytes, halves, sizeof halves);
+  return decoded;
+}
+
+glm::vec3 VertexPacker::put_int16(const glm::dvec3& p, const ChunkGrid& grid, std::byte* bytes) {
+  std::int16_t values[3];
+  glm::vec3 decoded;
+  const auto step = static_cast<float>(grid.step);
+  for (int i = 0; i < 3; ++i) {
+    values[i] = static_cast<std::int16_t>(grid_index(p[i], grid.step) - grid.middle[i]);
+    // Exact: multiples of the step are floats.
+    const float offset = static_cast<float>(grid.middle[i]) * step;
+    decoded[i] = offset + step * static_cast<float>(values[i]);
+  }
+  std::memcpy(bytes, values, sizeof values);
+  return decoded;
+}
+
+void VertexPacker::put_normal(const glm::dvec3& n, std::byte* bytes) {
+  std::int8_t values[3];
+  glm::dvec3 decoded;
+  for (int i = 0; i < 3; ++i) {
+    values[i] = float_to_snorm8(static_cast<float>(n[i]));
+    decoded[i] = static_cast<double>(snorm8_to_float(values[i]));
+  }
+  std::memcpy(bytes, values, sizeof values);
+  add_normal_error(decoded, n);
+}
+
+void VertexPacker::put_oct(const glm::dvec3& n, std::byte* bytes) {
+  const std::array<std::int8_t, 2> values = normal_to_oct8({n.x, n.y, n.z});
+  std::memcpy(bytes, values.data(), sizeof values);
+  add_normal_error(oct_to_normal((2.0 * values[0] + 1.0) / 255.0, (2.0 * values[1] + 1.0) / 255.0),
+                   n);
+}
+
+void VertexPacker::add_normal_error(const glm::dvec3& decoded, const glm::dvec3& n) {
+  // Small angles drown in an arc cosine, and nearly all are small: the first terms of the arc
+  // sine's series hold nine digits.
+  const double sine = glm::length(glm::cross(decoded, n)) / glm::length(decoded);
+  const double square = sine * sine;
+  const double angle = glm::dot(decoded, n) > 0 && sine < 0.05
+                           ? sine * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0)))
+                           : std::atan2(sine, glm::dot(decoded, n) / glm::length(decoded));
+  errors_.normal.add(angle * kDegrees);
+}
+
+void VertexPacker::put_uv(const glm::dvec2& uv, const UvRange& range, std::uint32_t texture_side,
+                          std::byte* bytes) {
+  std::uint16_t values[2];
+  glm::dvec2 error;
+  for (int i = 0; i < 2; ++i) {
+    const double wanted = uv[i] - range.shift[i];
+    const auto offset = static_cast<double>(range.offset[i]);
+    const auto scale = static_cast<double>(range.scale[i]);
+    values[i] = float_to_unorm16(static_cast<float>((wanted - offset) / scale));
+    error[i] = offset + scale * static_cast<double>(unorm16_to_float(values[i])) - wanted;
+  }
+  std::memcpy(bytes, values, sizeof values);
+  if (texture_side != 0) errors_.uv.add(glm::length(error) * texture_side);
+}
+
+}  // namespace modar

@@ -1,0 +1,102 @@
+// One chunk's vertices to their final bytes, and the error that the bytes were measured to have.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "bake/mesh/pack/chunked_mesh.hpp"
+#include "bake/mesh/pack/position_plan.hpp"
+#include "formats/layout.hpp"
+
+namespace modar {
+
+/// Byte offsets of the attributes; 0 where there is none but the position.
+struct VertexOffsets {
+  std::uint16_t normal = 0;
+  std::uint16_t uv = 0;
+  std::uint16_t colour = 0;
+  std::uint16_t stride = 0;
+};
+
+/// Half floats: 3 halves, 2 bytes of padding, 3 x i8 normal, 1 of padding. 16-bit integers: 3 of
+/// them and an octahedral normal of 2 x i8. Then, where the mesh has them, uv as 2 x u16 and colour
+/// as 4 x u8.
+LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets);
+
+/// uv = offset + scale * attribute, and the whole numbers that were taken off first.
+struct UvRange {
+  glm::dvec2 shift{0.0};
+  glm::vec2 offset{0.0f};
+  glm::vec2 scale{1.0f};
+};
+
+/// repeats: the chunk's texture repeats, so that whole numbers may be taken off.
+UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats);
+
+/// Which materials have triangles whose uv leave [0,1].
+std::vector<bool> repeating_materials(const ChunkedMesh& chunked);
+
+/// Greatest and summed squares of one kind of error.
+struct ErrorTally {
+  double greatest = 0;
+  double squares = 0;
+  std::uint64_t count = 0;
+
+  void add(double error) {
+    greatest = error > greatest ? error : greatest;
+    squares += error * error;
+    ++count;
+  }
+  void add(const ErrorTally& other) {
+    greatest = other.greatest > greatest ? other.greatest : greatest;
+    squares += other.squares;
+    count += other.count;
+  }
+  [[nodiscard]] double rms() const;
+};
+
+/// What decoding the packed bytes was measured to be off by: model space, degrees, texels.
+struct PackErrors {
+  ErrorTally position;
+  ErrorTally normal;
+  ErrorTally uv;
+
+  void add(const PackErrors& other);
+  /// In source units, degrees and texels.
+  void write(double scale, ModelRecord& record) const;
+};
+
+/// Writes vertices and measures what their bytes decode to.
+class VertexPacker {
+ public:
+  VertexPacker(const TriMesh& mesh, const VertexOffsets& offsets, PositionKind kind)
+      : mesh_(mesh), offsets_(offsets), kind_(kind) {}
+
+  /// bytes: a stride a vertex, zeroed. texture_side: pixels by which uv errors are told, 0: no
+  /// texture. decoded: filled with the positions that the bytes decode to, in model space.
+  void pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
+            std::uint32_t texture_side, std::byte* bytes, std::vector<glm::vec3>& decoded);
+
+  /// Of the last call of pack().
+  [[nodiscard]] const PackErrors& errors() const { return errors_; }
+
+ private:
+  glm::vec3 put_half(const glm::dvec3& p, std::byte* bytes);
+  glm::vec3 put_int16(const glm::dvec3& p, const ChunkGrid& grid, std::byte* bytes);
+  void put_normal(const glm::dvec3& n, std::byte* bytes);
+  void put_oct(const glm::dvec3& n, std::byte* bytes);
+  void add_normal_error(const glm::dvec3& decoded, const glm::dvec3& n);
+  void put_uv(const glm::dvec2& uv, const UvRange& range, std::uint32_t texture_side,
+              std::byte* bytes);
+
+  const TriMesh& mesh_;
+  VertexOffsets offsets_;
+  PositionKind kind_;
+  PackErrors errors_;
+};
+
+}  // namespace modar

@@ -1,0 +1,294 @@
+// Topology by the links of vertices: a triangle at a vertex is an edge between the two others, and
+// all that counts can be read off that small graph. OpenMesh walks the borders.
+#include "bake/mesh/topology/mesh_topology.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bake/mesh/topology/half_edge_topology.hpp"
+#include "bake/parallel.hpp"
+
+namespace modar {
+namespace {
+
+/// Bytes of OpenMesh's mesh a triangle: links of 1.5 edges, the face, half a vertex.
+constexpr std::uint64_t kHalfEdgeBytes = 64;
+constexpr std::size_t kStretch = 1u << 14;  ///< vertices that one thread takes at a time
+
+/// Triangles by the positions that they refer to.
+struct Surface {
+  std::size_t position_count = 0;
+  Array<std::uint32_t> corners;  ///< 3 a triangle
+  Array<std::uint32_t> first;    ///< of each position: where its triangles begin in `around`
+  Array<std::uint32_t> around;   ///< triangles
+};
+
+Surface make_surface(const TriMesh& mesh) {
+  Surface surface;
+  surface.position_count =
+      mesh.source_positions.empty() ? mesh.positions.size() : mesh.source_vertex_count;
+  surface.corners.resize(3 * mesh.triangles.size());
+  surface.first.assign(surface.position_count + 1, 0);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t p = mesh.source_position(mesh.triangles[t][i]);
+      surface.corners[3 * t + i] = p;
+      ++surface.first[p + std::size_t{1}];
+    }
+  }
+  for (std::size_t p = 0; p < surface.position_count; ++p) surface.first[p + 1] += surface.first[p];
+  surface.around.resize(surface.corners.size());
+  Array<std::uint32_t> next(surface.first);
+  for (std::size_t i = 0; i < surface.corners.size(); ++i) {
+    surface.around[next[surface.corners[i]]++] = static_cast<std::uint32_t>(i / 3);
+  }
+  return surface;
+}
+
+/// A neighbour of the vertex at hand, once for each triangle that has both.
+struct Spoke {
+  std::uint32_t neighbour = 0;
+  std::uint32_t triangle = 0;  ///< number among the vertex's own
+  bool leaves = false;         ///< the triangle walks the edge from the vertex to the neighbour
+};
+
+/// An end of a boundary edge: the edge, and the fan (a number among those of the whole surface)
+/// that it belongs to at this end.
+struct BoundaryEnd {
+  std::uint64_t edge = 0;
+  std::uint32_t fan = 0;
+};
+
+/// What a stretch of vertices adds to the whole.
+struct Part {
+  MeshTopology sums;
+  std::vector<BoundaryEnd> ends;  ///< fans are counted from 0 in each part
+  std::uint32_t fans = 0;         ///< that have ends
+};
+
+/// Looks at one vertex after another; the scratch is a thread's own.
+class LinkReader {
+ public:
+  LinkReader(const Surface& surface, Part& part)
+      : surface_(surface), sums_(part.sums), part_(part) {}
+
+  void read(std::uint32_t vertex) {
+    const std::uint32_t begin = surface_.first[vertex];
+    const std::uint32_t count = surface_.first[vertex + std::size_t{1}] - begin;
+    if (count == 0) return;
+    ++sums_.vertices;
+    gather(vertex, std::span(surface_.around.data() + begin, count));
+    fans_.resize(count);
+    std::iota(fans_.begin(), fans_.end(), 0u);
+    const bool crowded = read_edges(vertex);
+    bool several = false;
+    for (std::uint32_t t = 0; t < count; ++t) several = several || fan_of(t) != fan_of(0);
+    if (crowded || several) ++sums_.non_manifold_vertices;
+    add_boundary(vertex);
+  }
+
+ private:
+  void gather(std::uint32_t vertex, std::span<const std::uint32_t> triangles) {
+    spokes_.clear();
+    pairs_.clear();
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      const std::uint32_t* c = surface_.corners.data() + 3 * std::size_t{triangles[t]};
+      const int at = c[0] == vertex ? 0 : (c[1] == vertex ? 1 : 2);
+      const std::uint32_t ahead = c[(at + 1) % 3];
+      const std::uint32_t behind = c[(at + 2) % 3];
+      spokes_.push_back({ahead, t, true});
+      spokes_.push_back({behind, t, false});
+      // A triangle is told from its copies at its lowest vertex.
+      if (vertex < ahead && vertex < behind) {
+        pairs_.push_back(std::uint64_t{std::min(ahead, behind)} << 32 | std::max(ahead, behind));
+      }
+    }
+    std::sort(spokes_.begin(), spokes_.end(), [](const Spoke& a, const Spoke& b) {
+      return a.neighbour != b.neighbour ? a.neighbour < b.neighbour : a.triangle < b.triangle;
+    });
+    std::sort(pairs_.begin(), pairs_.end());
+    for (std::size_t i = 1; i < pairs_.size(); ++i) {
+      if (pairs_[i] == pairs_[i - 1]) ++sums_.duplicate_triangles;
+    }
+  }
+
+  /// Joins the triangles at each edge of the vertex; counts the edges whose lower end it is.
+  /// Answers whether one has more than two triangles.
+  bool read_edges(std::uint32_t vertex) {
+    bool crowded = false;
+    for (std::size_t i = 0; i < spokes_.size();) {
+      std::size_t end = i;
+      std::size_t leaving = 0;
+      for (; end < spokes_.size() && spokes_[end].neighbour == spokes_[i].neighbour; ++end) {
+        leaving += spokes_[end].leaves ? 1u : 0u;
+        fans_[fan_of(spokes_[end].triangle)] = fan_of(spokes_[i].triangle);
+      }
+      const std::size_t faces = end - i;
+      crowded = crowded || faces > 2;
+      if (vertex < spokes_[i].neighbour) {
+        ++sums_.edges;
+        sums_.boundary_edges += faces == 1 ? 1u : 0u;
+        sums_.non_manifold_edges += faces > 2 ? 1u : 0u;
+        sums_.flipped_edges += faces == 2 && leaving != 1 ? 1u : 0u;
+      }
+      i = end;
+    }
+    return crowded;
+  }
+
+  /// Boundary edges of the vertex, by the fan that each of them ends.
+  void add_boundary(std::uint32_t vertex) {
+    numbers_.assign(fans_.size(), kNoIndex);
+    for (std::size_t i = 0; i < spokes_.size(); ++i) {
+      const std::uint32_t other = spokes_[i].neighbour;
+      const bool alone = (i == 0 || spokes_[i - 1].neighbour != other) &&
+                         (i + 1 == spokes_.size() || spokes_[i + 1].neighbour != other);
+      if (!alone) continue;
+      std::uint32_t& number = numbers_[fan_of(spokes_[i].triangle)];
+      if (number == kNoIndex) number = part_.fans++;
+      part_.ends.push_back(
+          {std::uint64_t{std::min(vertex, other)} << 32 | std::max(vertex, other), number});
+    }
+  }
+
+  std::uint32_t fan_of(std::uint32_t triangle) {
+    while (fans_[triangle] != triangle) {
+      fans_[triangle] = fans_[fans_[triangle]];
+      triangle = fans_[triangle];
+    }
+    return triangle;
+  }
+
+  const Surface& surface_;
+  MeshTopology& sums_;
+  Part& part_;
+  std::vector<Spoke> spokes_;
+  std::vector<std::uint64_t> pairs_;
+  std::vector<std::uint32_t> fans_;
+  std::vector<std::uint32_t> numbers_;
+};
+
+/// Sets of numbers, joined pair by pair.
+class Sets {
+ public:
+  explicit Sets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  /// The lowest number of a set.
+  std::uint32_t root(std::uint32_t v) {
+    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
+    return v;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = root(a);
+    b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  Array<std::uint32_t> parent_;
+};
+
+/// Loops: what the two ends of each boundary edge and the fans at them join.
+std::uint64_t count_loops(std::vector<Part>& parts) {
+  std::vector<BoundaryEnd> ends;
+  std::uint32_t fans = 0;
+  for (Part& part : parts) {
+    for (const BoundaryEnd& end : part.ends) ends.push_back({end.edge, fans + end.fan});
+    fans += part.fans;
+    part.ends = {};
+  }
+  std::sort(ends.begin(), ends.end(), [](const BoundaryEnd& a, const BoundaryEnd& b) {
+    return a.edge != b.edge ? a.edge < b.edge : a.fan < b.fan;
+  });
+  Sets sets(fans);
+  for (std::size_t i = 0; i + 1 < ends.size(); i += 2) sets.join(ends[i].fan, ends[i + 1].fan);
+  std::uint64_t loops = 0;
+  for (std::uint32_t f = 0; f < fans; ++f) loops += sets.root(f) == f ? 1u : 0u;
+  return loops;
+}
+
+/// Parts of the surface that share no position.
+std::uint64_t count_components(const Surface& surface) {
+  Sets sets(surface.position_count);
+  for (std::size_t i = 0; i < surface.corners.size(); i += 3) {
+    sets.join(surface.corners[i], surface.corners[i + 1]);
+    sets.join(surface.corners[i], surface.corners[i + 2]);
+  }
+  std::uint64_t components = 0;
+  for (std::uint32_t v = 0; v < surface.position_count; ++v) {
+    if (sets.root(v) == v && surface.first[v] != surface.first[v + std::size_t{1}]) ++components;
+  }
+  return components;
+}
+
+void add(MeshTopology& sum, const MeshTopology& part) {
+  sum.vertices += part.vertices;
+  sum.edges += part.edges;
+  sum.boundary_edges += part.boundary_edges;
+  sum.non_manifold_edges += part.non_manifold_edges;
+  sum.flipped_edges += part.flipped_edges;
+  sum.non_manifold_vertices += part.non_manifold_vertices;
+  sum.duplicate_triangles += part.duplicate_triangles;
+}
+
+void report_findings(const TriMesh& mesh, const MeshTopology& topology, Report& report) {
+  const auto tell = [&](std::uint64_t count, const char* id, const std::string& message,
+                        const char* cure) {
+    if (count == 0) return;
+    report.findings.push_back({id, DiagnosticSeverity::kInfo, mesh.name, 0, message, cure});
+  };
+  tell(topology.non_manifold_edges + topology.non_manifold_vertices, "model.non-manifold",
+       std::to_string(topology.non_manifold_edges) + " edges have more than two triangles and " +
+           std::to_string(topology.non_manifold_vertices) +
+           " vertices are where surfaces meet or touch",
+       "they are kept as they are; levels of detail leave them in place");
+  tell(topology.duplicate_triangles, "model.duplicate-faces",
+       std::to_string(topology.duplicate_triangles) + " triangles repeat an earlier one",
+       "they are kept; remove them in a modelling program, they cost time and may flicker");
+  tell(topology.flipped_edges, "model.flipped",
+       std::to_string(topology.flipped_edges) +
+           " edges lie between triangles that wind against "
+           "each other",
+       "recalculate the normals in a modelling program if sides of the model are missing");
+  if (!topology.half_edges) return;
+  tell(topology.half_edges->copied_faces, "model.copied-faces",
+       std::to_string(topology.half_edges->copied_faces) +
+           " faces fit in no half-edge mesh (three at an edge, or turned over)",
+       "levels of detail keep them as they are");
+}
+
+}  // namespace
+
+MeshTopology measure_topology(const TriMesh& mesh, const TopologyOptions& options, Report& report) {
+  StageTimer timer(report, "topology");
+  MeshTopology topology;
+  topology.model = mesh.name;
+  Surface surface = make_surface(mesh);
+  std::vector<Part> parts((surface.position_count + kStretch - 1) / kStretch);
+  parallel_rows(static_cast<std::uint32_t>(parts.size()), options.jobs, [&](std::uint32_t s) {
+    LinkReader reader(surface, parts[s]);
+    const std::size_t end = std::min(surface.position_count, (s + std::size_t{1}) * kStretch);
+    for (std::size_t v = s * kStretch; v < end; ++v) reader.read(static_cast<std::uint32_t>(v));
+  });
+  for (const Part& part : parts) add(topology, part.sums);
+  topology.triangles = mesh.triangles.size();
+  topology.boundary_loops = count_loops(parts);
+  topology.components = count_components(surface);
+  surface.around.release();
+  surface.first.release();
+  const bool fits = options.half_edge_bytes == 0 ||
+                    mesh.triangles.size() * kHalfEdgeBytes <= options.half_edge_bytes;
+  if (fits) {
+    topology.half_edges = count_half_edges(
+        surface.position_count, std::span(surface.corners.data(), surface.corners.size()));
+  }
+  report_findings(mesh, topology, report);
+  timer.done(topology.triangles, topology.components);
+  return topology;
+}
+
+}  // namespace modar

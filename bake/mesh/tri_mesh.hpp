@@ -1,0 +1,60 @@
+// Welded triangles in [-1,1], and the way back to source units.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "bake/import/source_model.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// source = center + scale * normalised. Taken in double before anything is rounded.
+struct Placement {
+  glm::dvec3 center{0.0};
+  double scale = 1.0;
+};
+
+/// Vertices are unique (position, uv, normal) index triples of the source. Attribute arrays are
+/// empty or as long as positions. uv: v down (row 0 of the image at v = 0), as GL samples our
+/// textures.
+struct TriMesh {
+  std::string name;
+  Placement placement;
+  glm::dvec3 source_min{0.0};  ///< of the vertices that triangles use
+  glm::dvec3 source_max{0.0};
+  Array<glm::dvec3> positions;  ///< in [-1,1]
+  /// Index of the source position of each vertex; empty where vertex v is position v.
+  Array<std::uint32_t> source_positions;
+  Array<glm::vec3> normals;  ///< unit length
+  Array<glm::dvec2> uvs;
+  Array<glm::u8vec4> colours;
+  Array<std::array<std::uint32_t, 3>> triangles;
+  Array<std::uint32_t> triangle_material;
+  std::vector<SourceMaterial> materials;
+  std::uint64_t source_vertex_count = 0;
+  std::uint64_t source_face_count = 0;
+
+  [[nodiscard]] std::uint32_t source_position(std::uint32_t vertex) const {
+    return source_positions.empty() ? vertex : source_positions[vertex];
+  }
+};
+
+struct WeldOptions {
+  unsigned jobs = 1;  ///< threads; the result does not depend on it
+};
+
+/// Triangulates (concave polygons by ear clipping), drops what has no area, welds on index triples,
+/// makes missing normals (area-and-angle weighted, smoothing groups respected), normalises to
+/// [-1,1]. Findings of dropped and made things go to report.findings. Errors: kInvalidInput
+/// "model.empty" where no triangle is left. The form that takes the source over frees its arrays as
+/// it goes: large models need half the memory.
+Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& options = {});
+Result<TriMesh> weld(const SourceModel& source, Report& report, const WeldOptions& options = {});
+
+}  // namespace modar

@@ -1,0 +1,168 @@
+// Median-split boxes, searched nearest box first.
+#include "bake/mesh/triangle_tree.hpp"
+
+#include <algorithm>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace modar {
+namespace {
+
+constexpr std::uint32_t kLeaf = 4;
+/// Of the squared lengths of two sides: triangles of a lesser squared area have no plane.
+constexpr double kFlat = 1e-18;
+
+double square(const glm::dvec3& v) {
+  return glm::dot(v, v);
+}
+
+double box_distance_square(const glm::dvec3& p, const glm::dvec3& low, const glm::dvec3& high) {
+  return square(glm::max(glm::max(low - p, p - high), glm::dvec3(0.0)));
+}
+
+/// How far along the segment from a to b its nearest point is, 0 to 1.
+double along_segment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
+  const glm::dvec3 ab = b - a;
+  const double length = square(ab);
+  return length > 0 ? std::clamp(glm::dot(p - a, ab) / length, 0.0, 1.0) : 0.0;
+}
+
+Foot foot_of_flat(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
+  const double ab = along_segment(p, t[0], t[1]);
+  const double ac = along_segment(p, t[0], t[2]);
+  const double bc = along_segment(p, t[1], t[2]);
+  return std::min({Foot{square(p - glm::mix(t[0], t[1], ab)), ab, 0.0},
+                   Foot{square(p - glm::mix(t[0], t[2], ac)), 0.0, ac},
+                   Foot{square(p - glm::mix(t[1], t[2], bc)), 1.0 - bc, bc}},
+                  [](const Foot& x, const Foot& y) { return x.square < y.square; });
+}
+
+/// Where the distance is not below `best`, the distance from the plane may do.
+inline Foot foot_of(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
+  const glm::dvec3 ab = t[1] - t[0];
+  const glm::dvec3 ac = t[2] - t[0];
+  const glm::dvec3 n = glm::cross(ab, ac);
+  const double area = square(n);
+  const glm::dvec3 ap = p - t[0];
+  if (!(area > kFlat * square(ab) * square(ac))) return foot_of_flat(p, t);
+  const double height = glm::dot(ap, n);
+  const double plane = height * height / area;
+  if (plane >= best) return {plane, 0, 0};
+  // The region of the corner, edge or inside that is nearest to the point.
+  const double ab_ap = glm::dot(ab, ap);
+  const double ac_ap = glm::dot(ac, ap);
+  if (ab_ap <= 0 && ac_ap <= 0) return {square(ap), 0, 0};
+  const glm::dvec3 bp = p - t[1];
+  const double ab_bp = glm::dot(ab, bp);
+  const double ac_bp = glm::dot(ac, bp);
+  if (ab_bp >= 0 && ac_bp <= ab_bp) return {square(bp), 1, 0};
+  const double of_c = ab_ap * ac_bp - ab_bp * ac_ap;
+  if (ab_ap >= 0 && ab_bp <= 0 && of_c <= 0) {
+    const double b = ab_ap / (ab_ap - ab_bp);
+    return {square(ap - ab * b), b, 0};
+  }
+  const glm::dvec3 cp = p - t[2];
+  const double ab_cp = glm::dot(ab, cp);
+  const double ac_cp = glm::dot(ac, cp);
+  if (ac_cp >= 0 && ab_cp <= ac_cp) return {square(cp), 0, 1};
+  const double of_b = ab_cp * ac_ap - ab_ap * ac_cp;
+  if (ac_ap >= 0 && ac_cp <= 0 && of_b <= 0) {
+    const double c = ac_ap / (ac_ap - ac_cp);
+    return {square(ap - ac * c), 0, c};
+  }
+  const double from_b = ac_bp - ab_bp;
+  const double from_c = ab_cp - ac_cp;
+  if (from_b >= 0 && from_c >= 0 && ab_bp * ac_cp <= ab_cp * ac_bp) {
+    const double c = from_b / (from_b + from_c);
+    return {square(bp - (t[2] - t[1]) * c), 1 - c, c};
+  }
+  return {plane, of_b / area, of_c / area};
+}
+
+}  // namespace
+
+double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
+  return foot_of(p, t, best).square;
+}
+
+Foot nearest_foot(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
+  return foot_of(p, t, std::numeric_limits<double>::infinity());
+}
+
+LevelTree::LevelTree(std::span<const glm::dvec3> positions,
+                     std::span<const std::uint16_t> indices) {
+  triangles_.reserve(indices.size() / 3);
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    triangles_.push_back(
+        {positions[indices[i]], positions[indices[i + 1]], positions[indices[i + 2]]});
+  }
+  nodes_.reserve(triangles_.size());
+  nodes_.emplace_back();
+  build(0, 0, static_cast<std::uint32_t>(triangles_.size()));
+}
+
+void LevelTree::set_box(Node& node, std::uint32_t first, std::uint32_t count) const {
+  node.low = node.high = triangles_[first][0];
+  for (std::uint32_t t = first; t < first + count; ++t) {
+    for (const glm::dvec3& corner : triangles_[t]) {
+      node.low = glm::min(node.low, corner);
+      node.high = glm::max(node.high, corner);
+    }
+  }
+}
+
+void LevelTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
+  set_box(nodes_[node], first, count);
+  if (count <= kLeaf) {
+    nodes_[node].first = first;
+    nodes_[node].count = count;
+    return;
+  }
+  const glm::dvec3 side = nodes_[node].high - nodes_[node].low;
+  const int axis = side.x >= side.y && side.x >= side.z ? 0 : (side.y >= side.z ? 1 : 2);
+  const auto begin = triangles_.begin() + first;
+  std::nth_element(begin, begin + count / 2, begin + count, [axis](const auto& a, const auto& b) {
+    return a[0][axis] + a[1][axis] + a[2][axis] < b[0][axis] + b[1][axis] + b[2][axis];
+  });
+  const auto left = static_cast<std::uint32_t>(nodes_.size());
+  nodes_[node].first = left;
+  nodes_.resize(nodes_.size() + 2);
+  build(left, first, count / 2);
+  build(left + 1, first + count / 2, count - count / 2);
+}
+
+double LevelTree::nearest(const glm::dvec3& point, double enough) {
+  double best = distance_square(point, triangles_[last_]);
+  if (best <= enough) return best;
+  struct Entry {
+    std::uint32_t node;
+    double distance;
+  };
+  std::array<Entry, 64> stack;  // the tree is at most 2 * 17 deep: 16-bit chunks
+  std::size_t size = 0;
+  stack[size++] = {0, box_distance_square(point, nodes_[0].low, nodes_[0].high)};
+  while (size > 0) {
+    const Entry entry = stack[--size];
+    if (entry.distance >= best) continue;
+    const Node& node = nodes_[entry.node];
+    for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
+      const double distance = distance_square(point, triangles_[t], best);
+      if (distance >= best) continue;
+      best = distance;
+      last_ = t;
+      if (best <= enough) return best;
+    }
+    if (node.count != 0) continue;
+    const Node& left = nodes_[node.first];
+    const Node& right = nodes_[node.first + 1];
+    Entry near{node.first, box_distance_square(point, left.low, left.high)};
+    Entry far{node.first + 1, box_distance_square(point, right.low, right.high)};
+    if (far.distance < near.distance) std::swap(near, far);
+    stack[size++] = far;
+    stack[size++] = near;
+  }
+  return best;
+}
+
+}  // namespace modar

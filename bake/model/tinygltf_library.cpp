@@ -1,3 +1,0 @@
-// The one file that holds tinygltf's (and with it Draco's decoder's) implementation.
-#define TINYGLTF_IMPLEMENTATION
-#include "bake/model/tinygltf_library.hpp"

@@ -1,0 +1,139 @@
+// The textures of a bundle: which images the models show, which parts of them, and what they
+// become.
+#include "bake/texture/texture_stage.hpp"
+
+#include <algorithm>
+
+#include "bake/texture/texture_set.hpp"
+#include "formats/layout.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::uint32_t kCoverageSide = 1024;  ///< of masks: finer would cost more than it saves
+
+/// Does any triangle of the material sample outside of its image?
+std::vector<bool> repeating_materials(const TriMesh& mesh) {
+  constexpr double kSlack = 1e-4;  // half a texel at 4096: what exporters leave at the border
+  std::vector<bool> repeats(mesh.materials.size(), false);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const std::uint32_t v : mesh.triangles[t]) {
+      const glm::dvec2 uv = mesh.uvs[v];
+      if (uv.x < -kSlack || uv.y < -kSlack || uv.x > 1 + kSlack || uv.y > 1 + kSlack) {
+        repeats[mesh.triangle_material[t]] = true;
+      }
+    }
+  }
+  return repeats;
+}
+
+std::uint32_t use_of(const std::string& path, bool repeat, TextureUses& textures) {
+  const auto next = static_cast<std::uint32_t>(textures.uses.size());
+  const auto [place, added] = textures.index.try_emplace({path, repeat}, next);
+  if (added) textures.uses.push_back({path, repeat, make_coverage(kCoverageSide, kCoverageSide)});
+  return place->second;
+}
+
+TextureOutcome append_texture(const Etc1Texture& baked, BundleContent& content) {
+  TextureRecord record{};
+  record.name = content.intern(baked.name);
+  record.width = baked.levels.front().width;
+  record.height = baked.levels.front().height;
+  record.source_width = baked.source_width;
+  record.source_height = baked.source_height;
+  record.format = static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb);
+  record.flags = (baked.alpha ? kTextureAlpha : 0u) | (baked.repeat ? kTextureRepeat : 0u);
+  record.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
+  record.level_count = static_cast<std::uint32_t>(baked.levels.size());
+  record.psnr_db = static_cast<float>(baked.levels.front().psnr_db);
+  record.ssim = static_cast<float>(baked.levels.front().ssim);
+
+  std::vector<std::byte> data;
+  for (const Etc1Level& level : baked.levels) {
+    TextureLevelRecord out{};
+    out.offset = data.size();
+    out.alpha_offset = kNoOffset;
+    out.size = static_cast<std::uint32_t>(level.colour.size());
+    out.width = level.width;
+    out.height = level.height;
+    out.psnr_db = static_cast<float>(level.psnr_db);
+    out.ssim = static_cast<float>(level.ssim);
+    data.insert(data.end(), level.colour.begin(), level.colour.end());
+    if (baked.alpha) {
+      out.alpha_offset = data.size();
+      data.insert(data.end(), level.alpha.begin(), level.alpha.end());
+    }
+    content.texture_levels.push_back(out);
+  }
+  content.texture_data.push_back(std::move(data));
+  content.textures.push_back(record);
+  TextureOutcome outcome;
+  outcome.texture = static_cast<std::uint32_t>(content.textures.size() - 1);
+  outcome.side = std::max(record.width, record.height);
+  return outcome;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> collect_textures(const TriMesh& mesh, TextureUses& textures) {
+  std::vector<std::uint32_t> uses(mesh.materials.size(), kNone);
+  if (mesh.uvs.empty()) return uses;
+  const std::vector<bool> repeats = repeating_materials(mesh);
+  std::vector<bool> shown(mesh.materials.size(), false);
+  for (const std::uint32_t material : mesh.triangle_material) shown[material] = true;
+  for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+    const std::string& map = mesh.materials[m].diffuse_map;
+    if (shown[m] && !map.empty()) uses[m] = use_of(map, repeats[m], textures);
+  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t use = uses[mesh.triangle_material[t]];
+    if (use == kNone) continue;
+    std::array<std::array<double, 2>, 3> uv{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const glm::dvec2 corner = mesh.uvs[mesh.triangles[t][i]];
+      uv[i] = {corner.x, 1.0 - corner.y};  // a mask counts v upwards, as OBJ does
+    }
+    cover_triangle(textures.uses[use].coverage, uv);
+  }
+  return uses;
+}
+
+Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
+                                                  TextureOptions options, std::uint64_t budget,
+                                                  BundleContent& content, Report& report) {
+  if (budget != 0) {
+    std::vector<TexturePlan> plans;
+    for (const TextureUse& use : textures.uses) {
+      Result<RgbaImage> image = read_image(use.path);
+      if (!image) return tl::unexpected(image.error());
+      const auto opaque = [&](std::size_t pixel) { return image->pixels[4 * pixel + 3] == 255; };
+      bool alpha = false;
+      for (std::size_t p = 0; p < image->pixels.size() / 4 && !alpha; ++p) alpha = !opaque(p);
+      plans.push_back({image->width, image->height, alpha});
+    }
+    options.max_side = plan_max_side(plans, options, budget);
+  }
+  std::vector<Etc1Texture> baked;
+  for (const TextureUse& use : textures.uses) {
+    options.repeat = use.repeat;
+    options.coverage = &use.coverage;
+    Result<Etc1Texture> texture = bake_texture(use.path, options, report);
+    if (!texture) return tl::unexpected(texture.error());
+    baked.push_back(std::move(*texture));
+  }
+  const std::vector<std::size_t> first = first_identical(baked);
+  std::vector<TextureOutcome> outcomes(baked.size());
+  for (std::size_t i = 0; i < baked.size(); ++i) {
+    if (first[i] != i) {
+      outcomes[i] = outcomes[first[i]];
+    } else if (baked[i].constant) {
+      outcomes[i].constant = true;
+      outcomes[i].rgba = baked[i].constant_rgba;
+    } else {
+      outcomes[i] = append_texture(baked[i], content);
+    }
+  }
+  return outcomes;
+}
+
+}  // namespace modar

@@ -1,0 +1,53 @@
+// The textures of a bundle: which images the models show, which parts of them, and what they
+// become.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bake/mesh/tri_mesh.hpp"
+#include "bake/report.hpp"
+#include "bake/texture/atlas.hpp"
+#include "bake/texture/texture.hpp"
+#include "formats/bundle_writer.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// An image with one wrap mode, and the texels that any triangle of any model shows of it.
+struct TextureUse {
+  std::string path;
+  bool repeat = false;
+  CoverageMask coverage;
+};
+
+/// All uses of a bundle, in the order in which the models name them. An image that is used twice in
+/// the same way is one use.
+struct TextureUses {
+  std::vector<TextureUse> uses;
+  std::map<std::pair<std::string, bool>, std::uint32_t> index;
+};
+
+/// Notes the images that a mesh shows. Answers the use of each material, kNone where it shows none.
+std::vector<std::uint32_t> collect_textures(const TriMesh& mesh, TextureUses& textures);
+
+/// What became of a use: a texture of the bundle, or one colour that stands for it.
+struct TextureOutcome {
+  std::uint32_t texture = kNone;
+  std::uint32_t side = 0;  ///< pixels of the longer side of level 0; 0: no texture
+  bool constant = false;
+  std::array<std::uint8_t, 4> rgba{};
+};
+
+/// Bakes each use once, keeps identical results once, folds constant ones to their colour. budget:
+/// bytes that all of them together may take on the GPU, 0: any; the greatest side is lowered for
+/// it. Errors: those of bake_texture().
+Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
+                                                  TextureOptions options, std::uint64_t budget,
+                                                  BundleContent& content, Report& report);
+
+}  // namespace modar

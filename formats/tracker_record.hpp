@@ -1,0 +1,54 @@
+// What our own pose loop knows of a pattern: the section of type 258, owner: pattern, variant: 0.
+// bundle.md is the normative text. Numbers are little-endian, reserved fields are zero.
+#pragma once
+
+#include <cstdint>
+
+namespace modar {
+
+inline constexpr std::uint32_t kFeatureExtractor = 1;  ///< the one version of the describer so far
+inline constexpr std::uint32_t kTrackerBlockCodes = 32;  ///< codes in a block
+inline constexpr std::uint32_t kTrackerCodeBytes = 32;   ///< 256 bits
+inline constexpr std::uint32_t kMaxLoopFeatures = 65536;
+inline constexpr std::uint32_t kMaxLoopPatches = 4096;
+inline constexpr std::uint32_t kMaxLoopImageLevels = 8;
+
+/// Start of the section. Offsets count from the start of the section.
+struct TrackerRecordHeader {
+  std::uint32_t describer_version;  ///< kFeatureExtractorVersion of the baker's runtime
+  std::uint32_t feature_count;  ///< a multiple of kTrackerBlockCodes; the first bright_count are of
+  std::uint32_t bright_count;   ///< corners with a brighter arc; a multiple of it, too
+  std::uint32_t patch_count;
+  std::uint32_t width;  ///< of the pattern's image, 1 to 1023
+  std::uint32_t height;
+  std::uint32_t level_count;  ///< of the image: each level halves the one before, rounding down
+  std::uint32_t reserved0;
+  std::uint64_t features_offset;  ///< TrackerFeatureRecord[feature_count]
+  std::uint64_t codes_offset;  ///< a multiple of 64; blocks of kTrackerBlockCodes codes: byte 0 of
+                               ///< all codes of the block, then byte 1, ...
+  std::uint64_t patches_offset;  ///< TrackerPatchRecord[patch_count], by level
+  std::uint64_t pixels_offset;   ///< 8-bit gray levels, finest first, rows without padding
+  std::uint64_t reserved1[8];
+};
+static_assert(sizeof(TrackerRecordHeader) == 128);
+
+/// A feature as some view of the pattern showed it. Groups are filled up to whole blocks by
+/// repeating their last feature.
+struct TrackerFeatureRecord {
+  std::uint16_t x;  ///< of the pattern's image, from its left edge, in 1/64 pixels
+  std::uint16_t y;
+  /// Image pixels around the feature to pixels of the oriented patch, row by row, in 1/4096.
+  std::int16_t warp[4];
+};
+static_assert(sizeof(TrackerFeatureRecord) == 12);
+
+/// A place whose texture holds a position well.
+struct TrackerPatchRecord {
+  std::uint16_t x;  ///< of level 0, from its left edge, in 1/64 pixels
+  std::uint16_t y;
+  std::uint16_t level;  ///< of the image that the patch is cut from
+  std::uint16_t score;  ///< least eigenvalue of its gradient matrix, gray values a pixel, in 1/64
+};
+static_assert(sizeof(TrackerPatchRecord) == 8);
+
+}  // namespace modar

@@ -1,0 +1,98 @@
+#include "formats/transport/recipe.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace modar {
+namespace {
+
+tl::unexpected<Error> broken(const char* code, std::size_t offset, const char* cause) {
+  return fail(ExitCode::kInvalidInput, code, "recipe, byte " + std::to_string(offset), cause,
+              "publish the release again");
+}
+
+bool is_zero(std::span<const std::uint8_t> bytes) {
+  return std::all_of(bytes.begin(), bytes.end(), [](std::uint8_t b) { return b == 0; });
+}
+
+bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t limit) {
+  return offset <= limit && size <= limit - offset;
+}
+
+/// What is wrong with a piece, or nullptr.
+const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
+  const auto form = static_cast<PieceForm>(piece.form);
+  if (form < PieceForm::kStored || form > PieceForm::kLevel) return "its form is not known";
+  if (!is_zero(piece.reserved)) return "its reserved bytes are not zero";
+  if (piece.raw_size == 0 || piece.raw_size > kMaxPieceBytes ||
+      piece.stored_size > kMaxPieceBytes) {
+    return "its size is out of range";
+  }
+  const bool two_parts = form == PieceForm::kMesh || form == PieceForm::kFeatureText;
+  if (!two_parts && (piece.second_offset != 0 || piece.second_size != 0)) {
+    return "it has a second part that its form does not know";
+  }
+  if (form != PieceForm::kMesh && form != PieceForm::kLevel && piece.index_base != 0)
+    return "it has no indices to shift";
+  if (!fits(piece.second_offset, piece.second_size, bundle_size)) return "it leaves the bundle";
+  if (form == PieceForm::kFeatureText) {
+    if (piece.stored_size != 0 || !is_zero(piece.id)) return "a derived piece has nothing stored";
+    return fits(piece.offset, piece.raw_size, bundle_size) ? nullptr : "it leaves the bundle";
+  }
+  if (piece.stored_size == 0) return "its size is out of range";
+  if (form == PieceForm::kStored && piece.stored_size != piece.raw_size) {
+    return "stored and raw size differ";
+  }
+  if (form == PieceForm::kLevel && piece.raw_size % 6 != 0) return "its indices make no triangles";
+  if (form == PieceForm::kZstdHalves && piece.raw_size % 8 != 0) return "it is not of ETC1 blocks";
+  if (form == PieceForm::kMesh &&
+      (piece.second_size >= piece.raw_size || piece.second_size % 6 != 0)) {
+    return "its indices make no triangles";
+  }
+  const std::uint64_t first = piece.raw_size - (form == PieceForm::kMesh ? piece.second_size : 0);
+  return fits(piece.offset, first, bundle_size) ? nullptr : "it leaves the bundle";
+}
+
+}  // namespace
+
+Result<RecipeView> open_recipe(std::span<const std::byte> bytes) {
+  RecipeView view;
+  if (bytes.size() < sizeof view.header) {
+    return broken("recipe.truncated", bytes.size(), "it ends in its header");
+  }
+  std::memcpy(&view.header, bytes.data(), sizeof view.header);
+  if (!std::equal(kRecipeMagic.begin(), kRecipeMagic.end(), view.header.magic)) {
+    return broken("recipe.magic", 0, "it does not begin as a recipe does");
+  }
+  if (view.header.version != kRecipeVersion) {
+    return fail(ExitCode::kUnsupported, "recipe.version", "recipe, byte 8",
+                "it is of version " + std::to_string(view.header.version) + ", not 1",
+                "use a newer modar-fetch");
+  }
+  if (view.header.reserved != 0 || view.header.bundle_size > kMaxBundleBytes ||
+      view.header.piece_count > kMaxPieces) {
+    return broken("recipe.header", 12, "its header is out of range");
+  }
+  if (bytes.size() !=
+      sizeof view.header + std::size_t{view.header.piece_count} * sizeof(PieceRecord)) {
+    return broken("recipe.truncated", bytes.size(), "its pieces do not add up to its size");
+  }
+  view.pieces = {reinterpret_cast<const PieceRecord*>(bytes.data() + sizeof view.header),
+                 view.header.piece_count};
+  for (std::size_t i = 0; i < view.pieces.size(); ++i) {
+    if (const char* fault = fault_of(view.pieces[i], view.header.bundle_size)) {
+      return broken("recipe.piece", sizeof view.header + i * sizeof(PieceRecord), fault);
+    }
+  }
+  return view;
+}
+
+std::uint64_t raw_hash(std::span<const std::byte> bytes) {
+  return XXH64(bytes.data(), bytes.size(), 0);
+}
+
+}  // namespace modar

@@ -1,0 +1,77 @@
+// Hands out the arrays of a loop record.
+#include "tracked_pattern.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "formats/tracker_record_view.hpp"
+#include "modar/tracker_features.hpp"
+
+namespace modar::tracker {
+namespace {
+
+static_assert(kFeatureExtractor == kFeatureExtractorVersion);
+
+void view_levels(const TrackerRecordView& view, TrackedPattern& out) {
+  const std::uint8_t* pixels = view.pixels.data();
+  for (std::uint32_t level = 0; level < view.header.level_count; ++level) {
+    const std::uint32_t width = view.header.width >> level;
+    const std::uint32_t height = view.header.height >> level;
+    out.levels[level] = {pixels, static_cast<int>(width), static_cast<int>(height),
+                         static_cast<std::ptrdiff_t>(width)};
+    pixels += std::size_t{width} * height;
+  }
+  out.level_count = static_cast<int>(view.header.level_count);
+}
+
+void view_patches(const TrackerRecordView& view, TrackedPattern& out) {
+  std::size_t first = 0;
+  for (std::uint32_t level = 0; level < view.header.level_count; ++level) {
+    std::size_t last = first;
+    while (last < view.patches.size() && view.patches[last].level == level) ++last;
+    out.patches[level] = view.patches.subspan(first, last - first);
+    first = last;
+  }
+}
+
+}  // namespace
+
+glm::dvec2 TrackedPattern::to_world(glm::dvec2 pixel) const {
+  const double longest = std::max(width(), height());
+  return {(2.0 * pixel.x + 1.0 - width()) / longest, (height() - 2.0 * pixel.y - 1.0) / longest};
+}
+
+glm::dmat3 TrackedPattern::world_from_pixels() const {
+  const double longest = std::max(width(), height());
+  glm::dmat3 m(1.0);
+  m[0][0] = 2.0 / longest;
+  m[1][1] = -2.0 / longest;
+  m[2] = {(1.0 - width()) / longest, (height() - 1.0) / longest, 1.0};
+  return m;
+}
+
+Result<TrackedPattern> view_loop_pattern(std::span<const std::byte> bytes, std::uint32_t index) {
+  std::uint32_t version = 0;
+  if (bytes.size() >= sizeof version) std::memcpy(&version, bytes.data(), sizeof version);
+  if (bytes.size() >= sizeof(TrackerRecordHeader) && version != kFeatureExtractorVersion) {
+    return fail(ExitCode::kUnsupported, "tracker.record-version", "",
+                "the pattern's loop record is of another version", "bake the pattern again");
+  }
+  TrackerRecordView view;
+  if (const auto fault = view_tracker_record(bytes, view)) {
+    return fail(ExitCode::kInvalidInput, "tracker.record",
+                "byte " + std::to_string(fault->offset) + " of a loop record", fault->cause,
+                "bake the pattern again");
+  }
+  TrackedPattern out;
+  out.index = index;
+  out.bright_count = view.header.bright_count;
+  out.features = view.features;
+  out.codes = view.codes.data();
+  view_levels(view, out);
+  view_patches(view, out);
+  return out;
+}
+
+}  // namespace modar::tracker

@@ -1,0 +1,231 @@
+// Image files of all kinds to the right pixels, and hostile ones to errors.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string_view>
+
+#include "tests/texture/texture_samples.hpp"
+
+namespace modar {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+Bytes to_bytes(const std::vector<unsigned char>& in) {
+  Bytes out(in.size());
+  for (std::size_t i = 0; i < in.size(); ++i) out[i] = static_cast<std::byte>(in[i]);
+  return out;
+}
+
+Bytes encoded(const cv::Mat& mat, const std::string& extension,
+              const std::vector<int>& parameters = {}) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(extension, mat, bytes, parameters);
+  return to_bytes(bytes);
+}
+
+cv::Mat to_mat(const RgbaImage& image) {
+  cv::Mat mat(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC3);
+  for (int y = 0; y < mat.rows; ++y) {
+    for (int x = 0; x < mat.cols; ++x) {
+      const std::uint8_t* p = &image.pixels[static_cast<std::size_t>(y * mat.cols + x) * 4];
+      mat.at<cv::Vec3b>(y, x) = {p[2], p[1], p[0]};
+    }
+  }
+  return mat;
+}
+
+/// A TGA header of 18 bytes.
+Bytes tga_header(unsigned type, unsigned width, unsigned height, unsigned bits, unsigned flags) {
+  std::vector<unsigned char> h(18, 0);
+  h[2] = static_cast<unsigned char>(type);
+  h[12] = static_cast<unsigned char>(width & 255);
+  h[13] = static_cast<unsigned char>(width >> 8);
+  h[14] = static_cast<unsigned char>(height & 255);
+  h[15] = static_cast<unsigned char>(height >> 8);
+  h[16] = static_cast<unsigned char>(bits);
+  h[17] = static_cast<unsigned char>(flags);
+  return to_bytes(h);
+}
+
+Bytes operator+(Bytes a, std::initializer_list<unsigned> b) {
+  for (const unsigned value : b) a.push_back(static_cast<std::byte>(value));
+  return a;
+}
+
+void expect_code(const Bytes& bytes, const std::string& code, const std::string& what) {
+  const Result<RgbaImage> image = decode_image(bytes, what);
+  ASSERT_FALSE(image) << what;
+  EXPECT_EQ(image.error().code, code) << what;
+  EXPECT_EQ(image.error().exit, ExitCode::kInvalidInput) << what;
+  EXPECT_EQ(image.error().where, what);
+}
+
+class ImageKinds : public testing::TestWithParam<const char*> {};
+
+TEST_P(ImageKinds, ReadsLosslessKindsAndRefusesEveryTruncation) {
+  const RgbaImage image = test::synthetic_photo(23, 11);
+  const std::string kind = GetParam();
+  Bytes bytes = encoded(to_mat(image), kind,
+                        kind == ".webp" ? std::vector<int>{64, 101} : std::vector<int>{});
+  const Result<RgbaImage> decoded = decode_image(bytes, kind);
+  ASSERT_TRUE(decoded) << to_line(decoded.error());
+  EXPECT_EQ(decoded->width, 23U);
+  EXPECT_EQ(decoded->height, 11U);
+  if (kind == ".jpg") {
+    EXPECT_GT(psnr_db(*decoded, image), 25);
+  } else {
+    EXPECT_EQ(decoded->pixels, image.pixels);
+  }
+  const std::size_t step = bytes.size() > 400 ? 7 : 1;
+  for (std::size_t size = 0; size + 1 < bytes.size(); size += step) {
+    expect_code(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)),
+                "image.decode", kind + " of " + std::to_string(size));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ImageKinds,
+                         testing::Values(".png", ".jpg", ".bmp", ".webp", ".tiff"));
+
+TEST(ImageReader, KeepsAlphaAndNarrowsSixteenBits) {
+  cv::Mat deep(2, 2, CV_16UC4);
+  deep.at<cv::Vec4w>(0, 0) = {0, 257, 65535, 128 * 257};
+  deep.at<cv::Vec4w>(0, 1) = {128, 129, 65406, 65407};
+  deep.at<cv::Vec4w>(1, 0) = {1, 2, 3, 0};
+  deep.at<cv::Vec4w>(1, 1) = {10 * 257, 20 * 257, 30 * 257, 65535};
+  const Result<RgbaImage> image = decode_image(encoded(deep, ".png"), "deep");
+  ASSERT_TRUE(image) << to_line(image.error());
+  const std::vector<std::uint8_t> expected = {255, 1, 0, 128, 254, 1,  0,  255,
+                                              0,   0, 0, 0,   30,  20, 10, 255};
+  EXPECT_EQ(image->pixels, expected);
+}
+
+TEST(ImageReader, GrayBecomesColour) {
+  cv::Mat gray(1, 2, CV_8UC1);
+  gray.at<std::uint8_t>(0, 0) = 3;
+  gray.at<std::uint8_t>(0, 1) = 200;
+  for (const char* kind : {".png", ".bmp", ".tiff"}) {
+    const Result<RgbaImage> image = decode_image(encoded(gray, kind), kind);
+    ASSERT_TRUE(image) << to_line(image.error());
+    EXPECT_EQ(image->pixels, (std::vector<std::uint8_t>{3, 3, 3, 255, 200, 200, 200, 255})) << kind;
+  }
+}
+
+TEST(ImageReader, TgaFromTheBottomTheTopAndInRuns) {
+  const std::vector<std::uint8_t> expected = {3, 2, 1, 255, 6, 5, 4, 255};  // red above the other
+  const auto expect_pixels = [&expected](const Bytes& bytes, const char* what) {
+    const Result<RgbaImage> image = decode_image(bytes, what);
+    ASSERT_TRUE(image) << to_line(image.error());
+    EXPECT_EQ(image->pixels, expected) << what;
+  };
+  expect_pixels(tga_header(2, 1, 2, 24, 0) + std::initializer_list<unsigned>{4, 5, 6, 1, 2, 3},
+                "bottom");
+  expect_pixels(tga_header(2, 1, 2, 24, 0x20) + std::initializer_list<unsigned>{1, 2, 3, 4, 5, 6},
+                "top");
+  expect_pixels(tga_header(10, 1, 2, 24, 0x20) +
+                    std::initializer_list<unsigned>{0x80, 1, 2, 3, 0x00, 4, 5, 6},
+                "runs");
+  expect_pixels(tga_header(2, 2, 1, 24, 0x30) + std::initializer_list<unsigned>{4, 5, 6, 1, 2, 3},
+                "right");
+  expect_code(tga_header(10, 1, 2, 24, 0x20) + std::initializer_list<unsigned>{0x80, 1, 2, 3},
+              "image.decode", "short run");
+  expect_code(tga_header(2, 16000, 16000, 32, 0), "image.decode", "empty");
+}
+
+TEST(ImageReader, SizesBeyondTheLimitAreRefusedBeforeDecoding) {
+  Bytes png = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(9)), ".png");
+  for (const std::size_t at : {18U, 19U, 22U, 23U}) png[at] = std::byte{0xff};
+  expect_code(png, "image.too-large", "65535 png");
+  png[16] = std::byte{0x7f};
+  expect_code(png, "image.too-large", "2^31 png");
+  Bytes bmp = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(9)), ".bmp");
+  bmp[20] = std::byte{0x10};
+  expect_code(bmp, "image.too-large", "wide bmp");
+  expect_code(tga_header(2, 65535, 65535, 24, 0), "image.too-large", "tga");
+}
+
+TEST(ImageReader, OtherFilesAreRefused) {
+  expect_code({}, "image.decode", "empty");
+  expect_code(to_bytes({'h', 'e', 'l', 'l', 'o'}), "image.decode", "text");
+  expect_code(to_bytes({'P', '6', '\n', '1', ' ', '1', '\n', '2', '5', '5', '\n', 1, 2, 3}),
+              "image.decode", "ppm");
+  const Result<RgbaImage> missing = read_image("no/such/file.png");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, "io.open");
+  EXPECT_EQ(missing.error().exit, ExitCode::kIo);
+}
+
+/// A JPEG's EXIF segment that states an orientation.
+Bytes exif_segment(unsigned orientation) {
+  return Bytes() + std::initializer_list<unsigned>{
+                       0xFF, 0xE1, 0, 34, 'E',         'x', 'i', 'f', 0,    0,    'I', 'I',
+                       42,   0,    8, 0,  0,           0,   1,   0,   0x12, 0x01, 3,   0,
+                       1,    0,    0, 0,  orientation, 0,   0,   0,   0,    0,    0,   0};
+}
+
+TEST(ImageReader, ExifOrientationIsApplied) {
+  // Left half dark, right half bright, 32x16; 6 says: turn by 90 degrees clockwise to see it
+  // upright.
+  const RgbaImage image = test::paint(32, 16, [](std::uint32_t x, std::uint32_t) {
+    const int value = x < 16 ? 20 : 230;
+    return std::array<int, 3>{value, value, value};
+  });
+  Bytes jpeg = encoded(to_mat(image), ".jpg");
+  const Bytes segment = exif_segment(6);
+  jpeg.insert(jpeg.begin() + 2, segment.begin(), segment.end());
+  const Result<RgbaImage> turned = decode_image(jpeg, "turned");
+  ASSERT_TRUE(turned) << to_line(turned.error());
+  ASSERT_EQ(turned->width, 16U);
+  ASSERT_EQ(turned->height, 32U);
+  EXPECT_LT(turned->pixels[0], 60);
+  EXPECT_GT(turned->pixels[turned->pixels.size() - 4], 200);
+}
+
+TEST(ImageReader, JpegWhoseCodedDataIsCutShortIsRefused) {
+  // Everything but the end marker is lost after the first half, so the markers alone look whole.
+  Bytes jpeg = encoded(to_mat(test::noise(64, 64, 3)), ".jpg");
+  ASSERT_TRUE(decode_image(jpeg, "whole"));
+  jpeg.resize(jpeg.size() * 2 / 3);
+  expect_code(jpeg + std::initializer_list<unsigned>{0xFF, 0xD9}, "image.decode", "cut short");
+}
+
+TEST(ImageReader, CorruptFilesGiveErrorsAndValidOnesPixels) {
+  const auto hostile = test::shared_data() / "hostile";
+  const auto suite = test::files_of(hostile / "pngsuite");
+  if (suite.empty()) GTEST_SKIP() << "no corrupt files here";
+  for (const char* folder : {"pngsuite", "libpng_crashers", "jpeg_crash", "jpeg_valid_odd"}) {
+    for (const auto& file : test::files_of(hostile / folder)) {
+      const std::string name = file.filename().string();
+      const Result<RgbaImage> image = read_image(file.string());
+      if (!image) {
+        EXPECT_TRUE(image.error().code == "image.decode" || image.error().code == "image.too-large")
+            << name;
+      }
+      const bool png = file.extension() == ".png" && std::string_view(folder) == "pngsuite";
+      if (png) {
+        EXPECT_EQ(image.has_value(), name[0] != 'x') << name;
+      }
+    }
+  }
+}
+
+// As photo shops leave them: libpng would write to stderr, and it is not our words.
+TEST(ImageReader, APngsColourProfileIsPassedOverInSilence) {
+  const cv::Mat picture(5, 7, CV_8UC3, cv::Scalar(10, 20, 30));
+  Bytes bytes = encoded(picture, ".png");
+  // Behind the signature and the header: length, type, a profile that is none, a checksum that is
+  // none.
+  const Bytes profile = Bytes{} + std::initializer_list<unsigned>{0,   0, 0, 3, 'i', 'C', 'C', 'P',
+                                                                  'x', 0, 0, 1, 2,   3,   4};
+  bytes.insert(bytes.begin() + 33, profile.begin(), profile.end());
+  testing::internal::CaptureStderr();
+  const Result<RgbaImage> image = decode_image(bytes, "profile.png");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_TRUE(image) << to_line(image.error());
+  EXPECT_EQ(cv::norm(to_mat(*image), picture, cv::NORM_INF), 0);
+}
+
+}  // namespace
+}  // namespace modar

@@ -1,0 +1,279 @@
+// glTF in: hand-made files with known answers, Draco's own encoder, Debian's sample models, and our
+// own GLB round the circle.
+#include "bake/import/gltf/gltf_reader.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <draco/compression/encode.h>
+#include <draco/mesh/triangle_soup_mesh_builder.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "tests/import/samples.hpp"
+#include "tests/mesh/stages.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Gltf : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "modar-gltf-test-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// A file of this JSON whose one buffer holds `bytes`.
+  Result<SourceModel> read(const std::string& json, const std::string& bytes) {
+    std::ofstream(folder_ / "data.bin", std::ios::binary) << bytes;
+    std::ofstream(folder_ / "test.gltf", std::ios::binary)
+        << R"({"asset":{"version":"2.0"},"buffers":[{"uri":"data.bin","byteLength":)"
+        << bytes.size() << "}]," << json << "}";
+    return read_gltf((folder_ / "test.gltf").string());
+  }
+
+  fs::path folder_;
+};
+
+template <class T>
+std::string raw(const std::vector<T>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+
+/// Three positions, then three 16-bit indices.
+std::string one_triangle() {
+  return raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}) + raw<std::uint16_t>({0, 1, 2, 0});
+}
+
+constexpr const char* kOneTriangle =
+    R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+    {"buffer":0,"byteOffset":36,"byteLength":6}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+    {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],)";
+
+TEST_F(Gltf, NodesMoveTheirMeshes) {
+  const auto model = read(
+      std::string(kOneTriangle) +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "materials":[{"name":"red","doubleSided":true,
+          "pbrMetallicRoughness":{"baseColorFactor":[1,0.214,0,1]}}],
+          "nodes":[{"translation":[10,20,30],"children":[1,2]},
+          {"mesh":0,"scale":[2,3,4]},
+          {"mesh":0,"rotation":[0,0,0.7071067811865476,0.7071067811865476],"scale":[-1,1,1]}],
+          "scenes":[{"nodes":[0]}],"scene":0)",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->positions.size(), 6u);
+  EXPECT_EQ(model->positions[1], glm::dvec3(12, 20, 30));
+  EXPECT_EQ(model->positions[2], glm::dvec3(10, 23, 30));
+  // Mirrored along x, then a quarter turn about z: (1,0,0) to (0,-1,0), (0,1,0) to (-1,0,0).
+  EXPECT_LT(glm::length(model->positions[4] - glm::dvec3(10, 19, 30)), 1e-12);
+  EXPECT_LT(glm::length(model->positions[5] - glm::dvec3(9, 20, 30)), 1e-12);
+  // The mirrored one is turned round, so that both still face +z.
+  for (std::size_t f = 0; f < 2; ++f) {
+    const auto at = [&](std::size_t c) {
+      return model->positions[model->corner_positions[3 * f + c]];
+    };
+    EXPECT_GT(glm::cross(at(1) - at(0), at(2) - at(0)).z, 0) << f;
+  }
+  EXPECT_EQ(model->materials[0].name, "red");
+  EXPECT_TRUE(model->materials[0].two_sided);
+  // sRGB of linear 0.214 is 0.5 (IEC 61966-2-1).
+  EXPECT_NEAR(static_cast<double>(model->materials[0].diffuse.y), 0.5, 0.001);
+}
+
+TEST_F(Gltf, BrokenFilesAreErrors) {
+  const std::string scene = R"("nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])";
+  const std::string mesh =
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)";
+  ASSERT_TRUE(read(kOneTriangle + mesh + scene, one_triangle()));
+  // An index beyond the vertices.
+  std::string bytes = one_triangle();
+  bytes[36] = 3;
+  const auto index = read(kOneTriangle + mesh + scene, bytes);
+  ASSERT_FALSE(index);
+  EXPECT_EQ(index.error().code, "gltf.accessor");
+  // More vertices than the buffer holds.
+  std::string much = kOneTriangle;
+  much.replace(much.find("\"count\":3"), 9, "\"count\":4");
+  const auto beyond = read(much + mesh + scene, one_triangle());
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().code, "gltf.accessor");
+  // Billions of zeros out of nothing.
+  std::string nothing = kOneTriangle;
+  nothing.replace(nothing.find("{\"bufferView\":0,\"componentType\":5126,\"count\":3"), 46,
+                  "{\"componentType\":5126,\"count\":3000000000");
+  const auto zeros = read(nothing + mesh + scene, one_triangle());
+  ASSERT_FALSE(zeros);
+  EXPECT_EQ(zeros.error().code, "gltf.accessor");
+  // A node that is its own child.
+  EXPECT_FALSE(read(kOneTriangle + mesh + R"("nodes":[{"mesh":0,"children":[0]}],)" +
+                        R"("scenes":[{"nodes":[0]}])",
+                    one_triangle()));
+  EXPECT_FALSE(read(kOneTriangle + mesh + R"("nodes":[],"scenes":[{"nodes":[]}])", one_triangle()));
+  EXPECT_FALSE(read("this is no JSON", ""));
+  EXPECT_EQ(read_gltf("/no/such.glb").error().code, "gltf.open");
+}
+
+TEST_F(Gltf, SparseAccessorsReplaceWhatTheyList) {
+  const auto file = [&](const char* base, int index) {
+    // The base's third vertex moves to (5, 6, 7); without a base the others are zero, bar the
+    // second.
+    const std::string bytes = one_triangle() +
+                              raw<std::uint8_t>({1, static_cast<std::uint8_t>(index), 0, 0}) +
+                              raw<float>({4, 0, 1, 5, 6, 7});
+    return read(std::string(R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+        {"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":2},
+        {"buffer":0,"byteOffset":48,"byteLength":24}],
+        "accessors":[{)") +
+                    base + R"("componentType":5126,"count":3,"type":"VEC3",
+        "sparse":{"count":2,"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":3}}},
+        {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+        "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+                bytes);
+  };
+  const auto over = file("\"bufferView\":0,", 2);
+  ASSERT_TRUE(over) << to_line(over.error());
+  EXPECT_EQ(over->positions[0], glm::dvec3(0, 0, 0));
+  EXPECT_EQ(over->positions[1], glm::dvec3(4, 0, 1));
+  EXPECT_EQ(over->positions[2], glm::dvec3(5, 6, 7));
+  const auto alone = file("", 2);
+  ASSERT_TRUE(alone) << to_line(alone.error());
+  EXPECT_EQ(alone->positions[0], glm::dvec3(0, 0, 0));
+  EXPECT_EQ(alone->positions[2], glm::dvec3(5, 6, 7));
+  EXPECT_FALSE(file("", 3)) << "an element that is not there";
+}
+
+TEST_F(Gltf, TextureTransformsMoveTheUv) {
+  const auto model = read(std::string(R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+      {"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":24}],
+      "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+      {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"},
+      {"bufferView":2,"componentType":5126,"count":3,"type":"VEC2"}],
+      "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"extensions":
+      {"KHR_texture_transform":{"offset":[0.5,0.25],"rotation":1.5707963267948966,"scale":[2,4],
+      "texCoord":1}}}}}],
+      "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_1":2},"indices":1,"material":0}]}],
+      "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])"),
+                          one_triangle() + raw<float>({0, 0, 1, 0, 0, 1}));
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->uvs.size(), 3u);
+  // Scaled, then a quarter turn counter-clockwise as the image is seen, v down: to the right goes
+  // up.
+  const auto expect = [&](std::size_t v, double x, double down) {
+    EXPECT_NEAR(model->uvs[v].x, x, 1e-12) << v;
+    EXPECT_NEAR(model->uvs[v].y, 1.0 - down, 1e-12) << v;
+  };
+  expect(0, 0.5, 0.25);
+  expect(1, 0.5, 0.25 - 2);
+  expect(2, 0.5 + 4, 0.25);
+}
+
+TEST_F(Gltf, DracoPrimitivesAreWhatTheEncoderWasGiven) {
+  constexpr int kSide = 12;
+  draco::TriangleSoupMeshBuilder builder;
+  builder.Start(kSide * kSide);
+  const int attribute =
+      builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
+  double area = 0;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const auto x = static_cast<float>(i % kSide);
+    const auto y = static_cast<float>(i / kSide);
+    const std::array<float, 3> a = {x, y, 0.1f * x * y};
+    const std::array<float, 3> b = {x + 1, y, 0.1f * (x + 1) * y};
+    const std::array<float, 3> c = {x, y + 1, 0.1f * x * (y + 1)};
+    builder.SetAttributeValuesForFace(attribute, draco::FaceIndex(static_cast<std::uint32_t>(i)),
+                                      a.data(), b.data(), c.data());
+    area += 0.5 * std::sqrt(1 + 0.01 * double(y * y) + 0.01 * double(x * x));
+  }
+  const auto mesh = builder.Finalize();
+  draco::Encoder encoder;
+  draco::EncoderBuffer buffer;
+  ASSERT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+  const std::string bytes(buffer.data(), buffer.size());
+  const auto model = read(
+      R"("extensionsUsed":["KHR_draco_mesh_compression"],
+      "extensionsRequired":["KHR_draco_mesh_compression"],
+      "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":)" +
+          std::to_string(bytes.size()) + R"(}],
+      "accessors":[{"componentType":5126,"count":)" +
+          std::to_string(mesh->num_points()) + R"(,"type":"VEC3"},
+      {"componentType":5125,"count":)" +
+          std::to_string(3 * mesh->num_faces()) + R"(,"type":"SCALAR"}],
+      "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"extensions":
+      {"KHR_draco_mesh_compression":{"bufferView":0,"attributes":{"POSITION":0}}}}]}],
+      "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+      bytes);
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->face_count(), std::size_t{kSide * kSide});
+  double found = 0;
+  for (std::size_t f = 0; f < model->face_count(); ++f) {
+    const auto at = [&](std::size_t c) {
+      return model->positions[model->corner_positions[3 * f + c]];
+    };
+    found += glm::length(glm::cross(at(1) - at(0), at(2) - at(0))) / 2;
+  }
+  EXPECT_NEAR(found, area, 1e-3 * area);
+}
+
+TEST_F(Gltf, SampleModelsAreReadOrRefused) {
+  const fs::path samples = "/usr/share/assimp/models/glTF2";
+  if (!fs::is_directory(samples)) GTEST_SKIP() << "assimp-testmodels is not installed";
+  std::size_t good = 0;
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(samples)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (const fs::path& path : files) {
+    if (path.extension() != ".gltf" && path.extension() != ".glb") continue;
+    const auto model = read_gltf(path.string());
+    if (!model) {
+      EXPECT_FALSE(model.error().code.empty()) << path;
+      continue;
+    }
+    ++good;
+    Report report;
+    const auto mesh = weld(*model, report);
+    if (path.filename() == "BoxTextured.glb") {
+      EXPECT_EQ(model->face_count(), 12u);
+      ASSERT_TRUE(mesh);
+      EXPECT_EQ(mesh->source_max - mesh->source_min, glm::dvec3(1.0));
+      EXPECT_FALSE(model->materials[0].diffuse_map.empty());
+      EXPECT_TRUE(fs::exists(model->materials[0].diffuse_map));
+    }
+  }
+  EXPECT_GT(good, 15u);
+}
+
+TEST_F(Gltf, ImagesInsideTheFileGoWithTheMaterials) {
+  const fs::path sample = "/usr/share/assimp/models/glTF2/BoxTextured-glTF-Binary/BoxTextured.glb";
+  if (!fs::exists(sample)) GTEST_SKIP() << "assimp-testmodels is not installed";
+  std::string path;
+  {
+    const auto model = read_gltf(sample.string());
+    ASSERT_TRUE(model);
+    path = model->materials[0].diffuse_map;
+    std::ifstream image(path, std::ios::binary);
+    char head[4] = {};
+    image.read(head, 4);
+    EXPECT_EQ(std::memcmp(head, "\x89PNG", 4), 0);
+  }
+  EXPECT_FALSE(fs::exists(path)) << "the temporary file outlives its model";
+}
+
+}  // namespace
+}  // namespace modar

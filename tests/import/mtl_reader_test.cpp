@@ -1,0 +1,129 @@
+// MTL statements, and names of files as exporters write them.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "bake/import/obj/map_path.hpp"
+#include "bake/import/obj/obj_reader.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MtlReader : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "Maps");
+    for (const char* name : {"wood.jpg", "two words.png", "Maps/Stone.PNG", "-odd.png"}) {
+      std::ofstream(folder_ / name) << "x";
+    }
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string found(const std::string& statement) {
+    std::string name;
+    bool transformed = false;
+    const std::string path = find_map_file(statement, folder_.string(), name, transformed);
+    transformed_ = transformed;
+    return path.empty() ? path : fs::relative(path, folder_).string();
+  }
+  std::vector<SourceMaterial> parse(const std::string& text) {
+    return parse_mtl(text, folder_.string(), "m.mtl", findings_);
+  }
+
+  fs::path folder_;
+  std::vector<Diagnostic> findings_;
+  bool transformed_ = false;
+};
+
+TEST_F(MtlReader, FindsFilesHoweverTheyAreWritten) {
+  EXPECT_EQ(found("wood.jpg"), "wood.jpg");
+  EXPECT_EQ(found(".\\wood.jpg"), "wood.jpg");
+  EXPECT_EQ(found("./wood.jpg"), "wood.jpg");
+  EXPECT_EQ(found("WOOD.JPG"), "wood.jpg");
+  EXPECT_EQ(found("\"two words.png\""), "two words.png");
+  EXPECT_EQ(found("two words.png"), "two words.png");
+  EXPECT_EQ(found("two\\ words.png"), "two words.png");
+  EXPECT_EQ(found("maps\\stone.png"), "Maps/Stone.PNG");
+  EXPECT_EQ(found("C:\\Users\\me\\textures\\wood.jpg"), "wood.jpg");
+  EXPECT_EQ(found("/home/me/wood.jpg"), "wood.jpg");
+  EXPECT_EQ(found("-odd.png"), "-odd.png");
+  EXPECT_EQ(found("stone.jpg"), "");
+  EXPECT_EQ(found("Maps"), "");
+  EXPECT_EQ(found(""), "");
+}
+
+TEST_F(MtlReader, OptionsAreNoPartOfTheName) {
+  EXPECT_EQ(found("-clamp on wood.jpg"), "wood.jpg");
+  EXPECT_EQ(found("-o 0 0 0 -s 1 1 1 wood.jpg"), "wood.jpg");
+  EXPECT_FALSE(transformed_);
+  EXPECT_EQ(found("-s 0.5 wood.jpg"), "wood.jpg");
+  EXPECT_TRUE(transformed_);
+  EXPECT_EQ(found("-mm 0.1 0.3 -texres 512 two words.png"), "two words.png");
+  EXPECT_EQ(found("-imfchan r wood.jpg -bm 1.5"), "wood.jpg");
+  EXPECT_EQ(found("-unknown hello world -single two words.png"), "two words.png");
+}
+
+TEST_F(MtlReader, ReadsProperties) {
+  const auto m = parse(
+      "\xEF\xBB\xBF# comment\r\nKd 9 9 9\r\n"
+      "newmtl  a b \r\n\tKa .1 .2 .3\r\nKd 0.5\r\nKs 1 1 \\\n 0.25\nKe 0 0 1\nNs 96\n"
+      "Tr 0.25\nd 0.5\nTr 0.9\nmap_Kd Maps\\stone.png\n"
+      "newmtl c\nTr 0.25\nmap_Kd missing.png\nnewmtl d\nTr 1.0");
+  ASSERT_EQ(m.size(), 3u);
+  EXPECT_EQ(m[0].name, "a b");
+  EXPECT_EQ(m[0].ambient, glm::vec3(0.1f, 0.2f, 0.3f));
+  EXPECT_EQ(m[0].diffuse, glm::vec3(0.5f));
+  EXPECT_EQ(m[0].specular, glm::vec3(1, 1, 0.25f));
+  EXPECT_EQ(m[0].emission, glm::vec3(0, 0, 1));
+  EXPECT_EQ(m[0].shininess, 96.0f);
+  EXPECT_EQ(m[0].opacity, 0.5f);
+  EXPECT_EQ(fs::relative(m[0].diffuse_map, folder_), "Maps/Stone.PNG");
+  EXPECT_EQ(m[1].opacity, 0.75f);
+  EXPECT_EQ(m[1].diffuse_map, "");
+  EXPECT_EQ(m[2].opacity, 1.0f);
+  ASSERT_EQ(findings_.size(), 2u);
+  EXPECT_EQ(findings_[0].id, "mtl.missing-map");
+  EXPECT_EQ(findings_[0].line, 16u);
+  EXPECT_EQ(findings_[1].id, "mtl.invisible");
+}
+
+TEST_F(MtlReader, ObjTakesTheFileBesideItWhenItNamesAnother) {
+  std::ofstream(folder_ / "Box.MTL") << "newmtl red\nKd 1 0 0\n";
+  std::ofstream(folder_ / "box.obj") << "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+                                        "usemtl red\nf 1 2 3\nusemtl blue\nf 3 2 1\n";
+  const auto model = read_obj((folder_ / "box.obj").string());
+  ASSERT_TRUE(model);
+  ASSERT_EQ(model->materials.size(), 3u);
+  EXPECT_EQ(model->materials[1].diffuse, glm::vec3(1, 0, 0));
+  ASSERT_EQ(model->material_runs.size(), 2u);
+  EXPECT_EQ(model->material_runs[0].value, 1u);
+  EXPECT_EQ(model->material_runs[1].value, 2u);
+  std::vector<std::string> ids;
+  for (const Diagnostic& f : model->findings) ids.push_back(f.id);
+  EXPECT_EQ(ids, (std::vector<std::string>{"obj.missing-mtl", "obj.mtl-beside",
+                                           "obj.undefined-material"}));
+}
+
+TEST_F(MtlReader, LibrariesWithBlanksAndSeveralOnALine) {
+  std::ofstream(folder_ / "my lib.mtl") << "newmtl a\nKd 1 0 0\n";
+  std::ofstream(folder_ / "other.mtl") << "newmtl b\nKd 0 1 0\n";
+  const std::string faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n";
+  for (const char* library :
+       {"mtllib my lib.mtl\nmtllib other.mtl\n", "mtllib my\\ lib.mtl other.mtl\n"}) {
+    const auto model = parse_obj(library + faces, folder_.string(), "x.obj");
+    ASSERT_TRUE(model);
+    EXPECT_TRUE(model->findings.empty()) << library;
+    ASSERT_EQ(model->materials.size(), 3u);
+    EXPECT_EQ(model->materials[1].diffuse, glm::vec3(1, 0, 0));
+    EXPECT_EQ(model->materials[2].diffuse, glm::vec3(0, 1, 0));
+  }
+}
+
+}  // namespace
+}  // namespace modar

@@ -1,0 +1,398 @@
+// Levels of detail: no crack between any two, errors that hold against brute force.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <random>
+#include <set>
+#include <span>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "bake/mesh/lod/chunk_decimate.hpp"
+#include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/lod/surface_distance.hpp"
+#include "tests/import/samples.hpp"
+#include "tests/mesh/stages.hpp"
+
+namespace modar {
+namespace {
+
+using testing::chunked;
+using testing::grid;
+using testing::parse;
+using testing::welded;
+
+/// texture_side: pixels of the texture of every material, 0: none.
+ChunkedMesh levelled(const TriMesh& mesh, std::uint32_t max_vertices, unsigned jobs = 2,
+                     std::uint32_t texture_side = 0) {
+  ChunkedMesh split = chunked(mesh, max_vertices);
+  Report report;
+  LevelOptions options;
+  options.jobs = jobs;
+  options.texture_sides.assign(mesh.materials.size(), texture_side);
+  EXPECT_TRUE(make_levels(split, options, report));
+  return split;
+}
+
+/// A bumpy closed ball of about 8 n^2 triangles, without uv or normals: nothing is a seam.
+std::string ball(int n) {
+  std::string text;
+  const auto number = [](double x) { return std::to_string(x) + " "; };
+  const int around = 4 * n;
+  const auto vertex = [&](int ring, int step) {
+    const double a = 3.14159265358979 * ring / n;
+    const double b = 6.28318530717959 * step / around;
+    const double r = 1 + 0.05 * std::sin(7 * a) * std::cos(5 * b);
+    text += "v " + number(r * std::sin(a) * std::cos(b)) + number(r * std::sin(a) * std::sin(b)) +
+            number(r * std::cos(a)) + "\n";
+  };
+  vertex(0, 0);
+  for (int ring = 1; ring < n; ++ring) {
+    for (int step = 0; step < around; ++step) vertex(ring, step);
+  }
+  vertex(n, 0);
+  const auto at = [&](int ring, int step) {
+    if (ring == 0) return std::string(" 1");
+    if (ring == n) return " " + std::to_string(2 + (n - 1) * around);
+    return " " + std::to_string(2 + (ring - 1) * around + step % around);
+  };
+  for (int ring = 0; ring < n; ++ring) {
+    for (int s = 0; s < around; ++s) {
+      if (ring > 0) text += "f" + at(ring, s) + at(ring + 1, s) + at(ring, s + 1) + "\n";
+      if (ring < n - 1)
+        text += "f" + at(ring, s + 1) + at(ring + 1, s) + at(ring + 1, s + 1) + "\n";
+    }
+  }
+  return text;
+}
+
+using Point = std::array<float, 3>;
+using Edge = std::pair<Point, Point>;
+
+/// Triangles of one level of one chunk as decoded positions (half layout).
+std::vector<std::array<Point, 3>> triangles_of(const PackedMesh& mesh, const LevelRecord& level) {
+  std::vector<std::array<Point, 3>> triangles(level.index_count / 3);
+  for (std::uint32_t i = 0; i < level.index_count; ++i) {
+    std::uint16_t index = 0;
+    std::memcpy(&index, mesh.indices.data() + level.index_offset + 2 * i, 2);
+    EXPECT_LT(index, level.vertex_count);
+    const std::byte* at = mesh.vertices.data() + level.vertex_offset + index * mesh.layout.stride;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      _Float16 value;
+      std::memcpy(&value, at + 2 * axis, 2);
+      triangles[i / 3][i % 3][axis] = static_cast<float>(value);
+    }
+  }
+  return triangles;
+}
+
+/// Edges that one triangle has and no other has backwards.
+std::multiset<Edge> border_of(const std::vector<std::array<Point, 3>>& triangles) {
+  std::multiset<Edge> edges;
+  for (const auto& t : triangles) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Edge edge{t[i], t[(i + 1) % 3]};
+      const auto back = edges.find({edge.second, edge.first});
+      if (back != edges.end()) {
+        edges.erase(back);
+      } else {
+        edges.insert(edge);
+      }
+    }
+  }
+  return edges;
+}
+
+/// Every level of a chunk has the border of level 0, to the bit: whatever levels neighbours are
+/// drawn at, they meet.
+void expect_no_cracks(const PackedMesh& mesh, std::uint32_t least_levels) {
+  EXPECT_GE(mesh.record.level_count, least_levels);
+  std::uint64_t coarse = 0;
+  for (const ChunkRecord& chunk : mesh.chunks) {
+    const auto finest = triangles_of(mesh, mesh.levels[chunk.first_level]);
+    const auto border = border_of(finest);
+    for (std::uint32_t l = 1; l < chunk.level_count; ++l) {
+      const auto coarser = triangles_of(mesh, mesh.levels[chunk.first_level + l]);
+      EXPECT_LT(coarser.size() * 5, finest.size() * 4 + 5);
+      EXPECT_EQ(border_of(coarser), border);
+      ++coarse;
+    }
+  }
+  EXPECT_GT(coarse, 0u);
+}
+
+TEST(Levels, NeighboursOfAnyTwoLevelsMeet) {
+  expect_no_cracks(testing::packed(levelled(welded(parse(grid(40, 2))), 500)), 3);
+  expect_no_cracks(testing::packed(levelled(welded(parse(ball(16))), 400)), 3);
+}
+
+TEST(Levels, SeamsOfUvAndNormalsStay) {
+  // Two halves with uv of their own along the middle, as the exporters of atlases write them.
+  std::string text = grid(30, 1);
+  const ChunkedMesh plain = levelled(welded(parse(text)), 65535);
+  TriMesh cut = welded(parse(text));
+  std::map<std::uint32_t, std::uint32_t> twin;
+  std::set<std::uint32_t> middle;
+  for (std::uint32_t v = 0; v < cut.positions.size(); ++v) {
+    if (std::abs(cut.uvs[v].x - 0.5) < 1e-9) middle.insert(v);
+  }
+  ASSERT_EQ(middle.size(), 31u);
+  const std::size_t count = cut.positions.size();
+  Array<std::uint32_t> sources(count);
+  for (std::uint32_t v = 0; v < count; ++v) sources[v] = cut.source_position(v);
+  for (const std::uint32_t v : middle) {
+    twin[v] = static_cast<std::uint32_t>(cut.positions.size());
+    cut.positions.push_back(cut.positions[v]);
+    cut.normals.push_back(cut.normals[v]);
+    cut.uvs.push_back({cut.uvs[v].x + 0.25, cut.uvs[v].y});
+    sources.push_back(sources[v]);
+  }
+  cut.source_positions = std::move(sources);
+  for (auto& t : cut.triangles) {
+    const bool right =
+        std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return cut.uvs[v].x > 0.5 + 1e-9; });
+    for (std::uint32_t& v : t) v = right && twin.contains(v) ? twin[v] : v;
+  }
+  const ChunkedMesh split = levelled(cut, 65535);
+  ASSERT_GE(split.chunks[0].coarser.size(), 1u);
+  for (const ChunkLevel& level : split.chunks[0].coarser) {
+    std::set<std::uint32_t> used;
+    for (const std::uint16_t i : level.indices) used.insert(split.chunks[0].vertices[i]);
+    for (const auto& [v, w] : twin) {
+      EXPECT_TRUE(used.contains(v));
+      EXPECT_TRUE(used.contains(w));
+    }
+  }
+  ASSERT_GE(plain.chunks[0].coarser.size(), 2u);
+}
+
+double brute_distance(const glm::dvec3& p, const std::vector<std::array<glm::dvec3, 3>>& surface) {
+  double least = 1e9;
+  for (const auto& t : surface) {
+    // By minimising over a fine barycentric lattice: slow, and nothing like the code under test.
+    for (int i = 0; i <= 12; ++i) {
+      for (int j = 0; i + j <= 12; ++j) {
+        const glm::dvec3 q =
+            (double(i) * t[0] + double(j) * t[1] + double(12 - i - j) * t[2]) / 12.0;
+        least = std::min(least, glm::length(p - q));
+      }
+    }
+  }
+  return least;
+}
+
+TEST(Levels, TheStatedErrorBoundsTheDistance) {
+  const PackedMesh mesh = testing::packed(levelled(welded(parse(ball(9))), 65535));
+  const ChunkRecord& chunk = mesh.chunks[0];
+  ASSERT_GE(chunk.level_count, 3u);
+  std::vector<std::vector<std::array<glm::dvec3, 3>>> surfaces;
+  double lattice = 0;  // how far the lattice of brute_distance() may miss
+  for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+    auto& surface = surfaces.emplace_back();
+    for (const auto& t : triangles_of(mesh, mesh.levels[chunk.first_level + l])) {
+      auto& out = surface.emplace_back();
+      for (std::size_t i = 0; i < 3; ++i) out[i] = glm::dvec3(t[i][0], t[i][1], t[i][2]);
+      for (std::size_t i = 0; i < 3; ++i) {
+        lattice = std::max(lattice, glm::length(out[i] - out[(i + 1) % 3]) / 12);
+      }
+    }
+  }
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (std::uint32_t l = 1; l < chunk.level_count; ++l) {
+    const auto stated = static_cast<double>(mesh.levels[chunk.first_level + l].error);
+    double greatest = 0;
+    for (const auto& [from, to] : {std::pair(0u, l), std::pair(l, 0u)}) {
+      for (int i = 0; i < 150; ++i) {
+        const auto& t = surfaces[from][random() % surfaces[from].size()];
+        const double a = std::sqrt(uniform(random));
+        const double b = uniform(random);
+        const glm::dvec3 p = (1 - a) * t[0] + a * (1 - b) * t[1] + a * b * t[2];
+        greatest = std::max(greatest, brute_distance(p, surfaces[to]));
+      }
+    }
+    EXPECT_LE(greatest, stated + lattice);
+    // And it says something: half as much would be too little for random points, or nearly so.
+    EXPECT_GT(greatest + lattice, stated * 0.4) << "level " << l;
+  }
+}
+
+TEST(Levels, DistancesOfKnownSurfaces) {
+  // A square, and the same with its middle lifted by 0.5.
+  const std::vector<glm::dvec3> p = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 0.5}};
+  const std::vector<std::uint16_t> flat = {0, 1, 2, 0, 2, 3};
+  const std::vector<std::uint16_t> roof = {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4};
+  LevelSurface low(p, flat);
+  LevelSurface high(p, roof);
+  // Known, not known and wrong: the hints change the way, never the answer's truth.
+  for (const std::uint32_t near : {1u, kNoIndex, 0u}) {
+    const std::vector<std::uint32_t> nearby(p.size(), near);
+    const double up = surface_distance(high, low, nearby, 0);
+    EXPECT_GE(up, 0.5);
+    EXPECT_LE(up, 0.75);
+    // From the square's middle to a roof of 45 degrees.
+    const double down = surface_distance(low, high, nearby, 0);
+    EXPECT_GE(down, 0.5 * std::sqrt(0.5));
+    EXPECT_LE(down, 0.75 * std::sqrt(0.5));
+    EXPECT_LE(surface_distance(low, low, nearby, 0), kDistanceFloor);
+    // What is below the least that a caller asks for is not told apart.
+    EXPECT_EQ(surface_distance(low, high, nearby, 2.0), 2.0);
+  }
+}
+
+TEST(Levels, DistancesOfTrianglesWithoutArea) {
+  // As half floats leave the finest scans: corners fall together or on one line.
+  constexpr std::uint16_t kSide = 9;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(-0.6, 0.6);
+  for (int round = 0; round < 40; ++round) {
+    std::vector<glm::dvec3> p;
+    const glm::dvec3 along(uniform(random), uniform(random), uniform(random));
+    const glm::dvec3 across(uniform(random), uniform(random), uniform(random));
+    for (std::uint16_t v = 0; v < kSide * kSide; ++v) {
+      const glm::dvec3 at =
+          static_cast<double>(v % kSide) * along + static_cast<double>(v / kSide) * across;
+      // Every third of them no lattice, but a line through one.
+      p.push_back((round % 3 == 0 ? at * 0.7 : glm::round(at)) * 0x1p-11 * 7.0 + glm::dvec3(0.3));
+    }
+    // The two ways to cut the grid's squares.
+    std::vector<std::uint16_t> one;
+    std::vector<std::uint16_t> other;
+    for (std::uint16_t y = 0; y + 1 < kSide; ++y) {
+      for (std::uint16_t x = 0; x + 1 < kSide; ++x) {
+        const auto a = static_cast<std::uint16_t>(y * kSide + x);
+        const auto b = static_cast<std::uint16_t>(a + 1);
+        const auto c = static_cast<std::uint16_t>(a + kSide);
+        const auto d = static_cast<std::uint16_t>(c + 1);
+        one.insert(one.end(), {a, b, d, a, d, c});
+        other.insert(other.end(), {a, b, c, b, d, c});
+      }
+    }
+    LevelSurface from(p, one);
+    LevelSurface to(p, other);
+    double exact = 0;  // at the middles of the diagonals
+    for (std::size_t i = 0; i < one.size(); i += 6) {
+      const glm::dvec3 middle = 0.5 * (p[one[i]] + p[one[i + 2]]);
+      double least = 1e9;
+      for (std::uint32_t t = 0; t < other.size() / 3; ++t) {
+        least = std::min(least, distance_square(middle, to.triangle(t)));
+      }
+      exact = std::max(exact, std::sqrt(least));
+    }
+    for (const std::vector<std::uint32_t>& nearby :
+         {to.triangles_of_vertices(), std::vector<std::uint32_t>(p.size(), kNoIndex)}) {
+      const double bound = surface_distance(from, to, nearby, 0);
+      EXPECT_GE(bound, exact - 1e-12);
+      EXPECT_LE(bound, std::max(kDistanceFloor, 1.5 * 7 * 0x1p-11 * 1.8));
+    }
+  }
+}
+
+TEST(Levels, ThreeTrianglesAtAnEdgeAreKept) {
+  // A fan of many triangles round a common edge, none of which may go.
+  const std::vector<glm::dvec3> p = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}};
+  const std::vector<std::uint16_t> fan = {0, 1, 2, 0, 1, 3, 0, 1, 4};
+  const std::vector<std::uint8_t> free(p.size(), 0);
+  const std::vector<std::size_t> targets = {1};
+  const auto result = decimate_chunk({p, {}}, fan, free, targets, {1.0, 0.0, 0.0});
+  ASSERT_EQ(result.size(), 1u);
+  EXPECT_EQ(result[0].indices.size(), 9u);
+  EXPECT_EQ(result[0].nearby.size(), p.size());
+}
+
+/// uv of the triangles of a flat level at a point, by searching all of them.
+glm::dvec2 uv_at(const TriMesh& mesh, const Chunk& chunk, std::span<const std::uint16_t> indices,
+                 const glm::dvec2& p) {
+  const auto area = [](const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  };
+  glm::dvec2 best(0.0);
+  double least_outside = 1e9;
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    std::array<std::uint32_t, 3> v{};
+    std::array<glm::dvec2, 3> at;
+    for (std::size_t k = 0; k < 3; ++k) {
+      v[k] = chunk.vertices[indices[i + k]];
+      at[k] = glm::dvec2(mesh.positions[v[k]]);
+    }
+    const double whole = area(at[0], at[1], at[2]);
+    if (std::abs(whole) < 1e-6) continue;  // along the border
+    const std::array<double, 3> share = {area(p, at[1], at[2]) / whole,
+                                         area(at[0], p, at[2]) / whole,
+                                         area(at[0], at[1], p) / whole};
+    const double outside = -*std::min_element(share.begin(), share.end());
+    if (outside >= least_outside) continue;
+    least_outside = outside;
+    best = share[0] * mesh.uvs[v[0]] + share[1] * mesh.uvs[v[1]] + share[2] * mesh.uvs[v[2]];
+  }
+  EXPECT_LT(least_outside, 0.05);
+  return best;
+}
+
+TEST(Levels, TexturesSlideNoFartherThanStated) {
+  // Flat, so that the surface alone forbids nothing, under a texture that is sheared unevenly.
+  constexpr std::uint32_t kSide = 1024;
+  constexpr double kRounding =
+      1.0;  // texels: half floats move the vertices that levels are made of
+  TriMesh mesh = welded(parse(grid(40, 1)));
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    mesh.positions[v].z = 0;
+    glm::dvec2& uv = mesh.uvs[v];
+    uv = {uv.x + 0.12 * std::sin(14 * uv.y + 6 * uv.x), uv.y + 0.05 * uv.x * uv.x};
+  }
+  const auto greatest_shift = [&](const ChunkedMesh& split, std::size_t level) {
+    const Chunk& chunk = split.chunks[0];
+    double greatest = 0;
+    for (const std::uint32_t v : chunk.vertices) {
+      const glm::dvec2 there = uv_at(split.mesh, chunk, chunk.coarser[level].indices,
+                                     glm::dvec2(split.mesh.positions[v]));
+      greatest = std::max(greatest, kSide * glm::length(there - split.mesh.uvs[v]));
+    }
+    return greatest;
+  };
+  const ChunkedMesh bounded = levelled(mesh, 65535, 2, kSide);
+  ASSERT_EQ(bounded.chunks.size(), 1u);
+  ASSERT_GE(bounded.chunks[0].coarser.size(), 2u);
+  // The grid is 28 by 40: 1 % of its diagonal, in texels of an even texture of its area.
+  const double bound = 0.01 * std::hypot(28, 40) / std::sqrt(28.0 * 40) * kSide;
+  for (std::size_t l = 0; l < bounded.chunks[0].coarser.size(); ++l) {
+    const double stated = bounded.chunks[0].coarser[l].uv_shift;
+    EXPECT_NEAR(greatest_shift(bounded, l), stated, kRounding) << "level " << l + 1;
+    EXPECT_LE(stated, 1.05 * bound) << "level " << l + 1;
+    EXPECT_GT(stated, 0.02 * bound) << "level " << l + 1;
+  }
+  // Without a texture nothing is stated, and the uvs are off by far more.
+  const ChunkedMesh free = levelled(mesh, 65535, 2, 0);
+  ASSERT_GE(free.chunks[0].coarser.size(), 2u);
+  EXPECT_EQ(free.chunks[0].coarser[1].uv_shift, 0);
+  EXPECT_GT(greatest_shift(free, 1), 2 * greatest_shift(bounded, 1));
+}
+
+TEST(Levels, ThreadsChangeNothing) {
+  const TriMesh mesh = welded(parse(grid(40, 2)));
+  const PackedMesh one = testing::packed(levelled(mesh, 300, 1));
+  const PackedMesh eight = testing::packed(levelled(mesh, 300, 8));
+  EXPECT_EQ(one.indices, eight.indices);
+  EXPECT_EQ(one.vertices, eight.vertices);
+  ASSERT_EQ(one.levels.size(), eight.levels.size());
+  for (std::size_t l = 0; l < one.levels.size(); ++l) {
+    EXPECT_EQ(one.levels[l].error, eight.levels[l].error);
+  }
+}
+
+TEST(Levels, LevelZeroAndVerticesAreThoseWithoutLevels) {
+  const TriMesh mesh = welded(parse(grid(40, 2)));
+  const PackedMesh plain = testing::packed(chunked(mesh, 300));
+  const PackedMesh levels = testing::packed(levelled(mesh, 300));
+  EXPECT_EQ(plain.vertices, levels.vertices);
+  ASSERT_GT(levels.indices.size(), plain.indices.size());
+  EXPECT_TRUE(std::equal(plain.indices.begin(), plain.indices.end(), levels.indices.begin()));
+}
+
+}  // namespace
+}  // namespace modar

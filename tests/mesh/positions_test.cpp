@@ -1,0 +1,185 @@
+// The two layouts of positions: which one is chosen, what its bytes decode to, and that no chunk
+// cracks away from its neighbour.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <random>
+#include <set>
+
+#include <glm/geometric.hpp>
+
+#include "tests/import/samples.hpp"
+#include "tests/mesh/stages.hpp"
+
+namespace modar {
+namespace {
+
+using testing::chunked;
+using testing::grid;
+using testing::parse;
+using testing::welded;
+
+PackedMesh packed_as(const ChunkedMesh& mesh, PositionKind kind) {
+  Report report;
+  PackOptions options;
+  options.positions = kind;
+  auto result =
+      pack(mesh, std::vector<std::uint32_t>(mesh.mesh.materials.size(), 1024), options, report);
+  EXPECT_TRUE(result);
+  return result ? std::move(*result) : PackedMesh();
+}
+
+/// A vertex as bundle.md says, by the compiler's own half type.
+glm::dvec3 decoded(const PackedMesh& mesh, const ChunkRecord& chunk, std::size_t vertex) {
+  const std::byte* at = mesh.vertices.data() + vertex * mesh.layout.stride;
+  glm::dvec3 p;
+  for (int i = 0; i < 3; ++i) {
+    double a = 0;
+    if (mesh.layout.attributes[0].type == static_cast<std::uint8_t>(ComponentType::kHalf)) {
+      _Float16 value;
+      std::memcpy(&value, at + 2 * i, 2);
+      a = static_cast<double>(value);
+    } else {
+      std::int16_t value = 0;
+      std::memcpy(&value, at + 2 * i, 2);
+      a = value;
+    }
+    p[i] = double(chunk.position_offset[i]) + double(chunk.position_step) * a;
+  }
+  return p;
+}
+
+/// Each source corner's nearest decoded vertex of its chunk must be one and the same point wherever
+/// the vertex appears, and no farther off than stated.
+void expect_no_cracks(const ChunkedMesh& mesh, const PackedMesh& bytes) {
+  std::map<std::uint32_t, glm::dvec3> point_of_source;
+  std::uint64_t shared = 0;
+  double greatest = 0;
+  double squares = 0;
+  std::uint64_t count = 0;
+  for (std::size_t c = 0; c < mesh.chunks.size(); ++c) {
+    const ChunkRecord& chunk = bytes.chunks[c];
+    const LevelRecord& level = bytes.levels[chunk.first_level];
+    std::vector<glm::dvec3> points;
+    std::set<std::uint16_t> used;
+    for (std::uint32_t i = 0; i < level.index_count; ++i) {
+      std::uint16_t index = 0;
+      std::memcpy(&index, bytes.indices.data() + level.index_offset + 2 * i, 2);
+      if (used.insert(index).second) {
+        points.push_back(decoded(bytes, chunk, level.vertex_offset / bytes.layout.stride + index));
+      }
+    }
+    for (const std::uint32_t v : mesh.chunks[c].vertices) {
+      const glm::dvec3& p = mesh.mesh.positions[v];
+      const auto nearest = std::min_element(points.begin(), points.end(),
+                                            [&](const glm::dvec3& a, const glm::dvec3& b) {
+                                              return glm::length(a - p) < glm::length(b - p);
+                                            });
+      const double error = glm::length(*nearest - p) * mesh.mesh.placement.scale;
+      greatest = std::max(greatest, error);
+      squares += error * error;
+      ++count;
+      const auto [at, fresh] = point_of_source.emplace(mesh.mesh.source_position(v), *nearest);
+      if (fresh) continue;
+      ++shared;
+      ASSERT_EQ(at->second, *nearest) << "chunk " << c << " moved a shared vertex";
+    }
+  }
+  EXPECT_GT(shared, 30u) << "chunks share nothing: the test proves nothing";
+  EXPECT_NEAR(greatest, bytes.record.position_error_max, 1e-12 * bytes.record.diagonal);
+  EXPECT_NEAR(std::sqrt(squares / double(count)), bytes.record.position_error_rms, 1e-9 * greatest);
+}
+
+TEST(Positions, SharedVerticesDecodeToOnePointInBothLayouts) {
+  const TriMesh mesh = welded(parse(grid(40, 2)));
+  const ChunkedMesh split = chunked(mesh, 250);
+  for (const PositionKind kind : {PositionKind::kHalf, PositionKind::kInt16}) {
+    const PackedMesh bytes = packed_as(split, kind);
+    expect_no_cracks(split, bytes);
+  }
+}
+
+TEST(Positions, SixteenBitsStandOnOnePowerOfTwo) {
+  const TriMesh mesh = welded(parse(grid(40, 2)));
+  const ChunkedMesh split = chunked(mesh, 250);
+  const PackedMesh bytes = packed_as(split, PositionKind::kInt16);
+  EXPECT_EQ(bytes.layout.stride, 12);
+  double side = 0;
+  for (const ChunkRecord& chunk : bytes.chunks) {
+    EXPECT_EQ(chunk.position_step, bytes.chunks[0].position_step);
+    int exponent = 0;
+    EXPECT_EQ(std::frexp(chunk.position_step, &exponent), 0.5f);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(std::fmod(chunk.position_offset[i], chunk.position_step), 0.0f);
+      side = std::max(side, double(chunk.bounds_max[i]) - double(chunk.bounds_min[i]));
+    }
+  }
+  // The finest step that 65,534 of them span the largest chunk with.
+  EXPECT_LE(side, 65534.0 * double(bytes.chunks[0].position_step));
+  EXPECT_GT(side, 65534.0 * double(bytes.chunks[0].position_step) / 2 * 0.99);
+  EXPECT_LT(bytes.record.position_error_max,
+            bytes.record.scale * double(bytes.chunks[0].position_step) * 0.8661);
+  EXPECT_LT(bytes.record.normal_error_max_deg, 1.1f);
+  EXPECT_LT(bytes.record.normal_error_rms_deg, 0.5f);
+  EXPECT_LT(bytes.record.position_error_max,
+            packed_as(split, PositionKind::kHalf).record.position_error_max / 10);
+}
+
+TEST(Positions, TheAskedErrorIsKept) {
+  const TriMesh mesh = welded(parse(grid(40, 2)));
+  const double diagonal = glm::length(mesh.source_max - mesh.source_min);
+  for (const double part : {1e-3, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6}) {
+    Report report;
+    const auto plan = plan_positions(mesh, {std::nullopt, part * diagonal});
+    ASSERT_TRUE(plan) << part;
+    EXPECT_EQ(plan->kind, part > 2e-4 ? PositionKind::kHalf : PositionKind::kInt16) << part;
+    ChunkOptions options;
+    options.max_side = plan->max_side;
+    const auto split = chunk(mesh, options, report);
+    ASSERT_TRUE(split) << part;
+    const PackedMesh bytes = packed_as(*split, plan->kind);
+    EXPECT_LE(bytes.record.position_error_max, part * diagonal);
+    if (plan->kind == PositionKind::kInt16) expect_no_cracks(*split, bytes);
+  }
+}
+
+TEST(Positions, WhatCannotBeReachedIsSaid) {
+  const TriMesh mesh = welded(parse(grid(40, 2)));
+  const auto finest = plan_positions(mesh, {std::nullopt, 1e-9});
+  ASSERT_FALSE(finest);
+  EXPECT_EQ(finest.error().code, "model.max-error");
+  EXPECT_FALSE(plan_positions(mesh, {PositionKind::kHalf, 1e-4}));
+  Report report;
+  ChunkOptions options;
+  options.max_side = 1e-3;  // shorter than any triangle
+  const auto split = chunk(mesh, options, report);
+  ASSERT_FALSE(split);
+  EXPECT_EQ(split.error().code, "model.max-error");
+}
+
+TEST(Positions, SaharovTenTimesFinerThanHalves) {
+  const std::string shared = testing::shared_data();
+  if (shared.empty()) GTEST_SKIP() << "no shared data";
+  const auto source = read_obj(shared + "/models/saharov_utm_vcol/saharov_utm_dev.obj");
+  ASSERT_TRUE(source);
+  const TriMesh mesh = welded(*source);
+  const double wanted = half_error(mesh) * mesh.placement.scale / 10;
+  const auto plan = plan_positions(mesh, {std::nullopt, wanted});
+  ASSERT_TRUE(plan);
+  EXPECT_EQ(plan->kind, PositionKind::kInt16);
+  Report report;
+  ChunkOptions options;
+  options.max_side = plan->max_side;
+  const auto split = chunk(mesh, options, report);
+  ASSERT_TRUE(split);
+  const PackedMesh bytes = packed_as(*split, plan->kind);
+  EXPECT_LE(bytes.record.position_error_max, wanted);
+  expect_no_cracks(*split, bytes);
+}
+
+}  // namespace
+}  // namespace modar

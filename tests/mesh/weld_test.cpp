@@ -1,0 +1,156 @@
+// Triangulation and weld, against areas and hand-made cases.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <random>
+#include <span>
+
+#include <glm/geometric.hpp>
+
+#include "bake/mesh/weld/triangulate.hpp"
+#include "tests/mesh/stages.hpp"
+
+namespace modar {
+namespace {
+
+using testing::grid;
+using testing::parse;
+using testing::welded;
+
+double area(std::span<const glm::dvec3> p, const std::array<std::uint32_t, 3>& t) {
+  return glm::cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]]).z / 2;
+}
+
+void expect_tiles(const std::vector<glm::dvec3>& polygon) {
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  EXPECT_TRUE(triangulate(polygon, triangles));
+  ASSERT_EQ(triangles.size(), polygon.size() - 2);
+  double shoelace = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const glm::dvec3& a = polygon[i];
+    const glm::dvec3& b = polygon[(i + 1) % polygon.size()];
+    shoelace += (a.x * b.y - a.y * b.x) / 2;
+  }
+  // All of one winding and the areas add up: no overlap, nothing left out.
+  double sum = 0;
+  for (const auto& t : triangles) {
+    EXPECT_GE(area(polygon, t) * (shoelace > 0 ? 1 : -1), 0);
+    sum += area(polygon, t);
+  }
+  EXPECT_NEAR(sum, shoelace, 1e-9 * std::fabs(shoelace));
+}
+
+TEST(Triangulate, ConcavePolygonsAreTiledWithoutOverlap) {
+  expect_tiles({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {2, 1, 0}, {0, 4, 0}});
+  expect_tiles({{0, 4, 0}, {2, 1, 0}, {4, 4, 0}, {4, 0, 0}, {0, 0, 0}});
+  expect_tiles({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 2, 0}, {1, 0.5, 0}, {0, 2, 0}});
+  std::vector<glm::dvec3> star;
+  for (int i = 0; i < 40; ++i) {
+    const double r = i % 2 == 0 ? 3.0 : 1.0;
+    const double angle = i * 2 * 3.14159265358979 / 40;
+    star.emplace_back(r * std::cos(angle), r * std::sin(angle), 0);
+  }
+  expect_tiles(star);
+  // A square ring with a bridge between hole and border, as exporters write holes.
+  expect_tiles({{0, 0, 0},
+                {6, 0, 0},
+                {6, 6, 0},
+                {0, 6, 0},
+                {0, 0, 0},
+                {2, 2, 0},
+                {2, 4, 0},
+                {4, 4, 0},
+                {4, 2, 0},
+                {2, 2, 0}});
+}
+
+TEST(Triangulate, TangledPolygonsEndAndSaySo) {
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  const std::vector<glm::dvec3> bow = {{0, 0, 0}, {2, 2, 0}, {3, 0, 0}, {0, 2, 0}, {-1, 1, 0}};
+  triangulate(bow, triangles);
+  EXPECT_EQ(triangles.size(), 3u);
+  triangles.clear();
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::vector<glm::dvec3> noise(60);
+  for (auto& p : noise) p = {u(random), u(random), u(random)};
+  EXPECT_FALSE(triangulate(noise, triangles));
+  EXPECT_EQ(triangles.size(), 58u);
+}
+
+TEST(Weld, OneVertexATriple) {
+  const TriMesh mesh = welded(parse(grid(4, 1)));
+  EXPECT_EQ(mesh.positions.size(), 25u);
+  EXPECT_EQ(mesh.triangles.size(), 32u);
+  // A seam: the same positions under another uv are other vertices.
+  const TriMesh seam = welded(
+      parse("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 3/1 4/1\n"));
+  EXPECT_EQ(seam.positions.size(), 5u);
+  EXPECT_EQ(seam.uvs[0], glm::dvec2(0, 1)) << "v turns over";
+}
+
+TEST(Weld, HubsWithManyVerticesStayExact) {
+  // One position with 1,000 normals, each used twice.
+  std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (int i = 0; i < 1000; ++i) text += "vn 0 " + std::to_string(i) + " 1\n";
+  for (int round = 0; round < 2; ++round) {
+    for (int i = 1; i <= 1000; ++i) text += "f 1//" + std::to_string(i) + " 2//1 3//1\n";
+  }
+  EXPECT_EQ(welded(parse(text)).positions.size(), 1002u);
+}
+
+TEST(Weld, PlacementBringsBackTheSource) {
+  const SourceModel source = parse(
+      "v 349011.8489 6648378.3181 9.7628\nv 349013.8489 6648378.3181 9.7628\nv 349011.8489 "
+      "6648382.3181 10.7628\nf 1 2 3\n");
+  const TriMesh mesh = welded(source);
+  EXPECT_NEAR(mesh.placement.scale, 2.0, 1e-9);
+  for (std::size_t v = 0; v < 3; ++v) {
+    const glm::dvec3 back = mesh.placement.center + mesh.placement.scale * mesh.positions[v];
+    EXPECT_LT(
+        glm::length(back - source.positions[mesh.source_position(static_cast<std::uint32_t>(v))]),
+        2e-9);
+    for (int i = 0; i < 3; ++i) EXPECT_LE(std::fabs(mesh.positions[v][i]), 1.0);
+  }
+}
+
+TEST(Weld, MakesNormalsWithinSmoothingGroups) {
+  // Two walls of a cube corner: smooth they share the diagonal, in groups each keeps its own.
+  const std::string walls = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 0 1\nv 0 1 1\n";
+  const std::string a = "f 1 2 4 3\n";
+  const std::string b = "f 1 5 6 2\n";
+  const TriMesh smooth = welded(parse(walls + a + b));
+  EXPECT_EQ(smooth.positions.size(), 6u);
+  for (std::size_t v = 0; v < smooth.positions.size(); ++v) {
+    if (smooth.source_position(static_cast<std::uint32_t>(v)) > 1) continue;
+    // 90 degrees of each wall at the edge, whatever the diagonals of the quads.
+    EXPECT_NEAR(glm::dot(smooth.normals[v], glm::normalize(glm::vec3(-1, 0, -1))), 1.0f, 1e-6f);
+  }
+  for (const char* groups : {"s 1\n", "s off\n"}) {
+    const TriMesh hard = welded(parse(walls + groups + a + (groups[2] == '1' ? "s 2\n" : "") + b));
+    EXPECT_EQ(hard.positions.size(), 8u);
+    for (const glm::vec3& n : hard.normals) EXPECT_NEAR(std::max({-n.x, -n.y, -n.z}), 1.0f, 1e-6f);
+  }
+}
+
+TEST(Weld, DropsWhatCannotBeSeenAndSaysSo) {
+  Report report;
+  const auto mesh = weld(
+      parse("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nv nan 0 0\nf 1 2 3\nf 1 2 2\nf 1 2 5\nf 1 2 4\n"),
+      report);
+  ASSERT_TRUE(mesh);
+  EXPECT_EQ(mesh->triangles.size(), 1u);
+  EXPECT_EQ(mesh->positions.size(), 3u);
+  std::map<std::string, std::string> found;
+  for (const Diagnostic& f : report.findings) found[f.id] = f.message;
+  EXPECT_EQ(found["model.degenerate"].substr(0, 2), "2 ");
+  EXPECT_EQ(found["model.not-finite"].substr(0, 2), "1 ");
+  Report other;
+  EXPECT_EQ(weld(parse("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), other).error().code, "model.empty");
+}
+
+}  // namespace
+}  // namespace modar

@@ -1,0 +1,92 @@
+// Frames from pictures, folders and videos.
+#include "runtime/play/frame_source.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "files.hpp"
+
+namespace modar {
+namespace {
+
+cv::Mat flat(int width, int height, cv::Scalar bgr) {
+  return {height, width, CV_8UC3, bgr};
+}
+
+TEST(Source, APictureIsOneFrameInRgbAndGray) {
+  const test::Folder folder;
+  cv::imwrite(folder / "a.png", flat(7, 5, {10, 100, 200}));
+  auto source = open_frame_source(folder / "a.png");
+  ASSERT_TRUE(source) << to_line(source.error());
+  EXPECT_EQ((*source)->info().frames, 1u);
+  EXPECT_FALSE((*source)->info().live);
+  Frame frame;
+  ASSERT_TRUE(*(*source)->next(frame));
+  EXPECT_EQ(frame.width, 7);
+  EXPECT_EQ(frame.height, 5);
+  EXPECT_EQ(std::vector(frame.rgb.begin(), frame.rgb.begin() + 3),
+            (std::vector<std::uint8_t>{200, 100, 10}));
+  // ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B = 119.64.
+  EXPECT_NEAR(frame.gray[3], 120, 1);
+  EXPECT_FALSE(*(*source)->next(frame));
+}
+
+TEST(Source, AFolderComesInTheOrderOfItsNames) {
+  const test::Folder folder;
+  cv::imwrite(folder / "b.PNG", flat(4, 4, {0, 0, 20}));
+  cv::imwrite(folder / "a.jpg", flat(8, 4, {0, 0, 10}));
+  cv::imwrite(folder / "c.png", flat(4, 4, {0, 0, 30}));
+  test::write_text(folder / "notes.txt", "no picture");
+  auto source = open_frame_source(folder.path());
+  ASSERT_TRUE(source) << to_line(source.error());
+  Frame frame;
+  for (const int red : {10, 20, 30}) {
+    ASSERT_TRUE(*(*source)->next(frame));
+    EXPECT_NEAR(frame.rgb[0], red, 3);
+    EXPECT_EQ(frame.index, static_cast<std::uint64_t>(red / 10 - 1));
+  }
+  EXPECT_FALSE(*(*source)->next(frame));
+}
+
+TEST(Source, AVideoGivesEachFrameAtItsTime) {
+  const test::Folder folder;
+  {
+    cv::VideoWriter writer(folder / "v.avi", cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20,
+                           cv::Size(64, 48));
+    ASSERT_TRUE(writer.isOpened());
+    for (int i = 0; i < 5; ++i) writer.write(flat(64, 48, {0, 0, 40.0 * i}));
+  }
+  auto source = open_frame_source(folder / "v.avi");
+  ASSERT_TRUE(source) << to_line(source.error());
+  EXPECT_EQ((*source)->info().fps, 20);
+  EXPECT_EQ((*source)->info().frames, 5u);
+  Frame frame;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(*(*source)->next(frame));
+    EXPECT_NEAR(frame.rgb[3 * 100], 40 * i, 6);
+    EXPECT_DOUBLE_EQ(frame.time_s, i / 20.0);
+  }
+  EXPECT_FALSE(*(*source)->next(frame));
+  (*source)->stop();
+  EXPECT_FALSE(*(*source)->next(frame));
+}
+
+TEST(Source, SaysWhatIsWrongWithAnInput) {
+  const test::Folder folder;
+  EXPECT_EQ(open_frame_source(folder / "none.mp4").error().code, "input.open");
+  EXPECT_EQ(open_frame_source(folder.path()).error().code, "input.empty");
+  EXPECT_EQ(open_frame_source("camera:x").error().code, "input.camera");
+  EXPECT_EQ(open_frame_source("camera:77").error().code, "input.open");
+  test::write_text(folder / "text.mp4", "this is no video");
+  EXPECT_EQ(open_frame_source(folder / "text.mp4").error().code, "input.damaged");
+  test::write_text(folder / "torn.png", std::string("\x89PNG\r\n\x1a\n torn", 13));
+  auto torn = open_frame_source(folder / "torn.png");
+  ASSERT_TRUE(torn);
+  Frame frame;
+  EXPECT_EQ((*torn)->next(frame).error().code, "input.damaged");
+}
+
+}  // namespace
+}  // namespace modar

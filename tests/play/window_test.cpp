@@ -1,0 +1,146 @@
+// The window through SDL2 itself, with its driver that needs no display: keys and clicks come as a
+// desktop sends them.
+#include "runtime/play/window.hpp"
+
+#include <cstdlib>
+#include <map>
+
+#include <GLES2/gl2.h>
+#include <SDL.h>
+#include <gtest/gtest.h>
+
+#include "formats/bundle_writer.hpp"
+#include "modar/gl_context.hpp"
+#include "runtime/play/screen.hpp"
+
+namespace modar {
+namespace {
+
+using std::chrono::milliseconds;
+
+void press(SDL_Keycode key) {
+  SDL_Event event{};
+  event.type = SDL_KEYDOWN;
+  event.key.keysym.sym = key;
+  SDL_PushEvent(&event);
+}
+
+void click(int x, int y, std::uint8_t button) {
+  SDL_Event event{};
+  event.type = SDL_MOUSEBUTTONDOWN;
+  event.button.button = button;
+  event.button.x = x;
+  event.button.y = y;
+  SDL_PushEvent(&event);
+}
+
+class WindowTest : public testing::Test {
+ protected:
+  /// SDL unloads the driver with its last window, and what Mesa keeps would have no name then for
+  /// the leak checker to suppress: a display of our own keeps it loaded.
+  static void SetUpTestSuite() { static_cast<void>(GlContext::create_offscreen()); }
+
+  void SetUp() override {
+    setenv("SDL_VIDEODRIVER", "offscreen", 1);
+    auto opened = Window::open("test");
+    if (!opened) GTEST_SKIP() << to_line(opened.error());
+    window_ = std::move(*opened);
+    static_cast<void>(window_->acts(milliseconds(0)));
+  }
+  void TearDown() override {
+    window_.reset();
+    unsetenv("SDL_VIDEODRIVER");
+  }
+
+  std::unique_ptr<Window> window_;
+};
+
+TEST_F(WindowTest, EachKeyIsItsAct) {
+  const std::map<SDL_Keycode, Act> keys = {
+      {SDLK_ESCAPE, Act::kQuit},        {SDLK_q, Act::kQuit},
+      {SDLK_m, Act::kNextModel},        {SDLK_RIGHT, Act::kNextModel},
+      {SDLK_LEFT, Act::kPreviousModel}, {SDLK_p, Act::kNextPattern},
+      {SDLK_PLUS, Act::kLarger},        {SDLK_UP, Act::kLarger},
+      {SDLK_MINUS, Act::kSmaller},      {SDLK_DOWN, Act::kSmaller},
+      {SDLK_d, Act::kDisplay},          {SDLK_o, Act::kOutline},
+      {SDLK_SPACE, Act::kPause},        {SDLK_f, Act::kFreeze}};
+  for (const auto& [key, act] : keys) {
+    press(SDLK_z);  // means nothing
+    press(key);
+    const auto acts = window_->acts(milliseconds(0));
+    ASSERT_EQ(acts.size(), 1u) << SDL_GetKeyName(key);
+    EXPECT_EQ(acts[0].act, act) << SDL_GetKeyName(key);
+  }
+}
+
+TEST_F(WindowTest, ClosingIsQuitting) {
+  SDL_Event event{};
+  event.type = SDL_QUIT;
+  SDL_PushEvent(&event);
+  const auto acts = window_->acts(milliseconds(100));
+  ASSERT_EQ(acts.size(), 1u);
+  EXPECT_EQ(acts[0].act, Act::kQuit);
+}
+
+TEST_F(WindowTest, ClicksAreInPixelsOfThePicture) {
+  window_->fit(320, 240);
+  const int width = window_->width();
+  const int height = window_->height();
+  ASSERT_GT(width, 0);
+  click(width / 2, height / 2, SDL_BUTTON_LEFT);
+  click(3, 3, SDL_BUTTON_RIGHT);
+  const auto acts = window_->acts(milliseconds(0));
+  ASSERT_EQ(acts.size(), 1u) << "the right button means nothing";
+  EXPECT_EQ(acts[0].act, Act::kClick);
+  // The picture's middle lies between its pixels 159 and 160, 119 and 120.
+  EXPECT_NEAR(acts[0].at.x, 159.5, 1.0);
+  EXPECT_NEAR(acts[0].at.y, 119.5, 1.0);
+}
+
+TEST_F(WindowTest, ALostContextIsMadeAnewAndShowsTheSame) {
+  window_.reset();
+  BundleContent content;
+  content.meta = "{}";
+  const std::vector<std::byte> bytes = encode_bundle(content).value();
+  const BundleView bundle = BundleView::open(bytes).value();
+  PlayOptions options;
+  options.window = true;
+  auto screen = Screen::open(bundle, options);
+  ASSERT_TRUE(screen) << to_line(screen.error());
+  std::vector<std::uint8_t> rgb(3 * 16 * 12);
+  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<std::uint8_t>(i * 7);
+  CameraPicture picture;
+  picture.width = 16;
+  picture.height = 12;
+  picture.planes[0] = rgb.data();
+  picture.strides[0] = 3 * 16;
+  const auto drawn = [&] {
+    EXPECT_TRUE((*screen)->resize(16, 12));
+    (*screen)->draw(picture, default_camera(16, 12), {});
+    const RgbaImage seen = (*screen)->picture();
+    return std::vector<std::uint8_t>(seen.pixels.begin(), seen.pixels.end());
+  };
+  const std::vector<std::uint8_t> before = drawn();
+  ASSERT_EQ(before[4], rgb[3]);
+  for (const std::uint32_t loss : {SDL_RENDER_DEVICE_RESET, SDL_APP_DIDENTERFOREGROUND}) {
+    constexpr GLuint kMark = 4242;  // a name that only the context of before knows
+    glBindBuffer(GL_ARRAY_BUFFER, kMark);
+    ASSERT_TRUE(glIsBuffer(kMark));
+    SDL_Event event{};
+    event.type = loss;
+    SDL_PushEvent(&event);
+    EXPECT_TRUE((*screen)->acts(milliseconds(0)).empty());
+    EXPECT_EQ(drawn(), before);
+    EXPECT_FALSE(glIsBuffer(kMark));
+  }
+}
+
+TEST_F(WindowTest, WaitsNoLongerThanItIsTold) {
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_TRUE(window_->acts(milliseconds(30)).empty());
+  const auto waited = std::chrono::steady_clock::now() - start;
+  EXPECT_GE(waited, milliseconds(25));
+}
+
+}  // namespace
+}  // namespace modar
