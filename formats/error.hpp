@@ -39,6 +39,28 @@ inline tl::unexpected<Error> fail(ExitCode exit, std::string code, std::string w
       Error{exit, std::move(code), std::move(where), std::move(cause), std::move(cure)});
 }
 
+/// Returns the error of a Result from the calling function, which returns a Result too; discards a
+/// value.
+#define MODAR_TRY(...) MODAR_TRY_AS(MODAR_JOIN(modar_result_, __COUNTER__), (__VA_ARGS__))
+
+/// The same, and declares the value otherwise: MODAR_ASSIGN(const Image image, read_image(path));
+/// Not for the single statement of an `if` or a loop without braces.
+#define MODAR_ASSIGN(declaration, ...) \
+  MODAR_ASSIGN_AS(MODAR_JOIN(modar_result_, __COUNTER__), declaration, (__VA_ARGS__))
+
+#define MODAR_JOIN(a, b) MODAR_JOIN_NOW(a, b)
+#define MODAR_JOIN_NOW(a, b) a##b
+#define MODAR_TRY_AS(result, expression)                                \
+  do {                                                                  \
+    if (auto result = expression; !result) {                            \
+      return tl::unexpected<::modar::Error>(std::move(result).error()); \
+    }                                                                   \
+  } while (false)
+#define MODAR_ASSIGN_AS(result, declaration, expression)                         \
+  auto result = expression;                                                      \
+  if (!result) return tl::unexpected<::modar::Error>(std::move(result).error()); \
+  declaration = std::move(*result)
+
 /// One line for a terminal: "where: cause; cure [code]".
 inline std::string to_line(const Error& error) {
   std::string line = error.where.empty() ? std::string() : error.where + ": ";
