@@ -148,7 +148,7 @@ class GeometryCheck {
       std::array<double, 4> value{};
       bool finite = true;
       for (std::uint32_t c = 0; c < attribute.components; ++c) {
-        value[c] = component(place + c * size, attribute.type, attribute.normalised != 0);
+        value[c] = decode_component(attribute, vertex, c);
         finite = finite && std::isfinite(value[c]);
       }
       if (!finite) {

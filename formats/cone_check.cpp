@@ -31,17 +31,15 @@ double dot(const Vector& a, const Vector& b) {
 /// Positions as a shader has them, rounded to f32.
 void ConeCheck::decode(const BundleParts& parts, const LayoutRecord& layout,
                        const ChunkRecord& chunk, const LevelRecord& level) {
-  const AttributeRecord* position = layout.attributes;
-  while (position->semantic != static_cast<std::uint8_t>(Semantic::kPosition)) ++position;
-  const std::uint32_t size = component_bytes(position->type);
+  const AttributeRecord& position = *find_attribute(layout, Semantic::kPosition);
   positions_.resize(3 * std::size_t{level.vertex_count});
-  const std::byte* vertex = parts.vertices.data() + level.vertex_offset + position->offset;
+  const std::byte* vertex = parts.vertices.data() + level.vertex_offset;
   for (std::size_t v = 0; v < level.vertex_count; ++v, vertex += layout.stride) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       positions_[3 * v + axis] = static_cast<float>(
           static_cast<double>(chunk.position_offset[axis]) +
           static_cast<double>(chunk.position_step) *
-              component(vertex + axis * size, position->type, position->normalised != 0));
+              decode_component(position, vertex, static_cast<std::uint32_t>(axis)));
     }
   }
 }

@@ -1,4 +1,4 @@
-// Half floats and normalised integers, to and fro.
+// Encoders of half floats and normalised integers.
 #include "formats/quantise.hpp"
 
 #include <bit>
@@ -12,7 +12,7 @@ constexpr double kSnorm8Step = (2.0 / 255.0 + 1.0 / 127.0) / 2.0;
 
 /// What ES 2.0 and ES 3 make of c, in the middle.
 double snorm8_mean(int c) {
-  const double es2 = (2.0 * c + 1.0) / 255.0;
+  const double es2 = decode_normalised(static_cast<std::int8_t>(c));
   const double es3 = c == -128 ? -1.0 : c / 127.0;
   return (es2 + es3) / 2.0;
 }
@@ -27,7 +27,7 @@ constexpr SnormTables make_snorm_tables() {
   SnormTables tables;
   for (int c = -128; c < 128; ++c) {
     const auto at = static_cast<std::size_t>(c + 128);
-    tables.es2[at] = (2 * c + 1) / 255.0;
+    tables.es2[at] = decode_normalised(static_cast<std::int8_t>(c));
     tables.es3[at] = c < -127 ? -1.0 : c / 127.0;
   }
   return tables;
@@ -80,18 +80,6 @@ std::uint16_t float_to_half(float value) {
   return static_cast<std::uint16_t>(sign | half);
 }
 
-float half_to_float(std::uint16_t half) {
-  const std::uint32_t sign = (half & 0x8000u) << 16;
-  const std::uint32_t exponent = (half >> 10) & 0x1Fu;
-  const std::uint32_t mantissa = half & 0x03FFu;
-  if (exponent == 31) return std::bit_cast<float>(sign | 0x7F800000u | (mantissa << 13));
-  if (exponent != 0) {
-    return std::bit_cast<float>(sign | ((exponent + 112u) << 23) | (mantissa << 13));
-  }
-  const float magnitude = static_cast<float>(mantissa) * 0x1p-24f;
-  return sign != 0 ? -magnitude : magnitude;
-}
-
 std::int8_t float_to_snorm8(float value) {
   const double wanted = clamped(value, -1.0, 1.0);
   int best = static_cast<int>(std::floor((wanted - 0.5 / 255.0) / kSnorm8Step));
@@ -102,10 +90,6 @@ std::int8_t float_to_snorm8(float value) {
     ++best;
   }
   return static_cast<std::int8_t>(best);
-}
-
-float snorm8_to_float(std::int8_t value) {
-  return static_cast<float>(2 * value + 1) / 255.0f;
 }
 
 std::array<std::int8_t, 2> normal_to_oct8(const std::array<double, 3>& normal) {
@@ -149,16 +133,8 @@ std::uint16_t float_to_unorm16(float value) {
   return static_cast<std::uint16_t>(std::floor(clamped(value, 0.0, 1.0) * 65535.0 + 0.5));
 }
 
-float unorm16_to_float(std::uint16_t value) {
-  return static_cast<float>(value) / 65535.0f;
-}
-
 std::uint8_t float_to_unorm8(float value) {
   return static_cast<std::uint8_t>(std::floor(clamped(value, 0.0, 1.0) * 255.0 + 0.5));
-}
-
-float unorm8_to_float(std::uint8_t value) {
-  return static_cast<float>(value) / 255.0f;
 }
 
 }  // namespace modar

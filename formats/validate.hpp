@@ -8,6 +8,7 @@
 #include <string>
 
 #include "formats/bundle_view.hpp"
+#include "formats/component.hpp"
 #include "formats/rules.hpp"
 
 namespace modar {
@@ -35,9 +36,6 @@ const SectionEntry* find_section(std::span<const SectionEntry> sections, Section
 
 /// The index of the parameter set with that id, or kNone. Sets are sorted by id.
 std::uint32_t find_parameter_set(const Table<ParameterSetRecord>& sets, std::uint32_t id);
-
-/// Bytes of one component; 0 for an unknown type.
-std::uint32_t component_bytes(std::uint8_t type);
 
 inline std::span<const std::byte> section_bytes(const BundleParts& parts,
                                                 const SectionEntry& entry) {

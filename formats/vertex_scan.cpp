@@ -6,7 +6,7 @@
 #include <array>
 #include <cstring>
 
-#include "formats/quantise.hpp"
+#include "formats/component.hpp"
 #include "formats/validate.hpp"
 
 namespace modar {
@@ -35,22 +35,14 @@ constexpr std::array<std::uint32_t, 256> kSquares = make_squares();
 constexpr std::uint32_t kLeastSquare = 62451;
 constexpr std::uint32_t kGreatestSquare = 67651;
 
+/// Takes back what made a sort key of the bits.
 double lane_value(std::int16_t key, const AttributeRecord& position) {
-  const auto bits = static_cast<std::uint16_t>(key);
-  switch (static_cast<ComponentType>(position.type)) {
-    case ComponentType::kHalf: {
-      const auto half = static_cast<std::uint16_t>(key < 0 ? bits ^ 0x7FFFu : bits);
-      return static_cast<double>(half_to_float(half));
-    }
-    case ComponentType::kU16: {
-      const double c = bits ^ 0x8000u;
-      return position.normalised != 0 ? c / 65535.0 : c;
-    }
-    default: {
-      const double c = key;
-      return position.normalised != 0 ? (2.0 * c + 1.0) / 65535.0 : c;
-    }
-  }
+  auto bits = static_cast<std::uint16_t>(key);
+  const auto type = static_cast<ComponentType>(position.type);
+  if (type == ComponentType::kHalf && key < 0) bits ^= 0x7FFFu;
+  if (type == ComponentType::kU16) bits ^= 0x8000u;
+  return decode_component(reinterpret_cast<const std::byte*>(&bits), position.type,
+                          position.normalised != 0);
 }
 
 }  // namespace

@@ -199,21 +199,6 @@ void check_chunks(FaultLog& log, const BundleParts& parts, const ModelRecord& mo
 
 }  // namespace
 
-std::uint32_t component_bytes(std::uint8_t type) {
-  switch (static_cast<ComponentType>(type)) {
-    case ComponentType::kI8:
-    case ComponentType::kU8:
-      return 1;
-    case ComponentType::kHalf:
-    case ComponentType::kI16:
-    case ComponentType::kU16:
-      return 2;
-    case ComponentType::kF32:
-      return 4;
-  }
-  return 0;
-}
-
 void validate_models(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.layouts.size() && !log.stop(); ++i) {
     check_layout(RecordCheck(log, parts, "layout", i), parts.layouts[i]);

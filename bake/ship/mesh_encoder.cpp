@@ -7,6 +7,7 @@
 
 #include <zstd.h>
 
+#include "formats/component.hpp"
 #include "formats/transport/vertex_streams.hpp"
 #include "modar/mesh_transport.hpp"
 
@@ -20,7 +21,7 @@ DracoInput distinct_values(const VertexStream& stream, std::span<const std::byte
                            std::size_t stride) {
   DracoInput input;
   input.components = stream.attribute.components;
-  const std::size_t size = std::size_t{input.components} * stream.component_bytes();
+  const std::size_t size = std::size_t{input.components} * component_bytes(stream.attribute.type);
   std::map<std::string_view, std::uint32_t> known;
   for (std::size_t at = 0; at < vertices.size(); at += stride) {
     const std::byte* vertex = vertices.data() + at;

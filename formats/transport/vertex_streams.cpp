@@ -119,31 +119,22 @@ std::array<std::int32_t, 3> octahedral_of_snorm8(std::array<std::int8_t, 3> byte
   return best;
 }
 
-std::uint32_t VertexStream::component_bytes() const {
-  const auto type = static_cast<ComponentType>(attribute.type);
-  return type == ComponentType::kI8 || type == ComponentType::kU8 ? 1 : 2;
-}
-
 std::int32_t VertexStream::load(const std::byte* vertex, std::uint32_t c) const {
-  const std::byte* at = vertex + attribute.offset + c * component_bytes();
-  const auto read = [&]<class T>(T value) {
-    std::memcpy(&value, at, sizeof value);
-    return static_cast<std::int32_t>(value);
-  };
+  const std::byte* at = vertex + attribute.offset + c * component_bytes(attribute.type);
   switch (static_cast<ComponentType>(attribute.type)) {
     case ComponentType::kI8:
-      return read(std::int8_t{});
+      return load_number<std::int8_t>(at);
     case ComponentType::kU8:
-      return read(std::uint8_t{});
+      return load_number<std::uint8_t>(at);
     case ComponentType::kI16:
-      return read(std::int16_t{});
+      return load_number<std::int16_t>(at);
     default:
-      return read(std::uint16_t{});
+      return load_number<std::uint16_t>(at);
   }
 }
 
 bool VertexStream::store(std::byte* vertex, std::uint32_t c, std::int32_t value) const {
-  std::byte* at = vertex + attribute.offset + c * component_bytes();
+  std::byte* at = vertex + attribute.offset + c * component_bytes(attribute.type);
   const auto write = [&]<class T>(T narrow) {
     narrow = static_cast<T>(value);
     std::memcpy(at, &narrow, sizeof narrow);
@@ -170,7 +161,7 @@ std::optional<std::vector<VertexStream>> plan_streams(std::uint32_t stride,
     if (type < ComponentType::kHalf || type > ComponentType::kU8) return std::nullopt;
     VertexStream stream{Kind::kOther, a};
     if (a.components == 0 || a.components > 4 ||
-        a.offset + a.components * stream.component_bytes() > stride) {
+        a.offset + a.components * component_bytes(a.type) > stride) {
       return std::nullopt;
     }
     switch (static_cast<Semantic>(a.semantic)) {

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "formats/component.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -47,7 +48,6 @@ struct VertexStream {
   };
   Kind kind = Kind::kOther;
   AttributeRecord attribute{};
-  [[nodiscard]] std::uint32_t component_bytes() const;
   /// Component `c` of the vertex at `vertex` as the integer that its bits are.
   [[nodiscard]] std::int32_t load(const std::byte* vertex, std::uint32_t c) const;
   /// Errors: false if the value does not fit.
