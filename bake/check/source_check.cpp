@@ -9,11 +9,11 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "bake/check/triangle_tree.hpp"
 #include "bake/check/workstation_issues.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/pack/vertex_decoder.hpp"
 #include "bake/mesh/tri_mesh.hpp"
+#include "bake/mesh/triangle_tree.hpp"
 #include "bake/texture/texture.hpp"
 
 namespace modar {
@@ -32,7 +32,7 @@ constexpr double kLeastTexturePsnr = 30.0;
 struct Surface {
   std::vector<glm::dvec3> positions;
   std::vector<glm::dvec4> colours;  ///< empty, or one a position
-  std::vector<Triangle> triangles;
+  std::vector<TriangleTree::Triangle> triangles;
 };
 
 Surface surface_of(const BundleView& bundle, const ModelRecord& model) {
@@ -70,7 +70,7 @@ Surface surface_of(const TriMesh& mesh) {
 }
 
 /// Greatest distance of the one's vertices and triangle centres to the other.
-double greatest_distance(const Surface& from, const TriangleTree& to) {
+double greatest_distance(const Surface& from, TriangleTree& to) {
   const std::size_t count = from.positions.size() + from.triangles.size();
   const std::size_t step = (count + kMaxSamples - 1) / kMaxSamples;
   double greatest = 0;
@@ -79,23 +79,23 @@ double greatest_distance(const Surface& from, const TriangleTree& to) {
     if (i < from.positions.size()) {
       point = from.positions[i];
     } else {
-      const Triangle& t = from.triangles[i - from.positions.size()];
+      const TriangleTree::Triangle& t = from.triangles[i - from.positions.size()];
       point = (from.positions[t[0]] + from.positions[t[1]] + from.positions[t[2]]) / 3.0;
     }
-    greatest = std::max(greatest, to.nearest(point).distance);
+    greatest = std::max(greatest, to.nearest(point));
   }
-  return greatest;
+  return std::sqrt(greatest);
 }
 
 /// Greatest difference of a vertex's colour from the source's at the nearest point.
-double colour_error(const Surface& bundle, const Surface& source, const TriangleTree& tree) {
+double colour_error(const Surface& bundle, const Surface& source, TriangleTree& tree) {
   if (bundle.colours.empty() || source.colours.empty()) return 0;
   const std::size_t step = (bundle.positions.size() + kMaxSamples - 1) / kMaxSamples;
   double greatest = 0;
   for (std::size_t i = 0; i < bundle.positions.size(); i += step) {
-    const auto nearest = tree.nearest(bundle.positions[i]);
+    tree.nearest(bundle.positions[i]);
     double least = 1;
-    for (const std::uint32_t v : source.triangles[nearest.triangle]) {
+    for (const std::uint32_t v : tree.last_triangle()) {
       const glm::dvec4 off = glm::abs(bundle.colours[i] - source.colours[v]);
       least = std::min(least, std::max({off.x, off.y, off.z}));
     }
@@ -210,8 +210,8 @@ class SourceCheck {
     StageTimer timer(report, "measure");
     const Surface ours = surface_of(bundle_, model);
     const Surface theirs = surface_of(*mesh);
-    const TriangleTree our_tree(ours.positions, ours.triangles);
-    const TriangleTree their_tree(theirs.positions, theirs.triangles);
+    TriangleTree our_tree(ours.positions, ours.triangles);
+    TriangleTree their_tree(theirs.positions, theirs.triangles);
     ModelFit fit;
     fit.name = bundle_.name(model.name);
     fit.same_bytes = same_model(model);

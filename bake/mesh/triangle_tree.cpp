@@ -2,6 +2,7 @@
 #include "bake/mesh/triangle_tree.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -9,7 +10,7 @@
 namespace modar {
 namespace {
 
-constexpr std::uint32_t kLeaf = 4;
+constexpr std::uint32_t kLeaf = 4;  ///< triangles of a leaf, set by hand: fewer take more nodes
 /// Of the squared lengths of two sides: triangles of a lesser squared area have no plane.
 constexpr double kFlat = 1e-18;
 
@@ -80,6 +81,15 @@ inline Foot foot_of(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, dou
   return {plane, of_b / area, of_c / area};
 }
 
+std::vector<TriangleTree::Triangle> triples(std::span<const std::uint16_t> indices) {
+  std::vector<TriangleTree::Triangle> triangles;
+  triangles.reserve(indices.size() / 3);
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
+  }
+  return triangles;
+}
+
 }  // namespace
 
 double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
@@ -90,29 +100,28 @@ Foot nearest_foot(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
   return foot_of(p, t, std::numeric_limits<double>::infinity());
 }
 
-LevelTree::LevelTree(std::span<const glm::dvec3> positions,
-                     std::span<const std::uint16_t> indices) {
-  triangles_.reserve(indices.size() / 3);
-  for (std::size_t i = 0; i < indices.size(); i += 3) {
-    triangles_.push_back(
-        {positions[indices[i]], positions[indices[i + 1]], positions[indices[i + 2]]});
-  }
+TriangleTree::TriangleTree(std::span<const glm::dvec3> positions, std::vector<Triangle> triangles)
+    : positions_(positions), triangles_(std::move(triangles)) {
   nodes_.reserve(triangles_.size());
   nodes_.emplace_back();
   build(0, 0, static_cast<std::uint32_t>(triangles_.size()));
 }
 
-void LevelTree::set_box(Node& node, std::uint32_t first, std::uint32_t count) const {
-  node.low = node.high = triangles_[first][0];
+TriangleTree::TriangleTree(std::span<const glm::dvec3> positions,
+                           std::span<const std::uint16_t> indices)
+    : TriangleTree(positions, triples(indices)) {}
+
+void TriangleTree::set_box(Node& node, std::uint32_t first, std::uint32_t count) const {
+  node.low = node.high = positions_[triangles_[first][0]];
   for (std::uint32_t t = first; t < first + count; ++t) {
-    for (const glm::dvec3& corner : triangles_[t]) {
-      node.low = glm::min(node.low, corner);
-      node.high = glm::max(node.high, corner);
+    for (const std::uint32_t v : triangles_[t]) {
+      node.low = glm::min(node.low, positions_[v]);
+      node.high = glm::max(node.high, positions_[v]);
     }
   }
 }
 
-void LevelTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
+void TriangleTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
   set_box(nodes_[node], first, count);
   if (count <= kLeaf) {
     nodes_[node].first = first;
@@ -121,10 +130,12 @@ void LevelTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t cou
   }
   const glm::dvec3 side = nodes_[node].high - nodes_[node].low;
   const int axis = side.x >= side.y && side.x >= side.z ? 0 : (side.y >= side.z ? 1 : 2);
+  const auto centre = [this, axis](const Triangle& t) {
+    return positions_[t[0]][axis] + positions_[t[1]][axis] + positions_[t[2]][axis];
+  };
   const auto begin = triangles_.begin() + first;
-  std::nth_element(begin, begin + count / 2, begin + count, [axis](const auto& a, const auto& b) {
-    return a[0][axis] + a[1][axis] + a[2][axis] < b[0][axis] + b[1][axis] + b[2][axis];
-  });
+  std::nth_element(begin, begin + count / 2, begin + count,
+                   [&](const Triangle& a, const Triangle& b) { return centre(a) < centre(b); });
   const auto left = static_cast<std::uint32_t>(nodes_.size());
   nodes_[node].first = left;
   nodes_.resize(nodes_.size() + 2);
@@ -132,14 +143,15 @@ void LevelTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t cou
   build(left + 1, first + count / 2, count - count / 2);
 }
 
-double LevelTree::nearest(const glm::dvec3& point, double enough) {
-  double best = distance_square(point, triangles_[last_]);
+double TriangleTree::nearest(const glm::dvec3& point, double enough) {
+  double best = distance_square(point, corners(last_));
   if (best <= enough) return best;
   struct Entry {
     std::uint32_t node;
     double distance;
   };
-  std::array<Entry, 64> stack;  // the tree is at most 2 * 17 deep: 16-bit chunks
+  std::array<Entry, 64>
+      stack;  // two entries a level; halving 2^32 triangles takes 32 levels
   std::size_t size = 0;
   stack[size++] = {0, box_distance_square(point, nodes_[0].low, nodes_[0].high)};
   while (size > 0) {
@@ -147,7 +159,7 @@ double LevelTree::nearest(const glm::dvec3& point, double enough) {
     if (entry.distance >= best) continue;
     const Node& node = nodes_[entry.node];
     for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
-      const double distance = distance_square(point, triangles_[t], best);
+      const double distance = distance_square(point, corners(t), best);
       if (distance >= best) continue;
       best = distance;
       last_ = t;

@@ -1,4 +1,4 @@
-// A tree of boxes over triangles: which one is nearest to a point?
+// A tree of boxes over triangles: which triangle is nearest to a point?
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@
 namespace modar {
 
 /// Square of the distance of a point from a triangle (Ericson, "Real-Time Collision Detection",
-/// 5.1.5). Flat triangles give the distance of one of their corners or edges. Where it is not below
-/// `best`, any number that is not.
+/// 2005, 5.1.5). Triangles without area give the distance of one of their corners or edges. Where
+/// it is not below `best`, any number that is not.
 double distance_square(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle,
                        double best = std::numeric_limits<double>::infinity());
 
@@ -26,29 +26,41 @@ struct Foot {
 };
 Foot nearest_foot(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle);
 
-class LevelTree {
+/// A bounding volume tree, split at the medians of the triangles' centres.
+class TriangleTree {
  public:
-  /// At least one triangle.
-  LevelTree(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
+  using Triangle = std::array<std::uint32_t, 3>;  ///< of positions
+
+  /// At least one triangle, every index below positions.size(). The positions are the caller's and
+  /// must outlive the tree.
+  TriangleTree(std::span<const glm::dvec3> positions, std::vector<Triangle> triangles);
+  TriangleTree(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
 
   /// Square of the distance of the nearest triangle; where some triangle is within `enough` (a
-  /// square), that of any such triangle. Remembers the answer: neighbours ask for it again.
-  double nearest(const glm::dvec3& point, double enough);
-  /// The triangle that nearest() answered last.
-  [[nodiscard]] const std::array<glm::dvec3, 3>& last() const { return triangles_[last_]; }
+  /// square), that of any such triangle. Remembers the answer: neighbouring points ask for it
+  /// again.
+  double nearest(const glm::dvec3& point, double enough = 0);
+  /// The triangle that nearest() answered last, and its corners.
+  [[nodiscard]] const Triangle& last_triangle() const { return triangles_[last_]; }
+  [[nodiscard]] std::array<glm::dvec3, 3> last() const { return corners(last_); }
 
  private:
   struct Node {
     glm::dvec3 low;
     glm::dvec3 high;
     std::uint32_t first = 0;  // leaf: triangle; else the left child, the right one behind it
-    std::uint32_t count = 0;  // of triangles, 0: no leaf
+    std::uint32_t count = 0;  // of triangles; 0: an inner node
   };
+  [[nodiscard]] std::array<glm::dvec3, 3> corners(std::uint32_t t) const {
+    const Triangle& v = triangles_[t];
+    return {positions_[v[0]], positions_[v[1]], positions_[v[2]]};
+  }
   void build(std::uint32_t node, std::uint32_t first, std::uint32_t count);
   void set_box(Node& node, std::uint32_t first, std::uint32_t count) const;
 
+  std::span<const glm::dvec3> positions_;
+  std::vector<Triangle> triangles_;
   std::vector<Node> nodes_;
-  std::vector<std::array<glm::dvec3, 3>> triangles_;
   std::uint32_t last_ = 0;
 };
 

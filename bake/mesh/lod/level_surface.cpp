@@ -42,8 +42,8 @@ std::vector<std::uint32_t> LevelSurface::triangles_of_vertices() const {
   return result;
 }
 
-LevelTree& LevelSurface::tree() {
-  if (!tree_) tree_ = std::make_unique<LevelTree>(positions_, indices_);
+TriangleTree& LevelSurface::tree() {
+  if (!tree_) tree_ = std::make_unique<TriangleTree>(positions_, indices_);
   return *tree_;
 }
 

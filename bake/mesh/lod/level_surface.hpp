@@ -33,13 +33,13 @@ class LevelSurface {
   /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
   [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
   /// Made when it is first asked for.
-  LevelTree& tree();
+  TriangleTree& tree();
 
  private:
   std::span<const glm::dvec3> positions_;
   std::span<const std::uint16_t> indices_;
   std::vector<std::uint32_t> neighbours_;
-  std::unique_ptr<LevelTree> tree_;
+  std::unique_ptr<TriangleTree> tree_;
 };
 
 }  // namespace modar

@@ -159,7 +159,7 @@ class Bounder {
   }
 
   bool accept(const Piece& piece, bool at_once) {
-    LevelTree& tree = to_.tree();
+    TriangleTree& tree = to_.tree();
     const glm::dvec3 middle = piece.middle();
     double radius = 0;
     for (const glm::dvec3& corner : piece.all()) {

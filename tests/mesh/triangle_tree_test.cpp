@@ -1,9 +1,10 @@
 // The tree finds what trying every triangle finds; nearest points are nearest by a fine raster.
-#include "bake/check/triangle_tree.hpp"
+#include "bake/mesh/triangle_tree.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include <glm/geometric.hpp>
@@ -32,7 +33,9 @@ TEST(TriangleTree, NearestPointsOfATriangleBeatARaster) {
         least = std::min(least, glm::length(q - p));
       }
     }
-    const double found = glm::length(nearest_on_triangle(p, a, b, c) - p);
+    const double found = std::sqrt(distance_square(p, {a, b, c}));
+    const Foot foot = nearest_foot(p, {a, b, c});
+    EXPECT_NEAR(glm::length(a + foot.b * (b - a) + foot.c * (c - a) - p), found, 1e-12);
     EXPECT_LE(found, least + 1e-12);
     EXPECT_GE(found, least - 0.05);  // the raster is that coarse
   }
@@ -42,22 +45,23 @@ TEST(TriangleTree, FindsWhatTryingAllFinds) {
   std::mt19937 random(4);
   for (const std::size_t count : {1u, 4u, 5u, 300u}) {
     std::vector<glm::dvec3> positions;
-    std::vector<Triangle> triangles;
+    std::vector<TriangleTree::Triangle> triangles;
     for (std::uint32_t t = 0; t < count; ++t) {
       const glm::dvec3 at = draw(random);
       for (int corner = 0; corner < 3; ++corner) positions.push_back(at + 0.1 * draw(random));
       triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
     }
-    const TriangleTree tree(positions, triangles);
+    TriangleTree tree(positions, triangles);
     for (int trial = 0; trial < 200; ++trial) {
       const glm::dvec3 p = 1.5 * draw(random);
       double least = 1e9;
-      for (const Triangle& t : triangles) {
-        least = std::min(least, glm::length(nearest_on_triangle(p, positions[t[0]], positions[t[1]],
-                                                                positions[t[2]]) -
-                                            p));
+      for (const auto& t : triangles) {
+        least = std::min(least,
+                         distance_square(p, {positions[t[0]], positions[t[1]], positions[t[2]]}));
       }
-      EXPECT_EQ(tree.nearest(p).distance, least);
+      EXPECT_EQ(tree.nearest(p), least);
+      const auto& [a, b, c] = tree.last_triangle();
+      EXPECT_EQ(distance_square(p, {positions[a], positions[b], positions[c]}), least);
     }
   }
 }
