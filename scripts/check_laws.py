@@ -32,7 +32,7 @@ THIRD_PARTIES = {
     "CLI/": (r"bake/commands/((calibrate|check|pattern|ship)_)?cli\.cpp",),
     "nlohmann/json_fwd": (r"bake/json\.hpp",),
     "nlohmann/json.hpp": (r"bake/[a-z_/]*json[a-z_]*\.cpp", r"tests/.*"),
-    "rapidjson/": (r"runtime/play/(json_lines|qos_log|recording)\.cpp",
+    "rapidjson/": (r"runtime/play/(frame_report|recording)\.cpp",
                    r"runtime/fetch/(main|release|store)\.cpp", r"tests/.*"),
     "sodium.h": (r"runtime/fetch/(digest|signature)\.cpp", r"bake/ship/keys\.cpp"),
     "zstd.h": (r"runtime/fetch/(piece|mesh_object)\.cpp",

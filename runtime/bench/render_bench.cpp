@@ -1,22 +1,345 @@
-// The rows of `modar bench render`: curves, the article's gains, loading and culling.
+// `modar bench render`: curves of the ModAR paper's ways to draw copies of a model, the paper's
+// gains, loading, and how many triangles culling sends.
 #include "modar/render_bench.hpp"
 
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <memory>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include <GLES2/gl2.h>
+#include <glm/gtc/matrix_transform.hpp>
 
-#include "runtime/bench/cull_bench.hpp"
-#include "runtime/bench/render_curves.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/quantise.hpp"
+#include "modar/camera.hpp"
+#include "modar/mapped_file.hpp"
+#include "modar/renderer.hpp"
+#include "runtime/render/draw_list.hpp"
 
 namespace modar {
 namespace {
 
-/// The article's times for ten copies, its Tables 11 (low end) and 12 (mid range), in its units; in
-/// the order of `Way`, whose last one it does not have.
+/// Summed over views from the model's middle in the six directions of the axes and the eight
+/// between.
+struct CullCounts {
+  std::uint64_t sent = 0;    ///< triangles of the level-0 chunks that frustum culling leaves
+  std::uint64_t needed = 0;  ///< triangles whose own box meets the same frustum
+};
+
+enum Way : std::size_t {
+  kIndexArrays,
+  kIndexVbo,
+  kInstancingArrays,
+  kInstancingVbo,
+  kInstancedArrays,
+  kWays
+};
+inline constexpr std::array<const char*, kWays> kWayNames = {
+    "index_arrays", "index_vbo", "instancing_arrays", "instancing_vbo", "instanced_arrays"};
+
+/// One point of a curve; negative where it was not measured.
+struct CurvePoint {
+  double draw_calls = -1;
+  double state_changes = -1;
+  double bytes = -1;
+  double wall_ms = -1;
+  double cpu_ms = -1;
+  double batch_bytes = -1;
+};
+
+/// Everything that one process draws with.
+struct BenchStage {
+  MappedFile file;
+  std::unique_ptr<GlContext> context;
+  GlCaps caps;
+  BundleView bundle;
+};
+
+float component(const std::byte* bytes, const AttributeRecord& attribute, std::uint32_t index) {
+  switch (static_cast<ComponentType>(attribute.type)) {
+    case ComponentType::kHalf: {
+      std::uint16_t half = 0;
+      std::memcpy(&half, bytes + 2 * index, sizeof half);
+      return half_to_float(half);
+    }
+    case ComponentType::kI16: {
+      std::int16_t value = 0;
+      std::memcpy(&value, bytes + 2 * index, sizeof value);
+      return attribute.normalised != 0 ? std::max(static_cast<float>(value) / 32767.0f, -1.0f)
+                                       : static_cast<float>(value);
+    }
+    case ComponentType::kU16: {
+      std::uint16_t value = 0;
+      std::memcpy(&value, bytes + 2 * index, sizeof value);
+      return attribute.normalised != 0 ? unorm16_to_float(value) : static_cast<float>(value);
+    }
+    case ComponentType::kF32: {
+      float value = 0;
+      std::memcpy(&value, bytes + 4 * index, sizeof value);
+      return value;
+    }
+    case ComponentType::kI8:
+    case ComponentType::kU8:
+      break;
+  }
+  return 0.0f;
+}
+
+AttributeRecord position_of(const LayoutRecord& layout) {
+  for (const AttributeRecord& attribute : layout.attributes) {
+    if (static_cast<Semantic>(attribute.semantic) == Semantic::kPosition) return attribute;
+  }
+  return layout.attributes[0];
+}
+
+/// Boxes of the triangles of a chunk's level 0, as chunks of their own.
+std::vector<ChunkRecord> triangle_boxes(const BundleView& bundle, const LayoutRecord& layout,
+                                        const ChunkRecord& chunk) {
+  const LevelRecord& level = bundle.levels()[chunk.first_level];
+  const AttributeRecord position = position_of(layout);
+  std::vector<ChunkRecord> boxes(level.index_count / 3);
+  for (std::uint32_t i = 0; i < level.index_count; ++i) {
+    std::uint16_t index = 0;
+    std::memcpy(&index, bundle.indices().data() + level.index_offset + 2 * std::uint64_t{i},
+                sizeof index);
+    if (index >= level.vertex_count) continue;
+    const std::byte* vertex = bundle.vertices().data() + level.vertex_offset +
+                              std::uint64_t{index} * layout.stride + position.offset;
+    ChunkRecord& box = boxes[i / 3];
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const float value =
+          chunk.position_offset[axis] + chunk.position_step * component(vertex, position, axis);
+      box.bounds_min[axis] = i % 3 == 0 ? value : std::min(box.bounds_min[axis], value);
+      box.bounds_max[axis] = i % 3 == 0 ? value : std::max(box.bounds_max[axis], value);
+    }
+  }
+  return boxes;
+}
+
+std::vector<ModelView> views_from_inside() {
+  std::vector<ModelView> views;
+  const Camera camera = default_camera(480, 800);
+  const glm::mat4 projection = gl_projection(camera, 0.01, 10.0);
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) {
+        const int axes = x * x + y * y + z * z;
+        if (axes != 1 && axes != 3) continue;
+        const glm::vec3 up = x == 0 && y == 0 ? glm::vec3(0, 1, 0) : glm::vec3(0, 0, 1);
+        views.push_back(model_view(projection, glm::lookAt(glm::vec3(0.0f), glm::vec3(x, y, z), up),
+                                   camera.height));
+      }
+    }
+  }
+  return views;
+}
+
+/// Reads every vertex position of level 0 from the bytes.
+CullCounts count_culling(const BundleView& bundle, std::uint32_t model) {
+  const std::vector<ModelView> views = views_from_inside();
+  const ModelRecord& record = bundle.models()[model];
+  CullCounts counts;
+  for (std::uint32_t c = record.first_chunk; c < record.first_chunk + record.chunk_count; ++c) {
+    const ChunkRecord& chunk = bundle.chunks()[c];
+    const std::vector<ChunkRecord> boxes =
+        triangle_boxes(bundle, bundle.layouts()[record.layout], chunk);
+    for (const ModelView& view : views) {
+      if (!outside_frustum(view, chunk)) counts.sent += boxes.size();
+      counts.needed += static_cast<std::uint64_t>(std::ranges::count_if(
+          boxes, [&](const ChunkRecord& box) { return !outside_frustum(view, box); }));
+    }
+  }
+  return counts;
+}
+
+/// Milliseconds of a clock of the system.
+double clock_ms(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
+
+/// Of values in any order; they are shuffled.
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Copies on a grid before the camera, a turn apart, all in view.
+std::vector<DrawItem> grid(std::uint32_t model, int copies) {
+  std::vector<DrawItem> items;
+  for (int i = 0; i < copies; ++i) {
+    const float x = static_cast<float>(i % 3 - 1) * 1.2f;
+    const float y = static_cast<float>(i / 3 % 4) * 1.2f - 1.8f;
+    const glm::mat4 place = glm::translate(glm::mat4(1.0f), glm::vec3(x, y, -8.0f));
+    const glm::mat4 turned =
+        glm::rotate(place, 0.5f * static_cast<float>(i), glm::vec3(0.0f, 1.0f, 0.0f));
+    items.push_back({model, glm::scale(turned, glm::vec3(0.55f))});
+  }
+  return items;
+}
+
+RenderOptions options_of(Way way) {
+  RenderOptions options;
+  options.exclusive_context = true;
+  options.client_arrays = way == kIndexArrays || way == kInstancingArrays;
+  options.instancing = way != kIndexArrays && way != kIndexVbo;
+  options.lod_pixels = 0.0f;
+  return options;
+}
+
+CurvePoint measure(Renderer& renderer, Way way, std::span<const DrawItem> items,
+                   const RenderBenchOptions& options) {
+  const glm::mat4 projection =
+      gl_projection(default_camera(options.width, options.height), 0.1, 100.0);
+  renderer.set_options(options_of(way));
+  const auto frame = [&] {
+    renderer.render(RgbImage{}, projection, items);
+    glFinish();
+  };
+  for (int i = 0; i < 3; ++i) frame();
+  std::vector<double> walls;
+  std::vector<double> cpus;
+  for (int i = 0; i < options.frames; ++i) {
+    const double wall = clock_ms(CLOCK_MONOTONIC);
+    const double cpu = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
+    frame();
+    cpus.push_back(clock_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu);
+    walls.push_back(clock_ms(CLOCK_MONOTONIC) - wall);
+  }
+  const RenderStats& stats = renderer.stats();
+  return {static_cast<double>(stats.draw_calls),
+          static_cast<double>(stats.state_changes),
+          static_cast<double>(stats.bytes_uploaded),
+          median(walls),
+          median(cpus),
+          static_cast<double>(renderer.gpu_memory().batches)};
+}
+
+Result<std::unique_ptr<Renderer>> renderer_of(const BenchStage& stage, bool instanced_arrays,
+                                              const RenderBenchOptions& options) {
+  GlCaps caps = stage.caps;
+  caps.instanced_arrays = caps.instanced_arrays && instanced_arrays;
+  auto renderer = Renderer::create(stage.bundle, caps);
+  if (!renderer) return renderer;
+  MODAR_TRY((*renderer)->resize(options.width, options.height));
+  return renderer;
+}
+
+Result<BenchStage> open_stage(const std::string& path, const RenderBenchOptions& options) {
+  MODAR_ASSIGN(MappedFile file, MappedFile::open(path));
+  MODAR_ASSIGN(const BundleView bundle, BundleView::open(file.bytes()));
+  MODAR_ASSIGN(std::unique_ptr<GlContext> context, GlContext::create_offscreen());
+  GlCaps caps = probe_gl_caps();
+  if (!options.device.empty()) {
+    MODAR_ASSIGN(const GlCaps masked, mask_gl_caps(caps, options.device));
+    caps = masked;
+  }
+  // Every buffer stays, whatever the profile's memory: the ways are compared, not the eviction.
+  caps.gpu_memory = 0;
+  return BenchStage{std::move(file), std::move(context), caps, bundle};
+}
+
+/// The models of a bundle that have a curve.
+std::vector<std::uint32_t> curve_models(const BundleView& bundle,
+                                        const RenderBenchOptions& options) {
+  std::vector<std::uint32_t> models;
+  for (std::uint32_t i = 0; i < bundle.models().size(); ++i) {
+    if (bundle.models()[i].triangle_count <= options.most_triangles) models.push_back(i);
+  }
+  return models;
+}
+
+/// Curves of these models, all ways and numbers of copies, in that order.
+Result<std::vector<CurvePoint>> measure_curves(const BenchStage& stage,
+                                               const RenderBenchOptions& options) {
+  const std::vector<std::uint32_t> models = curve_models(stage.bundle, options);
+  std::vector<CurvePoint> points;
+  if (models.empty()) return points;
+  MODAR_ASSIGN(const auto plain, renderer_of(stage, false, options));
+  MODAR_ASSIGN(const auto instanced, renderer_of(stage, true, options));
+  const std::size_t all = models.size() * kWays * static_cast<std::size_t>(options.most_copies);
+  for (const std::uint32_t model : models) {
+    for (std::size_t way = 0; way < kWays; ++way) {
+      const bool extension = way == kInstancedArrays;
+      Renderer& renderer = extension ? *instanced : *plain;
+      for (int copies = 1; copies <= options.most_copies; ++copies) {
+        const bool skip = extension && !stage.caps.instanced_arrays;
+        points.push_back(
+            skip ? CurvePoint()
+                 : measure(renderer, static_cast<Way>(way), grid(model, copies), options));
+        if (options.progress) options.progress(points.size(), all);
+      }
+    }
+  }
+  return points;
+}
+
+bool write_all(int descriptor, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// The child's whole life: draws without a rasteriser, answers through the pipe.
+[[noreturn]] void draw_idle(const std::string& path, RenderBenchOptions options, int answers) {
+  ::setenv("GALLIUM_NOOP", "1", 1);
+  options.frames = options.idle_frames;
+  options.progress = nullptr;
+  const Result<BenchStage> stage = open_stage(path, options);
+  bool done = false;
+  if (stage && stage->caps.version.find("Mesa") != std::string::npos) {
+    const auto points = measure_curves(*stage, options);
+    done = points && write_all(answers, std::as_bytes(std::span(*points)));
+  }
+  // Not exit(): what the parent registered to run at its end is not ours to run.
+  ::_exit(done ? 0 : 1);
+}
+
+/// The same in a child process whose Mesa draws nothing; empty where that fails.
+std::vector<CurvePoint> curves_without_drawing(const std::string& path,
+                                               const RenderBenchOptions& options) {
+  int ends[2] = {-1, -1};
+  if (options.idle_frames < 1 || ::pipe(ends) != 0) return {};
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::close(ends[0]);
+    draw_idle(path, options, ends[1]);
+  }
+  ::close(ends[1]);
+  std::vector<std::byte> bytes;
+  std::array<std::byte, 4096> part{};
+  ssize_t count = 0;
+  while (child > 0 && (count = ::read(ends[0], part.data(), part.size())) > 0) {
+    bytes.insert(bytes.end(), part.begin(), part.begin() + count);
+  }
+  ::close(ends[0]);
+  int status = 1;
+  if (child > 0) ::waitpid(child, &status, 0);
+  if (status != 0 || bytes.size() % sizeof(CurvePoint) != 0) return {};
+  std::vector<CurvePoint> points(bytes.size() / sizeof(CurvePoint));
+  std::copy(bytes.begin(), bytes.end(), std::as_writable_bytes(std::span(points)).begin());
+  return points;
+}
+
+/// The ModAR paper's times for ten copies, its Tables 11 (low end) and 12 (mid range), in its
+/// units; in the order of `Way`, whose last one it does not have.
 struct PaperTimes {
   const char* model;
   double low_end[4];
@@ -122,11 +445,11 @@ Result<void> add_load(const BenchStage& stage, const std::string& path, Rows& ro
     const bool opened = file && BundleView::open(file->bytes());
     if (opened) opens.push_back(clock_ms(CLOCK_PROCESS_CPUTIME_ID) - start);
     start = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
-    const Result<std::unique_ptr<Renderer>> renderer = Renderer::create(stage.bundle, stage.caps);
-    if (!renderer) return tl::unexpected<Error>(renderer.error());
+    MODAR_ASSIGN(const std::unique_ptr<Renderer> renderer,
+                 Renderer::create(stage.bundle, stage.caps));
     glFinish();
     loads.push_back(clock_ms(CLOCK_PROCESS_CPUTIME_ID) - start);
-    memory = (*renderer)->gpu_memory();
+    memory = renderer->gpu_memory();
     start = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
     std::vector<std::byte> copy;
     copy.reserve(size);
@@ -148,25 +471,23 @@ Result<void> add_load(const BenchStage& stage, const std::string& path, Rows& ro
 /// All rows of one bundle.
 Result<void> add_bundle(const std::string& path, std::span<const CurvePoint> idle,
                         const RenderBenchOptions& options, Rows& rows) {
-  const Result<BenchStage> stage = open_stage(path, options);
-  if (!stage) return tl::unexpected<Error>(stage.error());
-  const Result<std::vector<CurvePoint>> drawn = measure_curves(*stage, options);
-  if (!drawn) return tl::unexpected<Error>(drawn.error());
+  MODAR_ASSIGN(const BenchStage stage, open_stage(path, options));
+  MODAR_ASSIGN(const std::vector<CurvePoint> drawn, measure_curves(stage, options));
   const std::size_t copies = static_cast<std::size_t>(options.most_copies);
   std::size_t first = 0;
   const auto name = [&](std::uint32_t model) {
-    return std::string(stage->bundle.name(stage->bundle.models()[model].name));
+    return std::string(stage.bundle.name(stage.bundle.models()[model].name));
   };
-  for (const std::uint32_t model : curve_models(stage->bundle, options)) {
-    Curves curves{name(model), std::span(*drawn).subspan(first, kWays * copies), {}, copies};
-    if (idle.size() == drawn->size()) curves.idle = idle.subspan(first, kWays * copies);
+  for (const std::uint32_t model : curve_models(stage.bundle, options)) {
+    Curves curves{name(model), std::span(drawn).subspan(first, kWays * copies), {}, copies};
+    if (idle.size() == drawn.size()) curves.idle = idle.subspan(first, kWays * copies);
     for (std::size_t way = kIndexVbo; way < kWays; ++way) add_curve(curves, way, rows);
     add_paper_gains(curves, rows);
     first += kWays * copies;
   }
-  if (auto loaded = add_load(*stage, path, rows); !loaded) return loaded;
-  for (std::uint32_t model = 0; model < stage->bundle.models().size(); ++model) {
-    const CullCounts counts = count_culling(stage->bundle, model);
+  MODAR_TRY(add_load(stage, path, rows));
+  for (std::uint32_t model = 0; model < stage.bundle.models().size(); ++model) {
+    const CullCounts counts = count_culling(stage.bundle, model);
     rows.add(name(model) + " inside triangles_sent", static_cast<double>(counts.sent),
              static_cast<double>(counts.needed));
   }
@@ -185,8 +506,7 @@ Result<std::vector<RenderBenchRow>> bench_render(std::span<const std::string> bu
   std::vector<RenderBenchRow> result;
   Rows rows(result);
   for (std::size_t i = 0; i < bundle_paths.size(); ++i) {
-    const Result<void> added = add_bundle(bundle_paths[i], idle[i], options, rows);
-    if (!added) return tl::unexpected<Error>(added.error());
+    MODAR_TRY(add_bundle(bundle_paths[i], idle[i], options, rows));
   }
   return result;
 }

@@ -1,8 +1,10 @@
-// modar.h: bundles, their names and scenes.
+// modar.h: bundles with their names and scenes; the camera, and from a pose to GL's matrices.
+// Nothing of the tracker and nothing of the renderer: what both halves share.
 #include <memory>
 #include <new>
 #include <utility>
 
+#include "modar/pose.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
 
@@ -86,4 +88,33 @@ int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scen
   scene->model = record.model;
   modar::copy_matrix(modar::scene_matrix(record), scene->place);
   return 1;
+}
+
+modar_camera modar_camera_default(int width, int height) {
+  const modar::Camera ours = modar::default_camera(width, height);
+  return {ours.width, ours.height, ours.fx, ours.fy, ours.cx, ours.cy, {}};
+}
+
+void modar_projection(const modar_camera* camera, double near_plane, double far_plane,
+                      float projection[16]) {
+  modar::copy_matrix(modar::gl_projection(modar::camera_of(*camera), near_plane, far_plane),
+                     projection);
+}
+
+void modar_view(const modar_pose* pose, float view[16]) {
+  modar::Pose ours;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      ours.rotation[column][row] = static_cast<double>(pose->rotation[3 * row + column]);
+    }
+    ours.translation[row] = static_cast<double>(pose->translation[row]);
+  }
+  modar::copy_matrix(modar::gl_view(ours), view);
+}
+
+void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose) {
+  float view[16];
+  modar_view(pose, view);
+  item->model = scene->model;
+  modar::copy_matrix(glm::make_mat4(view) * glm::make_mat4(scene->place), item->to_eye);
 }

@@ -27,9 +27,8 @@ namespace {
 modar::Result<modar::GlCaps> caps_for(const std::string& device, std::uint64_t gpu_bytes) {
   modar::GlCaps caps = modar::probe_gl_caps();
   if (!device.empty()) {
-    auto masked = modar::mask_gl_caps(caps, device);
-    if (!masked) return masked;
-    caps = *masked;
+    MODAR_ASSIGN(auto masked, modar::mask_gl_caps(caps, device));
+    caps = masked;
   }
   if (gpu_bytes > 0) caps.gpu_memory = gpu_bytes;
   return caps;

@@ -14,8 +14,8 @@ Controls::Controls(const BundleView& bundle, bool outline, bool display)
     : bundle_(bundle), outline_(outline), display_(display) {}
 
 void Controls::apply(const UserAct& act) {
-  constexpr float kStep = 1.1f;
-  constexpr float kMost = 20;
+  constexpr float kStep = 1.1f;  // a key press resizes by 10 %; set by hand
+  constexpr float kMost = 20;    // and by so much at most
   switch (act.act) {
     case Act::kQuit:
       // While corners are taken, it means that none are wanted.

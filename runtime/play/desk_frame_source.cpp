@@ -149,13 +149,11 @@ Result<std::unique_ptr<FrameSource>> open_folder(const std::string& folder) {
 
 /// Ours first; a camera that sends compressed pictures only goes through OpenCV.
 Result<std::unique_ptr<FrameSource>> open_camera(const std::string& input) {
-  const Result<int> number = camera_number(input);
-  if (!number) return tl::unexpected(number.error());
-  auto device = open_video_device("/dev/video" + std::to_string(*number));
-  if (!device) return tl::unexpected(device.error());
-  auto source = start_camera(std::move(*device), input, {});
+  MODAR_ASSIGN(const int number, camera_number(input));
+  MODAR_ASSIGN(auto device, open_video_device("/dev/video" + std::to_string(number)));
+  auto source = start_camera(std::move(device), input, {});
   if (source || source.error().code != "camera.format") return source;
-  cv::VideoCapture capture(*number, cv::CAP_V4L2);
+  cv::VideoCapture capture(number, cv::CAP_V4L2);
   if (!capture.isOpened()) return source;
   capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
   return std::make_unique<VideoSource>(std::move(capture), input, true);

@@ -5,11 +5,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "desk_pictures.hpp"
 #include "formats/atomic_file.hpp"
+#include "frame_report.hpp"
 #include "frame_sink.hpp"
 #include "report_page.hpp"
-#include "run_stats.hpp"
 
 namespace modar {
 namespace {
@@ -18,7 +17,7 @@ namespace {
 /// `stride_` is kept; where they become too many, every second one goes and the stride doubles.
 class ContactSheet {
  public:
-  void add(const RgbaImage& image, const FrameReport& report) {
+  void add(const RgbaView& image, const FrameReport& report) {
     if (count_++ % stride_ != 0) return;
     cells_.push_back(cell(image, report));
     if (cells_.size() < 2 * kCells) return;
@@ -53,7 +52,7 @@ class ContactSheet {
   static constexpr int kCellWidth = 320;
   static constexpr int kLabel = 18;  ///< pixels above the picture for its number and state
 
-  static cv::Mat cell(const RgbaImage& image, const FrameReport& report) {
+  static cv::Mat cell(const RgbaView& image, const FrameReport& report) {
     const cv::Mat whole(image.height, image.width, CV_8UC4,
                         const_cast<std::uint8_t*>(image.pixels.data()));
     const int height = std::max(1, image.height * kCellWidth / image.width);
@@ -89,7 +88,7 @@ class Report final : public FrameSink {
         movie_(std::move(movie)),
         lines_(std::move(lines)) {}
 
-  Result<void> picture(const RgbaImage& image, const FrameReport& report) override {
+  Result<void> picture(const RgbaView& image, const FrameReport& report) override {
     try {
       sheet_.add(image, report);
     } catch (const std::exception& error) {
@@ -105,10 +104,10 @@ class Report final : public FrameSink {
   }
 
   Result<void> finish(std::string_view summary) override {
-    if (auto done = movie_->finish(summary); !done) return done;
-    if (auto done = write_line(summary); !done) return done;
-    if (auto done = lines_.commit(); !done) return done;
-    if (auto done = write_sheet(); !done) return done;
+    MODAR_TRY(movie_->finish(summary));
+    MODAR_TRY(write_line(summary));
+    MODAR_TRY(lines_.commit());
+    MODAR_TRY(write_sheet());
     return write_file(folder_ + "/index.html", report_page(title_, fps_, frames_, stats_));
   }
 
@@ -137,7 +136,7 @@ class Report final : public FrameSink {
   }
 
   Result<void> write_line(std::string_view json) {
-    if (auto done = lines_.write(std::as_bytes(std::span(json))); !done) return done;
+    MODAR_TRY(lines_.write(std::as_bytes(std::span(json))));
     return lines_.write(std::as_bytes(std::span("\n", 1)));
   }
 
@@ -168,13 +167,11 @@ class Report final : public FrameSink {
 Result<std::unique_ptr<FrameSink>> open_report(const std::string& folder, double fps,
                                                const ReportTitle& title,
                                                std::span<const std::string> pattern_names) {
-  if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
-  auto movie = open_frame_sink(folder + "/overlay.mp4", fps);
-  if (!movie) return movie;
-  auto lines = AtomicFile::create(folder + "/frames.jsonl");
-  if (!lines) return tl::unexpected(lines.error());
-  return std::make_unique<Report>(folder, fps, title, pattern_names, std::move(*movie),
-                                  std::move(*lines));
+  MODAR_TRY(make_folder(folder));
+  MODAR_ASSIGN(auto movie, open_frame_sink(folder + "/overlay.mp4", fps));
+  MODAR_ASSIGN(auto lines, AtomicFile::create(folder + "/frames.jsonl"));
+  return std::make_unique<Report>(folder, fps, title, pattern_names, std::move(movie),
+                                  std::move(lines));
 }
 
 }  // namespace modar

@@ -9,11 +9,9 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "desk_pictures.hpp"
-#include "faststart.hpp"
 #include "formats/atomic_file.hpp"
 #include "frame_sink.hpp"
-#include "picture_file.hpp"
+#include "modar/mapped_file.hpp"
 
 namespace modar {
 namespace {
@@ -24,7 +22,7 @@ tl::unexpected<Error> opencv_failed(const std::string& where, const char* what) 
 }
 
 /// The pixels as OpenCV takes them, not copied; nothing here writes through it.
-cv::Mat wrap(const RgbaImage& image) {
+cv::Mat wrap(const RgbaView& image) {
   return {image.height, image.width, CV_8UC4, const_cast<std::uint8_t*>(image.pixels.data())};
 }
 
@@ -32,7 +30,7 @@ class PngFolder final : public FrameSink {
  public:
   explicit PngFolder(std::string folder) : folder_(std::move(folder)) {}
 
-  Result<void> picture(const RgbaImage& image, const FrameReport& report) override {
+  Result<void> picture(const RgbaView& image, const FrameReport& report) override {
     char name[40];
     std::snprintf(name, sizeof name, "/frame_%06llu.png",
                   static_cast<unsigned long long>(report.frame));
@@ -45,7 +43,7 @@ class PngFolder final : public FrameSink {
   std::string folder_;
 };
 
-/// The encoder writes beside the movie's place; finish() moves the index first and puts it there.
+/// The encoder writes beside the movie's place; finish() puts it there.
 class Movie final : public FrameSink {
  public:
   Movie(std::string path, double fps)
@@ -58,10 +56,10 @@ class Movie final : public FrameSink {
     std::remove(temporary_.c_str());
   }
 
-  Result<void> picture(const RgbaImage& image, const FrameReport& report) override {
+  Result<void> picture(const RgbaView& image, const FrameReport& report) override {
     try {
       if (!writer_.isOpened()) {
-        if (auto opened = open(image); !opened) return opened;
+        MODAR_TRY(open(image));
       }
       if (image.width != width_ || image.height != height_) {
         return fail(ExitCode::kInvalidInput, "out.size-changed", path_,
@@ -86,11 +84,12 @@ class Movie final : public FrameSink {
     } catch (const std::exception& error) {
       return opencv_failed(path_, error.what());
     }
-    return write_faststart(temporary_, path_);
+    MODAR_ASSIGN(const MappedFile movie, MappedFile::open(temporary_));
+    return write_file(path_, movie.bytes());
   }
 
  private:
-  Result<void> open(const RgbaImage& image) {
+  Result<void> open(const RgbaView& image) {
     width_ = image.width;
     height_ = image.height;
     // Chroma of half size needs even sides: an odd last row or column is left out.
@@ -126,7 +125,7 @@ std::string parent_of(const std::string& path) {
 
 }  // namespace
 
-Result<void> write_png(const std::string& path, const RgbaImage& image) {
+Result<void> write_png(const std::string& path, const RgbaView& image) {
   std::vector<std::uint8_t> file;
   try {
     cv::Mat bgr;
@@ -160,9 +159,7 @@ Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, doubl
     }
   }
   const bool movie = out.ends_with(".mp4");
-  if (auto made = make_folder(movie ? parent_of(out) : out); !made) {
-    return tl::unexpected(made.error());
-  }
+  MODAR_TRY(make_folder(movie ? parent_of(out) : out));
   if (movie) return std::make_unique<Movie>(out, fps);
   return std::make_unique<PngFolder>(out);
 }

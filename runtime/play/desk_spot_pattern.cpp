@@ -1,22 +1,56 @@
-// Rectifies and describes a pattern through OpenCV, which throws: caught here.
+// A pattern made on the spot: the order of its corners; rectified and described through OpenCV,
+// which throws: caught here.
+#include "spot_pattern.hpp"
+
 #include <algorithm>
 #include <cmath>
 
+#include <glm/geometric.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include <glm/geometric.hpp>
-
 #include "formats/bundle_writer.hpp"
 #include "modar/features.hpp"
-#include "spot_pattern.hpp"
 
 namespace modar {
 namespace {
 
+double cross(glm::dvec2 a, glm::dvec2 b) {
+  return a.x * b.y - a.y * b.x;
+}
+
+}  // namespace
+
+Result<std::array<glm::dvec2, 4>> ordered_corners(const std::array<glm::dvec2, 4>& clicked) {
+  constexpr double kLeastSide = 24;
+  std::array<glm::dvec2, 4> corners = clicked;
+  const glm::dvec2 centre = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
+  const auto angle = [centre](glm::dvec2 p) { return std::atan2(p.y - centre.y, p.x - centre.x); };
+  // y points down, so that growing angles go clockwise on the screen.
+  std::sort(corners.begin(), corners.end(),
+            [&](glm::dvec2 a, glm::dvec2 b) { return angle(a) < angle(b); });
+  const auto top_left =
+      std::min_element(corners.begin(), corners.end(),
+                       [](glm::dvec2 a, glm::dvec2 b) { return a.x + a.y < b.x + b.y; });
+  std::rotate(corners.begin(), top_left, corners.end());
+  bool good = true;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 side = corners[(i + 1) % 4] - corners[i];
+    const glm::dvec2 next = corners[(i + 2) % 4] - corners[(i + 1) % 4];
+    // Twice a triangle's area against its sides: three points in a row make no corner.
+    good = good && glm::length(side) >= kLeastSide &&
+           cross(side, next) > 0.1 * glm::length(side) * glm::length(next);
+  }
+  if (good) return corners;
+  return fail(ExitCode::kUsage, "spot.corners", "", "the four clicks make no four-sided figure",
+              "click the corners of the pattern, at least 24 pixels apart");
+}
+
+namespace {
+
 /// The quadrilateral as a rectangle with the mean of its opposite sides.
 cv::Mat rectified(const RgbImage& frame, const std::array<glm::dvec2, 4>& corners) {
-  constexpr double kMostSide = 640;
+  constexpr double kMostSide = 640;  // pixels: what camera frames show of it; more costs time
   double width =
       0.5 * (glm::distance(corners[0], corners[1]) + glm::distance(corners[3], corners[2]));
   double height =
@@ -44,16 +78,15 @@ cv::Mat rectified(const RgbImage& frame, const std::array<glm::dvec2, 4>& corner
 
 Result<BundleContent> content_of(const cv::Mat& flat, const ParameterSetRecord& asked) {
   const ParameterSetRecord& parameters = asked.id == 0 ? paper_parameter_sets().front() : asked;
-  Result<Features> features = describe_image(
-      {flat.data, flat.cols, flat.rows, static_cast<std::ptrdiff_t>(flat.step)}, parameters);
-  if (!features) return tl::unexpected(features.error());
-  if (features->keypoints.size() < parameters.min_matches) {
+  MODAR_ASSIGN(Features features, describe_image({flat.data, flat.cols, flat.rows,
+                                                  static_cast<std::ptrdiff_t>(flat.step)},
+                                                 parameters));
+  if (features.keypoints.size() < parameters.min_matches) {
     return fail(ExitCode::kInvalidInput, "spot.features", "",
                 "too little is found on it to know it again",
                 "take a pattern with more texture, or hold the camera closer");
   }
-  Result<std::string> yml = features_to_yml(*features);
-  if (!yml) return tl::unexpected(yml.error());
+  MODAR_ASSIGN(std::string yml, features_to_yml(features));
   BundleContent content;
   PatternRecord pattern{};
   pattern.name = content.intern("on the spot");
@@ -67,8 +100,8 @@ Result<BundleContent> content_of(const cv::Mat& flat, const ParameterSetRecord& 
   ParameterSetRecord set = parameters;
   set.name = content.intern(parameter_set_name(set.id));
   content.parameter_sets.push_back(set);
-  content.features.push_back({{set.id, features->descriptor_bytes, std::move(features->keypoints),
-                               std::move(features->descriptors), std::move(*yml)}});
+  content.features.push_back({{set.id, features.descriptor_bytes, std::move(features.keypoints),
+                               std::move(features.descriptors), std::move(yml)}});
   return content;
 }
 
@@ -77,12 +110,10 @@ Result<BundleContent> content_of(const cv::Mat& flat, const ParameterSetRecord& 
 Result<std::shared_ptr<const SpotPattern>> make_spot_pattern(
     const RgbImage& frame, const std::array<glm::dvec2, 4>& clicked,
     const ParameterSetRecord& parameters) {
-  const Result<std::array<glm::dvec2, 4>> corners = ordered_corners(clicked);
-  if (!corners) return tl::unexpected(corners.error());
+  MODAR_ASSIGN(const auto corners, ordered_corners(clicked));
   try {
-    const Result<BundleContent> content = content_of(rectified(frame, *corners), parameters);
-    if (!content) return tl::unexpected(content.error());
-    Result<std::vector<std::byte>> bytes = encode_bundle(*content);
+    MODAR_ASSIGN(const BundleContent content, content_of(rectified(frame, corners), parameters));
+    Result<std::vector<std::byte>> bytes = encode_bundle(content);
     if (!bytes) return tl::unexpected(bytes.error());
     auto pattern = std::make_shared<SpotPattern>();
     pattern->bytes = std::move(*bytes);

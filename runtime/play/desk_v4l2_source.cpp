@@ -13,7 +13,7 @@
 #include <cstring>
 
 #include "pipeline.hpp"
-#include "yuv.hpp"
+#include "raw_source.hpp"
 
 namespace modar {
 namespace {
@@ -76,10 +76,10 @@ class CameraSource final : public FrameSource {
   }
 
   Result<void> start() {
-    if (auto capable = require_capture(); !capable) return capable;
-    if (auto format = choose_format(); !format) return format;
+    MODAR_TRY(require_capture());
+    MODAR_TRY(choose_format());
     choose_rate();
-    if (auto buffers = map_buffers(); !buffers) return buffers;
+    MODAR_TRY(map_buffers());
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     if (const int error = device_->control(VIDIOC_STREAMON, &type)) return failed("start", error);
     streaming_ = true;
@@ -245,7 +245,7 @@ Result<std::unique_ptr<VideoDevice>> open_video_device(const std::string& path) 
 Result<std::unique_ptr<FrameSource>> start_camera(std::unique_ptr<VideoDevice> device,
                                                   const std::string& name, const CameraWish& wish) {
   auto source = std::make_unique<CameraSource>(std::move(device), name, wish);
-  if (auto started = source->start(); !started) return tl::unexpected(started.error());
+  MODAR_TRY(source->start());
   return source;
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "frame_source.hpp"
-#include "wake.hpp"
+#include "pipeline.hpp"
 
 namespace modar {
 

@@ -1,4 +1,4 @@
-// Our loop, and the article's tracker, as a step of the pipeline.
+// Our loop, and the ModAR paper's tracker, as a step of the pipeline.
 #include <memory>
 
 #include "vision.hpp"
@@ -12,7 +12,7 @@ struct State {
   Camera camera;
   std::unique_ptr<PaperTracker> tracker;
   std::shared_ptr<const SpotPattern> spot;  ///< tracked in place of the bundle's patterns
-  TrackStep ours;                           ///< empty: the article's method alone
+  TrackStep ours;                           ///< empty: the paper's method alone
 
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
@@ -25,15 +25,13 @@ struct State {
     if (ours && !spot) return ours(job);
     if (!tracker || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
-      auto created =
-          PaperTracker::create(spot ? spot->view : bundle, options.parameter_set, camera);
-      if (!created) return tl::unexpected(created.error());
-      tracker = std::move(*created);
+      MODAR_ASSIGN(auto created,
+                   PaperTracker::create(spot ? spot->view : bundle, options.parameter_set, camera));
+      tracker = std::move(created);
     }
     const std::int64_t before = now_ns();
-    Result<TrackResult> result = tracker->step(frame.gray_image());
-    if (!result) return tl::unexpected(result.error());
-    job.track = std::move(*result);
+    MODAR_ASSIGN(TrackResult result, tracker->step(frame.gray_image()));
+    job.track = std::move(result);
     job.track_ms = ms_since(before);
     job.camera = camera;
     job.spot = spot;

@@ -2,15 +2,14 @@
 // as PPM.
 #include <cstdio>
 
-#include "display.hpp"
 #include "formats/atomic_file.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
 #include "modar/camera_file.hpp"
-#include "picture_file.hpp"
+#include "overlay.hpp"
 #include "raw_source.hpp"
+#include "screen.hpp"
 #include "vision.hpp"
-#include "window.hpp"
 
 namespace modar {
 namespace {
@@ -39,7 +38,7 @@ class PpmFolder final : public FrameSink {
  public:
   explicit PpmFolder(std::string folder) : folder_(std::move(folder)) {}
 
-  Result<void> picture(const RgbaImage& image, const FrameReport& report) override {
+  Result<void> picture(const RgbaView& image, const FrameReport& report) override {
     char name[40];
     std::snprintf(name, sizeof name, "/frame_%06llu.ppm",
                   static_cast<unsigned long long>(report.frame));
@@ -61,7 +60,7 @@ Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input)
 
 Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, double /*fps*/) {
   if (out.ends_with(".mp4")) return left_out("out.unsupported", out, "movies");
-  if (auto made = make_folder(out); !made) return tl::unexpected(made.error());
+  MODAR_TRY(make_folder(out));
   return std::make_unique<PpmFolder>(out);
 }
 
@@ -92,7 +91,7 @@ Result<Camera> read_camera_file(const std::string& path) {
 
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
   if (options.ours) return our_vision(bundle, options);
-  return left_out("method.unsupported", "--method paper", "the article's method");
+  return left_out("method.unsupported", "--method paper", "the ModAR paper's method");
 }
 
 struct Window::State {};

@@ -1,12 +1,15 @@
-// What the player knows about a frame once it is on the screen: the content of its JSON line.
+// What the player knows about each frame, and what it writes of it: the statistics of a run, the
+// JSON lines (their keys are a contract, see --json) and the log of a field trial.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "formats/atomic_file.hpp"
 #include "modar/tracker.hpp"
 
 namespace modar {
@@ -46,6 +49,115 @@ struct FrameReport {
 
   double& at(Stage stage) { return ms[static_cast<std::size_t>(stage)]; }
   [[nodiscard]] double at(Stage stage) const { return ms[static_cast<std::size_t>(stage)]; }
+};
+
+inline constexpr std::array<Reason, 7> kReasons = {
+    Reason::kVisible,    Reason::kNoFeatures,         Reason::kFewMatches,
+    Reason::kNoGeometry, Reason::kFailedVerification, Reason::kLostByBlur,
+    Reason::kOutOfView};
+
+/// A frame whose picture comes later than this after the frame itself is late (30 frames a second).
+inline constexpr double kFrameBudgetMs = 1000.0 / 30.0;
+
+class RunStats {
+ public:
+  void add(const FrameReport& report);
+  void set_dropped(std::uint64_t dropped) { dropped_ = dropped; }
+
+  [[nodiscard]] std::uint64_t frames() const { return times_.size(); }
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+  [[nodiscard]] std::uint64_t visible() const { return visible_; }  ///< frames with a detection
+  [[nodiscard]] std::uint64_t late() const { return late_; }
+  [[nodiscard]] std::uint64_t count(Shown state) const {
+    return states_[static_cast<std::size_t>(state)];
+  }
+  [[nodiscard]] std::uint64_t count(Reason reason) const {
+    return reasons_[static_cast<std::size_t>(reason)];
+  }
+  [[nodiscard]] double recognised_percent() const;
+  /// Lower median of each stage; 0 without frames.
+  [[nodiscard]] StageTimes median_ms() const { return quantile_ms(0.5); }
+  /// The value that so large a share of the frames does not exceed, rounded down to a frame's own.
+  /// share: 0 to 1.
+  [[nodiscard]] StageTimes quantile_ms(double share) const;
+
+ private:
+  std::vector<std::array<float, kStageNames.size()>> times_;
+  std::array<std::uint64_t, 3> states_{};
+  std::array<std::uint64_t, kReasons.size()> reasons_{};
+  std::uint64_t visible_ = 0;
+  std::uint64_t late_ = 0;
+  std::uint64_t dropped_ = 0;
+};
+
+/// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches}],reason,state,ms}.
+/// Rotation row by row; numbers that are not finite become null. No newline at the end.
+/// pattern_names: by the bundle's pattern index.
+std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names);
+
+/// {"summary":{frames,dropped,visible,recognised_percent,states,reasons,late,ms}}; ms: medians.
+std::string summary_line(const RunStats& stats);
+
+/// {frame,model,angle_deg,triangles,draw_calls,ms:{render}}: a picture of the turntable.
+struct TurntableReport {
+  std::uint64_t frame = 0;
+  std::string_view model;
+  double angle_deg = 0;
+  std::uint64_t triangles = 0;
+  int draw_calls = 0;
+  double render_ms = 0;
+};
+std::string turntable_line(const TurntableReport& report);
+
+/// Bytes by kind.
+struct MemoryByKind {
+  std::uint64_t resident = 0;         ///< of the process
+  std::uint64_t heap = 0;             ///< allocated and not freed; 0 where libc does not tell
+  std::uint64_t bundle = 0;           ///< mapped
+  std::uint64_t bundle_resident = 0;  ///< of those, pages in memory
+  std::uint64_t gpu_geometry = 0;
+  std::uint64_t gpu_textures = 0;
+  std::uint64_t gpu_batches = 0;
+};
+
+/// Measures what the operating system reports; the GPU's part stays 0. mapped: the bundle's bytes.
+MemoryByKind measure_memory(std::span<const std::byte> mapped);
+
+/// What the log says about the machine and the run, once.
+struct QosHead {
+  std::string bundle;
+  std::string input;
+  std::string method;
+  std::string parameters;
+  std::string gl_renderer;
+  std::string gl_version;
+  std::string device;  ///< profile that masks the context
+};
+
+/// JSON lines: {"qos":{...head}}, {"event":"found"|"lost",...} as they happen, {"second":{...}}
+/// once a second (or 30 frames, where frames are not live), {"summary":{...}}.
+class QosLog {
+ public:
+  /// every_s: seconds of a window by the frames' own clock. Errors: kIo.
+  static Result<QosLog> create(const std::string& path, const QosHead& head, double every_s = 1);
+
+  /// True where this frame completes a window: then call window() with the memory as it is.
+  [[nodiscard]] bool due(const FrameReport& report) const;
+  Result<void> add(const FrameReport& report, std::span<const std::string> pattern_names);
+  Result<void> window(const MemoryByKind& memory);
+  Result<void> finish(std::string_view summary);
+
+ private:
+  QosLog(AtomicFile file, double every_s) : file_(std::move(file)), every_s_(every_s) {}
+  Result<void> write(std::string_view line);
+
+  AtomicFile file_;
+  double every_s_;
+  double window_start_s_ = 0;
+  double last_s_ = 0;
+  RunStats window_;
+  std::vector<bool> seen_;       ///< by pattern, in the frame before
+  std::vector<double> since_s_;  ///< when it was found or lost
 };
 
 }  // namespace modar

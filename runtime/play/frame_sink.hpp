@@ -9,11 +9,12 @@
 
 #include "formats/error.hpp"
 #include "frame_report.hpp"
+#include "modar/image.hpp"
 
 namespace modar {
 
 /// 8-bit R, G, B, A pixels without gaps, top row first, owned by the caller.
-struct RgbaImage {
+struct RgbaView {
   std::span<const std::uint8_t> pixels;
   int width = 0;
   int height = 0;
@@ -27,7 +28,7 @@ class FrameSink {
   virtual ~FrameSink() = default;
 
   /// Takes a frame's picture. Errors: kIo "out.write", kInvalidInput "out.size-changed".
-  virtual Result<void> picture(const RgbaImage& image, const FrameReport& report) = 0;
+  virtual Result<void> picture(const RgbaView& image, const FrameReport& report) = 0;
   /// Takes the frame's JSON line (without its newline), after its picture.
   virtual Result<void> line(const FrameReport& /*report*/, std::string_view /*json*/) { return {}; }
   /// Completes the output; summary is the last JSON line. Without it, nothing half-made is left.
@@ -54,5 +55,11 @@ Result<std::unique_ptr<FrameSink>> open_report(const std::string& folder, double
 
 /// Makes a folder and its parents. Errors: kIo "out.create".
 Result<void> make_folder(const std::string& path);
+
+/// Writes path.png on a desk, path.ppm on the device, through AtomicFile. Errors: kIo.
+Result<void> write_frame_picture(const std::string& path, const RgbImage& image);
+
+/// Writes a PNG (the alpha is left out) through AtomicFile. Errors: kIo "out.write", "io.*".
+Result<void> write_png(const std::string& path, const RgbaView& image);
 
 }  // namespace modar

@@ -1,10 +1,18 @@
-// modar-play: maps a bundle and plays it over a video, pictures or a camera.
+// modar-play: maps a bundle and plays it over a video, pictures or a camera: puts source, vision
+// and player together.
 #include <cstdio>
+#include <optional>
 
 #include "formats/bundle_view.hpp"
+#include "modar/camera_file.hpp"
 #include "modar/mapped_file.hpp"
 #include "options.hpp"
+#include "pipeline.hpp"
 #include "play.hpp"
+#include "player.hpp"
+#include "raw_source.hpp"
+#include "recording.hpp"
+#include "vision.hpp"
 
 namespace modar {
 
@@ -18,18 +26,95 @@ Result<void> print_line(const std::string& line) {
 
 namespace {
 
+/// What the command line and, of a replay, the recording ask for.
+struct Plan {
+  std::string input;
+  std::string method;
+  std::string parameters;
+  std::optional<Camera> camera;
+  std::optional<GoldenCheck> golden;
+};
+
+Result<Plan> make_plan(const PlayOptions& options, const BundleView& bundle) {
+  Plan plan{options.input, options.method, options.parameters, std::nullopt, std::nullopt};
+  if (!options.golden.empty()) {
+    MODAR_ASSIGN(Recording recording, read_recording(options.golden));
+    const RecordingHead& head = recording.head;
+    if (head.bundle_hash != bundle.header().hash && !options.quiet) {
+      std::fprintf(stderr, "modar-play: the recording was made with another bundle\n");
+    }
+    plan.input = options.golden + "/frames";
+    if (plan.method.empty() && plan.parameters.empty()) plan.method = head.method;
+    if (plan.parameters.empty()) plan.parameters = head.parameters;
+    if (head.camera.width > 0) plan.camera = head.camera;
+    plan.golden.emplace(std::move(recording), options.tolerance);
+  }
+  if (!options.camera_file.empty()) {
+    MODAR_ASSIGN(Camera camera, read_camera_file(options.camera_file));
+    plan.camera = camera;
+  }
+  return plan;
+}
+
+/// Recordings and replays look at the gray of the recorded picture, not at the camera's own.
+TrackStep with_gray_of_rgb(TrackStep track) {
+  return [track = std::move(track)](Job& job) {
+    make_rgb(job.frame);
+    gray_from_rgb(job.frame);
+    return track(job);
+  };
+}
+
+/// Plays the bundle's scenes over the frames of --input or --golden; answers the exit code.
+Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
+  MODAR_ASSIGN(Plan plan, make_plan(asked, bundle));
+  PlayOptions options = asked;
+  options.method = choose_method(bundle, plan.method, plan.parameters);
+  MODAR_ASSIGN(const std::uint32_t set,
+               choose_parameter_set(bundle, options.method, plan.parameters));
+  if (options.find_focal && options.method != "ours") {
+    return fail(ExitCode::kUsage, "usage.conflict", "--find-focal",
+                "it looks with our loop's records, not with the paper's method",
+                "leave --method and --parameters out, and bake the pattern with this modar");
+  }
+  MODAR_ASSIGN(auto source, open_frame_source(plan.input));
+  const SourceInfo info = source->info();
+  // Only where frames may be dropped may a result depend on time.
+  const bool newest = info.live || options.realtime;
+  SpotSlot spot;
+  MODAR_ASSIGN(TrackStep track, open_vision(bundle, {options.method == "ours", set, plan.camera,
+                                                     &spot, newest, options.find_focal}));
+
+  Player player(options, bundle);
+  const std::string name(bundle.name(parameter_set(bundle, set).name));
+  MODAR_TRY(player.open({info, set, name, plan.camera.value_or(Camera{}), &spot}));
+  if (!options.record.empty() || plan.golden) track = with_gray_of_rgb(std::move(track));
+  if (plan.golden) player.compare(std::move(*plan.golden));
+  if (bundle.scenes().empty() && !options.quiet) {
+    std::fprintf(stderr, "modar-play: no scene of the bundle binds a model to a pattern\n");
+  }
+
+  PipelineOptions how;
+  how.paced = options.realtime && !info.live;
+  if (newest) how.delivery = Delivery::kNewest;
+  how.idle = [&player] { return player.idle(); };
+  catch_interrupts();
+  MODAR_ASSIGN(const PipelineCounts counts,
+               run_pipeline(
+                   *source, track, [&player](const Job& job) { return player.show(job); }, how));
+  return player.finish(counts);
+}
+
 Result<int> run(const PlayOptions& options) {
-  Result<MappedFile> file = MappedFile::open(options.bundle);
-  if (!file) return tl::unexpected(file.error());
-  Result<BundleView> bundle = BundleView::open(file->bytes());
+  MODAR_ASSIGN(MappedFile file, MappedFile::open(options.bundle));
+  Result<BundleView> bundle = BundleView::open(file.bytes());
   if (!bundle) {
     Error error = bundle.error();
     error.where = options.bundle + (error.where.empty() ? "" : ":" + error.where);
     return tl::unexpected(error);
   }
   if (options.turntable == 0) return play_video(options, *bundle);
-  const Result<void> turned = play_turntable(options, *bundle);
-  if (!turned) return tl::unexpected(turned.error());
+  MODAR_TRY(play_turntable(options, *bundle));
   return 0;
 }
 

@@ -31,7 +31,7 @@ int positive(std::string_view text, int limit) {
 }
 
 bool set_size(PlayOptions& options, std::string_view text) {
-  constexpr int kMaxSide = 8192;
+  constexpr int kMaxSide = 8192;  // what current GPUs draw; refuses typing errors
   const std::size_t x = text.find('x');
   if (x == std::string_view::npos) return false;
   options.width = positive(text.substr(0, x), kMaxSide);
@@ -158,7 +158,7 @@ Result<void> validate(const PlayOptions& options) {
                  "a recording has one camera from its first frame on; give --camera FILE.yml");
   }
   if (options.find_focal && !options.camera_file.empty()) {
-    return usage("usage.conflict", "--find-focal", "--camera tells the focal length already");
+    return usage("usage.conflict", "--find-focal", "--camera gives the focal length already");
   }
   if (!options.method.empty() && options.method != "ours" && options.method != "paper") {
     return usage("usage.method", "--method",
@@ -211,9 +211,7 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
     const int number = getopt_long(argc, argv.data(), ":", table.data(), nullptr);
     if (number == -1) break;
     if (number == '?' || number == ':') return refused(number, argv);
-    if (auto applied = apply(options, number, optarg); !applied) {
-      return tl::unexpected(applied.error());
-    }
+    MODAR_TRY(apply(options, number, optarg));
   }
   for (int i = optind; i < argc; ++i) {
     const std::string argument = argv[static_cast<std::size_t>(i)];
@@ -222,7 +220,7 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
     }
     options.bundle = argument;
   }
-  if (auto valid = validate(options); !valid) return tl::unexpected(valid.error());
+  MODAR_TRY(validate(options));
   return options;
 }
 
@@ -248,13 +246,13 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
   --find-focal        instead (off by default): measures the focal length on tilted views of the
                       patterns while playing, and goes on with it; see also modar calibrate
   --method METHOD     how patterns are found: ours (default where the bundle has records for it),
-                      or paper, the article's
+                      or paper, the ModAR paper's
   --parameters SET    of --method paper, which it implies: orb-2000 (default), orb-500, brisk-3 or
                       brisk-2, as baked
   --device NAME       acts as this device: masks what its OpenGL ES lacks
   --realtime          plays a file at its own speed and drops frames that come too early
   --smooth MS         takes the trembling out of resting models, which may then lag by so much
-                      (default 0: off; the JSON's ms.smoothing tells each frame's)
+                      (default 0: off; see ms.smoothing of each frame in the JSON)
   --gpu-budget SIZE   keeps at most so much in GL, nearest and visible first (64M, 1G)
   --record FOLDER     keeps frames and poses
   --golden FOLDER     replays a recording and compares: exit code 10 where it differs

@@ -1,8 +1,9 @@
-// Lines by distance to their segment, blended where a pixel is covered in part.
+// Lines with soft edges, and the display's text.
 #include "overlay.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include <glm/geometric.hpp>
 
@@ -94,6 +95,44 @@ void draw_outline(const Canvas& canvas, const std::array<glm::dvec2, 4>& corners
       draw_line(canvas, corners[i], corners[(i + 1) % corners.size()], width, ink);
     }
   }
+}
+
+void RateMeter::add(std::int64_t now_ns) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  if (start_ns_ == 0) {
+    start_ns_ = now_ns;
+    return;
+  }
+  ++count_;
+  const std::int64_t passed = now_ns - start_ns_;
+  if (passed < kSecond) return;
+  rate_ = static_cast<double>(count_) * kSecond / static_cast<double>(passed);
+  start_ns_ = now_ns;
+  count_ = 0;
+}
+
+std::string display_text(const FrameReport& report, std::span<const std::string> pattern_names,
+                         double fps) {
+  std::string text = std::to_string(report.frame) + "  ";
+  if (fps > 0) {
+    char rate[32];
+    // Whole tenths by integers: printf would ask the locale for the point.
+    const auto tenths = static_cast<long>(fps * 10 + 0.5);
+    std::snprintf(rate, sizeof rate, "%ld.%ld fps  ", tenths / 10, tenths % 10);
+    text += rate;
+  }
+  text += to_string(report.state);
+  if (report.visible.empty()) {
+    text += std::string(": ") + to_string(report.reason);
+  } else if (report.state == Shown::kHidden) {
+    text += ": seen once";
+  }
+  for (const Detection& seen : report.visible) {
+    text += "  ";
+    if (seen.pattern < pattern_names.size()) text += pattern_names[seen.pattern] + " ";
+    text += std::to_string(seen.inliers) + " inliers";
+  }
+  return text;
 }
 
 }  // namespace modar

@@ -1,11 +1,16 @@
-// Paints on a finished picture: the outline of a pattern.
+// What is painted on a finished picture: outlines of patterns, and the small on-screen display.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include <glm/vec2.hpp>
+
+#include "formats/error.hpp"
+#include "frame_report.hpp"
 
 namespace modar {
 
@@ -29,5 +34,26 @@ void draw_line(const Canvas& canvas, glm::dvec2 from, glm::dvec2 to, double line
 
 /// The closed outline of four corners: a coloured line on a dark rim, seen on any ground.
 void draw_outline(const Canvas& canvas, const std::array<glm::dvec2, 4>& corners, Colour colour);
+
+/// Pictures a second over the last second or so.
+class RateMeter {
+ public:
+  void add(std::int64_t now_ns);
+  [[nodiscard]] double rate() const { return rate_; }
+
+ private:
+  std::int64_t start_ns_ = 0;
+  int count_ = 0;
+  double rate_ = 0;
+};
+
+/// One line: the frame, its state with the reason when lost, and of each pattern seen its name and
+/// inliers. fps: 0 leaves it out (pictures of a file are the same in each run).
+std::string display_text(const FrameReport& report, std::span<const std::string> pattern_names,
+                         double fps);
+
+/// Paints the line on a dark bar along the top. Characters outside ASCII become question marks.
+/// Errors: kUnsupported "display.unsupported" in a build without OpenCV's letters.
+Result<void> draw_text_bar(const Canvas& canvas, const std::string& text);
 
 }  // namespace modar

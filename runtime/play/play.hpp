@@ -1,4 +1,4 @@
-// The two things that the player does with a bundle.
+// What main.cpp and turntable.cpp share.
 #pragma once
 
 #include "formats/bundle_view.hpp"
@@ -6,9 +6,6 @@
 #include "options.hpp"
 
 namespace modar {
-
-/// Plays the bundle's scenes over the frames of --input or --golden; answers the exit code.
-Result<int> play_video(const PlayOptions& options, const BundleView& bundle);
 
 /// Draws options.turntable pictures of each model turning, and writes them to --out.
 Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle);

@@ -1,15 +1,42 @@
-// Draws, paints, writes and logs a frame at a time.
+// The frame's way through the render thread, and a progress bar.
 #include "player.hpp"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <string>
 
-#include "json_lines.hpp"
+#include "frame_report.hpp"
+#include "pipeline.hpp"
 #include "play.hpp"
+#include "raw_source.hpp"
 #include "vision.hpp"
-#include "yuv.hpp"
 
 namespace modar {
+
+Progress::Progress(bool wanted) : shown_(wanted && isatty(STDERR_FILENO) == 1) {}
+
+void Progress::step(std::uint64_t frames, std::uint64_t total, std::uint64_t visible) {
+  constexpr std::int64_t kEveryNs = 100'000'000;  // faster is not readable
+  if (!shown_ || (now_ns() - last_ns_ < kEveryNs && frames != total)) return;
+  last_ns_ = now_ns();
+  std::string bar;
+  if (total > 0) {
+    constexpr std::uint64_t kCells = 30;
+    const std::uint64_t full = std::min(kCells, kCells * frames / total);
+    bar = "[" + std::string(full, '#') + std::string(kCells - full, '.') + "] ";
+  }
+  std::fprintf(stderr, "\r%sframe %llu", bar.c_str(), static_cast<unsigned long long>(frames));
+  if (total > 0) std::fprintf(stderr, "/%llu", static_cast<unsigned long long>(total));
+  std::fprintf(stderr, ", pattern seen in %llu\033[K", static_cast<unsigned long long>(visible));
+}
+
+void Progress::end() {
+  if (shown_) std::fprintf(stderr, "\r\033[K");
+}
+
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
@@ -58,21 +85,20 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
 
 Result<void> Player::open(const PlayerSetup& setup) {
   setup_ = setup;
-  auto screen = Screen::open(bundle_, options_);
-  if (!screen) return tl::unexpected(screen.error());
-  screen_ = std::move(*screen);
-  if (auto opened = open_sinks(); !opened) return opened;
+  MODAR_ASSIGN(auto screen, Screen::open(bundle_, options_));
+  screen_ = std::move(screen);
+  MODAR_TRY(open_sinks());
   return open_logs();
 }
 
 Result<void> Player::open_sinks() {
-  const auto add = [this](Result<std::unique_ptr<FrameSink>> sink) -> Result<void> {
-    if (!sink) return tl::unexpected(sink.error());
-    sinks_.push_back(std::move(*sink));
+  const auto add = [this](Result<std::unique_ptr<FrameSink>> opened) -> Result<void> {
+    MODAR_ASSIGN(auto sink, std::move(opened));
+    sinks_.push_back(std::move(sink));
     return {};
   };
   if (!options_.out.empty()) {
-    if (auto added = add(open_frame_sink(options_.out, setup_.source.fps)); !added) return added;
+    MODAR_TRY(add(open_frame_sink(options_.out, setup_.source.fps)));
   }
   if (options_.report.empty()) return {};
   const ReportTitle title{file_name(options_.bundle), file_name(input_of(options_)),
@@ -82,28 +108,27 @@ Result<void> Player::open_sinks() {
 
 Result<void> Player::open_logs() {
   if (!options_.record.empty()) {
-    auto recorder =
+    MODAR_ASSIGN(
+        auto recorder,
         Recorder::create(options_.record, {options_.method, setup_.parameters, setup_.source.fps,
-                                           bundle_.header().hash, setup_.camera});
-    if (!recorder) return tl::unexpected(recorder.error());
-    recorder_ = std::move(*recorder);
+                                           bundle_.header().hash, setup_.camera}));
+    recorder_ = std::move(recorder);
   }
   if (options_.qos.empty()) return {};
   const GlCaps& caps = screen_->caps();
-  Result<QosLog> log = QosLog::create(
-      options_.qos, {file_name(options_.bundle), file_name(input_of(options_)), options_.method,
-                     setup_.parameters, caps.renderer, caps.version, options_.device});
-  if (!log) return tl::unexpected(log.error());
-  qos_.emplace(std::move(*log));
+  MODAR_ASSIGN(
+      QosLog log,
+      QosLog::create(options_.qos,
+                     {file_name(options_.bundle), file_name(input_of(options_)), options_.method,
+                      setup_.parameters, caps.renderer, caps.version, options_.device}));
+  qos_.emplace(std::move(log));
   return {};
 }
 
 Result<bool> Player::show(const Job& job) {
-  if (auto sized = screen_->resize(job.frame.width, job.frame.height); !sized) {
-    return tl::unexpected(sized.error());
-  }
+  MODAR_TRY(screen_->resize(job.frame.width, job.frame.height));
   follow_spot(job);
-  if (options_.find_focal && !options_.quiet) tell_focal(job);
+  if (options_.find_focal && !options_.quiet) report_focal(job);
   FrameReport report = begin_report(job);
   const std::int64_t before = now_ns();
   screen_->draw(job.frame.picture(), job.camera, items_);
@@ -111,7 +136,7 @@ Result<bool> Player::show(const Job& job) {
   if (painted || !sinks_.empty()) screen_->picture();
   report.at(Stage::kRender) = ms_since(before);
   if (painted || !sinks_.empty()) {
-    if (auto done = paint(report); !done) return tl::unexpected(done.error());
+    MODAR_TRY(paint(report));
   }
   if (painted) {
     screen_->present_canvas();
@@ -123,15 +148,13 @@ Result<bool> Player::show(const Job& job) {
                                    ? ms_since(job.frame.arrived_ns)
                                    : job.track_ms + ms_since(before);
   const std::int64_t shown = now_ns();
-  if (auto written = write_picture(report); !written) return tl::unexpected(written.error());
+  MODAR_TRY(write_picture(report));
   report.at(Stage::kSink) = ms_since(shown);
-  if (auto written = write_line(report, job.frame); !written) {
-    return tl::unexpected(written.error());
-  }
+  MODAR_TRY(write_line(report, job.frame));
   stats_.add(report);
   rate_.add(now_ns());
   progress_.step(stats_.frames(), setup_.source.frames, stats_.visible());
-  if (auto held = hold(job); !held) return tl::unexpected(held.error());
+  MODAR_TRY(hold(job));
   return idle();
 }
 
@@ -145,20 +168,20 @@ void Player::follow_spot(const Job& job) {
 }
 
 /// The vision thread has measured the focal length of frames of this size: says so once.
-void Player::tell_focal(const Job& job) {
+void Player::report_focal(const Job& job) {
   const Camera& camera = job.camera;
   focal_ = job.focal;
-  if (camera.fx == told_focal_ || camera.fx == default_camera(camera.width, camera.height).fx) {
+  if (camera.fx == reported_focal_ || camera.fx == default_camera(camera.width, camera.height).fx) {
     return;
   }
-  told_focal_ = camera.fx;
+  reported_focal_ = camera.fx;
   progress_.end();
   std::fprintf(stderr, "modar-play: the focal length is %.1f pixels, from frame %llu on\n",
                camera.fx, static_cast<unsigned long long>(stats_.frames()));
 }
 
 /// The run is over, and --find-focal has found nothing: what it would have needed.
-void Player::tell_focal_unknown() const {
+void Player::report_focal_unknown() const {
   char seen[120];
   if (focal_.deviation > 0 && focal_.scatter_deg < FocalProgress::kScatter) {
     std::snprintf(
@@ -229,9 +252,9 @@ Result<void> Player::paint(const FrameReport& report) {
 
 Result<void> Player::write_picture(const FrameReport& report) {
   const Canvas canvas = screen_->canvas();
-  const RgbaImage picture{canvas.rgba, canvas.width, canvas.height};
+  const RgbaView picture{canvas.rgba, canvas.width, canvas.height};
   for (const auto& sink : sinks_) {
-    if (auto written = sink->picture(picture, report); !written) return written;
+    MODAR_TRY(sink->picture(picture, report));
   }
   return {};
 }
@@ -239,15 +262,15 @@ Result<void> Player::write_picture(const FrameReport& report) {
 Result<void> Player::write_line(const FrameReport& report, const Frame& frame) {
   if (golden_) golden_->add(report, names_);
   if (qos_) {
-    if (auto written = write_qos(report); !written) return written;
+    MODAR_TRY(write_qos(report));
   }
   if (!options_.json && options_.report.empty() && !recorder_) return {};
   const std::string line = frame_line(report, names_);
   for (const auto& sink : sinks_) {
-    if (auto written = sink->line(report, line); !written) return written;
+    MODAR_TRY(sink->line(report, line));
   }
   if (recorder_) {
-    if (auto written = recorder_->add(frame, line); !written) return written;
+    MODAR_TRY(recorder_->add(frame, line));
   }
   return options_.json ? print_line(line) : Result<void>{};
 }
@@ -258,7 +281,7 @@ Result<void> Player::write_qos(const FrameReport& report) {
     memory.gpu_geometry = screen_->gpu_memory().geometry;
     memory.gpu_textures = screen_->gpu_memory().textures;
     memory.gpu_batches = screen_->gpu_memory().batches;
-    if (auto written = qos_->window(memory); !written) return written;
+    MODAR_TRY(qos_->window(memory));
   }
   return qos_->add(report, names_);
 }
@@ -277,7 +300,7 @@ Result<void> Player::hold(const Job& job) {
   constexpr std::chrono::milliseconds kLook(20);
   while (controls_.holds() && !controls_.quit() && !was_interrupted()) {
     if (controls_.frozen()) {
-      if (auto shown = show_frozen(job); !shown) return shown;
+      MODAR_TRY(show_frozen(job));
     }
     take_acts(kLook);
     std::array<glm::dvec2, 4> corners{};
@@ -304,7 +327,7 @@ Result<void> Player::show_frozen(const Job& job) {
   return done;
 }
 
-/// What goes wrong is told and ends nothing: the user may click again.
+/// An error is printed and ends nothing: the user may click again.
 void Player::make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corners) {
   Frame frame = job.frame;
   make_rgb(frame);
@@ -324,23 +347,22 @@ Result<int> Player::finish(const PipelineCounts& counts) {
                 "nothing half-made was left; start it again");
   }
   stats_.set_dropped(counts.dropped);
-  if (options_.find_focal && !options_.quiet && told_focal_ == 0) tell_focal_unknown();
+  if (options_.find_focal && !options_.quiet && reported_focal_ == 0) report_focal_unknown();
   const std::string summary = summary_line(stats_);
   for (const auto& sink : sinks_) {
-    if (auto done = sink->finish(summary); !done) return tl::unexpected(done.error());
+    MODAR_TRY(sink->finish(summary));
   }
   if (recorder_) {
-    if (auto done = recorder_->finish(); !done) return tl::unexpected(done.error());
+    MODAR_TRY(recorder_->finish());
   }
   if (qos_) {
-    if (auto done = qos_->finish(summary); !done) return tl::unexpected(done.error());
+    MODAR_TRY(qos_->finish(summary));
   }
   if (golden_) {
-    if (auto done = print_line(golden_->line()); !done) return tl::unexpected(done.error());
+    MODAR_TRY(print_line(golden_->line()));
   }
   if (options_.json || !options_.quiet) {
-    auto done = print_line(options_.json ? summary : summary_text());
-    if (!done) return tl::unexpected(done.error());
+    MODAR_TRY(print_line(options_.json ? summary : summary_text()));
   }
   return golden_ && !golden_->good() ? kExitDifferent : 0;
 }

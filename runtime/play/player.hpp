@@ -2,25 +2,38 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "controls.hpp"
-#include "display.hpp"
+#include "frame_report.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
 #include "modar/pose_smoother.hpp"
+#include "overlay.hpp"
 #include "pipeline.hpp"
-#include "progress.hpp"
-#include "qos_log.hpp"
 #include "recording.hpp"
-#include "run_stats.hpp"
 #include "screen.hpp"
 #include "spot_pattern.hpp"
 
 namespace modar {
+
+class Progress {
+ public:
+  /// Prints nothing unless `wanted` and standard error is a terminal.
+  explicit Progress(bool wanted);
+  /// total: 0 where it is unknown.
+  void step(std::uint64_t frames, std::uint64_t total, std::uint64_t visible);
+  /// Clears the bar's line.
+  void end();
+
+ private:
+  bool shown_ = false;
+  std::int64_t last_ns_ = 0;
+};
 
 /// What a run is about, beside its options.
 struct PlayerSetup {
@@ -62,8 +75,8 @@ class Player {
   Result<void> show_frozen(const Job& job);
   void make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corners);
   [[nodiscard]] std::string summary_text() const;
-  void tell_focal(const Job& job);
-  void tell_focal_unknown() const;
+  void report_focal(const Job& job);
+  void report_focal_unknown() const;
 
   const PlayOptions& options_;
   const BundleView& bundle_;
@@ -75,7 +88,7 @@ class Player {
   Controls controls_;
   Progress progress_;
   RateMeter rate_;
-  double told_focal_ = 0;  ///< pixels, of --find-focal; 0: none yet
+  double reported_focal_ = 0;  ///< pixels, of --find-focal; 0: none yet
   FocalProgress focal_;
   RunStats stats_;
   std::unique_ptr<Screen> screen_;

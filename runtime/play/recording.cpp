@@ -1,4 +1,4 @@
-// Writes and reads poses.jsonl with RapidJSON, which is told not to throw.
+// Writes and reads poses.jsonl with RapidJSON, configured not to throw.
 #include "recording.hpp"
 
 #include <algorithm>
@@ -14,7 +14,6 @@
 #include "formats/atomic_file.hpp"
 #include "frame_sink.hpp"
 #include "modar/mapped_file.hpp"
-#include "picture_file.hpp"
 
 namespace modar {
 namespace {
@@ -136,7 +135,7 @@ struct Recorder::State {
   AtomicFile lines;
 
   Result<void> write(std::string_view line) {
-    if (auto done = lines.write(std::as_bytes(std::span(line))); !done) return done;
+    MODAR_TRY(lines.write(std::as_bytes(std::span(line))));
     return lines.write(std::as_bytes(std::span("\n", 1)));
   }
 };
@@ -146,13 +145,10 @@ Recorder::~Recorder() = default;
 
 Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& folder,
                                                    const RecordingHead& head) {
-  if (auto made = make_folder(folder + "/frames"); !made) return tl::unexpected(made.error());
-  Result<AtomicFile> lines = AtomicFile::create(folder + "/poses.jsonl");
-  if (!lines) return tl::unexpected(lines.error());
-  auto state = std::make_unique<State>(State{folder, std::move(*lines)});
-  if (auto written = state->write(head_line(head)); !written) {
-    return tl::unexpected(written.error());
-  }
+  MODAR_TRY(make_folder(folder + "/frames"));
+  MODAR_ASSIGN(AtomicFile lines, AtomicFile::create(folder + "/poses.jsonl"));
+  auto state = std::make_unique<State>(State{folder, std::move(lines)});
+  MODAR_TRY(state->write(head_line(head)));
   return std::unique_ptr<Recorder>(new Recorder(std::move(state)));
 }
 
@@ -160,7 +156,7 @@ Result<void> Recorder::add(const Frame& frame, std::string_view json) {
   std::string number = std::to_string(frame.index);
   if (number.size() < 6) number.insert(0, 6 - number.size(), '0');
   const std::string path = state_->folder + "/frames/frame_" + number;
-  if (auto written = write_frame_picture(path, frame.rgb_image()); !written) return written;
+  MODAR_TRY(write_frame_picture(path, frame.rgb_image()));
   return state_->write(json);
 }
 
@@ -170,10 +166,9 @@ Result<void> Recorder::finish() {
 
 Result<Recording> read_recording(const std::string& folder) {
   const std::string path = folder + "/poses.jsonl";
-  const Result<MappedFile> file = MappedFile::open(path);
-  if (!file) return tl::unexpected(file.error());
-  const auto* first = reinterpret_cast<const char*>(file->bytes().data());
-  const std::string_view text(first, file->bytes().size());
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+  const auto* first = reinterpret_cast<const char*>(file.bytes().data());
+  const std::string_view text(first, file.bytes().size());
   Recording recording;
   std::size_t number = 0;
   for (std::size_t at = 0; at < text.size(); ++number) {

@@ -7,7 +7,6 @@
 
 #include "frame_report.hpp"
 #include "frame_sink.hpp"
-#include "run_stats.hpp"
 
 namespace modar {
 

@@ -6,18 +6,15 @@ namespace modar {
 Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const PlayOptions& options) {
   std::unique_ptr<Screen> screen(new Screen(bundle, options));
   if (options.window) {
-    auto window = Window::open("modar-play");
-    if (!window) return tl::unexpected(window.error());
-    screen->window_ = std::move(*window);
+    MODAR_ASSIGN(auto window, Window::open("modar-play"));
+    screen->window_ = std::move(window);
   } else {
-    auto context = GlContext::create_offscreen();
-    if (!context) return tl::unexpected(context.error());
-    screen->context_ = std::move(*context);
+    MODAR_ASSIGN(auto context, GlContext::create_offscreen());
+    screen->context_ = std::move(context);
   }
-  if (auto read = screen->read_caps(); !read) return tl::unexpected(read.error());
-  auto renderer = Renderer::create(bundle, screen->caps_);
-  if (!renderer) return tl::unexpected(renderer.error());
-  screen->renderer_ = std::move(*renderer);
+  MODAR_TRY(screen->read_caps());
+  MODAR_ASSIGN(auto renderer, Renderer::create(bundle, screen->caps_));
+  screen->renderer_ = std::move(renderer);
   RenderOptions drawing;
   drawing.exclusive_context = true;
   screen->renderer_->set_options(drawing);
@@ -27,9 +24,8 @@ Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const Pla
 Result<void> Screen::read_caps() {
   caps_ = probe_gl_caps();
   if (!options_.device.empty()) {
-    Result<GlCaps> masked = mask_gl_caps(caps_, options_.device);
-    if (!masked) return tl::unexpected(masked.error());
-    caps_ = *masked;
+    MODAR_ASSIGN(GlCaps masked, mask_gl_caps(caps_, options_.device));
+    caps_ = masked;
   }
   if (options_.gpu_budget > 0) caps_.gpu_memory = options_.gpu_budget;
   return {};
@@ -37,12 +33,12 @@ Result<void> Screen::read_caps() {
 
 Result<void> Screen::resize(int width, int height) {
   if (window_ && window_->take_loss()) {
-    if (auto renewed = window_->renew(); !renewed) return renewed;
-    if (auto read = read_caps(); !read) return read;
-    if (auto restored = renderer_->restore(caps_); !restored) return restored;
+    MODAR_TRY(window_->renew());
+    MODAR_TRY(read_caps());
+    MODAR_TRY(renderer_->restore(caps_));
   }
   if (width == width_ && height == height_) return {};
-  if (auto sized = renderer_->resize(width, height); !sized) return sized;
+  MODAR_TRY(renderer_->resize(width, height));
   width_ = width;
   height_ = height;
   rgba_.resize(std::size_t{4} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -61,7 +57,7 @@ void Screen::draw(const CameraPicture& background, const Camera& camera,
   stats_ = renderer_->stats();
 }
 
-RgbaImage Screen::picture() {
+RgbaView Screen::picture() {
   renderer_->read_pixels(rgba_);
   return {rgba_, width_, height_};
 }

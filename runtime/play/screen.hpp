@@ -1,21 +1,56 @@
-// The render thread's half: a context (window or off-screen), the renderer in it, and the picture.
+// The render thread's half: a window or an off-screen context, the renderer in it, the picture, and
+// what the user does in the window.
 #pragma once
 
 #include <chrono>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "controls.hpp"
 #include "formats/bundle_view.hpp"
+#include "formats/error.hpp"
 #include "frame_sink.hpp"
 #include "modar/camera.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"
 #include "options.hpp"
 #include "overlay.hpp"
-#include "window.hpp"
 
 namespace modar {
+
+/// A window with an OpenGL ES 2.0 context.
+class Window {
+ public:
+  /// Opens it and makes its context current on this thread.
+  /// Errors: kUnsupported "window.unsupported" (no display, or a build without SDL2).
+  static Result<std::unique_ptr<Window>> open(const std::string& title);
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
+  ~Window();
+
+  /// Gives the window the shape of a picture, no larger than the display. Clicks are reported in
+  /// that picture's pixels from now on.
+  void fit(int width, int height);
+  /// What the user did since the last call, waiting for at most `limit`. Valid until the next call.
+  std::span<const UserAct> acts(std::chrono::milliseconds limit);
+  [[nodiscard]] int width() const;  ///< of the framebuffer, pixels
+  [[nodiscard]] int height() const;
+  /// True once after the system took the context's contents away (a phone that slept, a driver that
+  /// was reset).
+  bool take_loss();
+  /// Puts a new context in the place of the lost one and makes it current. Errors: kUnsupported
+  /// "window.unsupported".
+  Result<void> renew();
+  /// Brings what was drawn to the display.
+  void swap();
+
+ private:
+  struct State;
+  explicit Window(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
 
 class Screen {
  public:
@@ -32,7 +67,7 @@ class Screen {
   /// Draws the background and the items as the camera sees them.
   void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items);
   /// Reads the picture back. The canvas of the same pixels may be painted on.
-  RgbaImage picture();
+  RgbaView picture();
   Canvas canvas();
 
   /// Shows what was drawn, or the canvas as it was painted on, in the window. Nothing without one.

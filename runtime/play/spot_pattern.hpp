@@ -1,4 +1,4 @@
-// A pattern made on the spot: four corners in a frame, as the article's app lets its users.
+// A pattern made on the spot: four corners in a frame, as the ModAR paper's app lets its users.
 #pragma once
 
 #include <array>

@@ -7,8 +7,8 @@
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 
+#include "frame_report.hpp"
 #include "frame_sink.hpp"
-#include "json_lines.hpp"
 #include "modar/camera.hpp"
 #include "modar/renderer.hpp"
 #include "pipeline.hpp"
@@ -18,7 +18,7 @@
 namespace modar {
 namespace {
 
-constexpr double kTiltDegrees = 20;  ///< seen from a little above
+constexpr double kTiltDegrees = 20;  ///< seen from a little above; set by hand
 
 /// The ball round the origin that holds the model's chunks (model space).
 double radius_of(const BundleView& bundle, std::uint32_t model) {
@@ -60,11 +60,9 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
     return fail(ExitCode::kInvalidInput, "play.no-models", options.bundle,
                 "the bundle holds no model", "bake it with --model FILE");
   }
-  Result<std::unique_ptr<Screen>> screen = Screen::open(bundle, options);
-  if (!screen) return tl::unexpected(screen.error());
-  Result<std::unique_ptr<FrameSink>> sink = open_frame_sink(options.out, kFps);
-  if (!sink) return tl::unexpected(sink.error());
-  if (auto sized = (*screen)->resize(options.width, options.height); !sized) return sized;
+  MODAR_ASSIGN(std::unique_ptr<Screen> screen, Screen::open(bundle, options));
+  MODAR_ASSIGN(std::unique_ptr<FrameSink> sink, open_frame_sink(options.out, kFps));
+  MODAR_TRY(screen->resize(options.width, options.height));
 
   const Camera camera = default_camera(options.width, options.height);
   TurntableReport turn;
@@ -76,21 +74,21 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
       turn.angle_deg = 360.0 * i / options.turntable;
       const std::array<DrawItem, 1> items = {{{model, turned(turn.angle_deg, distance)}}};
       const std::int64_t before = now_ns();
-      (*screen)->draw({}, camera, items);
-      const RgbaImage picture = (*screen)->picture();
+      screen->draw({}, camera, items);
+      const RgbaView picture = screen->picture();
       turn.render_ms = ms_since(before);
-      turn.triangles = (*screen)->stats().triangles;
-      turn.draw_calls = (*screen)->stats().draw_calls;
+      turn.triangles = screen->stats().triangles;
+      turn.draw_calls = screen->stats().draw_calls;
       report.frame = turn.frame;
       report.time_s = static_cast<double>(turn.frame) / kFps;
-      if (auto written = (*sink)->picture(picture, report); !written) return written;
+      MODAR_TRY(sink->picture(picture, report));
       if (options.json) {
-        if (auto printed = print_line(turntable_line(turn)); !printed) return printed;
+        MODAR_TRY(print_line(turntable_line(turn)));
       }
       ++turn.frame;
     }
   }
-  return (*sink)->finish("");
+  return sink->finish("");
 }
 
 }  // namespace modar

@@ -9,7 +9,8 @@
 namespace modar {
 namespace {
 
-constexpr int kLookEvery = 5;  // frames between looks for the focal length
+/// Frames between looks for the focal length: neighbours show the same view. Set by hand.
+constexpr int kLookEvery = 5;
 
 struct OurVision {
   const BundleView& bundle;
@@ -25,9 +26,8 @@ struct OurVision {
     if (--frames_to_look > 0) return {};
     frames_to_look = kLookEvery;
     if (!finder) {
-      auto created = FocalFinder::create(bundle, frame.width, frame.height);
-      if (!created) return tl::unexpected(created.error());
-      finder = std::move(*created);
+      MODAR_ASSIGN(auto created, FocalFinder::create(bundle, frame.width, frame.height));
+      finder = std::move(created);
     }
     const bool added = finder->look(frame.gray_image());
     focal = finder->progress();
@@ -45,17 +45,16 @@ struct OurVision {
     const std::int64_t before = now_ns();
     if (camera.width != frame.width || camera.height != frame.height) finder.reset();
     if (options.find_focal && !options.camera) {
-      if (auto looked = look(frame); !looked) return looked;
+      MODAR_TRY(look(frame));
     }
     if (!loop || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
       PoseLoopOptions how;
       how.apart = options.apart;
-      auto created = PoseLoop::create(bundle, camera, how);
-      if (!created) return tl::unexpected(created.error());
-      loop = std::move(*created);
+      MODAR_ASSIGN(auto created, PoseLoop::create(bundle, camera, how));
+      loop = std::move(created);
     }
-    if (auto done = loop->step(frame.gray_image(), job.track); !done) return done;
+    MODAR_TRY(loop->step(frame.gray_image(), job.track));
     job.track_ms = ms_since(before);
     job.camera = camera;
     job.focal = focal;
@@ -88,7 +87,7 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
   if (sets.empty()) {
     if (method == "ours") return 0;
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
-                "the bundle holds no pattern that the article's method can look for",
+                "the bundle holds no pattern that the paper's method can look for",
                 "bake it with --pattern IMAGE, and without --parameters none");
   }
   const std::string_view wanted = name.empty() ? std::string_view("orb-2000") : name;

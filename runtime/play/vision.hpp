@@ -12,7 +12,7 @@
 namespace modar {
 
 struct VisionOptions {
-  bool ours = true;                 ///< our pose loop; false: the article's method
+  bool ours = true;                 ///< our pose loop; false: the ModAR paper's method
   std::uint32_t parameter_set = 0;  ///< id, see choose_parameter_set()
   std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
   SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
@@ -28,7 +28,7 @@ std::string choose_method(const BundleView& bundle, const std::string& method,
 /// The id of the bundle's parameter set of that name; of an empty name: "orb-2000" where it is
 /// there, else the first; 0 where it has none and the method is "ours", which needs none. Errors:
 /// kUsage "parameters.unknown" (lists what the bundle has), kInvalidInput "tracker.no-patterns"
-/// where the article's method has none.
+/// where the paper's method has none.
 Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::string& method,
                                            const std::string& name);
 
@@ -38,10 +38,10 @@ ParameterSetRecord parameter_set(const BundleView& bundle, std::uint32_t id);
 /// The camera for frames of that size.
 Camera camera_for(const std::optional<Camera>& calibrated, int width, int height);
 
-/// Our loop or the article's method as a step of the pipeline; patterns made on the spot are found
-/// by the article's. The bundle's bytes must outlive it. A frame of another size than the one
+/// Our loop or the paper's method as a step of the pipeline; patterns made on the spot are found
+/// by the paper's. The bundle's bytes must outlive it. A frame of another size than the one
 /// before sets the tracker up anew. Errors: those of PoseLoop and PaperTracker; kUnsupported
-/// "method.unsupported" for the article's method in a build without OpenCV.
+/// "method.unsupported" for the paper's method in a build without OpenCV.
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
 
 /// Our loop alone, of `options` camera, apart and find_focal: a FocalFinder looks at every fifth

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "formats/bundle_view.hpp"
-#include "runtime/render/gl_state.hpp"
+#include "runtime/render/gl.hpp"
 #include "runtime/render/vertex_format.hpp"
 
 namespace modar {

@@ -1,15 +1,51 @@
-// Which chunks of which items are drawn, at which level, in which order.
+// What a view shows of a bundle: which chunks of which items are drawn, at which level, in which
+// order. Culling is conservative: what is seen in the least part is never culled. Internal to
+// runtime/render.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
 #include "formats/bundle_view.hpp"
+#include "formats/layout.hpp"
 #include "modar/renderer.hpp"
-#include "runtime/render/cull.hpp"
 
 namespace modar {
+
+/// One view on one model, in the model's own space.
+struct ModelView {
+  std::array<glm::vec4, 6> planes;  ///< a point is inside where dot(plane, (p, 1)) >= 0
+  glm::vec3 eye{0.0f};
+  bool perspective = true;  ///< false: parallel rays, `eye` means nothing
+  bool mirrored = false;    ///< the matrix turns the winding of triangles
+  float scale = 1.0f;       ///< greatest stretch of a length on its way to eye space
+  float pixels = 0.0f;      ///< size in pixels of one eye-space unit at distance 1
+};
+
+/// projection: of GL. to_eye: an affine matrix that can be inverted. height: of the viewport,
+/// pixels.
+ModelView model_view(const glm::mat4& projection, const glm::mat4& to_eye, int height);
+
+/// True only if no point of the chunk's box is inside the frustum.
+bool outside_frustum(const ModelView& view, const ChunkRecord& chunk);
+
+/// True only if every triangle of the chunk shows its back: see ChunkRecord::cone_cutoff.
+bool faces_away(const ModelView& view, const ChunkRecord& chunk);
+
+/// Least distance from the eye to the chunk's box in eye space; 0 inside it, or where rays are
+/// parallel.
+float eye_distance(const ModelView& view, const ChunkRecord& chunk);
+
+/// The coarsest level whose error is at most `pixels` on the screen (0 to level_count - 1).
+/// levels: of the bundle. The measure: a level's error times focal length over distance.
+std::uint32_t choose_level(const ModelView& view, const ChunkRecord& chunk,
+                           const Table<LevelRecord>& levels, float pixels);
 
 struct DrawCommand {
   std::uint32_t item = 0;

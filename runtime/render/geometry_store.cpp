@@ -8,6 +8,8 @@
 namespace modar {
 namespace {
 
+/// Vertices that are widened at a time: more would cost memory (16 KB at 4 bytes each way per
+/// attribute), fewer more calls of glBufferSubData. Set by hand.
 constexpr std::size_t kScratchVertices = 4096;
 
 GLuint make_buffer(GLenum target) {

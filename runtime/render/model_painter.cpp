@@ -1,8 +1,10 @@
-// Set-up of the painter, and what every piece needs set: surface, slot, attributes.
+// Programs and uniforms of a bundle's surfaces; pieces, groups of equal state, and the three ways
+// to draw a group.
 #include "runtime/render/model_painter.hpp"
 
 #include <algorithm>
 #include <cstring>
+#include <tuple>
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -10,7 +12,8 @@
 namespace modar {
 namespace {
 
-/// More slots than this bring nothing: a call for so many is no cost any more.
+/// Copies that one call can draw. More slots mean fewer calls and more uniforms (64 are 4 KB a
+/// call); at 64 the call's own cost is shared by so many that it no longer matters. Set by hand.
 constexpr int kMostSlots = 64;
 
 glm::vec4 colour(const float (&rgb)[3], float factor, float fourth) {
@@ -84,9 +87,8 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       key.coloured = format.attributes[kAttributeColour].components != 0;
       key.textured = material.texture != kNone && format.attributes[kAttributeUv].components != 0;
       key.alpha_twin = key.textured && textures.alpha(material.texture) != 0;
-      const Result<std::uint32_t> program = program_of(key);
-      if (!program) return tl::unexpected<Error>(program.error());
-      setups_[c].program = *program;
+      MODAR_ASSIGN(const std::uint32_t program, program_of(key));
+      setups_[c].program = program;
       setups_[c].material = equal_material_[bundle_.chunks()[c].material];
       setups_[c].blended = key.alpha_twin || material.opacity < 1.0f;
       chunk_layouts_[c] = equal_layout_[model.layout];
@@ -100,10 +102,9 @@ Result<std::uint32_t> ModelPainter::program_of(const ProgramKey& key) {
   for (std::uint32_t i = 0; i < programs_.size(); ++i) {
     if (programs_[i].by_slots[0].program.key == key) return i;
   }
-  const Result<ModelProgram> program = make_model_program(key);
-  if (!program) return tl::unexpected<Error>(program.error());
+  MODAR_ASSIGN(const ModelProgram program, make_model_program(key));
   programs_.emplace_back();
-  programs_.back().by_slots[0].program = *program;
+  programs_.back().by_slots[0].program = program;
   return static_cast<std::uint32_t>(programs_.size() - 1);
 }
 
@@ -211,6 +212,245 @@ void ModelPainter::set_attributes(std::uint32_t layout, GLuint buffer, std::uint
                          static_cast<GLsizei>(format.stride), offset + attribute.offset});
   }
   gl.enable_attributes(format.enabled | more);
+}
+
+namespace {
+
+/// With more vertices, two copies do not fit one batch.
+constexpr std::uint32_t kMostMeshVertices = kBatchVertices / 2;
+
+const void* index_pointer(std::uintptr_t offset) {
+  return reinterpret_cast<const void*>(offset);
+}
+
+}  // namespace
+
+void ModelPainter::draw(const PaintJob& job) {
+  ++frame_;
+  job.gl.set_depth_test(true);
+  make_pieces(job);
+  for (std::size_t i = 0; i < pieces_.size();) {
+    const auto same_state = [&](const Piece& a, const Piece& b) {
+      return a.program == b.program && a.material == b.material && a.layout == b.layout &&
+             a.mirrored == b.mirrored && !a.blended && !b.blended;
+    };
+    std::size_t end = i + 1;
+    while (end < pieces_.size() && same_state(pieces_[i], pieces_[end])) ++end;
+    draw_group(job, std::span(pieces_).subspan(i, end - i));
+    i = end;
+  }
+}
+
+void ModelPainter::make_pieces(const PaintJob& job) {
+  pieces_.clear();
+  for (const DrawCommand& command : job.list.commands()) {
+    const LevelRecord& level = bundle_.levels()[command.level];
+    if (!pieces_.empty() && !job.geometry.streams() && continues(pieces_.back(), command)) {
+      Piece& piece = pieces_.back();
+      piece.mesh.index_count += level.index_count;
+      piece.mesh.vertex_count = std::max(piece.mesh.vertex_count, level.vertex_count);
+      ++piece.chunks;
+      continue;
+    }
+    Piece piece;
+    piece.item = command.item;
+    piece.chunk = command.chunk;
+    piece.program = command.program;
+    piece.material = command.material;
+    piece.layout = chunk_layouts_[command.chunk];
+    piece.mesh = {command.level, level.vertex_count, level.index_count};
+    piece.chunks = 1;
+    piece.blended = command.blended;
+    piece.mirrored = job.list.view(command.item).mirrored;
+    pieces_.push_back(piece);
+  }
+}
+
+/// The command's triangles follow the piece's in the buffer, and need nothing set anew.
+bool ModelPainter::continues(const Piece& piece, const DrawCommand& next) const {
+  const LevelRecord& before = bundle_.levels()[piece.mesh.level];
+  const LevelRecord& after = bundle_.levels()[next.level];
+  return piece.item == next.item && piece.material == next.material &&
+         piece.program == next.program && before.vertex_offset == after.vertex_offset &&
+         before.index_offset + std::uint64_t{piece.mesh.index_count} * 2 == after.index_offset &&
+         same_decoding(piece.chunk, next.chunk);
+}
+
+void ModelPainter::draw_group(const PaintJob& job, std::span<Piece> group) {
+  const bool several_items = group.front().item != group.back().item;
+  if (!several_items || !job.options.instancing) {
+    for (const Piece& piece : group) draw_piece(job, piece);
+    return;
+  }
+  const auto order = [](const Piece& piece) {
+    return std::tuple(piece.mesh.level, piece.mesh.index_count, piece.item);
+  };
+  std::sort(group.begin(), group.end(),
+            [&](const Piece& a, const Piece& b) { return order(a) < order(b); });
+  // Copies of one mesh by instances, where the context has them; the rest side by side in batches,
+  // and what is too large for those alone.
+  std::size_t waiting = 0;
+  for (std::size_t i = 0; i < group.size();) {
+    std::size_t end = i + 1;
+    while (end < group.size() && group[end].mesh == group[i].mesh) ++end;
+    const std::span<Piece> copies = group.subspan(i, end - i);
+    i = end;
+    if (copies.size() > 1 && draw_instances(job, copies)) continue;
+    if (copies[0].mesh.vertex_count > kMostMeshVertices || job.geometry.streams()) {
+      for (const Piece& piece : copies) draw_piece(job, piece);
+      continue;
+    }
+    std::copy(copies.begin(), copies.end(), group.begin() + static_cast<std::ptrdiff_t>(waiting));
+    waiting += copies.size();
+  }
+  const std::span<const Piece> rest = group.first(waiting);
+  if (rest.size() > 1 && draw_batches(job, rest)) return;
+  for (const Piece& piece : rest) draw_piece(job, piece);
+}
+
+void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
+  LevelPlace place;
+  if (!job.geometry.use(piece.mesh.level, job.gl, place)) return;
+  ProgramState& state = programs_[piece.program].by_slots[0];
+  set_surface(job, state, piece);
+  set_slot(job, state, piece);
+  set_attributes(piece.layout, place.vertex_buffer, place.vertex_offset, 0, job.gl);
+  job.gl.bind_index_buffer(place.index_buffer);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(piece.mesh.index_count), GL_UNSIGNED_SHORT,
+                 index_pointer(place.index_offset));
+  if (job.geometry.client_arrays()) {
+    job.stats.bytes_uploaded +=
+        std::uint64_t{piece.mesh.index_count} * 2 +
+        std::uint64_t{piece.mesh.vertex_count} * formats_[piece.layout].stride;
+  }
+  ++job.stats.draw_calls;
+  job.stats.triangles += piece.mesh.index_count / 3;
+  job.stats.chunks_drawn += piece.chunks;
+}
+
+bool ModelPainter::draw_instances(const PaintJob& job, std::span<const Piece> pieces) {
+  if (!extensions_.instancing() || job.geometry.client_arrays()) return false;
+  ProgramState* state = program(pieces[0].program, SlotKind::kAttributes, job.gl);
+  LevelPlace place;
+  if (state == nullptr || !job.geometry.use(pieces[0].mesh.level, job.gl, place)) return false;
+  rows_.clear();
+  for (const Piece& piece : pieces) {
+    const Slot slot = make_slot(matrix(job, piece), bundle_.chunks()[piece.chunk]);
+    rows_.insert(rows_.end(), slot.begin(), slot.begin() + 3);
+  }
+  set_surface(job, *state, pieces[0]);
+  set_slot(job, *state, pieces[0]);  // its uv map is every copy's
+  job.gl.bind_array_buffer(row_buffer_);
+  const std::size_t bytes = rows_.size() * sizeof rows_[0];
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(bytes), rows_.data(), GL_STREAM_DRAW);
+  job.stats.bytes_uploaded += bytes;
+  constexpr GLsizei kStride = 3 * sizeof(glm::vec4);
+  for (GLuint row = 0; row < 3; ++row) {
+    job.gl.set_attribute(kAttributeRows + row,
+                         {row_buffer_, 4, GL_FLOAT, GL_FALSE, kStride, row * sizeof(glm::vec4)});
+    extensions_.vertex_attrib_divisor(kAttributeRows + row, 1);
+  }
+  set_attributes(pieces[0].layout, place.vertex_buffer, place.vertex_offset, 7u << kAttributeRows,
+                 job.gl);
+  job.gl.bind_index_buffer(place.index_buffer);
+  extensions_.draw_elements_instanced(
+      GL_TRIANGLES, static_cast<GLsizei>(pieces[0].mesh.index_count), GL_UNSIGNED_SHORT,
+      index_pointer(place.index_offset), static_cast<GLsizei>(pieces.size()));
+  ++job.stats.draw_calls;
+  for (const Piece& piece : pieces) {
+    job.stats.triangles += piece.mesh.index_count / 3;
+    job.stats.chunks_drawn += piece.chunks;
+  }
+  return true;
+}
+
+/// Draws all, or nothing and answers false.
+bool ModelPainter::draw_batches(const PaintJob& job, std::span<const Piece> pieces) {
+  if (slot_count_ < 2) return false;
+  ProgramState* state = program(pieces[0].program, SlotKind::kStream, job.gl);
+  if (state == nullptr) return false;
+  for (std::size_t i = 0; i < pieces.size();) {
+    std::size_t end = i;
+    std::uint32_t vertices = 0;
+    while (end < pieces.size() && end - i < static_cast<std::size_t>(slot_count_) &&
+           vertices + pieces[end].mesh.vertex_count <= kBatchVertices) {
+      vertices += pieces[end++].mesh.vertex_count;
+    }
+    const std::span<const Piece> batch = pieces.subspan(i, end - i);
+    if (batch.size() < 2 || !draw_batch(job, *state, batch)) {
+      for (const Piece& piece : batch) draw_piece(job, piece);
+    }
+    i = end;
+  }
+  return true;
+}
+
+/// pieces: sorted by mesh, within the limits of one batch.
+bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
+                              std::span<const Piece> pieces) {
+  parts_.clear();
+  for (const Piece& piece : pieces) {
+    if (parts_.empty() || parts_.back().mesh != piece.mesh) parts_.push_back({piece.mesh, 0});
+    ++parts_.back().copies;
+  }
+  const std::uint64_t before = batches_.uploaded_bytes();
+  const Batch* batch =
+      batches_.find(pieces[0].layout, parts_, static_cast<std::uint32_t>(slot_count_),
+                    job.geometry.client_arrays(), job.gl);
+  if (batch == nullptr) return false;
+  job.stats.bytes_uploaded += batches_.uploaded_bytes() - before;
+  slots_.clear();
+  for (const Piece& piece : pieces) {
+    const auto place = std::ranges::find(batch->places, piece.mesh, &BatchPlace::mesh);
+    const auto part = std::ranges::find(parts_, piece.mesh, &BatchPart::mesh);
+    // Copies of a part take its slots one after the other.
+    const std::size_t slot = place->first_slot + static_cast<std::size_t>(--part->copies);
+    slots_.resize(std::max(slots_.size(), slot + 1));
+    slots_[slot] = make_slot(matrix(job, piece), bundle_.chunks()[piece.chunk]);
+    job.stats.triangles += piece.mesh.index_count / 3;
+    job.stats.chunks_drawn += piece.chunks;
+  }
+  for (const Piece& piece : pieces) {
+    ++std::ranges::find(parts_, piece.mesh, &BatchPart::mesh)->copies;
+  }
+  set_surface(job, state, pieces[0]);
+  glUniform4fv(state.program.slots, static_cast<GLsizei>(slots_.size() * 4),
+               glm::value_ptr(slots_[0][0]));
+  job.stats.bytes_uploaded += slots_.size() * sizeof(Slot);
+  set_attributes(pieces[0].layout, batch->vertices, batch->vertices_offset, 1u << kAttributeSlot,
+                 job.gl);
+  job.gl.set_attribute(kAttributeSlot,
+                       {batch->vertices, 1, GL_UNSIGNED_BYTE, GL_FALSE, 4, batch->slots_offset});
+  job.gl.bind_index_buffer(batch->indices);
+  // Without a buffer, the driver takes all of them again.
+  job.stats.bytes_uploaded += batch->client.size();
+  draw_runs(job, *batch);
+  return true;
+}
+
+/// One call for what lies side by side in the batch: parts_ tells how many copies of each are
+/// asked.
+void ModelPainter::draw_runs(const PaintJob& job, const Batch& batch) {
+  std::uintptr_t start = 0;
+  std::uint32_t count = 0;
+  const auto flush = [&] {
+    if (count == 0) return;
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_SHORT,
+                   index_pointer(start));
+    ++job.stats.draw_calls;
+    count = 0;
+  };
+  for (const BatchPlace& place : batch.places) {
+    const auto part = std::ranges::find(parts_, place.mesh, &BatchPart::mesh);
+    if (part == parts_.end()) {
+      flush();
+      continue;
+    }
+    if (count == 0) start = batch.indices_offset + place.index_offset;
+    count += part->copies * place.mesh.index_count;
+    if (part->copies < place.copies) flush();
+  }
+  flush();
 }
 
 }  // namespace modar

@@ -98,12 +98,11 @@ Result<GLuint> link_program(const std::string& defines, const char* vertex, cons
 }
 
 Result<ModelProgram> make_model_program(const ProgramKey& key) {
-  const Result<GLuint> linked =
-      link_program(model_defines(key), kModelVertexSource, kModelFragmentSource);
-  if (!linked) return tl::unexpected<Error>(linked.error());
+  MODAR_ASSIGN(const GLuint linked,
+               link_program(model_defines(key), kModelVertexSource, kModelFragmentSource));
   ModelProgram program;
   program.key = key;
-  program.id = *linked;
+  program.id = linked;
   const auto place = [&](const char* name) { return glGetUniformLocation(program.id, name); };
   program.slots = place("u_slots");
   program.projection = place("u_projection");

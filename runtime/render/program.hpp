@@ -5,7 +5,7 @@
 #include <string>
 
 #include "formats/error.hpp"
-#include "runtime/render/gl_api.hpp"
+#include "runtime/render/gl.hpp"
 
 namespace modar {
 
@@ -13,7 +13,7 @@ enum class NormalKind : std::uint8_t { kAbsent, kXyz, kOctahedral };
 /// Where the matrices of a draw come from.
 enum class SlotKind : std::uint8_t { kSingle, kStream, kAttributes };
 
-/// What tells one variant of the model shaders from another.
+/// What distinguishes one variant of the model shaders from another.
 struct ProgramKey {
   NormalKind normal = NormalKind::kAbsent;
   SlotKind slots = SlotKind::kSingle;

@@ -7,14 +7,12 @@
 
 #include <glm/geometric.hpp>
 
-#include "runtime/render/background.hpp"
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
-#include "runtime/render/gl_extensions.hpp"
-#include "runtime/render/gl_state.hpp"
+#include "runtime/render/gl.hpp"
 #include "runtime/render/model_painter.hpp"
+#include "runtime/render/picture.hpp"
 #include "runtime/render/program.hpp"
-#include "runtime/render/target.hpp"
 #include "runtime/render/texture_store.hpp"
 
 namespace modar {
@@ -81,14 +79,11 @@ struct Renderer::State {
 
   Result<void> upload() {
     extensions = load_gl_extensions(caps);
-    const Result<void> textured =
-        textures.upload(caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2));
-    if (!textured) return textured;
+    MODAR_TRY(textures.upload(
+        caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2)));
     geometry.upload();
-    const Result<void> painted = painter.create(textures, extensions, caps);
-    if (!painted) return painted;
-    const Result<void> backed = background.create();
-    if (!backed) return backed;
+    MODAR_TRY(painter.create(textures, extensions, caps));
+    MODAR_TRY(background.create());
     gl.reset();
     return {};
   }
@@ -156,8 +151,7 @@ struct Renderer::State {
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const BundleView& bundle, const GlCaps& caps) {
   std::unique_ptr<Renderer> renderer(new Renderer(std::make_unique<State>(bundle, caps)));
-  const Result<void> uploaded = renderer->state_->upload();
-  if (!uploaded) return tl::unexpected<Error>(uploaded.error());
+  MODAR_TRY(renderer->state_->upload());
   return renderer;
 }
 

@@ -92,8 +92,7 @@ Result<void> TextureStore::choose_levels(std::uint64_t budget) {
 }
 
 Result<void> TextureStore::upload(std::uint64_t budget) {
-  const Result<void> chosen = choose_levels(budget);
-  if (!chosen) return chosen;
+  MODAR_TRY(choose_levels(budget));
   for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
     if (!used_[t]) continue;
     expect_reading(bundle_.texture_data(t));

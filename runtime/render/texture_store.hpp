@@ -7,7 +7,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
 #include "modar/gl_context.hpp"
-#include "runtime/render/gl_state.hpp"
+#include "runtime/render/gl.hpp"
 
 namespace modar {
 

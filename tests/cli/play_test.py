@@ -50,7 +50,7 @@ class Play(ProgramTest):
     def test_a_focal_length_that_stays_unknown_is_told_with_the_reason(self):
         bundle = self.bake_demo()
         paper = self.play(bundle, "--input", COVER, "--find-focal", "--method", "paper")
-        self.assert_fails(paper, 1, "the article's method")
+        self.assert_fails(paper, 1, "the paper's method")
         done = self.play(bundle, "--input", COVER, "--find-focal")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("the focal length stays unknown: 0 views tell something and 1 are too frontal", done.stderr)

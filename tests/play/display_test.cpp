@@ -1,5 +1,5 @@
 // What the on-screen display says, and that it is painted.
-#include "runtime/play/display.hpp"
+#include "runtime/play/overlay.hpp"
 
 #include <gtest/gtest.h>
 

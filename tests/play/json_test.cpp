@@ -1,5 +1,5 @@
 // The player's JSON lines, read by another JSON library.
-#include "runtime/play/json_lines.hpp"
+#include "runtime/play/frame_report.hpp"
 
 #include <gtest/gtest.h>
 

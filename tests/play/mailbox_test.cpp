@@ -1,5 +1,5 @@
 // The mailbox between two threads: order, newest wins, and an end in any state.
-#include "runtime/play/mailbox.hpp"
+#include "runtime/play/pipeline.hpp"
 
 #include <gtest/gtest.h>
 

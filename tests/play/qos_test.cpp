@@ -1,5 +1,5 @@
 // The log of a field trial, read by another JSON library.
-#include "runtime/play/qos_log.hpp"
+#include "runtime/play/frame_report.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>

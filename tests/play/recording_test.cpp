@@ -7,7 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "files.hpp"
-#include "runtime/play/json_lines.hpp"
+#include "runtime/play/frame_report.hpp"
 
 namespace modar {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "files.hpp"
 #include "runtime/play/frame_sink.hpp"
-#include "runtime/play/json_lines.hpp"
+#include "runtime/play/frame_report.hpp"
 #include "runtime/play/report_page.hpp"
 
 namespace modar {

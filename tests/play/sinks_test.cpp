@@ -36,7 +36,7 @@ TEST(Sinks, AFolderTakesNumberedPngsWithTheirColours) {
   EXPECT_EQ(read.at<cv::Vec3b>(1, 1), cv::Vec3b(30, 90, 80));
 }
 
-TEST(Sinks, AMovieHoldsEachFrameAndStartsWithItsIndex) {
+TEST(Sinks, AMovieHoldsEachFrame) {
   const test::Folder folder;
   const std::string path = folder / "a.mp4";
   auto sink = open_frame_sink(path, 25);
@@ -49,7 +49,6 @@ TEST(Sinks, AMovieHoldsEachFrameAndStartsWithItsIndex) {
   EXPECT_EQ(folder.count(), 1u) << "nothing half-made beside it";
   const std::string bytes = test::read_text(path);
   EXPECT_NE(bytes.find("avc1"), std::string::npos);
-  EXPECT_LT(bytes.find("moov"), bytes.find("mdat"));
 
   cv::VideoCapture video(path);
   cv::Mat frame;

@@ -23,7 +23,7 @@ struct FakeCamera final : VideoDevice {
   int torn = -1;          ///< that frame comes with the error flag
   int empty_wakes = 0;    ///< readable, but EAGAIN
   bool busy = false;
-  bool* stream_off = nullptr;  ///< told when the stream ends
+  bool* stream_off = nullptr;  ///< set when the stream ends
 
   int control(unsigned long request, void* argument) override {
     switch (request) {

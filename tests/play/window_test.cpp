@@ -1,6 +1,6 @@
 // The window through SDL2 itself, with its driver that needs no display: keys and clicks come as a
 // desktop sends them.
-#include "runtime/play/window.hpp"
+#include "runtime/play/screen.hpp"
 
 #include <cstdlib>
 #include <map>
@@ -11,7 +11,6 @@
 
 #include "formats/bundle_writer.hpp"
 #include "modar/gl_context.hpp"
-#include "runtime/play/screen.hpp"
 
 namespace modar {
 namespace {
@@ -117,7 +116,7 @@ TEST_F(WindowTest, ALostContextIsMadeAnewAndShowsTheSame) {
   const auto drawn = [&] {
     EXPECT_TRUE((*screen)->resize(16, 12));
     (*screen)->draw(picture, default_camera(16, 12), {});
-    const RgbaImage seen = (*screen)->picture();
+    const RgbaView seen = (*screen)->picture();
     return std::vector<std::uint8_t>(seen.pixels.begin(), seen.pixels.end());
   };
   const std::vector<std::uint8_t> before = drawn();

@@ -6,7 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "modar/camera.hpp"
-#include "runtime/render/cull.hpp"
+#include "runtime/render/draw_list.hpp"
 
 namespace modar {
 namespace {

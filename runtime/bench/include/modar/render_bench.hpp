@@ -1,4 +1,4 @@
-// What drawing costs: the article's four ways to draw copies of a model (its Tables 10 to 12) side
+// What drawing costs: the ModAR paper's four ways to draw copies of a model (its Tables 10 to 12) side
 // by side in one run, loading against copying, culling against brute force.
 #pragma once
 
@@ -39,7 +39,7 @@ struct RenderBenchRow {
 /// frame_ms (wall clock until the driver has finished), cpu_ms (of the process while the driver
 /// rasterises nothing: Mesa's no-op driver, in a child process; left out where Mesa is not the
 /// driver). "MODEL x10 WAY gain_low_end" and "gain_mid_range": how often our frame time of
-/// index_arrays holds that of the way, and the article's.
+/// index_arrays holds that of the way, and the paper's.
 /// Then, a bundle (by its path): open_ms; load_cpu_ms (buffers into GL) and
 /// driver_cpu_ms (glBufferData of the same bytes alone), both against memcpy; bytes in GL by kind;
 /// and, a model, triangles sent from inside it against those whose own boxes meet the frustum. Call

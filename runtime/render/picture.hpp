@@ -1,4 +1,5 @@
-// The camera's picture as textures, drawn as one rectangle; also the copy of a texture to a window.
+// Whole pictures: the off-screen framebuffer that is drawn into, and the camera's picture behind
+// the models. Internal to runtime/render.
 #pragma once
 
 #include <array>
@@ -6,10 +7,31 @@
 #include <cstdint>
 
 #include "formats/error.hpp"
+#include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"
-#include "runtime/render/gl_state.hpp"
+#include "runtime/render/gl.hpp"
 
 namespace modar {
+
+class Target {
+ public:
+  /// Makes the framebuffer anew at that size. Errors: kUnsupported "gl.framebuffer".
+  Result<void> resize(int width, int height, const GlCaps& caps, GlState& gl);
+  void release(GlState& gl);
+
+  /// Draw calls go here from now on.
+  void bind() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_); }
+  [[nodiscard]] GLuint texture() const { return texture_; }
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+
+ private:
+  GLuint framebuffer_ = 0;
+  GLuint texture_ = 0;
+  GLuint depth_ = 0;
+  int width_ = 0;
+  int height_ = 0;
+};
 
 class Background {
  public:

@@ -1,12 +1,55 @@
-// Remembers what is set in the context, so that nothing is set twice, and counts what is.
+// What the renderer asks of OpenGL ES 2.0: its constants, the entry points of extensions, and the
+// context's state, remembered so that nothing is set twice. Internal to runtime/render.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
-#include "runtime/render/gl_api.hpp"
+#include <GLES2/gl2.h>
+#include <GLES2/gl2ext.h>
+
+#include "modar/gl_context.hpp"
 
 namespace modar {
+
+/// Fixed attribute locations of every model program; a location per semantic, rows for instances.
+enum AttributeSlot : GLuint {
+  kAttributePosition = 0,
+  kAttributeNormal = 1,
+  kAttributeUv = 2,
+  kAttributeColour = 3,
+  kAttributeSlot = 4,  ///< the vertex's own choice of a slot
+  kAttributeRows = 5,  ///< the first of three rows that step once an instance
+  kAttributeCount = 8,
+};
+
+struct GlExtensions {
+  PFNGLDRAWELEMENTSINSTANCEDEXTPROC draw_elements_instanced = nullptr;
+  PFNGLVERTEXATTRIBDIVISOREXTPROC vertex_attrib_divisor = nullptr;
+  PFNGLPUSHDEBUGGROUPKHRPROC push_debug_group = nullptr;
+  PFNGLPOPDEBUGGROUPKHRPROC pop_debug_group = nullptr;
+  PFNGLPUSHGROUPMARKEREXTPROC push_group_marker = nullptr;
+  PFNGLPOPGROUPMARKEREXTPROC pop_group_marker = nullptr;
+
+  [[nodiscard]] bool instancing() const {
+    return draw_elements_instanced != nullptr && vertex_attrib_divisor != nullptr;
+  }
+};
+
+/// caps: masked ones; what they lack is not looked up.
+GlExtensions load_gl_extensions(const GlCaps& caps);
+
+/// Names the GL commands of its lifetime for profilers and traces, where the context can.
+class DebugGroup {
+ public:
+  DebugGroup(const GlExtensions& extensions, const char* label);
+  DebugGroup(const DebugGroup&) = delete;
+  DebugGroup& operator=(const DebugGroup&) = delete;
+  ~DebugGroup();
+
+ private:
+  const GlExtensions& extensions_;
+};
 
 /// A vertex attribute as glVertexAttribPointer takes it, with the buffer that it reads.
 struct AttributePointer {
@@ -39,9 +82,9 @@ class GlState {
   void set_blending(bool enabled);
   void set_depth_test(bool enabled);
 
-  /// To be told when another program was put in use behind our back.
+  /// Call this after putting a program in use by other means.
   void forget_program() { program_ = kUnknown; }
-  /// To be told when names are deleted, since GL may give them out again.
+  /// Call these before deleting a name, since GL may give it out again.
   void forget_buffer(GLuint buffer);
   void forget_texture(GLuint texture);
 

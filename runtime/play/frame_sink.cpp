@@ -1,4 +1,4 @@
-// Makes the folders that outputs go to.
+// Folders that outputs go to.
 #include <sys/stat.h>
 
 #include <cerrno>
