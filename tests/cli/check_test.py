@@ -5,7 +5,10 @@ import pathlib
 import shutil
 import unittest
 
-import jsonschema
+try:
+    import jsonschema
+except ImportError:
+    jsonschema = None
 
 from programs import COVER, POTTERY, ROOT, ProgramTest
 
@@ -15,6 +18,7 @@ CORRUPT = sorted((ROOT / "tests" / "corrupt").glob("*.modar"))
 GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
 
 
+@unittest.skipUnless(jsonschema, "python3-jsonschema is not installed")
 class Check(ProgramTest):
     def check(self, code, *arguments):
         done = self.modar("check", *arguments)

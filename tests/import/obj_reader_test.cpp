@@ -78,6 +78,7 @@ void expect_same_as_tinyobj(const std::string& path) {
 }
 
 TEST(ObjReader, EqualsTinyObjLoaderOnDebiansFiles) {
+  if (!testing::has_tinyobj()) GTEST_SKIP() << "libtinyobjloader-dev is not installed";
   const auto files = testing::assimp_obj_files();
   if (files.empty()) GTEST_SKIP() << "assimp-testmodels is not installed";
   for (const std::string& path : files) {
@@ -90,6 +91,7 @@ TEST(ObjReader, EqualsTinyObjLoaderOnDebiansFiles) {
 }
 
 TEST(ObjReader, EqualsTinyObjLoaderOnScans) {
+  if (!testing::has_tinyobj()) GTEST_SKIP() << "libtinyobjloader-dev is not installed";
   const std::string shared = testing::shared_data();
   if (shared.empty()) GTEST_SKIP() << "no shared data";
   const auto files = testing::obj_files_below(shared + "/models");

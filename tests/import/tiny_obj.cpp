@@ -1,9 +1,17 @@
 // tinyobjloader's arrays as ours are.
 #include "tests/import/tiny_obj.hpp"
 
+#ifdef MODAR_HAVE_TINYOBJ
 #include "bake/lab/tinyobj_library.hpp"
+#endif
 
 namespace modar::testing {
+
+#ifdef MODAR_HAVE_TINYOBJ
+
+bool has_tinyobj() {
+  return true;
+}
 
 TinyModel load_with_tinyobj(const std::string& path) {
   tinyobj::ObjReaderConfig config;
@@ -32,5 +40,17 @@ TinyModel load_with_tinyobj(const std::string& path) {
   }
   return model;
 }
+
+#else
+
+bool has_tinyobj() {
+  return false;
+}
+
+TinyModel load_with_tinyobj(const std::string& /*path*/) {
+  return {};
+}
+
+#endif
 
 }  // namespace modar::testing

@@ -26,6 +26,8 @@ struct TinyModel {
   std::vector<unsigned> face_sizes;
 };
 
+/// Whether tinyobjloader was there when the tests were built; without it nothing loads.
+bool has_tinyobj();
 TinyModel load_with_tinyobj(const std::string& path);
 
 }  // namespace modar::testing
