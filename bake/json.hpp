@@ -1,19 +1,91 @@
-// What all JSON of the workstation is written with.
+// JSON of the workstation: a value that is built like a literal, written as text and read back.
+// nlohmann/json is known to json.cpp alone: a file that includes it takes seconds to compile.
 #pragma once
 
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <optional>
 #include <string>
-
-#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+#include <type_traits>
+#include <utility>
 
 namespace modar {
 
-using Json = nlohmann::ordered_json;
+/// null, a truth value, a number, a text, an array, or an object whose keys keep their order.
+class Json {
+ public:
+  using Member = std::pair<std::string, Json>;
 
-/// JSON has no infinities: they become null.
-Json json_number(double value);
+  Json(std::nullptr_t = nullptr);  // NOLINT: literals convert to values
+  Json(std::string_view text);     // NOLINT
+  Json(const std::string& text) : Json(std::string_view(text)) {}  // NOLINT
+  Json(const char* text) : Json(std::string_view(text)) {}         // NOLINT
+  template <class T>
+  requires std::is_arithmetic_v<T> Json(T number) : Json(Number{}, widest(number)) {}  // NOLINT
+  /// An object: {{"key", value}, ...}.
+  Json(std::initializer_list<Member> members);
+  Json(const Json& other);
+  Json(Json&& other) noexcept;
+  Json& operator=(Json other) noexcept;
+  ~Json();
 
-/// Indented text with a line break at its end. Foreign bytes that are no UTF-8 are replaced, never
-/// thrown at.
-std::string json_text(const Json& json);
+  static Json object();
+  static Json array(std::initializer_list<Json> elements = {});
+  /// An array of a container's elements.
+  template <class Range>
+  static Json list(const Range& range) {
+    Json elements = array();
+    for (const auto& element : range) elements.push_back(element);
+    return elements;
+  }
+
+  /// To an array.
+  void push_back(Json element);
+  /// To an object, in place of what the key had.
+  void set(std::string_view key, Json value);
+
+  [[nodiscard]] bool is_null() const;
+  /// Elements of an array, members of an object; else 0.
+  [[nodiscard]] std::size_t size() const;
+  /// An element of an array. Nothing: there is none, or this is no array.
+  [[nodiscard]] std::optional<Json> at(std::size_t index) const;
+  /// A member of an object; "a/b" is b of a. Nothing: there is none.
+  [[nodiscard]] std::optional<Json> find(std::string_view path) const;
+  /// Nothing where this is of another type; a count is a number without sign or fraction.
+  [[nodiscard]] std::optional<double> number() const;
+  [[nodiscard]] std::optional<std::uint64_t> count() const;
+  [[nodiscard]] std::optional<std::string> text() const;
+  [[nodiscard]] bool is_array() const;
+
+  /// Indented, with a line break at its end. Infinities become null, bytes that are no UTF-8 are
+  /// replaced: nothing is thrown at.
+  [[nodiscard]] std::string dump() const;
+  /// null where the text is no JSON.
+  static Json parse(std::string_view text);
+
+ private:
+  struct Value;
+  struct Number {};
+  template <class T>
+  static auto widest(T number) {
+    if constexpr (std::is_same_v<T, bool>) {
+      return number;
+    } else if constexpr (std::is_floating_point_v<T>) {
+      return static_cast<double>(number);
+    } else if constexpr (std::is_signed_v<T>) {
+      return static_cast<std::int64_t>(number);
+    } else {
+      return static_cast<std::uint64_t>(number);
+    }
+  }
+  Json(Number, bool truth);
+  Json(Number, double number);
+  Json(Number, std::int64_t number);
+  Json(Number, std::uint64_t number);
+
+  std::unique_ptr<Value> value_;  ///< never empty but in what was moved from
+};
 
 }  // namespace modar

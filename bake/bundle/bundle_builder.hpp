@@ -76,10 +76,6 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report);
 SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,
                         const std::array<double, 3>& model_sides);
 
-/// JSON of the kMeta section: tool, options and source file names, without folders or times.
-/// What the report says of the models stands beside each.
-std::string bundle_meta(const BakeRequest& request, const Report& report);
-
 /// "dir/spider.obj" -> "spider".
 std::string file_stem(const std::string& path);
 

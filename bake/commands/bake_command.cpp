@@ -1,23 +1,63 @@
-// `modar bake`: OBJ models and pattern images to one bundle.
+// `modar bake`: models and pattern images to one bundle.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <system_error>
+#include <thread>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/bundle/topology_json.hpp"
+#include "bake/bundle/bundle_json.hpp"
 #include "bake/check/reproduce.hpp"
+#include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
-#include "bake/commands/json_output.hpp"
 #include "bake/memory/memory_limit.hpp"
+#include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/output_folder.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
+#include "modar/device_profile.hpp"
+#include "modar/features.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {
 namespace {
+
+struct BakeCommand {
+  BakeRequest request;
+  std::string output;
+  bool prove_reproducible = false;
+  bool quiet = false;
+  bool json = false;
+  // Options as text, before they are parsed into the request.
+  std::vector<std::string> patterns;
+  std::vector<std::string> scenes;
+  std::string unit;
+  std::string max_error;
+  std::string device;
+};
+
+/// Reads what the options say as text into the request.
+Result<void> complete(BakeCommand& command) {
+  BakeRequest& request = command.request;
+  for (const std::string& text : command.patterns) {
+    MODAR_ASSIGN(PatternRequest pattern, parse_pattern(text));
+    request.patterns.push_back(std::move(pattern));
+  }
+  for (const std::string& text : command.scenes) {
+    MODAR_ASSIGN(SceneRequest scene, parse_scene(text));
+    request.scenes.push_back(std::move(scene));
+  }
+  if (!command.unit.empty()) {
+    MODAR_ASSIGN(request.unit_metres, parse_unit(command.unit));
+  }
+  if (!command.max_error.empty()) {
+    MODAR_ASSIGN(request.max_error, parse_max_error(command.max_error));
+  }
+  if (!command.device.empty()) MODAR_TRY(plan_for_device(command.device, request));
+  request.tool_version = MODAR_VERSION;
+  return {};
+}
 
 void print_summary(const BundleView& bundle, const Report& report, const std::string& path) {
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
@@ -69,9 +109,49 @@ void report_memory(const BakeRequest& request, Report& report) {
                              "fewer --jobs, smaller textures or several bundles take less"});
 }
 
-}  // namespace
+const char* severity_name(DiagnosticSeverity severity) {
+  return severity == DiagnosticSeverity::kInfo      ? "info"
+         : severity == DiagnosticSeverity::kWarning ? "warning"
+                                                    : "error";
+}
 
-int run_bake(const BakeCommand& command) {
+Json bake_json(const BundleView& bundle, const Report& report) {
+  Json stages = Json::array();
+  for (const StageReport& stage : report.stages) {
+    stages.push_back({{"name", stage.name},
+                      {"ms", stage.ms},
+                      {"in", stage.in},
+                      {"out", stage.out},
+                      {"max_error", stage.max_error}});
+  }
+  Json findings = Json::array();
+  for (const Diagnostic& finding : report.findings) {
+    findings.push_back({{"id", finding.id},
+                        {"severity", severity_name(finding.severity)},
+                        {"file", finding.file},
+                        {"line", finding.line},
+                        {"message", finding.message},
+                        {"cure", finding.cure}});
+  }
+  Json half_edges = Json::array();
+  for (const MeshTopology& topology : report.topologies) {
+    if (!topology.half_edges) continue;
+    half_edges.push_back({{"model", topology.model},
+                          {"boundary_loops", topology.half_edges->boundary_loops},
+                          {"copied_faces", topology.half_edges->copied_faces},
+                          {"copied_vertices", topology.half_edges->copied_vertices}});
+  }
+  const ProcessCost cost = process_cost();
+  return {{"bundle", bundle_json(bundle)},
+          {"half_edges", half_edges},
+          {"stages", stages},
+          {"findings", findings},
+          {"cpu_seconds", cost.cpu_seconds},
+          {"peak_rss_bytes", cost.peak_rss_bytes}};
+}
+
+int run_bake(BakeCommand& command, const std::vector<std::string>& words) {
+  if (auto completed = complete(command); !completed) return print_error(completed.error());
   if (const std::string& folder = command.request.textures.picture_folder; !folder.empty()) {
     if (auto made = make_output_folder(folder); !made) return print_error(made.error());
   }
@@ -103,7 +183,7 @@ int run_bake(const BakeCommand& command) {
   if (!bundle) return print_error(bundle.error());
   if (command.prove_reproducible) {
     bar.show("bake again", 0);
-    auto proven = prove_reproducible(command.request, command.words, file->bytes());
+    auto proven = prove_reproducible(command.request, words, file->bytes());
     bar.clear();
     if (!proven) return print_error(proven.error());
     if (!command.quiet) std::fprintf(stderr, "a second bake elsewhere gave the same bytes\n");
@@ -111,8 +191,98 @@ int run_bake(const BakeCommand& command) {
   writing.done(content->models.size() + content->patterns.size(), file->bytes().size());
   bar.clear();
   if (!command.quiet) print_summary(*bundle, report, command.output);
-  if (command.json) std::fputs(bake_json(*bundle, report, process_cost()).c_str(), stdout);
+  if (command.json) std::fputs(bake_json(*bundle, report).dump().c_str(), stdout);
   return static_cast<int>(ExitCode::kOk);
+}
+
+void add_texture_options(CommandLine& line, TextureOptions& textures) {
+  line.option("--max-texture", &textures.max_side, "Longest side of a texture, in pixels",
+              {.shows_default = true, .least = 4, .most = kMaxTextureSide});
+  line.flag("!--no-mipmaps", textures.mipmaps, "Store level 0 of textures only");
+  line.choice<Etc1Effort>(
+      "--effort", textures.effort,
+      {{"fast", Etc1Effort::kFast}, {"good", Etc1Effort::kGood}, {"best", Etc1Effort::kBest}},
+      "Of the ETC1 encoder: fast, good (default) or best", {.type = "EFFORT"});
+  line.flag("--perceptual", textures.perceptual, "Weigh ETC1 errors as the eye does, by luma");
+  line.option("--min-psnr", &textures.min_psnr_db, "Report textures below this, in dB");
+  line.option("--min-ssim", &textures.min_ssim, "Report textures below this",
+              {.least = 0, .most = 1});
+  line.option("--texture-pictures", &textures.picture_folder,
+              "Write source, decoded and difference of each texture as PNG", {.type = "DIR"});
+}
+
+void add_geometry_options(CommandLine& line, BakeCommand& command) {
+  BakeRequest& request = command.request;
+  line.option("--unit", &command.unit, "Unit of the models' coordinates: mm, cm, m, km, in, ft");
+  line.option("--max-error", &command.max_error,
+              "Of packed positions: source units, a percentage of the diagonal (0.01%), or a "
+              "length (2mm, with --unit)",
+              {.type = "LENGTH"});
+  line.choice<PositionKind>("--positions", request.positions,
+                            {{"half", PositionKind::kHalf}, {"int16", PositionKind::kInt16}},
+                            "Store them as half or int16 (else: int16 where --max-error needs it)",
+                            {.type = "LAYOUT"});
+  line.option("--lods", &request.levels,
+              "Levels of detail, the finest counted, each of half the triangles before it",
+              {.shows_default = true, .least = 1, .most = kMaxLevels});
+  line.flag("--no-lods", [&request] { request.levels = 1; }, "The finest level only",
+            {.excludes = "--lods"});
+  line.flag("!--no-topology", request.topology, "Do not measure the models' topology");
+}
+
+void add_pattern_options(CommandLine& line, BakeRequest& request) {
+  line.option("--loop-views", &request.loop.trial_views,
+              "Random views that try a pattern's features: fewer bake faster, more hold better",
+              {.least = 1, .most = 10000});
+  std::vector<std::string> sets = {"none"};
+  std::string names = "none";
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    sets.emplace_back(parameter_set_name(set.id));
+    names += ", " + sets.back();
+  }
+  line.option(
+      "--parameters", &request.parameters,
+      "The ModAR paper's sets to store beside our record of a pattern, as YML and mapped: " +
+          names + " (default: all)",
+      {.type = "SET,SET", .choices = sets, .separator = ','});
+  line.flag("!--no-score", request.loop.score, "Do not score the patterns");
+}
+
+}  // namespace
+
+void add_bake(CommandLine& program) {
+  CommandLine& line = program.command("bake", "Models and pattern images to one bundle");
+  const auto command = std::make_shared<BakeCommand>();
+  BakeRequest& request = command->request;
+  request.jobs = std::max(1u, std::thread::hardware_concurrency());
+  line.option("--model", &request.models, "OBJ, glTF or GLB files", {.type = "FILE"});
+  line.option("--pattern", &command->patterns,
+              "Images of flat things, frontal; :WIDTHmm tells the printed width",
+              {.type = "FILE[:WIDTHmm]"});
+  line.option("--scene", &command->scenes,
+              "Which model stands on which pattern; needed where there is more than one of either",
+              {.type = "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred]"});
+  line.option("-o,--output", &command->output, "The bundle to write",
+              {.type = "OUT.modar", .required = true});
+  line.flag("--prove-reproducible", command->prove_reproducible,
+            "Bake again with other threads, paths, locale, time zone; compare the bytes");
+  add_geometry_options(line, *command);
+  add_texture_options(line, request.textures);
+  line.option("--device", &command->device,
+              "Plan for a device: its texture size and GPU memory (" + device_profile_names() + ")",
+              {.type = "NAME"});
+  add_pattern_options(line, request);
+  line.option("--jobs", &request.jobs, "Threads; the bytes do not depend on it",
+              {.shows_default = true, .least = 1, .most = 256});
+  line.size("--memory", request.memory_bytes,
+            "Hold the process there (1G, 800M): large arrays live in files beside the bundle",
+            {.type = "SIZE"});
+  line.flag("--quiet", command->quiet, "No progress, no summary, no diagnostics on stderr");
+  line.flag("--json", command->json, "Print what was baked, stages and diagnostics as JSON");
+  line.footer(
+      example("  modar bake --model spider.obj --pattern box.png:210mm"
+              " --scene box=spider,up=y,scale=0.8 -o spider.modar\n"));
+  line.run([command, &program] { return run_bake(*command, program.words()); });
 }
 
 }  // namespace modar

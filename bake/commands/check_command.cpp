@@ -87,7 +87,7 @@ void print_fit(const SourceFit& fit) {
 
 }  // namespace
 
-int run_check(const CheckCommand& command, SourceStages stages) {
+int run_check(const CheckCommand& command) {
   if (command.list_issues) {
     print_all_kinds();
     return static_cast<int>(ExitCode::kOk);
@@ -112,7 +112,7 @@ int run_check(const CheckCommand& command, SourceStages stages) {
     const Result<BundleView> bundle = BundleView::open(file->bytes());
     if (*device != nullptr) check_device(*bundle, **device, sink);
     if (!command.sources.empty()) {
-      if (auto done = stages(*bundle, command, sink, extras); !done) {
+      if (auto done = check_against_sources(*bundle, command, sink, extras); !done) {
         return print_error(done.error());
       }
     }

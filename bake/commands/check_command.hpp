@@ -31,24 +31,13 @@ struct CheckCommand {
   std::string second_reader;  ///< scripts/read_bundle.py, to tell harmless mutations
 };
 
-/// The part of a check that bakes, renders and tracks: it brings most of the workstation's
-/// libraries with it, so that the program that checks bytes alone is linked without it.
-using SourceStages = Result<void> (*)(const BundleView& bundle, const CheckCommand& command,
-                                      const IssueSink& sink, CheckExtras& extras);
-
 /// Rebakes, looks and tracks, as the command asks; command.sources is not empty.
 /// Errors: those of check_source(), check_looks() and check_poses(); kIo "io.folder".
 Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
                                    const IssueSink& sink, CheckExtras& extras);
 
-/// True if the words behind "check" ask for what only check_against_sources() can do.
-bool needs_sources(const std::vector<std::string>& words);
-
-/// Parses the words behind "check" and runs. stages: nullptr where needs_sources() is false.
-int run_check_line(std::vector<std::string> words, SourceStages stages);
-
-/// Each prints data to stdout and words to stderr, and answers the exit code.
-int run_check(const CheckCommand& command, SourceStages stages);
+/// Each prints data to stdout and diagnostics to stderr, and answers the exit code.
+int run_check(const CheckCommand& command);
 int run_mutate(const CheckCommand& command);
 
 }  // namespace modar

@@ -2,13 +2,12 @@
 #include "bake/commands/check_json.hpp"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <vector>
+
+#include "bake/json.hpp"
 
 namespace modar {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json tally_json(const MutationTally& tally) {
   return {{"tried", tally.tried},
@@ -21,11 +20,6 @@ std::string message_of(const Issue& issue) {
   std::string message = issue.kind->message;
   if (!issue.detail.empty()) message += ": " + issue.detail;
   return message;
-}
-
-/// Foreign bytes that are no UTF-8 are replaced, never thrown at.
-std::string dump(const Json& document) {
-  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 /// A path as a relative reference of RFC 3986: all but unreserved characters and slashes escaped.
@@ -54,7 +48,8 @@ Json source_json(const SourceFit& fit) {
                       {"bundle_to_source", model.bundle_to_source},
                       {"colour_error", model.colour_error}});
   }
-  return {{"models", models}, {"same", fit.same}, {"different", fit.different}};
+  return {
+      {"models", models}, {"same", Json::list(fit.same)}, {"different", Json::list(fit.different)}};
 }
 
 Json poses_json(const std::vector<PatternRange>& ranges) {
@@ -93,7 +88,7 @@ Json looks_json(const std::vector<ModelLook>& looks) {
                     {"delta_e_mean", look.delta_e_mean},
                     {"delta_e_worst", look.delta_e_worst},
                     {"worst_view", look.worst_view},
-                    {"picture", look.picture.empty() ? Json(nullptr) : Json(look.picture)}});
+                    {"picture", look.picture.empty() ? Json() : Json(look.picture)}});
   }
   return list;
 }
@@ -117,12 +112,14 @@ Json sarif_result(const WeighedIssue& weighed, const std::string& uri, std::size
   const Issue& issue = weighed.issue;
   const Json place = {{"artifactLocation", {{"uri", uri}}},
                       {"region", {{"byteOffset", issue.offset}, {"byteLength", 1}}}};
-  return {{"ruleId", issue.kind->id},
-          {"ruleIndex", rule},
-          {"level", sarif_level(weighed.severity)},
-          {"message", {{"text", message_of(issue) + "; " + issue.kind->cure}}},
-          {"locations",
-           {{{"physicalLocation", place}, {"logicalLocations", {{{"name", issue.where}}}}}}}};
+  return {
+      {"ruleId", issue.kind->id},
+      {"ruleIndex", rule},
+      {"level", sarif_level(weighed.severity)},
+      {"message", {{"text", message_of(issue) + "; " + issue.kind->cure}}},
+      {"locations",
+       Json::array({Json({{"physicalLocation", place},
+                          {"logicalLocations", Json::array({Json({{"name", issue.where}})})}})})}};
 }
 
 }  // namespace
@@ -139,17 +136,17 @@ std::string check_json(const Verdict& verdict, const CheckExtras& extras) {
                     {"cure", issue.kind->cure}});
   }
   Json left_out = Json::object();
-  for (const auto& [id, count] : verdict.left_out()) left_out[id] = count;
+  for (const auto& [id, count] : verdict.left_out()) left_out.set(id, count);
   Json document = {{"verdict", verdict.good() ? "good" : "bad"},
                    {"errors", verdict.errors()},
                    {"warnings", verdict.warnings()},
-                   {"device", extras.device.empty() ? Json(nullptr) : Json(extras.device)},
+                   {"device", extras.device.empty() ? Json() : Json(extras.device)},
                    {"issues", list},
                    {"left_out", left_out}};
-  if (extras.source) document["source"] = source_json(*extras.source);
-  if (!extras.poses.empty()) document["poses"] = poses_json(extras.poses);
-  if (!extras.looks.empty()) document["looks"] = looks_json(extras.looks);
-  return dump(document);
+  if (extras.source) document.set("source", source_json(*extras.source));
+  if (!extras.poses.empty()) document.set("poses", poses_json(extras.poses));
+  if (!extras.looks.empty()) document.set("looks", looks_json(extras.looks));
+  return document.dump();
 }
 
 std::string check_sarif(const Verdict& verdict, const std::string& path,
@@ -163,22 +160,24 @@ std::string check_sarif(const Verdict& verdict, const std::string& path,
   }
   const Json driver = {
       {"name", "modar check"}, {"version", tool_version}, {"rules", sarif_rules(kinds)}};
-  return dump({{"$schema", "https://json.schemastore.org/sarif-2.1.0.json"},
-               {"version", "2.1.0"},
-               {"runs",
-                {{{"tool", {{"driver", driver}}},
-                  {"invocations", {{{"executionSuccessful", true}}}},
-                  {"artifacts", {{{"location", {{"uri", uri_of(path)}}}}}},
-                  {"results", results}}}}});
+  const Json run = {{"tool", {{"driver", driver}}},
+                    {"invocations", Json::array({Json({{"executionSuccessful", true}})})},
+                    {"artifacts", Json::array({Json({{"location", {{"uri", uri_of(path)}}}})})},
+                    {"results", results}};
+  const Json document = {{"$schema", "https://json.schemastore.org/sarif-2.1.0.json"},
+                         {"version", "2.1.0"},
+                         {"runs", Json::array({run})}};
+  return document.dump();
 }
 
 std::string mutation_json(const MutationReport& report) {
   Json kinds = Json::object();
-  for (const auto& [kind, tally] : report.by_kind) kinds[kind] = tally_json(tally);
+  for (const auto& [kind, tally] : report.by_kind) kinds.set(kind, tally_json(tally));
   Json fields = Json::object();
   for (const auto& [field, tally] : report.by_field) {
-    fields[field] = tally_json(tally);
-    fields[field]["rate_without_statement"] = tally.rate_without_statement();
+    Json one = tally_json(tally);
+    one.set("rate_without_statement", tally.rate_without_statement());
+    fields.set(field, std::move(one));
   }
   Json survivors = Json::array();
   for (const MutationSurvivor& survivor : report.survivors) {
@@ -200,7 +199,7 @@ std::string mutation_json(const MutationReport& report) {
         {"by_kind", kinds},
         {"by_field", fields},
         {"survivors", survivors}}}};
-  return dump(document);
+  return document.dump();
 }
 
 }  // namespace modar

@@ -1,10 +1,11 @@
 // `modar inspect`: what a bundle holds, as a table, as JSON, or taken out as files.
 #include <cstdio>
+#include <memory>
 #include <string>
 
-#include "bake/bundle/topology_json.hpp"
+#include "bake/bundle/bundle_json.hpp"
+#include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
-#include "bake/commands/json_output.hpp"
 #include "bake/export/extract.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
@@ -12,6 +13,12 @@
 
 namespace modar {
 namespace {
+
+struct InspectCommand {
+  std::string bundle;
+  std::string extract;  ///< folder for GLB, PKM, YML; empty: none
+  bool json = false;
+};
 
 void print_models(const BundleView& bundle) {
   if (bundle.models().empty()) return;
@@ -88,8 +95,6 @@ void print_table(const BundleView& bundle, const std::string& path) {
   }
 }
 
-}  // namespace
-
 int run_inspect(const InspectCommand& command) {
   Result<MappedFile> file = MappedFile::open(command.bundle);
   if (!file) return print_error(file.error());
@@ -105,11 +110,24 @@ int run_inspect(const InspectCommand& command) {
     for (const std::string& name : *files) std::fprintf(stderr, "wrote %s\n", name.c_str());
   }
   if (command.json) {
-    std::fputs(inspect_json(*bundle).c_str(), stdout);
+    std::fputs(bundle_json(*bundle).dump().c_str(), stdout);
   } else {
     print_table(*bundle, command.bundle);
   }
   return static_cast<int>(ExitCode::kOk);
+}
+
+}  // namespace
+
+void add_inspect(CommandLine& program) {
+  CommandLine& line = program.command("inspect", "Show what a bundle holds, or take it out");
+  const auto command = std::make_shared<InspectCommand>();
+  line.option("bundle", &command->bundle, "The bundle", {.type = "BUNDLE", .required = true});
+  line.option("--extract", &command->extract,
+              "Write models as GLB, textures as PKM and KTX, patterns as YML", {.type = "DIR"});
+  line.flag("--json", command->json, "Print as JSON");
+  line.footer(example("  modar inspect spider.modar --extract out/\n"));
+  line.run([command] { return run_inspect(*command); });
 }
 
 }  // namespace modar

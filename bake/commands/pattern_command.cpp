@@ -1,18 +1,73 @@
-// `modar pattern`: what its commands do, one after the other.
+// `modar pattern`: rectify, score, simulate and confusion, one after the other.
+#include <algorithm>
 #include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
-#include "bake/commands/json_output.hpp"
-#include "bake/commands/pattern_json.hpp"
+#include "bake/json.hpp"
 #include "bake/output_folder.hpp"
+#include "bake/pattern/confusion.hpp"
+#include "bake/pattern/pattern_image.hpp"
 #include "bake/pattern/pattern_picture.hpp"
+#include "bake/pattern/score.hpp"
+#include "bake/pattern/simulate.hpp"
 #include "bake/terminal.hpp"
 #include "modar/camera_file.hpp"
 
 namespace modar {
+namespace {
 
-int run_rectify(const RectifyCommand& command) {
+struct RectifyCommand {
+  std::string photo;
+  std::string corners;
+  RectifyOptions options;
+  std::string output;
+  bool json = false;
+};
+
+struct ScoreCommand {
+  std::vector<std::string> patterns;  ///< image files
+  std::string overlay_folder;         ///< empty: none
+  unsigned jobs = 1;                  ///< threads; the scores do not depend on it
+  bool json = false;
+};
+
+struct NamedScore {
+  std::string name;
+  PatternScore score;
+};
+
+struct ConfusionCommand {
+  std::vector<std::string> inputs;  ///< bundles and image files
+  std::string photos;               ///< folder; empty: none
+  ConfusionOptions options;
+  bool quiet = false;
+  bool json = false;
+};
+
+struct SimulateCommand {
+  std::vector<std::string> patterns;  ///< image files
+  std::string camera_file;            ///< empty: the default camera
+  std::string backgrounds;            ///< folder; empty: made ones
+  std::string picture_folder;         ///< of contact sheets; empty: none
+  SimulateOptions options;
+  bool quiet = false;
+  bool json = false;
+};
+
+unsigned cores() {
+  return std::max(1u, std::thread::hardware_concurrency());
+}
+
+int run_rectify(RectifyCommand& command) {
+  const auto corners = parse_corners(command.corners);
+  if (!corners) return print_error(corners.error());
+  command.options.corners = *corners;
   Result<RgbaImage> photo = read_image(command.photo);
   if (!photo) return print_error(photo.error());
   Result<RgbaImage> image = rectify(*photo, command.options);
@@ -27,14 +82,55 @@ int run_rectify(const RectifyCommand& command) {
   std::fprintf(stderr, "wrote %s, %u x %u pixels\n", command.output.c_str(), image->width,
                image->height);
   if (command.json) {
-    std::fputs(
-        rectify_json(command.output, image->width, image->height, command.options.width_mm).c_str(),
-        stdout);
+    const Json json = {{"image", command.output},
+                       {"width", image->width},
+                       {"height", image->height},
+                       {"width_mm", command.options.width_mm}};
+    std::fputs(json.dump().c_str(), stdout);
   }
   return static_cast<int>(ExitCode::kOk);
 }
 
-int run_score(const ScoreCommand& command) {
+void add_rectify(CommandLine& pattern) {
+  CommandLine& line = pattern.command("rectify", "A frontal picture from a photo and four corners");
+  const auto command = std::make_shared<RectifyCommand>();
+  line.option("photo", &command->photo, "The photo", {.type = "PHOTO", .required = true});
+  line.option("--corners", &command->corners,
+              "Pixels of the top-left, top-right, bottom-right and bottom-left corner",
+              {.type = "x,y,x,y,x,y,x,y", .required = true});
+  line.option("--width-mm", &command->options.width_mm, "Physical width of the thing",
+              {.positive = true});
+  line.option("--height-mm", &command->options.height_mm,
+              "Physical height; without it the aspect ratio comes from the perspective",
+              {.positive = true});
+  line.option("--max-side", &command->options.max_side, "Longest side of the result, in pixels",
+              {.shows_default = true, .least = 16, .most = kMaxTextureSide});
+  line.option("-o,--output", &command->output, "The PNG to write",
+              {.type = "IMAGE", .required = true});
+  line.flag("--json", command->json, "Print the image's size as JSON");
+  line.footer(
+      example("  modar pattern rectify photo.jpg --corners 212,80,905,131,870,640,190,602"
+              " --width-mm 210 -o cover.png\n"));
+  line.run([command] { return run_rectify(*command); });
+}
+
+Json scores_json(const std::vector<NamedScore>& scores) {
+  Json out = Json::array();
+  for (const NamedScore& one : scores) {
+    Json causes = Json::array();
+    for (const ScoreCause& cause : one.score.causes) {
+      causes.push_back({{"id", cause.id}, {"value", cause.value}, {"advice", cause.advice}});
+    }
+    out.push_back({{"name", one.name},
+                   {"score", one.score.score},
+                   {"version", kScoreVersion},
+                   {"causes", causes}});
+  }
+  return out;
+}
+
+int run_score(ScoreCommand& command) {
+  if (auto opened = open_folders(command.patterns); !opened) return print_error(opened.error());
   if (!command.overlay_folder.empty()) {
     if (auto made = make_output_folder(command.overlay_folder); !made) {
       return print_error(made.error());
@@ -63,7 +159,7 @@ int run_score(const ScoreCommand& command) {
     scores.push_back({file_stem(path), std::move(*score)});
   }
   if (command.json) {
-    std::fputs(scores_json(scores).c_str(), stdout);
+    std::fputs(scores_json(scores).dump().c_str(), stdout);
     return static_cast<int>(ExitCode::kOk);
   }
   for (const NamedScore& one : scores) {
@@ -76,7 +172,56 @@ int run_score(const ScoreCommand& command) {
   return static_cast<int>(ExitCode::kOk);
 }
 
-namespace {
+void add_score(CommandLine& pattern) {
+  CommandLine& line =
+      pattern.command("score", "0 to 100: how well pictures serve as patterns, and what to do");
+  const auto command = std::make_shared<ScoreCommand>();
+  command->jobs = cores();
+  line.option("patterns", &command->patterns, "Pattern pictures, or folders of them",
+              {.type = "IMAGE|DIR...", .required = true});
+  line.option("--overlay", &command->overlay_folder,
+              "Write NAME.png of each: features that hold (green), that hold at times (orange), "
+              "places without any (dark)",
+              {.type = "DIR"});
+  line.option("--jobs", &command->jobs, "Threads; the scores do not depend on it",
+              {.least = 1, .most = 256});
+  line.flag("--json", command->json, "Print as JSON");
+  line.footer(example("  modar pattern score cover.png --overlay overlays\n"));
+  line.run([command] { return run_score(*command); });
+}
+
+Json value_json(const SimulatedValue& value) {
+  const PoseBenchRow& row = value.outcome.row;
+  return {{"value", value.value},
+          {"frames", row.frames},
+          {"recognised_pct", 100.0 * row.recognised / row.frames},
+          {"right_pct", 100.0 * row.right / row.frames},
+          {"error_px", row.error_px},
+          {"jitter_px", row.jitter_px}};
+}
+
+Json simulations_json(const std::vector<Simulation>& simulations) {
+  Json out = Json::array();
+  for (const Simulation& simulation : simulations) {
+    Json bands = Json::array();
+    for (const SimulatedBand& band : simulation.bands) {
+      Json values = Json::array();
+      for (const SimulatedValue& value : band.values) values.push_back(value_json(value));
+      bands.push_back({{"name", band.name}, {"unit", band.unit}, {"values", values}});
+    }
+    const double width = simulation.width_mm;
+    out.push_back({{"name", simulation.name},
+                   {"width_mm", width},
+                   {"nearest_widths", simulation.range.nearest},
+                   {"farthest_widths", simulation.range.farthest},
+                   {"nearest_mm", width > 0 ? Json(simulation.range.nearest * width) : Json()},
+                   {"farthest_mm", width > 0 ? Json(simulation.range.farthest * width) : Json()},
+                   {"tilt_deg", simulation.range.tilt_deg},
+                   {"sentence", range_sentence(simulation)},
+                   {"bands", bands}});
+  }
+  return out;
+}
 
 void print_simulation(const Simulation& simulation) {
   std::printf("%s: %s\n", simulation.name.c_str(), range_sentence(simulation).c_str());
@@ -90,25 +235,6 @@ void print_simulation(const Simulation& simulation) {
                   100.0 * row.right / row.frames, row.error_px, row.jitter_px);
     }
   }
-}
-
-void print_confusion(const Confusion& confusion) {
-  const std::size_t count = confusion.names.size();
-  std::printf("%-24s %14s %14s  %s\n", "shown", "recognised", "in photos", "taken for");
-  for (std::size_t shown = 0; shown < count; ++shown) {
-    std::printf("%-24s %7d of %3d %7d of %3d  ", confusion.names[shown].c_str(),
-                confusion.recognised[shown * count + shown], confusion.views,
-                confusion.in_photos[shown], confusion.photo_views);
-    for (std::size_t asked = 0; asked < count; ++asked) {
-      const int times = confusion.recognised[shown * count + asked];
-      if (asked != shown && times > 0) {
-        std::printf("%s (%d) ", confusion.names[asked].c_str(), times);
-      }
-    }
-    std::printf("\n");
-  }
-  std::printf("false recognitions: %d, each asked for alone; %d with all in one bundle\n",
-              confusion.false_recognitions(), confusion.together);
 }
 
 /// Options that are files, read.
@@ -126,32 +252,8 @@ Result<void> complete(SimulateCommand& command) {
   return {};
 }
 
-}  // namespace
-
-int run_confusion(ConfusionCommand& command) {
-  if (!command.photos.empty()) {
-    auto photos = pictures_of(command.photos);
-    if (!photos) return print_error(photos.error());
-    command.options.photos = std::move(*photos);
-  }
-  const auto patterns = read_patterns(command.inputs, command.options.jobs);
-  if (!patterns) return print_error(patterns.error());
-  ProgressBar bar(command.quiet);
-  const auto confusion =
-      measure_confusion(*patterns, command.options,
-                        [&](const std::string& what, double done) { bar.show(what, done); });
-  bar.clear();
-  if (!confusion) return print_error(confusion.error());
-  if (command.json) {
-    std::fputs(confusion_json(*confusion).c_str(), stdout);
-  } else {
-    print_confusion(*confusion);
-  }
-  return static_cast<int>(confusion->false_recognitions() == 0 ? ExitCode::kOk
-                                                               : ExitCode::kInvalidInput);
-}
-
 int run_simulate(SimulateCommand& command) {
+  if (auto opened = open_folders(command.patterns); !opened) return print_error(opened.error());
   if (auto done = complete(command); !done) return print_error(done.error());
   if (!command.picture_folder.empty()) {
     if (auto made = make_output_folder(command.picture_folder); !made) {
@@ -175,8 +277,135 @@ int run_simulate(SimulateCommand& command) {
     if (!command.json) print_simulation(*simulation);
     simulations.push_back(std::move(*simulation));
   }
-  if (command.json) std::fputs(simulations_json(simulations).c_str(), stdout);
+  if (command.json) std::fputs(simulations_json(simulations).dump().c_str(), stdout);
   return static_cast<int>(ExitCode::kOk);
+}
+
+void add_simulate(CommandLine& pattern) {
+  CommandLine& line = pattern.command(
+      "simulate", "How far, tilted, dark, blurred or covered a pattern may be: the device's loop");
+  const auto command = std::make_shared<SimulateCommand>();
+  SimulateOptions& options = command->options;
+  options.jobs = cores();
+  line.option("patterns", &command->patterns, "Pattern pictures, or folders of them",
+              {.type = "IMAGE|DIR...", .required = true});
+  line.option("--camera", &command->camera_file,
+              "Calibration of the camera (OpenCV's YML): intrinsics and resolution",
+              {.type = "FILE"});
+  line.option("--backgrounds", &command->backgrounds,
+              "A folder of photos without the pattern; else made ones", {.type = "DIR"});
+  line.option("--width-mm", &options.width_mm, "Printed width of the pattern", {.positive = true});
+  line.option("--views", &options.views, "Views of each value of a band",
+              {.shows_default = true, .least = 1, .most = 1000});
+  line.option("--seed", &options.seed, "Of the views", {.shows_default = true});
+  line.option("--picture", &command->picture_folder,
+              "Write a contact sheet NAME.png of each pattern's views", {.type = "DIR"});
+  line.option("--jobs", &options.jobs, "Threads; the figures do not depend on it",
+              {.least = 1, .most = 256});
+  line.flag("--quiet", command->quiet, "No progress bar");
+  line.flag("--json", command->json, "Print the figures as JSON");
+  line.footer(
+      example("  modar pattern simulate cover.png --width-mm 200 --camera phone.yml"
+              " --picture sheets\n"));
+  line.run([command] { return run_simulate(*command); });
+}
+
+Json confusion_json(const Confusion& confusion) {
+  const std::size_t count = confusion.names.size();
+  Json patterns = Json::array();
+  for (std::size_t shown = 0; shown < count; ++shown) {
+    Json taken_for = Json::object();
+    for (std::size_t asked = 0; asked < count; ++asked) {
+      const int times = confusion.recognised[shown * count + asked];
+      if (asked != shown && times > 0) taken_for.set(confusion.names[asked], times);
+    }
+    patterns.push_back({{"name", confusion.names[shown]},
+                        {"recognised", confusion.recognised[shown * count + shown]},
+                        {"taken_for", taken_for},
+                        {"in_photos", confusion.in_photos[shown]}});
+  }
+  return {{"views", confusion.views},
+          {"photo_views", confusion.photo_views},
+          {"false_recognitions", confusion.false_recognitions()},
+          {"false_together", confusion.together},
+          {"patterns", patterns}};
+}
+
+void print_confusion(const Confusion& confusion) {
+  const std::size_t count = confusion.names.size();
+  std::printf("%-24s %14s %14s  %s\n", "shown", "recognised", "in photos", "taken for");
+  for (std::size_t shown = 0; shown < count; ++shown) {
+    std::printf("%-24s %7d of %3d %7d of %3d  ", confusion.names[shown].c_str(),
+                confusion.recognised[shown * count + shown], confusion.views,
+                confusion.in_photos[shown], confusion.photo_views);
+    for (std::size_t asked = 0; asked < count; ++asked) {
+      const int times = confusion.recognised[shown * count + asked];
+      if (asked != shown && times > 0) {
+        std::printf("%s (%d) ", confusion.names[asked].c_str(), times);
+      }
+    }
+    std::printf("\n");
+  }
+  std::printf("false recognitions: %d, each asked for alone; %d with all in one bundle\n",
+              confusion.false_recognitions(), confusion.together);
+}
+
+int run_confusion(ConfusionCommand& command) {
+  if (auto opened = open_folders(command.inputs); !opened) return print_error(opened.error());
+  if (!command.photos.empty()) {
+    auto photos = pictures_of(command.photos);
+    if (!photos) return print_error(photos.error());
+    command.options.photos = std::move(*photos);
+  }
+  const auto patterns = read_patterns(command.inputs, command.options.jobs);
+  if (!patterns) return print_error(patterns.error());
+  ProgressBar bar(command.quiet);
+  const auto confusion =
+      measure_confusion(*patterns, command.options,
+                        [&](const std::string& what, double done) { bar.show(what, done); });
+  bar.clear();
+  if (!confusion) return print_error(confusion.error());
+  if (command.json) {
+    std::fputs(confusion_json(*confusion).dump().c_str(), stdout);
+  } else {
+    print_confusion(*confusion);
+  }
+  return static_cast<int>(confusion->false_recognitions() == 0 ? ExitCode::kOk
+                                                               : ExitCode::kInvalidInput);
+}
+
+void add_confusion(CommandLine& pattern) {
+  CommandLine& line =
+      pattern.command("confusion", "Is a pattern taken for another, or seen in photos without it?");
+  const auto command = std::make_shared<ConfusionCommand>();
+  ConfusionOptions& options = command->options;
+  options.jobs = cores();
+  line.option("inputs", &command->inputs,
+              "Bundles, pattern pictures and folders of them: all of a project",
+              {.type = "BUNDLE|IMAGE|DIR...", .required = true});
+  line.option("--backgrounds", &command->photos, "A folder of photos without a pattern",
+              {.type = "DIR"});
+  line.option("--views", &options.views, "Of each pattern and photo",
+              {.shows_default = true, .least = 1, .most = 10000});
+  line.option("--seed", &options.seed, "Of the views", {.shows_default = true});
+  line.option("--jobs", &options.jobs, "Threads; the counts do not depend on it",
+              {.least = 1, .most = 256});
+  line.flag("--quiet", command->quiet, "No progress bar");
+  line.flag("--json", command->json, "Print the counts as JSON");
+  line.footer(example("  modar pattern confusion museum.modar --backgrounds photos\n") +
+              "Answers 3 where a pattern is recognised that is not there.\n");
+  line.run([command] { return run_confusion(*command); });
+}
+
+}  // namespace
+
+void add_pattern(CommandLine& program) {
+  CommandLine& line =
+      program.command("pattern", "Work on pattern images: rectify, score, simulate, confusion");
+  add_rectify(line);
+  add_score(line);
+  add_simulate(line);
+  add_confusion(line);
 }
 
 }  // namespace modar

@@ -1,11 +1,12 @@
-// The command line of `modar ship`, told to CLI11 and taken from it as plain structs.
-#include <CLI/CLI.hpp>
+// The command line of `modar ship`.
 #include <algorithm>
+#include <memory>
 #include <thread>
 
 #include "bake/commands/arguments.hpp"
+#include "bake/commands/commands.hpp"
 #include "bake/commands/ship_command.hpp"
-#include "bake/terminal.hpp"
+#include "modar/device_profile.hpp"
 
 namespace modar {
 namespace {
@@ -14,130 +15,102 @@ std::string ship_example(const std::string& text) {
   return example(text, ", 15 another publisher is at work on the folder");
 }
 
-void add_key_options(CLI::App& sub, std::string& key, std::string& pass_phrase_file) {
-  sub.add_option("--key", key, "The secret key")->required()->type_name("K");
-  sub.add_option("--pass-phrase-file", pass_phrase_file,
-                 "Its pass phrase, the file's first line; else it is asked for")
-      ->type_name("FILE");
+void add_key_options(CommandLine& line, std::string& key, std::string& pass_phrase_file) {
+  line.option("--key", &key, "The secret key", {.type = "K", .required = true});
+  line.option("--pass-phrase-file", &pass_phrase_file,
+              "Its pass phrase, the file's first line; else it is asked for", {.type = "FILE"});
 }
 
-CLI::App* add_keygen(CLI::App& app, KeygenCommand& keygen) {
-  CLI::App* sub = app.add_subcommand("keygen", "A new pair of keys, in minisign's files");
-  sub->add_option("--out", keygen.out, "The secret key; the public one goes to K.pub")
-      ->required()
-      ->type_name("K");
-  sub->add_option("--pass-phrase-file", keygen.pass_phrase_file,
-                  "Encrypt the secret key with the file's first line")
-      ->type_name("FILE");
-  sub->add_flag("--force", keygen.force, "Write over a key that is there");
-  sub->footer(ship_example("  modar ship keygen --out museum.key\n"));
-  return sub;
+void add_keygen(CommandLine& ship) {
+  CommandLine& line = ship.command("keygen", "A new pair of keys, in minisign's files");
+  const auto keygen = std::make_shared<KeygenCommand>();
+  line.option("--out", &keygen->out, "The secret key; the public one goes to K.pub",
+              {.type = "K", .required = true});
+  line.option("--pass-phrase-file", &keygen->pass_phrase_file,
+              "Encrypt the secret key with the file's first line", {.type = "FILE"});
+  line.flag("--force", keygen->force, "Write over a key that is there");
+  line.footer(ship_example("  modar ship keygen --out museum.key\n"));
+  line.run([keygen] { return run_keygen(*keygen); });
 }
 
-CLI::App* add_publish(CLI::App& app, ShipPublishCommand& publish) {
-  CLI::App* sub = app.add_subcommand("publish", "A signed release of bundles into a folder");
-  sub->add_option("bundles", publish.request.bundles, "The bundles; files name them")
-      ->required()
-      ->type_name("BUNDLE...");
-  sub->add_option("--to", publish.request.folder, "The folder that devices will fetch from")
-      ->required()
-      ->type_name("DIR");
-  add_key_options(*sub, publish.key_file, publish.pass_phrase_file);
-  CLI::Option* expires = sub->add_option("--expires", publish.expires,
-                                         "When devices stop believing it, as 2027-01-31T00:00:00Z")
-                             ->type_name("TIME");
-  sub->add_option("--valid-days", publish.valid_days, "The same, from now")
-      ->check(CLI::Range(1u, 36500u))
-      ->capture_default_str()
-      ->excludes(expires);
-  sub->add_option("--release", publish.request.version,
-                  "Its number; greater than all before (one more than the newest)")
-      ->type_name("N");
-  sub->add_option("--for", publish.devices, "A bundle is for these device profiles only")
-      ->type_name("NAME=PROFILE[,PROFILE]");
-  sub->add_option("--jobs", publish.request.recipe.jobs, "Processes; the bytes do not depend on it")
-      ->check(CLI::Range(1u, 256u))
-      ->capture_default_str();
-  sub->add_flag("--quiet", publish.quiet, "No progress, no summary");
-  sub->add_flag("--json", publish.json, "Print the release and what was written as JSON");
-  sub->footer(ship_example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));
-  return sub;
+void add_publish(CommandLine& ship) {
+  CommandLine& line = ship.command("publish", "A signed release of bundles into a folder");
+  const auto publish = std::make_shared<ShipPublishCommand>();
+  PublishRequest& request = publish->request;
+  request.recipe.jobs = std::max(1u, std::thread::hardware_concurrency());
+  line.option("bundles", &request.bundles, "The bundles; files name them",
+              {.type = "BUNDLE...", .required = true});
+  line.option("--to", &request.folder, "The folder that devices will fetch from",
+              {.type = "DIR", .required = true});
+  add_key_options(line, publish->key_file, publish->pass_phrase_file);
+  line.option("--expires", &publish->expires,
+              "When devices stop believing it, as 2027-01-31T00:00:00Z", {.type = "TIME"});
+  line.option("--valid-days", &publish->valid_days, "The same, from now",
+              {.shows_default = true, .least = 1, .most = 36500, .excludes = "--expires"});
+  line.option("--release", &request.version,
+              "Its number; greater than all before (one more than the newest)", {.type = "N"});
+  line.option("--for", &publish->devices, "A bundle is for these device profiles only",
+              {.type = "NAME=PROFILE[,PROFILE]"});
+  line.option("--jobs", &request.recipe.jobs, "Processes; the bytes do not depend on it",
+              {.shows_default = true, .least = 1, .most = 256});
+  line.flag("--quiet", publish->quiet, "No progress, no summary");
+  line.flag("--json", publish->json, "Print the release and what was written as JSON");
+  line.footer(ship_example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));
+  line.run([publish] { return run_publish(*publish); });
 }
 
-CLI::App* add_rotate(CLI::App& app, RotateCommand& rotate) {
-  CLI::App* sub = app.add_subcommand("rotate", "Let devices follow from the old key to a new one");
-  sub->add_option("--to", rotate.folder, "The folder that devices fetch from")
-      ->required()
-      ->type_name("DIR");
-  add_key_options(*sub, rotate.key_file, rotate.pass_phrase_file);
-  sub->add_option("--next", rotate.next_key, "The new public key; publish with its secret one then")
-      ->required()
-      ->type_name("NEW.pub");
-  sub->footer(
+void add_rotate(CommandLine& ship) {
+  CommandLine& line = ship.command("rotate", "Let devices follow from the old key to a new one");
+  const auto rotate = std::make_shared<RotateCommand>();
+  line.option("--to", &rotate->folder, "The folder that devices fetch from",
+              {.type = "DIR", .required = true});
+  add_key_options(line, rotate->key_file, rotate->pass_phrase_file);
+  line.option("--next", &rotate->next_key, "The new public key; publish with its secret one then",
+              {.type = "NEW.pub", .required = true});
+  line.footer(
       ship_example("  modar ship rotate --to /var/www/ar --key old.key --next new.key.pub\n"));
-  return sub;
+  line.run([rotate] { return run_rotate(*rotate); });
 }
 
-CLI::App* add_prune(CLI::App& app, PruneCommand& prune) {
-  CLI::App* sub = app.add_subcommand("prune", "Remove old releases and what only they need");
-  sub->add_option("--to", prune.folder, "The folder")->required()->type_name("DIR");
-  sub->add_option("--keep", prune.keep, "Newest releases that stay")
-      ->check(CLI::Range(1u, 1000000u))
-      ->capture_default_str();
-  sub->add_flag("--json", prune.json, "Print what was freed as JSON");
-  sub->footer(ship_example("  modar ship prune --to /var/www/ar --keep 3\n"));
-  return sub;
+void add_prune(CommandLine& ship) {
+  CommandLine& line = ship.command("prune", "Remove old releases and what only they need");
+  const auto prune = std::make_shared<PruneCommand>();
+  line.option("--to", &prune->folder, "The folder", {.type = "DIR", .required = true});
+  line.option("--keep", &prune->keep, "Newest releases that stay",
+              {.shows_default = true, .least = 1, .most = 1000000});
+  line.flag("--json", prune->json, "Print what was freed as JSON");
+  line.footer(ship_example("  modar ship prune --to /var/www/ar --keep 3\n"));
+  line.run([prune] { return run_prune(*prune); });
 }
 
-CLI::App* add_plan(CLI::App& app, PlanCommand& plan) {
-  CLI::App* sub = app.add_subcommand("plan", "Bytes and minutes of an update, before publishing");
-  sub->add_option("old", plan.old_bundle, "The bundle that devices have")
-      ->required()
-      ->type_name("OLD");
-  sub->add_option("new", plan.new_bundle, "The one that they will get")
-      ->required()
-      ->type_name("NEW");
-  sub->add_option("--link", plan.link, "The network: 2g, 3g, 4g or wifi")->capture_default_str();
-  sub->add_option("--device", plan.device,
-                  "Device profile: cores, storage (" + device_profile_names() + ")")
-      ->type_name("NAME");
-  sub->add_option("--jobs", plan.recipe.jobs, "Processes")->check(CLI::Range(1u, 256u));
-  sub->add_flag("--json", plan.json, "Print as JSON");
-  sub->footer(ship_example("  modar ship plan old.modar new.modar --link 2g --device ace2\n") +
+void add_plan(CommandLine& ship) {
+  CommandLine& line = ship.command("plan", "Bytes and minutes of an update, before publishing");
+  const auto plan = std::make_shared<PlanCommand>();
+  plan->recipe.jobs = std::max(1u, std::thread::hardware_concurrency());
+  line.option("old", &plan->old_bundle, "The bundle that devices have",
+              {.type = "OLD", .required = true});
+  line.option("new", &plan->new_bundle, "The one that they will get",
+              {.type = "NEW", .required = true});
+  line.option("--link", &plan->link, "The network: 2g, 3g, 4g or wifi", {.shows_default = true});
+  line.option("--device", &plan->device,
+              "Device profile: cores, storage (" + device_profile_names() + ")", {.type = "NAME"});
+  line.option("--jobs", &plan->recipe.jobs, "Processes", {.least = 1, .most = 256});
+  line.flag("--json", plan->json, "Print as JSON");
+  line.footer(ship_example("  modar ship plan old.modar new.modar --link 2g --device ace2\n") +
               "A device on a cable needs no release: `adb push NAME.modar /sdcard/modar/`.\n");
-  return sub;
+  line.run([plan] { return run_plan(*plan); });
 }
 
 }  // namespace
 
-int run_ship(std::vector<std::string> arguments) {
-  CLI::App app("modar ship: releases that devices install with modar-fetch", "modar ship");
-  app.require_subcommand(1);
-  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
-  KeygenCommand keygen;
-  ShipPublishCommand publish;
-  RotateCommand rotate;
-  PruneCommand prune;
-  PlanCommand plan;
-  publish.request.recipe.jobs = plan.recipe.jobs = cores;
-  const CLI::App* keygen_sub = add_keygen(app, keygen);
-  const CLI::App* publish_sub = add_publish(app, publish);
-  const CLI::App* rotate_sub = add_rotate(app, rotate);
-  const CLI::App* prune_sub = add_prune(app, prune);
-  const CLI::App* plan_sub = add_plan(app, plan);
-  try {
-    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
-    app.parse(arguments);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
-                                : static_cast<int>(ExitCode::kUsage);
-  }
-  if (keygen_sub->parsed()) return run_keygen(keygen);
-  if (publish_sub->parsed()) return run_publish(publish);
-  if (rotate_sub->parsed()) return run_rotate(rotate);
-  if (prune_sub->parsed()) return run_prune(prune);
-  if (plan_sub->parsed()) return run_plan(plan);
-  return static_cast<int>(ExitCode::kUsage);
+void add_ship(CommandLine& program) {
+  CommandLine& line =
+      program.command("ship", "Releases for devices: keygen, publish, rotate, prune, plan");
+  add_keygen(line);
+  add_publish(line);
+  add_rotate(line);
+  add_prune(line);
+  add_plan(line);
 }
 
 }  // namespace modar

@@ -54,7 +54,4 @@ int run_rotate(const RotateCommand& command);
 int run_prune(const PruneCommand& command);
 int run_plan(const PlanCommand& command);
 
-/// `modar ship ARGUMENT...`, with a command line of its own. Answers the exit code.
-int run_ship(std::vector<std::string> arguments);
-
 }  // namespace modar

@@ -1,11 +1,9 @@
 #include "bake/commands/ship_json.hpp"
 
-#include <nlohmann/json.hpp>
+#include "bake/json.hpp"
 
 namespace modar {
 namespace {
-
-using nlohmann::ordered_json;
 
 const char* form_name(PieceForm form) {
   switch (form) {
@@ -28,36 +26,36 @@ const char* form_name(PieceForm form) {
 }  // namespace
 
 std::string publish_json(const PublishReport& report) {
-  ordered_json json;
-  json["release"] = ordered_json::parse(release_text(report.release));
-  json["added_bytes"] = report.added_bytes;
-  json["forms"] = ordered_json::array();
+  Json forms = Json::array();
   for (const auto& [form, totals] : report.forms) {
-    json["forms"].push_back({{"form", form_name(form)},
-                             {"pieces", totals.pieces},
-                             {"raw_bytes", totals.raw_bytes},
-                             {"stored_bytes", totals.stored_bytes}});
+    forms.push_back({{"form", form_name(form)},
+                     {"pieces", totals.pieces},
+                     {"raw_bytes", totals.raw_bytes},
+                     {"stored_bytes", totals.stored_bytes}});
   }
-  return json.dump(2) + "\n";
+  const Json json = {{"release", Json::parse(release_text(report.release))},
+                     {"added_bytes", report.added_bytes},
+                     {"forms", forms}};
+  return json.dump();
 }
 
 std::string prune_json(std::uint64_t freed_bytes, const std::vector<std::uint64_t>& releases) {
-  return ordered_json({{"freed_bytes", freed_bytes}, {"releases", releases}}).dump(2) + "\n";
+  return Json({{"freed_bytes", freed_bytes}, {"releases", Json::list(releases)}}).dump();
 }
 
 std::string plan_json(const UpdatePlan& plan, const Link& link, const std::string& device,
                       double minutes) {
-  const ordered_json json = {{"link", link.name},
-                             {"link_source", link.source},
-                             {"device", device},
-                             {"full_bytes", plan.full_bytes},
-                             {"update_bytes", plan.update_bytes},
-                             {"update_pieces", plan.update_pieces},
-                             {"transfer_seconds", plan.transfer_s},
-                             {"install_seconds", plan.install_s},
-                             {"minutes", minutes},
-                             {"storage_bytes", plan.storage_bytes}};
-  return json.dump(2) + "\n";
+  const Json json = {{"link", link.name},
+                     {"link_source", link.source},
+                     {"device", device},
+                     {"full_bytes", plan.full_bytes},
+                     {"update_bytes", plan.update_bytes},
+                     {"update_pieces", plan.update_pieces},
+                     {"transfer_seconds", plan.transfer_s},
+                     {"install_seconds", plan.install_s},
+                     {"minutes", minutes},
+                     {"storage_bytes", plan.storage_bytes}};
+  return json.dump();
 }
 
 }  // namespace modar

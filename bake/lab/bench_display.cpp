@@ -1,4 +1,4 @@
-// `modar bench render BUNDLE --video FILE`: the article's Table 9 beside a run of the player.
+// `modar bench render BUNDLE --video FILE`: the ModAR paper's Table 9 beside a run of the player.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/lab/bench_rows.hpp"
+#include "bake/lab/bench_parts.hpp"
 #include "bake/process.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// What the article prints of one model on one device; its dashes are no stutters.
+/// What the ModAR paper prints of one model on one device; its dashes are no stutters.
 struct PaperSession {
   double recognition_fps;
   double display_fps;
@@ -77,18 +77,17 @@ double display_s(const std::vector<PlayedFrame>& frames) {
 }
 
 /// Plays at the video's own speed in a process of its own, without a window.
-Result<PlayedRun> play(const std::string& bundle, const BenchCommand& command) {
+Result<PlayedRun> play(const std::string& bundle, const BenchOptions& command) {
   std::error_code error;
   const auto programs = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
   const TemporaryFolder folder;
   const std::string output = folder.path() + "/lines";
-  std::vector<std::string> words = {
-      (programs / MODAR_PROGRAMS / "modar-play").lexically_normal().string(),
-      bundle,
-      "--input",
-      command.pose.video,
-      "--realtime",
-      "--json"};
+  std::vector<std::string> words = {(programs / "modar-play").string(),
+                                    bundle,
+                                    "--input",
+                                    command.pose.video,
+                                    "--realtime",
+                                    "--json"};
   if (!command.device.empty()) words.insert(words.end(), {"--device", command.device});
   if (command.pose.quiet || command.json) words.emplace_back("--quiet");
   const int code = run_process({words, {}, output});
@@ -141,7 +140,7 @@ std::vector<BenchRow> display_rows(const std::string& model, const PlayedRun& ru
   return rows;
 }
 
-Result<std::vector<BenchRow>> bench_display_rows(const BenchCommand& command) {
+Result<std::vector<BenchRow>> bench_display_rows(const BenchOptions& command) {
   std::vector<BenchRow> rows;
   for (const std::string& path : command.inputs) {
     const Result<std::string> model = scene_model(path);

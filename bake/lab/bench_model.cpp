@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "bake/commands/json_output.hpp"
-#include "bake/lab/bench_rows.hpp"
+#include "bake/json.hpp"
+#include "bake/lab/bench_parts.hpp"
 #include "bake/process.hpp"
 
 namespace modar {
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kChurchTriangles = 14'628'048;  ///< of the article's largest model
+constexpr std::uint64_t kChurchTriangles = 14'628'048;  ///< of the ModAR paper's largest model
 constexpr std::uint64_t kUsualTriangles = 745'680;
 constexpr int kRuns = 3;  ///< of ours, the least processor time counts; one less of large files
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -35,7 +35,7 @@ using Figures = std::map<std::string, double>;
 
 class ModelBench {
  public:
-  ModelBench(std::string folder, const ModelBenchCommand& command)
+  ModelBench(std::string folder, const ModelBenchRequest& command)
       : folder_(std::move(folder)), command_(command) {
     std::error_code error;
     programs_ = fs::read_symlink("/proc/self/exe", error).parent_path();
@@ -43,7 +43,7 @@ class ModelBench {
 
   [[nodiscard]] bool has_probe() const {
     std::error_code error;
-    return fs::exists(programs_ / "modar-model-probe", error);
+    return fs::exists(programs_ / MODAR_LIBEXEC / "modar-model-probe", error);
   }
 
   /// Makes the file out of a scan, or takes the one that was named.
@@ -83,7 +83,7 @@ class ModelBench {
 
   /// What the probe prints, and "peak" of its process; nothing where it failed.
   Figures probe(std::vector<std::string> words) const {
-    words.insert(words.begin(), programs_ / "modar-model-probe");
+    words.insert(words.begin(), programs_ / MODAR_LIBEXEC / "modar-model-probe");
     const std::string path = folder_ + "/figures";
     const ProcessOutcome outcome = run_measured({std::move(words), {}, path});
     Figures figures;
@@ -126,13 +126,17 @@ class ModelBench {
   ProcessOutcome bake(const std::string& positions, unsigned jobs, double& bytes) const {
     const std::string report = folder_ + "/report.json";
     const ProcessOutcome outcome =
-        run_measured({{programs_ / "modar-workshop", "bake", "--model", obj_, "--no-lods",
-                       "--no-topology", "--positions", positions, "--jobs", std::to_string(jobs),
-                       "--quiet", "--json", "-o", folder_ + "/ours.modar"},
+        run_measured({{programs_ / "modar", "bake", "--model", obj_, "--no-lods", "--no-topology",
+                       "--positions", positions, "--jobs", std::to_string(jobs), "--quiet",
+                       "--json", "-o", folder_ + "/ours.modar"},
                       {},
                       report});
     std::ifstream file(report);
-    bytes = bytes_per_triangle_of({std::istreambuf_iterator<char>(file), {}});
+    const std::string text(std::istreambuf_iterator<char>(file), {});
+    const auto models = Json::parse(text).find("bundle/models");
+    const auto model = models ? models->at(0) : std::nullopt;
+    const auto figure = model ? model->find("bytes_per_triangle") : std::nullopt;
+    bytes = figure ? figure->number().value_or(kNone) : kNone;
     return outcome;
   }
 
@@ -202,7 +206,7 @@ class ModelBench {
 
   std::string folder_;
   std::string scan_;
-  const ModelBenchCommand& command_;
+  const ModelBenchRequest& command_;
   fs::path programs_;
   std::string obj_;
   double megabytes_ = 0;
@@ -212,7 +216,7 @@ class ModelBench {
 }  // namespace
 
 Result<std::vector<BenchRow>> bench_model_rows(const std::vector<std::string>& scans,
-                                               const ModelBenchCommand& command) {
+                                               const ModelBenchRequest& command) {
   if (scans.size() != 1 && command.obj.empty()) {
     return fail(ExitCode::kUsage, "bench.inputs", "model", "it needs one scan, or --obj FILE",
                 "modar bench model scan.obj --big");
@@ -221,7 +225,7 @@ Result<std::vector<BenchRow>> bench_model_rows(const std::vector<std::string>& s
   ModelBench bench(folder.path(), command);
   if (folder.path().empty() || !bench.has_probe()) {
     return fail(ExitCode::kUnsupported, "bench.probe", "modar-model-probe",
-                "it does not lie beside modar-workshop, or there is no room for temporary files",
+                "it is not installed with modar, or there is no room for temporary files",
                 "run modar from the folder of a build: cmake --build --preset release");
   }
   if (auto ready = bench.prepare(scans); !ready) return tl::unexpected(ready.error());

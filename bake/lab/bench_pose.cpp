@@ -1,12 +1,12 @@
-// `modar bench pose`: our loop beside the article's method on rendered frames of known pose and on
-// a video with its truth.
+// `modar bench pose`: our loop beside the ModAR paper's method on rendered frames of known pose and
+// on a video with its truth.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include "bake/lab/bench_rows.hpp"
+#include "bake/lab/bench_parts.hpp"
 #include "bake/lab/many_bench.hpp"
 #include "bake/lab/pose_bench.hpp"
 #include "bake/lab/score_bench.hpp"
@@ -30,7 +30,7 @@ double percent(int part, int whole) {
   return whole > 0 ? 100.0 * part / whole : 0.0;
 }
 
-/// Rows of one band: ours and, where it ran, the article's.
+/// Rows of one band: ours and, where it ran, the ModAR paper's.
 void add_rows(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   for (const PoseBenchRow& ours : measured) {
@@ -80,7 +80,7 @@ void add_stages(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>
   }
 }
 
-Result<PoseBenchOptions> options_of(const PoseBenchCommand& command) {
+Result<PoseBenchOptions> options_of(const PoseBenchRequest& command) {
   PoseBenchOptions options;
   options.frames = command.frames;
   options.seed = command.seed;
@@ -93,7 +93,7 @@ Result<PoseBenchOptions> options_of(const PoseBenchCommand& command) {
   if (options.paper_set == 0 && command.parameters != "none") {
     return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
                 "there is no parameter set '" + command.parameters + "'",
-                "name one of the article's sets, or none to run ours alone");
+                "name one of the ModAR paper's sets, or none to run ours alone");
   }
   for (const SceneBand& band : pose_bands()) {
     if (band.name.find(command.only) != std::string::npos) options.bands.push_back(band);
@@ -149,7 +149,7 @@ Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options,
 
 }  // namespace
 
-Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
+Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
   ProgressBar bar(command.quiet);
   const auto progress = [&bar](const std::string& what, double done) { bar.show(what, done); };
   std::vector<PoseBenchRow> measured;
@@ -163,7 +163,7 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchCommand& command) {
   if (command.scores || command.tables || command.many > 0) {
     auto rows = command.many > 0 ? many_rows(*options, progress)
                 : command.scores ? score_rows(*options, progress)
-                                 : article_rows(*options, progress);
+                                 : paper_rows(*options, progress);
     bar.clear();
     return rows;
   }

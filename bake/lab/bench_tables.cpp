@@ -1,10 +1,10 @@
-// The article's Tables 6 to 8 and its sentences on accuracy, beside the same figures measured here:
-// its method under its four parameter sets, and ours, on the same frames.
+// The ModAR paper's Tables 6 to 8 and its sentences on accuracy, beside the same figures measured
+// here: its method under its four parameter sets, and ours, on the same frames.
 #include <cmath>
 #include <limits>
 #include <string>
 
-#include "bake/lab/bench_rows.hpp"
+#include "bake/lab/bench_parts.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "modar/features.hpp"
 
@@ -13,34 +13,34 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// What the article prints of one parameter set.
-struct ArticleColumn {
+/// What the ModAR paper prints of one parameter set.
+struct PaperColumn {
   const char* set;
   double features[6];       ///< Table 6: of its six patterns
   double low_seconds[4];    ///< Table 7: detection, description, matching, homography
   double mid_seconds[4];    ///< Table 8
   double accuracy_far_pct;  ///< area ratios 0.4 to 0.9; from there to 4 all reach 100
 };
-constexpr ArticleColumn kArticle[] = {{"orb-2000",
-                                       {823, 1189, 1595, 1079, 604, 1279},
-                                       {0.086, 0.230, 0.020, 0.098},
-                                       {0.069, 0.194, 0.070, 0.023},
-                                       93},
-                                      {"orb-500",
-                                       {495, 430, 485, 437, 400, 475},
-                                       {0.069, 0.189, 0.016, 0.035},
-                                       {0.057, 0.155, 0.012, 0.026},
-                                       88},
-                                      {"brisk-3",
-                                       {248, 544, 781, 564, 174, 603},
-                                       {2.425, 2.337, 0.029, 0.089},
-                                       {1.926, 1.795, 0.027, 0.080},
-                                       97},
-                                      {"brisk-2",
-                                       {231, 540, 761, 553, 168, 588},
-                                       {2.296, 2.229, 0.026, 0.063},
-                                       {1.851, 1.656, 0.023, 0.050},
-                                       95}};
+constexpr PaperColumn kArticle[] = {{"orb-2000",
+                                     {823, 1189, 1595, 1079, 604, 1279},
+                                     {0.086, 0.230, 0.020, 0.098},
+                                     {0.069, 0.194, 0.070, 0.023},
+                                     93},
+                                    {"orb-500",
+                                     {495, 430, 485, 437, 400, 475},
+                                     {0.069, 0.189, 0.016, 0.035},
+                                     {0.057, 0.155, 0.012, 0.026},
+                                     88},
+                                    {"brisk-3",
+                                     {248, 544, 781, 564, 174, 603},
+                                     {2.425, 2.337, 0.029, 0.089},
+                                     {1.926, 1.795, 0.027, 0.080},
+                                     97},
+                                    {"brisk-2",
+                                     {231, 540, 761, 553, 168, 588},
+                                     {2.296, 2.229, 0.026, 0.063},
+                                     {1.851, 1.656, 0.023, 0.050},
+                                     95}};
 constexpr const char* kStages[] = {"detect_ms", "describe_ms", "match_ms", "homography_ms"};
 constexpr const char* kFar = "area 0.4-0.9";
 constexpr const char* kNear = "area 0.9-4";
@@ -62,10 +62,9 @@ Result<double> mean_features(const PoseBenchOptions& options, const ParameterSet
   return sum / static_cast<double>(options.patterns.size());
 }
 
-/// Rows of one method: its stages over both bands, its accuracy in each. article: null for ours.
+/// Rows of one method: its stages over both bands, its accuracy in each. paper: null for ours.
 void add_method(const std::vector<PoseBenchRow>& measured, const std::string& method,
-                const std::string& name, const ArticleColumn* article,
-                std::vector<BenchRow>& rows) {
+                const std::string& name, const PaperColumn* paper, std::vector<BenchRow>& rows) {
   double stages[4] = {0, 0, 0, 0};
   double ms = 0;
   double frames = 0;
@@ -74,19 +73,19 @@ void add_method(const std::vector<PoseBenchRow>& measured, const std::string& me
     for (std::size_t i = 0; i < 4; ++i) stages[i] += row.stages_ms[i] * row.frames;
     ms += row.ms * row.frames;
     frames += row.frames;
-    const double article_pct = article == nullptr ? kNone
-                               : row.band == kFar ? article->accuracy_far_pct
-                                                  : 100.0;
+    const double paper_pct = paper == nullptr   ? kNone
+                             : row.band == kFar ? paper->accuracy_far_pct
+                                                : 100.0;
     const double recognised = 100.0 * row.recognised / row.frames;
-    rows.push_back({"accuracy_pct " + row.band + " " + name, recognised, article_pct,
-                    ratio(recognised, article_pct)});
+    rows.push_back({"accuracy_pct " + row.band + " " + name, recognised, paper_pct,
+                    ratio(recognised, paper_pct)});
     rows.push_back(
         {"right_pct " + row.band + " " + name, 100.0 * row.right / row.frames, kNone, kNone});
   }
   for (std::size_t i = 0; i < 4; ++i) {
     const double here = stages[i] / frames;
-    const double low = article == nullptr ? kNone : 1e3 * article->low_seconds[i];
-    const double mid = article == nullptr ? kNone : 1e3 * article->mid_seconds[i];
+    const double low = paper == nullptr ? kNone : 1e3 * paper->low_seconds[i];
+    const double mid = paper == nullptr ? kNone : 1e3 * paper->mid_seconds[i];
     rows.push_back({std::string("table7_") + kStages[i] + " " + name, here, low, ratio(here, low)});
     rows.push_back({std::string("table8_") + kStages[i] + " " + name, here, mid, ratio(here, mid)});
   }
@@ -95,11 +94,11 @@ void add_method(const std::vector<PoseBenchRow>& measured, const std::string& me
 
 }  // namespace
 
-Result<std::vector<BenchRow>> article_rows(const PoseBenchOptions& options,
-                                           const ProgressCallback& progress) {
+Result<std::vector<BenchRow>> paper_rows(const PoseBenchOptions& options,
+                                         const ProgressCallback& progress) {
   std::vector<BenchRow> rows;
   bool first = true;
-  for (const ArticleColumn& column : kArticle) {
+  for (const PaperColumn& column : kArticle) {
     PoseBenchOptions run = options;
     run.ours = first;
     run.bands.clear();
@@ -111,10 +110,10 @@ Result<std::vector<BenchRow>> article_rows(const PoseBenchOptions& options,
       run.paper_set = set.id;
       const auto features = mean_features(options, set);
       if (!features) return tl::unexpected(features.error());
-      double article = 0;
-      for (const double count : column.features) article += count / 6;
-      rows.push_back({std::string("table6_features ") + column.set, *features, article,
-                      ratio(*features, article)});
+      double paper = 0;
+      for (const double count : column.features) paper += count / 6;
+      rows.push_back({std::string("table6_features ") + column.set, *features, paper,
+                      ratio(*features, paper)});
     }
     const auto measured = bench_detection(run, progress);
     if (!measured) return tl::unexpected(measured.error());

@@ -1,5 +1,5 @@
 // How well and how fast patterns are found and tracked on rendered frames of known pose: the
-// article's method and ours on the same frames, one thread.
+// paper's method and ours on the same frames, one thread.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct PoseBenchOptions {
   int clutter_frames = 0;                ///< without a pattern, in all; 0: frames a pattern
   int width = 1280;
   int height = 720;
-  std::uint32_t paper_set = 1;  ///< the article's parameter set; 0: without the article's method
+  std::uint32_t paper_set = 1;  ///< the ModAR paper's parameter set; 0: without the ModAR paper's method
   bool ours = true;
   int many = 50;  ///< bench_many(): patterns in the greatest bundle, 2 or more
   std::uint64_t seed = 1;

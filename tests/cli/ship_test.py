@@ -319,7 +319,7 @@ class Programs(unittest.TestCase):
         fetch = symbols(BIN / "modar-fetch")
         self.assertIn("draco::Decoder", fetch)
         self.assertNotIn("draco::ExpertEncoder", fetch)
-        self.assertIn("draco::ExpertEncoder", symbols(BIN.parent / "libexec/modar/modar-workshop"))
+        self.assertIn("draco::ExpertEncoder", symbols(BIN / "modar"))
         self.assertNotIn("draco::", symbols(BIN / "modar-play"))
 
 

@@ -8,9 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "bake/commands/commands.hpp"
-#include "bake/commands/json_output.hpp"
-#include "bake/lab/bench_rows.hpp"
+#include "bake/bundle/bundle_builder.hpp"
+#include "bake/lab/bench_parts.hpp"
 #include "bake/lab/etc1_bench.hpp"
 #include "bake/lab/ship_bench.hpp"
 #include "bake/terminal.hpp"
@@ -28,7 +27,7 @@ struct Bench {
   bool needs_inputs;
   const char* inputs;  ///< what its arguments are
   const char* summary;
-  std::function<BenchResult(const BenchCommand&)> run;
+  std::function<BenchResult(const BenchOptions&)> run;
 };
 
 /// Median milliseconds of `repeats` runs.
@@ -46,7 +45,7 @@ double median_ms(int repeats, const std::function<void()>& work) {
 
 /// Opening a bundle (map, validate headers and tables) against copying its bytes once, which is the
 /// least that any format pays that has to be read.
-BenchResult bench_load(const BenchCommand& command) {
+BenchResult bench_load(const BenchOptions& command) {
   std::vector<BenchRow> rows;
   for (const std::string& path : command.inputs) {
     Result<MappedFile> warm = MappedFile::open(path);
@@ -69,7 +68,7 @@ BenchResult bench_load(const BenchCommand& command) {
 }
 
 /// Our ETC1 encoder at its three efforts beside Android's libetc1.
-BenchResult bench_etc1_rows(const BenchCommand& command) {
+BenchResult bench_etc1_rows(const BenchOptions& command) {
   Result<std::vector<Etc1BenchRow>> measured = bench_etc1(command.inputs, command.crop);
   if (!measured) return tl::unexpected(measured.error());
   std::vector<BenchRow> rows;
@@ -80,7 +79,7 @@ BenchResult bench_etc1_rows(const BenchCommand& command) {
 }
 
 /// What bundles cost on the way, beside Draco, meshoptimizer's codecs and zstd.
-BenchResult bench_ship_rows(const BenchCommand& command) {
+BenchResult bench_ship_rows(const BenchOptions& command) {
   const auto measured = bench_ship(command.inputs, 1);
   if (!measured) return tl::unexpected(measured.error());
   std::vector<BenchRow> rows;
@@ -90,8 +89,8 @@ BenchResult bench_ship_rows(const BenchCommand& command) {
   return rows;
 }
 
-/// Copies of models in the article's four ways, loading and culling; or the player on a video.
-BenchResult bench_render_rows(const BenchCommand& command) {
+/// Copies of models in the ModAR paper's four ways, loading and culling; or the player on a video.
+BenchResult bench_render_rows(const BenchOptions& command) {
   if (!command.pose.video.empty()) return bench_display_rows(command);
   ProgressBar bar(command.pose.quiet || command.json);
   RenderBenchOptions options;
@@ -119,49 +118,37 @@ const std::vector<Bench>& benches() {
       {"ship", true, "BUNDLE...",
        "bytes and decoding of what travels, against Draco, meshopt and zstd", bench_ship_rows},
       {"render", true, "BUNDLE... [--device NAME] [--video FILE]",
-       "ten copies in the article's ways, loading, culling, against index rendering from arrays; "
+       "ten copies in the ModAR paper's ways, loading, culling, against index rendering from "
+       "arrays; "
        "or "
-       "the player on a video, against the article's Table 9",
+       "the player on a video, against the ModAR paper's Table 9",
        bench_render_rows},
       {"model", false, "SCAN [--big] | --obj FILE",
        "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "
        "gltfpack, Draco and the goals",
-       [](const BenchCommand& command) { return bench_model_rows(command.inputs, command.model); }},
+       [](const BenchOptions& command) { return bench_model_rows(command.inputs, command.model); }},
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
-       "our pose loop against the article's method, on the same frames",
-       [](const BenchCommand& command) { return bench_pose_rows(command.pose); }},
+       "our pose loop against the ModAR paper's method, on the same frames",
+       [](const BenchOptions& command) { return bench_pose_rows(command.pose); }},
   };
   return all;
 }
 
 }  // namespace
 
-int run_bench(const BenchCommand& command) {
-  for (const Bench& bench : benches()) {
-    if (command.name != bench.name) continue;
-    if (bench.needs_inputs && command.inputs.empty()) {
-      return print_error({ExitCode::kUsage, "bench.inputs", command.name, "it needs input files",
-                          std::string("modar bench ") + bench.name + " " + bench.inputs});
-    }
-    const BenchResult rows = bench.run(command);
-    if (!rows) return print_error(rows.error());
-    if (command.json) {
-      std::fputs(bench_json(*rows).c_str(), stdout);
-      return static_cast<int>(ExitCode::kOk);
-    }
-    std::printf("%-32s %14s %14s %10s\n", "measure", "ours", "reference", "ratio");
-    for (const BenchRow& row : *rows) {
-      std::printf("%-32s %14.6g %14.6g %10.4g\n", row.measure.c_str(), row.ours, row.reference,
-                  row.ratio);
-    }
-    return static_cast<int>(ExitCode::kOk);
-  }
+Result<std::vector<BenchRow>> run_bench(const BenchOptions& options) {
   std::string names;
   for (const Bench& bench : benches()) {
     names += std::string("\n  ") + bench.name + " " + bench.inputs + ": " + bench.summary;
+    if (options.name != bench.name) continue;
+    if (bench.needs_inputs && options.inputs.empty()) {
+      return fail(ExitCode::kUsage, "bench.inputs", options.name, "it needs input files",
+                  std::string("modar bench ") + bench.name + " " + bench.inputs);
+    }
+    return bench.run(options);
   }
-  return print_error({ExitCode::kUsage, "bench.unknown", command.name, "there is no such bench",
-                      "there are:" + names});
+  return fail(ExitCode::kUsage, "bench.unknown", options.name, "there is no such bench",
+              "there are:" + names);
 }
 
 }  // namespace modar

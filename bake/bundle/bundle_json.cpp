@@ -1,0 +1,275 @@
+// The bundle's meta text, written and read, and what `modar inspect` and `modar bake` print of a
+// bundle.
+#include "bake/bundle/bundle_json.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+namespace modar {
+namespace {
+
+/// The keys are a contract (json.md).
+constexpr struct {
+  const char* key;
+  std::uint64_t MeshTopology::*value;
+} kCounts[] = {
+    {"vertices", &MeshTopology::vertices},
+    {"edges", &MeshTopology::edges},
+    {"triangles", &MeshTopology::triangles},
+    {"components", &MeshTopology::components},
+    {"boundary_loops", &MeshTopology::boundary_loops},
+    {"boundary_edges", &MeshTopology::boundary_edges},
+    {"non_manifold_edges", &MeshTopology::non_manifold_edges},
+    {"non_manifold_vertices", &MeshTopology::non_manifold_vertices},
+    {"flipped_edges", &MeshTopology::flipped_edges},
+    {"duplicate_triangles", &MeshTopology::duplicate_triangles},
+};
+
+Json topology_json(const MeshTopology& topology) {
+  Json json = Json::object();
+  for (const auto& count : kCounts) json.set(count.key, topology.*count.value);
+  json.set("euler", topology.euler());
+  return json;
+}
+
+Json level_json(const LevelFigures& levels) {
+  return {{"position_error_max", levels.position_error_max},
+          {"uv_shift_max_texels", levels.uv_shift_max_texels}};
+}
+
+/// What the meta text has under a model's key.
+std::optional<Json> stated(const BundleView& bundle, std::uint32_t model, const char* key) {
+  const std::optional<Json> models = Json::parse(bundle.meta()).find("models");
+  const std::optional<Json> one = models ? models->at(model) : std::nullopt;
+  return one ? one->find(key) : std::nullopt;
+}
+
+const char* max_error_unit(const MaxError& error) {
+  switch (error.unit) {
+    case MaxError::Unit::kAny:
+      return "any";
+    case MaxError::Unit::kSource:
+      return "source";
+    case MaxError::Unit::kPercent:
+      return "percent";
+    case MaxError::Unit::kMetres:
+      break;
+  }
+  return "metres";
+}
+
+const char* positions_name(const BakeRequest& request) {
+  if (!request.positions) return "auto";
+  return *request.positions == PositionKind::kHalf ? "half" : "int16";
+}
+
+const char* layout_name(const LayoutRecord& layout) {
+  for (std::uint16_t a = 0; a < layout.attribute_count; ++a) {
+    const AttributeRecord& attribute = layout.attributes[a];
+    if (attribute.semantic != static_cast<std::uint8_t>(Semantic::kPosition)) continue;
+    return attribute.type == static_cast<std::uint8_t>(ComponentType::kHalf) ? "half" : "int16";
+  }
+  return "none";
+}
+
+std::uint64_t model_bytes(const BundleView& bundle, const ModelRecord& model) {
+  // Levels may share vertices: ranges are counted once. Levels are written in ascending order.
+  std::uint64_t bytes = 0;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;
+  const std::uint64_t stride = bundle.layouts()[model.layout].stride;
+  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+    const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+    for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+      const LevelRecord& level = bundle.levels()[chunk.first_level + l];
+      bytes += 2ull * level.index_count;
+      ranges.emplace_back(level.vertex_offset, level.vertex_offset + stride * level.vertex_count);
+    }
+  }
+  std::sort(ranges.begin(), ranges.end());
+  std::uint64_t end = 0;
+  for (const auto& [first, last] : ranges) {
+    if (last > end) bytes += last - std::max(first, end);
+    end = std::max(end, last);
+  }
+  return bytes;
+}
+
+Json model_json(const BundleView& bundle, std::uint32_t index) {
+  const ModelRecord& model = bundle.models()[index];
+  const std::uint64_t bytes = model_bytes(bundle, model);
+  std::uint64_t indices = 0;
+  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+    const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+    indices += bundle.levels()[chunk.first_level].index_count;
+  }
+  const std::uint64_t level0 =
+      model.vertex_count * bundle.layouts()[model.layout].stride + 2 * indices;
+  Json materials = Json::array();
+  for (std::uint32_t m = 0; m < model.material_count; ++m) {
+    materials.push_back(bundle.name(bundle.materials()[model.first_material + m].name));
+  }
+  const std::optional<MeshTopology> topology = stated_topology(bundle, index);
+  const std::optional<LevelFigures> levels = stated_levels(bundle, index);
+  return {{"name", bundle.name(model.name)},
+          {"vertices", model.vertex_count},
+          {"triangles", model.triangle_count},
+          {"source_vertices", model.source_vertex_count},
+          {"source_faces", model.source_face_count},
+          {"chunks", model.chunk_count},
+          {"lods", model.level_count},
+          {"materials", materials},
+          {"bytes", bytes},
+          {"bytes_per_triangle",
+           static_cast<double>(level0) / static_cast<double>(model.triangle_count)},
+          {"layout", layout_name(bundle.layouts()[model.layout])},
+          {"center", Json::list(model.center)},
+          {"scale", model.scale},
+          {"diagonal", model.diagonal},
+          {"unit_metres", model.unit_metres},
+          {"position_error_max", model.position_error_max},
+          {"position_error_rms", model.position_error_rms},
+          {"normal_error_max_deg", model.normal_error_max_deg},
+          {"normal_error_rms_deg", model.normal_error_rms_deg},
+          {"uv_error_max_texels", model.uv_error_max_texels},
+          {"uv_error_rms_texels", model.uv_error_rms_texels},
+          {"topology", topology ? topology_json(*topology) : Json()},
+          {"levels", levels ? level_json(*levels) : Json()}};
+}
+
+Json texture_json(const BundleView& bundle, std::uint32_t index) {
+  const TextureRecord& texture = bundle.textures()[index];
+  return {{"name", bundle.name(texture.name)},
+          {"width", texture.width},
+          {"height", texture.height},
+          {"source_width", texture.source_width},
+          {"source_height", texture.source_height},
+          {"levels", texture.level_count},
+          {"bytes", bundle.texture_data(index).size()},
+          {"psnr_db", texture.psnr_db},
+          {"ssim", texture.ssim},
+          {"alpha", (texture.flags & kTextureAlpha) != 0},
+          {"repeat", (texture.flags & kTextureRepeat) != 0}};
+}
+
+Json pattern_json(const BundleView& bundle, std::uint32_t index) {
+  const PatternRecord& pattern = bundle.patterns()[index];
+  Json keypoints = Json::object();
+  for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
+    const ParameterSetRecord& set = bundle.parameter_sets()[s];
+    if (bundle.section(SectionType::kMappedFeatures, index, set.id).empty()) continue;
+    keypoints.set(bundle.name(set.name), bundle.features(index, set.id).keypoints.size());
+  }
+  return {{"name", bundle.name(pattern.name)},
+          {"width", pattern.width},
+          {"height", pattern.height},
+          {"width_mm", pattern.width_mm},
+          {"score", pattern.score < 0 ? Json() : Json(pattern.score)},
+          {"keypoints", keypoints}};
+}
+
+}  // namespace
+
+std::string bundle_meta(const BakeRequest& request, const Report& report) {
+  const auto name = [](const std::string& path) {
+    return std::filesystem::path(path).filename().string();
+  };
+  Json models = Json::array();
+  for (const std::string& path : request.models) {
+    Json model = {{"file", name(path)}};
+    if (models.size() < report.topologies.size()) {
+      model.set("topology", topology_json(report.topologies[models.size()]));
+    }
+    if (models.size() < report.levels.size()) {
+      model.set("levels", level_json(report.levels[models.size()]));
+    }
+    models.push_back(std::move(model));
+  }
+  Json patterns = Json::array();
+  for (const PatternRequest& pattern : request.patterns) {
+    patterns.push_back({{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}});
+  }
+  const Json options = {{"device", request.device},
+                        {"lods", request.levels},
+                        {"max_error", request.max_error.value},
+                        {"max_error_unit", max_error_unit(request.max_error)},
+                        {"positions", positions_name(request)},
+                        {"topology", request.topology},
+                        {"effort", static_cast<int>(request.textures.effort)},
+                        {"perceptual", request.textures.perceptual},
+                        {"max_texture", request.textures.max_side},
+                        {"mipmaps", request.textures.mipmaps},
+                        {"unit_metres", request.unit_metres}};
+  const Json meta = {{"tool", "modar " + request.tool_version},
+                     {"models", models},
+                     {"patterns", patterns},
+                     {"options", options}};
+  return meta.dump();
+}
+
+std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint32_t model) {
+  const std::optional<Json> found = stated(bundle, model, "topology");
+  if (!found) return std::nullopt;
+  MeshTopology topology;
+  for (const auto& figure : kCounts) {
+    const std::optional<Json> value = found->find(figure.key);
+    const std::optional<std::uint64_t> count = value ? value->count() : std::nullopt;
+    if (!count) return std::nullopt;
+    topology.*figure.value = *count;
+  }
+  return topology;
+}
+
+std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_t model) {
+  const std::optional<Json> found = stated(bundle, model, "levels");
+  const std::optional<Json> error = found ? found->find("position_error_max") : std::nullopt;
+  const std::optional<Json> shift = found ? found->find("uv_shift_max_texels") : std::nullopt;
+  if (!error || !error->number() || !shift || !shift->number()) return std::nullopt;
+  return LevelFigures{*error->number(), *shift->number()};
+}
+
+std::string topology_words(const MeshTopology& t) {
+  return std::to_string(t.components) + " components, " + std::to_string(t.boundary_loops) +
+         " boundary loops, Euler number " + std::to_string(t.euler()) +
+         ", non-manifold: " + std::to_string(t.non_manifold_edges) + " edges, " +
+         std::to_string(t.non_manifold_vertices) + " vertices";
+}
+
+std::string level_words(const LevelFigures& levels) {
+  char text[128];
+  std::snprintf(text, sizeof text,
+                "levels of detail: off by at most %.3g, texture shifted by at most %.1f texels",
+                levels.position_error_max, levels.uv_shift_max_texels);
+  return text;
+}
+
+Json bundle_json(const BundleView& bundle) {
+  Json models = Json::array();
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    models.push_back(model_json(bundle, m));
+  }
+  Json textures = Json::array();
+  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
+    textures.push_back(texture_json(bundle, t));
+  }
+  Json patterns = Json::array();
+  for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
+    patterns.push_back(pattern_json(bundle, p));
+  }
+  Json scenes = Json::array();
+  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
+    const SceneRecord& scene = bundle.scenes()[s];
+    scenes.push_back({{"pattern", bundle.name(bundle.patterns()[scene.pattern].name)},
+                      {"model", bundle.name(bundle.models()[scene.model].name)},
+                      {"scale", scene.scale},
+                      {"offset", Json::list(scene.offset)}});
+  }
+  return {{"format", {{"major", bundle.header().major}, {"minor", bundle.header().minor}}},
+          {"bytes", bundle.bytes().size()},
+          {"models", models},
+          {"textures", textures},
+          {"patterns", patterns},
+          {"scenes", scenes}};
+}
+
+}  // namespace modar

@@ -1,0 +1,107 @@
+// The command line of `modar`, as its commands declare it: names, help and the variables that take
+// the values. CLI11 is known to command_line.cpp alone, for a file that includes it takes 8 s to
+// compile.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace modar {
+
+/// What an option accepts, beyond its type, and how --help shows it.
+struct OptionRules {
+  std::string type = {};  ///< name of the value in --help: "FILE"
+  bool required = false;
+  bool shows_default = false;  ///< print what the variable holds when it is declared
+  double least = -std::numeric_limits<double>::infinity();
+  double most = std::numeric_limits<double>::infinity();
+  bool positive = false;                  ///< above 0
+  std::vector<std::string> choices = {};  ///< the values there are; empty: any
+  char separator = 0;                     ///< between several values in one word; 0: none
+  bool repeatable = false;                ///< of a list: one value each time, not all that follow
+  std::string needs = {};                 ///< another option, declared before
+  std::string excludes = {};              ///< the same
+};
+
+/// A command with its options and subcommands. Variables must live until parse_and_run() returns.
+class CommandLine {
+ public:
+  using Value =
+      std::variant<std::string*, std::vector<std::string>*, double*, int*, unsigned*, std::size_t*>;
+
+  /// The program itself. version: what --version prints.
+  CommandLine(const std::string& about, const std::string& version);
+  ~CommandLine();
+
+  /// A subcommand, which stays this object's. A command that has some runs none itself.
+  CommandLine& command(const std::string& name, const std::string& about);
+
+  /// names: "-o,--output"; without dashes a positional argument.
+  void option(const std::string& names, Value value, const std::string& help,
+              const OptionRules& rules = {});
+  /// A number of bytes: 800M, 1G (powers of 1024).
+  void size(const std::string& names, std::uint64_t& bytes, const std::string& help,
+            const OptionRules& rules = {});
+  /// Without a value. names "!--no-x" sets the variable to false.
+  void flag(const std::string& names, bool& value, const std::string& help,
+            const OptionRules& rules = {});
+  /// Runs `seen` where the flag stands.
+  void flag(const std::string& names, std::function<void()> seen, const std::string& help,
+            const OptionRules& rules = {});
+  /// The same, but --name=N sets another number than `plain`.
+  void flag(const std::string& names, int& value, int plain, const std::string& help);
+  /// One of several words.
+  template <class Enum>
+  void choice(const std::string& names, Enum& value, const std::map<std::string, Enum>& words,
+              const std::string& help, const OptionRules& rules = {}) {
+    choose(
+        names, [&value](int chosen) { value = static_cast<Enum>(chosen); }, numbers(words), help,
+        rules);
+  }
+  template <class Enum>
+  void choice(const std::string& names, std::optional<Enum>& value,
+              const std::map<std::string, Enum>& words, const std::string& help,
+              const OptionRules& rules = {}) {
+    choose(
+        names, [&value](int chosen) { value = static_cast<Enum>(chosen); }, numbers(words), help,
+        rules);
+  }
+
+  /// Printed below the options.
+  void footer(const std::string& text);
+  /// What the command does; its answer is the program's exit code.
+  void run(std::function<int()> work);
+
+  /// What followed the program's name.
+  [[nodiscard]] const std::vector<std::string>& words() const { return words_; }
+
+  /// --help and --version go to stdout with 0, a wrong command line to stderr with
+  /// ExitCode::kUsage; else what the chosen command answers.
+  int parse_and_run(int argc, char** argv);
+
+ private:
+  struct Parts;
+  explicit CommandLine(std::unique_ptr<Parts> parts);
+  void choose(const std::string& names, std::function<void(int)> take,
+              const std::map<std::string, int>& words, const std::string& help,
+              const OptionRules& rules);
+  template <class Enum>
+  static std::map<std::string, int> numbers(const std::map<std::string, Enum>& words) {
+    std::map<std::string, int> numbers;
+    for (const auto& [word, value] : words) numbers[word] = static_cast<int>(value);
+    return numbers;
+  }
+
+  std::unique_ptr<Parts> parts_;
+  std::vector<std::string> words_;
+};
+
+}  // namespace modar
