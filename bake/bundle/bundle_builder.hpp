@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/mesh/pack/position_plan.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/pattern/tracker_record_bake.hpp"
 #include "bake/report.hpp"
 #include "bake/texture/texture.hpp"

@@ -11,9 +11,9 @@
 
 #include "bake/check/workstation_issues.hpp"
 #include "bake/import/read_model.hpp"
-#include "bake/mesh/pack/vertex_decoder.hpp"
-#include "bake/mesh/tri_mesh.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture.hpp"
 
 namespace modar {

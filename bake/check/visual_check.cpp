@@ -14,6 +14,7 @@
 #include "bake/check/software_render.hpp"
 #include "bake/check/workstation_issues.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_quality.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"

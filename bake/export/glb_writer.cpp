@@ -9,7 +9,7 @@
 
 #include "bake/image/png_encoder.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
-#include "bake/mesh/pack/vertex_decoder.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/atomic_file.hpp"
 
 namespace modar {

@@ -4,9 +4,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bake/import/gltf/gltf_reader.hpp"
-#include "bake/import/obj/obj_reader.hpp"
-
 namespace modar {
 
 Result<SourceModel> read_model(const std::string& path, unsigned jobs) {

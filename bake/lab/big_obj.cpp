@@ -13,7 +13,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/import/read_model.hpp"
-#include "bake/mesh/tri_mesh.hpp"
+#include "bake/mesh/weld/weld.hpp"
 
 namespace modar {
 namespace {

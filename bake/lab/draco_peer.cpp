@@ -7,7 +7,7 @@
 #include <draco/compression/encode.h>
 
 #include "bake/lab/ship_bench.hpp"
-#include "bake/mesh/pack/vertex_decoder.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/thread_clock.hpp"
 
 namespace modar {

@@ -9,11 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "bake/import/obj/obj_reader.hpp"
+#include "bake/import/read_model.hpp"
 #include "bake/lab/big_obj.hpp"
 #include "bake/lab/probe_peers.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/topology/mesh_topology.hpp"
+#include "bake/mesh/weld/weld.hpp"
 #include "formats/transport/chunk_order.hpp"
 
 namespace modar {

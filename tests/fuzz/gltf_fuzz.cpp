@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "bake/import/gltf/gltf_reader.hpp"
-#include "bake/mesh/tri_mesh.hpp"
+#include "bake/import/read_model.hpp"
+#include "bake/mesh/weld/weld.hpp"
 #include "tests/fuzz/input_file.hpp"
 #include "tests/fuzz/need.hpp"
 

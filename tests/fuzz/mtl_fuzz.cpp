@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "bake/import/obj/obj_reader.hpp"
+#include "bake/import/read_model.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::vector<modar::Diagnostic> findings;

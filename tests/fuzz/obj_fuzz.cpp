@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "bake/import/obj/obj_reader.hpp"
-#include "bake/mesh/tri_mesh.hpp"
+#include "bake/import/read_model.hpp"
+#include "bake/mesh/weld/weld.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // glTF in: hand-made files with known answers, Draco's own encoder, Debian's sample models, and our
 // own GLB round the circle.
-#include "bake/import/gltf/gltf_reader.hpp"
+#include "bake/import/read_model.hpp"
 
 #include <gtest/gtest.h>
 

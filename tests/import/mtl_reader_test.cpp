@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bake/import/obj/map_path.hpp"
-#include "bake/import/obj/obj_reader.hpp"
+#include "bake/import/obj/mtl_reader.hpp"
+#include "bake/import/read_model.hpp"
 
 namespace modar {
 namespace {

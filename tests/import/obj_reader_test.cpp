@@ -1,5 +1,5 @@
 // OBJ text to SourceModel: against tinyobjloader on real files, and by hand where readers differ.
-#include "bake/import/obj/obj_reader.hpp"
+#include "bake/import/read_model.hpp"
 
 #include <gtest/gtest.h>
 

@@ -18,7 +18,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/mesh/lod/mesh_levels.hpp"
-#include "bake/mesh/pack/vertex_decoder.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/assimp_oracle.hpp"
 #include "tests/mesh/stages.hpp"

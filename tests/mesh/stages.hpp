@@ -9,8 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "bake/import/obj/obj_reader.hpp"
-#include "bake/mesh/pack/packed_mesh.hpp"
+#include "bake/import/read_model.hpp"
+#include "bake/mesh/pack/pack.hpp"
+#include "bake/mesh/weld/weld.hpp"
 
 namespace modar::testing {
 

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "bake/import/source_model.hpp"
 
 namespace tinygltf {
@@ -26,5 +28,18 @@ std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const st
 
 /// Linear light to sRGB (IEC 61966-2-1), both in [0,1].
 double srgb_of_linear(double linear);
+
+/// KHR_texture_transform of the base colour: uv of the file to those of the image, v down in both.
+struct GltfUv {
+  std::string attribute = "TEXCOORD_0";
+  glm::dvec2 offset{0.0};
+  glm::dvec2 scale{1.0};
+  double rotation = 0.0;  ///< radians, counter-clockwise as one looks at the image
+
+  [[nodiscard]] glm::dvec2 apply(const glm::dvec2& uv) const;
+};
+
+/// material: of the primitive; what does not exist has the file's uv as they are.
+GltfUv gltf_uv(const tinygltf::Model& gltf, int material);
 
 }  // namespace modar

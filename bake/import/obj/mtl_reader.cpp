@@ -1,15 +1,190 @@
-// MTL text to materials.
+// Materials of an OBJ: paths as exporters write them, MTL text, and which material is which.
+#include "bake/import/obj/mtl_reader.hpp"
+
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
 #include <optional>
+#include <system_error>
+#include <vector>
 
-#include "bake/import/obj/ascii.hpp"
-#include "bake/import/obj/map_path.hpp"
 #include "bake/import/obj/number_parser.hpp"
-#include "bake/import/obj/obj_reader.hpp"
+#include "bake/import/read_model.hpp"
 
 namespace modar {
 namespace {
+
+// Names of files as exporters write them, to paths that exist.
+
+namespace fs = std::filesystem;
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error) && !error;
+}
+
+char lower(char c) {
+  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
+
+bool same_but_case(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](char x, char y) { return lower(x) == lower(y); });
+}
+
+/// The entry of `folder` named `name` in any case: the exact one if there is one, else the first in
+/// byte order, so that the answer does not hang on the file system's order.
+fs::path entry_of(const fs::path& folder, const std::string& name) {
+  std::error_code error;
+  if (name == "." || name == "..") return folder / name;
+  if (fs::exists(folder / name, error) && !error) return folder / name;
+  std::string best;
+  fs::directory_iterator it(folder.empty() ? fs::path(".") : folder, error);
+  for (; !error && it != fs::directory_iterator(); it.increment(error)) {
+    const std::string entry = it->path().filename().string();
+    if (same_but_case(entry, name) && (best.empty() || entry < best)) best = entry;
+  }
+  return best.empty() ? fs::path() : folder / best;
+}
+
+/// A relative path whose parts may stand in any case.
+fs::path any_case(const fs::path& folder, const fs::path& relative) {
+  fs::path at = folder;
+  for (const fs::path& part : relative) {
+    if (part.empty()) continue;
+    at = entry_of(at, part.string());
+    if (at.empty()) return {};
+  }
+  return is_file(at) ? at : fs::path();
+}
+
+std::string_view trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+/// Quotes off, escaped blanks to blanks, backslashes to slashes.
+std::string cleaned(std::string_view name) {
+  name = trimmed(name);
+  if (name.size() >= 2 && (name.front() == '"' || name.front() == '\'') &&
+      name.back() == name.front()) {
+    name = trimmed(name.substr(1, name.size() - 2));
+  }
+  std::string clean;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (name[i] != '\\') {
+      clean += name[i];
+    } else if (i + 1 < name.size() && name[i + 1] == ' ') {
+      continue;
+    } else if (clean.empty() || clean.back() != '/') {
+      clean += '/';
+    }
+  }
+  return clean;
+}
+
+bool is_number(std::string_view token) {
+  if (!token.empty() && token.front() == '+') token.remove_prefix(1);
+  double value = 0;
+  const auto result = std::from_chars(token.data(), token.data() + token.size(), value);
+  return result.ec == std::errc() && result.ptr == token.data() + token.size();
+}
+
+/// Takes the next word off the front of `text`.
+std::string_view take_word(std::string_view& text) {
+  text = trimmed(text);
+  const std::size_t end = std::min(text.find_first_of(" \t"), text.size());
+  const std::string_view word = text.substr(0, end);
+  text = trimmed(text.substr(end));
+  return word;
+}
+
+/// Sets aside the options that the MTL specification knows, with their arguments.
+std::string_view without_options(std::string_view text, bool& transformed) {
+  while (true) {
+    text = trimmed(text);
+    std::string_view rest = text;
+    const std::string_view option = take_word(rest);
+    if (option.size() < 2 || option.front() != '-') return text;
+    const std::string_view name = option.substr(1);
+    if (name == "o" || name == "s" || name == "t") {
+      const double neutral = name == "s" ? 1.0 : 0.0;
+      for (int i = 0; i < 3; ++i) {
+        std::string_view after = rest;
+        const std::string_view word = take_word(after);
+        if (!is_number(word) || after.empty()) break;
+        double value = neutral;
+        const std::size_t sign = word.front() == '+' ? 1 : 0;
+        std::from_chars(word.data() + sign, word.data() + word.size(), value);
+        transformed = transformed || value != neutral;
+        rest = after;
+      }
+    } else if (name == "mm") {
+      take_word(rest);
+      take_word(rest);
+    } else if (name == "blendu" || name == "blendv" || name == "clamp" || name == "cc" ||
+               name == "imfchan" || name == "texres" || name == "bm" || name == "boost" ||
+               name == "type") {
+      take_word(rest);
+    } else {
+      return text;
+    }
+    text = rest;
+  }
+}
+
+}  // namespace
+
+std::string find_named_file(std::string_view name, const std::string& folder) {
+  const fs::path base(folder);
+  const fs::path raw(trimmed(name));
+  if (raw.empty() || raw.string().find('\0') != std::string::npos) return {};
+  if (is_file(base / raw)) return (base / raw).string();
+  const fs::path clean(cleaned(name));
+  if (clean.empty()) return {};
+  if (is_file(base / clean)) return (base / clean).lexically_normal().string();
+  if (clean.is_relative()) {
+    if (const fs::path found = any_case(base, clean.lexically_normal()); !found.empty()) {
+      return found.string();
+    }
+  }
+  return any_case(base, clean.filename()).string();
+}
+
+std::string find_map_file(std::string_view statement, const std::string& folder, std::string& name,
+                          bool& transformed) {
+  transformed = false;
+  std::string_view rest = without_options(statement, transformed);
+  name = std::string(rest);
+  if (std::string found = find_named_file(rest, folder); !found.empty()) return found;
+  // Options after the name, then options that nobody knows before it.
+  const std::size_t option = rest.find(" -");
+  if (option != std::string_view::npos && option > 0) {
+    const std::string_view head = rest.substr(0, option);
+    if (std::string found = find_named_file(head, folder); !found.empty()) {
+      name = std::string(head);
+      return found;
+    }
+  }
+  if (rest.empty() || rest.front() != '-') return {};
+  for (int words = 0; words < 32 && !rest.empty(); ++words) {
+    take_word(rest);
+    if (std::string found = find_named_file(rest, folder); !found.empty()) {
+      name = std::string(rest);
+      return found;
+    }
+  }
+  return {};
+}
+namespace {
+
+// MTL text to materials.
 
 /// One statement, its continued lines joined, and where the next begins.
 std::string take_statement(std::string_view text, std::size_t& at, std::uint64_t& line) {
@@ -138,6 +313,127 @@ std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& 
       has_d = false;
     } else if (!materials.empty()) {
       take_property(key, value, context, has_d, materials.back());
+    }
+  }
+  return materials;
+}
+namespace {
+
+// Material libraries: names with blanks, several files, none at all.
+
+constexpr std::uintmax_t kMaxMtlBytes = 64u << 20;
+
+/// Words of an mtllib line; "\ " is a blank inside a name.
+std::vector<std::string> split_names(const std::string& text) {
+  std::vector<std::string> names;
+  std::string name;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool blank = text[i] == ' ' || text[i] == '\t';
+    if (blank && !(i > 0 && text[i - 1] == '\\')) {
+      if (!name.empty()) names.push_back(std::move(name));
+      name.clear();
+    } else {
+      name += text[i];
+    }
+  }
+  if (!name.empty()) names.push_back(std::move(name));
+  return names;
+}
+
+std::string read_text(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text;
+  char buffer[65536];
+  while (in.read(buffer, sizeof buffer), in.gcount() > 0) {
+    text.append(buffer, static_cast<std::size_t>(in.gcount()));
+    if (text.size() > kMaxMtlBytes) return {};
+  }
+  return text;
+}
+
+std::string folder_of(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  return slash == std::string::npos ? std::string(".") : path.substr(0, slash + 1);
+}
+
+std::string name_of(const std::string& path) {
+  return path.substr(path.rfind('/') + 1);
+}
+
+}  // namespace
+
+ObjMaterials::ObjMaterials() {
+  used_.push_back({"default", 0});
+}
+
+std::uint32_t ObjMaterials::use(const std::string& name, std::uint64_t line) {
+  const auto same = [&](const Named& n) { return n.name == name; };
+  // Materials are few, and the one in use is mostly among the latest.
+  const auto found = std::find_if(used_.rbegin(), used_.rend() - 1, same);
+  if (found != used_.rend() - 1) {
+    return static_cast<std::uint32_t>(std::distance(found, used_.rend()) - 1);
+  }
+  used_.push_back({name, line});
+  return static_cast<std::uint32_t>(used_.size() - 1);
+}
+
+void ObjMaterials::add_library(const std::string& text, std::uint64_t line) {
+  libraries_.push_back({text, line});
+}
+
+std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
+                                                  const std::string& stem, const std::string& label,
+                                                  std::vector<Diagnostic>& findings) {
+  std::vector<SourceMaterial> materials(used_.size());
+  for (std::size_t i = 0; i < used_.size(); ++i) materials[i].name = used_[i].name;
+  if (folder.empty()) return materials;
+
+  std::vector<std::string> paths;
+  const auto missing = [&](const std::string& name, std::uint64_t line) {
+    findings.push_back({"obj.missing-mtl", DiagnosticSeverity::kWarning, label, line,
+                        "material file '" + name + "' was not found",
+                        "put it beside the OBJ file, or correct the mtllib line"});
+  };
+  for (const Named& library : libraries_) {
+    if (std::string whole = find_named_file(library.name, folder); !whole.empty()) {
+      paths.push_back(std::move(whole));
+      continue;
+    }
+    for (const std::string& name : split_names(library.name)) {
+      std::string path = find_named_file(name, folder);
+      if (path.empty()) {
+        missing(name, library.line);
+      } else {
+        paths.push_back(std::move(path));
+      }
+    }
+  }
+  if (paths.empty() && (used_.size() > 1 || !libraries_.empty())) {
+    if (std::string beside = find_named_file(stem + ".mtl", folder); !beside.empty()) {
+      findings.push_back({"obj.mtl-beside", DiagnosticSeverity::kInfo, label, 0,
+                          "'" + name_of(beside) + "' is taken for the material file",
+                          "name it in an mtllib line"});
+      paths.push_back(std::move(beside));
+    }
+  }
+
+  std::map<std::string, SourceMaterial> defined;
+  std::vector<std::string> read;
+  for (const std::string& path : paths) {
+    if (std::find(read.begin(), read.end(), path) != read.end()) continue;
+    read.push_back(path);
+    for (SourceMaterial& m : parse_mtl(read_text(path), folder_of(path), name_of(path), findings)) {
+      std::string name = m.name;
+      defined.try_emplace(std::move(name), std::move(m));
+    }
+  }
+  for (std::size_t i = 1; i < used_.size(); ++i) {
+    if (const auto found = defined.find(used_[i].name); found != defined.end()) {
+      materials[i] = found->second;
+    } else {
+      findings.push_back({"obj.undefined-material", DiagnosticSeverity::kWarning, label,
+                          used_[i].line, "no material file defines '" + used_[i].name + "'",
+                          "it is drawn in the default grey; define it or correct its name"});
     }
   }
   return materials;

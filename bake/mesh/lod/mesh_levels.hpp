@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "bake/mesh/pack/chunked_mesh.hpp"
-#include "bake/mesh/pack/position_plan.hpp"
+#include "bake/mesh/pack/chunk.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 
 namespace modar {
 

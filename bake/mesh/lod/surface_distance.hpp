@@ -1,12 +1,46 @@
 // How far one triangle mesh lies from another.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <vector>
 
-#include "bake/mesh/lod/level_surface.hpp"
+#include <glm/vec3.hpp>
+
+#include "bake/mesh/triangle_tree.hpp"
 
 namespace modar {
+
+class LevelSurface {
+ public:
+  /// Of at least one triangle. Both spans are the caller's and must outlive it.
+  LevelSurface(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
+
+  [[nodiscard]] std::span<const std::uint16_t> indices() const { return indices_; }
+  [[nodiscard]] const glm::dvec3& position(std::uint16_t vertex) const {
+    return positions_[vertex];
+  }
+  [[nodiscard]] std::array<glm::dvec3, 3> triangle(std::uint32_t t) const {
+    const std::uint16_t* at = &indices_[3 * std::size_t{t}];
+    return {positions_[at[0]], positions_[at[1]], positions_[at[2]]};
+  }
+  /// The triangle beyond the edge from corner i to the next, kNoIndex at a border.
+  [[nodiscard]] std::uint32_t neighbour(std::uint32_t t, std::size_t i) const {
+    return neighbours_[3 * std::size_t{t} + i];
+  }
+  /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
+  [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
+  /// Made when it is first asked for.
+  TriangleTree& tree();
+
+ private:
+  std::span<const glm::dvec3> positions_;
+  std::span<const std::uint16_t> indices_;
+  std::vector<std::uint32_t> neighbours_;
+  std::unique_ptr<TriangleTree> tree_;
+};
 
 /// A bound on the distance of any point of one surface from the other: never below the truth, and
 /// above it by no more than half, or than kDistanceFloor or `least` where that is more; never below

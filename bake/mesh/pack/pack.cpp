@@ -1,4 +1,6 @@
 // Packs chunk by chunk: bytes, boxes and cones, order, records.
+#include "bake/mesh/pack/pack.hpp"
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -9,9 +11,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/mesh/pack/chunk_bounds.hpp"
-#include "bake/mesh/pack/packed_mesh.hpp"
-#include "bake/mesh/pack/vertex_packer.hpp"
 #include "bake/parallel.hpp"
 #include "formats/transport/chunk_order.hpp"
 

@@ -1,14 +1,501 @@
-// Polygons to welded triangles in [-1,1]: picks the way, normalises, tells what was dropped or
-// made.
+// Polygons to welded triangles in [-1,1]: picks one of two ways, normalises, reports what was
+// dropped or made.
+#include "bake/mesh/weld/weld.hpp"
+
 #include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
 #include <limits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
-#include "bake/mesh/weld/weld_steps.hpp"
+#include "bake/import/source_model.hpp"
+#include "bake/mesh/weld/triangulate.hpp"
+#include "bake/parallel.hpp"
 
 namespace modar {
 namespace {
+
+struct WeldCounts {
+  std::uint64_t flat = 0;         ///< triangles without area
+  std::uint64_t not_finite = 0;   ///< triangles with a nan
+  std::uint64_t tangled = 0;      ///< polygons
+  std::uint64_t bad_normals = 0;  ///< corners whose normal has no direction
+  std::uint64_t made_normals = 0;
+};
+
+/// Twice the area vector of a triangle, in doubles.
+glm::dvec3 area_vector(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  return glm::cross(b - a, c - a);
+}
+
+bool is_finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Does a source normal have a direction?
+bool has_direction(const glm::vec3& n) {
+  const float square = glm::dot(n, n);
+  return square > 1e-30f && square < 1e30f;
+}
+
+/// v turned over; what is no number becomes the image's corner.
+glm::dvec2 image_uv(const glm::dvec2& uv) {
+  if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return glm::dvec2(0.0, 1.0);
+  return {uv.x, 1.0 - uv.y};
+}
+
+/// colour: in [0,1].
+glm::u8vec4 byte_colour(const glm::vec3& colour) {
+  const glm::vec3 c = colour * 255.0f + 0.5f;
+  return {static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y),
+          static_cast<std::uint8_t>(c.z), std::uint8_t{255}};
+}
+
+/// Collects the faces round each (position, smoothing group); a group of 0 makes flat faces.
+/// Weights: area times the angle at the corner, so that neither thin nor many triangles of one flat
+/// side tilt the normal (Max, "Weights for computing vertex normals from facet normals", 1999, for
+/// the area; Thuermer and Wuethrich, 1998, for the angle).
+class NormalMaker {
+ public:
+  /// Starts over with `count` normals, numbered by the caller.
+  void reset(std::size_t count);
+  /// Number of the normal shared by the corners of this position and group; made on first use.
+  std::uint32_t node(std::uint32_t position, std::uint32_t group, std::size_t position_count);
+  /// Number of a normal of one face alone.
+  std::uint32_t flat_node();
+  /// Adds a triangle's share to one corner. cross: twice its area vector; a: the corner's position.
+  void add(std::uint32_t node, const glm::dvec3& cross, const glm::dvec3& a, const glm::dvec3& b,
+           const glm::dvec3& c);
+  /// Unit normals by number; (0, 0, 1) where the shares cancel.
+  [[nodiscard]] Array<glm::dvec3> take_normals();
+  [[nodiscard]] bool empty() const { return sums_.empty(); }
+
+ private:
+  Array<std::uint32_t> first_;  // of each position, kNoIndex where none
+  Array<std::uint32_t> next_;   // of each node
+  Array<std::uint32_t> group_;
+  Array<glm::dvec3> sums_;
+};
+
+void NormalMaker::reset(std::size_t count) {
+  first_.release();
+  next_.release();
+  group_.release();
+  sums_.assign(count, glm::dvec3(0.0));
+}
+
+std::uint32_t NormalMaker::node(std::uint32_t position, std::uint32_t group,
+                                std::size_t position_count) {
+  if (first_.empty()) first_.assign(position_count, kNoIndex);
+  for (std::uint32_t n = first_[position]; n != kNoIndex; n = next_[n]) {
+    if (group_[n] == group) return n;
+  }
+  const std::uint32_t n = flat_node();
+  next_[n] = first_[position];
+  group_[n] = group;
+  first_[position] = n;
+  return n;
+}
+
+std::uint32_t NormalMaker::flat_node() {
+  sums_.push_back(glm::dvec3(0.0));
+  next_.push_back(kNoIndex);
+  group_.push_back(0);
+  return static_cast<std::uint32_t>(sums_.size() - 1);
+}
+
+void NormalMaker::add(std::uint32_t node, const glm::dvec3& cross, const glm::dvec3& a,
+                      const glm::dvec3& b, const glm::dvec3& c) {
+  const double angle = std::atan2(glm::length(cross), glm::dot(b - a, c - a));
+  sums_[node] += cross * angle;
+}
+
+Array<glm::dvec3> NormalMaker::take_normals() {
+  for (glm::dvec3& n : sums_) {
+    const double length = glm::length(n);
+    n = length > 0 && std::isfinite(length) ? n / length : glm::dvec3(0, 0, 1);
+  }
+  return std::move(sums_);
+}
+
+/// Numbers distinct (position, uv, normal) triples by first use. They hang in a list at their
+/// position: corners that share a position stand near each other in files, so no hash is needed but
+/// for hubs with very many vertices.
+class VertexWeld {
+ public:
+  explicit VertexWeld(std::size_t position_count) : first_(position_count, kNoIndex) {}
+
+  std::uint32_t vertex(const Corner& key) {
+    std::uint32_t steps = 0;
+    for (std::uint32_t v = first_[key.position]; v != kNoIndex; v = next_[v]) {
+      if (keys_[v].uv == key.uv && keys_[v].normal == key.normal) return v;
+      if (++steps == kMaxSteps) return from_hub(key);
+    }
+    return add(key);
+  }
+
+  /// The triple of each vertex.
+  [[nodiscard]] const Array<Corner>& keys() const { return keys_; }
+  /// Ends the search; frees all but the keys.
+  void finish() {
+    first_.release();
+    next_.release();
+    hubs_.clear();
+  }
+
+ private:
+  static constexpr std::uint32_t kMaxSteps = 64;
+
+  std::uint32_t add(const Corner& key);
+  std::uint32_t from_hub(const Corner& key);
+
+  Array<std::uint32_t> first_;  // of each position
+  Array<std::uint32_t> next_;   // of each vertex
+  Array<Corner> keys_;          // of each vertex
+  std::unordered_map<std::uint32_t, std::unordered_map<std::uint64_t, std::uint32_t>> hubs_;
+};
+
+std::uint64_t attributes_of(const Corner& c) {
+  return (std::uint64_t{c.uv} << 32) | c.normal;
+}
+
+std::uint32_t VertexWeld::add(const Corner& key) {
+  const auto v = static_cast<std::uint32_t>(keys_.size());
+  keys_.push_back(key);
+  next_.push_back(first_[key.position]);
+  first_[key.position] = v;
+  return v;
+}
+
+std::uint32_t VertexWeld::from_hub(const Corner& key) {
+  // Only looked up, so the hash's order shows nowhere.
+  auto& hub = hubs_[key.position];
+  if (hub.empty()) {
+    for (std::uint32_t v = first_[key.position]; v != kNoIndex; v = next_[v]) {
+      hub.emplace(attributes_of(keys_[v]), v);
+    }
+  }
+  const auto [at, fresh] = hub.try_emplace(attributes_of(key), 0);
+  if (fresh) at->second = add(key);
+  return at->second;
+}
+
+// The general way: polygons, seams, missing and made normals.
+
+/// Marks the number of a made normal in a vertex key; source normals stay below it.
+constexpr std::uint32_t kMade = 0x80000000u;
+
+/// Runs over the faces once: triangulates, drops, gathers normals, welds.
+class Welder {
+ public:
+  Welder(SourceModel& source, TriMesh& mesh, WeldCounts& counts)
+      : source_(source), mesh_(mesh), counts_(counts), weld_(source.positions.size()) {}
+
+  void run() {
+    const std::size_t faces = source_.face_count();
+    // One triangle a face, two less than corners in all: exact but for what is dropped.
+    const std::size_t triangles = source_.corner_count() - 2 * faces;
+    mesh_.triangles.reserve(triangles);
+    mesh_.triangle_material.reserve(triangles);
+    RunCursor materials(source_.material_runs);
+    RunCursor smoothing(source_.smoothing_runs);
+    for (std::size_t f = 0; f < faces; ++f) {
+      material_ = materials.at(f);
+      smoothing_ = smoothing.at(f);
+      face(f);
+    }
+  }
+
+  /// Fills the mesh's vertex arrays, freeing the source's as it goes.
+  void finish() {
+    weld_.finish();
+    source_.corner_positions.release();
+    source_.corner_uvs.own.release();
+    source_.corner_normals.own.release();
+    source_.first_corner.release();
+    const Array<Corner>& keys = weld_.keys();
+    const std::size_t count = keys.size();
+    mesh_.normals.resize(count);
+    fill_normals(keys);
+    source_.normals.release();
+    fill_uvs(keys);
+    source_.uvs.release();
+    mesh_.source_positions.resize(count);
+    for (std::size_t v = 0; v < count; ++v) mesh_.source_positions[v] = keys[v].position;
+    if (!source_.colours.empty()) {
+      mesh_.colours.resize(count);
+      for (std::size_t v = 0; v < count; ++v) {
+        mesh_.colours[v] = byte_colour(source_.colours[keys[v].position]);
+      }
+    }
+    mesh_.positions.resize(count);
+    for (std::size_t v = 0; v < count; ++v) {
+      mesh_.positions[v] = source_.positions[keys[v].position];
+    }
+    source_.positions.release();
+    source_.colours.release();
+  }
+
+ private:
+  void fill_normals(const Array<Corner>& keys) {
+    const Array<glm::dvec3> made = normals_.take_normals();
+    counts_.made_normals = made.size();
+    for (std::size_t v = 0; v < keys.size(); ++v) {
+      const std::uint32_t n = keys[v].normal;
+      mesh_.normals[v] =
+          (n & kMade) != 0 ? glm::vec3(made[n & ~kMade]) : glm::normalize(source_.normals[n]);
+    }
+  }
+
+  void fill_uvs(const Array<Corner>& keys) {
+    const bool any =
+        std::any_of(keys.begin(), keys.end(), [](const Corner& key) { return key.uv != kNoIndex; });
+    if (!any) return;
+    mesh_.uvs.resize(keys.size());
+    for (std::size_t v = 0; v < keys.size(); ++v) {
+      const std::uint32_t uv = keys[v].uv;
+      mesh_.uvs[v] = image_uv(uv == kNoIndex ? glm::dvec2(0.0) : source_.uvs[uv]);
+    }
+  }
+
+  void face(std::size_t f) {
+    const std::size_t first = source_.face_first(f);
+    const std::size_t count = source_.face_size(f);
+    flat_ = kNoIndex;
+    if (count == 3) {
+      triangle(first, {0, 1, 2});
+      return;
+    }
+    polygon_.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+      polygon_.push_back(source_.positions[source_.corner_positions[first + i]]);
+    }
+    triangles_.clear();
+    if (!triangulate(polygon_, triangles_)) ++counts_.tangled;
+    for (const auto& t : triangles_) triangle(first, t);
+  }
+
+  void triangle(std::size_t first, const std::array<std::uint32_t, 3>& t) {
+    std::array<Corner, 3> corners;
+    std::array<glm::dvec3, 3> p;
+    for (std::size_t i = 0; i < 3; ++i) {
+      corners[i] = source_.corner(first + t[i]);
+      p[i] = source_.positions[corners[i].position];
+    }
+    const glm::dvec3 area = area_vector(p[0], p[1], p[2]);
+    if (!is_finite(area)) {
+      ++counts_.not_finite;
+      return;
+    }
+    if (area == glm::dvec3(0.0)) {
+      ++counts_.flat;
+      return;
+    }
+    std::array<std::uint32_t, 3> out{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      Corner& key = corners[i];
+      if (!has_normal(key)) {
+        const std::uint32_t node = normal_node(key.position);
+        normals_.add(node, area, p[i], p[(i + 1) % 3], p[(i + 2) % 3]);
+        key.normal = kMade | node;
+      }
+      out[i] = weld_.vertex(key);
+    }
+    mesh_.triangles.push_back(out);
+    mesh_.triangle_material.push_back(material_);
+  }
+
+  bool has_normal(const Corner& corner) {
+    if (corner.normal == kNoIndex) return false;
+    if (has_direction(source_.normals[corner.normal])) return true;
+    ++counts_.bad_normals;
+    return false;
+  }
+
+  std::uint32_t normal_node(std::uint32_t position) {
+    if (smoothing_ != 0) return normals_.node(position, smoothing_, source_.positions.size());
+    if (flat_ == kNoIndex) flat_ = normals_.flat_node();
+    return flat_;
+  }
+
+  SourceModel& source_;
+  TriMesh& mesh_;
+  WeldCounts& counts_;
+  VertexWeld weld_;
+  NormalMaker normals_;
+  std::uint32_t material_ = 0;
+  std::uint32_t smoothing_ = 0;
+  std::uint32_t flat_ = kNoIndex;  // the normal of the face at hand, where it is flat
+  std::vector<glm::dvec3> polygon_;
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+};
+
+void weld_any(SourceModel& source, TriMesh& mesh, WeldCounts& counts) {
+  Welder welder(source, mesh, counts);
+  welder.run();
+  if (!mesh.triangles.empty()) welder.finish();
+}
+
+// The way of files whose corners repeat one index (most scans): works in the source's arrays.
+
+constexpr std::size_t kStretch = 1u << 16;  ///< elements that one thread takes at a time
+
+std::uint32_t stretches(std::size_t count) {
+  return static_cast<std::uint32_t>((count + kStretch - 1) / kStretch);
+}
+
+/// Calls body(begin, end) over [0, count) in stretches, on several threads.
+template <class Body>
+void parallel_stretches(std::size_t count, unsigned jobs, const Body& body) {
+  parallel_rows(stretches(count), jobs, [&](std::uint32_t s) {
+    const std::size_t begin = s * kStretch;
+    body(begin, std::min(begin + kStretch, count));
+  });
+}
+
+enum class Verdict : std::uint8_t { kKeep, kFlat, kNotFinite };
+
+/// What to do with each triangle; marks the positions of those that stay.
+Array<Verdict> judge(const SourceModel& source, Array<std::uint8_t>& used, unsigned jobs) {
+  const std::size_t count = source.face_count();
+  Array<Verdict> verdicts(count);
+  used.assign(source.positions.size(), 0);
+  parallel_stretches(count, jobs, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const std::uint32_t* v = source.corner_positions.data() + 3 * t;
+      const glm::dvec3 area =
+          area_vector(source.positions[v[0]], source.positions[v[1]], source.positions[v[2]]);
+      verdicts[t] = !is_finite(area)          ? Verdict::kNotFinite
+                    : area == glm::dvec3(0.0) ? Verdict::kFlat
+                                              : Verdict::kKeep;
+      if (verdicts[t] != Verdict::kKeep) continue;
+      // Threads may mark one position at a time, all with the same value.
+      for (int i = 0; i < 3; ++i) {
+        std::atomic_ref<std::uint8_t>(used[v[i]]).store(1, std::memory_order_relaxed);
+      }
+    }
+  });
+  return verdicts;
+}
+
+/// Takes dropped triangles out and lists the materials of the rest.
+void keep_triangles(SourceModel& source, const Array<Verdict>& verdicts, TriMesh& mesh,
+                    WeldCounts& counts) {
+  RunCursor materials(source.material_runs);
+  mesh.triangle_material.resize(verdicts.size());
+  std::uint32_t* corners = source.corner_positions.data();
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < verdicts.size(); ++t) {
+    const std::uint32_t material = materials.at(t);
+    if (verdicts[t] != Verdict::kKeep) {
+      ++(verdicts[t] == Verdict::kFlat ? counts.flat : counts.not_finite);
+      continue;
+    }
+    mesh.triangle_material[kept] = material;
+    if (kept != t) std::copy_n(corners + 3 * t, 3, corners + 3 * kept);
+    ++kept;
+  }
+  mesh.triangle_material.resize(kept);
+  source.corner_positions.resize(3 * kept);
+}
+
+template <class T>
+void keep_elements(Array<T>& values, const Array<std::uint8_t>& used) {
+  if (values.empty()) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (used[i] != 0) values[kept++] = values[i];
+  }
+  values.resize(kept);
+  values.shrink();
+}
+
+/// Takes positions out that no triangle uses; `to` is where the others went.
+void drop_unused(SourceModel& source, const Array<std::uint8_t>& used, TriMesh& mesh) {
+  if (std::find(used.begin(), used.end(), std::uint8_t{0}) == used.end()) return;
+  Array<std::uint32_t> to(used.size());
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    to[i] = static_cast<std::uint32_t>(mesh.source_positions.size());
+    if (used[i] != 0) mesh.source_positions.push_back(static_cast<std::uint32_t>(i));
+  }
+  for (std::uint32_t& v : source.corner_positions) v = to[v];
+  keep_elements(source.positions, used);
+  keep_elements(source.normals, used);
+  keep_elements(source.uvs, used);
+  keep_elements(source.colours, used);
+}
+
+/// Normals round each position, for sources that have none.
+void make_normals(const SourceModel& source, TriMesh& mesh, WeldCounts& counts) {
+  NormalMaker maker;
+  maker.reset(source.positions.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& v = mesh.triangles[t];
+    const std::array<glm::dvec3, 3> p = {source.positions[v[0]], source.positions[v[1]],
+                                         source.positions[v[2]]};
+    const glm::dvec3 area = area_vector(p[0], p[1], p[2]);
+    for (std::size_t i = 0; i < 3; ++i) {
+      maker.add(v[i], area, p[i], p[(i + 1) % 3], p[(i + 2) % 3]);
+    }
+  }
+  const Array<glm::dvec3> made = maker.take_normals();
+  counts.made_normals = made.size();
+  mesh.normals.resize(made.size());
+  for (std::size_t v = 0; v < made.size(); ++v) mesh.normals[v] = glm::vec3(made[v]);
+}
+
+bool can_weld_directly(const SourceModel& source) {
+  using Kind = IndexPlane::Kind;
+  if (!source.first_corner.empty() || source.corner_uvs.kind == Kind::kOwn) return false;
+  if (source.corner_uvs.kind == Kind::kSame && source.uvs.size() < source.positions.size()) {
+    return false;
+  }
+  if (source.corner_normals.kind == Kind::kSame) {
+    return source.normals.size() >= source.positions.size() &&
+           std::all_of(source.normals.begin(), source.normals.end(), has_direction);
+  }
+  return source.corner_normals.kind == Kind::kAbsent && source.smoothing_runs.size() == 1 &&
+         source.smoothing_runs[0].value != 0;
+}
+
+void weld_identity_indices(SourceModel& source, TriMesh& mesh, WeldCounts& counts, unsigned jobs) {
+  if (source.corner_uvs.kind == IndexPlane::Kind::kAbsent) source.uvs.release();
+  if (source.corner_normals.kind == IndexPlane::Kind::kAbsent) source.normals.release();
+  // What lies beyond the last position no corner refers to.
+  if (!source.uvs.empty()) source.uvs.resize(source.positions.size());
+  if (!source.normals.empty()) source.normals.resize(source.positions.size());
+  Array<std::uint8_t> used;
+  keep_triangles(source, judge(source, used, jobs), mesh, counts);
+  if (mesh.triangle_material.empty()) return;
+  drop_unused(source, used, mesh);
+  used.release();
+  mesh.triangles = Array<std::array<std::uint32_t, 3>>::regroup(std::move(source.corner_positions));
+  if (source.normals.empty()) {
+    make_normals(source, mesh, counts);
+  } else {
+    mesh.normals = std::move(source.normals);
+    parallel_stretches(mesh.normals.size(), jobs, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t v = begin; v < end; ++v) mesh.normals[v] = glm::normalize(mesh.normals[v]);
+    });
+  }
+  mesh.uvs = std::move(source.uvs);
+  for (glm::dvec2& uv : mesh.uvs) uv = image_uv(uv);
+  mesh.colours.resize(source.colours.size());
+  for (std::size_t v = 0; v < mesh.colours.size(); ++v) {
+    mesh.colours[v] = byte_colour(source.colours[v]);
+  }
+  source.colours.release();
+  mesh.positions = std::move(source.positions);
+}
+
+// Picking the way, and what both share.
 
 /// Brings the positions into [-1,1]; the model's largest side fills it.
 void normalise(TriMesh& mesh) {

@@ -1,8 +1,9 @@
-// Bytes by offset, from a file or from memory.
+// The text of an OBJ file, in blocks of whole statements. Internal to the OBJ reader.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -52,6 +53,37 @@ class ByteSource {
   std::string_view text_;
   int descriptor_ = -1;
   std::uint64_t size_;
+};
+
+enum class LoadResult { kLoaded, kEmpty, kFailed, kTooLarge };
+
+/// The text of one block: mapped, or in a buffer of its own at the end of the file or where one
+/// statement is very long.
+struct BlockText {
+  std::string_view text;    ///< whole statements, padded with kTextPadding readable bytes
+  bool unfinished = false;  ///< the last line had no line end; one was added
+  MappedStretch mapped;
+  std::string buffer;
+};
+
+/// Loads the statements that begin in block `index` (those behind the end of a statement that lies
+/// behind the start of the block), each up to its end. A statement longer than a block belongs to
+/// the block where it begins; the blocks in its middle are empty.
+class BlockLoader {
+ public:
+  /// start: offset of the first statement. source: outlives this.
+  BlockLoader(const ByteSource& source, std::uint64_t start) : source_(source), start_(start) {}
+
+  [[nodiscard]] std::uint64_t count() const;
+  LoadResult load(std::uint64_t index, BlockText& block) const;
+
+ private:
+  LoadResult load_copy(std::uint64_t index, std::uint64_t from, std::uint64_t end,
+                       BlockText& block) const;
+  LoadResult load_to_statement_end(std::uint64_t end, std::string& text) const;
+
+  const ByteSource& source_;
+  std::uint64_t start_;
 };
 
 }  // namespace modar

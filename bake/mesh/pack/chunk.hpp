@@ -2,9 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 #include "bake/mesh/tri_mesh.hpp"
+#include "formats/error.hpp"
 
 namespace modar {
 
@@ -44,5 +48,18 @@ std::uint32_t chunk_vertices_for(std::size_t model_vertices);
 /// Takes the mesh over. Errors: kUnsupported "model.max-error" where one triangle is longer than
 /// max_side.
 Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& report);
+
+/// As ChunkRecord has them.
+struct ChunkBounds {
+  glm::vec3 low{0.0f};
+  glm::vec3 high{0.0f};
+  glm::vec3 cone_axis{0.0f};
+  float cone_cutoff = 2.0f;  ///< > 1: never culled
+};
+
+/// positions: decoded, as the device will have them. Triangles without area have no side that could
+/// be seen and do not count.
+ChunkBounds chunk_bounds(std::span<const glm::vec3> positions,
+                         std::span<const std::uint16_t> indices);
 
 }  // namespace modar

@@ -1,5 +1,6 @@
-// Quantises vertices, decodes them again and states the error that was found.
-#include "bake/mesh/pack/vertex_packer.hpp"
+// Chooses how positions are stored, packs vertices and measures the error of their bytes, decodes
+// them.
+#include "bake/mesh/pack/vertex_codec.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +10,126 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "bake/mesh/pack/vertex_decoder.hpp"
 #include "formats/quantise.hpp"
 
 namespace modar {
 namespace {
+
+// Positions: half floats, or integers on a shared grid.
+
+/// Floats hold all multiples of it in [-1,1] exactly, so that decoding rounds nothing.
+constexpr double kFinestStep = 0x1p-23;
+constexpr double kSteps = 65534.0;                    ///< that 16 bits span, with both ends at hand
+constexpr double kHalfDiagonal = 0.8660254037844387;  ///< of a cube of side 1
+
+/// Lowest and highest point of the grid that a chunk's vertices fall on.
+struct GridBox {
+  glm::ivec3 low;
+  glm::ivec3 high;
+};
+
+GridBox grid_box(const TriMesh& mesh, const Chunk& chunk, double step) {
+  glm::dvec3 low(mesh.positions[chunk.vertices[0]]);
+  glm::dvec3 high(low);
+  for (const std::uint32_t v : chunk.vertices) {
+    low = glm::min(low, mesh.positions[v]);
+    high = glm::max(high, mesh.positions[v]);
+  }
+  GridBox box;
+  for (int i = 0; i < 3; ++i) {
+    box.low[i] = grid_index(low[i], step);
+    box.high[i] = grid_index(high[i], step);
+  }
+  return box;
+}
+
+double longest_side(const GridBox& box) {
+  const glm::ivec3 side = box.high - box.low;
+  return std::max({side.x, side.y, side.z});
+}
+
+/// Rounds towards minus infinity, on every machine.
+glm::ivec3 middle_of(const GridBox& box) {
+  glm::ivec3 middle;
+  for (int i = 0; i < 3; ++i) middle[i] = (box.low[i] + box.high[i]) >> 1;
+  return middle;
+}
+
+tl::unexpected<Error> too_fine(const TriMesh& mesh, const PositionRequest& request,
+                               const std::string& cause) {
+  return fail(ExitCode::kUnsupported, "model.max-error", mesh.name,
+              "an error of at most " + std::to_string(request.max_error) + " units: " + cause,
+              "allow a greater --max-error, or split the model in several");
+}
+
+}  // namespace
+
+int grid_index(double coordinate, double step) {
+  return static_cast<int>(std::floor(coordinate / step + 0.5));
+}
+
+double half_error(const TriMesh& mesh) {
+  double greatest = 0;
+  for (const glm::dvec3& p : mesh.positions) {
+    const glm::dvec3 error = decoded_position(p, PositionKind::kHalf, {}) - p;
+    greatest = std::max(greatest, glm::dot(error, error));
+  }
+  return std::sqrt(greatest);
+}
+
+glm::dvec3 decoded_position(const glm::dvec3& position, PositionKind kind, const ChunkGrid& grid) {
+  glm::dvec3 decoded;
+  for (int i = 0; i < 3; ++i) {
+    decoded[i] =
+        kind == PositionKind::kHalf
+            ? static_cast<double>(half_to_float(float_to_half(static_cast<float>(position[i]))))
+            : grid.step * grid_index(position[i], grid.step);
+  }
+  return decoded;
+}
+
+Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& request) {
+  PositionPlan plan;
+  if (!(request.max_error > 0)) {
+    plan.kind = request.kind.value_or(PositionKind::kHalf);
+    return plan;
+  }
+  const double wanted = request.max_error / mesh.placement.scale;
+  if (request.kind != PositionKind::kInt16 && half_error(mesh) <= wanted) return plan;
+  if (request.kind == PositionKind::kHalf) {
+    return too_fine(
+        mesh, request,
+        "half floats have one of " + std::to_string(half_error(mesh) * mesh.placement.scale));
+  }
+  plan.kind = PositionKind::kInt16;
+  const double step = std::exp2(std::floor(std::log2(wanted / kHalfDiagonal)));
+  if (step < kFinestStep) {
+    return too_fine(mesh, request,
+                    "the finest grid has one of " +
+                        std::to_string(kFinestStep * kHalfDiagonal * mesh.placement.scale));
+  }
+  // Rounding to the grid moves each end by up to half a step.
+  plan.max_side = step * (kSteps - 1);
+  return plan;
+}
+
+std::vector<ChunkGrid> make_grids(const ChunkedMesh& chunked, PositionKind kind) {
+  std::vector<ChunkGrid> grids(chunked.chunks.size());
+  if (kind == PositionKind::kHalf) return grids;
+  double side = 0;
+  for (const Chunk& chunk : chunked.chunks) {
+    side = std::max(side, longest_side(grid_box(chunked.mesh, chunk, kFinestStep)));
+  }
+  double step = kFinestStep;
+  while (side * kFinestStep > step * (kSteps - 1)) step *= 2;
+  for (std::size_t c = 0; c < grids.size(); ++c) {
+    grids[c] = {middle_of(grid_box(chunked.mesh, chunked.chunks[c], step)), step};
+  }
+  return grids;
+}
+namespace {
+
+// Packing.
 
 /// How far uv may leave [0,1] and still count as inside: half a texel at 4096, as exporters leave.
 constexpr double kUvSlack = 1e-4;
@@ -207,6 +323,109 @@ void VertexPacker::put_uv(const glm::dvec2& uv, const UvRange& range, std::uint3
   }
   std::memcpy(bytes, values, sizeof values);
   if (texture_side != 0) errors_.uv.add(glm::length(error) * texture_side);
+}
+namespace {
+
+// Decoding.
+
+template <class T>
+T read(const std::byte* at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  return value;
+}
+
+}  // namespace
+
+VertexDecoder::VertexDecoder(const LayoutRecord& layout) : layout_(layout) {}
+
+const AttributeRecord* VertexDecoder::find(Semantic semantic) const {
+  for (std::uint16_t i = 0; i < layout_.attribute_count; ++i) {
+    if (layout_.attributes[i].semantic == static_cast<std::uint8_t>(semantic)) {
+      return &layout_.attributes[i];
+    }
+  }
+  return nullptr;
+}
+
+double VertexDecoder::component(const AttributeRecord& attribute, const std::byte* vertex,
+                                unsigned index) {
+  const std::byte* at = vertex + attribute.offset;
+  const bool normalised = attribute.normalised != 0;
+  switch (static_cast<ComponentType>(attribute.type)) {
+    case ComponentType::kHalf:
+      return static_cast<double>(half_to_float(read<std::uint16_t>(at + 2 * index)));
+    case ComponentType::kI16: {
+      const auto value = static_cast<double>(read<std::int16_t>(at + 2 * index));
+      return normalised ? (2 * value + 1) / 65535.0 : value;
+    }
+    case ComponentType::kU16: {
+      const auto value = static_cast<double>(read<std::uint16_t>(at + 2 * index));
+      return normalised ? value / 65535.0 : value;
+    }
+    case ComponentType::kI8: {
+      const auto value = static_cast<double>(read<std::int8_t>(at + index));
+      return normalised ? (2 * value + 1) / 255.0 : value;
+    }
+    case ComponentType::kU8: {
+      const auto value = static_cast<double>(read<std::uint8_t>(at + index));
+      return normalised ? value / 255.0 : value;
+    }
+    case ComponentType::kF32:
+      return static_cast<double>(read<float>(at + 4 * index));
+  }
+  return 0.0;
+}
+
+glm::dvec3 VertexDecoder::position(const std::byte* vertex, const ChunkRecord& chunk) const {
+  const AttributeRecord* a = find(Semantic::kPosition);
+  glm::dvec3 p(0.0);
+  for (int i = 0; a != nullptr && i < 3; ++i) {
+    p[i] =
+        static_cast<double>(chunk.position_offset[i]) +
+        static_cast<double>(chunk.position_step) * component(*a, vertex, static_cast<unsigned>(i));
+  }
+  return p;
+}
+
+glm::dvec3 oct_to_normal(double x, double y) {
+  // Meyer et al., "On floating-point normal vectors", 2010: the octahedron's lower half is folded
+  // over its upper one.
+  const double z = 1.0 - std::abs(x) - std::abs(y);
+  if (z >= 0) return {x, y, z};
+  return {(1.0 - std::abs(y)) * (x < 0 ? -1.0 : 1.0), (1.0 - std::abs(x)) * (y < 0 ? -1.0 : 1.0),
+          z};
+}
+
+glm::dvec3 VertexDecoder::normal(const std::byte* vertex) const {
+  glm::dvec3 n(0.0);
+  if (const AttributeRecord* a = find(Semantic::kNormal); a != nullptr) {
+    for (unsigned i = 0; i < 3; ++i) n[static_cast<int>(i)] = component(*a, vertex, i);
+  } else if (const AttributeRecord* oct = find(Semantic::kNormalOct); oct != nullptr) {
+    n = oct_to_normal(component(*oct, vertex, 0), component(*oct, vertex, 1));
+  }
+  const double length = glm::length(n);
+  return length > 0 ? n / length : glm::dvec3(0, 0, 1);
+}
+
+glm::dvec2 VertexDecoder::uv(const std::byte* vertex, const ChunkRecord& chunk) const {
+  const AttributeRecord* a = find(Semantic::kUv);
+  glm::dvec2 uv(0.0);
+  for (int i = 0; a != nullptr && i < 2; ++i) {
+    uv[i] =
+        static_cast<double>(chunk.uv_offset[i]) +
+        static_cast<double>(chunk.uv_scale[i]) * component(*a, vertex, static_cast<unsigned>(i));
+  }
+  return uv;
+}
+
+glm::dvec4 VertexDecoder::colour(const std::byte* vertex) const {
+  const AttributeRecord* a = find(Semantic::kColour);
+  glm::dvec4 colour(1.0);
+  for (int i = 0; a != nullptr && i < 4; ++i) {
+    colour[i] = component(*a, vertex, static_cast<unsigned>(i));
+  }
+  return colour;
 }
 
 }  // namespace modar

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bake/mesh/pack/chunked_mesh.hpp"
-#include "bake/mesh/pack/position_plan.hpp"
+#include "bake/mesh/pack/chunk.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {

@@ -1,0 +1,22 @@
+// SourceModel to TriMesh.
+#pragma once
+
+#include "bake/import/source_model.hpp"
+#include "bake/mesh/tri_mesh.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct WeldOptions {
+  unsigned jobs = 1;  ///< threads; the result does not depend on it
+};
+
+/// Triangulates (concave polygons by ear clipping), drops what has no area, welds on index triples,
+/// makes missing normals (area-and-angle weighted, smoothing groups respected), normalises to
+/// [-1,1]. Findings of dropped and made things go to report.findings. Errors: kInvalidInput
+/// "model.empty" where no triangle is left. The form that takes the source over frees its arrays as
+/// it goes: large models need half the memory.
+Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& options = {});
+Result<TriMesh> weld(const SourceModel& source, Report& report, const WeldOptions& options = {});
+
+}  // namespace modar
