@@ -18,28 +18,28 @@ struct ReadOptions {
   unsigned jobs = 1;  ///< threads; the result does not depend on it
 };
 
-/// Reads an OBJ file and the MTL files that it names. Positions are parsed in double with correct
-/// rounding. What is odd becomes a finding with its line; only what leaves nothing to read is an
-/// error: kIo "io.open"; kInvalidInput "obj.utf16", "obj.no-faces", "obj.too-large".
+/// Reads an OBJ file and the MTL files it names. Positions are parsed in double with correct
+/// rounding. Oddities become diagnostics with their line; an error is returned only where nothing
+/// is left to read: kIo "io.open"; kInvalidInput "obj.utf16", "obj.no-faces", "obj.too-large".
 Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options = {});
 
-/// The same from memory (for fuzzing and tests). folder: where mtllib names are looked up; empty:
-/// material files are not read. label: the file's name in findings.
+/// The same from memory, for fuzzing and tests. folder: where mtllib names are looked up; empty:
+/// material files are not read. label: the file's name in diagnostics.
 Result<SourceModel> parse_obj(std::string_view text, const std::string& folder,
                               const std::string& label, const ReadOptions& options = {});
 
 /// Materials of an MTL text. Map paths are resolved against `folder` (backslashes, quotes, wrong
-/// case, options and blanks in names are dealt with). label: the file's name in findings.
+/// case, options and blanks in names are handled). label: the file's name in diagnostics.
 std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& folder,
                                       const std::string& label, std::vector<Diagnostic>& findings);
 
-/// Reads a .gltf with its buffers, or a .glb, through tinygltf: triangles of the meshes of the
-/// default scene (of all root nodes where there is none), moved by their nodes; normals, the uv set
-/// that the base colour texture names, first vertex colours; base colour, emission, roughness and
-/// opacity of materials; Draco-compressed primitives. Images inside the file become temporary files
-/// that live as long as the model's materials. What is left out (points, lines, skins, morph
-/// targets) is a finding. Errors: kIo "gltf.open", kInvalidInput "gltf.read", "gltf.no-faces",
-/// "gltf.accessor" (data outside of its buffer, an index beyond its vertices).
+/// Reads a .gltf with its buffers, or a .glb, through tinygltf: the triangles of the default
+/// scene's meshes (of all root nodes where there is none), transformed by their nodes; normals, the
+/// uv set that the base colour texture names, first vertex colours; base colour, emission,
+/// roughness and opacity of materials; Draco-compressed primitives. Images inside the file become
+/// temporary files that live as long as the model's materials. Whatever is left out (points, lines,
+/// skins, morph targets) becomes a diagnostic. Errors: kIo "gltf.open", kInvalidInput "gltf.read",
+/// "gltf.no-faces", "gltf.accessor" (data outside of its buffer, an index beyond its vertices).
 Result<SourceModel> read_gltf(const std::string& path);
 
 }  // namespace modar

@@ -1,4 +1,4 @@
-// What a model file said, unrepaired.
+// A model file's content, unrepaired.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 
 namespace modar {
 
-/// A material as MTL or glTF names it. Paths are resolved against the file that names them, and
-/// exist; empty where there is no map or it was not found (then there is a finding).
+/// A material of an MTL or glTF file. Map paths are resolved against the file that names them and
+/// exist; empty where there is no map, or where it was not found (then there is a diagnostic).
 struct SourceMaterial {
   std::string name;
   glm::vec3 ambient{0.2f};
@@ -27,7 +27,7 @@ struct SourceMaterial {
   std::string diffuse_map;
   std::string alpha_map;
   bool two_sided = false;
-  std::shared_ptr<const void> keeper;  ///< of temporary files that the maps are in, or nothing
+  std::shared_ptr<const void> keeper;  ///< owner of temporary files that hold the maps, or null
 };
 
 /// One corner of a face: indices into the arrays of the model, kNoIndex where it has none.
@@ -38,11 +38,11 @@ struct Corner {
   std::uint32_t normal = kNoIndex;
 };
 
-/// Smoothing of faces in a file that says nothing of it: as one group of their own.
+/// Smoothing group of faces in a file that states none: they smooth as one group.
 inline constexpr std::uint32_t kUnstatedSmoothing = 0xFFFFFFFFu;
 
-/// The uv or normal index of every corner. Most files leave an attribute out or repeat the
-/// position's index throughout; then nothing is stored.
+/// The uv or normal index of every corner. Most files omit an attribute or repeat the position's
+/// index throughout; then nothing is stored.
 struct IndexPlane {
   enum class Kind : std::uint8_t { kAbsent, kSame, kOwn };
   Kind kind = Kind::kAbsent;
@@ -53,16 +53,16 @@ struct IndexPlane {
   }
 };
 
-/// Faces from `first_face` on, up to the next run, have `value`.
+/// Faces from `first_face` up to the next run have `value`.
 struct FaceRun {
   std::uint64_t first_face = 0;
   std::uint32_t value = 0;
 };
 
-/// Polygons of the file: face f has face_size(f) corners from face_first(f) on. material_runs hold
-/// indices into materials (0 is a default material where the file names none), smoothing_runs
-/// smoothing groups (0: off; kUnstatedSmoothing: the file does not say); both are ascending, the
-/// first run begins at face 0.
+/// Polygons of the file: face f has face_size(f) corners, starting at face_first(f). material_runs
+/// hold indices into materials (0 is a default material where the file names none), smoothing_runs
+/// smoothing groups (0: off; kUnstatedSmoothing: not stated); both are ascending and start at
+/// face 0.
 struct SourceModel {
   std::string name;  ///< the file's stem
   Array<glm::dvec3> positions;
@@ -98,7 +98,7 @@ struct SourceModel {
 class RunCursor {
  public:
   explicit RunCursor(const std::vector<FaceRun>& runs) : runs_(runs) {}
-  /// The value of a face that is not below the one asked for before; 0 where there are no runs.
+  /// The value of `face`, which must not be lower than in the previous call; 0 without runs.
   std::uint32_t at(std::size_t face) {
     while (next_ < runs_.size() && runs_[next_].first_face <= face) value_ = runs_[next_++].value;
     return value_;

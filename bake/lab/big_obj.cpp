@@ -174,19 +174,17 @@ bool write(const Array<glm::dvec3>& positions, const Triangles& triangles,
 
 Result<std::uint64_t> make_big_obj(const std::string& scan, std::uint64_t triangles,
                                    const std::string& path) {
-  Result<SourceModel> source = read_model(scan, 1);
-  if (!source) return tl::unexpected(source.error());
+  MODAR_ASSIGN(SourceModel source, read_model(scan, 1));
   Report report;
-  Result<TriMesh> mesh = weld(std::move(*source), report);
-  if (!mesh) return tl::unexpected(mesh.error());
-  for (glm::dvec3& p : mesh->positions) p = mesh->placement.center + mesh->placement.scale * p;
+  MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), report));
+  for (glm::dvec3& p : mesh.positions) p = mesh.placement.center + mesh.placement.scale * p;
   // Half of a step of four, on the scale of factors.
-  while (2 * mesh->triangles.size() < triangles) subdivide(mesh->positions, mesh->triangles);
-  if (!write(mesh->positions, mesh->triangles, path)) {
+  while (2 * mesh.triangles.size() < triangles) subdivide(mesh.positions, mesh.triangles);
+  if (!write(mesh.positions, mesh.triangles, path)) {
     return fail(ExitCode::kIo, "io.write", path, "the file cannot be written",
                 "make room, or set TMPDIR to a folder on a larger disk");
   }
-  return mesh->triangles.size();
+  return mesh.triangles.size();
 }
 
 }  // namespace modar

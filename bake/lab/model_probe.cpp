@@ -73,10 +73,9 @@ int probe_read(const std::string& path, unsigned jobs) {
 }
 
 Result<TriMesh> read_and_weld(const std::string& path, unsigned jobs) {
-  Result<SourceModel> model = read_obj(path, {jobs});
-  if (!model) return tl::unexpected(model.error());
+  MODAR_ASSIGN(SourceModel model, read_obj(path, {jobs}));
   Report report;
-  return weld(std::move(*model), report, {jobs});
+  return weld(std::move(model), report, {jobs});
 }
 
 int probe_topology(const std::string& path, unsigned jobs) {
@@ -89,10 +88,9 @@ int probe_topology(const std::string& path, unsigned jobs) {
 }
 
 Result<ChunkedMesh> read_and_chunk(const std::string& path, unsigned jobs) {
-  Result<TriMesh> mesh = read_and_weld(path, jobs);
-  if (!mesh) return tl::unexpected(mesh.error());
+  MODAR_ASSIGN(TriMesh mesh, read_and_weld(path, jobs));
   Report report;
-  return chunk(std::move(*mesh), {}, report);
+  return chunk(std::move(mesh), {}, report);
 }
 
 int probe_levels(const std::string& path, unsigned jobs) {

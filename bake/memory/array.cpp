@@ -12,18 +12,18 @@
 namespace modar::detail {
 namespace {
 
-/// Blocks stand on its boundaries, so that the system may hand them out as huge pages. It is not
-/// asked to: where free memory goes back to a host, as in virtual machines, huge pages were
-/// measured to cost 2.5 s a GiB at the first touch, others 0.6 s; an eighth of a whole bake's time.
+/// Blocks are aligned to it, so that the system may use huge pages. It is not asked to (madvise):
+/// in virtual machines that return free memory to their host, huge pages were measured at 2.5 s a
+/// GiB on first touch, small ones at 0.6 s; that is an eighth of a whole bake's time.
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-/// From here on a block has its own pages.
+/// Blocks of this size and above have their own pages.
 constexpr std::size_t kLarge = 2 * kHugePage;
 
 std::size_t to_pages(std::size_t size) {
   return (size + kHugePage - 1) / kHugePage * kHugePage;
 }
 
-/// Fresh address space on a huge page's boundary; nothing of it is in memory yet.
+/// Fresh address space, aligned to a huge page; none of it is in memory yet.
 void* map_memory(std::size_t size) {
   const std::size_t wide = size + kHugePage;
   void* const at = ::mmap(nullptr, wide, PROT_READ | PROT_WRITE,
@@ -42,7 +42,7 @@ void* map(std::size_t size) {
   return in_file != nullptr ? in_file : map_memory(size);
 }
 
-/// Grows or shrinks a large block; pages move, bytes do not.
+/// Grows or shrinks a large block; pages are remapped, not copied.
 void* remap(void* block, std::size_t old_size, std::size_t size) {
   if (to_pages(old_size) == to_pages(size)) return block;
   if (void* const moved = resize_file_block(block, to_pages(old_size), to_pages(size))) {

@@ -1,4 +1,4 @@
-// An array for very many plain elements: it grows without holding two copies of itself.
+// An array for very many plain elements, which grows without holding two copies of itself.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,14 @@ namespace detail {
 /// Throws std::bad_alloc; ends the program where exceptions are off.
 [[noreturn]] void out_of_memory();
 /// Memory of `size` bytes with the first bytes of `block` (nullptr: none), which had `old_size`.
-/// Large blocks are whole pages, moved by remapping and huge where the system has such.
+/// Large blocks are whole pages, moved by remapping.
 void* resize_block(void* block, std::size_t old_size, std::size_t size);
 void free_block(void* block, std::size_t size);
 }  // namespace detail
 
-/// Like std::vector for trivially copyable elements, but for two things that large models need:
-/// growing remaps pages where the system can, instead of copying them beside the old ones, and
-/// resize() leaves new elements as they are. Out of memory is std::bad_alloc.
+/// Like std::vector for trivially copyable elements, with two differences that large models need:
+/// growing remaps pages instead of copying them where the system can, and resize() leaves new
+/// elements uninitialised. Out of memory is std::bad_alloc.
 template <class T>
 class Array {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -85,7 +85,7 @@ class Array {
     resize(size_ + count);
     std::fill_n(data_ + size_ - count, count, value);
   }
-  /// Gives back what lies beyond the last element.
+  /// Releases the memory beyond the last element.
   void shrink() {
     if (size_ == 0) {
       Array().swap(*this);
@@ -93,7 +93,7 @@ class Array {
       reallocate(size_);
     }
   }
-  /// Empties it and gives its memory back.
+  /// Clears the array and releases its memory.
   void release() { Array().swap(*this); }
   /// The same memory as fewer, larger elements: T is an array of U.
   template <class U>

@@ -1,4 +1,4 @@
-// Arrays in nameless files, and the thread that keeps their pages out of the way.
+// Arrays in nameless files, and the thread that drops their pages near the limit.
 #include "bake/memory/memory_limit.hpp"
 
 #include <fcntl.h>
@@ -21,26 +21,30 @@
 namespace modar {
 namespace {
 
-/// Taken out of the process at a time.
-constexpr std::size_t kPiece = std::size_t{32} << 20;
+/// Time between two looks at the resident size; one costs some microseconds. A core touches about
+/// 1 MiB a millisecond, which kHigh leaves room for. Set by hand.
 constexpr auto kPause = std::chrono::milliseconds(1);
-
-/// Shares of the limit: where taking out begins, and where it ends. What lies between the first and
-/// the limit is for what is touched until the watch looks again.
+/// Share of the limit at which pages are dropped. The rest is for what is touched until the next
+/// look.
 constexpr double kHigh = 0.82;
-constexpr double kLow = 0.6;
 
 struct FileBlock {
   std::size_t size = 0;
   int descriptor = -1;
 };
 
-/// All blocks in files, by their address: like the heap, one for the process.
+/// All blocks in files, by their address. One for the process, like the heap.
 struct FileHeap {
   std::mutex mutex;
   std::string folder;
   std::map<char*, FileBlock> blocks;
-  char* cursor = nullptr;  ///< where the watch goes on
+
+  /// Unmaps all pages from the process. They stay in the system's cache, so touching them again
+  /// costs a minor fault, unless the system needed the memory.
+  void drop_pages() {
+    const std::lock_guard lock(mutex);
+    for (const auto& [at, block] : blocks) ::madvise(at, block.size, MADV_DONTNEED);
+  }
 };
 
 FileHeap& file_heap() {
@@ -53,14 +57,14 @@ std::atomic<std::size_t> file_blocks{0};
 int nameless_file(const std::string& folder) {
   const int descriptor = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (descriptor >= 0) return descriptor;
-  std::string name = folder + "/.modar-XXXXXX";  // file systems that know no nameless files
+  std::string name = folder + "/.modar-XXXXXX";  // for file systems without O_TMPFILE
   const int named = ::mkostemp(name.data(), O_CLOEXEC);
   if (named >= 0) ::unlink(name.c_str());
   return named;
 }
 
-/// Room on the disk, so that no page lacks it later, which would end the program.
-bool make_room(int descriptor, std::size_t size) {
+/// Allocates space on the disk: a page without it would kill the process later.
+bool allocate(int descriptor, std::size_t size) {
   if (::fallocate(descriptor, 0, 0, static_cast<off_t>(size)) == 0) return true;
   return errno == EOPNOTSUPP && ::ftruncate(descriptor, static_cast<off_t>(size)) == 0;
 }
@@ -75,25 +79,6 @@ std::uint64_t resident_bytes(int statm) {
   return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-/// Takes out the piece at the cursor, moves it on; false at the end of a round.
-bool take_piece_out(FileHeap& heap) {
-  auto at = heap.blocks.upper_bound(heap.cursor);
-  if (at != heap.blocks.begin()) {
-    const auto before = std::prev(at);
-    if (heap.cursor < before->first + before->second.size) at = before;
-  }
-  if (at == heap.blocks.end()) {
-    heap.cursor = nullptr;
-    return false;
-  }
-  char* const first = std::max(heap.cursor, at->first);
-  char* const end = at->first + at->second.size;
-  char* const last = static_cast<std::size_t>(end - first) > kPiece ? first + kPiece : end;
-  ::madvise(first, static_cast<std::size_t>(last - first), MADV_DONTNEED);
-  heap.cursor = last;
-  return true;
-}
-
 }  // namespace
 
 struct MemoryLimit::Watch {
@@ -105,18 +90,10 @@ struct MemoryLimit::Watch {
   std::thread thread;
 
   void run() {
+    const auto high = static_cast<std::uint64_t>(kHigh * static_cast<double>(bytes));
     std::unique_lock lock(mutex);
     while (!wake.wait_for(lock, kPause, [&] { return over; })) {
-      if (static_cast<double>(resident_bytes(statm)) > kHigh * static_cast<double>(bytes)) shrink();
-    }
-  }
-  void shrink() const {
-    FileHeap& heap = file_heap();
-    int rounds = 0;
-    while (rounds < 2 &&
-           static_cast<double>(resident_bytes(statm)) > kLow * static_cast<double>(bytes)) {
-      const std::lock_guard lock(heap.mutex);
-      if (!take_piece_out(heap)) ++rounds;
+      if (resident_bytes(statm) > high) file_heap().drop_pages();
     }
   }
 };
@@ -169,7 +146,7 @@ void* map_file_block(std::size_t size) {
   const std::lock_guard lock(heap.mutex);
   const int descriptor = nameless_file(heap.folder);
   if (descriptor < 0) out_of_memory();
-  void* const at = make_room(descriptor, size)
+  void* const at = allocate(descriptor, size)
                        ? ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0)
                        : MAP_FAILED;
   if (at == MAP_FAILED) {
@@ -188,10 +165,10 @@ void* resize_file_block(void* block, std::size_t old_size, std::size_t size) {
   const auto found = heap.blocks.find(static_cast<char*>(block));
   if (found == heap.blocks.end()) return nullptr;
   const int descriptor = found->second.descriptor;
-  if (size > old_size && !make_room(descriptor, size)) out_of_memory();
+  if (size > old_size && !allocate(descriptor, size)) out_of_memory();
   void* const moved = ::mremap(block, old_size, size, MREMAP_MAYMOVE);
   if (moved == MAP_FAILED) out_of_memory();
-  // Best effort: what is behind the end is only room on the disk.
+  // Best effort: what is beyond the end only takes disk space.
   if (size < old_size && ::ftruncate(descriptor, static_cast<off_t>(size)) != 0) errno = 0;
   heap.blocks.erase(found);
   heap.blocks[static_cast<char*>(moved)] = {size, descriptor};

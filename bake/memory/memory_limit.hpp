@@ -1,4 +1,4 @@
-// Work out of core: large arrays live in files while a limit stands.
+// Out-of-core work: large arrays live in files while a memory limit is set.
 #pragma once
 
 #include <cstddef>
@@ -10,14 +10,14 @@
 
 namespace modar {
 
-/// While one stands, blocks of Array from some megabytes on are mapped from nameless files instead
-/// of memory, and a thread of its own watches the process's resident size: before it reaches the
-/// limit, pages of those files are taken out of the process (the system writes them to disk where
-/// it needs the room). What the program computes stays the same, to the bit. Holds what is in
-/// arrays; what is elsewhere has to fit besides. At most one at a time; blocks may outlive it.
+/// While one exists, blocks of Array from some megabytes on are mapped from nameless files instead
+/// of memory, and a thread watches the process's resident size: near the limit, the pages of those
+/// files are unmapped from the process (the system writes them to disk when it needs the memory).
+/// Results stay the same to the bit. Only what is in arrays is limited; everything else has to fit
+/// besides. At most one at a time; blocks may outlive it.
 class MemoryLimit {
  public:
-  /// folder: for the files, which take up to what the arrays hold. Errors: kIo "memory.folder"
+  /// folder: for the files, which grow to the size of the arrays. Errors: kIo "memory.folder"
   /// where no file can be made there; kUnsupported "memory.small" below kLeast.
   static Result<std::unique_ptr<MemoryLimit>> start(const std::string& folder, std::uint64_t bytes);
   MemoryLimit(const MemoryLimit&) = delete;
@@ -33,11 +33,11 @@ class MemoryLimit {
 };
 
 namespace detail {
-/// A block of whole pages in a file of its own; nullptr where no limit stands.
+/// A block of whole pages in a file of its own; nullptr where no limit is set.
 void* map_file_block(std::size_t size);
-/// Grows or shrinks such a block; nullptr where `block` is none.
+/// Grows or shrinks such a block; nullptr where `block` is not one.
 void* resize_file_block(void* block, std::size_t old_size, std::size_t size);
-/// Answers whether `block` was such a block, and is gone.
+/// Frees such a block; false where `block` is not one.
 bool free_file_block(void* block);
 }  // namespace detail
 

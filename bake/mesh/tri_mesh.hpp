@@ -1,4 +1,4 @@
-// Welded triangles in [-1,1], and the way back to source units.
+// Welded triangles in [-1,1], and the placement that maps them back to source units.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// The part of glTF's metallic-roughness materials that our shader has.
+// Maps glTF's metallic-roughness materials to what our shader has; image files; uv transforms.
 #include "bake/import/gltf/gltf_materials.hpp"
 
 #include <unistd.h>
@@ -18,7 +18,7 @@
 namespace modar {
 namespace {
 
-/// A folder of our own that goes when the last material that needs it does.
+/// A temporary folder, removed with the last material that needs it.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -39,7 +39,7 @@ class TemporaryFolder {
   std::string path_;
 };
 
-/// Letters, digits, '-' and '_' of a name; `other` where nothing is left.
+/// The letters, digits, '-' and '_' of a name; `other` if nothing is left.
 std::string plain_name(const std::string& name, const std::string& other) {
   std::string plain;
   for (const char c : name) {

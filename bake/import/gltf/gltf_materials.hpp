@@ -15,13 +15,13 @@ class Model;
 
 namespace modar {
 
-/// Keeps an image's coded bytes as they are: for tinygltf::TinyGLTF::SetImageLoader().
+/// Keeps an image's encoded bytes as they are: for tinygltf::TinyGLTF::SetImageLoader().
 bool keep_image_bytes(tinygltf::Image* image, int index, std::string* error, std::string* warning,
                       int width, int height, const unsigned char* bytes, int size, void* user);
 
-/// One material of ours for each of the file's, and a white one behind them for primitives that
-/// have none. folder: where image names are looked up, with a slash at its end. label: the file's
-/// name in findings.
+/// One material for each of the file's, followed by a white one for primitives without a material.
+/// folder: where image names are looked up, with a trailing slash. label: the file's name in
+/// diagnostics.
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const std::string& folder,
                                            const std::string& label,
                                            std::vector<Diagnostic>& findings);
@@ -39,7 +39,7 @@ struct GltfUv {
   [[nodiscard]] glm::dvec2 apply(const glm::dvec2& uv) const;
 };
 
-/// material: of the primitive; what does not exist has the file's uv as they are.
+/// material: of the primitive; an unknown one uses the file's uv unchanged.
 GltfUv gltf_uv(const tinygltf::Model& gltf, int material);
 
 }  // namespace modar

@@ -24,11 +24,12 @@ namespace {
 
 // Checked access to arrays: bounds first, then bytes.
 
-/// Elements of one accessor as doubles. tinygltf holds none of its numbers against the buffers.
+/// Elements of one accessor as doubles. Checks every bound: tinygltf checks none.
 class GltfAccessor {
  public:
-  /// Answers false where the accessor does not exist or leaves its buffer. Without a buffer view
-  /// all elements are zero, as glTF has it; those that a sparse accessor lists are then replaced.
+  /// Returns false where the accessor does not exist or exceeds its buffer. Without a buffer view
+  /// all elements are zero, as the specification has it; elements of a sparse accessor replace
+  /// them.
   bool open(const tinygltf::Model& gltf, int index);
 
   [[nodiscard]] std::size_t size() const { return count_; }
@@ -49,7 +50,8 @@ class GltfAccessor {
   std::vector<double> replaced_;  // all elements, where some are sparse
 };
 
-/// Elements that no buffer has to back, so that a file of a few bytes may ask for any number.
+/// Elements without a buffer behind them: a file of a few bytes could ask for any number. Set by
+/// hand: far above real files, 384 MiB of normals at most.
 constexpr std::size_t kMostUnbacked = std::size_t{1} << 24;
 
 template <class T>
@@ -60,7 +62,7 @@ double load(const unsigned char* at) {
 }
 
 /// `count` elements of `element` bytes each, `stride` apart (0: the view's own, or none); nullptr
-/// where they leave their buffer.
+/// where they exceed their buffer.
 const unsigned char* place(const tinygltf::Model& gltf, int index, std::size_t offset,
                            std::size_t count, std::size_t element, std::size_t& stride) {
   if (index < 0 || static_cast<std::size_t>(index) >= gltf.bufferViews.size()) return nullptr;
@@ -168,7 +170,7 @@ double GltfAccessor::at(std::size_t element, std::size_t component) const {
 
 // The scene.
 
-constexpr int kMaxDepth = 1000;  ///< of nodes: what a stack surely holds
+constexpr int kMaxDepth = 1000;  ///< of nodes; keeps recursion within a small stack, set by hand
 
 class SceneReader {
  public:
@@ -176,9 +178,7 @@ class SceneReader {
       : gltf_(gltf), model_(model), label_(std::move(label)), seen_(gltf.nodes.size()) {}
 
   Result<void> run() {
-    for (const int node : roots()) {
-      if (auto walked = walk(node, glm::dmat4(1.0), 0); !walked) return walked;
-    }
+    for (const int node : roots()) MODAR_TRY(walk(node, glm::dmat4(1.0), 0));
     finish();
     return {};
   }
@@ -238,16 +238,14 @@ class SceneReader {
     if (node.skin >= 0) ++skins_;
     if (node.mesh >= 0 && static_cast<std::size_t>(node.mesh) < gltf_.meshes.size()) {
       for (const auto& primitive : gltf_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
-        if (auto added = add_primitive(primitive, to_scene); !added) return added;
+        MODAR_TRY(add_primitive(primitive, to_scene));
       }
     }
-    for (const int child : node.children) {
-      if (auto walked = walk(child, to_scene, depth + 1); !walked) return walked;
-    }
+    for (const int child : node.children) MODAR_TRY(walk(child, to_scene, depth + 1));
     return {};
   }
 
-  /// An attribute that there may be; false where there is one and it is broken.
+  /// Opens an optional attribute; false if it is present and broken.
   bool open(const tinygltf::Primitive& primitive, const std::string& name, std::size_t count,
             std::size_t least_components, GltfAccessor& accessor, bool& there) const {
     const auto found = primitive.attributes.find(name);
@@ -287,7 +285,7 @@ class SceneReader {
     for (std::size_t v = 0; v < positions.size(); ++v) {
       model_.positions.push_back(glm::dvec3(to_scene * glm::dvec4(vector(positions, v), 1.0)));
       model_.normals.push_back(has_normals ? glm::vec3(turn * vector(normals, v)) : glm::vec3(0));
-      // OBJ, whose sense SourceModel has, counts v from below.
+      // SourceModel has OBJ's convention: v points up.
       const glm::dvec2 uv =
           has_uvs ? placing.apply({uvs.at(v, 0), uvs.at(v, 1)}) : glm::dvec2(0.0, 1.0);
       model_.uvs.push_back({uv.x, 1.0 - uv.y});
@@ -331,7 +329,7 @@ class SceneReader {
     const bool fan = mode == TINYGLTF_MODE_TRIANGLE_FAN;
     for (std::size_t i = 0; i + 2 < count; i += list ? 3 : 1) {
       std::array<std::size_t, 3> corner = {fan ? 0 : i, i + 1, i + 2};
-      // Every other triangle of a strip, and all of a mirrored node, turn round.
+      // Every other triangle of a strip, and all of a mirrored node, reverse their winding.
       const bool odd = !list && !fan && i % 2 == 1;
       if (odd != mirrored) std::swap(corner[1], corner[2]);
       for (const std::size_t c : corner) {
@@ -348,8 +346,8 @@ class SceneReader {
     return {};
   }
 
-  /// The cheapest form of an index plane.
-  static void settle(const Array<std::uint32_t>& positions, IndexPlane& plane) {
+  /// Stores an index plane in its cheapest form.
+  static void compact(const Array<std::uint32_t>& positions, IndexPlane& plane) {
     const auto missing = [](std::uint32_t index) { return index == kNoIndex; };
     if (plane.own == positions) {
       plane.kind = IndexPlane::Kind::kSame;
@@ -363,10 +361,10 @@ class SceneReader {
   }
 
   void finish() {
-    settle(model_.corner_positions, model_.corner_uvs);
-    settle(model_.corner_positions, model_.corner_normals);
+    compact(model_.corner_positions, model_.corner_uvs);
+    compact(model_.corner_positions, model_.corner_normals);
     if (!any_colours_) model_.colours.release();
-    // glTF says that faces without normals are flat.
+    // The specification: faces without normals are flat-shaded.
     model_.smoothing_runs = {{0, 0}};
     const auto add = [&](std::uint64_t count, const char* id, const std::string& what) {
       if (count == 0) return;
@@ -388,7 +386,7 @@ class SceneReader {
   std::uint64_t morphs_ = 0;
 };
 
-/// All of a file; false where it cannot be read.
+/// Reads a whole file; false where it cannot be read.
 bool read_bytes(const std::string& path, std::string& bytes) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return false;
@@ -429,9 +427,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   SourceModel model;
   model.name = std::filesystem::path(path).stem().string();
   model.materials = gltf_materials(gltf, folder, path, model.findings);
-  if (auto read = SceneReader(gltf, model, path).run(); !read) {
-    return tl::unexpected(read.error());
-  }
+  MODAR_TRY(SceneReader(gltf, model, path).run());
   if (model.corner_positions.empty()) {
     return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it shows no triangles",
                 "export a mesh in its default scene");

@@ -36,8 +36,8 @@ bool same_but_case(std::string_view a, std::string_view b) {
                     [](char x, char y) { return lower(x) == lower(y); });
 }
 
-/// The entry of `folder` named `name` in any case: the exact one if there is one, else the first in
-/// byte order, so that the answer does not hang on the file system's order.
+/// The entry of `folder` named `name` in any case: the exact match if there is one, else the first
+/// in byte order, so that the result does not depend on the file system's order.
 fs::path entry_of(const fs::path& folder, const std::string& name) {
   std::error_code error;
   if (name == "." || name == "..") return folder / name;
@@ -51,7 +51,7 @@ fs::path entry_of(const fs::path& folder, const std::string& name) {
   return best.empty() ? fs::path() : folder / best;
 }
 
-/// A relative path whose parts may stand in any case.
+/// A relative path, each part matched in any case.
 fs::path any_case(const fs::path& folder, const fs::path& relative) {
   fs::path at = folder;
   for (const fs::path& part : relative) {
@@ -69,7 +69,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Quotes off, escaped blanks to blanks, backslashes to slashes.
+/// Removes quotes, unescapes blanks, turns backslashes into slashes.
 std::string cleaned(std::string_view name) {
   name = trimmed(name);
   if (name.size() >= 2 && (name.front() == '"' || name.front() == '\'') &&
@@ -96,7 +96,7 @@ bool is_number(std::string_view token) {
   return result.ec == std::errc() && result.ptr == token.data() + token.size();
 }
 
-/// Takes the next word off the front of `text`.
+/// Removes the first word of `text` and returns it.
 std::string_view take_word(std::string_view& text) {
   text = trimmed(text);
   const std::size_t end = std::min(text.find_first_of(" \t"), text.size());
@@ -105,7 +105,7 @@ std::string_view take_word(std::string_view& text) {
   return word;
 }
 
-/// Sets aside the options that the MTL specification knows, with their arguments.
+/// Skips the options of the MTL specification with their arguments.
 std::string_view without_options(std::string_view text, bool& transformed) {
   while (true) {
     text = trimmed(text);
@@ -163,7 +163,7 @@ std::string find_map_file(std::string_view statement, const std::string& folder,
   std::string_view rest = without_options(statement, transformed);
   name = std::string(rest);
   if (std::string found = find_named_file(rest, folder); !found.empty()) return found;
-  // Options after the name, then options that nobody knows before it.
+  // Options after the name, then unknown options before it.
   const std::size_t option = rest.find(" -");
   if (option != std::string_view::npos && option > 0) {
     const std::string_view head = rest.substr(0, option);
@@ -186,7 +186,7 @@ namespace {
 
 // MTL text to materials.
 
-/// One statement, its continued lines joined, and where the next begins.
+/// One statement with its continued lines joined; advances `at` to the next.
 std::string take_statement(std::string_view text, std::size_t& at, std::uint64_t& line) {
   std::string statement;
   while (at < text.size()) {
@@ -254,7 +254,8 @@ void take_map(std::string_view text, MtlContext& context, std::string& path) {
   }
 }
 
-/// Opacity of `d` or 1 - `Tr`. Exporters disagree on Tr, and none means a part that cannot be seen.
+/// Opacity from `d` or 1 - `Tr`. Exporters disagree on Tr, and none of them means an invisible
+/// part.
 void take_opacity(float opacity, MtlContext& context, SourceMaterial& material) {
   if (opacity <= 0.0f) {
     context.findings.push_back({"mtl.invisible", DiagnosticSeverity::kInfo, context.label,
@@ -281,7 +282,7 @@ void take_property(std::string_view key, std::string_view text, MtlContext& cont
       has_d = true;
     }
   }
-  // d says the same without doubt, so it wins wherever it stands.
+  // d is unambiguous, so it wins wherever it stands.
   if (key == "tr" && !has_d && take_numbers(text, v) > 0) {
     take_opacity(1.0f - v[0], context, material);
   }

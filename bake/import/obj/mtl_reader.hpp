@@ -11,13 +11,14 @@
 
 namespace modar {
 
-/// The existing regular file that `name` means, looked up in `folder` (absolute names as they are,
-/// too); empty where there is none. Tried in this order: as written; without quotes and escapes,
-/// backslashes as slashes; with any case; the bare file name in `folder`, with any case.
+/// The existing regular file that `name` refers to, looked up in `folder` (absolute names are tried
+/// as they are, too); empty where there is none. Tried in this order: as written; without quotes
+/// and escapes, backslashes as slashes; with any case; the bare file name in `folder`, with any
+/// case.
 std::string find_named_file(std::string_view name, const std::string& folder);
 
-/// The file of a texture statement of an MTL: options before and after the name are set aside.
-/// statement: all after the keyword. name: the part that was taken for the name, found or not.
+/// The file of a texture statement of an MTL: options before and after the name are ignored.
+/// statement: all after the keyword. name: the part taken for the name, found or not.
 /// transformed: the options scale, shift or disturb the uv.
 std::string find_map_file(std::string_view statement, const std::string& folder, std::string& name,
                           bool& transformed);
@@ -30,7 +31,7 @@ class ObjMaterials {
   std::uint32_t use(const std::string& name, std::uint64_t line);
   void add_library(const std::string& text, std::uint64_t line);
   /// Reads the MTL files and fills in what they say of the materials in use; what is missing
-  /// becomes a finding. path: the OBJ; folder: empty where nothing may be read.
+  /// becomes a diagnostic. folder: empty where nothing may be read.
   std::vector<SourceMaterial> resolve(const std::string& folder, const std::string& stem,
                                       const std::string& label, std::vector<Diagnostic>& findings);
 

@@ -1,4 +1,4 @@
-// The careful half of the number parser: long mantissas, exponents, nan and inf.
+// The slow path of the number parser: long mantissas, exponents, nan and inf.
 #include "bake/import/obj/number_parser.hpp"
 
 #include <cmath>

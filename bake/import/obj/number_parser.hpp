@@ -25,11 +25,11 @@ constexpr bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// Text handed to these functions ends in a byte that is no part of a number and is followed by at
+/// Text passed to these functions must end in a byte that is not part of a number, followed by at
 /// least this many readable bytes.
 inline constexpr std::size_t kTextPadding = 24;
 
-/// What stood where a number was expected.
+/// What was found where a number was expected.
 enum class NumberKind : std::uint8_t { kFinite, kNotFinite, kNone };
 
 namespace detail {
@@ -77,11 +77,10 @@ inline const char* take_digits(const char* p, std::uint64_t& value, unsigned& co
   }
 }
 
-/// The careful way, for whatever take_real() does not answer at once. `p` is the start of the
-/// token.
+/// The slow path, for whatever take_real() does not handle itself. `p` is the start of the token.
 const char* take_real_slow(const char* p, const char* end, double& value, NumberKind& kind);
 
-/// Magnitude with a sign, without a branch that random signs would mispredict.
+/// Applies a sign without a branch, which random signs would mispredict.
 inline double with_sign(double magnitude, bool negative) {
   const std::uint64_t sign = std::uint64_t{negative} << 63;
   return std::bit_cast<double>(std::bit_cast<std::uint64_t>(magnitude) | sign);
@@ -89,8 +88,8 @@ inline double with_sign(double magnitude, bool negative) {
 
 #ifdef __SSE2__
 /// "-12.345678" at p: a minus or none, digits, a point, digits, 1 to 8 of each, 16 bytes with what
-/// ends it. Both ends come out of one look at the bytes, so that the next number need not wait for
-/// the digits of this one. Returns the first byte after it, nullptr where it is anything else.
+/// ends it. One look at the bytes finds both ends, so parsing the next number need not wait for the
+/// digits of this one. Returns the first byte after it; nullptr for anything else.
 inline const char* take_short_real(const char* p, double& value) {
   const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
   // As signed bytes, '0' to '9' are the ten greatest once '9' is moved up to 127.
@@ -121,8 +120,8 @@ inline const char* take_short_real(const char* p, double& value) {
 
 }  // namespace detail
 
-/// The number at p where it is as plain as nearly all are: sign, digits, point, digits, at most 19
-/// of them, no exponent. Returns the first byte after it, nullptr where it is anything else.
+/// The number at p if it is as plain as nearly all are: sign, digits, point, digits, at most 19 of
+/// them, no exponent. Returns the first byte after it; nullptr for anything else.
 inline const char* take_plain_real(const char* p, double& value) {
 #ifdef __SSE2__
   if (const char* const end = detail::take_short_real(p, value)) return end;
@@ -138,15 +137,15 @@ inline const char* take_plain_real(const char* p, double& value) {
     p = detail::take_digits(p + 1, mantissa, digits);
     fraction = digits - before;
   }
-  // Both factors are exact: one rounding, hence the right one (Clinger, 1990). Letters from 'E' on
-  // may go on with the number.
+  // Both operands are exact, so the single rounding is correct (Clinger, "How to read floating
+  // point numbers accurately", 1990). Letters from 'E' on may continue the number.
   if (digits - 1u > 18u || mantissa > (1ull << 53) || *p >= 'E') return nullptr;
   value = detail::with_sign(static_cast<double>(mantissa) / detail::kExactPowersOfTen[fraction],
                             negative);
   return p;
 }
 
-/// Reads a decimal number at p, correctly rounded whatever the locale. Knows a leading '+', ".5",
+/// Reads a decimal number at p, correctly rounded in any locale. Accepts a leading '+', ".5",
 /// "2.", exponents, "nan" and "inf" in any case. Returns the first byte after it (p where there is
 /// none). end: end of the text, padding excluded.
 inline const char* take_real(const char* p, const char* end, double& value, NumberKind& kind) {

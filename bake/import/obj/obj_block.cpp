@@ -1,4 +1,4 @@
-// Parses OBJ statements. Streams over the bytes once; never looks for the end of a line first.
+// Parses OBJ statements in a single pass over the bytes, without searching for line ends first.
 #include "bake/import/obj/obj_block.hpp"
 
 #include <cmath>
@@ -18,7 +18,7 @@ using detail::digits_value;
 
 constexpr std::uint32_t kMaxFaceCorners = 0x00FFFFFFu;
 
-/// Vertices of the block that have no colour before one that has.
+/// Marks the block's vertices before the first coloured one as uncoloured.
 void fill_colours(ObjBlock& block) {
   while (block.colours.size() + 1 < block.positions.size()) {
     block.colours.push(glm::vec3(std::numeric_limits<float>::quiet_NaN()));
@@ -31,14 +31,14 @@ void pop_corners(ObjBlock& block, std::uint32_t count) {
   block.corner_normals.pop(count);
 }
 
-/// One past the line end at p, nullptr where the line goes on.
+/// One past the line end at p; nullptr where the line continues.
 const char* take_line_end(const char* p) {
   p += static_cast<int>(*p == '\r');
   return *p == '\n' ? p + 1 : nullptr;
 }
 
-/// Plain numbers, a blank ahead of each, then the line's end. Returns what follows it and how many
-/// there were; nullptr where it is not so or they are more than kMost.
+/// Plain numbers, each after one blank, up to the line end. Returns the byte after it and their
+/// count; nullptr for anything else, or for more than kMost.
 template <unsigned kMost>
 const char* take_plain_reals(const char* p, double (&values)[kMost], unsigned& count) {
   count = 0;
@@ -92,7 +92,7 @@ const char* take_plain_normal(const char* p, ObjBlock& block) {
   return p;
 }
 
-/// Text of an index and what it says.
+/// An index as text and as a value.
 struct IndexText {
   std::uint64_t bytes = 0;
   unsigned digits = 0;
@@ -107,7 +107,7 @@ const char* take_first_index(const char* p, IndexText& index) {
   return index.value == 0 ? nullptr : p + index.digits;
 }
 
-/// An index that mostly repeats the first one of its corner: then no digit needs to be counted.
+/// An index that mostly repeats the first one of its corner: then no digits need counting.
 const char* take_next_index(const char* p, const IndexText& first, std::uint32_t& value) {
   std::uint64_t bytes = 0;
   std::memcpy(&bytes, p, sizeof bytes);
@@ -120,7 +120,7 @@ const char* take_next_index(const char* p, const IndexText& first, std::uint32_t
   return take_plain_index(p, value);
 }
 
-/// One corner "v", "v/t", "v//n" or "v/t/n" of positive indices; nullptr where it is anything else.
+/// One corner "v", "v/t", "v//n" or "v/t/n" of positive indices; nullptr for anything else.
 const char* take_plain_corner(const char* p, ObjBlock& block) {
   IndexText first;
   std::uint32_t t = 0;
@@ -166,9 +166,9 @@ const char* take_plain_face(const char* p, ObjBlock& block) {
   return p;
 }
 
-/// Parses the v, vt, vn or f line at p where it is as plain as exporters write them: single blanks,
-/// plain numbers, positive indices, nothing else. Returns the start of the next line; nullptr, with
-/// nothing done, for any other line.
+/// Parses the v, vt, vn or f line at p if it is as plain as exporters write them: single blanks,
+/// plain numbers, positive indices, nothing else. Returns the start of the next line; nullptr for
+/// any other line, which leaves the block unchanged.
 const char* take_plain_statement(const char* p, ObjBlock& block) {
   if (p[0] == 'f' && p[1] == ' ') return take_plain_face(p + 1, block);
   if (p[0] != 'v') return nullptr;
@@ -178,7 +178,7 @@ const char* take_plain_statement(const char* p, ObjBlock& block) {
   return nullptr;
 }
 
-constexpr std::uint32_t kTooLarge = 0x7FFFFFFFu;  // no file of ours has so many elements
+constexpr std::uint32_t kTooLarge = 0x7FFFFFFFu;  // beyond kMaxElements of obj_reader.cpp
 
 class BlockParser {
  public:
@@ -196,7 +196,7 @@ class BlockParser {
     if (tally.count++ == 0) tally.first_line = line_;
   }
 
-  /// Bytes of a backslash and the line end that it continues, a lone '\r' too; else 0.
+  /// Size of a backslash and the line end it continues (a lone '\r' counts); else 0.
   [[nodiscard]] std::size_t continuation() const {
     if (*p_ != '\\' || !is_line_end(p_[1]) || p_ + 1 >= end_) return 0;
     return p_[1] == '\r' && p_[2] == '\n' ? 3 : 2;
@@ -247,7 +247,7 @@ class BlockParser {
     }
   }
 
-  /// A number of the line, or nothing where the line is over.
+  /// The next number of the line; false at the end of the line.
   bool real(double& value) {
     skip_blanks();
     if (at_end()) return false;
@@ -332,7 +332,7 @@ class BlockParser {
     skip_statement();
   }
 
-  /// An index as it stands in the file: 0 where there is none, kTooLarge beyond what we hold.
+  /// An index as written in the file: 0 where there is none, kTooLarge beyond what we hold.
   std::int64_t index() {
     const bool negative = *p_ == '-';
     if (negative) ++p_;
@@ -344,8 +344,8 @@ class BlockParser {
     return negative ? -index : index;
   }
 
-  /// Index from 0 of what the file counts from 1 or, below zero, from here. local: elements of the
-  /// block so far. Answers false where it refers to nothing.
+  /// Converts an index of the file (from 1, or negative and relative) to one from 0. local:
+  /// elements of the block so far. Returns false where it refers to nothing.
   bool resolve(std::int64_t index, std::uint64_t local, std::uint64_t before, std::uint64_t total,
                std::uint32_t component, std::uint64_t& highest, std::uint32_t& out) {
     if (limits_ != nullptr) {
@@ -360,7 +360,7 @@ class BlockParser {
       highest = value > highest ? value : highest;
       out = static_cast<std::uint32_t>(value - 1);
     } else {
-      // Whether it exists is known once the blocks ahead are counted.
+      // Whether it exists is known once the previous blocks are counted.
       block_.relative.push_back(static_cast<std::uint32_t>(3 * block_.corner_positions.size()) +
                                 component);
       out = static_cast<std::uint32_t>(
@@ -369,7 +369,7 @@ class BlockParser {
     return true;
   }
 
-  /// One corner "v", "v/t", "v//n" or "v/t/n". Answers false where the face cannot be kept.
+  /// One corner "v", "v/t", "v//n" or "v/t/n". Returns false where the face cannot be kept.
   bool corner() {
     const std::int64_t v = index();
     std::int64_t t = 0;

@@ -1,5 +1,5 @@
-// One stretch of OBJ text to plain arrays, knowing nothing of what stands before it: the unit of
-// work of the reader's threads.
+// Parses one block of OBJ text to plain arrays, independently of the text before it: the unit of
+// work of the reader's threads. Internal to the OBJ reader.
 #pragma once
 
 #include <array>
@@ -17,16 +17,16 @@
 
 namespace modar {
 
-/// Things in a file that deserve a word. Counted, with the first line of each.
+/// Oddities of a file that are worth a diagnostic. Counted, with the first line of each.
 enum class ObjNote : std::uint8_t {
   kNotFinite,       ///< nan, inf, or a number too large for a double
-  kBadNumber,       ///< something else where a number should be
+  kBadNumber,       ///< not a number where one was expected
   kShortVertex,     ///< a v line with fewer than three numbers
   kWeight,          ///< a fourth coordinate that is not 1
   kLine,            ///< l element
   kPoint,           ///< p element
   kFreeForm,        ///< curves and surfaces
-  kUnknown,         ///< a keyword that no OBJ specification knows
+  kUnknown,         ///< a keyword that is in no OBJ specification
   kShortFace,       ///< fewer than three corners
   kZeroIndex,       ///< a corner with index 0
   kIndexRange,      ///< a corner that refers to no vertex of the file
@@ -41,11 +41,11 @@ struct NoteTally {
 };
 using NoteTallies = std::array<NoteTally, static_cast<std::size_t>(ObjNote::kCount)>;
 
-/// A growing array whose room is made ahead, so that adding an element checks nothing.
+/// An array whose capacity is reserved up front, so that push() checks nothing.
 template <class T>
 class Scratch {
  public:
-  /// Makes room for `capacity` elements in all; forgets those it holds.
+  /// Reserves `capacity` elements in all and clears the array.
   void reset(std::size_t capacity) {
     if (capacity > capacity_) {
       data_ = std::make_unique_for_overwrite<T[]>(capacity);
@@ -67,7 +67,7 @@ class Scratch {
   std::size_t capacity_ = 0;
 };
 
-/// usemtl, s or mtllib, and the face of the block before which it stands.
+/// A usemtl, s or mtllib statement, and the face of the block that follows it.
 struct ObjStatement {
   enum class Kind : std::uint8_t { kMaterial, kSmoothing, kLibrary };
   Kind kind = Kind::kMaterial;
@@ -101,19 +101,19 @@ struct ObjBlock {
   std::uint64_t lines = 0;
 };
 
-/// Set for the second, careful pass over a file with bad indices: every corner is held against them
-/// at once, so that the finding can name the line.
+/// Set for the second, checked pass over a file with bad indices: every corner is checked against
+/// these at once, so that the diagnostic can name the line.
 struct ObjLimits {
   ObjCounts before;  ///< elements ahead of the block
   ObjCounts total;   ///< elements of the whole file
 };
 
-/// Parses text that consists of whole statements, the last byte a '\n'; kTextPadding bytes of
-/// whatever follow it. limits: nullptr in the fast pass, where indices are resolved later.
+/// Parses whole statements; the last byte is a '\n', followed by kTextPadding readable bytes.
+/// limits: nullptr in the fast pass, where indices are resolved later.
 void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block);
 
-/// The first end of a statement whose last byte lies in [from, size): one past a '\n' that no
-/// backslash continues; 0 where there is none.
+/// The first statement end whose last byte lies in [from, size): one past a '\n' that is not
+/// continued by a backslash; 0 if there is none.
 std::size_t first_statement_end(std::string_view text, std::size_t from);
 
 }  // namespace modar

@@ -30,7 +30,7 @@
 namespace modar {
 namespace {
 
-// Joining blocks.
+// Joins blocks into one SourceModel.
 
 constexpr std::uint64_t kMaxElements = 0x3FFFFFFFu;  ///< of each kind, and corners
 
@@ -41,12 +41,12 @@ class ObjAssembler {
 
   /// Appends a block; changes it on the way.
   void add(ObjBlock& block);
-  /// What has been added so far.
+  /// Totals of the blocks added so far.
   [[nodiscard]] const ObjCounts& counts() const { return counts_; }
-  /// Is there a corner that refers to nothing? Then the file must be parsed again with ObjLimits.
-  [[nodiscard]] bool needs_careful_pass() const;
+  /// Does some corner refer to nothing? Then the file must be parsed again with ObjLimits.
+  [[nodiscard]] bool needs_checked_pass() const;
   [[nodiscard]] bool too_large() const;
-  /// Reads the materials, turns tallies into findings, gives spare memory back.
+  /// Reads the materials and turns tallies into diagnostics.
   void finish(const std::string& folder, const std::string& label);
 
  private:
@@ -103,7 +103,7 @@ constexpr NoteText kNoteTexts[] = {
 };
 static_assert(std::size(kNoteTexts) == static_cast<std::size_t>(ObjNote::kCount));
 
-/// How a block's indices of one attribute relate to its positions'.
+/// How a block's indices of one attribute relate to its position indices.
 IndexPlane::Kind kind_of(const Scratch<std::uint32_t>& positions,
                          const Scratch<std::uint32_t>& indices) {
   bool same = true;
@@ -121,7 +121,7 @@ void append(Array<T>& to, const Scratch<T>& from) {
   to.append(from.data(), from.size());
 }
 
-bool ObjAssembler::needs_careful_pass() const {
+bool ObjAssembler::needs_checked_pass() const {
   return bad_relative_ || highest_.positions > counts_.positions || highest_.uvs > counts_.uvs ||
          highest_.normals > counts_.normals;
 }
@@ -185,7 +185,7 @@ void ObjAssembler::add_plane(const ObjBlock& block, const Scratch<std::uint32_t>
     const IndexPlane::Kind kind = kind_of(block.corner_positions, indices);
     if (model_.corner_count() == 0 && kind != IndexPlane::Kind::kOwn) plane.kind = kind;
     if (plane.kind == kind) return;
-    // The rule broke: what it stood for is written out.
+    // The rule no longer holds: write out the indices it stood for.
     if (plane.kind == IndexPlane::Kind::kSame) {
       plane.own = model_.corner_positions;
     } else {
@@ -278,18 +278,18 @@ void ObjAssembler::finish(const std::string& folder, const std::string& label) {
 // The threads. Blocks are cut at fixed places, so the result does not depend on the number of
 // threads.
 
-/// Hands blocks out in order and takes them back in order.
+/// Hands out blocks in order and joins them in the same order.
 class BlockQueue {
  public:
   explicit BlockQueue(std::uint64_t count) : count_(count) {}
 
-  /// The next block to parse, nothing when all are out or one has failed.
+  /// The next block to parse; nothing when all are taken or one has failed.
   std::optional<std::uint64_t> next() {
     const std::lock_guard lock(mutex_);
     if (failed_ || next_ >= count_) return std::nullopt;
     return next_++;
   }
-  /// Waits for the turn of block `index`, runs `join` and passes the turn on. Answers false where a
+  /// Waits for the turn of block `index`, runs `join` and passes the turn on. Returns false if a
   /// block has failed meanwhile.
   template <class Join>
   bool in_turn(std::uint64_t index, const Join& join) {
@@ -312,7 +312,7 @@ class BlockQueue {
   bool failed_ = false;
 };
 
-/// Where the statements begin: behind a UTF-8 byte order mark.
+/// Offset of the first statement, after a UTF-8 byte order mark.
 std::uint64_t text_start(const ByteSource& source) {
   char head[3];
   return source.read(0, 3, head) == 3 && std::memcmp(head, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
@@ -377,8 +377,8 @@ bool is_utf16(std::string_view head) {
          (byte(0) != 0 && byte(1) == 0 && byte(2) != 0 && byte(3) == 0);
 }
 
-/// Shrinks what grew in steps.
-void give_spare_back(SourceModel& model) {
+/// Releases the unused capacity of arrays that grew in steps.
+void shrink_arrays(SourceModel& model) {
   model.positions.shrink();
   model.colours.shrink();
   model.uvs.shrink();
@@ -389,16 +389,14 @@ void give_spare_back(SourceModel& model) {
   model.first_corner.shrink();
 }
 
-/// One pass over the text. totals: as in read_obj_blocks(). Answers the counts where some corner
-/// refers to nothing, so that a careful pass has to follow; nothing where all is well.
+/// One pass over the text. totals: as in read_obj_blocks(). Returns the counts where some corner
+/// refers to nothing, so that a checked pass has to follow; otherwise nothing.
 Result<std::optional<ObjCounts>> parse_once(const ByteSource& source, const std::string& folder,
                                             const std::string& label, unsigned jobs,
                                             const ObjCounts* totals, SourceModel& model) {
   ObjAssembler assembler(model);
-  if (auto done = read_obj_blocks(source, label, jobs, totals, assembler); !done) {
-    return tl::unexpected(done.error());
-  }
-  if (totals == nullptr && assembler.needs_careful_pass()) return assembler.counts();
+  MODAR_TRY(read_obj_blocks(source, label, jobs, totals, assembler));
+  if (totals == nullptr && assembler.needs_checked_pass()) return assembler.counts();
   assembler.finish(folder, label);
   return std::nullopt;
 }
@@ -414,15 +412,12 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
   }
   SourceModel model;
   model.name = stem;
-  const auto bad = parse_once(source, folder, label, options.jobs, nullptr, model);
-  if (!bad) return tl::unexpected(bad.error());
-  if (bad->has_value()) {
+  MODAR_ASSIGN(const std::optional<ObjCounts> bad,
+               parse_once(source, folder, label, options.jobs, nullptr, model));
+  if (bad) {
     model = SourceModel();
     model.name = stem;
-    const ObjCounts totals = **bad;
-    if (const auto again = parse_once(source, folder, label, 1, &totals, model); !again) {
-      return tl::unexpected(again.error());
-    }
+    MODAR_TRY(parse_once(source, folder, label, 1, &*bad, model));
   }
   if (model.face_count() == 0) {
     return fail(ExitCode::kInvalidInput, "obj.no-faces", label,
@@ -430,7 +425,7 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
                     " vertices and no face that can be kept",
                 "export the model as polygons (point clouds must be meshed first)");
   }
-  give_spare_back(model);
+  shrink_arrays(model);
   return model;
 }
 
@@ -447,7 +442,7 @@ Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat status {};
   if (descriptor < 0 || ::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
-    const std::string cause = descriptor < 0 ? std::strerror(errno) : "this is no regular file";
+    const std::string cause = descriptor < 0 ? std::strerror(errno) : "this is not a regular file";
     if (descriptor >= 0) ::close(descriptor);
     return fail(ExitCode::kIo, "io.open", path, cause, "check the path and its permissions");
   }

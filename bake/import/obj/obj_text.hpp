@@ -9,7 +9,7 @@
 
 namespace modar {
 
-/// A stretch of a file in memory for as long as this lives.
+/// A range of a file, mapped for as long as this object lives.
 class MappedStretch {
  public:
   MappedStretch() = default;
@@ -34,8 +34,8 @@ class MappedStretch {
   std::string_view text_;
 };
 
-/// Safe for several threads. A large file is never in memory as a whole: stretches of it are mapped
-/// (which spares a copy, half the cost of a plain read) or read.
+/// Bytes by offset, from a file or from memory. Thread-safe. A large file is never in memory as a
+/// whole: ranges of it are mapped (which saves a copy, half the cost of a plain read) or read.
 class ByteSource {
  public:
   explicit ByteSource(std::string_view text) : text_(text), size_(text.size()) {}
@@ -43,8 +43,8 @@ class ByteSource {
   ByteSource(int descriptor, std::uint64_t size) : descriptor_(descriptor), size_(size) {}
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  /// The bytes [offset, offset + count), fewer at the end; empty where they cannot be mapped, or
-  /// where the file has shrunk, so that a page behind its end would end the program.
+  /// The bytes [offset, offset + count), fewer at the end of the file; empty where they cannot be
+  /// mapped or the file has shrunk (reading a page beyond its end would kill the process).
   [[nodiscard]] MappedStretch map(std::uint64_t offset, std::size_t count) const;
   /// Copies up to `count` bytes from `offset` to `out`. Returns how many, -1 where reading failed.
   std::int64_t read(std::uint64_t offset, std::size_t count, char* out) const;

@@ -1,4 +1,4 @@
-// OpenMesh's decimater on one chunk, with a mesh and a module that answer it fast.
+// OpenMesh's decimater on one chunk, with faster tests and our own quadric module.
 #include "bake/mesh/lod/chunk_decimate.hpp"
 
 #include <algorithm>
@@ -19,15 +19,15 @@
 namespace modar {
 namespace {
 
-struct Landing {
-  const LandingFace* face = nullptr;
+struct Projection {
+  const KeptTriangle* face = nullptr;
   Foot foot;
 };
 
-Landing nearest_of(const ChunkVertices& vertices, std::uint16_t vertex,
-                   std::span<const LandingFace> faces) {
-  Landing nearest;
-  for (const LandingFace& face : faces) {
+Projection nearest_of(const ChunkVertices& vertices, std::uint16_t vertex,
+                      std::span<const KeptTriangle> faces) {
+  Projection nearest;
+  for (const KeptTriangle& face : faces) {
     const auto& [a, b, c] = face.corners;
     const Foot foot =
         nearest_foot(vertices.positions[vertex],
@@ -37,18 +37,18 @@ Landing nearest_of(const ChunkVertices& vertices, std::uint16_t vertex,
   return nearest;
 }
 
-double shift_at(const ChunkVertices& vertices, std::uint16_t vertex, const Landing& landing) {
-  const auto& [a, b, c] = landing.face->corners;
+double shift_at(const ChunkVertices& vertices, std::uint16_t vertex, const Projection& projection) {
+  const auto& [a, b, c] = projection.face->corners;
   const std::span<const glm::dvec2> uvs = vertices.uvs;
   const glm::dvec2 there =
-      uvs[a] + landing.foot.b * (uvs[b] - uvs[a]) + landing.foot.c * (uvs[c] - uvs[a]);
+      uvs[a] + projection.foot.b * (uvs[b] - uvs[a]) + projection.foot.c * (uvs[c] - uvs[a]);
   return glm::length(there - uvs[vertex]);
 }
 
 }  // namespace
 
 double uv_shift_of(const ChunkVertices& vertices, std::uint16_t vertex,
-                   std::span<const LandingFace> faces) {
+                   std::span<const KeptTriangle> faces) {
   return shift_at(vertices, vertex, nearest_of(vertices, vertex, faces));
 }
 
@@ -59,25 +59,25 @@ RemovedVertexMap::RemovedVertexMap(const ChunkVertices& vertices, std::size_t fa
       next_(vertices.positions.size(), kNoIndex),
       uv_shifts_(faces, 0.0) {}
 
-void RemovedVertexMap::lift(std::uint32_t face) {
+void RemovedVertexMap::detach_triangle(std::uint32_t face) {
   for (std::uint32_t v = first_[face]; v != kNoIndex; v = next_[v]) {
-    hand_.push_back(static_cast<std::uint16_t>(v));
+    detached_.push_back(static_cast<std::uint16_t>(v));
   }
   first_[face] = kNoIndex;
   uv_shifts_[face] = 0;
 }
 
-void RemovedVertexMap::settle(std::span<const LandingFace> faces) {
-  for (const std::uint16_t vertex : hand_) {
-    const Landing landing = nearest_of(vertices_, vertex, faces);
-    const std::uint32_t face = landing.face->face;
+void RemovedVertexMap::reattach(std::span<const KeptTriangle> faces) {
+  for (const std::uint16_t vertex : detached_) {
+    const Projection projection = nearest_of(vertices_, vertex, faces);
+    const std::uint32_t face = projection.face->face;
     face_of_[vertex] = face;
     next_[vertex] = first_[face];
     first_[face] = vertex;
     if (vertices_.uvs.empty()) continue;
-    uv_shifts_[face] = std::max(uv_shifts_[face], shift_at(vertices_, vertex, landing));
+    uv_shifts_[face] = std::max(uv_shifts_[face], shift_at(vertices_, vertex, projection));
   }
-  hand_.clear();
+  detached_.clear();
 }
 namespace {
 
@@ -174,11 +174,11 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
 
   /// ours: of each vertex. All but the limits must outlive the module.
   void set(const ChunkVertices& vertices, const DecimateLimits& limits,
-           std::span<const std::uint16_t> ours, RemovedVertexMap& landings) {
+           std::span<const std::uint16_t> ours, RemovedVertexMap& removed) {
     vertices_ = vertices;
     limits_ = limits;
     ours_ = ours;
-    landings_ = &landings;
+    removed_ = &removed;
   }
 
   void initialize() override {
@@ -223,9 +223,9 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
   }
 
   void preprocess_collapse(const CollapseInfo& info) override {
-    landings_->lift_vertex(ours_[at(info.v0)]);
+    removed_->detach_vertex(ours_[at(info.v0)]);
     for (const auto face : mesh().vf_range(info.v0)) {
-      landings_->lift(static_cast<std::uint32_t>(face.idx()));
+      removed_->detach_triangle(static_cast<std::uint32_t>(face.idx()));
     }
     collect(info);
   }
@@ -233,7 +233,7 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
   void postprocess_collapse(const CollapseInfo& info) override {
     vertex_ = Mesh::VertexHandle();
     add(planes_[at(info.v1)], planes_[at(info.v0)]);
-    landings_->settle(faces_);
+    removed_->reattach(faces_);
   }
 
  private:
@@ -288,7 +288,7 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
   double shift_after(const CollapseInfo& info) {
     double before = 0;
     for (const auto face : mesh().vf_range(info.v0)) {
-      before = std::max(before, landings_->uv_shift(static_cast<std::uint32_t>(face.idx())));
+      before = std::max(before, removed_->uv_shift(static_cast<std::uint32_t>(face.idx())));
     }
     collect(info);
     return before + uv_shift_of(vertices_, ours_[at(info.v0)], faces_);
@@ -298,10 +298,10 @@ class Quadrics : public OpenMesh::Decimater::ModBaseT<Mesh> {
   ChunkVertices vertices_;
   DecimateLimits limits_;
   std::span<const std::uint16_t> ours_;
-  RemovedVertexMap* landings_ = nullptr;
+  RemovedVertexMap* removed_ = nullptr;
   Mesh::VertexHandle vertex_;  // the one whose collapses are priced
   float least_ = 0;
-  std::vector<LandingFace> faces_;  // what stays of the triangles around a vertex that goes
+  std::vector<KeptTriangle> faces_;  // what stays of the triangles around a vertex that goes
 };
 
 /// A mesh of OpenMesh's, and which of our vertices each of its own is.
@@ -335,7 +335,7 @@ void build(std::span<const glm::dvec3> positions, std::span<const std::uint16_t>
   }
 }
 
-CoarserTriangles remaining(const HalfEdges& edges, const RemovedVertexMap& landings,
+CoarserTriangles remaining(const HalfEdges& edges, const RemovedVertexMap& removed,
                            std::size_t vertices) {
   CoarserTriangles result;
   const Mesh& mesh = edges.mesh;
@@ -352,10 +352,10 @@ CoarserTriangles remaining(const HalfEdges& edges, const RemovedVertexMap& landi
   }
   for (std::uint32_t face = 0; face < numbers.size(); ++face) {
     if (numbers[face] == kNoIndex) continue;
-    result.uv_shift = std::max(result.uv_shift, landings.uv_shift(face));
+    result.uv_shift = std::max(result.uv_shift, removed.uv_shift(face));
   }
   for (std::size_t v = 0; v < vertices; ++v) {
-    const std::uint32_t face = landings.face_of(static_cast<std::uint16_t>(v));
+    const std::uint32_t face = removed.face_of(static_cast<std::uint16_t>(v));
     if (face != kNoIndex) result.nearby[v] = numbers[face];
   }
   return result;
@@ -364,9 +364,9 @@ CoarserTriangles remaining(const HalfEdges& edges, const RemovedVertexMap& landi
 /// Keeps what is left whenever a target is reached, so that one run makes all levels.
 class Snapshots : public OpenMesh::Decimater::Observer {
  public:
-  Snapshots(const HalfEdges& edges, const RemovedVertexMap& landings, std::size_t vertices,
+  Snapshots(const HalfEdges& edges, const RemovedVertexMap& removed, std::size_t vertices,
             std::span<const std::size_t> targets)
-      : Observer(1), edges_(edges), landings_(landings), vertices_(vertices), targets_(targets) {}
+      : Observer(1), edges_(edges), removed_(removed), vertices_(vertices), targets_(targets) {}
 
   /// A collapse inside the surface takes two triangles.
   void notify(std::size_t collapses) override {
@@ -376,13 +376,13 @@ class Snapshots : public OpenMesh::Decimater::Observer {
     }
   }
 
-  void take() { taken.push_back(remaining(edges_, landings_, vertices_)); }
+  void take() { taken.push_back(remaining(edges_, removed_, vertices_)); }
 
   std::vector<CoarserTriangles> taken;
 
  private:
   const HalfEdges& edges_;
-  const RemovedVertexMap& landings_;
+  const RemovedVertexMap& removed_;
   std::size_t vertices_;
   std::span<const std::size_t> targets_;
 };
@@ -408,9 +408,9 @@ std::vector<CoarserTriangles> decimate_chunk(const ChunkVertices& vertices,
   Decimater decimater(mesh);
   Quadrics::Handle quadrics;
   decimater.add(quadrics);
-  RemovedVertexMap landings(vertices, mesh.n_faces());
-  decimater.module(quadrics).set(vertices, limits, edges.ours, landings);
-  Snapshots snapshots(edges, landings, vertices.positions.size(), targets);
+  RemovedVertexMap removed(vertices, mesh.n_faces());
+  decimater.module(quadrics).set(vertices, limits, edges.ours, removed);
+  Snapshots snapshots(edges, removed, vertices.positions.size(), targets);
   decimater.set_observer(&snapshots);
   if (targets.empty() || !decimater.initialize()) return {};
   decimater.decimate_to_faces(0, targets.back());

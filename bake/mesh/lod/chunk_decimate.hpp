@@ -1,4 +1,4 @@
-// Fewer triangles over the vertices that there are.
+// Decimates a chunk: fewer triangles over the same vertices. Internal to lod.
 #pragma once
 
 #include <array>
@@ -17,33 +17,33 @@ struct ChunkVertices {
   std::span<const glm::dvec2> uvs;
 };
 
-/// A triangle that stays, by a number of the caller's and the vertices of its corners.
-struct LandingFace {
+/// A triangle that is kept: the caller's number of it, and its corners.
+struct KeptTriangle {
   std::uint32_t face = 0;
   std::array<std::uint16_t, 3> corners{};
 };
 
-/// The distance between a vertex' uv and that of triangles (at least one) at their point that is
-/// nearest to it.
+/// The distance between a vertex' uv and the uv of the nearest point of some triangles (at least
+/// one).
 double uv_shift_of(const ChunkVertices& vertices, std::uint16_t vertex,
-                   std::span<const LandingFace> faces);
+                   std::span<const KeptTriangle> faces);
 
-/// Every vertex that was taken out lies on one triangle: the nearest of those that took the place
-/// of the triangles around it, and again when one of those changes. What the texture is off by
-/// there is measured with it.
+/// Maps every removed vertex to a triangle of the remaining surface: the nearest of those that
+/// replaced its triangles, updated whenever one of them changes. Measures how far the texture has
+/// slid there.
 class RemovedVertexMap {
  public:
   /// The vertices are the caller's and must outlive it.
   RemovedVertexMap(const ChunkVertices& vertices, std::size_t faces);
 
-  /// Takes up what lies on a triangle that changes or vanishes.
-  void lift(std::uint32_t face);
-  /// Takes up a vertex that leaves the mesh.
-  void lift_vertex(std::uint16_t vertex) { hand_.push_back(vertex); }
-  /// Lays down what was taken up, on the nearest of at least one triangle.
-  void settle(std::span<const LandingFace> faces);
+  /// Detaches the removed vertices of a triangle that changes or vanishes.
+  void detach_triangle(std::uint32_t face);
+  /// Adds a vertex that is being removed.
+  void detach_vertex(std::uint16_t vertex) { detached_.push_back(vertex); }
+  /// Maps all detached vertices to the nearest of some triangles (at least one).
+  void reattach(std::span<const KeptTriangle> faces);
 
-  /// kNoIndex where the vertex was not taken out.
+  /// kNoIndex for a vertex that was not removed.
   [[nodiscard]] std::uint32_t face_of(std::uint16_t vertex) const { return face_of_[vertex]; }
   /// Greatest of uv_shift_of() of the vertices on the triangle.
   [[nodiscard]] double uv_shift(std::uint32_t face) const { return uv_shifts_[face]; }
@@ -54,7 +54,7 @@ class RemovedVertexMap {
   std::vector<std::uint32_t> first_;    // of each face, the vertices on it as a linked list
   std::vector<std::uint32_t> next_;     // of each vertex
   std::vector<double> uv_shifts_;       // of each face
-  std::vector<std::uint16_t> hand_;
+  std::vector<std::uint16_t> detached_;
 };
 
 /// A coarser level: triangles, and where vertices are on them.

@@ -1,4 +1,4 @@
-// Decimates chunk by chunk, on several threads, and measures what it did.
+// Decimates chunk by chunk, on several threads, and measures the error.
 #include "bake/mesh/lod/mesh_levels.hpp"
 
 #include <algorithm>
@@ -15,14 +15,16 @@
 namespace modar {
 namespace {
 
-constexpr std::size_t kFewTriangles = 24;  ///< not worth a coarser level
-/// A level with more of the triangles of the one before is not worth its bytes.
+/// Chunks of fewer triangles get no coarser level: they cost a draw call either way. Set by hand.
+constexpr std::size_t kFewTriangles = 24;
+/// A level that keeps more of the previous one's triangles is not worth its bytes. Set by hand.
 constexpr double kWorthwhile = 0.8;
-/// Of the chunk's diagonal: a collapse that moves the surface by more spoils even a coarse level.
+/// Of the chunk's diagonal: a collapse that moves the surface farther spoils even a coarse level.
+/// Set by hand.
 constexpr double kMaxCollapse = 0.03;
-/// Of the chunk's diagonal: so far may a texture slide.
+/// Of the chunk's diagonal: the texture may slide this far. Set by hand.
 constexpr double kMaxSlide = 0.01;
-constexpr std::size_t kStretch = 8;  ///< chunks between two words to the progress bar
+constexpr std::size_t kStretch = 8;  ///< chunks between two updates of the progress bar
 
 /// The chunk that uses each source position, kShared where there are several.
 constexpr std::uint32_t kShared = kNoIndex - 1;
@@ -121,7 +123,7 @@ Result<void> LevelOptions::validate() const {
 }
 
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report) {
-  if (auto valid = options.validate(); !valid) return valid;
+  MODAR_TRY(options.validate());
   if (options.levels == 1) return {};
   StageTimer timer(report, "levels");
   const Array<std::uint32_t> owners = owners_of_positions(mesh);

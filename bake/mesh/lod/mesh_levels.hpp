@@ -21,8 +21,8 @@ struct LevelOptions {
 inline constexpr std::uint32_t kMaxLevels = 12;
 
 /// Gives each chunk coarser levels, each of about half the triangles of the one before, over the
-/// vertices that it has. Positions of other chunks, borders and seams stay as they are, so that
-/// chunks of any two levels meet without a crack. A level's error bounds the distance between it
+/// chunk's vertices. Positions shared with other chunks, borders and seams stay, so that chunks of
+/// any two levels meet without a crack. A level's error bounds the distance between it
 /// and level 0, both as the device decodes them, measured from either to the other (see
 /// surface_distance()). At vertices of level 0 that were taken out, the texture has slid by no more
 /// than 1 % of the chunk's diagonal: collapses that may shift it farther are refused. A chunk ends

@@ -1,4 +1,4 @@
-// Divides triangles until each piece is known to lie within the bound.
+// Subdivides triangles until each piece is known to lie within the bound.
 #include "bake/mesh/lod/surface_distance.hpp"
 
 #include <algorithm>
@@ -55,12 +55,16 @@ TriangleTree& LevelSurface::tree() {
 }
 namespace {
 
-constexpr double kSlack = 1.5;  ///< of the bound over a distance that was found
+/// The bound may exceed a distance that was found by this factor: 1.5 keeps coarse levels usable at
+/// their distance, and tighter bounds take more subdivisions.
+constexpr double kSlack = 1.5;
 
-constexpr double kSliver = 1e-9;  ///< model space: narrower parts are not cut off
-/// Pieces of one triangle; the rest is bounded as it is, by more than it need be.
+/// Model space: narrower parts are not cut off. Far above double rounding, far below half floats.
+constexpr double kSliver = 1e-9;
+/// Pieces of one triangle; the rest is bounded as it is, less tightly. Set by hand against endless
+/// subdivision, as kMostSteps.
 constexpr std::size_t kMostPieces = 2000;
-/// Pieces of one triangle that go from neighbour to neighbour; the rest is searched for.
+/// Pieces of one triangle that walk from neighbour to neighbour; the rest is searched in the tree.
 constexpr std::size_t kMostSteps = 1500;
 
 /// A convex piece of a triangle.
@@ -71,7 +75,7 @@ struct Piece {
   std::uint32_t target = kNoIndex;  ///< the triangle to try next, kNoIndex: search for one
   std::uint32_t before = kNoIndex;  ///< the one that it was cut off by
 
-  /// A convex piece with room for a corner more never needs two; rounding may think so.
+  /// Cutting a convex piece adds at most one corner; rounding may claim two.
   void add(const glm::dvec3& corner) {
     if (count < kMost) corners[count++] = corner;
   }
@@ -83,8 +87,8 @@ struct Piece {
   }
 };
 
-/// Who is as near as a sliver is on the plane: rounding would have a piece without area cross it
-/// again and again, and gain a corner each time.
+/// Points closer than a sliver are on the plane: with rounding, a piece without area would cross it
+/// again and again and gain a corner each time.
 double off_plane(const glm::dvec3& p, const glm::dvec3& point, const glm::dvec3& normal) {
   const double off = glm::dot(p - point, normal);
   return std::abs(off) < kSliver ? 0.0 : off;
@@ -122,7 +126,7 @@ class Bounder {
  public:
   Bounder(LevelSurface& to, double least) : to_(to), least_(least), bound_(least) {}
 
-  /// Learns how far the farthest of some points lies, whose squared distances are at most these.
+  /// Finds the distance of the farthest of some points, whose squared distances are at most these.
   void probe(std::vector<std::pair<double, std::uint16_t>> points) {
     std::make_heap(points.begin(), points.end());
     while (!points.empty() && points.front().first > std::max(lower_ * lower_, limit_square())) {
@@ -133,7 +137,7 @@ class Bounder {
     }
   }
 
-  /// Grows the bound to hold for every point of the triangle; `nearby` are tried first.
+  /// Raises the bound to hold for every point of the triangle; tries `nearby` first.
   void cover(Piece whole, const std::array<std::uint32_t, 3>& nearby) {
     for (const std::uint32_t near : nearby) {
       if (near != kNoIndex && accept_by(whole, to_.triangle(near))) return;
@@ -156,8 +160,8 @@ class Bounder {
   [[nodiscard]] double bound() const { return bound_; }
 
  private:
-  /// Is the piece near enough to one triangle? The distance from it is convex, so that the corners
-  /// bound the piece.
+  /// Is the piece near enough to one triangle? The distance from it is convex, so its corners bound
+  /// the piece.
   bool accept_by(const Piece& piece, const std::array<glm::dvec3, 3>& t) {
     double greatest = 0;
     const double most = limit_square();
@@ -189,7 +193,7 @@ class Bounder {
       if (outside.count < 3) continue;
       outside.before = target;
       outside.target = to_.neighbour(target, i);
-      // Over an edge that two triangles meet in, a piece may lie beside both.
+      // Near an edge, a piece may lie outside of both triangles that share it.
       if (outside.target == came_from) outside.target = kNoIndex;
       if (outside.target != kNoIndex || !accept_by(outside, t)) pieces_.push_back(outside);
       if (inside.count < 3) return;
@@ -206,10 +210,10 @@ class Bounder {
     for (const glm::dvec3& corner : piece.all()) {
       radius = std::max(radius, glm::length(corner - middle));
     }
-    const double room = std::max(0.0, limit() - radius);
-    const double distance = std::sqrt(tree.nearest(middle, room * room));
-    // What is found within the room need not be the nearest: it proves no distance.
-    if (distance > room) lower_ = std::max(lower_, distance);
+    const double margin = std::max(0.0, limit() - radius);
+    const double distance = std::sqrt(tree.nearest(middle, margin * margin));
+    // A triangle found within the margin need not be the nearest: it proves no distance.
+    if (distance > margin) lower_ = std::max(lower_, distance);
     // Within the radius no point is farther off than so.
     const double upper = std::min(distance + radius, corner_bound(piece));
     if (upper > limit() && !at_once) return false;
@@ -225,7 +229,7 @@ class Bounder {
     return std::sqrt(greatest);
   }
 
-  /// Parts what lies over the nearest triangle, which is mostly done with then, from what lies
+  /// Separates the part over the nearest triangle, which is mostly settled then, from the parts
   /// beside it.
   void divide(Piece piece) {
     const std::array<glm::dvec3, 3> t = to_.tree().last();
@@ -263,7 +267,7 @@ class Bounder {
       if (glm::length(corner - middle) > glm::length(far - middle)) far = corner;
     }
     if (piece.count == Piece::kMost) {
-      // No room for another corner: the piece as triangles.
+      // No space for another corner: split the piece into triangles.
       for (std::size_t i = 1; i + 1 < piece.count; ++i) {
         Piece& part = pieces_.emplace_back();
         for (const std::size_t c : {std::size_t{0}, i, i + 1}) part.add(piece.corners[c]);

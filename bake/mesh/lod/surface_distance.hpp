@@ -1,4 +1,4 @@
-// How far one triangle mesh lies from another.
+// A bound on the distance of one triangle mesh from another. Internal to lod.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ class LevelSurface {
   }
   /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
   [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
-  /// Made when it is first asked for.
+  /// Built on first use.
   TriangleTree& tree();
 
  private:
@@ -42,17 +42,17 @@ class LevelSurface {
   std::unique_ptr<TriangleTree> tree_;
 };
 
-/// A bound on the distance of any point of one surface from the other: never below the truth, and
-/// above it by no more than half, or than kDistanceFloor or `least` where that is more; never below
-/// `least`. Both are triangles over the same positions; the measure is one-sided: from points of
-/// `from` to the surface `to`. nearby: of each vertex a triangle of `to` that is probably near,
-/// kNoIndex where it is not known; where it is wrong, the search only takes longer. Branch and
-/// bound as in Tang, Lee, Kim, "Interactive Hausdorff distance computation for general polygonal
-/// models", 2009, that goes from triangle to triangle before it searches.
+/// An upper bound on the distance of any point of one surface from the other. It exceeds the true
+/// distance by no more than half of it (or kDistanceFloor, or `least`, where that is more), and is
+/// never below `least`. Both are triangles over the same positions; the measure is one-sided: from
+/// points of `from` to the surface `to`. nearby: for each vertex a triangle of `to` that is
+/// probably near, kNoIndex where unknown; wrong ones only slow the search down. Branch and bound as
+/// in Tang, Lee, Kim, "Interactive Hausdorff distance computation for general polygonal models",
+/// 2009, walking from triangle to triangle before it searches the tree.
 double surface_distance(const LevelSurface& from, LevelSurface& to,
                         std::span<const std::uint32_t> nearby, double least);
 
-/// Finer distances are not told apart: half of what half floats round positions by in [-1,1].
+/// Smaller distances are not told apart: half of the rounding error of half floats in [-1,1].
 inline constexpr double kDistanceFloor = 0x1p-13;
 
 }  // namespace modar

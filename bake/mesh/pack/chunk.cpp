@@ -35,9 +35,10 @@ Item make_item(const TriMesh& mesh, std::uint32_t triangle) {
   return item;
 }
 
-/// A piece that is surely too large is split before its vertices are counted.
+/// A piece estimated to exceed the limit by this factor is split without counting its vertices: a
+/// wrong estimate would make chunks small. Set by hand.
 constexpr double kSurely = 1.25;
-/// What borders add to the vertices of a piece, and some room for uneven halves.
+/// What borders add to the vertices of a piece, and a margin for uneven halves. Set by hand.
 constexpr double kMargin = 1.055;
 
 class ChunkBuilder {
@@ -51,7 +52,7 @@ class ChunkBuilder {
         vertices_per_triangle_(static_cast<double>(mesh.positions.size()) /
                                static_cast<double>(mesh.triangles.size())) {}
 
-  /// Triangles of one material in the order of the file. Answers false where one of them is longer
+  /// Triangles of one material in the order of the file. Returns false where one of them is longer
   /// than a chunk may be.
   bool split(std::span<Item> items, std::uint32_t material) {
     double vertices = static_cast<double>(items.size()) * vertices_per_triangle_;
@@ -88,8 +89,8 @@ class ChunkBuilder {
     return side(0) >= side(1) && side(0) >= side(2) ? 0 : (side(1) >= side(2) ? 1 : 2);
   }
 
-  /// Puts the `middle` triangles that lie lowest along the longest side of their box in front, both
-  /// parts in the order of the file; of equally low ones the first in the file.
+  /// Moves the `middle` triangles that lie lowest along the longest side of their box to the front;
+  /// both parts keep file order, and ties go to the first in the file.
   void partition(std::span<Item> items, std::size_t middle) {
     const std::size_t axis = longest_axis(items);
     histogram_.assign(65536, 0);
@@ -126,7 +127,7 @@ class ChunkBuilder {
     return static_cast<std::uint32_t>(used_.size());
   }
 
-  /// Are the numbered vertices as close together as they must be?
+  /// Do the numbered vertices fit into a box of max_side?
   [[nodiscard]] bool fits() const {
     if (!(max_side_ > 0)) return true;
     glm::dvec3 low = mesh_.positions[used_[0]];
@@ -184,7 +185,7 @@ Result<void> ChunkOptions::validate() const {
 }
 
 Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& report) {
-  if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
+  MODAR_TRY(options.validate());
   StageTimer timer(report, "chunk");
   ChunkedMesh result;
   result.mesh = std::move(mesh);
@@ -197,14 +198,14 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
   for (std::uint32_t t = 0; t < items.size(); ++t) {
     items[next[result.mesh.triangle_material[t]]++] = make_item(result.mesh, t);
   }
-  result.mesh.triangle_material.release();  // chunks say it from here on
+  result.mesh.triangle_material.release();  // chunks hold it from here on
   ChunkBuilder builder(result.mesh, options, result.chunks);
   for (std::uint32_t m = 0; m + 1 < begins.size(); ++m) {
     const auto part =
         std::span(items.data(), items.size()).subspan(begins[m], begins[m + 1] - begins[m]);
     if (!part.empty() && !builder.split(part, m)) {
       return fail(ExitCode::kUnsupported, "model.max-error", result.mesh.name,
-                  "a triangle is too long for the grid that the asked error needs",
+                  "a triangle is too long for the grid that the requested error needs",
                   "allow a greater --max-error, or divide the model's longest triangles");
     }
   }
@@ -216,7 +217,8 @@ namespace {
 
 // Boxes and cones.
 
-/// Rounding of the axis to float, of the renderer's normalisation and of its dot product.
+/// Covers the rounding of the axis to float, of the renderer's normalisation and dot product (some
+/// 1e-6); set by hand.
 constexpr double kConeSlack = 1e-4;
 
 /// Unit normal of triangle i, or zero where it has no area.

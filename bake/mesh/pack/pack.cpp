@@ -1,4 +1,4 @@
-// Packs chunk by chunk: bytes, boxes and cones, order, records.
+// Packs chunk by chunk: vertex bytes, boxes and cones, vertex order, records.
 #include "bake/mesh/pack/pack.hpp"
 
 #include <algorithm>
@@ -17,7 +17,8 @@
 namespace modar {
 namespace {
 
-constexpr unsigned kWave = 4;  ///< chunks a thread between two joins
+/// Chunks per thread between two joins: more balance load better and hold more memory. Set by hand.
+constexpr unsigned kWave = 4;
 
 MaterialRecord material_record(const SourceMaterial& source) {
   MaterialRecord m{};
@@ -34,8 +35,8 @@ MaterialRecord material_record(const SourceMaterial& source) {
   return m;
 }
 
-/// Coarse triangles in the numbers of the packed vertices. Those of which two vertices became one
-/// are left out: they had no area.
+/// Coarse triangles in packed vertex numbers. Those with two vertices merged into one are left out:
+/// they have no area.
 std::vector<std::uint16_t> coarse_triangles(const std::vector<std::uint16_t>& indices,
                                             const ChunkOrderer& places) {
   std::vector<std::uint16_t> coarse;
@@ -49,7 +50,7 @@ std::vector<std::uint16_t> coarse_triangles(const std::vector<std::uint16_t>& in
   return coarse;
 }
 
-/// One chunk in its final bytes, but for where it will stand.
+/// One chunk in its final bytes, before its place in the buffers is known.
 struct PackedChunk {
   std::vector<std::byte> vertices;                 ///< in their final order
   std::vector<std::vector<std::uint16_t>> levels;  ///< indices, the finest first
@@ -58,7 +59,7 @@ struct PackedChunk {
   PackErrors errors;
 };
 
-/// Triangles of all levels: what a box and a cone have to hold for.
+/// Triangles of all levels: the box and the cone must hold for each.
 std::vector<std::uint16_t> all_indices(const Chunk& chunk) {
   std::vector<std::uint16_t> indices = chunk.indices;
   for (const ChunkLevel& level : chunk.coarser) {
@@ -89,7 +90,7 @@ ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRang
   return record;
 }
 
-/// Packs one chunk after another; what it needs on the way it keeps between them.
+/// Packs one chunk after another, reusing its buffers.
 class ChunkPacker {
  public:
   ChunkPacker(const TriMesh& mesh, const VertexOffsets& offsets, PositionKind kind)
@@ -127,9 +128,9 @@ class ChunkPacker {
   std::vector<glm::vec3> decoded_;
 };
 
-/// Puts chunks behind each other. Chunks that follow each other share one range of
-/// vertices, hence one set-up of attributes, as long as 16 bits reach all of it. Their indices of
-/// one level lie side by side: chunks of equal level can be drawn in one call.
+/// Concatenates chunks. Successive chunks share one range of vertices (one set-up of attributes) as
+/// long as 16-bit indices reach all of it. Their indices of one level are contiguous, so chunks of
+/// equal level can be drawn in one call.
 class ChunkAppender {
  public:
   explicit ChunkAppender(PackedMesh& out) : out_(out) {}
@@ -150,7 +151,7 @@ class ChunkAppender {
     record.level_count = std::max(record.level_count, chunk.record.level_count);
   }
 
-  /// States the size of the open range in its levels, and opens the next.
+  /// Writes the size of the open range to its levels, and opens the next.
   void close_range() {
     for (; first_level_ < out_.levels.size(); ++first_level_) {
       out_.levels[first_level_].vertex_count = range_size_;
@@ -159,7 +160,7 @@ class ChunkAppender {
     range_size_ = 0;
   }
 
-  /// Closes the last range and puts the indices of coarser levels behind those of level 0.
+  /// Closes the last range and appends the indices of coarser levels to those of level 0.
   void finish() {
     close_range();
     for (std::size_t depth = 0; depth < coarser_.size(); ++depth) {
@@ -178,7 +179,7 @@ class ChunkAppender {
     std::vector<std::pair<std::size_t, std::size_t>> levels;
   };
 
-  /// Shifts the indices to where the chunk stands in its range.
+  /// Offsets the indices by the chunk's place in its range.
   void add_level(std::size_t depth, double error, std::vector<std::uint16_t>& indices) {
     for (std::uint16_t& index : indices) index = static_cast<std::uint16_t>(index + range_size_);
     if (coarser_.size() < depth) coarser_.resize(depth);

@@ -1,4 +1,4 @@
-// The final bytes of a model, with the error that they were measured to have.
+// The final bytes of a model, with their measured error.
 #pragma once
 
 #include <cstddef>
@@ -33,9 +33,9 @@ struct PackOptions {
 };
 
 /// Quantises (positions as asked, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes
-/// and measures the greatest and rms error; computes conservative boxes and normal cones; puts each
-/// chunk in the order of formats/chunk_order.hpp, where vertices of equal bytes become one.
-/// texture_side: pixels by which uv errors are told in texels (0: no texture), one a material.
+/// and measures their greatest and rms error; computes conservative boxes and normal cones; puts
+/// each chunk in the order of formats/chunk_order.hpp, where vertices of equal bytes become one.
+/// texture_side: for each material the texture's side in pixels, for uv errors in texels (0: none).
 Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint32_t>& texture_side,
                         const PackOptions& options, Report& report);
 

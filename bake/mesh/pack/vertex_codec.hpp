@@ -13,6 +13,7 @@
 #include <glm/vec4.hpp>
 
 #include "bake/mesh/pack/chunk.hpp"
+#include "formats/component.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -22,18 +23,18 @@ enum class PositionKind : std::uint8_t {
   kInt16,  ///< 16-bit integers, counted from a point of each chunk, on one grid for all chunks
 };
 
-/// What the user asks of positions.
+/// What the user asks for.
 struct PositionRequest {
-  std::optional<PositionKind> kind;  ///< nothing: half floats where they are exact enough
-  double max_error = 0.0;            ///< source units; 0: any
+  std::optional<PositionKind> kind;  ///< unset: half floats where they are exact enough
+  double max_error = 0.0;            ///< source units; 0: no limit
 };
 
 struct PositionPlan {
   PositionKind kind = PositionKind::kHalf;
-  double max_side = 0.0;  ///< model space: longest side that a chunk may have; 0: any
+  double max_side = 0.0;  ///< model space: longest side that a chunk may have; 0: no limit
 };
 
-/// Errors: kUnsupported "model.max-error" where neither layout, or not the one asked for, is exact
+/// Errors: kUnsupported "model.max-error" where no layout, or not the requested one, is exact
 /// enough.
 Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& request);
 
@@ -70,14 +71,14 @@ struct VertexOffsets {
 /// as 4 x u8.
 LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets);
 
-/// uv = offset + scale * attribute, and the whole numbers that were taken off first.
+/// uv = shift + offset + scale * attribute; shift holds whole numbers, which are not stored.
 struct UvRange {
   glm::dvec2 shift{0.0};
   glm::vec2 offset{0.0f};
   glm::vec2 scale{1.0f};
 };
 
-/// repeats: the chunk's texture repeats, so that whole numbers may be taken off.
+/// repeats: the chunk's texture repeats, so whole numbers may be subtracted.
 UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats);
 
 /// Which materials have triangles whose uv leave [0,1].
@@ -102,7 +103,7 @@ struct ErrorTally {
   [[nodiscard]] double rms() const;
 };
 
-/// What decoding the packed bytes was measured to be off by: model space, degrees, texels.
+/// Measured quantisation error: model space, degrees, texels.
 struct PackErrors {
   ErrorTally position;
   ErrorTally normal;
@@ -113,18 +114,18 @@ struct PackErrors {
   void write(double scale, ModelRecord& record) const;
 };
 
-/// Writes vertices and measures what their bytes decode to.
+/// Writes vertices and measures the error of what their bytes decode to.
 class VertexPacker {
  public:
   VertexPacker(const TriMesh& mesh, const VertexOffsets& offsets, PositionKind kind)
       : mesh_(mesh), offsets_(offsets), kind_(kind) {}
 
-  /// bytes: a stride a vertex, zeroed. texture_side: pixels by which uv errors are told, 0: no
+  /// bytes: a stride a vertex, zeroed. texture_side: in pixels, for uv errors; 0: no
   /// texture. decoded: filled with the positions that the bytes decode to, in model space.
   void pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
             std::uint32_t texture_side, std::byte* bytes, std::vector<glm::vec3>& decoded);
 
-  /// Of the last call of pack().
+  /// Of the last call to pack().
   [[nodiscard]] const PackErrors& errors() const { return errors_; }
 
  private:
@@ -150,7 +151,9 @@ class VertexDecoder {
  public:
   explicit VertexDecoder(const LayoutRecord& layout);
 
-  [[nodiscard]] bool has(Semantic semantic) const { return find(semantic) != nullptr; }
+  [[nodiscard]] bool has(Semantic semantic) const {
+    return find_attribute(layout_, semantic) != nullptr;
+  }
   [[nodiscard]] std::uint32_t stride() const { return layout_.stride; }
   /// Model space, in [-1,1].
   [[nodiscard]] glm::dvec3 position(const std::byte* vertex, const ChunkRecord& chunk) const;
@@ -162,9 +165,6 @@ class VertexDecoder {
   [[nodiscard]] glm::dvec4 colour(const std::byte* vertex) const;
 
  private:
-  [[nodiscard]] const AttributeRecord* find(Semantic semantic) const;
-  [[nodiscard]] static double component(const AttributeRecord& attribute, const std::byte* vertex,
-                                        unsigned index);
   LayoutRecord layout_;
 };
 

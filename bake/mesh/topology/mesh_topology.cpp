@@ -1,5 +1,5 @@
-// Topology by the links of vertices: a triangle at a vertex is an edge between the two others, and
-// all that counts can be read off that small graph. OpenMesh walks the borders.
+// Topology by vertex links: a triangle at a vertex is an edge between its two other vertices, and
+// all counts can be read off that small graph. OpenMesh walks the borders of its half-edge mesh.
 #include "bake/mesh/topology/mesh_topology.hpp"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ struct Traits : OpenMesh::DefaultTraits {
 };
 using Mesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 
-/// Borders, each walked once. A walk ends where it began: next half-edges of a border are a border.
+/// Number of borders. A walk ends where it began: the next half-edge of a border is on the border.
 std::uint64_t count_loops(const Mesh& mesh) {
   std::vector<bool> walked(mesh.n_halfedges(), false);
   std::uint64_t loops = 0;
@@ -41,7 +41,7 @@ std::uint64_t count_loops(const Mesh& mesh) {
 }
 
 HalfEdgeCount count_half_edges(std::size_t vertex_count, std::span<const std::uint32_t> indices) {
-  omerr().disable();  // it tells stderr of every face that it refuses
+  omerr().disable();  // it writes to stderr for every face it refuses
   Mesh mesh;
   mesh.reserve(vertex_count, indices.size() / 2, indices.size() / 3);
   for (std::size_t v = 0; v < vertex_count; ++v) mesh.new_vertex();
@@ -63,9 +63,11 @@ HalfEdgeCount count_half_edges(std::size_t vertex_count, std::span<const std::ui
 
 // Figures by the links of vertices.
 
-/// Bytes of OpenMesh's mesh a triangle: links of 1.5 edges, the face, half a vertex.
+/// Bytes of OpenMesh's mesh per triangle: 1.5 edges of two linked half-edges, a face, half a
+/// vertex.
 constexpr std::uint64_t kHalfEdgeBytes = 64;
-constexpr std::size_t kStretch = 1u << 14;  ///< vertices that one thread takes at a time
+/// Vertices that a thread takes at a time: small enough to balance load, set by hand.
+constexpr std::size_t kStretch = 1u << 14;
 
 /// Triangles by the positions that they refer to.
 struct Surface {
@@ -97,28 +99,27 @@ Surface make_surface(const TriMesh& mesh) {
   return surface;
 }
 
-/// A neighbour of the vertex at hand, once for each triangle that has both.
+/// A neighbour of the current vertex, once for each triangle that has both.
 struct Spoke {
   std::uint32_t neighbour = 0;
   std::uint32_t triangle = 0;  ///< number among the vertex's own
   bool leaves = false;         ///< the triangle walks the edge from the vertex to the neighbour
 };
 
-/// An end of a boundary edge: the edge, and the fan (a number among those of the whole surface)
-/// that it belongs to at this end.
+/// An end of a boundary edge: the edge, and the number of the fan it belongs to at this end.
 struct BoundaryEnd {
   std::uint64_t edge = 0;
   std::uint32_t fan = 0;
 };
 
-/// What a stretch of vertices adds to the whole.
+/// The sums of one range of vertices.
 struct Part {
   MeshTopology sums;
   std::vector<BoundaryEnd> ends;  ///< fans are counted from 0 in each part
   std::uint32_t fans = 0;         ///< that have ends
 };
 
-/// Looks at one vertex after another; the scratch is a thread's own.
+/// Reads the links of one vertex after another; each thread has its own.
 class LinkReader {
  public:
   LinkReader(const Surface& surface, Part& part)
@@ -150,7 +151,7 @@ class LinkReader {
       const std::uint32_t behind = c[(at + 2) % 3];
       spokes_.push_back({ahead, t, true});
       spokes_.push_back({behind, t, false});
-      // A triangle is told from its copies at its lowest vertex.
+      // Copies of a triangle are counted at its lowest vertex.
       if (vertex < ahead && vertex < behind) {
         pairs_.push_back(std::uint64_t{std::min(ahead, behind)} << 32 | std::max(ahead, behind));
       }
@@ -165,7 +166,7 @@ class LinkReader {
   }
 
   /// Joins the triangles at each edge of the vertex; counts the edges whose lower end it is.
-  /// Answers whether one has more than two triangles.
+  /// Returns whether one has more than two triangles.
   bool read_edges(std::uint32_t vertex) {
     bool crowded = false;
     for (std::size_t i = 0; i < spokes_.size();) {
@@ -220,10 +221,10 @@ class LinkReader {
   std::vector<std::uint32_t> numbers_;
 };
 
-/// Sets of numbers, joined pair by pair.
-class Sets {
+/// Disjoint sets of numbers (union-find).
+class DisjointSets {
  public:
-  explicit Sets(std::size_t count) : parent_(count) {
+  explicit DisjointSets(std::size_t count) : parent_(count) {
     std::iota(parent_.begin(), parent_.end(), 0u);
   }
   /// The lowest number of a set.
@@ -253,16 +254,16 @@ std::uint64_t count_loops(std::vector<Part>& parts) {
   std::sort(ends.begin(), ends.end(), [](const BoundaryEnd& a, const BoundaryEnd& b) {
     return a.edge != b.edge ? a.edge < b.edge : a.fan < b.fan;
   });
-  Sets sets(fans);
+  DisjointSets sets(fans);
   for (std::size_t i = 0; i + 1 < ends.size(); i += 2) sets.join(ends[i].fan, ends[i + 1].fan);
   std::uint64_t loops = 0;
   for (std::uint32_t f = 0; f < fans; ++f) loops += sets.root(f) == f ? 1u : 0u;
   return loops;
 }
 
-/// Parts of the surface that share no position.
+/// Components: parts of the surface that share no position.
 std::uint64_t count_components(const Surface& surface) {
-  Sets sets(surface.position_count);
+  DisjointSets sets(surface.position_count);
   for (std::size_t i = 0; i < surface.corners.size(); i += 3) {
     sets.join(surface.corners[i], surface.corners[i + 1]);
     sets.join(surface.corners[i], surface.corners[i + 2]);
@@ -284,30 +285,30 @@ void add(MeshTopology& sum, const MeshTopology& part) {
   sum.duplicate_triangles += part.duplicate_triangles;
 }
 
-void report_findings(const TriMesh& mesh, const MeshTopology& topology, Report& report) {
-  const auto tell = [&](std::uint64_t count, const char* id, const std::string& message,
-                        const char* cure) {
+void add_diagnostics(const TriMesh& mesh, const MeshTopology& topology, Report& report) {
+  const auto add = [&](std::uint64_t count, const char* id, const std::string& message,
+                       const char* cure) {
     if (count == 0) return;
     report.findings.push_back({id, DiagnosticSeverity::kInfo, mesh.name, 0, message, cure});
   };
-  tell(topology.non_manifold_edges + topology.non_manifold_vertices, "model.non-manifold",
-       std::to_string(topology.non_manifold_edges) + " edges have more than two triangles and " +
-           std::to_string(topology.non_manifold_vertices) +
-           " vertices are where surfaces meet or touch",
-       "they are kept as they are; levels of detail leave them in place");
-  tell(topology.duplicate_triangles, "model.duplicate-faces",
-       std::to_string(topology.duplicate_triangles) + " triangles repeat an earlier one",
-       "they are kept; remove them in a modelling program, they cost time and may flicker");
-  tell(topology.flipped_edges, "model.flipped",
-       std::to_string(topology.flipped_edges) +
-           " edges lie between triangles that wind against "
-           "each other",
-       "recalculate the normals in a modelling program if sides of the model are missing");
+  add(topology.non_manifold_edges + topology.non_manifold_vertices, "model.non-manifold",
+      std::to_string(topology.non_manifold_edges) + " edges have more than two triangles and " +
+          std::to_string(topology.non_manifold_vertices) +
+          " vertices are where surfaces meet or touch",
+      "they are kept as they are; levels of detail leave them in place");
+  add(topology.duplicate_triangles, "model.duplicate-faces",
+      std::to_string(topology.duplicate_triangles) + " triangles repeat an earlier one",
+      "they are kept; remove them in a modelling program, they cost time and may flicker");
+  add(topology.flipped_edges, "model.flipped",
+      std::to_string(topology.flipped_edges) +
+          " edges lie between triangles that wind against "
+          "each other",
+      "recalculate the normals in a modelling program if sides of the model are missing");
   if (!topology.half_edges) return;
-  tell(topology.half_edges->copied_faces, "model.copied-faces",
-       std::to_string(topology.half_edges->copied_faces) +
-           " faces fit in no half-edge mesh (three at an edge, or turned over)",
-       "levels of detail keep them as they are");
+  add(topology.half_edges->copied_faces, "model.copied-faces",
+      std::to_string(topology.half_edges->copied_faces) +
+          " faces fit in no half-edge mesh (three at an edge, or turned over)",
+      "levels of detail keep them as they are");
 }
 
 }  // namespace
@@ -335,7 +336,7 @@ MeshTopology measure_topology(const TriMesh& mesh, const TopologyOptions& option
     topology.half_edges = count_half_edges(
         surface.position_count, std::span(surface.corners.data(), surface.corners.size()));
   }
-  report_findings(mesh, topology, report);
+  add_diagnostics(mesh, topology, report);
   timer.done(topology.triangles, topology.components);
   return topology;
 }

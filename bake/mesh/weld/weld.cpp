@@ -45,7 +45,7 @@ bool has_direction(const glm::vec3& n) {
   return square > 1e-30f && square < 1e30f;
 }
 
-/// v turned over; what is no number becomes the image's corner.
+/// Flips v; non-finite coordinates become the image's corner.
 glm::dvec2 image_uv(const glm::dvec2& uv) {
   if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return glm::dvec2(0.0, 1.0);
   return {uv.x, 1.0 - uv.y};
@@ -58,7 +58,7 @@ glm::u8vec4 byte_colour(const glm::vec3& colour) {
           static_cast<std::uint8_t>(c.z), std::uint8_t{255}};
 }
 
-/// Collects the faces round each (position, smoothing group); a group of 0 makes flat faces.
+/// Collects the faces around each (position, smoothing group); group 0 makes flat faces.
 /// Weights: area times the angle at the corner, so that neither thin nor many triangles of one flat
 /// side tilt the normal (Max, "Weights for computing vertex normals from facet normals", 1999, for
 /// the area; Thuermer and Wuethrich, 1998, for the angle).
@@ -68,7 +68,7 @@ class NormalMaker {
   void reset(std::size_t count);
   /// Number of the normal shared by the corners of this position and group; made on first use.
   std::uint32_t node(std::uint32_t position, std::uint32_t group, std::size_t position_count);
-  /// Number of a normal of one face alone.
+  /// Number of a normal that belongs to one face.
   std::uint32_t flat_node();
   /// Adds a triangle's share to one corner. cross: twice its area vector; a: the corner's position.
   void add(std::uint32_t node, const glm::dvec3& cross, const glm::dvec3& a, const glm::dvec3& b,
@@ -125,9 +125,9 @@ Array<glm::dvec3> NormalMaker::take_normals() {
   return std::move(sums_);
 }
 
-/// Numbers distinct (position, uv, normal) triples by first use. They hang in a list at their
-/// position: corners that share a position stand near each other in files, so no hash is needed but
-/// for hubs with very many vertices.
+/// Numbers distinct (position, uv, normal) triples by first use, in a list per position: corners
+/// that share a position are near each other in files, so a hash is needed only for hubs with very
+/// many vertices.
 class VertexWeld {
  public:
   explicit VertexWeld(std::size_t position_count) : first_(position_count, kNoIndex) {}
@@ -143,7 +143,7 @@ class VertexWeld {
 
   /// The triple of each vertex.
   [[nodiscard]] const Array<Corner>& keys() const { return keys_; }
-  /// Ends the search; frees all but the keys.
+  /// Frees everything but the keys.
   void finish() {
     first_.release();
     next_.release();
@@ -151,6 +151,7 @@ class VertexWeld {
   }
 
  private:
+  /// Longer lists are hashed: keeps adversarial files linear; set by hand, real ones need under 10.
   static constexpr std::uint32_t kMaxSteps = 64;
 
   std::uint32_t add(const Corner& key);
@@ -189,7 +190,7 @@ std::uint32_t VertexWeld::from_hub(const Corner& key) {
 
 // The general way: polygons, seams, missing and made normals.
 
-/// Marks the number of a made normal in a vertex key; source normals stay below it.
+/// Flags a made normal's number in a vertex key; numbers of source normals are below it.
 constexpr std::uint32_t kMade = 0x80000000u;
 
 /// Runs over the faces once: triangulates, drops, gathers normals, welds.
@@ -345,7 +346,8 @@ void weld_any(SourceModel& source, TriMesh& mesh, WeldCounts& counts) {
 
 // The way of files whose corners repeat one index (most scans): works in the source's arrays.
 
-constexpr std::size_t kStretch = 1u << 16;  ///< elements that one thread takes at a time
+/// Elements that a thread takes at a time: small enough to balance load, set by hand.
+constexpr std::size_t kStretch = 1u << 16;
 
 std::uint32_t stretches(std::size_t count) {
   return static_cast<std::uint32_t>((count + kStretch - 1) / kStretch);
@@ -360,42 +362,42 @@ void parallel_stretches(std::size_t count, unsigned jobs, const Body& body) {
   });
 }
 
-enum class Verdict : std::uint8_t { kKeep, kFlat, kNotFinite };
+enum class TriangleClass : std::uint8_t { kKeep, kFlat, kNotFinite };
 
-/// What to do with each triangle; marks the positions of those that stay.
-Array<Verdict> judge(const SourceModel& source, Array<std::uint8_t>& used, unsigned jobs) {
+/// Classifies each triangle; marks the positions of those that are kept.
+Array<TriangleClass> classify(const SourceModel& source, Array<std::uint8_t>& used, unsigned jobs) {
   const std::size_t count = source.face_count();
-  Array<Verdict> verdicts(count);
+  Array<TriangleClass> classes(count);
   used.assign(source.positions.size(), 0);
   parallel_stretches(count, jobs, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const std::uint32_t* v = source.corner_positions.data() + 3 * t;
       const glm::dvec3 area =
           area_vector(source.positions[v[0]], source.positions[v[1]], source.positions[v[2]]);
-      verdicts[t] = !is_finite(area)          ? Verdict::kNotFinite
-                    : area == glm::dvec3(0.0) ? Verdict::kFlat
-                                              : Verdict::kKeep;
-      if (verdicts[t] != Verdict::kKeep) continue;
-      // Threads may mark one position at a time, all with the same value.
+      classes[t] = !is_finite(area)          ? TriangleClass::kNotFinite
+                   : area == glm::dvec3(0.0) ? TriangleClass::kFlat
+                                             : TriangleClass::kKeep;
+      if (classes[t] != TriangleClass::kKeep) continue;
+      // Several threads may mark one position, all with the same value.
       for (int i = 0; i < 3; ++i) {
         std::atomic_ref<std::uint8_t>(used[v[i]]).store(1, std::memory_order_relaxed);
       }
     }
   });
-  return verdicts;
+  return classes;
 }
 
-/// Takes dropped triangles out and lists the materials of the rest.
-void keep_triangles(SourceModel& source, const Array<Verdict>& verdicts, TriMesh& mesh,
+/// Removes dropped triangles and lists the materials of the rest.
+void keep_triangles(SourceModel& source, const Array<TriangleClass>& classes, TriMesh& mesh,
                     WeldCounts& counts) {
   RunCursor materials(source.material_runs);
-  mesh.triangle_material.resize(verdicts.size());
+  mesh.triangle_material.resize(classes.size());
   std::uint32_t* corners = source.corner_positions.data();
   std::size_t kept = 0;
-  for (std::size_t t = 0; t < verdicts.size(); ++t) {
+  for (std::size_t t = 0; t < classes.size(); ++t) {
     const std::uint32_t material = materials.at(t);
-    if (verdicts[t] != Verdict::kKeep) {
-      ++(verdicts[t] == Verdict::kFlat ? counts.flat : counts.not_finite);
+    if (classes[t] != TriangleClass::kKeep) {
+      ++(classes[t] == TriangleClass::kFlat ? counts.flat : counts.not_finite);
       continue;
     }
     mesh.triangle_material[kept] = material;
@@ -417,7 +419,7 @@ void keep_elements(Array<T>& values, const Array<std::uint8_t>& used) {
   values.shrink();
 }
 
-/// Takes positions out that no triangle uses; `to` is where the others went.
+/// Removes positions that no triangle uses; `to` holds the new numbers of the others.
 void drop_unused(SourceModel& source, const Array<std::uint8_t>& used, TriMesh& mesh) {
   if (std::find(used.begin(), used.end(), std::uint8_t{0}) == used.end()) return;
   Array<std::uint32_t> to(used.size());
@@ -432,7 +434,7 @@ void drop_unused(SourceModel& source, const Array<std::uint8_t>& used, TriMesh& 
   keep_elements(source.colours, used);
 }
 
-/// Normals round each position, for sources that have none.
+/// A normal for each position, for sources without normals.
 void make_normals(const SourceModel& source, TriMesh& mesh, WeldCounts& counts) {
   NormalMaker maker;
   maker.reset(source.positions.size());
@@ -451,7 +453,7 @@ void make_normals(const SourceModel& source, TriMesh& mesh, WeldCounts& counts) 
   for (std::size_t v = 0; v < made.size(); ++v) mesh.normals[v] = glm::vec3(made[v]);
 }
 
-bool can_weld_directly(const SourceModel& source) {
+bool has_identity_indices(const SourceModel& source) {
   using Kind = IndexPlane::Kind;
   if (!source.first_corner.empty() || source.corner_uvs.kind == Kind::kOwn) return false;
   if (source.corner_uvs.kind == Kind::kSame && source.uvs.size() < source.positions.size()) {
@@ -468,11 +470,11 @@ bool can_weld_directly(const SourceModel& source) {
 void weld_identity_indices(SourceModel& source, TriMesh& mesh, WeldCounts& counts, unsigned jobs) {
   if (source.corner_uvs.kind == IndexPlane::Kind::kAbsent) source.uvs.release();
   if (source.corner_normals.kind == IndexPlane::Kind::kAbsent) source.normals.release();
-  // What lies beyond the last position no corner refers to.
+  // No corner refers to elements beyond the last position.
   if (!source.uvs.empty()) source.uvs.resize(source.positions.size());
   if (!source.normals.empty()) source.normals.resize(source.positions.size());
   Array<std::uint8_t> used;
-  keep_triangles(source, judge(source, used, jobs), mesh, counts);
+  keep_triangles(source, classify(source, used, jobs), mesh, counts);
   if (mesh.triangle_material.empty()) return;
   drop_unused(source, used, mesh);
   used.release();
@@ -516,7 +518,7 @@ void normalise(TriMesh& mesh) {
   }
 }
 
-/// Keeps the materials that triangles use, in their order.
+/// Keeps only the materials that triangles use, in the same order.
 void keep_used_materials(const SourceModel& source, TriMesh& mesh) {
   std::vector<std::uint32_t> to(source.materials.size(), kNoIndex);
   for (const std::uint32_t m : mesh.triangle_material) to[m] = 0;
@@ -556,7 +558,7 @@ Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& op
   mesh.source_vertex_count = source.positions.size();
   mesh.source_face_count = source.face_count();
   WeldCounts counts;
-  if (can_weld_directly(source)) {
+  if (has_identity_indices(source)) {
     weld_identity_indices(source, mesh, counts, options.jobs);
   } else {
     weld_any(source, mesh, counts);

@@ -13,9 +13,9 @@ struct WeldOptions {
 
 /// Triangulates (concave polygons by ear clipping), drops what has no area, welds on index triples,
 /// makes missing normals (area-and-angle weighted, smoothing groups respected), normalises to
-/// [-1,1]. Findings of dropped and made things go to report.findings. Errors: kInvalidInput
-/// "model.empty" where no triangle is left. The form that takes the source over frees its arrays as
-/// it goes: large models need half the memory.
+/// [-1,1]. Diagnostics of dropped triangles and made normals go to report.findings. Errors:
+/// kInvalidInput "model.empty" where no triangle is left. The overload that takes ownership frees
+/// the source's arrays as it goes: large models need half the memory.
 Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& options = {});
 Result<TriMesh> weld(const SourceModel& source, Report& report, const WeldOptions& options = {});
 
