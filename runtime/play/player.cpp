@@ -183,18 +183,18 @@ void Player::report_focal(const Job& job) {
 /// The run is over, and --find-focal has found nothing: what it would have needed.
 void Player::report_focal_unknown() const {
   char seen[120];
-  if (focal_.deviation > 0 && focal_.scatter_deg < FocalProgress::kScatter) {
+  if (focal_.deviation > 0 && focal_.scatter_deg < FocalProgress::kMinScatterDeg) {
     std::snprintf(
         seen, sizeof seen,
         "all %d views are tilted to the same side: they scatter by %.1f degrees, %.0f are needed",
-        focal_.views, focal_.scatter_deg, FocalProgress::kScatter);
+        focal_.views, focal_.scatter_deg, FocalProgress::kMinScatterDeg);
   } else if (focal_.deviation > 0) {
     std::snprintf(seen, sizeof seen, "%d views tell it to %.1f %%, 1 %% is needed", focal_.views,
                   100 * focal_.deviation);
-  } else if (focal_.views + focal_.faint > 0) {
+  } else if (focal_.views + focal_.frontal > 0) {
     std::snprintf(seen, sizeof seen,
                   "%d views tell something and %d are too frontal or too far, %d are needed",
-                  focal_.views, focal_.faint, FocalProgress::kFewestViews);
+                  focal_.views, focal_.frontal, FocalProgress::kMinViews);
   } else {
     std::snprintf(seen, sizeof seen, "no pattern was seen well enough");
   }
@@ -202,7 +202,7 @@ void Player::report_focal_unknown() const {
       stderr,
       "modar-play: the focal length stays unknown: %s (in %d looks); tilt a pattern by 30 to 50 "
       "degrees, to every side, large in the frame, or use `modar calibrate`\n",
-      seen, focal_.looks);
+      seen, focal_.frames);
 }
 
 /// Hysteresis, what to draw, and all of the report that stands before drawing.

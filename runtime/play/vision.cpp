@@ -29,7 +29,7 @@ struct OurVision {
       MODAR_ASSIGN(auto created, FocalFinder::create(bundle, frame.width, frame.height));
       finder = std::move(created);
     }
-    const bool added = finder->look(frame.gray_image());
+    const bool added = finder->add_frame(frame.gray_image());
     focal = finder->progress();
     const std::optional<double> found = added ? finder->focal() : std::nullopt;
     if (!found) return {};
@@ -50,7 +50,7 @@ struct OurVision {
     if (!loop || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
       PoseLoopOptions how;
-      how.apart = options.apart;
+      how.async_search = options.apart;
       MODAR_ASSIGN(auto created, PoseLoop::create(bundle, camera, how));
       loop = std::move(created);
     }

@@ -44,7 +44,7 @@ Camera camera_for(const std::optional<Camera>& calibrated, int width, int height
 /// "method.unsupported" for the paper's method in a build without OpenCV.
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
 
-/// Our loop alone, of `options` camera, apart and find_focal: a FocalFinder looks at every fifth
+/// Our loop alone, of `options` camera, apart and find_focal: a FocalFinder takes every fifth
 /// frame until it knows the focal length; from then on that is the jobs' camera. Errors: those of
 /// PoseLoop.
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options);

@@ -9,6 +9,7 @@
 namespace modar {
 namespace {
 
+// The iteration gains a digit or two a step with lenses of phones; the bound is for extreme ones.
 constexpr int kUndistortSteps = 50;
 constexpr double kUndistortPrecision = 1e-12;  // normalised image units
 
@@ -41,7 +42,7 @@ Camera default_camera(int width, int height) {
 
 Camera scaled_camera(const Camera& camera, int width, int height) {
   if (camera.width <= 0 || camera.height <= 0) return default_camera(width, height);
-  // The larger factor fills the new frame; what sticks out on the other axis is cut on both sides.
+  // The larger factor fills the new frame; the excess on the other axis is cropped on both sides.
   const double scale = std::max(static_cast<double>(width) / camera.width,
                                 static_cast<double>(height) / camera.height);
   Camera scaled = camera;
@@ -63,7 +64,7 @@ glm::dvec2 undistort(const Camera& camera, glm::dvec2 pixel) {
   for (int step = 0; step < kUndistortSteps; ++step) {
     const double r2 = glm::dot(ideal, ideal);
     const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    // Beyond the lens model's turning point no ideal pixel exists: the seen one is the best answer.
+    // Beyond the turning point of the lens model no undistorted pixel exists: returns the input.
     if (!(radial > 0.0)) return pixel;
     const double xy = ideal.x * ideal.y;
     const glm::dvec2 tangential{2.0 * p1 * xy + p2 * (r2 + 2.0 * ideal.x * ideal.x),

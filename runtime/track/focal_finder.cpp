@@ -13,8 +13,8 @@
 #include "kernels.hpp"
 #include "modar/camera.hpp"
 #include "modar/tracker_features.hpp"
-#include "plane_matcher.hpp"
-#include "refine_pose.hpp"
+#include "pattern_matching.hpp"
+#include "pose_refinement.hpp"
 #include "tracked_pattern.hpp"
 
 namespace modar {
@@ -22,20 +22,22 @@ namespace {
 
 using tracker::TrackedPattern;
 
-constexpr int kInliers = 15;  // of a find that is worth aligning
-constexpr double kPerspective =
-    0.06;  // of the two axes' vanishing terms, below which nothing shows
-constexpr int kMostViews = 256;
+// Inliers of a hypothesis that is aligned: without the photometric check of a search, so more of
+// them.
+constexpr int kMinInliers = 15;
+// Perspective terms of the homography per half pattern: below, noise decides. Both by hand.
+constexpr double kMinPerspective = 0.06;
+constexpr int kMaxViews = 256;  // bounds the memory
 
-/// a * x = b for x = 1 / f^2: an axis of the plane is as long as the other, and at right angles.
+/// a * x = b for x = 1 / f^2: the axes of the plane are equally long, or orthogonal.
 struct Constraint {
   double a = 0;
   double b = 0;
 };
 
-/// Both constraints of a view. homography: world (ModAR Eq. 1) to pixels from the frame's middle.
+/// Both constraints of a view. homography: world (ModAR Eq. 1) to pixels from the frame's centre.
 std::array<Constraint, 2> constraints_of(const glm::dmat3& homography, double unit) {
-  // In units of the frame's width the first two rows and the last are of one size.
+  // In units of the frame's width all three rows are of one magnitude.
   glm::dvec3 h1 = homography[0];
   glm::dvec3 h2 = homography[1];
   for (glm::dvec3* h : {&h1, &h2}) {
@@ -56,27 +58,27 @@ struct FocalFinder::State {
   double unit = 0;  ///< frame width
   Camera camera;    ///< the default: only its principal point matters
   std::vector<TrackedPattern> patterns;
-  std::unique_ptr<FeatureExtractor> describer;
+  std::unique_ptr<FeatureExtractor> extractor;
   std::unique_ptr<tracker::PlaneMatcher> matcher;
   tracker::PatchCache patches;
   std::vector<Constraint> constraints;  ///< two a view
-  std::vector<glm::dvec3> horizons;     ///< of the views: vanishing lines, pixels from the middle
-  int looks = 0;
-  int faint = 0;
+  std::vector<glm::dvec3> horizons;     ///< of the views: vanishing lines, pixels from the centre
+  int frames = 0;
+  int frontal = 0;
 
   /// x = 1 / f^2 in squared units, and its standard deviation.
   [[nodiscard]] bool solve(double& x, double& deviation) const;
   [[nodiscard]] double scatter_deg(double focal) const;
 };
 
-/// As FocalProgress has it.
+/// As FocalProgress defines it.
 double FocalFinder::State::scatter_deg(double focal) const {
   glm::dvec2 sum(0);
   double xx = 0;
   double xy = 0;
   double yy = 0;
   for (const glm::dvec3& line : horizons) {
-    // Through K, a vanishing line is its plane's normal.
+    // K maps a vanishing line to the normal of its plane.
     glm::dvec3 normal = glm::normalize(glm::dvec3(line.x * focal, line.y * focal, line.z));
     if (normal.z < 0) normal = -normal;
     sum += glm::dvec2(normal);
@@ -88,12 +90,12 @@ double FocalFinder::State::scatter_deg(double focal) const {
   xx = share * xx - share * share * sum.x * sum.x;
   xy = share * xy - share * share * sum.x * sum.y;
   yy = share * yy - share * share * sum.y * sum.y;
-  const double most = 0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy);
-  return glm::degrees(std::sqrt(std::max(0.0, most)));
+  const double largest = 0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy);
+  return glm::degrees(std::sqrt(std::max(0.0, largest)));
 }
 
 bool FocalFinder::State::solve(double& x, double& deviation) const {
-  // Twice: the second time without views that the first cannot explain.
+  // Twice: the second time without views more than 2.5 standard deviations off.
   double limit = 1e9;
   for (int pass = 0; pass < 2; ++pass) {
     double aa = 0;
@@ -105,7 +107,7 @@ bool FocalFinder::State::solve(double& x, double& deviation) const {
       ab += c.a * c.b;
       ++count;
     }
-    if (count < FocalProgress::kFewestViews || !(aa > 0)) return false;
+    if (count < FocalProgress::kMinViews || !(aa > 0)) return false;
     const double best = ab / aa;
     double rest = 0;
     for (const Constraint& c : constraints) {
@@ -131,14 +133,13 @@ Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundl
   auto state = std::make_unique<State>();
   state->unit = width;
   state->camera = default_camera(width, height);
-  std::size_t most_codes = 0;
+  std::size_t max_codes = 0;
   for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
     const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
     if (bytes.empty()) continue;
-    auto pattern = tracker::view_loop_pattern(bytes, i);
-    if (!pattern) return tl::unexpected(pattern.error());
-    most_codes = std::max(most_codes, pattern->features.size());
-    state->patterns.push_back(*pattern);
+    MODAR_ASSIGN(const TrackedPattern pattern, tracker::view_tracked_pattern(bytes, i));
+    max_codes = std::max(max_codes, pattern.features.size());
+    state->patterns.push_back(pattern);
   }
   if (state->patterns.empty()) {
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
@@ -146,36 +147,36 @@ Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundl
                 "bake it with a pattern");
   }
   const DetectOptions detect;
-  state->describer = FeatureExtractor::create(width, height, detect);
+  state->extractor = FeatureExtractor::create(width, height, detect);
   state->matcher = std::make_unique<tracker::PlaneMatcher>(
-      state->camera, tracker::kernels(), static_cast<std::size_t>(detect.max_features), most_codes);
-  state->constraints.reserve(2 * kMostViews);
-  state->horizons.reserve(kMostViews);
+      state->camera, tracker::kernels(), static_cast<std::size_t>(detect.max_features), max_codes);
+  state->constraints.reserve(2 * kMaxViews);
+  state->horizons.reserve(kMaxViews);
   return std::unique_ptr<FocalFinder>(new FocalFinder(std::move(state)));
 }
 
-bool FocalFinder::look(const GrayImage& frame) {
+bool FocalFinder::add_frame(const GrayImage& frame) {
   State& state = *state_;
-  ++state.looks;
-  state.describer->set_frame(frame);
-  const auto features = state.describer->features();
-  const tracker::Scene scene{state.camera, state.describer->pyramid(), tracker::kernels(),
-                             state.patches};
+  ++state.frames;
+  state.extractor->set_frame(frame);
+  const auto features = state.extractor->features();
+  const tracker::FrameView view{state.camera, state.extractor->pyramid(), tracker::kernels(),
+                                state.patches};
   bool added = false;
   for (const TrackedPattern& pattern : state.patterns) {
-    if (state.horizons.size() == kMostViews) return added;
-    const auto finds = state.matcher->find(pattern, features);
-    if (finds.empty() || finds[0].inliers < kInliers) continue;
-    tracker::PlaneMap map{finds[0].homography};
-    tracker::Fit fit;
-    if (!tracker::settle_map(pattern, scene, map, fit)) continue;
+    if (state.horizons.size() == kMaxViews) return added;
+    const auto hypotheses = state.matcher->find(pattern, features);
+    if (hypotheses.empty() || hypotheses[0].inliers < kMinInliers) continue;
+    tracker::PlaneMap map{hypotheses[0].homography};
+    tracker::PatchFit fit;
+    if (!tracker::refine_map(pattern, view, map, fit)) continue;
     glm::dmat3 centre(1.0);
     centre[2] = {-state.camera.cx, -state.camera.cy, 1.0};
     const glm::dmat3 from_world =
         centre * map.homography * glm::inverse(pattern.world_from_pixels());
     const glm::dmat3 homography = from_world * (1.0 / from_world[2][2]);
-    if (std::hypot(homography[0].z, homography[1].z) < kPerspective) {
-      ++state.faint;
+    if (std::hypot(homography[0].z, homography[1].z) < kMinPerspective) {
+      ++state.frontal;
       continue;
     }
     for (const Constraint& constraint : constraints_of(homography, state.unit)) {
@@ -188,7 +189,8 @@ bool FocalFinder::look(const GrayImage& frame) {
 }
 
 FocalProgress FocalFinder::progress() const {
-  FocalProgress progress{state_->looks, state_->faint, static_cast<int>(state_->horizons.size())};
+  FocalProgress progress{state_->frames, state_->frontal,
+                         static_cast<int>(state_->horizons.size())};
   double x = 0;
   double deviation = 0;
   // f = x^(-1/2): its relative deviation is half of that of x.
@@ -201,12 +203,12 @@ FocalProgress FocalFinder::progress() const {
 std::optional<double> FocalFinder::focal() const {
   double x = 0;
   double deviation = 0;
-  if (state_->horizons.size() < FocalProgress::kFewestViews || !state_->solve(x, deviation) ||
-      !(0.5 * deviation < FocalProgress::kSure * x)) {
+  if (state_->horizons.size() < FocalProgress::kMinViews || !state_->solve(x, deviation) ||
+      !(0.5 * deviation < FocalProgress::kMaxDeviation * x)) {
     return std::nullopt;
   }
   const double focal = state_->unit / std::sqrt(x);
-  if (state_->scatter_deg(focal) < FocalProgress::kScatter) return std::nullopt;
+  if (state_->scatter_deg(focal) < FocalProgress::kMinScatterDeg) return std::nullopt;
   const bool plausible = focal > 0.3 * state_->unit && focal < 6 * state_->unit;
   return plausible ? std::optional<double>(focal) : std::nullopt;
 }

@@ -1,56 +1,59 @@
-// Holds patterns from frame to frame, once they were found. Internal to runtime/track.
+// Tracks patterns from frame to frame, once they were found. Internal to runtime/track.
 #pragma once
 
 #include <memory>
 
 #include "modar/tracker.hpp"
 #include "modar/tracker_features.hpp"
-#include "patch_cache.hpp"
-#include "refine_pose.hpp"
+#include "pose_refinement.hpp"
 
 namespace modar::tracker {
 
-inline constexpr int kLately = 60;  ///< frames for which a lost pattern is looked for first
+/// Frames for which a lost pattern is searched for first, and in every frame: two seconds. Trades
+/// the time of those searches for how fast a pattern comes back; set by hand.
+inline constexpr int kRecentFrames = 60;
 
 /// What is known of a pattern from frame to frame.
 struct Track {
-  bool held = false;
-  bool by_map = false;  ///< no pose of the camera explains it: its own map is followed
-  bool moving = false;  ///< two poses in sequence tell a motion
+  bool tracked = false;
+  bool homography_only = false;  ///< no pose of the camera explains it: its plane map is tracked
+  bool has_motion = false;       ///< `previous` is the pose of the frame before
   Pose pose;
-  Pose before;
-  PlaneMap map;         ///< where by_map
-  double share = 1;     ///< of the patches in view, how many hold; of the frames before
-  double likeness = 0;  ///< of the patches, of the sharp frames before
-  int since_lost = kLately;
-  Reason told = Reason::kNoFeatures;  ///< by the last search
+  Pose previous;
+  PlaneMap map;             ///< if homography_only
+  double inlier_ratio = 1;  ///< of the patches in view; running mean of the frames before
+  double correlation = 0;   ///< of the patches, in the sharp frames before
+  int frames_since_lost = kRecentFrames;
+  Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
 };
 
-/// What the frames so far tell of all patterns, and the present one.
+/// The present frame, and the steps that bring tracks to it.
 class FrameTracker {
  public:
   FrameTracker(const Camera& camera, const DetectOptions& options);
-  /// The present frame, which must stay until the next.
-  void set_frame(const GrayImage& frame) { eye_->set_frame(frame); }
-  [[nodiscard]] FeatureExtractor& eye() { return *eye_; }
-  [[nodiscard]] Scene scene() const { return {camera_, eye_->pyramid(), kernels_, *patches_}; }
-  /// Brings a track to the present frame; false where the pattern is lost, and why in track.told.
-  bool follow(const TrackedPattern& pattern, Track& track, Detection& detection);
-  /// Where the track lies, without counts; false where no camera sees a pattern so.
-  bool report(const TrackedPattern& pattern, const Track& track, Detection& detection) const;
+  /// Sets the present frame, which must stay until the next.
+  void set_frame(const GrayImage& frame) { extractor_->set_frame(frame); }
+  [[nodiscard]] FeatureExtractor& extractor() { return *extractor_; }
+  [[nodiscard]] FrameView frame() const {
+    return {camera_, extractor_->pyramid(), kernels_, *patches_};
+  }
+  /// Brings a track to the present frame; false if the pattern is lost, with track.last_reason.
+  bool update(const TrackedPattern& pattern, Track& track, Detection& detection);
+  /// Fills in pattern, pose and corners; false if no camera could see the pattern there.
+  bool locate(const TrackedPattern& pattern, const Track& track, Detection& detection) const;
 
  private:
-  bool follow_pose(const TrackedPattern& pattern, Track& track, Fit& fit);
-  bool find_again(const TrackedPattern& pattern, const Track& track, const Pose& predicted,
-                  Pose& pose, Fit& fit) const;
-  bool unsmear(const TrackedPattern& pattern, const Track& track, const Pose& predicted, Pose& pose,
-               Fit& fit);
+  bool update_pose(const TrackedPattern& pattern, Track& track, PatchFit& fit);
+  bool reacquire(const TrackedPattern& pattern, const Track& track, const Pose& predicted,
+                 Pose& pose, PatchFit& fit) const;
+  bool refine_blurred(const TrackedPattern& pattern, const Track& track, const Pose& predicted,
+                      Pose& pose, PatchFit& fit);
 
   Camera camera_;
   const Kernels& kernels_;
-  std::unique_ptr<FeatureExtractor> eye_;
+  std::unique_ptr<FeatureExtractor> extractor_;
   std::unique_ptr<PatchCache> patches_ = std::make_unique<PatchCache>();
-  double smear_ = 0;  ///< share of a frame's time that the shutter is open, as blur tells
+  double exposure_ = 0;  ///< share of the frame interval, as estimated from the last blurred frame
 };
 
 }  // namespace modar::tracker

@@ -1,10 +1,10 @@
 // The kernels, compiled once a SIMD level from this one source (Highway).
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "runtime/track/kernels.cpp"
-// Levels that gain little here and cost code: SSSE3 and AVX-512 on x86, SVE on ARM.
+// Targets that gain little here and cost code: SSSE3 and AVX-512 on x86, SVE on ARM.
 #define HWY_DISABLED_TARGETS \
   (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
-// Every target passes here anew, so the order of these two is fixed.
+// Highway includes this file once per target, so the order of these two is fixed.
 #include "kernels.hpp"
 
 #include <algorithm>
@@ -12,7 +12,6 @@
 
 #include "hwy/foreach_target.h"
 #include "hwy/highway.h"
-#include "patch_offsets.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace modar::tracker::HWY_NAMESPACE {
@@ -36,7 +35,7 @@ void halve_row(const std::uint8_t* top, const std::uint8_t* bottom, std::uint8_t
   const D16 wide;
   const Half8 narrow;
   const int step = lanes16();
-  // A 16-bit lane holds two neighbours whatever the byte order.
+  // A 16-bit lane holds two neighbouring pixels, in any byte order.
   for (; i + step <= count; i += step) {
     const auto low = hn::Set(wide, 0x00FF);
     const auto a = hn::BitCast(wide, hn::LoadU(hn::Repartition<std::uint8_t, D16>(), top + 2 * i));
@@ -90,7 +89,7 @@ void blur_row(const std::uint16_t* in, std::uint8_t* out, int count) {
   }
 }
 
-/// Over the 16 arcs of nine neighbours, the greatest of the arcs' least values.
+/// The greatest of the least values of all 16 arcs of nine neighbours.
 inline V8 best_arc(const V8* difference) {
   V8 two[16];
   V8 four[16];
@@ -124,7 +123,7 @@ void corner_scores(const std::uint8_t* pixels, std::ptrdiff_t stride, int thresh
       up[k] = hn::SaturatedSub(p, centre);
       down[k] = hn::SaturatedSub(centre, p);
     }
-    // Nine in sequence hold one of each pair of opposite compass points.
+    // Nine in sequence contain one of each pair of opposite compass points.
     const V8 maybe_up = hn::Min(hn::Max(up[0], up[8]), hn::Max(up[4], up[12]));
     const V8 maybe_down = hn::Min(hn::Max(down[0], down[8]), hn::Max(down[4], down[12]));
     if (hn::AllFalse(d, hn::Gt(hn::Max(maybe_up, maybe_down), least))) {
@@ -221,7 +220,7 @@ void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrd
     alignas(16) std::int32_t rows[4];
     hn::Store(column, whole, columns);
     hn::Store(row, whole, rows);
-    // A lane holds the four neighbours of its place, a byte each.
+    // A lane holds the four neighbouring pixels, a byte each.
     alignas(16) std::int32_t four[4];
     for (int i = 0; i < lanes; ++i) {
       const std::uint8_t* p = pixels + rows[i] * stride + columns[i];
@@ -304,7 +303,7 @@ HWY_AFTER_NAMESPACE();
 #include <cpuid.h>
 #endif
 
-// Highway's own dispatch needs its shared library; these few lines need none.
+// Highway's own dispatch needs its shared library; this needs none.
 namespace modar::tracker {
 
 #if HWY_ARCH_X86 && (HWY_TARGETS & HWY_SSE4) && (HWY_TARGETS & HWY_AVX2)
@@ -332,7 +331,7 @@ std::span<const Kernels> all_kernels() {
   static constexpr Kernels kTables[] = {N_SSE4::table("sse4"), N_AVX2::table("avx2")};
   constexpr std::size_t kBaseline = 0;
 #endif
-  // Each level as Highway compiles it: SSE4 with its carry-less multiply, AVX2 with FMA and BMI2.
+  // What Highway compiles for: SSE4 with carry-less multiplication, AVX2 with FMA and BMI2.
   static const std::size_t count = [] {
     __builtin_cpu_init();
     const bool sse4 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("pclmul") &&

@@ -1,6 +1,6 @@
-// The loops over pixels and bits that take most of a frame's time, one table a SIMD level. All
-// levels give the same bits: the loops hold integers, or floats of which no two are summed across
-// lanes in an order of the level's own.
+// The loops over pixels and bits that take most of a frame's time, one table per SIMD level. All
+// levels give the same bits: the loops use integers, or floats that are summed in an order that
+// does not depend on the number of lanes. Internal to runtime/track.
 #pragma once
 
 #include <cstddef>
@@ -10,29 +10,47 @@
 namespace modar::tracker {
 
 inline constexpr int kSlack = 64;       ///< elements past a range that kernels may read or write
-inline constexpr int kBlockCodes = 32;  ///< codes in a block; byte k of all of them lies together
+inline constexpr int kBlockCodes = 32;  ///< codes in a block; byte k of all of them is contiguous
 inline constexpr int kCodeBytes = 32;   ///< 256 bits
 
-inline constexpr int kPatchHalf = 4;     ///< a tracking patch is 9x9 pixels
-inline constexpr int kPatchPixels = 84;  ///< of those 81, filled up to whole vectors
+/// A tracking patch is 9x9 pixels: smaller ones match more places, larger ones cross more edges of
+/// what lies before the pattern. Set by hand (the study used 11x11); baked patches keep that
+/// distance from the border.
+inline constexpr int kPatchHalf = 4;
+inline constexpr int kPatchPixels = 84;  ///< those 81, padded to whole vectors
 
 /// A pattern's patch for alignment: gray values and half differences to the right and down, row by
-/// row; the filling is zero. The gradient is the template's, which has no noise: an image's own
-/// noise in both the gradient and the difference would pull towards the middle between pixels.
+/// row; the padding is zero. The gradient is the template's, which has no noise: noise in both the
+/// gradient and the difference would bias displacements towards half pixels.
 struct PatchTemplate {
   alignas(16) float gray[kPatchPixels];
   alignas(16) float right[kPatchPixels];
   alignas(16) float down[kPatchPixels];
 };
 
-/// Where a patch lies in an image: its centre, and the steps of a template's pixel.
+/// Offsets of a patch's pixels from its centre, row by row; the padding's are zero.
+struct PatchOffsets {
+  alignas(16) float right[kPatchPixels] = {};
+  alignas(16) float down[kPatchPixels] = {};
+  constexpr PatchOffsets() {
+    constexpr int kSide = 2 * kPatchHalf + 1;
+    for (int k = 0; k < kSide * kSide; ++k) {
+      right[k] = static_cast<float>(k % kSide - kPatchHalf);
+      down[k] = static_cast<float>(k / kSide - kPatchHalf);
+    }
+  }
+};
+
+inline constexpr PatchOffsets kPatchOffsets;
+
+/// A patch in an image: its centre, and the image steps of one template pixel.
 struct PatchPlace {
   float x = 0, y = 0;
   float right_x = 1, right_y = 0;
   float down_x = 0, down_y = 1;
 };
 
-/// Sums over a patch of the image alone, squared, and times the template's three.
+/// Sums over a patch: of the image, its square, and its products with the template's three.
 struct PatchSums {
   float i = 0, ii = 0, ti = 0, ix = 0, iy = 0;
 };
@@ -57,20 +75,20 @@ struct Kernels {
   /// 0.
   void (*peaks)(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below,
                 int count, std::uint8_t* peak);
-  /// Hamming distances (at most 255) of a code to blocks of kBlockCodes; answers the smallest.
-  /// Blocks none of whose codes lies within `reach` over their first 16 bytes answer 255
+  /// Hamming distances (at most 255) of a code to blocks of kBlockCodes; returns the smallest.
+  /// Blocks none of whose codes lies within `limit` over their first 16 bytes get 255
   /// throughout.
   int (*distances)(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t block_count,
-                   int reach, std::uint8_t* out);
+                   int limit, std::uint8_t* out);
   /// Samples the image bilinearly under a patch that lies inside with a pixel to spare. Its sums
   /// are added in the same order at every level: four partial ones, each of every fourth pixel.
   PatchSums (*patch_sums)(const PatchTemplate& patch, const PatchPlace& place,
                           const std::uint8_t* pixels, std::ptrdiff_t stride);
 };
 
-/// A level that this processor has: an index into all_kernels(), clamped; -1: the best.
+/// A level that this processor supports: an index into all_kernels(), clamped; -1: the best.
 const Kernels& kernels(int level = -1);
-/// Every level that this processor has, best last.
+/// Every level that this processor supports, best last.
 std::span<const Kernels> all_kernels();
 
 }  // namespace modar::tracker

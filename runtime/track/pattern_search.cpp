@@ -1,49 +1,72 @@
-// Features, which patterns to match, their homographies, poses and checks.
+// Features, the patterns to match, their homographies, poses and checks; and the thread for them.
 #include "pattern_search.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include <glm/matrix.hpp>
 
-#include "refine_from_inliers.hpp"
 #include "runtime/platform/lap_clock.hpp"
 
 namespace modar::tracker {
 namespace {
 
-constexpr int kFewestInliers = 6;
-constexpr int kFewestMatches = 6;
-// Where the finest patches do not hold, which in clutter they never did:
-constexpr int kVaguePercent = 60;     // so much must show,
-constexpr int kVagueCells = 24;       // in so many cells: a few smooth ones look alike anywhere;
-constexpr double kVagueMisfit = 3.0;  // and what the features then may leave
-constexpr double kMostMisfit = 1.5;   // of what the features alone leave
-constexpr double kMirrored = 1.5;     // the same, of two mirror images
-constexpr double kFarMisfit = 3.0;    // where it is another place altogether
-constexpr int kApartLoss = 8;         // what a place that features deny must show more
-constexpr double kUnhidden = 0.85;    // share of patches that hold where nothing hides any
-constexpr double kAll = 0.95;         // where the mirror image cannot be the right one
-constexpr int kManyInliers = 16;      // features that speak for a place by themselves, so that
-constexpr int kLeastPercent = 20;     // less of the pattern need show there
-constexpr int kMapGain = 20;          // percent that the map shows more than the best pose
-constexpr int kMapInliers = 16;       // where no pose fits, and the map alone must convince
-// Of many patterns, those are matched in full
-constexpr std::uint16_t kClearVotes = 4;  // that so many features speak for (chance: two or three),
-constexpr int kShadowed = 6;              // and no fewer than this part of those for another there:
-                                          // a shared frame or logo speaks for what it is not;
-constexpr double kMargin = 0.25;          // of the pattern's size;
-constexpr std::ptrdiff_t kMostClear = 4;  // at most so many a frame;
-constexpr std::size_t kGuessed = 2;       // where none is found, these at least, by their votes,
-constexpr std::size_t kMatched = 3;       // and with them the one whose turn it is.
+// Features that agree with a homography, and matches at all, below which nothing is detected.
+// Trades small and covered patterns for time in clutter, where the photometric check then has to
+// refuse what chance brings. By hand.
+constexpr int kMinInliers = 6;
+constexpr int kMinMatches = 6;
+// A place whose finest patches do not fit: so end 3 of 2,328 true detections, and every false one
+// (in 11,000 cluttered frames no place fitted on the finest level). So much of it must correlate,
+// in so many cells (a pattern with 8 of 11 cells alike was seen 16 times in a street's video), and
+// the features must lie within so many sigmas: with them 0 false in 20,000 cluttered frames.
+constexpr int kVaguePercent = 60;
+constexpr int kVagueCells = 24;
+constexpr double kVagueRms = 3.0;
+// Reprojection RMS after patches took over, of that before: above the first the place loses
+// kDoubtPenalty points of its score, above the second (and a sigma) all. Patches on the edge of an
+// occluder draw a pose away from what all features say. By hand on half-covered patterns.
+constexpr double kDoubtfulRms = 1.5;
+constexpr double kWrongRms = 3.0;
+constexpr int kDoubtPenalty = 8;
+// The same, of two mirror images: both are tried up to it.
+constexpr double kMirrorRms = 1.5;
+// Inlier ratio of patches from which nothing hides the pattern, so that further hypotheses are not
+// tried, and from which the mirror image cannot be right. Lower saves time, higher finds better
+// places of patterns in part hidden. By hand.
+constexpr double kUnoccluded = 0.85;
+constexpr double kComplete = 0.95;
+// Features that by themselves speak for a place, so that less of the pattern need correlate there:
+// half-covered patterns went from 95.0 to 98.8 % right with that and PatchFit::good().
+constexpr int kManyInliers = 16;
+constexpr int kManyInliersPercent = 20;
+// A plane map replaces the best pose if it correlates in so many percent more, and with so many
+// inliers: it has two parameters more to bend. By hand, on photos of unknown focal length.
+constexpr int kMapGain = 20;
+constexpr int kMapInliers = 16;
 
-std::size_t most_codes(std::span<const TrackedPattern> patterns) {
+// Of many patterns, those are matched in full that at least kMinVotes features vote for (by chance,
+// two or three do), and not fewer than a kShadowRatio-th of the votes for another pattern at the
+// same place: what shares a frame or a logo with it. Of 50 patterns, that removed one false name in
+// a hundred frames. kMargin widens a place by a quarter of the pattern: one vote places it that
+// well.
+constexpr std::uint16_t kMinVotes = 4;
+constexpr int kShadowRatio = 6;
+constexpr double kMargin = 0.25;
+// At most so many of them a frame, and if none is found, so many by votes alone, then in all with
+// the one whose turn it is: each costs the time of a match in full. By hand.
+constexpr std::ptrdiff_t kMaxLikely = 4;
+constexpr std::size_t kGuesses = 2;
+constexpr std::size_t kMatched = 3;
+
+std::size_t max_codes(std::span<const TrackedPattern> patterns) {
   std::size_t most = 0;
   for (const TrackedPattern& pattern : patterns) most = std::max(most, pattern.features.size());
   return most;
 }
 
-/// Whether a pattern lies where another one shows; with a margin, as one vote tells its outline.
-bool covers(const TrackedPattern& pattern, const PlaneMatch& place, const PlaneMatch& other) {
+/// Whether `other` lies within the outline that a pattern has by one vote, with a margin.
+bool covers(const TrackedPattern& pattern, const FeatureMatch& place, const FeatureMatch& other) {
   const glm::dvec2 size(pattern.width(), pattern.height());
   const glm::dvec2 at =
       (glm::inverse(place.affine) * (other.ideal - place.ideal) + place.pattern) / size;
@@ -58,203 +81,253 @@ PatternSearch::PatternSearch(const Camera& camera, std::span<const TrackedPatter
       kernels_(kernels(options.simd)),
       patterns_(patterns),
       matcher_(camera, kernels_, static_cast<std::size_t>(options.max_features),
-               most_codes(patterns)) {
-  chosen_.reserve(patterns.size());
-  is_clear_.resize(patterns.size());
+               max_codes(patterns)) {
+  selected_.reserve(patterns.size());
+  has_votes_.resize(patterns.size());
 }
 
-/// Leaves in chosen_ the patterns to match in full; the first clear_ of them are likely there.
-void PatternSearch::choose(std::span<const TrackerFeature> features, std::span<const Want> wants) {
-  chosen_.clear();
+/// Leaves in selected_ the patterns to match in full; the first likely_ of them are probably there.
+void PatternSearch::select(std::span<const TrackerFeature> features,
+                           std::span<const SearchPriority> priorities) {
+  selected_.clear();
   for (std::uint32_t i = 0; i < patterns_.size(); ++i) {
-    if (wants[i] != Want::kNo) chosen_.push_back(i);
+    if (priorities[i] != SearchPriority::kNone) selected_.push_back(i);
   }
-  clear_ = chosen_.size();
-  if (chosen_.size() <= kMatched) return;
-  if (!index_) index_ = std::make_unique<CodeIndex>(patterns_, kernels_, matcher_.most_features());
+  likely_ = selected_.size();
+  if (selected_.size() <= kMatched) return;
+  if (!index_) index_ = std::make_unique<CodeIndex>(patterns_, kernels_, matcher_.max_features());
   const std::span<const CodeIndex::Support> support = index_->vote(features);
-  for (const std::uint32_t i : chosen_) {
+  for (const std::uint32_t i : selected_) {
     const CodeIndex::Support& one = support[i];
-    is_clear_[i] = one.votes >= kClearVotes ? 1 : 0;
-    for (std::size_t k = 0; k < support.size() && is_clear_[i] != 0; ++k) {
-      const bool more = support[k].votes > kShadowed * one.votes;
-      if (more && covers(patterns_[k], support[k].place, one.place)) is_clear_[i] = 0;
+    has_votes_[i] = one.votes >= kMinVotes ? 1 : 0;
+    for (std::size_t k = 0; k < support.size() && has_votes_[i] != 0; ++k) {
+      const bool more = support[k].votes > kShadowRatio * one.votes;
+      if (more && covers(patterns_[k], support[k].place, one.place)) has_votes_[i] = 0;
     }
   }
-  const auto is_clear = [&](std::uint32_t i) { return is_clear_[i] != 0; };
+  const auto has_votes = [&](std::uint32_t i) { return has_votes_[i] != 0; };
   const auto before = [&](std::uint32_t a, std::uint32_t b) {
-    if (is_clear(a) != is_clear(b)) return is_clear(a);
-    if (wants[a] != wants[b]) return wants[a] == Want::kFirst;
+    if (has_votes(a) != has_votes(b)) return has_votes(a);
+    if (priorities[a] != priorities[b]) return priorities[a] == SearchPriority::kFirst;
     if (support[a].votes != support[b].votes) return support[a].votes > support[b].votes;
     return a < b;
   };
-  const auto first = chosen_.begin();
-  std::partial_sort(first, first + kMostClear, chosen_.end(), before);
-  clear_ = static_cast<std::size_t>(std::find_if_not(first, first + kMostClear, is_clear) - first);
-  const auto turn = first + static_cast<std::ptrdiff_t>(std::max(clear_, kGuessed));
-  if (turn == chosen_.end()) return;
+  const auto first = selected_.begin();
+  std::partial_sort(first, first + kMaxLikely, selected_.end(), before);
+  likely_ =
+      static_cast<std::size_t>(std::find_if_not(first, first + kMaxLikely, has_votes) - first);
+  const auto turn = first + static_cast<std::ptrdiff_t>(std::max(likely_, kGuesses));
+  if (turn == selected_.end()) return;
   const auto since = [this](std::uint32_t i) {
     const auto count = static_cast<std::uint32_t>(patterns_.size());
     return (i + count - turn_) % count;
   };
   const auto next = std::min_element(
-      turn, chosen_.end(), [&](std::uint32_t a, std::uint32_t b) { return since(a) < since(b); });
+      turn, selected_.end(), [&](std::uint32_t a, std::uint32_t b) { return since(a) < since(b); });
   turn_ = (*next + 1) % static_cast<std::uint32_t>(patterns_.size());
   std::iter_swap(turn, next);
-  chosen_.erase(turn + 1, chosen_.end());
+  selected_.erase(turn + 1, selected_.end());
 }
 
-void PatternSearch::run(FeatureExtractor& eye, std::span<const Want> wants,
+void PatternSearch::run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
                         DetectionCandidates& candidates) {
   LapClock clock;
   candidates.patterns.resize(patterns_.size());
   candidates.times = {};
-  const auto features = eye.features();
+  const auto features = extractor.features();
   candidates.features = static_cast<int>(features.size());
   candidates.times.detect = clock.lap();
   for (std::size_t i = 0; i < patterns_.size(); ++i) {
-    if (wants[i] == Want::kNo) continue;
+    if (priorities[i] == SearchPriority::kNone) continue;
     candidates.patterns[i] = {};
-    // Those that the index does not choose have few matches, as far as it can tell.
+    // Patterns that the index does not select have few matches, as far as it can tell.
     if (!features.empty()) candidates.patterns[i].reason = Reason::kFewMatches;
   }
   if (features.empty()) return;
-  choose(features, wants);
+  select(features, priorities);
   candidates.times.match = clock.lap();
-  const Scene scene{camera_, eye.pyramid(), kernels_, patches_};
+  const FrameView frame{camera_, extractor.pyramid(), kernels_, patches_};
   bool found = false;
-  for (std::size_t k = 0; k < chosen_.size() && (k < clear_ || !found); ++k) {
-    DetectionCandidate& candidate = candidates.patterns[chosen_[k]];
-    candidate = find(patterns_[chosen_[k]], scene, features, candidates.times);
+  for (std::size_t k = 0; k < selected_.size() && (k < likely_ || !found); ++k) {
+    DetectionCandidate& candidate = candidates.patterns[selected_[k]];
+    candidate = find(patterns_[selected_[k]], frame, features, candidates.times);
     found = found || candidate.reason == Reason::kVisible;
   }
 }
 
-DetectionCandidate PatternSearch::find(const TrackedPattern& pattern, const Scene& scene,
+DetectionCandidate PatternSearch::find(const TrackedPattern& pattern, const FrameView& frame,
                                        std::span<const TrackerFeature> features,
                                        TrackTimes& times) {
   LapClock clock;
   DetectionCandidate candidate;
-  const auto finds = matcher_.find(pattern, features);
+  const auto hypotheses = matcher_.find(pattern, features);
   candidate.matches = matcher_.matches();
   times.match += clock.lap();
-  candidate.reason = candidate.matches < kFewestMatches ? Reason::kFewMatches : Reason::kNoGeometry;
-  Place best;
-  for (const PlaneFind& found : finds) {
-    if (found.inliers < kFewestInliers || best.whole) break;
-    if (candidate.reason == Reason::kVisible && 2 * found.inliers < candidate.inliers) break;
+  candidate.reason = candidate.matches < kMinMatches ? Reason::kFewMatches : Reason::kNoGeometry;
+  PoseCandidate best;
+  for (const HomographyHypothesis& hypothesis : hypotheses) {
+    if (hypothesis.inliers < kMinInliers || best.unoccluded) break;
+    if (candidate.reason == Reason::kVisible && 2 * hypothesis.inliers < candidate.inliers) break;
     if (candidate.reason == Reason::kNoGeometry) candidate.reason = Reason::kFailedVerification;
-    find_pose(pattern, scene, found, best, candidate);
+    find_pose(pattern, frame, hypothesis, best, candidate);
   }
-  // Where a pose shows part of the pattern only, its map may show all of it.
+  // Where a pose shows a part of the pattern only, a plane map may show all of it.
   if (candidate.reason == Reason::kFailedVerification ||
-      (candidate.reason == Reason::kVisible && !best.whole)) {
-    find_map(pattern, scene, finds.front(), best.right + kMapGain, candidate);
+      (candidate.reason == Reason::kVisible && !best.unoccluded)) {
+    find_map(pattern, frame, hypotheses.front(), best.percent + kMapGain, candidate);
   }
   times.homography += clock.lap();
   return candidate;
 }
 
-/// Where the patches alone settle from a start, and how well that shows the pattern.
-PatternSearch::Place PatternSearch::settled(const TrackedPattern& pattern, const Scene& scene,
-                                            Reach reach, const Pose& start) const {
-  Place place;
-  place.pose = start;
-  Fit fit;
-  place.settled = settle(pattern, scene, reach, place.pose, fit);
-  place.right = percent_right(pattern, scene, place.pose);
-  place.value = place.right;
-  if (!place.settled) return place;
-  const int levels = static_cast<int>(scene.pyramid.size());
-  const Resolution best = finest(pattern, map_of_pose(pattern, camera_, place.pose), levels);
-  place.fine = fit.level == best.frame_level;
-  place.whole = place.fine && fit.share() >= kUnhidden;
-  place.all = place.fine && fit.share() >= kAll;
-  // The patches of the finest level tell two places apart that show as many cells.
-  place.value =
-      static_cast<int>(place.fine ? 0.5 * place.right + 100.0 * (fit.share() + fit.likeness)
-                                  : place.right + 50.0 * fit.likeness);
-  return place;
+/// Where the patches alone lead from a start, and how much of the pattern shows there.
+PatternSearch::PoseCandidate PatternSearch::evaluate_start(const TrackedPattern& pattern,
+                                                           const FrameView& frame,
+                                                           SearchRadius radius,
+                                                           const Pose& start) const {
+  PoseCandidate out;
+  out.pose = start;
+  PatchFit fit;
+  out.refined = refine(pattern, frame, radius, out.pose, fit);
+  out.percent = photometric_percent(pattern, frame, out.pose);
+  out.score = out.percent;
+  if (!out.refined) return out;
+  const int levels = static_cast<int>(frame.pyramid.size());
+  const Resolution best = tracker::finest(pattern, map_of_pose(pattern, camera_, out.pose), levels);
+  out.finest = fit.level == best.frame_level;
+  out.unoccluded = out.finest && fit.inlier_ratio() >= kUnoccluded;
+  out.complete = out.finest && fit.inlier_ratio() >= kComplete;
+  // Of two places that show as many cells, the finest level's patches tell the better one.
+  out.score = static_cast<int>(out.finest ? 0.5 * out.percent +
+                                                100.0 * (fit.inlier_ratio() + fit.correlation)
+                                          : out.percent + 50.0 * fit.correlation);
+  return out;
 }
 
-/// Brings a start to its place: by the features and by the patches as far as they are known from
-/// them, then by the patches alone; from further away where that does not hold.
-PatternSearch::Place PatternSearch::bring(const TrackedPattern& pattern, const Scene& scene,
-                                          Pose start) const {
+/// Refines a start by features and those patches that they predict, then by patches alone, from
+/// further away if that does not fit.
+PatternSearch::PoseCandidate PatternSearch::refine_start(const TrackedPattern& pattern,
+                                                         const FrameView& frame, Pose start) const {
   const PlanePoints points = matcher_.inliers();
-  grow(pattern, scene, points, start);
-  const double before = misfit(camera_, start, points);
-  Place best;
-  for (const Reach reach : {Reach::kNear, Reach::kFrame, Reach::kFar}) {
-    Place place = settled(pattern, scene, reach, start);
-    // Patches on the edge of what hides the rest can pull a pose away from what all features say.
-    const double after = misfit(camera_, place.pose, points);
-    if (after > kMostMisfit * before + 1.0) place.value -= kApartLoss;
-    if (after > kFarMisfit * (before + 1.0)) place.value = 0;
-    if (reach == Reach::kNear || place.value > best.value) best = place;
-    if (best.fine) break;
+  refine_from_inliers(pattern, frame, points, start);
+  const double before = reprojection_rms(camera_, start, points);
+  PoseCandidate best;
+  for (const SearchRadius radius :
+       {SearchRadius::kNear, SearchRadius::kFrame, SearchRadius::kFar}) {
+    PoseCandidate now = evaluate_start(pattern, frame, radius, start);
+    const double after = reprojection_rms(camera_, now.pose, points);
+    if (after > kDoubtfulRms * before + 1.0) now.score -= kDoubtPenalty;
+    if (after > kWrongRms * (before + 1.0)) now.score = 0;
+    if (radius == SearchRadius::kNear || now.score > best.score) best = now;
+    if (best.finest) break;
   }
   return best;
 }
 
-/// Replaces the candidate where the picture shows more of the pattern here than `best` tells.
-void PatternSearch::find_pose(const TrackedPattern& pattern, const Scene& scene,
-                              const PlaneFind& found, Place& best, DetectionCandidate& candidate) {
-  matcher_.choose(pattern, found);
+/// Replaces `best` and the candidate if this hypothesis shows more of the pattern.
+void PatternSearch::find_pose(const TrackedPattern& pattern, const FrameView& frame,
+                              const HomographyHypothesis& hypothesis, PoseCandidate& best,
+                              DetectionCandidate& candidate) {
+  matcher_.select(pattern, hypothesis);
   std::array<Pose, 2> starts;
-  const int count = fit_poses(pattern, camera_, found.homography, matcher_.inliers(), starts);
+  const int count = fit_poses(pattern, camera_, hypothesis.homography, matcher_.inliers(), starts);
   if (count == 0) return;
-  const bool many = found.inliers >= kManyInliers;
-  const auto convinces = [&](const Place& place) {
-    if (place.fine) return place.right >= (many ? kLeastPercent : kRightPercent);
-    return place.right >= (many ? kRightPercent : kVaguePercent) &&
-           misfit(camera_, place.pose, matcher_.inliers()) <= kVagueMisfit &&
-           percent_right(pattern, scene, place.pose, kVagueCells) > 0;
+  const bool many = hypothesis.inliers >= kManyInliers;
+  const auto convinces = [&](const PoseCandidate& one) {
+    if (one.finest) return one.percent >= (many ? kManyInliersPercent : kMinPercent);
+    return one.percent >= (many ? kMinPercent : kVaguePercent) &&
+           reprojection_rms(camera_, one.pose, matcher_.inliers()) <= kVagueRms &&
+           photometric_percent(pattern, frame, one.pose, kVagueCells) > 0;
   };
-  const auto consider = [&](const Place& place) {
+  const auto consider = [&](const PoseCandidate& one) {
     std::array<glm::dvec2, 4> corners;
-    if (place.value <= best.value || !convinces(place) ||
-        !map_corners(pattern, map_of_pose(pattern, camera_, place.pose), corners) ||
+    if (one.score <= best.score || !convinces(one) ||
+        !map_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners) ||
         !plausible(corners)) {
       return;
     }
-    best = place;
+    best = one;
     candidate.reason = Reason::kVisible;
-    candidate.pose = place.pose;
-    candidate.inliers = found.inliers;
+    candidate.pose = one.pose;
+    candidate.inliers = hypothesis.inliers;
   };
-  consider(settled(pattern, scene, Reach::kNear, starts[0]));
-  // Of two mirror images the features may rule one out; where they do not, each shows much of the
-  // pattern, and both are tried.
-  const double least = misfit(camera_, starts[0], matcher_.inliers());
+  consider(evaluate_start(pattern, frame, SearchRadius::kNear, starts[0]));
+  // The features may rule out one of two mirror images; otherwise each shows much of the pattern,
+  // and both are tried.
+  const double least = reprojection_rms(camera_, starts[0], matcher_.inliers());
   const auto likely = [&](std::size_t i) {
-    return misfit(camera_, starts[i], matcher_.inliers()) <= kMirrored * least + 0.5;
+    return reprojection_rms(camera_, starts[i], matcher_.inliers()) <= kMirrorRms * least + 0.5;
   };
-  const bool told = count == 1 || !likely(1) || best.all;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count) && !(best.whole && told); ++i) {
-    const Pose& start = starts[i];
+  const bool decided = count == 1 || !likely(1) || best.complete;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count) && !(best.unoccluded && decided);
+       ++i) {
     if (!likely(i)) continue;
-    consider(bring(pattern, scene, start));
+    consider(refine_start(pattern, frame, starts[i]));
   }
 }
 
-/// A wrong focal length bends every pose, while the plane's own map still tells where it lies: its
-/// corners, with the nearest pose, where much more speaks for it than a pose needs.
-void PatternSearch::find_map(const TrackedPattern& pattern, const Scene& scene,
-                             const PlaneFind& found, int better,
+/// A wrong focal length bends every pose, but the plane's map still tells the corners: takes them,
+/// with the nearest pose, where the map shows at least `min_percent`.
+void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& frame,
+                             const HomographyHypothesis& hypothesis, int min_percent,
                              DetectionCandidate& candidate) const {
-  if (found.inliers < kMapInliers) return;
-  PlaneMap map{found.homography, bending(camera_)};
-  if (map_percent(pattern, scene, map) < better) return;
-  Fit fit;
+  if (hypothesis.inliers < kMapInliers) return;
+  PlaneMap map{hypothesis.homography, distorting_lens(camera_)};
+  if (map_photometric_percent(pattern, frame, map) < min_percent) return;
+  PatchFit fit;
   PlaneMap refined = map;
-  if (settle_map(pattern, scene, refined, fit)) map = refined;
+  if (refine_map(pattern, frame, refined, fit)) map = refined;
   std::array<glm::dvec2, 4> corners;
   const auto pose = nearest_pose(pattern, camera_, map);
-  if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) {
-    return;
+  if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) return;
+  candidate = {Reason::kVisible, *pose, true, map, candidate.matches, hypothesis.inliers};
+}
+
+// ---- On a thread of its own ----
+
+AsyncDetector::AsyncDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
+                             const DetectOptions& options)
+    : extractor_(FeatureExtractor::create(camera.width, camera.height, options)),
+      search_(camera, patterns, options),
+      pixels_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)),
+      priorities_(patterns.size(), SearchPriority::kNone) {
+  frame_ = {pixels_.data(), camera.width, camera.height, camera.width};
+  found_.patterns.resize(patterns.size());
+  thread_ = std::thread([this] { work(); });
+}
+
+AsyncDetector::~AsyncDetector() {
+  closing_.store(true, std::memory_order_release);
+  wake_.release();
+  thread_.join();
+}
+
+void AsyncDetector::start(const GrayImage& frame, std::span<const SearchPriority> priorities) {
+  for (int y = 0; y < frame_.height; ++y) {
+    std::memcpy(pixels_.data() + y * frame_.stride, frame.pixels + y * frame.stride,
+                static_cast<std::size_t>(frame_.width));
   }
-  candidate = {Reason::kVisible, *pose, true, map, candidate.matches, found.inliers};
+  std::copy(priorities.begin(), priorities.end(), priorities_.begin());
+  stage_.store(Stage::kSearching, std::memory_order_release);
+  wake_.release();
+}
+
+bool AsyncDetector::take(DetectionCandidates& candidates, std::vector<SearchPriority>& priorities) {
+  if (stage_.load(std::memory_order_acquire) != Stage::kFound) return false;
+  std::swap(candidates, found_);
+  priorities.swap(priorities_);
+  stage_.store(Stage::kIdle, std::memory_order_release);
+  return true;
+}
+
+void AsyncDetector::work() {
+  for (;;) {
+    wake_.acquire();
+    if (closing_.load(std::memory_order_acquire)) return;
+    extractor_->set_frame(frame_);
+    search_.run(*extractor_, priorities_, found_);
+    stage_.store(Stage::kFound, std::memory_order_release);
+  }
 }
 
 }  // namespace modar::tracker

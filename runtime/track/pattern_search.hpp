@@ -1,74 +1,81 @@
-// Looks for patterns in a single frame, wherever they are. Internal to runtime/track.
+// The search for patterns in one frame, wherever they are: on the caller's thread, or on a thread
+// of its own. Internal to runtime/track.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <thread>
 #include <vector>
 
-#include "code_index.hpp"
 #include "modar/tracker.hpp"
 #include "modar/tracker_features.hpp"
-#include "plane_matcher.hpp"
-#include "refine_pose.hpp"
+#include "pattern_matching.hpp"
+#include "pose_refinement.hpp"
+#include "runtime/platform/semaphore.hpp"
 
 namespace modar::tracker {
 
-/// How much a pattern is asked for.
-enum class Want : std::uint8_t {
-  kNo,
-  kYes,
-  kFirst,  ///< it was there a moment ago
+/// Whether a pattern is searched for, and how urgently.
+enum class SearchPriority : std::uint8_t {
+  kNone,
+  kNormal,
+  kFirst,  ///< it was lost a moment ago
 };
 
-/// What a search says of one pattern.
+/// What a search found of one pattern.
 struct DetectionCandidate {
   Reason reason = Reason::kNoFeatures;
-  Pose pose;            ///< where the reason is kVisible
-  bool by_map = false;  ///< no pose explains the picture, but the map does: the pose is the nearest
-  PlaneMap map;         ///< where by_map
+  Pose pose;                     ///< if kVisible
+  bool homography_only = false;  ///< no pose explains the frame, but `map` does; `pose` is nearest
+  PlaneMap map;                  ///< if homography_only
   int matches = 0;
   int inliers = 0;
 };
 
 struct DetectionCandidates {
-  std::vector<DetectionCandidate> patterns;  ///< of those that were not wanted: untouched
+  std::vector<DetectionCandidate> patterns;  ///< unchanged where the priority was kNone
   int features = 0;
   TrackTimes times;  ///< detect, match and homography
 };
 
-/// Features of the frame are found once. Where many patterns are wanted, an index over all of them
-/// tells which few are worth matching in full; where none of those is there, one of the others has
-/// its turn.
+/// Extracts the frame's features once. If many patterns are searched for, an index over all of them
+/// selects the few to match in full; if none of those is found, one of the others has its turn.
 class PatternSearch {
  public:
   /// The patterns must outlive it. With more than a few of them, the first run() builds the index.
   PatternSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
                 const DetectOptions& options);
-  /// eye: holds the frame. wants: one a pattern. Allocates nothing after the first call.
-  void run(FeatureExtractor& eye, std::span<const Want> wants, DetectionCandidates& candidates);
+  /// extractor: holds the frame. priorities: one per pattern. Allocates nothing after the first
+  /// call.
+  void run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
+           DetectionCandidates& candidates);
 
  private:
-  void choose(std::span<const TrackerFeature> features, std::span<const Want> wants);
-  DetectionCandidate find(const TrackedPattern& pattern, const Scene& scene,
+  void select(std::span<const TrackerFeature> features, std::span<const SearchPriority> priorities);
+  DetectionCandidate find(const TrackedPattern& pattern, const FrameView& frame,
                           std::span<const TrackerFeature> features, TrackTimes& times);
-  /// Where a start leads to.
-  struct Place {
+  /// A refined pose and the evidence for it.
+  struct PoseCandidate {
     Pose pose;
-    int right = 0;         ///< percent
-    int value = 0;         ///< what speaks for it
-    bool settled = false;  ///< the patches hold,
-    bool fine = false;     ///< on the finest level,
-    bool whole = false;    ///< most of them,
-    bool all = false;      ///< nearly all
+    int percent = 0;          ///< of the textured cells in view that correlate
+    int score = 0;            ///< ranks candidates
+    bool refined = false;     ///< the patches fit,
+    bool finest = false;      ///< on the finest level,
+    bool unoccluded = false;  ///< most of them,
+    bool complete = false;    ///< nearly all
   };
-  [[nodiscard]] Place settled(const TrackedPattern& pattern, const Scene& scene, Reach reach,
-                              const Pose& start) const;
-  [[nodiscard]] Place bring(const TrackedPattern& pattern, const Scene& scene, Pose start) const;
-  void find_pose(const TrackedPattern& pattern, const Scene& scene, const PlaneFind& found,
-                 Place& best, DetectionCandidate& candidate);
-  void find_map(const TrackedPattern& pattern, const Scene& scene, const PlaneFind& found,
-                int better, DetectionCandidate& candidate) const;
+  [[nodiscard]] PoseCandidate evaluate_start(const TrackedPattern& pattern, const FrameView& frame,
+                                             SearchRadius radius, const Pose& start) const;
+  [[nodiscard]] PoseCandidate refine_start(const TrackedPattern& pattern, const FrameView& frame,
+                                           Pose start) const;
+  void find_pose(const TrackedPattern& pattern, const FrameView& frame,
+                 const HomographyHypothesis& hypothesis, PoseCandidate& best,
+                 DetectionCandidate& candidate);
+  void find_map(const TrackedPattern& pattern, const FrameView& frame,
+                const HomographyHypothesis& hypothesis, int min_percent,
+                DetectionCandidate& candidate) const;
 
   Camera camera_;
   const Kernels& kernels_;
@@ -76,10 +83,45 @@ class PatternSearch {
   PatchCache patches_;
   PlaneMatcher matcher_;
   std::unique_ptr<CodeIndex> index_;
-  std::vector<std::uint32_t> chosen_;
-  std::vector<std::uint8_t> is_clear_;  ///< by pattern
-  std::size_t clear_ = 0;               ///< the first of them, which are matched whatever is found
-  std::uint32_t turn_ = 0;              ///< the pattern whose turn is next
+  std::vector<std::uint32_t> selected_;
+  std::vector<std::uint8_t> has_votes_;  ///< by pattern
+  std::size_t likely_ = 0;               ///< the first of selected_, which are always matched
+  std::uint32_t turn_ = 0;               ///< the pattern whose turn is next
+};
+
+/// Runs a PatternSearch on a thread of its own, one frame at a time: on a copy, so that the
+/// caller's may change at once. start() and take() belong to one thread; neither waits.
+class AsyncDetector {
+ public:
+  /// The patterns must outlive it.
+  AsyncDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
+                const DetectOptions& options);
+  AsyncDetector(const AsyncDetector&) = delete;
+  AsyncDetector& operator=(const AsyncDetector&) = delete;
+  /// Waits for a running search to end.
+  ~AsyncDetector();
+
+  /// False while a search runs or its candidates have not been taken.
+  [[nodiscard]] bool idle() const { return stage_.load(std::memory_order_acquire) == Stage::kIdle; }
+  /// Starts a search; only if idle(). priorities: one per pattern.
+  void start(const GrayImage& frame, std::span<const SearchPriority> priorities);
+  /// Swaps out the candidates and priorities of a finished search; false if there is none.
+  bool take(DetectionCandidates& candidates, std::vector<SearchPriority>& priorities);
+
+ private:
+  enum class Stage : std::uint8_t { kIdle, kSearching, kFound };
+  void work();
+
+  std::unique_ptr<FeatureExtractor> extractor_;
+  PatternSearch search_;
+  GrayImage frame_;
+  std::vector<std::uint8_t> pixels_;
+  std::vector<SearchPriority> priorities_;
+  DetectionCandidates found_;
+  std::atomic<Stage> stage_{Stage::kIdle};  ///< kSearching: the fields above belong to thread_
+  std::atomic<bool> closing_{false};
+  Semaphore wake_{0};
+  std::thread thread_;
 };
 
 }  // namespace modar::tracker

@@ -10,7 +10,7 @@
 #include <Eigen/SVD>
 #include <glm/geometric.hpp>
 
-#include "symmetric_solver.hpp"
+#include "plane_geometry.hpp"
 
 namespace modar {
 namespace {
@@ -18,6 +18,7 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+// Steps of Levenberg-Marquardt: bounds the time of points without a solution; others stop earlier.
 constexpr int kRefineSteps = 30;
 constexpr double kDegenerateArea = 1e-6;   // of normalised points, whose mean distance is 1
 constexpr double kDegenerateAngle = 1e-6;  // sine between r1 and r2

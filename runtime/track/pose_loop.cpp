@@ -1,47 +1,47 @@
-// The loop's states: search for patterns, hold those that were found, tell why none is there.
+// The states of the loop: search for patterns, track those found, give the reason if there is none.
 #include "modar/pose_loop.hpp"
 
 #include <algorithm>
 #include <vector>
 
-#include "async_detector.hpp"
 #include "frame_tracker.hpp"
+#include "pattern_search.hpp"
 #include "runtime/platform/lap_clock.hpp"
 
 namespace modar {
 namespace {
 
 using tracker::DetectionCandidate;
-using tracker::Fit;
+using tracker::PatchFit;
+using tracker::SearchPriority;
 using tracker::Track;
 using tracker::TrackedPattern;
-using tracker::Want;
 
 }  // namespace
 
 struct PoseLoop::State {
   State(const Camera& seen_by, const PoseLoopOptions& how)
-      : camera(seen_by), options(how), follower(seen_by, how.detect) {}
+      : camera(seen_by), options(how), frame_tracker(seen_by, how.detect) {}
 
   Camera camera;
   PoseLoopOptions options;
   std::vector<TrackedPattern> patterns;
   std::vector<Track> tracks;  ///< one a pattern
-  tracker::FrameTracker follower;
+  tracker::FrameTracker frame_tracker;
   std::unique_ptr<tracker::PatternSearch> search;  ///< on the caller's thread, or
-  std::unique_ptr<tracker::AsyncDetector> seeker;  ///< on its own
-  std::vector<Want> wants;
+  std::unique_ptr<tracker::AsyncDetector> async;   ///< on its own
+  std::vector<SearchPriority> priorities;
   tracker::DetectionCandidates candidates;
   int frames_to_search = 0;
-  bool stale = false;  ///< what the seeker finds was asked for before a reset
+  bool discard_found = false;  ///< what the running search finds is of before a reset
 
   void step(const GrayImage& frame, TrackResult& result);
-  void follow_all(TrackResult& result);
-  bool due(bool any_held);
-  void adopt(TrackResult& result);
-  bool take_up(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
-               Detection& detection) const;
-  bool prevails(std::size_t i, const Detection& detection, TrackResult& result);
+  void track_all(TrackResult& result);
+  bool search_due(bool any_tracked);
+  void accept(TrackResult& result);
+  bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
+                   Detection& detection) const;
+  bool resolve_overlap(std::size_t i, const Detection& detection, TrackResult& result);
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -58,9 +58,8 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
     if (bytes.empty()) continue;
-    auto pattern = tracker::view_loop_pattern(bytes, i);
-    if (!pattern) return tl::unexpected(pattern.error());
-    state->patterns.push_back(*pattern);
+    MODAR_ASSIGN(const TrackedPattern pattern, tracker::view_tracked_pattern(bytes, i));
+    state->patterns.push_back(pattern);
   }
   if (state->patterns.empty()) {
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
@@ -68,10 +67,10 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
                 "bake it with a pattern");
   }
   state->tracks.resize(state->patterns.size());
-  state->wants.resize(state->patterns.size());
+  state->priorities.resize(state->patterns.size());
   state->candidates.patterns.resize(state->patterns.size());
-  if (options.apart) {
-    state->seeker =
+  if (options.async_search) {
+    state->async =
         std::make_unique<tracker::AsyncDetector>(camera, state->patterns, options.detect);
   } else {
     state->search =
@@ -83,12 +82,12 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
 void PoseLoop::reset() {
   for (Track& track : state_->tracks) track = {};
   state_->frames_to_search = 0;
-  state_->stale = state_->seeker != nullptr && !state_->seeker->idle();
+  state_->discard_found = state_->async != nullptr && !state_->async->idle();
 }
 
 Result<TrackResult> PoseLoop::step(const GrayImage& frame) {
   TrackResult result;
-  if (auto done = step(frame, result); !done) return tl::unexpected(done.error());
+  MODAR_TRY(step(frame, result));
   return result;
 }
 
@@ -106,21 +105,23 @@ Result<void> PoseLoop::step(const GrayImage& frame, TrackResult& result) {
   return {};
 }
 
-/// Whether this frame is searched for the patterns that are not held; sets what is wanted.
-bool PoseLoop::State::due(bool any_held) {
+/// Whether this frame is searched for the patterns that are not tracked; sets their priorities.
+bool PoseLoop::State::search_due(bool any_tracked) {
   bool missing = false;
-  bool lately = false;
+  bool recently = false;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     Track& track = tracks[i];
-    const bool lost = track.since_lost < tracker::kLately;
-    wants[i] = track.held ? Want::kNo : lost ? Want::kFirst : Want::kYes;
-    missing = missing || !track.held;
-    lately = lately || (!track.held && lost);
+    const bool lost = track.frames_since_lost < tracker::kRecentFrames;
+    priorities[i] = track.tracked ? SearchPriority::kNone
+                    : lost        ? SearchPriority::kFirst
+                                  : SearchPriority::kNormal;
+    missing = missing || !track.tracked;
+    recently = recently || (!track.tracked && lost);
   }
   --frames_to_search;
-  // While one is tracked there is no haste to find others, but for those that were there just now.
-  if (!missing || (any_held && !lately && frames_to_search > 0)) return false;
-  if (seeker != nullptr && !seeker->idle()) return false;
+  // While one is tracked, only patterns lost a moment ago are worth a search in every frame.
+  if (!missing || (any_tracked && !recently && frames_to_search > 0)) return false;
+  if (async != nullptr && !async->idle()) return false;
   frames_to_search = options.search_every;
   return true;
 }
@@ -132,121 +133,126 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   result.features = 0;
   result.times = {};
   LapClock clock;
-  follower.set_frame(frame);
-  follow_all(result);
-  if (seeker != nullptr && seeker->take(candidates, wants)) {
-    if (!stale) adopt(result);
-    stale = false;
+  frame_tracker.set_frame(frame);
+  track_all(result);
+  if (async != nullptr && async->take(candidates, priorities)) {
+    if (!discard_found) accept(result);
+    discard_found = false;
   }
   result.times.pose = clock.lap();
-  if (due(!result.visible.empty())) {
-    if (seeker != nullptr) {
-      seeker->start(frame, wants);
+  if (search_due(!result.visible.empty())) {
+    if (async != nullptr) {
+      async->start(frame, priorities);
     } else {
-      search->run(follower.eye(), wants, candidates);
-      adopt(result);
+      search->run(frame_tracker.extractor(), priorities, candidates);
+      accept(result);
     }
   }
   for (const Track& track : tracks) {
-    const Reason reason = track.held ? Reason::kVisible : track.told;
+    const Reason reason = track.tracked ? Reason::kVisible : track.last_reason;
     if (progress(reason) > progress(result.reason)) result.reason = reason;
   }
   std::sort(result.visible.begin(), result.visible.end(),
             [](const Detection& a, const Detection& b) { return a.pattern < b.pattern; });
 }
 
-void PoseLoop::State::follow_all(TrackResult& result) {
+void PoseLoop::State::track_all(TrackResult& result) {
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     Track& track = tracks[i];
     Detection detection;
-    if (!track.held) {
-      track.since_lost = std::min(track.since_lost + 1, tracker::kLately);
+    if (!track.tracked) {
+      track.frames_since_lost = std::min(track.frames_since_lost + 1, tracker::kRecentFrames);
       continue;
     }
-    track.held = options.track && follower.follow(patterns[i], track, detection);
-    if (track.held) {
+    track.tracked = options.track && frame_tracker.update(patterns[i], track, detection);
+    if (track.tracked) {
       result.visible.push_back(detection);
     } else {
-      track.since_lost = options.track ? 0 : tracker::kLately;
+      track.frames_since_lost = options.track ? 0 : tracker::kRecentFrames;
     }
   }
 }
 
-/// Answers whether a candidate is visible in the present frame.
-bool PoseLoop::State::take_up(const TrackedPattern& pattern, Track& track,
-                              const DetectionCandidate& candidate, Detection& detection) const {
+/// Starts a track; false if the candidate is not visible in the present frame.
+bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
+                                  const DetectionCandidate& candidate, Detection& detection) const {
   Track next;
   next.pose = candidate.pose;
-  next.by_map = candidate.by_map;
+  next.homography_only = candidate.homography_only;
   next.map = candidate.map;
   detection.matches = candidate.matches;
   detection.inliers = candidate.inliers;
-  if (seeker != nullptr) {
-    // It was found in a frame that has gone by.
-    Fit fit;
-    const bool here =
-        next.by_map
-            ? tracker::settle_map(pattern, follower.scene(), next.map, fit)
-            : tracker::settle(pattern, follower.scene(), tracker::Reach::kFar, next.pose, fit) &&
-                  tracker::percent_right(pattern, follower.scene(), next.pose) >=
-                      tracker::kRightPercent;
+  if (async != nullptr) {
+    // It was found in an earlier frame.
+    PatchFit fit;
+    const bool here = next.homography_only
+                          ? tracker::refine_map(pattern, frame_tracker.frame(), next.map, fit)
+                          : tracker::refine(pattern, frame_tracker.frame(),
+                                            tracker::SearchRadius::kFar, next.pose, fit) &&
+                                tracker::photometric_percent(pattern, frame_tracker.frame(),
+                                                             next.pose) >= tracker::kMinPercent;
     if (!here) return false;
   }
-  if (!follower.report(pattern, next, detection)) return false;
-  next.held = true;
+  if (!frame_tracker.locate(pattern, next, detection)) return false;
+  next.tracked = true;
   track = next;
   return true;
 }
 
-/// Prints of one series share so much that one is taken for the other: of those that claim the same
-/// place, the frame decides. Answers whether pattern i, new, stays; then the others yield to it.
-bool PoseLoop::State::prevails(std::size_t i, const Detection& detection, TrackResult& result) {
+/// Prints of one series share so much that one is taken for the other: of those that claim one
+/// place, the one stays that shows more. Returns whether the new pattern i stays; the others are
+/// then dropped.
+bool PoseLoop::State::resolve_overlap(std::size_t i, const Detection& detection,
+                                      TrackResult& result) {
   const auto percent_of = [this](std::size_t which) {
     const Track& track = tracks[which];
-    return track.by_map ? tracker::map_percent(patterns[which], follower.scene(), track.map)
-                        : tracker::percent_right(patterns[which], follower.scene(), track.pose);
+    return track.homography_only
+               ? tracker::map_photometric_percent(patterns[which], frame_tracker.frame(), track.map)
+               : tracker::photometric_percent(patterns[which], frame_tracker.frame(), track.pose);
   };
-  // None yields before it is known that the new one prevails against all.
-  for (const bool yields : {false, true}) {
+  // None is dropped before the new one is known to stay.
+  for (const bool drop : {false, true}) {
     for (std::size_t k = 0; k < tracks.size(); ++k) {
       Detection rival;
-      const bool other = k != i && tracks[k].held && follower.report(patterns[k], tracks[k], rival);
+      const bool other =
+          k != i && tracks[k].tracked && frame_tracker.locate(patterns[k], tracks[k], rival);
       if (!other || !tracker::same_place(rival.corners, detection.corners)) continue;
-      if (!yields) {
+      if (!drop) {
         if (percent_of(i) <= percent_of(k)) return false;
         continue;
       }
       tracks[k] = {};
-      tracks[k].told = Reason::kFailedVerification;
+      tracks[k].last_reason = Reason::kFailedVerification;
       std::erase_if(result.visible, [&](const Detection& s) { return s.pattern == rival.pattern; });
     }
   }
   return true;
 }
 
-/// Takes what a search found into the tracks and the frame's result.
-void PoseLoop::State::adopt(TrackResult& result) {
+/// Brings what a search found into the tracks and the frame's result.
+void PoseLoop::State::accept(TrackResult& result) {
   result.features = candidates.features;
   result.times.detect = candidates.times.detect;
   result.times.match = candidates.times.match;
   result.times.homography = candidates.times.homography;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     Track& track = tracks[i];
-    if (wants[i] == Want::kNo || track.held) continue;
+    if (priorities[i] == SearchPriority::kNone || track.tracked) continue;
     const DetectionCandidate& candidate = candidates.patterns[i];
     const Track before = track;
     Detection detection;
-    const bool here =
-        candidate.reason == Reason::kVisible && take_up(patterns[i], track, candidate, detection);
-    if (here && prevails(i, detection, result)) {
+    const bool here = candidate.reason == Reason::kVisible &&
+                      start_track(patterns[i], track, candidate, detection);
+    if (here && resolve_overlap(i, detection, result)) {
       result.visible.push_back(detection);
       continue;
     }
-    if (here) track = before;  // if it was lost a moment ago, it is still looked for first
+    if (here) track = before;  // a recently lost one keeps its priority
     const Reason reason =
         candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
-    // In the frame that lost it, what it was lost by tells more.
-    if (track.since_lost > 0 || progress(reason) > progress(track.told)) track.told = reason;
+    // In the frame that lost it, the reason of the loss says more.
+    if (track.frames_since_lost > 0 || progress(reason) > progress(track.last_reason))
+      track.last_reason = reason;
   }
 }
 

@@ -10,27 +10,31 @@
 namespace modar {
 namespace {
 
-constexpr double kLivelySpeed = 0.05;   // radians a second that halve the latency
-constexpr double kSpeedMemory_s = 0.1;  // time constant of the speed's own filter
-constexpr double kLongestGap_s = 0.5;   // between frames; after it the motion is unknown
+// Radians per second that halve the latency: about what a hand at rest does. Lower lags less,
+// higher jitters less. By hand, as are the next two.
+constexpr double kHalvingSpeed = 0.05;
+// Time constant of the speed's own filter: longer reacts later, shorter takes jitter for motion.
+constexpr double kSpeedTime_s = 0.1;
+// Between frames; after it the motion is unknown.
+constexpr double kMaxGap_s = 0.5;
 
 glm::dvec3 turn_between(const Pose& from, const Pose& to) {
   return rotation_vector(to.rotation * glm::transpose(from.rotation));
 }
 
-double share(double seconds, double constant) {
+double blend(double seconds, double constant) {
   return seconds / (seconds + constant);
 }
 
 }  // namespace
 
-PoseSmoother::PoseSmoother(std::size_t pattern_count, double greatest_ms)
-    : states_(pattern_count), greatest_s_(std::clamp(greatest_ms, 0.0, 1000.0) * 1e-3) {}
+PoseSmoother::PoseSmoother(std::size_t pattern_count, double max_latency_ms)
+    : states_(pattern_count), max_latency_s_(std::clamp(max_latency_ms, 0.0, 1000.0) * 1e-3) {}
 
-/// Answers the latency in seconds.
+/// Returns the latency in seconds.
 double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
   const double seconds = time_s - state.time_s;
-  const bool fresh = !state.known || !(seconds > 0.0) || seconds > kLongestGap_s;
+  const bool fresh = !state.known || !(seconds > 0.0) || seconds > kMaxGap_s;
   const Pose raw = pose;
   double latency = 0.0;
   if (fresh) {
@@ -40,9 +44,9 @@ double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
     const double depth = std::max(raw.translation.z, 1e-9);
     const double moved = glm::length(turn_between(state.raw, raw)) +
                          glm::length(raw.translation - state.raw.translation) / depth;
-    state.speed += share(seconds, kSpeedMemory_s) * (moved / seconds - state.speed);
-    latency = greatest_s_ / (1.0 + state.speed / kLivelySpeed);
-    const double part = share(seconds, latency);
+    state.speed += blend(seconds, kSpeedTime_s) * (moved / seconds - state.speed);
+    latency = max_latency_s_ / (1.0 + state.speed / kHalvingSpeed);
+    const double part = blend(seconds, latency);
     state.smooth.rotation =
         rotation_matrix(part * turn_between(state.smooth, raw)) * state.smooth.rotation;
     state.smooth.translation += part * (raw.translation - state.smooth.translation);
@@ -55,7 +59,7 @@ double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
 }
 
 double PoseSmoother::step(double time_s, std::span<Detection> visible) {
-  if (greatest_s_ == 0.0) return 0.0;
+  if (max_latency_s_ == 0.0) return 0.0;
   double slowest = 0.0;
   for (State& state : states_) state.seen = false;
   for (Detection& detection : visible) {

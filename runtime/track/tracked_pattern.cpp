@@ -1,4 +1,4 @@
-// Hands out the arrays of a loop record.
+// Views of the arrays of a tracker record.
 #include "tracked_pattern.hpp"
 
 #include <algorithm>
@@ -51,7 +51,7 @@ glm::dmat3 TrackedPattern::world_from_pixels() const {
   return m;
 }
 
-Result<TrackedPattern> view_loop_pattern(std::span<const std::byte> bytes, std::uint32_t index) {
+Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index) {
   std::uint32_t version = 0;
   if (bytes.size() >= sizeof version) std::memcpy(&version, bytes.data(), sizeof version);
   if (bytes.size() >= sizeof(TrackerRecordHeader) && version != kFeatureExtractorVersion) {

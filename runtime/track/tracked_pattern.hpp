@@ -1,4 +1,16 @@
-// A pattern's loop record as mapped arrays. Internal to runtime/track.
+// A pattern's tracker record as views of the mapped bundle. Internal to runtime/track.
+//
+// What runtime/track offers inside, each header building on those before it:
+//   kernels.hpp           loops over pixels and bits, one table per SIMD level
+//   tracked_pattern.hpp   a pattern's record: features, codes, patches, image levels
+//   plane_geometry.hpp    maps between pattern and frame, poses from points, motion model
+//   patch_alignment.hpp   Gauss-Newton over small patches
+//   pose_refinement.hpp   coarse to fine, from features to a pose, photometric check
+//   pattern_matching.hpp  features to homographies of one pattern; an index over all patterns
+//   pattern_search.hpp    finds patterns in a frame, also on a thread of its own
+//   frame_tracker.hpp     tracks patterns from frame to frame
+// Others include the public headers only: modar/pose_loop.hpp drives all of it; modar/tracker_features.hpp,
+// pose.hpp, camera.hpp, pose_smoother.hpp and focal_finder.hpp offer parts.
 #pragma once
 
 #include <array>
@@ -30,9 +42,9 @@ struct TrackedPattern {
   [[nodiscard]] glm::dmat3 world_from_pixels() const;
 };
 
-/// Views a section's bytes, which must outlive the pattern. Every count and offset is checked, and
-/// every feature and patch lies within the image, so that nothing later needs to look again.
-/// Errors: kInvalidInput "tracker.record"; kUnsupported "tracker.record-version".
-Result<TrackedPattern> view_loop_pattern(std::span<const std::byte> bytes, std::uint32_t index);
+/// Views a section's bytes, which must outlive the pattern. Every count and offset is validated,
+/// and every feature and patch lies within the image: nothing later checks again. Errors:
+/// kInvalidInput "tracker.record"; kUnsupported "tracker.record-version".
+Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index);
 
 }  // namespace modar::tracker

@@ -6,8 +6,116 @@
 #include <cstring>
 #include <vector>
 
-#include "corner_finder.hpp"
 #include "kernels.hpp"
+
+namespace modar::tracker {
+
+struct Corner {
+  std::int16_t x = 0;
+  std::int16_t y = 0;
+  std::uint8_t score = 0;
+  std::uint8_t dark = 0;
+  std::uint8_t level = 0;
+};
+
+/// FAST-9 corners of one pyramid level with 3x3 suppression, the strongest few of each cell: Rosten
+/// & Drummond, "Machine learning for high-speed corner detection" (2006), with the score of its
+/// later implementation, the greatest threshold. Holds buffers for levels up to a width.
+class CornerFinder {
+ public:
+  CornerFinder(int width, const DetectOptions& options);
+  /// Appends the corners of a level, ordered by rows of cells; never beyond the reserved capacity.
+  void find(const GrayImage& image, std::uint8_t level, std::vector<Corner>& corners);
+
+ private:
+  void keep(const Corner& corner, int cell);
+  void flush(std::vector<Corner>& corners);
+
+  DetectOptions options_;
+  int pitch_ = 0;
+  std::vector<std::uint8_t> rows_;  ///< three rows of scores, three of bright scores, peaks
+  std::vector<Corner> cells_;       ///< per_cell slots a cell of the current cell row
+  std::vector<int> counts_;
+};
+
+CornerFinder::CornerFinder(int width, const DetectOptions& options)
+    : options_(options),
+      pitch_(width + 2 * kSlack),
+      rows_(static_cast<std::size_t>(pitch_) * 7),
+      cells_(static_cast<std::size_t>((width / options.cell + 1) * options.per_cell)),
+      counts_(static_cast<std::size_t>(width / options.cell + 1)) {}
+
+void CornerFinder::keep(const Corner& corner, int cell) {
+  Corner* slots = cells_.data() + cell * options_.per_cell;
+  int& count = counts_[static_cast<std::size_t>(cell)];
+  if (count < options_.per_cell) {
+    slots[count++] = corner;
+    return;
+  }
+  // The weakest is dropped; of equally weak ones the last, so that ties go by row.
+  int weakest = 0;
+  for (int i = 1; i < count; ++i) {
+    if (slots[i].score <= slots[weakest].score) weakest = i;
+  }
+  if (corner.score > slots[weakest].score) slots[weakest] = corner;
+}
+
+void CornerFinder::flush(std::vector<Corner>& corners) {
+  for (std::size_t cell = 0; cell < counts_.size(); ++cell) {
+    const Corner* slots = cells_.data() + cell * static_cast<std::size_t>(options_.per_cell);
+    for (int i = 0; i < counts_[cell]; ++i) {
+      if (corners.size() < corners.capacity()) corners.push_back(slots[i]);
+    }
+    counts_[cell] = 0;
+  }
+}
+
+void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<Corner>& corners) {
+  const int count = image.width - 2 * kTrackerBorder;
+  if (count <= 0 || image.height <= 2 * kTrackerBorder) return;
+  const Kernels& run = kernels(options_.simd);
+  // The pixel before the range is compared too, and never a corner.
+  const auto row_at = [&](int slot) {
+    return rows_.data() + static_cast<std::size_t>(slot) * static_cast<std::size_t>(pitch_) +
+           kSlack;
+  };
+  std::uint8_t* peak = row_at(6);
+  std::fill(rows_.begin(), rows_.end(), std::uint8_t{0});
+  const int last = image.height - kTrackerBorder;
+  for (int y = kTrackerBorder; y <= last; ++y) {
+    std::uint8_t* score = row_at(y % 3);
+    std::uint8_t* bright = row_at(3 + y % 3);
+    if (y < last) {
+      run.corner_scores(image.pixels + y * image.stride + kTrackerBorder, image.stride,
+                        options_.threshold, count, bright, score);
+      // Kernels write past the range; that is no neighbour.
+      std::memset(score + count, 0, kSlack);
+    } else {
+      std::memset(score, 0, static_cast<std::size_t>(count) + kSlack);
+    }
+    const int centre = y - 1;
+    if (centre < kTrackerBorder) continue;
+    const std::uint8_t* middle = row_at(centre % 3);
+    const std::uint8_t* middle_bright = row_at(3 + centre % 3);
+    run.peaks(row_at((centre + 2) % 3), middle, score, count, peak);
+    const int cell_row = centre / options_.cell;
+    for (int i = 0; i < count; i += 8) {
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, peak + i, sizeof eight);
+      if (eight == 0) continue;
+      for (int x = i; x < std::min(i + 8, count); ++x) {
+        if (peak[x] == 0) continue;
+        const int column = x + kTrackerBorder;
+        keep({static_cast<std::int16_t>(column), static_cast<std::int16_t>(centre), peak[x],
+              static_cast<std::uint8_t>(middle_bright[x] == middle[x] ? 0 : 1), level},
+             column / options_.cell);
+      }
+    }
+    if (y == last || (centre + 1) / options_.cell != cell_row) flush(corners);
+  }
+}
+
+}  // namespace modar::tracker
 
 namespace modar {
 namespace {
@@ -15,21 +123,25 @@ namespace {
 using tracker::Corner;
 using tracker::kSlack;
 
-constexpr int kAngles = 64;  // orientations for which the tests are turned in advance
-constexpr int kTests = 256;
-constexpr int kTestRadius = 14;  // pixels of a level; turned and rounded it stays within 15
-constexpr int kMomentRadius = 14;
+// The first four are part of kFeatureExtractorVersion: other values make other codes.
+constexpr int kAngles = 64;        // orientations that the tests are rotated to in advance
+constexpr int kTests = 256;        // bits of a code
+constexpr int kTestRadius = 14;    // pixels of a level; rotated and rounded it stays within 15
+constexpr int kMomentRadius = 14;  // the same, of the disk whose centroid is the orientation
+// Two levels above the last one with features: tracking starts there (SearchRadius::kFar).
 constexpr int kPyramidLevels = kTrackerLevels + 2;
-constexpr int kSmallestSide = 16;
-constexpr int kSure = 40;  // score of a corner that noise and light leave where it is
+constexpr int kMinSide = 16;
+// Score from which a corner's rank in its cell decides instead of its contrast. Without it a page
+// of print took all 1,250 features of a frame, and no pattern on it was found; with it 95 to 100 %.
+constexpr int kSureScore = 40;
 
 struct Point {
   int x = 0;
   int y = 0;
 };
 
-/// The tests' end points: BRIEF's isotropic normal distribution (Calonder et al., 2010), drawn from
-/// a fixed sequence, at least 4 pixels apart.
+/// The tests' end points: BRIEF's isotropic normal distribution (Calonder et al., "BRIEF", 2010),
+/// from a fixed pseudo-random sequence, at least 4 pixels apart.
 std::array<Point, 2 * kTests> test_points() {
   std::array<Point, 2 * kTests> points{};
   std::uint64_t state = 0x9E3779B97F4A7C15ull;
@@ -59,7 +171,7 @@ std::array<Point, 2 * kTests> test_points() {
 /// Offsets of all end points for every orientation, in a buffer of that stride.
 std::vector<std::int32_t> test_offsets(int stride) {
   const auto points = test_points();
-  // cos and sin of 2 pi / 64, multiplied up: no library's last digit decides a rounding.
+  // cos and sin of 2 pi / 64, then the angle addition formula: no rounding depends on a libm.
   constexpr double kCos = 0.99518472667219688624;
   constexpr double kSin = 0.09801714032956060199;
   double c = 1.0;
@@ -79,7 +191,7 @@ std::vector<std::int32_t> test_offsets(int stride) {
   return offsets;
 }
 
-/// Angle of a direction in 64ths of a turn, by plain arithmetic that rounds alike everywhere.
+/// Angle of a direction in 64ths of a turn, by arithmetic that rounds alike on every platform.
 int angle_bin(float x, float y) {
   const float ax = std::abs(x);
   const float ay = std::abs(y);
@@ -128,7 +240,7 @@ std::unique_ptr<FeatureExtractor> FeatureExtractor::create(int width, int height
   state->pitch = (width + kSlack + 63) / 64 * 64;
   std::size_t cells = 0;
   for (int level = 0, w = width, h = height; level < kPyramidLevels; ++level, w /= 2, h /= 2) {
-    if (level > 0 && std::min(w, h) < kSmallestSide) break;
+    if (level > 0 && std::min(w, h) < kMinSide) break;
     state->levels.push_back({nullptr, w, h, 0});
     if (level > 0) {
       state->halves.emplace_back(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) +
@@ -183,14 +295,14 @@ void FeatureExtractor::State::smooth_level(std::size_t level) {
     const std::uint8_t* rows[5];
     for (int k = 0; k < 5; ++k) rows[k] = image.pixels + (y + k - 2) * image.stride;
     run.blur_columns(rows, sums, image.width);
-    // The two columns at each side are smoothed with what lies beyond: nothing reads them.
+    // The two columns at each side are smoothed with what lies beyond; nothing reads them.
     run.blur_row(sums, smooth[level].data() + static_cast<std::ptrdiff_t>(y) * pitch, image.width);
   }
 }
 
-/// Scores decide up to the one that makes a corner sure; of sure ones the best of each cell go
-/// first. So what has the greatest contrast, a page of print, cannot take all features of a frame.
-/// Cells lie side by side in `corners`.
+/// Weights for strongest(): scores up to kSureScore, above it by rank in the cell, so that what has
+/// the greatest contrast, a page of print, cannot take all features of a frame. Corners of a cell
+/// are adjacent in `corners`.
 void FeatureExtractor::State::weigh() {
   const auto cell_of = [this](const Corner& corner) {
     return std::array<int, 3>{corner.level, corner.y / options.cell, corner.x / options.cell};
@@ -209,7 +321,8 @@ void FeatureExtractor::State::weigh() {
       }
       const int score = corners[i].score;
       weights.push_back(static_cast<std::uint8_t>(
-          score < kSure ? score : std::clamp(kSure + options.per_cell - rank, kSure, 255)));
+          score < kSureScore ? score
+                             : std::clamp(kSureScore + options.per_cell - rank, kSureScore, 255)));
     }
   }
 }

@@ -188,7 +188,7 @@ TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
       const Pose pose = draw_pose(band, test::gray(image), camera, random);
       const SceneFrame scene =
           render_scene(test::gray(image), camera, pose, background, band, random);
-      (*finder)->look(scene.picture.view());
+      (*finder)->add_frame(scene.picture.view());
     }
     ASSERT_TRUE((*finder)->focal())
         << truth << " after " << (*finder)->progress().views << " views";
@@ -211,7 +211,7 @@ TEST(FocalFinder, FrontalViewsTellNothing) {
   band.tilt_high = 1;
   for (int i = 0; i < 10; ++i) {
     const Pose pose = draw_pose(band, test::gray(image), camera, random);
-    (*finder)->look(
+    (*finder)->add_frame(
         render_scene(test::gray(image), camera, pose, background, band, random).picture.view());
   }
   EXPECT_FALSE((*finder)->focal());

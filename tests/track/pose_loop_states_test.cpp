@@ -183,9 +183,9 @@ TEST(PoseLoopStates, APlaneThatNoPoseExplainsIsFollowedByItsMap) {
   EXPECT_GE(followed, 8) << "it was searched for again and again";
 }
 
-PoseLoopOptions apart() {
+PoseLoopOptions async_search() {
   PoseLoopOptions options;
-  options.apart = true;
+  options.async_search = true;
   return options;
 }
 
@@ -200,8 +200,8 @@ bool shows_in_time(PoseLoop& loop, const GrayPicture& frame, TrackResult& result
   return false;
 }
 
-TEST(PoseLoopApart, FindsWithoutMakingTheFrameWait) {
-  auto loop = loop_of(one_pattern(), apart());
+TEST(PoseLoopAsync, FindsWithoutMakingTheFrameWait) {
+  auto loop = loop_of(one_pattern(), async_search());
   const SceneFrame scene = frame_of(near_view(), background());
   TrackResult result;
   ASSERT_TRUE(loop->step(scene.picture.view(), result));
@@ -216,8 +216,8 @@ TEST(PoseLoopApart, FindsWithoutMakingTheFrameWait) {
   EXPECT_EQ(result.times.detect, 0.0);
 }
 
-TEST(PoseLoopApart, WhatWasFoundIsBroughtToThePresentFrame) {
-  auto loop = loop_of(one_pattern(), apart());
+TEST(PoseLoopAsync, WhatWasFoundIsBroughtToThePresentFrame) {
+  auto loop = loop_of(one_pattern(), async_search());
   TrackResult result;
   bool found = false;
   for (int i = 0; i < 400 && !found; ++i) {
@@ -233,8 +233,8 @@ TEST(PoseLoopApart, WhatWasFoundIsBroughtToThePresentFrame) {
   EXPECT_TRUE(found);
 }
 
-TEST(PoseLoopApart, ForgetsWhatItSearchedForBeforeAReset) {
-  auto loop = loop_of(one_pattern(), apart());
+TEST(PoseLoopAsync, ForgetsWhatItSearchedForBeforeAReset) {
+  auto loop = loop_of(one_pattern(), async_search());
   const SceneFrame scene = frame_of(near_view(), background());
   const GrayPicture blank = plain(kWidth, kHeight, 120);
   for (int i = 0; i < 10; ++i) {
@@ -246,10 +246,10 @@ TEST(PoseLoopApart, ForgetsWhatItSearchedForBeforeAReset) {
   }
 }
 
-TEST(PoseLoopApart, EndsAtAnyMoment) {
+TEST(PoseLoopAsync, EndsAtAnyMoment) {
   const SceneFrame scene = frame_of(near_view(), background());
   for (int i = 0; i < 20; ++i) {
-    auto loop = loop_of(one_pattern(), apart());
+    auto loop = loop_of(one_pattern(), async_search());
     TrackResult result;
     for (int k = 0; k < i % 3; ++k) ASSERT_TRUE(loop->step(scene.picture.view(), result));
     if (i % 2 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(i));

@@ -14,7 +14,7 @@
 #include "bake/pattern/tracker_record_bake.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/pose_loop.hpp"
-#include "runtime/track/refine_from_inliers.hpp"
+#include "runtime/track/pose_refinement.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 #include "tests/track/synthetic.hpp"
 
@@ -67,9 +67,9 @@ TEST(TrackerFeatures, PrintLeavesRoomForAPictureOnIt) {
   paler.copyTo(frame(place));
   DetectOptions options;
   options.max_features = 400;
-  const auto describer = FeatureExtractor::create(frame.cols, frame.rows, options);
-  describer->set_frame(test::gray(frame));
-  const auto features = describer->features();
+  const auto extractor = FeatureExtractor::create(frame.cols, frame.rows, options);
+  extractor->set_frame(test::gray(frame));
+  const auto features = extractor->features();
   EXPECT_EQ(features.size(), 400u);
   const auto inside = std::count_if(features.begin(), features.end(), [&](const TrackerFeature& f) {
     return place.contains(cv::Point(static_cast<int>(f.x), static_cast<int>(f.y)));
@@ -111,13 +111,13 @@ TEST(PoseLoop, FindsThePatternWhereItIs) {
 // pose up from there, though half of them is hidden.
 TEST(PoseLoop, GrowsAPoseFromTheFeaturesOfOneCorner) {
   const Camera camera = default_camera(640, 480);
-  const auto pattern = tracker::view_loop_pattern(record(), 0);
+  const auto pattern = tracker::view_tracked_pattern(record(), 0);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
   SceneBand band;
   band.area_low = 0.8;
   band.area_high = 1.2;
   band.covered_low = band.covered_high = 0.5;
-  const auto describer = FeatureExtractor::create(camera.width, camera.height, {});
+  const auto extractor = FeatureExtractor::create(camera.width, camera.height, {});
   tracker::PatchCache patches;
   Random random(6);
   int grown_from_far = 0;
@@ -126,7 +126,7 @@ TEST(PoseLoop, GrowsAPoseFromTheFeaturesOfOneCorner) {
     const SceneFrame scene =
         render_scene(test::gray(picture()), camera, pose,
                      clutter(640, 480, static_cast<std::uint32_t>(300 + i)), band, random);
-    describer->set_frame(scene.picture.view());
+    extractor->set_frame(scene.picture.view());
     std::vector<glm::dvec2> world, seen;
     for (int k = 0; k < 12; ++k) {
       world.emplace_back(random.uniform(-0.8, 0.0), random.uniform(-0.6, 0.0));
@@ -137,8 +137,9 @@ TEST(PoseLoop, GrowsAPoseFromTheFeaturesOfOneCorner) {
     const std::vector<double> sigma(world.size(), 1.5);
     const Pose start = refine_pose(camera, world, seen, pose);
     Pose grown = start;
-    tracker::grow(*pattern, {camera, describer->pyramid(), tracker::kernels(), patches},
-                  {world, seen, sigma}, grown);
+    tracker::refine_from_inliers(*pattern,
+                                 {camera, extractor->pyramid(), tracker::kernels(), patches},
+                                 {world, seen, sigma}, grown);
     const auto error = [&](const Pose& at) {
       Detection detection;
       EXPECT_TRUE(tracker::map_corners(*pattern, tracker::map_of_pose(*pattern, camera, at),

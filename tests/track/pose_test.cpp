@@ -9,7 +9,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "runtime/track/symmetric_solver.hpp"
+#include "runtime/track/plane_geometry.hpp"
 #include "synthetic.hpp"
 
 namespace modar {

@@ -9,7 +9,7 @@
 namespace modar {
 
 /// Pinhole with Brown-Conrady distortion, as OpenCV has it. Pixels; the centre of the top-left
-/// pixel is (0, 0). The article has one camera constant c: fx = fy = c.
+/// pixel is (0, 0). The ModAR paper has one camera constant c: fx = fy = c.
 struct Camera {
   int width = 0;
   int height = 0;
@@ -23,10 +23,10 @@ struct Camera {
 /// The camera that is assumed when none is given: focal length = width, principal point = centre.
 Camera default_camera(int width, int height);
 
-/// The same lens on frames of another size (same aspect: scaled; other aspect: centre crop).
+/// The same lens for frames of another size (same aspect: scaled; other aspect: centre crop).
 Camera scaled_camera(const Camera& camera, int width, int height);
 
-/// Distorted pixel to the pixel an ideal pinhole with the same K would see (fixed-point iteration).
+/// Distorted pixel to that of a pinhole camera with the same K (fixed-point iteration).
 glm::dvec2 undistort(const Camera& camera, glm::dvec2 pixel);
 
 /// A point in camera axes (x right, y down, z forward) to a distorted pixel. z must be > 0.

@@ -1,4 +1,4 @@
-// The focal length of a camera that nobody has calibrated, from the patterns that it sees anyway.
+// The focal length of an uncalibrated camera, from the patterns that it sees anyway.
 #pragma once
 
 #include <memory>
@@ -10,26 +10,28 @@
 
 namespace modar {
 
-/// How far a FocalFinder has come.
+/// The state of a FocalFinder, and what it needs to be done. The three limits trade the time to
+/// find a focal length for its accuracy; with them rendered views are within 1 % of the truth.
 struct FocalProgress {
-  static constexpr int kFewestViews = 8;
-  static constexpr double kSure = 0.01;
-  static constexpr double kScatter = 8;
-  int looks = 0;         ///< frames looked at
-  int faint = 0;         ///< detections in them with too little perspective: too frontal or too far
-  int views = 0;         ///< detections that tell something; kFewestViews are needed
-  double deviation = 0;  ///< of the focal length, relative; at most kSure is needed; 0: unknown
-  /// Degrees, of the planes' normals about their mean, the way they scatter most; kScatter is
-  /// needed: what a lens bends and a principal point off the middle pull all planes of one tilt the
-  /// same way, and only others show it.
+  static constexpr int kMinViews = 8;
+  static constexpr double kMaxDeviation = 0.01;
+  static constexpr double kMinScatterDeg = 8;
+  int frames = 0;        ///< frames taken
+  int frontal = 0;       ///< detections in them with too little perspective: frontal, or far away
+  int views = 0;         ///< detections used; kMinViews are needed
+  double deviation = 0;  ///< relative standard deviation of the focal length; at most
+                         ///< kMaxDeviation is needed; 0: unknown
+  /// Standard deviation of the planes' normals in the direction of most scatter, degrees;
+  /// kMinScatterDeg is needed: distortion and a principal point off the centre bias all planes of
+  /// one tilt alike, and only other tilts show it.
   double scatter_deg = 0;
 };
 
-/// Looks for the bundle's patterns in frames now and then. Each view of a tilted plane tells the
-/// focal length (Zhang, "A flexible new technique for camera calibration", 2000, with the principal
-/// point in the frame's middle and square pixels); many views tell it well. What is found is
-/// aligned with the picture first, to a fraction of a pixel. Lenses that bend much need `modar
-/// calibrate`.
+/// Searches the frames it is given for the bundle's patterns. Each view of a tilted plane
+/// constrains the focal length (Zhang, "A flexible new technique for camera calibration", 2000,
+/// with the principal point in the frame's centre and square pixels); many views determine it.
+/// Detections are aligned with the frame to a fraction of a pixel first. Strongly distorting lenses
+/// need `modar calibrate`.
 class FocalFinder {
  public:
   /// Frames have that size. The bundle's bytes must outlive it. Errors: those of
@@ -40,10 +42,10 @@ class FocalFinder {
   FocalFinder& operator=(const FocalFinder&) = delete;
   ~FocalFinder();
 
-  /// A frame of the size of create(), about as dear as a search of PoseLoop; allocates nothing.
-  /// True where a view was added.
-  bool look(const GrayImage& frame);
-  /// Pixels; nothing before it is known to about 1 % (one standard deviation).
+  /// Takes a frame of the size given to create(). Costs about a search of PoseLoop; allocates
+  /// nothing. True if it added a view.
+  bool add_frame(const GrayImage& frame);
+  /// Pixels; none until progress() meets its limits.
   [[nodiscard]] std::optional<double> focal() const;
   [[nodiscard]] FocalProgress progress() const;
 

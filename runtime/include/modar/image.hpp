@@ -1,4 +1,4 @@
-// Pixels that somebody else owns.
+// Views of pixels, which the caller owns.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // Plane geometry of one pattern: from four corners or a homography to the camera's pose.
-// Source: "ModAR", section 3.2, Eq. 1 to 5. Small algebra by Eigen, kept inside pose.cpp.
+// Source: the ModAR paper, section 3.2, Eq. 1 to 5.
 #pragma once
 
 #include <array>
@@ -34,12 +34,12 @@ Result<glm::dmat3> homography_from_points(std::span<const glm::dvec2, 4> from,
 
 /// Homography to camera pose (ModAR Eq. 3-5). homography: pattern plane -> undistorted pixels.
 /// Deviation: its sign is chosen such that the pattern lies before the camera, and the last
-/// singular vector is flipped where det(U V^T) < 0. Errors: kInvalidInput "pose.degenerate".
+/// singular vector is flipped if det(U V^T) < 0. Errors: kInvalidInput "pose.degenerate".
 Result<Pose> pose_from_homography(const Camera& camera, const glm::dmat3& homography);
 
 /// Levenberg-Marquardt over the six parameters (rotation vector, translation), minimising the
 /// squared distance between projections of plane points (z = 0) and undistorted pixels.
-/// world.size() == pixels.size() >= 4. Answers the start pose where no step lowers the error.
+/// world.size() == pixels.size() >= 4. Returns the start pose if no step lowers the error.
 Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
                  std::span<const glm::dvec2> pixels, const Pose& start);
 

@@ -1,4 +1,4 @@
-// Our own pose loop: detect a pattern once, then track it. No OpenCV.
+// The pose loop: detects a pattern once, then tracks it. Needs no OpenCV.
 #pragma once
 
 #include <memory>
@@ -14,18 +14,21 @@ namespace modar {
 
 struct PoseLoopOptions {
   DetectOptions detect;
-  bool track = true;      ///< false: every frame is searched anew
-  int search_every = 10;  ///< frames between searches for further patterns while one is tracked
-  /// Searches on a thread of its own, on the newest frame, while tracking goes on: no frame waits,
-  /// but what is found depends on time. False: the same frames always give the same results.
-  bool apart = false;
+  bool track = true;  ///< false: every frame is searched anew
+  /// Frames between searches for further patterns while one is tracked: trades the time of a
+  /// search, some fifteen times that of tracking, for how soon a second pattern appears. Set by
+  /// hand.
+  int search_every = 10;
+  /// Searches on a thread of its own, on the latest frame, while tracking goes on: no frame waits,
+  /// but what is found depends on timing. False: the same frames always give the same results.
+  bool async_search = false;
 };
 
-/// Reads the patterns' loop records (section type 258) from the bundle's mapped bytes, which must
-/// outlive it. Allocates nothing per frame once a TrackResult has grown.
+/// Reads the patterns' tracker records (section type 258) from the bundle's mapped bytes, which
+/// must outlive it. Allocates nothing per frame once a TrackResult has grown.
 class PoseLoop {
  public:
-  /// Errors: kInvalidInput "tracker.no-patterns" where no pattern has a loop record,
+  /// Errors: kInvalidInput "tracker.no-patterns" if no pattern has a tracker record,
   /// "tracker.record"; kUnsupported "tracker.record-version".
   static Result<std::unique_ptr<PoseLoop>> create(const BundleView& bundle, const Camera& camera,
                                                   const PoseLoopOptions& options = {});
@@ -33,13 +36,12 @@ class PoseLoop {
   PoseLoop& operator=(const PoseLoop&) = delete;
   ~PoseLoop();
 
-  /// One frame of the camera's size. inliers of a detection: features that agree where it was
-  /// detected, patches that hold where it was tracked.
+  /// One frame of the camera's size.
   /// Errors: kInvalidInput "tracker.frame-size".
   Result<TrackResult> step(const GrayImage& frame);
-  /// The same into a result of the caller's, whose memory is used again.
+  /// The same into a result of the caller's, whose memory is reused.
   Result<void> step(const GrayImage& frame, TrackResult& result);
-  /// Forgets what it tracks.
+  /// Forgets all tracks.
   void reset();
 
  private:

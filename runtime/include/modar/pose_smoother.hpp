@@ -1,4 +1,4 @@
-// Takes the trembling out of poses, for drawing, at the price of a latency that it states.
+// Removes jitter from poses, for drawing, at the price of a latency that it reports.
 #pragma once
 
 #include <cstddef>
@@ -9,17 +9,18 @@
 
 namespace modar {
 
-/// Low-pass filter of first order whose cut-off rises with speed, after Casiez, Roussel & Vogel,
-/// "1 Euro filter" (2012): a resting model does not tremble, a moving one does not lag. What it
-/// answers trails a steady motion by exactly the latency that it states.
+/// First-order low-pass filter whose cut-off rises with speed, after Casiez, Roussel & Vogel, "1
+/// Euro filter" (2012): a resting model does not jitter, a moving one does not lag. Its output
+/// trails a steady motion by exactly the reported latency.
 class PoseSmoother {
  public:
-  /// greatest_ms: latency of a resting pattern, 0 to 1000; 0: off, poses pass unchanged. It falls
-  /// as 1 / (1 + speed / 0.05), speed in radians a second: of turning plus of the line of sight.
-  PoseSmoother(std::size_t pattern_count, double greatest_ms);
+  /// max_latency_ms: latency of a resting pattern, 0 to 1000; 0: off, poses pass unchanged. It
+  /// falls as 1 / (1 + speed / 0.05), speed in radians per second: of the rotation plus of the line
+  /// of sight.
+  PoseSmoother(std::size_t pattern_count, double max_latency_ms);
 
-  /// time_s: of the frame, rising. Changes the poses alone, not the corners. A pattern that was not
-  /// among the last frame's starts anew. Answers the latency of the slowest, milliseconds.
+  /// time_s: of the frame, increasing. Changes poses only, not corners. A pattern that was not in
+  /// the last frame starts anew. Returns the largest latency, milliseconds.
   double step(double time_s, std::span<Detection> visible);
 
  private:
@@ -34,7 +35,7 @@ class PoseSmoother {
   double smooth(double time_s, State& state, Pose& pose) const;
 
   std::vector<State> states_;
-  double greatest_s_ = 0;
+  double max_latency_s_ = 0;
 };
 
 }  // namespace modar

@@ -1,4 +1,4 @@
-// What the pose loop answers for a frame.
+// The result of tracking a frame, the method of the ModAR paper, and its two-frame rule.
 #pragma once
 
 #include <array>
@@ -16,19 +16,19 @@
 
 namespace modar {
 
-/// Why nothing is visible in a frame. A value, never an error.
+/// Why nothing is visible in a frame. A value, not an error.
 enum class Reason : std::uint8_t {
   kVisible,
   kNoFeatures,          ///< the frame has no corners to describe
-  kFewMatches,          ///< fewer than min_matches survive cross-check and the distance limit
-  kNoGeometry,          ///< no homography, or fewer than min_inliers agree with it
-  kFailedVerification,  ///< a homography that no camera before a plane can see
-  kLostByBlur,
-  kOutOfView,
+  kFewMatches,          ///< too few features match the pattern's
+  kNoGeometry,          ///< no homography, or too few matches agree with it
+  kFailedVerification,  ///< the homography is impossible, or the frame does not look like it
+  kLostByBlur,          ///< it was tracked, should be in view, and does not fit
+  kOutOfView,           ///< it was tracked and left the frame
 };
 /// "visible", "no features", "few matches", ...
 const char* to_string(Reason reason);
-/// How far a pattern came before that reason: of several patterns the frame answers the farthest's.
+/// How far a pattern came, 1 to 6: a frame reports the reason of the one that came furthest.
 int progress(Reason reason);
 
 /// A pattern measured in this frame.
@@ -37,8 +37,8 @@ struct Detection {
   std::array<glm::dvec2, 4>
       corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left
   Pose pose;
-  int matches = 0;
-  int inliers = 0;
+  int matches = 0;  ///< features that match, or patches in view if tracked
+  int inliers = 0;  ///< of those, the ones that agree with the pose
 };
 
 /// Milliseconds of the stages of one frame (wall clock of the calling thread).
@@ -57,13 +57,13 @@ struct TrackResult {
   TrackTimes times;
 };
 
-/// The article's pipeline (inventory C to F), with OpenCV: detect, describe, match by brute force
-/// with cross-check, RANSAC homography, Levenberg-Marquardt, corners, pose. The reference that ours
-/// is measured against; nothing of ours ever improves it.
+/// The pipeline of the ModAR paper (README cites it), by OpenCV: detect, describe, match by brute
+/// force with cross-check, RANSAC homography, Levenberg-Marquardt, corners, pose. The baseline for
+/// PoseLoop, so nothing of PoseLoop goes into it.
 class PaperTracker {
  public:
-  /// Reads the patterns described with parameter set `set_id` from the bundle's mapped twins.
-  /// Errors: kInvalidInput "tracker.no-patterns" if the bundle has none.
+  /// Reads the patterns described with parameter set `set_id` from the bundle's mapped feature
+  /// sections. Errors: kInvalidInput "tracker.no-patterns" if the bundle has none.
   static Result<std::unique_ptr<PaperTracker>> create(const BundleView& bundle,
                                                       std::uint32_t set_id, const Camera& camera);
   PaperTracker(const PaperTracker&) = delete;
@@ -80,8 +80,8 @@ class PaperTracker {
   std::unique_ptr<State> state_;
 };
 
-/// The article's two-frame rule (inventory G 37): a model is shown once its pattern was seen in two
-/// frames in sequence, and stays for at least two frames more when it is lost.
+/// The two-frame rule of the ModAR paper: a model is shown once its pattern was seen in two
+/// consecutive frames, and stays for two frames after its loss.
 class Hysteresis {
  public:
   explicit Hysteresis(std::size_t pattern_count);
@@ -89,15 +89,15 @@ class Hysteresis {
   struct State {
     bool shown = false;     ///< draw the model, at `pose`
     bool measured = false;  ///< the pose is of this frame
-    Pose pose;              ///< the newest pose that was measured
+    Pose pose;              ///< the latest measured pose
   };
-  /// Takes a frame's detections; answers one state a pattern, valid until the next call.
+  /// Takes a frame's detections; returns one state per pattern, valid until the next call.
   std::span<const State> step(std::span<const Detection> visible);
 
  private:
   struct Counter {
-    int seen = 0;    ///< frames in sequence with a detection
-    int missed = 0;  ///< frames in sequence without
+    int seen = 0;    ///< consecutive frames with a detection
+    int missed = 0;  ///< consecutive frames without
     State state;
   };
   std::vector<Counter> counters_;

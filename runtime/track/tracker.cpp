@@ -1,7 +1,47 @@
-// The article's two-frame rule: appear after two detections in sequence, outlive two misses.
+// Names and order of reasons, and the two-frame rule of the ModAR paper: a model appears after two
+// detections in sequence and outlives two misses.
 #include "modar/tracker.hpp"
 
 namespace modar {
+
+const char* to_string(Reason reason) {
+  switch (reason) {
+    case Reason::kVisible:
+      return "visible";
+    case Reason::kNoFeatures:
+      return "no features";
+    case Reason::kFewMatches:
+      return "few matches";
+    case Reason::kNoGeometry:
+      return "no geometry";
+    case Reason::kFailedVerification:
+      return "failed verification";
+    case Reason::kLostByBlur:
+      return "lost by blur";
+    case Reason::kOutOfView:
+      return "out of view";
+  }
+  return "unknown";
+}
+
+int progress(Reason reason) {
+  switch (reason) {
+    case Reason::kVisible:
+      return 6;
+    case Reason::kLostByBlur:
+    case Reason::kOutOfView:
+      return 5;
+    case Reason::kFailedVerification:
+      return 4;
+    case Reason::kNoGeometry:
+      return 3;
+    case Reason::kFewMatches:
+      return 2;
+    default:
+      return 1;
+  }
+}
+
 namespace {
 
 constexpr int kFramesToShow = 2;
@@ -23,7 +63,7 @@ std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> v
   for (std::size_t i = 0; i < counters_.size(); ++i) {
     Counter& counter = counters_[i];
     if (counter.state.measured) {
-      // Counting further would only overflow in a session of years.
+      // Not counted further: it would overflow in a session of years.
       if (counter.seen < kFramesToShow) ++counter.seen;
       counter.missed = 0;
       if (counter.seen >= kFramesToShow) counter.state.shown = true;

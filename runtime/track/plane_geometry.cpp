@@ -1,31 +1,37 @@
-// Plane maps of poses and homographies, and the pose that explains points best.
-#include "plane_map.hpp"
+// Plane maps, poses from points, the motion model and the solver of normal equations.
+#include "plane_geometry.hpp"
 
 #include <cmath>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 namespace modar::tracker {
 namespace {
 
-constexpr double kSmallestArea = 300.0;  // square pixels
+// Square pixels of a plausible outline. Smaller ones cannot hold the patches of a pyramid level;
+// set by hand, it trades the farthest distance for outlines of a few pixels that clutter can
+// imitate.
+constexpr double kMinArea = 300.0;
 
-/// The pose whose plane leans the other way about the line of sight to the pattern's centre.
+/// The second solution of the planar pose problem: the plane reflected about the line of sight to
+/// the pattern's centre.
 Pose mirrored(const Pose& pose) {
   const glm::dvec3 sight = glm::normalize(pose.translation);
   const glm::dvec3 normal = pose.rotation[2];
   const glm::dvec3 axis = glm::cross(normal, sight);
   const double sine = glm::length(axis);
   if (sine < 1e-9) return pose;
-  // The face looks against the line of sight: turn the normal through it to the other side.
+  // The normal points towards the camera: rotate it through the line of sight to the other side.
   const double angle = std::atan2(sine, -glm::dot(normal, sight));
   Pose other = pose;
   other.rotation = rotation_matrix(-2.0 * angle / sine * axis) * pose.rotation;
   return other;
 }
 
-/// Pixels; corners clockwise on the screen.
+/// Square pixels; positive for corners in clockwise order on the screen.
 double area_of(const std::array<glm::dvec2, 4>& corners) {
   double area = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -38,10 +44,10 @@ double area_of(const std::array<glm::dvec2, 4>& corners) {
 
 }  // namespace
 
-glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& ahead) const {
+glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& in_front) const {
   const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);
-  ahead = p.z > 1e-12;
-  if (!ahead) return {0.0, 0.0};
+  in_front = p.z > 1e-12;
+  if (!in_front) return {0.0, 0.0};
   const glm::dvec2 ideal = glm::dvec2(p) / p.z;
   if (lens == nullptr) return ideal;
   return project(*lens, {(ideal.x - lens->cx) / lens->fx, (ideal.y - lens->cy) / lens->fy, 1.0});
@@ -57,7 +63,7 @@ glm::dmat2 PlaneMap::derivative(glm::dvec2 pixel) const {
   return d;
 }
 
-const Camera* bending(const Camera& camera) {
+const Camera* distorting_lens(const Camera& camera) {
   for (const double k : camera.distortion) {
     if (k != 0.0) return &camera;
   }
@@ -71,7 +77,7 @@ PlaneMap map_of_pose(const TrackedPattern& pattern, const Camera& camera, const 
   k[2] = {camera.cx, camera.cy, 1.0};
   glm::dmat3 plane = pose.rotation;
   plane[2] = pose.translation;
-  return {k * plane * pattern.world_from_pixels(), bending(camera)};
+  return {k * plane * pattern.world_from_pixels(), distorting_lens(camera)};
 }
 
 bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
@@ -81,9 +87,9 @@ bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
   const std::array<glm::dvec2, 4> image = {glm::dvec2{-0.5, -0.5}, glm::dvec2{right, -0.5},
                                            glm::dvec2{right, bottom}, glm::dvec2{-0.5, bottom}};
   for (std::size_t i = 0; i < 4; ++i) {
-    bool ahead = false;
-    corners[i] = map.at(image[i], ahead);
-    if (!ahead || !std::isfinite(corners[i].x) || !std::isfinite(corners[i].y)) return false;
+    bool in_front = false;
+    corners[i] = map.at(image[i], in_front);
+    if (!in_front || !std::isfinite(corners[i].x) || !std::isfinite(corners[i].y)) return false;
   }
   return true;
 }
@@ -93,25 +99,25 @@ bool plausible(const std::array<glm::dvec2, 4>& corners) {
     const glm::dvec2 a = corners[i];
     const glm::dvec2 b = corners[(i + 1) % 4];
     const glm::dvec2 c = corners[(i + 2) % 4];
-    // y points down: the order of the corners is clockwise on the screen.
+    // y points down: the corners go clockwise on the screen.
     if (!((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) > 0.0)) return false;
   }
-  return area_of(corners) > kSmallestArea;
+  return area_of(corners) > kMinArea;
 }
 
 bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
-  const auto holds_middle = [](const std::array<glm::dvec2, 4>& outline,
-                               const std::array<glm::dvec2, 4>& other) {
-    const glm::dvec2 middle = 0.25 * (other[0] + other[1] + other[2] + other[3]);
+  const auto contains_centre = [](const std::array<glm::dvec2, 4>& outline,
+                                  const std::array<glm::dvec2, 4>& other) {
+    const glm::dvec2 centre = 0.25 * (other[0] + other[1] + other[2] + other[3]);
     for (std::size_t i = 0; i < 4; ++i) {
       const glm::dvec2 from = outline[i];
       const glm::dvec2 side = outline[(i + 1) % 4] - from;
-      if (side.x * (middle.y - from.y) - side.y * (middle.x - from.x) < 0.0) return false;
+      if (side.x * (centre.y - from.y) - side.y * (centre.x - from.x) < 0.0) return false;
     }
     return true;
   };
   const double ratio = area_of(a) / area_of(b);
-  return ratio > 0.5 && ratio < 2.0 && holds_middle(a, b) && holds_middle(b, a);
+  return ratio > 0.5 && ratio < 2.0 && contains_centre(a, b) && contains_centre(b, a);
 }
 
 std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,
@@ -129,7 +135,7 @@ int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dm
   int count = 0;
   for (const Pose& pose :
        {first, refine_pose(camera, points.world, points.ideal, mirrored(first))}) {
-    // The plane's face, not its back, must look at the camera.
+    // The plane's front must face the camera.
     if (glm::dot(pose.rotation[2], pose.translation) < 0.0) {
       poses[static_cast<std::size_t>(count++)] = pose;
     }
@@ -137,4 +143,51 @@ int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dm
   return count;
 }
 
+Pose extrapolate(const Pose& previous, const Pose& now) {
+  const glm::dmat3 turn = now.rotation * glm::transpose(previous.rotation);
+  Pose next;
+  // Orthonormalised: otherwise the rounding error of a pose fed back every frame doubles each time.
+  const glm::dmat3 turned = turn * now.rotation;
+  next.rotation[0] = glm::normalize(turned[0]);
+  next.rotation[1] =
+      glm::normalize(turned[1] - next.rotation[0] * glm::dot(next.rotation[0], turned[1]));
+  next.rotation[2] = glm::cross(next.rotation[0], next.rotation[1]);
+  next.translation = now.translation + (now.translation - previous.translation);
+  if (!(next.translation.z > 0.0)) return now;
+  return next;
+}
+
+bool in_view(const TrackedPattern& pattern, const PlaneMap& map, const Camera& camera) {
+  constexpr int kSide = 5;
+  constexpr int kMinInside = 4;  // of 25: names the reason of a loss only; set by hand
+  int inside = 0;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    bool in_front = false;
+    const glm::dvec2 p = map.at({(i % kSide + 0.5) / kSide * pattern.width(),
+                                 (static_cast<int>(i / kSide) + 0.5) / kSide * pattern.height()},
+                                in_front);
+    inside += in_front && p.x >= 0 && p.y >= 0 && p.x < camera.width && p.y < camera.height ? 1 : 0;
+  }
+  return inside >= kMinInside;
+}
+
 }  // namespace modar::tracker
+
+namespace modar {
+
+void solve_symmetric(int n, int columns, const double* a, double* x) {
+  // Padded to 8 x 8 by the identity, which leaves the other unknowns unchanged.
+  using Square = Eigen::Matrix<double, 8, 8>;
+  using Column = Eigen::Matrix<double, 8, 1>;
+  Square padded = Square::Identity();
+  padded.topLeftCorner(n, n) = Eigen::Map<const Eigen::MatrixXd>(a, n, n);
+  const Eigen::LDLT<Square> solver(padded);
+  for (int k = 0; k < columns; ++k) {
+    Eigen::Map<Eigen::VectorXd> column(x + k * n, n);
+    Column right = Column::Zero();
+    right.head(n) = column;
+    column = Column(solver.solve(right)).head(n);
+  }
+}
+
+}  // namespace modar

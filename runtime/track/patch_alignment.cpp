@@ -1,0 +1,499 @@
+// Patch templates, their normal equations, and Gauss-Newton over them.
+#include "patch_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <Eigen/Core>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace modar::tracker {
+namespace {
+
+constexpr int kSide = 2 * kPatchHalf + 1;
+constexpr float kPixels = kSide * kSide;
+
+// ---- Templates ----
+
+constexpr int kRing = 2;  // pixels around a patch: one for the smoothing, one for the differences
+constexpr int kWide = kSide + 2 * kRing;
+using Surroundings = std::array<float, kWide * kWide>;
+
+void add_sums(Patch& patch) {
+  for (int k = 0; k < kPatchPixels; ++k) {
+    const float t = patch.pixels.gray[k];
+    const float gx = patch.pixels.right[k];
+    const float gy = patch.pixels.down[k];
+    patch.t += t;
+    patch.tt += t * t;
+    patch.x += gx;
+    patch.y += gy;
+    patch.xx += gx * gx;
+    patch.xy += gx * gy;
+    patch.yy += gy * gy;
+    patch.tx += t * gx;
+    patch.ty += t * gy;
+  }
+}
+
+/// Binomial 1 2 1 along one direction, for elements that have both neighbours.
+void smooth(const float* from, int step, int first, int last, float* to) {
+  for (int k = first; k < last; ++k) {
+    to[k] = 0.25f * (from[k - step] + 2.0f * from[k] + from[k + step]);
+  }
+}
+
+/// Smooths about as much as a lens does, then differentiates. A template sharper than the frame is
+/// drawn aside by what lies on the patch's edge, each patch in its own direction: a constant error
+/// of the pose. Smoothing brought tracked corners from 0.057 to 0.016 px of the truth.
+void fill(const Surroundings& gray, Patch& patch) {
+  constexpr int kAll = kWide * kWide;
+  Surroundings rows{};
+  Surroundings both{};
+  smooth(gray.data(), 1, 1, kAll - 1, rows.data());
+  smooth(rows.data(), kWide, kWide, kAll - kWide, both.data());
+  for (int v = 0; v < kSide; ++v) {
+    for (int u = 0; u < kSide; ++u) {
+      const float* at = both.data() + (v + kRing) * kWide + u + kRing;
+      const int k = v * kSide + u;
+      patch.pixels.gray[k] = at[0];
+      patch.pixels.right[k] = 0.5f * (at[1] - at[-1]);
+      patch.pixels.down[k] = 0.5f * (at[kWide] - at[-kWide]);
+    }
+  }
+  add_sums(patch);
+}
+
+/// False if the patch or its ring crosses the image border.
+bool cut(const GrayImage& image, const TrackerPatchRecord& record, int level, Patch& patch) {
+  constexpr int kReach = kPatchHalf + kRing;
+  const double grow = static_cast<double>(1 << level);
+  const int column = static_cast<int>(record.x / (64.0 * grow));
+  const int row = static_cast<int>(record.y / (64.0 * grow));
+  if (column < kReach || row < kReach || column >= image.width - kReach ||
+      row >= image.height - kReach) {
+    return false;
+  }
+  patch = {};
+  patch.centre = {(column + 0.5) * grow - 0.5, (row + 0.5) * grow - 0.5};
+  Surroundings gray;
+  for (int v = 0; v < kWide; ++v) {
+    std::copy_n(image.pixels + (row + v - kReach) * image.stride + column - kReach, kWide,
+                gray.begin() + v * kWide);
+  }
+  fill(gray, patch);
+  return true;
+}
+
+/// Bilinear, with the border repeated outside of the image.
+float sample_clamped(const GrayImage& image, float x, float y) {
+  return sample(image, std::clamp(x, 0.0f, static_cast<float>(image.width) - 1.001f),
+                std::clamp(y, 0.0f, static_cast<float>(image.height) - 1.001f));
+}
+
+}  // namespace
+
+PatchCache::PatchCache() {
+  scratch_.reserve(kMaxPatches);
+  for (Slot& slot : slots_) slot.patches.reserve(kMaxPatches);
+}
+
+std::vector<Patch>& PatchCache::scratch() {
+  scratch_.clear();
+  return scratch_;
+}
+
+void PatchCache::motion_blur(const TrackedPattern& pattern, int level, const Patch& patch,
+                             glm::dvec2 motion, Patch& blurred) {
+  constexpr int kMaxSamples =
+      16;  // of the exposure, one a pixel: longer motions are sampled coarser
+  const GrayImage& image = pattern.levels[static_cast<std::size_t>(level)];
+  const double grow = static_cast<double>(1 << level);
+  const auto x0 = static_cast<float>((patch.centre.x + 0.5) / grow - 0.5) - kPatchHalf - kRing;
+  const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - kRing;
+  const int samples =
+      std::clamp(static_cast<int>(std::ceil(std::hypot(motion.x, motion.y))), 2, kMaxSamples);
+  Surroundings gray{};
+  for (int i = 0; i < samples; ++i) {
+    const double time = (i + 0.5) / samples - 0.5;
+    const float left = x0 + static_cast<float>(time * motion.x);
+    const float top = y0 + static_cast<float>(time * motion.y);
+    for (int v = 0; v < kWide; ++v) {
+      for (int u = 0; u < kWide; ++u) {
+        gray[static_cast<std::size_t>(v * kWide + u)] +=
+            sample_clamped(image, left + static_cast<float>(u), top + static_cast<float>(v));
+      }
+    }
+  }
+  blurred = {};
+  blurred.centre = patch.centre;
+  for (float& sum : gray) sum /= static_cast<float>(samples);
+  fill(gray, blurred);
+}
+
+std::span<const Patch> PatchCache::of(const TrackedPattern& pattern, int level) {
+  ++uses_;
+  Slot* oldest = slots_.data();
+  for (Slot& slot : slots_) {
+    if (slot.level == level && slot.pattern == pattern.index) {
+      slot.last_use = uses_;
+      return slot.patches;
+    }
+    if (slot.last_use < oldest->last_use) oldest = &slot;
+  }
+  oldest->pattern = pattern.index;
+  oldest->level = level;
+  oldest->last_use = uses_;
+  oldest->patches.clear();
+  Patch patch;
+  for (const TrackerPatchRecord& record : pattern.patches[static_cast<std::size_t>(level)]) {
+    if (oldest->patches.size() == kMaxPatches) break;
+    if (cut(pattern.levels[static_cast<std::size_t>(level)], record, level, patch)) {
+      oldest->patches.push_back(patch);
+    }
+  }
+  return oldest->patches;
+}
+
+// ---- One patch against the frame ----
+
+namespace {
+
+bool inside(const PatchPlace& place, const GrayImage& image) {
+  const float reach_x = kPatchHalf * (std::abs(place.right_x) + std::abs(place.down_x)) + 1.0f;
+  const float reach_y = kPatchHalf * (std::abs(place.right_y) + std::abs(place.down_y)) + 1.0f;
+  return place.x - reach_x >= 0.0f && place.y - reach_y >= 0.0f &&
+         place.x + reach_x < static_cast<float>(image.width - 1) &&
+         place.y + reach_y < static_cast<float>(image.height - 1);
+}
+
+PatchNormalEquations equations_of(const Patch& p, const PatchSums& s, float tukey) {
+  // Squared gray values. Below kFlat a template shows nothing, and the frame nothing below a
+  // quarter of it, for darker exposures. kNoise keeps the weight 1 / variance of plain patches
+  // finite: from there down it is noise that decides what a patch is worth. Both set by hand.
+  constexpr float kFlat = 4.0f;
+  constexpr float kNoise = 30.0f;
+  PatchNormalEquations out;
+  const float inverse = 1.0f / kPixels;
+  const float var_t = p.tt * inverse - p.t * inverse * p.t * inverse;
+  const float var_i = s.ii * inverse - s.i * inverse * s.i * inverse;
+  if (var_t < kFlat || var_i < kFlat * 0.25f) return out;
+  const float gain = std::sqrt(var_i / var_t);
+  out.correlation = (s.ti * inverse - p.t * inverse * s.i * inverse) / std::sqrt(var_t * var_i);
+  const float miss = (1.0f - out.correlation) / tukey;
+  if (miss >= 1.0f) return out;
+  // The frame is brought to the template's contrast.
+  const float weight = (1.0f - miss * miss) * (1.0f - miss * miss) / (var_t + kNoise);
+  out.xx = weight * (p.xx - p.x * p.x * inverse);
+  out.xy = weight * (p.xy - p.x * p.y * inverse);
+  out.yy = weight * (p.yy - p.y * p.y * inverse);
+  out.ex = weight * ((p.tx - p.t * p.x * inverse) - (s.ix - s.i * p.x * inverse) / gain);
+  out.ey = weight * ((p.ty - p.t * p.y * inverse) - (s.iy - s.i * p.y * inverse) / gain);
+  return out;
+}
+
+}  // namespace
+
+glm::vec2 displacement(const PatchNormalEquations& equations) {
+  // A tenth of the trace: along an edge the displacement shrinks, across it by a tenth. By hand.
+  const float damping = 0.1f * (equations.xx + equations.yy);
+  const float xx = equations.xx + damping;
+  const float yy = equations.yy + damping;
+  const float determinant = xx * yy - equations.xy * equations.xy;
+  if (!(determinant > 0.0f)) return {0.0f, 0.0f};
+  return glm::vec2{yy * equations.ex - equations.xy * equations.ey,
+                   xx * equations.ey - equations.xy * equations.ex} /
+         determinant;
+}
+
+PatchView view_of(const TrackedPattern& pattern, const FrameView& frame, int frame_level,
+                  const PlaneMap& map, std::size_t count) {
+  const Resolution best = finest(pattern, map, static_cast<int>(frame.pyramid.size()));
+  PatchView view{&frame.pyramid[static_cast<std::size_t>(frame_level)],
+                 &frame.kernels,
+                 {frame_level, best.pattern_level + frame_level - best.frame_level},
+                 {}};
+  if (view.at.pattern_level < 0 || view.at.pattern_level >= pattern.level_count) return view;
+  view.patches = frame.patches.of(pattern, view.at.pattern_level);
+  view.stride = std::max<std::size_t>(1, view.patches.size() / count);
+  return view;
+}
+
+bool observe_patch(const PatchView& view, const PlaneMap& map, const Patch& patch, float tukey,
+                   PatchObservation& out) {
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  const double grow = static_cast<double>(1 << view.at.pattern_level);
+  bool in_front = false;
+  out.pixel = map.at(patch.centre, in_front);
+  if (!in_front) return false;
+  const glm::dmat2 d = map.derivative(patch.centre) * (grow * shrink);
+  out.jacobian = d;
+  const PatchPlace place{static_cast<float>((out.pixel.x + 0.5) * shrink - 0.5),
+                         static_cast<float>((out.pixel.y + 0.5) * shrink - 0.5),
+                         static_cast<float>(d[0].x),
+                         static_cast<float>(d[0].y),
+                         static_cast<float>(d[1].x),
+                         static_cast<float>(d[1].y)};
+  if (!inside(place, *view.image)) return false;
+  const PatchSums sums =
+      view.kernels->patch_sums(patch.pixels, place, view.image->pixels, view.image->stride);
+  out.equations = equations_of(patch, sums, tukey);
+  return true;
+}
+
+PoseJacobian pose_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 world, double scale) {
+  const glm::dvec3 turned = pose.rotation * glm::dvec3(world, 0.0);
+  const glm::dvec3 p = turned + pose.translation;
+  const double fx = scale * camera.fx / p.z;
+  const double fy = scale * camera.fy / p.z;
+  const double x = p.x / p.z;
+  const double y = p.y / p.z;
+  return {{-fx * x * turned.y, fx * (turned.z + x * turned.x), -fx * turned.y, fx, 0, -fx * x},
+          {-fy * (turned.z + y * turned.y), fy * y * turned.x, fy * turned.x, 0, fy, -fy * y}};
+}
+
+double move_pose(const TrackedPattern& pattern, const Camera& camera, double scale,
+                 const std::array<double, 6>& change, Pose& pose) {
+  const glm::dvec3 translation = pose.translation + glm::dvec3(change[3], change[4], change[5]);
+  if (!(translation.z > 0.0)) return -1.0;
+  const double right = pattern.width();
+  const double bottom = pattern.height();
+  double most = 0.0;
+  for (const glm::dvec2 corner : {glm::dvec2{0, 0}, {right, 0}, {0, bottom}, {right, bottom}}) {
+    const PoseJacobian j = pose_jacobian(camera, pose, pattern.to_world(corner), scale);
+    most =
+        std::max(most, std::hypot(std::inner_product(j.x.begin(), j.x.end(), change.begin(), 0.0),
+                                  std::inner_product(j.y.begin(), j.y.end(), change.begin(), 0.0)));
+  }
+  pose.rotation = rotation_matrix({change[0], change[1], change[2]}) * pose.rotation;
+  pose.translation = translation;
+  return most;
+}
+
+Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_levels) {
+  const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
+  // Frame pixels per pattern pixel.
+  const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
+  const int octaves = static_cast<int>(std::lround(std::log2(std::clamp(scale, 1e-3, 1e3))));
+  Resolution out;
+  out.frame_level = std::clamp(octaves, 0, frame_levels - 1);
+  out.pattern_level = std::clamp(out.frame_level - octaves, 0, pattern.level_count - 1);
+  return out;
+}
+
+// ---- Gauss-Newton over all patches of a level ----
+
+namespace {
+
+// Pixels of the level: steps below it end a stage. Lower gains accuracy that the last stage brings
+// anyway and costs steps.
+constexpr double kConverged = 0.1;
+// Patches for the steps before the last ones, which only have to come near. A study measured the
+// price of 40 patches in all steps: an error of 0.050 px instead of 0.040, at 7/8 of the time.
+constexpr std::size_t kCoarsePatches = 40;
+// Steps over all patches; a converged pose ends earlier. Bounds the time of one that does not; set
+// by hand.
+constexpr int kPreciseSteps = 10;
+// 1 minus the correlation at which a patch loses its weight. In the first step the pose is still
+// off, and even patches that hardly correlate point in the right direction.
+constexpr float kTukeyFirst = 1.0f;
+constexpr float kTukey = 0.7f;
+// Radians, and the same of a homography's parameters: larger steps are not Gauss-Newton's to take.
+constexpr double kMaxRotation = 0.5;
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+/// Tukey's weight by the displacement that a patch still asks for once the others have converged: a
+/// patch on the edge of an occluder correlates well, but points elsewhere. It loses its weight at
+/// 1.2 template pixels, beyond what noise does; set by hand.
+void reweight(PatchNormalEquations& equations) {
+  constexpr float kFar = 1.2f;
+  const glm::vec2 d = displacement(equations);
+  const float far = std::min(1.0f, glm::dot(d, d) / (kFar * kFar));
+  const float weight = (1.0f - far) * (1.0f - far);
+  for (float* part : {&equations.xx, &equations.xy, &equations.yy, &equations.ex, &equations.ey}) {
+    *part *= weight;
+  }
+}
+
+/// Inverse of a patch's Jacobian: pixels of the level to template pixels.
+Eigen::Matrix2d to_template(const glm::dmat2& d) {
+  const double inverse = 1.0 / (d[0].x * d[1].y - d[0].y * d[1].x);
+  Eigen::Matrix2d m;
+  m << d[1].y * inverse, -d[1].x * inverse, -d[0].y * inverse, d[0].x * inverse;
+  return m;
+}
+
+/// Normal equations of N parameters over the patches of a view, and how well these fit.
+template <int N>
+struct NormalEquations {
+  Eigen::Matrix<double, N, N> jtj = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> jtr = Eigen::Matrix<double, N, 1>::Zero();
+  PatchFit fit;
+};
+
+/// jacobian(centre, pixel): derivative of a pattern pixel's place in the level by the parameters.
+template <int N, class Jacobian>
+NormalEquations<N> accumulate(const PatchView& view, const PlaneMap& map, float tukey,
+                              Jacobian&& jacobian) {
+  NormalEquations<N> out;
+  out.fit.level = view.at.frame_level;
+  for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
+    const Patch& patch = view.patches[i];
+    PatchObservation seen;
+    if (!observe_patch(view, map, patch, tukey, seen)) continue;
+    ++out.fit.visible;
+    PatchNormalEquations& one = seen.equations;
+    if (one.correlation >= kInlierCorrelation) ++out.fit.inliers;
+    out.fit.correlation += static_cast<double>(std::max(0.0f, one.correlation));
+    if (view.converged) reweight(one);
+    if (one.xx == 0.0f && one.yy == 0.0f) continue;
+    const Eigen::Matrix<double, 2, N> j =
+        to_template(seen.jacobian) * jacobian(patch.centre, seen.pixel);
+    Eigen::Matrix2d g;
+    g << static_cast<double>(one.xx), static_cast<double>(one.xy), static_cast<double>(one.xy),
+        static_cast<double>(one.yy);
+    out.jtj += j.transpose() * g * j;
+    out.jtr +=
+        j.transpose() * Eigen::Vector2d(static_cast<double>(one.ex), static_cast<double>(one.ey));
+  }
+  if (out.fit.visible > 0) out.fit.correlation /= out.fit.visible;
+  return out;
+}
+
+/// The Gauss-Newton step, with a trace of damping; false if the equations determine nothing.
+template <int N>
+bool solve(NormalEquations<N>& equations, Eigen::Matrix<double, N, 1>& change) {
+  const double trace = equations.jtj.trace();
+  if (equations.fit.visible < 4 || !(trace > 0.0)) return false;
+  equations.jtj.diagonal().array() += 1e-9 * trace;
+  change = solve_symmetric(equations.jtj, equations.jtr);
+  return change.allFinite();
+}
+
+/// Replaces the patches of a view by blurred ones where the motion exceeds a pixel of the level.
+void apply_motion_blur(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
+                       PatchView& view) {
+  constexpr double kLeast = 1.0;
+  if (frame.blur == nullptr || frame.blur->share <= 0.0) return;
+  const PlaneMap now = map_of_pose(pattern, frame.camera, pose);
+  const PlaneMap then = map_of_pose(pattern, frame.camera, frame.blur->previous);
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  const double grow = static_cast<double>(1 << view.at.pattern_level);
+  std::vector<Patch>& blurred = frame.patches.scratch();
+  for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
+    const Patch& patch = view.patches[i];
+    bool in_front = false;
+    bool was_in_front = false;
+    const glm::dvec2 way = now.at(patch.centre, in_front) - then.at(patch.centre, was_in_front);
+    if (!in_front || !was_in_front) continue;
+    const glm::dvec2 motion = frame.blur->share * shrink * way;
+    if (glm::length(motion) < kLeast) {
+      blurred.push_back(patch);
+      continue;
+    }
+    const Eigen::Vector2d turned = to_template(now.derivative(patch.centre) * (grow * shrink)) *
+                                   Eigen::Vector2d(motion.x, motion.y);
+    PatchCache::motion_blur(pattern, view.at.pattern_level, patch, {turned.x(), turned.y()},
+                            blurred.emplace_back());
+  }
+  view.patches = blurred;
+  view.stride = 1;
+}
+
+/// One step on the pose. Returns the displacement of its corners, pixels of the level; negative if
+/// there is no step.
+double step_pose(const TrackedPattern& pattern, const FrameView& frame, const PatchView& view,
+                 float tukey, Pose& pose, PatchFit& fit) {
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  NormalEquations<6> equations = accumulate<6>(
+      view, map_of_pose(pattern, frame.camera, pose), tukey, [&](glm::dvec2 centre, glm::dvec2) {
+        const PoseJacobian rows =
+            pose_jacobian(frame.camera, pose, pattern.to_world(centre), shrink);
+        Eigen::Matrix<double, 2, 6> j;
+        j.row(0) = Eigen::Map<const Eigen::Matrix<double, 1, 6>>(rows.x.data());
+        j.row(1) = Eigen::Map<const Eigen::Matrix<double, 1, 6>>(rows.y.data());
+        return j;
+      });
+  fit = equations.fit;
+  Vector6 change;
+  if (!solve(equations, change) || change.head<3>().norm() > kMaxRotation) return -1.0;
+  std::array<double, 6> by{};
+  Eigen::Map<Vector6>(by.data()) = change;
+  return move_pose(pattern, frame.camera, shrink, by, pose);
+}
+
+}  // namespace
+
+PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_level, int steps,
+               bool precise, Pose& pose) {
+  PatchView view = view_of(pattern, frame, frame_level, map_of_pose(pattern, frame.camera, pose),
+                           kCoarsePatches);
+  PatchFit fit;
+  fit.level = frame_level;
+  if (view.patches.empty()) return fit;
+  const PatchView sharp = view;
+  apply_motion_blur(pattern, frame, pose, view);
+  double moved = 0.0;
+  for (int step = 0; step < steps; ++step) {
+    moved = step_pose(pattern, frame, view, step == 0 ? kTukeyFirst : kTukey, pose, fit);
+    if (moved < kConverged) break;
+  }
+  if (precise) {
+    view = sharp;
+    // Blurred patches are made anew in each frame: half of them will do.
+    view.stride = frame.blur != nullptr ? 2 : 1;
+    apply_motion_blur(pattern, frame, pose, view);
+  }
+  for (int step = 0; step < (precise ? kPreciseSteps : 1) && moved >= 0.0; ++step) {
+    // The fit is that of the pose before the step, which lies near enough to be judged by it.
+    moved = step_pose(pattern, frame, view, kTukey, pose, fit);
+    if (view.converged || (!precise && moved < kConverged)) break;
+    view.converged = precise && moved < kConverged;
+  }
+  return fit;
+}
+
+PatchFit evaluate(const TrackedPattern& pattern, const FrameView& frame, int frame_level,
+                  const Pose& pose) {
+  Pose unchanged = pose;
+  return align(pattern, frame, frame_level, 0, false, unchanged);
+}
+
+PatchFit align_map(const TrackedPattern& pattern, const FrameView& frame, int frame_level,
+                   int steps, PlaneMap& map) {
+  PatchView view = view_of(pattern, frame, frame_level, map, kCoarsePatches);
+  view.stride = 1;
+  PatchFit fit;
+  fit.level = frame_level;
+  if (view.patches.empty()) return fit;
+  const Camera& camera = frame.camera;
+  const double scale = camera.fx / static_cast<double>(1 << frame_level);
+  const auto jacobian = [&](glm::dvec2, glm::dvec2 pixel) {
+    const double u = (pixel.x - camera.cx) / camera.fx;
+    const double v = (pixel.y - camera.cy) / camera.fx;
+    Eigen::Matrix<double, 2, 8> j;
+    j << 1, u, v, 0, 0, 0, u * u, u * v, 0, 0, 0, 1, u, v, u * v, v * v;
+    return Eigen::Matrix<double, 2, 8>(scale * j);
+  };
+  glm::dmat3 k(1.0);
+  k[0][0] = k[1][1] = camera.fx;
+  k[2] = {camera.cx, camera.cy, 1.0};
+  for (int step = 0; step <= steps; ++step) {
+    NormalEquations<8> equations =
+        accumulate<8>(view, map, step == 0 ? kTukeyFirst : kTukey, jacobian);
+    fit = equations.fit;
+    Eigen::Matrix<double, 8, 1> e;
+    if (step == steps || !solve(equations, e) || e.norm() > kMaxRotation) break;
+    glm::dmat3 change(1.0);
+    change[0] = {1.0 + e(1), e(4), -e(6)};
+    change[1] = {e(2), 1.0 + e(5), -e(7)};
+    change[2] = {e(0), e(3), 1.0};
+    map.homography = k * change * glm::inverse(k) * map.homography;
+  }
+  return fit;
+}
+
+}  // namespace modar::tracker

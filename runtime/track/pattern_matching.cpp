@@ -1,0 +1,528 @@
+// Matches codes, lets every match vote for an affine map, fits homographies to the best votes; and
+// the index over all patterns.
+#include "pattern_matching.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace modar::tracker {
+namespace {
+
+// Bits, of 256: largest distance of a match. Trades steep and blurred views, which differ by more
+// from the baked ones, for chance matches, which the vote below has to sort out. By hand.
+constexpr int kMaxDistance = 72;
+// Bits of a code's first half up to which a block of codes is compared in full: trades matches
+// whose differences crowd there for the time of all other blocks. By hand.
+constexpr int kMaxHalfDistance = 44;
+// Ratio test, percent of the second best: 90 after the study of detectors that this loop follows.
+// Lower loses repeated texture, higher lets ambiguous matches through.
+constexpr int kRatio = 90;
+// Pattern pixels within which the second best is the same point seen in another baked view.
+constexpr double kSamePoint = 6.0;
+// Matches whose affine map is voted on, those of least distance first: their number times that of
+// the matches is the vote's cost.
+constexpr std::size_t kMaxVotes = 96;
+// Matches from which on there is a hypothesis: an affine map needs three, and as many to confirm
+// it.
+constexpr std::size_t kMinMatches = 6;
+// Votes that are fitted; those that lead to a hypothesis again are dropped. Bounds the time in
+// clutter, where no vote leads anywhere.
+constexpr int kMaxFits = 8;
+
+glm::dvec2 place(const TrackerFeatureRecord& record) {
+  return {record.x / 64.0 - 0.5, record.y / 64.0 - 0.5};
+}
+
+/// Similarity that normalises points to mean 0 and mean distance 1.
+struct Scaling {
+  glm::dvec2 mean{0.0};
+  double scale = 1.0;
+  [[nodiscard]] glm::dvec2 apply(glm::dvec2 p) const { return (p - mean) * scale; }
+};
+
+template <class Get>
+Scaling scaling_of(std::span<const std::uint8_t> mask, Get&& get) {
+  Scaling out;
+  double count = 0.0;
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i] == 0) continue;
+    out.mean += get(i);
+    count += 1.0;
+  }
+  out.mean /= count;
+  double distance = 0.0;
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i] != 0) distance += glm::length(get(i) - out.mean);
+  }
+  out.scale = distance > 0.0 ? count / distance : 0.0;
+  return out;
+}
+
+/// normal_to^-1 * h * normal_from.
+glm::dmat3 unscaled(const glm::dmat3& h, const Scaling& from, const Scaling& to) {
+  glm::dmat3 normal(1.0);
+  normal[0][0] = normal[1][1] = from.scale;
+  normal[2] = {-from.mean * from.scale, 1.0};
+  glm::dmat3 back(1.0);
+  back[0][0] = back[1][1] = 1.0 / to.scale;
+  back[2] = {to.mean, 1.0};
+  return back * h * normal;
+}
+
+}  // namespace
+
+FeatureMatch match_of(const TrackerFeatureRecord& record, const TrackerFeature& feature) {
+  FeatureMatch match;
+  match.pattern = place(record);
+  match.ideal = {static_cast<double>(feature.x), static_cast<double>(feature.y)};
+  match.sigma = static_cast<double>(1 << feature.level);
+  // From the oriented patch to the frame: rotate by the feature's angle, scale by its level.
+  const double c = static_cast<double>(feature.cosine) * match.sigma / 4096.0;
+  const double s = static_cast<double>(feature.sine) * match.sigma / 4096.0;
+  const std::int16_t* w = record.warp;
+  match.affine[0] = {c * w[0] - s * w[2], s * w[0] + c * w[2]};
+  match.affine[1] = {c * w[1] - s * w[3], s * w[1] + c * w[3]};
+  return match;
+}
+
+bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other) {
+  const glm::dmat2& a = hypothesis.affine;
+  const glm::dvec2 away = a * (other.pattern - hypothesis.pattern);
+  const glm::dvec2 miss = away + hypothesis.ideal - other.ideal;
+  // Four pixels of the feature's level, and a quarter of the way for what orientation and scale of
+  // one feature are off by, perspective included; in shape 0.6 of the map's norm. Set by hand: the
+  // fit that follows sorts out what they let in.
+  const double limit = 4.0 * other.sigma + 0.25 * glm::length(away);
+  if (!(glm::dot(miss, miss) < limit * limit)) return false;
+  const glm::dmat2 gap = other.affine - a;
+  const double size = glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]);
+  return glm::dot(gap[0], gap[0]) + glm::dot(gap[1], gap[1]) < 0.36 * size;
+}
+
+PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t max_features,
+                           std::size_t max_codes)
+    : camera_(camera), kernels_(kernels), distances_(max_codes + kSlack) {
+  for (HomographyHypothesis& one : hypotheses_) one.mask.reserve(max_features);
+  matches_.reserve(max_features);
+  mask_.reserve(max_features);
+  explained_.reserve(max_features);
+  supporters_.reserve(max_features);
+  order_.reserve(max_features);
+  inlier_world_.reserve(max_features);
+  inlier_ideal_.reserve(max_features);
+  inlier_sigma_.reserve(max_features);
+}
+
+/// Lowe's ratio test, where a second best at the same point of the pattern (from another view) is
+/// no rival. at: index of the best.
+bool PlaneMatcher::unambiguous(const TrackedPattern& pattern, std::size_t first, std::size_t count,
+                               int best, std::size_t& at) const {
+  const auto limit = static_cast<std::uint8_t>(best * 100 / kRatio);
+  const auto* nearest =
+      static_cast<const std::uint8_t*>(std::memchr(distances_.data(), best, count));
+  at = static_cast<std::size_t>(nearest - distances_.data());
+  const glm::dvec2 here = place(pattern.features[first + at]);
+  // Most blocks hold no code that near.
+  for (std::size_t block = 0; block < count; block += kBlockCodes) {
+    const std::uint8_t* distances = distances_.data() + block;
+    unsigned any = 0;
+    for (std::size_t i = 0; i < kBlockCodes; ++i) any |= distances[i] <= limit ? 1u : 0u;
+    if (any == 0) continue;
+    for (std::size_t i = 0; i < kBlockCodes; ++i) {
+      if (distances[i] > limit) continue;
+      if (glm::length(place(pattern.features[first + block + i]) - here) > kSamePoint) return false;
+    }
+  }
+  at += first;
+  return true;
+}
+
+void PlaneMatcher::match(const TrackedPattern& pattern, std::span<const TrackerFeature> features) {
+  matches_.clear();
+  const Camera* lens = camera_.distortion == std::array<double, 5>{} ? nullptr : &camera_;
+  for (const TrackerFeature& feature : features) {
+    const std::size_t first = feature.dark != 0 ? pattern.bright_count : 0;
+    const std::size_t last = feature.dark != 0 ? pattern.features.size() : pattern.bright_count;
+    if (first == last) continue;
+    const int best =
+        kernels_.distances(feature.code.data(), pattern.codes + first * kCodeBytes,
+                           (last - first) / kBlockCodes, kMaxHalfDistance, distances_.data());
+    std::size_t at = 0;
+    if (best > kMaxDistance || !unambiguous(pattern, first, last - first, best, at)) continue;
+    FeatureMatch& match = matches_.emplace_back(match_of(pattern.features[at], feature));
+    if (lens != nullptr) match.ideal = undistort(*lens, match.ideal);
+    match.distance = best;
+  }
+}
+
+/// Counts the matches that agree with one match's affine map.
+std::size_t PlaneMatcher::support(const FeatureMatch& hypothesis,
+                                  std::vector<std::uint8_t>* mask) const {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    const bool one = agrees(hypothesis, matches_[i]);
+    count += one ? 1 : 0;
+    if (mask != nullptr) (*mask)[i] = one ? 1 : 0;
+  }
+  return count;
+}
+
+std::size_t PlaneMatcher::collect(const glm::dmat3& homography, double pixels,
+                                  std::vector<std::uint8_t>& mask) const {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    const glm::dvec3 p = homography * glm::dvec3(matches_[i].pattern, 1.0);
+    const glm::dvec2 miss = glm::dvec2(p) / p.z - matches_[i].ideal;
+    const double limit = pixels * matches_[i].sigma;
+    mask[i] = p.z > 0.0 && glm::dot(miss, miss) < limit * limit ? 1 : 0;
+    count += mask[i];
+  }
+  return count;
+}
+
+bool PlaneMatcher::fit_affine(std::span<const std::uint8_t> mask, glm::dmat3& homography) const {
+  const Scaling from = scaling_of(mask, [&](std::size_t i) { return matches_[i].pattern; });
+  const Scaling to = scaling_of(mask, [&](std::size_t i) { return matches_[i].ideal; });
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d right = Eigen::Matrix2d::Zero();
+  // The scaling's means are unweighted; these are weighted.
+  double weights = 0.0;
+  Eigen::Vector2d mean_p = Eigen::Vector2d::Zero();
+  Eigen::Vector2d mean_q = Eigen::Vector2d::Zero();
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      if (mask[i] == 0) continue;
+      const double w = 1.0 / (matches_[i].sigma * matches_[i].sigma);
+      const glm::dvec2 p = from.apply(matches_[i].pattern);
+      const glm::dvec2 q = to.apply(matches_[i].ideal);
+      if (pass == 0) {
+        weights += w;
+        mean_p += w * Eigen::Vector2d(p.x, p.y);
+        mean_q += w * Eigen::Vector2d(q.x, q.y);
+      } else {
+        const Eigen::Vector2d dp = Eigen::Vector2d(p.x, p.y) - mean_p;
+        const Eigen::Vector2d dq = Eigen::Vector2d(q.x, q.y) - mean_q;
+        normal += w * dp * dp.transpose();
+        right += w * dq * dp.transpose();
+      }
+    }
+    if (pass == 0) {
+      mean_p /= weights;
+      mean_q /= weights;
+    }
+  }
+  const double determinant = normal.determinant();
+  if (!(determinant > 1e-9 * normal.trace() * normal.trace())) return false;
+  Eigen::Matrix2d inverse;
+  inverse << normal(1, 1), -normal(0, 1), -normal(1, 0), normal(0, 0);
+  const Eigen::Matrix2d a = right * inverse / determinant;
+  const Eigen::Vector2d b = mean_q - a * mean_p;
+  glm::dmat3 h(1.0);
+  h[0] = {a(0, 0), a(1, 0), 0.0};
+  h[1] = {a(0, 1), a(1, 1), 0.0};
+  h[2] = {b(0), b(1), 1.0};
+  homography = unscaled(h, from, to);
+  return true;
+}
+
+bool PlaneMatcher::fit_homography(std::span<const std::uint8_t> mask,
+                                  glm::dmat3& homography) const {
+  using Vector8 = Eigen::Matrix<double, 8, 1>;
+  const Scaling from = scaling_of(mask, [&](std::size_t i) { return matches_[i].pattern; });
+  const Scaling to = scaling_of(mask, [&](std::size_t i) { return matches_[i].ideal; });
+  if (!(from.scale > 0.0) || !(to.scale > 0.0)) return false;
+  Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
+  Vector8 right = Vector8::Zero();
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i] == 0) continue;
+    const glm::dvec2 p = from.apply(matches_[i].pattern);
+    const glm::dvec2 q = to.apply(matches_[i].ideal);
+    // Divided by the depth under the current map, the algebraic error is the geometric one.
+    const double depth = (homography * glm::dvec3(matches_[i].pattern, 1.0)).z;
+    const double w = 1.0 / (matches_[i].sigma * matches_[i].sigma * depth * depth);
+    Vector8 row_x;
+    Vector8 row_y;
+    row_x << p.x, p.y, 1, 0, 0, 0, -q.x * p.x, -q.x * p.y;
+    row_y << 0, 0, 0, p.x, p.y, 1, -q.y * p.x, -q.y * p.y;
+    normal += w * (row_x * row_x.transpose() + row_y * row_y.transpose());
+    right += w * (q.x * row_x + q.y * row_y);
+  }
+  // A trace of damping keeps the perspective of few or crowded points near zero.
+  normal(6, 6) += 1e-3 * normal(0, 0);
+  normal(7, 7) += 1e-3 * normal(1, 1);
+  const Vector8 h = solve_symmetric(normal, right);
+  if (!h.allFinite()) return false;
+  glm::dmat3 m;
+  m[0] = {h(0), h(3), h(6)};
+  m[1] = {h(1), h(4), h(7)};
+  m[2] = {h(2), h(5), 1.0};
+  m = unscaled(m, from, to);
+  homography = m;
+  return true;
+}
+
+/// From a vote to a homography: affine first, which few points determine, then projective, with
+/// limits that shrink from what one feature predicts to 3 pixels of a feature's level, the noise of
+/// a corner. The sequence is set by hand.
+std::size_t PlaneMatcher::fit(const FeatureMatch& hypothesis, glm::dmat3& homography) {
+  std::size_t count = support(hypothesis, &mask_);
+  if (count < kMinMatches) return 0;
+  if (!fit_affine(mask_, homography)) return 0;
+  for (const double pixels : {16.0, 10.0}) {
+    count = collect(homography, pixels, mask_);
+    if (count < kMinMatches || !fit_affine(mask_, homography)) return 0;
+  }
+  for (const double pixels : {10.0, 6.0, 4.0, 3.0, 3.0}) {
+    count = collect(homography, pixels, mask_);
+    if (count < kMinMatches || !fit_homography(mask_, homography)) return 0;
+  }
+  return collect(homography, 3.0, mask_);
+}
+
+/// Counts the supporters of the nearest matches.
+void PlaneMatcher::rank_votes() {
+  order_.clear();
+  for (std::uint32_t i = 0; i < matches_.size(); ++i) order_.push_back(i);
+  std::sort(order_.begin(), order_.end(), [this](std::uint32_t a, std::uint32_t b) {
+    return matches_[a].distance != matches_[b].distance
+               ? matches_[a].distance < matches_[b].distance
+               : a < b;
+  });
+  if (order_.size() > kMaxVotes) order_.resize(kMaxVotes);
+  for (const std::uint32_t i : order_) {
+    supporters_[i] =
+        static_cast<std::uint8_t>(std::min<std::size_t>(support(matches_[i], nullptr), 255));
+  }
+}
+
+std::span<const HomographyHypothesis> PlaneMatcher::find(const TrackedPattern& pattern,
+                                                         std::span<const TrackerFeature> features) {
+  match(pattern, features);
+  if (matches_.size() < kMinMatches) return {};
+  mask_.assign(matches_.size(), 0);
+  explained_.assign(matches_.size(), 0);
+  supporters_.assign(matches_.size(), 0);
+  rank_votes();
+  std::size_t count = 0;
+  for (int attempt = 0; attempt < kMaxFits && count < hypotheses_.size(); ++attempt) {
+    std::uint32_t chosen = order_.front();
+    int votes = -1;
+    for (const std::uint32_t i : order_) {
+      if (explained_[i] == 0 && supporters_[i] > votes) {
+        votes = supporters_[i];
+        chosen = i;
+      }
+    }
+    if (votes < static_cast<int>(kMinMatches)) break;
+    HomographyHypothesis& one = hypotheses_[count];
+    one.inliers = static_cast<int>(fit(matches_[chosen], one.homography));
+    one.mask.assign(mask_.begin(), mask_.end());
+    explained_[chosen] = 1;
+    int fresh = 0;
+    for (std::size_t i = 0; i < mask_.size(); ++i) {
+      fresh += mask_[i] & ~explained_[i];
+      explained_[i] |= mask_[i];
+    }
+    // Most votes that a hypothesis leaves over lead back to it: it needs a quarter of new inliers.
+    if (4 * fresh < one.inliers || one.inliers == 0) continue;
+    ++count;
+    for (std::size_t i = count - 1; i > 0 && hypotheses_[i - 1].inliers < hypotheses_[i].inliers;
+         --i) {
+      std::swap(hypotheses_[i - 1], hypotheses_[i]);
+    }
+  }
+  return std::span(hypotheses_).first(count);
+}
+
+void PlaneMatcher::select(const TrackedPattern& pattern, const HomographyHypothesis& hypothesis) {
+  inlier_world_.clear();
+  inlier_ideal_.clear();
+  inlier_sigma_.clear();
+  for (std::size_t i = 0; i < hypothesis.mask.size(); ++i) {
+    if (hypothesis.mask[i] == 0) continue;
+    inlier_world_.push_back(pattern.to_world(matches_[i].pattern));
+    inlier_ideal_.push_back(matches_[i].ideal);
+    inlier_sigma_.push_back(matches_[i].sigma);
+  }
+}
+
+// ---- The index over all patterns ----
+
+namespace {
+
+// Codes of a pattern and polarity in the index, the most repeatable: trades memory and time for
+// patterns seen from views whose codes come later. With 128, half a megabyte for 50 patterns.
+constexpr std::size_t kIndexed = 128;
+// Bits: a code further away casts no vote. Tighter than a match, since it is held against all
+// patterns' codes. By hand.
+constexpr int kMaxVoteDistance = 60;
+// Votes of a pattern that its other votes are compared with; with more, every n-th. Bounds the time
+// of a pattern that takes all votes.
+constexpr std::size_t kCompared = 64;
+constexpr std::uint32_t kNone = ~0u;
+constexpr unsigned kWordBits = 20;  // of a word's number, below its distance
+constexpr int kNoLimit = 255;       // of Kernels::distances(): leaves nothing out
+constexpr std::size_t kBlockBytes = std::size_t{kBlockCodes} * kCodeBytes;
+
+using Code = CodeIndex::Code;
+
+Code code_at(const std::uint8_t* blocks, std::size_t i) {
+  const std::uint8_t* block = blocks + i / kBlockCodes * kBlockBytes + i % kBlockCodes;
+  Code code;
+  for (std::size_t k = 0; k < code.size(); ++k) code[k] = block[k * kBlockCodes];
+  return code;
+}
+
+void put_code(const Code& code, std::size_t i, std::uint8_t* blocks) {
+  std::uint8_t* block = blocks + i / kBlockCodes * kBlockBytes + i % kBlockCodes;
+  for (std::size_t k = 0; k < code.size(); ++k) block[k * kBlockCodes] = code[k];
+}
+
+std::size_t position_of(std::span<const std::uint8_t> distances, int wanted) {
+  std::size_t at = 0;
+  while (at + 1 < distances.size() && distances[at] != wanted) ++at;
+  return at;
+}
+
+/// Where a pattern's features of a polarity begin and end.
+std::array<std::size_t, 2> range_of(const TrackedPattern& pattern, bool dark) {
+  if (dark) return {pattern.bright_count, pattern.features.size()};
+  return {0, pattern.bright_count};
+}
+
+}  // namespace
+
+CodeIndex::CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
+                     std::size_t max_features)
+    : patterns_(patterns),
+      kernels_(kernels),
+      votes_(max_features),
+      last_(patterns.size()),
+      support_(patterns.size()) {
+  build(groups_[0], false);
+  build(groups_[1], true);
+}
+
+void CodeIndex::build(Group& group, bool dark) {
+  std::vector<Code> codes;
+  std::vector<std::uint32_t> owners;
+  for (std::uint32_t p = 0; p < patterns_.size(); ++p) {
+    const auto [first, last] = range_of(patterns_[p], dark);
+    for (std::size_t i = first; i < std::min(last, first + kIndexed); ++i) {
+      codes.push_back(code_at(patterns_[p].codes, i));
+      owners.push_back(p * static_cast<std::uint32_t>(kIndexed) +
+                       static_cast<std::uint32_t>(i - first));
+    }
+  }
+  if (codes.empty()) return;
+  // So many words that comparing with them and with the codes of a few costs about the same.
+  const double balanced = std::sqrt(2.0 * static_cast<double>(codes.size()));
+  const std::size_t words = (static_cast<std::size_t>(balanced) / kBlockCodes + 1) * kBlockCodes;
+  group.words.resize(words * kCodeBytes);
+  for (std::size_t w = 0; w < words; ++w) {
+    put_code(codes[w * codes.size() / words], w, group.words.data());
+  }
+  distances_.resize(std::max(distances_.size(), words + kSlack));
+  std::vector<std::vector<std::uint32_t>> lists(words);
+  for (std::uint32_t i = 0; i < codes.size(); ++i) {
+    const int least = kernels_.distances(codes[i].data(), group.words.data(), words / kBlockCodes,
+                                         kNoLimit, distances_.data());
+    lists[position_of({distances_.data(), words}, least)].push_back(i);
+  }
+  for (const std::vector<std::uint32_t>& list : lists) {
+    group.starts.push_back(static_cast<std::uint32_t>(group.owners.size() / kBlockCodes));
+    const std::size_t filled = (list.size() + kBlockCodes - 1) / kBlockCodes * kBlockCodes;
+    group.codes.resize((group.owners.size() + filled) * kCodeBytes);
+    for (std::size_t k = 0; k < filled; ++k) {
+      const std::uint32_t i = list[std::min(k, list.size() - 1)];  // padded with its last
+      put_code(codes[i], group.owners.size(), group.codes.data());
+      group.owners.push_back(owners[i]);
+    }
+    distances_.resize(std::max(distances_.size(), filled + kSlack));
+  }
+  group.starts.push_back(static_cast<std::uint32_t>(group.owners.size() / kBlockCodes));
+  group.codes.shrink_to_fit();
+  group.owners.shrink_to_fit();
+}
+
+/// The nearest words that have codes, by distance and number, then kNone.
+std::array<std::uint32_t, CodeIndex::kProbes> CodeIndex::nearest_words(const Group& group,
+                                                                       const Code& code) {
+  const std::size_t words = group.starts.size() - 1;
+  kernels_.distances(code.data(), group.words.data(), words / kBlockCodes, kNoLimit,
+                     distances_.data());
+  std::array<std::uint32_t, kProbes> near;
+  near.fill(kNone);
+  for (std::uint32_t w = 0; w < words; ++w) {
+    std::uint32_t key = std::uint32_t{distances_[w]} << kWordBits | w;
+    if (key >= near.back() || group.starts[w] == group.starts[w + 1]) continue;
+    for (std::uint32_t& other : near) {
+      if (key < other) std::swap(key, other);
+    }
+  }
+  return near;
+}
+
+/// The owner of the nearest code of the nearest words; kNone if none is near.
+std::uint32_t CodeIndex::nearest_owner(const Group& group, const Code& code) {
+  std::uint32_t owner = kNone;
+  int best = kMaxVoteDistance + 1;
+  for (const std::uint32_t key : nearest_words(group, code)) {
+    if (key == kNone) break;
+    const std::uint32_t word = key & ((1u << kWordBits) - 1);
+    const std::size_t first = std::size_t{group.starts[word]} * kBlockCodes;
+    const std::size_t blocks = group.starts[word + 1] - group.starts[word];
+    const int least = kernels_.distances(code.data(), group.codes.data() + first * kCodeBytes,
+                                         blocks, best, distances_.data());
+    if (least >= best) continue;
+    best = least;
+    owner = group.owners[first + position_of({distances_.data(), blocks * kBlockCodes}, least)];
+  }
+  return owner;
+}
+
+/// The most votes of a pattern that agree on one place; last: its last vote.
+CodeIndex::Support CodeIndex::largest_agreement(std::uint32_t last, std::size_t count) const {
+  Support most;
+  const std::size_t stride = count / kCompared + 1;
+  std::size_t k = 0;
+  for (std::uint32_t i = last; i != kNone; i = votes_[i].previous, ++k) {
+    if (k % stride != 0) continue;
+    std::uint16_t agree = 0;
+    for (std::uint32_t j = last; j != kNone; j = votes_[j].previous) {
+      if (agrees(votes_[i].match, votes_[j].match)) ++agree;
+    }
+    if (agree > most.votes) most = {agree, votes_[i].match};
+  }
+  return most;
+}
+
+std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const TrackerFeature> features) {
+  std::fill(support_.begin(), support_.end(), Support{});
+  std::fill(last_.begin(), last_.end(), kNone);
+  std::uint32_t count = 0;
+  for (const TrackerFeature& feature : features.first(std::min(features.size(), votes_.size()))) {
+    const bool dark = feature.dark != 0;
+    const Group& group = groups_[dark ? 1 : 0];
+    if (group.starts.empty()) continue;
+    const std::uint32_t owner = nearest_owner(group, feature.code);
+    if (owner == kNone) continue;
+    const std::uint32_t p = owner / kIndexed;
+    const std::size_t at = range_of(patterns_[p], dark)[0] + owner % kIndexed;
+    votes_[count] = {last_[p], match_of(patterns_[p].features[at], feature)};
+    last_[p] = count++;
+    ++support_[p].votes;
+  }
+  for (std::size_t p = 0; p < support_.size(); ++p) {
+    support_[p] = largest_agreement(last_[p], support_[p].votes);
+  }
+  return support_;
+}
+
+}  // namespace modar::tracker

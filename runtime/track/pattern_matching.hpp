@@ -1,0 +1,138 @@
+// Matching of a frame's features: with one pattern's codes, to homographies, and with all patterns'
+// codes through an index, to the patterns worth matching. Internal to runtime/track.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/mat2x2.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+
+#include "kernels.hpp"
+#include "modar/camera.hpp"
+#include "modar/tracker_features.hpp"
+#include "plane_geometry.hpp"
+#include "tracked_pattern.hpp"
+
+namespace modar::tracker {
+
+/// A frame's feature and the pattern's feature that it resembles, with the local affine map that
+/// their orientations and scales imply.
+struct FeatureMatch {
+  glm::dvec2 pattern{};  ///< pixels of the pattern's image
+  glm::dvec2 ideal{};    ///< undistorted frame pixels
+  glm::dmat2 affine{};   ///< pattern pixels to frame pixels, around the feature
+  double sigma = 1;      ///< frame pixels per pixel of the feature's level
+  int distance = 0;      ///< Hamming distance, bits
+};
+
+/// Leaves the lens distortion in `ideal` and sets no distance.
+FeatureMatch match_of(const TrackerFeatureRecord& record, const TrackerFeature& feature);
+/// Whether `other` lies where the affine map of `hypothesis` puts it, with a similar shape.
+bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other);
+
+/// A homography that some of the matches agree with.
+struct HomographyHypothesis {
+  int inliers = 0;
+  glm::dmat3 homography{1.0};      ///< pattern pixels to undistorted frame pixels
+  std::vector<std::uint8_t> mask;  ///< by match: 1 for inliers
+};
+
+/// Finds homographies of one pattern at a time. Allocates nothing after construction.
+class PlaneMatcher {
+ public:
+  PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t max_features,
+               std::size_t max_codes);
+  /// At most four hypotheses, by falling inliers; valid until the next call.
+  std::span<const HomographyHypothesis> find(const TrackedPattern& pattern,
+                                             std::span<const TrackerFeature> features);
+  [[nodiscard]] std::size_t max_features() const { return matches_.capacity(); }
+  /// Matches of the last find().
+  [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
+  /// Makes inliers() those of a hypothesis of the last find().
+  void select(const TrackedPattern& pattern, const HomographyHypothesis& hypothesis);
+  [[nodiscard]] PlanePoints inliers() const {
+    return {inlier_world_, inlier_ideal_, inlier_sigma_};
+  }
+
+ private:
+  void match(const TrackedPattern& pattern, std::span<const TrackerFeature> features);
+  bool unambiguous(const TrackedPattern& pattern, std::size_t first, std::size_t count, int best,
+                   std::size_t& at) const;
+  std::size_t support(const FeatureMatch& hypothesis, std::vector<std::uint8_t>* mask) const;
+  std::size_t fit(const FeatureMatch& hypothesis, glm::dmat3& homography);
+  bool fit_homography(std::span<const std::uint8_t> mask, glm::dmat3& homography) const;
+  bool fit_affine(std::span<const std::uint8_t> mask, glm::dmat3& homography) const;
+  std::size_t collect(const glm::dmat3& homography, double pixels,
+                      std::vector<std::uint8_t>& mask) const;
+  void rank_votes();
+
+  Camera camera_;
+  const Kernels& kernels_;
+  std::array<HomographyHypothesis, 4> hypotheses_;
+  std::vector<FeatureMatch> matches_;
+  std::vector<std::uint8_t> distances_;
+  std::vector<std::uint8_t> mask_;
+  std::vector<std::uint8_t> explained_;
+  std::vector<std::uint8_t> supporters_;
+  std::vector<std::uint32_t> order_;
+  std::vector<glm::dvec2> inlier_world_;
+  std::vector<glm::dvec2> inlier_ideal_;
+  std::vector<double> inlier_sigma_;
+};
+
+/// Which patterns a frame may show: an inverted file (Sivic & Zisserman, "Video Google", 2003) over
+/// the binary codes of all patterns, whose words are a sample of the codes. A feature is compared
+/// with the words and then with the codes of the nearest few, so that its cost grows with the
+/// square root of the number of patterns. It votes for the pattern of the nearest code found; of a
+/// pattern's votes only those count that agree on one place and shape.
+class CodeIndex {
+ public:
+  using Code = std::array<std::uint8_t, kCodeBytes>;
+
+  /// Indexes the most repeatable codes of each pattern, about 9 KB a pattern. Allocates nothing
+  /// later. The patterns must outlive it.
+  CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
+            std::size_t max_features);
+  /// The evidence for a pattern.
+  struct Support {
+    std::uint16_t votes = 0;  ///< features that agree on one place,
+    FeatureMatch place;       ///< given by one of them
+  };
+  /// One per pattern, valid until the next call.
+  std::span<const Support> vote(std::span<const TrackerFeature> features);
+
+ private:
+  /// Words whose codes a feature is compared with: trades time for votes that the nearest word
+  /// alone misses. With four, 99 % of what a linear search finds in 50 patterns has the most votes.
+  static constexpr std::size_t kProbes = 4;
+
+  /// Codes of one polarity, in blocks as Kernels::distances() takes them.
+  struct Group {
+    std::vector<std::uint8_t> words;
+    std::vector<std::uint32_t> starts;  ///< by word, in blocks, and the end
+    std::vector<std::uint8_t> codes;
+    std::vector<std::uint32_t> owners;  ///< by code: pattern and feature
+  };
+  struct Vote {
+    std::uint32_t previous = 0;  ///< the same pattern's vote before this one
+    FeatureMatch match;
+  };
+  void build(Group& group, bool dark);
+  std::array<std::uint32_t, kProbes> nearest_words(const Group& group, const Code& code);
+  std::uint32_t nearest_owner(const Group& group, const Code& code);
+  [[nodiscard]] Support largest_agreement(std::uint32_t last, std::size_t count) const;
+
+  std::span<const TrackedPattern> patterns_;
+  const Kernels& kernels_;
+  std::array<Group, 2> groups_;  ///< bright, dark
+  std::vector<std::uint8_t> distances_;
+  std::vector<Vote> votes_;
+  std::vector<std::uint32_t> last_;  ///< by pattern: its last vote
+  std::vector<Support> support_;
+};
+
+}  // namespace modar::tracker
