@@ -216,8 +216,8 @@ TEST(FocalFinder, FrontalViewsTellNothing) {
   }
   EXPECT_FALSE((*finder)->focal());
   const FocalProgress progress = (*finder)->progress();
-  EXPECT_EQ(progress.looks, 10);
-  EXPECT_EQ(progress.faint, 10);
+  EXPECT_EQ(progress.frames, 10);
+  EXPECT_EQ(progress.frontal, 10);
   EXPECT_EQ(progress.views, 0);
   EXPECT_EQ(progress.deviation, 0);
 }
