@@ -44,7 +44,7 @@ Bytes bytes_of(const T& record) {
 std::uint16_t flags_of(SectionType type) {
   switch (type) {
     case SectionType::kMeta:
-    case SectionType::kStatement:
+    case SectionType::kContentSummary:
     case SectionType::kFeatureYml:
       return 0;
     case SectionType::kVertices:
@@ -184,7 +184,7 @@ const char* contradiction(const BundleContent& content) {
 void collect(const BundleContent& content, SectionList& list) {
   list.add_blob(SectionType::kNames, kNone, std::as_bytes(std::span(content.names)));
   list.add_blob(SectionType::kMeta, kNone, std::as_bytes(std::span(content.meta)));
-  list.add_blob(SectionType::kStatement, kNone, std::as_bytes(std::span(content.statement)));
+  list.add_blob(SectionType::kContentSummary, kNone, std::as_bytes(std::span(content.summary)));
   list.add_table(SectionType::kModels, content.models);
   list.add_table(SectionType::kChunks, content.chunks);
   list.add_table(SectionType::kLevels, content.levels);

@@ -38,8 +38,8 @@ struct ExtraSection {
 struct BundleContent {
   std::string names;  ///< filled by intern()
   std::string meta;   ///< JSON text
-  /// What statement_of() makes of all the rest at last, or empty.
-  std::string statement;
+  /// content_summary_of() everything else, set last; or empty.
+  std::string summary;
   std::vector<ModelRecord> models;
   std::vector<ChunkRecord> chunks;
   std::vector<LevelRecord> levels;

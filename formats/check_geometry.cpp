@@ -2,12 +2,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "formats/check_rules.hpp"
 #include "formats/component.hpp"
-#include "formats/cone_check.hpp"
 #include "formats/validate.hpp"
 #include "formats/vertex_scan.hpp"
 
@@ -19,6 +20,146 @@ double length_tolerance(std::uint8_t type) {
   return bytes == 1 ? 0.02 : (bytes == 2 ? 2e-3 : 1e-4);
 }
 
+/// Of the cut-off: writers round positions, normals and axes in their own ways (bundle.md,
+/// CHUNK_CONE).
+constexpr double kConeSlack = 1e-3;
+
+using Floats [[gnu::vector_size(16)]] = float;
+using Doubles [[gnu::vector_size(32)]] = double;
+using Words [[gnu::vector_size(16)]] = std::uint32_t;
+
+/// The four half floats at `bytes`, which are finite. The bits of a half, in the place of a
+/// float's, are its value times 2^-112; subnormal ones, too.
+Floats load_halves(const std::byte* bytes) {
+  using Halves [[gnu::vector_size(8)]] = std::uint16_t;
+  Halves halves;
+  std::memcpy(&halves, bytes, sizeof halves);
+  const Words wide = __builtin_convertvector(halves, Words);
+  const Words bits = (wide & 0x7FFF) << 13;
+  Floats values;
+  std::memcpy(&values, &bits, sizeof values);
+  values *= 0x1p112f;
+  Words signs;
+  std::memcpy(&signs, &values, sizeof signs);
+  signs |= (wide & 0x8000) << 16;
+  std::memcpy(&values, &signs, sizeof values);
+  return values;
+}
+
+/// Tests the normals of triangles against their chunk's cone, from decoded positions.
+class ConeCheck {
+ public:
+  struct Outside {
+    std::uint64_t count = 0;
+    std::uint32_t first = 0;  ///< index of the first of them
+  };
+  /// How many triangles of the level face out of their chunk's cone; 0 where the chunk is never
+  /// culled. range: of the level's indices, which are below vertex_count. Positions are finite.
+  Outside count_outside(const BundleParts& parts, const LayoutRecord& layout,
+                        const ChunkRecord& chunk, const LevelRecord& level, IndexScan range);
+
+ private:
+  void decode(const BundleParts& parts, const LayoutRecord& layout, const ChunkRecord& chunk,
+              const LevelRecord& level, IndexScan range);
+  void load_corners(const std::uint16_t* indices, std::array<Doubles, 9>& corners) const;
+
+  /// x, y, z and one unused, of the vertices from base_ on; at most 65535: it does not grow with
+  /// the bundle.
+  std::vector<Floats> positions_;
+  std::uint16_t base_ = 0;
+};
+
+/// Positions as a shader has them, rounded to f32.
+void ConeCheck::decode(const BundleParts& parts, const LayoutRecord& layout,
+                       const ChunkRecord& chunk, const LevelRecord& level, IndexScan range) {
+  const AttributeRecord& position = *find_attribute(layout, Semantic::kPosition);
+  const auto step = static_cast<double>(chunk.position_step);
+  const float* const o = chunk.position_offset;
+  const Doubles offset = {static_cast<double>(o[0]), static_cast<double>(o[1]),
+                          static_cast<double>(o[2]), 0.0};
+  base_ = range.least;
+  const std::size_t count = std::size_t{range.greatest} - range.least + 1;
+  positions_.resize(count);
+  const auto bytes = parts.vertices.subspan(static_cast<std::size_t>(level.vertex_offset) +
+                                            std::size_t{range.least} * layout.stride);
+  const auto put = [&](std::size_t v, const Doubles& value) {
+    positions_[v] = __builtin_convertvector(offset + step * value, Floats);
+  };
+  std::size_t v = 0;
+  constexpr std::size_t kLoaded = 8;  // bytes that load_halves() reads
+  if (static_cast<ComponentType>(position.type) == ComponentType::kHalf) {
+    for (std::size_t at = position.offset; v < count && at + kLoaded <= bytes.size();
+         ++v, at += layout.stride) {
+      put(v, __builtin_convertvector(load_halves(bytes.data() + at), Doubles));
+    }
+  }
+  for (; v < count; ++v) {
+    const std::byte* vertex = bytes.data() + v * layout.stride;
+    put(v, Doubles{decode_component(position, vertex, 0), decode_component(position, vertex, 1),
+                   decode_component(position, vertex, 2), 0.0});
+  }
+}
+
+/// corners[3 * k + axis]: corner k of four triangles, one a lane.
+void ConeCheck::load_corners(const std::uint16_t* indices, std::array<Doubles, 9>& corners) const {
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::array<Floats, 4> p{};
+    for (std::size_t t = 0; t < 4; ++t) {
+      p[t] = positions_[static_cast<std::size_t>(indices[3 * t + k] - base_)];
+    }
+    const Floats xy01 = __builtin_shufflevector(p[0], p[1], 0, 4, 1, 5);
+    const Floats xy23 = __builtin_shufflevector(p[2], p[3], 0, 4, 1, 5);
+    const Floats z01 = __builtin_shufflevector(p[0], p[1], 2, 6, 3, 7);
+    const Floats z23 = __builtin_shufflevector(p[2], p[3], 2, 6, 3, 7);
+    const Floats x = __builtin_shufflevector(xy01, xy23, 0, 1, 4, 5);
+    const Floats y = __builtin_shufflevector(xy01, xy23, 2, 3, 6, 7);
+    const Floats z = __builtin_shufflevector(z01, z23, 0, 1, 4, 5);
+    corners[3 * k] = __builtin_convertvector(x, Doubles);
+    corners[3 * k + 1] = __builtin_convertvector(y, Doubles);
+    corners[3 * k + 2] = __builtin_convertvector(z, Doubles);
+  }
+}
+
+ConeCheck::Outside ConeCheck::count_outside(const BundleParts& parts, const LayoutRecord& layout,
+                                            const ChunkRecord& chunk, const LevelRecord& level,
+                                            IndexScan range) {
+  Outside outside;
+  if (chunk.cone_cutoff > 1.0f || level.index_count == 0) return outside;
+  decode(parts, layout, chunk, level, range);
+  const auto* indices =
+      reinterpret_cast<const std::uint16_t*>(parts.indices.data() + level.index_offset);
+  const double axis[] = {static_cast<double>(chunk.cone_axis[0]),
+                         static_cast<double>(chunk.cone_axis[1]),
+                         static_cast<double>(chunk.cone_axis[2])};
+  const double sine = static_cast<double>(chunk.cone_cutoff) + kConeSlack;
+  // Lengths stay squared: no root, no division, and triangles without area pass.
+  const double least = std::max(0.0, 1.0 - sine * sine) *
+                       (axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  std::array<Doubles, 9> p;
+  for (std::uint32_t i = 0; i < level.index_count; i += 12) {
+    const std::uint32_t count = std::min(4u, (level.index_count - i) / 3);
+    const std::uint16_t* four = indices + i;
+    std::array<std::uint16_t, 12> last;
+    if (count < 4) {
+      last.fill(*four);  // lanes without a triangle get one without area
+      std::copy_n(four, 3 * count, last.begin());
+      four = last.data();
+    }
+    load_corners(four, p);
+    const Doubles ux = p[3] - p[0], uy = p[4] - p[1], uz = p[5] - p[2];
+    const Doubles vx = p[6] - p[0], vy = p[7] - p[1], vz = p[8] - p[2];
+    const Doubles nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+    const Doubles along = nx * axis[0] + ny * axis[1] + nz * axis[2];
+    const Doubles square = nx * nx + ny * ny + nz * nz;
+    const auto inside = (along >= 0.0) & (along * along >= least * square);
+    if ((inside[0] & inside[1] & inside[2] & inside[3]) != 0) continue;
+    for (std::uint32_t t = 0; t < count; ++t) {
+      if (inside[t] == 0 && outside.count++ == 0) outside.first = i + 3 * t;
+    }
+  }
+  return outside;
+}
+
 /// Checks level after level with one set of marks.
 class GeometryCheck {
  public:
@@ -28,9 +169,12 @@ class GeometryCheck {
   template <class Where>
   void check_level(const LayoutRecord& layout, const VertexScan& scan, const ChunkRecord& chunk,
                    const LevelRecord& level, Where where) {
-    if (surely_good(layout, scan, chunk, level)) return check_cone(layout, chunk, level, where);
     const auto* indices =
         reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset);
+    const IndexScan range = scan_indices({indices, level.index_count});
+    if (valid_at_a_glance(layout, scan, chunk, level, range)) {
+      return check_cone(layout, chunk, level, range, where);
+    }
     wrong_index_ = degenerate_ = not_finite_ = normal_ = outside_ = padding_ = Tally();
     for (std::uint32_t i = 0; i < level.index_count; ++i) {
       const std::uint16_t index = indices[i];
@@ -60,7 +204,7 @@ class GeometryCheck {
     if (wrong_index_.count + not_finite_.count > 0) {
       extent_.broken = true;
     } else {
-      check_cone(layout, chunk, level, where);
+      check_cone(layout, chunk, level, range, where);
     }
   }
 
@@ -96,28 +240,29 @@ class GeometryCheck {
 
   template <class Where>
   void check_cone(const LayoutRecord& layout, const ChunkRecord& chunk, const LevelRecord& level,
-                  Where where) {
-    const ConeCheck::Outside outside = cones_.look(parts_, layout, chunk, level);
+                  IndexScan range, Where where) {
+    const ConeCheck::Outside outside = cones_.count_outside(parts_, layout, chunk, level, range);
     if (outside.count == 0) return;
     log_.add(Rule::kChunkCone,
              offset_of(parts_, parts_.indices.data() + level.index_offset + 2ull * outside.first),
              where(), std::to_string(outside.count) + " triangles face out of the cone");
   }
 
-  /// A quick look at all indices and at all vertices, used or not. Levels that use few of many
-  /// vertices are left to the slow look, which takes no longer than their indices.
-  [[nodiscard]] bool surely_good(const LayoutRecord& layout, const VertexScan& scan,
-                                 const ChunkRecord& chunk, const LevelRecord& level) {
-    if (!scan.possible() || level.vertex_count == 0 || level.vertex_count > level.index_count) {
+  /// A fast scan of all indices and of all vertices between the least and the greatest, used or
+  /// not. False where one has to be checked by itself, or where few of many vertices are used: the
+  /// time taken follows the indices.
+  [[nodiscard]] bool valid_at_a_glance(const LayoutRecord& layout, const VertexScan& scan,
+                                       const ChunkRecord& chunk, const LevelRecord& level,
+                                       IndexScan range) {
+    if (!scan.possible() || level.index_count == 0 || range.degenerate ||
+        range.greatest >= level.vertex_count) {
       return false;
     }
-    const IndexScan indices = scan_indices(
-        {reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset),
-         level.index_count});
-    if (indices.degenerate || indices.greatest >= level.vertex_count) return false;
-    const VertexScan::Extent extent =
-        scan.scan(parts_.vertices.subspan(static_cast<std::size_t>(level.vertex_offset),
-                                          std::size_t{level.vertex_count} * layout.stride));
+    const std::size_t count = std::size_t{range.greatest} - range.least + 1;
+    if (count > level.index_count) return false;
+    const VertexScan::Extent extent = scan.scan(parts_.vertices.subspan(
+        static_cast<std::size_t>(level.vertex_offset) + std::size_t{range.least} * layout.stride,
+        count * layout.stride));
     const auto low = place(chunk, {extent.low[0], extent.low[1], extent.low[2], 0.0});
     const auto high = place(chunk, {extent.high[0], extent.high[1], extent.high[2], 0.0});
     const bool good = extent.finite && extent.unit_normals && extent.clean_padding &&
@@ -221,7 +366,7 @@ class GeometryCheck {
 }  // namespace
 
 void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes,
-                    StatementCheck& statement) {
+                    SummaryCheck& summary) {
   GeometryCheck check(log, parts);
   for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
     const ModelRecord& model = parts.models[i];
@@ -236,7 +381,7 @@ void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashe
         const LevelRecord& level = parts.levels[chunk.first_level + k];
         check.check_level(layout, scan, chunk, level,
                           [&] { return where() + ", level " + std::to_string(k); });
-        statement.level(chunk.first_level + k, layout.stride);
+        summary.level(chunk.first_level + k, layout.stride);
         // Hashed while the caches still hold it.
         hashes.vertices.read_to(level.vertex_offset +
                                 std::uint64_t{level.vertex_count} * layout.stride);

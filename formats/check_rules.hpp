@@ -1,4 +1,4 @@
-// The rules on payloads, split by subject. Internal to formats/.
+// What check.cpp, check_geometry.cpp and content_summary.cpp share. Internal to formats/.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,8 @@
 
 namespace modar {
 
-/// Hashes of sections but for vertices and indices, zero padding between them, sections that are
-/// skipped. Needs sections that lie inside the file, nothing more.
-void check_section_bytes(FaultLog& log, const BundleParts& parts, const CheckOptions& options);
-
-/// The hash of one section, taken front to back in pieces of any size. What was hashed is given
-/// back to the system (CheckOptions::release).
+/// The hash of one section, updated front to back in pieces of any size. Hashed bytes are released
+/// to the system (CheckOptions::release).
 class SectionHash {
  public:
   /// The section with that key may be missing. All arguments must outlive this.
@@ -43,23 +39,18 @@ class SectionHash {
   std::uint64_t released_ = 0;
 };
 
-/// The two great buffers: hashed while their contents are checked.
+/// The two large buffers, hashed while their contents are checked.
 struct BufferHashes {
   SectionHash vertices;
   SectionHash indices;
 };
 
-// What follows needs a bundle whose structure was found clean.
-
-/// Counts, placements, boxes, cones, order of levels, materials, bytes that nothing refers to.
-void check_model_records(FaultLog& log, const BundleParts& parts);
-
-/// Holds the statement against the bundle, line by line in its order. Does nothing where there is
-/// no statement.
-class StatementCheck {
+/// Compares the content summary with the bundle, line by line in its order. Does nothing where
+/// there is none.
+class SummaryCheck {
  public:
   /// Both must outlive this.
-  StatementCheck(FaultLog& log, const BundleParts& parts);
+  SummaryCheck(FaultLog& log, const BundleParts& parts);
   void records();
   void level(std::uint32_t index, std::uint32_t stride);
   void texture_level(std::uint32_t index, std::span<const std::byte> data);
@@ -67,7 +58,7 @@ class StatementCheck {
   void finish();
 
  private:
-  void loop_records();
+  void tracker_records();
   void expect(std::string_view line, const char* subject, std::uint32_t index);
 
   FaultLog& log_;
@@ -77,15 +68,10 @@ class StatementCheck {
   std::size_t read_ = 0;
 };
 
-/// Every index and every vertex that one refers to. Time grows with the index buffer.
+/// Every index and every vertex that one refers to. Time grows with the index buffer. Needs a
+/// bundle whose structure is valid.
 void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes,
-                    StatementCheck& statement);
-
-/// Sides, overlaps and gaps of textures.
-void check_textures(FaultLog& log, const BundleParts& parts, StatementCheck& statement);
-
-/// Parameter sets, keypoints, descriptors, feature texts.
-void check_patterns(FaultLog& log, const BundleParts& parts);
+                    SummaryCheck& summary);
 
 /// Counts how often a rule is broken and remembers where first, so that a million bad vertices make
 /// one line.

@@ -1,21 +1,76 @@
-// Writes the lines of a statement.
+// Writes the lines of a content summary, and holds those of a bundle against its other sections.
 #include "formats/content_summary.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstring>
 
-#include "formats/column_checksums.hpp"
+#include "formats/check_rules.hpp"
+#include "formats/component.hpp"
 #include "formats/field_table.hpp"
+#include "formats/validate.hpp"
 
 namespace modar {
 namespace {
 
-template <class T>
-T load(const std::byte* place) {
-  T value;
-  std::memcpy(&value, place, sizeof(T));
-  return value;
+using Words [[gnu::vector_size(16)]] = std::uint16_t;
+using Sums [[gnu::vector_size(32)]] = std::uint32_t;
+constexpr std::size_t kLanes = 8;
+constexpr std::size_t kMaxVectors = 4;
+/// Rows whose words surely add up to less than 2^32.
+constexpr std::size_t kRowsBetweenCarries = 65535;
+
+/// Sums of whole vectors from each row on; lanes beyond the row are for nobody. Answers the rows
+/// that were read: the last ones, whose vectors would leave the bytes, are not.
+template <std::size_t kVectors>
+std::size_t sum_rows(std::span<const std::byte> bytes, std::size_t stride,
+                     std::span<std::uint64_t> sums) {
+  const std::size_t reach = kVectors * sizeof(Words);
+  const std::size_t rows = bytes.size() < reach ? 0 : (bytes.size() - reach) / stride + 1;
+  for (std::size_t first = 0; first < rows; first += kRowsBetweenCarries) {
+    const std::size_t end = std::min(rows, first + kRowsBetweenCarries);
+    std::array<Sums, kVectors> part{};
+    for (std::size_t row = first; row < end; ++row) {
+      const std::byte* at = bytes.data() + row * stride;
+      for (std::size_t v = 0; v < kVectors; ++v) {
+        Words words;
+        std::memcpy(&words, at + v * sizeof words, sizeof words);
+        part[v] += __builtin_convertvector(words, Sums);
+      }
+    }
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += part[i / kLanes][i % kLanes];
+  }
+  return rows;
+}
+
+/// sums[i] += word i of every row, little-endian. bytes: whole rows of 2 * sums.size() bytes.
+void add_column_checksums(std::span<const std::byte> bytes, std::span<std::uint64_t> sums) {
+  const std::size_t stride = 2 * sums.size();
+  std::size_t row = 0;
+  if (sums.size() <= kLanes) {
+    row = sum_rows<1>(bytes, stride, sums);
+  } else if (sums.size() <= 2 * kLanes) {
+    row = sum_rows<2>(bytes, stride, sums);
+  } else if (sums.size() <= kMaxVectors * kLanes) {
+    row = sum_rows<kMaxVectors>(bytes, stride, sums);
+  }
+  for (std::size_t at = row * stride; at < bytes.size(); at += stride) {
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      sums[i] += load_number<std::uint16_t>(bytes.data() + at + 2 * i);
+  }
+}
+
+/// The same for an array in which rows have `sums.size()` words, a power of two up to 8, read many
+/// rows at a time. bytes: any number of whole rows.
+void add_array_sums(std::span<const std::byte> bytes, std::span<std::uint64_t> sums) {
+  const std::size_t whole = bytes.size() / sizeof(Words) * sizeof(Words);
+  std::array<std::uint64_t, kLanes> lanes{};
+  add_column_checksums(bytes.first(whole), lanes);
+  for (std::size_t i = 0; i < kLanes; ++i) sums[i % sums.size()] += lanes[i];
+  for (std::size_t at = whole; at < bytes.size(); at += 2) {
+    sums[(at - whole) / 2 % sums.size()] += load_number<std::uint16_t>(bytes.data() + at);
+  }
 }
 
 /// Shortest digits that read back as the same number; JSON reads them, too.
@@ -52,23 +107,23 @@ void append_element(std::string& line, const BundleParts& parts, FieldType type,
                     const std::byte* place) {
   switch (type) {
     case FieldType::kU8:
-      return append(line, std::uint32_t{load<std::uint8_t>(place)});
+      return append(line, std::uint32_t{load_number<std::uint8_t>(place)});
     case FieldType::kU16:
-      return append(line, std::uint32_t{load<std::uint16_t>(place)});
+      return append(line, std::uint32_t{load_number<std::uint16_t>(place)});
     case FieldType::kU32:
-      return append(line, load<std::uint32_t>(place));
+      return append(line, load_number<std::uint32_t>(place));
     case FieldType::kU64:
-      return append(line, load<std::uint64_t>(place));
+      return append(line, load_number<std::uint64_t>(place));
     case FieldType::kI32:
-      return append(line, load<std::int32_t>(place));
+      return append(line, load_number<std::int32_t>(place));
     case FieldType::kF32:
-      return append(line, load<float>(place));
+      return append(line, load_number<float>(place));
     case FieldType::kF64:
-      return append(line, load<double>(place));
+      return append(line, load_number<double>(place));
     case FieldType::kName:
-      return append_name(line, parts, load<NameRef>(place));
+      return append_name(line, parts, load_number<NameRef>(place));
     case FieldType::kAttributes:
-      return append_attribute(line, load<AttributeRecord>(place));
+      return append_attribute(line, load_number<AttributeRecord>(place));
   }
 }
 
@@ -91,8 +146,8 @@ std::string record_line(const BundleParts& parts, const RecordInfo& info, std::u
 }
 
 template <class T>
-void state_table(const BundleParts& parts, const char* record, const Table<T>& table,
-                 const StatementSink& sink) {
+void summarise_table(const BundleParts& parts, const char* record, const Table<T>& table,
+                     const SummarySink& sink) {
   const RecordInfo& info = record_info(record);
   for (std::uint32_t i = 0; i < table.size(); ++i) {
     sink(record_line(parts, info, i, reinterpret_cast<const std::byte*>(&table[i])), info.table, i);
@@ -139,20 +194,20 @@ BundleParts parts_of(const BundleContent& content) {
 
 }  // namespace
 
-void state_records(const BundleParts& parts, std::uint16_t minor, const StatementSink& sink) {
+void summarise_records(const BundleParts& parts, std::uint16_t minor, const SummarySink& sink) {
   std::string first = "{\"statement\":1,\"minor\":";
   append(first, std::uint32_t{minor});
   sink(first + "}", "header", 0);
-  state_table(parts, "ModelRecord", parts.models, sink);
-  state_table(parts, "ChunkRecord", parts.chunks, sink);
-  state_table(parts, "LevelRecord", parts.levels, sink);
-  state_table(parts, "MaterialRecord", parts.materials, sink);
-  state_table(parts, "LayoutRecord", parts.layouts, sink);
-  state_table(parts, "TextureRecord", parts.textures, sink);
-  state_table(parts, "TextureLevelRecord", parts.texture_levels, sink);
-  state_table(parts, "PatternRecord", parts.patterns, sink);
-  state_table(parts, "ParameterSetRecord", parts.parameter_sets, sink);
-  state_table(parts, "SceneRecord", parts.scenes, sink);
+  summarise_table(parts, "ModelRecord", parts.models, sink);
+  summarise_table(parts, "ChunkRecord", parts.chunks, sink);
+  summarise_table(parts, "LevelRecord", parts.levels, sink);
+  summarise_table(parts, "MaterialRecord", parts.materials, sink);
+  summarise_table(parts, "LayoutRecord", parts.layouts, sink);
+  summarise_table(parts, "TextureRecord", parts.textures, sink);
+  summarise_table(parts, "TextureLevelRecord", parts.texture_levels, sink);
+  summarise_table(parts, "PatternRecord", parts.patterns, sink);
+  summarise_table(parts, "ParameterSetRecord", parts.parameter_sets, sink);
+  summarise_table(parts, "SceneRecord", parts.scenes, sink);
 }
 
 std::string feature_line(const FeatureFact& fact) {
@@ -167,7 +222,7 @@ std::string feature_line(const FeatureFact& fact) {
   return line + "}";
 }
 
-std::string loop_line(std::uint32_t pattern, std::span<const std::byte> record) {
+std::string tracker_record_line(std::uint32_t pattern, std::span<const std::byte> record) {
   std::string line = "{\"loop_record\":";
   append(line, pattern);
   line += ",\"bytes\":";
@@ -215,12 +270,12 @@ std::string texture_level_line(const BundleParts& parts, std::uint32_t level,
   return line + "}";
 }
 
-std::string statement_of(const BundleContent& content) {
+std::string content_summary_of(const BundleContent& content) {
   const BundleParts parts = parts_of(content);
   std::string text;
   const auto add = [&text](std::string_view line) { (text += line) += '\n'; };
-  state_records(parts, kMinorVersion,
-                [&](std::string_view line, const char*, std::uint32_t) { add(line); });
+  summarise_records(parts, kMinorVersion,
+                    [&](std::string_view line, const char*, std::uint32_t) { add(line); });
   for (std::uint32_t p = 0; p < content.features.size(); ++p) {
     for (const FeatureContent& features : content.features[p]) {
       add(feature_line({p, features.set_id, static_cast<std::uint32_t>(features.keypoints.size()),
@@ -229,7 +284,7 @@ std::string statement_of(const BundleContent& content) {
   }
   for (const ExtraSection& extra : content.extra) {
     if (extra.type == static_cast<std::uint32_t>(SectionType::kTrackerRecord)) {
-      add(loop_line(extra.owner, extra.bytes));
+      add(tracker_record_line(extra.owner, extra.bytes));
     }
   }
   for (const ModelRecord& model : content.models) {
@@ -248,6 +303,86 @@ std::string statement_of(const BundleContent& content) {
     }
   }
   return text;
+}
+
+namespace {
+
+/// Characters of a line that are shown from where two differ.
+constexpr std::size_t kShown = 48;
+
+std::string_view from_difference(std::string_view line, std::size_t at) {
+  return line.substr(std::min(at, line.size()), kShown);
+}
+
+}  // namespace
+
+SummaryCheck::SummaryCheck(FaultLog& log, const BundleParts& parts)
+    : log_(log),
+      parts_(parts),
+      entry_(find_section(parts.sections, SectionType::kContentSummary, kNone, 0)) {
+  if (entry_ == nullptr) return;
+  const std::span<const std::byte> bytes = section_bytes(parts, *entry_);
+  text_ = {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+void SummaryCheck::expect(std::string_view line, const char* subject, std::uint32_t index) {
+  const std::string_view rest = text_.substr(std::min(read_, text_.size()));
+  const std::size_t end = std::min(rest.find('\n'), rest.size());
+  const std::string_view told = rest.substr(0, end);
+  // The last line has its end, too.
+  if (told != line || end == rest.size()) {
+    const auto [a, b] = std::mismatch(told.begin(), told.end(), line.begin(), line.end());
+    const auto at = static_cast<std::size_t>(a - told.begin());
+    const std::size_t shown = at - std::min<std::size_t>(at, kShown / 2);
+    log_.add(Rule::kContentSummary, entry_->offset + read_ + at,
+             std::string(subject) + " " + std::to_string(index),
+             "it states '" + std::string(from_difference(told, shown)) + "', the bundle holds '" +
+                 std::string(from_difference(line, shown)) + "'");
+  }
+  read_ += end + 1;
+}
+
+void SummaryCheck::records() {
+  if (entry_ == nullptr) return;
+  const std::uint16_t minor = reinterpret_cast<const FileHeader*>(parts_.bytes.data())->minor;
+  summarise_records(parts_, minor,
+                    [this](std::string_view line, const char* subject, std::uint32_t index) {
+                      expect(line, subject, index);
+                    });
+  for (const SectionEntry& twin : parts_.sections) {
+    if (twin.type != static_cast<std::uint32_t>(SectionType::kMappedFeatures)) continue;
+    const SectionEntry* text =
+        find_section(parts_.sections, SectionType::kFeatureYml, twin.owner, twin.variant);
+    const auto& header =
+        *reinterpret_cast<const FeatureHeader*>(section_bytes(parts_, twin).data());
+    expect(feature_line({twin.owner, twin.variant, header.count, text != nullptr ? text->size : 0}),
+           "features", twin.owner);
+  }
+  tracker_records();
+}
+
+void SummaryCheck::tracker_records() {
+  for (const SectionEntry& entry : parts_.sections) {
+    if (entry.type != static_cast<std::uint32_t>(SectionType::kTrackerRecord)) continue;
+    expect(tracker_record_line(entry.owner, section_bytes(parts_, entry)), "tracker record",
+           entry.owner);
+  }
+}
+
+void SummaryCheck::level(std::uint32_t index, std::uint32_t stride) {
+  if (entry_ != nullptr) expect(level_line(parts_, index, stride), "payload of level", index);
+}
+
+void SummaryCheck::texture_level(std::uint32_t index, std::span<const std::byte> data) {
+  if (entry_ != nullptr) {
+    expect(texture_level_line(parts_, index, data), "payload of texture level", index);
+  }
+}
+
+void SummaryCheck::finish() {
+  if (entry_ == nullptr || read_ >= text_.size()) return;
+  log_.add(Rule::kContentSummary, entry_->offset + read_, "content summary",
+           std::to_string(text_.size() - read_) + " bytes follow its last line");
 }
 
 }  // namespace modar

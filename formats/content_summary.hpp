@@ -1,6 +1,6 @@
-// The statement of a bundle: its records once more, as JSON lines that any text editor shows, and
-// sums of its payloads. It follows from the other sections (bundle.md, Statement), so that the
-// checker can hold the two against each other as it holds feature texts against their twins.
+// The content summary of a bundle: its records once more as JSON lines that any text editor shows,
+// and checksums of its payloads. It is derived from the other sections (bundle.md, Content
+// summary), so the checker can compare it with them.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@
 
 namespace modar {
 
-/// One line, without its end, and what it tells of: a record of the table, or nullptr.
-using StatementSink =
+/// One line without its line feed, and the table and record that it describes.
+using SummarySink =
     std::function<void(std::string_view line, const char* subject, std::uint32_t index)>;
 
 /// A pattern's features under one parameter set.
@@ -28,23 +28,23 @@ struct FeatureFact {
 };
 
 /// The first line and the records of all tables. minor: of the header.
-void state_records(const BundleParts& parts, std::uint16_t minor, const StatementSink& sink);
+void summarise_records(const BundleParts& parts, std::uint16_t minor, const SummarySink& sink);
 
 /// "{"features":...}".
 std::string feature_line(const FeatureFact& fact);
 
-/// Size and sums of a pattern's loop record.
-std::string loop_line(std::uint32_t pattern, std::span<const std::byte> record);
+/// Size and checksums of a pattern's tracker record.
+std::string tracker_record_line(std::uint32_t pattern, std::span<const std::byte> record);
 
-/// Sums of a level's vertices and indices; vertices are left out where the level uses few of them,
-/// so that the time taken follows the indices.
+/// Checksums of a level's vertices and indices; without vertices if it has more of them than
+/// indices, so that the time taken follows the indices.
 std::string level_line(const BundleParts& parts, std::uint32_t level, std::uint32_t stride);
 
-/// Sums of the blocks of a texture's level. data: of that texture.
+/// Checksums of the blocks of a texture's level. data: of that texture.
 std::string texture_level_line(const BundleParts& parts, std::uint32_t level,
                                std::span<const std::byte> data);
 
-/// The whole statement of a content that is about to be written.
-std::string statement_of(const BundleContent& content);
+/// The whole summary of a content that is about to be written.
+std::string content_summary_of(const BundleContent& content);
 
 }  // namespace modar

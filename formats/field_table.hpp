@@ -1,5 +1,5 @@
-// The fields of the bundle's records, by name: for whoever walks over all of them (the statement,
-// the mutations of `modar check --mutate`). A test holds the table against bundle.md.
+// Every field of the bundle's records by name, for code that walks over all of them (the content
+// summary, `modar check --mutate`). A test compares the table with bundle.md.
 #pragma once
 
 #include <cstddef>
@@ -38,14 +38,14 @@ struct FieldInfo {
 
 struct RecordInfo {
   const char* name;   ///< of the struct, as in bundle.md
-  const char* table;  ///< of the table in statements: "models"; nullptr: no table of records
+  const char* table;  ///< of the table in content summaries: "models"; nullptr: no table of records
   SectionType section = SectionType::kNames;  ///< that holds the table
   std::size_t size = 0;
   std::span<const FieldInfo> fields;
 };
 
-/// All structs of bundle.md but NameRef and those of loop records; those of tables come first, by
-/// section type.
+/// All structs of bundle.md but NameRef and those of tracker records; those of tables come first,
+/// by section type.
 std::span<const RecordInfo> record_infos();
 
 /// The one of that name, which must be there.

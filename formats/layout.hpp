@@ -30,7 +30,7 @@ inline constexpr std::uint64_t kGpuAlignment = 4096;
 enum class SectionType : std::uint32_t {
   kNames = 1,             ///< UTF-8 names, back to back
   kMeta = 2,              ///< JSON text: how the bundle was baked
-  kStatement = 3,         ///< JSON lines that follow from the rest: see statement.hpp
+  kContentSummary = 3,    ///< JSON lines that follow from the rest: see content_summary.hpp
   kModels = 16,           ///< table of ModelRecord
   kChunks = 17,           ///< table of ChunkRecord
   kLevels = 18,           ///< table of LevelRecord
@@ -43,7 +43,7 @@ enum class SectionType : std::uint32_t {
   kScenes = 64,           ///< table of SceneRecord
   kMappedFeatures = 256,  ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
   kFeatureYml = 257,      ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
-  kTrackerRecord = 258,   ///< owner: pattern, variant: 0; see loop_record.hpp
+  kTrackerRecord = 258,   ///< owner: pattern, variant: 0; see tracker_record.hpp
   kVertices = 512,        ///< GPU: merged vertex buffer of all models
   kIndices = 513,         ///< GPU: merged 16-bit index buffer of all models
   kTextureData = 514,     ///< GPU: owner: texture; ETC1 blocks of all its levels
@@ -260,7 +260,8 @@ static_assert(sizeof(PatternRecord) == 64);
 
 enum class Detector : std::uint32_t { kFastOrb = 1, kAgastBrisk = 2 };
 
-/// Everything that detection on the device shares with the bake (Tables 4 and 5 of the article).
+/// Everything that detection on the device shares with the bake (Tables 4 and 5 of the ModAR
+/// paper).
 struct ParameterSetRecord {
   NameRef name;                ///< "orb-2000"
   std::uint32_t id;            ///< the `variant` of its feature sections; never reused

@@ -68,7 +68,7 @@ enum class Rule : std::uint8_t {
   kFeaturesMissing,
   kFeatureYml,
   kTrackerRecord,
-  kStatement,
+  kContentSummary,
   kVertexPadding,
   kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV
   kUnreferencedVertices,

@@ -1,21 +1,27 @@
-// What our own pose loop knows of a pattern: the section of type 258, owner: pattern, variant: 0.
-// bundle.md is the normative text. Numbers are little-endian, reserved fields are zero.
+// The tracker record of a pattern: its features, patches and image, as the tracker uses them in
+// place (section type 258, owner: pattern, variant: 0). bundle.md is the normative text. Numbers
+// are little-endian, reserved fields are zero. Checker and tracker read it through
+// view_tracker_record().
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 
 namespace modar {
 
-inline constexpr std::uint32_t kFeatureExtractor = 1;  ///< the one version of the describer so far
+/// Of the feature extractor whose codes these records hold; the only one so far.
+inline constexpr std::uint32_t kTrackerExtractorVersion = 1;
 inline constexpr std::uint32_t kTrackerBlockCodes = 32;  ///< codes in a block
 inline constexpr std::uint32_t kTrackerCodeBytes = 32;   ///< 256 bits
-inline constexpr std::uint32_t kMaxLoopFeatures = 65536;
-inline constexpr std::uint32_t kMaxLoopPatches = 4096;
-inline constexpr std::uint32_t kMaxLoopImageLevels = 8;
+inline constexpr std::uint32_t kMaxTrackerFeatures = 65536;
+inline constexpr std::uint32_t kMaxTrackerPatches = 4096;
+inline constexpr std::uint32_t kMaxTrackerImageLevels = 8;
 
 /// Start of the section. Offsets count from the start of the section.
 struct TrackerRecordHeader {
-  std::uint32_t describer_version;  ///< kFeatureExtractorVersion of the baker's runtime
+  std::uint32_t describer_version;  ///< kTrackerExtractorVersion
   std::uint32_t feature_count;  ///< a multiple of kTrackerBlockCodes; the first bright_count are of
   std::uint32_t bright_count;   ///< corners with a brighter arc; a multiple of it, too
   std::uint32_t patch_count;
@@ -42,7 +48,7 @@ struct TrackerFeatureRecord {
 };
 static_assert(sizeof(TrackerFeatureRecord) == 12);
 
-/// A place whose texture holds a position well.
+/// A patch with enough texture to measure a position.
 struct TrackerPatchRecord {
   std::uint16_t x;  ///< of level 0, from its left edge, in 1/64 pixels
   std::uint16_t y;
@@ -50,5 +56,25 @@ struct TrackerPatchRecord {
   std::uint16_t score;  ///< least eigenvalue of its gradient matrix, gray values a pixel, in 1/64
 };
 static_assert(sizeof(TrackerPatchRecord) == 8);
+
+/// Spans into the section's bytes, which must outlive them.
+struct TrackerRecordView {
+  TrackerRecordHeader header{};
+  std::span<const TrackerFeatureRecord> features;
+  std::span<const std::uint8_t> codes;
+  std::span<const TrackerPatchRecord> patches;
+  std::span<const std::uint8_t> pixels;  ///< all levels, the finest first
+};
+
+struct TrackerFault {
+  std::uint64_t offset = 0;  ///< from the start of the section
+  const char* cause = "";
+};
+
+/// Validates a section's bytes, aligned to 8, against bundle.md and points `view` into them;
+/// nullopt if they are valid. describer_version is not judged: a reader refuses those it does not
+/// know.
+std::optional<TrackerFault> view_tracker_record(std::span<const std::byte> bytes,
+                                                TrackerRecordView& view);
 
 }  // namespace modar

@@ -41,8 +41,9 @@ double lane_value(std::int16_t key, const AttributeRecord& position) {
   const auto type = static_cast<ComponentType>(position.type);
   if (type == ComponentType::kHalf && key < 0) bits ^= 0x7FFFu;
   if (type == ComponentType::kU16) bits ^= 0x8000u;
-  return decode_component(reinterpret_cast<const std::byte*>(&bits), position.type,
-                          position.normalised != 0);
+  std::array<std::byte, 4> bytes{};  // as wide as the widest type
+  std::memcpy(bytes.data(), &bits, sizeof bits);
+  return decode_component(bytes.data(), position.type, position.normalised != 0);
 }
 
 }  // namespace
@@ -62,6 +63,7 @@ IndexScan scan_indices(std::span<const std::uint16_t> indices) {
     return lanes;
   };
   Lanes greatest = Lanes{} - 0x7FFF - 1;
+  Lanes least = Lanes{} + 0x7FFF;
   Lanes equal{};
   std::size_t i = 0;
   for (; i + kBlock + 2 <= indices.size(); i += kBlock) {
@@ -71,17 +73,20 @@ IndexScan scan_indices(std::span<const std::uint16_t> indices) {
                ((at == load(i + v * kLanesOfVector + 2)) & kAfter[v]);
       const Lanes key = at ^ kTopBit;
       greatest = key > greatest ? key : greatest;
+      least = key < least ? key : least;
     }
   }
   IndexScan scan;
   for (std::size_t lane = 0; lane < kLanesOfVector; ++lane) {
     const auto most = static_cast<std::uint16_t>(greatest[lane] ^ kTopBit);
     scan.greatest = std::max(scan.greatest, most);
+    scan.least = std::min(scan.least, static_cast<std::uint16_t>(least[lane] ^ kTopBit));
     scan.degenerate = scan.degenerate || equal[lane] != 0;
   }
   for (; i < indices.size(); i += 3) {
     const std::uint16_t* at = indices.data() + i;
     scan.greatest = std::max({scan.greatest, at[0], at[1], at[2]});
+    scan.least = std::min({scan.least, at[0], at[1], at[2]});
     scan.degenerate = scan.degenerate || at[0] == at[1] || at[1] == at[2] || at[0] == at[2];
   }
   return scan;

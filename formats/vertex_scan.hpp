@@ -1,5 +1,5 @@
-// Quick looks at a level's bytes, many vertices and indices at a time: they answer "all of it is
-// surely good" or "look closer". Internal to formats/.
+// Fast scans of a level's bytes, many vertices and indices at a time: their answer is "all of it is
+// valid" or "check one by one". Internal to formats/.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,9 @@
 
 namespace modar {
 
-/// What a level's indices are like as a whole.
+/// Properties of all indices of a level.
 struct IndexScan {
+  std::uint16_t least = 0xFFFF;
   std::uint16_t greatest = 0;
   bool degenerate = false;  ///< some triangle uses a vertex twice
 };
@@ -24,14 +25,13 @@ class VertexScan {
  public:
   explicit VertexScan(const LayoutRecord& layout);
 
-  /// False: the layout has attributes (32-bit floats, say) that only a look at each vertex can
-  /// judge.
+  /// False: the layout has attributes (32-bit floats, say) that have to be checked one by one.
   [[nodiscard]] bool possible() const { return possible_; }
 
-  /// What all vertices have in common.
+  /// Properties of all vertices.
   struct Extent {
     bool finite = true;         ///< no infinity, no NaN
-    bool unit_normals = true;   ///< lengths surely within the tolerance of VERTEX_NORMAL
+    bool unit_normals = true;   ///< lengths certainly within the tolerance of VERTEX_NORMAL
     bool clean_padding = true;  ///< bytes of no attribute are zero
     double low[3] = {};         ///< of the position attribute, as OpenGL ES 2.0 decodes it
     double high[3] = {};

@@ -363,7 +363,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
         place_scene(known.scene, known.pattern, known.model, (*sides)[known.model]));
   }
   content.meta = bundle_meta(request, report);
-  content.statement = statement_of(content);
+  content.summary = content_summary_of(content);
   return content;
 }
 

@@ -176,7 +176,7 @@ std::string mutation_json(const MutationReport& report) {
   Json fields = Json::object();
   for (const auto& [field, tally] : report.by_field) {
     Json one = tally_json(tally);
-    one.set("rate_without_statement", tally.rate_without_statement());
+    one.set("rate_without_statement", tally.rate_without_summary());
     fields.set(field, std::move(one));
   }
   Json survivors = Json::array();
@@ -194,7 +194,7 @@ std::string mutation_json(const MutationReport& report) {
        {{"n", report.n},
         {"rate_unhashed", report.unhashed.rate()},
         {"rate_rehashed", report.rehashed.rate()},
-        {"rate_rehashed_without_statement", report.rehashed.rate_without_statement()},
+        {"rate_rehashed_without_statement", report.rehashed.rate_without_summary()},
         {"harmless", report.unhashed.harmless + report.rehashed.harmless},
         {"by_kind", kinds},
         {"by_field", fields},

@@ -25,7 +25,7 @@ void print_report(const MutationReport& report) {
   print_tally("without true hashes", report.unhashed);
   print_tally("with true hashes", report.rehashed);
   std::printf("%-28s %7.3f %%\n", "... by all rules but one",
-              100 * report.rehashed.rate_without_statement());
+              100 * report.rehashed.rate_without_summary());
   for (const auto& [kind, tally] : report.by_kind) print_tally("  " + kind, tally);
   for (const MutationSurvivor& survivor : report.survivors) {
     std::printf("survived: %s of %s at byte %llu: %s became %s\n", survivor.kind.c_str(),

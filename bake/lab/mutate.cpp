@@ -17,7 +17,7 @@ constexpr std::size_t kBatch = 64;
 
 struct Judgement {
   bool killed = false;
-  bool statement_only = false;
+  bool summary_only = false;
 };
 
 /// The YML rule where the mutation may have broken it: parsing texts takes longer than all else.
@@ -46,7 +46,7 @@ Judgement judge(std::span<const std::byte> file, const Mutation& mutation) {
   Judgement verdict;
   verdict.killed = !check_bundle(file, sink);
   if (!verdict.killed) verdict.killed = !features_agree(file, mutation, sink);
-  verdict.statement_only = verdict.killed && !other;
+  verdict.summary_only = verdict.killed && !other;
   return verdict;
 }
 
@@ -101,7 +101,7 @@ class Trial {
     tally(mutation, [&](MutationTally& t) {
       ++t.tried;
       t.killed += verdict.killed ? 1 : 0;
-      t.statement += verdict.statement_only ? 1 : 0;
+      t.summary += verdict.summary_only ? 1 : 0;
     });
     if (!verdict.killed) {
       // Ours first: what it sees changed need not be asked about.
@@ -158,8 +158,8 @@ double MutationTally::rate() const {
   return share(killed, tried - harmless);
 }
 
-double MutationTally::rate_without_statement() const {
-  return share(killed - statement, tried - harmless);
+double MutationTally::rate_without_summary() const {
+  return share(killed - summary, tried - harmless);
 }
 
 Result<MutationReport> mutate_bundle(std::span<const std::byte> bytes,

@@ -137,7 +137,7 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
       return out.add("names", FieldType::kU8, all);
     case SectionType::kMeta:
       return out.add("meta", FieldType::kU8, all);
-    case SectionType::kStatement:
+    case SectionType::kContentSummary:
       return out.add("statement", FieldType::kU8, all);
     case SectionType::kFeatureYml:
       return out.add("feature text", FieldType::kU8, all);

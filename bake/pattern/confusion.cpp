@@ -9,7 +9,7 @@
 #include "bake/pattern/pattern_picture.hpp"
 #include "bake/pattern/pose_subject.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/tracker_record_view.hpp"
+#include "formats/tracker_record.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"
 

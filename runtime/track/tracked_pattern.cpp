@@ -5,13 +5,13 @@
 #include <cstring>
 #include <string>
 
-#include "formats/tracker_record_view.hpp"
+#include "formats/tracker_record.hpp"
 #include "modar/tracker_features.hpp"
 
 namespace modar::tracker {
 namespace {
 
-static_assert(kFeatureExtractor == kFeatureExtractorVersion);
+static_assert(kFeatureExtractorVersion == kTrackerExtractorVersion);
 
 void view_levels(const TrackerRecordView& view, TrackedPattern& out) {
   const std::uint8_t* pixels = view.pixels.data();

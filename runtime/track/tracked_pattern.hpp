@@ -31,8 +31,8 @@ struct TrackedPattern {
   std::uint32_t bright_count = 0;
   std::span<const TrackerFeatureRecord> features;
   const std::uint8_t* codes = nullptr;
-  std::array<std::span<const TrackerPatchRecord>, kMaxLoopImageLevels> patches;  ///< by level
-  std::array<GrayImage, kMaxLoopImageLevels> levels;
+  std::array<std::span<const TrackerPatchRecord>, kMaxTrackerImageLevels> patches;  ///< by level
+  std::array<GrayImage, kMaxTrackerImageLevels> levels;
   int level_count = 0;
 
   [[nodiscard]] int width() const { return levels[0].width; }

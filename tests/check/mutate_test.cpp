@@ -22,7 +22,7 @@ using namespace modar::test;
 /// All of the format, with a statement.
 Bytes stated_bundle() {
   BundleContent content = golden_content();
-  content.statement = statement_of(content);
+  content.summary = content_summary_of(content);
   return encode(content);
 }
 

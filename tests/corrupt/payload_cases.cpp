@@ -155,7 +155,7 @@ constexpr CorruptCase kCases[] = {
     {"STATEMENT_DIFFERS",
      [] {
        return changed(model_content(), [](auto& c) {
-         c.statement = statement_of(c);
+         c.summary = content_summary_of(c);
          c.materials[0].diffuse[1] = 0.25f;
        });
      }},

@@ -202,7 +202,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
   using modar::SectionType;
   const std::map<SectionType, std::string> names = {{SectionType::kNames, "names"},
                                                     {SectionType::kMeta, "meta"},
-                                                    {SectionType::kStatement, "statement"},
+                                                    {SectionType::kContentSummary, "content summary"},
                                                     {SectionType::kModels, "models"},
                                                     {SectionType::kChunks, "chunks"},
                                                     {SectionType::kLevels, "levels"},
@@ -215,7 +215,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
                                                     {SectionType::kScenes, "scenes"},
                                                     {SectionType::kMappedFeatures, "feature twin"},
                                                     {SectionType::kFeatureYml, "feature text"},
-                                                    {SectionType::kTrackerRecord, "loop record"},
+                                                    {SectionType::kTrackerRecord, "tracker record"},
                                                     {SectionType::kVertices, "vertices"},
                                                     {SectionType::kIndices, "indices"},
                                                     {SectionType::kTextureData, "texture data"}};

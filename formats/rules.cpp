@@ -11,93 +11,92 @@
 namespace modar {
 namespace {
 
-constexpr const char* kRebake = "bake the bundle again; if it comes back, report the baker";
+constexpr const char* kRebake = "bake the bundle again; if that does not help, report it as a bug";
 constexpr const char* kFetch = "copy or download the file again, or bake it again";
-constexpr const char* kUpdate = "update this program, or bake with the version that it knows";
+constexpr const char* kUpdate = "update this program, or bake with a version that it supports";
 
 constexpr IssueKind kIssueKinds[] = {
     {"BUNDLE_TRUNCATED", Severity::kError, "The file ends before the bundle does", kFetch},
-    {"BUNDLE_MAGIC", Severity::kError, "The file is no ModAR bundle",
-     "give a file that `modar bake` wrote"},
-    {"BUNDLE_VERSION", Severity::kError, "The bundle has another major version", kUpdate},
+    {"BUNDLE_MAGIC", Severity::kError, "The file is not a ModAR bundle",
+     "pass a file that `modar bake` wrote"},
+    {"BUNDLE_VERSION", Severity::kError, "The bundle has a different major version", kUpdate},
     {"BUNDLE_FILE_SIZE", Severity::kError, "The file is longer than the bundle", kFetch},
     {"BUNDLE_HEADER", Severity::kError,
-     "The section table is not where version 1 has it, or the bytes lie askew in memory", kFetch},
-    {"BUNDLE_HEADER_HASH", Severity::kError, "Header or section table are damaged", kFetch},
+     "The section table is not at byte 64, or the bytes are not 8-byte aligned in memory", kFetch},
+    {"BUNDLE_HEADER_HASH", Severity::kError, "The header or the section table is damaged", kFetch},
     {"BUNDLE_SECTION_COUNT", Severity::kError, "The section table does not fit into the file",
      kFetch},
-    {"BUNDLE_SECTION_REQUIRED", Severity::kError, "A required section is of an unknown type",
+    {"BUNDLE_SECTION_REQUIRED", Severity::kError, "A required section has an unknown type",
      kUpdate},
     {"BUNDLE_SECTION_VERSION", Severity::kError, "A section has an unknown version", kUpdate},
-    {"BUNDLE_SECTION_FLAGS", Severity::kError, "A section has flags that its type does not have",
+    {"BUNDLE_SECTION_FLAGS", Severity::kError, "A section's flags do not match its type", kRebake},
+    {"BUNDLE_SECTION_ORDER", Severity::kError, "Sections are not sorted, or one is present twice",
      kRebake},
-    {"BUNDLE_SECTION_ORDER", Severity::kError, "Sections are not sorted, or one is there twice",
-     kRebake},
-    {"BUNDLE_SECTION_OWNER", Severity::kError, "A section belongs to a record that is not there",
+    {"BUNDLE_SECTION_OWNER", Severity::kError, "A section belongs to a record that does not exist",
      kRebake},
     {"BUNDLE_SECTION_ALIGNMENT", Severity::kError, "A section is not aligned", kRebake},
-    {"BUNDLE_SECTION_RANGE", Severity::kError, "A section leaves the file or overlaps another",
-     kFetch},
-    {"BUNDLE_TABLE_SHAPE", Severity::kError, "A table does not fill its section with its records",
-     kRebake},
+    {"BUNDLE_SECTION_RANGE", Severity::kError,
+     "A section extends past the file or overlaps another", kFetch},
+    {"BUNDLE_TABLE_SHAPE", Severity::kError, "A table's records do not fill its section", kRebake},
     {"BUNDLE_RESERVED", Severity::kError, "Reserved bytes or bits are not zero", kRebake},
-    {"BUNDLE_ENUM", Severity::kError, "A field has a value that means nothing", kUpdate},
-    {"BUNDLE_NUMBER", Severity::kError, "A number is not finite or out of its bounds", kRebake},
+    {"BUNDLE_ENUM", Severity::kError, "A field has an undefined value", kUpdate},
+    {"BUNDLE_NUMBER", Severity::kError, "A number is not finite or out of range", kRebake},
     {"BUNDLE_NAME", Severity::kError, "A name is not printable UTF-8 inside the names", kRebake},
     {"BUNDLE_MODEL_RANGE", Severity::kError,
-     "A model refers to chunks, materials or a layout that are not there", kRebake},
+     "A model refers to chunks, materials or a layout that do not exist", kRebake},
     {"BUNDLE_CHUNK_RANGE", Severity::kError,
-     "A chunk has no levels, levels that are not its own, or an impossible box", kRebake},
+     "A chunk has no levels, levels of another chunk, or an impossible box", kRebake},
     {"BUNDLE_LEVEL_RANGE", Severity::kError,
-     "A level of detail refers to vertices or indices that are not there", kRebake},
+     "A level of detail refers to vertices or indices that do not exist", kRebake},
     {"BUNDLE_MATERIAL_RANGE", Severity::kError,
-     "A material or a texture is referred to that is not there", kRebake},
+     "A reference to a material or a texture that does not exist", kRebake},
     {"BUNDLE_LAYOUT", Severity::kError, "A vertex layout contradicts itself", kRebake},
     {"BUNDLE_TEXTURE_RANGE", Severity::kError,
-     "A texture has an impossible size or levels that are not there", kRebake},
+     "A texture has an impossible size or refers to levels that do not exist", kRebake},
     {"BUNDLE_TEXTURE_LEVEL", Severity::kError,
-     "A texture level has the wrong size or lies outside of its data", kRebake},
-    {"BUNDLE_PATTERN", Severity::kError, "A pattern's sizes contradict each other", kRebake},
+     "A texture level has the wrong size or lies outside its data", kRebake},
+    {"BUNDLE_PATTERN", Severity::kError, "A pattern's sizes are inconsistent", kRebake},
     {"BUNDLE_PARAMETER_SET", Severity::kError,
-     "A parameter set is out of order or describes nothing", kRebake},
+     "A parameter set is out of order or has an impossible descriptor", kRebake},
     {"BUNDLE_FEATURES", Severity::kError, "A pattern's features do not fill their section",
      kRebake},
-    {"BUNDLE_SCENE", Severity::kError, "A scene refers to what is not there or turns badly",
+    {"BUNDLE_SCENE", Severity::kError,
+     "A scene refers to a pattern or model that does not exist, or its rotation is not a unit "
+     "quaternion",
      kRebake},
-    {"SECTION_HASH", Severity::kError, "The bytes of a section are damaged", kFetch},
+    {"SECTION_HASH", Severity::kError, "A section's bytes do not match its hash", kFetch},
     {"SECTION_PADDING", Severity::kError, "Bytes between sections are not zero", kFetch},
     {"META_TEXT", Severity::kWarning, "The bundle's description is not UTF-8 text", kRebake},
     {"MODEL_PLACEMENT", Severity::kError,
-     "A model's scale and diagonal cannot belong to one box, or its chunks do not fit into that "
+     "A model's scale and diagonal cannot describe one box, or its chunks do not fit into that "
      "box",
      kRebake},
-    {"MODEL_COUNTS", Severity::kError, "A model's counts differ from what it holds", kRebake},
-    {"MODEL_ERRORS", Severity::kError, "A model's mean error is greater than its greatest one",
-     kRebake},
-    {"CHUNK_BOUNDS", Severity::kError, "A vertex lies outside of its chunk's box", kRebake},
-    {"CHUNK_LOOSE", Severity::kError, "A chunk's box is larger than the vertices in it", kRebake},
-    {"CHUNK_OUTSIDE", Severity::kError, "A chunk's box leaves the unit cube", kRebake},
+    {"MODEL_COUNTS", Severity::kError, "A model's counts differ from its contents", kRebake},
+    {"MODEL_ERRORS", Severity::kError, "A model's mean error is greater than its maximum", kRebake},
+    {"CHUNK_BOUNDS", Severity::kError, "A vertex lies outside its chunk's box", kRebake},
+    {"CHUNK_LOOSE", Severity::kError, "A chunk's box is larger than its vertices need", kRebake},
+    {"CHUNK_OUTSIDE", Severity::kError, "A chunk's box extends past the unit cube", kRebake},
     {"CHUNK_CONE", Severity::kError,
-     "A chunk's cone axis is not of unit length, or triangles face out of the cone", kRebake},
+     "A chunk's cone axis does not have unit length, or triangles face out of the cone", kRebake},
     {"CHUNK_GRID", Severity::kWarning,
      "Chunks of a model store integer positions on different grids: their borders may crack",
      kRebake},
     {"LEVEL_ORDER", Severity::kError,
-     "Levels of detail do not get coarser, or level 0 states an error", kRebake},
+     "Levels of detail do not get coarser, or level 0 has a non-zero error", kRebake},
     {"LEVEL_INDEX", Severity::kError, "An index refers to a vertex that its level lacks", kRebake},
     {"VERTEX_NOT_FINITE", Severity::kError, "A vertex attribute is infinite or not a number",
      kRebake},
-    {"VERTEX_NORMAL", Severity::kError, "A normal is not of unit length", kRebake},
+    {"VERTEX_NORMAL", Severity::kError, "A normal does not have unit length", kRebake},
     {"MATERIAL_VALUES", Severity::kError, "A material's colour, shininess or opacity is unusable",
      "correct the material in the source and bake again"},
     {"TEXTURE_SIDES", Severity::kError,
-     "A texture that repeats or has mipmaps has sides that are no powers of two (OpenGL ES 2.0)",
+     "A texture that repeats or has mipmaps has sides that are not powers of two (OpenGL ES 2.0)",
      kRebake},
     {"TEXTURE_OVERLAP", Severity::kError, "Levels of a texture share bytes", kRebake},
     {"TEXTURE_UNREFERENCED", Severity::kWarning, "Bytes of a texture belong to no level", kRebake},
     {"PARAMETER_VALUES", Severity::kError,
      "A parameter set has values that its detector cannot run with", kRebake},
-    {"KEYPOINT_OUTSIDE", Severity::kError, "A keypoint lies outside of its pattern", kRebake},
+    {"KEYPOINT_OUTSIDE", Severity::kError, "A keypoint lies outside its pattern", kRebake},
     {"KEYPOINT_VALUES", Severity::kError, "A keypoint's size, angle or octave is impossible",
      kRebake},
     {"DESCRIPTOR_LENGTH", Severity::kError, "Descriptors do not have their detector's length",
@@ -105,13 +104,11 @@ constexpr IssueKind kIssueKinds[] = {
     {"PATTERN_WITHOUT_FEATURES", Severity::kWarning, "A pattern has too few features to be found",
      "use a pattern with more texture"},
     {"FEATURE_TEXT", Severity::kError,
-     "A feature text is no OpenCV FileStorage or has no mapped twin", kRebake},
-    {"LOOP_RECORD", Severity::kError, "A pattern's record for the pose loop cannot be read",
-     kRebake},
+     "A feature text is not an OpenCV FileStorage or has no mapped twin", kRebake},
+    {"LOOP_RECORD", Severity::kError, "A pattern's tracker record is invalid", kRebake},
     {"STATEMENT_DIFFERS", Severity::kError,
-     "The statement says something else than the records or payloads", kRebake},
-    {"VERTEX_PADDING", Severity::kError, "Bytes of a vertex that no attribute has are not zero",
-     kRebake},
+     "The content summary differs from the records or payloads", kRebake},
+    {"VERTEX_PADDING", Severity::kError, "Padding bytes of a vertex are not zero", kRebake},
     {"PATTERN_YML_DIFFERS", Severity::kError,
      "A feature text, read by OpenCV, differs from its mapped twin", kRebake},
     {"VERTICES_UNREFERENCED", Severity::kWarning, "Bytes of the vertex buffer belong to no level",
@@ -123,7 +120,7 @@ constexpr IssueKind kIssueKinds[] = {
     {"BUNDLE_EMPTY", Severity::kWarning, "The bundle holds neither models nor patterns",
      "bake it with --model or --pattern"},
     {"SECTION_UNKNOWN", Severity::kInfo, "An optional section of an unknown type is skipped",
-     "update this program if you want what it holds"},
+     "update this program to use its contents"},
 };
 static_assert(std::size(kIssueKinds) == static_cast<std::size_t>(Rule::kCount));
 
@@ -179,9 +176,8 @@ void FaultLog::add(Rule rule, std::uint64_t offset, std::string where, std::stri
                  kind.message + (": " + detail), kind.cure};
 }
 
-/// The fewest digits that read back the same. Not std::to_chars: its tables for floating point
-/// weigh 130 KB, a quarter of the player. printf and strtod know the same decimal point, which
-/// becomes '.'.
+/// Not std::to_chars: its floating-point tables take 130 KB, a quarter of the player. printf and
+/// strtod agree on the locale's decimal point, which becomes '.'.
 std::string number_text(double value) {
   std::array<char, 40> text{};
   constexpr int kExact = 17;  // digits tell any double apart
@@ -211,7 +207,8 @@ std::string issue_rows(std::span<const IssueKind> kinds) {
 
 std::string issues_markdown() {
   return "# Issues that the checker reports\n\n"
-         "Ids are stable. An error makes a bundle bad; a warning does not.\n\n"
+         "Ids are stable. A bundle with an error fails validation; warnings do not matter for "
+         "that.\n\n"
          "| id | severity | what is wrong | what to do |\n|---|---|---|---|\n" +
          issue_rows(kIssueKinds);
 }

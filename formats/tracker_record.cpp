@@ -1,5 +1,5 @@
-// Holds loop records against bundle.md.
-#include "formats/tracker_record_view.hpp"
+// Validates tracker records.
+#include "formats/tracker_record.hpp"
 
 #include <algorithm>
 #include <array>
@@ -15,20 +15,21 @@ std::optional<TrackerFault> check_header(const TrackerRecordHeader& header) {
   const auto fault = [](std::uint64_t offset, const char* cause) {
     return std::optional<TrackerFault>({offset, cause});
   };
-  if (header.feature_count > kMaxLoopFeatures || header.feature_count % kTrackerBlockCodes != 0) {
+  if (header.feature_count > kMaxTrackerFeatures ||
+      header.feature_count % kTrackerBlockCodes != 0) {
     return fault(offsetof(TrackerRecordHeader, feature_count), "feature_count is no whole blocks");
   }
   if (header.bright_count > header.feature_count || header.bright_count % kTrackerBlockCodes != 0) {
     return fault(offsetof(TrackerRecordHeader, bright_count), "bright_count is no whole blocks");
   }
-  if (header.patch_count > kMaxLoopPatches) {
+  if (header.patch_count > kMaxTrackerPatches) {
     return fault(offsetof(TrackerRecordHeader, patch_count), "patch_count is too great");
   }
   if (header.width < 1 || header.width > kLargestSide || header.height < 1 ||
       header.height > kLargestSide) {
     return fault(offsetof(TrackerRecordHeader, width), "a side is not 1 to 1023 pixels");
   }
-  if (header.level_count < 1 || header.level_count > kMaxLoopImageLevels ||
+  if (header.level_count < 1 || header.level_count > kMaxTrackerImageLevels ||
       (std::min(header.width, header.height) >> (header.level_count - 1)) == 0) {
     return fault(offsetof(TrackerRecordHeader, level_count), "there are too many levels");
   }

@@ -1,0 +1,793 @@
+// Validates a bundle's structure: the header, the section table, every record of every table.
+// Payloads are bounded here and read by check.hpp.
+#include "formats/validate.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <tuple>
+
+#include "formats/utf8.hpp"
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace modar {
+namespace {
+
+/// What version 1.0 says about a section type.
+struct KnownType {
+  SectionType type;
+  std::uint16_t flags;
+  bool owned;  ///< owner and variant are used
+};
+
+constexpr KnownType kKnownTypes[] = {
+    {SectionType::kNames, kSectionRequired, false},
+    {SectionType::kMeta, 0, false},
+    {SectionType::kContentSummary, 0, false},
+    {SectionType::kModels, kSectionRequired, false},
+    {SectionType::kChunks, kSectionRequired, false},
+    {SectionType::kLevels, kSectionRequired, false},
+    {SectionType::kMaterials, kSectionRequired, false},
+    {SectionType::kLayouts, kSectionRequired, false},
+    {SectionType::kTextures, kSectionRequired, false},
+    {SectionType::kTextureLevels, kSectionRequired, false},
+    {SectionType::kPatterns, kSectionRequired, false},
+    {SectionType::kParameterSets, kSectionRequired, false},
+    {SectionType::kScenes, kSectionRequired, false},
+    {SectionType::kMappedFeatures, kSectionRequired, true},
+    {SectionType::kFeatureYml, 0, true},
+    {SectionType::kTrackerRecord, 0, true},
+    {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
+    {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
+    {SectionType::kTextureData, kSectionRequired | kSectionGpu, true},
+};
+
+const KnownType* known_type(std::uint32_t type) {
+  for (const KnownType& known : kKnownTypes) {
+    if (static_cast<std::uint32_t>(known.type) == type) return &known;
+  }
+  return nullptr;
+}
+
+auto key(const SectionEntry& entry) {
+  return std::make_tuple(entry.type, entry.owner, entry.variant);
+}
+
+std::uint64_t header_hash(std::span<const std::byte> bytes, const FileHeader& header) {
+  XXH64_state_t state;
+  XXH64_reset(&state, 0);
+  XXH64_update(&state, bytes.data(), offsetof(FileHeader, hash));
+  XXH64_update(&state, bytes.data() + header.table_offset,
+               std::size_t{header.section_count} * sizeof(SectionEntry));
+  return XXH64_digest(&state);
+}
+
+/// The fields that decide whether the rest of the file can be looked at. False: it cannot.
+bool readable(std::span<const std::byte> bytes, FaultLog& log) {
+  const auto refuse = [&log](Rule rule, std::uint64_t offset, std::string detail) {
+    log.add(rule, offset, "header", std::move(detail));
+    return false;
+  };
+  if (bytes.size() < sizeof(FileHeader)) {
+    return refuse(Rule::kTruncated, bytes.size(),
+                  "the file has " + std::to_string(bytes.size()) + " bytes, a header has 64");
+  }
+  if (reinterpret_cast<std::uintptr_t>(bytes.data()) % alignof(std::uint64_t) != 0) {
+    return refuse(Rule::kHeader, 0, "the first byte is at an address that 8 does not divide");
+  }
+  const auto& header = *reinterpret_cast<const FileHeader*>(bytes.data());
+  if (std::memcmp(header.magic, kMagic.data(), kMagic.size()) != 0) {
+    return refuse(Rule::kMagicBytes, 0, "the first eight bytes are not those of a bundle");
+  }
+  if (header.major != kMajorVersion) {
+    return refuse(Rule::kVersion, offsetof(FileHeader, major),
+                  "the file has version " + std::to_string(header.major) + "." +
+                      std::to_string(header.minor) + ", this program reads 1.x");
+  }
+  const auto sizes = [&] {
+    return "the header states " + std::to_string(header.file_size) + " bytes, the file has " +
+           std::to_string(bytes.size());
+  };
+  if (bytes.size() < header.file_size) return refuse(Rule::kTruncated, bytes.size(), sizes());
+  if (bytes.size() > header.file_size) {
+    return refuse(Rule::kFileSize, offsetof(FileHeader, file_size), sizes());
+  }
+  if (header.table_offset != sizeof(FileHeader) || header.entry_size != sizeof(SectionEntry)) {
+    return refuse(Rule::kHeader, offsetof(FileHeader, table_offset),
+                  "the section table is not at byte 64 with entries of 48 bytes");
+  }
+  if (header.section_count > kMaxSections ||
+      header.section_count > (bytes.size() - sizeof(FileHeader)) / sizeof(SectionEntry)) {
+    return refuse(Rule::kSectionCount, offsetof(FileHeader, section_count),
+                  std::to_string(header.section_count) + " sections do not fit");
+  }
+  return true;
+}
+
+/// Type, version, flags and owner of one entry.
+void check_kind(const RecordCheck& check, const SectionEntry& entry, bool newer) {
+  if (!newer && (entry.flags & ~(kSectionRequired | kSectionGpu)) != 0) {
+    check.fault(Rule::kReserved, &entry.flags,
+                "flags " + std::to_string(entry.flags) + " have unknown bits");
+  }
+  check.reserved(&entry.reserved, sizeof(entry.reserved));
+  const KnownType* known = known_type(entry.type);
+  if (known == nullptr) {
+    if ((entry.flags & kSectionRequired) != 0) {
+      check.fault(Rule::kSectionRequired, &entry.type,
+                  "section type " + std::to_string(entry.type) + " is required and unknown");
+    }
+    return;
+  }
+  if (entry.version != 1) {
+    check.fault(Rule::kSectionVersion, &entry.version,
+                "section type " + std::to_string(entry.type) + " has version " +
+                    std::to_string(entry.version) + ", this program reads 1");
+  }
+  if ((entry.flags & (kSectionRequired | kSectionGpu)) != known->flags) {
+    check.fault(Rule::kSectionFlags, &entry.flags,
+                "section type " + std::to_string(entry.type) + " has flags " +
+                    std::to_string(entry.flags) + ", not " + std::to_string(known->flags));
+  }
+  if (!known->owned && (entry.owner != kNone || entry.variant != 0)) {
+    check.fault(Rule::kSectionOwner, &entry.owner,
+                "section type " + std::to_string(entry.type) + " belongs to no record");
+  }
+}
+
+/// True if the section lies inside the file, behind `end`.
+bool check_place(const RecordCheck& check, const SectionEntry& entry, std::uint64_t end,
+                 std::uint64_t file_size) {
+  const std::uint64_t alignment =
+      (entry.flags & kSectionGpu) != 0 ? kGpuAlignment : kSectionAlignment;
+  if (entry.offset % alignment != 0) {
+    check.fault(Rule::kSectionUnaligned, &entry.offset,
+                "offset " + std::to_string(entry.offset) + " is no multiple of " +
+                    std::to_string(alignment));
+    return false;
+  }
+  if (entry.offset < end || entry.offset > file_size || entry.size > file_size - entry.offset) {
+    check.fault(Rule::kSectionRange, &entry.offset,
+                std::to_string(entry.size) + " bytes at " + std::to_string(entry.offset) +
+                    " do not lie between byte " + std::to_string(end) + " and the end, " +
+                    std::to_string(file_size));
+    return false;
+  }
+  return true;
+}
+
+/// The header of a table whose records have `size` bytes, if it has the right shape; its records
+/// follow it. nullptr and true: the bundle has no such table.
+bool find_header(FaultLog& log, const BundleParts& parts, SectionType type, std::size_t size,
+                 const TableHeader*& found) {
+  const SectionEntry* entry = find_section(parts.sections, type, kNone, 0);
+  if (entry == nullptr) return true;
+  const std::span<const std::byte> bytes = section_bytes(parts, *entry);
+  const auto refuse = [&](std::string detail) {
+    log.add(Rule::kTableShape, entry->offset, "section type " + std::to_string(entry->type),
+            std::move(detail));
+    return false;
+  };
+  if (bytes.size() < sizeof(TableHeader)) return refuse("it is too small for a table's header");
+  const auto& header = *reinterpret_cast<const TableHeader*>(bytes.data());
+  if (header.stride < size || header.stride % 8 != 0 ||
+      (header.stride != size && !newer_minor(parts))) {
+    return refuse("its records have " + std::to_string(header.stride) + " bytes, not " +
+                  std::to_string(size));
+  }
+  // Neither factor exceeds 32 bits, so the product cannot overflow.
+  if (std::uint64_t{header.count} * header.stride != bytes.size() - sizeof(TableHeader)) {
+    return refuse(std::to_string(header.count) + " records of " + std::to_string(header.stride) +
+                  " bytes do not fill " + std::to_string(bytes.size()) + " bytes");
+  }
+  if (header.reserved != 0 && !newer_minor(parts)) {
+    log.add(Rule::kReserved, entry->offset + offsetof(TableHeader, reserved),
+            "section type " + std::to_string(entry->type), "a reserved field is not zero");
+  }
+  found = &header;
+  return true;
+}
+
+template <class T>
+bool find_table(FaultLog& log, const BundleParts& parts, SectionType type, Table<T>& table) {
+  const TableHeader* header = nullptr;
+  if (!find_header(log, parts, type, sizeof(T), header)) return false;
+  if (header != nullptr) {
+    table = Table<T>(reinterpret_cast<const std::byte*>(header + 1), header->count, header->stride);
+  }
+  return true;
+}
+
+void check_names(FaultLog& log, const BundleParts& parts) {
+  std::string_view rest(reinterpret_cast<const char*>(parts.names.data()), parts.names.size());
+  while (!rest.empty()) {
+    const std::size_t length = utf8_character(rest);
+    if (length == 0) {
+      const auto* at = reinterpret_cast<const std::byte*>(rest.data());
+      log.add(Rule::kName, static_cast<std::uint64_t>(at - parts.bytes.data()), "names",
+              "a byte belongs to no printable character of UTF-8");
+      return;
+    }
+    rest.remove_prefix(length);
+  }
+}
+
+}  // namespace
+
+bool known_section_type(std::uint32_t type) {
+  return known_type(type) != nullptr;
+}
+
+const SectionEntry* find_section(std::span<const SectionEntry> sections, SectionType type,
+                                 std::uint32_t owner, std::uint32_t variant) {
+  const auto wanted = std::make_tuple(static_cast<std::uint32_t>(type), owner, variant);
+  const auto found = std::lower_bound(
+      sections.begin(), sections.end(), wanted,
+      [](const SectionEntry& entry, const auto& value) { return key(entry) < value; });
+  return found != sections.end() && key(*found) == wanted ? &*found : nullptr;
+}
+
+bool validate_sections(std::span<const std::byte> bytes, FaultLog& log, BundleParts& parts) {
+  if (!readable(bytes, log)) return false;
+  const auto& header = *reinterpret_cast<const FileHeader*>(bytes.data());
+  parts.bytes = bytes;
+  parts.sections = {reinterpret_cast<const SectionEntry*>(bytes.data() + header.table_offset),
+                    header.section_count};
+  if (header_hash(bytes, header) != header.hash) {
+    log.add(Rule::kHeaderHash, offsetof(FileHeader, hash), "header",
+            "the hash of header and section table differs from the stated one");
+  }
+  const RecordCheck header_check(log, parts, "header", 0);
+  header_check.reserved(&header.reserved0, sizeof(header.reserved0));
+  header_check.reserved(header.reserved1, sizeof(header.reserved1));
+  bool placed = true;
+  std::uint64_t end =
+      header.table_offset + std::uint64_t{header.section_count} * sizeof(SectionEntry);
+  for (std::uint32_t i = 0; i < header.section_count && !log.stop(); ++i) {
+    const SectionEntry& entry = parts.sections[i];
+    const RecordCheck check(log, parts, "section", i);
+    if (i > 0 && !(key(parts.sections[i - 1]) < key(entry))) {
+      check.fault(Rule::kSectionOrder, &entry.type,
+                  "it does not sort behind the one before by type, owner and variant");
+      placed = false;
+    }
+    check_kind(check, entry, newer_minor(parts));
+    if (check_place(check, entry, end, header.file_size)) {
+      end = entry.offset + entry.size;
+    } else {
+      placed = false;
+    }
+  }
+  if (placed && !log.stop() && end != header.file_size) {
+    log.add(Rule::kFileSize, end, "header",
+            "the last section ends at byte " + std::to_string(end) + ", the file at " +
+                std::to_string(header.file_size));
+  }
+  return placed && !log.stop();
+}
+
+bool validate_tables(FaultLog& log, BundleParts& parts) {
+  const auto blob = [&parts](SectionType type) {
+    const SectionEntry* entry = find_section(parts.sections, type, kNone, 0);
+    return entry != nullptr ? section_bytes(parts, *entry) : std::span<const std::byte>();
+  };
+  parts.names = blob(SectionType::kNames);
+  parts.vertices = blob(SectionType::kVertices);
+  parts.indices = blob(SectionType::kIndices);
+  check_names(log, parts);
+  bool walkable = find_table(log, parts, SectionType::kModels, parts.models);
+  walkable &= find_table(log, parts, SectionType::kChunks, parts.chunks);
+  walkable &= find_table(log, parts, SectionType::kLevels, parts.levels);
+  walkable &= find_table(log, parts, SectionType::kMaterials, parts.materials);
+  walkable &= find_table(log, parts, SectionType::kLayouts, parts.layouts);
+  walkable &= find_table(log, parts, SectionType::kTextures, parts.textures);
+  walkable &= find_table(log, parts, SectionType::kTextureLevels, parts.texture_levels);
+  walkable &= find_table(log, parts, SectionType::kPatterns, parts.patterns);
+  walkable &= find_table(log, parts, SectionType::kParameterSets, parts.parameter_sets);
+  walkable &= find_table(log, parts, SectionType::kScenes, parts.scenes);
+  return walkable && !log.stop();
+}
+
+void RecordCheck::name(const NameRef& ref) const {
+  const std::uint64_t end = std::uint64_t{ref.offset} + ref.length;
+  const auto starts_character = [this](std::uint64_t at) {
+    return at == parts_.names.size() ||
+           !utf8_continues(static_cast<char>(parts_.names[static_cast<std::size_t>(at)]));
+  };
+  if (ref.length > kMaxNameBytes || end > parts_.names.size() || !starts_character(ref.offset) ||
+      !starts_character(end)) {
+    fault(Rule::kName, &ref,
+          std::to_string(ref.length) + " bytes at " + std::to_string(ref.offset) +
+              " are no whole characters of the " + std::to_string(parts_.names.size()) +
+              " bytes of names");
+  }
+}
+
+bool RecordCheck::range(Rule rule, const std::uint32_t& first, std::uint32_t count,
+                        std::uint64_t expected, std::uint32_t size, const char* name) const {
+  if (first == expected && std::uint64_t{first} + count <= size) return true;
+  fault(rule, &first,
+        std::string(name) + " " + std::to_string(first) + " and " + std::to_string(count) +
+            " in all do not follow the " + std::to_string(expected) + " before them within " +
+            std::to_string(size));
+  return false;
+}
+
+namespace {
+
+/// What ES 2.0 can be handed for a semantic.
+bool components_fit(std::uint8_t semantic, std::uint8_t components) {
+  switch (static_cast<Semantic>(semantic)) {
+    case Semantic::kPosition:
+      return components == 3 || components == 4;
+    case Semantic::kNormal:
+      return components == 3;
+    case Semantic::kUv:
+    case Semantic::kNormalOct:
+      return components == 2;
+    case Semantic::kColour:
+      return components == 4;
+  }
+  return false;
+}
+
+bool known_semantic(std::uint8_t semantic) {
+  return semantic >= static_cast<std::uint8_t>(Semantic::kPosition) &&
+         semantic <= static_cast<std::uint8_t>(Semantic::kNormalOct);
+}
+
+bool is_float(std::uint8_t type) {
+  return type == static_cast<std::uint8_t>(ComponentType::kHalf) ||
+         type == static_cast<std::uint8_t>(ComponentType::kF32);
+}
+
+void check_attribute(const RecordCheck& check, const LayoutRecord& layout,
+                     const AttributeRecord& attribute) {
+  const std::uint32_t size = component_bytes(attribute.type);
+  check.reserved(&attribute.reserved, sizeof(attribute.reserved));
+  if (!known_semantic(attribute.semantic) || size == 0 || attribute.normalised > 1) {
+    return check.fault(Rule::kEnum, &attribute,
+                       "an attribute has semantic " + std::to_string(attribute.semantic) +
+                           ", type " + std::to_string(attribute.type) + ", normalised " +
+                           std::to_string(attribute.normalised));
+  }
+  const std::uint32_t end = attribute.offset + size * attribute.components;
+  if (!components_fit(attribute.semantic, attribute.components) ||
+      (is_float(attribute.type) && attribute.normalised != 0) || attribute.offset % 2 != 0 ||
+      attribute.offset % size != 0 || end > layout.stride) {
+    check.fault(Rule::kLayout, &attribute,
+                "an attribute of " + std::to_string(attribute.components) + " components of " +
+                    std::to_string(size) + " bytes at " + std::to_string(attribute.offset) +
+                    " does not suit its meaning or the stride " + std::to_string(layout.stride));
+  }
+}
+
+/// True if two attributes share a meaning or a byte.
+bool collide(const AttributeRecord& a, const AttributeRecord& b) {
+  const bool normal_twice =
+      std::min(a.semantic, b.semantic) == static_cast<std::uint8_t>(Semantic::kNormal) &&
+      std::max(a.semantic, b.semantic) == static_cast<std::uint8_t>(Semantic::kNormalOct);
+  const std::uint32_t a_end = a.offset + component_bytes(a.type) * a.components;
+  const std::uint32_t b_end = b.offset + component_bytes(b.type) * b.components;
+  return a.semantic == b.semantic || normal_twice || (a.offset < b_end && b.offset < a_end);
+}
+
+void check_layout(const RecordCheck& check, const LayoutRecord& layout) {
+  check.reserved(&layout.reserved, sizeof(layout.reserved));
+  const std::uint32_t count = layout.attribute_count;
+  if (layout.stride == 0 || layout.stride % 4 != 0 || layout.stride > kMaxVertexStride ||
+      count == 0 || count > std::size(layout.attributes)) {
+    return check.fault(Rule::kLayout, &layout,
+                       "stride " + std::to_string(layout.stride) + " and " + std::to_string(count) +
+                           " attributes are not possible");
+  }
+  std::uint32_t positions = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    check_attribute(check, layout, layout.attributes[i]);
+    positions += layout.attributes[i].semantic == static_cast<std::uint8_t>(Semantic::kPosition);
+    for (std::uint32_t j = 0; j < i; ++j) {
+      if (collide(layout.attributes[i], layout.attributes[j])) {
+        check.fault(Rule::kLayout, &layout.attributes[i],
+                    "attributes " + std::to_string(j) + " and " + std::to_string(i) + " collide");
+      }
+    }
+  }
+  if (positions == 0) check.fault(Rule::kLayout, &layout, "it has no position");
+  check.reserved(&layout.attributes[count],
+                 (std::size(layout.attributes) - count) * sizeof(AttributeRecord));
+}
+
+void check_material(const RecordCheck& check, const BundleParts& parts,
+                    const MaterialRecord& material) {
+  check.name(material.name);
+  check.numbers(material.ambient, "ambient");
+  check.numbers(material.diffuse, "diffuse");
+  check.numbers(material.specular, "specular");
+  check.numbers(material.emission, "emission");
+  check.number(material.shininess, "shininess");
+  check.number(material.opacity, "opacity");
+  check.flags(material.flags, kMaterialTwoSided);
+  check.reserved(material.reserved, sizeof(material.reserved));
+  if (material.texture != kNone && material.texture >= parts.textures.size()) {
+    check.fault(Rule::kMaterialRange, &material.texture,
+                "texture " + std::to_string(material.texture) + " is not there");
+  }
+}
+
+void check_level(const RecordCheck& check, const BundleParts& parts, const LevelRecord& level,
+                 std::uint32_t stride) {
+  check.number(level.error, "error", 0.0);
+  check.reserved(&level.reserved, sizeof(level.reserved));
+  const std::uint64_t vertex_bytes = std::uint64_t{level.vertex_count} * stride;
+  if (level.vertex_count > kMaxChunkVertices || level.vertex_offset % 4 != 0 ||
+      level.vertex_offset > parts.vertices.size() ||
+      vertex_bytes > parts.vertices.size() - level.vertex_offset) {
+    check.fault(Rule::kLevelRange, &level.vertex_offset,
+                std::to_string(level.vertex_count) + " vertices of " + std::to_string(stride) +
+                    " bytes at " + std::to_string(level.vertex_offset) + " do not lie in the " +
+                    std::to_string(parts.vertices.size()) + " bytes of vertices");
+  }
+  const std::uint64_t index_bytes = std::uint64_t{level.index_count} * 2;
+  if (level.index_count % 3 != 0 || level.index_offset % 2 != 0 ||
+      level.index_offset > parts.indices.size() ||
+      index_bytes > parts.indices.size() - level.index_offset) {
+    check.fault(Rule::kLevelRange, &level.index_offset,
+                std::to_string(level.index_count) + " indices at " +
+                    std::to_string(level.index_offset) + " are no triangles in the " +
+                    std::to_string(parts.indices.size()) + " bytes of indices");
+  }
+}
+
+void check_chunk(const RecordCheck& check, const ModelRecord& model, const ChunkRecord& chunk) {
+  check.numbers(chunk.bounds_min, "bounds_min");
+  check.numbers(chunk.bounds_max, "bounds_max");
+  for (int axis = 0; axis < 3; ++axis) {
+    if (chunk.bounds_min[axis] > chunk.bounds_max[axis]) {
+      check.fault(Rule::kChunkRange, &chunk.bounds_min[axis], "its box is inside out");
+    }
+  }
+  check.numbers(chunk.cone_axis, "cone_axis");
+  check.number(chunk.cone_cutoff, "cone_cutoff");
+  check.numbers(chunk.position_offset, "position_offset");
+  check.number(chunk.position_step, "position_step", std::numeric_limits<float>::denorm_min());
+  check.numbers(chunk.uv_offset, "uv_offset");
+  check.numbers(chunk.uv_scale, "uv_scale");
+  check.reserved(&chunk.reserved, sizeof(chunk.reserved));
+  if (chunk.level_count == 0) {
+    check.fault(Rule::kChunkRange, &chunk.level_count, "it has no level");
+  }
+  // The model's own range was held against the table before.
+  if (chunk.material < model.first_material ||
+      chunk.material - model.first_material >= model.material_count) {
+    check.fault(Rule::kMaterialRange, &chunk.material,
+                "material " + std::to_string(chunk.material) + " is none of its model's");
+  }
+}
+
+void check_model(const RecordCheck& check, const BundleParts& parts, const ModelRecord& model) {
+  check.name(model.name);
+  check.numbers(model.center, "center");
+  check.number(model.scale, "scale", std::numeric_limits<double>::denorm_min());
+  check.number(model.diagonal, "diagonal", 0.0);
+  check.number(model.unit_metres, "unit_metres", 0.0);
+  check.number(model.position_error_max, "position_error_max", 0.0);
+  check.number(model.position_error_rms, "position_error_rms", 0.0);
+  check.number(model.normal_error_max_deg, "normal_error_max_deg", 0.0, 180.0);
+  check.number(model.normal_error_rms_deg, "normal_error_rms_deg", 0.0, 180.0);
+  check.number(model.uv_error_max_texels, "uv_error_max_texels", 0.0);
+  check.number(model.uv_error_rms_texels, "uv_error_rms_texels", 0.0);
+  check.reserved(model.reserved, sizeof(model.reserved));
+  if (model.layout >= parts.layouts.size()) {
+    check.fault(Rule::kModelRange, &model.layout,
+                "layout " + std::to_string(model.layout) + " is not there");
+  }
+  if (std::uint64_t{model.first_material} + model.material_count > parts.materials.size()) {
+    check.fault(Rule::kModelRange, &model.first_material, "its materials are not there");
+  }
+}
+
+/// Chunks of one model and their levels; `next_level` runs over the levels of the whole bundle.
+void check_chunks(FaultLog& log, const BundleParts& parts, const ModelRecord& model,
+                  std::uint64_t& next_level) {
+  const std::uint32_t stride =
+      model.layout < parts.layouts.size() ? parts.layouts[model.layout].stride : 0;
+  for (std::uint32_t i = 0; i < model.chunk_count && !log.stop(); ++i) {
+    const std::uint32_t index = model.first_chunk + i;
+    const ChunkRecord& chunk = parts.chunks[index];
+    const RecordCheck check(log, parts, "chunk", index);
+    check_chunk(check, model, chunk);
+    const bool found = check.range(Rule::kChunkRange, chunk.first_level, chunk.level_count,
+                                   next_level, parts.levels.size(), "level");
+    next_level += chunk.level_count;
+    for (std::uint32_t j = 0; found && j < chunk.level_count && !log.stop(); ++j) {
+      const std::uint32_t level = chunk.first_level + j;
+      check_level(RecordCheck(log, parts, "level", level), parts, parts.levels[level], stride);
+    }
+  }
+}
+
+}  // namespace
+
+void validate_models(FaultLog& log, const BundleParts& parts) {
+  for (std::uint32_t i = 0; i < parts.layouts.size() && !log.stop(); ++i) {
+    check_layout(RecordCheck(log, parts, "layout", i), parts.layouts[i]);
+  }
+  for (std::uint32_t i = 0; i < parts.materials.size() && !log.stop(); ++i) {
+    check_material(RecordCheck(log, parts, "material", i), parts, parts.materials[i]);
+  }
+  // Ranges have to follow each other without gap or overlap: each chunk has one model and each
+  // level one chunk, and the time taken does not exceed the size of the tables.
+  std::uint64_t next_chunk = 0;
+  std::uint64_t next_level = 0;
+  for (std::uint32_t i = 0; i < parts.models.size() && !log.stop(); ++i) {
+    const ModelRecord& model = parts.models[i];
+    const RecordCheck check(log, parts, "model", i);
+    check_model(check, parts, model);
+    const bool found = check.range(Rule::kModelRange, model.first_chunk, model.chunk_count,
+                                   next_chunk, parts.chunks.size(), "chunk");
+    next_chunk += model.chunk_count;
+    if (found) check_chunks(log, parts, model, next_level);
+  }
+  if (!log.clean()) return;
+  // Levels that shared indices could make a small file cost any time to draw or check.
+  std::uint64_t index_bytes = 0;
+  for (std::uint32_t i = 0; i < parts.levels.size(); ++i) {
+    index_bytes += std::uint64_t{parts.levels[i].index_count} * 2;
+  }
+  if (index_bytes > parts.indices.size()) {
+    log.add(Rule::kLevelRange, 0, "levels",
+            "levels use " + std::to_string(index_bytes) + " bytes of indices where " +
+                std::to_string(parts.indices.size()) + " are: some are shared");
+  }
+  if (next_chunk != parts.chunks.size()) {
+    log.add(Rule::kModelRange, 0, "chunks",
+            std::to_string(parts.chunks.size() - next_chunk) + " chunks belong to no model");
+  } else if (next_level != parts.levels.size()) {
+    log.add(Rule::kChunkRange, 0, "levels",
+            std::to_string(parts.levels.size() - next_level) + " levels belong to no chunk");
+  }
+}
+
+namespace {
+
+/// Above what one wrong step in the largest texture gives.
+constexpr double kMaxPsnr = 140.0;
+
+std::uint64_t etc1_bytes(std::uint32_t width, std::uint32_t height) {
+  return (std::uint64_t{width} + 3) / 4 * ((std::uint64_t{height} + 3) / 4) * 8;
+}
+
+void check_texture(const RecordCheck& check, const TextureRecord& texture) {
+  check.name(texture.name);
+  check.number(texture.psnr_db, "psnr_db", 0.0, kMaxPsnr);
+  check.number(texture.ssim, "ssim", -1.0, 1.0);
+  check.flags(texture.flags, kTextureAlpha | kTextureRepeat);
+  check.reserved(texture.reserved, sizeof(texture.reserved));
+  if (texture.format != static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb)) {
+    check.fault(Rule::kEnum, &texture.format,
+                "format " + std::to_string(texture.format) + " is not known");
+  }
+  const std::uint32_t side = std::max(texture.width, texture.height);
+  if (std::min(texture.width, texture.height) == 0 || side > kMaxTextureSide ||
+      std::min(texture.source_width, texture.source_height) == 0) {
+    check.fault(Rule::kTextureRange, &texture.width,
+                std::to_string(texture.width) + " x " + std::to_string(texture.height) +
+                    " pixels are no possible size");
+    return;
+  }
+  const auto chain = static_cast<std::uint32_t>(std::bit_width(side));
+  if (texture.level_count != 1 && texture.level_count != chain) {
+    check.fault(Rule::kTextureRange, &texture.level_count,
+                std::to_string(texture.level_count) +
+                    " levels are neither 1 nor the full chain of " + std::to_string(chain));
+  }
+}
+
+void check_texture_level(const RecordCheck& check, const TextureRecord& texture,
+                         const TextureLevelRecord& level, std::uint32_t number,
+                         std::uint64_t data_size) {
+  check.number(level.psnr_db, "psnr_db", 0.0, kMaxPsnr);
+  check.number(level.ssim, "ssim", -1.0, 1.0);
+  check.reserved(&level.reserved, sizeof(level.reserved));
+  const std::uint32_t width = std::max(1u, number < 32 ? texture.width >> number : 0u);
+  const std::uint32_t height = std::max(1u, number < 32 ? texture.height >> number : 0u);
+  if (level.width != width || level.height != height || level.size != etc1_bytes(width, height)) {
+    check.fault(Rule::kTextureLevel, &level.size,
+                std::to_string(level.width) + " x " + std::to_string(level.height) + " pixels in " +
+                    std::to_string(level.size) + " bytes are not " + std::to_string(width) + " x " +
+                    std::to_string(height) + " in " + std::to_string(etc1_bytes(width, height)));
+  }
+  const auto inside = [&](std::uint64_t offset) {
+    return offset % 8 == 0 && offset <= data_size && level.size <= data_size - offset;
+  };
+  const bool alpha = (texture.flags & kTextureAlpha) != 0;
+  if (!inside(level.offset) ||
+      (alpha ? !inside(level.alpha_offset) : level.alpha_offset != kNoOffset)) {
+    check.fault(Rule::kTextureLevel, &level.offset,
+                "its blocks at " + std::to_string(level.offset) + " or their alpha twin at " +
+                    std::to_string(level.alpha_offset) + " do not lie in the " +
+                    std::to_string(data_size) + " bytes of the texture");
+  }
+}
+
+void check_textures(FaultLog& log, const BundleParts& parts) {
+  std::uint64_t next_level = 0;
+  for (std::uint32_t i = 0; i < parts.textures.size() && !log.stop(); ++i) {
+    const TextureRecord& texture = parts.textures[i];
+    const RecordCheck check(log, parts, "texture", i);
+    check_texture(check, texture);
+    const SectionEntry* data = find_section(parts.sections, SectionType::kTextureData, i, 0);
+    const bool found = check.range(Rule::kTextureRange, texture.first_level, texture.level_count,
+                                   next_level, parts.texture_levels.size(), "level");
+    next_level += texture.level_count;
+    for (std::uint32_t j = 0; found && j < texture.level_count && !log.stop(); ++j) {
+      const std::uint32_t level = texture.first_level + j;
+      check_texture_level(RecordCheck(log, parts, "texture level", level), texture,
+                          parts.texture_levels[level], j, data != nullptr ? data->size : 0);
+    }
+  }
+  if (log.clean() && next_level != parts.texture_levels.size()) {
+    log.add(
+        Rule::kTextureRange, 0, "texture levels",
+        std::to_string(parts.texture_levels.size() - next_level) + " levels belong to no texture");
+  }
+}
+
+void check_pattern(const RecordCheck& check, const PatternRecord& pattern) {
+  check.name(pattern.name);
+  check.number(pattern.width_mm, "width_mm", 0.0);
+  check.number(pattern.score, "score", -1.0, 100.0);
+  check.reserved(pattern.reserved, sizeof(pattern.reserved));
+  const std::uint32_t side = std::max(pattern.width, pattern.height);
+  if (std::min(pattern.width, pattern.height) == 0 || side > kMaxPatternSide) {
+    return check.fault(Rule::kPattern, &pattern.width,
+                       std::to_string(pattern.width) + " x " + std::to_string(pattern.height) +
+                           " pixels are no possible size");
+  }
+  const double half_width = static_cast<double>(pattern.width) / side;
+  const double half_height = static_cast<double>(pattern.height) / side;
+  // Written so that NaN fails.
+  if (!(std::fabs(static_cast<double>(pattern.half_width) - half_width) <= 1e-6) ||
+      !(std::fabs(static_cast<double>(pattern.half_height) - half_height) <= 1e-6)) {
+    check.fault(Rule::kPattern, &pattern.half_width,
+                "half sides " + number_text(static_cast<double>(pattern.half_width)) + ", " +
+                    number_text(static_cast<double>(pattern.half_height)) +
+                    " do not follow from its pixels");
+  }
+}
+
+void check_parameter_set(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
+  const ParameterSetRecord& set = parts.parameter_sets[index];
+  check.name(set.name);
+  check.number(set.scale_factor, "scale_factor", 0.0);
+  check.number(set.pattern_scale, "pattern_scale", 0.0);
+  check.number(set.ransac_threshold, "ransac_threshold", 0.0);
+  check.reserved(set.reserved, sizeof(set.reserved));
+  if (set.detector != static_cast<std::uint32_t>(Detector::kFastOrb) &&
+      set.detector != static_cast<std::uint32_t>(Detector::kAgastBrisk)) {
+    check.fault(Rule::kEnum, &set.detector,
+                "detector " + std::to_string(set.detector) + " is not known");
+  }
+  if (set.harris > 1) {
+    check.fault(Rule::kEnum, &set.harris, "harris is " + std::to_string(set.harris));
+  }
+  if (index > 0 && parts.parameter_sets[index - 1].id >= set.id) {
+    check.fault(Rule::kParameterSet, &set.id, "ids do not rise from set to set");
+  }
+  if (set.descriptor_bits == 0 || set.descriptor_bits % 8 != 0 ||
+      set.descriptor_bits > kMaxDescriptorBits) {
+    check.fault(Rule::kParameterSet, &set.descriptor_bits,
+                std::to_string(set.descriptor_bits) + " bits are no possible descriptor");
+  }
+}
+
+void check_twin(const RecordCheck& check, const BundleParts& parts, const SectionEntry& entry,
+                const ParameterSetRecord& set) {
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  if (bytes.size() < sizeof(FeatureHeader)) {
+    return check.fault(Rule::kFeatures, &entry.size, "it is too small for its header");
+  }
+  const auto& header = *reinterpret_cast<const FeatureHeader*>(bytes.data());
+  check.reserved(&header.reserved, sizeof(header.reserved));
+  const std::uint64_t keypoint_bytes = std::uint64_t{header.count} * sizeof(KeypointRecord);
+  const std::uint64_t descriptor_bytes = std::uint64_t{header.count} * header.descriptor_bytes;
+  const std::uint64_t first = header.keypoints_offset;
+  const std::uint64_t second = header.descriptors_offset;
+  if (header.descriptor_bytes != set.descriptor_bits / 8) {
+    check.fault(Rule::kFeatures, &header.descriptor_bytes,
+                "descriptors of " + std::to_string(header.descriptor_bytes) +
+                    " bytes are not the " + std::to_string(set.descriptor_bits) +
+                    " bits of its parameter set");
+  }
+  if (first != sizeof(FeatureHeader) || second % 16 != 0 || second > bytes.size() ||
+      second < first + keypoint_bytes || second - first - keypoint_bytes >= 16 ||
+      descriptor_bytes != bytes.size() - second) {
+    check.fault(Rule::kFeatures, &header.keypoints_offset,
+                std::to_string(header.count) + " keypoints at " + std::to_string(first) +
+                    " and descriptors at " + std::to_string(second) + " do not fill its " +
+                    std::to_string(bytes.size()) + " bytes");
+  }
+}
+
+/// Sections that belong to a record: the record is there, and so is the parameter set.
+void check_owned_sections(FaultLog& log, const BundleParts& parts) {
+  for (std::uint32_t i = 0; i < parts.sections.size() && !log.stop(); ++i) {
+    const SectionEntry& entry = parts.sections[i];
+    const RecordCheck check(log, parts, "section", i);
+    const auto type = static_cast<SectionType>(entry.type);
+    if (type == SectionType::kTextureData) {
+      if (entry.owner >= parts.textures.size() || entry.variant != 0) {
+        check.fault(Rule::kSectionOwner, &entry.owner,
+                    "texture " + std::to_string(entry.owner) + " is not there");
+      }
+    } else if (type == SectionType::kMappedFeatures || type == SectionType::kFeatureYml) {
+      const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry.variant);
+      if (entry.owner >= parts.patterns.size() || set == kNone) {
+        check.fault(Rule::kSectionOwner, &entry.owner,
+                    "pattern " + std::to_string(entry.owner) + " or parameter set " +
+                        std::to_string(entry.variant) + " is not there");
+      } else if (type == SectionType::kMappedFeatures) {
+        check_twin(check, parts, entry, parts.parameter_sets[set]);
+      }
+    } else if (type == SectionType::kTrackerRecord) {
+      if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
+        check.fault(Rule::kSectionOwner, &entry.owner,
+                    "pattern " + std::to_string(entry.owner) + " is not there");
+      }
+    }
+  }
+}
+
+void check_scene(const RecordCheck& check, const BundleParts& parts, const SceneRecord& scene) {
+  check.number(scene.scale, "scale", std::numeric_limits<float>::denorm_min());
+  check.numbers(scene.offset, "offset");
+  check.numbers(scene.rotation, "rotation");
+  check.reserved(scene.reserved, sizeof(scene.reserved));
+  if (scene.pattern >= parts.patterns.size() || scene.model >= parts.models.size()) {
+    check.fault(Rule::kScene, &scene.pattern,
+                "pattern " + std::to_string(scene.pattern) + " or model " +
+                    std::to_string(scene.model) + " is not there");
+  }
+  double square = 0.0;
+  for (const float part : scene.rotation) {
+    square += static_cast<double>(part) * static_cast<double>(part);
+  }
+  if (!(std::fabs(square - 1.0) <= 1e-4)) {
+    check.fault(Rule::kScene, scene.rotation, "its rotation is no unit quaternion");
+  }
+}
+
+}  // namespace
+
+std::uint32_t find_parameter_set(const Table<ParameterSetRecord>& sets, std::uint32_t id) {
+  std::uint32_t low = 0;
+  std::uint32_t high = sets.size();
+  while (low < high) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (sets[middle].id < id) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low < sets.size() && sets[low].id == id ? low : kNone;
+}
+
+void validate_assets(FaultLog& log, const BundleParts& parts) {
+  check_textures(log, parts);
+  for (std::uint32_t i = 0; i < parts.patterns.size() && !log.stop(); ++i) {
+    check_pattern(RecordCheck(log, parts, "pattern", i), parts.patterns[i]);
+  }
+  for (std::uint32_t i = 0; i < parts.parameter_sets.size() && !log.stop(); ++i) {
+    check_parameter_set(RecordCheck(log, parts, "parameter set", i), parts, i);
+  }
+  if (!log.stop()) check_owned_sections(log, parts);
+  for (std::uint32_t i = 0; i < parts.scenes.size() && !log.stop(); ++i) {
+    check_scene(RecordCheck(log, parts, "scene", i), parts, parts.scenes[i]);
+  }
+}
+
+}  // namespace modar
