@@ -71,4 +71,13 @@ int run_process(const ProcessRequest& request) {
   return run_measured(request).exit;
 }
 
+std::string program_folder() {
+  std::error_code error;
+  return fs::read_symlink("/proc/self/exe", error).parent_path().string();
+}
+
+std::string companion_file(const std::string& name) {
+  return (fs::path(program_folder()) / MODAR_LIBEXEC / name).lexically_normal().string();
+}
+
 }  // namespace modar

@@ -1,4 +1,4 @@
-// Other programs that a check runs, and a folder for what it hands them.
+// Other programs that a command runs, a folder for what it hands them, and where ModAR's own lie.
 #pragma once
 
 #include <cstdint>
@@ -40,5 +40,10 @@ ProcessOutcome run_measured(const ProcessRequest& request);
 
 /// Runs it to its end. Answers its exit code, or -1 where it could not be started or was killed.
 int run_process(const ProcessRequest& request);
+
+/// Path of the running program's folder: that of all programs of ModAR.
+std::string program_folder();
+/// Path of a file that is installed with the programs, but that only they load or run.
+std::string companion_file(const std::string& name);
 
 }  // namespace modar

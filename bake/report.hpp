@@ -1,14 +1,13 @@
-// What a bake says of itself: stages as they run, findings as they turn up. The progress bar,
+// What a bake says of itself: stages as they run, diagnostics as they turn up. The progress bar,
 // --json and the summary all read this one stream.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
-
-#include "bake/topology_figures.hpp"
 
 namespace modar {
 
@@ -37,6 +36,36 @@ struct StageReport {
   double max_error = 0;
 };
 
+/// A half-edge mesh, as OpenMesh builds it.
+struct HalfEdgeCount {
+  std::uint64_t boundary_loops = 0;  ///< where fans touch, a walk goes from one to the next
+  std::uint64_t copied_faces = 0;  ///< that it refused, and that stand on copies of their vertices
+  std::uint64_t copied_vertices = 0;
+};
+
+/// Over the positions that the file's corners refer to (vertices that only differ in uv or normal
+/// are one; positions written twice are two) and the triangles that the weld kept.
+struct MeshTopology {
+  std::string model;           ///< its name
+  std::uint64_t vertices = 0;  ///< positions that triangles use
+  std::uint64_t edges = 0;     ///< pairs of positions
+  std::uint64_t triangles = 0;
+  std::uint64_t components = 0;             ///< parts that share no position
+  std::uint64_t boundary_edges = 0;         ///< of one triangle
+  std::uint64_t non_manifold_edges = 0;     ///< of more than two triangles
+  std::uint64_t flipped_edges = 0;          ///< of two triangles that wind against each other
+  std::uint64_t non_manifold_vertices = 0;  ///< at such an edge, or where several fans touch
+  std::uint64_t duplicate_triangles = 0;    ///< over the same positions as an earlier one
+  std::uint64_t boundary_loops = 0;  ///< holes and rims; where fans touch, each goes its own way
+  /// What OpenMesh makes of it; nothing where its mesh would not fit in memory.
+  std::optional<HalfEdgeCount> half_edges;
+
+  /// Vertices less edges plus faces: 2 for a sphere, 0 for a torus, 1 for a disk.
+  [[nodiscard]] std::int64_t euler() const {
+    return static_cast<std::int64_t>(vertices + triangles) - static_cast<std::int64_t>(edges);
+  }
+};
+
 /// What a model's levels of detail are off by, the worst of all.
 struct LevelFigures {
   double position_error_max = 0;   ///< source units: bounds the distance from level 0
@@ -46,7 +75,7 @@ struct LevelFigures {
 /// Collects the stream. Not thread-safe: stages report from the thread that called them.
 struct Report {
   std::vector<StageReport> stages;
-  std::vector<Diagnostic> findings;
+  std::vector<Diagnostic> diagnostics;
   std::vector<MeshTopology> topologies;  ///< one a model, where they were asked for
   std::vector<LevelFigures> levels;      ///< one a model, where levels were asked for
   ProgressCallback progress;             ///< may be empty

@@ -52,15 +52,15 @@ int guarded(const std::function<int()>& work) {
   }
 }
 
-void print_diagnostic(const Diagnostic& finding) {
-  const char* severity = finding.severity == DiagnosticSeverity::kInfo      ? "note"
-                         : finding.severity == DiagnosticSeverity::kWarning ? "warning"
-                                                                            : "error";
-  std::string line = std::string(severity) + ": " + finding.file;
-  if (finding.line != 0) line += ":" + std::to_string(finding.line);
-  line += ": " + finding.message;
-  if (!finding.cure.empty()) line += "; " + finding.cure;
-  std::fprintf(stderr, "%s [%s]\n", line.c_str(), finding.id.c_str());
+void print_diagnostic(const Diagnostic& diagnostic) {
+  const char* severity = diagnostic.severity == DiagnosticSeverity::kInfo      ? "note"
+                         : diagnostic.severity == DiagnosticSeverity::kWarning ? "warning"
+                                                                               : "error";
+  std::string line = std::string(severity) + ": " + diagnostic.file;
+  if (diagnostic.line != 0) line += ":" + std::to_string(diagnostic.line);
+  line += ": " + diagnostic.message;
+  if (!diagnostic.cure.empty()) line += "; " + diagnostic.cure;
+  std::fprintf(stderr, "%s [%s]\n", line.c_str(), diagnostic.id.c_str());
 }
 
 ProcessCost process_cost() {

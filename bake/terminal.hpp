@@ -32,7 +32,7 @@ int print_error(const Error& error);
 /// a bug of ours.
 int guarded(const std::function<int()>& work);
 /// "warning: file:line: message; cure [id]" on stderr.
-void print_diagnostic(const Diagnostic& finding);
+void print_diagnostic(const Diagnostic& diagnostic);
 
 /// CPU time of the process (user and system) and its greatest resident size.
 struct ProcessCost {

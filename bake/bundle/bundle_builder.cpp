@@ -102,7 +102,8 @@ Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& re
   StageTimer reading(report, "read");
   Result<SourceModel> source = read_model(path, request.jobs);
   if (!source) return tl::unexpected(source.error());
-  report.findings.insert(report.findings.end(), source->findings.begin(), source->findings.end());
+  report.diagnostics.insert(report.diagnostics.end(), source->diagnostics.begin(),
+                            source->diagnostics.end());
   reading.done(source->positions.size(), source->face_count());
   Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
   if (!mesh) return tl::unexpected(mesh.error());

@@ -65,7 +65,7 @@ class OtherPaths {
 std::vector<std::string> second_command(const BakeRequest& request,
                                         const std::vector<std::string>& words,
                                         const OtherPaths& paths, const std::string& output) {
-  std::vector<std::string> command = {fs::read_symlink("/proc/self/exe").string()};
+  std::vector<std::string> command = {program_folder() + "/modar"};
   for (std::size_t i = 0; i < words.size(); ++i) {
     bool with_value = false;
     if (taken_out(words[i], with_value)) {

@@ -13,7 +13,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/memory/memory_limit.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
-#include "bake/output_folder.hpp"
+#include "bake/output.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/device_profile.hpp"
@@ -104,9 +104,9 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
 void report_memory(const BakeRequest& request, Report& report) {
   const std::uint64_t peak = process_cost().peak_rss_bytes;
   if (request.memory_bytes == 0 || peak <= request.memory_bytes) return;
-  report.findings.push_back({"bake.memory", DiagnosticSeverity::kWarning, "--memory", 0,
-                             "the bake took " + human_bytes(peak) + ", more than was asked",
-                             "fewer --jobs, smaller textures or several bundles take less"});
+  report.diagnostics.push_back({"bake.memory", DiagnosticSeverity::kWarning, "--memory", 0,
+                                "the bake took " + human_bytes(peak) + ", more than was asked",
+                                "fewer --jobs, smaller textures or several bundles take less"});
 }
 
 const char* severity_name(DiagnosticSeverity severity) {
@@ -124,14 +124,14 @@ Json bake_json(const BundleView& bundle, const Report& report) {
                       {"out", stage.out},
                       {"max_error", stage.max_error}});
   }
-  Json findings = Json::array();
-  for (const Diagnostic& finding : report.findings) {
-    findings.push_back({{"id", finding.id},
-                        {"severity", severity_name(finding.severity)},
-                        {"file", finding.file},
-                        {"line", finding.line},
-                        {"message", finding.message},
-                        {"cure", finding.cure}});
+  Json diagnostics = Json::array();
+  for (const Diagnostic& diagnostic : report.diagnostics) {
+    diagnostics.push_back({{"id", diagnostic.id},
+                           {"severity", severity_name(diagnostic.severity)},
+                           {"file", diagnostic.file},
+                           {"line", diagnostic.line},
+                           {"message", diagnostic.message},
+                           {"cure", diagnostic.cure}});
   }
   Json half_edges = Json::array();
   for (const MeshTopology& topology : report.topologies) {
@@ -145,22 +145,21 @@ Json bake_json(const BundleView& bundle, const Report& report) {
   return {{"bundle", bundle_json(bundle)},
           {"half_edges", half_edges},
           {"stages", stages},
-          {"findings", findings},
+          {"findings", diagnostics},
           {"cpu_seconds", cost.cpu_seconds},
           {"peak_rss_bytes", cost.peak_rss_bytes}};
 }
 
-int run_bake(BakeCommand& command, const std::vector<std::string>& words) {
-  if (auto completed = complete(command); !completed) return print_error(completed.error());
+Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& words) {
+  MODAR_TRY(complete(command));
   if (const std::string& folder = command.request.textures.picture_folder; !folder.empty()) {
-    if (auto made = make_output_folder(folder); !made) return print_error(made.error());
+    MODAR_TRY(make_output_folder(folder));
   }
   std::unique_ptr<MemoryLimit> limit;
   if (command.request.memory_bytes != 0) {
     const auto folder = std::filesystem::absolute(command.output).parent_path();
-    auto started = MemoryLimit::start(folder.string(), command.request.memory_bytes);
-    if (!started) return print_error(started.error());
-    limit = std::move(*started);
+    MODAR_ASSIGN(auto started, MemoryLimit::start(folder.string(), command.request.memory_bytes));
+    limit = std::move(started);
   }
   ProgressBar bar(command.quiet);
   Report report;
@@ -170,29 +169,27 @@ int run_bake(BakeCommand& command, const std::vector<std::string>& words) {
   bar.clear();
   report_memory(command.request, report);
   if (!command.quiet) {
-    for (const Diagnostic& finding : report.findings) print_diagnostic(finding);
+    for (const Diagnostic& diagnostic : report.diagnostics) print_diagnostic(diagnostic);
   }
-  if (!content) return print_error(content.error());
+  if (!content) return tl::unexpected(content.error());
   StageTimer writing(report, "write");
-  if (auto saved = save_bundle(*content, command.output); !saved) return print_error(saved.error());
+  MODAR_TRY(save_bundle(*content, command.output));
 
   // What is told of the bundle is read back from the file, so that it is true of the file.
-  Result<MappedFile> file = MappedFile::open(command.output);
-  if (!file) return print_error(file.error());
-  Result<BundleView> bundle = BundleView::open(file->bytes());
-  if (!bundle) return print_error(bundle.error());
+  MODAR_ASSIGN(auto file, MappedFile::open(command.output));
+  MODAR_ASSIGN(auto bundle, BundleView::open(file.bytes()));
   if (command.prove_reproducible) {
     bar.show("bake again", 0);
-    auto proven = prove_reproducible(command.request, words, file->bytes());
+    auto proven = prove_reproducible(command.request, words, file.bytes());
     bar.clear();
-    if (!proven) return print_error(proven.error());
+    MODAR_TRY(std::move(proven));
     if (!command.quiet) std::fprintf(stderr, "a second bake elsewhere gave the same bytes\n");
   }
-  writing.done(content->models.size() + content->patterns.size(), file->bytes().size());
+  writing.done(content->models.size() + content->patterns.size(), file.bytes().size());
   bar.clear();
-  if (!command.quiet) print_summary(*bundle, report, command.output);
-  if (command.json) std::fputs(bake_json(*bundle, report).dump().c_str(), stdout);
-  return static_cast<int>(ExitCode::kOk);
+  if (!command.quiet) print_summary(bundle, report, command.output);
+  if (command.json) std::fputs(bake_json(bundle, report).dump().c_str(), stdout);
+  return ExitCode::kOk;
 }
 
 void add_texture_options(CommandLine& line, TextureOptions& textures) {

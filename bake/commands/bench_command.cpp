@@ -13,26 +13,25 @@
 namespace modar {
 namespace {
 
-int print_rows(const BenchOptions& bench) {
-  const Result<std::vector<BenchRow>> rows = run_bench(bench);
-  if (!rows) return print_error(rows.error());
+Result<ExitCode> print_rows(const BenchOptions& bench) {
+  MODAR_ASSIGN(const auto rows, run_bench(bench));
   if (bench.json) {
     Json list = Json::array();
-    for (const BenchRow& row : *rows) {
+    for (const BenchRow& row : rows) {
       list.push_back({{"measure", row.measure},
                       {"ours", row.ours},
                       {"reference", row.reference},
                       {"ratio", row.ratio}});
     }
     std::fputs(list.dump().c_str(), stdout);
-    return static_cast<int>(ExitCode::kOk);
+    return ExitCode::kOk;
   }
   std::printf("%-32s %14s %14s %10s\n", "measure", "ours", "reference", "ratio");
-  for (const BenchRow& row : *rows) {
+  for (const BenchRow& row : rows) {
     std::printf("%-32s %14.6g %14.6g %10.4g\n", row.measure.c_str(), row.ours, row.reference,
                 row.ratio);
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
 void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {

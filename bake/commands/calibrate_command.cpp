@@ -56,16 +56,14 @@ Result<void> complete(CalibrateCommand& command) {
   return open_folders(options.inputs);
 }
 
-int run_calibrate(CalibrateCommand& command) {
-  if (auto done = complete(command); !done) return print_error(done.error());
+Result<ExitCode> run_calibrate(CalibrateCommand& command) {
+  MODAR_TRY(complete(command));
   ProgressBar bar(command.quiet);
   const auto calibration = calibrate(
       command.options, [&](const std::string& what, double done) { bar.show(what, done); });
   bar.clear();
-  if (!calibration) return print_error(calibration.error());
-  if (auto wrote = write_camera_file(*calibration, command.output); !wrote) {
-    return print_error(wrote.error());
-  }
+  if (!calibration) return tl::unexpected(calibration.error());
+  MODAR_TRY(write_camera_file(*calibration, command.output));
   if (command.json) {
     std::fputs(calibration_json(*calibration).dump().c_str(), stdout);
   } else {
@@ -78,7 +76,7 @@ int run_calibrate(CalibrateCommand& command) {
         calibration->principal_point_assumed ? " (assumed)" : "", camera.width, camera.height,
         calibration->views, calibration->frames, calibration->rms_px);
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
 }  // namespace

@@ -76,7 +76,7 @@ void add_check(CommandLine& program) {
       "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
       "4 a bug of ours, 5 not supported. A bad bundle answers 3, and so does a proof that misses\n"
       "its goals.\n");
-  line.run([check] { return run(*check); });
+  line.run([check] { return ExitCode{run(*check)}; });
 }
 
 }  // namespace modar

@@ -4,7 +4,7 @@
 #include <system_error>
 
 #include "bake/commands/check_command.hpp"
-#include "bake/output_folder.hpp"
+#include "bake/output.hpp"
 #include "bake/terminal.hpp"
 
 namespace modar {

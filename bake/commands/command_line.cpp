@@ -5,14 +5,14 @@
 #include <cstdio>
 #include <type_traits>
 
-#include "formats/error.hpp"
+#include "bake/terminal.hpp"
 
 namespace modar {
 
 struct CommandLine::Parts {
   std::unique_ptr<CLI::App> own;  ///< of the program; its subcommands' belong to CLI11
   CLI::App* app = nullptr;
-  std::function<int()> work;
+  std::function<Result<ExitCode>()> work;
   std::vector<std::unique_ptr<CommandLine>> commands;
 };
 
@@ -103,7 +103,7 @@ void CommandLine::footer(const std::string& text) {
   parts_->app->footer(text);
 }
 
-void CommandLine::run(std::function<int()> work) {
+void CommandLine::run(std::function<Result<ExitCode>()> work) {
   parts_->work = std::move(work);
 }
 
@@ -124,7 +124,8 @@ int CommandLine::parse_and_run(int argc, char** argv) {
     if (next == nullptr) return static_cast<int>(ExitCode::kUsage);
     chosen = next;
   }
-  return chosen->parts_->work();
+  const Result<ExitCode> answer = chosen->parts_->work();
+  return answer ? static_cast<int>(*answer) : print_error(answer.error());
 }
 
 }  // namespace modar

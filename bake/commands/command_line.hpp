@@ -14,6 +14,8 @@
 #include <variant>
 #include <vector>
 
+#include "formats/error.hpp"
+
 namespace modar {
 
 /// What an option accepts, beyond its type, and how --help shows it.
@@ -77,8 +79,8 @@ class CommandLine {
 
   /// Printed below the options.
   void footer(const std::string& text);
-  /// What the command does; its answer is the program's exit code.
-  void run(std::function<int()> work);
+  /// What the command does. Its answer is the program's exit code; an error is printed to stderr.
+  void run(std::function<Result<ExitCode>()> work);
 
   /// What followed the program's name.
   [[nodiscard]] const std::vector<std::string>& words() const { return words_; }

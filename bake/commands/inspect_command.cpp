@@ -95,26 +95,24 @@ void print_table(const BundleView& bundle, const std::string& path) {
   }
 }
 
-int run_inspect(const InspectCommand& command) {
-  Result<MappedFile> file = MappedFile::open(command.bundle);
-  if (!file) return print_error(file.error());
-  Result<BundleView> bundle = BundleView::open(file->bytes());
+Result<ExitCode> run_inspect(const InspectCommand& command) {
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
+  Result<BundleView> bundle = BundleView::open(file.bytes());
   if (!bundle) {
     Error error = bundle.error();
     error.where = command.bundle + (error.where.empty() ? "" : ", " + error.where);
-    return print_error(error);
+    return tl::unexpected(std::move(error));
   }
   if (!command.extract.empty()) {
-    Result<std::vector<std::string>> files = extract_bundle(*bundle, command.extract);
-    if (!files) return print_error(files.error());
-    for (const std::string& name : *files) std::fprintf(stderr, "wrote %s\n", name.c_str());
+    MODAR_ASSIGN(const auto files, extract_bundle(*bundle, command.extract));
+    for (const std::string& name : files) std::fprintf(stderr, "wrote %s\n", name.c_str());
   }
   if (command.json) {
     std::fputs(bundle_json(*bundle).dump().c_str(), stdout);
   } else {
     print_table(*bundle, command.bundle);
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
 }  // namespace

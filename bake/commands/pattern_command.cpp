@@ -10,7 +10,7 @@
 #include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
-#include "bake/output_folder.hpp"
+#include "bake/output.hpp"
 #include "bake/pattern/confusion.hpp"
 #include "bake/pattern/pattern_image.hpp"
 #include "bake/pattern/pattern_picture.hpp"
@@ -64,21 +64,17 @@ unsigned cores() {
   return std::max(1u, std::thread::hardware_concurrency());
 }
 
-int run_rectify(RectifyCommand& command) {
-  const auto corners = parse_corners(command.corners);
-  if (!corners) return print_error(corners.error());
-  command.options.corners = *corners;
-  Result<RgbaImage> photo = read_image(command.photo);
-  if (!photo) return print_error(photo.error());
-  Result<RgbaImage> image = rectify(*photo, command.options);
+Result<ExitCode> run_rectify(RectifyCommand& command) {
+  MODAR_ASSIGN(const auto corners, parse_corners(command.corners));
+  command.options.corners = corners;
+  MODAR_ASSIGN(auto photo, read_image(command.photo));
+  Result<RgbaImage> image = rectify(photo, command.options);
   if (!image) {
     Error error = image.error();
     if (error.where.empty()) error.where = command.photo;
-    return print_error(error);
+    return tl::unexpected(std::move(error));
   }
-  if (auto wrote = write_pattern_png(*image, command.options.width_mm, command.output); !wrote) {
-    return print_error(wrote.error());
-  }
+  MODAR_TRY(write_pattern_png(*image, command.options.width_mm, command.output));
   std::fprintf(stderr, "wrote %s, %u x %u pixels\n", command.output.c_str(), image->width,
                image->height);
   if (command.json) {
@@ -88,7 +84,7 @@ int run_rectify(RectifyCommand& command) {
                        {"width_mm", command.options.width_mm}};
     std::fputs(json.dump().c_str(), stdout);
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
 void add_rectify(CommandLine& pattern) {
@@ -129,38 +125,33 @@ Json scores_json(const std::vector<NamedScore>& scores) {
   return out;
 }
 
-int run_score(ScoreCommand& command) {
-  if (auto opened = open_folders(command.patterns); !opened) return print_error(opened.error());
+Result<ExitCode> run_score(ScoreCommand& command) {
+  MODAR_TRY(open_folders(command.patterns));
   if (!command.overlay_folder.empty()) {
-    if (auto made = make_output_folder(command.overlay_folder); !made) {
-      return print_error(made.error());
-    }
+    MODAR_TRY(make_output_folder(command.overlay_folder));
   }
   std::vector<NamedScore> scores;
   for (const std::string& path : command.patterns) {
     bool shrunk = false;
-    const auto picture = load_pattern(path, shrunk);
-    if (!picture) return print_error(picture.error());
+    MODAR_ASSIGN(const auto picture, load_pattern(path, shrunk));
     TrackerRecordOptions loop;
     loop.jobs = command.jobs;
-    auto score = bake_tracker_record(picture->view(), loop).and_then([&](const auto& record) {
-      return score_pattern(picture->view(), record, command.jobs);
+    auto score = bake_tracker_record(picture.view(), loop).and_then([&](const auto& record) {
+      return score_pattern(picture.view(), record, command.jobs);
     });
     if (!score) {
       score.error().where = path;
-      return print_error(score.error());
+      return tl::unexpected(score.error());
     }
     if (!command.overlay_folder.empty()) {
       const std::string out = command.overlay_folder + "/" + file_stem(path) + ".png";
-      if (auto wrote = write_png(score_overlay(picture->view(), *score), out); !wrote) {
-        return print_error(wrote.error());
-      }
+      MODAR_TRY(write_png(score_overlay(picture.view(), *score), out));
     }
     scores.push_back({file_stem(path), std::move(*score)});
   }
   if (command.json) {
     std::fputs(scores_json(scores).dump().c_str(), stdout);
-    return static_cast<int>(ExitCode::kOk);
+    return ExitCode::kOk;
   }
   for (const NamedScore& one : scores) {
     std::printf("%s: %d of 100 (version %u)\n", one.name.c_str(), one.score.score, kScoreVersion);
@@ -169,7 +160,7 @@ int run_score(ScoreCommand& command) {
                   cause.advice);
     }
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
 void add_score(CommandLine& pattern) {
@@ -252,13 +243,11 @@ Result<void> complete(SimulateCommand& command) {
   return {};
 }
 
-int run_simulate(SimulateCommand& command) {
-  if (auto opened = open_folders(command.patterns); !opened) return print_error(opened.error());
-  if (auto done = complete(command); !done) return print_error(done.error());
+Result<ExitCode> run_simulate(SimulateCommand& command) {
+  MODAR_TRY(open_folders(command.patterns));
+  MODAR_TRY(complete(command));
   if (!command.picture_folder.empty()) {
-    if (auto made = make_output_folder(command.picture_folder); !made) {
-      return print_error(made.error());
-    }
+    MODAR_TRY(make_output_folder(command.picture_folder));
   }
   ProgressBar bar(command.quiet);
   std::vector<Simulation> simulations;
@@ -267,18 +256,16 @@ int run_simulate(SimulateCommand& command) {
       bar.show(file_stem(path), done);
     });
     bar.clear();
-    if (!simulation) return print_error(simulation.error());
+    if (!simulation) return tl::unexpected(simulation.error());
     if (!command.picture_folder.empty()) {
       const std::string out = command.picture_folder + "/" + simulation->name + ".png";
-      if (auto wrote = write_png(simulation_picture(*simulation), out); !wrote) {
-        return print_error(wrote.error());
-      }
+      MODAR_TRY(write_png(simulation_picture(*simulation), out));
     }
     if (!command.json) print_simulation(*simulation);
     simulations.push_back(std::move(*simulation));
   }
   if (command.json) std::fputs(simulations_json(simulations).dump().c_str(), stdout);
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
 void add_simulate(CommandLine& pattern) {
@@ -350,28 +337,25 @@ void print_confusion(const Confusion& confusion) {
               confusion.false_recognitions(), confusion.together);
 }
 
-int run_confusion(ConfusionCommand& command) {
-  if (auto opened = open_folders(command.inputs); !opened) return print_error(opened.error());
+Result<ExitCode> run_confusion(ConfusionCommand& command) {
+  MODAR_TRY(open_folders(command.inputs));
   if (!command.photos.empty()) {
-    auto photos = pictures_of(command.photos);
-    if (!photos) return print_error(photos.error());
-    command.options.photos = std::move(*photos);
+    MODAR_ASSIGN(auto photos, pictures_of(command.photos));
+    command.options.photos = std::move(photos);
   }
-  const auto patterns = read_patterns(command.inputs, command.options.jobs);
-  if (!patterns) return print_error(patterns.error());
+  MODAR_ASSIGN(const auto patterns, read_patterns(command.inputs, command.options.jobs));
   ProgressBar bar(command.quiet);
   const auto confusion =
-      measure_confusion(*patterns, command.options,
+      measure_confusion(patterns, command.options,
                         [&](const std::string& what, double done) { bar.show(what, done); });
   bar.clear();
-  if (!confusion) return print_error(confusion.error());
+  if (!confusion) return tl::unexpected(confusion.error());
   if (command.json) {
     std::fputs(confusion_json(*confusion).dump().c_str(), stdout);
   } else {
     print_confusion(*confusion);
   }
-  return static_cast<int>(confusion->false_recognitions() == 0 ? ExitCode::kOk
-                                                               : ExitCode::kInvalidInput);
+  return confusion->false_recognitions() == 0 ? ExitCode::kOk : ExitCode::kInvalidInput;
 }
 
 void add_confusion(CommandLine& pattern) {

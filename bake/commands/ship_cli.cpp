@@ -30,7 +30,7 @@ void add_keygen(CommandLine& ship) {
               "Encrypt the secret key with the file's first line", {.type = "FILE"});
   line.flag("--force", keygen->force, "Write over a key that is there");
   line.footer(ship_example("  modar ship keygen --out museum.key\n"));
-  line.run([keygen] { return run_keygen(*keygen); });
+  line.run([keygen] { return ExitCode{run_keygen(*keygen)}; });
 }
 
 void add_publish(CommandLine& ship) {
@@ -56,7 +56,7 @@ void add_publish(CommandLine& ship) {
   line.flag("--quiet", publish->quiet, "No progress, no summary");
   line.flag("--json", publish->json, "Print the release and what was written as JSON");
   line.footer(ship_example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));
-  line.run([publish] { return run_publish(*publish); });
+  line.run([publish] { return ExitCode{run_publish(*publish)}; });
 }
 
 void add_rotate(CommandLine& ship) {
@@ -69,7 +69,7 @@ void add_rotate(CommandLine& ship) {
               {.type = "NEW.pub", .required = true});
   line.footer(
       ship_example("  modar ship rotate --to /var/www/ar --key old.key --next new.key.pub\n"));
-  line.run([rotate] { return run_rotate(*rotate); });
+  line.run([rotate] { return ExitCode{run_rotate(*rotate)}; });
 }
 
 void add_prune(CommandLine& ship) {
@@ -80,7 +80,7 @@ void add_prune(CommandLine& ship) {
               {.shows_default = true, .least = 1, .most = 1000000});
   line.flag("--json", prune->json, "Print what was freed as JSON");
   line.footer(ship_example("  modar ship prune --to /var/www/ar --keep 3\n"));
-  line.run([prune] { return run_prune(*prune); });
+  line.run([prune] { return ExitCode{run_prune(*prune)}; });
 }
 
 void add_plan(CommandLine& ship) {
@@ -98,7 +98,7 @@ void add_plan(CommandLine& ship) {
   line.flag("--json", plan->json, "Print as JSON");
   line.footer(ship_example("  modar ship plan old.modar new.modar --link 2g --device ace2\n") +
               "A device on a cable needs no release: `adb push NAME.modar /sdcard/modar/`.\n");
-  line.run([plan] { return run_plan(*plan); });
+  line.run([plan] { return ExitCode{run_plan(*plan)}; });
 }
 
 }  // namespace

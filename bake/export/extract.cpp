@@ -8,7 +8,7 @@
 
 #include "bake/export/glb_writer.hpp"
 #include "bake/export/texture_files.hpp"
-#include "bake/output_folder.hpp"
+#include "bake/output.hpp"
 #include "bake/texture/texture.hpp"
 #include "formats/atomic_file.hpp"
 

@@ -76,7 +76,7 @@ struct SourceModel {
   std::vector<FaceRun> material_runs;
   std::vector<FaceRun> smoothing_runs;
   std::vector<SourceMaterial> materials;
-  std::vector<Diagnostic> findings;
+  std::vector<Diagnostic> diagnostics;
 
   [[nodiscard]] std::size_t corner_count() const { return corner_positions.size(); }
   [[nodiscard]] Corner corner(std::size_t i) const {

@@ -78,11 +78,9 @@ double display_s(const std::vector<PlayedFrame>& frames) {
 
 /// Plays at the video's own speed in a process of its own, without a window.
 Result<PlayedRun> play(const std::string& bundle, const BenchOptions& command) {
-  std::error_code error;
-  const auto programs = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
   const TemporaryFolder folder;
   const std::string output = folder.path() + "/lines";
-  std::vector<std::string> words = {(programs / "modar-play").string(),
+  std::vector<std::string> words = {program_folder() + "/modar-play",
                                     bundle,
                                     "--input",
                                     command.pose.video,

@@ -36,14 +36,11 @@ using Figures = std::map<std::string, double>;
 class ModelBench {
  public:
   ModelBench(std::string folder, const ModelBenchRequest& command)
-      : folder_(std::move(folder)), command_(command) {
-    std::error_code error;
-    programs_ = fs::read_symlink("/proc/self/exe", error).parent_path();
-  }
+      : folder_(std::move(folder)), command_(command) {}
 
   [[nodiscard]] bool has_probe() const {
     std::error_code error;
-    return fs::exists(programs_ / MODAR_LIBEXEC / "modar-model-probe", error);
+    return fs::exists(companion_file("modar-model-probe"), error);
   }
 
   /// Makes the file out of a scan, or takes the one that was named.
@@ -83,7 +80,7 @@ class ModelBench {
 
   /// What the probe prints, and "peak" of its process; nothing where it failed.
   Figures probe(std::vector<std::string> words) const {
-    words.insert(words.begin(), programs_ / MODAR_LIBEXEC / "modar-model-probe");
+    words.insert(words.begin(), companion_file("modar-model-probe"));
     const std::string path = folder_ + "/figures";
     const ProcessOutcome outcome = run_measured({std::move(words), {}, path});
     Figures figures;
@@ -126,9 +123,9 @@ class ModelBench {
   ProcessOutcome bake(const std::string& positions, unsigned jobs, double& bytes) const {
     const std::string report = folder_ + "/report.json";
     const ProcessOutcome outcome =
-        run_measured({{programs_ / "modar", "bake", "--model", obj_, "--no-lods", "--no-topology",
-                       "--positions", positions, "--jobs", std::to_string(jobs), "--quiet",
-                       "--json", "-o", folder_ + "/ours.modar"},
+        run_measured({{program_folder() + "/modar", "bake", "--model", obj_, "--no-lods",
+                       "--no-topology", "--positions", positions, "--jobs", std::to_string(jobs),
+                       "--quiet", "--json", "-o", folder_ + "/ours.modar"},
                       {},
                       report});
     std::ifstream file(report);
@@ -207,7 +204,6 @@ class ModelBench {
   std::string folder_;
   std::string scan_;
   const ModelBenchRequest& command_;
-  fs::path programs_;
   std::string obj_;
   double megabytes_ = 0;
   std::vector<BenchRow> rows_;

@@ -43,7 +43,7 @@ Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned 
       std::min_element(score->causes.begin(), score->causes.end(),
                        [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
   const bool weak = score->score < kWeakScore;
-  report.findings.push_back({weak ? "pattern.weak" : "pattern.score",
+  report.diagnostics.push_back({weak ? "pattern.weak" : "pattern.score",
                              weak ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, path,
                              0, "the pattern scores " + std::to_string(score->score) + " of 100",
                              weak ? worst->advice : ""});
@@ -61,7 +61,7 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
   if (!picture) return tl::unexpected(picture.error());
   const GrayImage gray = picture->view();
   if (shrunk) {
-    report.findings.push_back({"pattern.resized", DiagnosticSeverity::kInfo, path, 0,
+    report.diagnostics.push_back({"pattern.resized", DiagnosticSeverity::kInfo, path, 0,
                                "the picture was made smaller, to " + std::to_string(gray.width) +
                                    "x" + std::to_string(gray.height) + " pixels",
                                ""});

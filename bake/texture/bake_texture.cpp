@@ -105,7 +105,7 @@ void judge(const std::string& path, const Etc1Level& level, const TextureOptions
   const bool bad_psnr = options.min_psnr_db > 0 && level.psnr_db < options.min_psnr_db;
   const bool bad_ssim = options.min_ssim > 0 && level.ssim < options.min_ssim;
   if (!bad_psnr && !bad_ssim) return;
-  report.findings.push_back(
+  report.diagnostics.push_back(
       {"texture.quality", DiagnosticSeverity::kWarning, path, 0,
        "compressed it has " + decimals(level.psnr_db) + " dB and SSIM " + decimals(level.ssim) +
            "; its worst block, at pixel " + std::to_string(level.worst_x) + "," +

@@ -67,7 +67,7 @@ struct TextureOptions {
   /// Which texels the model shows (bake/texture/atlas.hpp), at any size; nothing: all of them. The
   /// others are filled, and blocks far from any are flat.
   const CoverageMask* coverage = nullptr;
-  double min_psnr_db = 0;      ///< level 0 below it: finding "texture.quality"; 0: no gate
+  double min_psnr_db = 0;      ///< level 0 below it: diagnostic "texture.quality"; 0: no gate
   double min_ssim = 0;         ///< the same
   std::string picture_folder;  ///< quality_picture() of level 0 goes there as NAME.png; empty: none
 };

@@ -1,5 +1,5 @@
-// libFuzzer target: any text as an MTL file gives materials whose numbers are finite, and findings
-// that tell where.
+// libFuzzer target: any text as an MTL file gives materials whose numbers are finite, and
+// diagnostics that tell where.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -9,9 +9,9 @@
 #include "bake/import/read_model.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::vector<modar::Diagnostic> findings;
-  const auto materials =
-      modar::parse_mtl({reinterpret_cast<const char*>(data), size}, "/nowhere", "fuzz", findings);
+  std::vector<modar::Diagnostic> diagnostics;
+  const auto materials = modar::parse_mtl({reinterpret_cast<const char*>(data), size}, "/nowhere",
+                                          "fuzz", diagnostics);
   for (const modar::SourceMaterial& m : materials) {
     for (const glm::vec3& colour : {m.ambient, m.diffuse, m.specular, m.emission}) {
       for (int i = 0; i < 3; ++i) {
@@ -21,8 +21,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!std::isfinite(m.shininess) || !std::isfinite(m.opacity)) std::abort();
     if (!m.diffuse_map.empty() || !m.alpha_map.empty()) std::abort();  // nothing lies there
   }
-  for (const modar::Diagnostic& finding : findings) {
-    if (finding.id.empty() || finding.message.empty()) std::abort();
+  for (const modar::Diagnostic& diagnostic : diagnostics) {
+    if (diagnostic.id.empty() || diagnostic.message.empty()) std::abort();
   }
   return 0;
 }

@@ -35,6 +35,7 @@ class PlantedViolations(unittest.TestCase):
             (self.folder / room).mkdir(parents=True)
 
     def assert_refused(self, path, text, expected):
+        (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
         (self.folder / path).write_text(text)
         code, out = run("--root", self.folder)
         self.assertEqual(code, 3)
@@ -61,6 +62,22 @@ class PlantedViolations(unittest.TestCase):
 
     def test_the_command_line_library_stays_in_its_file(self):
         self.assert_refused("bake/commands/a.cpp", "#include <CLI/CLI.hpp>\n", "CLI")
+
+    def test_json_stays_in_its_file(self):
+        self.assert_refused("bake/commands/a.cpp", "#include <nlohmann/json.hpp>\n", "nlohmann")
+
+    def test_rooms_of_the_workstation_have_an_order(self):
+        self.assert_refused("bake/mesh/a.cpp", '#include "bake/commands/commands.hpp"\n', "lies below")
+        self.assert_refused("bake/import/a.cpp", '#include "bake/mesh/weld/weld.hpp"\n', "lies below")
+
+    def test_a_room_must_have_a_rank(self):
+        self.assert_refused("bake/attic/a.cpp", '#include "bake/mesh/weld/weld.hpp"\n', "is no room")
+
+    def test_the_product_knows_no_lab(self):
+        self.assert_refused("bake/mesh/a.cpp", '#include "bake/lab/bench.hpp"\n', "lies below")
+
+    def test_the_lab_has_two_doors(self):
+        self.assert_refused("bake/commands/a.cpp", '#include "bake/lab/pose_bench.hpp"\n', "bake/lab/bench.hpp")
 
     def test_no_iostream_on_the_device(self):
         self.assert_refused("runtime/track/a.cpp", "#include <iostream>\n", "iostream")

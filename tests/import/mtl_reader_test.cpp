@@ -105,7 +105,7 @@ TEST_F(MtlReader, ObjTakesTheFileBesideItWhenItNamesAnother) {
   EXPECT_EQ(model->material_runs[0].value, 1u);
   EXPECT_EQ(model->material_runs[1].value, 2u);
   std::vector<std::string> ids;
-  for (const Diagnostic& f : model->findings) ids.push_back(f.id);
+  for (const Diagnostic& f : model->diagnostics) ids.push_back(f.id);
   EXPECT_EQ(ids, (std::vector<std::string>{"obj.missing-mtl", "obj.mtl-beside",
                                            "obj.undefined-material"}));
 }
@@ -118,7 +118,7 @@ TEST_F(MtlReader, LibrariesWithBlanksAndSeveralOnALine) {
        {"mtllib my lib.mtl\nmtllib other.mtl\n", "mtllib my\\ lib.mtl other.mtl\n"}) {
     const auto model = parse_obj(library + faces, folder_.string(), "x.obj");
     ASSERT_TRUE(model);
-    EXPECT_TRUE(model->findings.empty()) << library;
+    EXPECT_TRUE(model->diagnostics.empty()) << library;
     ASSERT_EQ(model->materials.size(), 3u);
     EXPECT_EQ(model->materials[1].diffuse, glm::vec3(1, 0, 0));
     EXPECT_EQ(model->materials[2].diffuse, glm::vec3(0, 1, 0));

@@ -26,10 +26,10 @@ std::string error_code(const std::string& text) {
   return model ? "none" : model.error().code;
 }
 
-/// "id:line" of each finding.
-std::multiset<std::string> findings(const SourceModel& model) {
+/// "id:line" of each diagnostic.
+std::multiset<std::string> diagnostics(const SourceModel& model) {
   std::multiset<std::string> all;
-  for (const Diagnostic& f : model.findings) all.insert(f.id + ":" + std::to_string(f.line));
+  for (const Diagnostic& f : model.diagnostics) all.insert(f.id + ":" + std::to_string(f.line));
   return all;
 }
 
@@ -149,9 +149,10 @@ TEST(ObjReader, BadIndicesAreLeftOutAndTheirLinesNamed) {
                               "vt 0 0\nf 1 2 3\nf 1 2 9\nf 1 2 -9\nf 0 1 2\nf 1 2\n"
                               "f 1/7 2/1 3/1\nf /1 /1 /1\nf 1 2 x\nf 3 2 1\n");
   EXPECT_EQ(m.face_count(), 3u);
-  EXPECT_EQ(findings(m), (std::multiset<std::string>{"obj.index-range:6", "obj.zero-index:8",
-                                                     "obj.short-face:9", "obj.attribute-range:10",
-                                                     "obj.no-position:11", "obj.bad-number:12"}));
+  EXPECT_EQ(diagnostics(m),
+            (std::multiset<std::string>{"obj.index-range:6", "obj.zero-index:8", "obj.short-face:9",
+                                        "obj.attribute-range:10", "obj.no-position:11",
+                                        "obj.bad-number:12"}));
   EXPECT_EQ(m.corner(3).uv, kNoIndex);
   EXPECT_EQ(m.corner(4).uv, 0u);
 }
@@ -166,7 +167,7 @@ TEST(ObjReader, ContinuedLinesTabsAndCarriageReturns) {
       "\t1          \\\n 2\\\n 3\nf 3 2 1 # a comment");
   EXPECT_EQ(position_indices(m), (std::vector<std::uint32_t>{0, 1, 2, 2, 1, 0}));
   EXPECT_EQ(m.positions[1], glm::dvec3(1, 0, 0));
-  EXPECT_TRUE(m.findings.empty());
+  EXPECT_TRUE(m.diagnostics.empty());
   EXPECT_EQ(parse("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r").face_count(), 1u);
 }
 
@@ -180,7 +181,7 @@ TEST(ObjReader, LinesAreCountedThroughContinuationsAndComments) {
   const SourceModel m = parse(
       "# ends in a backslash \\\nv 0 0 0\nv 1 \\\n0 \\\n0\nv 0 1 0\n\nf 1 2 3\n"
       "blah\n");
-  EXPECT_EQ(findings(m), (std::multiset<std::string>{"obj.unknown:9"}));
+  EXPECT_EQ(diagnostics(m), (std::multiset<std::string>{"obj.unknown:9"}));
 }
 
 TEST(ObjReader, ByteOrderMarksAndUtf16) {
@@ -205,7 +206,7 @@ TEST(ObjReader, ColoursOfSomeOrAllVertices) {
   ASSERT_EQ(some.colours.size(), 3u);
   EXPECT_EQ(some.colours[0], glm::vec3(1));
   EXPECT_EQ(some.colours[1], glm::vec3(0.25f, 0.5f, 1));
-  EXPECT_EQ(findings(some), (std::multiset<std::string>{"obj.partial-colours:0"}));
+  EXPECT_EQ(diagnostics(some), (std::multiset<std::string>{"obj.partial-colours:0"}));
   const SourceModel bytes = parse("v 0 0 0 255 0 51\nv 1 0 0 0 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n");
   EXPECT_EQ(bytes.colours[0], glm::vec3(1, 0, 0.2f));
   EXPECT_TRUE(parse("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").colours.empty());
@@ -216,7 +217,7 @@ TEST(ObjReader, LinesPointsAndCurvesAreSkippedAndTheirLinesNamed) {
                               "g a b\no thing\np 1 2\nf 1 2 3\nl 1 2 3\nl 2 3\n"
                               "cstype bezier\ndeg 3\ncurv 0 1 1 2 3\nend\nf 3 2 1\n");
   EXPECT_EQ(position_indices(m), (std::vector<std::uint32_t>{0, 1, 2, 2, 1, 0}));
-  EXPECT_EQ(findings(m),
+  EXPECT_EQ(diagnostics(m),
             (std::multiset<std::string>{"obj.points:6", "obj.lines:8", "obj.free-form:10"}));
 }
 
@@ -234,7 +235,7 @@ TEST(ObjReader, LinesOfAnyLength) {
   EXPECT_EQ(m.face_size(0), kCorners);
   EXPECT_EQ(m.corner(kCorners - 1).position, kCorners - 1);
   EXPECT_EQ(m.positions[kCorners - 1], glm::dvec3(kCorners, 0, 1));
-  EXPECT_EQ(findings(m), (std::multiset<std::string>{"obj.unknown:200003"}));
+  EXPECT_EQ(diagnostics(m), (std::multiset<std::string>{"obj.unknown:200003"}));
 }
 
 TEST(ObjReader, EveryFindingNamesFileLineCauseAndCure) {
@@ -244,7 +245,7 @@ TEST(ObjReader, EveryFindingNamesFileLineCauseAndCure) {
             "f 1 2 x\nv nan 0 0\nv 1 0x 2\nv 5\nv 0 0 0 0.5\nv 1 1 1 255 0 0\nl 1 2\n"
             "p 1\ncurv 0 1 1 2\nblah\nf 1 2 3\n");
   std::set<std::string> ids;
-  for (const Diagnostic& f : m.findings) {
+  for (const Diagnostic& f : m.diagnostics) {
     ids.insert(f.id);
     EXPECT_EQ(f.file, "test.obj") << f.id;
     EXPECT_FALSE(f.message.empty()) << f.id;
@@ -274,8 +275,8 @@ TEST(ObjReader, OddNumbersAreFindings) {
   const SourceModel m = parse("v nan 0 0\nv 1 0 1e999\nv 0 1 0x\nv 5\nv 0 0 0 0.5\nf 1 2 3 4\n");
   EXPECT_TRUE(std::isnan(m.positions[0].x));
   EXPECT_EQ(m.positions[3], glm::dvec3(5, 0, 0));
-  EXPECT_EQ(findings(m), (std::multiset<std::string>{"obj.not-finite:1", "obj.bad-number:3",
-                                                     "obj.short-vertex:4", "obj.weight:5"}));
+  EXPECT_EQ(diagnostics(m), (std::multiset<std::string>{"obj.not-finite:1", "obj.bad-number:3",
+                                                        "obj.short-vertex:4", "obj.weight:5"}));
 }
 
 TEST(ObjReader, BlocksJoinWithoutASeam) {
@@ -297,10 +298,10 @@ TEST(ObjReader, BlocksJoinWithoutASeam) {
   const auto smoothing = by_face(m, m.smoothing_runs);
   EXPECT_EQ(smoothing[30000], 20000u);
   EXPECT_EQ(smoothing.back(), 40000u);
-  ASSERT_EQ(m.findings.size(), 1u);
-  EXPECT_EQ(m.findings[0].message.substr(0, 2), "2 ");
+  ASSERT_EQ(m.diagnostics.size(), 1u);
+  EXPECT_EQ(m.diagnostics[0].message.substr(0, 2), "2 ");
   // 2 lines a step but for the first two, the statements at 20000 (with its own face) and up.
-  EXPECT_EQ(m.findings[0].line, 2u + 2u * 19999u + 2u);
+  EXPECT_EQ(m.diagnostics[0].line, 2u + 2u * 19999u + 2u);
 }
 
 TEST(ObjReader, TruncatedAnywhereItAnswers) {

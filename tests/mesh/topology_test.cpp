@@ -262,11 +262,11 @@ TEST(Topology, ThreadsDoNotMatterAndFindingsTell) {
   const auto mesh = testing::welded(testing::parse(
       obj_of({{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {0, 1, 2}, {5, 6, 7}, {5, 6, 8}}, 9)));
   measure_topology(mesh, {}, report);
-  ASSERT_EQ(report.findings.size(), 4u);
-  EXPECT_EQ(report.findings[0].id, "model.non-manifold");
-  EXPECT_EQ(report.findings[1].id, "model.duplicate-faces");
-  EXPECT_EQ(report.findings[2].id, "model.flipped");
-  EXPECT_EQ(report.findings[3].id, "model.copied-faces");
+  ASSERT_EQ(report.diagnostics.size(), 4u);
+  EXPECT_EQ(report.diagnostics[0].id, "model.non-manifold");
+  EXPECT_EQ(report.diagnostics[1].id, "model.duplicate-faces");
+  EXPECT_EQ(report.diagnostics[2].id, "model.flipped");
+  EXPECT_EQ(report.diagnostics[3].id, "model.copied-faces");
   // Where OpenMesh would take too much, it is left out, and nothing is said of it.
   EXPECT_FALSE(measure_topology(mesh, {1, 100}, report).half_edges);
 }

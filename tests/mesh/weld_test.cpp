@@ -145,7 +145,7 @@ TEST(Weld, DropsWhatCannotBeSeenAndSaysSo) {
   EXPECT_EQ(mesh->triangles.size(), 1u);
   EXPECT_EQ(mesh->positions.size(), 3u);
   std::map<std::string, std::string> found;
-  for (const Diagnostic& f : report.findings) found[f.id] = f.message;
+  for (const Diagnostic& f : report.diagnostics) found[f.id] = f.message;
   EXPECT_EQ(found["model.degenerate"].substr(0, 2), "2 ");
   EXPECT_EQ(found["model.not-finite"].substr(0, 2), "1 ");
   Report other;

@@ -243,8 +243,8 @@ TEST(BakePattern, LargePicturesAreBroughtToThePatternsOfTheArticle) {
   ASSERT_TRUE(baked) << to_line(baked.error());
   EXPECT_EQ(baked->record.width, 720u);
   EXPECT_EQ(baked->record.height, 500u);
-  ASSERT_EQ(report.findings.size(), 1u);
-  EXPECT_EQ(report.findings[0].id, "pattern.resized");
+  ASSERT_EQ(report.diagnostics.size(), 1u);
+  EXPECT_EQ(report.diagnostics[0].id, "pattern.resized");
 }
 
 TEST(BakePattern, TakesTheWidthThatThePngStates) {

@@ -169,9 +169,9 @@ TEST(QualityGate, NamesTheWorstBlockAndDrawsAPicture) {
   Report report;
   const Result<Etc1Texture> texture = bake_texture(folder.file("spot.png"), options, report);
   ASSERT_TRUE(texture) << to_line(texture.error());
-  ASSERT_EQ(report.findings.size(), 1U);
-  EXPECT_EQ(report.findings[0].id, "texture.quality");
-  EXPECT_NE(report.findings[0].message.find("20,8"), std::string::npos);
+  ASSERT_EQ(report.diagnostics.size(), 1U);
+  EXPECT_EQ(report.diagnostics[0].id, "texture.quality");
+  EXPECT_NE(report.diagnostics[0].message.find("20,8"), std::string::npos);
   const Result<RgbaImage> picture = read_image(folder.file("spot.png.png"));
   ASSERT_TRUE(picture) << to_line(picture.error());
   EXPECT_EQ(picture->width, 96U);
@@ -180,7 +180,7 @@ TEST(QualityGate, NamesTheWorstBlockAndDrawsAPicture) {
   options.min_psnr_db = 5;
   Report quiet;
   ASSERT_TRUE(bake_texture(folder.file("spot.png"), options, quiet));
-  EXPECT_TRUE(quiet.findings.empty());
+  EXPECT_TRUE(quiet.diagnostics.empty());
 }
 
 TEST(Etc1Bench, HasItsSixRows) {

@@ -53,11 +53,11 @@ std::string plain_name(const std::string& name, const std::string& other) {
 class MaterialReader {
  public:
   MaterialReader(const tinygltf::Model& gltf, std::string folder, std::string label,
-                 std::vector<Diagnostic>& findings)
+                 std::vector<Diagnostic>& diagnostics)
       : gltf_(gltf),
         folder_(std::move(folder)),
         label_(std::move(label)),
-        findings_(findings),
+        diagnostics_(diagnostics),
         paths_(gltf.images.size()) {}
 
   SourceMaterial read(const tinygltf::Material& source) {
@@ -108,16 +108,16 @@ class MaterialReader {
       const auto bytes = std::as_bytes(std::span(image.image));
       if (!folder_of_images_->path().empty() && write_file(path, bytes)) return path;
     }
-    findings_.push_back({"gltf.missing-image", DiagnosticSeverity::kWarning, label_, 0,
-                         "the base colour image '" + image.uri + "' is not there",
-                         "put the image beside the file under that name"});
+    diagnostics_.push_back({"gltf.missing-image", DiagnosticSeverity::kWarning, label_, 0,
+                            "the base colour image '" + image.uri + "' is not there",
+                            "put the image beside the file under that name"});
     return {};
   }
 
   const tinygltf::Model& gltf_;
   std::string folder_;
   std::string label_;
-  std::vector<Diagnostic>& findings_;
+  std::vector<Diagnostic>& diagnostics_;
   std::vector<std::optional<std::string>> paths_;
   std::shared_ptr<TemporaryFolder> folder_of_images_;
 };
@@ -137,8 +137,8 @@ bool keep_image_bytes(tinygltf::Image* image, int, std::string*, std::string*, i
 
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const std::string& folder,
                                            const std::string& label,
-                                           std::vector<Diagnostic>& findings) {
-  MaterialReader reader(gltf, folder, label, findings);
+                                           std::vector<Diagnostic>& diagnostics) {
+  MaterialReader reader(gltf, folder, label, diagnostics);
   std::vector<SourceMaterial> materials;
   for (const tinygltf::Material& m : gltf.materials) materials.push_back(reader.read(m));
   materials.push_back(reader.read(tinygltf::Material()));

@@ -24,7 +24,7 @@ bool keep_image_bytes(tinygltf::Image* image, int index, std::string* error, std
 /// diagnostics.
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const std::string& folder,
                                            const std::string& label,
-                                           std::vector<Diagnostic>& findings);
+                                           std::vector<Diagnostic>& diagnostics);
 
 /// Linear light to sRGB (IEC 61966-2-1), both in [0,1].
 double srgb_of_linear(double linear);

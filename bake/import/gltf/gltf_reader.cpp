@@ -368,7 +368,7 @@ class SceneReader {
     model_.smoothing_runs = {{0, 0}};
     const auto add = [&](std::uint64_t count, const char* id, const std::string& what) {
       if (count == 0) return;
-      model_.findings.push_back(
+      model_.diagnostics.push_back(
           {id, DiagnosticSeverity::kWarning, label_, 0, std::to_string(count) + " " + what, ""});
     };
     add(lines_and_points_, "gltf.lines", "primitives of lines or points are left out");
@@ -426,7 +426,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   }
   SourceModel model;
   model.name = std::filesystem::path(path).stem().string();
-  model.materials = gltf_materials(gltf, folder, path, model.findings);
+  model.materials = gltf_materials(gltf, folder, path, model.diagnostics);
   MODAR_TRY(SceneReader(gltf, model, path).run());
   if (model.corner_positions.empty()) {
     return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it shows no triangles",

@@ -235,7 +235,7 @@ void take_colour(std::string_view text, glm::vec3& colour) {
 struct MtlContext {
   const std::string& folder;
   const std::string& label;
-  std::vector<Diagnostic>& findings;
+  std::vector<Diagnostic>& diagnostics;
   std::uint64_t line = 1;
 };
 
@@ -244,13 +244,14 @@ void take_map(std::string_view text, MtlContext& context, std::string& path) {
   bool transformed = false;
   path = find_map_file(text, context.folder, name, transformed);
   if (path.empty()) {
-    context.findings.push_back({"mtl.missing-map", DiagnosticSeverity::kWarning, context.label,
-                                context.line, "texture '" + name + "' was not found",
-                                "put the image beside the MTL file, or correct its name"});
+    context.diagnostics.push_back({"mtl.missing-map", DiagnosticSeverity::kWarning, context.label,
+                                   context.line, "texture '" + name + "' was not found",
+                                   "put the image beside the MTL file, or correct its name"});
   } else if (transformed) {
-    context.findings.push_back({"mtl.map-transform", DiagnosticSeverity::kWarning, context.label,
-                                context.line, "options that shift or scale the texture are ignored",
-                                "apply them to the vt lines in the modelling program"});
+    context.diagnostics.push_back({"mtl.map-transform", DiagnosticSeverity::kWarning, context.label,
+                                   context.line,
+                                   "options that shift or scale the texture are ignored",
+                                   "apply them to the vt lines in the modelling program"});
   }
 }
 
@@ -258,10 +259,10 @@ void take_map(std::string_view text, MtlContext& context, std::string& path) {
 /// part.
 void take_opacity(float opacity, MtlContext& context, SourceMaterial& material) {
   if (opacity <= 0.0f) {
-    context.findings.push_back({"mtl.invisible", DiagnosticSeverity::kInfo, context.label,
-                                context.line,
-                                "material '" + material.name + "' would be wholly transparent",
-                                "it is taken as opaque; remove its d or Tr line"});
+    context.diagnostics.push_back({"mtl.invisible", DiagnosticSeverity::kInfo, context.label,
+                                   context.line,
+                                   "material '" + material.name + "' would be wholly transparent",
+                                   "it is taken as opaque; remove its d or Tr line"});
     opacity = 1.0f;
   }
   material.opacity = std::min(opacity, 1.0f);
@@ -293,9 +294,10 @@ void take_property(std::string_view key, std::string_view text, MtlContext& cont
 }  // namespace
 
 std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& folder,
-                                      const std::string& label, std::vector<Diagnostic>& findings) {
+                                      const std::string& label,
+                                      std::vector<Diagnostic>& diagnostics) {
   std::vector<SourceMaterial> materials;
-  MtlContext context{folder, label, findings};
+  MtlContext context{folder, label, diagnostics};
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   bool has_d = false;
   std::size_t at = 0;
@@ -384,16 +386,16 @@ void ObjMaterials::add_library(const std::string& text, std::uint64_t line) {
 
 std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
                                                   const std::string& stem, const std::string& label,
-                                                  std::vector<Diagnostic>& findings) {
+                                                  std::vector<Diagnostic>& diagnostics) {
   std::vector<SourceMaterial> materials(used_.size());
   for (std::size_t i = 0; i < used_.size(); ++i) materials[i].name = used_[i].name;
   if (folder.empty()) return materials;
 
   std::vector<std::string> paths;
   const auto missing = [&](const std::string& name, std::uint64_t line) {
-    findings.push_back({"obj.missing-mtl", DiagnosticSeverity::kWarning, label, line,
-                        "material file '" + name + "' was not found",
-                        "put it beside the OBJ file, or correct the mtllib line"});
+    diagnostics.push_back({"obj.missing-mtl", DiagnosticSeverity::kWarning, label, line,
+                           "material file '" + name + "' was not found",
+                           "put it beside the OBJ file, or correct the mtllib line"});
   };
   for (const Named& library : libraries_) {
     if (std::string whole = find_named_file(library.name, folder); !whole.empty()) {
@@ -411,9 +413,9 @@ std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
   }
   if (paths.empty() && (used_.size() > 1 || !libraries_.empty())) {
     if (std::string beside = find_named_file(stem + ".mtl", folder); !beside.empty()) {
-      findings.push_back({"obj.mtl-beside", DiagnosticSeverity::kInfo, label, 0,
-                          "'" + name_of(beside) + "' is taken for the material file",
-                          "name it in an mtllib line"});
+      diagnostics.push_back({"obj.mtl-beside", DiagnosticSeverity::kInfo, label, 0,
+                             "'" + name_of(beside) + "' is taken for the material file",
+                             "name it in an mtllib line"});
       paths.push_back(std::move(beside));
     }
   }
@@ -423,7 +425,8 @@ std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
   for (const std::string& path : paths) {
     if (std::find(read.begin(), read.end(), path) != read.end()) continue;
     read.push_back(path);
-    for (SourceMaterial& m : parse_mtl(read_text(path), folder_of(path), name_of(path), findings)) {
+    for (SourceMaterial& m :
+         parse_mtl(read_text(path), folder_of(path), name_of(path), diagnostics)) {
       std::string name = m.name;
       defined.try_emplace(std::move(name), std::move(m));
     }
@@ -432,9 +435,9 @@ std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
     if (const auto found = defined.find(used_[i].name); found != defined.end()) {
       materials[i] = found->second;
     } else {
-      findings.push_back({"obj.undefined-material", DiagnosticSeverity::kWarning, label,
-                          used_[i].line, "no material file defines '" + used_[i].name + "'",
-                          "it is drawn in the default grey; define it or correct its name"});
+      diagnostics.push_back({"obj.undefined-material", DiagnosticSeverity::kWarning, label,
+                             used_[i].line, "no material file defines '" + used_[i].name + "'",
+                             "it is drawn in the default grey; define it or correct its name"});
     }
   }
   return materials;

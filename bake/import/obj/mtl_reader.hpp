@@ -33,7 +33,8 @@ class ObjMaterials {
   /// Reads the MTL files and fills in what they say of the materials in use; what is missing
   /// becomes a diagnostic. folder: empty where nothing may be read.
   std::vector<SourceMaterial> resolve(const std::string& folder, const std::string& stem,
-                                      const std::string& label, std::vector<Diagnostic>& findings);
+                                      const std::string& label,
+                                      std::vector<Diagnostic>& diagnostics);
 
  private:
   struct Named {

@@ -254,13 +254,13 @@ void ObjAssembler::finish_colours(const std::string& label) {
     c = glm::clamp(c, 0.0f, 1.0f);
   }
   if (missing != 0) {
-    model_.findings.push_back({"obj.partial-colours", DiagnosticSeverity::kInfo, label, 0,
-                               std::to_string(missing) + " vertices have no colour while others do",
-                               "they are white"});
+    model_.diagnostics.push_back(
+        {"obj.partial-colours", DiagnosticSeverity::kInfo, label, 0,
+         std::to_string(missing) + " vertices have no colour while others do", "they are white"});
   }
   if (bytes) {
-    model_.findings.push_back({"obj.byte-colours", DiagnosticSeverity::kInfo, label, 0,
-                               "vertex colours go beyond 1", "they are taken as 0 to 255"});
+    model_.diagnostics.push_back({"obj.byte-colours", DiagnosticSeverity::kInfo, label, 0,
+                                  "vertex colours go beyond 1", "they are taken as 0 to 255"});
   }
 }
 
@@ -269,10 +269,10 @@ void ObjAssembler::finish(const std::string& folder, const std::string& label) {
   for (std::size_t i = 0; i < notes_.size(); ++i) {
     if (notes_[i].count == 0) continue;
     const NoteText& text = kNoteTexts[i];
-    model_.findings.push_back({text.id, text.severity, label, notes_[i].first_line,
-                               std::to_string(notes_[i].count) + " " + text.message, text.cure});
+    model_.diagnostics.push_back({text.id, text.severity, label, notes_[i].first_line,
+                                  std::to_string(notes_[i].count) + " " + text.message, text.cure});
   }
-  model_.materials = materials_.resolve(folder, model_.name, label, model_.findings);
+  model_.materials = materials_.resolve(folder, model_.name, label, model_.diagnostics);
 }
 
 // The threads. Blocks are cut at fixed places, so the result does not depend on the number of

@@ -289,7 +289,7 @@ void add_diagnostics(const TriMesh& mesh, const MeshTopology& topology, Report& 
   const auto add = [&](std::uint64_t count, const char* id, const std::string& message,
                        const char* cure) {
     if (count == 0) return;
-    report.findings.push_back({id, DiagnosticSeverity::kInfo, mesh.name, 0, message, cure});
+    report.diagnostics.push_back({id, DiagnosticSeverity::kInfo, mesh.name, 0, message, cure});
   };
   add(topology.non_manifold_edges + topology.non_manifold_vertices, "model.non-manifold",
       std::to_string(topology.non_manifold_edges) + " edges have more than two triangles and " +

@@ -534,7 +534,8 @@ void report_counts(const std::string& name, const WeldCounts& counts, Report& re
   const auto add = [&](std::uint64_t count, const char* id, DiagnosticSeverity severity,
                        const char* message, const char* cure) {
     if (count == 0) return;
-    report.findings.push_back({id, severity, name, 0, std::to_string(count) + " " + message, cure});
+    report.diagnostics.push_back(
+        {id, severity, name, 0, std::to_string(count) + " " + message, cure});
   };
   add(counts.flat, "model.degenerate", DiagnosticSeverity::kInfo, "triangles without area left out",
       "");

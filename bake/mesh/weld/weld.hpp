@@ -13,7 +13,7 @@ struct WeldOptions {
 
 /// Triangulates (concave polygons by ear clipping), drops what has no area, welds on index triples,
 /// makes missing normals (area-and-angle weighted, smoothing groups respected), normalises to
-/// [-1,1]. Diagnostics of dropped triangles and made normals go to report.findings. Errors:
+/// [-1,1]. Diagnostics of dropped triangles and made normals go to report.diagnostics. Errors:
 /// kInvalidInput "model.empty" where no triangle is left. The overload that takes ownership frees
 /// the source's arrays as it goes: large models need half the memory.
 Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& options = {});
