@@ -18,7 +18,7 @@
 #include "bake/ship/release_folder.hpp"
 #include "bake/terminal.hpp"
 #include "formats/atomic_file.hpp"
-#include "modar/digest.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 namespace {
@@ -60,19 +60,17 @@ Result<std::string> ask_pass_phrase() {
 }
 
 Result<SecretKey> load_key(const std::string& path, const std::string& pass_phrase_file) {
-  const auto text = read_text(path);
-  if (!text) return tl::unexpected(text.error());
+  MODAR_ASSIGN(const auto text, read_text(path));
   std::string pass_phrase;
   if (!pass_phrase_file.empty()) {
-    const auto file = read_text(pass_phrase_file);
-    if (!file) return tl::unexpected(file.error());
-    pass_phrase = first_line(*file);
-  } else if (needs_pass_phrase(*text)) {
+    MODAR_ASSIGN(const auto file, read_text(pass_phrase_file));
+    pass_phrase = first_line(file);
+  } else if (needs_pass_phrase(text)) {
     const auto asked = ask_pass_phrase();
     if (!asked) return asked.map([](const std::string&) { return SecretKey(); });
     pass_phrase = *asked;
   }
-  auto key = parse_secret_key(*text, pass_phrase);
+  auto key = parse_secret_key(text, pass_phrase);
   if (!key) key.error().where = path;
   return key;
 }

@@ -6,7 +6,7 @@
 
 #include <sodium.h>
 
-#include "modar/digest.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 namespace {

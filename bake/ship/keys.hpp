@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "modar/signature.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 

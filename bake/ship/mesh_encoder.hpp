@@ -1,4 +1,4 @@
-// A chunk to the object that it travels as (modar/mesh_transport.hpp).
+// A chunk to the object that it travels as (modar/piece.hpp).
 #pragma once
 
 #include <cstddef>

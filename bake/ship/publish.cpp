@@ -4,8 +4,8 @@
 
 #include "bake/ship/release_folder.hpp"
 #include "formats/check.hpp"
-#include "modar/digest.hpp"
 #include "modar/mapped_file.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 namespace {
@@ -17,15 +17,13 @@ struct OpenBundle {
 };
 
 Result<OpenBundle> open_bundle(const std::string& path) {
-  auto file = MappedFile::open(path);
-  if (!file) return tl::unexpected(file.error());
-  if (const std::string error = first_error(file->bytes()); !error.empty()) {
+  MODAR_ASSIGN(auto file, MappedFile::open(path));
+  if (const std::string error = first_error(file.bytes()); !error.empty()) {
     return fail(ExitCode::kInvalidInput, "ship.bad-bundle", path, error,
                 "see `modar check " + path + "`, and bake it again");
   }
-  const auto view = BundleView::open(file->bytes());
-  if (!view) return tl::unexpected(view.error());
-  return OpenBundle{std::move(*file), *view};
+  MODAR_ASSIGN(const auto view, BundleView::open(file.bytes()));
+  return OpenBundle{std::move(file), view};
 }
 
 ReleaseBundle describe(const std::string& name, const PublishedBundle& made) {
@@ -70,42 +68,35 @@ constexpr double kFlashBytesPerSecond = 8e6;
 }  // namespace
 
 Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report) {
-  auto folder = ReleaseFolder::open(request.folder);
-  if (!folder) return tl::unexpected(folder.error());
+  MODAR_ASSIGN(auto folder, ReleaseFolder::open(request.folder));
   PublishReport done;
-  const auto version = next_version(*folder, request.version);
-  if (!version) return tl::unexpected(version.error());
-  done.release.version = *version;
+  MODAR_ASSIGN(const auto version, next_version(folder, request.version));
+  done.release.version = version;
   done.release.expires = request.expires;
   for (const std::string& path : request.bundles) {
     StageTimer timer(report, "publish " + path);
-    const auto bundle = open_bundle(path);
-    if (!bundle) return tl::unexpected(bundle.error());
-    const auto made = make_recipe(bundle->view, request.recipe);
-    if (!made) return tl::unexpected(made.error());
-    const auto added = folder->add_objects(*made);
-    if (!added) return tl::unexpected(added.error());
-    done.added_bytes += *added;
+    MODAR_ASSIGN(const auto bundle, open_bundle(path));
+    MODAR_ASSIGN(const auto made, make_recipe(bundle.view, request.recipe));
+    MODAR_ASSIGN(const auto added, folder.add_objects(made));
+    done.added_bytes += added;
     const std::string name = std::filesystem::path(path).stem().string();
-    done.release.bundles.push_back(describe(name, *made));
+    done.release.bundles.push_back(describe(name, made));
     if (const auto devices = request.devices.find(name); devices != request.devices.end()) {
       done.release.bundles.back().devices = devices->second;
     }
-    for (const auto& [form, totals] : made->forms) {
+    for (const auto& [form, totals] : made.forms) {
       done.forms[form].pieces += totals.pieces;
       done.forms[form].raw_bytes += totals.raw_bytes;
       done.forms[form].stored_bytes += totals.stored_bytes;
     }
-    timer.done(bundle->view.bytes().size(), made->download_size);
+    timer.done(bundle.view.bytes().size(), made.download_size);
   }
   // What a device would refuse is not published.
   if (const auto readable = parse_release(release_text(done.release)); !readable) {
     return fail(ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
                 "name each bundle's file with letters, digits, '.', '_' and '-', no two alike");
   }
-  if (auto added = folder->add_release(done.release, key); !added) {
-    return tl::unexpected(added.error());
-  }
+  MODAR_TRY(folder.add_release(done.release, key));
   return done;
 }
 
@@ -123,24 +114,20 @@ const Link* find_link(std::string_view name) {
 Result<UpdatePlan> plan_update(const std::string& old_bundle, const std::string& new_bundle,
                                const Link& link, const DeviceProfile* device,
                                const RecipeOptions& options) {
-  const auto before = open_bundle(old_bundle);
-  if (!before) return tl::unexpected(before.error());
-  const auto after = open_bundle(new_bundle);
-  if (!after) return tl::unexpected(after.error());
-  const auto old_recipe = make_recipe(before->view, options);
-  if (!old_recipe) return tl::unexpected(old_recipe.error());
-  const auto new_recipe = make_recipe(after->view, options);
-  if (!new_recipe) return tl::unexpected(new_recipe.error());
+  MODAR_ASSIGN(const auto before, open_bundle(old_bundle));
+  MODAR_ASSIGN(const auto after, open_bundle(new_bundle));
+  MODAR_ASSIGN(const auto old_recipe, make_recipe(before.view, options));
+  MODAR_ASSIGN(const auto new_recipe, make_recipe(after.view, options));
 
   UpdatePlan plan;
   Release release;
   release.version = 1;
-  release.bundles.push_back(describe("bundle", *new_recipe));
-  const std::uint64_t documents = release_text(release).size() + new_recipe->recipe_object.size();
-  plan.full_bytes = release_text(release).size() + new_recipe->download_size;
+  release.bundles.push_back(describe("bundle", new_recipe));
+  const std::uint64_t documents = release_text(release).size() + new_recipe.recipe_object.size();
+  plan.full_bytes = release_text(release).size() + new_recipe.download_size;
   plan.update_bytes = documents;
-  for (const auto& [id, object] : new_recipe->objects) {
-    if (old_recipe->objects.contains(id)) continue;
+  for (const auto& [id, object] : new_recipe.objects) {
+    if (old_recipe.objects.contains(id)) continue;
     plan.update_bytes += object.size();
     ++plan.update_pieces;
   }
@@ -150,11 +137,11 @@ Result<UpdatePlan> plan_update(const std::string& old_bundle, const std::string&
       (static_cast<double>(plan.update_bytes) + kRequestBytes * (4.0 + plan.update_pieces)) * 8 /
           link.bits_per_second +
       requests * link.round_trip_s;
-  const auto size = static_cast<double>(after->view.bytes().size());
+  const auto size = static_cast<double>(after.view.bytes().size());
   const double cores = device == nullptr ? 1 : device->cores;
   plan.install_s =
       size / (kInstallBytesPerSecond * std::max(1.0, cores / 2)) + size / kFlashBytesPerSecond;
-  plan.storage_bytes = after->view.bytes().size() + plan.update_bytes;
+  plan.storage_bytes = after.view.bytes().size() + plan.update_bytes;
   return plan;
 }
 

@@ -12,8 +12,8 @@
 #include "bake/ship/limited_process.hpp"
 #include "bake/ship/mesh_encoder.hpp"
 #include "formats/transport/feature_text.hpp"
-#include "modar/digest.hpp"
 #include "modar/piece.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 namespace {

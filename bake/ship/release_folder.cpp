@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "formats/atomic_file.hpp"
-#include "modar/digest.hpp"
 #include "modar/piece.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 namespace {
@@ -62,13 +62,12 @@ ReleaseFolder::ReleaseFolder(std::string path, FolderLock lock)
 
 Result<ReleaseFolder> ReleaseFolder::open(const std::string& path) {
   for (const char* folder : {"/releases", "/keys", "/objects"}) {
-    if (auto made = make_folders(path + folder); !made) return tl::unexpected(made.error());
+    MODAR_TRY(make_folders(path + folder));
   }
-  auto lock = FolderLock::take(
-      path + "/.lock", {kExitLocked, "ship.locked", path, "another publisher is at work on it",
-                        "wait until it ends"});
-  if (!lock) return tl::unexpected(lock.error());
-  return ReleaseFolder(path, std::move(*lock));
+  MODAR_ASSIGN(auto lock, FolderLock::take(path + "/.lock", {kExitLocked, "ship.locked", path,
+                                                             "another publisher is at work on it",
+                                                             "wait until it ends"}));
+  return ReleaseFolder(path, std::move(lock));
 }
 
 std::vector<std::uint64_t> ReleaseFolder::versions() const {
@@ -96,16 +95,14 @@ Result<std::uint64_t> ReleaseFolder::add_objects(const PublishedBundle& bundle) 
     // Names are hashes of the content: what is there in full length is the same.
     std::error_code error;
     if (fs::file_size(path, error) == bytes.size() && !error) return {};
-    if (auto made = make_folders(path.parent_path()); !made) return made;
+    MODAR_TRY(make_folders(path.parent_path()));
     added += bytes.size();
     return write_file(path.string(), bytes);
   };
   for (const auto& [id, bytes] : bundle.objects) {
-    if (auto done = add(id, bytes); !done) return tl::unexpected(done.error());
+    MODAR_TRY(add(id, bytes));
   }
-  if (auto done = add(bundle.recipe_id, bundle.recipe_object); !done) {
-    return tl::unexpected(done.error());
-  }
+  MODAR_TRY(add(bundle.recipe_id, bundle.recipe_object));
   return added;
 }
 
@@ -134,20 +131,18 @@ Result<std::uint64_t> ReleaseFolder::prune(std::size_t keep) const {
   const std::size_t gone = all.size() > keep ? all.size() - keep : 0;
   std::set<std::string> needed;
   for (std::size_t i = gone; i < all.size(); ++i) {
-    const auto kept = release(all[i]);
-    if (!kept) return tl::unexpected(kept.error());
-    for (const ReleaseBundle& bundle : kept->bundles) {
+    MODAR_ASSIGN(const auto kept, release(all[i]));
+    for (const ReleaseBundle& bundle : kept.bundles) {
       needed.insert(to_hex(bundle.recipe));
       const auto stored = read_text(path_ + "/objects/" + object_path(bundle.recipe));
       if (!stored) {
         return fail(ExitCode::kIo, "ship.recipe", object_path(bundle.recipe),
                     "a recipe of a kept release is missing", "publish that release again");
       }
-      auto raw = unpack_zstd(std::as_bytes(std::span(*stored)), bundle.recipe_raw_size);
-      if (!raw) return tl::unexpected(raw.error());
-      const auto recipe = open_recipe(*raw);
-      if (!recipe) return tl::unexpected(recipe.error());
-      for (const PieceRecord& piece : recipe->pieces) needed.insert(to_hex(piece.id));
+      MODAR_ASSIGN(auto raw,
+                   unpack_zstd(std::as_bytes(std::span(*stored)), bundle.recipe_raw_size));
+      MODAR_ASSIGN(const auto recipe, open_recipe(raw));
+      for (const PieceRecord& piece : recipe.pieces) needed.insert(to_hex(piece.id));
     }
   }
   std::uint64_t bytes = 0;

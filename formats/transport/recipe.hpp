@@ -27,7 +27,7 @@ enum class PieceForm : std::uint8_t {
   kStored = 1,      ///< the raw bytes
   kZstd = 2,        ///< a zstd frame of them
   kZstdHalves = 3,  ///< ETC1: a zstd frame of the blocks' first four bytes, then of their last four
-  kMesh = 4,        ///< a mesh object (modar/mesh_transport.hpp)
+  kMesh = 4,        ///< a mesh object (modar/piece.hpp)
   kFeatureText = 5,  ///< nothing travels: the text of the feature twin at second_offset
   kLevel = 6,        ///< a coarser level's indices: zstd of meshoptimizer's index codec
 };

@@ -1,10 +1,11 @@
-// The one file of the device that knows Draco: a buffer of integer attributes to plain arrays.
+// Draco buffers of integer attributes to plain arrays: the only file of the device that includes
+// Draco.
 #include <cstring>
 #include <memory>
 
 #include <draco/compression/decode.h>
 
-#include "modar/mesh_transport.hpp"
+#include "modar/piece.hpp"
 
 namespace modar {
 namespace {

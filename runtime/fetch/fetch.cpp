@@ -1,16 +1,107 @@
-// From the server's release to the release in use, step by step (formats/shipping.md, Fetching).
+// From the server's newest release to the release in use (formats/shipping.md).
 #include "modar/fetch.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <ctime>
+#include <optional>
 
-#include "files.hpp"
-#include "installation.hpp"
-#include "trust.hpp"
+#include "install.hpp"
 
 namespace modar {
 namespace fetch {
 namespace {
+
+// --- Trust ---
+
+constexpr std::size_t kMaxSignatureBytes = 4096;
+constexpr std::size_t kMaxLinkBytes = 4096;
+constexpr std::size_t kMaxLatestBytes = 32;
+constexpr std::uint32_t kMaxLinks = 1000;
+
+Result<std::uint64_t> parse_latest(std::string_view text) {
+  std::uint64_t version = 0;
+  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), version);
+  if (parsed.ec != std::errc() || version == 0 ||
+      std::string_view(parsed.ptr,
+                       static_cast<std::size_t>(text.data() + text.size() - parsed.ptr)) != "\n") {
+    return fail(kExitMixed, "fetch.latest", "latest", "it does not name a release",
+                "give the address of a folder that `modar ship publish` filled");
+  }
+  return version;
+}
+
+/// The key that a link of the chain leads to from `trusted`; `trusted` itself where another key has
+/// signed the link (it comes before the place where this device joined).
+/// Errors: "fetch.missing" at the end of the chain.
+Result<PublicKey> follow_link(Transfers& transfers, std::uint32_t serial,
+                              const PublicKey& trusted) {
+  const std::string path = "keys/" + std::to_string(serial) + ".json";
+  MODAR_ASSIGN(const auto text, transfers.text(path, kMaxLinkBytes));
+  MODAR_ASSIGN(const auto signature_text, transfers.text(path + ".minisig", kMaxSignatureBytes));
+  MODAR_ASSIGN(const auto signature, parse_signature(signature_text));
+  if (signature.key_id != trusted.id) return trusted;
+  MODAR_TRY(verify_signature(text, signature, trusted));
+  MODAR_ASSIGN(const auto link, parse_key_link(text));
+  if (link.serial != serial) {
+    return fail(kExitMixed, "fetch.chain", path, "it is a different link of the chain",
+                "publish the chain of keys again");
+  }
+  return parse_public_key(link.key);
+}
+
+/// Moves the trust along the chain until the key of `wanted` is trusted.
+Result<void> follow_chain(Transfers& transfers, const Signature& wanted, StoreState& state) {
+  MODAR_ASSIGN(auto trusted, parse_public_key(state.trusted_key));
+  while (trusted.id != wanted.key_id && state.key_serial < kMaxLinks) {
+    auto next = follow_link(transfers, state.key_serial + 1, trusted);
+    if (!next && next.error().code == "fetch.missing") return {};  // the signature check reports it
+    if (!next) return tl::unexpected(next.error());
+    trusted = *next;
+    state.trusted_key = public_key_line(trusted);
+    ++state.key_serial;
+  }
+  return {};
+}
+
+/// Puts the key that --trust gives into the state, unless the state knows where the chain of keys
+/// has led from it. Errors: kInvalidInput "key.public".
+Result<void> recall_trust(const std::string& given_key, StoreState& state) {
+  MODAR_ASSIGN(const auto given, parse_public_key(given_key));
+  const std::string line = public_key_line(given);
+  if (line == state.root_key || line == state.trusted_key) return {};
+  state.root_key = line;
+  state.trusted_key = line;
+  state.key_serial = 0;
+  return {};
+}
+
+/// The server's newest release. Follows the chain of keys where another key than the trusted one
+/// has signed, and moves the state's trust along it.
+/// Errors: kExitWrongKey; kExitMixed; kExitNetwork; kInvalidInput "release.*".
+Result<SignedRelease> download_release(Transfers& transfers, StoreState& state) {
+  MODAR_ASSIGN(const auto latest, transfers.text("latest", kMaxLatestBytes));
+  MODAR_ASSIGN(const auto version, parse_latest(latest));
+  const std::string path = "releases/" + std::to_string(version) + ".json";
+  SignedRelease news;
+  MODAR_ASSIGN(auto text, transfers.text(path, kMaxReleaseBytes));
+  MODAR_ASSIGN(auto signature_text, transfers.text(path + ".minisig", kMaxSignatureBytes));
+  news.text = std::move(text);
+  news.signature_text = std::move(signature_text);
+  MODAR_ASSIGN(const auto signature, parse_signature(news.signature_text));
+  MODAR_TRY(follow_chain(transfers, signature, state));
+  MODAR_ASSIGN(const auto trusted, parse_public_key(state.trusted_key));
+  MODAR_TRY(verify_signature(news.text, signature, trusted));
+  MODAR_ASSIGN(auto release, parse_release(news.text));
+  if (release.version != version) {
+    return fail(kExitMixed, "fetch.mixed", path, "it is release " + std::to_string(release.version),
+                "publish the release again");
+  }
+  news.release = std::move(release);
+  return news;
+}
+
+// --- What this device wants ---
 
 TransferOptions transfer_options(const FetchOptions& options) {
   TransferOptions transfer;
@@ -23,8 +114,8 @@ TransferOptions transfer_options(const FetchOptions& options) {
   return transfer;
 }
 
-/// Refuses what is older than what was installed, what is past its time, and what is another
-/// release under an old number.
+/// Refuses a release that is older than what was installed, has expired, or differs from the
+/// installed one of the same number.
 Result<void> judge_release(const SignedRelease& news, const StoreState& state,
                            const std::optional<InstalledRelease>& active) {
   const std::uint64_t known =
@@ -33,17 +124,17 @@ Result<void> judge_release(const SignedRelease& news, const StoreState& state,
   if (news.release.version < known) {
     return fail(kExitRollBack, "fetch.roll-back", where,
                 "release " + std::to_string(known) + " was installed before",
-                "publish under a greater number");
+                "publish it under a higher number");
   }
   if (news.release.expires <= std::time(nullptr)) {
     return fail(kExitExpired, "fetch.expired", where,
                 "it expired at " + time_text(news.release.expires),
-                "publish anew; or set this device's clock");
+                "publish it again, or set this device's clock");
   }
   if (active && active->release.version == news.release.version && active->text != news.text) {
     return fail(kExitMixed, "fetch.same-number", where,
                 "another release was installed under this number",
-                "publish under a greater number");
+                "publish it under a higher number");
   }
   return {};
 }
@@ -66,17 +157,27 @@ Result<std::vector<ReleaseBundle>> choose_bundles(const Release& release,
   if (chosen.empty()) {
     return fail(ExitCode::kUnsupported, "fetch.device",
                 "release " + std::to_string(release.version),
-                "it holds no bundle for this device or of this name",
+                "it has no bundle for this device, or none of this name",
                 "see its bundles in releases/" + std::to_string(release.version) + ".json");
   }
   return chosen;
 }
 
-/// Whether every chosen bundle of the release in use lies there in full length.
+/// Whether every chosen bundle of the release in use is there with its full length.
 bool is_installed(const InstalledRelease& active, const std::vector<ReleaseBundle>& chosen) {
   return std::all_of(chosen.begin(), chosen.end(), [&](const ReleaseBundle& bundle) {
     return file_size(active.folder + "/" + bundle.name + ".modar") == bundle.size;
   });
+}
+
+/// The first damaged bundle of a release, or nothing.
+std::optional<Error> find_damage(const InstalledRelease& installed) {
+  for (const ReleaseBundle& bundle : installed.release.bundles) {
+    const std::string file = installed.folder + "/" + bundle.name + ".modar";
+    if (!file_size(file)) continue;  // not for this device
+    if (auto good = verify_bundle(file, bundle); !good) return good.error();
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -84,41 +185,50 @@ bool is_installed(const InstalledRelease& active, const std::vector<ReleaseBundl
 
 Result<FetchReport> fetch_release(const FetchOptions& options) {
   using namespace fetch;
-  auto store = Store::open(options.store);
-  if (!store) return tl::unexpected(store.error());
-  auto transfers = Transfers::create(transfer_options(options));
-  if (!transfers) return tl::unexpected(transfers.error());
-  StoreState state = store->state();
-  if (auto known = recall_trust(options.trusted_key, state); !known) {
-    return tl::unexpected(known.error());
-  }
-  const auto news = bring_release(*transfers, state);
-  if (!news) return tl::unexpected(news.error());
-  auto active = store->active();
-  if (auto fine = judge_release(*news, state, active); !fine) return tl::unexpected(fine.error());
-  const auto chosen = choose_bundles(news->release, options);
-  if (!chosen) return tl::unexpected(chosen.error());
+  MODAR_ASSIGN(auto store, Store::open(options.store));
+  MODAR_ASSIGN(auto transfers, Transfers::create(transfer_options(options)));
+  StoreState state = store.state();
+  MODAR_TRY(recall_trust(options.trusted_key, state));
+  MODAR_ASSIGN(const auto news, download_release(transfers, state));
+  auto active = store.active();
+  MODAR_TRY(judge_release(news, state, active));
+  MODAR_ASSIGN(const auto chosen, choose_bundles(news.release, options));
 
   FetchReport report;
-  report.version = news->release.version;
-  report.changed = !active || active->text != news->text || !is_installed(*active, *chosen);
+  report.version = news.release.version;
+  report.changed = !active || active->text != news.text || !is_installed(*active, chosen);
   if (report.changed) {
-    if (auto done =
-            install({options, *store, *transfers, *news, std::move(active), *chosen}, report);
-        !done) {
-      return tl::unexpected(done.error());
-    }
-  } else if (auto linked = store->link_bundles(news->release); !linked) {
-    return tl::unexpected(linked.error());
+    MODAR_TRY(install({options, store, transfers, news, std::move(active), chosen}, report));
+  } else {
+    MODAR_TRY(store.link_bundles(news.release));
   }
-  state.version = news->release.version;
-  if (auto saved = store->save_state(state); !saved) return tl::unexpected(saved.error());
-  if (auto cleared = empty_folder(store->pieces()); !cleared)
-    return tl::unexpected(cleared.error());
-  report.bundles = store->bundle_paths(news->release);
-  report.downloaded_bytes = transfers->stats().bytes;
-  report.retries = transfers->stats().retries;
-  report.corrupt_pieces += transfers->stats().corrupt;
+  state.version = news.release.version;
+  MODAR_TRY(store.save_state(state));
+  MODAR_TRY(empty_folder(store.pieces()));
+  report.bundles = store.bundle_paths(news.release);
+  report.downloaded_bytes = transfers.stats().bytes;
+  report.retries = transfers.stats().retries;
+  report.corrupt_pieces += transfers.stats().corrupt;
+  return report;
+}
+
+Result<StoreReport> verify_store(const std::string& path) {
+  using namespace fetch;
+  MODAR_ASSIGN(auto store, Store::open(path));
+  StoreReport report;
+  auto active = store.active();
+  if (!active || find_damage(*active)) {
+    auto before = store.other();
+    if (!before || find_damage(*before)) {
+      return fail(kExitBadBundle, "store.damaged", path, "no good release is left in it",
+                  "run modar-fetch with the server's address");
+    }
+    MODAR_TRY(store.activate(*before));
+    report.fell_back = true;
+    active = std::move(before);
+  }
+  report.version = active->release.version;
+  report.bundles = store.bundle_paths(active->release);
   return report;
 }
 

@@ -1,13 +1,16 @@
 // modar-fetch: installs releases on the device.
 #include <unistd.h>
 
+#include <array>
 #include <cinttypes>
 #include <cstdio>
+#include <span>
 
 #include <rapidjson/prettywriter.h>
 
-#include "fetch_options.hpp"
-#include "files.hpp"
+#include "modar/fetch.hpp"
+#include "runtime/platform/command_line.hpp"
+#include "store.hpp"
 
 #ifndef MODAR_VERSION
 #error "CMake defines MODAR_VERSION"
@@ -15,6 +18,136 @@
 
 namespace modar::fetch {
 namespace {
+
+constexpr const char* kHelp = R"(modar-fetch: installs the newest release of bundles on this device
+
+Usage:
+  modar-fetch URL --store DIR --trust K.pub [OPTION]...
+  modar-fetch --store DIR --verify
+
+URL is http(s)://HOST/PATH, or a folder (a USB stick), that `modar ship publish` filled. The installed
+bundles are DIR/NAME.modar. Interrupted at any moment, the release in use stays whole, and the next run
+resumes the download.
+
+  --store DIR       where releases are installed; made where it is missing
+  --trust K.pub     the publisher's public key, of `modar ship keygen`
+  --device NAME     only bundles for this device profile
+  --bundle NAME     only this bundle; may be given again
+  --parallel N      pieces at once, 1 to 32 (4)
+  --limit-rate N    bytes a second at most; 16k and 1M are understood
+  --attempts N      give up after so many attempts in a row without any data (8)
+  --verify          check what is installed; go back to the release before if it is damaged
+  --json            print what was done as JSON
+  --quiet           no progress, no summary
+  --help, --version
+
+Example:
+  modar-fetch http://museum.example/ar --store /sdcard/modar --trust museum.pub
+
+Exit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input, 4 internal error,
+5 nothing for this device or this version; 10 not signed by the trusted key, 11 older than what is
+installed, 12 expired, 13 the server's files belong to different releases, 14 not enough free space,
+15 another fetch is running, 16 the network failed (run it again), 17 the new bundle fails validation.
+)";
+
+// --- Command line ---
+
+struct CommandLine {
+  FetchOptions options;
+  std::string trust_file;
+  bool verify = false;  ///< only check what is installed
+  bool json = false;
+  bool quiet = false;
+  bool help = false;
+  bool version = false;
+};
+
+struct Option {
+  CommandOption syntax;
+  bool (*set)(CommandLine&, std::string_view);
+};
+
+bool set_parallel(CommandLine& line, std::string_view value) {
+  line.options.parallel = static_cast<unsigned>(parse_count(value, 32));
+  return line.options.parallel != 0;
+}
+
+/// "2000", "16k", "1M": bytes.
+bool set_rate(CommandLine& line, std::string_view value) {
+  std::uint64_t unit = 1;
+  if (value.ends_with('k') || value.ends_with('K')) unit = 1000;
+  if (value.ends_with('M')) unit = 1000000;
+  if (unit != 1) value.remove_suffix(1);
+  line.options.bytes_per_second = unit * parse_count(value, 1000000000u);
+  return line.options.bytes_per_second != 0;
+}
+
+bool set_attempts(CommandLine& line, std::string_view value) {
+  line.options.attempts = static_cast<unsigned>(parse_count(value, 1000));
+  return line.options.attempts != 0;
+}
+
+template <bool CommandLine::*Member>
+bool set_switch(CommandLine& line, std::string_view) {
+  return line.*Member = true;
+}
+
+template <std::string FetchOptions::*Member>
+bool set_text(CommandLine& line, std::string_view value) {
+  line.options.*Member = value;
+  return true;
+}
+
+bool set_trust(CommandLine& line, std::string_view value) {
+  line.trust_file = value;
+  return true;
+}
+
+bool add_bundle(CommandLine& line, std::string_view value) {
+  line.options.bundles.emplace_back(value);
+  return true;
+}
+
+constexpr std::array<Option, 12> kOptions = {{
+    {{"store", "a folder"}, set_text<&FetchOptions::store>},
+    {{"trust", "a file"}, set_trust},
+    {{"device", "a name"}, set_text<&FetchOptions::device>},
+    {{"bundle", "a name"}, add_bundle},
+    {{"parallel", "a number from 1 to 32"}, set_parallel},
+    {{"limit-rate", "a number of bytes like 2000, 16k or 1M"}, set_rate},
+    {{"attempts", "a number from 1 to 1000"}, set_attempts},
+    {{"verify"}, set_switch<&CommandLine::verify>},
+    {{"json"}, set_switch<&CommandLine::json>},
+    {{"quiet"}, set_switch<&CommandLine::quiet>},
+    {{"help"}, set_switch<&CommandLine::help>},
+    {{"version"}, set_switch<&CommandLine::version>},
+}};
+
+tl::unexpected<Error> usage(const char* code, std::string where, std::string cause) {
+  return fail(ExitCode::kUsage, code, std::move(where), std::move(cause), "see modar-fetch --help");
+}
+
+/// Errors: kUsage "cli.*".
+Result<CommandLine> read_command_line(std::span<const char* const> arguments) {
+  std::vector<CommandOption> syntax;
+  for (const Option& option : kOptions) syntax.push_back(option.syntax);
+  CommandLine line;
+  MODAR_ASSIGN(const auto urls,
+               parse_command_line(arguments, {"cli", "see modar-fetch --help", syntax},
+                                  [&](std::size_t index, std::string_view value) {
+                                    return kOptions[index].set(line, value);
+                                  }));
+  if (line.help || line.version) return line;
+  if (urls.size() > 1) return usage("cli.url", urls[1], "there is one URL already");
+  if (!urls.empty()) line.options.url = urls.front();
+  if (line.options.store.empty()) return usage("cli.store", "--store", "it is missing");
+  if (line.verify) return line;
+  if (line.options.url.empty()) return usage("cli.url", "URL", "it is missing");
+  if (line.trust_file.empty()) return usage("cli.trust", "--trust", "it is missing");
+  return line;
+}
+
+// --- Program ---
 
 constexpr std::size_t kMaxKeyBytes = 4096;
 
@@ -115,10 +248,10 @@ int run_fetch(CommandLine& line) {
 int main(int argc, char** argv) {
   using namespace modar;
   using namespace modar::fetch;
-  auto line = parse_command_line(argc, argv);
+  auto line = read_command_line(std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
   if (!line) return answer(line.error());
   if (line->help || line->version) {
-    std::fputs(line->help ? help_text() : "modar-fetch " MODAR_VERSION "\n", stdout);
+    std::fputs(line->help ? kHelp : "modar-fetch " MODAR_VERSION "\n", stdout);
     return 0;
   }
   return line->verify ? run_verify(*line) : run_fetch(*line);

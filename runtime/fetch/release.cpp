@@ -1,17 +1,197 @@
 #include "modar/release.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
+#include <cstring>
 #include <ctime>
 #include <set>
 
 #include <rapidjson/document.h>
 #include <rapidjson/prettywriter.h>
-
-#include "modar/digest.hpp"
+#include <sodium.h>
 
 namespace modar {
+
+// --- Hashes ---
+
+namespace {
+
+template <class Hash>
+Hash blake2b(std::span<const std::byte> bytes) {
+  // Without it libsodium does not choose its SIMD code: half the speed.
+  static const int ready = sodium_init();
+  static_cast<void>(ready);
+  Hash hash{};
+  crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(bytes.data()),
+                     bytes.size(), nullptr, 0);
+  return hash;
+}
+
+template <class Hash>
+std::optional<Hash> of_hex(std::string_view text) {
+  Hash hash{};
+  if (text.size() != 2 * hash.size()) return std::nullopt;
+  for (const char c : text) {
+    if ((c < '0' || c > '9') && (c < 'a' || c > 'f')) return std::nullopt;
+  }
+  std::size_t length = 0;
+  if (sodium_hex2bin(hash.data(), hash.size(), text.data(), text.size(), nullptr, &length,
+                     nullptr) != 0 ||
+      length != hash.size()) {
+    return std::nullopt;
+  }
+  return hash;
+}
+
+}  // namespace
+
+ObjectId object_id(std::span<const std::byte> bytes) {
+  return blake2b<ObjectId>(bytes);
+}
+BundleHash bundle_hash(std::span<const std::byte> bytes) {
+  return blake2b<BundleHash>(bytes);
+}
+
+std::string to_hex(std::span<const std::uint8_t> bytes) {
+  std::string text(2 * bytes.size() + 1, '\0');
+  sodium_bin2hex(text.data(), text.size(), bytes.data(), bytes.size());
+  text.pop_back();
+  return text;
+}
+
+std::optional<ObjectId> object_id_of_hex(std::string_view text) {
+  return of_hex<ObjectId>(text);
+}
+std::optional<BundleHash> bundle_hash_of_hex(std::string_view text) {
+  return of_hex<BundleHash>(text);
+}
+
+std::string object_path(const ObjectId& id) {
+  const std::string hex = to_hex(id);
+  return hex.substr(0, 2) + "/" + hex;
+}
+
+// --- Keys and signatures ---
+
+namespace {
+
+constexpr std::string_view kUntrusted = "untrusted comment: ";
+constexpr std::string_view kTrusted = "trusted comment: ";
+
+/// Removes the first line from `text` and returns it without its line end.
+std::string_view take_line(std::string_view& text) {
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  std::string_view line = text.substr(0, end);
+  text.remove_prefix(std::min(end + 1, text.size()));
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return line;
+}
+
+/// Decodes base64 of exactly `out`'s size.
+bool from_base64(std::string_view text, std::span<std::uint8_t> out) {
+  // libsodium 1.0.18 accepts some bytes above 127 as digits.
+  if (std::any_of(text.begin(), text.end(), [](char c) { return (c & 0x80) != 0; })) return false;
+  std::size_t length = 0;
+  return sodium_base642bin(out.data(), out.size(), text.data(), text.size(), nullptr, &length,
+                           nullptr, sodium_base64_VARIANT_ORIGINAL) == 0 &&
+         length == out.size();
+}
+
+tl::unexpected<Error> bad_text(const char* cause) {
+  return fail(ExitCode::kInvalidInput, "signature.text", "signature", cause,
+              "fetch it again, or sign the release again");
+}
+
+}  // namespace
+
+std::string to_base64(std::span<const std::uint8_t> bytes) {
+  std::string text(sodium_base64_ENCODED_LEN(bytes.size(), sodium_base64_VARIANT_ORIGINAL), '\0');
+  sodium_bin2base64(text.data(), text.size(), bytes.data(), bytes.size(),
+                    sodium_base64_VARIANT_ORIGINAL);
+  text.pop_back();
+  return text;
+}
+
+Result<PublicKey> parse_public_key(std::string_view text) {
+  std::string_view line = take_line(text);
+  if (line.starts_with(kUntrusted)) line = take_line(text);
+  std::array<std::uint8_t, 42> bytes{};
+  if (!from_base64(line, bytes) || bytes[0] != 'E' || bytes[1] != 'd') {
+    return fail(ExitCode::kInvalidInput, "key.public", "public key",
+                "it is not a minisign public key", "give the file K.pub of `modar ship keygen`");
+  }
+  PublicKey key;
+  std::copy_n(bytes.begin() + 2, 8, key.id.begin());
+  std::copy_n(bytes.begin() + 10, 32, key.bytes.begin());
+  return key;
+}
+
+std::string public_key_line(const PublicKey& key) {
+  std::array<std::uint8_t, 42> bytes{'E', 'd'};
+  std::copy(key.id.begin(), key.id.end(), bytes.begin() + 2);
+  std::copy(key.bytes.begin(), key.bytes.end(), bytes.begin() + 10);
+  return to_base64(bytes);
+}
+
+Result<Signature> parse_signature(std::string_view text) {
+  if (!take_line(text).starts_with(kUntrusted))
+    return bad_text("its first line is not an untrusted comment");
+  std::array<std::uint8_t, 74> bytes{};
+  if (!from_base64(take_line(text), bytes) || bytes[0] != 'E' ||
+      (bytes[1] != 'D' && bytes[1] != 'd')) {
+    return bad_text("its second line is not an Ed25519 signature");
+  }
+  Signature signature;
+  signature.prehashed = bytes[1] == 'D';
+  std::copy_n(bytes.begin() + 2, 8, signature.key_id.begin());
+  std::copy_n(bytes.begin() + 10, 64, signature.bytes.begin());
+  const std::string_view comment = take_line(text);
+  if (!comment.starts_with(kTrusted)) return bad_text("its third line is not a trusted comment");
+  signature.trusted_comment = comment.substr(kTrusted.size());
+  if (!from_base64(take_line(text), signature.comment_bytes) || !text.empty()) {
+    return bad_text("its fourth line is not the signature of the trusted comment");
+  }
+  return signature;
+}
+
+std::string signature_text(const Signature& signature, std::string_view untrusted_comment) {
+  std::array<std::uint8_t, 74> bytes{'E',
+                                     static_cast<std::uint8_t>(signature.prehashed ? 'D' : 'd')};
+  std::copy(signature.key_id.begin(), signature.key_id.end(), bytes.begin() + 2);
+  std::copy(signature.bytes.begin(), signature.bytes.end(), bytes.begin() + 10);
+  return std::string(kUntrusted) + std::string(untrusted_comment) + "\n" + to_base64(bytes) + "\n" +
+         std::string(kTrusted) + signature.trusted_comment + "\n" +
+         to_base64(signature.comment_bytes) + "\n";
+}
+
+Result<void> verify_signature(std::string_view message, const Signature& signature,
+                              const PublicKey& key) {
+  if (signature.key_id != key.id) {
+    return fail(kExitWrongKey, "signature.key", "signature",
+                "it was made with key " + to_hex(signature.key_id) + ", the trusted key is " +
+                    to_hex(key.id),
+                "fetch from the right server, or give the publisher's key with --trust");
+  }
+  std::vector<std::uint8_t> hash(crypto_generichash_BYTES_MAX);
+  const auto* bytes = reinterpret_cast<const unsigned char*>(message.data());
+  crypto_generichash(hash.data(), hash.size(), bytes, message.size(), nullptr, 0);
+  if (!signature.prehashed) hash.assign(bytes, bytes + message.size());
+  std::vector<std::uint8_t> comment(signature.bytes.begin(), signature.bytes.end());
+  comment.insert(comment.end(), signature.trusted_comment.begin(), signature.trusted_comment.end());
+  if (crypto_sign_verify_detached(signature.bytes.data(), hash.data(), hash.size(),
+                                  key.bytes.data()) != 0 ||
+      crypto_sign_verify_detached(signature.comment_bytes.data(), comment.data(), comment.size(),
+                                  key.bytes.data()) != 0) {
+    return fail(kExitWrongKey, "signature.bad", "signature", "it does not match what it signs",
+                "fetch again; if that does not help, the server's files were changed");
+  }
+  return {};
+}
+
+// --- Release documents ---
+
 namespace {
 
 constexpr const char* kReleaseFormat = "modar-release";
@@ -22,7 +202,7 @@ tl::unexpected<Error> bad(std::string where, std::string cause) {
               std::move(cause), "publish the release again");
 }
 
-/// Reads members of one object, remembering the first that is missing or of another kind.
+/// Reads the members of an object and remembers the first that is missing or of the wrong type.
 class Members {
  public:
   explicit Members(const rapidjson::Value& object) : object_(object) {}
@@ -42,7 +222,7 @@ class Members {
     if (v == nullptr || !v->IsArray()) return miss<const rapidjson::Value*>(key);
     return v;
   }
-  /// The first member that was not as it should be, or empty.
+  /// The first member that was missing or wrong, or empty.
   [[nodiscard]] const std::string& missing() const { return missing_; }
 
  private:
@@ -60,7 +240,7 @@ class Members {
   std::string missing_;
 };
 
-/// A file name that means the same everywhere and leads nowhere else.
+/// A file name that is valid on every file system and cannot leave its folder.
 bool is_plain_name(std::string_view name) {
   if (name.empty() || name.size() > 100 || name.front() == '.') return false;
   for (const char c : name) {
@@ -84,14 +264,14 @@ Result<ReleaseBundle> read_bundle(const rapidjson::Value& json) {
   bundle.download_size = members.number("download_size", kMaxBundleBytes);
   const rapidjson::Value* devices = members.array("devices");
   if (!members.missing().empty()) return bad("bundle", members.missing() + " is missing or wrong");
-  if (!is_plain_name(bundle.name)) return bad("bundle", "its name is no plain file name");
+  if (!is_plain_name(bundle.name)) return bad("bundle", "its name is not a plain file name");
   for (const rapidjson::Value& device : devices->GetArray()) {
-    if (!device.IsString()) return bad("bundle " + bundle.name, "a device is no text");
+    if (!device.IsString()) return bad("bundle " + bundle.name, "a device is not a string");
     bundle.devices.emplace_back(device.GetString(), device.GetStringLength());
   }
   const auto hash_bytes = bundle_hash_of_hex(hash);
   const auto recipe_id = object_id_of_hex(recipe);
-  if (!hash_bytes || !recipe_id) return bad("bundle " + bundle.name, "a hash is not one");
+  if (!hash_bytes || !recipe_id) return bad("bundle " + bundle.name, "a hash is malformed");
   bundle.hash = *hash_bytes;
   bundle.recipe = *recipe_id;
   return bundle;
@@ -103,15 +283,15 @@ Result<rapidjson::Document> parse_document(std::string_view json, const char* fo
   document.Parse<rapidjson::kParseIterativeFlag | rapidjson::kParseValidateEncodingFlag>(
       json.data(), json.size());
   if (json.size() > kMaxReleaseBytes || document.HasParseError() || !document.IsObject()) {
-    return bad("byte " + std::to_string(document.GetErrorOffset()), "it is no JSON object");
+    return bad("byte " + std::to_string(document.GetErrorOffset()), "it is not a JSON object");
   }
   Members members(document);
   if (members.text("format") != format) {
-    return bad("format", std::string("it is no ") + format);
+    return bad("format", std::string("it is not a ") + format + " document");
   }
   if (members.number("format_version", 1000000) != 1) {
     return fail(ExitCode::kUnsupported, "release.version", "release document",
-                "it is of another version of the format", "use a newer modar-fetch");
+                "its format version is not 1", "use a newer modar-fetch");
   }
   return document;
 }
@@ -148,24 +328,21 @@ void write_bundle(Writer& json, const ReleaseBundle& bundle) {
 }  // namespace
 
 Result<Release> parse_release(std::string_view json) {
-  const auto document = parse_document(json, kReleaseFormat);
-  if (!document) return tl::unexpected(document.error());
-  Members members(*document);
+  MODAR_ASSIGN(const auto document, parse_document(json, kReleaseFormat));
+  Members members(document);
   Release release;
   release.version = members.number("version", std::uint64_t{1} << 53);
   const std::string expires = members.text("expires");
   const rapidjson::Value* bundles = members.array("bundles");
   if (!members.missing().empty()) return bad(members.missing(), "it is missing or wrong");
   if (release.version == 0) return bad("version", "versions begin at 1");
-  const auto time = parse_time(expires);
-  if (!time) return tl::unexpected(time.error());
-  release.expires = *time;
+  MODAR_ASSIGN(const auto time, parse_time(expires));
+  release.expires = time;
   std::set<std::string> names;
   for (const rapidjson::Value& json_bundle : bundles->GetArray()) {
-    auto bundle = read_bundle(json_bundle);
-    if (!bundle) return tl::unexpected(bundle.error());
-    if (!names.insert(bundle->name).second) return bad("bundles", "two have the same name");
-    release.bundles.push_back(std::move(*bundle));
+    MODAR_ASSIGN(auto bundle, read_bundle(json_bundle));
+    if (!names.insert(bundle.name).second) return bad("bundles", "two have the same name");
+    release.bundles.push_back(std::move(bundle));
   }
   if (release.bundles.empty()) return bad("bundles", "there is none");
   return release;
@@ -199,16 +376,16 @@ Result<std::int64_t> parse_time(std::string_view text) {
   if (!shaped || !field(0, 4, time.tm_year) || !field(5, 2, time.tm_mon) ||
       !field(8, 2, time.tm_mday) || !field(11, 2, time.tm_hour) || !field(14, 2, time.tm_min) ||
       !field(17, 2, time.tm_sec)) {
-    return fail(ExitCode::kInvalidInput, "release.time", std::string(text),
-                "it is no time as 2027-01-31T00:00:00Z", "write it so");
+    return fail(ExitCode::kInvalidInput, "release.time", std::string(text), "it is not a time",
+                "write it as 2027-01-31T00:00:00Z");
   }
   time.tm_year -= 1900;
   time.tm_mon -= 1;
   const std::int64_t seconds = timegm(&time);
-  // A date that the calendar does not have comes back as another.
+  // timegm() turns a date that does not exist into another.
   if (time_text(seconds) != text) {
     return fail(ExitCode::kInvalidInput, "release.time", std::string(text),
-                "the calendar has no such time", "write one that it has");
+                "there is no such date or time", "check the day and the hour");
   }
   return seconds;
 }
@@ -224,9 +401,8 @@ std::string time_text(std::int64_t seconds) {
 }
 
 Result<KeyLink> parse_key_link(std::string_view json) {
-  const auto document = parse_document(json, kKeyFormat);
-  if (!document) return tl::unexpected(document.error());
-  Members members(*document);
+  MODAR_ASSIGN(const auto document, parse_document(json, kKeyFormat));
+  Members members(document);
   KeyLink link;
   link.serial = static_cast<std::uint32_t>(members.number("serial", 1000000));
   link.key = members.text("key");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <deque>
 #include <optional>
 #include <thread>
@@ -10,11 +11,9 @@
 
 #include <curl/curl.h>
 
-#include "files.hpp"
-#include "modar/digest.hpp"
 #include "modar/mapped_file.hpp"
-#include "modar/signature.hpp"
-#include "server_address.hpp"
+#include "modar/release.hpp"
+#include "store.hpp"
 
 namespace modar::fetch {
 namespace {
@@ -23,6 +22,24 @@ using Clock = std::chrono::steady_clock;
 
 constexpr long kConnectSeconds = 15;
 constexpr std::size_t kPatience = 3;  ///< answers "no such file" before it is believed
+
+/// The URL of an address or folder without a slash at its end; empty if there is no such folder.
+std::string server_address(const std::string& url_or_folder) {
+  std::string base = url_or_folder;
+  while (base.size() > 1 && base.back() == '/') base.pop_back();
+  if (base.find("://") != std::string::npos) return base;
+  char* absolute = ::realpath(base.c_str(), nullptr);
+  if (absolute == nullptr) return {};
+  CURLU* parts = curl_url();
+  curl_url_set(parts, CURLUPART_SCHEME, "file", 0);
+  curl_url_set(parts, CURLUPART_PATH, absolute, CURLU_URLENCODE);
+  char* text = nullptr;
+  if (curl_url_get(parts, CURLUPART_URL, &text, 0) == CURLUE_OK) base = text;
+  curl_free(text);
+  curl_url_cleanup(parts);
+  std::free(absolute);
+  return base;
+}
 
 class TransferLoop;
 
@@ -365,7 +382,7 @@ Result<std::string> Transfers::text(const std::string& path, std::size_t limit) 
   transfers.back()->path = path;
   transfers.back()->text = &text;
   transfers.back()->limit = limit;
-  if (auto done = state_->run(transfers, nullptr); !done) return tl::unexpected(done.error());
+  MODAR_TRY(state_->run(transfers, nullptr));
   return text;
 }
 

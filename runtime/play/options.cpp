@@ -1,13 +1,10 @@
-// Parses the player's command line with getopt_long: the player links no library for it.
 #include "options.hpp"
 
-#include <getopt.h>
-
 #include <array>
-#include <charconv>
 #include <vector>
 
 #include "decimal.hpp"
+#include "runtime/platform/command_line.hpp"
 
 namespace modar {
 namespace {
@@ -16,31 +13,17 @@ tl::unexpected<Error> usage(const char* code, std::string where, std::string cau
   return fail(ExitCode::kUsage, code, std::move(where), std::move(cause), "see modar-play --help");
 }
 
-/// The whole text as a number; false where it is none.
-template <class T>
-bool read_number(std::string_view text, T& value) {
-  const char* end = text.data() + text.size();
-  const auto [last, error] = std::from_chars(text.data(), end, value);
-  return error == std::errc() && last == end;
-}
-
-/// A whole number from 1 to `limit`, 0 where the text is none.
-int positive(std::string_view text, int limit) {
-  int value = 0;
-  return read_number(text, value) && value >= 1 && value <= limit ? value : 0;
-}
-
 bool set_size(PlayOptions& options, std::string_view text) {
   constexpr int kMaxSide = 8192;  // what current GPUs draw; refuses typing errors
   const std::size_t x = text.find('x');
   if (x == std::string_view::npos) return false;
-  options.width = positive(text.substr(0, x), kMaxSide);
-  options.height = positive(text.substr(x + 1), kMaxSide);
+  options.width = static_cast<int>(parse_count(text.substr(0, x), kMaxSide));
+  options.height = static_cast<int>(parse_count(text.substr(x + 1), kMaxSide));
   return options.width > 0 && options.height > 0;
 }
 
 bool set_turntable(PlayOptions& options, std::string_view text) {
-  options.turntable = positive(text, 100'000);
+  options.turntable = static_cast<int>(parse_count(text, 100'000));
   return options.turntable > 0;
 }
 
@@ -100,40 +83,25 @@ constexpr std::array<SwitchOption, 9> kSwitches = {{{"json", &PlayOptions::json}
                                                     {"help", &PlayOptions::help},
                                                     {"version", &PlayOptions::version}}};
 
-/// getopt's numbers: above any letter, in the order of the three tables.
-constexpr int kFirst = 256;
-constexpr int kFirstValue = kFirst + static_cast<int>(kTexts.size());
-constexpr int kFirstSwitch = kFirstValue + static_cast<int>(kValues.size());
-
-std::vector<option> getopt_table() {
-  std::vector<option> table;
-  int number = kFirst;
-  for (const TextOption& each : kTexts) {
-    table.push_back({each.name, required_argument, nullptr, number++});
-  }
-  for (const ValueOption& each : kValues) {
-    table.push_back({each.name, required_argument, nullptr, number++});
-  }
-  for (const SwitchOption& each : kSwitches) {
-    table.push_back({each.name, no_argument, nullptr, number++});
-  }
-  table.push_back({nullptr, 0, nullptr, 0});
-  return table;
+/// All options, in the order of the three tables.
+std::vector<CommandOption> all_options() {
+  std::vector<CommandOption> all;
+  for (const TextOption& each : kTexts) all.push_back({each.name, "a text"});
+  for (const ValueOption& each : kValues) all.push_back({each.name, each.expected});
+  for (const SwitchOption& each : kSwitches) all.push_back({each.name});
+  return all;
 }
 
-Result<void> apply(PlayOptions& options, int number, const char* value) {
-  if (number >= kFirstSwitch) {
-    options.*kSwitches[static_cast<std::size_t>(number - kFirstSwitch)].on = true;
-  } else if (number < kFirstValue) {
-    options.*kTexts[static_cast<std::size_t>(number - kFirst)].text = value;
-  } else {
-    const ValueOption& each = kValues[static_cast<std::size_t>(number - kFirstValue)];
-    if (!each.set(options, value)) {
-      return usage("usage.value", std::string("--") + each.name,
-                   "'" + std::string(value) + "' is not " + each.expected);
-    }
+/// Takes option number `index` of all_options(); false where its value is invalid.
+bool take(PlayOptions& options, std::size_t index, std::string_view value) {
+  if (index < kTexts.size()) {
+    options.*kTexts[index].text = value;
+    return true;
   }
-  return {};
+  index -= kTexts.size();
+  if (index < kValues.size()) return kValues[index].set(options, value);
+  options.*kSwitches[index - kValues.size()].on = true;
+  return true;
 }
 
 Result<void> validate(const PlayOptions& options) {
@@ -170,17 +138,6 @@ Result<void> validate(const PlayOptions& options) {
   return {};
 }
 
-/// What getopt refused: optopt is the letter of a short option, else our number or 0; optind points
-/// behind a long one.
-tl::unexpected<Error> refused(int answer, const std::vector<char*>& argv) {
-  const bool letter = optopt > 0 && optopt < kFirst;
-  const std::string current = letter ? std::string("-") + static_cast<char>(optopt)
-                                     : argv[static_cast<std::size_t>(optind - 1)];
-  if (answer == ':') return usage("usage.value", current, "the option needs a value");
-  if (optopt >= kFirst) return usage("usage.value", current, "the option takes no value");
-  return usage("usage.option", "", "'" + current + "' is no option");
-}
-
 }  // namespace
 
 std::uint64_t parse_bytes(std::string_view text) {
@@ -190,31 +147,18 @@ std::uint64_t parse_bytes(std::string_view text) {
   if (text.ends_with('M')) shift = 20;
   if (text.ends_with('G')) shift = 30;
   if (shift > 0) text.remove_suffix(1);
-  std::uint64_t value = 0;
-  if (!read_number(text, value) || value > (kMost >> shift)) return 0;
-  return value << shift;
+  return parse_count(text, kMost >> shift) << shift;
 }
 
 Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
-  // getopt_long permutes the array that it is given, not the texts: a copy of the pointers serves.
-  std::string program = "modar-play";
-  std::vector<char*> argv = {program.data()};
-  for (const char* argument : arguments) argv.push_back(const_cast<char*>(argument));
-  argv.push_back(nullptr);
-  const int argc = static_cast<int>(argv.size()) - 1;
-  const std::vector<option> table = getopt_table();
-
+  const std::vector<CommandOption> table = all_options();
   PlayOptions options;
-  opterr = 0;
-  optind = 0;  // starts a new scan (GNU)
-  for (;;) {
-    const int number = getopt_long(argc, argv.data(), ":", table.data(), nullptr);
-    if (number == -1) break;
-    if (number == '?' || number == ':') return refused(number, argv);
-    MODAR_TRY(apply(options, number, optarg));
-  }
-  for (int i = optind; i < argc; ++i) {
-    const std::string argument = argv[static_cast<std::size_t>(i)];
+  MODAR_ASSIGN(const auto rest,
+               parse_command_line(arguments, {"usage", "see modar-play --help", table},
+                                  [&](std::size_t index, std::string_view value) {
+                                    return take(options, index, value);
+                                  }));
+  for (const std::string& argument : rest) {
     if (!options.bundle.empty()) {
       return usage("usage.argument", "", "'" + argument + "' is one argument too many");
     }

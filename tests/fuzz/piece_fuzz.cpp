@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "modar/mesh_transport.hpp"
 #include "modar/piece.hpp"
 #include "tests/fuzz/need.hpp"
 

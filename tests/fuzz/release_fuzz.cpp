@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include "modar/release.hpp"
-#include "modar/signature.hpp"
 #include "tests/fuzz/need.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

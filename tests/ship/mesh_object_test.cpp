@@ -8,7 +8,7 @@
 #include "bake/ship/mesh_encoder.hpp"
 #include "formats/quantise.hpp"
 #include "formats/transport/chunk_order.hpp"
-#include "modar/mesh_transport.hpp"
+#include "modar/piece.hpp"
 
 namespace modar {
 namespace {

@@ -9,7 +9,6 @@
 
 #include "bake/ship/keys.hpp"
 #include "bake/ship/recipe_maker.hpp"
-#include "modar/mesh_transport.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
 #include "tests/formats/support.hpp"

@@ -6,8 +6,8 @@
 #include <cstring>
 
 #include "bake/ship/recipe_maker.hpp"
-#include "modar/digest.hpp"
 #include "modar/piece.hpp"
+#include "modar/release.hpp"
 #include "tests/formats/support.hpp"
 
 namespace modar {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "formats/error.hpp"
-#include "modar/signature.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 

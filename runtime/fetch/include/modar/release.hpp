@@ -1,7 +1,12 @@
-// The release document: what a publisher signs and a device believes (formats/shipping.md).
+// What a publisher signs and a device believes: release documents, keys, signatures, and the hashes
+// that name everything else. formats/shipping.md is the normative text.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,43 +16,111 @@
 
 namespace modar {
 
+/// Exit codes of a fetch beyond the common ones (ExitCode leaves 10 and up to the commands).
+inline constexpr ExitCode kExitWrongKey{10};  ///< not signed by the trusted key
+inline constexpr ExitCode kExitRollBack{11};  ///< older than what is installed
+inline constexpr ExitCode kExitExpired{12};   ///< past its expiry
+inline constexpr ExitCode kExitMixed{13};     ///< the server's files belong to different releases
+inline constexpr ExitCode kExitNoSpace{14};   ///< not enough free space
+inline constexpr ExitCode kExitLocked{15};    ///< another process holds the folder
+inline constexpr ExitCode kExitNetwork{16};   ///< gave up; what was downloaded is kept
+inline constexpr ExitCode kExitBadBundle{
+    17};  ///< the new bundle fails validation; the old one stays
+
+/// @name Hashes
+/// BLAKE2b by libsodium, and its hexadecimal text.
+/// @{
+ObjectId object_id(std::span<const std::byte> bytes);
+BundleHash bundle_hash(std::span<const std::byte> bytes);
+
+std::string to_hex(std::span<const std::uint8_t> bytes);
+/// Nothing unless `text` is exactly 2 * N lower-case hexadecimal digits.
+std::optional<ObjectId> object_id_of_hex(std::string_view text);
+std::optional<BundleHash> bundle_hash_of_hex(std::string_view text);
+
+/// "ab/abcdef...": the path of an object below `objects/`.
+std::string object_path(const ObjectId& id);
+/// @}
+
+/// @name Keys and signatures
+/// In minisign's file formats: Ed25519 over BLAKE2b-512.
+/// @{
+struct PublicKey {
+  std::array<std::uint8_t, 8> id{};  ///< minisign's key number
+  std::array<std::uint8_t, 32> bytes{};
+  bool operator==(const PublicKey&) const = default;
+};
+
+/// Reads the base64 line of a minisign public key, or the whole file.
+/// Errors: kInvalidInput "key.public".
+Result<PublicKey> parse_public_key(std::string_view text);
+/// The base64 line.
+std::string public_key_line(const PublicKey& key);
+
+/// Base64 as minisign's files use it (RFC 4648, padded).
+std::string to_base64(std::span<const std::uint8_t> bytes);
+
+/// A detached minisign signature.
+struct Signature {
+  bool prehashed = true;
+  std::array<std::uint8_t, 8> key_id{};
+  std::array<std::uint8_t, 64> bytes{};
+  std::string trusted_comment;
+  std::array<std::uint8_t, 64> comment_bytes{};  ///< over `bytes` and the trusted comment
+};
+
+/// Reads a *.minisig file. Errors: kInvalidInput "signature.text".
+Result<Signature> parse_signature(std::string_view text);
+/// Its text. untrusted_comment: one line that nothing signs.
+std::string signature_text(const Signature& signature, std::string_view untrusted_comment);
+
+/// Checks that `key` signed both `message` and the trusted comment.
+/// Errors: kExitWrongKey "signature.key" (made with another key), "signature.bad".
+Result<void> verify_signature(std::string_view message, const Signature& signature,
+                              const PublicKey& key);
+/// @}
+
+/// @name Release documents
+/// @{
 inline constexpr std::size_t kMaxReleaseBytes = 1u << 20;
-inline constexpr std::size_t kMaxRecipeBytes = sizeof(RecipeHeader) + std::size_t{kMaxPieces} * 64;
+inline constexpr std::size_t kMaxRecipeBytes =
+    sizeof(RecipeHeader) + std::size_t{kMaxPieces} * sizeof(PieceRecord);
 
 struct ReleaseBundle {
   std::string name;        ///< a file name without its extension: letters, digits, . _ - only
   std::uint64_t size = 0;  ///< bytes of the installed bundle
   BundleHash hash{};       ///< of the installed bundle
-  ObjectId recipe{};       ///< the object that holds the recipe, zstd
-  std::uint32_t recipe_size = 0;      ///< bytes as stored
-  std::uint32_t recipe_raw_size = 0;  ///< bytes
+  ObjectId recipe{};       ///< the object that holds the recipe
+  std::uint32_t recipe_size = 0;      ///< bytes as stored (zstd)
+  std::uint32_t recipe_raw_size = 0;  ///< bytes unpacked
   std::uint32_t pieces = 0;
   std::uint64_t download_size = 0;   ///< bytes of all its objects, for a device that has none
   std::vector<std::string> devices;  ///< profiles that it is for; empty: all
 };
 
 struct Release {
-  std::uint64_t version = 0;           ///< at least 1; only grows
+  std::uint64_t version = 0;           ///< 1 or more; only grows
   std::int64_t expires = 0;            ///< seconds since 1970-01-01, UTC
-  std::vector<ReleaseBundle> bundles;  ///< at least one; names differ
+  std::vector<ReleaseBundle> bundles;  ///< at least one, each name once
 };
 
 /// Errors: kInvalidInput "release.*"; kUnsupported "release.version".
 Result<Release> parse_release(std::string_view json);
-/// The document, always the same bytes for the same release.
+/// The document: the same release always gives the same bytes.
 std::string release_text(const Release& release);
 
-/// "2027-01-31T00:00:00Z". Errors: kInvalidInput "release.time".
+/// "2027-01-31T00:00:00Z" to seconds. Errors: kInvalidInput "release.time".
 Result<std::int64_t> parse_time(std::string_view text);
 std::string time_text(std::int64_t seconds);
 
-/// A link of the chain of keys: signed by the key before, it names the one that follows.
+/// A link of the chain of keys: signed by one key, it names the key that follows.
 struct KeyLink {
   std::uint32_t serial = 0;  ///< from 1, without gaps
   std::string key;           ///< public_key_line()
 };
-/// Errors: kInvalidInput "keylink.text".
+/// Errors: kInvalidInput "release.text".
 Result<KeyLink> parse_key_link(std::string_view json);
 std::string key_link_text(const KeyLink& link);
+/// @}
 
 }  // namespace modar

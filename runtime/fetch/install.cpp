@@ -1,0 +1,421 @@
+#include "install.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "formats/atomic_file.hpp"
+#include "formats/check.hpp"
+#include "modar/mapped_file.hpp"
+#include "modar/piece.hpp"
+
+namespace modar::fetch {
+namespace {
+
+// --- Installed bundles as a source of pieces ---
+
+/// Unpacks and validates a recipe as stored; `bytes` receives what the view points into.
+/// Errors: kInvalidInput "recipe.*".
+Result<RecipeView> unpack_recipe(std::span<const std::byte> stored, std::size_t raw_size,
+                                 std::vector<std::uint64_t>& bytes) {
+  MODAR_ASSIGN(const auto raw, unpack_zstd(stored, raw_size));
+  bytes.assign((raw.size() + 7) / 8, 0);
+  if (!raw.empty()) std::memcpy(bytes.data(), raw.data(), raw.size());
+  return open_recipe(std::as_bytes(std::span(bytes)).first(raw.size()));
+}
+
+/// Adds `base` to each 16-bit index, modulo 65536: indices of a piece are local to its chunk.
+void shift_indices(std::span<std::byte> indices, std::uint16_t base) {
+  for (std::size_t i = 0; i + 1 < indices.size(); i += 2) {
+    std::uint16_t index = 0;
+    std::memcpy(&index, indices.data() + i, 2);
+    index = static_cast<std::uint16_t>(index + base);
+    std::memcpy(indices.data() + i, &index, 2);
+  }
+}
+
+/// An installed bundle with its recipe.
+struct OldBundle {
+  MappedFile bundle;
+  std::vector<std::uint64_t> recipe_bytes;  ///< aligned for RecipeView
+  RecipeView recipe;
+};
+
+class PieceSource {
+ public:
+  /// Maps those bundles of an installed release whose recipe can be read.
+  void add(const InstalledRelease& installed);
+  /// Whether one of them has the piece.
+  [[nodiscard]] bool has(const ObjectId& id) const { return places_.contains(id); }
+  /// Its raw bytes; nothing if they do not have the hash that the recipe says (a damaged file).
+  [[nodiscard]] std::optional<std::vector<std::byte>> raw(const ObjectId& id) const;
+
+ private:
+  std::vector<std::unique_ptr<OldBundle>> bundles_;
+  std::map<ObjectId, std::pair<const OldBundle*, const PieceRecord*>> places_;
+};
+
+void PieceSource::add(const InstalledRelease& installed) {
+  for (const ReleaseBundle& bundle : installed.release.bundles) {
+    const std::string path = installed.folder + "/" + bundle.name;
+    auto file = MappedFile::open(path + ".modar");
+    const auto stored = read_small_file(path + ".recipe", kMaxRecipeBytes);
+    if (!file || !stored || file->bytes().size() != bundle.size) continue;
+    auto old = std::make_unique<OldBundle>();
+    old->bundle = std::move(*file);
+    const auto recipe =
+        unpack_recipe(std::as_bytes(std::span(*stored)), bundle.recipe_raw_size, old->recipe_bytes);
+    if (!recipe || recipe->header.bundle_size != bundle.size) continue;
+    old->recipe = *recipe;
+    for (const PieceRecord& piece : old->recipe.pieces) {
+      if (piece.stored_size == 0) continue;
+      places_.emplace(std::to_array(piece.id), std::pair(old.get(), &piece));
+    }
+    bundles_.push_back(std::move(old));
+  }
+}
+
+std::optional<std::vector<std::byte>> PieceSource::raw(const ObjectId& id) const {
+  const auto place = places_.find(id);
+  if (place == places_.end()) return std::nullopt;
+  const auto& [old, piece] = place->second;
+  const auto bytes = old->bundle.bytes();
+  const auto first = bytes.subspan(piece->offset, piece->raw_size - piece->second_size);
+  const auto second = bytes.subspan(piece->second_offset, piece->second_size);
+  std::vector<std::byte> raw(first.begin(), first.end());
+  raw.insert(raw.end(), second.begin(), second.end());
+  const bool level = static_cast<PieceForm>(piece->form) == PieceForm::kLevel;
+  shift_indices(std::span(raw).subspan(level ? 0 : first.size()),
+                static_cast<std::uint16_t>(-piece->index_base));
+  if (raw_hash(raw) != piece->raw_hash) return std::nullopt;
+  return raw;
+}
+
+// --- A bundle from old pieces and new ones ---
+
+/// A bundle under construction.
+struct Assembly {
+  ReleaseBundle bundle;
+  std::string recipe_stored;                ///< as downloaded, kept beside the bundle
+  std::vector<std::uint64_t> recipe_bytes;  ///< unpacked, aligned
+  RecipeView recipe;
+  std::string file;  ///< NAME.modar in the spare slot
+};
+
+struct AssemblyCounts {
+  std::uint64_t reused_bytes = 0;
+  std::uint32_t reused_pieces = 0;
+  std::uint32_t new_pieces = 0;
+};
+
+Result<void> write_raw(OutputFile& file, const PieceRecord& piece, std::span<std::byte> raw) {
+  const auto form = static_cast<PieceForm>(piece.form);
+  const std::size_t second_size = form == PieceForm::kMesh ? piece.second_size : 0;
+  const auto second = raw.last(second_size);
+  shift_indices(form == PieceForm::kLevel ? raw : second, piece.index_base);
+  MODAR_TRY(file.write_at(piece.offset, raw.data(), raw.size() - second_size));
+  if (second.empty()) return {};
+  return file.write_at(piece.second_offset, second.data(), second.size());
+}
+
+/// Feature texts are written last, from the mapped features that are in the file by then.
+Result<void> write_texts(const Assembly& assembly, OutputFile& file) {
+  MODAR_ASSIGN(const auto mapped, MappedFile::open(assembly.file));
+  for (const PieceRecord& piece : assembly.recipe.pieces) {
+    if (static_cast<PieceForm>(piece.form) != PieceForm::kFeatureText) continue;
+    MODAR_ASSIGN(auto raw, decode_piece(piece, mapped.bytes().subspan(piece.second_offset,
+                                                                      piece.second_size)));
+    MODAR_TRY(write_raw(file, piece, raw));
+  }
+  return {};
+}
+
+Result<std::vector<std::byte>> downloaded(const PieceRecord& piece, const std::string& pieces) {
+  MODAR_ASSIGN(const auto file, MappedFile::open(pieces + "/" + to_hex(piece.id)));
+  return decode_piece(piece, file.bytes());
+}
+
+/// Writes the file at `assembly.file`: pieces that `source` has from there, the others from
+/// `pieces`/ID. Pieces in `damaged` are never taken from `source`; pieces of it that turn out to be
+/// damaged are added to the set, and then the file is left unfinished. Errors: kIo; kInvalidInput.
+Result<void> assemble(const Assembly& assembly, const PieceSource& source,
+                      const std::string& pieces, AssemblyCounts& counts,
+                      std::set<ObjectId>& damaged) {
+  const std::size_t known_damage = damaged.size();
+  MODAR_ASSIGN(auto file, OutputFile::open(assembly.file));
+  MODAR_TRY(file.resize(assembly.bundle.size));
+  for (const PieceRecord& piece : assembly.recipe.pieces) {
+    if (piece.stored_size == 0) continue;
+    const ObjectId id = std::to_array(piece.id);
+    if (source.has(id) && !damaged.contains(id)) {
+      auto raw = source.raw(id);
+      if (!raw || raw->size() != piece.raw_size || raw_hash(*raw) != piece.raw_hash) {
+        damaged.insert(id);
+        continue;
+      }
+      MODAR_TRY(write_raw(file, piece, *raw));
+      counts.reused_bytes += raw->size();
+      ++counts.reused_pieces;
+      continue;
+    }
+    MODAR_ASSIGN(auto raw, downloaded(piece, pieces));
+    MODAR_TRY(write_raw(file, piece, raw));
+    ++counts.new_pieces;
+  }
+  if (damaged.size() != known_damage) return {};
+  MODAR_TRY(write_texts(assembly, file));
+  return file.sync();
+}
+
+// --- A release ---
+
+/// Left free beyond what is needed, for folders, links and the state: set by hand.
+constexpr std::uint64_t kSpareBytes = 1u << 20;
+
+/// Reports progress at most ten times a second.
+class ProgressReporter {
+ public:
+  ProgressReporter(const FetchOptions& options, std::uint64_t total)
+      : options_(options), begin_(std::chrono::steady_clock::now()) {
+    progress_.bytes_total = total;
+  }
+  void add(std::int64_t bytes) {
+    progress_.bytes_done += static_cast<std::uint64_t>(bytes);
+    if (first_ == 0 && bytes > 0) first_ = progress_.bytes_done;
+    const auto now = std::chrono::steady_clock::now();
+    if (!options_.progress || now - reported_ < std::chrono::milliseconds(100)) return;
+    reported_ = now;
+    const double seconds = std::chrono::duration<double>(now - begin_).count();
+    const double came = double(progress_.bytes_done) - double(first_);
+    if (came > 0 && seconds > 1) {
+      progress_.seconds_left =
+          (double(progress_.bytes_total) - double(progress_.bytes_done)) * seconds / came;
+    }
+    options_.progress(progress_);
+  }
+
+ private:
+  const FetchOptions& options_;
+  FetchProgress progress_;
+  std::uint64_t first_ = 0;  // bytes of earlier runs
+  std::chrono::steady_clock::time_point begin_;
+  std::chrono::steady_clock::time_point reported_{};
+};
+
+/// One installation, from the verified document to the switch.
+class Installation {
+ public:
+  explicit Installation(const InstallationJob& job)
+      : options_(job.options),
+        store_(job.store),
+        transfers_(job.transfers),
+        news_(job.news),
+        active_(job.active),
+        chosen_(job.chosen),
+        slot_(job.store.spare_folder()) {}
+
+  Result<void> run(FetchReport& report) {
+    if (active_) source_.add(*active_);
+    return bring_recipes()
+        .and_then([&] { return empty_folder(slot_); })
+        .and_then([&] { return tidy_pieces(); })
+        .and_then([&] { return bring_pieces(); })
+        .and_then([&] { return build(report); })
+        .and_then([&] { return finish(); });
+  }
+
+ private:
+  Result<void> bring_recipes() {
+    assemblies_.reserve(chosen_.size());
+    std::vector<Wanted> wanted;
+    for (const ReleaseBundle& bundle : chosen_) {
+      const std::string file = piece_file(bundle.recipe);
+      if (!file_size(file)) wanted.push_back(want(bundle.recipe, bundle.recipe_size));
+    }
+    MODAR_TRY(transfers_.objects(wanted, [](std::int64_t) {}));
+    for (const ReleaseBundle& bundle : chosen_) {
+      Assembly& assembly = assemblies_.emplace_back();
+      assembly.bundle = bundle;
+      assembly.file = slot_ + "/" + bundle.name + ".modar";
+      MODAR_TRY(open_stored_recipe(assembly));
+    }
+    return {};
+  }
+
+  Result<void> open_stored_recipe(Assembly& assembly) {
+    const std::string file = piece_file(assembly.bundle.recipe);
+    const auto stored = read_small_file(file, kMaxRecipeBytes);
+    if (!stored || object_id(std::as_bytes(std::span(*stored))) != assembly.bundle.recipe) {
+      // It was damaged on the disk after it was verified: the next run downloads it again.
+      MODAR_TRY(remove_file(file));
+      return fail(ExitCode::kIo, "fetch.recipe", file, "it was damaged on the disk",
+                  "run modar-fetch again");
+    }
+    assembly.recipe_stored = *stored;
+    MODAR_ASSIGN(const auto recipe,
+                 unpack_recipe(std::as_bytes(std::span(assembly.recipe_stored)),
+                               assembly.bundle.recipe_raw_size, assembly.recipe_bytes));
+    assembly.recipe = recipe;
+    if (recipe.header.bundle_size != assembly.bundle.size ||
+        !std::equal(assembly.bundle.hash.begin(), assembly.bundle.hash.end(),
+                    recipe.header.bundle_hash)) {
+      return fail(kExitMixed, "fetch.mixed", "bundle " + assembly.bundle.name,
+                  "its recipe belongs to another bundle", "publish the release again");
+    }
+    return {};
+  }
+
+  /// Pieces that no installed bundle has, by the size of their objects.
+  [[nodiscard]] std::map<ObjectId, std::uint64_t> missing_pieces() const {
+    std::map<ObjectId, std::uint64_t> sizes;
+    for (const Assembly& assembly : assemblies_) {
+      for (const PieceRecord& piece : assembly.recipe.pieces) {
+        const ObjectId id = std::to_array(piece.id);
+        if (piece.stored_size == 0 || (source_.has(id) && !damaged_.contains(id))) continue;
+        sizes.emplace(id, piece.stored_size);
+      }
+    }
+    return sizes;
+  }
+
+  /// Removes pieces that this release does not need.
+  Result<void> tidy_pieces() {
+    std::set<std::string> needed;
+    for (const auto& [id, size] : missing_pieces()) needed.insert(to_hex(id));
+    for (const Assembly& assembly : assemblies_) needed.insert(to_hex(assembly.bundle.recipe));
+    for (const std::string& name : list_folder(store_.pieces())) {
+      if (needed.contains(name.substr(0, name.find('.')))) continue;
+      MODAR_TRY(remove_file(store_.pieces() + "/" + name));
+    }
+    return {};
+  }
+
+  Result<void> bring_pieces() {
+    std::vector<Wanted> wanted;
+    std::uint64_t total = 0;
+    std::uint64_t needed = kSpareBytes;
+    for (const auto& [id, size] : missing_pieces()) {
+      if (is_whole(id, size)) continue;
+      wanted.push_back(want(id, size));
+      total += size;
+      const auto part = file_size(wanted.back().file + ".part").value_or(0);
+      needed += size - std::min(part, size);
+    }
+    for (const Assembly& assembly : assemblies_) {
+      needed += assembly.bundle.size - file_size(assembly.file).value_or(0);
+    }
+    MODAR_ASSIGN(const auto space, free_space(store_.path()));
+    if (space < needed) {
+      return fail(
+          kExitNoSpace, "fetch.space", store_.path(),
+          std::to_string(needed) + " bytes are needed, " + std::to_string(space) + " are free",
+          "make room and run modar-fetch again");
+    }
+    ProgressReporter progress(options_, total);
+    return transfers_.objects(wanted, [&](std::int64_t bytes) { progress.add(bytes); });
+  }
+
+  /// Whether the store has a piece with the right content; one with the wrong content is removed.
+  bool is_whole(const ObjectId& id, std::uint64_t size) {
+    const std::string file = piece_file(id);
+    const auto found = file_size(file);
+    if (!found) return false;
+    if (const auto mapped = MappedFile::open(file);
+        *found == size && mapped && object_id(mapped->bytes()) == id) {
+      return true;
+    }
+    ::unlink(file.c_str());
+    return false;
+  }
+
+  Result<void> build(FetchReport& report) {
+    for (const Assembly& assembly : assemblies_) {
+      if (!link_old_bundle(assembly, report)) {
+        MODAR_TRY(build_bundle(assembly, report));
+        MODAR_TRY(verify_bundle(assembly.file, assembly.bundle));
+      }
+      MODAR_TRY(write_file(slot_ + "/" + assembly.bundle.name + ".recipe",
+                           std::string_view(assembly.recipe_stored)));
+    }
+    return {};
+  }
+
+  /// A bundle that did not change is one file (hard link) in both slots.
+  bool link_old_bundle(const Assembly& assembly, FetchReport& report) const {
+    if (!active_) return false;
+    const std::string old = active_->folder + "/" + assembly.bundle.name + ".modar";
+    if (!verify_bundle(old, assembly.bundle) || !share_file(old, assembly.file)) return false;
+    report.reused_bytes += assembly.bundle.size;
+    report.reused_pieces += static_cast<std::uint32_t>(assembly.recipe.pieces.size());
+    return true;
+  }
+
+  Result<void> build_bundle(const Assembly& assembly, FetchReport& report) {
+    AssemblyCounts counts;
+    while (true) {
+      const std::size_t known = damaged_.size();
+      counts = {};
+      MODAR_TRY(assemble(assembly, source_, store_.pieces(), counts, damaged_));
+      if (damaged_.size() == known) break;
+      // An installed bundle is damaged on the disk: download these pieces after all.
+      report.corrupt_pieces += static_cast<std::uint32_t>(damaged_.size() - known);
+      MODAR_TRY(bring_pieces());
+    }
+    report.reused_bytes += counts.reused_bytes;
+    report.reused_pieces += counts.reused_pieces;
+    report.downloaded_pieces += counts.new_pieces;
+    return {};
+  }
+
+  /// The documents last: a slot with a release.json is complete.
+  Result<void> finish() {
+    return write_file(slot_ + "/release.json.minisig", std::string_view(news_.signature_text))
+        .and_then([&] { return write_file(slot_ + "/release.json", std::string_view(news_.text)); })
+        .and_then([&] {
+          return store_.activate({slot_, news_.text, news_.release});
+        });
+  }
+
+  [[nodiscard]] std::string piece_file(const ObjectId& id) const {
+    return store_.pieces() + "/" + to_hex(id);
+  }
+  [[nodiscard]] Wanted want(const ObjectId& id, std::uint64_t size) const {
+    return {id, size, "objects/" + object_path(id), piece_file(id)};
+  }
+
+  const FetchOptions& options_;
+  const Store& store_;
+  Transfers& transfers_;
+  const SignedRelease& news_;
+  const std::optional<InstalledRelease>& active_;
+  const std::vector<ReleaseBundle>& chosen_;
+  std::string slot_;
+  PieceSource source_;
+  std::vector<Assembly> assemblies_;
+  std::set<ObjectId> damaged_;
+};
+
+}  // namespace
+
+Result<void> verify_bundle(const std::string& file, const ReleaseBundle& bundle) {
+  MODAR_ASSIGN(const auto mapped, MappedFile::open(file));
+  if (mapped.bytes().size() != bundle.size || bundle_hash(mapped.bytes()) != bundle.hash) {
+    return fail(kExitBadBundle, "store.hash", file, "it is not what was signed",
+                "run modar-fetch again");
+  }
+  const std::string error = first_error(mapped.bytes());
+  if (error.empty()) return {};
+  return fail(kExitBadBundle, "store.rules", file, error,
+              "tell the publisher: `modar check` finds it before publishing");
+}
+
+Result<void> install(const InstallationJob& job, FetchReport& report) {
+  return Installation(job).run(report);
+}
+
+}  // namespace modar::fetch
