@@ -12,8 +12,8 @@
 #include "bake/check/workstation_issues.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "bake/pattern/pose_scene.hpp"
+#include "modar/paper_tracker.hpp"
 #include "modar/pose_loop.hpp"
-#include "modar/tracker.hpp"
 
 namespace modar {
 namespace {

@@ -10,8 +10,8 @@
 #include "bake/lab/pose_bench.hpp"
 #include "bake/pattern/pose_scene.hpp"
 #include "bake/pattern/tracker_record_bake.hpp"
+#include "modar/paper_tracker.hpp"
 #include "modar/pose_loop.hpp"
-#include "modar/tracker.hpp"
 
 namespace modar {
 

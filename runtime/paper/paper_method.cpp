@@ -7,7 +7,7 @@
 
 #include "features.hpp"
 #include "modar/features.hpp"
-#include "modar/tracker.hpp"
+#include "modar/paper_tracker.hpp"
 #include "opencv_bridge.hpp"
 #include "runtime/platform/lap_clock.hpp"
 

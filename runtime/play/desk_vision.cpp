@@ -3,6 +3,8 @@
 
 #include "vision.hpp"
 
+#include "modar/paper_tracker.hpp"
+
 namespace modar {
 namespace {
 

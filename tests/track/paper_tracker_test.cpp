@@ -4,7 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "modar/features.hpp"
-#include "modar/tracker.hpp"
+#include "modar/paper_tracker.hpp"
 #include "synthetic.hpp"
 
 namespace modar {

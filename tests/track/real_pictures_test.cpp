@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "modar/tracker.hpp"
+#include "modar/paper_tracker.hpp"
 #include "synthetic.hpp"
 
 namespace modar {

@@ -1,17 +1,14 @@
-// The result of tracking a frame, the method of the ModAR paper, and its two-frame rule.
+// The result of tracking a frame, and the two-frame rule of the ModAR paper.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <memory>
+#include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
-#include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "modar/camera.hpp"
-#include "modar/image.hpp"
 #include "modar/pose.hpp"
 
 namespace modar {
@@ -55,29 +52,6 @@ struct TrackResult {
   Reason reason = Reason::kNoFeatures;  ///< of the pattern that came furthest
   int features = 0;                     ///< keypoints of the frame
   TrackTimes times;
-};
-
-/// The pipeline of the ModAR paper (README cites it), by OpenCV: detect, describe, match by brute
-/// force with cross-check, RANSAC homography, Levenberg-Marquardt, corners, pose. The baseline for
-/// PoseLoop, so nothing of PoseLoop goes into it.
-class PaperTracker {
- public:
-  /// Reads the patterns described with parameter set `set_id` from the bundle's mapped feature
-  /// sections. Errors: kInvalidInput "tracker.no-patterns" if the bundle has none.
-  static Result<std::unique_ptr<PaperTracker>> create(const BundleView& bundle,
-                                                      std::uint32_t set_id, const Camera& camera);
-  PaperTracker(const PaperTracker&) = delete;
-  PaperTracker& operator=(const PaperTracker&) = delete;
-  ~PaperTracker();
-
-  /// One frame of the camera's size. Errors: kInvalidInput "tracker.frame-size", kInternal
-  /// "tracker.opencv".
-  Result<TrackResult> step(const GrayImage& frame);
-
- private:
-  struct State;
-  explicit PaperTracker(std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
 };
 
 /// The two-frame rule of the ModAR paper: a model is shown once its pattern was seen in two
