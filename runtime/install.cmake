@@ -4,13 +4,25 @@ set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/modar)
 set(include_dir ${CMAKE_INSTALL_INCLUDEDIR}/modar)
 set_target_properties(modar_runtime PROPERTIES EXPORT_NAME runtime)
 set_target_properties(modar_formats PROPERTIES EXPORT_NAME formats)
-install(TARGETS modar_runtime modar_formats EXPORT modar-targets
+set(packages modar)
+set(libraries modar_runtime modar_formats)
+set(include_folders include/)
+if(TARGET modar_fetch)
+  set_target_properties(modar_fetch PROPERTIES EXPORT_NAME fetch)
+  list(APPEND packages modar-fetch)
+  list(APPEND libraries modar_fetch)
+  list(APPEND include_folders fetch/include/)
+endif()
+install(TARGETS ${libraries} EXPORT modar-targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
   INCLUDES DESTINATION ${include_dir})
 install(EXPORT modar-targets NAMESPACE modar:: DESTINATION ${package_dir} COMPONENT development)
-install(DIRECTORY include/ DESTINATION ${include_dir} COMPONENT development)
-install(DIRECTORY ${CMAKE_SOURCE_DIR}/formats/ DESTINATION ${include_dir}/formats
-  COMPONENT development FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY ${include_folders} DESTINATION ${include_dir} COMPONENT development)
+# Of formats/ only what the headers above include; tests/cli/app_test.py links every function of theirs.
+foreach(header error layout bundle_view transport/recipe)
+  get_filename_component(folder formats/${header} DIRECTORY)
+  install(FILES ${CMAKE_SOURCE_DIR}/formats/${header}.hpp DESTINATION ${include_dir}/${folder} COMPONENT development)
+endforeach()
 install(FILES example/overlay.c example/CMakeLists.txt
   DESTINATION ${CMAKE_INSTALL_DOCDIR}/example COMPONENT development)
 
@@ -24,6 +36,8 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/modar-config.cmake
 # Wherever the whole is moved to, it finds itself.
 file(RELATIVE_PATH prefix_from_pkgconfig
   /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
-configure_file(modar.pc.in ${CMAKE_CURRENT_BINARY_DIR}/modar.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/modar.pc
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
+foreach(package ${packages})
+  configure_file(${package}.pc.in ${CMAKE_CURRENT_BINARY_DIR}/${package}.pc @ONLY)
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${package}.pc
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
+endforeach()

@@ -48,7 +48,7 @@ there_on_arm() {
     done
   fi
 
-  cmake --preset device -B "$build" --toolchain "$PWD/scripts/foreign.cmake" -DMODAR_FOREIGN="$arch" \
+  cmake --preset device -B "$build" --toolchain "$PWD/scripts/foreign.cmake" -DMODAR_FOREIGN="$arch" -DMODAR_FETCH=OFF \
     -DMODAR_FOREIGN_ROOT="$root" > /dev/null
   cmake --build "$build" --target modar-play
   "$triple-strip" -o "$build/modar-play.stripped" "$build/bin/modar-play"

@@ -7,14 +7,18 @@
 namespace modar {
 namespace {
 
+// Sizes trade what an update downloads (small pieces) against recipe bytes and requests (large
+// ones). Set by hand; tests/bench/ship_peers.py compares updates with casync and zchunk.
 constexpr std::size_t kLeast = 8 << 10;
 constexpr std::size_t kUsual = 64 << 10;
 constexpr std::size_t kMost = 256 << 10;
-// Two bits more before the usual size and two fewer after it: sizes gather round it.
+// The normalised chunking of FastCDC, level 2: two mask bits more before the usual size, two fewer
+// after it.
 constexpr std::uint64_t kRareMask = ((std::uint64_t{1} << 18) - 1) << 40;
 constexpr std::uint64_t kCommonMask = ((std::uint64_t{1} << 14) - 1) << 40;
 
-/// A random number a byte value (SplitMix64), for good: other numbers would be other pieces.
+/// A random number for each byte value (SplitMix64). Never to be changed: other numbers cut other
+/// pieces, and devices download everything again.
 constexpr std::array<std::uint64_t, 256> make_gear() {
   std::array<std::uint64_t, 256> gear{};
   std::uint64_t state = 0x6d6f646172;  // "modar"

@@ -1,5 +1,5 @@
-// Where to cut bytes so that the cuts move with the content: an insertion changes the pieces round
-// it and no other.
+// Content-defined chunking: cuts move with the content, so that an insertion changes only the
+// pieces around it.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace modar {
 
-/// Sizes of the pieces that the bytes fall into, front to back: 8 to 256 KiB, 64 KiB in the middle.
+/// Sizes of the pieces, front to back: 8 to 256 KiB, typically 64 KiB.
 /// FastCDC (Xia et al., "FastCDC: a fast and efficient content-defined chunking approach for data
 /// deduplication", 2016), with its normalised chunking.
 /// unit: cuts fall on multiples of it, counted from the first byte.

@@ -1,4 +1,4 @@
-// The one file of the workstation that encodes with Draco for shipping.
+// Encodes integer attributes with Draco: the only file of bake/ship that includes it.
 #include <array>
 #include <cstring>
 
@@ -66,7 +66,7 @@ std::optional<std::vector<std::byte>> encode_draco(std::span<const DracoInput> a
     if (attributes[a].kind == DracoInput::Kind::kNormal) {
       encoder.SetAttributeQuantization(id, normal_bits);
     } else if (attributes[a].kind == DracoInput::Kind::kUv) {
-      // Integers already; the width lets Draco's predictor of texture coordinates in.
+      // They are integers already; the bit width enables Draco's texture coordinate predictor.
       encoder.SetAttributeQuantization(id, 16);
     }
   }

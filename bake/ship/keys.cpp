@@ -81,7 +81,7 @@ bool read_record(std::string_view text, Record& record) {
 
 Result<SecretKey> make_key() {
   if (sodium_init() < 0) {
-    return fail(ExitCode::kInternal, "key.random", "", "the system gives no random numbers",
+    return fail(ExitCode::kInternal, "key.random", "", "the system provides no random numbers",
                 "see that /dev/urandom is there");
   }
   SecretKey key;
@@ -107,8 +107,8 @@ Result<std::string> secret_key_text(const SecretKey& key, const std::string& pas
   std::copy(sum.begin(), sum.end(), masked + 72);
   if (!pass_phrase.empty() && !apply_mask(record, pass_phrase)) {
     return fail(ExitCode::kInternal, "key.memory", "",
-                "scrypt needs 1 GiB of memory and has not got it",
-                "free memory, or leave the pass phrase out");
+                "scrypt cannot get the 1 GiB of memory that it needs",
+                "free memory, or use no pass phrase");
   }
   return std::string("untrusted comment: minisign ") +
          (pass_phrase.empty() ? "unencrypted" : "encrypted") + " secret key\n" + to_base64(record) +
@@ -123,7 +123,7 @@ bool needs_pass_phrase(std::string_view text) {
 Result<SecretKey> parse_secret_key(std::string_view text, const std::string& pass_phrase) {
   Record record{};
   if (!read_record(text, record)) {
-    return bad_secret("key.secret", "it is no minisign secret key",
+    return bad_secret("key.secret", "it is not a minisign secret key",
                       "give the file that `modar ship keygen` wrote");
   }
   if (record[2] == 'S' && !apply_mask(record, pass_phrase)) {

@@ -1,4 +1,4 @@
-// The publisher's keys, in minisign's own files: either program can use the other's.
+// The publisher's keys, in minisign's file formats: either program reads the other's files.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ struct SecretKey {
   std::array<std::uint8_t, 64> bytes{};  ///< libsodium's: seed and public key
 };
 
-/// A new pair of keys. Errors: kInternal "key.random".
+/// Generates a pair of keys. Errors: kInternal "key.random".
 Result<SecretKey> make_key();
 
 /// The text of the secret file; encrypted (scrypt) unless the pass phrase is empty.
@@ -26,7 +26,7 @@ bool needs_pass_phrase(std::string_view text);
 /// The text of K.pub.
 std::string public_key_text(const PublicKey& key);
 
-/// A *.minisig text over `message`.
+/// Signs `message`; returns the text of a *.minisig file.
 std::string sign(const SecretKey& key, std::string_view message,
                  const std::string& trusted_comment);
 

@@ -18,7 +18,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kLimitMemory = false;  // their shadow needs terabytes of addresses
+constexpr bool kLimitMemory = false;  // their shadow memory needs terabytes of addresses
 #else
 constexpr bool kLimitMemory = true;
 #endif
@@ -54,7 +54,7 @@ bool write_all(int descriptor, const std::byte* bytes, std::size_t size) {
   try {
     const TaskResult result = task();
     sent = result && write_all(pipe, result->data(), result->size());
-  } catch (...) {  // out of memory, or what a library throws: the parent goes without
+  } catch (...) {  // out of memory, or a library threw: no result
   }
   ::_exit(sent ? 0 : 1);
 }
@@ -76,7 +76,7 @@ Child start(std::size_t task, const ProcessLimits& limits,
   return child;
 }
 
-/// Takes what has come; false once the child has closed its end.
+/// Reads what is there; false once the child has closed its end.
 bool drain(Child& child) {
   std::array<std::byte, 65536> buffer;
   const ssize_t size = ::read(child.pipe, buffer.data(), buffer.size());

@@ -15,6 +15,7 @@
 namespace modar {
 namespace {
 
+/// The highest level without more memory for the decoder: time of publishing for download bytes.
 constexpr int kZstdLevel = 19;
 
 /// Values of one attribute that differ in their bytes, and the value of each vertex.
@@ -38,7 +39,7 @@ DracoInput distinct_values(const VertexStream& stream, std::span<const std::byte
   return input;
 }
 
-/// Triangles that Draco keeps, and those that it would drop for having a corner twice.
+/// Triangles that Draco keeps, and those that it drops because they have a corner twice.
 struct SplitTriangles {
   std::vector<std::uint16_t> kept;
   std::vector<std::uint16_t> loose;
@@ -57,8 +58,8 @@ SplitTriangles split_triangles(std::span<const std::uint16_t> indices,
   return split;
 }
 
-/// Values of every attribute in the order in which Draco will give them back. The order hangs on
-/// the connectivity alone, so it is found by sending the values' numbers in place of the values.
+/// Values of every attribute in the order in which Draco returns them. That order depends on the
+/// connectivity alone, so it is found by encoding the numbers of the values instead of the values.
 std::optional<std::vector<std::vector<std::uint32_t>>> travelling_order(
     std::span<const DracoInput> attributes, std::span<const std::uint16_t> indices,
     std::uint32_t vertex_count) {
@@ -111,7 +112,7 @@ std::vector<std::byte> squeeze(const std::vector<std::byte>& bytes) {
   return packed;
 }
 
-/// A chunk on its way: what Draco gets, and what goes beside it.
+/// Encodes one chunk: what Draco carries, and what travels beside it.
 class MeshObjectMaker {
  public:
   MeshObjectMaker(std::span<const std::byte> vertices, std::span<const std::uint16_t> indices,
@@ -167,7 +168,8 @@ class MeshObjectMaker {
     }
   }
 
-  /// Where a place of the map gives a normal's exact bytes, points it at that place.
+  /// Moves a normal to a place of the octahedral map that decodes to its exact bytes, if there is
+  /// one.
   static void aim_normals(DracoInput& normals, int bits) {
     for (std::size_t i = 0; i + 2 < normals.values.size(); i += 3) {
       std::int32_t* n = normals.values.data() + i;
@@ -201,7 +203,7 @@ class MeshObjectMaker {
     return bits.bytes();
   }
 
-  /// Three planes of what the octahedral map misses, then the loose triangles.
+  /// Three planes of what the octahedral map is off by, then the loose triangles.
   [[nodiscard]] std::optional<std::vector<std::byte>> corrections(
       const std::vector<std::byte>& draco, int normal_bits) const {
     std::vector<std::byte> bytes;

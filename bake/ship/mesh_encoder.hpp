@@ -1,4 +1,4 @@
-// A chunk to the object that it travels as (modar/piece.hpp).
+// Encodes chunks as mesh objects and coarser levels (modar/piece.hpp decodes them).
 #pragma once
 
 #include <cstddef>
@@ -20,21 +20,20 @@ struct DracoInput {
   std::vector<std::uint32_t> value_of_vertex;
 };
 
-/// Draco's smallest buffer for these triangles (3 distinct position values each); nothing if it
-/// refuses. normal_bits: of the octahedral map.
+/// Encodes with Draco's best compression; nothing if Draco refuses. indices: triangles with 3
+/// distinct position values each. normal_bits: of the octahedral map.
 std::optional<std::vector<std::byte>> encode_draco(std::span<const DracoInput> attributes,
                                                    std::span<const std::uint16_t> indices,
                                                    std::uint32_t vertex_count, int normal_bits);
 
-/// The object, which decode_mesh_object() was seen to turn back into these very bytes; nothing if
-/// the chunk cannot travel this way (layout, -0, another order than the bake's).
-/// vertices: of `layout`. indices: local to them.
+/// A mesh object, verified by decoding it; nothing if the chunk cannot travel this way (layout, -0,
+/// or an order that is not ChunkOrderer's). vertices: of `layout`. indices: local to them.
 std::optional<std::vector<std::byte>> encode_mesh_object(std::span<const std::byte> vertices,
                                                          std::span<const std::uint16_t> indices,
                                                          const LayoutRecord& layout);
 
-/// The indices of a coarser level for decode_level(), which was seen to give them back; nothing if
-/// they stand in another order than the bake's.
+/// Encodes the indices of a coarser level for decode_level(), verified by decoding them; nothing if
+/// their order is not LevelOrderer's.
 std::optional<std::vector<std::byte>> encode_level(std::span<const std::uint16_t> indices);
 
 }  // namespace modar

@@ -91,7 +91,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
     }
     timer.done(bundle.view.bytes().size(), made.download_size);
   }
-  // What a device would refuse is not published.
+  // A document that devices would refuse is not published.
   if (const auto readable = parse_release(release_text(done.release)); !readable) {
     return fail(ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
                 "name each bundle's file with letters, digits, '.', '_' and '-', no two alike");

@@ -1,4 +1,4 @@
-// A release from bundles, and what an update would cost before it is published.
+// Publishes releases, and estimates what an update costs before it is published.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ struct PublishReport {
   std::map<PieceForm, FormTotals> forms;
 };
 
-/// Checks each bundle, writes its pieces, then the signed document, then `latest`: what was
-/// published before stays valid at every moment.
+/// Validates each bundle, writes its pieces, then the signed document, then `latest`: the release
+/// before stays valid at every moment.
 /// Errors: kInvalidInput "ship.bad-bundle", "ship.name"; kUsage "ship.version"; kIo; kExitLocked.
 Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report);
 

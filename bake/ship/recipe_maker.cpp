@@ -18,7 +18,10 @@
 namespace modar {
 namespace {
 
+/// The highest level without more memory for the decoder: time of publishing for download bytes.
 constexpr int kZstdLevel = 19;
+/// Feature sets of a pattern up to here travel as one piece: they share most descriptors, but an
+/// update downloads them all. Set by hand, above the four sets of 2000 keypoints.
 constexpr std::uint64_t kMaxPatternPiece = 4u << 20;
 
 std::vector<std::byte> zstd(std::span<const std::byte> bytes) {
@@ -38,15 +41,15 @@ std::vector<std::byte> split_halves(std::span<const std::byte> blocks) {
   return halves;
 }
 
-/// One piece on its way to the recipe.
+/// A piece under construction.
 struct Draft {
   PieceRecord record{};
-  std::vector<std::byte> raw;  ///< only where it is not a stretch of the bundle
+  std::vector<std::byte> raw;  ///< only where it is not a range of the bundle
   std::vector<std::byte> stored;
   bool blocks = false;  ///< of ETC1
 };
 
-/// A chunk of a model that may travel as a mesh: where its vertices and indices lie.
+/// Where the vertices and indices of a chunk lie that may travel as a mesh object.
 struct ChunkPlace {
   std::uint64_t vertices = 0;  ///< byte in the bundle
   std::uint64_t vertex_bytes = 0;
@@ -94,7 +97,7 @@ std::vector<std::uint16_t> local_indices(const BundleView& bundle, const ChunkPl
   return indices;
 }
 
-/// A stretch of the bundle that some piece covers.
+/// A range of the bundle that a piece covers.
 struct Covered {
   std::uint64_t begin = 0;
   std::uint64_t end = 0;
@@ -140,7 +143,7 @@ class RecipeMaker {
       const ChunkPlace& place = places[i];
       auto object = encode_mesh_object(at(place.vertices, place.vertex_bytes),
                                        local_indices(bundle_, place), *place.layout);
-      // A tiny chunk is cheaper as it is.
+      // zstd alone is smaller for tiny chunks.
       if (object && zstd(mesh_raw(place)).size() <= object->size()) object.reset();
       return object;
     });
@@ -211,7 +214,7 @@ class RecipeMaker {
            is_covered(place.indices, place.index_bytes);
   }
 
-  /// Texts that their twins give.
+  /// Feature texts that can be derived from the mapped features.
   void draft_texts() {
     for (const SectionEntry& entry : bundle_.sections()) {
       if (entry.type != static_cast<std::uint32_t>(SectionType::kFeatureYml)) continue;
@@ -248,7 +251,7 @@ class RecipeMaker {
       ++i;
       if (entry.type < 256) continue;
       if (entry.type == static_cast<std::uint32_t>(SectionType::kMappedFeatures)) {
-        // The sets of one pattern share most of their descriptors: they travel as one piece.
+        // The sets of one pattern share most of their descriptors: one piece for all.
         while (i < sections.size() && sections[i].type == entry.type &&
                sections[i].owner == entry.owner &&
                sections[i].offset + sections[i].size - entry.offset <= kMaxPatternPiece) {
@@ -265,7 +268,7 @@ class RecipeMaker {
 
   enum class Cut { kContent, kBlocks, kWhole };
 
-  /// What nothing covers yet between two places.
+  /// Drafts what no piece covers yet between two offsets.
   void draft_gaps(std::uint64_t begin, std::uint64_t end, Cut cut) {
     std::sort(covered_.begin(), covered_.end(),
               [](const Covered& a, const Covered& b) { return a.begin < b.begin; });
@@ -300,7 +303,7 @@ class RecipeMaker {
     return draft.raw.empty() ? at(draft.record.offset, draft.record.raw_size) : draft.raw;
   }
 
-  /// Chooses the smallest form, states hash and sizes.
+  /// Chooses the smallest form and fills in hash and sizes.
   void pack(Draft& draft) const {
     const auto raw = raw_of(draft);
     draft.record.raw_hash = raw_hash(raw);
@@ -345,7 +348,7 @@ class RecipeMaker {
       if (!decode_piece(draft.record, stored)) {
         return fail(ExitCode::kInternal, "ship.piece",
                     "byte " + std::to_string(draft.record.offset),
-                    "a piece does not decode to what it was made of", "report this as a bug");
+                    "a piece does not decode to its original bytes", "report this as a bug");
       }
       append(std::as_bytes(std::span(&draft.record, 1)));
       FormTotals& totals = out.forms[static_cast<PieceForm>(draft.record.form)];

@@ -1,4 +1,4 @@
-// A bundle to the pieces that travel, and the recipe that puts them together again.
+// Splits a bundle into the pieces that travel, and writes the recipe that joins them again.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace modar {
 
-/// What one form would cost, over all the pieces that could take it: for `modar bench ship`.
+/// Sums over the pieces of one form.
 struct FormTotals {
   std::uint64_t pieces = 0;
   std::uint64_t raw_bytes = 0;
@@ -21,7 +21,7 @@ struct RecipeOptions {
   unsigned jobs = 1;  ///< processes and threads; the pieces do not depend on it
 };
 
-/// Everything that has to lie on a server for one bundle.
+/// Everything that a server needs for one bundle.
 struct PublishedBundle {
   std::vector<std::byte> recipe;         ///< as RecipeView reads it
   std::vector<std::byte> recipe_object;  ///< zstd of it
@@ -31,7 +31,7 @@ struct PublishedBundle {
   std::uint64_t download_size = 0;  ///< recipe and objects
 };
 
-/// Every piece was seen to decode to its bytes of the bundle.
+/// Verifies every piece by decoding it.
 /// Errors: kInternal "ship.piece".
 Result<PublishedBundle> make_recipe(const BundleView& bundle, const RecipeOptions& options);
 

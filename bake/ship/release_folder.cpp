@@ -65,7 +65,7 @@ Result<ReleaseFolder> ReleaseFolder::open(const std::string& path) {
     MODAR_TRY(make_folders(path + folder));
   }
   MODAR_ASSIGN(auto lock, FolderLock::take(path + "/.lock", {kExitLocked, "ship.locked", path,
-                                                             "another publisher is at work on it",
+                                                             "another publisher is using it",
                                                              "wait until it ends"}));
   return ReleaseFolder(path, std::move(lock));
 }
@@ -92,7 +92,7 @@ Result<std::uint64_t> ReleaseFolder::add_objects(const PublishedBundle& bundle) 
   std::uint64_t added = 0;
   const auto add = [&](const ObjectId& id, std::span<const std::byte> bytes) -> Result<void> {
     const fs::path path = path_ + "/objects/" + object_path(id);
-    // Names are hashes of the content: what is there in full length is the same.
+    // Names are hashes of the content: a file of full length is the same object.
     std::error_code error;
     if (fs::file_size(path, error) == bytes.size() && !error) return {};
     MODAR_TRY(make_folders(path.parent_path()));
@@ -147,7 +147,7 @@ Result<std::uint64_t> ReleaseFolder::prune(std::size_t keep) const {
   }
   std::uint64_t bytes = 0;
   std::error_code error;
-  // Documents first: no document that stands names an object that is gone.
+  // Documents first: no remaining document names a removed object.
   for (std::size_t i = 0; i < gone; ++i) {
     const std::string path = path_ + "/releases/" + std::to_string(all[i]) + ".json";
     fs::remove(path, error);

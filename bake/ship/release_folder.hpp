@@ -1,4 +1,4 @@
-// The folder that a publisher fills and any server or USB stick can serve:
+// The folder that a publisher writes and any web server or USB stick can serve:
 //
 //   latest                       number of the newest release
 //   releases/N.json(.minisig)    release documents
@@ -17,26 +17,26 @@
 
 namespace modar {
 
-/// Holds the folder's lock while it lives, so that two publishers never meet.
+/// Holds the lock of the folder: one publisher at a time.
 class ReleaseFolder {
  public:
   /// Creates what is missing. Errors: kIo; kExitLocked "ship.locked".
   static Result<ReleaseFolder> open(const std::string& path);
 
-  /// Numbers of the releases, rising.
+  /// Numbers of the releases, ascending.
   [[nodiscard]] std::vector<std::uint64_t> versions() const;
   [[nodiscard]] Result<Release> release(std::uint64_t version) const;
-  /// Links of the chain of keys.
+  /// Number of links in the chain of keys.
   [[nodiscard]] std::uint32_t key_links() const;
 
-  /// Writes the objects that are not there; answers how many bytes that were.
+  /// Writes the objects that are missing; returns their bytes.
   Result<std::uint64_t> add_objects(const PublishedBundle& bundle) const;
   /// Writes and signs the document, then points `latest` at it.
   Result<void> add_release(const Release& release, const SecretKey& key) const;
   /// Appends `next` to the chain, signed by `key`.
   Result<void> add_key(const PublicKey& next, const SecretKey& key) const;
-  /// Removes all but the `keep` newest releases, then the objects that no release needs; answers
-  /// how many bytes that were.
+  /// Removes all but the `keep` newest releases, then the objects that no release needs; returns
+  /// their bytes.
   Result<std::uint64_t> prune(std::size_t keep) const;
 
  private:

@@ -10,7 +10,7 @@
 namespace modar {
 namespace {
 
-/// A chunk has at most 65,535 vertices; Draco splits those where surfaces touch.
+/// Of a chunk: 16-bit indices bound its vertices; the faces bound memory (12 MB), set by hand.
 constexpr std::uint32_t kMaxPoints = 65536;
 constexpr std::uint32_t kMaxFaces = 1u << 20;
 

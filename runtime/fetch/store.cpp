@@ -28,7 +28,7 @@ tl::unexpected<Error> io(const char* code, const std::string& path, const char* 
   return fail(ExitCode::kIo, code, path, std::strerror(errno), cure);
 }
 
-constexpr const char* kStoreCure = "see that the store's folder can be written and has room";
+constexpr const char* kStoreCure = "check that the store's folder is writable and has room";
 
 }  // namespace
 
@@ -92,7 +92,7 @@ Result<void> sync_folder(const std::string& path) {
   if (descriptor < 0) return io("io.sync", path, kStoreCure);
   const int synced = ::fsync(descriptor);
   ::close(descriptor);
-  // Some file systems cannot sync a folder and say so; there is nothing more to do on them.
+  // Some file systems cannot sync a folder; there is nothing more to do on them.
   if (synced != 0 && errno != EINVAL) return io("io.sync", path, kStoreCure);
   return {};
 }
@@ -190,11 +190,10 @@ Result<Store> Store::open(const std::string& path) {
        {path, path + "/slots", path + "/slots/a", path + "/slots/b", path + "/pieces"}) {
     MODAR_TRY(make_folder(folder));
   }
-  MODAR_ASSIGN(auto lock,
-               FolderLock::take(path + "/lock",
-                                {kExitLocked, "store.locked", path,
-                                 "another fetch is at work on this store", "wait until it ends"}));
-  // What a fetch that was cut off was writing.
+  MODAR_ASSIGN(auto lock, FolderLock::take(path + "/lock", {kExitLocked, "store.locked", path,
+                                                            "another fetch is using this store",
+                                                            "wait until it ends"}));
+  // Left behind by a fetch that was killed.
   for (const std::string& name : list_folder(path)) {
     if (!name.ends_with(".tmp") && !name.ends_with(".new")) continue;
     MODAR_TRY(remove_file(path + "/" + name));

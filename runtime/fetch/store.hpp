@@ -23,7 +23,7 @@ namespace modar::fetch {
 /// @name Files
 /// Every error names the path.
 /// @{
-/// Creates a folder; one that is there already is fine. Errors: kIo "io.create".
+/// Creates a folder if it is missing. Errors: kIo "io.create".
 Result<void> make_folder(const std::string& path);
 /// Names in a folder without "." and "..", sorted; empty if there is no such folder.
 std::vector<std::string> list_folder(const std::string& path);
@@ -36,18 +36,18 @@ std::optional<std::uint64_t> file_size(const std::string& path);
 Result<void> remove_file(const std::string& path);
 /// Errors: kIo "io.rename".
 Result<void> rename_file(const std::string& from, const std::string& to);
-/// Writes names of a folder through to the disk. Errors: kIo "io.sync".
+/// Syncs the names in a folder to the disk. Errors: kIo "io.sync".
 Result<void> sync_folder(const std::string& path);
-/// Points the symbolic link `path` at `target`, in one step. Errors: kIo "io.link".
+/// Points the symbolic link `path` at `target` atomically. Errors: kIo "io.link".
 Result<void> switch_link(const std::string& path, const std::string& target);
 /// Gives a file a second name (a hard link); false where the file system cannot.
 bool share_file(const std::string& path, const std::string& second);
-/// What a symbolic link points at, or empty.
+/// Target of a symbolic link, or empty.
 std::string link_target(const std::string& path);
 /// Free bytes of the file system of `path`. Errors: kIo "io.space".
 Result<std::uint64_t> free_space(const std::string& path);
 
-/// A file open for writing at any place; closed when destroyed.
+/// A file open for writing at any offset; closed when destroyed.
 class OutputFile {
  public:
   /// Creates the file, or opens it and keeps what it holds. Errors: kIo "io.create".
@@ -68,13 +68,13 @@ class OutputFile {
 /// @}
 
 struct StoreState {
-  std::uint64_t version = 0;  ///< greatest that was installed
+  std::uint64_t version = 0;  ///< highest that was installed
   std::string root_key;       ///< public_key_line() that was given with --trust
-  std::string trusted_key;    ///< what the chain of keys has led to
+  std::string trusted_key;    ///< where the chain of keys has led to
   std::uint32_t key_serial = 0;
 };
 
-/// A release as it lies in a slot.
+/// A release in a slot.
 struct InstalledRelease {
   std::string folder;
   std::string text;  ///< of the release document
@@ -83,7 +83,7 @@ struct InstalledRelease {
 
 class Store {
  public:
-  /// Creates what is missing and takes the lock, which is held until the object goes.
+  /// Creates what is missing and takes the lock, which is held until the object is destroyed.
   /// Errors: kIo; kExitLocked "store.locked".
   static Result<Store> open(const std::string& path);
 
@@ -92,16 +92,16 @@ class Store {
   [[nodiscard]] StoreState state() const;
   Result<void> save_state(const StoreState& state) const;
 
-  /// The release in use, if its slot holds one that reads.
+  /// The release in use, if its slot has a readable one.
   [[nodiscard]] std::optional<InstalledRelease> active() const;
   /// The release in the slot that is not in use.
   [[nodiscard]] std::optional<InstalledRelease> other() const;
-  /// The folder that the next release is built in: not the one in use.
+  /// The folder in which the next release is built.
   [[nodiscard]] std::string spare_folder() const;
 
-  /// Makes a finished slot the one in use, and the links at the top those of its bundles.
+  /// Puts a complete slot in use and updates the links NAME.modar.
   Result<void> activate(const InstalledRelease& release) const;
-  /// Puts the links NAME.modar right.
+  /// Makes the links NAME.modar those of the release.
   Result<void> link_bundles(const Release& release) const;
   /// Those of a release's bundles that are installed and in use.
   [[nodiscard]] std::vector<std::string> bundle_paths(const Release& release) const;
@@ -112,7 +112,7 @@ class Store {
   FolderLock lock_;
 };
 
-/// Reads the release in a slot, whether it is in use or not.
+/// Reads the release in a slot; nothing if it has none.
 std::optional<InstalledRelease> read_slot(const std::string& folder);
 
 }  // namespace modar::fetch

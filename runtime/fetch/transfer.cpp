@@ -20,8 +20,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// Set by hand: a few round trips of a 2G link with lost packets.
 constexpr long kConnectSeconds = 15;
-constexpr std::size_t kPatience = 3;  ///< answers "no such file" before it is believed
+/// "No such file" answers before an object counts as missing: servers err while files are replaced.
+constexpr std::size_t kMissingAttempts = 3;
 
 /// The URL of an address or folder without a slash at its end; empty if there is no such folder.
 std::string server_address(const std::string& url_or_folder) {
@@ -43,23 +45,24 @@ std::string server_address(const std::string& url_or_folder) {
 
 class TransferLoop;
 
-/// One object or text on its way. The handle's callbacks point here, so it never moves.
+/// One download. libcurl's callbacks point here, so it never moves.
 struct Transfer {
   TransferLoop* loop = nullptr;
   CURL* handle = nullptr;
   std::string path;
-  std::string* text = nullptr;  ///< where a text goes, else into the part file of `wanted`
-  std::size_t limit = 0;        ///< bytes that may come
+  std::string* text =
+      nullptr;            ///< destination of a text; an object goes to the part file of `wanted`
+  std::size_t limit = 0;  ///< greatest number of bytes
   const Wanted* wanted = nullptr;
   std::optional<OutputFile> part;
   std::uint64_t have = 0;  ///< bytes of the part file, or of the text
   std::uint64_t asked_from = 0;
-  std::uint64_t came = 0;  ///< bytes of this attempt
-  bool judged = false;     ///< the status line was looked at
-  bool welcome = false;    ///< the body is what was asked for, not an error page
+  std::uint64_t received = 0;  ///< bytes of this attempt
+  bool judged = false;         ///< the status code was checked
+  bool welcome = false;        ///< the body is the file, not an error page
   bool too_long = false;
   bool failed_to_write = false;
-  unsigned fruitless = 0;  ///< attempts in a row that brought nothing
+  unsigned fruitless = 0;  ///< attempts in a row without any data
   unsigned missing = 0;    ///< answers "no such file"
   Clock::time_point not_before{};
   Error error;
@@ -101,7 +104,7 @@ class TransferLoop {
   Outcome again(Transfer& transfer, const std::string& cause);
   Outcome missing(Transfer& transfer);
   void discard(Transfer& transfer);
-  void hold_cap() const;
+  void limit_rate() const;
   void tell(std::int64_t bytes) const {
     if (on_bytes_ != nullptr && bytes != 0) (*on_bytes_)(bytes);
   }
@@ -115,7 +118,7 @@ class TransferLoop {
   const std::function<void(std::int64_t)>* on_bytes_ = nullptr;
 };
 
-/// Throws away what came of an object or text.
+/// Discards what was received of an object or text.
 void TransferLoop::discard(Transfer& transfer) {
   if (transfer.wanted != nullptr) {
     tell(-static_cast<std::int64_t>(transfer.have));
@@ -124,16 +127,16 @@ void TransferLoop::discard(Transfer& transfer) {
     transfer.text->clear();
   }
   transfer.have = 0;
-  transfer.came = 0;
+  transfer.received = 0;
 }
 
 void TransferLoop::judge_status(Transfer& transfer) {
   transfer.judged = true;
   long status = 0;
   curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &status);
-  // 0: not HTTP; a file's own part comes from where it was asked for.
+  // 0: not HTTP; file:// honours the range.
   transfer.welcome = status == 0 || status == 206 || status == 200;
-  // A server without ranges sends the file from its beginning.
+  // A server without range requests sends the file from its beginning.
   if (status == 200 && transfer.asked_from != 0) discard(transfer);
 }
 
@@ -152,7 +155,7 @@ std::size_t TransferLoop::take(Transfer& transfer, const char* bytes, std::size_
     return 0;
   }
   transfer.have += size;
-  transfer.came += size;
+  transfer.received += size;
   if (transfer.wanted != nullptr) tell(static_cast<std::int64_t>(size));
   return size;
 }
@@ -172,7 +175,7 @@ void set_common(CURL* handle, const TransferOptions& options) {
   curl_easy_setopt(handle, CURLOPT_LOW_SPEED_LIMIT, 1L);
   curl_easy_setopt(handle, CURLOPT_LOW_SPEED_TIME,
                    std::max(1L, static_cast<long>(std::ceil(options.stall_s))));
-  // Small reads keep the cap smooth on slow links.
+  // Small reads keep the rate limit smooth on slow links.
   if (options.bytes_per_second != 0) curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 2048L);
 }
 
@@ -187,7 +190,7 @@ bool TransferLoop::open_part(Transfer& transfer) {
   transfer.part.emplace(std::move(*file));
   if (transfer.have == 0) tell(static_cast<std::int64_t>(have));
   transfer.have = have;
-  // One that is whole already was cut off before it was judged: it comes again, to be safe.
+  // A complete part file was never verified (the run was killed): download it again.
   if (have >= transfer.wanted->size) discard(transfer);
   return true;
 }
@@ -197,7 +200,7 @@ bool TransferLoop::start(Transfer& transfer) {
   transfer.loop = this;
   transfer.judged = transfer.welcome = transfer.too_long = false;
   if (transfer.wanted != nullptr && !open_part(transfer)) return false;
-  transfer.came = 0;
+  transfer.received = 0;
   transfer.asked_from = transfer.have;
   if (idle_.empty()) idle_.push_back(curl_easy_init());
   transfer.handle = idle_.back();
@@ -216,13 +219,13 @@ bool TransferLoop::start(Transfer& transfer) {
   return false;
 }
 
-/// Waits and tries again, unless too many attempts in a row brought nothing.
+/// Schedules another attempt, unless too many in a row brought no data.
 Outcome TransferLoop::again(Transfer& transfer, const std::string& cause) {
-  transfer.fruitless = transfer.came != 0 ? 0 : transfer.fruitless + 1;
+  transfer.fruitless = transfer.received != 0 ? 0 : transfer.fruitless + 1;
   if (transfer.fruitless >= options_.attempts) {
     transfer.error = {kExitNetwork, "fetch.network", base_ + "/" + transfer.path,
                       cause + ", " + std::to_string(transfer.fruitless) + " times in a row",
-                      "run modar-fetch again: it goes on where it stopped"};
+                      "run modar-fetch again: it resumes where it stopped"};
     return Outcome::kFailed;
   }
   ++stats_.retries;
@@ -234,14 +237,14 @@ Outcome TransferLoop::again(Transfer& transfer, const std::string& cause) {
 }
 
 Outcome TransferLoop::missing(Transfer& transfer) {
-  transfer.came = 0;
-  if (++transfer.missing < kPatience) return again(transfer, "the server has no such file");
+  transfer.received = 0;
+  if (++transfer.missing < kMissingAttempts) return again(transfer, "the server has no such file");
   transfer.error = {kExitMixed, "fetch.missing", base_ + "/" + transfer.path,
                     "the server has no such file", "publish the release again, whole"};
   return Outcome::kFailed;
 }
 
-/// An object that came whole: right, or thrown away and fetched again.
+/// Verifies a complete object; discards it and tries again if it is wrong.
 Outcome TransferLoop::judge_object(Transfer& transfer) {
   bool right = false;
   if (const auto file = MappedFile::open(transfer.part_path())) {
@@ -298,9 +301,9 @@ Outcome TransferLoop::finish(Transfer& transfer, CURLcode code) {
   return outcome;
 }
 
-/// Waits until what came is no more than the cap allows; what a server sends meanwhile fills the
-/// socket, and then the server waits, too.
-void TransferLoop::hold_cap() const {
+/// Sleeps until the bytes received are within the rate limit. Meanwhile the socket fills up, and
+/// the server waits, too.
+void TransferLoop::limit_rate() const {
   if (options_.bytes_per_second == 0) return;
   const double allowed = std::chrono::duration<double>(Clock::now() - begin_).count();
   const double taken =
@@ -331,7 +334,7 @@ Result<void> TransferLoop::run(std::vector<std::unique_ptr<Transfer>>& transfers
         error = next.error;
       }
     }
-    hold_cap();
+    limit_rate();
     int running = 0;
     curl_multi_perform(multi_, &running);
     int left = 0;

@@ -1,5 +1,5 @@
-// Files from a server or a folder, by libcurl: several at once, resumed where they broke off,
-// retried with growing waits.
+// Downloads from a server or a folder, by libcurl: several at once, resumed where they were
+// interrupted, retried with growing waits. Internal to runtime/fetch.
 #pragma once
 
 #include <cstdint>
@@ -17,25 +17,25 @@ namespace modar::fetch {
 struct TransferOptions {
   std::string url;                     ///< http://, https://, file:// or a folder
   unsigned parallel = 4;               ///< transfers at once
-  std::uint64_t bytes_per_second = 0;  ///< of all together; 0: as fast as it goes
-  unsigned attempts = 8;               ///< in a row that bring nothing, then it gives up
+  std::uint64_t bytes_per_second = 0;  ///< of all transfers together; 0: no limit
+  unsigned attempts = 8;               ///< in a row without any data, then it gives up
   double first_wait_s = 0.5;           ///< before the second attempt; doubles up to max_wait_s
   double max_wait_s = 30;
-  double stall_s = 30;  ///< a transfer that brings nothing for so long is broken off
+  double stall_s = 30;  ///< a transfer without data for so long is aborted
 };
 
-/// One object to bring.
+/// One object to download.
 struct Wanted {
   ObjectId id{};
   std::uint64_t size = 0;  ///< bytes
   std::string path;        ///< below the URL
-  std::string file;        ///< where it goes; `file`.part while it comes
+  std::string file;        ///< its destination; `file`.part until it is complete
 };
 
 struct TransferStats {
-  std::uint64_t bytes = 0;  ///< of bodies that came, useful or not
+  std::uint64_t bytes = 0;  ///< of response bodies, useful or not
   std::uint32_t retries = 0;
-  std::uint32_t corrupt = 0;  ///< objects that came whole and wrong, and were thrown away
+  std::uint32_t corrupt = 0;  ///< objects that were complete and wrong, and were discarded
 };
 
 class Transfers {
@@ -51,8 +51,8 @@ class Transfers {
   /// file).
   Result<std::string> text(const std::string& path, std::size_t limit);
 
-  /// Brings objects into their files, each verified by its id. `on_bytes` hears of what came since
-  /// it was last called (negative: that was thrown away). Errors: as text(); kIo "io.*".
+  /// Downloads objects into their files, each verified by its id. `on_bytes` receives the number of
+  /// bytes since the last call (negative: discarded). Errors: as text(); kIo "io.*".
   Result<void> objects(std::span<const Wanted> wanted,
                        const std::function<void(std::int64_t)>& on_bytes);
 

@@ -1,4 +1,4 @@
-"""What is installed: programs that run from there; the runtime, found by CMake and pkg-config, called from C."""
+"""What is installed: programs that run from there; the libraries, found by CMake and pkg-config; their headers."""
 import csv
 import os
 import pathlib
@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import unittest
 
+from installed_headers import clang, declared_symbols, headers, program
 from programs import BIN, COVER, POTTERY, ROOT, ProgramTest
 
 BUILD = BIN.parent
@@ -14,7 +15,16 @@ SANITIZE = os.environ.get("MODAR_SANITIZE", "")
 FLAGS = [f"-fsanitize={SANITIZE}"] if SANITIZE else []
 WIDTH, HEIGHT, FRAMES = 480, 360, 6
 
-# Draws and never tracks; told by its arguments.
+# A project outside of the tree that links every function of the installed headers.
+EVERYTHING = """
+cmake_minimum_required(VERSION 3.22)
+project(everything LANGUAGES CXX)
+find_package(modar 0.1 REQUIRED COMPONENTS runtime fetch)
+add_executable(everything everything.cpp)
+target_link_libraries(everything PRIVATE modar::fetch modar::runtime)
+"""
+
+# Draws and never tracks, as its arguments say.
 DRAW_ALONE = r"""
 #include <modar/modar.h>
 #include <stdio.h>
@@ -131,6 +141,42 @@ class App(ProgramTest):
             self.assert_overlay(k, done.stdout[k * WIDTH * HEIGHT * 4:], rgb[k * WIDTH * HEIGHT * 3:], centre)
         self.assertGreaterEqual(found, FRAMES - 2)
 
+    def pkg_config(self, package):
+        return run("pkg-config", "--cflags", "--libs", package, check=True, text=True,
+                   env={**os.environ, "PKG_CONFIG_PATH": str(next(self.prefix.rglob("pkgconfig")))}).stdout.split()
+
+    def link_by_pkg_config(self, symbols):
+        source = self.folder / "everything.cpp"
+        source.write_text(program(symbols))
+        return run("c++", *FLAGS, "-o", self.folder / "everything", source, *self.pkg_config("modar-fetch"), text=True)
+
+    @unittest.skipUnless(clang(), "clang, which parses the headers, is not installed")
+    def test_every_function_of_every_installed_header_links(self):
+        include = self.prefix / "include" / "modar"
+        self.assertGreaterEqual(set(headers(include)), {"modar/modar.h", "modar/fetch.hpp", "formats/bundle_view.hpp"})
+        symbols = declared_symbols(include, self.folder)
+        names = run("c++filt", input="\n".join(symbols).encode()).stdout.decode()
+        self.assertGreater(len(symbols), 100)
+        for known in ("modar_tracker_step", "modar::BundleView::open(", "modar::fetch_release(", "modar::PoseLoop::~"):
+            self.assertIn(known, names)
+        done = self.link_by_pkg_config(symbols)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        project = self.folder / "project"
+        project.mkdir()
+        (project / "CMakeLists.txt").write_text(EVERYTHING)
+        (project / "everything.cpp").write_text(program(symbols))
+        for command in (["cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}",
+                         f"-DCMAKE_EXE_LINKER_FLAGS={' '.join(FLAGS)}"], ["cmake", "--build", project / "build"]):
+            done = run(*command, text=True)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        # A function that no library has is found.
+        planted = self.folder / "include"
+        shutil.copytree(include, planted)
+        (planted / "modar" / "planted.hpp").write_text("namespace modar { struct Planted { private: void nowhere(); }; }\n")
+        more = declared_symbols(planted, self.folder)
+        self.assertEqual(len(more), len(symbols) + 1)
+        self.assertIn("Planted::nowhere", self.link_by_pkg_config(more).stderr)
+
     def test_installed_programs_run(self):
         place = self.folder / "usr"
         done = run("cmake", "--install", BUILD, "--prefix", place, text=True)
@@ -144,8 +190,7 @@ class App(ProgramTest):
     def test_drawing_alone_carries_no_tracker(self):
         bundle = self.bake_demo()
         (self.folder / "draw.c").write_text(DRAW_ALONE)
-        flags = run("pkg-config", "--cflags", "--libs", "modar", check=True, text=True,
-                    env={**os.environ, "PKG_CONFIG_PATH": str(next(self.prefix.rglob("pkgconfig")))}).stdout.split()
+        flags = self.pkg_config("modar")
         done = run("cc", "-Wall", "-Wextra", "-Werror", *FLAGS, "-o", self.folder / "draw", self.folder / "draw.c",
                    *flags, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -26,9 +26,9 @@ struct FetchOptions {
   std::vector<std::string> bundles;    ///< only these; empty: all
   unsigned parallel = 4;               ///< pieces at once
   std::uint64_t bytes_per_second = 0;  ///< cap; 0: none
-  unsigned attempts = 8;               ///< in a row that bring nothing, then it gives up
+  unsigned attempts = 8;               ///< in a row without any data, then it gives up
   double first_wait_s = 0.5;           ///< before the second attempt, then twice as long each time
-  double stall_s = 30;                 ///< a silent connection is broken off after this
+  double stall_s = 30;                 ///< a silent connection is closed after this
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
 };
 
@@ -36,29 +36,29 @@ struct FetchReport {
   std::uint64_t version = 0;
   bool changed = false;                ///< false: this release was installed already
   std::vector<std::string> bundles;    ///< paths of the installed bundles
-  std::uint64_t downloaded_bytes = 0;  ///< bodies of all answers
-  std::uint64_t reused_bytes = 0;      ///< raw bytes taken from bundles installed before
+  std::uint64_t downloaded_bytes = 0;  ///< bodies of all responses
+  std::uint64_t reused_bytes = 0;      ///< raw bytes taken from installed bundles
   std::uint32_t downloaded_pieces = 0;
   std::uint32_t reused_pieces = 0;
   std::uint32_t retries = 0;
-  std::uint32_t corrupt_pieces = 0;  ///< thrown away and fetched again
+  std::uint32_t corrupt_pieces = 0;  ///< discarded and downloaded again
 };
 
-/// Brings the store up to the server's release. Whatever happens, on whatever line it is killed,
-/// the release in use stays whole; the next call goes on with what came. Errors: kExitWrongKey,
-/// kExitRollBack, kExitExpired, kExitMixed, kExitNoSpace, kExitLocked, kExitNetwork,
+/// Brings the store up to the server's newest release. Whatever happens and wherever it is killed,
+/// the release in use stays whole; the next call resumes with what was downloaded. Errors:
+/// kExitWrongKey, kExitRollBack, kExitExpired, kExitMixed, kExitNoSpace, kExitLocked, kExitNetwork,
 /// kExitBadBundle; kIo; kUnsupported "fetch.device" (nothing for this device).
 Result<FetchReport> fetch_release(const FetchOptions& options);
 
 struct StoreReport {
   std::uint64_t version = 0;         ///< of the release in use
   std::vector<std::string> bundles;  ///< paths
-  bool fell_back = false;            ///< the release in use was damaged: the one before it is now
+  bool fell_back = false;  ///< the release in use was damaged: the one before it is in use now
 };
 
-/// Reads every installed bundle, holds it against its signed hash and the rules of a good bundle,
-/// and falls back to the release before where one is damaged.
-/// Errors: kExitLocked; kExitBadBundle "store.damaged" (no good release is left); kIo.
+/// Checks every installed bundle against its signed hash and the rules of a good bundle, and goes
+/// back to the release before if one is damaged.
+/// Errors: kExitLocked; kExitBadBundle "store.damaged" (no intact release is left); kIo.
 Result<StoreReport> verify_store(const std::string& store);
 
 }  // namespace modar
