@@ -14,7 +14,7 @@ import sys
 from bundle_bytes import (FEATURES, KEYPOINT, NO_OFFSET, NONE, Bundle, Fault, at_least, digest, flags_known, follow,
                           need)
 from bundle_models import check_models, check_tight, decode_level
-from bundle_statement import check_statement
+from bundle_summary import check_summary
 
 OF_ORB = ("max_features", "scale_factor", "level_count", "edge_threshold", "first_level", "wta_k", "harris",
           "patch_size", "fast_threshold")
@@ -118,7 +118,7 @@ def read_features(bundle):
 
 
 def read_loop_record(data, pattern):
-    """The record of the pose loop: counts, offsets, places inside of the image."""
+    """The tracker record: counts, offsets, places inside the image."""
     need(len(data) >= 128, "LOOP_RECORD", 0, "too small")
     (version, count, bright, patch_count, width, height, levels, zero, features, codes, patches,
      pixels) = struct.unpack_from("<8I4Q", data)
@@ -163,7 +163,7 @@ def check(bundle, full):
     check_textures(bundle)
     check_patterns(bundle)
     features = read_features(bundle)
-    check_statement(bundle)
+    check_summary(bundle)
     for model in tables["models"]:
         layout = tables["layouts"][model["layout"]]
         for chunk in tables["chunks"][model["first_chunk"]:][:model["chunk_count"]]:

@@ -81,7 +81,7 @@ tl::unexpected<Error> refuse(const std::string& where, const std::string& cause)
 Result<void> parse_device_profile(std::string_view json, const std::string& where,
                                   DeviceFile& file) {
   const Json document = Json::parse(json, nullptr, false);
-  if (!document.is_object()) return refuse(where, "it is no JSON object");
+  if (!document.is_object()) return refuse(where, "it is not a JSON object");
   ProfileReader reader(document);
   DeviceProfile& profile = file.profile;
   reader.text("name", file.name);
@@ -113,12 +113,10 @@ Result<void> parse_device_profile(std::string_view json, const std::string& wher
 Result<const DeviceProfile*> choose_device(const std::string& word, DeviceFile& file) {
   if (word.empty()) return nullptr;
   if (word.ends_with(".json")) {
-    const Result<MappedFile> text = MappedFile::open(word);
-    if (!text) return tl::unexpected(text.error());
-    const auto bytes = text->bytes();
-    auto parsed = parse_device_profile({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                                       word, file);
-    if (!parsed) return tl::unexpected(parsed.error());
+    MODAR_ASSIGN(const MappedFile text, MappedFile::open(word));
+    const auto bytes = text.bytes();
+    MODAR_TRY(parse_device_profile({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
+                                   word, file));
     return &file.profile;
   }
   const DeviceProfile* device = find_device_profile(word);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "bake/check/workstation_issues.hpp"
+#include "bake/check/verdict.hpp"
 
 namespace modar {
 namespace {

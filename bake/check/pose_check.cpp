@@ -9,7 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/check/workstation_issues.hpp"
+#include "bake/check/verdict.hpp"
 #include "bake/pattern/pattern_picture.hpp"
 #include "bake/pattern/pose_scene.hpp"
 #include "modar/paper_tracker.hpp"
@@ -25,10 +25,10 @@ constexpr double kTilts[] = {15, 30, 45, 60, 70};
 constexpr double kExpectedTilt = 30;
 
 /// Either tracker, stepping over unrelated frames.
-class Eye {
+class BundleTracker {
  public:
-  static Result<Eye> open(const BundleView& bundle, const Camera& camera) {
-    Eye eye;
+  static Result<BundleTracker> open(const BundleView& bundle, const Camera& camera) {
+    BundleTracker tracker;
     const bool records = std::any_of(
         bundle.sections().begin(), bundle.sections().end(), [](const SectionEntry& entry) {
           return entry.type == static_cast<std::uint32_t>(SectionType::kTrackerRecord);
@@ -36,16 +36,12 @@ class Eye {
     if (records) {
       PoseLoopOptions options;
       options.track = false;
-      auto ours = PoseLoop::create(bundle, camera, options);
-      if (!ours) return tl::unexpected(ours.error());
-      eye.ours_ = std::move(*ours);
-      return eye;
+      MODAR_ASSIGN(tracker.ours_, PoseLoop::create(bundle, camera, options));
+      return tracker;
     }
     const std::uint32_t set = bundle.parameter_sets().empty() ? 0 : bundle.parameter_sets()[0].id;
-    auto paper = PaperTracker::create(bundle, set, camera);
-    if (!paper) return tl::unexpected(paper.error());
-    eye.paper_ = std::move(*paper);
-    return eye;
+    MODAR_ASSIGN(tracker.paper_, PaperTracker::create(bundle, set, camera));
+    return tracker;
   }
   [[nodiscard]] const char* method() const { return ours_ ? "ours" : "paper"; }
   Result<TrackResult> step(const GrayImage& frame) {
@@ -59,9 +55,9 @@ class Eye {
 
 class PatternSweep {
  public:
-  PatternSweep(Eye& eye, std::uint32_t pattern, GrayPicture picture, const Camera& camera,
-               const PoseCheckOptions& options)
-      : eye_(eye),
+  PatternSweep(BundleTracker& tracker, std::uint32_t pattern, GrayPicture picture,
+               const Camera& camera, const PoseCheckOptions& options)
+      : tracker_(tracker),
         pattern_(pattern),
         picture_(std::move(picture)),
         camera_(camera),
@@ -80,9 +76,8 @@ class PatternSweep {
       const Pose pose = draw_pose(band, picture_.view(), camera_, random_);
       const SceneFrame scene =
           render_scene(picture_.view(), camera_, pose, background_, band, random_);
-      const Result<TrackResult> seen = eye_.step(scene.picture.view());
-      if (!seen) return tl::unexpected(seen.error());
-      add(step, scene, *seen);
+      MODAR_ASSIGN(const TrackResult seen, tracker_.step(scene.picture.view()));
+      add(step, scene, seen);
     }
     if (step.right > 0) {
       step.corner_px /= step.right;
@@ -112,7 +107,7 @@ class PatternSweep {
     }
   }
 
-  Eye& eye_;
+  BundleTracker& tracker_;
   std::uint32_t pattern_;
   GrayPicture picture_;
   Camera camera_;
@@ -164,10 +159,9 @@ Result<PatternRange> sweep_pattern(PatternSweep& sweep, const std::function<void
   PatternRange range;
   for (std::size_t i = 0; i < kSteps; ++i) {
     const bool front = i < std::size(kAreas);
-    Result<PoseStep> step =
-        front ? sweep.step(kAreas[i], 0) : sweep.step(1.0, kTilts[i - std::size(kAreas)]);
-    if (!step) return tl::unexpected(step.error());
-    range.steps.push_back(*step);
+    MODAR_ASSIGN(const PoseStep step,
+                 front ? sweep.step(kAreas[i], 0) : sweep.step(1.0, kTilts[i - std::size(kAreas)]));
+    range.steps.push_back(step);
     stepped();
   }
   sum_up(range);
@@ -191,8 +185,7 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
   std::vector<PatternRange> ranges;
   if (bundle.patterns().empty()) return ranges;
   const Camera camera = default_camera(options.width, options.height);
-  Result<Eye> eye = Eye::open(bundle, camera);
-  if (!eye) return tl::unexpected(eye.error());
+  MODAR_ASSIGN(BundleTracker tracker, BundleTracker::open(bundle, camera));
   double done = 0;
   const auto stepped = [&] {
     done += 1.0 / (kSteps * static_cast<double>(bundle.patterns().size()));
@@ -209,21 +202,18 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
       continue;
     }
     bool shrunk = false;
-    Result<GrayPicture> picture = load_pattern(*path, shrunk);
-    if (!picture) return tl::unexpected(picture.error());
-    PatternSweep sweep(*eye, p, std::move(*picture), camera, options);
-    Result<PatternRange> range = sweep_pattern(sweep, stepped);
-    if (!range) return tl::unexpected(range.error());
-    range->name = bundle.name(record.name);
-    range->method = eye->method();
-    if (range->tilt_deg < kExpectedTilt) {
+    MODAR_ASSIGN(GrayPicture picture, load_pattern(*path, shrunk));
+    PatternSweep sweep(tracker, p, std::move(picture), camera, options);
+    MODAR_ASSIGN(PatternRange range, sweep_pattern(sweep, stepped));
+    range.name = bundle.name(record.name);
+    range.method = tracker.method();
+    if (range.tilt_deg < kExpectedTilt) {
       tell(bundle, record, sink, WorkstationRule::kPoseRange,
-           range->tilt_deg < 0
-               ? "it is missed from the front"
-               : "it is found up to a tilt of " +
-                     std::to_string(static_cast<int>(range->tilt_deg)) + " degrees");
+           range.tilt_deg < 0 ? "it is missed from the front"
+                              : "it is found up to a tilt of " +
+                                    std::to_string(static_cast<int>(range.tilt_deg)) + " degrees");
     }
-    ranges.push_back(std::move(*range));
+    ranges.push_back(std::move(range));
   }
   return ranges;
 }

@@ -1,4 +1,4 @@
-// Patterns of a bundle seen with the device's eye: the tracker that ships, on views of known pose.
+// Patterns of a bundle as the device's tracker finds them, in rendered views of known pose.
 #pragma once
 
 #include <functional>
@@ -44,10 +44,10 @@ struct PatternRange {
 };
 
 /// Renders each pattern over a made background, with blur, noise and light of its own, and asks
-/// the tracker: our pose loop where the bundle has its records, else the article's method. Reports
-/// POSE_RANGE where a pattern of its picture's size is missed from the front or at 30 degrees, and
-/// SOURCE_MISSING where its picture is not there. Errors: those of reading pictures and of the
-/// trackers.
+/// the tracker: our pose loop where the bundle has its records, else the ModAR paper's method.
+/// Reports POSE_RANGE where a pattern of its picture's size is missed from the front or at 30
+/// degrees, and SOURCE_MISSING where its picture is missing. Errors: those of reading pictures and
+/// of the trackers.
 Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
                                               const PoseCheckOptions& options,
                                               const IssueSink& sink);

@@ -111,9 +111,8 @@ Result<void> prove_reproducible(const BakeRequest& request, const std::vector<st
   if (const int code = run_process(process); code != 0) {
     return trouble("the second bake ended with code " + std::to_string(code));
   }
-  const Result<MappedFile> again = MappedFile::open(output);
-  if (!again) return tl::unexpected(again.error());
-  const std::span<const std::byte> bytes = again->bytes();
+  MODAR_ASSIGN(const MappedFile again, MappedFile::open(output));
+  const std::span<const std::byte> bytes = again.bytes();
   const auto [a, b] = std::mismatch(baked.begin(), baked.end(), bytes.begin(), bytes.end());
   if (a == baked.end() && b == bytes.end()) return {};
   return fail(ExitCode::kInternal, "bake.not-reproducible",

@@ -9,7 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "bake/check/workstation_issues.hpp"
+#include "bake/check/verdict.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/triangle_tree.hpp"
@@ -118,9 +118,8 @@ class SourceCheck {
   SourceCheck(const BundleView& bundle, const IssueSink& sink) : bundle_(bundle), sink_(sink) {}
 
   Result<SourceFit> run(const BakeRequest& request, Report& report) {
-    const Result<BundleContent> content = build_bundle(request, report);
-    if (!content) return tl::unexpected(content.error());
-    again_ = &*content;
+    MODAR_ASSIGN(const BundleContent content, build_bundle(request, report));
+    again_ = &content;
     for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
       const ModelRecord& model = bundle_.models()[m];
       const auto path = std::find_if(
@@ -130,9 +129,7 @@ class SourceCheck {
         missing("model", model.name, &model);
         continue;
       }
-      if (auto done = check_model(model, *path, request.jobs, report); !done) {
-        return tl::unexpected(done.error());
-      }
+      MODAR_TRY(check_model(model, *path, request.jobs, report));
     }
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
     for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) check_pattern(p);
@@ -203,13 +200,11 @@ class SourceCheck {
   Result<void> check_model(const ModelRecord& model, const std::string& path, unsigned jobs,
                            Report& report) {
     Report quiet;
-    Result<SourceModel> source = read_model(path, jobs);
-    if (!source) return tl::unexpected(source.error());
-    const Result<TriMesh> mesh = weld(std::move(*source), quiet, {jobs});
-    if (!mesh) return tl::unexpected(mesh.error());
+    MODAR_ASSIGN(SourceModel source, read_model(path, jobs));
+    MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), quiet, {jobs}));
     StageTimer timer(report, "measure");
     const Surface ours = surface_of(bundle_, model);
-    const Surface theirs = surface_of(*mesh);
+    const Surface theirs = surface_of(mesh);
     TriangleTree our_tree(ours.positions, ours.triangles);
     TriangleTree their_tree(theirs.positions, theirs.triangles);
     ModelFit fit;
@@ -221,7 +216,7 @@ class SourceCheck {
     fit.colour_error = colour_error(ours, theirs, their_tree);
     timer.done(theirs.positions.size(), ours.positions.size(),
                std::max(fit.source_to_bundle, fit.bundle_to_source));
-    judge_model(model, *mesh, fit);
+    judge_model(model, mesh, fit);
     fit_.models.push_back(fit);
     return {};
   }

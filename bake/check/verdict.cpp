@@ -1,11 +1,62 @@
-// Weighs issues.
+// The table of workstation issues, and the weighing of issues.
 #include "bake/check/verdict.hpp"
 
 #include <algorithm>
-
-#include "bake/check/workstation_issues.hpp"
+#include <cstddef>
+#include <iterator>
 
 namespace modar {
+namespace {
+
+constexpr IssueKind kKinds[] = {
+    {"DEVICE_TEXTURE_SIZE", Severity::kError, "A texture is larger than the device can hold",
+     "bake with --device, or with a smaller --max-texture"},
+    {"DEVICE_ATTRIBUTES", Severity::kError,
+     "A vertex layout has more attributes than the device can fetch",
+     "leave colours or texture coordinates out of the source"},
+    {"DEVICE_UNIFORMS", Severity::kError,
+     "The shaders need more uniform vectors than the device has",
+     "this device cannot run the player; choose another"},
+    {"DEVICE_GPU_MEMORY", Severity::kError,
+     "Models and textures exceed the GPU memory that one app should plan for",
+     "bake with --device, smaller textures, or fewer models in one bundle"},
+    {"DEVICE_RAM", Severity::kError, "The bundle is larger than half of the device's RAM",
+     "split it into several bundles"},
+    {"DEVICE_STORAGE", Severity::kError, "The bundle takes more than half of the device's storage",
+     "split it, or ship it compressed with smaller textures"},
+    {"DEVICE_HALF_FLOAT", Severity::kWarning,
+     "The device has no half-float vertices: the player converts them on upload",
+     "none needed if these attributes may take twice the memory"},
+    {"DEVICE_ETC1", Severity::kWarning,
+     "The device has no ETC1 textures: the player decodes them on upload",
+     "none needed if textures may take six times the memory"},
+    {"SOURCE_MISSING", Severity::kWarning, "No file of --source is this asset's source",
+     "pass all files that the bundle was baked from"},
+    {"SOURCE_BYTES", Severity::kInfo, "Baking this asset again gives different bytes",
+     "none needed if the source, the options or this program changed; differences are measured"},
+    {"SOURCE_SURFACE", Severity::kError,
+     "A model differs from its source by more than the bundle states",
+     "bake it again from this source; if that does not help, report it as a bug"},
+    {"SOURCE_COLOUR", Severity::kError, "Colours differ from those of the source",
+     "bake it again from this source"},
+    {"SOURCE_COUNTS", Severity::kError, "Counts differ from those of the source",
+     "bake it again from this source"},
+    {"POSE_RANGE", Severity::kWarning, "A pattern is missed in easy views",
+     "use a picture with more texture, evenly spread, or a larger print"},
+    {"VISUAL_DIFFERS", Severity::kError, "A model does not look like its source",
+     "look at the picture of the worst view; bake with larger textures or a smaller --max-error"},
+};
+static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
+
+}  // namespace
+
+std::span<const IssueKind> workstation_issue_kinds() {
+  return kKinds;
+}
+
+const IssueKind& workstation_issue_kind(WorkstationRule rule) {
+  return kKinds[static_cast<std::size_t>(rule)];
+}
 
 std::vector<const IssueKind*> all_issue_kinds() {
   std::vector<const IssueKind*> kinds;

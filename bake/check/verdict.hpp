@@ -1,9 +1,12 @@
-// What a check found, as the user wants it weighed: severities changed, repeats counted.
+// The kinds of issues that only a workstation can find, and the verdict: what a check found, with
+// severities as the user changed them and repeats counted.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,6 +14,29 @@
 #include "formats/error.hpp"
 
 namespace modar {
+
+/// In the order of workstation_issue_kinds().
+enum class WorkstationRule : std::uint8_t {
+  kDeviceTextureSize,
+  kDeviceAttributes,
+  kDeviceUniforms,
+  kDeviceGpuMemory,
+  kDeviceRam,
+  kDeviceStorage,
+  kDeviceHalfFloat,
+  kDeviceEtc1,
+  kSourceMissing,
+  kSourceBytes,
+  kSourceSurface,
+  kSourceColour,
+  kSourceCounts,
+  kPoseRange,
+  kVisualDiffers,
+  kCount
+};
+
+std::span<const IssueKind> workstation_issue_kinds();
+const IssueKind& workstation_issue_kind(WorkstationRule rule);
 
 /// An issue with the severity that it has in this run.
 struct WeighedIssue {

@@ -11,8 +11,8 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/check/software_render.hpp"
-#include "bake/check/workstation_issues.hpp"
+#include "bake/check/reference_renderer.hpp"
+#include "bake/check/verdict.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_quality.hpp"
@@ -118,9 +118,8 @@ Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned job
   }
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
     if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
-    const Result<RgbaImage> image = read_image(mesh.materials[m].diffuse_map);
-    if (!image) return tl::unexpected(image.error());
-    textures[m].levels = mip_chain(*image, textures[m].repeat, jobs);
+    MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
+    textures[m].levels = mip_chain(image, textures[m].repeat, jobs);
   }
   return textures;
 }
@@ -135,35 +134,26 @@ class Looker {
   }
 
   Result<void> set_up() {
-    auto context = GlContext::create_offscreen();
-    if (!context) return tl::unexpected(context.error());
-    context_ = std::move(*context);
-    auto renderer = Renderer::create(bundle_, probe_gl_caps());
-    if (!renderer) return tl::unexpected(renderer.error());
-    renderer_ = std::move(*renderer);
+    MODAR_ASSIGN(context_, GlContext::create_offscreen());
+    MODAR_ASSIGN(renderer_, Renderer::create(bundle_, probe_gl_caps()));
     renderer_->set_options(render_);
     return renderer_->resize(options_.side, options_.side);
   }
 
   Result<ModelLook> look(std::uint32_t index, const std::string& path) {
     Report quiet;
-    Result<SourceModel> source = read_model(path, options_.jobs);
-    if (!source) return tl::unexpected(source.error());
-    const Result<TriMesh> mesh = weld(std::move(*source), quiet, {options_.jobs});
-    if (!mesh) return tl::unexpected(mesh.error());
+    MODAR_ASSIGN(SourceModel source, read_model(path, options_.jobs));
+    MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
     ModelLook look;
     look.name = bundle_.name(bundle_.models()[index].name);
-    look.judged = !translucent(*mesh);
+    look.judged = !translucent(mesh);
     if (!look.judged) return look;
-    const Result<std::vector<SoftTexture>> textures = load_textures(*mesh, options_.jobs);
-    if (!textures) return tl::unexpected(textures.error());
-    compare(index, *mesh, *textures, look);
+    MODAR_ASSIGN(const std::vector<SoftTexture> textures, load_textures(mesh, options_.jobs));
+    compare(index, mesh, textures, look);
     if (!options_.picture_folder.empty()) {
       look.picture =
           (std::filesystem::path(options_.picture_folder) / (look.name + ".png")).string();
-      if (auto saved = write_png(worst_, look.picture); !saved) {
-        return tl::unexpected(saved.error());
-      }
+      MODAR_TRY(write_png(worst_, look.picture));
     }
     judge(index, look);
     return look;
@@ -261,16 +251,15 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
   std::vector<ModelLook> looks;
   if (bundle.models().empty()) return looks;
   Looker looker(bundle, options, sink);
-  if (auto ready = looker.set_up(); !ready) return tl::unexpected(ready.error());
+  MODAR_TRY(looker.set_up());
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
     const auto path = std::find_if(
         options.models.begin(), options.models.end(),
         [&](const std::string& file) { return file_stem(file) == bundle.name(model.name); });
-    if (path == options.models.end()) continue;  // SOURCE_MISSING tells of it
-    Result<ModelLook> look = looker.look(m, *path);
-    if (!look) return tl::unexpected(look.error());
-    looks.push_back(std::move(*look));
+    if (path == options.models.end()) continue;  // SOURCE_MISSING reports it
+    MODAR_ASSIGN(ModelLook look, looker.look(m, *path));
+    looks.push_back(std::move(look));
   }
   return looks;
 }

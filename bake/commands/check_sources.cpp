@@ -15,8 +15,8 @@ bool is_model(const std::string& path) {
   return extension == ".obj" || extension == ".OBJ" || extension == ".glb" || extension == ".gltf";
 }
 
-Result<SourceFit> against_sources(const BundleView& bundle, const CheckCommand& command,
-                                  const IssueSink& sink) {
+Result<SourceFit> bake_and_compare(const BundleView& bundle, const CheckCommand& command,
+                                   const IssueSink& sink) {
   BakeRequest request;
   for (const std::string& path : command.sources) {
     if (is_model(path)) {
@@ -33,9 +33,9 @@ Result<SourceFit> against_sources(const BundleView& bundle, const CheckCommand& 
   return check_source(bundle, request, sink, report);
 }
 
-Result<std::vector<PatternRange>> with_the_devices_eye(const BundleView& bundle,
-                                                       const CheckCommand& command,
-                                                       const IssueSink& sink) {
+Result<std::vector<PatternRange>> track_patterns(const BundleView& bundle,
+                                                 const CheckCommand& command,
+                                                 const IssueSink& sink) {
   PoseCheckOptions options;
   for (const std::string& path : command.sources) {
     if (!is_model(path)) options.pictures.push_back(path);
@@ -46,9 +46,9 @@ Result<std::vector<PatternRange>> with_the_devices_eye(const BundleView& bundle,
   return check_poses(bundle, options, sink);
 }
 
-Result<std::vector<ModelLook>> beside_sources(const BundleView& bundle, const CheckCommand& command,
-                                              const IssueSink& sink) {
-  if (auto made = make_output_folder(command.visual); !made) return tl::unexpected(made.error());
+Result<std::vector<ModelLook>> compare_looks(const BundleView& bundle, const CheckCommand& command,
+                                             const IssueSink& sink) {
+  MODAR_TRY(make_output_folder(command.visual));
   VisualOptions options;
   for (const std::string& path : command.sources) {
     if (is_model(path)) options.models.push_back(path);
@@ -64,18 +64,12 @@ Result<std::vector<ModelLook>> beside_sources(const BundleView& bundle, const Ch
 
 Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
                                    const IssueSink& sink, CheckExtras& extras) {
-  Result<SourceFit> fit = against_sources(bundle, command, sink);
-  if (!fit) return tl::unexpected(fit.error());
-  extras.source = std::move(*fit);
+  MODAR_ASSIGN(extras.source, bake_and_compare(bundle, command, sink));
   if (!command.visual.empty()) {
-    Result<std::vector<ModelLook>> looks = beside_sources(bundle, command, sink);
-    if (!looks) return tl::unexpected(looks.error());
-    extras.looks = std::move(*looks);
+    MODAR_ASSIGN(extras.looks, compare_looks(bundle, command, sink));
   }
   if (command.pose) {
-    Result<std::vector<PatternRange>> ranges = with_the_devices_eye(bundle, command, sink);
-    if (!ranges) return tl::unexpected(ranges.error());
-    extras.poses = std::move(*ranges);
+    MODAR_ASSIGN(extras.poses, track_patterns(bundle, command, sink));
   }
   return {};
 }

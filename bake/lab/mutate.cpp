@@ -3,10 +3,9 @@
 
 #include <cstring>
 
-#include "bake/check/scene_digest.hpp"
-#include "bake/check/second_reader.hpp"
 #include "bake/check/yml_rule.hpp"
 #include "bake/lab/mutator.hpp"
+#include "bake/lab/scene_digest.hpp"
 #include "formats/check.hpp"
 
 namespace modar {
@@ -74,9 +73,9 @@ class Trial {
       }
       try_one(i);
       if (candidates_.size() < kBatch) continue;
-      if (auto asked = ask_second_reader(); !asked) return tl::unexpected(asked.error());
+      MODAR_TRY(ask_second_reader());
     }
-    if (auto asked = ask_second_reader(); !asked) return tl::unexpected(asked.error());
+    MODAR_TRY(ask_second_reader());
     report_.n = options_.count;
     return std::move(report_);
   }
@@ -126,11 +125,10 @@ class Trial {
     if (candidates_.empty()) return {};
     std::vector<std::span<const std::byte>> files{bytes_};
     for (const Candidate& candidate : candidates_) files.emplace_back(candidate.file);
-    const auto scenes = read_scenes(options_.second_reader, files);
-    if (!scenes) return tl::unexpected(scenes.error());
+    MODAR_ASSIGN(const auto scenes, read_scenes(options_.second_reader, files));
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       const Candidate& candidate = candidates_[i];
-      if ((*scenes)[i + 1] == (*scenes)[0]) {
+      if (scenes[i + 1] == scenes[0]) {
         tally(candidate.mutation, [](MutationTally& t) { ++t.harmless; });
       } else {
         survive(candidate.mutation, candidate.number);
@@ -165,10 +163,11 @@ double MutationTally::rate_without_summary() const {
 Result<MutationReport> mutate_bundle(std::span<const std::byte> bytes,
                                      const MutateOptions& options) {
   const IssueSink ignore = [](const Issue&) {};
-  if (const auto view = BundleView::open(bytes); !view) return tl::unexpected(view.error());
+  MODAR_TRY(BundleView::open(bytes));
   if (!check_bundle(bytes, ignore) || !check_yml_twins(bytes, ignore)) {
     return fail(ExitCode::kInvalidInput, "mutate.bad", "bundle",
-                "the bundle is not good to begin with", "run modar check and bake it again");
+                "the bundle fails validation before any mutation",
+                "run modar check and bake it again");
   }
   return Trial(bytes, options).run();
 }

@@ -24,9 +24,9 @@ struct MutateOptions {
 /// How mutations of one kind fared.
 struct MutationTally {
   std::uint64_t tried = 0;
-  std::uint64_t killed = 0;     ///< the checker found the bundle bad
-  std::uint64_t harmless = 0;   ///< survived, and both readers decode the identical scene
-  std::uint64_t summary = 0;  ///< of the killed, those that only STATEMENT_DIFFERS found
+  std::uint64_t killed = 0;    ///< the checker found the bundle bad
+  std::uint64_t harmless = 0;  ///< survived, and both readers decode the identical scene
+  std::uint64_t summary = 0;   ///< of the killed, those that only STATEMENT_DIFFERS found
   /// Killed among those that are not harmless; 1 where there are none.
   [[nodiscard]] double rate() const;
   /// The same without the kills of the content summary: what the other rules do.

@@ -1,4 +1,5 @@
-// One mutation after the other on a copy of a bundle, each taken back before the next.
+// Mutations of a bundle: the places of every field of the specification, and one mutation after the
+// other on a copy, each undone before the next.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +9,32 @@
 #include <string>
 #include <vector>
 
-#include "bake/lab/mutation_targets.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/field_table.hpp"
 
 namespace modar {
+
+/// `count` elements, each `step` bytes behind the one before.
+struct PlaceRange {
+  std::uint64_t first = 0;  ///< byte in the file
+  std::uint64_t step = 0;
+  std::uint64_t count = 0;
+};
+
+/// One field of the specification with all its places in the file.
+struct MutationField {
+  std::string name;  ///< "ModelRecord.center", "vertex uv", "index", "names"
+  FieldType type = FieldType::kU8;
+  bool hash = false;  ///< made true again where hashes are
+  std::vector<PlaceRange> places;
+
+  [[nodiscard]] std::uint64_t elements() const;
+  /// Byte of element i < elements().
+  [[nodiscard]] std::uint64_t place(std::uint64_t i) const;
+};
+
+/// Every field that has a place in the bundle, in a fixed order.
+std::vector<MutationField> mutation_fields(const BundleView& bundle);
 
 /// What was done to the bytes.
 struct Mutation {

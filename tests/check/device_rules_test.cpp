@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bake/check/verdict.hpp"
-#include "bake/check/workstation_issues.hpp"
+#include "bake/check/verdict.hpp"
 #include "tests/formats/support.hpp"
 
 namespace {

@@ -6,8 +6,7 @@
 #include <set>
 #include <string>
 
-#include "bake/check/scene_digest.hpp"
-#include "bake/lab/mutation_targets.hpp"
+#include "bake/lab/scene_digest.hpp"
 #include "bake/lab/mutator.hpp"
 #include "formats/check.hpp"
 #include "formats/content_summary.hpp"

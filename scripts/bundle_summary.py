@@ -1,4 +1,4 @@
-"""The statement of a ModAR bundle, written from formats/bundle.md alone (for read_bundle.py)."""
+"""The content summary of a ModAR bundle, written from formats/bundle.md alone (for read_bundle.py)."""
 import json
 import struct
 
@@ -50,7 +50,7 @@ def feature_lines(bundle):
                    ("count", struct.unpack_from("<I", data)[0], "I"), ("text_bytes", len(text), "Q")]
 
 
-def loop_lines(bundle):
+def tracker_lines(bundle):
     for (kind, owner, _), data in bundle.payload.items():
         if kind == 258:
             words = struct.unpack(f"<{len(data) // 2}H", data[:len(data) // 2 * 2])
@@ -94,12 +94,12 @@ def lines_of(bundle):
         for index, row in enumerate(bundle.tables[table]):
             yield list(record_pairs(table, record, index, row))
     yield from feature_lines(bundle)
-    yield from loop_lines(bundle)
+    yield from tracker_lines(bundle)
     yield from level_lines(bundle)
     yield from texture_lines(bundle)
 
 
-def check_statement(bundle):
+def check_summary(bundle):
     text = bundle.payload.get((3, NONE, 0))
     if text is None:
         return

@@ -1,5 +1,5 @@
 // Rasterises triangle after triangle into a depth buffer.
-#include "bake/check/software_render.hpp"
+#include "bake/check/reference_renderer.hpp"
 
 #include <algorithm>
 #include <cmath>

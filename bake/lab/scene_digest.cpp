@@ -1,9 +1,13 @@
-// Hashes a bundle through BundleView, as a renderer and a tracker read it.
-#include "bake/check/scene_digest.hpp"
+// Hashes a bundle as BundleView decodes it, and runs the second reader as a process.
+#include "bake/lab/scene_digest.hpp"
 
+#include <fstream>
 #include <string_view>
 
+#include "bake/process.hpp"
+#include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
+#include "formats/component.hpp"
 #include "formats/field_table.hpp"
 
 #define XXH_INLINE_ALL
@@ -46,25 +50,13 @@ void add_table(Digest& digest, const BundleView& view, const char* name, const T
   }
 }
 
-std::size_t component_size(std::uint8_t type) {
-  switch (static_cast<ComponentType>(type)) {
-    case ComponentType::kI8:
-    case ComponentType::kU8:
-      return 1;
-    case ComponentType::kF32:
-      return 4;
-    default:
-      return 2;
-  }
-}
-
 void add_level(Digest& digest, const BundleView& view, const LayoutRecord& layout,
                const LevelRecord& level) {
   const std::byte* vertex = view.vertices().data() + level.vertex_offset;
   for (std::uint32_t i = 0; i < level.vertex_count; ++i, vertex += layout.stride) {
     for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
       const AttributeRecord& attribute = layout.attributes[a];
-      digest.add(vertex + attribute.offset, attribute.components * component_size(attribute.type));
+      digest.add(vertex + attribute.offset, attribute.components * component_bytes(attribute.type));
     }
   }
   digest.add(view.indices().data() + level.index_offset, 2 * std::size_t{level.index_count});
@@ -110,6 +102,40 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
     digest.add(view.section(type, entry.owner, entry.variant));
   }
   return digest.value();
+}
+
+namespace {
+
+tl::unexpected<Error> trouble(const std::string& reader, const std::string& cause) {
+  return fail(ExitCode::kIo, "mutate.second-reader", reader, cause,
+              "name scripts/read_bundle.py with --second-reader, and install python3");
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> read_scenes(const std::string& reader,
+                                             const std::vector<std::span<const std::byte>>& files) {
+  const TemporaryFolder folder;
+  if (folder.path().empty()) return trouble(reader, "there is no room for temporary files");
+  ProcessRequest request;
+  request.words = {"python3", reader, "--scenes"};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    request.words.push_back(folder.path() + "/" + std::to_string(i) + ".modar");
+    MODAR_TRY(write_file(request.words.back(), files[i]));
+  }
+  request.output = folder.path() + "/scenes";
+  // 3: it refuses a file and says so in its line.
+  if (const int code = run_process(request); code != 0 && code != 3) {
+    return trouble(reader, "it could not be run, or failed");
+  }
+  std::vector<std::string> lines;
+  std::ifstream text(request.output);
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  if (lines.size() != files.size()) {
+    return trouble(reader, "it answered for " + std::to_string(lines.size()) + " files, not for " +
+                               std::to_string(files.size()));
+  }
+  return lines;
 }
 
 }  // namespace modar
