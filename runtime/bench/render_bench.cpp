@@ -22,7 +22,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "formats/bundle_view.hpp"
-#include "formats/quantise.hpp"
+#include "formats/component.hpp"
 #include "modar/camera.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/renderer.hpp"
@@ -67,60 +67,25 @@ struct BenchStage {
   BundleView bundle;
 };
 
-float component(const std::byte* bytes, const AttributeRecord& attribute, std::uint32_t index) {
-  switch (static_cast<ComponentType>(attribute.type)) {
-    case ComponentType::kHalf: {
-      std::uint16_t half = 0;
-      std::memcpy(&half, bytes + 2 * index, sizeof half);
-      return half_to_float(half);
-    }
-    case ComponentType::kI16: {
-      std::int16_t value = 0;
-      std::memcpy(&value, bytes + 2 * index, sizeof value);
-      return attribute.normalised != 0 ? std::max(static_cast<float>(value) / 32767.0f, -1.0f)
-                                       : static_cast<float>(value);
-    }
-    case ComponentType::kU16: {
-      std::uint16_t value = 0;
-      std::memcpy(&value, bytes + 2 * index, sizeof value);
-      return attribute.normalised != 0 ? unorm16_to_float(value) : static_cast<float>(value);
-    }
-    case ComponentType::kF32: {
-      float value = 0;
-      std::memcpy(&value, bytes + 4 * index, sizeof value);
-      return value;
-    }
-    case ComponentType::kI8:
-    case ComponentType::kU8:
-      break;
-  }
-  return 0.0f;
-}
-
-AttributeRecord position_of(const LayoutRecord& layout) {
-  for (const AttributeRecord& attribute : layout.attributes) {
-    if (static_cast<Semantic>(attribute.semantic) == Semantic::kPosition) return attribute;
-  }
-  return layout.attributes[0];
-}
-
 /// Boxes of the triangles of a chunk's level 0, as chunks of their own.
 std::vector<ChunkRecord> triangle_boxes(const BundleView& bundle, const LayoutRecord& layout,
                                         const ChunkRecord& chunk) {
   const LevelRecord& level = bundle.levels()[chunk.first_level];
-  const AttributeRecord position = position_of(layout);
+  const AttributeRecord* position = find_attribute(layout, Semantic::kPosition);
+  if (position == nullptr) return {};
   std::vector<ChunkRecord> boxes(level.index_count / 3);
   for (std::uint32_t i = 0; i < level.index_count; ++i) {
     std::uint16_t index = 0;
     std::memcpy(&index, bundle.indices().data() + level.index_offset + 2 * std::uint64_t{i},
                 sizeof index);
     if (index >= level.vertex_count) continue;
-    const std::byte* vertex = bundle.vertices().data() + level.vertex_offset +
-                              std::uint64_t{index} * layout.stride + position.offset;
+    const std::byte* vertex =
+        bundle.vertices().data() + level.vertex_offset + std::uint64_t{index} * layout.stride;
     ChunkRecord& box = boxes[i / 3];
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       const float value =
-          chunk.position_offset[axis] + chunk.position_step * component(vertex, position, axis);
+          chunk.position_offset[axis] +
+          chunk.position_step * static_cast<float>(decode_component(*position, vertex, axis));
       box.bounds_min[axis] = i % 3 == 0 ? value : std::min(box.bounds_min[axis], value);
       box.bounds_max[axis] = i % 3 == 0 ? value : std::max(box.bounds_max[axis], value);
     }

@@ -3,32 +3,27 @@
 
 #include <cstring>
 
-#include "formats/quantise.hpp"
+#include "formats/component.hpp"
 
 namespace modar {
 namespace {
 
-struct Component {
-  GLenum type;
-  std::uint32_t bytes;
-};
-
-Component component(ComponentType type) {
+GLenum gl_type(ComponentType type) {
   switch (type) {
     case ComponentType::kHalf:
-      return {GL_HALF_FLOAT_OES, 2};
+      return GL_HALF_FLOAT_OES;
     case ComponentType::kI16:
-      return {GL_SHORT, 2};
+      return GL_SHORT;
     case ComponentType::kU16:
-      return {GL_UNSIGNED_SHORT, 2};
+      return GL_UNSIGNED_SHORT;
     case ComponentType::kI8:
-      return {GL_BYTE, 1};
+      return GL_BYTE;
     case ComponentType::kU8:
-      return {GL_UNSIGNED_BYTE, 1};
+      return GL_UNSIGNED_BYTE;
     case ComponentType::kF32:
       break;
   }
-  return {GL_FLOAT, 4};
+  return GL_FLOAT;
 }
 
 /// kAttributeCount where a model shader has no such attribute.
@@ -67,14 +62,13 @@ VertexFormat vertex_format(const LayoutRecord& layout, bool halves) {
     const std::uint32_t location = location_of(semantic);
     if (location >= format.attributes.size()) continue;
     const ComponentType type = static_cast<ComponentType>(record.type);
-    const Component source = component(type);
     const bool widen = format.widened && type == ComponentType::kHalf;
     VertexAttribute& attribute = format.attributes[location];
     attribute.components = record.components;
-    attribute.type = widen ? GLenum{GL_FLOAT} : source.type;
+    attribute.type = widen ? GLenum{GL_FLOAT} : gl_type(type);
     attribute.normalised = record.normalised != 0 ? GLboolean{GL_TRUE} : GLboolean{GL_FALSE};
     attribute.source_offset = record.offset;
-    attribute.bytes = source.bytes * record.components;
+    attribute.bytes = component_bytes(record.type) * record.components;
     attribute.offset = format.widened ? end : record.offset;
     // Attributes of a rewritten vertex start at multiples of 4, which every GPU reads fastest.
     end += ((widen ? 2 * attribute.bytes : attribute.bytes) + 3) & ~3u;
