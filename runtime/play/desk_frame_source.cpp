@@ -4,18 +4,15 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <cstdlib>
 #include <vector>
 
 #include <opencv2/core.hpp>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "desk_v4l2_source.hpp"
 #include "frame_source.hpp"
+#include "modar/video_reader.hpp"
 #include "raw_source.hpp"
 
 namespace modar {
@@ -45,29 +42,19 @@ void fill(Frame& frame, const cv::Mat& picture) {
 /// A video file or a camera.
 class VideoSource final : public FrameSource {
  public:
-  VideoSource(cv::VideoCapture capture, std::string name, bool live)
-      : capture_(std::move(capture)), name_(std::move(name)) {
-    info_.live = live;
-    const double fps = capture_.get(cv::CAP_PROP_FPS);
-    info_.fps = std::isfinite(fps) && fps >= 1 && fps <= 1000 ? fps : kDefaultFps;
-    const double count = live ? 0 : capture_.get(cv::CAP_PROP_FRAME_COUNT);
-    if (std::isfinite(count) && count > 0) info_.frames = static_cast<std::uint64_t>(count);
+  VideoSource(VideoReader reader, bool live) : reader_(std::move(reader)) {
+    info_ = {reader_.fps(), reader_.frames(), live};
   }
 
   [[nodiscard]] SourceInfo info() const override { return info_; }
 
   Result<bool> next(Frame& frame) override {
     if (stopped_) return false;
-    try {
-      if (!capture_.read(picture_) || picture_.empty()) {
-        if (next_ > 0 && !info_.live) return false;
-        return damaged(name_, info_.live ? "the camera gives no more frames"
-                                         : "the video has no frame that can be decoded");
-      }
-      fill(frame, picture_);
-    } catch (const std::exception& error) {
-      return damaged(name_, std::string("OpenCV: ") + error.what());
-    }
+    MODAR_ASSIGN(const bool more, reader_.next());
+    if (!more) return false;
+    const BgrPicture picture = reader_.picture();
+    fill(frame, {picture.height, picture.width, CV_8UC3,
+                 const_cast<std::uint8_t*>(picture.pixels), picture.stride});
     frame.index = next_;
     frame.time_s = static_cast<double>(next_) / info_.fps;
     ++next_;
@@ -77,9 +64,7 @@ class VideoSource final : public FrameSource {
   void stop() override { stopped_ = true; }
 
  private:
-  cv::VideoCapture capture_;
-  std::string name_;
-  cv::Mat picture_;
+  VideoReader reader_;
   SourceInfo info_;
   std::uint64_t next_ = 0;
   std::atomic<bool> stopped_{false};
@@ -153,28 +138,24 @@ Result<std::unique_ptr<FrameSource>> open_camera(const std::string& input) {
   MODAR_ASSIGN(auto device, open_video_device("/dev/video" + std::to_string(number)));
   auto source = start_camera(std::move(device), input, {});
   if (source || source.error().code != "camera.format") return source;
-  cv::VideoCapture capture(number, cv::CAP_V4L2);
-  if (!capture.isOpened()) return source;
-  capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
-  return std::make_unique<VideoSource>(std::move(capture), input, true);
+  auto reader = VideoReader::open_camera(number, input);
+  if (!reader) return source;
+  return std::make_unique<VideoSource>(std::move(*reader), true);
 }
 
 Result<std::unique_ptr<FrameSource>> open_file(const std::string& path) {
   if (cv::haveImageReader(path)) {
     return std::make_unique<PictureSource>(std::vector<std::string>{path});
   }
-  cv::VideoCapture capture(path, cv::CAP_FFMPEG);
-  if (!capture.isOpened()) return damaged(path, "it is neither a picture nor a video");
-  return std::make_unique<VideoSource>(std::move(capture), path, false);
+  MODAR_ASSIGN(VideoReader reader, VideoReader::open_file(path));
+  return std::make_unique<VideoSource>(std::move(reader), false);
 }
 
 }  // namespace
 
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
   try {
-    // Errors of theirs come back as ours; the same words twice help nobody.
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+    silence_opencv();
     if (is_raw_input(input)) return open_raw_source(input);
     if (input == "camera" || input.starts_with("camera:")) return open_camera(input);
     struct stat status {};

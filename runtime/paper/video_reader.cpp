@@ -1,0 +1,108 @@
+// Wraps cv::VideoCapture; catches what it throws.
+#include "modar/video_reader.hpp"
+
+#include <cmath>
+#include <cstdlib>
+
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+namespace modar {
+namespace {
+
+constexpr double kDefaultFps = 30;
+
+tl::unexpected<Error> damaged(const std::string& name, const std::string& cause) {
+  return fail(ExitCode::kInvalidInput, "input.damaged", name, cause,
+              "give a video or picture that other players show");
+}
+
+}  // namespace
+
+struct VideoReader::State {
+  cv::VideoCapture capture;
+  std::string name;
+  bool live = false;
+  bool any = false;  ///< a frame has been decoded
+  cv::Mat picture;
+  cv::Mat gray;
+};
+
+VideoReader::VideoReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+VideoReader::VideoReader(VideoReader&&) noexcept = default;
+VideoReader::~VideoReader() = default;
+
+void silence_opencv() {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+}
+
+Result<VideoReader> VideoReader::open_file(const std::string& path) {
+  silence_opencv();
+  try {
+    auto state = std::make_unique<State>();
+    state->name = path;
+    if (!state->capture.open(path, cv::CAP_FFMPEG)) {
+      return damaged(path, "it is neither a picture nor a video");
+    }
+    return VideoReader(std::move(state));
+  } catch (const std::exception& thrown) {
+    return damaged(path, std::string("OpenCV: ") + thrown.what());
+  }
+}
+
+Result<VideoReader> VideoReader::open_camera(int number, const std::string& name) {
+  silence_opencv();
+  try {
+    auto state = std::make_unique<State>();
+    state->name = name;
+    state->live = true;
+    if (state->capture.open(number, cv::CAP_V4L2)) {
+      state->capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
+      return VideoReader(std::move(state));
+    }
+    return fail(ExitCode::kIo, "input.open", name, "the camera cannot be opened",
+                "check that it is connected and that no other program uses it");
+  } catch (const std::exception& thrown) {
+    return damaged(name, std::string("OpenCV: ") + thrown.what());
+  }
+}
+
+double VideoReader::fps() const {
+  const double fps = state_->capture.get(cv::CAP_PROP_FPS);
+  return std::isfinite(fps) && fps >= 1 && fps <= 1000 ? fps : kDefaultFps;
+}
+
+std::uint64_t VideoReader::frames() const {
+  const double count = state_->live ? 0 : state_->capture.get(cv::CAP_PROP_FRAME_COUNT);
+  return std::isfinite(count) && count > 0 ? static_cast<std::uint64_t>(count) : 0;
+}
+
+Result<bool> VideoReader::next() {
+  try {
+    if (!state_->capture.read(state_->picture) || state_->picture.empty()) {
+      if (state_->any && !state_->live) return false;
+      return damaged(state_->name, state_->live ? "the camera gives no more frames"
+                                                : "the video has no frame that can be decoded");
+    }
+    state_->any = true;
+    return true;
+  } catch (const std::exception& thrown) {
+    return damaged(state_->name, std::string("OpenCV: ") + thrown.what());
+  }
+}
+
+BgrPicture VideoReader::picture() const {
+  const cv::Mat& picture = state_->picture;
+  return {picture.data, picture.cols, picture.rows, picture.step[0]};
+}
+
+GrayImage VideoReader::gray() {
+  cv::cvtColor(state_->picture, state_->gray, cv::COLOR_BGR2GRAY);
+  const cv::Mat& gray = state_->gray;
+  return {gray.data, gray.cols, gray.rows, static_cast<std::ptrdiff_t>(gray.step[0])};
+}
+
+}  // namespace modar
