@@ -14,7 +14,7 @@
 #include "bake/mesh/pack/pack.hpp"
 #include "bake/mesh/topology/mesh_topology.hpp"
 #include "bake/mesh/weld/weld.hpp"
-#include "bake/pattern/pattern_image.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "bake/texture/texture_stage.hpp"
 #include "formats/content_summary.hpp"
 #include "modar/device_profile.hpp"

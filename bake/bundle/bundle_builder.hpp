@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bake/mesh/pack/vertex_codec.hpp"
-#include "bake/pattern/tracker_record_bake.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "bake/report.hpp"
 #include "bake/texture/texture.hpp"
 #include "formats/bundle_writer.hpp"

@@ -10,8 +10,7 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/check/verdict.hpp"
-#include "bake/pattern/pattern_picture.hpp"
-#include "bake/pattern/pose_scene.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "modar/paper_tracker.hpp"
 #include "modar/pose_loop.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/pattern/pattern_image.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "formats/error.hpp"
 
 namespace modar {

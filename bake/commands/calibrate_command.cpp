@@ -5,8 +5,7 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
-#include "bake/pattern/calibrate.hpp"
-#include "bake/pattern/pattern_picture.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "bake/terminal.hpp"
 
 namespace modar {

@@ -11,11 +11,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
 #include "bake/output.hpp"
-#include "bake/pattern/confusion.hpp"
-#include "bake/pattern/pattern_image.hpp"
-#include "bake/pattern/pattern_picture.hpp"
-#include "bake/pattern/score.hpp"
-#include "bake/pattern/simulate.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "bake/terminal.hpp"
 #include "modar/camera_file.hpp"
 
@@ -182,7 +178,7 @@ void add_score(CommandLine& pattern) {
 }
 
 Json value_json(const SimulatedValue& value) {
-  const PoseBenchRow& row = value.outcome.row;
+  const PoseFigures& row = value.outcome.figures;
   return {{"value", value.value},
           {"frames", row.frames},
           {"recognised_pct", 100.0 * row.recognised / row.frames},
@@ -220,7 +216,7 @@ void print_simulation(const Simulation& simulation) {
               "error px", "jitter px");
   for (const SimulatedBand& band : simulation.bands) {
     for (const SimulatedValue& value : band.values) {
-      const PoseBenchRow& row = value.outcome.row;
+      const PoseFigures& row = value.outcome.figures;
       std::printf("  %-10s %10.3g %-11s %8.1f %8.1f %10.3f %10.3f\n", band.name.c_str(),
                   value.value, band.unit.c_str(), 100.0 * row.recognised / row.frames,
                   100.0 * row.right / row.frames, row.error_px, row.jitter_px);

@@ -1,5 +1,5 @@
-// `modar bench pose`: our loop beside the ModAR paper's method on rendered frames of known pose and
-// on a video with its truth.
+// `modar bench pose`: our tracker beside the ModAR paper's method on rendered frames of known pose
+// and on a video with its truth.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,14 +10,13 @@
 #include "bake/lab/many_bench.hpp"
 #include "bake/lab/pose_bench.hpp"
 #include "bake/lab/score_bench.hpp"
-#include "bake/pattern/pattern_picture.hpp"
 #include "bake/terminal.hpp"
 #include "modar/features.hpp"
 
 namespace modar {
 namespace {
 
-/// Bands of the tracking part: what it is called, speed of the hand, blur for each pixel of motion.
+/// Bands of the tracking part: name, speed of the hand, motion blur for each pixel of motion.
 struct Path {
   const char* name;
   double speed;
@@ -30,7 +29,7 @@ double percent(int part, int whole) {
   return whole > 0 ? 100.0 * part / whole : 0.0;
 }
 
-/// Rows of one band: ours and, where it ran, the ModAR paper's.
+/// Rows of one band: ours and, where it ran, the paper's.
 void add_rows(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   for (const PoseBenchRow& ours : measured) {
@@ -93,30 +92,25 @@ Result<PoseBenchOptions> options_of(const PoseBenchRequest& command) {
   if (options.paper_set == 0 && command.parameters != "none") {
     return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
                 "there is no parameter set '" + command.parameters + "'",
-                "name one of the ModAR paper's sets, or none to run ours alone");
+                "name one of the paper's sets, or none to run ours alone");
   }
   for (const SceneBand& band : pose_bands()) {
     if (band.name.find(command.only) != std::string::npos) options.bands.push_back(band);
   }
-  auto patterns = pictures_of(command.patterns);
-  if (!patterns) return tl::unexpected(patterns.error());
-  options.patterns = std::move(*patterns);
-  auto backgrounds = pictures_of(command.backgrounds);
-  if (!backgrounds) return tl::unexpected(backgrounds.error());
-  options.backgrounds = std::move(*backgrounds);
+  MODAR_ASSIGN(options.patterns, pictures_of(command.patterns));
+  MODAR_ASSIGN(options.backgrounds, pictures_of(command.backgrounds));
   return options;
 }
 
-/// Scores beside working ranges, and how well their orders agree.
+/// Scores beside working ranges, and their rank correlation.
 Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
                                          const ProgressCallback& progress) {
-  const auto scores = bench_scores(options, progress);
-  if (!scores) return tl::unexpected(scores.error());
+  MODAR_ASSIGN(const auto scores, bench_scores(options, progress));
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<BenchRow> rows;
   std::vector<double> of_score[3];  // all, the half that it was tuned on, the other
   std::vector<double> of_range[3];
-  for (const ScoreBenchRow& one : *scores) {
+  for (const ScoreBenchRow& one : scores) {
     rows.push_back({"score " + one.name, 1.0 * one.score, one.range(), kNone});
     rows.push_back({"farthest " + one.name, one.farthest, kNone, kNone});
     rows.push_back({"tilt_deg " + one.name, one.tilt_deg, kNone, kNone});
@@ -135,11 +129,10 @@ Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
 
 Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options,
                                         const ProgressCallback& progress) {
-  const auto measured = bench_many(options, progress);
-  if (!measured) return tl::unexpected(measured.error());
+  MODAR_ASSIGN(const auto measured, bench_many(options, progress));
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<BenchRow> rows;
-  for (const ManyBenchRow& row : *measured) {
+  for (const ManyBenchRow& row : measured) {
     const bool held = row.reference > 0;
     rows.push_back({row.measure + " x" + std::to_string(row.patterns), row.value,
                     held ? row.reference : kNone, held ? row.value / row.reference : kNone});
@@ -153,34 +146,31 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
   ProgressBar bar(command.quiet);
   const auto progress = [&bar](const std::string& what, double done) { bar.show(what, done); };
   std::vector<PoseBenchRow> measured;
-  const auto take = [&measured](Result<std::vector<PoseBenchRow>> rows) -> Result<void> {
-    if (!rows) return tl::unexpected(rows.error());
-    measured.insert(measured.end(), rows->begin(), rows->end());
-    return {};
+  const auto take = [&measured](const std::vector<PoseBenchRow>& rows) {
+    measured.insert(measured.end(), rows.begin(), rows.end());
   };
-  auto options = options_of(command);
-  if (!options) return tl::unexpected(options.error());
+  MODAR_ASSIGN(const PoseBenchOptions options, options_of(command));
   if (command.scores || command.tables || command.many > 0) {
-    auto rows = command.many > 0 ? many_rows(*options, progress)
-                : command.scores ? score_rows(*options, progress)
-                                 : paper_rows(*options, progress);
+    auto rows = command.many > 0 ? many_rows(options, progress)
+                : command.scores ? score_rows(options, progress)
+                                 : paper_rows(options, progress);
     bar.clear();
     return rows;
   }
-  if (!options->bands.empty()) {
-    if (auto done = take(bench_detection(*options, progress)); !done) {
-      return tl::unexpected(done.error());
-    }
+  if (!options.bands.empty()) {
+    MODAR_ASSIGN(const auto rows, bench_detection(options, progress));
+    take(rows);
   }
   for (const Path& path : kPaths) {
     if (std::string(path.name).find(command.only) == std::string::npos) continue;
-    auto done = take(bench_tracking(*options, path.name, path.speed, path.blur, progress));
-    if (!done) return tl::unexpected(done.error());
+    MODAR_ASSIGN(const auto rows,
+                 bench_tracking(options, path.name, path.speed, path.blur, progress));
+    take(rows);
   }
   if (!command.video.empty()) {
-    auto done = take(
-        bench_video(*options, {command.video, command.truth, command.video_pattern}, progress));
-    if (!done) return tl::unexpected(done.error());
+    const VideoBench video{command.video, command.truth, command.video_pattern};
+    MODAR_ASSIGN(const auto rows, bench_video(options, video, progress));
+    take(rows);
   }
   bar.clear();
   std::vector<BenchRow> rows;

@@ -1,11 +1,10 @@
-// The ModAR paper's Tables 6 to 8 and its sentences on accuracy, beside the same figures measured
+// The ModAR paper's Tables 6 to 8 and what it states of accuracy, beside the same figures measured
 // here: its method under its four parameter sets, and ours, on the same frames.
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "bake/lab/bench_parts.hpp"
-#include "bake/pattern/pattern_picture.hpp"
 #include "modar/features.hpp"
 
 namespace modar {
@@ -13,7 +12,7 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// What the ModAR paper prints of one parameter set.
+/// What the paper prints of one parameter set.
 struct PaperColumn {
   const char* set;
   double features[6];       ///< Table 6: of its six patterns
@@ -21,26 +20,26 @@ struct PaperColumn {
   double mid_seconds[4];    ///< Table 8
   double accuracy_far_pct;  ///< area ratios 0.4 to 0.9; from there to 4 all reach 100
 };
-constexpr PaperColumn kArticle[] = {{"orb-2000",
-                                     {823, 1189, 1595, 1079, 604, 1279},
-                                     {0.086, 0.230, 0.020, 0.098},
-                                     {0.069, 0.194, 0.070, 0.023},
-                                     93},
-                                    {"orb-500",
-                                     {495, 430, 485, 437, 400, 475},
-                                     {0.069, 0.189, 0.016, 0.035},
-                                     {0.057, 0.155, 0.012, 0.026},
-                                     88},
-                                    {"brisk-3",
-                                     {248, 544, 781, 564, 174, 603},
-                                     {2.425, 2.337, 0.029, 0.089},
-                                     {1.926, 1.795, 0.027, 0.080},
-                                     97},
-                                    {"brisk-2",
-                                     {231, 540, 761, 553, 168, 588},
-                                     {2.296, 2.229, 0.026, 0.063},
-                                     {1.851, 1.656, 0.023, 0.050},
-                                     95}};
+constexpr PaperColumn kPaper[] = {{"orb-2000",
+                                   {823, 1189, 1595, 1079, 604, 1279},
+                                   {0.086, 0.230, 0.020, 0.098},
+                                   {0.069, 0.194, 0.070, 0.023},
+                                   93},
+                                  {"orb-500",
+                                   {495, 430, 485, 437, 400, 475},
+                                   {0.069, 0.189, 0.016, 0.035},
+                                   {0.057, 0.155, 0.012, 0.026},
+                                   88},
+                                  {"brisk-3",
+                                   {248, 544, 781, 564, 174, 603},
+                                   {2.425, 2.337, 0.029, 0.089},
+                                   {1.926, 1.795, 0.027, 0.080},
+                                   97},
+                                  {"brisk-2",
+                                   {231, 540, 761, 553, 168, 588},
+                                   {2.296, 2.229, 0.026, 0.063},
+                                   {1.851, 1.656, 0.023, 0.050},
+                                   95}};
 constexpr const char* kStages[] = {"detect_ms", "describe_ms", "match_ms", "homography_ms"};
 constexpr const char* kFar = "area 0.4-0.9";
 constexpr const char* kNear = "area 0.9-4";
@@ -53,11 +52,9 @@ Result<double> mean_features(const PoseBenchOptions& options, const ParameterSet
   double sum = 0;
   for (const std::string& path : options.patterns) {
     bool shrunk = false;
-    const auto picture = load_pattern(path, shrunk);
-    if (!picture) return tl::unexpected(picture.error());
-    const auto features = describe_image(picture->view(), set);
-    if (!features) return tl::unexpected(features.error());
-    sum += static_cast<double>(features->keypoints.size());
+    MODAR_ASSIGN(const auto picture, load_pattern(path, shrunk));
+    MODAR_ASSIGN(const auto features, describe_image(picture.view(), set));
+    sum += static_cast<double>(features.keypoints.size());
   }
   return sum / static_cast<double>(options.patterns.size());
 }
@@ -98,7 +95,7 @@ Result<std::vector<BenchRow>> paper_rows(const PoseBenchOptions& options,
                                          const ProgressCallback& progress) {
   std::vector<BenchRow> rows;
   bool first = true;
-  for (const PaperColumn& column : kArticle) {
+  for (const PaperColumn& column : kPaper) {
     PoseBenchOptions run = options;
     run.ours = first;
     run.bands.clear();
@@ -108,17 +105,15 @@ Result<std::vector<BenchRow>> paper_rows(const PoseBenchOptions& options,
     for (const ParameterSetRecord& set : paper_parameter_sets()) {
       if (std::string(parameter_set_name(set.id)) != column.set) continue;
       run.paper_set = set.id;
-      const auto features = mean_features(options, set);
-      if (!features) return tl::unexpected(features.error());
+      MODAR_ASSIGN(const double features, mean_features(options, set));
       double paper = 0;
       for (const double count : column.features) paper += count / 6;
-      rows.push_back({std::string("table6_features ") + column.set, *features, paper,
-                      ratio(*features, paper)});
+      rows.push_back(
+          {std::string("table6_features ") + column.set, features, paper, ratio(features, paper)});
     }
-    const auto measured = bench_detection(run, progress);
-    if (!measured) return tl::unexpected(measured.error());
-    if (first) add_method(*measured, "ours", "ours", nullptr, rows);
-    add_method(*measured, "paper", column.set, &column, rows);
+    MODAR_ASSIGN(const auto measured, bench_detection(run, progress));
+    if (first) add_method(measured, "ours", "ours", nullptr, rows);
+    add_method(measured, "paper", column.set, &column, rows);
     first = false;
   }
   return rows;

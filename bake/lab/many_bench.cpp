@@ -1,4 +1,4 @@
-// Bundles of quarters of pictures, and what the device's loop makes of them.
+// Runs the device's tracker on bundles of many patterns: quarters of pictures.
 #include "bake/lab/many_bench.hpp"
 
 #include <algorithm>
@@ -8,19 +8,18 @@
 #include <malloc.h>
 
 #include "bake/parallel.hpp"
-#include "bake/pattern/pattern_picture.hpp"
-#include "bake/pattern/pose_subject.hpp"
 #include "bake/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
+#include "modar/pose_loop.hpp"
 
 namespace modar {
 namespace {
 
-constexpr std::size_t kSome = 10;
-constexpr std::size_t kOfPicture = 8;  // quarters, and those mirrored
-constexpr int kSettle = 5;             // frames before a pattern is hidden
-constexpr int kHidden = 10;
-constexpr int kPatience = 60;  // frames to wait for it
+constexpr std::size_t kSome = 10;      // patterns, between one and all
+constexpr std::size_t kOfPicture = 8;  // four quarters, and those mirrored
+constexpr int kShown = 15;             // frames before a pattern is hidden
+constexpr int kHidden = 10;            // frames for which it is
+constexpr int kPatience = 60;          // frames to wait for it
 
 /// Quarter 0 to 3 of a picture, mirrored from 4 on.
 GrayPicture quarter_of(const GrayPicture& picture, std::size_t which) {
@@ -57,9 +56,8 @@ Result<Many> make_many(const PoseBenchOptions& options, const ProgressCallback& 
   std::vector<GrayPicture> whole;
   for (const std::string& path : options.patterns) {
     bool shrunk = false;
-    auto picture = load_pattern(path, shrunk);
-    if (!picture) return tl::unexpected(picture.error());
-    whole.push_back(std::move(*picture));
+    MODAR_ASSIGN(auto picture, load_pattern(path, shrunk));
+    whole.push_back(std::move(picture));
   }
   Many many;
   for (std::size_t i = 0; i < most; ++i) {
@@ -70,14 +68,14 @@ Result<Many> make_many(const PoseBenchOptions& options, const ProgressCallback& 
   parallel_rows(
       static_cast<std::uint32_t>(most), std::thread::hardware_concurrency(),
       [&](std::uint32_t i) { baked[i] = bake_tracker_record(many.pictures[i].view(), {}); });
-  for (auto& record : baked) {
-    if (!record) return tl::unexpected(record.error());
-    many.records.push_back(std::move(*record));
+  for (auto& one : baked) {
+    MODAR_ASSIGN(auto record, std::move(one));
+    many.records.push_back(std::move(record));
   }
   return many;
 }
 
-/// How pictures are shown: close enough that a search finds what it can.
+/// How pictures are shown: large and little tilted.
 SceneBand easy_band() {
   SceneBand band;
   band.area_low = 2.0;
@@ -86,7 +84,7 @@ SceneBand easy_band() {
   return band;
 }
 
-/// Frames that each show one pattern, drawn when they are asked for.
+/// Frames that show one pattern each, rendered on demand.
 class Frames {
  public:
   Frames(const Many& many, const std::vector<GrayPicture>& backgrounds,
@@ -111,16 +109,16 @@ class Frames {
   const PoseBenchOptions& options_;
 };
 
-/// What searches made of frames.
+/// Outcome of searches.
 struct Searched {
   double seconds = 0;
   int right = 0;
-  int others = 0;  ///< recognitions of what was not shown
+  int others = 0;  ///< recognitions of patterns not shown
 
   Result<void> add(PoseLoop& loop, const SceneFrame& frame, std::uint32_t shown) {
     TrackResult seen;
     const double start = thread_seconds();
-    if (auto done = loop.step(frame.picture.view(), seen); !done) return done;
+    MODAR_TRY(loop.step(frame.picture.view(), seen));
     seconds += thread_seconds() - start;
     for (const Detection& each : seen.visible) {
       right += each.pattern == shown && is_right(each, {true, frame.corners}) ? 1 : 0;
@@ -130,7 +128,7 @@ struct Searched {
   }
 };
 
-/// A loop that searches every frame anew.
+/// A tracker that searches every frame anew.
 Result<std::unique_ptr<PoseLoop>> searcher(std::span<const std::byte> bytes, const Camera& camera) {
   PoseLoopOptions how;
   how.track = false;
@@ -144,21 +142,18 @@ Result<void> measure_detection(const Many& many, const Frames& frames, const Cam
   double with_one = 0;
   for (const std::size_t count : {std::size_t{1}, kSome, many.size()}) {
     if (count == kSome && many.size() <= kSome) continue;
-    const auto bytes = many.bundle(count);
-    if (!bytes) return tl::unexpected(bytes.error());
-    const auto loop = searcher(*bytes, camera);
-    if (!loop) return tl::unexpected(loop.error());
+    MODAR_ASSIGN(const auto bytes, many.bundle(count));
+    MODAR_ASSIGN(const auto loop, searcher(bytes, camera));
     Searched all;
     Searched alone;
     for (int i = 0; i < frames.count(); ++i) {
       const std::size_t shown = static_cast<std::size_t>(i) % count;
       const SceneFrame frame = frames.at(i, shown);
-      if (auto done = all.add(**loop, frame, static_cast<std::uint32_t>(shown)); !done) return done;
-      const auto single = bundle_of_record(many.pictures[shown].view(), many.records[shown]);
-      if (!single) return tl::unexpected(single.error());
-      const auto one = searcher(*single, camera);
-      if (!one) return tl::unexpected(one.error());
-      if (auto done = alone.add(**one, frame, 0); !done) return done;
+      MODAR_TRY(all.add(*loop, frame, static_cast<std::uint32_t>(shown)));
+      MODAR_ASSIGN(const auto single,
+                   bundle_of_record(many.pictures[shown].view(), many.records[shown]));
+      MODAR_ASSIGN(const auto one, searcher(single, camera));
+      MODAR_TRY(alone.add(*one, frame, 0));
       if (progress) progress("detection x" + std::to_string(count), (i + 1.0) / frames.count());
     }
     const double ms = 1e3 * all.seconds / frames.count();
@@ -177,8 +172,8 @@ double heap_bytes() {
   return static_cast<double>(now.uordblks + now.hblkhd);
 }
 
-/// From mapped bytes to a loop that takes frames: median time, and what it holds on the heap; what
-/// it holds once it has searched a frame, and what that first one takes.
+/// From mapped bytes to a tracker that takes frames: median time and heap; then the time of its
+/// first search and the heap after it.
 Result<void> measure_ready(std::span<const std::byte> bytes, int patterns, const Camera& camera,
                            const SceneFrame& frame, std::vector<ManyBenchRow>& rows) {
   std::vector<double> times;
@@ -188,17 +183,13 @@ Result<void> measure_ready(std::span<const std::byte> bytes, int patterns, const
   for (int i = 0; i < 5; ++i) {
     const double before = heap_bytes();
     const auto start = std::chrono::steady_clock::now();
-    const auto bundle = BundleView::open(bytes);
-    if (!bundle) return tl::unexpected(bundle.error());
-    const auto loop = PoseLoop::create(*bundle, camera);
-    if (!loop) return tl::unexpected(loop.error());
+    MODAR_ASSIGN(const auto bundle, BundleView::open(bytes));
+    MODAR_ASSIGN(const auto loop, PoseLoop::create(bundle, camera));
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     times.push_back(ms.count());
     held = heap_bytes() - before;
     const double stepped = thread_seconds();
-    if (const auto seen = (*loop)->step(frame.picture.view()); !seen) {
-      return tl::unexpected(seen.error());
-    }
+    MODAR_TRY(loop->step(frame.picture.view()));
     first = 1e3 * (thread_seconds() - stepped);
     searching = heap_bytes() - before;
   }
@@ -211,10 +202,10 @@ Result<void> measure_ready(std::span<const std::byte> bytes, int patterns, const
 }
 
 /// A scene of one or two patterns; the first is hidden and shown again, the other stays.
-class Return {
+class HideAndShow {
  public:
-  Return(const Many& many, const GrayPicture& background, const Camera& camera, bool beside,
-         std::uint64_t seed)
+  HideAndShow(const Many& many, const GrayPicture& background, const Camera& camera, bool beside,
+              std::uint64_t seed)
       : many_(many), camera_(camera), random_(seed) {
     patterns_[0] = random_.next() % many.size();
     patterns_[1] = (patterns_[0] + 1 + random_.next() % (many.size() - 1)) % many.size();
@@ -226,7 +217,7 @@ class Return {
       pose.translation.y = 0;
       poses_.push_back(pose);
     }
-    // Drawn once, exposed in each frame.
+    // Rendered once, exposed in each frame.
     hidden_ = beside ? drawn(1, background).picture : background;
     SceneFrame all = drawn(0, hidden_);
     shown_ = std::move(all.picture);
@@ -234,19 +225,19 @@ class Return {
   }
 
   /// Frames until the pattern is right again, 1: at once; kPatience where it never is; 0 where it
-  /// was not there to be lost.
+  /// was not recognised before it was hidden.
   Result<int> frames(PoseLoop& loop) {
     loop.reset();
     TrackResult seen;
-    for (int i = 0; i < kSettle + 10; ++i) {
-      if (auto done = show(loop, true, seen); !done) return tl::unexpected(done.error());
+    for (int i = 0; i < kShown; ++i) {
+      MODAR_TRY(show(loop, true, seen));
     }
     if (!is_back(seen)) return 0;
     for (int i = 0; i < kHidden; ++i) {
-      if (auto done = show(loop, false, seen); !done) return tl::unexpected(done.error());
+      MODAR_TRY(show(loop, false, seen));
     }
     for (int waited = 1; waited < kPatience; ++waited) {
-      if (auto done = show(loop, true, seen); !done) return tl::unexpected(done.error());
+      MODAR_TRY(show(loop, true, seen));
       if (is_back(seen)) return waited;
     }
     return kPatience;
@@ -281,26 +272,25 @@ class Return {
   std::array<glm::dvec2, 4> corners_{};
 };
 
-/// Alone in the frame, and beside a pattern that is tracked on.
+/// Alone in the frame, and beside a pattern that stays tracked.
 Result<void> measure_return(const Many& many, std::span<const std::byte> bytes,
                             const std::vector<GrayPicture>& backgrounds,
                             const PoseBenchOptions& options, const ProgressCallback& progress,
                             std::vector<ManyBenchRow>& rows) {
   const Camera camera = default_camera(options.width, options.height);
-  auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera);
-  if (!loop) return tl::unexpected(loop.error());
+  MODAR_ASSIGN(const auto loop, PoseLoop::create(BundleView::open(bytes).value(), camera));
   for (const bool beside : {false, true}) {
     double sum = 0;
     int worst = 0;
     int times = 0;
     for (int i = 0; i < options.frames; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      Return scene(many, backgrounds[k % backgrounds.size()], camera, beside, options.seed + k);
-      const Result<int> frames = scene.frames(**loop);
-      if (!frames) return tl::unexpected(frames.error());
-      sum += *frames;
-      worst = std::max(worst, *frames);
-      times += *frames > 0 ? 1 : 0;
+      HideAndShow scene(many, backgrounds[k % backgrounds.size()], camera, beside,
+                        options.seed + k);
+      MODAR_ASSIGN(const int frames, scene.frames(*loop));
+      sum += frames;
+      worst = std::max(worst, frames);
+      times += frames > 0 ? 1 : 0;
       if (progress) progress("return", (beside ? 0.5 : 0.0) + 0.5 * (i + 1) / options.frames);
     }
     const int patterns = static_cast<int>(many.size());
@@ -316,23 +306,16 @@ Result<void> measure_return(const Many& many, std::span<const std::byte> bytes,
 
 Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
                                              const ProgressCallback& progress) {
-  const auto many = make_many(options, progress);
-  if (!many) return tl::unexpected(many.error());
-  const auto backgrounds = load_backgrounds(options.backgrounds, options.width, options.height);
-  if (!backgrounds) return tl::unexpected(backgrounds.error());
+  MODAR_ASSIGN(const Many many, make_many(options, progress));
+  MODAR_ASSIGN(const auto backgrounds,
+               load_backgrounds(options.backgrounds, options.width, options.height));
   const Camera camera = default_camera(options.width, options.height);
-  const Frames frames(*many, *backgrounds, options);
-  const auto bytes = many->bundle(many->size());
-  if (!bytes) return tl::unexpected(bytes.error());
+  const Frames frames(many, backgrounds, options);
+  MODAR_ASSIGN(const auto bytes, many.bundle(many.size()));
   std::vector<ManyBenchRow> rows;
-  if (auto done = measure_detection(*many, frames, camera, progress, rows); !done) {
-    return tl::unexpected(done.error());
-  }
-  if (auto done = measure_ready(*bytes, options.many, camera, frames.at(0, 0), rows); !done) {
-    return tl::unexpected(done.error());
-  }
-  auto done = measure_return(*many, *bytes, *backgrounds, options, progress, rows);
-  if (!done) return tl::unexpected(done.error());
+  MODAR_TRY(measure_detection(many, frames, camera, progress, rows));
+  MODAR_TRY(measure_ready(bytes, options.many, camera, frames.at(0, 0), rows));
+  MODAR_TRY(measure_return(many, bytes, backgrounds, options, progress, rows));
   return rows;
 }
 

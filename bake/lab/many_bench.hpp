@@ -1,4 +1,4 @@
-// What many patterns in one bundle cost, and how soon a pattern that was hidden is back.
+// The cost of many patterns in one bundle, and how soon a hidden pattern is detected again.
 #pragma once
 
 #include <string>
@@ -13,16 +13,16 @@ struct ManyBenchRow {
   std::string measure;
   int patterns = 0;
   double value = 0;
-  /// Detection: the time with one pattern, times `patterns`, or what a search for the shown pattern
-  /// alone gets right; returns: how often a pattern was hidden; 0: none.
+  /// Detection: the time with one pattern times `patterns`, or the share that a search for the
+  /// shown pattern alone gets right; returns: how often a pattern was hidden; 0: none.
   double reference = 0;
 };
 
 /// Detection, set-up and return with 1, 10 and options.many patterns: quarters of the options'
-/// pictures, and their mirror images. Single thread; options.frames: frames of each count, which
-/// show the patterns in turn, and times that a pattern is hidden. Measures as in
-/// bake/commands/json.md. Errors: kUsage "bench.input" for fewer than seven pictures or no
-/// background; those of baking and of the loop.
+/// pictures, and their mirror images. Single-threaded; options.frames: frames of each count, which
+/// show the patterns in turn, and how often a pattern is hidden. Measures as in
+/// bake/commands/json.md. Errors: kUsage "bench.input" for too few pictures or no background; those
+/// of baking and of the tracker.
 Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
                                              const ProgressCallback& progress);
 

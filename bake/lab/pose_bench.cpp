@@ -1,16 +1,128 @@
-// Runs both methods over bands of rendered frames and over hand-held paths.
+// Runs both methods over bands of rendered frames, over hand-held paths and over real videos.
 #include "bake/lab/pose_bench.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <sstream>
 
 #include <glm/geometric.hpp>
 #include <opencv2/core.hpp>
 
-#include "bake/pattern/pose_subject.hpp"
+#include "bake/thread_clock.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/features.hpp"
+#include "modar/paper_tracker.hpp"
+#include "modar/pose_loop.hpp"
+#include "modar/video_reader.hpp"
 
 namespace modar {
 namespace {
+
+/// Patterns, their bundle and the trackers on it.
+struct Fixture {
+  std::vector<GrayPicture> pictures;
+  std::vector<std::byte> bytes;
+  std::unique_ptr<PaperTracker> paper;  ///< null where options.paper_set is 0
+  std::unique_ptr<PoseLoop> ours;
+};
+
+/// track: whether ours tracks patterns from frame to frame. Errors: those of reading pictures,
+/// describing and baking them.
+Result<Fixture> make_fixture(const std::vector<std::string>& paths, const PoseBenchOptions& options,
+                             const Camera& camera, bool track) {
+  Fixture fixture;
+  std::vector<std::vector<std::byte>> records;
+  for (const std::string& path : paths) {
+    bool shrunk = false;
+    MODAR_ASSIGN(auto picture, load_pattern(path, shrunk));
+    fixture.pictures.push_back(std::move(picture));
+    records.emplace_back();
+    // Baking ours takes most of the time of a run of the paper's method alone.
+    if (!options.ours) continue;
+    MODAR_ASSIGN(records.back(), bake_tracker_record(fixture.pictures.back().view(), {}));
+  }
+  const ParameterSetRecord* set = nullptr;
+  const auto sets = paper_parameter_sets();
+  for (const ParameterSetRecord& each : sets) set = each.id == options.paper_set ? &each : set;
+  MODAR_ASSIGN(fixture.bytes, bundle_of_records(fixture.pictures, records, set));
+  MODAR_ASSIGN(const auto bundle, BundleView::open(fixture.bytes));
+  if (set != nullptr) {
+    MODAR_ASSIGN(fixture.paper, PaperTracker::create(bundle, options.paper_set, camera));
+  }
+  if (options.ours) {
+    PoseLoopOptions how;
+    how.track = track;
+    MODAR_ASSIGN(fixture.ours, PoseLoop::create(bundle, camera, how));
+  }
+  return fixture;
+}
+
+/// Sums of one method on one band.
+class MethodTally {
+ public:
+  MethodTally(std::string band, const char* method, bool sequence) {
+    row_.band = std::move(band);
+    row_.method = method;
+    row_.sequence = sequence;
+  }
+  void cut() { poses_.cut(); }
+  template <class Method>
+  Result<void> run(Method& method, const GrayImage& frame, const FrameTruth& truth) {
+    const double start = thread_seconds();
+    const auto result = method.step(frame);
+    row_.ms += 1e3 * (thread_seconds() - start);
+    if (!result) return tl::unexpected(result.error());
+    poses_.add(*result, truth);
+    row_.stages_ms[0] += result->times.detect;
+    row_.stages_ms[1] += result->times.describe;
+    row_.stages_ms[2] += result->times.match;
+    row_.stages_ms[3] += result->times.homography + result->times.pose;
+    return {};
+  }
+  PoseBenchRow finish() {
+    static_cast<PoseFigures&>(row_) = poses_.figures();
+    const double frames = std::max(row_.frames, 1);
+    row_.ms /= frames;
+    for (double& stage : row_.stages_ms) stage /= frames;
+    return row_;
+  }
+
+ private:
+  PoseBenchRow row_;
+  PoseTally poses_;
+};
+
+/// Both methods on the same frames.
+class MethodTallies {
+ public:
+  MethodTallies(const std::string& band, bool sequence)
+      : paper_(band, "paper", sequence), ours_(band, "ours", sequence) {}
+  void cut() {
+    paper_.cut();
+    ours_.cut();
+  }
+  /// Runs the fixture's trackers on a frame. Errors: those of the trackers.
+  Result<void> run(Fixture& fixture, const GrayImage& frame, const FrameTruth& truth) {
+    if (fixture.paper) MODAR_TRY(paper_.run(*fixture.paper, frame, truth));
+    if (fixture.ours) MODAR_TRY(ours_.run(*fixture.ours, frame, truth));
+    return {};
+  }
+  /// Appends a row for each method that ran.
+  void finish(const PoseBenchOptions& options, std::vector<PoseBenchRow>& rows) {
+    if (options.paper_set != 0) rows.push_back(paper_.finish());
+    if (options.ours) rows.push_back(ours_.finish());
+  }
+
+ private:
+  MethodTally paper_;
+  MethodTally ours_;
+};
 
 Result<std::vector<GrayPicture>> backgrounds_of(const PoseBenchOptions& options) {
   if (options.backgrounds.empty() || options.patterns.empty()) {
@@ -27,11 +139,12 @@ int frames_of(const PoseBenchOptions& options, const SceneBand& band) {
   return (options.clutter_frames + patterns - 1) / patterns;
 }
 
-/// A hand's path: slow sines of all six parameters about a pose.
+/// A hand-held camera's path: slow sines of all six parameters about a pose. Set by hand so that
+/// the pattern stays in the frame and moves by up to 15 pixels a frame at speed 1.
 Pose path_pose(const Pose& middle, double time, double speed, const std::array<double, 12>& phase) {
   const auto sway = [&](std::size_t k, double hertz) {
-    return std::sin(2 * 3.14159265358979323846 * hertz * speed * time + phase[k]) +
-           0.3 * std::sin(2 * 3.14159265358979323846 * 2.7 * hertz * speed * time + phase[k + 6]);
+    return std::sin(2 * std::numbers::pi * hertz * speed * time + phase[k]) +
+           0.3 * std::sin(2 * std::numbers::pi * 2.7 * hertz * speed * time + phase[k + 6]);
   };
   Pose pose = middle;
   pose.rotation =
@@ -43,25 +156,23 @@ Pose path_pose(const Pose& middle, double time, double speed, const std::array<d
   return pose;
 }
 
-/// A hand's path in one light, over one photo.
+/// One path under one exposure, over one photo.
 Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const GrayPicture& background,
-                      double speed, double blur, Tallies& tallies) {
+                      double speed, double blur, MethodTallies& tallies) {
   const Camera camera = default_camera(options.width, options.height);
   SceneBand band;
   band.area_low = 0.8;
   band.area_high = 2.0;
   band.tilt_high = 35;
-  auto subject = make_subject({options.patterns[p]}, options, camera, true);
-  if (!subject) return tl::unexpected(subject.error());
-  const GrayImage picture = subject->pictures[0].view();
+  MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, true));
+  const GrayImage picture = fixture.pictures[0].view();
   Random random(options.seed + 1000003 * p + 17);
   Pose middle = draw_pose(band, picture, camera, random);
   middle.translation.x = middle.translation.y = 0.0;
   std::array<double, 12> phase{};
   for (double& value : phase) value = random.uniform(0.0, 6.28);
   const SceneLight light = draw_light(random);
-  tallies.paper.cut();
-  tallies.ours.cut();
+  tallies.cut();
   glm::dvec2 last{0.0};
   for (int i = 0; i < options.frames; ++i) {
     const Pose pose = path_pose(middle, i / 30.0, speed, phase);
@@ -71,51 +182,91 @@ Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const Gray
     const SceneFrame scene =
         render_scene(picture, camera, pose, background, band, random, &light,
                      {blur * glm::length(motion), std::atan2(motion.y, motion.x)});
-    auto done = tallies.measure(*subject, scene.picture.view(), {true, scene.corners});
-    if (!done) return done;
+    MODAR_TRY(tallies.run(fixture, scene.picture.view(), {true, scene.corners}));
   }
   return {};
 }
 
+using Truths = std::map<std::uint64_t, FrameTruth>;
+
+tl::unexpected<Error> bad_truth(const std::string& path, std::size_t line, const char* cause) {
+  return fail(ExitCode::kInvalidInput, "bench.truth", path + ":" + std::to_string(line), cause,
+              "write a line a frame: its number, 1 or 0 for a pattern that shows or not, and at "
+              "last the corners' eight coordinates");
+}
+
+Result<Truths> read_truth(const std::string& path) {
+  Truths truths;
+  if (path.empty()) return truths;
+  std::ifstream file(path);
+  if (!file) {
+    return fail(ExitCode::kIo, "bench.truth", path, "the file cannot be read", "check its path");
+  }
+  std::string line;
+  for (std::size_t number = 1; std::getline(file, line); ++number) {
+    if (line.empty() || line[0] == '#') continue;
+    for (char& letter : line) letter = letter == ',' ? ' ' : letter;
+    std::istringstream words(line);
+    words.imbue(std::locale::classic());
+    std::vector<double> values;
+    for (double value = 0; words >> value;) values.push_back(value);
+    if (!words.eof() || values.size() < 2) return bad_truth(path, number, "this is no number");
+    FrameTruth truth;
+    truth.pattern = values[1] == 1.0;
+    if (truth.pattern && values.size() < 10) return bad_truth(path, number, "corners are missing");
+    for (std::size_t i = 0; i < 8 && truth.pattern; ++i) {
+      truth.corners[i / 2][static_cast<int>(i % 2)] = values[values.size() - 8 + i];
+    }
+    truths[static_cast<std::uint64_t>(values[0])] = truth;
+  }
+  return truths;
+}
+
+std::vector<std::string> patterns_of(const PoseBenchOptions& options, const VideoBench& video) {
+  if (!video.pattern.empty()) return {video.pattern};
+  const auto beside = std::filesystem::path(video.video).parent_path() / "pattern.png";
+  std::error_code failed;
+  if (std::filesystem::is_regular_file(beside, failed)) return {beside.string()};
+  return options.patterns;
+}
+
 }  // namespace
 
-Result<std::vector<GrayPicture>> load_backgrounds(const std::vector<std::string>& paths, int width,
-                                                  int height) {
-  std::vector<GrayPicture> backgrounds;
-  for (const std::string& path : paths) {
-    auto background = load_background(path, width, height);
-    if (!background) return tl::unexpected(background.error());
-    backgrounds.push_back(std::move(*background));
-  }
-  return backgrounds;
+std::vector<SceneBand> pose_bands() {
+  return {{"area 0.1-0.25", 0.1, 0.25, 0, 45, 0, 0, true},
+          {"area 0.25-0.4", 0.25, 0.4, 0, 45, 0, 0, true},
+          {"area 0.4-0.9", 0.4, 0.9, 0, 45, 0, 0, true},
+          {"area 0.9-4", 0.9, 4.0, 0, 45, 0, 0, true},
+          {"area 4-5", 4.0, 5.0, 0, 45, 0, 0, true},
+          {"tilt 45-60", 0.5, 3.0, 45, 60, 0, 0, true},
+          {"tilt 60-70", 0.5, 3.0, 60, 70, 0, 0, true},
+          {"half covered", 0.5, 3.0, 0, 45, 0.5, 0.5, true},
+          {"mixed", 0.25, 5.0, 0, 65, 0, 0.5, true},
+          {"none", 0.4, 4.0, 0, 45, 0, 0, false}};
 }
 
 Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& options,
                                                   const ProgressCallback& progress) {
   cv::setNumThreads(1);
-  const auto backgrounds = backgrounds_of(options);
-  if (!backgrounds) return tl::unexpected(backgrounds.error());
+  MODAR_ASSIGN(const auto backgrounds, backgrounds_of(options));
   const Camera camera = default_camera(options.width, options.height);
   const std::vector<SceneBand> bands = options.bands.empty() ? pose_bands() : options.bands;
-  std::vector<Tallies> tallies;
+  std::vector<MethodTallies> tallies;
   for (const SceneBand& band : bands) tallies.emplace_back(band.name, false);
   for (std::size_t p = 0; p < options.patterns.size(); ++p) {
-    auto subject = make_subject({options.patterns[p]}, options, camera, false);
-    if (!subject) return tl::unexpected(subject.error());
-    const GrayImage picture = subject->pictures[0].view();
+    MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, false));
+    const GrayImage picture = fixture.pictures[0].view();
     for (std::size_t b = 0; b < bands.size(); ++b) {
       Random random(options.seed + 1000003 * p + 7919 * b);
       const int frames = frames_of(options, bands[b]);
       for (int i = 0; i < frames; ++i) {
         const GrayPicture& photo =
-            (*backgrounds)[static_cast<std::size_t>(random.next() % backgrounds->size())];
-        // Without a pattern, the photo alone has to make the frames differ.
+            backgrounds[static_cast<std::size_t>(random.next() % backgrounds.size())];
+        // Without a pattern only the photo makes the frames differ.
         const GrayPicture background = bands[b].pattern ? photo : another_view(photo, random);
         const Pose pose = draw_pose(bands[b], picture, camera, random);
         const SceneFrame scene = render_scene(picture, camera, pose, background, bands[b], random);
-        auto done =
-            tallies[b].measure(*subject, scene.picture.view(), {bands[b].pattern, scene.corners});
-        if (!done) return tl::unexpected(done.error());
+        MODAR_TRY(tallies[b].run(fixture, scene.picture.view(), {bands[b].pattern, scene.corners}));
       }
       if (progress) {
         progress("detection", static_cast<double>(p * bands.size() + b + 1) /
@@ -124,7 +275,7 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
     }
   }
   std::vector<PoseBenchRow> rows;
-  for (Tallies& each : tallies) each.finish(options, rows);
+  for (MethodTallies& each : tallies) each.finish(options, rows);
   return rows;
 }
 
@@ -132,18 +283,47 @@ Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options
                                                  const std::string& name, double speed, double blur,
                                                  const ProgressCallback& progress) {
   cv::setNumThreads(1);
-  const auto backgrounds = backgrounds_of(options);
-  if (!backgrounds) return tl::unexpected(backgrounds.error());
-  Tallies tallies(name, true);
+  MODAR_ASSIGN(const auto backgrounds, backgrounds_of(options));
+  MethodTallies tallies(name, true);
   for (std::size_t p = 0; p < options.patterns.size(); ++p) {
-    const GrayPicture& background = (*backgrounds)[(options.seed + p) % backgrounds->size()];
-    if (auto done = run_path(options, p, background, speed, blur, tallies); !done) {
-      return tl::unexpected(done.error());
-    }
+    const GrayPicture& background = backgrounds[(options.seed + p) % backgrounds.size()];
+    MODAR_TRY(run_path(options, p, background, speed, blur, tallies));
     if (progress) {
       progress(name, static_cast<double>(p + 1) / static_cast<double>(options.patterns.size()));
     }
   }
+  std::vector<PoseBenchRow> rows;
+  tallies.finish(options, rows);
+  return rows;
+}
+
+Result<std::vector<PoseBenchRow>> bench_video(const PoseBenchOptions& options,
+                                              const VideoBench& video,
+                                              const ProgressCallback& progress) {
+  cv::setNumThreads(1);
+  MODAR_ASSIGN(const Truths truths, read_truth(video.truth));
+  auto reader = VideoReader::open_file(video.video);
+  if (!reader || !reader->next().value_or(false)) {
+    return fail(ExitCode::kIo, "bench.video", video.video, "the video cannot be read",
+                "give a video that other players show");
+  }
+  const Camera camera = default_camera(reader->picture().width, reader->picture().height);
+  MODAR_ASSIGN(Fixture fixture, make_fixture(patterns_of(options, video), options, camera, true));
+  MethodTallies tallies(std::filesystem::path(video.video).filename().string(), true);
+  std::uint64_t frame = 0;
+  do {
+    const auto truth = truths.find(frame);
+    // Frames that the truth does not mention are played, not judged.
+    const bool judged = truths.empty() || truth != truths.end();
+    MethodTallies unjudged("", true);
+    MODAR_TRY(
+        (judged ? tallies : unjudged)
+            .run(fixture, reader->gray(), truth != truths.end() ? truth->second : FrameTruth{}));
+    ++frame;
+    if (progress && reader->frames() > 0) {
+      progress("video", static_cast<double>(frame) / static_cast<double>(reader->frames()));
+    }
+  } while (reader->next().value_or(false));
   std::vector<PoseBenchRow> rows;
   tallies.finish(options, rows);
   return rows;

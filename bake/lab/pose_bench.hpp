@@ -1,26 +1,28 @@
-// How well and how fast patterns are found and tracked on rendered frames of known pose: the
-// paper's method and ours on the same frames, one thread.
+// How well and how fast patterns are detected and tracked on rendered frames of known pose: the
+// ModAR paper's method and ours on the same frames, single-threaded.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "bake/pattern/pose_scene.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "bake/report.hpp"
 #include "formats/error.hpp"
 
 namespace modar {
 
+/// The bands of the ModAR paper's experiments and beyond, as bench tables print them.
+std::vector<SceneBand> pose_bands();
+
 struct PoseBenchOptions {
   std::vector<std::string> patterns;     ///< image files
   std::vector<std::string> backgrounds;  ///< image files
-  int frames = 100;                      ///< a band and pattern
-  int clutter_frames = 0;                ///< without a pattern, in all; 0: frames a pattern
+  int frames = 100;                      ///< of each band and pattern
+  int clutter_frames = 0;  ///< without a pattern, in all; 0: `frames` for each pattern
   int width = 1280;
   int height = 720;
-  std::uint32_t paper_set = 1;  ///< the ModAR paper's parameter set; 0: without the ModAR paper's method
+  std::uint32_t paper_set = 1;  ///< parameter set of the paper's method; 0: without that method
   bool ours = true;
   int many = 50;  ///< bench_many(): patterns in the greatest bundle, 2 or more
   std::uint64_t seed = 1;
@@ -28,26 +30,15 @@ struct PoseBenchOptions {
 };
 
 /// One method on one band, over all patterns.
-struct PoseBenchRow {
+struct PoseBenchRow : PoseFigures {
   std::string band;
-  std::string method;     ///< "paper" or "ours"
-  bool sequence = false;  ///< frames followed each other, and were tracked
-  int frames = 0;
-  int without_pattern = 0;  ///< of the frames
-  int false_found = 0;      ///< recognitions in those
-  int recognised = 0;       ///< recognitions in the others
-  int right = 0;            ///< mean error of the four corners under 5 pixels
-  double error_px = 0;      ///< median over the right ones
-  double jitter_px = 0;     ///< tracking: rms change of the corners' error from frame to frame
-  double ms = 0;            ///< thread-CPU milliseconds a frame, mean
-  double stages_ms[4] = {0, 0, 0, 0};  ///< wall: detect, describe, match, homography
+  std::string method;                  ///< "paper" or "ours"
+  bool sequence = false;               ///< frames followed each other and were tracked
+  double ms = 0;                       ///< thread-CPU milliseconds of a frame, mean
+  double stages_ms[4] = {0, 0, 0, 0};  ///< wall time: detect, describe, match, homography
 };
 
-/// Pictures as backgrounds of frames of that size. Errors: those of read_image().
-Result<std::vector<GrayPicture>> load_backgrounds(const std::vector<std::string>& paths, int width,
-                                                  int height);
-
-/// Detection: every frame stands for itself.
+/// Detection: frames are independent.
 Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& options,
                                                   const ProgressCallback& progress);
 
@@ -57,13 +48,14 @@ Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options
                                                  const std::string& name, double speed, double blur,
                                                  const ProgressCallback& progress);
 
-/// A real video. truth: lines "frame ok ... x0 y0 x1 y1 x2 y2 x3 y3" parted by blanks, '#' starts
-/// a comment, ok is 1 where the pattern shows and the last eight numbers are its corners; empty:
-/// the video shows no pattern, and every recognition is false. pattern: its picture; empty:
-/// pattern.png beside the video, else all patterns of the options at once.
+/// A real video.
 struct VideoBench {
   std::string video;
+  /// Lines "frame ok ... x0 y0 x1 y1 x2 y2 x3 y3" separated by blanks; '#' starts a comment, ok is
+  /// 1 where the pattern shows, and the last eight numbers are its corners. Empty: the video shows
+  /// no pattern, and every recognition is false.
   std::string truth;
+  /// Its picture; empty: pattern.png beside the video, else all patterns of the options at once.
   std::string pattern;
 };
 

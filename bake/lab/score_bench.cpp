@@ -1,41 +1,37 @@
-// Scores and measured working ranges, pattern by pattern.
+// Measures scores and working ranges, pattern by pattern.
 #include "bake/lab/score_bench.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numeric>
+#include <numbers>
 #include <thread>
-
-#include "bake/pattern/pose_subject.hpp"
-#include "bake/pattern/score.hpp"
-#include "bake/pattern/view_trial.hpp"
-#include "formats/bundle_view.hpp"
 
 namespace modar {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+// Sizes and tilts between those that every picture of the test data is recognised at and those that
+// none is; finer steps than the spread of a pattern's own results gain nothing. Set by hand.
 constexpr double kLargest = 150;  // frame pixels: root of the area of the nearest views
-constexpr double kStep = 1.15;
+constexpr double kStep = 1.15;    // from one size to the next
 constexpr int kSizes = 10;
-constexpr double kTilts[] = {54, 58, 62, 66, 70, 74, 78, 82};
+constexpr double kTilts[] = {54, 58, 62, 66, 70, 74, 78, 82};  // degrees
 constexpr double kTiltStep = 4;
-constexpr double kEasySide = 240;
+constexpr double kTiltSide = 240;  // frame pixels: root of the area of the tilted views, if frontal
 
 std::vector<TrialSetting> settings_of(const GrayImage& picture) {
   const double own = 1.0 * picture.width * picture.height;
   std::vector<TrialSetting> settings;
   const auto add = [&](double side, double low, double high) {
     TrialSetting setting;
-    const double foreshortened = std::cos(0.5 * (low + high) * kPi / 180);
+    const double foreshortened = std::cos(0.5 * (low + high) * std::numbers::pi / 180);
     setting.band.area_low = setting.band.area_high = side * side / own * foreshortened;
     setting.band.tilt_low = low;
     setting.band.tilt_high = high;
     settings.push_back(setting);
   };
   for (int k = 0; k < kSizes; ++k) add(kLargest / std::pow(kStep, k), 0, 30);
-  const double side = std::min(std::sqrt(own), kEasySide);
+  const double side = std::min(std::sqrt(own), kTiltSide);
   for (const double tilt : kTilts) add(side, tilt, tilt);
   return settings;
 }
@@ -70,41 +66,35 @@ double rank_correlation(const std::vector<double>& a, const std::vector<double>&
 
 Result<std::vector<ScoreBenchRow>> bench_scores(const PoseBenchOptions& options,
                                                 const ProgressCallback& progress) {
-  const auto backgrounds = load_backgrounds(options.backgrounds, options.width, options.height);
-  if (!backgrounds) return tl::unexpected(backgrounds.error());
-  PoseBenchOptions ours = options;
-  ours.paper_set = 0;
-  ours.ours = false;
-  TrialBed bed;
-  bed.camera = default_camera(options.width, options.height);
-  bed.backgrounds = *backgrounds;
-  bed.views = options.frames;
-  bed.seed = options.seed;
-  bed.jobs = std::thread::hardware_concurrency();
+  MODAR_ASSIGN(const auto backgrounds,
+               load_backgrounds(options.backgrounds, options.width, options.height));
+  TrialSetup setup;
+  setup.camera = default_camera(options.width, options.height);
+  setup.backgrounds = backgrounds;
+  setup.views = options.frames;
+  setup.seed = options.seed;
+  setup.jobs = std::thread::hardware_concurrency();
   std::vector<ScoreBenchRow> rows;
   for (const std::string& path : options.patterns) {
-    const auto subject = make_subject({path}, ours, bed.camera, true);
-    if (!subject) return tl::unexpected(subject.error());
-    bed.picture = subject->pictures[0].view();
-    bed.bundle = subject->bytes;
-    const auto score = score_pattern(
-        bed.picture, BundleView::open(subject->bytes)->section(SectionType::kTrackerRecord, 0, 0),
-        bed.jobs);
-    if (!score) return tl::unexpected(score.error());
-    const auto outcomes = try_views(bed, settings_of(bed.picture), {});
-    if (!outcomes) return tl::unexpected(outcomes.error());
+    bool shrunk = false;
+    MODAR_ASSIGN(const GrayPicture picture, load_pattern(path, shrunk));
+    MODAR_ASSIGN(const auto record, bake_tracker_record(picture.view(), {}));
+    MODAR_ASSIGN(const PatternScore score, score_pattern(picture.view(), record, setup.jobs));
+    MODAR_ASSIGN(const auto bundle, bundle_of_record(picture.view(), record));
+    setup.picture = picture.view();
+    setup.bundle = bundle;
+    MODAR_ASSIGN(const auto outcomes, try_views(setup, settings_of(setup.picture), {}));
     ScoreBenchRow row;
     row.name = std::filesystem::path(path).stem().string();
-    row.score = score->score;
+    row.score = score.score;
     row.tuned = rows.size() % 2 == 0;
     // A step counts by the share of its views that are right: the mean place of the range's end.
     double steps = 0;
-    for (int k = 0; k < kSizes; ++k)
-      steps += (*outcomes)[static_cast<std::size_t>(k)].right_share();
-    row.farthest = bed.camera.fx / kLargest * std::pow(kStep, steps - 0.5);
+    for (int k = 0; k < kSizes; ++k) steps += outcomes[static_cast<std::size_t>(k)].right_share();
+    row.farthest = setup.camera.fx / kLargest * std::pow(kStep, steps - 0.5);
     row.tilt_deg = kTilts[0] - 0.5 * kTiltStep;
-    for (std::size_t k = kSizes; k < outcomes->size(); ++k) {
-      row.tilt_deg += kTiltStep * (*outcomes)[k].right_share();
+    for (std::size_t k = kSizes; k < outcomes.size(); ++k) {
+      row.tilt_deg += kTiltStep * outcomes[k].right_share();
     }
     rows.push_back(row);
     if (progress) {

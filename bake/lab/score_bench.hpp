@@ -1,4 +1,4 @@
-// Holds the scores of patterns against what the loop really achieves on them.
+// Compares the scores of patterns with the working ranges that the tracker reaches on them.
 #pragma once
 
 #include <string>
@@ -8,13 +8,14 @@
 
 namespace modar {
 
-/// A pattern's score beside its working range, measured on views that get smaller and steeper.
+/// A pattern's score beside its working range, measured on smaller and smaller and steeper and
+/// steeper views.
 struct ScoreBenchRow {
   std::string name;
   int score = 0;
   double farthest = 0;  ///< distance in roots of the pattern's area, for a focal length of 1280
   double tilt_deg = 0;
-  bool tuned = false;  ///< of the half that the score was tuned on: every second by name
+  bool tuned = false;  ///< in the half that the score was tuned on: every second by name
   [[nodiscard]] double range() const { return farthest * tilt_deg / 90; }
 };
 

@@ -1,37 +1,163 @@
-// From views of a plane to a camera, with OpenCV's solver.
+// Finds a chessboard or a pattern in frames, and solves for the camera with OpenCV.
 #include "bake/pattern/calibrate.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 
+#include <glm/vec2.hpp>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
+#include <opencv2/video/tracking.hpp>
 
-#include "bake/pattern/pattern_picture.hpp"
-#include "bake/pattern/plane_points.hpp"
+#include "bake/pattern/gray_mat.hpp"
+#include "bake/pattern/trial.hpp"
 #include "formats/atomic_file.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/pose_loop.hpp"
+#include "modar/video_reader.hpp"
 
 namespace modar {
 namespace {
 
+// Points of a pattern that are searched for, and the fewest that make a view: more slow the search
+// down, fewer let a wrong one weigh. Set by hand.
+constexpr int kMostPoints = 300;
+constexpr std::size_t kFewestPoints = 30;
+constexpr double kMostDistortion = 4.0;  // pixels that a lens may move points off a homography
+
+// Zhang's method needs 3 views; 5 leave some to tell a bad one by.
 constexpr std::size_t kFewestViews = 5;
 constexpr int kFewestTilted = 3;
-constexpr double kTilted = 0.97;   // cosine of 14 degrees
-constexpr double kWeakest = 0.03;  // spread of the focal length
-constexpr double kOneSide = 8.0;   // degrees: see Tilts; less tells no focal length
-constexpr double kOneAxis = 4.0;   // degrees: less tells no principal point
-constexpr int kVideoSteps = 120;   // frames of a video that are looked at
-constexpr double kOutlier = 3.0;   // times the median error of a view
+constexpr double kTilted =
+    0.97;  // cosine of 14 degrees: less tilt says nothing of the focal length
+// Standard deviation of the focal length over its value. 3 % moves a model by a fiftieth of its
+// distance, which shows beside real objects.
+constexpr double kWeakest = 0.03;
+// Degrees by which the planes' normals must scatter, see Tilts. On a video whose planes were nearly
+// parallel the solver put the principal point 220 pixels off with a small standard deviation.
+constexpr double kFocalScatter = 8.0;
+constexpr double kPrincipalPointScatter = 4.0;
+constexpr int kVideoFrames = 120;  // of a video that are examined: three for each view that is used
+constexpr double kOutlier = 3.0;   // times the median error: such views are left out. Set by hand
 
-using Look = std::function<void(const GrayImage& frame)>;
+/// Points of one view: on the plane (any unit) and in the frame (pixels).
+struct PlanePoints {
+  std::vector<glm::dvec2> plane;
+  std::vector<glm::dvec2> pixels;
+};
+
+/// Inner corners of a chessboard with sub-pixel accuracy; none unless all of it is visible.
+PlanePoints board_points(const GrayImage& frame, int columns, int rows) {
+  PlanePoints points;
+  const cv::Mat gray = as_mat(frame);
+  std::vector<cv::Point2f> corners;
+  if (!cv::findChessboardCorners(
+          gray, {columns, rows}, corners,
+          cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK)) {
+    return points;
+  }
+  cv::cornerSubPix(gray, corners, {5, 5}, {-1, -1},
+                   {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 40, 0.001});
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const cv::Point2f& p = corners[static_cast<std::size_t>(row * columns + column)];
+      points.plane.emplace_back(column, row);
+      points.pixels.emplace_back(p.x, p.y);
+    }
+  }
+  return points;
+}
+
+/// Brings the frame's part to the picture's mean and contrast: the optical flow assumes equal
+/// brightness.
+void match_light(const cv::Mat& picture, const cv::Mat& mask, cv::Mat& warped) {
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::Scalar target;
+  cv::Scalar spread;
+  cv::meanStdDev(warped, mean, deviation, mask);
+  cv::meanStdDev(picture, target, spread, mask);
+  const double gain = spread[0] / std::max(deviation[0], 1.0);
+  warped.convertTo(warped, CV_8U, gain, target[0] - gain * mean[0]);
+}
+
+/// Finds a pattern in frames of one size.
+class PatternFinder {
+ public:
+  /// pattern: must outlive this. Errors: those of the tracker.
+  static Result<PatternFinder> create(const NamedPattern& pattern, int width, int height) {
+    MODAR_ASSIGN(const auto bundle, BundleView::open(pattern.bundle));
+    PoseLoopOptions options;
+    options.track = false;
+    PatternFinder finder;
+    MODAR_ASSIGN(finder.loop_, PoseLoop::create(bundle, default_camera(width, height), options));
+    finder.picture_ = as_mat(pattern.picture.view());
+    cv::goodFeaturesToTrack(finder.picture_, finder.points_, kMostPoints, 0.01,
+                            0.02 * std::max(pattern.picture.width, pattern.picture.height), {}, 7);
+    return finder;
+  }
+  /// Well-textured points of the pattern in the frame; none where it is not seen well. The tracker
+  /// finds the pattern, then each point is searched for around its predicted position, so that the
+  /// result depends neither on the tracker's default camera nor on a lens without distortion.
+  [[nodiscard]] PlanePoints find(const GrayImage& frame) const;
+
+ private:
+  PatternFinder() = default;
+  cv::Mat picture_;
+  std::vector<cv::Point2f> points_;
+  std::unique_ptr<PoseLoop> loop_;
+};
+
+PlanePoints PatternFinder::find(const GrayImage& frame) const {
+  PlanePoints points;
+  const auto seen = loop_->step(frame);
+  if (!seen || seen->visible.empty()) return points;
+  const float right = static_cast<float>(picture_.cols) - 0.5f;
+  const float bottom = static_cast<float>(picture_.rows) - 0.5f;
+  const cv::Point2f own[4] = {{-0.5f, -0.5f}, {right, -0.5f}, {right, bottom}, {-0.5f, bottom}};
+  cv::Point2f there[4];
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2& corner = seen->visible[0].corners[i];
+    there[i] = {static_cast<float>(corner.x), static_cast<float>(corner.y)};
+  }
+  const cv::Mat to_frame = cv::getPerspectiveTransform(own, there);
+  cv::Mat warped;
+  cv::Mat mask;
+  cv::warpPerspective(as_mat(frame), warped, to_frame, picture_.size(),
+                      cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  cv::warpPerspective(cv::Mat(frame.height, frame.width, CV_8UC1, cv::Scalar(255)), mask, to_frame,
+                      picture_.size(), cv::INTER_NEAREST | cv::WARP_INVERSE_MAP);
+  match_light(picture_, mask, warped);
+  std::vector<cv::Point2f> found;
+  std::vector<std::uint8_t> ok;
+  std::vector<float> error;
+  cv::calcOpticalFlowPyrLK(picture_, warped, points_, found, ok, error, {21, 21}, 2);
+  std::vector<cv::Point2f> in_frame;
+  cv::perspectiveTransform(found, in_frame, to_frame);
+  std::vector<cv::Point2f> places;
+  std::vector<cv::Point2f> pixels;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const cv::Point2f& p = in_frame[i];
+    const bool inside = p.x >= 0 && p.y >= 0 && p.x < static_cast<float>(frame.width) &&
+                        p.y < static_cast<float>(frame.height);
+    if (ok[i] == 0 || error[i] > 20 || !inside) continue;
+    places.push_back(points_[i]);
+    pixels.push_back(p);
+  }
+  if (places.size() < kFewestPoints) return points;
+  std::vector<std::uint8_t> agrees;
+  cv::findHomography(places, pixels, cv::RANSAC, kMostDistortion, agrees);
+  for (std::size_t i = 0; i < agrees.size(); ++i) {
+    if (agrees[i] == 0) continue;
+    points.plane.emplace_back(places[i].x, places[i].y);
+    points.pixels.emplace_back(pixels[i].x, pixels[i].y);
+  }
+  return points.plane.size() >= kFewestPoints ? points : PlanePoints{};
+}
 
 bool is_picture(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
@@ -42,41 +168,37 @@ bool is_picture(const std::string& path) {
          ending == ".tif" || ending == ".tiff";
 }
 
-Result<void> look_at_video(const std::string& path, const Look& look) {
-  cv::VideoCapture capture(path, cv::CAP_FFMPEG);
-  cv::Mat picture;
-  if (!capture.isOpened() || !capture.read(picture)) {
+/// Passes frames of the video to `add`, evenly spread, about kVideoFrames of them.
+template <class Add>
+Result<void> read_video(const std::string& path, Add&& add) {
+  auto video = VideoReader::open_file(path);
+  if (!video || !video->next().value_or(false)) {
     return fail(ExitCode::kIo, "calibrate.input", path, "neither a picture nor a video",
                 "give pictures or a video that other players show");
   }
-  const int count = static_cast<int>(capture.get(cv::CAP_PROP_FRAME_COUNT));
-  const int step = std::max(1, count / kVideoSteps);
-  cv::Mat gray;
-  for (int frame = 0; !picture.empty(); ++frame) {
-    if (frame % step == 0) {
-      cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
-      look({gray.data, gray.cols, gray.rows, static_cast<std::ptrdiff_t>(gray.step[0])});
-    }
-    if (!capture.read(picture)) break;
-  }
+  const auto step = std::max<std::uint64_t>(1, video->frames() / kVideoFrames);
+  std::uint64_t index = 0;
+  do {
+    if (index++ % step == 0) add(video->gray());
+  } while (video->next().value_or(false));
   return {};
 }
 
-/// What the frames gave.
-struct Gathered {
+/// Views of the plane in all frames.
+struct PlaneViews {
   cv::Size size;
   std::vector<PlanePoints> views;
   int frames = 0;
   std::optional<Error> error;
 };
 
-/// Looks for the plane in each frame.
-class Gatherer {
+/// Searches each frame for the plane.
+class ViewCollector {
  public:
-  Gatherer(const CalibrateOptions& options, const NamedPattern* pattern, Gathered& out)
+  ViewCollector(const CalibrateOptions& options, const NamedPattern* pattern, PlaneViews& out)
       : options_(options), pattern_(pattern), out_(out) {}
 
-  void look(const std::string& path, const GrayImage& frame) {
+  void add(const std::string& path, const GrayImage& frame) {
     if (out_.error) return;
     const cv::Size size(frame.width, frame.height);
     if (out_.frames == 0) out_.size = size;
@@ -99,43 +221,40 @@ class Gatherer {
  private:
   bool ready(const cv::Size& size) {
     if (finder_) return true;
-    auto finder = PatternPoints::create(*pattern_, size.width, size.height);
+    auto finder = PatternFinder::create(*pattern_, size.width, size.height);
     if (!finder) {
       out_.error = finder.error();
       return false;
     }
-    finder_ = std::make_unique<PatternPoints>(std::move(*finder));
+    finder_ = std::make_unique<PatternFinder>(std::move(*finder));
     return true;
   }
 
   const CalibrateOptions& options_;
   const NamedPattern* pattern_;
-  Gathered& out_;
-  std::unique_ptr<PatternPoints> finder_;
+  PlaneViews& out_;
+  std::unique_ptr<PatternFinder> finder_;
 };
 
-Result<Gathered> gather(const CalibrateOptions& options, const NamedPattern* pattern,
-                        const ProgressCallback& progress) {
-  Gathered gathered;
-  Gatherer gatherer(options, pattern, gathered);
+Result<PlaneViews> collect_views(const CalibrateOptions& options, const NamedPattern* pattern,
+                                 const ProgressCallback& progress) {
+  PlaneViews views;
+  ViewCollector collector(options, pattern, views);
   double done = 0;
   for (const std::string& path : options.inputs) {
     if (is_picture(path)) {
-      const auto picture = load_gray(path);
-      if (!picture) return tl::unexpected(picture.error());
-      gatherer.look(path, picture->view());
-    } else if (auto looked =
-                   look_at_video(path, [&](const GrayImage& frame) { gatherer.look(path, frame); });
-               !looked) {
-      return tl::unexpected(looked.error());
+      MODAR_ASSIGN(const GrayPicture picture, load_gray(path));
+      collector.add(path, picture.view());
+    } else {
+      MODAR_TRY(read_video(path, [&](const GrayImage& frame) { collector.add(path, frame); }));
     }
-    if (gathered.error) return tl::unexpected(*gathered.error);
+    if (views.error) return tl::unexpected(*views.error);
     if (progress) progress("frames", ++done / static_cast<double>(options.inputs.size()));
   }
-  return gathered;
+  return views;
 }
 
-/// Every so many-th, so that at most `most` are left.
+/// At most `most` of the views, evenly spread.
 std::vector<PlanePoints> spread_out(std::vector<PlanePoints> views, int most) {
   const std::size_t count = views.size();
   const auto keep = static_cast<std::size_t>(most);
@@ -146,8 +265,8 @@ std::vector<PlanePoints> spread_out(std::vector<PlanePoints> views, int most) {
 }
 
 /// How the planes' normals scatter about their mean, in degrees: standard deviations along the
-/// direction in which they scatter most, and across. Zhang's method lives on it: from planes that
-/// are all but parallel a solver makes up a principal point, and is sure of it.
+/// direction in which they scatter most, and across. Zhang's method depends on it: from planes that
+/// are nearly parallel a solver returns a wrong principal point with a small standard deviation.
 struct Tilts {
   double along = 0;
   double across = 0;
@@ -223,7 +342,7 @@ Solved solve(const std::vector<PlanePoints>& views, const cv::Size& size, bool b
   return solved;
 }
 
-/// Leaves out views that fit far worse than the others.
+/// The views without those that fit far worse than the others.
 std::vector<PlanePoints> without_outliers(const std::vector<PlanePoints>& views,
                                           const Solved& solved) {
   std::vector<double> sorted = solved.view_rms;
@@ -237,31 +356,30 @@ std::vector<PlanePoints> without_outliers(const std::vector<PlanePoints>& views,
 }
 
 /// Errors: kInvalidInput "calibrate.weak".
-Result<Solved> trusted(Solved solved) {
+Result<void> check_observable(const Solved& solved) {
   const char* cure =
       "tilt the plane by 30 to 50 degrees, to every side, near and large in the frame";
-  // Without tilts the solver's own spread means nothing: distance and focal length are one.
+  // Without tilts the solver's own spread means nothing: distance and focal length are ambiguous.
   if (solved.tilted < kFewestTilted ||
       !(solved.focal_spread <= kWeakest * solved.matrix.at<double>(0, 0))) {
     return fail(ExitCode::kInvalidInput, "calibrate.weak", "",
                 "the views are too alike to tell the focal length", cure);
   }
-  if (solved.tilts.along < kOneSide) {
+  if (solved.tilts.along < kFocalScatter) {
     char cause[120];
     std::snprintf(cause, sizeof cause,
                   "all views are tilted to the same side: they scatter by %.1f degrees, %.0f are "
                   "needed",
-                  solved.tilts.along, kOneSide);
+                  solved.tilts.along, kFocalScatter);
     return fail(ExitCode::kInvalidInput, "calibrate.weak", "", cause, cure);
   }
-  return solved;
+  return {};
 }
 
-Calibration calibration_of(const Solved& solved, const Gathered& gathered, int views,
-                           bool centred) {
+Calibration calibration_of(const Solved& solved, const PlaneViews& found, int views, bool centred) {
   Calibration out;
-  out.camera.width = gathered.size.width;
-  out.camera.height = gathered.size.height;
+  out.camera.width = found.size.width;
+  out.camera.height = found.size.height;
   out.camera.fx = solved.matrix.at<double>(0, 0);
   out.camera.fy = solved.matrix.at<double>(1, 1);
   out.camera.cx = solved.matrix.at<double>(0, 2);
@@ -269,7 +387,7 @@ Calibration calibration_of(const Solved& solved, const Gathered& gathered, int v
   for (std::size_t i = 0; i < 5 && i < solved.distortion.total(); ++i) {
     out.camera.distortion[i] = solved.distortion.at<double>(static_cast<int>(i));
   }
-  out.frames = gathered.frames;
+  out.frames = found.frames;
   out.views = views;
   out.rms_px = solved.rms;
   out.focal_spread = solved.focal_spread;
@@ -277,23 +395,22 @@ Calibration calibration_of(const Solved& solved, const Gathered& gathered, int v
   return out;
 }
 
-Result<Calibration> calibrated(Gathered gathered, int most_views, bool board) {
-  std::vector<PlanePoints> views = spread_out(std::move(gathered.views), most_views);
+Result<Calibration> calibrate_from(PlaneViews found, int most_views, bool board) {
+  std::vector<PlanePoints> views = spread_out(std::move(found.views), most_views);
   if (views.size() < kFewestViews) {
     return fail(ExitCode::kInvalidInput, "calibrate.few-views", "",
                 "the plane was found in " + std::to_string(views.size()) + " of " +
-                    std::to_string(gathered.frames) + " frames, 5 are needed",
+                    std::to_string(found.frames) + " frames, 5 are needed",
                 "show all of it, sharp and large, from more sides");
   }
-  Solved solved = solve(views, gathered.size, board, false);
+  Solved solved = solve(views, found.size, board, false);
   std::vector<PlanePoints> kept = without_outliers(views, solved);
   const bool fewer = kept.size() < views.size() && kept.size() >= kFewestViews;
   if (fewer) views = std::move(kept);
-  const bool centred = solved.tilts.across < kOneAxis;
-  if (fewer || centred) solved = solve(views, gathered.size, board, centred);
-  auto good = trusted(std::move(solved));
-  if (!good) return tl::unexpected(good.error());
-  return calibration_of(*good, gathered, static_cast<int>(views.size()), centred);
+  const bool centred = solved.tilts.across < kPrincipalPointScatter;
+  if (fewer || centred) solved = solve(views, found.size, board, centred);
+  MODAR_TRY(check_observable(solved));
+  return calibration_of(solved, found, static_cast<int>(views.size()), centred);
 }
 
 }  // namespace
@@ -302,16 +419,11 @@ Result<Calibration> calibrate(const CalibrateOptions& options, const ProgressCal
   const bool board = options.board_columns > 0;
   std::vector<NamedPattern> patterns;
   if (!board) {
-    auto read = read_patterns({options.pattern}, 1);
-    if (!read) return tl::unexpected(read.error());
-    patterns = std::move(*read);
+    MODAR_ASSIGN(patterns, read_patterns({options.pattern}, 1));
   }
   try {
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
-    auto gathered = gather(options, board ? nullptr : &patterns.at(0), progress);
-    if (!gathered) return tl::unexpected(gathered.error());
-    return calibrated(std::move(*gathered), options.most_views, board);
+    MODAR_ASSIGN(auto views, collect_views(options, board ? nullptr : &patterns.at(0), progress));
+    return calibrate_from(std::move(views), options.most_views, board);
   } catch (const std::exception& thrown) {
     return fail(ExitCode::kInvalidInput, "calibrate.weak", "",
                 std::string("no camera explains the views: ") + thrown.what(),

@@ -1,11 +1,11 @@
-// `modar calibrate`: a camera's interior orientation from pictures of a chessboard, or of any
-// pattern that can be baked.
+// `modar calibrate`: a camera's intrinsics from pictures of a chessboard, or of any pattern that
+// can be baked.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "bake/lab/pose_bench.hpp"
+#include "bake/report.hpp"
 #include "formats/error.hpp"
 #include "modar/camera.hpp"
 
@@ -13,27 +13,30 @@ namespace modar {
 
 struct CalibrateOptions {
   std::vector<std::string> inputs;  ///< image files and videos, all of one size
-  int board_columns = 0;            ///< inner corners of the chessboard; 0: a pattern is looked for
+  int board_columns = 0;            ///< inner corners of the chessboard; 0: the plane is a pattern
   int board_rows = 0;
   std::string pattern;  ///< picture, or bundle whose first pattern it is
-  int most_views = 40;  ///< that are calibrated from, spread over those that show it
+  /// Views used, spread evenly over those that show the plane: more average more noise, and the
+  /// time to solve grows with their cube. Set by hand.
+  int most_views = 40;
 };
 
 struct Calibration {
   Camera camera;
-  int frames = 0;                        ///< that were looked at
+  int frames = 0;                        ///< examined
   int views = 0;                         ///< in which board or pattern was found and used
   double rms_px = 0;                     ///< reprojection error over all points
   double focal_spread = 0;               ///< standard deviation of the focal length, pixels
-  bool principal_point_assumed = false;  ///< in the middle: the views were tilted about one axis
+  bool principal_point_assumed = false;  ///< in the middle, since all views tilt about one axis
 };
 
 /// Finds board or pattern in each frame and calibrates from the plane's views (Zhang, "A flexible
 /// new technique for camera calibration", 2000, as OpenCV has it). From a board: fx, fy, cx, cy and
 /// k1 k2 p1 p2 k3; from a pattern: one focal length for both axes, cx, cy and k1 k2.
 /// Errors: kIo "calibrate.input"; kInvalidInput "calibrate.size" (frames of different sizes),
-/// "calibrate.few-views" (fewer than 5 views), "calibrate.weak" (views too alike to tell the focal
-/// length to 3 %, or all tilted to the same side); those of reading pictures and of the loop.
+/// "calibrate.few-views" (fewer than 5 views), "calibrate.weak" (views too similar to determine the
+/// focal length to 3 %, or all tilted to the same side); those of reading pictures and of the
+/// tracker.
 Result<Calibration> calibrate(const CalibrateOptions& options, const ProgressCallback& progress);
 
 /// The camera as OpenCV's YML, for modar-play --camera. Errors: those of write_file().

@@ -1,4 +1,4 @@
-// PNG files that know how wide the thing in them is: the pHYs chunk, written and read.
+// The physical size that a PNG states (pHYs), written and read.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "bake/pattern/pattern_image.hpp"
+#include "bake/pattern/rectify.hpp"
 #include "formats/atomic_file.hpp"
 
 namespace modar {

@@ -1,17 +1,19 @@
-// A quadrilateral in a photo to its frontal view, with the aspect ratio that the flat thing has.
+// A quadrilateral in a photo to its frontal view, with the object's aspect ratio.
+#include "bake/pattern/rectify.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include <opencv2/imgproc.hpp>
 
-#include "bake/pattern/pattern_image.hpp"
-
 namespace modar {
 namespace {
 
-constexpr double kSmallestSide = 32.0;  // photo pixels
-constexpr std::uint32_t kLargestSide = 8192;
+// Photo pixels of the shortest side: the smallest picture that can be baked.
+constexpr double kSmallestSide = 32.0;
+// Of the result: the largest texture side that the workstation handles anywhere.
+constexpr std::uint32_t kLargestResult = 8192;
 
 struct Vector {
   double x = 0;
@@ -42,7 +44,7 @@ double aspect_of_sides(const std::array<PixelPoint, 4>& c) {
 /// Width over height from the perspective (Zhang & He, "Whiteboard scanning and image enhancement",
 /// Eq. 11, 12, 20, 21); 0 where the perspective is too weak to tell the focal length.
 double aspect_of_perspective(const std::array<PixelPoint, 4>& c, double width, double height) {
-  std::array<Vector, 4> m;  // the paper's order: top-left, top-right, bottom-left, bottom-right
+  std::array<Vector, 4> m;  // Zhang and He's order: top-left, top-right, bottom-left, bottom-right
   constexpr std::array<std::size_t, 4> kOrder = {0, 1, 3, 2};
   const double unit = std::max(width, height);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -54,7 +56,8 @@ double aspect_of_perspective(const std::array<PixelPoint, 4>& c, double width, d
   const Vector n2{k2 * m[1].x - m[0].x, k2 * m[1].y - m[0].y, k2 - 1.0};
   const Vector n3{k3 * m[2].x - m[0].x, k3 * m[2].y - m[0].y, k3 - 1.0};
   const double focal_squared = -(n2.x * n3.x + n2.y * n3.y) / (n2.z * n3.z);
-  // Lenses of cameras see between 10 and 110 degrees; anything else is noise in the corners.
+  // Focal lengths in units of the longer side. Cameras see between 10 and 110 degrees; anything
+  // else is noise in the corners.
   constexpr double kShortest = 0.35;
   constexpr double kLongest = 6.0;
   if (!(focal_squared > kShortest * kShortest) || !(focal_squared < kLongest * kLongest))
@@ -68,6 +71,7 @@ double aspect_ratio(const RectifyOptions& options, double width, double height) 
   if (options.width_mm > 0 && options.height_mm > 0) return options.width_mm / options.height_mm;
   const double by_sides = aspect_of_sides(options.corners);
   const double by_perspective = aspect_of_perspective(options.corners, width, height);
+  // Opposite sides cannot mislead by more than a view at 75 degrees does. Set by hand.
   const bool plausible = by_perspective > 0.25 * by_sides && by_perspective < 4.0 * by_sides;
   return plausible ? by_perspective : by_sides;
 }
@@ -121,7 +125,7 @@ Result<void> RectifyOptions::validate() const {
     return fail(ExitCode::kUsage, "rectify.size", "", "a physical size is negative or not a number",
                 "give millimetres");
   }
-  if (max_side < 32 || max_side > kLargestSide) {
+  if (max_side < 32 || max_side > kLargestResult) {
     return fail(ExitCode::kUsage, "rectify.max-side", "",
                 "the longer side must be 32 to 8192 pixels", "give another number");
   }
@@ -129,7 +133,7 @@ Result<void> RectifyOptions::validate() const {
 }
 
 Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options) {
-  if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
+  MODAR_TRY(options.validate());
   const double width = photo.width;
   const double height = photo.height;
   for (const PixelPoint& corner : options.corners) {
@@ -145,7 +149,7 @@ Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options)
   const double shortest = aspect >= 1.0 ? longest / aspect : longest * aspect;
   const auto long_pixels = static_cast<std::uint32_t>(std::lround(longest));
   const auto short_pixels = static_cast<std::uint32_t>(std::max(1L, std::lround(shortest)));
-  // A coarser result would alias: it is sampled finer and averaged.
+  // A result coarser than the photo is sampled finer and averaged, so that it does not alias.
   const int oversampling = std::clamp(static_cast<int>(std::ceil(photo_longest / longest)), 1, 8);
   return aspect >= 1.0 ? warp(photo, c, long_pixels, short_pixels, oversampling)
                        : warp(photo, c, short_pixels, long_pixels, oversampling);

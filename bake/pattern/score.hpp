@@ -1,4 +1,4 @@
-// `modar pattern score`: how well a picture serves as a pattern, before anything is printed.
+// `modar pattern score`: how well a picture will serve as a pattern, before anything is printed.
 #pragma once
 
 #include <cstddef>
@@ -8,15 +8,15 @@
 #include <vector>
 
 #include "bake/image/image.hpp"
-#include "bake/pattern/view_render.hpp"
 #include "formats/error.hpp"
 #include "modar/image.hpp"
 
 namespace modar {
 
-/// Names the rules of the score; scores of different versions cannot be compared.
+/// Version of the score's rules; scores of different versions cannot be compared.
 inline constexpr std::uint32_t kScoreVersion = 1;
-/// Scores below this are worth a warning: such patterns are found from close by only.
+/// Scores below this cause a warning: such patterns are recognised from close by only. Set by hand
+/// on the twelve pictures that the score was tuned on.
 inline constexpr int kWeakScore = 30;
 
 struct ScoreCause {
@@ -25,7 +25,7 @@ struct ScoreCause {
   const char* advice;  ///< what a person can do; empty where the value is good
 };
 
-/// A corner of the picture and in how many of the test views it was told from all others.
+/// A corner of the picture, and in how many of the test views it was matched unambiguously.
 struct ScorePlace {
   float x = 0;  ///< picture pixels
   float y = 0;
@@ -39,15 +39,16 @@ struct PatternScore {
   int views = 0;  ///< test views
 };
 
-/// Renders the picture ever smaller and ever more tilted, in fixed views by whole numbers, and asks
-/// the device's loop for it: the score is the share of these views in which it is right. The causes
-/// come from the picture and from the features that hold. A count of decisions, so that no
-/// machine and no number of threads changes it. loop_record: of that picture. Errors: those of
-/// the loop.
-Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> loop_record,
+/// Renders the picture smaller and smaller and more and more tilted, in fixed views, and runs the
+/// device's tracker on them: the score is the share of these views in which it is right. The causes
+/// come from the picture and from the features that are matched again. A count of decisions, which
+/// depends neither on the machine nor on the number of threads. record: the picture's tracker
+/// record. Errors: those of the tracker.
+Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
                                    unsigned jobs);
 
-/// The picture with its good features (green), poor ones (red), and shades where there are none.
+/// The picture with its reliable features (green), unreliable ones (orange), and places without any
+/// darkened.
 RgbaImage score_overlay(const GrayImage& pattern, const PatternScore& score);
 
 }  // namespace modar

@@ -1,4 +1,4 @@
-// Bands of views through the loop, and the range that follows from them.
+// Runs the tracker over bands of views, derives the working range, and draws the contact sheet.
 #include "bake/pattern/simulate.hpp"
 
 #include <algorithm>
@@ -6,29 +6,38 @@
 #include <cstdio>
 #include <filesystem>
 #include <mutex>
+#include <numbers>
 
-#include "bake/pattern/pattern_image.hpp"
-#include "bake/pattern/pose_subject.hpp"
+#include <opencv2/imgproc.hpp>
+
+#include "bake/pattern/gray_mat.hpp"
+#include "bake/pattern/rectify.hpp"
 
 namespace modar {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kWorks = 0.9;  // share of right frames
+using std::numbers::pi;
+
+// Share of right frames from which a value belongs to the working range. A tracker that is right in
+// nine of ten frames shows its model steadily, since it tracks through the tenth.
+constexpr double kWorks = 0.9;
+constexpr int kMadeBackgrounds = 4;  // where no photos are given
 
 /// Ratio of the pattern's area in the frame to its picture's, seen from the front.
 double area_at(double widths, const GrayImage& picture, const Camera& camera) {
   return camera.fx * camera.fy / (widths * widths * picture.width * picture.width);
 }
 
-/// From where everything but the distance is tried: half of the frame's height, or the picture's
-/// own size where that is less.
+/// The distance at which everything else is tried: there the pattern takes half of the frame's
+/// height, or the picture's own size where that is less.
 double easy_distance(const GrayImage& picture, const Camera& camera) {
   const double side = std::min(std::sqrt(1.0 * picture.width * picture.height),
                                0.5 * std::min(camera.width, camera.height));
   return std::sqrt(camera.fx * camera.fy * picture.height / picture.width) / side;
 }
 
+/// All values of all bands. The ranges begin where every pattern works and end where none does; the
+/// steps are a compromise with time: a value costs 20 frames of each pattern.
 class Bands {
  public:
   Bands(const GrayImage& picture, const Camera& camera)
@@ -80,7 +89,7 @@ class Bands {
   [[nodiscard]] TrialSetting tilted(double degrees) const {
     TrialSetting setting = easy(easy_);
     // The distance stays, so that the area shrinks with the tilt.
-    setting.band.area_low *= std::cos(degrees * kPi / 180);
+    setting.band.area_low *= std::cos(degrees * pi / 180);
     setting.band.area_high = setting.band.area_low;
     setting.band.tilt_low = setting.band.tilt_high = degrees;
     return setting;
@@ -138,6 +147,47 @@ std::string length_text(double mm) {
   return text;
 }
 
+// Layout of the contact sheet, pixels.
+constexpr int kWide = 160;  // of a view
+constexpr int kText = 16;   // height of a line of text
+constexpr int kName = 100;  // width of the bands' names
+constexpr int kGap = 4;
+const cv::Scalar kWhite(255, 255, 255, 255);
+const cv::Scalar kGreen(80, 220, 80, 255);
+const cv::Scalar kRed(240, 80, 80, 255);
+const cv::Scalar kPaper(24, 24, 28, 255);
+
+void write(cv::Mat& sheet, const std::string& text, int x, int y, const cv::Scalar& colour) {
+  cv::putText(sheet, text, {x, y}, cv::FONT_HERSHEY_SIMPLEX, 0.36, colour, 1, cv::LINE_AA);
+}
+
+void outline(cv::Mat& view, const std::array<glm::dvec2, 4>& corners, double scale,
+             const cv::Scalar& colour) {
+  std::vector<cv::Point> points;
+  for (const glm::dvec2& corner : corners) {
+    // Corners near the camera project far outside; lines are clipped at the view's border anyway.
+    points.emplace_back(static_cast<int>(std::clamp(corner.x * scale, -1e4, 1e4)),
+                        static_cast<int>(std::clamp(corner.y * scale, -1e4, 1e4)));
+  }
+  cv::polylines(view, points, true, colour, 1, cv::LINE_AA);
+}
+
+void draw_value(cv::Mat& sheet, const SimulatedValue& value, int x, int y, int height) {
+  const TrialOutcome& outcome = value.outcome;
+  const GrayPicture& sample = outcome.sample;
+  cv::Mat view;
+  cv::cvtColor(as_mat(sample.view()), view, cv::COLOR_GRAY2RGBA);
+  cv::resize(view, view, cv::Size(kWide, height), 0, 0, cv::INTER_AREA);
+  const double scale = static_cast<double>(kWide) / sample.width;
+  outline(view, outcome.truth, scale, kWhite);
+  if (outcome.sample_right) outline(view, outcome.seen, scale, kGreen);
+  view.copyTo(sheet(cv::Rect(x, y, kWide, height)));
+  char text[48];
+  std::snprintf(text, sizeof text, "%.3g: %.0f %%", value.value, 100 * outcome.right_share());
+  write(sheet, text, x + 2, y + height + kText - 4,
+        outcome.right_share() >= kWorks ? kGreen : kRed);
+}
+
 }  // namespace
 
 Result<Simulation> simulate(const std::string& path, const SimulateOptions& options,
@@ -147,42 +197,39 @@ Result<Simulation> simulate(const std::string& path, const SimulateOptions& opti
     return fail(ExitCode::kUsage, "simulate.camera", "", "the camera file states no image size",
                 "add image_width and image_height to it, or give a resolution");
   }
-  PoseBenchOptions bench;
-  bench.paper_set = 0;
-  bench.ours = false;
-  const auto subject = make_subject({path}, bench, camera, true);
-  if (!subject) return tl::unexpected(subject.error());
-  auto backgrounds = load_backgrounds(options.backgrounds, camera.width, camera.height);
-  if (!backgrounds) return tl::unexpected(backgrounds.error());
+  bool shrunk = false;
+  MODAR_ASSIGN(const GrayPicture picture, load_pattern(path, shrunk));
+  MODAR_ASSIGN(const auto bundle, bundle_of_pattern(picture.view(), {}));
+  MODAR_ASSIGN(auto backgrounds,
+               load_backgrounds(options.backgrounds, camera.width, camera.height));
   Random random(options.seed);
-  while (options.backgrounds.empty() && backgrounds->size() < 4) {
-    backgrounds->push_back(made_background(camera.width, camera.height, random));
+  while (options.backgrounds.empty() && backgrounds.size() < kMadeBackgrounds) {
+    backgrounds.push_back(made_background(camera.width, camera.height, random));
   }
-  TrialBed bed;
-  bed.picture = subject->pictures[0].view();
-  bed.bundle = subject->bytes;
-  bed.camera = camera;
-  bed.backgrounds = *backgrounds;
-  bed.views = options.views;
-  bed.seed = options.seed;
-  bed.jobs = options.jobs;
-  Bands bands(bed.picture, camera);
-  std::mutex one_at_a_time;
+  TrialSetup setup;
+  setup.picture = picture.view();
+  setup.bundle = bundle;
+  setup.camera = camera;
+  setup.backgrounds = backgrounds;
+  setup.views = options.views;
+  setup.seed = options.seed;
+  setup.jobs = options.jobs;
+  Bands bands(setup.picture, camera);
+  std::mutex progress_mutex;
   std::size_t done = 0;
-  const auto stepped = [&] {
-    const std::lock_guard lock(one_at_a_time);
+  const auto setting_done = [&] {
+    const std::lock_guard lock(progress_mutex);
     ++done;
     if (progress)
       progress("views", static_cast<double>(done) / static_cast<double>(bands.settings.size()));
   };
-  auto outcomes = try_views(bed, bands.settings, stepped);
-  if (!outcomes) return tl::unexpected(outcomes.error());
+  MODAR_ASSIGN(auto outcomes, try_views(setup, bands.settings, setting_done));
   Simulation simulation;
   simulation.name = std::filesystem::path(path).stem().string();
   simulation.width_mm = options.width_mm > 0 ? options.width_mm : read_width_mm(path);
   std::size_t next = 0;
   for (SimulatedBand& band : bands.bands) {
-    for (SimulatedValue& value : band.values) value.outcome = std::move((*outcomes)[next++]);
+    for (SimulatedValue& value : band.values) value.outcome = std::move(outcomes[next++]);
   }
   simulation.bands = std::move(bands.bands);
   simulation.range = range_of(simulation.bands);
@@ -206,6 +253,37 @@ std::string range_sentence(const Simulation& simulation) {
                   range.nearest, range.farthest, range.tilt_deg);
   }
   return text;
+}
+
+RgbaImage simulation_picture(const Simulation& simulation) {
+  std::size_t columns = 1;
+  for (const SimulatedBand& band : simulation.bands) {
+    columns = std::max(columns, band.values.size());
+  }
+  const GrayPicture& first = simulation.bands.front().values.front().outcome.sample;
+  const int height = std::max(1, kWide * first.height / first.width);
+  const int row = height + kText + kGap;
+  RgbaImage image;
+  image.width = static_cast<std::uint32_t>(kName + static_cast<int>(columns) * (kWide + kGap));
+  image.height =
+      static_cast<std::uint32_t>(2 * kText + static_cast<int>(simulation.bands.size()) * row);
+  image.pixels.resize(std::size_t{image.width} * image.height * 4);
+  cv::Mat sheet(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC4,
+                image.pixels.data());
+  sheet.setTo(kPaper);
+  write(sheet, simulation.name + ": " + range_sentence(simulation), 6, kText + 2, kWhite);
+  int y = 2 * kText;
+  for (const SimulatedBand& band : simulation.bands) {
+    write(sheet, band.name, 6, y + kText, kWhite);
+    write(sheet, band.unit, 6, y + 2 * kText, kWhite);
+    int x = kName;
+    for (const SimulatedValue& value : band.values) {
+      draw_value(sheet, value, x, y, height);
+      x += kWide + kGap;
+    }
+    y += row;
+  }
+  return image;
 }
 
 }  // namespace modar

@@ -1,4 +1,4 @@
-// Renders affine views by averaging samples over each pixel's footprint.
+// Renders affine views by averaging samples over each pixel's footprint, and finds their features.
 #include "bake/pattern/view_render.hpp"
 
 #include <algorithm>
@@ -10,9 +10,12 @@
 namespace modar {
 namespace {
 
-constexpr int kMostSamples = 6;  // on a side of a footprint
+// Samples along a side of a footprint, at most, which bounds a pixel at 36. Views tilted up to 3
+// times get a sample for each level pixel, the steepest baked ones (4.1) one for each 1.4. Set by
+// hand.
+constexpr int kMostSamples = 6;
 
-// Places in a level are fixed-point numbers with 16 bits after the point, so that every machine
+// Positions in a level are fixed-point numbers with 16 fractional bits, so that every machine
 // renders the same bytes.
 constexpr double kOne = 65536.0;
 
@@ -20,8 +23,8 @@ std::int32_t fixed(double value) {
   return static_cast<std::int32_t>(std::lround(value * kOne));
 }
 
-/// A weighted sum of four pixels with 16 bits after the point. (x0, y0) and its neighbours to the
-/// right and below are in the picture.
+/// A weighted sum of four pixels with 16 fractional bits. (x0, y0) and its neighbours to the right
+/// and below are in the picture.
 std::int32_t bilinear(const GrayPicture& picture, int x0, int y0, std::int32_t fx,
                       std::int32_t fy) {
   const std::uint8_t* p =
@@ -32,7 +35,7 @@ std::int32_t bilinear(const GrayPicture& picture, int x0, int y0, std::int32_t f
   return (top << 8) + fy * (bottom - top);
 }
 
-/// Of the place (x, y), the picture's border repeated where it lies outside.
+/// The picture at (x, y), its border repeated outside.
 std::int32_t sample_anywhere(const GrayPicture& picture, std::int32_t x, std::int32_t y) {
   x = std::clamp(x, 0, (picture.width - 1) << 16);
   y = std::clamp(y, 0, (picture.height - 1) << 16);
@@ -41,7 +44,7 @@ std::int32_t sample_anywhere(const GrayPicture& picture, std::int32_t x, std::in
   return bilinear(picture, x0, y0, (x - (x0 << 16)) >> 8, (y - (y0 << 16)) >> 8);
 }
 
-/// Places of a pixel's samples around its centre, in pixels of the level.
+/// Offsets of a pixel's samples from its centre, in pixels of the level.
 struct Footprint {
   std::vector<std::array<std::int32_t, 2>> offsets;
   std::int32_t reach_x = 0;  ///< of the offsets
@@ -70,7 +73,7 @@ Footprint footprint_of(const std::array<double, 4>& inverse, double factor) {
   return footprint;
 }
 
-/// Takes the samples of a row's pixels out of one level.
+/// Samples rows of pixels from one level.
 class Sampler {
  public:
   Sampler(const ViewLevel& level, const GrayPicture& finest, const std::array<double, 4>& inverse,
@@ -81,8 +84,8 @@ class Sampler {
         right_(fixed(finest.width / factor - 0.5)),
         bottom_(fixed(finest.height / factor - 0.5)) {}
 
-  /// x, y: the centres of the row's pixels, each stepping one way all along. behind: grays outside
-  /// of the picture, null: its border pixels.
+  /// x, y: the centres of the row's pixels, both monotonic along the row. behind: grays outside of
+  /// the picture, null: its border pixels.
   void row(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
            const std::uint8_t* behind, std::uint8_t* out) const {
     if (behind == nullptr) return sample_pixels(samples_, x.data(), y.data(), x.size(), out);
@@ -101,7 +104,8 @@ class Sampler {
   }
 
  private:
-  static constexpr std::size_t kRun = 16;  // pixels that are looked at together
+  // Pixels classified together: one AVX-512 vector of 32-bit lanes.
+  static constexpr std::size_t kRun = 16;
 
   /// All samples of a pixel lie in the picture.
   [[nodiscard]] bool inside(std::int32_t x, std::int32_t y) const {
@@ -109,7 +113,7 @@ class Sampler {
            x < ((level_.width - 1) << 16) - footprint_.reach_x &&
            y < ((level_.height - 1) << 16) - footprint_.reach_y;
   }
-  /// All samples of the pixels from one place to another lie on the same side of the picture.
+  /// All samples of the pixels from `from` to `to` lie on the same side of the picture.
   static bool beside(std::int32_t from, std::int32_t to, std::int32_t reach, std::int32_t end) {
     return std::max(from, to) + reach < -0x8000 || std::min(from, to) - reach > end;
   }
@@ -299,7 +303,7 @@ GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& 
     factor *= 2;
   }
   const Sampler sampler(levels[level], levels[0], inverse, factor);
-  // The place of a pixel is stepped along a row with 32 bits after the point.
+  // A pixel's position is stepped along a row with 32 fractional bits.
   constexpr double kFine = 4294967296.0;
   const std::int64_t step_x = std::llround(inverse[0] / factor * kFine);
   const std::int64_t step_y = std::llround(inverse[2] / factor * kFine);
@@ -326,6 +330,24 @@ GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& 
                 out.pixels.data() + first);
   }
   return out;
+}
+
+std::array<double, 2> to_picture(const AffineView& view, double x, double y) {
+  const auto& a = view.linear;
+  const double determinant = a[0] * a[3] - a[1] * a[2];
+  const double u = x - view.offset[0];
+  const double v = y - view.offset[1];
+  return {(a[3] * u - a[1] * v) / determinant, (a[0] * v - a[2] * u) / determinant};
+}
+
+DetectOptions generous_detection() {
+  DetectOptions options;
+  // Sixteen corners in each cell of 32 pixels, several times what the default allows: the bake and
+  // the score choose among them. 20,000 is more than a view of 720 pixels holds.
+  options.cell = 32;
+  options.per_cell = 16;
+  options.max_features = 20000;
+  return options;
 }
 
 }  // namespace modar

@@ -1,15 +1,17 @@
-// Affine views of a picture, anti-aliased, for the bake of patterns. Plain arithmetic, no library.
+// Affine views of a picture, anti-aliased, and the features found in them. Integer and rational
+// arithmetic only, so that baked bytes are the same on every machine.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
-#include "modar/image.hpp"
+#include "bake/pattern/picture.hpp"
+#include "modar/tracker_features.hpp"
 
 namespace modar {
 
-/// A repeatable sequence (SplitMix64).
+/// A reproducible sequence of random numbers (SplitMix64).
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
@@ -30,46 +32,46 @@ struct AffineView {
   int height = 0;
 };
 
-/// The cosine and the sine of an angle.
+/// Cosine and sine of an angle.
 struct Turn {
   double cosine = 1;
   double sine = 0;
 };
-/// By sums and products alone, as exp_of(): a library's sine may differ in its last bit from
-/// machine to machine, and baked bytes must not. Right to about 1e-15. radians: within +-1000.
+/// Computed from sums and products only, like exp_of(): the last bit of a library's sine differs
+/// between machines, and baked bytes must not. Accurate to about 1e-15. radians: within +-1000.
 Turn turn_of(double radians);
-/// e to the power x, right to about 1e-15 of it. x: within +-4.
+/// e to the power x, with a relative error of about 1e-15. x: within +-4.
 double exp_of(double x);
 
 /// A view scaled by `scale`, compressed by `tilt` (>= 1) along `direction`, then rotated. It shows
-/// the whole picture with `margin` pixels around. Sums and products only: turns of rational numbers
-/// give the same view on every machine.
+/// the whole picture with a border of `margin` pixels.
 AffineView make_view(int picture_width, int picture_height, double scale, double tilt,
                      Turn direction, Turn rotation, int margin);
 
-struct GrayPicture {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint8_t> pixels;
-  [[nodiscard]] GrayImage view() const { return {pixels.data(), width, height, width}; }
-};
-
-/// The picture and its halves, down to a side of 8.
+/// The picture and its successive halvings, down to a side of 8.
 std::vector<GrayPicture> halved(const GrayImage& picture);
 
-/// A halved picture, and beside each pixel its neighbours, as rendering reads them.
+/// One of the halvings, with each pixel's neighbours packed beside it as rendering reads them.
 struct ViewLevel : GrayPicture {
   std::vector<std::uint32_t> quads;  ///< see ViewSamples
 };
-/// Those of halved().
+/// The levels of halved().
 std::vector<ViewLevel> view_levels(const GrayImage& picture);
 
-/// Boxes of random grays, as a background.
+/// Boxes of random grays: a background without a photo.
 GrayPicture made_clutter(Random& random, int width, int height);
 
 /// Renders a view. Outside of the picture: its border pixels where `background` is null, else the
 /// background, which has the view's size.
 GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& view,
                         const GrayPicture* background);
+
+using TrackerCode = std::array<std::uint8_t, 32>;
+
+/// Picture coordinates of a point of a view.
+std::array<double, 2> to_picture(const AffineView& view, double x, double y);
+
+/// Detects every corner that could be kept of a pattern; a frame's search takes the best only.
+DetectOptions generous_detection();
 
 }  // namespace modar

@@ -9,8 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "bake/pattern/pose_scene.hpp"
-#include "bake/pattern/pose_subject.hpp"
+#include "bake/pattern/trial.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/camera_file.hpp"
 #include "modar/focal_finder.hpp"

@@ -1,5 +1,5 @@
 // Rectifying photos, PNG files with a physical size, and baking patterns.
-#include "bake/pattern/pattern_image.hpp"
+#include "bake/pattern/pattern.hpp"
 
 #include <cmath>
 #include <cstdio>

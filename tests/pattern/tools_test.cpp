@@ -7,11 +7,9 @@
 
 #include "bake/lab/score_bench.hpp"
 #include "bake/pattern/confusion.hpp"
-#include "bake/pattern/described_view.hpp"
-#include "bake/pattern/pose_subject.hpp"
 #include "bake/pattern/score.hpp"
 #include "bake/pattern/simulate.hpp"
-#include "bake/pattern/tracker_record_bake.hpp"
+#include "bake/pattern/trial.hpp"
 #include "bake/pattern/view_kernel.hpp"
 #include "bake/pattern/view_render.hpp"
 #include "bake/texture/etc1/etc1_kernel.hpp"
@@ -252,26 +250,26 @@ TEST(Trials, ShowNearViewsRightAndFarOnesMissedThroughABentLens) {
   ASSERT_TRUE(bundle) << to_line(bundle.error());
   Random random(3);
   const std::vector<GrayPicture> backgrounds = {made_background(400, 300, random)};
-  TrialBed bed;
-  bed.picture = pattern.view();
-  bed.bundle = *bundle;
-  bed.camera = default_camera(400, 300);
-  bed.camera.distortion = {-0.25, 0.08, 0, 0, 0};
-  bed.backgrounds = backgrounds;
-  bed.views = 4;
+  TrialSetup setup;
+  setup.picture = pattern.view();
+  setup.bundle = *bundle;
+  setup.camera = default_camera(400, 300);
+  setup.camera.distortion = {-0.25, 0.08, 0, 0, 0};
+  setup.backgrounds = backgrounds;
+  setup.views = 4;
   const std::vector<TrialSetting> settings = {at_side(150, 10), at_side(12, 10), at_side(150, 86)};
-  const auto alone = try_views(bed, settings, {});
-  bed.jobs = 3;
-  const auto together = try_views(bed, settings, {});
+  const auto alone = try_views(setup, settings, {});
+  setup.jobs = 3;
+  const auto together = try_views(setup, settings, {});
   ASSERT_TRUE(alone && together);
-  EXPECT_EQ((*alone)[0].row.frames, 8);
-  EXPECT_EQ((*alone)[0].row.right, 8);
-  EXPECT_LT((*alone)[0].row.error_px, 0.5);
+  EXPECT_EQ((*alone)[0].figures.frames, 8);
+  EXPECT_EQ((*alone)[0].figures.right, 8);
+  EXPECT_LT((*alone)[0].figures.error_px, 0.5);
   EXPECT_TRUE((*alone)[0].sample_right);
-  EXPECT_EQ((*alone)[1].row.right, 0);
-  EXPECT_EQ((*alone)[2].row.right, 0);
+  EXPECT_EQ((*alone)[1].figures.right, 0);
+  EXPECT_EQ((*alone)[2].figures.right, 0);
   for (std::size_t i = 0; i < settings.size(); ++i) {
-    EXPECT_EQ((*alone)[i].row.error_px, (*together)[i].row.error_px);
+    EXPECT_EQ((*alone)[i].figures.error_px, (*together)[i].figures.error_px);
     EXPECT_EQ((*alone)[i].sample.pixels, (*together)[i].sample.pixels);
   }
 }

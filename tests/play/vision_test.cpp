@@ -3,9 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bake/pattern/pose_scene.hpp"
-#include "bake/pattern/pose_subject.hpp"
-#include "bake/pattern/tracker_record_bake.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "tests/track/synthetic.hpp"
 
 namespace modar {

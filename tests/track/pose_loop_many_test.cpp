@@ -2,7 +2,7 @@
 // and one that was hidden is soon back.
 #include <gtest/gtest.h>
 
-#include "bake/pattern/tracker_record_bake.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "modar/pose_loop.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 

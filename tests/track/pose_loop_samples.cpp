@@ -4,7 +4,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/pattern/tracker_record_bake.hpp"
+#include "bake/pattern/pattern.hpp"
 
 namespace modar::test {
 

@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "bake/pattern/pose_scene.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "modar/tracker.hpp"
 #include "tests/track/synthetic.hpp"
 

@@ -11,7 +11,7 @@
 #include <glm/trigonometric.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "bake/pattern/tracker_record_bake.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/pose_loop.hpp"
 #include "runtime/track/pose_refinement.hpp"

@@ -1,25 +1,34 @@
-// A pattern's picture as everything in this folder sees it: gray, and no larger than is useful.
+// Pattern pictures in memory: read, in gray, and no larger than is useful.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "bake/image/image.hpp"
-#include "bake/pattern/view_render.hpp"
 #include "formats/error.hpp"
+#include "modar/image.hpp"
 
 namespace modar {
 
-/// Gray as cameras deliver it (Rec. 601); what is transparent shows white paper.
+/// A gray picture that owns its pixels, row by row without padding.
+struct GrayPicture {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> pixels;
+  [[nodiscard]] GrayImage view() const { return {pixels.data(), width, height, width}; }
+};
+
+/// Rec. 601 luma, as cameras deliver it; transparent pixels show white paper.
 GrayPicture gray_of(const RgbaImage& image);
 /// Reads an image file as gray. Errors: those of read_image().
 Result<GrayPicture> load_gray(const std::string& path);
 /// The same, its longer side at most 720 pixels. shrunk: whether it was made smaller.
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
-/// The PNG and JPEG files of a folder in the order of their names, or the file itself. Errors: kIo
+/// The PNG and JPEG files of a folder sorted by name, or the file itself. Errors: kIo
 /// "pictures.folder" where there is none.
 Result<std::vector<std::string>> pictures_of(const std::string& path);
-/// The paths with its pictures in each folder's place. Errors: those of pictures_of().
+/// Replaces each folder in `paths` by its pictures. Errors: those of pictures_of().
 Result<void> open_folders(std::vector<std::string>& paths);
 
 }  // namespace modar

@@ -1,21 +1,21 @@
-// Draws poses and renders frames with OpenCV, apart from the bake's own renderer.
-#include "bake/pattern/pose_scene.hpp"
+// Draws poses and renders frames with OpenCV, independently of the bake's renderer.
+#include "bake/pattern/scene.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "bake/pattern/pattern_image.hpp"
-#include "bake/pattern/pattern_picture.hpp"
+#include "bake/pattern/gray_mat.hpp"
 
 namespace modar {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+using std::numbers::pi;
 
 std::array<glm::dvec2, 4> corners_of(const GrayImage& pattern, const Camera& camera,
                                      const Pose& pose) {
@@ -27,7 +27,7 @@ std::array<glm::dvec2, 4> corners_of(const GrayImage& pattern, const Camera& cam
   return corners;
 }
 
-/// The turn that takes the camera's axis to a line of sight.
+/// The rotation that takes the camera's axis to a line of sight.
 glm::dmat3 towards(const glm::dvec3& sight) {
   const glm::dvec3 axis(-sight.y, sight.x, 0);
   const double across = std::hypot(axis.x, axis.y);
@@ -45,12 +45,8 @@ double area_of(const std::array<glm::dvec2, 4>& c) {
   return area;
 }
 
-cv::Mat as_mat(const GrayImage& image) {
-  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels),
-          static_cast<std::size_t>(image.stride)};
-}
-
-/// Samples a side of a frame's pixel: fewer where the picture is enlarged, and smooth.
+/// Samples along a side of a frame's pixel. An enlarged picture is smooth and needs fewer; more
+/// than 3 make rendering slower, which takes most of a bench's time. Set by hand.
 int oversampling_of(double linear) {
   return linear < 1.0 ? 3 : 2;
 }
@@ -59,12 +55,12 @@ int oversampling_of(double linear) {
 struct Shown {
   cv::Rect place;
   cv::Mat picture;
-  cv::Mat mask;  ///< 255 where nothing of the background shows
+  cv::Mat mask;  ///< 255 where the pattern hides the background
 };
 
-/// Pixels of the frame around the pattern's outline, which a lens bends.
+/// Pixels of the frame around the pattern's outline, which a distorting lens bends.
 cv::Rect place_of(const GrayImage& pattern, const Camera& camera, const Pose& pose) {
-  constexpr int kPoints = 8;  // a side
+  constexpr int kPoints = 8;  // on each side of the outline
   const auto world = pattern_corners(pattern.width, pattern.height);
   double low_x = camera.width;
   double low_y = camera.height;
@@ -80,7 +76,7 @@ cv::Rect place_of(const GrayImage& pattern, const Camera& camera, const Pose& po
       high_y = std::max(high_y, at.y);
     }
   }
-  constexpr int kRoom = 3;
+  constexpr int kRoom = 3;  // pixels for the outline between those points
   const int x0 = std::max(0, static_cast<int>(std::floor(low_x)) - kRoom);
   const int y0 = std::max(0, static_cast<int>(std::floor(low_y)) - kRoom);
   const int x1 = std::min(camera.width, static_cast<int>(std::ceil(high_x)) + kRoom + 1);
@@ -88,9 +84,9 @@ cv::Rect place_of(const GrayImage& pattern, const Camera& camera, const Pose& po
   return x1 > x0 && y1 > y0 ? cv::Rect(x0, y0, x1 - x0, y1 - y0) : cv::Rect();
 }
 
-/// Where each fine pixel of the place looks in the pattern's picture, through the camera's lens.
-/// map: picture pixels to fine ideal pixels of the place. The lens is worked out on a grid of every
-/// fourth pixel; between, it is linear to a thousandth of a pixel.
+/// The position in the pattern's picture of each fine pixel of the place, through the camera's
+/// lens. map: picture pixels to fine ideal pixels of the place. Distortion is evaluated at every
+/// fourth pixel; linear interpolation between is right to a thousandth of a pixel.
 cv::Mat lens_map(const Camera& camera, const cv::Rect& place, const cv::Mat& map,
                  int oversampling) {
   constexpr int kStep = 4;
@@ -125,7 +121,7 @@ cv::Mat lens_map(const Camera& camera, const cv::Rect& place, const cv::Mat& map
   return out;
 }
 
-/// The picture with the share `covered` hidden from one side.
+/// A mask of the picture that hides the share `covered` from one side.
 cv::Mat uncovered(cv::Size size, double covered, int side) {
   cv::Mat shown(size, CV_8UC1, cv::Scalar(255));
   const int cut_x = static_cast<int>(std::lround(size.width * covered));
@@ -167,12 +163,13 @@ Shown show(const GrayImage& pattern, const Camera& camera, const Pose& pose, dou
   }
   const cv::Mat map = cv::getPerspectiveTransform(from.data(), to.data());
   const cv::Size large = shown.place.size() * oversampling;
-  const bool bent = camera.distortion != ideal.distortion;
-  const cv::Mat bends = bent ? lens_map(camera, shown.place, map, oversampling) : cv::Mat();
+  const bool distorting = camera.distortion != ideal.distortion;
+  const cv::Mat positions =
+      distorting ? lens_map(camera, shown.place, map, oversampling) : cv::Mat();
   const auto warp = [&](const cv::Mat& what, int sampling, int border, cv::Mat& out) {
     cv::Mat fine;
-    if (bent) {
-      cv::remap(what, fine, bends, cv::noArray(), sampling, border, cv::Scalar(0));
+    if (distorting) {
+      cv::remap(what, fine, positions, cv::noArray(), sampling, border, cv::Scalar(0));
     } else {
       cv::warpPerspective(what, fine, map, large, sampling, border, cv::Scalar(0));
     }
@@ -211,31 +208,18 @@ cv::Mat motion_kernel(double length, double angle) {
 
 }  // namespace
 
-std::vector<SceneBand> pose_bands() {
-  return {{"area 0.1-0.25", 0.1, 0.25, 0, 45, 0, 0, true},
-          {"area 0.25-0.4", 0.25, 0.4, 0, 45, 0, 0, true},
-          {"area 0.4-0.9", 0.4, 0.9, 0, 45, 0, 0, true},
-          {"area 0.9-4", 0.9, 4.0, 0, 45, 0, 0, true},
-          {"area 4-5", 4.0, 5.0, 0, 45, 0, 0, true},
-          {"tilt 45-60", 0.5, 3.0, 45, 60, 0, 0, true},
-          {"tilt 60-70", 0.5, 3.0, 60, 70, 0, 0, true},
-          {"half covered", 0.5, 3.0, 0, 45, 0.5, 0.5, true},
-          {"mixed", 0.25, 5.0, 0, 65, 0, 0.5, true},
-          {"none", 0.4, 4.0, 0, 45, 0, 0, false}};
-}
-
 Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
                Random& random) {
   const double area = std::exp(random.uniform(std::log(band.area_low), std::log(band.area_high)));
-  const double tilt = random.uniform(band.tilt_low, band.tilt_high) * kPi / 180.0;
-  const double axis = random.uniform(0.0, 2 * kPi);
-  const double roll = random.uniform(band.roll_low, band.roll_high) * kPi / 180.0;
+  const double tilt = random.uniform(band.tilt_low, band.tilt_high) * pi / 180.0;
+  const double axis = random.uniform(0.0, 2 * pi);
+  const double roll = random.uniform(band.roll_low, band.roll_high) * pi / 180.0;
   glm::dmat3 frontal(1.0);
   frontal[1][1] = frontal[2][2] = -1.0;
   const glm::dmat3 turned = rotation_matrix({0, 0, roll}) *
                             rotation_matrix({tilt * std::cos(axis), tilt * std::sin(axis), 0}) *
                             frontal;
-  // The centre lies where a pattern of that size stays in the frame, or in its middle.
+  // The centre is drawn where a pattern of that size stays in the frame, else near the middle.
   const double side = std::sqrt(area * pattern.width * pattern.height);
   const double room_x = std::max(0.05 * camera.width, 0.5 * (camera.width - 1.3 * side));
   const double room_y = std::max(0.05 * camera.height, 0.5 * (camera.height - 1.3 * side));
@@ -257,6 +241,8 @@ Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& ca
   return pose;
 }
 
+// Ranges of a room's light and of a focused lens, those of the protocol that all of the tracker's
+// figures were measured under.
 SceneLight draw_light(Random& random) {
   SceneLight light;
   light.gain = random.uniform(0.6, 1.25);
@@ -305,10 +291,10 @@ void expose(const GrayPicture& still, const SceneLight& light, Random& random,
 SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,
                         const GrayPicture& background, const SceneBand& band, Random& random,
                         const SceneLight* light, MotionBlur blur) {
-  const SceneLight shining = light != nullptr ? *light : draw_light(random);
+  const SceneLight used = light != nullptr ? *light : draw_light(random);
   SceneFrame scene =
-      render_still(pattern, camera, pose, background, band, random, shining.focus, blur);
-  expose(scene.picture, shining, random, scene.picture);
+      render_still(pattern, camera, pose, background, band, random, used.focus, blur);
+  expose(scene.picture, used, random, scene.picture);
   return scene;
 }
 
@@ -353,10 +339,9 @@ GrayPicture made_background(int width, int height, Random& random) {
 }
 
 Result<GrayPicture> load_background(const std::string& path, int width, int height) {
-  auto picture = load_gray(path);
-  if (!picture) return tl::unexpected(picture.error());
-  const cv::Mat photo = as_mat(picture->view());
-  // The frame's middle of the photo, scaled to fill it.
+  MODAR_ASSIGN(const GrayPicture picture, load_gray(path));
+  const cv::Mat photo = as_mat(picture.view());
+  // Scaled to fill the frame.
   const double scale =
       std::max(static_cast<double>(width) / photo.cols, static_cast<double>(height) / photo.rows);
   cv::Mat scaled;
@@ -372,6 +357,16 @@ Result<GrayPicture> load_background(const std::string& path, int width, int heig
   for (int y = 0; y < height; ++y)
     out.pixels.insert(out.pixels.end(), cut.ptr(y), cut.ptr(y) + width);
   return out;
+}
+
+Result<std::vector<GrayPicture>> load_backgrounds(const std::vector<std::string>& paths, int width,
+                                                  int height) {
+  std::vector<GrayPicture> backgrounds;
+  for (const std::string& path : paths) {
+    MODAR_ASSIGN(auto background, load_background(path, width, height));
+    backgrounds.push_back(std::move(background));
+  }
+  return backgrounds;
 }
 
 }  // namespace modar

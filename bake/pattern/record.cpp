@@ -1,33 +1,54 @@
-// Chooses, of all descriptors that rendered views of a pattern give, those that random views
-// repeat.
-#include "bake/pattern/tracker_record_bake.hpp"
+// Keeps those descriptors of a pattern's rendered views that random views repeat; chooses patches
+// to track; describes the picture under the ModAR paper's parameter sets.
+#include "bake/pattern/record.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <queue>
+#include <string_view>
 
 #include "bake/parallel.hpp"
-#include "bake/pattern/described_view.hpp"
-#include "bake/pattern/tracker_patches.hpp"
+#include "bake/pattern/picture.hpp"
+#include "bake/pattern/rectify.hpp"
+#include "bake/pattern/score.hpp"
 #include "bake/pattern/view_kernel.hpp"
 #include "bake/pattern/view_render.hpp"
 #include "formats/tracker_record.hpp"
+#include "modar/features.hpp"
+#include "modar/pose.hpp"
 #include "modar/tracker_features.hpp"
 
 namespace modar {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr int kLargestSide = 1023;
-constexpr double kScaleStep = 1.2599210498948732;  // three views an octave
+using std::numbers::pi;
+
+constexpr int kLargestSide = 1023;  // of TrackerFeatureRecord's 16-bit positions in 64ths
+
+// Candidates: every third of an octave over two octaves. In the study of this tracker's design
+// baked scales took ORB-2000 from 63 to 68 % right at area 0.25-0.4, baked tilted views to 78 %,
+// and at 60 to 70 degrees from 6 to 48 %.
+constexpr double kScaleStep = 1.2599210498948732;
 constexpr int kScales = 7;
-constexpr double kLogSmallest = -1.2039728043259361;  // of the trials' scales: 0.3
-constexpr double kLogLargest = 0.69314718055994531;   // 2
-constexpr int kMargin = 24;       // pixels around a rendered pattern: a patch and the border
-constexpr int kNear = 3;          // view pixels between a trial's feature and a candidate
-constexpr int kRepeats = 64;      // bits: a candidate within this of a trial's feature repeats it
-constexpr double kEnough = 24.0;  // matches of a view after which more gain little
+// Natural logarithms of the smallest and largest scale of the trial views, 0.3 and 2: the areas 0.1
+// to 4 that the tracker is asked for.
+constexpr double kLogSmallest = -1.2039728043259361;
+constexpr double kLogLargest = 0.69314718055994531;
+// Degrees of the steepest trial view: a tilt of 4.4, just beyond the steepest baked one of 4.1.
+constexpr double kSteepest = 77.0;
+// Pixels around a rendered pattern: half a descriptor's patch and the detector's border.
+constexpr int kMargin = 24;
+// View pixels between a trial's feature and the candidate that it repeats. Detection scatters by a
+// pixel or two; a wider radius lets neighbouring corners vouch for each other. Set by hand.
+constexpr int kNear = 3;
+// Bits of 256 within which a candidate repeats a trial's feature. Random codes differ by 128 +- 8,
+// so that 64 lets no chance match through; fewer keep too few of tilted views. Set by hand.
+constexpr int kRepeats = 64;
+// Matches of a view at which one more counts half: what pulls the choice towards hard views. The
+// pose needs about 8 and half a dozen spare; higher values favour easy views. Set by hand.
+constexpr double kEnough = 24.0;
 
 struct Candidate {
   double x = 0;  // pattern pixels
@@ -37,15 +58,15 @@ struct Candidate {
   std::uint8_t dark = 0;
 };
 
-/// A candidate that repeats a trial's feature, and how well (0 to 1].
+/// A trial's feature that a candidate repeats, and how well (0 to 1].
 struct Hit {
   std::uint32_t feature = 0;
   float value = 0;
 };
 
 struct Trials {
-  std::vector<std::vector<Hit>> hits;  // a list a candidate
-  std::vector<std::uint32_t> view_of;  // a view a trial feature
+  std::vector<std::vector<Hit>> hits;  // of each candidate
+  std::vector<std::uint32_t> view_of;  // of each trial feature
   std::uint32_t views = 0;
 };
 
@@ -56,11 +77,11 @@ bool within(const GrayImage& pattern, const std::array<double, 2>& p) {
 std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const AffineView& view) {
   std::vector<Candidate> candidates;
   const GrayPicture picture = render_view(levels, view, nullptr);
-  const auto describer =
+  const auto extractor =
       FeatureExtractor::create(picture.width, picture.height, generous_detection());
-  describer->set_frame(picture.view());
-  for (const TrackerFeature& feature : describer->features()) {
-    // Coarser levels show what views of smaller scale show.
+  extractor->set_frame(picture.view());
+  for (const TrackerFeature& feature : extractor->features()) {
+    // Coarser levels repeat what views of a smaller scale show.
     if (feature.level != 0) continue;
     const auto place =
         to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
@@ -89,7 +110,7 @@ std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels, uns
     for (const auto& [tilt, turns] : {std::pair{1.0, 2}, {1.5, 4}, {2.1, 6}, {2.9, 8}, {4.1, 11}}) {
       for (int i = 0; i < turns; ++i) {
         views.push_back(make_view(levels[0].width, levels[0].height, scale, tilt,
-                                  turn_of(kPi * i / turns), turn_of(random.uniform(0.0, 2 * kPi)),
+                                  turn_of(pi * i / turns), turn_of(random.uniform(0.0, 2 * pi)),
                                   kMargin));
       }
     }
@@ -102,8 +123,8 @@ std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels, uns
   return candidates;
 }
 
-/// What a camera adds: other light and noise.
-void disturb(Random& random, GrayPicture& picture) {
+/// Applies a random exposure and sensor noise.
+void expose_trial(Random& random, GrayPicture& picture) {
   const double gain = random.uniform(0.6, 1.25);
   const double bias = random.uniform(-20.0, 20.0);
   for (std::uint8_t& gray : picture.pixels) {
@@ -112,7 +133,7 @@ void disturb(Random& random, GrayPicture& picture) {
   }
 }
 
-/// Candidates by squares of the pattern, so that a trial's feature meets only its neighbours.
+/// Candidates by squares of the pattern, so that a trial's feature is compared with near ones only.
 class Grid {
  public:
   Grid(const GrayImage& pattern, const std::vector<Candidate>& candidates)
@@ -146,8 +167,8 @@ class Grid {
   }
 
  private:
-  static constexpr int kSquare = 4;
-  /// What decides on a visit lies together: most candidates are looked at no further.
+  static constexpr int kSquare = 4;  // pixels: about the radius of a query
+  /// Positions beside the index, since most candidates of a square are too far away.
   struct Entry {
     double x;
     double y;
@@ -163,7 +184,7 @@ class Grid {
   std::vector<TrackerCode> codes_;
 };
 
-/// What a random view shows of the pattern: a hit list of (candidate, feature of the view).
+/// What a random view shows of the pattern: (candidate, feature of the view) that match.
 struct TrialView {
   std::uint32_t features = 0;
   std::vector<std::pair<std::uint32_t, Hit>> hits;
@@ -172,21 +193,21 @@ struct TrialView {
 TrialView run_trial(const std::vector<ViewLevel>& levels, std::uint64_t seed, const Grid& grid) {
   Random random(seed);
   const double scale = exp_of(random.uniform(kLogSmallest, kLogLargest));
-  const double tilt = 1.0 / turn_of(random.uniform(0.0, 77.0) * kPi / 180.0).cosine;
-  const Turn direction = turn_of(random.uniform(0.0, kPi));
-  const Turn rotation = turn_of(random.uniform(0.0, 2 * kPi));
+  const double tilt = 1.0 / turn_of(random.uniform(0.0, kSteepest) * pi / 180.0).cosine;
+  const Turn direction = turn_of(random.uniform(0.0, pi));
+  const Turn rotation = turn_of(random.uniform(0.0, 2 * pi));
   const AffineView view =
       make_view(levels[0].width, levels[0].height, scale, tilt, direction, rotation, kMargin + 8);
   const GrayPicture background = made_clutter(random, view.width, view.height);
   GrayPicture picture = render_view(levels, view, &background);
-  disturb(random, picture);
-  const auto describer = FeatureExtractor::create(picture.width, picture.height, DetectOptions{});
-  describer->set_frame(picture.view());
+  expose_trial(random, picture);
+  const auto extractor = FeatureExtractor::create(picture.width, picture.height, DetectOptions{});
+  extractor->set_frame(picture.view());
   const double mean_scale = scale / std::sqrt(tilt);
   TrialView trial;
   std::vector<std::uint32_t> which;
   std::vector<int> bits;
-  for (const TrackerFeature& feature : describer->features()) {
+  for (const TrackerFeature& feature : extractor->features()) {
     const auto place =
         to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     if (!within(levels[0].view(), place)) continue;
@@ -259,8 +280,9 @@ std::vector<std::uint32_t> choose(const Trials& trials, std::uint32_t count) {
   return chosen;
 }
 
-/// Bright ones first, each group filled up to whole blocks; answers the number of bright ones.
-std::uint32_t group(const std::vector<Candidate>& candidates, std::vector<std::uint32_t>& chosen) {
+/// Bright ones first, each group filled up to whole blocks; returns the number of bright ones.
+std::uint32_t group_by_polarity(const std::vector<Candidate>& candidates,
+                                std::vector<std::uint32_t>& chosen) {
   std::vector<std::uint32_t> ordered;
   std::uint32_t bright = 0;
   for (int dark = 0; dark < 2; ++dark) {
@@ -296,7 +318,7 @@ std::vector<std::byte> assemble(const std::vector<ViewLevel>& levels,
                                 const std::vector<TrackerPatchRecord>& patches) {
   TrackerRecordHeader header{};
   header.describer_version = kFeatureExtractorVersion;
-  header.bright_count = group(candidates, chosen);
+  header.bright_count = group_by_polarity(candidates, chosen);
   header.feature_count = static_cast<std::uint32_t>(chosen.size());
   header.patch_count = static_cast<std::uint32_t>(patches.size());
   header.width = static_cast<std::uint32_t>(levels[0].width);
@@ -330,6 +352,128 @@ std::vector<std::byte> assemble(const std::vector<ViewLevel>& levels,
   return bytes;
 }
 
+constexpr int kPatchHalf = 4;  // a patch is 9x9 pixels of its level, as the tracker samples it
+constexpr int kPatchBorder = kPatchHalf + 2;
+// Gray values a pixel of rms gradient that a patch needs in every direction: the tracker assumes a
+// noise of about 3. A lower limit lets flat patches in, which slide. Set by hand.
+constexpr double kWeakestPatch = 3.0;
+
+struct PatchPlace {
+  int x = 0;
+  int y = 0;
+  double score = 0;
+};
+
+/// Shi & Tomasi, "Good features to track" (1994), as a root mean square gradient.
+double patch_score(const GrayPicture& picture, int x, int y) {
+  double xx = 0;
+  double xy = 0;
+  double yy = 0;
+  const std::uint8_t* pixels = picture.pixels.data();
+  for (int v = y - kPatchHalf; v <= y + kPatchHalf; ++v) {
+    for (int u = x - kPatchHalf; u <= x + kPatchHalf; ++u) {
+      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(v) * picture.width + u;
+      const double gx = 0.5 * (pixels[at + 1] - pixels[at - 1]);
+      const double gy = 0.5 * (pixels[at + picture.width] - pixels[at - picture.width]);
+      xx += gx * gx;
+      xy += gx * gy;
+      yy += gy * gy;
+    }
+  }
+  const double least = 0.5 * (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy));
+  return std::sqrt(std::max(0.0, least) / ((2 * kPatchHalf + 1) * (2 * kPatchHalf + 1)));
+}
+
+std::vector<PatchPlace> patch_places(const GrayPicture& picture) {
+  std::vector<PatchPlace> places;
+  for (int y = kPatchBorder; y < picture.height - kPatchBorder; y += 2) {
+    for (int x = kPatchBorder; x < picture.width - kPatchBorder; x += 2) {
+      const double score = patch_score(picture, x, y);
+      if (score >= kWeakestPatch) places.push_back({x, y, score});
+    }
+  }
+  std::stable_sort(places.begin(), places.end(),
+                   [](const PatchPlace& a, const PatchPlace& b) { return a.score > b.score; });
+  return places;
+}
+
+/// The best places, as far apart as `count` of them can be: distances from a quarter of the picture
+/// down to 4 pixels are tried, each 0.8 of the one before.
+std::vector<PatchPlace> spread_patches(const std::vector<PatchPlace>& places, std::uint32_t count,
+                                       double side) {
+  std::vector<PatchPlace> kept;
+  for (double apart = side / 4; apart >= 4.0; apart *= 0.8) {
+    kept.clear();
+    for (const PatchPlace& place : places) {
+      const bool free = std::none_of(kept.begin(), kept.end(), [&](const PatchPlace& other) {
+        const double dx = place.x - other.x;
+        const double dy = place.y - other.y;
+        return dx * dx + dy * dy < apart * apart;
+      });
+      if (free) kept.push_back(place);
+      if (kept.size() == count) return kept;
+    }
+  }
+  return kept;
+}
+
+/// At most `count` patches a level, spread over the picture, by level and then by score.
+std::vector<TrackerPatchRecord> choose_patches(const std::vector<ViewLevel>& levels,
+                                               std::uint32_t count) {
+  std::vector<TrackerPatchRecord> patches;
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    const GrayPicture& picture = levels[level];
+    const double scale = static_cast<double>(1u << level);
+    for (const PatchPlace& place :
+         spread_patches(patch_places(picture), count, std::max(picture.width, picture.height))) {
+      TrackerPatchRecord record{};
+      record.x = static_cast<std::uint16_t>(std::lround((place.x + 0.5) * scale * 64));
+      record.y = static_cast<std::uint16_t>(std::lround((place.y + 0.5) * scale * 64));
+      record.level = static_cast<std::uint16_t>(level);
+      record.score = static_cast<std::uint16_t>(std::min(place.score * 64, 65535.0));
+      patches.push_back(record);
+    }
+  }
+  return patches;
+}
+
+std::string base_name(std::string_view path) {
+  const std::size_t slash = path.find_last_of("/\\");
+  std::string_view name = slash == std::string_view::npos ? path : path.substr(slash + 1);
+  const std::size_t dot = name.find_last_of('.');
+  if (dot != std::string_view::npos && dot > 0) name = name.substr(0, dot);
+  return std::string(name);
+}
+
+Result<FeatureContent> paper_features(const GrayImage& image,
+                                      const ParameterSetRecord& parameters) {
+  MODAR_ASSIGN(auto features, describe_image(image, parameters));
+  MODAR_ASSIGN(auto yml, features_to_yml(features));
+  FeatureContent content;
+  content.set_id = parameters.id;
+  content.descriptor_bytes = features.descriptor_bytes;
+  content.keypoints = std::move(features.keypoints);
+  content.descriptors = std::move(features.descriptors);
+  content.yml = std::move(yml);
+  return content;
+}
+
+Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned jobs,
+                       PatternFeatures& out, Report& report) {
+  MODAR_ASSIGN(const PatternScore score, score_pattern(gray, out.loop_record, jobs));
+  out.record.score = static_cast<float>(score.score);
+  out.record.score_version = kScoreVersion;
+  const auto worst =
+      std::min_element(score.causes.begin(), score.causes.end(),
+                       [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
+  const bool weak = score.score < kWeakScore;
+  report.diagnostics.push_back(
+      {weak ? "pattern.weak" : "pattern.score",
+       weak ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, path, 0,
+       "the pattern scores " + std::to_string(score.score) + " of 100", weak ? worst->advice : ""});
+  return {};
+}
+
 }  // namespace
 
 Result<void> TrackerRecordOptions::validate() const {
@@ -343,7 +487,7 @@ Result<void> TrackerRecordOptions::validate() const {
 
 Result<std::vector<std::byte>> bake_tracker_record(const GrayImage& pattern,
                                                    const TrackerRecordOptions& options) {
-  if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
+  MODAR_TRY(options.validate());
   if (pattern.width < 32 || pattern.height < 32 || pattern.width > kLargestSide ||
       pattern.height > kLargestSide) {
     return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
@@ -360,6 +504,49 @@ Result<std::vector<std::byte>> bake_tracker_record(const GrayImage& pattern,
                 "take a picture with more texture");
   }
   return assemble(levels, candidates, chosen, choose_patches(levels, options.patches_per_level));
+}
+
+Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
+                                     std::span<const ParameterSetRecord> sets,
+                                     const TrackerRecordOptions& options, Report& report) {
+  StageTimer timer(report, "pattern");
+  bool shrunk = false;
+  MODAR_ASSIGN(const GrayPicture picture, load_pattern(path, shrunk));
+  const GrayImage gray = picture.view();
+  if (shrunk) {
+    report.diagnostics.push_back({"pattern.resized", DiagnosticSeverity::kInfo, path, 0,
+                                  "the picture was made smaller, to " + std::to_string(gray.width) +
+                                      "x" + std::to_string(gray.height) + " pixels",
+                                  ""});
+  }
+  PatternFeatures out;
+  out.name = base_name(path);
+  out.record.width = static_cast<std::uint32_t>(gray.width);
+  out.record.height = static_cast<std::uint32_t>(gray.height);
+  out.record.width_mm = width_mm > 0 ? width_mm : read_width_mm(path);
+  const auto corners = pattern_corners(gray.width, gray.height);
+  out.record.half_width = static_cast<float>(corners[1].x);
+  out.record.half_height = static_cast<float>(corners[1].y);
+  out.record.score = -1.0f;
+  for (const ParameterSetRecord& parameters : sets) {
+    MODAR_ASSIGN(auto content, paper_features(gray, parameters));
+    out.features.push_back(std::move(content));
+  }
+  const std::size_t found = sets.empty() ? 0 : out.features.front().keypoints.size();
+  if (!sets.empty() && found < sets.front().min_matches) {
+    return fail(ExitCode::kInvalidInput, "pattern.no-features", path,
+                "the picture holds " + std::to_string(found) + " features, too few to recognise it",
+                "take a larger, sharper picture with more texture");
+  }
+  auto record = bake_tracker_record(gray, options);
+  if (!record) {
+    record.error().where = path;
+    return tl::unexpected(record.error());
+  }
+  out.loop_record = std::move(*record);
+  if (options.score) MODAR_TRY(add_score(path, gray, options.jobs, out, report));
+  timer.done(picture.pixels.size(), found);
+  return out;
 }
 
 }  // namespace modar

@@ -1,5 +1,5 @@
-// Reads pictures of patterns, turns them gray and brings them to size.
-#include "bake/pattern/pattern_picture.hpp"
+// Reads pattern pictures with bake/image, converts them to gray and limits their size.
+#include "bake/pattern/picture.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +10,9 @@
 namespace modar {
 namespace {
 
-// The article's patterns are 245 to 717 pixels on a side. Larger pictures only move the scales at
-// which features are found away from those at which a camera sees the pattern.
-constexpr int kLargestSide = 720;
+// Pixels. The patterns of the ModAR paper are 245 to 717 on a side. A larger picture only moves the
+// scales at which features are found away from those at which a 1280x720 camera sees the pattern.
+constexpr int kLargestPattern = 720;
 
 }  // namespace
 
@@ -32,23 +32,21 @@ GrayPicture gray_of(const RgbaImage& image) {
 }
 
 Result<GrayPicture> load_gray(const std::string& path) {
-  const auto image = read_image(path);
-  if (!image) return tl::unexpected(image.error());
-  return gray_of(*image);
+  MODAR_ASSIGN(const RgbaImage image, read_image(path));
+  return gray_of(image);
 }
 
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
-  auto gray = load_gray(path);
-  if (!gray) return gray;
-  const int longest = std::max(gray->width, gray->height);
-  shrunk = longest > kLargestSide;
+  MODAR_ASSIGN(GrayPicture gray, load_gray(path));
+  const int longest = std::max(gray.width, gray.height);
+  shrunk = longest > kLargestPattern;
   if (!shrunk) return gray;
   try {
-    const double scale = static_cast<double>(kLargestSide) / longest;
-    const cv::Mat large(gray->height, gray->width, CV_8UC1, gray->pixels.data());
+    const double scale = static_cast<double>(kLargestPattern) / longest;
+    const cv::Mat large(gray.height, gray.width, CV_8UC1, gray.pixels.data());
     GrayPicture out;
-    out.width = std::max(1, static_cast<int>(std::lround(gray->width * scale)));
-    out.height = std::max(1, static_cast<int>(std::lround(gray->height * scale)));
+    out.width = std::max(1, static_cast<int>(std::lround(gray.width * scale)));
+    out.height = std::max(1, static_cast<int>(std::lround(gray.height * scale)));
     out.pixels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
     cv::Mat small(out.height, out.width, CV_8UC1, out.pixels.data());
     cv::resize(large, small, small.size(), 0, 0, cv::INTER_AREA);
@@ -88,9 +86,8 @@ Result<void> open_folders(std::vector<std::string>& paths) {
       files.push_back(path);
       continue;
     }
-    const auto pictures = pictures_of(path);
-    if (!pictures) return tl::unexpected(pictures.error());
-    files.insert(files.end(), pictures->begin(), pictures->end());
+    MODAR_ASSIGN(const auto pictures, pictures_of(path));
+    files.insert(files.end(), pictures.begin(), pictures.end());
   }
   paths = std::move(files);
   return {};
