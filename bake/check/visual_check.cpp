@@ -14,6 +14,7 @@
 #include "bake/check/reference_renderer.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/mesh/repeating.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_quality.hpp"
 #include "modar/gl_context.hpp"
@@ -22,7 +23,6 @@
 namespace modar {
 namespace {
 
-constexpr double kUvSlack = 1e-4;
 constexpr std::size_t kViews = 12;
 constexpr double kDistance = 4.0;  // of the eye from the middle of a model in [-1,1]
 
@@ -108,18 +108,12 @@ bool translucent(const TriMesh& mesh) {
 /// Uncompressed pictures of all materials, at their own size.
 Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned jobs) {
   std::vector<SoftTexture> textures(mesh.materials.size());
-  for (std::size_t t = 0; t < mesh.triangles.size() && !mesh.uvs.empty(); ++t) {
-    for (const std::uint32_t v : mesh.triangles[t]) {
-      const glm::dvec2& uv = mesh.uvs[v];
-      if (std::min(uv.x, uv.y) < -kUvSlack || std::max(uv.x, uv.y) > 1 + kUvSlack) {
-        textures[mesh.triangle_material[t]].repeat = true;
-      }
-    }
-  }
+  const std::vector<bool> repeats = repeating_materials(mesh);
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
     if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
     MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
-    textures[m].levels = mip_chain(image, textures[m].repeat, jobs);
+    textures[m].repeat = repeats[m];
+    textures[m].levels = mip_chain(image, repeats[m], jobs);
   }
   return textures;
 }

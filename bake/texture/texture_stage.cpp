@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "bake/mesh/repeating.hpp"
 #include "bake/texture/texture_set.hpp"
 #include "formats/layout.hpp"
 
@@ -11,21 +12,6 @@ namespace modar {
 namespace {
 
 constexpr std::uint32_t kCoverageSide = 1024;  ///< of masks: finer would cost more than it saves
-
-/// Does any triangle of the material sample outside of its image?
-std::vector<bool> repeating_materials(const TriMesh& mesh) {
-  constexpr double kSlack = 1e-4;  // half a texel at 4096: what exporters leave at the border
-  std::vector<bool> repeats(mesh.materials.size(), false);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const std::uint32_t v : mesh.triangles[t]) {
-      const glm::dvec2 uv = mesh.uvs[v];
-      if (uv.x < -kSlack || uv.y < -kSlack || uv.x > 1 + kSlack || uv.y > 1 + kSlack) {
-        repeats[mesh.triangle_material[t]] = true;
-      }
-    }
-  }
-  return repeats;
-}
 
 std::uint32_t use_of(const std::string& path, bool repeat, TextureUses& textures) {
   const auto next = static_cast<std::uint32_t>(textures.uses.size());

@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/mesh/repeating.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -189,6 +190,7 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
   StageTimer timer(report, "chunk");
   ChunkedMesh result;
   result.mesh = std::move(mesh);
+  result.repeats = repeating_materials(result.mesh);
   // Triangles by material, in file order within each.
   std::vector<std::uint32_t> begins(result.mesh.materials.size() + 1, 0);
   for (const std::uint32_t m : result.mesh.triangle_material) ++begins[m + 1];

@@ -240,7 +240,6 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   fill_model_record(chunked, options, out.record);
   for (const SourceMaterial& m : mesh.materials) out.materials.push_back(material_record(m));
   out.sources = mesh.materials;
-  const std::vector<bool> repeats = repeating_materials(chunked);
   out.vertices.reserve(mesh.positions.size() * offsets.stride);
   out.indices.reserve(index_count(chunked) * sizeof(std::uint16_t));
 
@@ -258,7 +257,7 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
     parallel_rows(jobs, jobs, [&](std::uint32_t thread) {
       for (std::size_t i = next++; i < count; i = next++) {
         const Chunk& chunk = chunked.chunks[first + i];
-        const UvRange uv = uv_range(mesh, chunk, repeats[chunk.material]);
+        const UvRange uv = uv_range(mesh, chunk, chunked.repeats[chunk.material]);
         packers[thread].pack(chunk, grids[first + i], uv, texture_side[chunk.material], packed[i]);
       }
     });

@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/mesh/repeating.hpp"
 #include "formats/quantise.hpp"
 
 namespace modar {
@@ -131,8 +132,6 @@ namespace {
 
 // Packing.
 
-/// How far uv may leave [0,1] and still count as inside: half a texel at 4096, as exporters leave.
-constexpr double kUvSlack = 1e-4;
 constexpr std::uint16_t kMinusZero = 0x8000;
 constexpr double kDegrees = 57.29577951308232;
 
@@ -216,21 +215,6 @@ UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats) {
                                     std::numeric_limits<float>::infinity());
   }
   return range;
-}
-
-std::vector<bool> repeating_materials(const ChunkedMesh& chunked) {
-  std::vector<bool> repeats(chunked.mesh.materials.size(), false);
-  if (chunked.mesh.uvs.empty()) return repeats;
-  for (const Chunk& chunk : chunked.chunks) {
-    for (const std::uint32_t v : chunk.vertices) {
-      const glm::dvec2& uv = chunked.mesh.uvs[v];
-      if (uv.x < -kUvSlack || uv.y < -kUvSlack || uv.x > 1 + kUvSlack || uv.y > 1 + kUvSlack) {
-        repeats[chunk.material] = true;
-        break;
-      }
-    }
-  }
-  return repeats;
 }
 
 void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,

@@ -81,9 +81,6 @@ struct UvRange {
 /// repeats: the chunk's texture repeats, so whole numbers may be subtracted.
 UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats);
 
-/// Which materials have triangles whose uv leave [0,1].
-std::vector<bool> repeating_materials(const ChunkedMesh& chunked);
-
 /// Greatest and summed squares of one kind of error.
 struct ErrorTally {
   double greatest = 0;
