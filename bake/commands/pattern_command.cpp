@@ -70,7 +70,7 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
     if (error.where.empty()) error.where = command.photo;
     return tl::unexpected(std::move(error));
   }
-  MODAR_TRY(write_pattern_png(*image, command.options.width_mm, command.output));
+  MODAR_TRY(write_png(*image, command.output, command.options.width_mm));
   std::fprintf(stderr, "wrote %s, %u x %u pixels\n", command.output.c_str(), image->width,
                image->height);
   if (command.json) {

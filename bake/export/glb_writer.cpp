@@ -7,7 +7,6 @@
 #include <limits>
 #include <sstream>
 
-#include "bake/image/png_encoder.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/atomic_file.hpp"
@@ -84,11 +83,12 @@ void GlbBuilder::add_images(std::span<const GlbImage> images) {
     for (std::uint32_t m = 0; m < model_.material_count; ++m) {
       used = used || bundle_.materials()[model_.first_material + m].texture == source.texture;
     }
-    const std::string png = used ? encode_png(source.pixels) : std::string();
-    if (png.empty()) continue;
+    if (!used) continue;
+    const Result<std::vector<std::byte>> png = encode_png(source.pixels);
+    if (!png) continue;
     tinygltf::Image image;
     image.mimeType = "image/png";
-    image.bufferView = add_view(png.data(), png.size(), 0);
+    image.bufferView = add_view(png->data(), png->size(), 0);
     const TextureRecord& record = bundle_.textures()[source.texture];
     image.name = std::string(bundle_.name(record.name));
     gltf_.images.push_back(image);

@@ -1,4 +1,4 @@
-// The image type of the workstation, and its way in and out of files.
+// The image type of the workstation, its files, and its change of size: the door of bake/image.
 #pragma once
 
 #include <cstddef>
@@ -11,28 +11,41 @@
 
 namespace modar {
 
-/// 8-bit RGBA pixels, sRGB, top row first, without padding.
+/// 8-bit RGBA pixels, sRGB, alpha not multiplied in, top row first, without padding.
 struct RgbaImage {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<std::uint8_t> pixels;  ///< width * height * 4
 };
 
-/// Reads PNG, JPEG, TGA, BMP, WebP, TIFF through OpenCV; EXIF orientation applied; grey, palette,
-/// 16-bit become 8-bit RGBA. The size in the file's header is held against the limit before
-/// anything is allocated. Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large".
+/// Whether the alpha of every pixel is 255.
+bool is_opaque(const RgbaImage& image);
+
+/// Larger images are refused: each side, in pixels. Both at the limit make 1 GiB of RGBA.
+inline constexpr std::uint32_t kMaxImageSide = 16384;
+
+/// Reads PNG (libpng), JPEG (libjpeg-turbo), WebP (libwebp), TIFF (libtiff), BMP and TGA
+/// (stb_image) as upright 8-bit RGBA: EXIF orientation is applied; gray, palette, CMYK and 16-bit
+/// images are converted; colour profiles are ignored. The size that a header states is checked
+/// before anything is allocated; a truncated or damaged file is an error, never a partial image.
+/// Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large".
 Result<RgbaImage> read_image(const std::string& path);
 /// The same from a file's bytes; `name` is what errors call it.
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name);
+
+/// A PNG file: 8-bit RGB, or RGBA where any pixel is not opaque. width_mm: the physical width of
+/// what the picture shows, stored as its resolution (pHYs); 0: not stored. Errors: kInternal
+/// "image.encode" where the image is empty.
+Result<std::vector<std::byte>> encode_png(const RgbaImage& image, double width_mm = 0);
+/// The same to a file, atomically. Errors: also kIo "io.write".
+Result<void> write_png(const RgbaImage& image, const std::string& path, double width_mm = 0);
+/// The physical width that a PNG file's pHYs states, in mm; 0: none, or no readable PNG file.
+double png_width_mm(const std::string& path);
 
 /// Levels from the image itself down to 1x1, each side max(1, floor(side / 2)), filtered in linear
 /// light (sRGB-correct), colours weighted by alpha. repeat: the filter reaches across the edges, as
 /// a texture that repeats does.
 std::vector<RgbaImage> mip_chain(const RgbaImage& image, bool repeat = false, unsigned jobs = 1);
-
-/// Writes an image as PNG (atomically: a temporary file beside it, renamed). Errors: kIo
-/// "io.write".
-Result<void> write_png(const RgbaImage& image, const std::string& path);
 
 /// Mean over R, G, B; 99 where the images are equal.
 double psnr_db(const RgbaImage& a, const RgbaImage& b);

@@ -1,20 +1,15 @@
-// Image files to 8-bit RGBA through OpenCV, their headers held against limits first.
-#include <algorithm>
+// Which library decodes an image file, and what is done with its pixels afterwards.
+#include <array>
 #include <cstdio>
-#include <cstring>
-#include <exception>
 #include <memory>
+#include <string_view>
 
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-
-#include "bake/image/image.hpp"
-#include "bake/image/image_header.hpp"
-#include "bake/image/jpeg_check.hpp"
-#include "bake/image/tga_reader.hpp"
+#include "bake/image/decoders.hpp"
 
 namespace modar {
 namespace {
+
+using std::string_view_literals::operator""sv;
 
 /// A file of more bytes than this is no image within our limits.
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 31;
@@ -40,35 +35,27 @@ Result<std::vector<std::byte>> read_bytes(const std::string& path) {
   return bytes;
 }
 
-std::uint8_t to_byte(std::uint16_t value) {
-  return static_cast<std::uint8_t>((std::uint32_t{value} * 255 + 32767) / 65535);
-}
-std::uint8_t to_byte(std::uint8_t value) {
-  return value;
+bool starts_with(std::span<const std::byte> bytes, std::string_view text, std::size_t at = 0) {
+  return at <= bytes.size() && text.size() <= bytes.size() - at &&
+         std::equal(text.begin(), text.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at),
+                    [](char a, std::byte b) { return static_cast<std::byte>(a) == b; });
 }
 
-/// Gray, BGR or BGRA rows of OpenCV to our pixels.
-template <class Sample>
-RgbaImage to_rgba(const cv::Mat& mat) {
-  RgbaImage image{static_cast<std::uint32_t>(mat.cols), static_cast<std::uint32_t>(mat.rows), {}};
-  image.pixels.resize(std::size_t{image.width} * image.height * 4);
-  const auto channels = static_cast<std::size_t>(mat.channels());
-  std::uint8_t* out = image.pixels.data();
-  for (int y = 0; y < mat.rows; ++y) {
-    const Sample* in = mat.ptr<Sample>(y);
-    for (int x = 0; x < mat.cols; ++x, in += channels, out += 4) {
-      out[0] = to_byte(in[channels >= 3 ? 2 : 0]);
-      out[1] = to_byte(in[channels >= 3 ? 1 : 0]);
-      out[2] = to_byte(in[0]);
-      out[3] = channels == 4 ? to_byte(in[3]) : channels == 2 ? to_byte(in[1]) : std::uint8_t{255};
-    }
+Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::string& name) {
+  if (starts_with(bytes, "\x89PNG\r\n\x1A\n"sv)) return decode_png(bytes, name);
+  if (starts_with(bytes, "\xFF\xD8\xFF"sv)) return decode_jpeg(bytes, name);
+  if (starts_with(bytes, "RIFF") && starts_with(bytes, "WEBP", 8)) return decode_webp(bytes, name);
+  if (starts_with(bytes, "II*\0"sv) || starts_with(bytes, "MM\0*"sv)) {
+    return decode_tiff(bytes, name);
   }
-  return image;
+  return decode_stb(bytes, name);
 }
 
-/// Turns the picture upright; orientation as EXIF counts it.
-RgbaImage upright(RgbaImage image, unsigned orientation) {
-  if (orientation <= 1 || orientation > 8) return image;
+/// Turns the picture upright.
+RgbaImage upright(StoredImage stored) {
+  const unsigned orientation = stored.orientation;
+  if (orientation <= 1 || orientation > 8) return std::move(stored.image);
+  const RgbaImage& image = stored.image;
   const bool swap = orientation >= 5;
   const bool right = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
   const bool bottom = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
@@ -87,82 +74,66 @@ RgbaImage upright(RgbaImage image, unsigned orientation) {
   return out;
 }
 
-/// JPEG has no alpha and OpenCV turns it upright itself; the others keep their channels and depth.
-int flags_of(ImageFormat format) {
-  return format == ImageFormat::kJpeg ? cv::IMREAD_COLOR : cv::IMREAD_UNCHANGED;
-}
-
-/// A PNG without its colour profile: OpenCV uses none, and libpng tells stderr what it thinks of
-/// those that it doubts. Bytes after a damaged chunk stay as they are.
-std::vector<std::byte> without_profile(std::span<const std::byte> png) {
-  constexpr std::size_t kSignature = 8;
-  constexpr std::size_t kAround = 12;  // length, type and checksum of a chunk
-  std::vector<std::byte> kept;
-  kept.reserve(png.size());
-  std::size_t first = 0;
-  for (std::size_t at = kSignature; at + kAround <= png.size();) {
-    std::size_t length = 0;
-    for (std::size_t i = 0; i < 4; ++i)
-      length = length << 8 | std::to_integer<std::size_t>(png[at + i]);
-    if (length > png.size() - at - kAround) break;
-    const std::size_t next = at + kAround + length;
-    if (std::memcmp(png.data() + at + 4, "iCCP", 4) == 0) {
-      kept.insert(kept.end(), png.begin() + static_cast<std::ptrdiff_t>(first),
-                  png.begin() + static_cast<std::ptrdiff_t>(at));
-      first = next;
-    }
-    at = next;
+/// A number of `count` bytes, of either byte order; 0 beyond the end.
+std::uint32_t number_at(std::span<const std::byte> bytes, std::size_t at, std::size_t count,
+                        bool big_endian) {
+  if (at > bytes.size() || count > bytes.size() - at) return 0;
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t k = at + (big_endian ? i : count - 1 - i);
+    value = value << 8 | std::to_integer<std::uint32_t>(bytes[k]);
   }
-  kept.insert(kept.end(), png.begin() + static_cast<std::ptrdiff_t>(first), png.end());
-  return kept;
-}
-
-cv::Mat decode(std::span<const std::byte> bytes, ImageFormat format) {
-  // OpenCV wants a matrix, and leaves these bytes alone.
-  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
-                    const_cast<std::byte*>(bytes.data()));
-  try {
-    return cv::imdecode(raw, flags_of(format));
-  } catch (const std::exception&) {
-    return {};
-  }
+  return value;
 }
 
 }  // namespace
 
+Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const std::string& name) {
+  if (width > kMaxImageSide || height > kMaxImageSide) {
+    return fail(
+        ExitCode::kInvalidInput, "image.too-large", name,
+        "its header states " + std::to_string(width) + "x" + std::to_string(height) + " pixels",
+        "scale it to at most " + std::to_string(kMaxImageSide) + " pixels a side");
+  }
+  if (width == 0 || height == 0) return damaged_image(name, "its header states no size");
+  return {};
+}
+
+unsigned exif_orientation(std::span<const std::byte> exif) {
+  constexpr std::uint32_t kOrientationTag = 274;
+  constexpr std::size_t kEntryBytes = 12;
+  if (starts_with(exif, "Exif\0\0"sv)) exif = exif.subspan(6);
+  const bool big = starts_with(exif, "MM\0*"sv);
+  if (!big && !starts_with(exif, "II*\0"sv)) return 1;
+  const std::size_t directory = number_at(exif, 4, 4, big);
+  const std::size_t count = number_at(exif, directory, 2, big);
+  unsigned orientation = 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t entry = directory + 2 + kEntryBytes * i;
+    if (entry + kEntryBytes > exif.size()) return 1;
+    if (number_at(exif, entry, 2, big) != kOrientationTag) continue;
+    const std::uint32_t type = number_at(exif, entry + 2, 2, big);  // 1: BYTE, 3: SHORT, 4: LONG
+    const std::size_t bytes = type == 1 ? 1 : type == 3 ? 2 : type == 4 ? 4 : 0;
+    orientation = number_at(exif, entry + 8, bytes, big);
+  }
+  return orientation >= 1 && orientation <= 8 ? orientation : 1;
+}
+
+bool is_opaque(const RgbaImage& image) {
+  for (std::size_t i = 3; i < image.pixels.size(); i += 4) {
+    if (image.pixels[i] != 255) return false;
+  }
+  return true;
+}
+
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name) {
-  const Result<ImageHeader> header = read_image_header(bytes, name);
-  if (!header) return tl::unexpected(header.error());
-  if (header->format == ImageFormat::kTga) return read_tga(bytes, name);
-  if (header->format == ImageFormat::kJpeg) {
-    if (const std::string damage = jpeg_damage(bytes); !damage.empty()) {
-      return fail(ExitCode::kInvalidInput, "image.decode", name,
-                  "the JPEG data is damaged (" + damage + ")", "export the image again");
-    }
-  }
-  const bool png = header->format == ImageFormat::kPng;
-  const cv::Mat mat =
-      png ? decode(without_profile(bytes), header->format) : decode(bytes, header->format);
-  const auto is_side = [&header](int side) {
-    const auto value = static_cast<std::uint32_t>(side);
-    return value == header->width || value == header->height;
-  };
-  if (mat.empty() || !is_side(mat.cols) || !is_side(mat.rows)) {
-    return fail(ExitCode::kInvalidInput, "image.decode", name, "the image data is damaged",
-                "export the image again");
-  }
-  const bool own = png || header->format == ImageFormat::kWebp;
-  const unsigned orientation = own ? header->orientation : 1;
-  if (mat.depth() == CV_8U) return upright(to_rgba<std::uint8_t>(mat), orientation);
-  if (mat.depth() == CV_16U) return upright(to_rgba<std::uint16_t>(mat), orientation);
-  return fail(ExitCode::kInvalidInput, "image.decode", name,
-              "its samples are neither 8 nor 16 bits", "save it with 8 bits a channel");
+  MODAR_ASSIGN(StoredImage stored, decode_stored(bytes, name));
+  return upright(std::move(stored));
 }
 
 Result<RgbaImage> read_image(const std::string& path) {
-  const Result<std::vector<std::byte>> bytes = read_bytes(path);
-  if (!bytes) return tl::unexpected(bytes.error());
-  return decode_image(*bytes, path);
+  MODAR_ASSIGN(const std::vector<std::byte> bytes, read_bytes(path));
+  return decode_image(bytes, path);
 }
 
 }  // namespace modar

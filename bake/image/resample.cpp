@@ -1,4 +1,4 @@
-// Change of size in linear light: sRGB tables and a separable filter.
+// Change of size and mip levels in linear light: sRGB tables and a separable filter.
 #include "bake/image/resample.hpp"
 
 #include <algorithm>
@@ -158,6 +158,18 @@ RgbaImage to_srgb(const LinearImage& image) {
 LinearImage resample(const LinearImage& image, std::uint32_t width, std::uint32_t height,
                      const ResampleOptions& options) {
   return resample_columns(resample_rows(image, height, options), width, options);
+}
+
+std::vector<RgbaImage> mip_chain(const RgbaImage& image, bool repeat, unsigned jobs) {
+  std::vector<RgbaImage> levels = {image};
+  if (image.width == 0 || image.height == 0) return levels;
+  LinearImage level = to_linear(image);
+  while (level.width > 1 || level.height > 1) {
+    level = resample(level, std::max(1U, level.width / 2), std::max(1U, level.height / 2),
+                     {repeat, jobs});
+    levels.push_back(to_srgb(level));
+  }
+  return levels;
 }
 
 }  // namespace modar

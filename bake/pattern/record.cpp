@@ -523,7 +523,7 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
   out.name = base_name(path);
   out.record.width = static_cast<std::uint32_t>(gray.width);
   out.record.height = static_cast<std::uint32_t>(gray.height);
-  out.record.width_mm = width_mm > 0 ? width_mm : read_width_mm(path);
+  out.record.width_mm = width_mm > 0 ? width_mm : png_width_mm(path);
   const auto corners = pattern_corners(gray.width, gray.height);
   out.record.half_width = static_cast<float>(corners[1].x);
   out.record.half_height = static_cast<float>(corners[1].y);

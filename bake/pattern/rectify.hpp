@@ -31,10 +31,4 @@ struct RectifyOptions {
 /// "rectify.corners" (not convex, outside of the photo, too small).
 Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options);
 
-/// Writes a PNG that states width_mm as its physical size (pHYs) where that is not 0.
-Result<void> write_pattern_png(const RgbaImage& image, double width_mm, const std::string& path);
-
-/// The physical width that a PNG's pHYs states, in mm; 0: none.
-double read_width_mm(const std::string& path);
-
 }  // namespace modar

@@ -226,7 +226,7 @@ Result<Simulation> simulate(const std::string& path, const SimulateOptions& opti
   MODAR_ASSIGN(auto outcomes, try_views(setup, bands.settings, setting_done));
   Simulation simulation;
   simulation.name = std::filesystem::path(path).stem().string();
-  simulation.width_mm = options.width_mm > 0 ? options.width_mm : read_width_mm(path);
+  simulation.width_mm = options.width_mm > 0 ? options.width_mm : png_width_mm(path);
   std::size_t next = 0;
   for (SimulatedBand& band : bands.bands) {
     for (SimulatedValue& value : band.values) value.outcome = std::move(outcomes[next++]);

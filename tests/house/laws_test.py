@@ -57,6 +57,14 @@ class PlantedViolations(unittest.TestCase):
     def test_opencv_stays_in_its_files(self):
         self.assert_refused("runtime/track/a.cpp", "#include <opencv2/core.hpp>\n", "opencv2")
 
+    def test_each_image_library_stays_in_its_file(self):
+        self.assert_refused("bake/image/jpeg.cpp", "#include <png.h>\n", "png.h")
+        self.assert_refused("bake/image/png.cpp", "#include <jpeglib.h>\n", "jpeglib.h")
+        self.assert_refused("bake/texture/a.cpp", "#include <webp/decode.h>\n", "webp/")
+        self.assert_refused("bake/image/image_reader.cpp", "#include <tiffio.h>\n", "tiffio.h")
+        self.assert_refused("bake/image/tiff.cpp", "#include <stb/stb_image.h>\n", "stb/")
+        self.assert_refused("bake/image/image_reader.cpp", "#include <opencv2/imgcodecs.hpp>\n", "opencv2")
+
     def test_openmesh_stays_in_its_file(self):
         self.assert_refused("bake/mesh/weld/weld.cpp", "#include <OpenMesh/Core/IO/MeshIO.hh>\n", "OpenMesh")
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string_view>
 
 #include "tests/texture/texture_samples.hpp"
@@ -134,11 +135,76 @@ TEST(ImageReader, TgaFromTheBottomTheTopAndInRuns) {
   expect_code(tga_header(2, 16000, 16000, 32, 0), "image.decode", "empty");
 }
 
+TEST(ImageReader, TgaAlphaCountsWhereTheHeaderSaysSo) {
+  const Bytes pixel = Bytes{} + std::initializer_list<unsigned>{1, 2, 3, 4};
+  for (const bool has_alpha : {false, true}) {
+    Bytes file = tga_header(2, 1, 1, 32, has_alpha ? 0x28 : 0x20);
+    file.insert(file.end(), pixel.begin(), pixel.end());
+    const Result<RgbaImage> image = decode_image(file, "alpha");
+    ASSERT_TRUE(image) << to_line(image.error());
+    const std::uint8_t alpha = has_alpha ? 4 : 255;
+    EXPECT_EQ(image->pixels, (std::vector<std::uint8_t>{3, 2, 1, alpha}));
+  }
+}
+
+/// A TIFF file of 2x1 RGBA pixels, by the tables of the TIFF 6.0 specification.
+Bytes tiny_tiff(unsigned orientation, const std::vector<unsigned>& samples) {
+  Bytes file;
+  const auto put = [&file](std::uint32_t value, std::size_t bytes) {
+    for (std::size_t i = 0; i < bytes; ++i, value >>= 8) file.push_back(std::byte(value & 255));
+  };
+  constexpr std::uint32_t kPixels = 8;
+  constexpr std::uint32_t kBits = 16;
+  constexpr std::uint32_t kDirectory = 24;
+  put(0x2A4949, 4);
+  put(kDirectory, 4);
+  for (const unsigned sample : samples) put(sample, 1);
+  for (int i = 0; i < 4; ++i) put(8, 2);
+  const std::uint32_t entries[][4] = {
+      {256, 3, 1, 2},           {257, 3, 1, 1}, {258, 3, 4, kBits},
+      {259, 3, 1, 1},           {262, 3, 1, 2}, {273, 4, 1, kPixels},
+      {274, 3, 1, orientation}, {277, 3, 1, 4}, {278, 3, 1, 1},
+      {279, 4, 1, 8},           {338, 3, 1, 2}};  // alpha: not multiplied in
+  put(std::size(entries), 2);
+  for (const auto& entry : entries) {
+    put(entry[0], 2);
+    put(entry[1], 2);
+    put(entry[2], 4);
+    put(entry[3], 4);
+  }
+  put(0, 4);
+  return file;
+}
+
+TEST(ImageReader, TiffKeepsColoursUnderAlphaAndIsTurnedUpright) {
+  const Result<RgbaImage> plain = decode_image(tiny_tiff(1, {200, 100, 50, 10, 1, 2, 3, 255}), "a");
+  ASSERT_TRUE(plain) << to_line(plain.error());
+  EXPECT_EQ(plain->pixels, (std::vector<std::uint8_t>{200, 100, 50, 10, 1, 2, 3, 255}));
+  // 8: the first row is the picture's left column, the first pixel its bottom-left corner.
+  const Result<RgbaImage> turned =
+      decode_image(tiny_tiff(8, {200, 100, 50, 10, 1, 2, 3, 255}), "b");
+  ASSERT_TRUE(turned) << to_line(turned.error());
+  EXPECT_EQ(turned->height, 2U);
+  EXPECT_EQ(turned->pixels, (std::vector<std::uint8_t>{1, 2, 3, 255, 200, 100, 50, 10}));
+}
+
+/// Corrects the checksum of a PNG's header (ISO/IEC 15948, annex D).
+void seal_header(Bytes& png) {
+  std::uint32_t crc = 0xFFFFFFFF;
+  for (std::size_t i = 12; i < 29; ++i) {
+    crc ^= std::to_integer<std::uint32_t>(png[i]);
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ ((crc & 1) != 0 ? 0xEDB88320 : 0);
+  }
+  for (std::size_t i = 0; i < 4; ++i) png[29 + i] = std::byte(~crc >> (24 - 8 * i) & 255);
+}
+
 TEST(ImageReader, SizesBeyondTheLimitAreRefusedBeforeDecoding) {
   Bytes png = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(9)), ".png");
   for (const std::size_t at : {18U, 19U, 22U, 23U}) png[at] = std::byte{0xff};
+  seal_header(png);
   expect_code(png, "image.too-large", "65535 png");
   png[16] = std::byte{0x7f};
+  seal_header(png);
   expect_code(png, "image.too-large", "2^31 png");
   Bytes bmp = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(9)), ".bmp");
   bmp[20] = std::byte{0x10};
@@ -209,6 +275,24 @@ TEST(ImageReader, CorruptFilesGiveErrorsAndValidOnesPixels) {
       }
     }
   }
+}
+
+TEST(PngEncoder, WritesAlphaWhereThereIsSome) {
+  for (const bool opaque : {true, false}) {
+    RgbaImage image = test::noise(9, 5, 1);
+    image.pixels[3] = opaque ? 255 : 7;
+    const Result<Bytes> png = encode_png(image);
+    ASSERT_TRUE(png) << to_line(png.error());
+    const cv::Mat raw(1, static_cast<int>(png->size()), CV_8UC1,
+                      const_cast<std::byte*>(png->data()));
+    const cv::Mat read = cv::imdecode(raw, cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(read.channels(), opaque ? 3 : 4);
+    cv::Mat bgra;
+    cv::cvtColor(cv::Mat(5, 9, CV_8UC4, image.pixels.data()), bgra,
+                 opaque ? cv::COLOR_RGBA2BGR : cv::COLOR_RGBA2BGRA);
+    EXPECT_EQ(cv::norm(read, bgra, cv::NORM_INF), 0);
+  }
+  EXPECT_FALSE(encode_png(RgbaImage{}));
 }
 
 // As photo shops leave them: libpng would write to stderr, and it is not our words.

@@ -147,9 +147,9 @@ TEST(Rectify, CornersThatAreNoQuadrilateralAreRefused) {
 TEST(PatternPng, KeepsPixelsAndPhysicalWidth) {
   const RemoveAtEnd file{temporary("size.png")};
   const RgbaImage image = waves(360, 240);
-  ASSERT_TRUE(write_pattern_png(image, 180.0, file.path));
+  ASSERT_TRUE(write_png(image, file.path, 180.0));
   // 360 pixels on 180 mm are 2000 pixels a metre.
-  EXPECT_DOUBLE_EQ(read_width_mm(file.path), 180.0);
+  EXPECT_DOUBLE_EQ(png_width_mm(file.path), 180.0);
   const cv::Mat read = cv::imread(file.path, cv::IMREAD_COLOR);
   ASSERT_EQ(read.size(), cv::Size(360, 240));
   for (int y = 0; y < 240; y += 11) {
@@ -163,7 +163,7 @@ TEST(PatternPng, KeepsPixelsAndPhysicalWidth) {
 
 TEST(PatternPng, ThePhysChunkIsByteForByteWhatThePngSpecificationAsksFor) {
   const RemoveAtEnd file{temporary("chunk.png")};
-  ASSERT_TRUE(write_pattern_png(waves(64, 64), 64.0 / 2835 * 1000, file.path));
+  ASSERT_TRUE(write_png(waves(64, 64), file.path, 64.0 / 2835 * 1000));
   std::ifstream stream(file.path, std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
   // 2835 pixels a metre (72 dpi): a chunk, with its CRC, that many PNG files of other tools hold.
@@ -175,14 +175,14 @@ TEST(PatternPng, ThePhysChunkIsByteForByteWhatThePngSpecificationAsksFor) {
 
 TEST(PatternPng, FilesWithoutASizeAnswerZero) {
   const RemoveAtEnd file{temporary("none.png")};
-  ASSERT_TRUE(write_pattern_png(waves(64, 64), 0.0, file.path));
-  EXPECT_EQ(read_width_mm(file.path), 0.0);
-  EXPECT_EQ(read_width_mm("/nowhere/at/all.png"), 0.0);
+  ASSERT_TRUE(write_png(waves(64, 64), file.path, 0.0));
+  EXPECT_EQ(png_width_mm(file.path), 0.0);
+  EXPECT_EQ(png_width_mm("/nowhere/at/all.png"), 0.0);
   std::ifstream stream(file.path, std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
   for (std::size_t size : {0u, 7u, 20u, 33u, 40u}) {
     std::ofstream(file.path, std::ios::binary) << bytes.substr(0, size);
-    EXPECT_EQ(read_width_mm(file.path), 0.0);
+    EXPECT_EQ(png_width_mm(file.path), 0.0);
   }
 }
 
@@ -253,7 +253,7 @@ TEST(BakePattern, TakesTheWidthThatThePngStates) {
   cv::Mat rgba;
   cv::cvtColor(picture, rgba, cv::COLOR_BGR2RGBA);
   RgbaImage image{300, 300, {rgba.data, rgba.data + rgba.total() * 4}};
-  ASSERT_TRUE(write_pattern_png(image, 150.0, file.path));
+  ASSERT_TRUE(write_png(image, file.path, 150.0));
   Report report;
   EXPECT_DOUBLE_EQ(
       bake_pattern(file.path, 0.0, paper_parameter_sets(), quick(), report).value().record.width_mm,

@@ -1,0 +1,65 @@
+// What the decoders of the image formats share. Internal to bake/image.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "bake/image/image.hpp"
+
+namespace modar {
+
+/// An image as its file stores it.
+struct StoredImage {
+  RgbaImage image;
+  /// Which corner of the picture the first pixel is: 1-8 as EXIF and TIFF count, 1: upright.
+  unsigned orientation = 1;
+};
+
+/// The error "image.decode" of a file that is truncated or damaged.
+inline tl::unexpected<Error> damaged_image(const std::string& name, std::string cause) {
+  return fail(ExitCode::kInvalidInput, "image.decode", name, std::move(cause),
+              "export the image again");
+}
+
+/// Called with the size that a header states, before anything of that size is allocated.
+/// Errors: "image.too-large", "image.decode" where a side is 0.
+Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const std::string& name);
+
+/// The orientation that an EXIF block (a TIFF header and its first directory) states; 1 where it
+/// states none. An "Exif\0\0" before it is skipped.
+unsigned exif_orientation(std::span<const std::byte> exif);
+
+/// Gives an image its pixels, uninitialised where a format's library fills all of them.
+inline void allocate_pixels(RgbaImage& image, std::uint32_t width, std::uint32_t height) {
+  image.width = width;
+  image.height = height;
+  image.pixels.resize(std::size_t{width} * height * 4);
+}
+
+/// A file in memory, as the read callbacks of libpng, libtiff and stb_image want it.
+struct MemoryFile {
+  std::span<const std::byte> bytes;
+  std::size_t at = 0;
+
+  /// Copies at most `count` bytes and answers how many there were.
+  std::size_t read(void* to, std::size_t count) {
+    const std::size_t copied = std::min(count, bytes.size() - at);
+    std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), copied,
+                static_cast<std::byte*>(to));
+    at += copied;
+    return copied;
+  }
+};
+
+/// One decoder a library. The bytes begin with the format's signature (decode_stb(): BMP's or none,
+/// as TGA files do). Errors: kInvalidInput "image.decode", "image.too-large".
+Result<StoredImage> decode_png(std::span<const std::byte> bytes, const std::string& name);
+Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name);
+Result<StoredImage> decode_webp(std::span<const std::byte> bytes, const std::string& name);
+Result<StoredImage> decode_tiff(std::span<const std::byte> bytes, const std::string& name);
+Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::string& name);
+
+}  // namespace modar

@@ -1,0 +1,129 @@
+// JPEG files through libjpeg-turbo, with its default settings (accurate integer DCT, smooth
+// upsampling). libjpeg reports errors by longjmp(): functions that call setjmp() keep all that they
+// change, and all that has a destructor, in an object of their caller.
+#include <array>
+#include <csetjmp>
+#include <cstdio>
+
+#include <jerror.h>
+#include <jpeglib.h>
+
+#include "bake/image/decoders.hpp"
+
+namespace modar {
+namespace {
+
+/// libjpeg's error manager and the message that it gave up with. The manager must come first:
+/// libjpeg hands us a pointer to it.
+struct ErrorManager {
+  jpeg_error_mgr manager;
+  std::jmp_buf escape;
+  std::array<char, JMSG_LENGTH_MAX> message;
+};
+
+ErrorManager& manager_of(j_common_ptr info) {
+  return *reinterpret_cast<ErrorManager*>(info->err);
+}
+
+/// Warnings that mean lost or invented pixels; the others are stray bytes between markers.
+bool spoils_pixels(int code) {
+  return code == JWRN_HIT_MARKER || code == JWRN_HUFF_BAD_CODE || code == JWRN_JPEG_EOF ||
+         code == JWRN_MUST_RESYNC;
+}
+
+[[noreturn]] void give_up(j_common_ptr info) {
+  ErrorManager& manager = manager_of(info);
+  (*info->err->format_message)(info, manager.message.data());
+  std::longjmp(manager.escape, 1);
+}
+
+void on_message(j_common_ptr info, int level) {
+  if (level < 0 && spoils_pixels(info->err->msg_code)) give_up(info);
+}
+
+class JpegReader {
+ public:
+  explicit JpegReader(std::span<const std::byte> bytes) : bytes_(bytes) {
+    info_.err = jpeg_std_error(&errors_.manager);
+    errors_.manager.error_exit = give_up;
+    errors_.manager.emit_message = on_message;
+  }
+  ~JpegReader() { jpeg_destroy_decompress(&info_); }
+  JpegReader(const JpegReader&) = delete;
+  JpegReader& operator=(const JpegReader&) = delete;
+
+  [[nodiscard]] std::string error() const { return errors_.message.data(); }
+  [[nodiscard]] std::uint32_t width() const { return info_.image_width; }
+  [[nodiscard]] std::uint32_t height() const { return info_.image_height; }
+
+  bool read_header() {
+    if (setjmp(errors_.escape) != 0) return false;
+    jpeg_create_decompress(&info_);
+    jpeg_save_markers(&info_, JPEG_APP0 + 1, 0xFFFF);
+    jpeg_mem_src(&info_, reinterpret_cast<const unsigned char*>(bytes_.data()),
+                 static_cast<unsigned long>(bytes_.size()));
+    jpeg_read_header(&info_, TRUE);
+    return true;
+  }
+
+  /// Rows of width() * 4 bytes: RGBA, or CMYK where is_cmyk(). Reads up to the end marker.
+  bool read_pixels(std::uint8_t* pixels) {
+    if (setjmp(errors_.escape) != 0) return false;
+    info_.out_color_space = is_cmyk() ? JCS_CMYK : JCS_EXT_RGBA;
+    jpeg_start_decompress(&info_);
+    while (info_.output_scanline < info_.output_height) {
+      JSAMPROW row = pixels + std::size_t{info_.output_scanline} * info_.output_width * 4;
+      jpeg_read_scanlines(&info_, &row, 1);
+    }
+    jpeg_finish_decompress(&info_);
+    return true;
+  }
+  /// YCCK counts as CMYK, which libjpeg makes of it.
+  [[nodiscard]] bool is_cmyk() const { return info_.num_components == 4; }
+
+  /// Valid after read_header().
+  [[nodiscard]] unsigned orientation() const {
+    for (const jpeg_marker_struct* marker = info_.marker_list; marker != nullptr;
+         marker = marker->next) {
+      const unsigned found =
+          exif_orientation(std::as_bytes(std::span(marker->data, marker->data_length)));
+      if (found != 1) return found;
+    }
+    return 1;
+  }
+
+ private:
+  std::span<const std::byte> bytes_;
+  ErrorManager errors_{};
+  jpeg_decompress_struct info_{};
+};
+
+/// Adobe's programs store the inks inverted, as libjpeg hands them on: 255 is no ink.
+void cmyk_to_rgba(std::vector<std::uint8_t>& pixels) {
+  for (std::size_t i = 0; i < pixels.size(); i += 4) {
+    const int k = pixels[i + 3];
+    for (std::size_t c = 0; c < 3; ++c) {
+      pixels[i + c] = static_cast<std::uint8_t>(k - ((255 - pixels[i + c]) * k >> 8));
+    }
+    pixels[i + 3] = 255;
+  }
+}
+
+}  // namespace
+
+Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
+  JpegReader reader(bytes);
+  const auto damaged = [&] {
+    return damaged_image(name, "the JPEG data is damaged (" + reader.error() + ")");
+  };
+  if (!reader.read_header()) return damaged();
+  MODAR_TRY(check_image_size(reader.width(), reader.height(), name));
+  StoredImage stored;
+  stored.orientation = reader.orientation();
+  allocate_pixels(stored.image, reader.width(), reader.height());
+  if (!reader.read_pixels(stored.image.pixels.data())) return damaged();
+  if (reader.is_cmyk()) cmyk_to_rgba(stored.image.pixels);
+  return stored;
+}
+
+}  // namespace modar

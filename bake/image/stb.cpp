@@ -1,0 +1,109 @@
+// BMP and Truevision TGA files through stb_image, which fills what a truncated file lacks with
+// anything: reads beyond the end are noted, and refused.
+#include <cmath>
+#include <memory>
+
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#define STBI_ONLY_BMP
+#define STBI_ONLY_TGA
+#define STBI_NO_STDIO
+#include <stb/stb_image.h>
+
+#include "bake/image/decoders.hpp"
+
+namespace modar {
+namespace {
+
+struct StbFile {
+  MemoryFile in;
+  /// Where stb_image keeps what it has read ahead: there, and only there, it takes fewer bytes than
+  /// it asks for.
+  const char* read_ahead = nullptr;
+  bool beyond_end = false;
+};
+
+StbFile& file_of(void* user) {
+  return *static_cast<StbFile*>(user);
+}
+
+int on_read(void* user, char* to, int size) {
+  StbFile& file = file_of(user);
+  if (file.read_ahead == nullptr) file.read_ahead = to;
+  const std::size_t asked = static_cast<std::size_t>(size);
+  const std::size_t got = file.in.read(to, asked);
+  file.beyond_end = file.beyond_end || got == 0 || (got < asked && to != file.read_ahead);
+  return static_cast<int>(got);
+}
+void on_skip(void* user, int count) {
+  StbFile& file = file_of(user);
+  const std::size_t left = file.in.bytes.size() - file.in.at;
+  file.beyond_end = file.beyond_end || static_cast<std::size_t>(count) > left;
+  file.in.at += std::min(static_cast<std::size_t>(count), left);
+}
+int on_end(void* user) {
+  return file_of(user).in.at == file_of(user).in.bytes.size() ? 1 : 0;
+}
+
+constexpr stbi_io_callbacks kCallbacks = {on_read, on_skip, on_end};
+
+/// What stb_image passes over in a TGA file's header of 18 bytes.
+struct TgaQuirks {
+  bool from_right = false;   ///< rows are stored from right to left
+  bool no_alpha = false;     ///< the fourth byte of 32-bit pixels means nothing
+  bool shifted_map = false;  ///< the colour map does not begin with entry 0
+};
+
+TgaQuirks tga_quirks(std::span<const std::byte> bytes) {
+  const auto at = [&](std::size_t i) { return std::to_integer<unsigned>(bytes[i]); };
+  const bool gray = (at(2) & 7) == 3;
+  return {(at(17) & 0x10) != 0, !gray && (at(17) & 15) == 0, at(1) == 1 && (at(3) | at(4)) != 0};
+}
+
+}  // namespace
+
+Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::string& name) {
+  constexpr std::size_t kTgaHeader = 18;
+  /// Pixels of the longest run that a packet of two bytes can hold.
+  constexpr std::size_t kLongestRun = 128;
+  StbFile header{{bytes}};
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  if (bytes.size() < kTgaHeader ||
+      stbi_info_from_callbacks(&kCallbacks, &header, &width, &height, &channels) == 0) {
+    return fail(ExitCode::kInvalidInput, "image.decode", name,
+                "this is no PNG, JPEG, BMP, TGA, WebP or TIFF file that can be read",
+                "save the image in one of these formats");
+  }
+  const auto columns = static_cast<std::uint64_t>(std::abs(std::int64_t{width}));
+  const auto rows = static_cast<std::uint64_t>(std::abs(std::int64_t{height}));
+  MODAR_TRY(check_image_size(columns, rows, name));
+  const bool bmp = bytes[0] == std::byte{'B'} && bytes[1] == std::byte{'M'};
+  const TgaQuirks quirks = bmp ? TgaQuirks{} : tga_quirks(bytes);
+  if (quirks.shifted_map) {
+    return damaged_image(name, "its colour map does not begin with entry 0");
+  }
+  const auto truncated = [&] { return damaged_image(name, "the file ends before its image does"); };
+  if (columns * rows > bytes.size() * kLongestRun) return truncated();  // before it is allocated
+  StbFile file{{bytes}};
+  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+      stbi_load_from_callbacks(&kCallbacks, &file, &width, &height, &channels, 4),
+      &stbi_image_free);
+  if (file.beyond_end) return truncated();
+  if (!pixels) {
+    return damaged_image(name, std::string(bmp ? "as a BMP" : "as a TGA") +
+                                   " file it is damaged or of an unknown kind");
+  }
+  StoredImage stored;
+  allocate_pixels(stored.image, static_cast<std::uint32_t>(width),
+                  static_cast<std::uint32_t>(height));
+  std::copy_n(pixels.get(), stored.image.pixels.size(), stored.image.pixels.data());
+  if (quirks.no_alpha) {
+    for (std::size_t i = 3; i < stored.image.pixels.size(); i += 4) stored.image.pixels[i] = 255;
+  }
+  if (quirks.from_right) stored.orientation = 2;
+  return stored;
+}
+
+}  // namespace modar
