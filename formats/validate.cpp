@@ -8,6 +8,7 @@
 #include <cstring>
 #include <tuple>
 
+#include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
 
 #define XXH_INLINE_ALL
@@ -556,17 +557,13 @@ namespace {
 /// Above what one wrong step in the largest texture gives.
 constexpr double kMaxPsnr = 140.0;
 
-std::uint64_t etc1_bytes(std::uint32_t width, std::uint32_t height) {
-  return (std::uint64_t{width} + 3) / 4 * ((std::uint64_t{height} + 3) / 4) * 8;
-}
-
 void check_texture(const RecordCheck& check, const TextureRecord& texture) {
   check.name(texture.name);
   check.number(texture.psnr_db, "psnr_db", 0.0, kMaxPsnr);
   check.number(texture.ssim, "ssim", -1.0, 1.0);
   check.flags(texture.flags, kTextureAlpha | kTextureRepeat);
   check.reserved(texture.reserved, sizeof(texture.reserved));
-  if (texture.format != static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb)) {
+  if (find_texture_format(texture.format) == nullptr) {
     check.fault(Rule::kEnum, &texture.format,
                 "format " + std::to_string(texture.format) + " is not known");
   }
@@ -594,11 +591,13 @@ void check_texture_level(const RecordCheck& check, const TextureRecord& texture,
   check.reserved(&level.reserved, sizeof(level.reserved));
   const std::uint32_t width = std::max(1u, number < 32 ? texture.width >> number : 0u);
   const std::uint32_t height = std::max(1u, number < 32 ? texture.height >> number : 0u);
-  if (level.width != width || level.height != height || level.size != etc1_bytes(width, height)) {
+  const TextureFormatInfo* format = find_texture_format(texture.format);
+  const std::uint64_t size = format != nullptr ? format->bytes(width, height) : 0;
+  if (level.width != width || level.height != height || level.size != size) {
     check.fault(Rule::kTextureLevel, &level.size,
                 std::to_string(level.width) + " x " + std::to_string(level.height) + " pixels in " +
                     std::to_string(level.size) + " bytes are not " + std::to_string(width) + " x " +
-                    std::to_string(height) + " in " + std::to_string(etc1_bytes(width, height)));
+                    std::to_string(height) + " in " + std::to_string(size));
   }
   const auto inside = [&](std::uint64_t offset) {
     return offset % 8 == 0 && offset <= data_size && level.size <= data_size - offset;

@@ -43,8 +43,8 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   if (!request.device.empty() && !plan_for_device(request.device, request)) request.device.clear();
   int effort = static_cast<int>(request.textures.effort);
   take(options, "effort", effort);
-  if (effort >= 0 && effort <= static_cast<int>(Etc1Effort::kBest)) {
-    request.textures.effort = static_cast<Etc1Effort>(effort);
+  if (effort >= 0 && effort <= static_cast<int>(TextureEffort::kBest)) {
+    request.textures.effort = static_cast<TextureEffort>(effort);
   }
   take(options, "perceptual", request.textures.perceptual);
   std::uint32_t side = request.textures.max_side;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "bake/check/verdict.hpp"
+#include "formats/texture_format.hpp"
 
 namespace modar {
 namespace {
@@ -14,15 +15,13 @@ constexpr std::uint64_t kMebibyte = 1u << 20;
 constexpr int kVertexUniforms = 13;
 /// Vec4s of the fragment shaders: opacity, or a camera picture's range and swap.
 constexpr int kFragmentUniforms = 2;
-constexpr std::uint64_t kBlockBytes = 8;
-constexpr std::uint64_t kDecodedBlockBytes = 48;  ///< 16 pixels of RGB8
+constexpr std::uint64_t kDecodedPixelBytes = 3;  ///< RGB8
 
 class DeviceCheck {
  public:
   DeviceCheck(const BundleView& bundle, const DeviceProfile& device, const IssueSink& sink)
       : bundle_(bundle), device_(device), sink_(sink) {
-    // OpenGL ES 3 has both in its core.
-    etc1_ = device.es_version >= 30 || device.has_extension("GL_OES_compressed_ETC1_RGB8_texture");
+    // OpenGL ES 3 has it in its core.
     half_ = device.es_version >= 30 || device.has_extension("GL_OES_vertex_half_float");
   }
 
@@ -54,17 +53,21 @@ class DeviceCheck {
     const TextureRecord& texture = bundle_.textures()[index];
     const std::string where = label("texture", texture.name);
     const std::uint64_t bytes = bundle_.texture_data(index).size();
-    texture_bytes_ += etc1_ ? bytes : bytes / kBlockBytes * kDecodedBlockBytes;
+    const TextureFormatInfo& format = *find_texture_format(texture.format);
+    const bool reads = device_.es_version >= static_cast<int>(format.core_since) ||
+                       device_.has_extension(format.gl_extension);
+    const std::uint64_t decoded =
+        bytes / format.block_bytes * format.block_side * format.block_side * kDecodedPixelBytes;
+    texture_bytes_ += reads ? bytes : decoded;
     if (std::max(texture.width, texture.height) >
         static_cast<std::uint32_t>(device_.max_texture_size)) {
       tell(WorkstationRule::kDeviceTextureSize, where, &texture.width,
            std::to_string(texture.width) + " x " + std::to_string(texture.height) +
                " pixels, at most " + std::to_string(device_.max_texture_size));
     }
-    if (!etc1_) {
+    if (!reads) {
       tell(WorkstationRule::kDeviceEtc1, where, &texture.format,
-           std::to_string(bytes) + " bytes become " +
-               std::to_string(bytes / kBlockBytes * kDecodedBlockBytes));
+           std::to_string(bytes) + " bytes become " + std::to_string(decoded));
     }
   }
 
@@ -139,7 +142,6 @@ class DeviceCheck {
   const BundleView& bundle_;
   const DeviceProfile& device_;
   const IssueSink& sink_;
-  bool etc1_ = false;
   bool half_ = false;
   bool good_ = true;
   std::uint64_t texture_bytes_ = 0;

@@ -14,7 +14,7 @@
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
-#include "bake/texture/texture.hpp"
+#include "bake/texture/texture_codec.hpp"
 
 namespace modar {
 namespace {
@@ -268,7 +268,8 @@ class SourceCheck {
     if (same) return;
     const auto picture = [](const TextureRecord& t, const TextureLevelRecord& level,
                             std::span<const std::byte> bytes) {
-      return decode_etc1(part(bytes, level.offset, level.size), t.width, t.height);
+      return decode_texture(static_cast<TextureFormat>(t.format),
+                            part(bytes, level.offset, level.size), t.width, t.height);
     };
     const RgbaImage ours = picture(texture, bundle_.texture_levels()[texture.first_level],
                                    bundle_.texture_data(index));

@@ -196,10 +196,12 @@ void add_texture_options(CommandLine& line, TextureOptions& textures) {
   line.option("--max-texture", &textures.max_side, "Longest side of a texture, in pixels",
               {.shows_default = true, .least = 4, .most = kMaxTextureSide});
   line.flag("!--no-mipmaps", textures.mipmaps, "Store level 0 of textures only");
-  line.choice<Etc1Effort>(
-      "--effort", textures.effort,
-      {{"fast", Etc1Effort::kFast}, {"good", Etc1Effort::kGood}, {"best", Etc1Effort::kBest}},
-      "Of the ETC1 encoder: fast, good (default) or best", {.type = "EFFORT"});
+  line.choice<TextureEffort>("--effort", textures.effort,
+                             {{"fast", TextureEffort::kFast},
+                              {"good", TextureEffort::kGood},
+                              {"best", TextureEffort::kBest}},
+                             "Of the ETC1 encoder: fast, good (default) or best",
+                             {.type = "EFFORT"});
   line.flag("--perceptual", textures.perceptual, "Weigh ETC1 errors as the eye does, by luma");
   line.option("--min-psnr", &textures.min_psnr_db, "Report textures below this, in dB");
   line.option("--min-ssim", &textures.min_ssim, "Report textures below this",

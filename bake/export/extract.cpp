@@ -9,7 +9,7 @@
 #include "bake/export/glb_writer.hpp"
 #include "bake/export/texture_files.hpp"
 #include "bake/output.hpp"
-#include "bake/texture/texture.hpp"
+#include "bake/texture/texture_codec.hpp"
 #include "formats/atomic_file.hpp"
 
 namespace modar {
@@ -24,6 +24,10 @@ std::string file_name(std::string_view name) {
   }
   if (clean.empty() || clean.front() == '.') clean.insert(clean.begin(), '_');
   return clean;
+}
+
+TextureFormat format_of(const TextureRecord& texture) {
+  return static_cast<TextureFormat>(texture.format);
 }
 
 /// Collects what was written, and keeps names apart that clean to the same file.
@@ -73,6 +77,7 @@ Result<void> Extraction::textures() {
       const TextureLevelRecord& level = bundle_.texture_levels()[texture.first_level + l];
       levels.push_back({level.width, level.height, plane(t, level, false)});
       for (const bool alpha : {false, true}) {
+        if (format_of(texture) != TextureFormat::kEtc1Rgb) continue;  // all that PKM holds
         if (alpha && (texture.flags & kTextureAlpha) == 0) continue;
         const std::string name = stem + (alpha ? ".alpha." : ".") + std::to_string(l);
         const auto written = write_file(
@@ -81,8 +86,8 @@ Result<void> Extraction::textures() {
         if (!written) return written;
       }
     }
-    const auto written =
-        write_file(path_for(stem, ".ktx"), std::span<const std::byte>(to_ktx(levels)));
+    const auto written = write_file(path_for(stem, ".ktx"),
+                                    std::span<const std::byte>(to_ktx(format_of(texture), levels)));
     if (!written) return written;
   }
   return {};
@@ -109,9 +114,11 @@ Result<void> Extraction::models() {
     const TextureLevelRecord& level = bundle_.texture_levels()[texture.first_level];
     GlbImage image;
     image.texture = t;
-    image.pixels = decode_etc1(plane(t, level, false), level.width, level.height);
+    image.pixels =
+        decode_texture(format_of(texture), plane(t, level, false), level.width, level.height);
     if ((texture.flags & kTextureAlpha) != 0) {
-      const RgbaImage alpha = decode_etc1(plane(t, level, true), level.width, level.height);
+      const RgbaImage alpha =
+          decode_texture(format_of(texture), plane(t, level, true), level.width, level.height);
       for (std::size_t i = 0; i < alpha.pixels.size(); i += 4) {
         image.pixels.pixels[i + 3] = alpha.pixels[i];
       }

@@ -1,7 +1,9 @@
-// PKM and KTX 1 around ETC1 blocks.
+// PKM around ETC1 blocks, KTX 1 around those of any format.
 #include "bake/export/texture_files.hpp"
 
 #include <string_view>
+
+#include "formats/texture_format.hpp"
 
 namespace modar {
 namespace {
@@ -28,7 +30,6 @@ class ByteWriter {
 };
 
 constexpr std::uint32_t kGlRgb = 0x1907;
-constexpr std::uint32_t kGlEtc1Rgb8 = 0x8D64;
 
 }  // namespace
 
@@ -45,7 +46,7 @@ std::vector<std::byte> to_pkm(std::span<const std::byte> blocks, std::uint32_t w
   return out.take();
 }
 
-std::vector<std::byte> to_ktx(std::span<const KtxLevel> levels) {
+std::vector<std::byte> to_ktx(TextureFormat format, std::span<const KtxLevel> levels) {
   using std::string_view_literals::operator""sv;
   ByteWriter out;
   out.text("\xABKTX 11\xBB\r\n\x1A\n"sv);
@@ -53,7 +54,7 @@ std::vector<std::byte> to_ktx(std::span<const KtxLevel> levels) {
   out.little32(0);           // glType: compressed
   out.little32(1);           // glTypeSize
   out.little32(0);           // glFormat: compressed
-  out.little32(kGlEtc1Rgb8);
+  out.little32(find_texture_format(static_cast<std::uint32_t>(format))->gl_format);
   out.little32(kGlRgb);
   out.little32(levels.empty() ? 0 : levels.front().width);
   out.little32(levels.empty() ? 0 : levels.front().height);

@@ -1,4 +1,4 @@
-// ETC1 textures as files of other tools.
+// Compressed textures as files of other tools.
 #pragma once
 
 #include <cstddef>
@@ -6,9 +6,11 @@
 #include <span>
 #include <vector>
 
+#include "formats/layout.hpp"
+
 namespace modar {
 
-/// PKM 1.0 (as Android's etc1tool reads it): 16-byte header, then the blocks.
+/// PKM 1.0 around ETC1 blocks (as Android's etc1tool reads it): 16-byte header, then the blocks.
 std::vector<std::byte> to_pkm(std::span<const std::byte> blocks, std::uint32_t width,
                               std::uint32_t height);
 
@@ -18,7 +20,7 @@ struct KtxLevel {
   std::uint32_t height = 0;
   std::span<const std::byte> blocks;
 };
-/// KTX 1 with GL_ETC1_RGB8_OES, all levels.
-std::vector<std::byte> to_ktx(std::span<const KtxLevel> levels);
+/// KTX 1 with blocks of the format, all levels.
+std::vector<std::byte> to_ktx(TextureFormat format, std::span<const KtxLevel> levels);
 
 }  // namespace modar

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "bake/lab/etc1_reference.hpp"
-#include "bake/texture/texture.hpp"
+#include "bake/texture/etc1/etc1_encoder.hpp"
 #include "bake/thread_clock.hpp"
 
 namespace modar {
@@ -49,7 +49,8 @@ Figures measure(const std::vector<RgbaImage>& images, const Encode& encode) {
       const double start = thread_seconds();
       const std::vector<std::byte> blocks = encode(image);
       seconds += thread_seconds() - start;
-      db += psnr_db(image, decode_etc1(blocks, image.width, image.height));
+      db += psnr_db(image,
+                    decode_texture(TextureFormat::kEtc1Rgb, blocks, image.width, image.height));
     }
     figures.db = db / static_cast<double>(images.size());
     fastest = run == 0 ? seconds : std::min(fastest, seconds);
@@ -84,10 +85,11 @@ Result<std::vector<Etc1BenchRow>> bench_etc1(const std::vector<std::string>& fil
   Figures reference;
   if (kHasEtc1Reference) reference = measure(images, encode_etc1_reference);
   std::vector<Etc1BenchRow> rows;
-  const std::pair<const char*, Etc1Effort> efforts[] = {
-      {"fast", Etc1Effort::kFast}, {"good", Etc1Effort::kGood}, {"best", Etc1Effort::kBest}};
+  const std::pair<const char*, TextureEffort> efforts[] = {{"fast", TextureEffort::kFast},
+                                                           {"good", TextureEffort::kGood},
+                                                           {"best", TextureEffort::kBest}};
   for (const auto& [name, effort] : efforts) {
-    const Etc1Options options = {.effort = effort};
+    const EncodeOptions options = {.effort = effort};
     const Figures ours =
         measure(images, [&options](const RgbaImage& image) { return encode_etc1(image, options); });
     add_row(rows, std::string(name) + "_db", ours.db, reference.db);

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "bake/texture/texture.hpp"
+#include "bake/image/image.hpp"
 
 namespace modar {
 

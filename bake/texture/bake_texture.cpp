@@ -1,16 +1,22 @@
-// One texture from its file to measured levels of ETC1 blocks.
+// One texture from its file to measured levels of compressed blocks.
 #include <algorithm>
+#include <bit>
 #include <charconv>
 
 #include "bake/image/resample.hpp"
-#include "bake/texture/atlas.hpp"
+#include "bake/texture/coverage.hpp"
 #include "bake/texture/texture.hpp"
 #include "bake/texture/texture_quality.hpp"
-#include "bake/texture/texture_size.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
 namespace {
+
+std::uint32_t nearest_power(std::uint32_t side, std::uint32_t limit) {
+  const std::uint64_t below = std::bit_floor(side);
+  const bool up = std::uint64_t{side} * side > below * below * 2;
+  return std::min(static_cast<std::uint32_t>(up ? below * 2 : below), std::bit_floor(limit));
+}
 
 std::uint64_t pixel_count(const RgbaImage& image) {
   return std::uint64_t{image.width} * image.height;
@@ -37,13 +43,6 @@ bool is_constant(const RgbaImage& image, std::array<std::uint8_t, 4>& colour) {
   return true;
 }
 
-bool has_alpha(const RgbaImage& image) {
-  for (std::size_t i = 3; i < image.pixels.size(); i += 4) {
-    if (image.pixels[i] != 255) return true;
-  }
-  return false;
-}
-
 /// Alpha as a gray image: the twin.
 RgbaImage alpha_twin(const RgbaImage& image) {
   RgbaImage twin{image.width, image.height, std::vector<std::uint8_t>(image.pixels.size(), 255)};
@@ -53,14 +52,15 @@ RgbaImage alpha_twin(const RgbaImage& image) {
   return twin;
 }
 
-Etc1Level encode_level(const RgbaImage& image, bool alpha, const TextureOptions& texture) {
-  const Etc1Options options = {texture.effort, texture.perceptual, texture.jobs};
-  Etc1Level level;
+TextureLevel encode_level(const RgbaImage& image, bool alpha, const TextureOptions& texture) {
+  const EncodeOptions options = {texture.effort, texture.perceptual, texture.jobs};
+  const TextureCodec& codec = texture_codec(texture.format);
+  TextureLevel level;
   level.width = image.width;
   level.height = image.height;
-  level.colour = encode_etc1(image, options);
-  if (alpha) level.alpha = encode_etc1(alpha_twin(image), options);
-  const RgbaImage decoded = decode_etc1(level.colour, level.width, level.height);
+  level.colour = codec.encode(image, options);
+  if (alpha) level.alpha = codec.encode(alpha_twin(image), options);
+  const RgbaImage decoded = decode_texture(texture.format, level.colour, level.width, level.height);
   level.psnr_db = psnr_db(image, decoded);
   level.ssim = ssim(image, decoded);
   const WorstBlock worst = worst_block(image, decoded);
@@ -72,12 +72,12 @@ Etc1Level encode_level(const RgbaImage& image, bool alpha, const TextureOptions&
 
 /// The images of all levels, ready to encode.
 std::vector<RgbaImage> make_levels(const RgbaImage& source, const TextureOptions& options,
-                                   Etc1Texture& texture) {
+                                   Texture& texture) {
   RgbaImage top = resized(source, options);
   if (options.coverage) {
     fill_uncovered(top, resize_coverage(*options.coverage, top.width, top.height));
   }
-  texture.alpha = has_alpha(top);
+  texture.alpha = !is_opaque(top);
   texture.constant = is_constant(top, texture.constant_rgba);
   if (texture.constant) {
     top = {1, 1, {texture.constant_rgba.begin(), texture.constant_rgba.end()}};
@@ -100,7 +100,7 @@ std::string decimals(double value) {
 }
 
 /// The gate: says so where level 0 is worse than asked.
-void judge(const std::string& path, const Etc1Level& level, const TextureOptions& options,
+void judge(const std::string& path, const TextureLevel& level, const TextureOptions& options,
            Report& report) {
   const bool bad_psnr = options.min_psnr_db > 0 && level.psnr_db < options.min_psnr_db;
   const bool bad_ssim = options.min_ssim > 0 && level.ssim < options.min_ssim;
@@ -113,19 +113,33 @@ void judge(const std::string& path, const Etc1Level& level, const TextureOptions
        "bake it with more effort, larger, or lower the threshold"});
 }
 
-Result<void> write_picture(const RgbaImage& image, const Etc1Texture& texture,
+Result<void> write_picture(const RgbaImage& image, const Texture& texture,
                            const TextureOptions& options) {
   if (options.picture_folder.empty()) return {};
-  const Etc1Level& level = texture.levels.front();
-  const RgbaImage decoded = decode_etc1(level.colour, level.width, level.height);
+  const TextureLevel& level = texture.levels.front();
+  const RgbaImage decoded = decode_texture(texture.format, level.colour, level.width, level.height);
   return write_png(quality_picture(image, decoded),
                    options.picture_folder + "/" + texture.name + ".png");
 }
 
 }  // namespace
 
-Result<Etc1Texture> bake_texture(const std::string& path, const TextureOptions& options,
-                                 Report& report) {
+TextureSize texture_size(TextureSize source, const TextureOptions& options) {
+  if (options.mipmaps || options.repeat) {
+    return {nearest_power(source.width, options.max_side),
+            nearest_power(source.height, options.max_side)};
+  }
+  const std::uint64_t longer = std::max(source.width, source.height);
+  if (longer <= options.max_side) return source;
+  const auto scaled = [&](std::uint64_t side) {
+    return static_cast<std::uint32_t>(
+        std::max<std::uint64_t>(1, (side * options.max_side * 2 + longer) / (2 * longer)));
+  };
+  return {scaled(source.width), scaled(source.height)};
+}
+
+Result<Texture> bake_texture(const std::string& path, const TextureOptions& options,
+                             Report& report) {
   if (options.max_side == 0 || options.max_side > kMaxTextureSide) {
     return fail(
         ExitCode::kUsage, "texture.max-side", std::to_string(options.max_side),
@@ -133,22 +147,23 @@ Result<Etc1Texture> bake_texture(const std::string& path, const TextureOptions& 
         "choose another");
   }
   StageTimer read_timer(report, "texture.read");
-  const Result<RgbaImage> source = read_image(path);
-  if (!source) return tl::unexpected(source.error());
-  read_timer.done(1, pixel_count(*source));
+  MODAR_ASSIGN(const RgbaImage source, read_image(path));
+  read_timer.done(1, pixel_count(source));
 
   StageTimer mip_timer(report, "texture.mips");
-  Etc1Texture texture;
+  Texture texture;
   texture.name = file_name(path);
-  texture.source_width = source->width;
-  texture.source_height = source->height;
+  texture.format = options.format;
+  texture.source_width = source.width;
+  texture.source_height = source.height;
   texture.repeat = options.repeat;
-  const std::vector<RgbaImage> images = make_levels(*source, options, texture);
+  const std::vector<RgbaImage> images = make_levels(source, options, texture);
   std::uint64_t pixels = 0;
   for (const RgbaImage& image : images) pixels += pixel_count(image);
-  mip_timer.done(pixel_count(*source), pixels);
+  mip_timer.done(pixel_count(source), pixels);
 
-  StageTimer encode_timer(report, "texture.etc1");
+  StageTimer encode_timer(report,
+                          "texture." + std::string(texture_codec(options.format).format.name));
   std::uint64_t bytes = 0;
   for (const RgbaImage& image : images) {
     texture.levels.push_back(encode_level(image, texture.alpha, options));
@@ -156,9 +171,7 @@ Result<Etc1Texture> bake_texture(const std::string& path, const TextureOptions& 
   }
   encode_timer.done(pixels, bytes);
   judge(path, texture.levels.front(), options, report);
-  if (const Result<void> wrote = write_picture(images.front(), texture, options); !wrote) {
-    return tl::unexpected(wrote.error());
-  }
+  MODAR_TRY(write_picture(images.front(), texture, options));
   return texture;
 }
 

@@ -3,9 +3,9 @@
 #include "bake/texture/texture_stage.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include "bake/mesh/repeating.hpp"
-#include "bake/texture/texture_set.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -20,14 +20,23 @@ std::uint32_t use_of(const std::string& path, bool repeat, TextureUses& textures
   return place->second;
 }
 
-TextureOutcome append_texture(const Etc1Texture& baked, BundleContent& content) {
+bool same_level(const TextureLevel& a, const TextureLevel& b) {
+  return a.width == b.width && a.height == b.height && a.colour == b.colour && a.alpha == b.alpha;
+}
+
+bool same_pixels(const Texture& a, const Texture& b) {
+  return a.repeat == b.repeat && a.alpha == b.alpha &&
+         std::equal(a.levels.begin(), a.levels.end(), b.levels.begin(), b.levels.end(), same_level);
+}
+
+TextureOutcome append_texture(const Texture& baked, BundleContent& content) {
   TextureRecord record{};
   record.name = content.intern(baked.name);
   record.width = baked.levels.front().width;
   record.height = baked.levels.front().height;
   record.source_width = baked.source_width;
   record.source_height = baked.source_height;
-  record.format = static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb);
+  record.format = static_cast<std::uint32_t>(baked.format);
   record.flags = (baked.alpha ? kTextureAlpha : 0u) | (baked.repeat ? kTextureRepeat : 0u);
   record.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
   record.level_count = static_cast<std::uint32_t>(baked.levels.size());
@@ -35,7 +44,7 @@ TextureOutcome append_texture(const Etc1Texture& baked, BundleContent& content) 
   record.ssim = static_cast<float>(baked.levels.front().ssim);
 
   std::vector<std::byte> data;
-  for (const Etc1Level& level : baked.levels) {
+  for (const TextureLevel& level : baked.levels) {
     TextureLevelRecord out{};
     out.offset = data.size();
     out.alpha_offset = kNoOffset;
@@ -84,28 +93,56 @@ std::vector<std::uint32_t> collect_textures(const TriMesh& mesh, TextureUses& te
   return uses;
 }
 
+std::vector<std::size_t> first_identical(std::span<const Texture> textures) {
+  std::vector<std::size_t> first(textures.size());
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    std::size_t k = 0;
+    while (k < i && !same_pixels(textures[k], textures[i])) ++k;
+    first[i] = k;
+  }
+  return first;
+}
+
+std::uint64_t planned_bytes(std::span<const TexturePlan> textures, const TextureOptions& options) {
+  const TextureFormatInfo& format = texture_codec(options.format).format;
+  std::uint64_t bytes = 0;
+  for (const TexturePlan& texture : textures) {
+    TextureSize size = texture_size({texture.width, texture.height}, options);
+    const std::uint64_t images = texture.alpha ? 2 : 1;
+    bytes += images * format.bytes(size.width, size.height);
+    while (options.mipmaps && (size.width > 1 || size.height > 1)) {
+      size = {std::max(1U, size.width / 2), std::max(1U, size.height / 2)};
+      bytes += images * format.bytes(size.width, size.height);
+    }
+  }
+  return bytes;
+}
+
+std::uint32_t plan_max_side(std::span<const TexturePlan> textures, const TextureOptions& options,
+                            std::uint64_t budget) {
+  TextureOptions smaller = options;
+  smaller.max_side = std::bit_floor(options.max_side);
+  while (smaller.max_side > 1 && planned_bytes(textures, smaller) > budget) smaller.max_side /= 2;
+  return smaller.max_side;
+}
+
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,
                                                   BundleContent& content, Report& report) {
   if (budget != 0) {
     std::vector<TexturePlan> plans;
     for (const TextureUse& use : textures.uses) {
-      Result<RgbaImage> image = read_image(use.path);
-      if (!image) return tl::unexpected(image.error());
-      const auto opaque = [&](std::size_t pixel) { return image->pixels[4 * pixel + 3] == 255; };
-      bool alpha = false;
-      for (std::size_t p = 0; p < image->pixels.size() / 4 && !alpha; ++p) alpha = !opaque(p);
-      plans.push_back({image->width, image->height, alpha});
+      MODAR_ASSIGN(const RgbaImage image, read_image(use.path));
+      plans.push_back({image.width, image.height, !is_opaque(image)});
     }
     options.max_side = plan_max_side(plans, options, budget);
   }
-  std::vector<Etc1Texture> baked;
+  std::vector<Texture> baked;
   for (const TextureUse& use : textures.uses) {
     options.repeat = use.repeat;
     options.coverage = &use.coverage;
-    Result<Etc1Texture> texture = bake_texture(use.path, options, report);
-    if (!texture) return tl::unexpected(texture.error());
-    baked.push_back(std::move(*texture));
+    MODAR_ASSIGN(Texture texture, bake_texture(use.path, options, report));
+    baked.push_back(std::move(texture));
   }
   const std::vector<std::size_t> first = first_identical(baked);
   std::vector<TextureOutcome> outcomes(baked.size());

@@ -3,15 +3,17 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "bake/mesh/tri_mesh.hpp"
 #include "bake/report.hpp"
-#include "bake/texture/atlas.hpp"
+#include "bake/texture/coverage.hpp"
 #include "bake/texture/texture.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/error.hpp"
@@ -34,6 +36,25 @@ struct TextureUses {
 
 /// Notes the images that a mesh shows. Answers the use of each material, kNone where it shows none.
 std::vector<std::uint32_t> collect_textures(const TriMesh& mesh, TextureUses& textures);
+
+/// For each texture the index of the first that has the same pixels, alpha and wrapping (its own,
+/// where it is the first). Names and source sizes do not count.
+std::vector<std::size_t> first_identical(std::span<const Texture> textures);
+
+/// What plan_max_side() needs to know of an image before it is baked.
+struct TexturePlan {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  bool alpha = false;  ///< counts twice
+};
+
+/// GPU bytes of the textures under these options.
+std::uint64_t planned_bytes(std::span<const TexturePlan> textures, const TextureOptions& options);
+
+/// The greatest power of two, at most options.max_side, under which all textures together take at
+/// most `budget` bytes; 1 where even that is too much.
+std::uint32_t plan_max_side(std::span<const TexturePlan> textures, const TextureOptions& options,
+                            std::uint64_t budget);
 
 /// What became of a use: a texture of the bundle, or one colour that stands for it.
 struct TextureOutcome {

@@ -11,6 +11,7 @@
 #include <EGL/eglext.h>
 #include <GLES2/gl2.h>
 
+#include "formats/texture_format.hpp"
 #include "modar/device_profile.hpp"
 #include "runtime/platform/extension_list.hpp"
 
@@ -132,6 +133,11 @@ int es_major(std::string_view version) {
   return !number.empty() && number[0] >= '2' && number[0] <= '9' ? number[0] - '0' : 2;
 }
 
+/// Of GlCaps::texture_formats.
+std::uint32_t bit_of(const TextureFormatInfo& format) {
+  return std::uint32_t{1} << static_cast<std::uint32_t>(format.format);
+}
+
 }  // namespace
 
 GlCaps probe_gl_caps() {
@@ -143,8 +149,11 @@ GlCaps probe_gl_caps() {
   const auto has = [&](std::string_view name) { return lists_extension(extensions, name); };
   const bool es3 = es_major(caps.version) >= 3;
   caps.half_float_vertices = has("GL_OES_vertex_half_float");
-  caps.etc1 = has("GL_OES_compressed_ETC1_RGB8_texture");
-  caps.etc1_sub_texture = caps.etc1 && has("GL_EXT_compressed_ETC1_RGB8_sub_texture");
+  for (const TextureFormatInfo& format : kTextureFormats) {
+    if (has(format.gl_extension)) caps.texture_formats |= bit_of(format);
+  }
+  caps.etc1_sub_texture =
+      caps.reads(TextureFormat::kEtc1Rgb) && has("GL_EXT_compressed_ETC1_RGB8_sub_texture");
   caps.npot_mipmaps = es3 || has("GL_OES_texture_npot");
   caps.depth24 = es3 || has("GL_OES_depth24");
   caps.debug_groups = has("GL_KHR_debug") || has("GL_EXT_debug_marker");
@@ -167,7 +176,9 @@ Result<GlCaps> mask_gl_caps(const GlCaps& caps, const std::string& device) {
   };
   const bool es3 = profile->es_version >= 30;
   mask(masked.half_float_vertices, "GL_OES_vertex_half_float");
-  mask(masked.etc1, "GL_OES_compressed_ETC1_RGB8_texture");
+  for (const TextureFormatInfo& format : kTextureFormats) {
+    if (!profile->has_extension(format.gl_extension)) masked.texture_formats &= ~bit_of(format);
+  }
   mask(masked.etc1_sub_texture, "GL_EXT_compressed_ETC1_RGB8_sub_texture");
   masked.debug_groups = masked.debug_groups && (profile->has_extension("GL_KHR_debug") ||
                                                 profile->has_extension("GL_EXT_debug_marker"));

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "formats/texture_format.hpp"
 #include "modar/mapped_file.hpp"
-#include "runtime/render/etc1_decode.hpp"
 
 namespace modar {
 namespace {
@@ -18,7 +18,7 @@ bool power_of_two(const TextureRecord& texture) {
 
 TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
     : bundle_(bundle),
-      etc1_(caps.etc1),
+      formats_(caps.texture_formats),
       npot_mipmaps_(caps.npot_mipmaps),
       max_side_(static_cast<std::uint32_t>(caps.max_texture_size)) {
   const std::uint32_t count = bundle.textures().size();
@@ -35,7 +35,7 @@ TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
 std::uint64_t TextureStore::level_bytes(const TextureRecord& texture, std::uint32_t level) const {
   const TextureLevelRecord& record = bundle_.texture_levels()[texture.first_level + level];
   const std::uint64_t one =
-      etc1_ ? std::uint64_t{record.size} : std::uint64_t{record.width} * record.height * 3;
+      reads(texture) ? std::uint64_t{record.size} : std::uint64_t{record.width} * record.height * 3;
   return record.alpha_offset == kNoOffset ? one : 2 * one;
 }
 
@@ -105,6 +105,7 @@ Result<void> TextureStore::upload(std::uint64_t budget) {
 
 GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
   const TextureRecord& record = bundle_.textures()[texture];
+  const TextureFormatInfo& format = *find_texture_format(record.format);  // the view checked it
   const std::span<const std::byte> data = bundle_.texture_data(texture);
   const bool mips = mipmapped(record);
   GLuint id = 0;
@@ -119,14 +120,14 @@ GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
     const GLint target_level = static_cast<GLint>(i - first);
     const GLsizei width = static_cast<GLsizei>(level.width);
     const GLsizei height = static_cast<GLsizei>(level.height);
-    if (etc1_) {
-      glCompressedTexImage2D(GL_TEXTURE_2D, target_level, GL_ETC1_RGB8_OES, width, height, 0,
+    if (reads(record)) {
+      glCompressedTexImage2D(GL_TEXTURE_2D, target_level, format.gl_format, width, height, 0,
                              static_cast<GLsizei>(level.size), blocks.data());
       uploaded_bytes_ += level.size;
     } else {
       const std::size_t bytes = std::size_t{level.width} * level.height * 3;
       decoded_.resize(std::max(decoded_.size(), bytes));
-      decode_etc1_rgb(blocks, level.width, level.height, decoded_);
+      format.decode(blocks, level.width, level.height, 3, decoded_);
       glTexImage2D(GL_TEXTURE_2D, target_level, GL_RGB, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE,
                    decoded_.data());
       uploaded_bytes_ += bytes;

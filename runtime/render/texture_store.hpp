@@ -1,4 +1,4 @@
-// The bundle's textures in GL: ETC1 blocks straight from the mapped bytes, or decoded to RGB.
+// The bundle's textures in GL: compressed blocks straight from the mapped bytes, or decoded to RGB.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +28,10 @@ class TextureStore {
   [[nodiscard]] std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }
 
  private:
+  /// Whether the context reads the texture's blocks; else they are decoded to RGB.
+  [[nodiscard]] bool reads(const TextureRecord& texture) const {
+    return (formats_ >> texture.format & 1) != 0;
+  }
   [[nodiscard]] std::uint64_t level_bytes(const TextureRecord& texture, std::uint32_t level) const;
   [[nodiscard]] std::uint64_t bytes_from(std::uint32_t texture, std::uint32_t first) const;
   [[nodiscard]] bool mipmapped(const TextureRecord& texture) const;
@@ -35,7 +39,7 @@ class TextureStore {
   GLuint make(std::uint32_t texture, bool alpha);
 
   const BundleView& bundle_;
-  bool etc1_ = false;
+  std::uint32_t formats_ = 0;  ///< as in GlCaps
   bool npot_mipmaps_ = false;
   std::uint32_t max_side_ = 64;
   std::vector<bool> used_;

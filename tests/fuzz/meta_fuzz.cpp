@@ -11,7 +11,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   modar::BakeRequest request;
   modar::read_bake_options({reinterpret_cast<const char*>(data), size}, request);
-  if (request.textures.effort > modar::Etc1Effort::kBest) std::abort();
+  if (request.textures.effort > modar::TextureEffort::kBest) std::abort();
   const std::uint32_t side = request.textures.max_side;
   if (side < 4 || side > modar::kMaxTextureSide) std::abort();
   if (request.levels < 1 || request.levels > modar::kMaxLevels) std::abort();

@@ -139,18 +139,18 @@ TEST(Views, AreTheSameAtEverySimdLevel) {
   const TrackerCode code{1, 2, 255};
   const std::array<TrackerCode, 3> codes{TrackerCode{}, TrackerCode{1, 2, 254},
                                          TrackerCode{1, 3, 255, 7}};
-  for (const std::int64_t level : etc1_simd_levels()) {
-    force_etc1_simd_level(level);
+  for (const std::int64_t level : simd_levels()) {
+    force_simd_level(level);
     EXPECT_EQ(render_view(levels, tilted_view(), nullptr).pixels, best.pixels)
-        << etc1_simd_name(level);
+        << simd_level_name(level);
     std::vector<int> bits(3);
     code_distances(code, codes.data(), nullptr, 3, bits.data());
-    EXPECT_EQ(bits, (std::vector{10, 1, 4})) << etc1_simd_name(level);
+    EXPECT_EQ(bits, (std::vector{10, 1, 4})) << simd_level_name(level);
     const std::uint32_t which[] = {2, 0};
     code_distances(code, codes.data(), which, 2, bits.data());
-    EXPECT_EQ(bits, (std::vector{4, 10, 4})) << etc1_simd_name(level);
+    EXPECT_EQ(bits, (std::vector{4, 10, 4})) << simd_level_name(level);
   }
-  force_etc1_simd_level(0);
+  force_simd_level(0);
 }
 
 TEST(Score, IsTheSameOnAnyNumberOfThreads) {

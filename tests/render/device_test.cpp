@@ -26,20 +26,21 @@ TEST(DeviceProfiles, AreSortedNamedAndCited) {
 
 TEST(DeviceProfiles, MasksOnlyEverTakeAway) {
   GlCaps all;
-  all.half_float_vertices = all.etc1 = all.etc1_sub_texture = all.npot_mipmaps = true;
+  all.texture_formats = 1 << static_cast<unsigned>(TextureFormat::kEtc1Rgb);
+  all.half_float_vertices = all.etc1_sub_texture = all.npot_mipmaps = true;
   all.depth24 = all.debug_groups = all.instanced_arrays = true;
   all.max_texture_size = 16384;
   all.max_vertex_uniform_vectors = 4096;
   const Result<GlCaps> ace2 = mask_gl_caps(all, "ace2");
   ASSERT_TRUE(ace2.has_value());
   EXPECT_TRUE(ace2->half_float_vertices);
-  EXPECT_TRUE(ace2->etc1);
+  EXPECT_TRUE(ace2->reads(TextureFormat::kEtc1Rgb));
   EXPECT_FALSE(ace2->etc1_sub_texture);
   EXPECT_FALSE(ace2->instanced_arrays);
   EXPECT_EQ(ace2->max_vertex_uniform_vectors, 128);
   const Result<GlCaps> none = mask_gl_caps(GlCaps(), "desktop");
   ASSERT_TRUE(none.has_value());
-  EXPECT_FALSE(none->etc1);
+  EXPECT_FALSE(none->reads(TextureFormat::kEtc1Rgb));
   EXPECT_EQ(none->max_texture_size, 64);
   const Result<GlCaps> unknown = mask_gl_caps(all, "toaster");
   ASSERT_FALSE(unknown.has_value());

@@ -160,13 +160,13 @@ class TextureTest : public GlTest {
 };
 
 TEST_F(TextureTest, DriverDecodesBlocksAsTheTablesSay) {
-  if (!probe_gl_caps().etc1) GTEST_SKIP() << "this driver has no ETC1";
+  if (!probe_gl_caps().reads(TextureFormat::kEtc1Rgb)) GTEST_SKIP() << "this driver has no ETC1";
   check_random_blocks(probe_gl_caps());
 }
 
 TEST_F(TextureTest, DecodedFallbackShowsTheSame) {
   GlCaps caps = probe_gl_caps();
-  caps.etc1 = false;
+  caps.texture_formats = 0;
   check_random_blocks(caps);
 }
 
@@ -185,7 +185,7 @@ TEST_F(TextureTest, EachMipLevelIsTheOneOfItsSize) {
   const MappedBundle bundle(maker.content);
   for (const bool etc1 : {true, false}) {
     GlCaps caps = probe_gl_caps();
-    caps.etc1 = caps.etc1 && etc1;
+    if (!etc1) caps.texture_formats = 0;
     const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
     ASSERT_TRUE(renderer);
     for (int level = 0; level < 5; ++level) {
@@ -217,7 +217,8 @@ TEST_F(TextureTest, LevelsBeyondTheLimitAreLeftOut) {
   const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
   ASSERT_TRUE(renderer);
   // Levels of 64 and 32 texels: 256 and 64 blocks of 8 bytes (3 bytes a texel where decoded).
-  const std::uint64_t dropped = caps.etc1 ? (256 + 64) * 8 : (64 * 64 + 32 * 32) * 3;
+  const std::uint64_t dropped =
+      caps.reads(TextureFormat::kEtc1Rgb) ? (256 + 64) * 8 : (64 * 64 + 32 * 32) * 3;
   EXPECT_EQ(renderer->gpu_memory().textures, all - dropped);
   const ExactView view = exact_view(16);
   const std::vector<std::uint8_t> pixels = draw(*renderer, view.camera, {&view.item, 1});
@@ -252,7 +253,7 @@ TEST_F(TextureTest, AlphaTwinBlendsOverTheBackground) {
   const RgbImage background{blue.data(), 8, 8, 24};
   for (const bool etc1 : {true, false}) {
     GlCaps caps = probe_gl_caps();
-    caps.etc1 = caps.etc1 && etc1;
+    if (!etc1) caps.texture_formats = 0;
     const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
     ASSERT_TRUE(renderer);
     const ExactView view = exact_view(8);

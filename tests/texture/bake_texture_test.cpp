@@ -24,12 +24,12 @@ std::string write_png(const test::ScratchFolder& folder, const RgbaImage& image)
   return path;
 }
 
-Etc1Texture bake(const std::string& path, const TextureOptions& options) {
+Texture bake(const std::string& path, const TextureOptions& options) {
   Report report;
-  Result<Etc1Texture> texture = bake_texture(path, options, report);
+  Result<Texture> texture = bake_texture(path, options, report);
   if (!texture) {
     ADD_FAILURE() << to_line(texture.error());
-    Etc1Texture none;
+    Texture none;
     none.levels.resize(1);
     return none;
   }
@@ -39,7 +39,7 @@ Etc1Texture bake(const std::string& path, const TextureOptions& options) {
 
 TEST(BakeTexture, SidesBecomePowersOfTwoWithAFullChain) {
   const test::ScratchFolder folder;
-  const Etc1Texture texture = bake(write_png(folder, test::synthetic_photo(100, 90)), {});
+  const Texture texture = bake(write_png(folder, test::synthetic_photo(100, 90)), {});
   EXPECT_EQ(texture.name, "texture.png");
   EXPECT_EQ(texture.source_width, 100U);
   EXPECT_EQ(texture.source_height, 90U);
@@ -48,7 +48,7 @@ TEST(BakeTexture, SidesBecomePowersOfTwoWithAFullChain) {
   EXPECT_EQ(texture.levels[0].height, 64U);
   EXPECT_EQ(texture.levels[7].width, 1U);
   EXPECT_EQ(texture.levels[7].height, 1U);
-  for (const Etc1Level& level : texture.levels) {
+  for (const TextureLevel& level : texture.levels) {
     EXPECT_EQ(level.colour.size(),
               std::size_t{(level.width + 3) / 4} * ((level.height + 3) / 4) * 8);
     EXPECT_TRUE(level.alpha.empty());
@@ -65,7 +65,7 @@ TEST(BakeTexture, LimitsAndKeepsSizes) {
   options.max_side = 100;
   EXPECT_EQ(bake(path, options).levels[0].width, 64U);
   options.mipmaps = false;
-  const Etc1Texture scaled = bake(path, options);
+  const Texture scaled = bake(path, options);
   EXPECT_EQ(scaled.levels[0].width, 100U);
   EXPECT_EQ(scaled.levels[0].height, 33U);
   EXPECT_EQ(scaled.levels.size(), 1U);
@@ -75,7 +75,7 @@ TEST(BakeTexture, LimitsAndKeepsSizes) {
   EXPECT_EQ(bake(path, options).levels[0].width, 128U);
   Report report;
   options.max_side = 0;
-  const Result<Etc1Texture> refused = bake_texture(path, options, report);
+  const Result<Texture> refused = bake_texture(path, options, report);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().exit, ExitCode::kUsage);
 }
@@ -87,10 +87,11 @@ TEST(BakeTexture, AlphaHasATwinOnlyWhereItIsNotConstant) {
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
     image.pixels[i + 3] = static_cast<std::uint8_t>(i / 128 * 8);  // a row is 128 bytes
   }
-  const Etc1Texture texture = bake(write_png(folder, image), {});
+  const Texture texture = bake(write_png(folder, image), {});
   EXPECT_TRUE(texture.alpha);
-  for (const Etc1Level& level : texture.levels) ASSERT_EQ(level.alpha.size(), level.colour.size());
-  const RgbaImage alpha = decode_etc1(texture.levels[0].alpha, 32, 32);
+  for (const TextureLevel& level : texture.levels)
+    ASSERT_EQ(level.alpha.size(), level.colour.size());
+  const RgbaImage alpha = decode_texture(TextureFormat::kEtc1Rgb, texture.levels[0].alpha, 32, 32);
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
     EXPECT_NEAR(alpha.pixels[i], image.pixels[i + 3], 12);
     EXPECT_EQ(alpha.pixels[i], alpha.pixels[i + 2]);
@@ -101,10 +102,10 @@ TEST(BakeTexture, ThreadsChangeNothing) {
   const test::ScratchFolder folder;
   const std::string path = write_png(folder, test::synthetic_photo(90, 70));
   TextureOptions options;
-  const Etc1Texture one = bake(path, options);
+  const Texture one = bake(path, options);
   for (const unsigned jobs : {2U, 8U}) {
     options.jobs = jobs;
-    const Etc1Texture many = bake(path, options);
+    const Texture many = bake(path, options);
     ASSERT_EQ(many.levels.size(), one.levels.size());
     for (std::size_t i = 0; i < one.levels.size(); ++i) {
       EXPECT_EQ(many.levels[i].colour, one.levels[i].colour);

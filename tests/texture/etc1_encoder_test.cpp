@@ -4,9 +4,10 @@
 #include <array>
 #include <random>
 
-#include "bake/texture/etc1/etc1_block.hpp"
+#include "bake/texture/etc1/etc1_encoder.hpp"
 #include "bake/texture/etc1/etc1_kernel.hpp"
 #include "bake/texture/texture_quality.hpp"
+#include "tests/texture/etc1_block.hpp"
 #include "tests/texture/libetc1.hpp"
 #include "tests/texture/texture_samples.hpp"
 
@@ -14,13 +15,16 @@ namespace modar {
 namespace {
 
 double quality(const RgbaImage& image) {
-  return psnr_db(image, decode_etc1(encode_etc1(image), image.width, image.height));
+  return psnr_db(image, decode_texture(TextureFormat::kEtc1Rgb, encode_etc1(image), image.width,
+                                       image.height));
 }
 double quality_of_libetc1(const RgbaImage& image) {
-  return psnr_db(image, decode_etc1(test::libetc1_encode(image), image.width, image.height));
+  return psnr_db(image, decode_texture(TextureFormat::kEtc1Rgb, test::libetc1_encode(image),
+                                       image.width, image.height));
 }
 
-constexpr Etc1Effort kEfforts[] = {Etc1Effort::kFast, Etc1Effort::kGood, Etc1Effort::kBest};
+constexpr TextureEffort kEfforts[] = {TextureEffort::kFast, TextureEffort::kGood,
+                                      TextureEffort::kBest};
 
 /// Sum of squared errors of a colour block with one modifier, tried for all that the format has.
 int best_solid_error(const std::array<int, 3>& colour) {
@@ -53,7 +57,7 @@ TEST(Etc1Encoder, FlatBlocksAreTheBestThatTheFormatHas) {
     const std::array<int, 3> colour = {value(), value(), value()};
     const RgbaImage image =
         test::paint(4, 4, [&colour](std::uint32_t, std::uint32_t) { return colour; });
-    const RgbaImage decoded = decode_etc1(encode_etc1(image), 4, 4);
+    const RgbaImage decoded = decode_texture(TextureFormat::kEtc1Rgb, encode_etc1(image), 4, 4);
     int error = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       const int d = int{decoded.pixels[c]} - colour[c];
@@ -72,9 +76,10 @@ TEST(Etc1Encoder, BlackWithWhiteIsExactAtEveryEffort) {
     const int value = (mask >> (4 * (y % 4) + x % 4) & 1) != 0 ? 255 : 0;
     return std::array<int, 3>{value, value, value};
   });
-  for (const Etc1Effort effort : kEfforts) {
+  for (const TextureEffort effort : kEfforts) {
     const std::vector<std::byte> blocks = encode_etc1(image, {.effort = effort});
-    EXPECT_EQ(decode_etc1(blocks, 64, 64).pixels, image.pixels) << static_cast<int>(effort);
+    EXPECT_EQ(decode_texture(TextureFormat::kEtc1Rgb, blocks, 64, 64).pixels, image.pixels)
+        << static_cast<int>(effort);
   }
 }
 
@@ -83,7 +88,7 @@ TEST(Etc1Encoder, BestRecoversBlocksThatTheFormatHolds) {
   std::mt19937 random(5);
   std::vector<std::byte> blocks;
   for (int i = 0; i < 64; ++i) {
-    Etc1Block block;
+    test::Etc1Block block;
     block.flip = i % 2 != 0;
     for (std::size_t half = 0; half < 2; ++half) {
       block.table[half] = static_cast<int>(random() % 4);
@@ -91,19 +96,21 @@ TEST(Etc1Encoder, BestRecoversBlocksThatTheFormatHolds) {
     }
     for (std::uint8_t& code : block.code) code = static_cast<std::uint8_t>(random() % 4);
     std::array<std::byte, 8> bytes{};
-    pack_etc1(block, bytes);
+    test::pack_etc1(block, bytes);
     blocks.insert(blocks.end(), bytes.begin(), bytes.end());
   }
-  const RgbaImage image = decode_etc1(blocks, 32, 32);
-  const std::vector<std::byte> again = encode_etc1(image, {.effort = Etc1Effort::kBest});
-  EXPECT_EQ(decode_etc1(again, 32, 32).pixels, image.pixels);
+  const RgbaImage image = decode_texture(TextureFormat::kEtc1Rgb, blocks, 32, 32);
+  const std::vector<std::byte> again = encode_etc1(image, {.effort = TextureEffort::kBest});
+  EXPECT_EQ(decode_texture(TextureFormat::kEtc1Rgb, again, 32, 32).pixels, image.pixels);
 }
 
 TEST(Etc1Encoder, EachEffortIsBetterThanTheOneBelow) {
   const RgbaImage photo = test::synthetic_photo(64, 64);
   double before = quality_of_libetc1(photo);
-  for (const Etc1Effort effort : kEfforts) {
-    const double db = psnr_db(photo, decode_etc1(encode_etc1(photo, {.effort = effort}), 64, 64));
+  for (const TextureEffort effort : kEfforts) {
+    const double db = psnr_db(
+        photo,
+        decode_texture(TextureFormat::kEtc1Rgb, encode_etc1(photo, {.effort = effort}), 64, 64));
     EXPECT_GT(db, before) << static_cast<int>(effort);
     before = db;
   }
@@ -122,31 +129,33 @@ TEST(Etc1Encoder, PerceptualSparesLuma) {
     }
     return sum;
   };
-  for (const Etc1Effort effort : kEfforts) {
+  for (const TextureEffort effort : kEfforts) {
     const auto decoded = [&](bool perceptual) {
-      return decode_etc1(encode_etc1(photo, {.effort = effort, .perceptual = perceptual}), 64, 64);
+      return decode_texture(TextureFormat::kEtc1Rgb,
+                            encode_etc1(photo, {.effort = effort, .perceptual = perceptual}), 64,
+                            64);
     };
     EXPECT_LT(luma_error(decoded(true)), luma_error(decoded(false)) * 0.97);
   }
 }
 
 TEST(Etc1Encoder, BytesDoNotDependOnTheSimdLevel) {
-  const std::vector<std::int64_t> levels = etc1_simd_levels();
+  const std::vector<std::int64_t> levels = simd_levels();
   RgbaImage image = test::synthetic_photo(52, 52);
   const RgbaImage grains = test::noise(52, 20, 3);
   std::copy(grains.pixels.begin(), grains.pixels.end(), image.pixels.begin());
-  for (const Etc1Effort effort : kEfforts) {
+  for (const TextureEffort effort : kEfforts) {
     for (const bool perceptual : {false, true}) {
-      const Etc1Options options = {.effort = effort, .perceptual = perceptual};
+      const EncodeOptions options = {.effort = effort, .perceptual = perceptual};
       const std::vector<std::byte> expected = encode_etc1(image, options);
       for (const std::int64_t level : levels) {
-        force_etc1_simd_level(level);
-        EXPECT_EQ(encode_etc1(image, options), expected) << etc1_simd_name(level);
+        force_simd_level(level);
+        EXPECT_EQ(encode_etc1(image, options), expected) << simd_level_name(level);
       }
-      force_etc1_simd_level(0);
+      force_simd_level(0);
     }
   }
-  for (const std::int64_t level : levels) RecordProperty(etc1_simd_name(level), "compared");
+  for (const std::int64_t level : levels) RecordProperty(simd_level_name(level), "compared");
   EXPECT_GE(levels.size(), 2U) << "one SIMD level only: nothing was compared";
 }
 

@@ -7,9 +7,9 @@
 #include <array>
 #include <random>
 
-#include "bake/texture/etc1/etc1_block.hpp"
 #include "bake/texture/texture.hpp"
 #include "modar/gl_context.hpp"
+#include "tests/texture/etc1_block.hpp"
 
 namespace modar {
 namespace {
@@ -79,7 +79,7 @@ std::vector<std::byte> random_legal_blocks() {
   const auto below = [&random](unsigned limit) { return static_cast<int>(random() % limit); };
   std::vector<std::byte> blocks;
   for (int i = 0; i < kSide / 4 * kSide / 4; ++i) {
-    Etc1Block block;
+    test::Etc1Block block;
     block.differential = below(2) != 0;
     block.flip = below(2) != 0;
     const int top = block.differential ? 31 : 15;
@@ -91,7 +91,7 @@ std::vector<std::byte> random_legal_blocks() {
     block.table = {below(8), below(8)};
     for (std::uint8_t& code : block.code) code = static_cast<std::uint8_t>(below(4));
     std::array<std::byte, 8> bytes{};
-    pack_etc1(block, bytes);
+    test::pack_etc1(block, bytes);
     blocks.insert(blocks.end(), bytes.begin(), bytes.end());
   }
   return blocks;
@@ -100,9 +100,10 @@ std::vector<std::byte> random_legal_blocks() {
 TEST(MesaEtc1, ShowsThePixelsOfOurDecoder) {
   const Result<std::unique_ptr<GlContext>> context = GlContext::create_offscreen();
   if (!context) GTEST_SKIP() << to_line(context.error());
-  if (!probe_gl_caps().etc1) GTEST_SKIP() << "this driver has no ETC1";
+  if (!probe_gl_caps().reads(TextureFormat::kEtc1Rgb)) GTEST_SKIP() << "this driver has no ETC1";
   const std::vector<std::byte> blocks = random_legal_blocks();
-  EXPECT_EQ(shown_by_gl(blocks), decode_etc1(blocks, kSide, kSide).pixels);
+  EXPECT_EQ(shown_by_gl(blocks),
+            decode_texture(TextureFormat::kEtc1Rgb, blocks, kSide, kSide).pixels);
 }
 
 }  // namespace

@@ -1,12 +1,13 @@
 // An image to ETC1 blocks: cuts it into tiles, sorts their blocks into batches, hands them to the
 // kernel.
+#include "bake/texture/etc1/etc1_encoder.hpp"
+
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 
 #include "bake/parallel.hpp"
 #include "bake/texture/etc1/etc1_kernel.hpp"
-#include "bake/texture/etc1/etc1_solid.hpp"
-#include "bake/texture/texture.hpp"
 
 namespace modar {
 namespace {
@@ -17,22 +18,22 @@ constexpr std::size_t kTile = 512;
 using Pixels16 = std::array<std::uint32_t, 16>;
 
 /// What each effort means to the kernel.
-Etc1Search search_of(const Etc1Options& options) {
+Etc1Search search_of(const EncodeOptions& options) {
   Etc1Search search;
   search.perceptual = options.perceptual;
   switch (options.effort) {
-    case Etc1Effort::kFast:
+    case TextureEffort::kFast:
       search.reach5 = 32;
       search.reach4 = 64;
       break;
-    case Etc1Effort::kGood:
+    case TextureEffort::kGood:
       search.reach5 = 24;
       search.reach4 = 32;
       search.spread5 = search.spread4 = 1;
       search.exact = true;
       search.rounds = 2;
       break;
-    case Etc1Effort::kBest:
+    case TextureEffort::kBest:
       search.reach5 = search.reach4 = 2040;  // the whole path
       search.exact = search.thorough = true;
       search.rounds = 4;
@@ -82,6 +83,84 @@ void write_block(std::uint64_t word, std::byte* out) {
   for (std::size_t i = 0; i < 8; ++i) out[i] = static_cast<std::byte>(word >> (56 - 8 * i) & 0xff);
 }
 
+constexpr std::size_t kModifiers = 32;  // table * 4 + code
+
+/// For a mode (0: 4 bits, 1: 5 bits), a modifier and a value: the best base and how far it is off.
+struct SolidTable {
+  std::uint8_t base[2][kModifiers][256]{};
+  std::uint8_t miss[2][kModifiers][256]{};
+
+  SolidTable() {
+    for (std::size_t mode = 0; mode < 2; ++mode) {
+      for (std::size_t modifier = 0; modifier < kModifiers; ++modifier) fill(mode, modifier);
+    }
+  }
+
+ private:
+  void fill(std::size_t mode, std::size_t modifier) {
+    const int size = kEtc1Modifiers[modifier / 4][modifier % 2];
+    const int add = modifier % 4 >= 2 ? -size : size;
+    for (int value = 0; value < 256; ++value) {
+      int best = 256;
+      int best_base = 0;
+      for (int q = 0; q < (mode == 1 ? 32 : 16); ++q) {
+        const int wide = mode == 1 ? etc1_expand5(q) : etc1_expand4(q);
+        const int off = std::abs(std::clamp(wide + add, 0, 255) - value);
+        if (off < best) {
+          best = off;
+          best_base = q;
+        }
+      }
+      const auto at = static_cast<std::size_t>(value);
+      base[mode][modifier][at] = static_cast<std::uint8_t>(best_base);
+      miss[mode][modifier][at] = static_cast<std::uint8_t>(best);
+    }
+  }
+};
+
+const SolidTable& solid_table() {
+  static const SolidTable table;
+  return table;
+}
+
+/// All pixels of one code in the low word.
+constexpr std::uint64_t codes_of(std::size_t code) {
+  return (code >= 2 ? std::uint64_t{0xffff0000} : 0) | (code % 2 == 1 ? 0xffff : 0);
+}
+
+/// The best block for sixteen pixels of one colour (red in the lowest byte, then green, blue), as
+/// the number whose most significant byte GL reads first. It needs no search: for each modifier
+/// the nearest base colour is known. perceptual: weights 3:6:1, else equal ones.
+std::uint64_t encode_solid(std::uint32_t rgb, bool perceptual) {
+  const SolidTable& table = solid_table();
+  const std::size_t value[3] = {rgb & 255, rgb >> 8 & 255, rgb >> 16 & 255};
+  const std::uint32_t weight[3] = {perceptual ? 3U : 1U, perceptual ? 6U : 1U, 1U};
+  std::uint32_t best = ~0U;
+  std::size_t best_mode = 0;
+  std::size_t best_modifier = 0;
+  for (std::size_t mode = 0; mode < 2; ++mode) {
+    for (std::size_t modifier = 0; modifier < kModifiers; ++modifier) {
+      std::uint32_t error = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const std::uint32_t miss = table.miss[mode][modifier][value[c]];
+        error += weight[c] * miss * miss;
+      }
+      if (error >= best) continue;
+      best = error;
+      best_mode = mode;
+      best_modifier = modifier;
+    }
+  }
+  std::uint64_t high = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::uint64_t base = table.base[best_mode][best_modifier][value[c]];
+    high = high << 8 | (best_mode == 1 ? base << 3 : base << 4 | base);
+  }
+  const std::uint64_t tables = best_modifier / 4 * 9;  // the same table in both halves
+  high = high << 8 | tables << 2 | best_mode << 1;
+  return high << 32 | codes_of(best_modifier % 4);
+}
+
 /// The blocks of a tile that wait for the kernel.
 class Tile {
  public:
@@ -91,7 +170,7 @@ class Tile {
     const bool solid = std::all_of(pixels.begin(), pixels.end(),
                                    [&pixels](std::uint32_t p) { return p == pixels[0]; });
     if (solid) {
-      write_block(encode_solid_etc1(pixels[0], search_.perceptual), out_ + 8 * index);
+      write_block(encode_solid(pixels[0], search_.perceptual), out_ + 8 * index);
       return;
     }
     // A walk is as long as the contrast asks, and a vector waits for its longest: like goes to
@@ -133,7 +212,7 @@ class Tile {
 
 }  // namespace
 
-std::vector<std::byte> encode_etc1(const RgbaImage& image, const Etc1Options& options) {
+std::vector<std::byte> encode_etc1(const RgbaImage& image, const EncodeOptions& options) {
   const std::size_t columns = (std::size_t{image.width} + 3) / 4;
   const std::size_t count = columns * ((std::size_t{image.height} + 3) / 4);
   std::vector<std::byte> blocks(count * 8);

@@ -41,9 +41,10 @@ struct Etc1BatchOut {
 void encode_etc1_batch(const Etc1BatchIn& in, const Etc1Search& search, Etc1BatchOut& out);
 
 /// SIMD levels that this machine can run, best first, as bits of Highway's targets.
-std::vector<std::int64_t> etc1_simd_levels();
-std::string etc1_simd_name(std::int64_t level);
-/// For tests: encode with this level only; 0: the best again.
-void force_etc1_simd_level(std::int64_t level);
+std::vector<std::int64_t> simd_levels();
+std::string simd_level_name(std::int64_t level);
+/// For tests: Highway's switch, which makes every kernel of this process (the pattern's too) run
+/// with this level only; 0: the best again.
+void force_simd_level(std::int64_t level);
 
 }  // namespace modar

@@ -14,8 +14,8 @@
 #define MODAR_ETC1_SEARCH_INL
 #endif
 
-#include "bake/texture/etc1/etc1_block.hpp"
 #include "bake/texture/etc1/etc1_lanes-inl.hpp"
+#include "formats/etc1.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace modar {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "formats/error.hpp"
+#include "formats/layout.hpp"
 
 namespace modar {
 
@@ -14,17 +15,21 @@ struct GlCaps {
   std::string vendor;
   std::string renderer;
   std::string version;
-  bool half_float_vertices = false;  ///< GL_OES_vertex_half_float
-  bool etc1 = false;                 ///< GL_OES_compressed_ETC1_RGB8_texture
-  bool etc1_sub_texture = false;     ///< GL_EXT_compressed_ETC1_RGB8_sub_texture
-  bool npot_mipmaps = false;         ///< GL_OES_texture_npot
-  bool depth24 = false;              ///< GL_OES_depth24
-  bool debug_groups = false;         ///< GL_KHR_debug or GL_EXT_debug_marker
-  bool instanced_arrays = false;     ///< GL_EXT/ANGLE_instanced_arrays, or the core of ES 3
+  bool half_float_vertices = false;   ///< GL_OES_vertex_half_float
+  std::uint32_t texture_formats = 0;  ///< bit n: reads the blocks of the TextureFormat n
+  bool etc1_sub_texture = false;      ///< GL_EXT_compressed_ETC1_RGB8_sub_texture
+  bool npot_mipmaps = false;          ///< GL_OES_texture_npot
+  bool depth24 = false;               ///< GL_OES_depth24
+  bool debug_groups = false;          ///< GL_KHR_debug or GL_EXT_debug_marker
+  bool instanced_arrays = false;      ///< GL_EXT/ANGLE_instanced_arrays, or the core of ES 3
   int max_texture_size = 64;
   int max_vertex_uniform_vectors = 128;
   int max_vertex_attributes = 8;
   std::uint64_t gpu_memory = 0;  ///< bytes that models and textures may take; 0: no limit
+
+  [[nodiscard]] bool reads(TextureFormat format) const {
+    return (texture_formats >> static_cast<std::uint32_t>(format) & 1) != 0;
+  }
 };
 
 /// Reads the caps of the context that is current on this thread.

@@ -1,5 +1,5 @@
-// Coverage of an atlas by triangles, dilation by pull-push, flat blocks where nothing is shown.
-#include "bake/texture/atlas.hpp"
+// Coverage of a texture by triangles, dilation by pull-push, flat blocks where nothing is shown.
+#include "bake/texture/coverage.hpp"
 
 #include <algorithm>
 #include <cmath>

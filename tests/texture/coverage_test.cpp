@@ -1,5 +1,5 @@
 // Coverage, filling and flattening of atlases; sets of textures; the quality gate.
-#include "bake/texture/atlas.hpp"
+#include "bake/texture/coverage.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "bake/lab/etc1_bench.hpp"
 #include "bake/texture/texture_quality.hpp"
-#include "bake/texture/texture_set.hpp"
+#include "bake/texture/texture_stage.hpp"
 #include "tests/texture/texture_samples.hpp"
 
 namespace modar {
@@ -75,11 +75,12 @@ TEST(Atlas, NothingUncoveredShowsAtAnyLevel) {
   TextureOptions options;
   options.coverage = &mask;
   Report report;
-  const Result<Etc1Texture> texture = bake_texture(folder.file("atlas.png"), options, report);
+  const Result<Texture> texture = bake_texture(folder.file("atlas.png"), options, report);
   ASSERT_TRUE(texture) << to_line(texture.error());
   ASSERT_EQ(texture->levels.size(), 7U);
-  for (const Etc1Level& level : texture->levels) {
-    const RgbaImage decoded = decode_etc1(level.colour, level.width, level.height);
+  for (const TextureLevel& level : texture->levels) {
+    const RgbaImage decoded =
+        decode_texture(TextureFormat::kEtc1Rgb, level.colour, level.width, level.height);
     for (std::size_t i = 0; i < decoded.pixels.size(); i += 4) {
       EXPECT_NEAR(decoded.pixels[i], 180, 8) << level.width;
       EXPECT_NEAR(decoded.pixels[i + 1], 20, 8) << level.width;
@@ -108,7 +109,7 @@ TEST(Atlas, ConstantTexturesBecomeOneTexel) {
   TextureOptions options;
   options.coverage = &mask;
   Report report;
-  const Result<Etc1Texture> texture = bake_texture(folder.file("flat.png"), options, report);
+  const Result<Texture> texture = bake_texture(folder.file("flat.png"), options, report);
   ASSERT_TRUE(texture);
   EXPECT_TRUE(texture->constant);
   EXPECT_EQ(texture->constant_rgba, (std::array<std::uint8_t, 4>{180, 20, 10, 255}));
@@ -127,7 +128,7 @@ TEST(Atlas, EmptyMaskChangesNothing) {
 
 TEST(TextureSet, FindsIdenticalTextures) {
   const test::ScratchFolder folder;
-  std::vector<Etc1Texture> textures;
+  std::vector<Texture> textures;
   for (const auto& [name, seed] : {std::pair{"a.png", 1U}, {"b.png", 2U}, {"c.png", 1U}}) {
     ASSERT_TRUE(write_png(test::synthetic_photo(16, 16, seed), folder.file(name)));
     Report report;
@@ -167,7 +168,7 @@ TEST(QualityGate, NamesTheWorstBlockAndDrawsAPicture) {
   options.min_psnr_db = 60;
   options.picture_folder = folder.file("");
   Report report;
-  const Result<Etc1Texture> texture = bake_texture(folder.file("spot.png"), options, report);
+  const Result<Texture> texture = bake_texture(folder.file("spot.png"), options, report);
   ASSERT_TRUE(texture) << to_line(texture.error());
   ASSERT_EQ(report.diagnostics.size(), 1U);
   EXPECT_EQ(report.diagnostics[0].id, "texture.quality");
