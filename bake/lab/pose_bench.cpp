@@ -15,11 +15,11 @@
 #include <opencv2/core.hpp>
 
 #include "bake/thread_clock.hpp"
+#include "bake/video/video.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/features.hpp"
 #include "modar/paper_tracker.hpp"
 #include "modar/pose_loop.hpp"
-#include "modar/video_reader.hpp"
 
 namespace modar {
 namespace {
@@ -302,28 +302,27 @@ Result<std::vector<PoseBenchRow>> bench_video(const PoseBenchOptions& options,
                                               const ProgressCallback& progress) {
   cv::setNumThreads(1);
   MODAR_ASSIGN(const Truths truths, read_truth(video.truth));
-  auto reader = VideoReader::open_file(video.video);
-  if (!reader || !reader->next().value_or(false)) {
+  MODAR_ASSIGN(Video played, Video::open(video.video));
+  auto picture = played.next();
+  if (!picture) {
     return fail(ExitCode::kIo, "bench.video", video.video, "the video cannot be read",
                 "give a video that other players show");
   }
-  const Camera camera = default_camera(reader->picture().width, reader->picture().height);
+  const Camera camera = default_camera(picture->width, picture->height);
   MODAR_ASSIGN(Fixture fixture, make_fixture(patterns_of(options, video), options, camera, true));
   MethodTallies tallies(std::filesystem::path(video.video).filename().string(), true);
-  std::uint64_t frame = 0;
-  do {
+  for (std::uint64_t frame = 0; picture; picture = played.next()) {
     const auto truth = truths.find(frame);
     // Frames that the truth does not mention are played, not judged.
     const bool judged = truths.empty() || truth != truths.end();
     MethodTallies unjudged("", true);
-    MODAR_TRY(
-        (judged ? tallies : unjudged)
-            .run(fixture, reader->gray(), truth != truths.end() ? truth->second : FrameTruth{}));
+    MODAR_TRY((judged ? tallies : unjudged)
+                  .run(fixture, *picture, truth != truths.end() ? truth->second : FrameTruth{}));
     ++frame;
-    if (progress && reader->frames() > 0) {
-      progress("video", static_cast<double>(frame) / static_cast<double>(reader->frames()));
+    if (progress && played.frames() > 0) {
+      progress("video", static_cast<double>(frame) / static_cast<double>(played.frames()));
     }
-  } while (reader->next().value_or(false));
+  }
   std::vector<PoseBenchRow> rows;
   tallies.finish(options, rows);
   return rows;

@@ -15,10 +15,10 @@
 
 #include "bake/pattern/gray_mat.hpp"
 #include "bake/pattern/trial.hpp"
+#include "bake/video/video.hpp"
 #include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
-#include "modar/video_reader.hpp"
 
 namespace modar {
 namespace {
@@ -171,16 +171,16 @@ bool is_picture(const std::string& path) {
 /// Passes frames of the video to `add`, evenly spread, about kVideoFrames of them.
 template <class Add>
 Result<void> read_video(const std::string& path, Add&& add) {
-  auto video = VideoReader::open_file(path);
-  if (!video || !video->next().value_or(false)) {
+  MODAR_ASSIGN(Video video, Video::open(path));
+  auto frame = video.next();
+  if (!frame) {
     return fail(ExitCode::kIo, "calibrate.input", path, "neither a picture nor a video",
                 "give pictures or a video that other players show");
   }
-  const auto step = std::max<std::uint64_t>(1, video->frames() / kVideoFrames);
-  std::uint64_t index = 0;
-  do {
-    if (index++ % step == 0) add(video->gray());
-  } while (video->next().value_or(false));
+  const auto step = std::max<std::uint64_t>(1, video.frames() / kVideoFrames);
+  for (std::uint64_t index = 0; frame; ++index, frame = video.next()) {
+    if (index % step == 0) add(*frame);
+  }
   return {};
 }
 

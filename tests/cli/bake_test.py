@@ -274,6 +274,12 @@ class Help(ProgramTest):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertRegex(done.stdout, r"^modar \d+\.\d+\.\d+\n$")
 
+    def test_few_libraries_are_mapped(self):
+        done = self.modar("--version", env={"LD_TRACE_LOADED_OBJECTS": "1"})
+        libraries = done.stdout.splitlines()
+        self.assertGreater(len(libraries), 5)
+        self.assertLess(len(libraries), 60)
+
     def test_a_wrong_command_line(self):
         for arguments in ([], ["fly"], ["bake", "--nonsense"], ["check"], ["bench", "nonsense"]):
             self.assert_fails(self.modar(*arguments), 1)
