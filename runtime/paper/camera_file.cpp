@@ -31,7 +31,7 @@ cv::FileNode first_of(const cv::FileStorage& file, std::initializer_list<const c
 
 /// OpenCV makes room for what a matrix states before it looks at its data.
 bool is_small(const cv::FileNode& matrix) {
-  constexpr int kMaxSide = 16;
+  constexpr int kMaxSide = 16;  // rows and columns: distortion has at most 14 values
   for (const char* side : {"rows", "cols"}) {
     const cv::FileNode node = matrix[side];
     if (!node.isInt() || static_cast<int>(node) < 1 || static_cast<int>(node) > kMaxSide) {

@@ -1,4 +1,4 @@
-// The article's four parameter sets, and the detection and description that they stand for.
+// The ModAR paper's four parameter sets, and detection and description under them.
 #include "features.hpp"
 
 #include <algorithm>

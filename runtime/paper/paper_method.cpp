@@ -1,4 +1,4 @@
-// The article's pose loop, frame by frame: match, RANSAC, Levenberg-Marquardt, corners, pose.
+// The ModAR paper's pose loop, frame by frame: match, RANSAC, Levenberg-Marquardt, corners, pose.
 #include <cmath>
 #include <vector>
 

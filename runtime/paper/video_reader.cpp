@@ -12,7 +12,7 @@
 namespace modar {
 namespace {
 
-constexpr double kDefaultFps = 30;
+constexpr double kDefaultFps = 30;  // of videos that state none: what most cameras record
 
 tl::unexpected<Error> damaged(const std::string& name, const std::string& cause) {
   return fail(ExitCode::kInvalidInput, "input.damaged", name, cause,

@@ -20,7 +20,7 @@ struct Features {
   std::uint32_t descriptor_bytes = 0;
 };
 
-/// The article's four parameter sets (Tables 4 and 5), ids 1 to 4: "orb-2000", "orb-500",
+/// The ModAR paper's four parameter sets (Tables 4 and 5), ids 1 to 4: "orb-2000", "orb-500",
 /// "brisk-3", "brisk-2". `name` fields are empty: parameter_set_name() gives them.
 std::span<const ParameterSetRecord> paper_parameter_sets();
 const char* parameter_set_name(std::uint32_t id);
