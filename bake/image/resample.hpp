@@ -9,7 +9,9 @@
 namespace modar {
 
 /// Linear light, top row first, four floats a pixel: red, green, blue, each times (alpha +
-/// kAlphaFloor), and alpha, all for white = 1. The floor keeps the colour of transparent pixels.
+/// kAlphaFloor), and alpha, all for white = 1. The floor keeps the colour
+/// of transparent pixels; 1/4096 is small beside the smallest alpha that shows, 1/255, and far from
+/// where floats lose digits. Set by hand.
 struct LinearImage {
   static constexpr float kAlphaFloor = 1.0F / 4096;
   std::uint32_t width = 0;

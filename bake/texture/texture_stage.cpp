@@ -11,7 +11,9 @@
 namespace modar {
 namespace {
 
-constexpr std::uint32_t kCoverageSide = 1024;  ///< of masks: finer would cost more than it saves
+/// Side of coverage masks, whatever the image's. Finer ones leave fewer texels uncovered that only
+/// share a mask texel with shown ones, and cost four times the time and memory a step. Set by hand.
+constexpr std::uint32_t kCoverageSide = 1024;
 
 std::uint32_t use_of(const std::string& path, bool repeat, TextureUses& textures) {
   const auto next = static_cast<std::uint32_t>(textures.uses.size());

@@ -1,4 +1,4 @@
-// An image to ETC1 blocks: cuts it into tiles, sorts their blocks into batches, hands them to the
+// An image to ETC1 blocks: blocks of one colour by tables, all others in batches through the
 // kernel.
 #include "bake/texture/etc1/etc1_encoder.hpp"
 
@@ -12,12 +12,16 @@
 namespace modar {
 namespace {
 
-/// Blocks that one thread takes at a time, and that are sorted among themselves.
+/// Blocks that one thread takes at a time and sorts by contrast. A larger tile makes batches of
+/// more equal blocks, a smaller one spreads small images over more threads. Set by hand.
 constexpr std::size_t kTile = 512;
 
 using Pixels16 = std::array<std::uint32_t, 16>;
 
-/// What each effort means to the kernel.
+/// What each effort means to the kernel: how far from the mean colour it looks (reach, spread), and
+/// how often it steps on (rounds). Chosen with `modar bench etc1`; on four Kodak photos (512x512
+/// crops) the efforts reach 36.19, 36.63 and 36.78 dB at 57, 14 and 1.2 Mpixel/s, libetc1 34.92 dB
+/// at 2.5.
 Etc1Search search_of(const EncodeOptions& options) {
   Etc1Search search;
   search.perceptual = options.perceptual;
