@@ -26,7 +26,7 @@ constexpr double kConeSlack = 1e-3;
 
 using Floats [[gnu::vector_size(16)]] = float;
 using Doubles [[gnu::vector_size(32)]] = double;
-using Words [[gnu::vector_size(16)]] = std::uint32_t;
+using Words32 [[gnu::vector_size(16)]] = std::uint32_t;
 
 /// The four half floats at `bytes`, which are finite. The bits of a half, in the place of a
 /// float's, are its value times 2^-112; subnormal ones, too.
@@ -34,12 +34,12 @@ Floats load_halves(const std::byte* bytes) {
   using Halves [[gnu::vector_size(8)]] = std::uint16_t;
   Halves halves;
   std::memcpy(&halves, bytes, sizeof halves);
-  const Words wide = __builtin_convertvector(halves, Words);
-  const Words bits = (wide & 0x7FFF) << 13;
+  const Words32 wide = __builtin_convertvector(halves, Words32);
+  const Words32 bits = (wide & 0x7FFF) << 13;
   Floats values;
   std::memcpy(&values, &bits, sizeof values);
   values *= 0x1p112f;
-  Words signs;
+  Words32 signs;
   std::memcpy(&signs, &values, sizeof signs);
   signs |= (wide & 0x8000) << 16;
   std::memcpy(&values, &signs, sizeof values);

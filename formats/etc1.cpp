@@ -64,7 +64,8 @@ void decode_etc1(std::span<const std::byte> blocks, std::uint32_t width, std::ui
       const Block block = read_block(blocks.data() + index * 8);
       for (std::uint32_t y = 0; y < std::min(4u, height - top); ++y) {
         for (std::uint32_t x = 0; x < std::min(4u, width - left); ++x) {
-          write_pixel(block, x, y, &pixels[(std::size_t{top + y} * width + left + x) * pixel_bytes]);
+          write_pixel(block, x, y,
+                      &pixels[(std::size_t{top + y} * width + left + x) * pixel_bytes]);
         }
       }
     }

@@ -7,7 +7,6 @@
 #include "bake/check/device_file.hpp"
 #include "bake/check/device_rules.hpp"
 #include "bake/check/verdict.hpp"
-#include "bake/check/verdict.hpp"
 #include "bake/check/yml_rule.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"

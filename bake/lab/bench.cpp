@@ -103,8 +103,8 @@ BenchResult bench_render_rows(const BenchOptions& command) {
   if (!measured) return tl::unexpected(measured.error());
   std::vector<BenchRow> rows;
   for (const RenderBenchRow& row : *measured) {
-    const double ratio = row.reference > 0 ? row.ours / row.reference : std::nan("");
-    rows.push_back({row.measure, row.ours, row.reference, ratio});
+    const double quotient = ratio(row.ours, row.reference);
+    rows.push_back({row.measure, row.ours, row.reference, quotient});
   }
   return rows;
 }

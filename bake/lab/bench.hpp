@@ -2,6 +2,7 @@
 // same run. Mutation of bundles has a door of its own, mutate.hpp.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,9 @@ struct BenchOptions {
   ModelBenchRequest model;
   bool json = false;  ///< no progress either
 };
+
+/// In the place of a figure that does not apply.
+inline constexpr double kNoFigure = std::numeric_limits<double>::quiet_NaN();
 
 /// A figure of ours beside the reference; what does not apply is not finite.
 struct BenchRow {

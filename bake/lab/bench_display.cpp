@@ -17,8 +17,6 @@
 namespace modar {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
 /// What the ModAR paper prints of one model on one device; its dashes are no stutters.
 struct PaperSession {
   double recognition_fps;
@@ -35,11 +33,7 @@ constexpr PaperModel kPaperModels[] = {{"pottery", {25, 17, 18, 0}, {30, 23, 12,
                                        {"bust", {26, 10, 30, 3}, {29, 20, 27, 1}},
                                        {"statue", {28, 22, 28, 2}, {30, 25, 17, 0}},
                                        {"church", {28, 8, 61, 3}, {30, 13, 54, 1}}};
-constexpr PaperSession kNoSession = {kUnknown, kUnknown, kUnknown, kUnknown};
-
-double ratio(double a, double b) {
-  return b > 0 ? a / b : kUnknown;
-}
+constexpr PaperSession kNoSession = {kNoFigure, kNoFigure, kNoFigure, kNoFigure};
 
 /// Frames a second that vision keeps up with while the pattern is seen, at most the source's own.
 double recognition_fps(const std::vector<PlayedFrame>& frames) {
@@ -50,7 +44,7 @@ double recognition_fps(const std::vector<PlayedFrame>& frames) {
     ms += frame.track_ms;
     ++count;
   }
-  if (frames.empty() || count == 0) return kUnknown;
+  if (frames.empty() || count == 0) return kNoFigure;
   const auto steps = static_cast<double>(frames.back().frame - frames.front().frame);
   const double source = ratio(steps, frames.back().time_s - frames.front().time_s);
   const double able = ms > 0 ? 1e3 * count / ms : std::numeric_limits<double>::infinity();
@@ -73,7 +67,7 @@ double display_fps(const std::vector<PlayedFrame>& frames) {
 /// Seconds from the camera's frame to the first picture with a model.
 double display_s(const std::vector<PlayedFrame>& frames) {
   const auto first = std::ranges::find(frames, true, &PlayedFrame::drawn);
-  return first == frames.end() ? kUnknown : first->latency_ms / 1e3;
+  return first == frames.end() ? kNoFigure : first->latency_ms / 1e3;
 }
 
 /// Plays at the video's own speed in a process of its own, without a window.
@@ -133,8 +127,8 @@ std::vector<BenchRow> display_rows(const std::string& model, const PlayedRun& ru
     add("table9_display_s" + device, display_s(run.frames), sessions[i].display_s);
     add("table9_stutters" + device, static_cast<double>(run.late), sessions[i].stutters);
   }
-  add("pictures", static_cast<double>(run.frames.size()), kUnknown);
-  add("dropped_frames", static_cast<double>(run.dropped), kUnknown);
+  add("pictures", static_cast<double>(run.frames.size()), kNoFigure);
+  add("dropped_frames", static_cast<double>(run.dropped), kNoFigure);
   return rows;
 }
 

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -21,7 +20,6 @@ namespace fs = std::filesystem;
 constexpr std::uint64_t kChurchTriangles = 14'628'048;  ///< of the ModAR paper's largest model
 constexpr std::uint64_t kUsualTriangles = 745'680;
 constexpr int kRuns = 3;  ///< of ours, the least processor time counts; one less of large files
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // What issue "models" asks for.
 constexpr double kGoalReadMb = 800;
@@ -110,8 +108,8 @@ class ModelBench {
       Figures theirs = probe({peer, obj_, "1"});
       const bool ran = !theirs.empty();
       add(std::string("read_mb_per_cpu_s/") + peer, speed,
-          ran ? megabytes_ / theirs["cpu_s"] : kNone);
-      add(std::string("read_peak_bytes/") + peer, ours["peak"], ran ? theirs["peak"] : kNone);
+          ran ? megabytes_ / theirs["cpu_s"] : kNoFigure);
+      add(std::string("read_peak_bytes/") + peer, ours["peak"], ran ? theirs["peak"] : kNoFigure);
     }
     add("read_wall_per_cpu/goal", ours["wall_s"] / ours["cpu_s"], kGoalReadWall);
     add("read_peak_per_array_bytes/goal", ours["peak"] / ours["array_bytes"], kGoalReadPeak);
@@ -133,7 +131,7 @@ class ModelBench {
     const auto models = Json::parse(text).find("bundle/models");
     const auto model = models ? models->at(0) : std::nullopt;
     const auto figure = model ? model->find("bytes_per_triangle") : std::nullopt;
-    bytes = figure ? figure->number().value_or(kNone) : kNone;
+    bytes = figure ? figure->number().value_or(kNoFigure) : kNoFigure;
     return outcome;
   }
 
@@ -172,9 +170,9 @@ class ModelBench {
     for (const auto& [name, words] : peers) {
       const ProcessOutcome theirs = run_measured({words, {}, ""});
       const bool ran = theirs.exit == 0;
-      add("bake_cpu_s/" + name, ours.cpu_seconds, ran ? theirs.cpu_seconds : kNone);
+      add("bake_cpu_s/" + name, ours.cpu_seconds, ran ? theirs.cpu_seconds : kNoFigure);
       add("bake_peak_bytes/" + name, static_cast<double>(ours.peak_rss_bytes),
-          ran ? static_cast<double>(theirs.peak_rss_bytes) : kNone);
+          ran ? static_cast<double>(theirs.peak_rss_bytes) : kNoFigure);
     }
   }
 
@@ -198,7 +196,7 @@ class ModelBench {
   void add_stage(const std::string& stage, const std::string& obj) {
     Figures figures = probe({stage, obj, std::to_string(command_.jobs)});
     Figures read = probe({"read", obj, "1"});
-    add(stage + "_cpu_s/read", figures.empty() ? kNone : figures["cpu_s"], read["cpu_s"]);
+    add(stage + "_cpu_s/read", figures.empty() ? kNoFigure : figures["cpu_s"], read["cpu_s"]);
   }
 
   std::string folder_;

@@ -11,6 +11,11 @@
 
 namespace modar {
 
+/// a / b, kNoFigure where b is not positive.
+inline double ratio(double a, double b) {
+  return b > 0 ? a / b : kNoFigure;
+}
+
 /// `modar bench pose`: a row a measure and band; the reference is the ModAR paper's method. Values
 /// that do not apply are not finite. Errors: kIo "pictures.folder"; those of reading pictures and
 /// videos.

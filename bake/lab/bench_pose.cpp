@@ -2,7 +2,6 @@
 // and on a video with its truth.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -31,7 +30,6 @@ double percent(int part, int whole) {
 
 /// Rows of one band: ours and, where it ran, the paper's.
 void add_rows(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   for (const PoseBenchRow& ours : measured) {
     if (ours.method != "ours") continue;
     const PoseBenchRow* paper = nullptr;
@@ -39,10 +37,10 @@ void add_rows(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& 
       if (other.band == ours.band && other.method == "paper") paper = &other;
     }
     const auto add = [&](const std::string& what, auto&& value) {
-      const double reference = paper != nullptr ? value(*paper) : kNone;
+      const double reference = paper != nullptr ? value(*paper) : kNoFigure;
       const double own = value(ours);
       rows.push_back(
-          {what + " " + ours.band, own, reference, reference != 0.0 ? own / reference : kNone});
+          {what + " " + ours.band, own, reference, reference != 0.0 ? own / reference : kNoFigure});
     };
     if (ours.without_pattern > 0) {
       add("false_pct",
@@ -106,14 +104,13 @@ Result<PoseBenchOptions> options_of(const PoseBenchRequest& command) {
 Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
                                          const ProgressCallback& progress) {
   MODAR_ASSIGN(const auto scores, bench_scores(options, progress));
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<BenchRow> rows;
   std::vector<double> of_score[3];  // all, the half that it was tuned on, the other
   std::vector<double> of_range[3];
   for (const ScoreBenchRow& one : scores) {
-    rows.push_back({"score " + one.name, 1.0 * one.score, one.range(), kNone});
-    rows.push_back({"farthest " + one.name, one.farthest, kNone, kNone});
-    rows.push_back({"tilt_deg " + one.name, one.tilt_deg, kNone, kNone});
+    rows.push_back({"score " + one.name, 1.0 * one.score, one.range(), kNoFigure});
+    rows.push_back({"farthest " + one.name, one.farthest, kNoFigure, kNoFigure});
+    rows.push_back({"tilt_deg " + one.name, one.tilt_deg, kNoFigure, kNoFigure});
     for (const std::size_t group : {std::size_t{0}, one.tuned ? std::size_t{1} : std::size_t{2}}) {
       of_score[group].push_back(one.score);
       of_range[group].push_back(one.range());
@@ -122,7 +119,7 @@ Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
   constexpr const char* kGroups[] = {"all", "tuned", "other"};
   for (std::size_t group = 0; group < 3; ++group) {
     rows.push_back({std::string("rank_correlation ") + kGroups[group],
-                    rank_correlation(of_score[group], of_range[group]), kNone, kNone});
+                    rank_correlation(of_score[group], of_range[group]), kNoFigure, kNoFigure});
   }
   return rows;
 }
@@ -130,12 +127,12 @@ Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
 Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options,
                                         const ProgressCallback& progress) {
   MODAR_ASSIGN(const auto measured, bench_many(options, progress));
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<BenchRow> rows;
   for (const ManyBenchRow& row : measured) {
     const bool held = row.reference > 0;
     rows.push_back({row.measure + " x" + std::to_string(row.patterns), row.value,
-                    held ? row.reference : kNone, held ? row.value / row.reference : kNone});
+                    held ? row.reference : kNoFigure,
+                    held ? row.value / row.reference : kNoFigure});
   }
   return rows;
 }

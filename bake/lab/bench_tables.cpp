@@ -1,7 +1,6 @@
 // The ModAR paper's Tables 6 to 8 and what it states of accuracy, beside the same figures measured
 // here: its method under its four parameter sets, and ours, on the same frames.
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "bake/lab/bench_parts.hpp"
@@ -9,8 +8,6 @@
 
 namespace modar {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// What the paper prints of one parameter set.
 struct PaperColumn {
@@ -44,10 +41,6 @@ constexpr const char* kStages[] = {"detect_ms", "describe_ms", "match_ms", "homo
 constexpr const char* kFar = "area 0.4-0.9";
 constexpr const char* kNear = "area 0.9-4";
 
-double ratio(double a, double b) {
-  return b > 0 ? a / b : kNone;
-}
-
 Result<double> mean_features(const PoseBenchOptions& options, const ParameterSetRecord& set) {
   double sum = 0;
   for (const std::string& path : options.patterns) {
@@ -70,23 +63,23 @@ void add_method(const std::vector<PoseBenchRow>& measured, const std::string& me
     for (std::size_t i = 0; i < 4; ++i) stages[i] += row.stages_ms[i] * row.frames;
     ms += row.ms * row.frames;
     frames += row.frames;
-    const double paper_pct = paper == nullptr   ? kNone
+    const double paper_pct = paper == nullptr   ? kNoFigure
                              : row.band == kFar ? paper->accuracy_far_pct
                                                 : 100.0;
     const double recognised = 100.0 * row.recognised / row.frames;
     rows.push_back({"accuracy_pct " + row.band + " " + name, recognised, paper_pct,
                     ratio(recognised, paper_pct)});
-    rows.push_back(
-        {"right_pct " + row.band + " " + name, 100.0 * row.right / row.frames, kNone, kNone});
+    rows.push_back({"right_pct " + row.band + " " + name, 100.0 * row.right / row.frames, kNoFigure,
+                    kNoFigure});
   }
   for (std::size_t i = 0; i < 4; ++i) {
     const double here = stages[i] / frames;
-    const double low = paper == nullptr ? kNone : 1e3 * paper->low_seconds[i];
-    const double mid = paper == nullptr ? kNone : 1e3 * paper->mid_seconds[i];
+    const double low = paper == nullptr ? kNoFigure : 1e3 * paper->low_seconds[i];
+    const double mid = paper == nullptr ? kNoFigure : 1e3 * paper->mid_seconds[i];
     rows.push_back({std::string("table7_") + kStages[i] + " " + name, here, low, ratio(here, low)});
     rows.push_back({std::string("table8_") + kStages[i] + " " + name, here, mid, ratio(here, mid)});
   }
-  rows.push_back({"cpu_ms " + name, ms / frames, kNone, kNone});
+  rows.push_back({"cpu_ms " + name, ms / frames, kNoFigure, kNoFigure});
 }
 
 }  // namespace

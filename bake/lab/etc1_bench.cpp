@@ -11,7 +11,7 @@
 namespace modar {
 namespace {
 
-struct Figures {
+struct EncoderFigures {
   double db = 0;
   double mpix_s = 0;
 };
@@ -36,8 +36,8 @@ RgbaImage centre_crop(const RgbaImage& image, std::uint32_t crop) {
 
 /// Runs until 0.3 s have passed or ten runs are done, at least twice; the fastest counts.
 template <class Encode>
-Figures measure(const std::vector<RgbaImage>& images, const Encode& encode) {
-  Figures figures;
+EncoderFigures measure(const std::vector<RgbaImage>& images, const Encode& encode) {
+  EncoderFigures figures;
   double pixels = 0;
   for (const RgbaImage& image : images) pixels += double{1} * image.width * image.height;
   double fastest = 0;
@@ -82,7 +82,7 @@ Result<std::vector<Etc1BenchRow>> bench_etc1(const std::vector<std::string>& fil
     if (!image) return tl::unexpected(image.error());
     images.push_back(centre_crop(*image, crop));
   }
-  Figures reference;
+  EncoderFigures reference;
   if (kHasEtc1Reference) reference = measure(images, encode_etc1_reference);
   std::vector<Etc1BenchRow> rows;
   const std::pair<const char*, TextureEffort> efforts[] = {{"fast", TextureEffort::kFast},
@@ -90,7 +90,7 @@ Result<std::vector<Etc1BenchRow>> bench_etc1(const std::vector<std::string>& fil
                                                            {"best", TextureEffort::kBest}};
   for (const auto& [name, effort] : efforts) {
     const EncodeOptions options = {.effort = effort};
-    const Figures ours =
+    const EncoderFigures ours =
         measure(images, [&options](const RgbaImage& image) { return encode_etc1(image, options); });
     add_row(rows, std::string(name) + "_db", ours.db, reference.db);
     add_row(rows, std::string(name) + "_mpix_s", ours.mpix_s, reference.mpix_s);

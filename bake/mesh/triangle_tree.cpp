@@ -150,8 +150,7 @@ double TriangleTree::nearest(const glm::dvec3& point, double enough) {
     std::uint32_t node;
     double distance;
   };
-  std::array<Entry, 64>
-      stack;  // two entries a level; halving 2^32 triangles takes 32 levels
+  std::array<Entry, 64> stack;  // two entries a level; halving 2^32 triangles takes 32 levels
   std::size_t size = 0;
   stack[size++] = {0, box_distance_square(point, nodes_[0].low, nodes_[0].high)};
   while (size > 0) {

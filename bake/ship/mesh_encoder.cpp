@@ -15,9 +15,6 @@
 namespace modar {
 namespace {
 
-/// The highest level without more memory for the decoder: time of publishing for download bytes.
-constexpr int kZstdLevel = 19;
-
 /// Values of one attribute that differ in their bytes, and the value of each vertex.
 DracoInput distinct_values(const VertexStream& stream, std::span<const std::byte> vertices,
                            std::size_t stride) {

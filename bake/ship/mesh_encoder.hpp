@@ -11,6 +11,9 @@
 
 namespace modar {
 
+/// The highest level without more memory for the decoder: time of publishing for download bytes.
+inline constexpr int kZstdLevel = 19;
+
 /// One attribute for Draco: values, and the value of each vertex.
 struct DracoInput {
   enum class Kind { kPosition, kNormal, kUv, kOther };

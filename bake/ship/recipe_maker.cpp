@@ -18,8 +18,6 @@
 namespace modar {
 namespace {
 
-/// The highest level without more memory for the decoder: time of publishing for download bytes.
-constexpr int kZstdLevel = 19;
 /// Feature sets of a pattern up to here travel as one piece: they share most descriptors, but an
 /// update downloads them all. Set by hand, above the four sets of 2000 keypoints.
 constexpr std::uint64_t kMaxPatternPiece = 4u << 20;

@@ -53,8 +53,8 @@ class VideoSource final : public FrameSource {
     MODAR_ASSIGN(const bool more, reader_.next());
     if (!more) return false;
     const BgrPicture picture = reader_.picture();
-    fill(frame, {picture.height, picture.width, CV_8UC3,
-                 const_cast<std::uint8_t*>(picture.pixels), picture.stride});
+    fill(frame, {picture.height, picture.width, CV_8UC3, const_cast<std::uint8_t*>(picture.pixels),
+                 picture.stride});
     frame.index = next_;
     frame.time_s = static_cast<double>(next_) / info_.fps;
     ++next_;

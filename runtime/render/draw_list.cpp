@@ -16,7 +16,7 @@ namespace {
 
 /// Slack for rounding, relative to the size of what is compared: about 80 roundings of a float
 /// (2^-23 each). Larger would only draw what lies that close outside.
-constexpr float kSlack = 1e-5f;
+constexpr float kRoundingSlack = 1e-5f;
 
 glm::vec3 corner(const ChunkRecord& chunk, unsigned which) {
   return {(which & 1) != 0 ? chunk.bounds_max[0] : chunk.bounds_min[0],
@@ -55,7 +55,7 @@ bool outside_frustum(const ModelView& view, const ChunkRecord& chunk) {
       reach += plane[axis] * far_side;
       size += std::abs(plane[axis] * far_side);
     }
-    if (reach < -kSlack * size) return true;
+    if (reach < -kRoundingSlack * size) return true;
   }
   return false;
 }
@@ -68,7 +68,8 @@ bool faces_away(const ModelView& view, const ChunkRecord& chunk) {
   for (unsigned i = 0; i < 8; ++i) {
     const glm::vec3 ray = corner(chunk, i) - view.eye;
     const float length = glm::length(ray);
-    if (glm::dot(ray, axis) < (chunk.cone_cutoff + kSlack) * length || length == 0.0f) return false;
+    if (glm::dot(ray, axis) < (chunk.cone_cutoff + kRoundingSlack) * length || length == 0.0f)
+      return false;
   }
   return true;
 }

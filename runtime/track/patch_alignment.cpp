@@ -300,8 +300,6 @@ constexpr int kPreciseSteps = 10;
 // off, and even patches that hardly correlate point in the right direction.
 constexpr float kTukeyFirst = 1.0f;
 constexpr float kTukey = 0.7f;
-// Radians, and the same of a homography's parameters: larger steps are not Gauss-Newton's to take.
-constexpr double kMaxRotation = 0.5;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 

@@ -26,6 +26,8 @@ inline constexpr std::size_t kMaxPatches = 256;
 /// Correlation from which a patch counts as an inlier. Blur and noise lower it for every patch,
 /// chance agreement of edges reaches 0.5; set by hand between the two.
 inline constexpr float kInlierCorrelation = 0.7f;
+/// Radians, and the same of a homography's parameters: larger steps are not Gauss-Newton's to take.
+inline constexpr double kMaxRotation = 0.5;
 
 /// A patch of the pattern's image with the sums that do not depend on the frame: of gray values, of
 /// their gradient, and of the products of the two.

@@ -28,9 +28,6 @@ constexpr double kSamePoint = 6.0;
 // Matches whose affine map is voted on, those of least distance first: their number times that of
 // the matches is the vote's cost.
 constexpr std::size_t kMaxVotes = 96;
-// Matches from which on there is a hypothesis: an affine map needs three, and as many to confirm
-// it.
-constexpr std::size_t kMinMatches = 6;
 // Votes that are fitted; those that lead to a hypothesis again are dropped. Bounds the time in
 // clutter, where no vote leads anywhere.
 constexpr int kMaxFits = 8;

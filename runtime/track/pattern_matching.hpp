@@ -19,6 +19,10 @@
 
 namespace modar::tracker {
 
+/// Matches from which on there is a hypothesis: an affine map needs three, and as many to confirm
+/// it.
+inline constexpr std::size_t kMinMatches = 6;
+
 /// A frame's feature and the pattern's feature that it resembles, with the local affine map that
 /// their orientations and scales imply.
 struct FeatureMatch {

@@ -11,11 +11,10 @@
 namespace modar::tracker {
 namespace {
 
-// Features that agree with a homography, and matches at all, below which nothing is detected.
+// Features that agree with a homography, below which nothing is detected.
 // Trades small and covered patterns for time in clutter, where the photometric check then has to
 // refuse what chance brings. By hand.
 constexpr int kMinInliers = 6;
-constexpr int kMinMatches = 6;
 // A place whose finest patches do not fit: so end 3 of 2,328 true detections, and every false one
 // (in 11,000 cluttered frames no place fitted on the finest level). So much of it must correlate,
 // in so many cells (a pattern with 8 of 11 cells alike was seen 16 times in a street's video), and
@@ -163,7 +162,8 @@ DetectionCandidate PatternSearch::find(const TrackedPattern& pattern, const Fram
   const auto hypotheses = matcher_.find(pattern, features);
   candidate.matches = matcher_.matches();
   times.match += clock.lap();
-  candidate.reason = candidate.matches < kMinMatches ? Reason::kFewMatches : Reason::kNoGeometry;
+  candidate.reason =
+      candidate.matches < static_cast<int>(kMinMatches) ? Reason::kFewMatches : Reason::kNoGeometry;
   PoseCandidate best;
   for (const HomographyHypothesis& hypothesis : hypotheses) {
     if (hypothesis.inliers < kMinInliers || best.unoccluded) break;

@@ -295,7 +295,6 @@ void add_patches(const TrackedPattern& pattern, const FrameView& frame, const Pa
 /// if the information determines nothing. covariance: of the pose.
 double step(const TrackedPattern& pattern, const Camera& camera, PoseInformation& sum, Pose& pose,
             Matrix6& covariance) {
-  constexpr double kMaxRotation = 0.5;  // radians
   sum.matrix.diagonal().array() += 1e-9 * sum.matrix.trace();
   const Vector6 change = solve_symmetric(sum.matrix, sum.vector);
   if (!change.allFinite() || change.head<3>().norm() > kMaxRotation) return -1.0;

@@ -9,8 +9,9 @@
 //   pattern_matching.hpp  features to homographies of one pattern; an index over all patterns
 //   pattern_search.hpp    finds patterns in a frame, also on a thread of its own
 //   frame_tracker.hpp     tracks patterns from frame to frame
-// Others include the public headers only: modar/pose_loop.hpp drives all of it; modar/tracker_features.hpp,
-// pose.hpp, camera.hpp, pose_smoother.hpp and focal_finder.hpp offer parts.
+// Others include the public headers only: modar/pose_loop.hpp drives all of it;
+// modar/tracker_features.hpp, pose.hpp, camera.hpp, pose_smoother.hpp and focal_finder.hpp offer
+// parts.
 #pragma once
 
 #include <array>

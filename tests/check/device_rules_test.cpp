@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "bake/check/verdict.hpp"
-#include "bake/check/verdict.hpp"
 #include "tests/formats/support.hpp"
 
 namespace {

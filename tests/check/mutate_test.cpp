@@ -6,8 +6,8 @@
 #include <set>
 #include <string>
 
-#include "bake/lab/scene_digest.hpp"
 #include "bake/lab/mutator.hpp"
+#include "bake/lab/scene_digest.hpp"
 #include "formats/check.hpp"
 #include "formats/content_summary.hpp"
 #include "tests/formats/support.hpp"

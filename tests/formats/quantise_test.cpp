@@ -146,7 +146,8 @@ TEST(Unorm, EveryValueComesBackAndBoundsHold) {
   for (unsigned c = 0; c < 256; ++c) {
     const auto value = static_cast<std::uint8_t>(c);
     ASSERT_EQ(modar::float_to_unorm8(static_cast<float>(modar::decode_normalised(value))), value);
-    ASSERT_NEAR(static_cast<double>(static_cast<float>(modar::decode_normalised(value))), c / 255.0, 6e-8);
+    ASSERT_NEAR(static_cast<double>(static_cast<float>(modar::decode_normalised(value))), c / 255.0,
+                6e-8);
   }
   for (const float value : {-1.0f, -0.0f, std::nanf(""), -std::numeric_limits<float>::infinity()}) {
     EXPECT_EQ(modar::float_to_unorm16(value), 0);

@@ -200,25 +200,26 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
       rows[static_cast<unsigned>(std::stoul(row[0]))] = row;
   }
   using modar::SectionType;
-  const std::map<SectionType, std::string> names = {{SectionType::kNames, "names"},
-                                                    {SectionType::kMeta, "meta"},
-                                                    {SectionType::kContentSummary, "content summary"},
-                                                    {SectionType::kModels, "models"},
-                                                    {SectionType::kChunks, "chunks"},
-                                                    {SectionType::kLevels, "levels"},
-                                                    {SectionType::kMaterials, "materials"},
-                                                    {SectionType::kLayouts, "layouts"},
-                                                    {SectionType::kTextures, "textures"},
-                                                    {SectionType::kTextureLevels, "texture levels"},
-                                                    {SectionType::kPatterns, "patterns"},
-                                                    {SectionType::kParameterSets, "parameter sets"},
-                                                    {SectionType::kScenes, "scenes"},
-                                                    {SectionType::kMappedFeatures, "feature twin"},
-                                                    {SectionType::kFeatureYml, "feature text"},
-                                                    {SectionType::kTrackerRecord, "tracker record"},
-                                                    {SectionType::kVertices, "vertices"},
-                                                    {SectionType::kIndices, "indices"},
-                                                    {SectionType::kTextureData, "texture data"}};
+  const std::map<SectionType, std::string> names = {
+      {SectionType::kNames, "names"},
+      {SectionType::kMeta, "meta"},
+      {SectionType::kContentSummary, "content summary"},
+      {SectionType::kModels, "models"},
+      {SectionType::kChunks, "chunks"},
+      {SectionType::kLevels, "levels"},
+      {SectionType::kMaterials, "materials"},
+      {SectionType::kLayouts, "layouts"},
+      {SectionType::kTextures, "textures"},
+      {SectionType::kTextureLevels, "texture levels"},
+      {SectionType::kPatterns, "patterns"},
+      {SectionType::kParameterSets, "parameter sets"},
+      {SectionType::kScenes, "scenes"},
+      {SectionType::kMappedFeatures, "feature twin"},
+      {SectionType::kFeatureYml, "feature text"},
+      {SectionType::kTrackerRecord, "tracker record"},
+      {SectionType::kVertices, "vertices"},
+      {SectionType::kIndices, "indices"},
+      {SectionType::kTextureData, "texture data"}};
   EXPECT_EQ(rows.size(), names.size());
   for (const auto& [type, name] : names) {
     EXPECT_EQ(rows[static_cast<unsigned>(type)].at(1), name);

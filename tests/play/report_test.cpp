@@ -6,8 +6,8 @@
 #include <regex>
 
 #include "files.hpp"
-#include "runtime/play/frame_sink.hpp"
 #include "runtime/play/frame_report.hpp"
+#include "runtime/play/frame_sink.hpp"
 #include "runtime/play/report_page.hpp"
 
 namespace modar {

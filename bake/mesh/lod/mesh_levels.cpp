@@ -24,7 +24,7 @@ constexpr double kWorthwhile = 0.8;
 constexpr double kMaxCollapse = 0.03;
 /// Of the chunk's diagonal: the texture may slide this far. Set by hand.
 constexpr double kMaxSlide = 0.01;
-constexpr std::size_t kStretch = 8;  ///< chunks between two updates of the progress bar
+constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
 /// The chunk that uses each source position, kShared where there are several.
 constexpr std::uint32_t kShared = kNoIndex - 1;
@@ -128,8 +128,8 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
   StageTimer timer(report, "levels");
   const Array<std::uint32_t> owners = owners_of_positions(mesh);
   const std::vector<ChunkGrid> grids = make_grids(mesh, options.positions);
-  for (std::size_t first = 0; first < mesh.chunks.size(); first += kStretch) {
-    const std::size_t count = std::min(kStretch, mesh.chunks.size() - first);
+  for (std::size_t first = 0; first < mesh.chunks.size(); first += kChunksPerUpdate) {
+    const std::size_t count = std::min(kChunksPerUpdate, mesh.chunks.size() - first);
     parallel_rows(static_cast<std::uint32_t>(count), options.jobs, [&](std::uint32_t i) {
       level_chunk(mesh.mesh, owners, grids[first + i], options, mesh.chunks[first + i]);
     });

@@ -19,19 +19,19 @@ namespace {
 // What OpenMesh's half-edge mesh makes of the triangles.
 
 /// Links alone: no normals, no status.
-struct Traits : OpenMesh::DefaultTraits {
+struct TopologyTraits : OpenMesh::DefaultTraits {
   HalfedgeAttributes(OpenMesh::Attributes::None);
 };
-using Mesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+using TopologyMesh = OpenMesh::TriMesh_ArrayKernelT<TopologyTraits>;
 
 /// Number of borders. A walk ends where it began: the next half-edge of a border is on the border.
-std::uint64_t count_loops(const Mesh& mesh) {
+std::uint64_t count_loops(const TopologyMesh& mesh) {
   std::vector<bool> walked(mesh.n_halfedges(), false);
   std::uint64_t loops = 0;
   for (const auto start : mesh.halfedges()) {
     if (!mesh.is_boundary(start) || walked[static_cast<std::size_t>(start.idx())]) continue;
     ++loops;
-    Mesh::HalfedgeHandle at = start;
+    TopologyMesh::HalfedgeHandle at = start;
     do {
       walked[static_cast<std::size_t>(at.idx())] = true;
       at = mesh.next_halfedge_handle(at);
@@ -42,17 +42,17 @@ std::uint64_t count_loops(const Mesh& mesh) {
 
 HalfEdgeCount count_half_edges(std::size_t vertex_count, std::span<const std::uint32_t> indices) {
   omerr().disable();  // it writes to stderr for every face it refuses
-  Mesh mesh;
+  TopologyMesh mesh;
   mesh.reserve(vertex_count, indices.size() / 2, indices.size() / 3);
   for (std::size_t v = 0; v < vertex_count; ++v) mesh.new_vertex();
   HalfEdgeCount count;
   for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
-    std::array<Mesh::VertexHandle, 3> face;
+    std::array<TopologyMesh::VertexHandle, 3> face;
     for (std::size_t k = 0; k < 3; ++k) {
-      face[k] = Mesh::VertexHandle(static_cast<int>(indices[i + k]));
+      face[k] = TopologyMesh::VertexHandle(static_cast<int>(indices[i + k]));
     }
     if (mesh.add_face(face.data(), 3).is_valid()) continue;
-    for (Mesh::VertexHandle& vertex : face) vertex = mesh.new_vertex();
+    for (TopologyMesh::VertexHandle& vertex : face) vertex = mesh.new_vertex();
     mesh.add_face(face.data(), 3);
     ++count.copied_faces;
     count.copied_vertices += 3;
@@ -67,7 +67,7 @@ HalfEdgeCount count_half_edges(std::size_t vertex_count, std::span<const std::ui
 /// vertex.
 constexpr std::uint64_t kHalfEdgeBytes = 64;
 /// Vertices that a thread takes at a time: small enough to balance load, set by hand.
-constexpr std::size_t kStretch = 1u << 14;
+constexpr std::size_t kVerticesPerPart = 1u << 14;
 
 /// Triangles by the positions that they refer to.
 struct Surface {
@@ -318,11 +318,13 @@ MeshTopology measure_topology(const TriMesh& mesh, const TopologyOptions& option
   MeshTopology topology;
   topology.model = mesh.name;
   Surface surface = make_surface(mesh);
-  std::vector<Part> parts((surface.position_count + kStretch - 1) / kStretch);
+  std::vector<Part> parts((surface.position_count + kVerticesPerPart - 1) / kVerticesPerPart);
   parallel_rows(static_cast<std::uint32_t>(parts.size()), options.jobs, [&](std::uint32_t s) {
     LinkReader reader(surface, parts[s]);
-    const std::size_t end = std::min(surface.position_count, (s + std::size_t{1}) * kStretch);
-    for (std::size_t v = s * kStretch; v < end; ++v) reader.read(static_cast<std::uint32_t>(v));
+    const std::size_t end =
+        std::min(surface.position_count, (s + std::size_t{1}) * kVerticesPerPart);
+    for (std::size_t v = s * kVerticesPerPart; v < end; ++v)
+      reader.read(static_cast<std::uint32_t>(v));
   });
   for (const Part& part : parts) add(topology, part.sums);
   topology.triangles = mesh.triangles.size();

@@ -347,22 +347,22 @@ void weld_any(SourceModel& source, TriMesh& mesh, WeldCounts& counts) {
 // The way of files whose corners repeat one index (most scans): works in the source's arrays.
 
 /// Elements that a thread takes at a time: small enough to balance load, set by hand.
-constexpr std::size_t kStretch = 1u << 16;
+constexpr std::size_t kElementsPerTask = 1u << 16;
 
 std::uint32_t stretches(std::size_t count) {
-  return static_cast<std::uint32_t>((count + kStretch - 1) / kStretch);
+  return static_cast<std::uint32_t>((count + kElementsPerTask - 1) / kElementsPerTask);
 }
 
 /// Calls body(begin, end) over [0, count) in stretches, on several threads.
 template <class Body>
 void parallel_stretches(std::size_t count, unsigned jobs, const Body& body) {
   parallel_rows(stretches(count), jobs, [&](std::uint32_t s) {
-    const std::size_t begin = s * kStretch;
-    body(begin, std::min(begin + kStretch, count));
+    const std::size_t begin = s * kElementsPerTask;
+    body(begin, std::min(begin + kElementsPerTask, count));
   });
 }
 
-enum class TriangleClass : std::uint8_t { kKeep, kFlat, kNotFinite };
+enum class TriangleClass : std::uint8_t { kKeep, kZeroArea, kNotFinite };
 
 /// Classifies each triangle; marks the positions of those that are kept.
 Array<TriangleClass> classify(const SourceModel& source, Array<std::uint8_t>& used, unsigned jobs) {
@@ -375,7 +375,7 @@ Array<TriangleClass> classify(const SourceModel& source, Array<std::uint8_t>& us
       const glm::dvec3 area =
           area_vector(source.positions[v[0]], source.positions[v[1]], source.positions[v[2]]);
       classes[t] = !is_finite(area)          ? TriangleClass::kNotFinite
-                   : area == glm::dvec3(0.0) ? TriangleClass::kFlat
+                   : area == glm::dvec3(0.0) ? TriangleClass::kZeroArea
                                              : TriangleClass::kKeep;
       if (classes[t] != TriangleClass::kKeep) continue;
       // Several threads may mark one position, all with the same value.
@@ -397,7 +397,7 @@ void keep_triangles(SourceModel& source, const Array<TriangleClass>& classes, Tr
   for (std::size_t t = 0; t < classes.size(); ++t) {
     const std::uint32_t material = materials.at(t);
     if (classes[t] != TriangleClass::kKeep) {
-      ++(classes[t] == TriangleClass::kFlat ? counts.flat : counts.not_finite);
+      ++(classes[t] == TriangleClass::kZeroArea ? counts.flat : counts.not_finite);
       continue;
     }
     mesh.triangle_material[kept] = material;

@@ -1,5 +1,5 @@
-// What drawing costs: the ModAR paper's four ways to draw copies of a model (its Tables 10 to 12) side
-// by side in one run, loading against copying, culling against brute force.
+// What drawing costs: the ModAR paper's four ways to draw copies of a model (its Tables 10 to 12)
+// side by side in one run, loading against copying, culling against brute force.
 #pragma once
 
 #include <cstdint>
