@@ -35,4 +35,9 @@ RgbaImage to_srgb(const LinearImage& image);
 LinearImage resample(const LinearImage& image, std::uint32_t width, std::uint32_t height,
                      const ResampleOptions& options);
 
+/// to_srgb(resample(to_linear(image))), bit for bit, in the memory of a few rows: a picture of
+/// 8192² pixels takes 1 GB in floats.
+RgbaImage resize(const RgbaImage& image, std::uint32_t width, std::uint32_t height,
+                 const ResampleOptions& options);
+
 }  // namespace modar

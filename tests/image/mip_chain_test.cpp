@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "bake/image/resample.hpp"
 #include "tests/texture/texture_samples.hpp"
 
 namespace modar {
@@ -82,6 +83,22 @@ TEST(MipChain, RepeatReachesAcrossTheEdge) {
   const RgbaImage clamped = mip_chain(image, false)[1];
   const RgbaImage repeated = mip_chain(image, true)[1];
   EXPECT_NE(clamped.pixels, repeated.pixels);
+}
+
+TEST(Resize, IsTheSameInBandsAsInOnePiece) {
+  for (const bool opaque : {true, false}) {
+    RgbaImage image = test::noise(61, 83, 5);
+    for (std::size_t i = 3; i < image.pixels.size() && !opaque; i += 4) {
+      image.pixels[i] = static_cast<std::uint8_t>(i % 256);
+    }
+    for (const bool repeat : {false, true}) {
+      for (const auto& [width, height] : {std::pair{16U, 32U}, {128U, 64U}, {61U, 1U}}) {
+        const ResampleOptions options = {repeat, 2};
+        const RgbaImage whole = to_srgb(resample(to_linear(image), width, height, options));
+        EXPECT_EQ(resize(image, width, height, options).pixels, whole.pixels) << width;
+      }
+    }
+  }
 }
 
 }  // namespace
