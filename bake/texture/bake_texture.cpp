@@ -30,8 +30,7 @@ std::string file_name(const std::string& path) {
 RgbaImage resized(const RgbaImage& image, const TextureOptions& options) {
   const TextureSize size = texture_size({image.width, image.height}, options);
   if (size.width == image.width && size.height == image.height) return image;
-  return to_srgb(
-      resample(to_linear(image), size.width, size.height, {options.repeat, options.jobs}));
+  return resize(image, size.width, size.height, {options.repeat, options.jobs});
 }
 
 /// Whether all texels that are shown look the same.
@@ -78,6 +77,7 @@ std::vector<RgbaImage> make_levels(const RgbaImage& source, const TextureOptions
     fill_uncovered(top, resize_coverage(*options.coverage, top.width, top.height));
   }
   texture.alpha = !is_opaque(top);
+  if (texture.alpha) fill_transparent(top);
   texture.constant = is_constant(top, texture.constant_rgba);
   if (texture.constant) {
     top = {1, 1, {texture.constant_rgba.begin(), texture.constant_rgba.end()}};

@@ -7,29 +7,85 @@
 namespace modar {
 namespace {
 
-constexpr double kMaxRepeats = 64;
+/// A triangle that spans more repeats than this along an axis counts as if it showed its whole
+/// bounding box: more rows than that would be walked for few texels. Less covers more than is
+/// shown, more costs time on scenes whose floors repeat a texture in long strips. Set by hand.
+constexpr double kMaxRepeats = 4;
 
 using Corners = std::array<std::array<double, 2>, 3>;
 
-/// Whether the unit square at (x, y) lies wholly outside of the edge from a to b; `side` is the
-/// sign of the triangle's area.
-bool outside_edge(const std::array<double, 2>& a, const std::array<double, 2>& b, double side,
-                  double x, double y) {
+/// Texels first to last of a row, unwrapped; none where last < first.
+struct Span {
+  std::int64_t first = 0;
+  std::int64_t last = 0;
+};
+
+/// Cuts the span to the texels of row y that do not lie wholly outside of the edge from a to b;
+/// `side` is the sign of the triangle's area.
+void cut_by_edge(const std::array<double, 2>& a, const std::array<double, 2>& b, double side,
+                 std::int64_t y, Span& span) {
   const double nx = (a[1] - b[1]) * side;
   const double ny = (b[0] - a[0]) * side;
-  const double best_x = nx > 0 ? x + 1 : x;
-  const double best_y = ny > 0 ? y + 1 : y;
-  return nx * (best_x - a[0]) + ny * (best_y - a[1]) < 0;
-}
-
-bool touches(const Corners& p, double side, double x, double y) {
-  return !outside_edge(p[0], p[1], side, x, y) && !outside_edge(p[1], p[2], side, x, y) &&
-         !outside_edge(p[2], p[0], side, x, y);
+  // Of the square at (x, y), the corner that lies farthest inside.
+  const double best_y = ny * (static_cast<double>(ny > 0 ? y + 1 : y) - a[1]);
+  const auto outside = [&](std::int64_t x) {
+    return nx * (static_cast<double>(nx > 0 ? x + 1 : x) - a[0]) + best_y < 0;
+  };
+  if (nx == 0) {
+    if (best_y < 0) span.last = span.first - 1;
+    return;
+  }
+  // Where the edge crosses, give or take a texel that rounding costs.
+  const double crossing = std::floor(a[0] - best_y / nx);
+  auto x = static_cast<std::int64_t>(
+      std::clamp(crossing, static_cast<double>(span.first), static_cast<double>(span.last)));
+  if (nx > 0) {
+    while (x > span.first && !outside(x - 1)) --x;
+    while (x <= span.last && outside(x)) ++x;
+    span.first = x;
+  } else {
+    while (x < span.last && !outside(x + 1)) ++x;
+    while (x >= span.first && outside(x)) --x;
+    span.last = x;
+  }
 }
 
 std::size_t wrapped(std::int64_t value, std::uint32_t size) {
   const std::int64_t rest = value % size;
   return static_cast<std::size_t>(rest < 0 ? rest + size : rest);
+}
+
+/// Marks a span of row y, wrapped around.
+void cover_span(CoverageMask& mask, std::int64_t y, Span span) {
+  if (span.last < span.first) return;
+  const auto row =
+      mask.covered.begin() + static_cast<std::ptrdiff_t>(wrapped(y, mask.height) * mask.width);
+  const std::size_t count =
+      std::min(static_cast<std::size_t>(span.last - span.first) + 1, std::size_t{mask.width});
+  const std::size_t first = wrapped(span.first, mask.width);
+  const std::size_t before_edge = std::min(count, mask.width - first);
+  std::fill_n(row + static_cast<std::ptrdiff_t>(first), before_edge, std::uint8_t{1});
+  std::fill_n(row, count - before_edge, std::uint8_t{1});
+  mask.marked += count;
+}
+
+void cover_all(CoverageMask& mask) {
+  std::fill(mask.covered.begin(), mask.covered.end(), std::uint8_t{1});
+  mask.full = true;
+}
+
+/// Whether a triangle contains a rectangle of the mask's size, and with it each texel. At a point
+/// inside, the edge functions (twice the area of the triangle of point and edge) are positive and
+/// add up to twice_area, in any proportion; a rectangle around the point fits where each is at
+/// least half of the rectangle's extent along the edge's normal.
+bool holds_a_period(const CoverageMask& mask, const Corners& p, double twice_area) {
+  double needed = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::array<double, 2>& a = p[i];
+    const std::array<double, 2>& b = p[(i + 1) % 3];
+    needed += (std::abs(b[1] - a[1]) * mask.width + std::abs(b[0] - a[0]) * mask.height) / 2;
+  }
+  return twice_area > 0 && twice_area >= needed;
 }
 
 /// A level of the pyramid: colours times weight, and weight, in floats.
@@ -38,17 +94,6 @@ struct PullLevel {
   std::uint32_t height = 0;
   std::vector<std::array<float, 5>> texels;  ///< r, g, b, a times weight; weight 0-1
 };
-
-PullLevel first_level(const RgbaImage& image, const CoverageMask& mask) {
-  PullLevel level{image.width, image.height, {}};
-  level.texels.resize(mask.covered.size());
-  for (std::size_t i = 0; i < mask.covered.size(); ++i) {
-    if (mask.covered[i] == 0) continue;
-    for (std::size_t c = 0; c < 4; ++c) level.texels[i][c] = image.pixels[4 * i + c];
-    level.texels[i][4] = 1;
-  }
-  return level;
-}
 
 PullLevel pull(const PullLevel& fine) {
   PullLevel coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
@@ -81,6 +126,18 @@ void push(const PullLevel& coarse, PullLevel& fine) {
   }
 }
 
+/// Fills the empty texels of a level.
+void pull_and_push(PullLevel& level) {
+  std::vector<PullLevel> coarser;
+  for (const PullLevel* last = &level; last->width > 1 || last->height > 1;
+       last = &coarser.back()) {
+    coarser.push_back(pull(*last));
+  }
+  for (std::size_t i = coarser.size(); i-- > 0;) {
+    push(coarser[i], i == 0 ? level : coarser[i - 1]);
+  }
+}
+
 std::uint8_t to_byte(float value) {
   return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 255.0F) + 0.5F);
 }
@@ -105,31 +162,42 @@ CoverageMask make_coverage(std::uint32_t width, std::uint32_t height) {
 }
 
 void cover_triangle(CoverageMask& mask, const std::array<std::array<double, 2>, 3>& uv) {
+  if (mask.full) return;
   Corners p;
   bool sane = true;
   for (std::size_t i = 0; i < 3; ++i) {
     p[i] = {uv[i][0] * mask.width, (1 - uv[i][1]) * mask.height};
     sane = sane && std::abs(uv[i][0]) < 1e6 && std::abs(uv[i][1]) < 1e6;
   }
-  const auto [left, right] = std::minmax({p[0][0], p[1][0], p[2][0]});
-  const auto [top, bottom] = std::minmax({p[0][1], p[1][1], p[2][1]});
-  if (!sane || right - left > kMaxRepeats * mask.width ||
-      bottom - top > kMaxRepeats * mask.height) {
-    std::fill(mask.covered.begin(), mask.covered.end(), std::uint8_t{1});
-    return;
-  }
   const double area =
       (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
-  const double side = area < 0 ? -1 : 1;
-  const auto first_x = static_cast<std::int64_t>(std::floor(left));
-  const auto first_y = static_cast<std::int64_t>(std::floor(top));
-  for (std::int64_t y = first_y; static_cast<double>(y) <= bottom; ++y) {
-    const std::size_t row = wrapped(y, mask.height) * mask.width;
-    for (std::int64_t x = first_x; static_cast<double>(x) <= right; ++x) {
-      if (!touches(p, side, static_cast<double>(x), static_cast<double>(y))) continue;
-      mask.covered[row + wrapped(x, mask.width)] = 1;
+  if (!sane || holds_a_period(mask, p, std::abs(area))) {
+    cover_all(mask);
+    return;
+  }
+  const auto [left, right] = std::minmax({p[0][0], p[1][0], p[2][0]});
+  const auto [top, bottom] = std::minmax({p[0][1], p[1][1], p[2][1]});
+  const Span columns = {static_cast<std::int64_t>(std::floor(left)),
+                        static_cast<std::int64_t>(std::floor(right))};
+  const Span rows = {static_cast<std::int64_t>(std::floor(top)),
+                     static_cast<std::int64_t>(std::floor(bottom))};
+  if (right - left > kMaxRepeats * mask.width || bottom - top > kMaxRepeats * mask.height) {
+    const std::int64_t last = std::min(rows.last, rows.first + mask.height - 1);
+    for (std::int64_t y = rows.first; y <= last; ++y) cover_span(mask, y, columns);
+  } else {
+    const double side = area < 0 ? -1 : 1;
+    for (std::int64_t y = rows.first; y <= rows.last; ++y) {
+      Span span = columns;
+      for (std::size_t i = 0; i < 3 && span.first <= span.last; ++i) {
+        cut_by_edge(p[i], p[(i + 1) % 3], side, y, span);
+      }
+      cover_span(mask, y, span);
     }
   }
+  if (mask.marked < mask.covered.size()) return;
+  // Looked at as rarely as the texels were marked once over, which costs less than marking them.
+  mask.marked = 0;
+  mask.full = std::find(mask.covered.begin(), mask.covered.end(), 0) == mask.covered.end();
 }
 
 CoverageMask resize_coverage(const CoverageMask& mask, std::uint32_t width, std::uint32_t height) {
@@ -153,18 +221,39 @@ CoverageMask resize_coverage(const CoverageMask& mask, std::uint32_t width, std:
 }
 
 void fill_uncovered(RgbaImage& image, const CoverageMask& mask) {
-  if (std::count(mask.covered.begin(), mask.covered.end(), 0) ==
-      static_cast<std::ptrdiff_t>(mask.covered.size())) {
-    return;
+  const std::vector<std::uint8_t>& covered = mask.covered;
+  if (std::all_of(covered.begin(), covered.end(), [](std::uint8_t c) { return c == 0; })) return;
+  PullLevel level{image.width, image.height, {}};
+  level.texels.resize(covered.size());
+  for (std::size_t i = 0; i < covered.size(); ++i) {
+    if (covered[i] == 0) continue;
+    for (std::size_t c = 0; c < 4; ++c) level.texels[i][c] = image.pixels[4 * i + c];
+    level.texels[i][4] = 1;
   }
-  std::vector<PullLevel> levels = {first_level(image, mask)};
-  while (levels.back().width > 1 || levels.back().height > 1) levels.push_back(pull(levels.back()));
-  for (std::size_t i = levels.size() - 1; i-- > 0;) push(levels[i + 1], levels[i]);
-  for (std::size_t i = 0; i < mask.covered.size(); ++i) {
-    if (mask.covered[i] != 0) continue;
-    for (std::size_t c = 0; c < 4; ++c) {
-      image.pixels[4 * i + c] = to_byte(levels[0].texels[i][c]);
-    }
+  pull_and_push(level);
+  for (std::size_t i = 0; i < covered.size(); ++i) {
+    if (covered[i] != 0) continue;
+    for (std::size_t c = 0; c < 4; ++c) image.pixels[4 * i + c] = to_byte(level.texels[i][c]);
+  }
+}
+
+void fill_transparent(RgbaImage& image) {
+  PullLevel level{image.width, image.height, {}};
+  level.texels.resize(image.pixels.size() / 4);
+  bool any_visible = false;
+  bool any_hidden = false;
+  for (std::size_t i = 0; i < level.texels.size(); ++i) {
+    const std::uint8_t* pixel = &image.pixels[4 * i];
+    const float weight = static_cast<float>(pixel[3]) / 255;
+    for (std::size_t c = 0; c < 3; ++c) level.texels[i][c] = pixel[c] * weight;
+    level.texels[i][4] = weight;
+    (pixel[3] == 0 ? any_hidden : any_visible) = true;
+  }
+  if (!any_visible || !any_hidden) return;
+  pull_and_push(level);
+  for (std::size_t i = 0; i < level.texels.size(); ++i) {
+    if (image.pixels[4 * i + 3] != 0) continue;
+    for (std::size_t c = 0; c < 3; ++c) image.pixels[4 * i + c] = to_byte(level.texels[i][c]);
   }
 }
 

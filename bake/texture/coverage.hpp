@@ -14,13 +14,15 @@ struct CoverageMask {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<std::uint8_t> covered;  ///< width * height
+  bool full = false;                  ///< known to be covered everywhere
+  std::uint64_t marked = 0;           ///< texels, with repetition, since `full` was looked at
 };
 
 CoverageMask make_coverage(std::uint32_t width, std::uint32_t height);
 
 /// Marks every texel whose square a triangle touches. uv: three corners, v upwards as in OBJ files
-/// (0 is the bottom row's lower edge); parts beyond [0,1] wrap around. A triangle that is not
-/// finite or spans over 64 repeats marks everything.
+/// (0 is the bottom row's lower edge); parts beyond [0,1] wrap around. A triangle that spans more
+/// than four repeats marks its bounding box; one that is not finite, everything.
 void cover_triangle(CoverageMask& mask, const std::array<std::array<double, 2>, 3>& uv);
 
 /// The mask at another size: a texel is covered where any part of it was.
@@ -30,6 +32,11 @@ CoverageMask resize_coverage(const CoverageMask& mask, std::uint32_t width, std:
 /// first (pull-push, Gortler et al., "The Lumigraph", 1996), so that no filter brings in what no
 /// triangle shows. mask has the image's size; one without any covered texel changes nothing.
 void fill_uncovered(RgbaImage& image, const CoverageMask& mask);
+
+/// Gives texels of alpha 0 the colours around them, weighted by alpha, in the same way: hidden
+/// colours reach visible texels through mips and through the blocks that they share. An image
+/// without any visible texel stays as it is.
+void fill_transparent(RgbaImage& image);
 
 /// Paints blocks of 4x4 texels that lie more than one texel away from all that is covered in the
 /// mean colour of what is: they all become the same 8 bytes.

@@ -142,7 +142,7 @@ Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
   std::vector<Texture> baked;
   for (const TextureUse& use : textures.uses) {
     options.repeat = use.repeat;
-    options.coverage = &use.coverage;
+    options.coverage = use.coverage.full ? nullptr : &use.coverage;
     MODAR_ASSIGN(Texture texture, bake_texture(use.path, options, report));
     baked.push_back(std::move(texture));
   }

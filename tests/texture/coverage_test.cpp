@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
 #include <set>
 
 #include "bake/lab/etc1_bench.hpp"
@@ -41,6 +43,74 @@ TEST(Coverage, WrapsAroundAndSurvivesNonsense) {
   CoverageMask huge = make_coverage(8, 8);
   cover_triangle(huge, Triangle{{{0, 0}, {1e300, 0}, {0, 1e9}}});
   EXPECT_EQ(count(huge), 64U);
+}
+
+/// Whether a triangle and the unit square at (x, y) meet: what is left of the triangle when it is
+/// clipped to the square (Sutherland and Hodgman, "Reentrant polygon clipping", 1974).
+bool meets_square(const Triangle& corners, double x, double y) {
+  std::vector<std::array<double, 2>> polygon(corners.begin(), corners.end());
+  const std::array<std::array<double, 3>, 4> sides = {
+      {{1, 0, -x}, {-1, 0, x + 1}, {0, 1, -y}, {0, -1, y + 1}}};
+  for (const auto& [nx, ny, d] : sides) {
+    std::vector<std::array<double, 2>> kept;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const auto& p = polygon[i];
+      const auto& q = polygon[(i + 1) % polygon.size()];
+      const double at_p = nx * p[0] + ny * p[1] + d;
+      const double at_q = nx * q[0] + ny * q[1] + d;
+      if (at_p >= 0) kept.push_back(p);
+      if ((at_p >= 0) != (at_q >= 0)) {
+        const double t = at_p / (at_p - at_q);
+        kept.push_back({p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])});
+      }
+    }
+    polygon = kept;
+  }
+  return !polygon.empty();
+}
+
+TEST(Coverage, IsWhatClippingFindsForTrianglesThatWrapAround) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1.5, 1.5);
+  constexpr std::uint32_t kWidth = 16;
+  constexpr std::uint32_t kHeight = 8;
+  for (int round = 0; round < 60; ++round) {
+    const double size = round % 3 == 0 ? 0.1 : 1;
+    const std::array<double, 2> at = {uniform(random), uniform(random)};
+    Triangle uv{};
+    Triangle texels{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      uv[i] = {at[0] + size * uniform(random), at[1] + size * uniform(random)};
+      texels[i] = {uv[i][0] * kWidth, (1 - uv[i][1]) * kHeight};
+    }
+    CoverageMask mask = make_coverage(kWidth, kHeight);
+    cover_triangle(mask, uv);
+    CoverageMask expected = make_coverage(kWidth, kHeight);
+    for (int y = -40; y < 48; ++y) {
+      for (int x = -64; x < 80; ++x) {
+        if (!meets_square(texels, x, y)) continue;
+        expected.covered[static_cast<std::size_t>((y + 40) % 8 * 16 + (x + 64) % 16)] = 1;
+      }
+    }
+    EXPECT_EQ(mask.covered, expected.covered) << round;
+  }
+}
+
+TEST(Coverage, IsFullOnceATriangleHoldsAWholeRepeat) {
+  CoverageMask floor = make_coverage(1024, 1024);
+  cover_triangle(floor, Triangle{{{0, 0}, {24, 0}, {24, 24}}});
+  EXPECT_TRUE(floor.full);
+  EXPECT_EQ(count(floor), floor.covered.size());
+  // Half of a repeat, twice: found full by looking, once as many texels were marked as there are.
+  CoverageMask tile = make_coverage(64, 64);
+  cover_triangle(tile, Triangle{{{0, 0}, {1, 0}, {1, 1}}});
+  EXPECT_FALSE(tile.full);
+  cover_triangle(tile, Triangle{{{0, 0}, {1, 1}, {0, 1}}});
+  EXPECT_TRUE(tile.full);
+  // A strip of one column's width along 9 repeats shows that column alone, and its neighbours.
+  CoverageMask strip = make_coverage(64, 64);
+  cover_triangle(strip, Triangle{{{0.501, 0}, {0.502, 0}, {0.501, 9}}});
+  EXPECT_EQ(count(strip), 64U);
 }
 
 TEST(Coverage, ResizingLosesNothing) {
@@ -123,6 +193,45 @@ TEST(Atlas, EmptyMaskChangesNothing) {
   const std::vector<std::uint8_t> before = image.pixels;
   fill_uncovered(image, make_coverage(16, 16));
   flatten_uncovered_blocks(image, make_coverage(16, 16));
+  EXPECT_EQ(image.pixels, before);
+}
+
+TEST(CutOut, HiddenColoursReachNoLevel) {
+  // A green leaf on magenta of alpha 0, as painting programs leave it.
+  constexpr std::uint32_t kSide = 64;
+  RgbaImage image = test::paint(kSide, kSide, [](std::uint32_t, std::uint32_t) {
+    return std::array<int, 3>{255, 0, 255};
+  });
+  for (std::uint32_t y = 0; y < kSide; ++y) {
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      std::uint8_t* pixel = &image.pixels[(std::size_t{y} * kSide + x) * 4];
+      pixel[3] = 0;
+      if (std::hypot(x - 31.5, y - 31.5) > 20) continue;
+      const std::uint8_t leaf[4] = {40, static_cast<std::uint8_t>(140 + x % 8), 30, 255};
+      std::copy_n(leaf, 4, pixel);
+    }
+  }
+  const test::ScratchFolder folder;
+  ASSERT_TRUE(write_png(image, folder.file("leaf.png")));
+  Report report;
+  const Result<Texture> texture = bake_texture(folder.file("leaf.png"), {}, report);
+  ASSERT_TRUE(texture) << to_line(texture.error());
+  EXPECT_TRUE(texture->alpha);
+  for (const TextureLevel& level : texture->levels) {
+    const RgbaImage colours =
+        decode_texture(TextureFormat::kEtc1Rgb, level.colour, level.width, level.height);
+    for (std::size_t i = 0; i < colours.pixels.size(); i += 4) {
+      EXPECT_NEAR(colours.pixels[i], 40, 12) << level.width;
+      EXPECT_NEAR(colours.pixels[i + 2], 30, 12) << level.width;
+    }
+  }
+}
+
+TEST(CutOut, AnImageWithoutVisibleTexelsStaysAsItIs) {
+  RgbaImage image = test::noise(8, 8, 8);
+  for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 0;
+  const std::vector<std::uint8_t> before = image.pixels;
+  fill_transparent(image);
   EXPECT_EQ(image.pixels, before);
 }
 
