@@ -4,7 +4,6 @@
 #include <new>
 #include <utility>
 
-#include "modar/pose.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
 
@@ -99,22 +98,4 @@ void modar_projection(const modar_camera* camera, double near_plane, double far_
                       float projection[16]) {
   modar::copy_matrix(modar::gl_projection(modar::camera_of(*camera), near_plane, far_plane),
                      projection);
-}
-
-void modar_view(const modar_pose* pose, float view[16]) {
-  modar::Pose ours;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      ours.rotation[column][row] = static_cast<double>(pose->rotation[3 * row + column]);
-    }
-    ours.translation[row] = static_cast<double>(pose->translation[row]);
-  }
-  modar::copy_matrix(modar::gl_view(ours), view);
-}
-
-void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose) {
-  float view[16];
-  modar_view(pose, view);
-  item->model = scene->model;
-  modar::copy_matrix(glm::make_mat4(view) * glm::make_mat4(scene->place), item->to_eye);
 }

@@ -1,4 +1,4 @@
-// modar.h: our pose loop and the two-frame rule.
+// modar.h: our pose loop, the two-frame rule, and poses as GL's matrices.
 #include <memory>
 #include <vector>
 
@@ -83,4 +83,22 @@ int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pos
 
 const char* modar_tracker_reason(const modar_tracker* tracker) {
   return modar::to_string(tracker->result.reason);
+}
+
+void modar_view(const modar_pose* pose, float view[16]) {
+  modar::Pose ours;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      ours.rotation[column][row] = static_cast<double>(pose->rotation[3 * row + column]);
+    }
+    ours.translation[row] = static_cast<double>(pose->translation[row]);
+  }
+  modar::copy_matrix(modar::gl_view(ours), view);
+}
+
+void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose) {
+  float view[16];
+  modar_view(pose, view);
+  item->model = scene->model;
+  modar::copy_matrix(glm::make_mat4(view) * glm::make_mat4(scene->place), item->to_eye);
 }
