@@ -56,8 +56,8 @@ double aspect_of_perspective(const std::array<PixelPoint, 4>& c, double width, d
   const Vector n2{k2 * m[1].x - m[0].x, k2 * m[1].y - m[0].y, k2 - 1.0};
   const Vector n3{k3 * m[2].x - m[0].x, k3 * m[2].y - m[0].y, k3 - 1.0};
   const double focal_squared = -(n2.x * n3.x + n2.y * n3.y) / (n2.z * n3.z);
-  // Focal lengths in units of the longer side. Cameras see between 10 and 110 degrees; anything
-  // else is noise in the corners.
+  // Focal lengths in units of the longer side: fields of view of 10 to 110 degrees. Anything else
+  // is taken for noise in the corners. Set by hand.
   constexpr double kShortest = 0.35;
   constexpr double kLongest = 6.0;
   if (!(focal_squared > kShortest * kShortest) || !(focal_squared < kLongest * kLongest))

@@ -7,8 +7,7 @@
 namespace modar {
 namespace {
 
-/// More batches keep more mixes of models from being copied again, and take memory. Set by hand:
-/// scenes with more than 16 different mixes in use at once were not seen.
+/// More batches keep more mixes of models from being copied again, and take memory. Set by hand.
 constexpr std::size_t kMostBatches = 16;
 
 bool holds(const Batch& batch, std::span<const BatchPart> parts) {

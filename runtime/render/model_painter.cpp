@@ -13,7 +13,7 @@ namespace modar {
 namespace {
 
 /// Copies that one call can draw. More slots mean fewer calls and more uniforms (64 are 4 KB a
-/// call); at 64 the call's own cost is shared by so many that it no longer matters. Set by hand.
+/// call). Set by hand.
 constexpr int kMostSlots = 64;
 
 glm::vec4 colour(const float (&rgb)[3], float factor, float fourth) {
