@@ -3,7 +3,6 @@
 // encoders.
 #pragma once
 
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -30,14 +29,14 @@ constexpr std::uint32_t component_bytes(std::uint8_t type) {
   return 0;
 }
 
-/// IEEE 754 binary16.
+/// IEEE 754 binary16. By the builtin: std::bit_cast is missing from the libc++ 13 of older NDKs.
 constexpr float half_to_float(std::uint16_t half) {
   const std::uint32_t sign = (half & 0x8000u) << 16;
   const std::uint32_t exponent = (half >> 10) & 0x1Fu;
   const std::uint32_t mantissa = half & 0x03FFu;
-  if (exponent == 31) return std::bit_cast<float>(sign | 0x7F800000u | (mantissa << 13));
+  if (exponent == 31) return __builtin_bit_cast(float, sign | 0x7F800000u | (mantissa << 13));
   if (exponent != 0) {
-    return std::bit_cast<float>(sign | ((exponent + 112u) << 23) | (mantissa << 13));
+    return __builtin_bit_cast(float, sign | ((exponent + 112u) << 23) | (mantissa << 13));
   }
   const float magnitude = static_cast<float>(mantissa) * 0x1p-24f;
   return sign != 0 ? -magnitude : magnitude;

@@ -1,7 +1,6 @@
 // Encoders of half floats and normalised integers.
 #include "formats/quantise.hpp"
 
-#include <bit>
 #include <cmath>
 
 namespace modar {
@@ -55,7 +54,7 @@ double clamped(float value, double low, double high) {
 }  // namespace
 
 std::uint16_t float_to_half(float value) {
-  const std::uint32_t bits = std::bit_cast<std::uint32_t>(value);
+  const std::uint32_t bits = __builtin_bit_cast(std::uint32_t, value);
   const auto sign = static_cast<std::uint16_t>((bits >> 16) & 0x8000u);
   const std::uint32_t magnitude = bits & 0x7FFFFFFFu;
   std::uint32_t half = 0;

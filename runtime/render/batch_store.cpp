@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kMostBatches = 16;
 
 bool holds(const Batch& batch, std::span<const BatchPart> parts) {
-  return std::ranges::all_of(parts, [&](const BatchPart& part) {
-    return std::ranges::any_of(batch.places, [&](const BatchPlace& place) {
+  return std::all_of(parts.begin(), parts.end(), [&](const BatchPart& part) {
+    return std::any_of(batch.places.begin(), batch.places.end(), [&](const BatchPlace& place) {
       return place.mesh == part.mesh && place.copies >= part.copies;
     });
   });
@@ -135,7 +135,9 @@ void BatchStore::write_part(const BatchPart& part, std::uint32_t layout, Batch& 
 }
 
 void BatchStore::destroy_oldest(GlState& gl) {
-  const auto oldest = std::ranges::min_element(batches_, {}, &Batch::last_used);
+  const auto oldest =
+      std::min_element(batches_.begin(), batches_.end(),
+                       [](const Batch& a, const Batch& b) { return a.last_used < b.last_used; });
   const GLuint names[] = {oldest->vertices, oldest->indices};
   for (const GLuint name : names) gl.forget_buffer(name);
   glDeleteBuffers(2, names);

@@ -158,7 +158,9 @@ bool GeometryStore::use(std::uint32_t level, GlState& gl, LevelPlace& place) {
     return true;
   }
   if (!streams_) {
-    place = {whole_vertices_, whole_indices_, vertices.gpu_offset, indices.gpu_offset};
+    // GL's offsets are pointers: on a 32-bit device, what a buffer holds fits them too.
+    place = {whole_vertices_, whole_indices_, static_cast<std::uintptr_t>(vertices.gpu_offset),
+             static_cast<std::uintptr_t>(indices.gpu_offset)};
     return true;
   }
   // Stamped before room is made, so that making room for one does not throw out the other.

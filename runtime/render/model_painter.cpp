@@ -25,9 +25,22 @@ void set_vector(GLint place, const glm::vec4& value, RenderStats& stats) {
   stats.bytes_uploaded += sizeof value;
 }
 
+// Loops of our own below and in batch_store.cpp: the libc++ 14 of the NDK has no algorithms of
+// std::ranges.
+template <std::size_t kSize>
+bool equal(const float (&a)[kSize], const float (&b)[kSize]) {
+  return std::equal(a, a + kSize, b);
+}
+
+template <class Parts>
+auto find_mesh(Parts& parts, const MeshRange& mesh) {
+  return std::find_if(parts.begin(), parts.end(),
+                      [&](const auto& each) { return each.mesh == mesh; });
+}
+
 bool equal_surface(const MaterialRecord& a, const MaterialRecord& b) {
-  return std::ranges::equal(a.ambient, b.ambient) && std::ranges::equal(a.diffuse, b.diffuse) &&
-         std::ranges::equal(a.specular, b.specular) && std::ranges::equal(a.emission, b.emission) &&
+  return equal(a.ambient, b.ambient) && equal(a.diffuse, b.diffuse) &&
+         equal(a.specular, b.specular) && equal(a.emission, b.emission) &&
          a.shininess == b.shininess && a.opacity == b.opacity && a.texture == b.texture &&
          a.flags == b.flags;
 }
@@ -141,10 +154,9 @@ bool ModelPainter::same_decoding(std::uint32_t a, std::uint32_t b) const {
   if (a == kNone || b == kNone) return false;
   const ChunkRecord& left = bundle_.chunks()[a];
   const ChunkRecord& right = bundle_.chunks()[b];
-  return std::ranges::equal(left.position_offset, right.position_offset) &&
-         left.position_step == right.position_step &&
-         std::ranges::equal(left.uv_offset, right.uv_offset) &&
-         std::ranges::equal(left.uv_scale, right.uv_scale);
+  return equal(left.position_offset, right.position_offset) &&
+         left.position_step == right.position_step && equal(left.uv_offset, right.uv_offset) &&
+         equal(left.uv_scale, right.uv_scale);
 }
 
 /// Program, uniforms but for slots, textures and switches.
@@ -401,8 +413,8 @@ bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
   job.stats.bytes_uploaded += batches_.uploaded_bytes() - before;
   slots_.clear();
   for (const Piece& piece : pieces) {
-    const auto place = std::ranges::find(batch->places, piece.mesh, &BatchPlace::mesh);
-    const auto part = std::ranges::find(parts_, piece.mesh, &BatchPart::mesh);
+    const auto place = find_mesh(batch->places, piece.mesh);
+    const auto part = find_mesh(parts_, piece.mesh);
     // Copies of a part take its slots one after the other.
     const std::size_t slot = place->first_slot + static_cast<std::size_t>(--part->copies);
     slots_.resize(std::max(slots_.size(), slot + 1));
@@ -411,7 +423,7 @@ bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
     job.stats.chunks_drawn += piece.chunks;
   }
   for (const Piece& piece : pieces) {
-    ++std::ranges::find(parts_, piece.mesh, &BatchPart::mesh)->copies;
+    ++find_mesh(parts_, piece.mesh)->copies;
   }
   set_surface(job, state, pieces[0]);
   glUniform4fv(state.program.slots, static_cast<GLsizei>(slots_.size() * 4),
@@ -441,7 +453,7 @@ void ModelPainter::draw_runs(const PaintJob& job, const Batch& batch) {
     count = 0;
   };
   for (const BatchPlace& place : batch.places) {
-    const auto part = std::ranges::find(parts_, place.mesh, &BatchPart::mesh);
+    const auto part = find_mesh(parts_, place.mesh);
     if (part == parts_.end()) {
       flush();
       continue;

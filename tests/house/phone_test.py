@@ -1,0 +1,66 @@
+"""The device's code in the phone's dialect: clang 14 with libc++ 14 (what NDK r25 has), for 32 and 64 bits."""
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+GENERATED = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin")).parent
+CLANG = shutil.which("clang++-14")
+LIBCXX = pathlib.Path("/usr/lib/llvm-14/include/c++/v1")
+# wasm: clang knows no system behind it; the C library's headers are those of Linux, EGL's of the browser.
+TARGETS = {
+    "armv7a-linux-gnueabihf": [],
+    "aarch64-linux-gnu": [],
+    "i686-linux-gnu": [],
+    "wasm32-unknown-unknown": ["-D__linux__", "-D__EMSCRIPTEN__"],
+}
+ROOMS = ("formats/**/*.cpp", "runtime/track/*.cpp", "runtime/render/*.cpp", "runtime/platform/*.cpp",
+         "runtime/capi/*.cpp")
+ONLY_64_BITS = "\nnamespace { unsigned long long planted; __UINTPTR_TYPE__ narrowed[] = {planted}; }\n"
+
+
+@unittest.skipUnless(CLANG and LIBCXX.exists(), "clang-14 or libc++-14-dev is not installed")
+class Phone(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        # The host's C library stands for the phone's: what depends on the processor is laid over it.
+        for name, text in {"gnu/stubs.h": "",
+                           "bits/wordsize.h": "#define __WORDSIZE (__SIZEOF_POINTER__ * 8)\n"
+                                              "#define __WORDSIZE_TIME64_COMPAT32 0\n"}.items():
+            (self.folder / name).parent.mkdir(exist_ok=True)
+            (self.folder / name).write_text(text)
+
+    def compile(self, target, pattern, more=""):
+        """All files of a room as one: the headers are read once."""
+        files = sorted(ROOT.glob(pattern))
+        self.assertTrue(files, pattern)
+        unit = self.folder / "unit.cpp"
+        unit.write_text("".join(f'#include "{file}"\n' for file in files) + more)
+        includes = [ROOT, ROOT / "runtime" / "include", GENERATED / "shaders" / "generated",
+                    GENERATED / "assets" / "generated"]
+        return subprocess.run(
+            [CLANG, f"--target={target}", *TARGETS[target], "-std=c++20", "-fsyntax-only", "-w", "-fno-exceptions",
+             "-fno-rtti", "-nostdinc++", "-nostdlibinc", "-DEIGEN_DONT_VECTORIZE", "-DEGL_NO_X11", "-D__regparm__(x)=",
+             *(f"-I{path}" for path in includes), "-isystem", LIBCXX, "-isystem", self.folder, "-idirafter",
+             "/usr/include", "-idirafter", "/usr/include/x86_64-linux-gnu", "-idirafter", "/usr/include/eigen3", unit],
+            capture_output=True, text=True)
+
+    def test_formats_and_runtime_compile_for_every_phone(self):
+        for target in TARGETS:
+            for room in ROOMS:
+                with self.subTest(target=target, room=room):
+                    done = self.compile(target, room)
+                    self.assertEqual(done.returncode, 0, done.stderr[:4000])
+
+    def test_a_line_that_needs_64_bits_is_seen(self):
+        for target in TARGETS:
+            done = self.compile(target, "runtime/platform/device_profile.cpp", ONLY_64_BITS)
+            self.assertEqual("narrowed" in done.stderr, target != "aarch64-linux-gnu", f"{target}: {done.stderr[:500]}")
+
+
+if __name__ == "__main__":
+    unittest.main()
