@@ -16,6 +16,10 @@ endif()
 install(TARGETS ${libraries} EXPORT modar-targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
   INCLUDES DESTINATION ${include_dir})
+set_target_properties(modar_shared PROPERTIES EXPORT_NAME shared)
+install(TARGETS modar_shared EXPORT modar-targets
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
+  INCLUDES DESTINATION ${include_dir})
 install(EXPORT modar-targets NAMESPACE modar:: DESTINATION ${package_dir} COMPONENT development)
 install(DIRECTORY ${include_folders} DESTINATION ${include_dir} COMPONENT development)
 # Of formats/ only what the headers above include; tests/cli/app_test.py links every function of theirs.

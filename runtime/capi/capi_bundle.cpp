@@ -32,6 +32,12 @@ size_t copy_name(std::string_view name, char* text, size_t size) {
 
 }  // namespace
 
+static_assert(MODAR_VERSION_NUMBER == MODAR_BUILT_VERSION, "modar.h and CMakeLists.txt name two versions");
+
+uint32_t modar_version(void) {
+  return MODAR_VERSION_NUMBER;
+}
+
 modar_bundle* modar_bundle_open(const char* path, modar_error* error) {
   if (path == nullptr) {
     hand_over(modar::missing("path"), error);

@@ -13,9 +13,19 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* The version of this header: 10000 * major + 100 * minor + patch. Below 1.0.0, a program runs with the library of
+ * the same major and minor version. */
+#define MODAR_VERSION_MAJOR 0
+#define MODAR_VERSION_MINOR 1
+#define MODAR_VERSION_PATCH 0
+#define MODAR_VERSION_NUMBER (10000 * MODAR_VERSION_MAJOR + 100 * MODAR_VERSION_MINOR + MODAR_VERSION_PATCH)
+
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* MODAR_VERSION_NUMBER of the library that is linked. */
+uint32_t modar_version(void);
 
 typedef struct modar_bundle modar_bundle;
 typedef struct modar_tracker modar_tracker;
