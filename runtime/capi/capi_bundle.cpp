@@ -17,7 +17,7 @@ modar_bundle* opened(modar::MappedFile file, std::span<const std::byte> bytes, m
     hand_over(view.error(), error);
     return nullptr;
   }
-  return new modar_bundle{std::move(file), *view};
+  return new modar_bundle{std::move(file), {}, *view};
 }
 
 /// strlcpy's contract.
@@ -32,7 +32,8 @@ size_t copy_name(std::string_view name, char* text, size_t size) {
 
 }  // namespace
 
-static_assert(MODAR_VERSION_NUMBER == MODAR_BUILT_VERSION, "modar.h and CMakeLists.txt name two versions");
+static_assert(MODAR_VERSION_NUMBER == MODAR_BUILT_VERSION,
+              "modar.h and CMakeLists.txt name two versions");
 
 uint32_t modar_version(void) {
   return MODAR_VERSION_NUMBER;
@@ -52,12 +53,37 @@ modar_bundle* modar_bundle_open(const char* path, modar_error* error) {
   return opened(std::move(*file), bytes, error);
 }
 
+modar_bundle* modar_bundle_open_fd(int fd, int64_t offset, int64_t length, modar_error* error) {
+  if (offset < 0 || length < 0) {
+    hand_over(
+        {modar::ExitCode::kUsage, "io.range", "offset", "is negative", "pass the asset's own"},
+        error);
+    return nullptr;
+  }
+  auto file = modar::MappedFile::open(fd, static_cast<std::uint64_t>(offset),
+                                      static_cast<std::uint64_t>(length));
+  if (!file) {
+    hand_over(file.error(), error);
+    return nullptr;
+  }
+  const std::span<const std::byte> bytes = file->bytes();
+  return opened(std::move(*file), bytes, error);
+}
+
 modar_bundle* modar_bundle_open_bytes(const void* bytes, size_t size, modar_error* error) {
   if (bytes == nullptr) {
     hand_over(modar::missing("bytes"), error);
     return nullptr;
   }
-  return opened({}, {static_cast<const std::byte*>(bytes), size}, error);
+  const auto* first = static_cast<const std::byte*>(bytes);
+  if (reinterpret_cast<std::uintptr_t>(bytes) % alignof(std::uint64_t) == 0)
+    return opened({}, {first, size}, error);
+  std::vector<std::uint64_t> copy(size / sizeof(std::uint64_t) + 1);
+  std::memcpy(copy.data(), first, size);
+  const std::span<const std::byte> aligned = std::as_bytes(std::span(copy)).first(size);
+  modar_bundle* bundle = opened({}, aligned, error);
+  if (bundle != nullptr) bundle->copy = std::move(copy);
+  return bundle;
 }
 
 void modar_bundle_close(modar_bundle* bundle) {
@@ -84,6 +110,22 @@ size_t modar_model_name(const modar_bundle* bundle, uint32_t index, char* text, 
 size_t modar_pattern_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
   if (index >= bundle->view.patterns().size()) return 0;
   return copy_name(bundle->view.name(bundle->view.patterns()[index].name), text, size);
+}
+
+double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index) {
+  if (index >= bundle->view.patterns().size()) return 0.0;
+  return static_cast<double>(bundle->view.patterns()[index].width_mm);
+}
+
+int modar_camera_read(const char* path, modar_camera* camera, modar_error* error) {
+  if (path == nullptr || camera == nullptr) {
+    return hand_over(modar::missing(path == nullptr ? "path" : "camera"), error);
+  }
+  const auto read = modar::read_camera_yml(path);
+  if (!read) return hand_over(read.error(), error);
+  *camera = {read->width, read->height, read->fx, read->fy, read->cx, read->cy, {}};
+  std::copy(read->distortion.begin(), read->distortion.end(), camera->distortion);
+  return 0;
 }
 
 int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scene) {

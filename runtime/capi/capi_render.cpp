@@ -49,6 +49,41 @@ modar::CameraPicture picture_of(const modar_picture& picture) {
   return ours;
 }
 
+modar::SurfaceView surface_of(const modar_surface& surface) {
+  const modar_surface asked = modar::grown(surface);
+  return {asked.x,        asked.y,           asked.width,      asked.height,
+          asked.rotation, asked.mirror != 0, asked.cover != 0, asked.keep_depth == 0};
+}
+
+/// The items of models that there are, into the renderer's own list.
+void take_items(modar_renderer& renderer, const modar_item* items, size_t count) {
+  renderer.items.clear();
+  for (size_t i = 0; i < count; ++i) {
+    if (items[i].model >= renderer.view.models().size()) continue;
+    renderer.items.push_back({items[i].model, glm::make_mat4(items[i].to_eye)});
+  }
+}
+
+/// The caller's, or the camera's with depth limits that enclose the items.
+glm::mat4 projection_of(const modar_renderer& renderer, const modar_camera* camera,
+                        const float* projection) {
+  if (projection != nullptr) return glm::make_mat4(projection);
+  if (camera == nullptr || renderer.items.empty()) return glm::mat4(1.0f);
+  const modar::DepthRange range = modar::depth_range(renderer.view, renderer.items);
+  return modar::gl_projection(modar::camera_of(*camera), range.near_plane, range.far_plane);
+}
+
+/// Without a picture, the camera's size alone.
+modar::CameraPicture frame_of(const modar_picture* picture, const modar_camera* camera) {
+  if (picture != nullptr) return picture_of(*picture);
+  modar::CameraPicture frame;
+  if (camera != nullptr) {
+    frame.width = camera->width;
+    frame.height = camera->height;
+  }
+  return frame;
+}
+
 }  // namespace
 
 modar_context* modar_context_create(modar_error* error) {
@@ -116,20 +151,64 @@ void modar_renderer_set_light(modar_renderer* renderer, const float direction[3]
 void modar_renderer_render(modar_renderer* renderer, const modar_picture* picture,
                            const modar_camera* camera, const float projection[16],
                            const modar_item* items, size_t count) {
-  renderer->items.clear();
-  for (size_t i = 0; i < count; ++i) {
-    if (items[i].model >= renderer->view.models().size()) continue;
-    renderer->items.push_back({items[i].model, glm::make_mat4(items[i].to_eye)});
-  }
-  glm::mat4 matrix(1.0f);
-  if (projection != nullptr) {
-    matrix = glm::make_mat4(projection);
-  } else if (camera != nullptr && !renderer->items.empty()) {
-    const modar::DepthRange range = modar::depth_range(renderer->view, renderer->items);
-    matrix = modar::gl_projection(modar::camera_of(*camera), range.near_plane, range.far_plane);
-  }
-  renderer->renderer->render(picture == nullptr ? modar::CameraPicture() : picture_of(*picture),
-                             matrix, renderer->items);
+  take_items(*renderer, items, count);
+  renderer->renderer->render(frame_of(picture, camera),
+                             projection_of(*renderer, camera, projection), renderer->items);
+}
+
+void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
+                         const modar_picture* picture, const modar_camera* camera,
+                         const float projection[16], const modar_item* items, size_t count) {
+  take_items(*renderer, items, count);
+  renderer->renderer->draw(surface_of(*surface), frame_of(picture, camera),
+                           projection_of(*renderer, camera, projection), renderer->items);
+}
+
+void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
+                            double y, double* frame_x, double* frame_y) {
+  const glm::dvec2 pixel =
+      modar::frame_pixel(surface_of(*surface), camera->width, camera->height, {x, y});
+  *frame_x = pixel.x;
+  *frame_y = pixel.y;
+}
+
+int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double frame_x,
+               double frame_y, const modar_item* items, size_t count, modar_hit* hit) {
+  std::vector<modar::DrawItem> ours;
+  for (size_t i = 0; i < count; ++i)
+    ours.push_back({items[i].model, glm::make_mat4(items[i].to_eye)});
+  const auto found = modar::pick(bundle->view, modar::camera_of(*camera), {frame_x, frame_y}, ours);
+  if (!found) return 0;
+  *hit = {found->item, {found->point.x, found->point.y, found->point.z}, found->distance};
+  return 1;
+}
+
+void modar_render_options_default(modar_render_options* options) {
+  const modar::RenderOptions ours;
+  *options = {sizeof *options,
+              {ours.light.x, ours.light.y, ours.light.z},
+              ours.light_strength,
+              ours.ambient_strength,
+              {ours.clear_colour.r, ours.clear_colour.g, ours.clear_colour.b, ours.clear_colour.a},
+              ours.lod_pixels,
+              ours.exclusive_context ? 1 : 0};
+}
+
+void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options) {
+  const modar_render_options asked = modar::grown(*options);
+  modar::RenderOptions ours;
+  ours.light = glm::make_vec3(asked.light);
+  ours.light_strength = asked.light_strength;
+  ours.ambient_strength = asked.ambient_strength;
+  ours.clear_colour = glm::make_vec4(asked.clear_colour);
+  ours.lod_pixels = asked.lod_pixels;
+  ours.exclusive_context = asked.exclusive != 0;
+  renderer->renderer->set_options(ours);
+}
+
+uint64_t modar_renderer_gpu_bytes(const modar_renderer* renderer) {
+  const modar::GpuMemory memory = renderer->renderer->gpu_memory();
+  return memory.geometry + memory.textures + memory.batches;
 }
 
 void modar_renderer_show(modar_renderer* renderer, int window_width, int window_height) {

@@ -2,13 +2,17 @@
 #include <memory>
 #include <vector>
 
+#include "modar/focal_finder.hpp"
 #include "modar/pose_loop.hpp"
+#include "modar/pose_smoother.hpp"
 #include "runtime/capi/handles.hpp"
 
 struct modar_tracker {
   modar::Camera camera;
   std::unique_ptr<modar::PoseLoop> loop;
   modar::Hysteresis hysteresis;
+  modar::PoseSmoother smoother;
+  double time_s = 0;
   modar::TrackResult result;
   std::vector<modar_pose> poses;  ///< one a pattern
 };
@@ -28,19 +32,46 @@ void set_pose(const modar::Pose& from, modar_pose& to) {
 
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     modar_error* error) {
-  if (bundle == nullptr || camera == nullptr) {
-    modar::hand_over(modar::missing(bundle == nullptr ? "bundle" : "camera"), error);
+  const modar_tracker_options options = {sizeof options, 0, 0, 0.0};
+  return modar_tracker_create_with(bundle, camera, &options, error);
+}
+
+modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar_camera* camera,
+                                         const modar_tracker_options* options, modar_error* error) {
+  if (bundle == nullptr || camera == nullptr || options == nullptr) {
+    const char* none = bundle == nullptr ? "bundle" : camera == nullptr ? "camera" : "options";
+    modar::hand_over(modar::missing(none), error);
     return nullptr;
   }
   const modar::Camera ours = modar::camera_of(*camera);
-  auto loop = modar::PoseLoop::create(bundle->view, ours);
+  if (const auto valid = modar::validate(ours); !valid) {
+    modar::hand_over(valid.error(), error);
+    return nullptr;
+  }
+  const modar_tracker_options asked = modar::grown(*options);
+  modar::PoseLoopOptions how;
+  how.async_search = asked.async_search != 0;
+  if (asked.search_every > 0) how.search_every = asked.search_every;
+  auto loop = modar::PoseLoop::create(bundle->view, ours, how);
   if (!loop) {
     modar::hand_over(loop.error(), error);
     return nullptr;
   }
   const std::size_t patterns = bundle->view.patterns().size();
-  return new modar_tracker{
-      ours, std::move(*loop), modar::Hysteresis(patterns), {}, std::vector<modar_pose>(patterns)};
+  const double smooth_ms = std::clamp(asked.smooth_ms, 0.0, 1000.0);
+  return new modar_tracker{ours,
+                           std::move(*loop),
+                           modar::Hysteresis(patterns),
+                           modar::PoseSmoother(patterns, smooth_ms),
+                           0,
+                           {},
+                           std::vector<modar_pose>(patterns)};
+}
+
+void modar_tracker_reset(modar_tracker* tracker) {
+  tracker->loop->reset();
+  tracker->hysteresis = modar::Hysteresis(tracker->poses.size());
+  tracker->poses.assign(tracker->poses.size(), modar_pose{});
 }
 
 void modar_tracker_destroy(modar_tracker* tracker) {
@@ -49,17 +80,25 @@ void modar_tracker_destroy(modar_tracker* tracker) {
 
 int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride,
                        modar_error* error) {
+  return modar_tracker_step_at(tracker, gray, stride, tracker->time_s + 1.0 / 30.0, error);
+}
+
+int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
+                          modar_error* error) {
   if (gray == nullptr) return modar::hand_over(modar::missing("gray"), error);
   const modar::Camera& camera = tracker->camera;
   const auto done = tracker->loop->step(
       {gray, camera.width, camera.height, static_cast<std::ptrdiff_t>(stride)}, tracker->result);
   if (!done) return modar::hand_over(done, error);
+  tracker->time_s = time_s;
+  tracker->smoother.step(time_s, tracker->result.visible);
   const auto states = tracker->hysteresis.step(tracker->result.visible);
   for (std::size_t i = 0; i < states.size(); ++i) {
     modar_pose& pose = tracker->poses[i];
     pose.shown = states[i].shown ? 1 : 0;
     pose.visible = 0;
     pose.inliers = 0;
+    pose.fit = 0;
     if (states[i].shown) set_pose(states[i].pose, pose);
   }
   for (const modar::Detection& seen : tracker->result.visible) {
@@ -67,6 +106,10 @@ int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t strid
     set_pose(seen.pose, pose);
     pose.visible = 1;
     pose.inliers = seen.inliers;
+    pose.fit =
+        seen.matches > 0
+            ? std::min(1.0f, static_cast<float>(seen.inliers) / static_cast<float>(seen.matches))
+            : 0;
     for (std::size_t i = 0; i < seen.corners.size(); ++i) {
       pose.corners[2 * i] = static_cast<float>(seen.corners[i].x);
       pose.corners[2 * i + 1] = static_cast<float>(seen.corners[i].y);
@@ -101,4 +144,34 @@ void modar_item_place(modar_item* item, const modar_scene* scene, const modar_po
   modar_view(pose, view);
   item->model = scene->model;
   modar::copy_matrix(glm::make_mat4(view) * glm::make_mat4(scene->place), item->to_eye);
+}
+
+struct modar_focal_finder {
+  std::unique_ptr<modar::FocalFinder> finder;
+  int width = 0;
+  int height = 0;
+};
+
+modar_focal_finder* modar_focal_finder_create(const modar_bundle* bundle, int width, int height,
+                                              modar_error* error) {
+  if (bundle == nullptr) {
+    modar::hand_over(modar::missing("bundle"), error);
+    return nullptr;
+  }
+  auto finder = modar::FocalFinder::create(bundle->view, width, height);
+  if (!finder) {
+    modar::hand_over(finder.error(), error);
+    return nullptr;
+  }
+  return new modar_focal_finder{std::move(*finder), width, height};
+}
+
+void modar_focal_finder_destroy(modar_focal_finder* finder) {
+  delete finder;
+}
+
+double modar_focal_finder_look(modar_focal_finder* finder, const uint8_t* gray, size_t stride) {
+  finder->finder->add_frame(
+      {gray, finder->width, finder->height, static_cast<std::ptrdiff_t>(stride)});
+  return finder->finder->focal().value_or(0.0);
 }

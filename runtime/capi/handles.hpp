@@ -2,18 +2,22 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <string>
+#include <vector>
 
 #include <glm/gtc/type_ptr.hpp>
 
 #include "formats/bundle_view.hpp"
 #include "modar/camera.hpp"
+#include "modar/camera_yml.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/modar.h"
 
 struct modar_bundle {
-  modar::MappedFile file;  ///< empty where the bytes are the caller's
+  modar::MappedFile file;           ///< empty where the bytes are the caller's
+  std::vector<std::uint64_t> copy;  ///< of bytes that were not aligned; else empty
   modar::BundleView view;
 };
 
@@ -41,6 +45,15 @@ inline int hand_over(const Error& error, modar_error* to) {
 
 inline int hand_over(const Result<void>& result, modar_error* to) {
   return result ? 0 : hand_over(result.error(), to);
+}
+
+/// The caller's options in a structure of this version's size: what an older caller did not know is
+/// 0.
+template <class Options>
+Options grown(const Options& options) {
+  Options ours{};
+  std::memcpy(&ours, &options, std::min(options.size, sizeof ours));
+  return ours;
 }
 
 /// What a caller forgot.

@@ -1,6 +1,7 @@
 // Maps a file for reading with mmap.
 #include "modar/mapped_file.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -53,21 +54,67 @@ Result<MappedFile> MappedFile::open(const std::string& path) {
   ::madvise(address, size, MADV_RANDOM);
   MappedFile mapped;
   mapped.bytes_ = {static_cast<const std::byte*>(address), size};
+  mapped.mapped_ = mapped.bytes_;
   return mapped;
 }
 
-MappedFile::MappedFile(MappedFile&& other) noexcept : bytes_(std::exchange(other.bytes_, {})) {}
+Result<MappedFile> MappedFile::open(int descriptor, std::uint64_t offset, std::uint64_t length) {
+  struct stat status {};
+  const std::string where = "descriptor " + std::to_string(descriptor);
+  if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
+    return fail(ExitCode::kIo, "io.map", where, "this is not a regular file", "open a file");
+  }
+  const std::uint64_t file_size = static_cast<std::uint64_t>(status.st_size);
+  if (length == 0 || offset > file_size || length > file_size - offset || length > SIZE_MAX / 2) {
+    return fail(ExitCode::kUsage, "io.range", where, "the file does not hold that range",
+                "pass the asset's own offset and length");
+  }
+  const std::size_t size = static_cast<std::size_t>(length);
+  MappedFile part;
+  if (offset % alignof(std::uint64_t) != 0) {
+    part.copy_.reset(new std::byte[size]);
+    for (std::size_t at = 0; at < size;) {
+      const ssize_t got =
+          ::pread(descriptor, part.copy_.get() + at, size - at, static_cast<off_t>(offset + at));
+      if (got <= 0 && errno != EINTR) {
+        return fail(ExitCode::kIo, "io.map", where, std::strerror(errno), "check the file");
+      }
+      at += static_cast<std::size_t>(std::max<ssize_t>(got, 0));
+    }
+    part.bytes_ = {part.copy_.get(), size};
+    return part;
+  }
+  const std::uint64_t lead = offset % static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::size_t whole = size + static_cast<std::size_t>(lead);
+  void* const address =
+      ::mmap(nullptr, whole, PROT_READ, MAP_PRIVATE, descriptor, static_cast<off_t>(offset - lead));
+  if (address == MAP_FAILED) {
+    return fail(ExitCode::kIo, "io.map", where, std::strerror(errno),
+                "free some memory or address space");
+  }
+  ::madvise(address, whole, MADV_RANDOM);
+  part.mapped_ = {static_cast<const std::byte*>(address), whole};
+  part.bytes_ = part.mapped_.subspan(static_cast<std::size_t>(lead));
+  return part;
+}
+
+MappedFile::MappedFile(MappedFile&& other) noexcept
+    : bytes_(std::exchange(other.bytes_, {})),
+      mapped_(std::exchange(other.mapped_, {})),
+      copy_(std::move(other.copy_)) {}
 
 MappedFile& MappedFile::operator=(MappedFile&& other) noexcept {
   if (this != &other) {
-    unmap(bytes_);
+    unmap(mapped_);
     bytes_ = std::exchange(other.bytes_, {});
+    mapped_ = std::exchange(other.mapped_, {});
+    copy_ = std::move(other.copy_);
   }
   return *this;
 }
 
 MappedFile::~MappedFile() {
-  unmap(bytes_);
+  unmap(mapped_);
 }
 
 void expect_reading(std::span<const std::byte> bytes) {

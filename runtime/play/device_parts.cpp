@@ -5,6 +5,7 @@
 #include "formats/atomic_file.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
+#include "modar/camera_yml.hpp"
 #include "modar/camera_file.hpp"
 #include "overlay.hpp"
 #include "raw_source.hpp"
@@ -86,7 +87,7 @@ Result<std::shared_ptr<const SpotPattern>> make_spot_pattern(
 }
 
 Result<Camera> read_camera_file(const std::string& path) {
-  return left_out("camera.unsupported", path, "camera files");
+  return read_camera_yml(path);
 }
 
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {

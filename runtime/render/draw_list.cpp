@@ -38,11 +38,15 @@ ModelView model_view(const glm::mat4& projection, const glm::mat4& to_eye, int h
   const glm::dmat3 linear(to_eye);
   view.eye = glm::vec3(-(glm::inverse(linear) * glm::dvec3(to_eye[3])));
   view.perspective = std::abs(projection[2][3]) > 0.0f;
-  view.mirrored = glm::determinant(linear) < 0.0;
+  // A projection that mirrors the picture (a front camera) turns the winding as well.
+  const glm::mat4& p = projection;
+  const bool flips = p[0][0] * p[1][1] - p[1][0] * p[0][1] < 0.0f;
+  view.mirrored = (glm::determinant(linear) < 0.0) != flips;
   view.scale = static_cast<float>(
       std::sqrt(std::max({glm::dot(linear[0], linear[0]), glm::dot(linear[1], linear[1]),
                           glm::dot(linear[2], linear[2])})));
-  view.pixels = 0.5f * static_cast<float>(height) * std::abs(projection[1][1]);
+  // The row's length: a picture that is turned by 90 degrees has its scale in the other column.
+  view.pixels = 0.5f * static_cast<float>(height) * std::hypot(p[0][1], p[1][1]);
   return view;
 }
 

@@ -30,6 +30,8 @@ struct GlExtensions {
   PFNGLPOPDEBUGGROUPKHRPROC pop_debug_group = nullptr;
   PFNGLPUSHGROUPMARKEREXTPROC push_group_marker = nullptr;
   PFNGLPOPGROUPMARKEREXTPROC pop_group_marker = nullptr;
+  PFNGLBINDVERTEXARRAYOESPROC bind_vertex_array = nullptr;  ///< of ES 3, or of the extension
+  void(GL_APIENTRYP bind_sampler)(GLuint unit, GLuint sampler) = nullptr;  ///< of ES 3
 
   [[nodiscard]] bool instancing() const {
     return draw_elements_instanced != nullptr && vertex_attrib_divisor != nullptr;
@@ -38,6 +40,51 @@ struct GlExtensions {
 
 /// caps: masked ones; what they lack is not looked up.
 GlExtensions load_gl_extensions(const GlCaps& caps);
+
+/// What GL calls of ours change, as the app had it, brought back when this ends: framebuffer,
+/// viewport, vertex array object, program, buffers, the textures and samplers of units 0 to 2, the
+/// active unit, blending, culling, depth, scissor, stencil test, polygon offset, masks, clear
+/// colour and the pixel store. Of the default vertex array object, the attributes 0 to 7 end
+/// disabled, with a divisor of 0, and their pointers are ours.
+class SavedGlState {
+ public:
+  /// all: false saves and restores the framebuffer alone (RenderOptions::exclusive_context).
+  SavedGlState(const GlExtensions& extensions, bool all);
+  SavedGlState(const SavedGlState&) = delete;
+  SavedGlState& operator=(const SavedGlState&) = delete;
+  ~SavedGlState();
+
+ private:
+  static constexpr std::size_t kUnits = 3;
+  static constexpr std::size_t kStored = 6;
+
+  void save_objects();
+  void restore_objects() const;
+
+  const GlExtensions& extensions_;
+  bool all_;
+  GLint framebuffer_ = 0;
+  GLint renderbuffer_ = 0;
+  GLint vertex_array_ = 0;
+  std::array<GLint, 2> pixel_buffers_{};  ///< pack, unpack
+  GLint program_ = 0;
+  GLint array_buffer_ = 0;
+  GLint index_buffer_ = 0;
+  GLint active_unit_ = 0;
+  std::array<GLint, kUnits> textures_{};
+  std::array<GLint, kUnits> samplers_{};
+  std::array<GLint, 4> viewport_{};
+  std::array<GLint, 4> scissor_{};
+  std::array<GLint, 6> blend_{};  ///< equations and factors: RGB, then alpha
+  std::array<GLint, 3> modes_{};  ///< culled face, front face, depth function
+  std::array<GLint, kStored> pixel_store_{};
+  std::array<GLboolean, 6> switches_{};
+  std::array<GLboolean, 4> colour_mask_{};
+  GLboolean depth_mask_ = 0;
+  std::array<GLfloat, 4> clear_colour_{};
+  std::array<GLfloat, 2> depth_range_{};
+  GLfloat clear_depth_ = 1;
+};
 
 /// Names the GL commands of its lifetime for profilers and traces, where the context can.
 class DebugGroup {

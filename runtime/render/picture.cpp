@@ -124,7 +124,8 @@ Result<void> Background::link(Kind kind) {
   if (!linked) return tl::unexpected<Error>(linked.error());
   program.id = *linked;
   const auto place = [&](const char* name) { return glGetUniformLocation(program.id, name); };
-  program.uv = place("u_uv");
+  program.turn = place("u_turn");
+  program.start = place("u_start");
   program.range = place("u_range");
   program.swap = place("u_swap");
   glUseProgram(program.id);
@@ -201,7 +202,7 @@ void Background::set_filters(bool exact, GlState& gl) {
   }
 }
 
-int Background::draw(bool exact, GlState& gl) {
+int Background::draw(bool exact, const TextureMap& map, GlState& gl) {
   const Kind kind = kind_of(format_);
   Program& program = programs_[kind];
   if (program.id == 0 && !program.failed) {
@@ -221,17 +222,15 @@ int Background::draw(bool exact, GlState& gl) {
     }
     glUniform1f(program.swap, format_ == PictureFormat::kNv21 ? 1.0f : 0.0f);
   }
-  // Row 0 of the texture is the top of the picture.
-  return draw_rectangle(program, {1.0f, -1.0f, 0.0f, 1.0f}, gl);
+  return draw_rectangle(program, map, gl);
 }
 
 int Background::draw_texture(GLuint texture, GlState& gl) {
   gl.bind_texture(0, texture);
-  return draw_rectangle(programs_[kRgb], {1.0f, 1.0f, 0.0f, 0.0f}, gl);
+  return draw_rectangle(programs_[kRgb], {{1.0f, 0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}}, gl);
 }
 
-int Background::draw_rectangle(const Program& program, const std::array<float, 4>& uv,
-                               GlState& gl) {
+int Background::draw_rectangle(const Program& program, const TextureMap& map, GlState& gl) {
   gl.use_program(program.id);
   gl.set_depth_test(false);
   gl.set_blending(false);
@@ -239,7 +238,8 @@ int Background::draw_rectangle(const Program& program, const std::array<float, 4
   gl.set_front_face(GL_CCW);
   gl.set_attribute(kAttributePosition, {rectangle_, 2, GL_FLOAT, GL_FALSE, 8, 0});
   gl.enable_attributes(1u << kAttributePosition);
-  glUniform4fv(program.uv, 1, uv.data());
+  glUniform4fv(program.turn, 1, map.turn.data());
+  glUniform2fv(program.start, 1, map.start.data());
   glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
   return 1;
 }

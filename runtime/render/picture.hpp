@@ -33,6 +33,12 @@ class Target {
   int height_ = 0;
 };
 
+/// Corners of a viewport (0 or 1, y up) to texture coordinates: start + x * across + y * up.
+struct TextureMap {
+  std::array<float, 4> turn{1.0f, 0.0f, 0.0f, -1.0f};  ///< across, then up
+  std::array<float, 2> start{0.0f, 1.0f};              ///< as it stands: row 0 is the picture's top
+};
+
 class Background {
  public:
   /// Makes the rectangle and the RGB program in the current context. Errors: kUnsupported "gl.*".
@@ -44,7 +50,7 @@ class Background {
   std::uint64_t upload(const CameraPicture& picture, GlState& gl);
   /// Fills the viewport with the picture sent last; exact: a texel is a pixel there. Answers the
   /// draw calls: none where the driver cannot link the format's shader.
-  int draw(bool exact, GlState& gl);
+  int draw(bool exact, const TextureMap& map, GlState& gl);
   /// Fills the viewport with any texture whose first row is the bottom one.
   int draw_texture(GLuint texture, GlState& gl);
 
@@ -53,7 +59,8 @@ class Background {
   enum Kind : std::size_t { kRgb, kPair, kPlanes, kKinds };
   struct Program {
     GLuint id = 0;
-    GLint uv = -1;
+    GLint turn = -1;
+    GLint start = -1;
     GLint range = -1;
     GLint swap = -1;
     bool failed = false;
@@ -67,7 +74,7 @@ class Background {
   Result<void> link(Kind kind);
   void allocate(const CameraPicture& picture, GlState& gl);
   void set_filters(bool exact, GlState& gl);
-  int draw_rectangle(const Program& program, const std::array<float, 4>& uv, GlState& gl);
+  int draw_rectangle(const Program& program, const TextureMap& map, GlState& gl);
 
   std::array<Program, kKinds> programs_;
   std::array<Plane, 3> planes_;

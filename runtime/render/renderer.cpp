@@ -2,10 +2,13 @@
 #include "modar/renderer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <utility>
 
 #include <glm/geometric.hpp>
+#include <glm/mat2x2.hpp>
+#include <glm/matrix.hpp>
 
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
@@ -47,7 +50,63 @@ Viewport fit(int picture_width, int picture_height, int width, int height) {
   return view;
 }
 
+/// A frame on a surface: the viewport, and the frame's NDC (x right, y up) to the viewport's.
+struct SurfaceMap {
+  Viewport view;
+  glm::mat2 turn{1.0f};
+};
+
+SurfaceMap map_frame(const SurfaceView& surface, int frame_width, int frame_height) {
+  constexpr std::array<int, 4> kCosine = {1, 0, -1, 0};
+  constexpr std::array<int, 4> kSine = {0, 1, 0, -1};
+  SurfaceMap map;
+  map.view = {surface.x, surface.y, surface.width, surface.height};
+  if (frame_width < 1 || frame_height < 1) return map;
+  const std::size_t quarter = static_cast<std::size_t>((surface.rotation / 90 % 4 + 4) % 4);
+  const int width = quarter % 2 == 1 ? frame_height : frame_width;
+  const int height = quarter % 2 == 1 ? frame_width : frame_height;
+  glm::vec2 stretch(1.0f);
+  if (surface.cover) {
+    const glm::vec2 fills(static_cast<float>(surface.width) / static_cast<float>(width),
+                          static_cast<float>(surface.height) / static_cast<float>(height));
+    stretch = std::max(fills.x, fills.y) / fills;
+  } else {
+    map.view = fit(width, height, surface.width, surface.height);
+    map.view.x += surface.x;
+    map.view.y += surface.y;
+  }
+  const float cosine = static_cast<float>(kCosine[quarter]);
+  const float sine = static_cast<float>(kSine[quarter]);
+  if (surface.mirror) stretch.x = -stretch.x;
+  // Clockwise: what was on top comes to the right.
+  map.turn = {glm::vec2(cosine, -sine) * stretch, glm::vec2(sine, cosine) * stretch};
+  return map;
+}
+
+TextureMap texture_map(const glm::mat2& turn) {
+  const glm::mat2 back = glm::inverse(turn);
+  const auto texel = [&](float x, float y) {
+    const glm::vec2 ndc = back * glm::vec2(x, y);
+    return glm::vec2(0.5f + 0.5f * ndc.x, 0.5f - 0.5f * ndc.y);
+  };
+  const glm::vec2 start = texel(-1.0f, -1.0f);
+  const glm::vec2 across = texel(1.0f, -1.0f) - start;
+  const glm::vec2 up = texel(-1.0f, 1.0f) - start;
+  return {{across.x, across.y, up.x, up.y}, {start.x, start.y}};
+}
+
 }  // namespace
+
+glm::dvec2 frame_pixel(const SurfaceView& surface, int frame_width, int frame_height,
+                       glm::dvec2 point) {
+  const SurfaceMap map = map_frame(surface, frame_width, frame_height);
+  // From the surface's rows, which go down, to the viewport's NDC.
+  const double x = point.x - (map.view.x - surface.x);
+  const double y = surface.height - point.y - (map.view.y - surface.y);
+  const glm::dvec2 ndc(2.0 * x / map.view.width - 1.0, 2.0 * y / map.view.height - 1.0);
+  const glm::dvec2 frame = glm::inverse(glm::dmat2(map.turn)) * ndc;
+  return {0.5 * (frame.x + 1.0) * frame_width - 0.5, 0.5 * (1.0 - frame.y) * frame_height - 0.5};
+}
 
 struct Renderer::State {
   State(const BundleView& view, const GlCaps& context_caps)
@@ -79,6 +138,7 @@ struct Renderer::State {
 
   Result<void> upload() {
     extensions = load_gl_extensions(caps);
+    const SavedGlState saved(extensions, !options.exclusive_context);
     MODAR_TRY(textures.upload(
         caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2)));
     geometry.upload();
@@ -166,6 +226,7 @@ Renderer::~Renderer() {
 }
 
 Result<void> Renderer::resize(int width, int height) {
+  const SavedGlState saved(state_->extensions, !state_->options.exclusive_context);
   return state_->target.resize(width, height, state_->caps, state_->gl);
 }
 
@@ -194,12 +255,12 @@ void Renderer::render(const RgbImage& background, const glm::mat4& projection,
 void Renderer::render(const CameraPicture& background, const glm::mat4& projection,
                       std::span<const DrawItem> items) {
   State& s = *state_;
+  const SavedGlState saved(s.extensions, !s.options.exclusive_context);
   s.begin_frame();
   const bool shown =
       background.planes[0] != nullptr && background.width > 0 && background.height > 0;
   const Viewport view =
-      shown ? fit(background.width, background.height, s.target.width(), s.target.height())
-            : Viewport{0, 0, s.target.width(), s.target.height()};
+      fit(background.width, background.height, s.target.width(), s.target.height());
   s.target.bind();
   glViewport(view.x, view.y, view.width, view.height);
   const glm::vec4& clear = s.options.clear_colour;
@@ -209,7 +270,7 @@ void Renderer::render(const CameraPicture& background, const glm::mat4& projecti
     const DebugGroup group(s.extensions, "camera picture");
     const bool exact = view.width == background.width && view.height == background.height;
     s.stats.bytes_uploaded += s.background.upload(background, s.gl);
-    s.stats.draw_calls += s.background.draw(exact, s.gl);
+    s.stats.draw_calls += s.background.draw(exact, {}, s.gl);
   }
   if (!items.empty()) {
     const DebugGroup group(s.extensions, "models");
@@ -218,7 +279,40 @@ void Renderer::render(const CameraPicture& background, const glm::mat4& projecti
   s.end_frame();
 }
 
+void Renderer::draw(const SurfaceView& surface, const CameraPicture& frame,
+                    const glm::mat4& projection, std::span<const DrawItem> items) {
+  State& s = *state_;
+  const SavedGlState saved(s.extensions, !s.options.exclusive_context);
+  s.begin_frame();
+  const auto [view, turn] = map_frame(surface, frame.width, frame.height);
+  glViewport(view.x, view.y, view.width, view.height);
+  if (surface.clear_depth) {
+    // The viewport's part alone: the rest of the surface is the app's.
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(view.x, view.y, view.width, view.height);
+    glClear(GL_DEPTH_BUFFER_BIT);
+    glDisable(GL_SCISSOR_TEST);
+  }
+  if (frame.planes[0] != nullptr && frame.width > 0 && frame.height > 0) {
+    const DebugGroup group(s.extensions, "camera picture");
+    const bool exact =
+        turn == glm::mat2(1.0f) && view.width == frame.width && view.height == frame.height;
+    s.stats.bytes_uploaded += s.background.upload(frame, s.gl);
+    s.stats.draw_calls += s.background.draw(exact, texture_map(turn), s.gl);
+  }
+  if (!items.empty()) {
+    const DebugGroup group(s.extensions, "models");
+    glm::mat4 turned(1.0f);
+    turned[0] = glm::vec4(turn[0], 0.0f, 0.0f);
+    turned[1] = glm::vec4(turn[1], 0.0f, 0.0f);
+    s.draw_models(turned * projection, view.height, items);
+  }
+  s.end_frame();
+}
+
 void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
+  const SavedGlState saved(state_->extensions, !state_->options.exclusive_context);
+  if (!state_->options.exclusive_context) state_->gl.reset();
   const int width = state_->target.width();
   const int height = state_->target.height();
   state_->target.bind();
@@ -235,9 +329,9 @@ void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
 
 void Renderer::blit_to_window(int window_width, int window_height) {
   State& s = *state_;
+  const SavedGlState saved(s.extensions, !s.options.exclusive_context);
   if (!s.options.exclusive_context) s.gl.reset();
   const Viewport view = fit(s.target.width(), s.target.height(), window_width, window_height);
-  glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glViewport(0, 0, window_width, window_height);
   glClearColor(0.0f, 0.0f, 0.0f, 1.0f);
   glClear(GL_COLOR_BUFFER_BIT);

@@ -45,7 +45,10 @@ typedef struct modar_error {
 
 /* Maps the file; NULL and an error where it is no good bundle. */
 modar_bundle* modar_bundle_open(const char* path, modar_error* error);
-/* The same on bytes of the caller's (an asset of an APK), 8-byte aligned, which must outlive it. */
+/* `length` bytes of an open file from `offset` on: an uncompressed asset of an APK, as AAsset_openFileDescriptor64()
+ * gives it. The descriptor may be closed. Mapped where the offset is a multiple of 8 (zipalign 8), else copied. */
+modar_bundle* modar_bundle_open_fd(int fd, int64_t offset, int64_t length, modar_error* error);
+/* The same on bytes of the caller's, which must outlive it: aligned to 8 they are used in place, else they are copied. */
 modar_bundle* modar_bundle_open_bytes(const void* bytes, size_t size, modar_error* error);
 void modar_bundle_close(modar_bundle* bundle); /* NULL is fine, as in every function that frees */
 
@@ -55,6 +58,9 @@ uint32_t modar_scene_count(const modar_bundle* bundle);
 /* Copy a name, cut to `size` with its closing 0; answer its whole length, 0 for no such index. */
 size_t modar_model_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size);
 size_t modar_pattern_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size);
+
+/* The width that a pattern is printed in, millimetres; 0 where the bundle does not state it. */
+double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index);
 
 /* A model that stands on a pattern. place: model space to pattern space. */
 typedef struct modar_scene {
@@ -76,6 +82,8 @@ typedef struct modar_camera {
 } modar_camera;
 /* What is assumed of an unknown camera: focal length = width. */
 modar_camera modar_camera_default(int width, int height);
+/* Reads the file that `modar calibrate` writes. */
+int modar_camera_read(const char* path, modar_camera* camera, modar_error* error);
 
 /* The paper's answer for a pattern: 9 + 3 floats and the flag. Pattern space (x right, y up, z
  * towards the viewer, the largest side from -1 to 1) to camera space (x right, y down, z forward):
@@ -86,21 +94,45 @@ typedef struct modar_pose {
   int visible;          /* 1: measured in this frame */
   int shown;            /* 1: draw the model (the pose may be of the last frame but one) */
   int inliers;          /* 0 where it is not visible */
+  float fit;            /* share of the features looked at that agree with the pose, 0 to 1 */
   float corners[8];     /* x, y in pixels: top left, top right, bottom right, bottom left */
 } modar_pose;
 
 /* NULL where no pattern of the bundle can be tracked. */
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     modar_error* error);
+/* How to track. Set `size` to sizeof(modar_tracker_options) and what you do not know to 0: later versions append. */
+typedef struct modar_tracker_options {
+  size_t size;
+  int async_search; /* 1: searches on a thread of its own; then results depend on time */
+  int search_every; /* frames between searches for further patterns while one is tracked; 0: 10 */
+  double smooth_ms; /* takes the trembling out of resting poses, which may lag by so much; 0: off */
+} modar_tracker_options;
+modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar_camera* camera,
+                                         const modar_tracker_options* options, modar_error* error);
 void modar_tracker_destroy(modar_tracker* tracker);
+/* Forgets what it tracks: after a pause, a cut. */
+void modar_tracker_reset(modar_tracker* tracker);
 /* One frame of the camera's size, 8 bits of gray a pixel: the luma plane of NV21. stride: bytes
  * from row to row. That no pattern is in it is no error. */
 int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride,
                        modar_error* error);
+/* The same with the frame's time, rising, which smoothing goes by; modar_tracker_step() counts 30 frames a second. */
+int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
+                          modar_error* error);
 /* The pose of a pattern in the newest frame; answers its flag `visible`. */
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose);
 /* Why nothing is visible: "few matches", "lost by blur"...; "visible" where something is. */
 const char* modar_tracker_reason(const modar_tracker* tracker);
+
+/* The focal length of a camera that nobody has calibrated, from views of tilted patterns. */
+typedef struct modar_focal_finder modar_focal_finder;
+modar_focal_finder* modar_focal_finder_create(const modar_bundle* bundle, int width, int height,
+                                              modar_error* error);
+void modar_focal_finder_destroy(modar_focal_finder* finder);
+/* Looks at a frame of that size, about as dear as a search; the focal length in pixels once it is known to about 1 %,
+ * else 0. Give it every fifth frame or so. */
+double modar_focal_finder_look(modar_focal_finder* finder, const uint8_t* gray, size_t stride);
 
 /* GL's projection for the camera: pixels of the frame land on pixels of a viewport that shows it. */
 void modar_projection(const modar_camera* camera, double near_plane, double far_plane,
@@ -152,14 +184,58 @@ void modar_renderer_destroy(modar_renderer* renderer);
 /* After the context was lost, with the new one current: everything anew from the bundle's bytes. */
 int modar_renderer_restore(modar_renderer* renderer, modar_error* error);
 int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar_error* error);
+/* How to draw. modar_render_options_default() fills it, `size` too; later versions append. */
+typedef struct modar_render_options {
+  size_t size;
+  float light[3]; /* direction to the light in eye space, any length > 0 */
+  float light_strength;
+  float ambient_strength;
+  float clear_colour[4];
+  float lod_pixels; /* a level of detail may be off by so much on the screen */
+  int exclusive;    /* 1 if nobody else draws in the context; 0: every call leaves GL's state as it found it */
+} modar_render_options;
+void modar_render_options_default(modar_render_options* options);
+void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options);
+/* Bytes that the bundle takes in GL memory now. */
+uint64_t modar_renderer_gpu_bytes(const modar_renderer* renderer);
 /* exclusive: 1 if nobody else draws in the context between frames: what is set then stays set. */
 void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive);
-/* Draws the picture (NULL: black) and the items over it. projection NULL: for `camera`, with depth
+/* Where a camera's frame and its models go in the framebuffer that is bound: pixels, (0, 0) at the bottom left. What is
+ * upright there is the frame turned clockwise. Set `size` to sizeof(modar_surface) and what you do not know to 0. */
+typedef struct modar_surface {
+  size_t size;
+  int x, y, width, height;
+  int rotation;   /* degrees: 0, 90, 180, 270 */
+  int mirror;     /* 1: left and right change places after the turn (front camera) */
+  int cover;      /* 1: fills the viewport and crops the frame; 0: shows the whole frame in its middle */
+  int keep_depth; /* 1: for a second renderer's items among those of a first, same projection */
+} modar_surface;
+/* Draws into the framebuffer that is bound, which needs a depth buffer; modar_renderer_resize() is not needed. picture
+ * NULL: the items alone, over what is there (the app's own camera picture), for a frame of the camera's size. Alpha
+ * ends as coverage, colours premultiplied where the surface was transparent. projection as below. */
+void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
+                         const modar_picture* picture, const modar_camera* camera,
+                         const float projection[16], const modar_item* items, size_t count);
+/* The frame's pixel under a touch: pixels from the viewport's top left, y down. */
+void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
+                            double y, double* frame_x, double* frame_y);
+
+/* The nearest surface of the items under a pixel of the frame. */
+typedef struct modar_hit {
+  size_t item;       /* index into the items */
+  float point[3];    /* in the item's model space */
+  float distance;    /* from the eye, in eye space */
+} modar_hit;
+/* 1 and the hit, or 0. Reads the triangles from the bundle's bytes: for a tap, not for every frame. */
+int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double frame_x,
+               double frame_y, const modar_item* items, size_t count, modar_hit* hit);
+
+/* Draws the picture (NULL: the clear colour) and the items over it, off-screen, in the picture's (or camera's) shape. projection NULL: for `camera`, with depth
  * limits that enclose the items. */
 void modar_renderer_render(modar_renderer* renderer, const modar_picture* picture,
                            const modar_camera* camera, const float projection[16],
                            const modar_item* items, size_t count);
-/* Puts what was drawn on the window's framebuffer, as large as it fits. */
+/* Puts what was drawn on the framebuffer that is bound, as large as it fits. */
 void modar_renderer_show(modar_renderer* renderer, int window_width, int window_height);
 /* Copies what was drawn, top row first: width * height * 4 bytes. */
 void modar_renderer_read_rgba(modar_renderer* renderer, uint8_t* rgba);

@@ -6,15 +6,18 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
+#include "modar/camera.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/image.hpp"
 
@@ -50,7 +53,28 @@ struct CameraPicture {
   int row_count = 1 << 30;
 };
 
-/// Counted over the last render() call.
+/// Where a camera's frame and its models go on a surface of the app's: pixels of the framebuffer
+/// that is bound, whose (0, 0) is at the bottom left. What is upright on the surface is the frame
+/// turned clockwise by `rotation`.
+struct SurfaceView {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+  int rotation = 0;     ///< degrees: a multiple of 90
+  bool mirror = false;  ///< left and right change places after the turn, as with a front camera
+  bool cover = false;   ///< fills the viewport and crops the frame; false: shows the whole frame in
+                        ///< its middle
+  bool clear_depth =
+      true;  ///< false: for a second renderer's models among those of a first, same projection
+};
+
+/// The frame's pixel (centre of the top-left one: 0, 0) under a point of the surface, as a touch
+/// has it: pixels from the viewport's top left, y down.
+glm::dvec2 frame_pixel(const SurfaceView& surface, int frame_width, int frame_height,
+                       glm::dvec2 point);
+
+/// Counted over the last render() or draw() call.
 struct RenderStats {
   int draw_calls = 0;
   int state_changes = 0;  ///< program, buffer, texture, attribute and switch set-ups
@@ -76,7 +100,11 @@ struct RenderOptions {
   float light_strength = 0.7f;           ///< times a material's diffuse and specular colour
   float ambient_strength = 0.3f;         ///< times its ambient colour
   glm::vec4 clear_colour{0.0f, 0.0f, 0.0f, 1.0f};
-  /// Nobody else draws in the context between frames: what is set then stays set.
+  /// Nobody else draws in the context between frames: what is set then stays set. False: every call
+  /// leaves the context as it found it (framebuffer, vertex array object, program, buffers,
+  /// textures and samplers of units 0 to 2, blending, depth, culling, masks, pixel store), but that
+  /// the attributes 0 to 7 of the default vertex array object end disabled. True: only the
+  /// framebuffer is left as found.
   bool exclusive_context = false;
   /// Vertices and indices are handed in from the mapped bytes in every draw call, without GL
   /// buffers: what benchmarks compare with. Only where the layouts need no rewriting and all
@@ -97,6 +125,20 @@ struct DepthRange {
   double far_plane = 100.0;
 };
 DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items);
+
+/// What a ray through a pixel meets first.
+struct Pick {
+  std::size_t item = 0;   ///< index into the items
+  glm::vec3 point{0.0f};  ///< in the item's model space
+  float distance = 0.0f;  ///< from the eye, in eye space
+};
+
+/// Casts a ray through a pixel of the frame (an ideal pinhole's, as models are drawn) against the
+/// finest level of the items' models, both sides of each triangle. Reads the triangles from the
+/// bundle's bytes: for a tap, not for every frame. Nothing where no model is met, or a model does
+/// not exist. camera: see validate().
+std::optional<Pick> pick(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
+                         std::span<const DrawItem> items);
 
 class Renderer {
  public:
@@ -120,8 +162,19 @@ class Renderer {
   void render(const RgbImage& background, const glm::mat4& projection,
               std::span<const DrawItem> items);
 
+  /// A background without planes has the frame's size only: then the clear colour stands for its
+  /// picture.
   void render(const CameraPicture& background, const glm::mat4& projection,
               std::span<const DrawItem> items);
+
+  /// Draws into the framebuffer that is bound, which needs a depth buffer, and needs no resize():
+  /// the frame's picture, where it has planes, and the items over it. Without planes, `frame` gives
+  /// its size alone and the models go over what is in the framebuffer. Alpha ends as the coverage
+  /// of what was drawn over what was there, and colours are premultiplied with it where that was
+  /// transparent. Nothing outside the viewport is touched. projection: for the frame, see
+  /// gl_projection(). Allocates nothing after the first frame of a size.
+  void draw(const SurfaceView& surface, const CameraPicture& frame, const glm::mat4& projection,
+            std::span<const DrawItem> items);
 
   /// The context was lost, and another one is current: makes everything anew in it from the
   /// bundle's bytes, at the same size and with the same options. Nothing of the lost context is
@@ -130,7 +183,7 @@ class Renderer {
 
   /// Copies the picture, top row first, 4 bytes a pixel (RGBA). rgba.size() == width * height * 4.
   void read_pixels(std::span<std::uint8_t> rgba);
-  /// Puts the off-screen picture on the window's framebuffer (0).
+  /// Puts the off-screen picture on the framebuffer that is bound, a window's say.
   void blit_to_window(int window_width, int window_height);
 
   void set_options(const RenderOptions& options);

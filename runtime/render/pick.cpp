@@ -1,0 +1,111 @@
+// A ray against the triangles of a bundle: which model lies under a pixel.
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "formats/component.hpp"
+#include "modar/renderer.hpp"
+
+namespace modar {
+namespace {
+
+struct Ray {
+  glm::dvec3 from;
+  glm::dvec3 step;
+};
+
+/// Slabs: whether the ray meets the box before `limit` steps.
+bool meets_box(const Ray& ray, const ChunkRecord& chunk, double limit) {
+  double enter = 0.0;
+  double leave = limit;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = static_cast<double>(chunk.bounds_min[axis]) - ray.from[axis];
+    const double high = static_cast<double>(chunk.bounds_max[axis]) - ray.from[axis];
+    if (ray.step[axis] == 0.0) {
+      if (low > 0.0 || high < 0.0) return false;
+      continue;
+    }
+    const double a = low / ray.step[axis];
+    const double b = high / ray.step[axis];
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  return enter <= leave;
+}
+
+/// Moeller & Trumbore, "Fast, minimum storage ray-triangle intersection" (1997): steps to the
+/// triangle, or infinity.
+double meet_triangle(const Ray& ray, const std::array<glm::dvec3, 3>& corners) {
+  constexpr double kMiss = std::numeric_limits<double>::infinity();
+  const glm::dvec3 first = corners[1] - corners[0];
+  const glm::dvec3 second = corners[2] - corners[0];
+  const glm::dvec3 p = glm::cross(ray.step, second);
+  const double determinant = glm::dot(first, p);
+  if (determinant == 0.0) return kMiss;
+  const glm::dvec3 offset = ray.from - corners[0];
+  const double u = glm::dot(offset, p) / determinant;
+  const glm::dvec3 q = glm::cross(offset, first);
+  const double v = glm::dot(ray.step, q) / determinant;
+  if (!(u >= 0.0) || !(v >= 0.0) || !(u + v <= 1.0)) return kMiss;
+  const double steps = glm::dot(second, q) / determinant;
+  return steps > 0.0 ? steps : kMiss;
+}
+
+/// Steps to the chunk's nearest triangle, or `nearest`.
+double meet_chunk(const BundleView& bundle, const LayoutRecord& layout, const ChunkRecord& chunk,
+                  const Ray& ray, double nearest) {
+  const AttributeRecord* position = find_attribute(layout, Semantic::kPosition);
+  const LevelRecord& level = bundle.levels()[chunk.first_level];
+  if (position == nullptr || !meets_box(ray, chunk, nearest)) return nearest;
+  const std::byte* indices = bundle.indices().data() + level.index_offset;
+  const std::byte* vertices = bundle.vertices().data() + level.vertex_offset;
+  const auto corner = [&](std::size_t i) {
+    const std::size_t index = load_number<std::uint16_t>(indices + 2 * i);
+    // Payloads are bounded, not read, by BundleView::open().
+    if (index >= level.vertex_count) return glm::dvec3(std::numeric_limits<double>::quiet_NaN());
+    glm::dvec3 point;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      point[static_cast<int>(axis)] =
+          static_cast<double>(chunk.position_offset[axis]) +
+          static_cast<double>(chunk.position_step) *
+              decode_component(*position, vertices + index * layout.stride, axis);
+    }
+    return point;
+  };
+  for (std::size_t i = 0; i + 2 < level.index_count; i += 3) {
+    nearest = std::min(nearest, meet_triangle(ray, {corner(i), corner(i + 1), corner(i + 2)}));
+  }
+  return nearest;
+}
+
+}  // namespace
+
+std::optional<Pick> pick(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
+                         std::span<const DrawItem> items) {
+  // In GL's eye space; a step is one unit of depth, so that steps compare between items.
+  const glm::dvec3 direction((pixel.x - camera.cx) / camera.fx, (camera.cy - pixel.y) / camera.fy,
+                             -1.0);
+  double nearest = std::numeric_limits<double>::infinity();
+  std::optional<Pick> found;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (items[i].model >= bundle.models().size()) continue;
+    const ModelRecord& model = bundle.models()[items[i].model];
+    const glm::dmat4 to_model = glm::inverse(glm::dmat4(items[i].to_eye));
+    const Ray ray{glm::dvec3(to_model[3]), glm::dmat3(to_model) * direction};
+    double met = nearest;
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      met = meet_chunk(bundle, bundle.layouts()[model.layout],
+                       bundle.chunks()[model.first_chunk + c], ray, met);
+    }
+    if (!(met < nearest)) continue;
+    nearest = met;
+    found = Pick{i, glm::vec3(ray.from + met * ray.step),
+                 static_cast<float>(met * glm::length(direction))};
+  }
+  return found;
+}
+
+}  // namespace modar
