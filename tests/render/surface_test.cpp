@@ -328,8 +328,8 @@ std::vector<GLint> host_state() {
     glGetIntegerv(name, &value);
     state.push_back(value);
   }
-  for (const GLenum name :
-       {GLenum{GL_VIEWPORT}, GL_SCISSOR_BOX, GL_COLOR_WRITEMASK, GL_COLOR_CLEAR_VALUE}) {
+  for (const GLenum name : std::initializer_list<GLenum>{
+           GL_VIEWPORT, GL_SCISSOR_BOX, GL_COLOR_WRITEMASK, GL_COLOR_CLEAR_VALUE}) {
     GLint values[4] = {};
     glGetIntegerv(name, values);
     state.insert(state.end(), values, values + 4);
@@ -375,7 +375,9 @@ class Host {
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffers_[2]);
     glViewport(1, 2, 33, 44);
     glScissor(3, 4, 5, 6);
-    for (const GLenum each : {GLenum{GL_BLEND}, GL_CULL_FACE, GL_SCISSOR_TEST}) glEnable(each);
+    glEnable(GL_BLEND);
+    glEnable(GL_CULL_FACE);
+    glEnable(GL_SCISSOR_TEST);
     glCullFace(GL_FRONT);
     glFrontFace(GL_CW);
     glDepthFunc(GL_GREATER);
