@@ -142,6 +142,9 @@ class SurfaceTest : public GlTest {
     material.opacity = 0.5f;
     const std::uint32_t glass = maker.add_material(material);
     maker.add_model(layout, {{{triangles_}, {0.0f}, glass, std::nullopt}});
+    std::vector<Triangle> gray = triangles_;
+    for (Triangle& triangle : gray) triangle.colour = {200, 200, 200};
+    maker.add_model(layout, {{{gray}, {0.0f}, one_sided, std::nullopt}});
     bundle_ = std::make_unique<MappedBundle>(maker.content);
     renderer_ = make_renderer(*bundle_->view, probe_gl_caps());
     ASSERT_TRUE(renderer_);
@@ -269,9 +272,9 @@ TEST_F(SurfaceTest, TwoBundlesShareOneFrameAndItsDepth) {
   SurfaceView surface{0, kSurface - kHeight, kWidth, kHeight, 0, false, false, true};
   draw(surface, true);
   const std::vector<std::uint8_t> first = host_->pixels();
-  // The same model a little farther away: what the first covers stays.
+  // The same in gray, a little farther away: what the first covers stays.
   const glm::mat4 away = glm::translate(glm::mat4(1.0f), glm::vec3(0, 0, -0.5f));
-  const DrawItem behind[] = {{0, away * glm::mat4(some_view())}};
+  const DrawItem behind[] = {{2, away * glm::mat4(some_view())}};
   surface.clear_depth = false;
   second->draw(surface, frame(false), gl_projection(frame_camera(), 0.1, 100.0), behind);
   const std::vector<std::uint8_t> both = host_->pixels();
