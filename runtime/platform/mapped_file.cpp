@@ -76,10 +76,12 @@ Result<MappedFile> MappedFile::open(int descriptor, std::uint64_t offset, std::u
     for (std::size_t at = 0; at < size;) {
       const ssize_t got =
           ::pread(descriptor, part.copy_.get() + at, size - at, static_cast<off_t>(offset + at));
-      if (got <= 0 && errno != EINTR) {
-        return fail(ExitCode::kIo, "io.map", where, std::strerror(errno), "check the file");
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) {
+        return fail(ExitCode::kIo, "io.map", where,
+                    got < 0 ? std::strerror(errno) : "the file ends early", "check the file");
       }
-      at += static_cast<std::size_t>(std::max<ssize_t>(got, 0));
+      at += static_cast<std::size_t>(got);
     }
     part.bytes_ = {part.copy_.get(), size};
     return part;

@@ -15,7 +15,7 @@ TARGETS = {
     "armv7a-linux-gnueabihf": [],
     "aarch64-linux-gnu": [],
     "i686-linux-gnu": [],
-    "wasm32-unknown-unknown": ["-D__linux__", "-D__EMSCRIPTEN__"],
+    "wasm32-unknown-unknown": ["-D__linux__", "-D__EMSCRIPTEN__", "-D_GNU_SOURCE"],
 }
 ROOMS = ("formats/**/*.cpp", "runtime/track/*.cpp", "runtime/render/*.cpp", "runtime/platform/*.cpp",
          "runtime/capi/*.cpp")
@@ -29,6 +29,7 @@ class Phone(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
         # The host's C library stands for the phone's: what depends on the processor is laid over it.
         for name, text in {"gnu/stubs.h": "",
+                           "xlocale.h": "#include <stdlib.h>\n#include <wchar.h>\n",
                            "bits/wordsize.h": "#define __WORDSIZE (__SIZEOF_POINTER__ * 8)\n"
                                               "#define __WORDSIZE_TIME64_COMPAT32 0\n"}.items():
             (self.folder / name).parent.mkdir(exist_ok=True)
@@ -44,7 +45,7 @@ class Phone(unittest.TestCase):
                     GENERATED / "assets" / "generated"]
         return subprocess.run(
             [CLANG, f"--target={target}", *TARGETS[target], "-std=c++20", "-fsyntax-only", "-w", "-fno-exceptions",
-             "-fno-rtti", "-nostdinc++", "-nostdlibinc", "-DEIGEN_DONT_VECTORIZE", "-DEGL_NO_X11", "-D__regparm__(x)=",
+             "-fno-rtti", "-nostdinc++", "-nostdlibinc", "-DEIGEN_DONT_VECTORIZE", "-DMODAR_BUILT_VERSION=MODAR_VERSION_NUMBER", "-DEGL_NO_X11", "-D__regparm__(x)=",
              *(f"-I{path}" for path in includes), "-isystem", LIBCXX, "-isystem", self.folder, "-idirafter",
              "/usr/include", "-idirafter", "/usr/include/x86_64-linux-gnu", "-idirafter", "/usr/include/eigen3", unit],
             capture_output=True, text=True)
