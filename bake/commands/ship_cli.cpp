@@ -38,8 +38,9 @@ void add_publish(CommandLine& ship) {
   const auto publish = std::make_shared<ShipPublishCommand>();
   PublishRequest& request = publish->request;
   request.recipe.jobs = std::max(1u, std::thread::hardware_concurrency());
-  line.option("bundles", &request.bundles, "The bundles; files name them",
-              {.type = "BUNDLE...", .required = true});
+  line.option("bundles", &request.bundles,
+              "Bundles that are new or changed; files name them. Others stay in the release",
+              {.type = "BUNDLE..."});
   line.option("--to", &request.folder, "The folder that devices will fetch from",
               {.type = "DIR", .required = true});
   add_key_options(line, publish->key_file, publish->pass_phrase_file);
@@ -47,6 +48,11 @@ void add_publish(CommandLine& ship) {
               "When devices stop believing it, as 2027-01-31T00:00:00Z", {.type = "TIME"});
   line.option("--valid-days", &publish->valid_days, "The same, from now",
               {.shows_default = true, .least = 1, .most = 36500, .excludes = "--expires"});
+  line.flag("--no-expiry", publish->no_expiry, "Devices believe it for ever: for USB sticks",
+            {.excludes = "--expires"});
+  line.option("--drop", &request.drop, "This bundle leaves the release; may be given again",
+              {.type = "NAME", .repeatable = true});
+  line.flag("--dry-run", request.dry_run, "Print what would change and write nothing");
   line.option("--release", &request.version,
               "Its number; greater than all before (one more than the newest)", {.type = "N"});
   line.option("--for", &publish->devices, "A bundle is for these device profiles only",
@@ -70,6 +76,32 @@ void add_rotate(CommandLine& ship) {
   line.footer(
       ship_example("  modar ship rotate --to /var/www/ar --key old.key --next new.key.pub\n"));
   line.run([rotate] { return ExitCode{run_rotate(*rotate)}; });
+}
+
+void add_root(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("root", "Name the key that signs, by the root key that devices trust");
+  const auto root = std::make_shared<RotateCommand>();
+  line.option("--to", &root->folder, "The folder that devices fetch from",
+              {.type = "DIR", .required = true});
+  add_key_options(line, root->key_file, root->pass_phrase_file);
+  line.option("--next", &root->next_key, "The public key that signs from now on",
+              {.type = "NEW.pub", .required = true});
+  line.footer(
+      ship_example("  modar ship root --to /var/www/ar --key root.key --next museum.key.pub\n") +
+      "Keep the root key offline. Where a signing key was stolen, name a new one: devices leave "
+      "the\n"
+      "stolen one, whatever it has signed since, and count releases anew.\n");
+  line.run([root] { return ExitCode{run_root(*root)}; });
+}
+
+void add_list(CommandLine& ship) {
+  CommandLine& line = ship.command("list", "Releases, their dates, sizes, bundles and expiry");
+  const auto list = std::make_shared<ListCommand>();
+  line.option("--to", &list->folder, "The folder", {.type = "DIR", .required = true});
+  line.flag("--json", list->json, "Print as JSON");
+  line.footer(ship_example("  modar ship list --to /var/www/ar\n"));
+  line.run([list] { return ExitCode{run_list(*list)}; });
 }
 
 void add_prune(CommandLine& ship) {
@@ -104,10 +136,12 @@ void add_plan(CommandLine& ship) {
 }  // namespace
 
 void add_ship(CommandLine& program) {
-  CommandLine& line =
-      program.command("ship", "Releases for devices: keygen, publish, rotate, prune, plan");
+  CommandLine& line = program.command(
+      "ship", "Releases for devices: keygen, publish, list, root, rotate, prune, plan");
   add_keygen(line);
   add_publish(line);
+  add_list(line);
+  add_root(line);
   add_rotate(line);
   add_prune(line);
   add_plan(line);

@@ -21,6 +21,7 @@ struct ShipPublishCommand {
   std::string pass_phrase_file;
   std::string expires;  ///< a time, or empty
   unsigned valid_days = 365;
+  bool no_expiry = false;
   std::vector<std::string> devices;  ///< NAME=PROFILE[,PROFILE]
   bool quiet = false;
   bool json = false;
@@ -31,6 +32,11 @@ struct RotateCommand {
   std::string key_file;
   std::string pass_phrase_file;
   std::string next_key;  ///< file of the public key that follows
+};
+
+struct ListCommand {
+  std::string folder;
+  bool json = false;
 };
 
 struct PruneCommand {
@@ -51,6 +57,9 @@ struct PlanCommand {
 int run_keygen(const KeygenCommand& command);
 int run_publish(ShipPublishCommand& command);
 int run_rotate(const RotateCommand& command);
+/// Writes the root key's word: the next key signs.
+int run_root(const RotateCommand& command);
+int run_list(const ListCommand& command);
 int run_prune(const PruneCommand& command);
 int run_plan(const PlanCommand& command);
 

@@ -33,10 +33,25 @@ std::string publish_json(const PublishReport& report) {
                      {"raw_bytes", totals.raw_bytes},
                      {"stored_bytes", totals.stored_bytes}});
   }
+  Json changes = Json::array();
+  for (const BundleChange& change : report.changes) {
+    changes.push_back({{"change", to_string(change.kind)}, {"name", change.name}});
+  }
   const Json json = {{"release", Json::parse(release_text(report.release))},
                      {"added_bytes", report.added_bytes},
+                     {"changes", changes},
                      {"forms", forms}};
   return json.dump();
+}
+
+std::string list_json(const std::vector<ListedRelease>& releases) {
+  Json list = Json::array();
+  for (const ListedRelease& listed : releases) {
+    list.push_back({{"release", Json::parse(release_text(listed.release))},
+                    {"published", time_text(listed.published)},
+                    {"current", listed.current}});
+  }
+  return Json({{"releases", list}}).dump();
 }
 
 std::string prune_json(std::uint64_t freed_bytes, const std::vector<std::uint64_t>& releases) {
@@ -53,6 +68,10 @@ std::string plan_json(const UpdatePlan& plan, const Link& link, const std::strin
                      {"update_pieces", plan.update_pieces},
                      {"transfer_seconds", plan.transfer_s},
                      {"install_seconds", plan.install_s},
+                     {"geometry_bytes", plan.geometry_bytes},
+                     {"geometry_instructions_per_byte", kGeometryInstructions},
+                     {"other_bytes", plan.other_bytes},
+                     {"other_instructions_per_byte", kOtherInstructions},
                      {"minutes", minutes},
                      {"storage_bytes", plan.storage_bytes}};
   return json.dump();

@@ -1,6 +1,8 @@
 #include "bake/ship/publish.hpp"
 
+#include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "bake/ship/release_folder.hpp"
 #include "formats/check.hpp"
@@ -40,14 +42,99 @@ ReleaseBundle describe(const std::string& name, const PublishedBundle& made) {
   return bundle;
 }
 
-Result<std::uint64_t> next_version(const ReleaseFolder& folder, std::uint64_t wanted) {
-  const auto versions = folder.versions();
-  const std::uint64_t newest = versions.empty() ? 0 : versions.back();
-  if (wanted == 0) return newest + 1;
-  if (wanted > newest) return wanted;
+/// Numbers begin anew in each epoch, but no document is written over.
+Result<std::uint64_t> next_version(const ReleaseFolder& folder, std::uint64_t epoch,
+                                   std::uint64_t wanted) {
+  std::uint64_t newest = 0;  // of the epoch
+  std::set<std::uint64_t> taken;
+  for (const std::uint64_t version : folder.versions()) {
+    taken.insert(version);
+    const auto release = folder.release(version);
+    if (release && release->epoch == epoch) newest = std::max(newest, version);
+  }
+  if (wanted == 0) {
+    wanted = newest + 1;
+    while (taken.contains(wanted)) ++wanted;
+    return wanted;
+  }
+  if (wanted > newest && !taken.contains(wanted)) return wanted;
   return fail(ExitCode::kUsage, "ship.version", std::to_string(wanted),
-              "release " + std::to_string(newest) + " was published already",
+              "release " + std::to_string(std::max(newest, taken.contains(wanted) ? wanted : 0)) +
+                  " was published already",
               "choose a greater number, or none");
+}
+
+const ReleaseBundle* find_bundle(const std::vector<ReleaseBundle>& bundles,
+                                 const std::string& name) {
+  for (const ReleaseBundle& bundle : bundles) {
+    if (bundle.name == name) return &bundle;
+  }
+  return nullptr;
+}
+
+/// The bundles of the release before, without the dropped ones. Errors: kUsage "ship.drop".
+Result<std::vector<ReleaseBundle>> kept_bundles(const std::vector<ReleaseBundle>& before,
+                                                const PublishRequest& request) {
+  std::vector<ReleaseBundle> kept = before;
+  for (const std::string& name : request.drop) {
+    const ReleaseBundle* bundle = find_bundle(kept, name);
+    if (bundle == nullptr) {
+      return fail(ExitCode::kUsage, "ship.drop", name, "the newest release has no such bundle",
+                  "see `modar ship list --to " + request.folder + "`");
+    }
+    kept.erase(kept.begin() + (bundle - kept.data()));
+  }
+  return kept;
+}
+
+std::vector<BundleChange> changes_between(const std::vector<ReleaseBundle>& before,
+                                          const std::vector<ReleaseBundle>& after) {
+  std::vector<BundleChange> changes;
+  for (const ReleaseBundle& bundle : after) {
+    const ReleaseBundle* old = find_bundle(before, bundle.name);
+    const bool same = old != nullptr && old->hash == bundle.hash && old->devices == bundle.devices;
+    changes.push_back({old == nullptr ? BundleChange::Kind::kAdded
+                       : same         ? BundleChange::Kind::kKept
+                                      : BundleChange::Kind::kChanged,
+                       bundle.name});
+  }
+  for (const ReleaseBundle& bundle : before) {
+    if (find_bundle(after, bundle.name) == nullptr) {
+      changes.push_back({BundleChange::Kind::kDropped, bundle.name});
+    }
+  }
+  std::sort(changes.begin(), changes.end(),
+            [](const BundleChange& a, const BundleChange& b) { return a.name < b.name; });
+  return changes;
+}
+
+/// Makes the pieces of the request's bundles and puts them into the release.
+Result<void> add_bundles(const PublishRequest& request, const ReleaseFolder& folder,
+                         PublishReport& done, Report& report) {
+  for (const std::string& path : request.bundles) {
+    StageTimer timer(report, "publish " + path);
+    MODAR_ASSIGN(const auto bundle, open_bundle(path));
+    MODAR_ASSIGN(const auto made, make_recipe(bundle.view, request.recipe));
+    if (!request.dry_run) {
+      MODAR_ASSIGN(const auto added, folder.add_objects(made));
+      done.added_bytes += added;
+    }
+    const std::string name = std::filesystem::path(path).stem().string();
+    ReleaseBundle described = describe(name, made);
+    auto& bundles = done.release.bundles;
+    if (const ReleaseBundle* old = find_bundle(bundles, name)) {
+      described.devices = old->devices;  // unless --for says otherwise
+      bundles.erase(bundles.begin() + (old - bundles.data()));
+    }
+    bundles.push_back(std::move(described));
+    for (const auto& [form, totals] : made.forms) {
+      done.forms[form].pieces += totals.pieces;
+      done.forms[form].raw_bytes += totals.raw_bytes;
+      done.forms[form].stored_bytes += totals.stored_bytes;
+    }
+    timer.done(bundle.view.bytes().size(), made.download_size);
+  }
+  return {};
 }
 
 // Rates and delays that browsers' tools and WebPageTest use for these networks.
@@ -60,43 +147,74 @@ constexpr std::array<Link, 4> kLinks = {
 /// Headers of a request and its answer.
 constexpr double kRequestBytes = 500;
 constexpr double kRequestsAtOnce = 4;
-/// Assumed, not measured on a phone: bytes of the bundle a second that an 800 MHz Cortex-A9
-/// decodes, hashes and checks, and that flash of its class writes.
-constexpr double kInstallBytesPerSecond = 4e6;
+/// Assumed, not measured on a phone: an 800 MHz Cortex-A9 at one instruction a cycle, and what
+/// flash of its class writes.
+constexpr double kInstructionsPerSecond = 800e6;
 constexpr double kFlashBytesPerSecond = 8e6;
+
+bool is_geometry(PieceForm form) {
+  return form == PieceForm::kMesh || form == PieceForm::kLevel;
+}
 
 }  // namespace
 
-Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report) {
-  MODAR_ASSIGN(auto folder, ReleaseFolder::open(request.folder));
-  PublishReport done;
-  MODAR_ASSIGN(const auto version, next_version(folder, request.version));
-  done.release.version = version;
-  done.release.expires = request.expires;
-  for (const std::string& path : request.bundles) {
-    StageTimer timer(report, "publish " + path);
-    MODAR_ASSIGN(const auto bundle, open_bundle(path));
-    MODAR_ASSIGN(const auto made, make_recipe(bundle.view, request.recipe));
-    MODAR_ASSIGN(const auto added, folder.add_objects(made));
-    done.added_bytes += added;
-    const std::string name = std::filesystem::path(path).stem().string();
-    done.release.bundles.push_back(describe(name, made));
-    if (const auto devices = request.devices.find(name); devices != request.devices.end()) {
-      done.release.bundles.back().devices = devices->second;
-    }
-    for (const auto& [form, totals] : made.forms) {
-      done.forms[form].pieces += totals.pieces;
-      done.forms[form].raw_bytes += totals.raw_bytes;
-      done.forms[form].stored_bytes += totals.stored_bytes;
-    }
-    timer.done(bundle.view.bytes().size(), made.download_size);
+const char* to_string(BundleChange::Kind kind) {
+  switch (kind) {
+    case BundleChange::Kind::kAdded:
+      return "added";
+    case BundleChange::Kind::kChanged:
+      return "changed";
+    case BundleChange::Kind::kKept:
+      return "kept";
+    case BundleChange::Kind::kDropped:
+      return "dropped";
   }
+  return "";
+}
+
+Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report) {
+  if (request.bundles.empty() && request.drop.empty() && request.devices.empty()) {
+    return fail(ExitCode::kUsage, "ship.nothing", request.folder, "there is nothing to publish",
+                "name bundles, or --drop NAME");
+  }
+  std::set<std::string> names;
+  for (const std::string& path : request.bundles) {
+    const std::string name = std::filesystem::path(path).stem().string();
+    if (!names.insert(lower_case(name)).second) {
+      return fail(ExitCode::kInvalidInput, "ship.name", path,
+                  "two bundles have this name, or names that differ by case only",
+                  "rename one: a phone's storage may ignore case");
+    }
+  }
+  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(request.folder));
+  MODAR_TRY(folder.check_signer(key.public_key));
+  MODAR_ASSIGN(const auto newest, folder.newest());
+  const std::vector<ReleaseBundle> before = newest ? newest->bundles : std::vector<ReleaseBundle>();
+  PublishReport done;
+  MODAR_ASSIGN(const RootWord word, folder.root_word());
+  done.release.epoch = word.epoch;
+  MODAR_ASSIGN(done.release.version, next_version(folder, word.epoch, request.version));
+  done.release.expires = request.expires;
+  MODAR_ASSIGN(done.release.bundles, kept_bundles(before, request));
+  MODAR_TRY(add_bundles(request, folder, done, report));
+  for (const auto& [name, devices] : request.devices) {
+    for (ReleaseBundle& bundle : done.release.bundles) {
+      if (bundle.name == name) bundle.devices = devices;
+    }
+    if (find_bundle(done.release.bundles, name) == nullptr) {
+      return fail(ExitCode::kUsage, "ship.for", name, "the release has no such bundle",
+                  "name one that it has");
+    }
+  }
+  std::sort(done.release.bundles.begin(), done.release.bundles.end(),
+            [](const ReleaseBundle& a, const ReleaseBundle& b) { return a.name < b.name; });
+  done.changes = changes_between(before, done.release.bundles);
   // A document that devices would refuse is not published.
   if (const auto readable = parse_release(release_text(done.release)); !readable) {
     return fail(ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
                 "name each bundle's file with letters, digits, '.', '_' and '-', no two alike");
   }
-  MODAR_TRY(folder.add_release(done.release, key));
+  if (!request.dry_run) MODAR_TRY(folder.add_release(done.release, key));
   return done;
 }
 
@@ -112,8 +230,7 @@ const Link* find_link(std::string_view name) {
 }
 
 Result<UpdatePlan> plan_update(const std::string& old_bundle, const std::string& new_bundle,
-                               const Link& link, const DeviceProfile* device,
-                               const RecipeOptions& options) {
+                               const Link& link, const RecipeOptions& options) {
   MODAR_ASSIGN(const auto before, open_bundle(old_bundle));
   MODAR_ASSIGN(const auto after, open_bundle(new_bundle));
   MODAR_ASSIGN(const auto old_recipe, make_recipe(before.view, options));
@@ -137,10 +254,14 @@ Result<UpdatePlan> plan_update(const std::string& old_bundle, const std::string&
       (static_cast<double>(plan.update_bytes) + kRequestBytes * (4.0 + plan.update_pieces)) * 8 /
           link.bits_per_second +
       requests * link.round_trip_s;
+  for (const auto& [form, totals] : new_recipe.forms) {
+    (is_geometry(form) ? plan.geometry_bytes : plan.other_bytes) += totals.raw_bytes;
+  }
   const auto size = static_cast<double>(after.view.bytes().size());
-  const double cores = device == nullptr ? 1 : device->cores;
-  plan.install_s =
-      size / (kInstallBytesPerSecond * std::max(1.0, cores / 2)) + size / kFlashBytesPerSecond;
+  plan.install_s = (static_cast<double>(plan.geometry_bytes) * kGeometryInstructions +
+                    static_cast<double>(plan.other_bytes) * kOtherInstructions) /
+                       kInstructionsPerSecond +
+                   size / kFlashBytesPerSecond;
   plan.storage_bytes = after.view.bytes().size() + plan.update_bytes;
   return plan;
 }

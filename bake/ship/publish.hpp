@@ -9,29 +9,41 @@
 #include "bake/report.hpp"
 #include "bake/ship/keys.hpp"
 #include "bake/ship/recipe_maker.hpp"
-#include "modar/device_profile.hpp"
 #include "modar/release.hpp"
 
 namespace modar {
 
 struct PublishRequest {
   std::vector<std::string> bundles;  ///< files; their names without extension name the bundles
+  std::vector<std::string> drop;     ///< names of bundles that leave the release
+  bool dry_run = false;              ///< writes nothing
   std::string folder;
   std::uint64_t version = 0;                                ///< 0: one more than the newest
-  std::int64_t expires = 0;                                 ///< seconds since 1970, UTC
+  std::int64_t expires = 0;                                 ///< seconds since 1970, UTC; kNever
   std::map<std::string, std::vector<std::string>> devices;  ///< by bundle name; none: for all
   RecipeOptions recipe;
 };
 
+/// What a release does to a bundle of the one before it.
+struct BundleChange {
+  enum class Kind { kAdded, kChanged, kKept, kDropped };
+  Kind kind = Kind::kKept;
+  std::string name;
+};
+const char* to_string(BundleChange::Kind kind);
+
 struct PublishReport {
   Release release;
-  std::uint64_t added_bytes = 0;  ///< of objects that were not in the folder
+  std::vector<BundleChange> changes;  ///< by name
+  std::uint64_t added_bytes = 0;      ///< of objects that were not in the folder
   std::map<PieceForm, FormTotals> forms;
 };
 
+/// A release is the whole set: bundles that the request does not name are kept from the newest.
 /// Validates each bundle, writes its pieces, then the signed document, then `latest`: the release
 /// before stays valid at every moment.
-/// Errors: kInvalidInput "ship.bad-bundle", "ship.name"; kUsage "ship.version"; kIo; kExitLocked.
+/// Errors: kInvalidInput "ship.bad-bundle", "ship.name"; kUsage "ship.version", "ship.key",
+/// "ship.drop"; kIo; kExitLocked.
 Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report);
 
 /// A network as planning sees it.
@@ -44,18 +56,24 @@ struct Link {
 std::span<const Link> links();
 const Link* find_link(std::string_view name);
 
+/// Instructions of modar-fetch for each byte that it installs (decoding, hashing, checking),
+/// measured on x86-64 and taken for ARM as they are.
+inline constexpr double kGeometryInstructions = 344;
+inline constexpr double kOtherInstructions = 66;
+
 struct UpdatePlan {
   std::uint64_t full_bytes = 0;    ///< for a device that has nothing
   std::uint64_t update_bytes = 0;  ///< for one that has the old bundle: document, recipe, pieces
   std::uint32_t update_pieces = 0;
   double transfer_s = 0;
-  double install_s = 0;             ///< decoding, writing, checking, on the device
-  std::uint64_t storage_bytes = 0;  ///< free space that installing needs
+  std::uint64_t geometry_bytes = 0;  ///< of the new bundle: meshes and coarser levels
+  std::uint64_t other_bytes = 0;     ///< of the new bundle: textures, patterns, tables
+  double install_s = 0;              ///< decoding, writing, checking, on the device
+  std::uint64_t storage_bytes = 0;   ///< free space that installing needs
 };
 
 /// Errors: as make_recipe().
 Result<UpdatePlan> plan_update(const std::string& old_bundle, const std::string& new_bundle,
-                               const Link& link, const DeviceProfile* device,
-                               const RecipeOptions& options);
+                               const Link& link, const RecipeOptions& options);
 
 }  // namespace modar

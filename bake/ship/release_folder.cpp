@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -71,7 +72,64 @@ Result<ReleaseFolder> ReleaseFolder::open(const std::string& path) {
 }
 
 std::vector<std::uint64_t> ReleaseFolder::versions() const {
-  return numbers_in(path_ + "/releases");
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> found;
+  for (const std::uint64_t version : numbers_in(path_ + "/releases")) {
+    const auto read = release(version);
+    found.emplace_back(read ? read->epoch : 0, version);
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<std::uint64_t> versions;
+  for (const auto& [epoch, version] : found) versions.push_back(version);
+  return versions;
+}
+
+Result<std::optional<Release>> ReleaseFolder::newest() const {
+  const auto text = read_text(path_ + "/latest");
+  if (!text) return std::optional<Release>();
+  std::uint64_t version = 0;
+  std::from_chars(text->data(), text->data() + text->size(), version);
+  MODAR_ASSIGN(auto newest, release(version));
+  return std::optional<Release>(std::move(newest));
+}
+
+std::int64_t ReleaseFolder::published(std::uint64_t version) const {
+  std::error_code error;
+  const auto time =
+      fs::last_write_time(path_ + "/releases/" + std::to_string(version) + ".json", error);
+  if (error) return 0;
+  const auto system = std::chrono::file_clock::to_sys(time);
+  return std::chrono::duration_cast<std::chrono::seconds>(system.time_since_epoch()).count();
+}
+
+Result<RootWord> ReleaseFolder::root_word() const {
+  const auto text = read_text(path_ + "/root.json");
+  return text ? parse_root_word(*text) : RootWord{};
+}
+
+Result<void> ReleaseFolder::check_signer(const PublicKey& key) const {
+  const auto refuse = [&](const std::array<std::uint8_t, 8>& wanted) {
+    return fail(ExitCode::kUsage, "ship.key", path_,
+                "it is signed with key " + to_hex(wanted) + ", not with " + to_hex(key.id) +
+                    ", which devices would refuse",
+                "give the secret key of that one, or lead devices to yours: `modar ship rotate`");
+  };
+  MODAR_ASSIGN(const RootWord word, root_word());
+  const std::uint32_t links = key_links();
+  if (links > word.links) {
+    const std::string path = path_ + "/keys/" + std::to_string(links) + ".json";
+    MODAR_ASSIGN(const KeyLink link, parse_key_link(read_text(path).value_or("")));
+    MODAR_ASSIGN(const PublicKey last, parse_public_key(link.key));
+    return last == key ? Result<void>() : refuse(last.id);
+  }
+  if (word.epoch != 0) {
+    MODAR_ASSIGN(const PublicKey named, parse_public_key(word.key));
+    return named == key ? Result<void>() : refuse(named.id);
+  }
+  MODAR_ASSIGN(const auto last, newest());
+  if (!last) return {};
+  const std::string path = path_ + "/releases/" + std::to_string(last->version) + ".json.minisig";
+  MODAR_ASSIGN(const Signature signature, parse_signature(read_text(path).value_or("")));
+  return signature.key_id == key.id ? Result<void>() : refuse(signature.key_id);
 }
 
 Result<Release> ReleaseFolder::release(std::uint64_t version) const {
@@ -114,6 +172,29 @@ Result<void> ReleaseFolder::add_release(const Release& release, const SecretKey&
   return write_file(path + ".minisig", std::string_view(signature))
       .and_then([&] { return write_file(path, std::string_view(text)); })
       .and_then([&] { return write_file(path_ + "/latest", std::string_view(number + "\n")); });
+}
+
+Result<RootWord> ReleaseFolder::add_root_word(const PublicKey& next, const SecretKey& root) const {
+  const std::string path = path_ + "/root.json";
+  MODAR_ASSIGN(RootWord word, root_word());
+  if (word.epoch != 0) {
+    MODAR_ASSIGN(const Signature before,
+                 parse_signature(read_text(path + ".minisig").value_or("")));
+    if (before.key_id != root.public_key.id) {
+      return fail(ExitCode::kUsage, "ship.root", path,
+                  "key " + to_hex(before.key_id) + " signed the word before, not " +
+                      to_hex(root.public_key.id),
+                  "give the root key that devices trust");
+    }
+  }
+  ++word.epoch;
+  word.links = key_links();
+  word.key = public_key_line(next);
+  const std::string text = root_word_text(word);
+  const std::string signature = sign(root, text, "modar root " + std::to_string(word.epoch));
+  MODAR_TRY(write_file(path + ".minisig", std::string_view(signature)));
+  MODAR_TRY(write_file(path, std::string_view(text)));
+  return word;
 }
 
 Result<void> ReleaseFolder::add_key(const PublicKey& next, const SecretKey& key) const {

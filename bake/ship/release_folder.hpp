@@ -3,10 +3,12 @@
 //   latest                       number of the newest release
 //   releases/N.json(.minisig)    release documents
 //   keys/S.json(.minisig)        the chain of keys
+//   root.json(.minisig)          the root key's word: which key signs
 //   objects/ab/abcdef...         pieces and recipes, by the BLAKE2b of their bytes
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,16 +25,28 @@ class ReleaseFolder {
   /// Creates what is missing. Errors: kIo; kExitLocked "ship.locked".
   static Result<ReleaseFolder> open(const std::string& path);
 
-  /// Numbers of the releases, ascending.
+  /// Numbers of the releases, by epoch, then ascending.
   [[nodiscard]] std::vector<std::uint64_t> versions() const;
+  /// The one that `latest` names; nothing in a new folder. Errors: kInvalidInput "release.*"; kIo.
+  [[nodiscard]] Result<std::optional<Release>> newest() const;
+  /// When a release was published: the time of its document's file, seconds since 1970.
+  [[nodiscard]] std::int64_t published(std::uint64_t version) const;
   [[nodiscard]] Result<Release> release(std::uint64_t version) const;
   /// Number of links in the chain of keys.
   [[nodiscard]] std::uint32_t key_links() const;
+  /// The root's word; epoch 0: none.
+  [[nodiscard]] Result<RootWord> root_word() const;
+  /// Refuses a key that is not the one devices have been led to: by the chain, by the root's word,
+  /// by the newest release. Errors: kUsage "ship.key".
+  [[nodiscard]] Result<void> check_signer(const PublicKey& key) const;
 
   /// Writes the objects that are missing; returns their bytes.
   Result<std::uint64_t> add_objects(const PublishedBundle& bundle) const;
   /// Writes and signs the document, then points `latest` at it.
   Result<void> add_release(const Release& release, const SecretKey& key) const;
+  /// Writes the root's word: `next` signs from now on, and a new epoch begins.
+  /// Errors: kUsage "ship.root" (another key than that of the word before).
+  Result<RootWord> add_root_word(const PublicKey& next, const SecretKey& root) const;
   /// Appends `next` to the chain, signed by `key`.
   Result<void> add_key(const PublicKey& next, const SecretKey& key) const;
   /// Removes all but the `keep` newest releases, then the objects that no release needs; returns

@@ -31,37 +31,64 @@ Result<std::uint64_t> parse_latest(std::string_view text) {
   return version;
 }
 
-/// The key that a link of the chain leads to from `trusted`; `trusted` itself where another key has
-/// signed the link (it comes before the place where this device joined).
-/// Errors: "fetch.missing" at the end of the chain.
-Result<PublicKey> follow_link(Transfers& transfers, std::uint32_t serial,
-                              const PublicKey& trusted) {
-  const std::string path = "keys/" + std::to_string(serial) + ".json";
-  MODAR_ASSIGN(const auto text, transfers.text(path, kMaxLinkBytes));
+/// A signed document of the chain of trust. Errors: "fetch.missing" where the server has none.
+struct TrustDocument {
+  std::string text;
+  Signature signature;
+};
+
+Result<TrustDocument> download_trust(Transfers& transfers, const std::string& path) {
+  TrustDocument document;
+  MODAR_ASSIGN(document.text, transfers.text(path, kMaxLinkBytes, true));
   MODAR_ASSIGN(const auto signature_text, transfers.text(path + ".minisig", kMaxSignatureBytes));
-  MODAR_ASSIGN(const auto signature, parse_signature(signature_text));
-  if (signature.key_id != trusted.id) return trusted;
-  MODAR_TRY(verify_signature(text, signature, trusted));
-  MODAR_ASSIGN(const auto link, parse_key_link(text));
-  if (link.serial != serial) {
-    return fail(kExitMixed, "fetch.chain", path, "it is a different link of the chain",
-                "publish the chain of keys again");
-  }
-  return parse_public_key(link.key);
+  MODAR_ASSIGN(document.signature, parse_signature(signature_text));
+  return document;
 }
 
-/// Moves the trust along the chain until the key of `wanted` is trusted.
-Result<void> follow_chain(Transfers& transfers, const Signature& wanted, StoreState& state) {
+/// Believes the root's word if there is a newer one than the state knows. Only the root key signs
+/// it, so no thief of a signing key can stop or forge it.
+Result<void> follow_root(Transfers& transfers, const Store& store, StoreState& state) {
+  const auto document = download_trust(transfers, "root.json");
+  if (!document && document.error().code == "fetch.missing") return {};
+  if (!document) return tl::unexpected(document.error());
+  MODAR_ASSIGN(const auto root, parse_public_key(state.root_key));
+  MODAR_TRY(verify_signature(document->text, document->signature, root));
+  MODAR_ASSIGN(const auto word, parse_root_word(document->text));
+  if (word.epoch <= state.epoch) return {};  // known, or replayed
+  MODAR_ASSIGN(const auto key, parse_public_key(word.key));
+  state.trusted_key = public_key_line(key);
+  state.epoch = word.epoch;
+  state.key_serial = word.links;
+  state.version = 0;
+  return store.save_state(state);
+}
+
+/// Moves the trust along the chain of keys until `wanted` is trusted; to the chain's end where the
+/// state is fresh, so that a key that was left behind is not believed again. What verifies is saved
+/// at once.
+Result<void> follow_chain(Transfers& transfers, const Signature& wanted, const Store& store,
+                          StoreState& state) {
   MODAR_ASSIGN(auto trusted, parse_public_key(state.trusted_key));
-  while (trusted.id != wanted.key_id && state.key_serial < kMaxLinks) {
-    auto next = follow_link(transfers, state.key_serial + 1, trusted);
-    if (!next && next.error().code == "fetch.missing") return {};  // the signature check reports it
-    if (!next) return tl::unexpected(next.error());
-    trusted = *next;
+  while ((state.fresh || trusted.id != wanted.key_id) && state.key_serial < kMaxLinks) {
+    const std::uint32_t serial = state.key_serial + 1;
+    const std::string path = "keys/" + std::to_string(serial) + ".json";
+    const auto document = download_trust(transfers, path);
+    if (!document && document.error().code == "fetch.missing") break;
+    if (!document) return tl::unexpected(document.error());
+    state.key_serial = serial;
+    // A device that joined in the middle passes over the links before its key.
+    if (document->signature.key_id != trusted.id) continue;
+    MODAR_TRY(verify_signature(document->text, document->signature, trusted));
+    MODAR_ASSIGN(const auto link, parse_key_link(document->text));
+    if (link.serial != serial) {
+      return fail(kExitMixed, "fetch.chain", path, "it is a different link of the chain",
+                  "publish the chain of keys again");
+    }
+    MODAR_ASSIGN(trusted, parse_public_key(link.key));
     state.trusted_key = public_key_line(trusted);
-    ++state.key_serial;
+    MODAR_TRY(store.save_state(state));
   }
-  return {};
+  return {};  // where the end of the chain is not `wanted`, the signature check reports it
 }
 
 /// Puts the key that --trust gives into the state, unless the state knows where the chain of keys
@@ -70,16 +97,17 @@ Result<void> recall_trust(const std::string& given_key, StoreState& state) {
   MODAR_ASSIGN(const auto given, parse_public_key(given_key));
   const std::string line = public_key_line(given);
   if (line == state.root_key || line == state.trusted_key) return {};
+  state = {};
   state.root_key = line;
   state.trusted_key = line;
-  state.key_serial = 0;
   return {};
 }
 
-/// The server's newest release. Follows the chain of keys where another key than the trusted one
-/// has signed, and moves the state's trust along it.
+/// The server's newest release. Where another key than the trusted one has signed it, asks for the
+/// root's word and follows the chain of keys.
 /// Errors: kExitWrongKey; kExitMixed; kExitNetwork; kInvalidInput "release.*".
-Result<SignedRelease> download_release(Transfers& transfers, StoreState& state) {
+Result<SignedRelease> download_release(Transfers& transfers, const Store& store,
+                                       StoreState& state) {
   MODAR_ASSIGN(const auto latest, transfers.text("latest", kMaxLatestBytes));
   MODAR_ASSIGN(const auto version, parse_latest(latest));
   const std::string path = "releases/" + std::to_string(version) + ".json";
@@ -89,7 +117,11 @@ Result<SignedRelease> download_release(Transfers& transfers, StoreState& state) 
   news.text = std::move(text);
   news.signature_text = std::move(signature_text);
   MODAR_ASSIGN(const auto signature, parse_signature(news.signature_text));
-  MODAR_TRY(follow_chain(transfers, signature, state));
+  MODAR_ASSIGN(const auto before, parse_public_key(state.trusted_key));
+  if (state.fresh || before.id != signature.key_id) {
+    MODAR_TRY(follow_root(transfers, store, state));
+    MODAR_TRY(follow_chain(transfers, signature, store, state));
+  }
   MODAR_ASSIGN(const auto trusted, parse_public_key(state.trusted_key));
   MODAR_TRY(verify_signature(news.text, signature, trusted));
   MODAR_ASSIGN(auto release, parse_release(news.text));
@@ -103,7 +135,7 @@ Result<SignedRelease> download_release(Transfers& transfers, StoreState& state) 
 
 // --- What this device wants ---
 
-TransferOptions transfer_options(const FetchOptions& options) {
+TransferOptions transfer_options(const FetchOptions& options, const std::string& installed) {
   TransferOptions transfer;
   transfer.url = options.url;
   transfer.parallel = options.parallel;
@@ -111,6 +143,9 @@ TransferOptions transfer_options(const FetchOptions& options) {
   transfer.attempts = options.attempts;
   transfer.first_wait_s = options.first_wait_s;
   transfer.stall_s = options.stall_s;
+  transfer.authorities = options.authorities;
+  transfer.source = options.source;
+  transfer.user_agent = "modar-fetch/" MODAR_VERSION " (" + installed + ")";
   return transfer;
 }
 
@@ -118,20 +153,28 @@ TransferOptions transfer_options(const FetchOptions& options) {
 /// installed one of the same number.
 Result<void> judge_release(const SignedRelease& news, const StoreState& state,
                            const std::optional<InstalledRelease>& active) {
+  // The active release counts too, in case the state was lost; not one of an epoch before.
+  const bool counts = active && active->release.epoch == state.epoch;
   const std::uint64_t known =
-      std::max(state.version, active ? active->release.version : std::uint64_t{0});
+      std::max(state.version, counts ? active->release.version : std::uint64_t{0});
   const std::string where = "release " + std::to_string(news.release.version);
+  if (news.release.epoch != state.epoch) {
+    return fail(news.release.epoch < state.epoch ? kExitRollBack : kExitMixed, "fetch.epoch", where,
+                "it is of epoch " + std::to_string(news.release.epoch) +
+                    ", the root key's word of epoch " + std::to_string(state.epoch),
+                "publish it again");
+  }
   if (news.release.version < known) {
     return fail(kExitRollBack, "fetch.roll-back", where,
                 "release " + std::to_string(known) + " was installed before",
                 "publish it under a higher number");
   }
-  if (news.release.expires <= std::time(nullptr)) {
+  if (news.release.expires != kNever && news.release.expires <= std::time(nullptr)) {
     return fail(kExitExpired, "fetch.expired", where,
                 "it expired at " + time_text(news.release.expires),
                 "publish it again, or set this device's clock");
   }
-  if (active && active->release.version == news.release.version && active->text != news.text) {
+  if (counts && active->release.version == news.release.version && active->text != news.text) {
     return fail(kExitMixed, "fetch.same-number", where,
                 "another release was installed under this number",
                 "publish it under a higher number");
@@ -163,10 +206,11 @@ Result<std::vector<ReleaseBundle>> choose_bundles(const Release& release,
   return chosen;
 }
 
-/// Whether every chosen bundle of the release in use is there with its full length.
+/// Whether every chosen bundle of the release in use is there and intact. Reads them all (BLAKE2b,
+/// about 1 GB/s on a desk): a fetch heals what has rotted.
 bool is_installed(const InstalledRelease& active, const std::vector<ReleaseBundle>& chosen) {
   return std::all_of(chosen.begin(), chosen.end(), [&](const ReleaseBundle& bundle) {
-    return file_size(active.folder + "/" + bundle.name + ".modar") == bundle.size;
+    return has_hash(active.folder + "/" + bundle.name + ".modar", bundle);
   });
 }
 
@@ -186,11 +230,13 @@ std::optional<Error> find_damage(const InstalledRelease& installed) {
 Result<FetchReport> fetch_release(const FetchOptions& options) {
   using namespace fetch;
   MODAR_ASSIGN(auto store, Store::open(options.store));
-  MODAR_ASSIGN(auto transfers, Transfers::create(transfer_options(options)));
+  auto active = store.active();
+  const std::string installed =
+      active ? "release " + std::to_string(active->release.version) : "nothing installed";
+  MODAR_ASSIGN(auto transfers, Transfers::create(transfer_options(options, installed)));
   StoreState state = store.state();
   MODAR_TRY(recall_trust(options.trusted_key, state));
-  MODAR_ASSIGN(const auto news, download_release(transfers, state));
-  auto active = store.active();
+  MODAR_ASSIGN(const auto news, download_release(transfers, store, state));
   MODAR_TRY(judge_release(news, state, active));
   MODAR_ASSIGN(const auto chosen, choose_bundles(news.release, options));
 
@@ -204,8 +250,11 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   }
   state.version = news.release.version;
   MODAR_TRY(store.save_state(state));
-  MODAR_TRY(empty_folder(store.pieces()));
-  report.bundles = store.bundle_paths(news.release);
+  MODAR_TRY(store.remove_pieces({}));
+  report.epoch = news.release.epoch;
+  report.expires = news.release.expires;
+  report.blocked = store.blocked_links(news.release);
+  report.bundles = installed_paths(store.path(), news.release);
   report.downloaded_bytes = transfers.stats().bytes;
   report.retries = transfers.stats().retries;
   report.corrupt_pieces += transfers.stats().corrupt;
@@ -228,8 +277,16 @@ Result<StoreReport> verify_store(const std::string& path) {
     active = std::move(before);
   }
   report.version = active->release.version;
-  report.bundles = store.bundle_paths(active->release);
+  report.bundles = installed_paths(store.path(), active->release);
   return report;
+}
+
+std::optional<StoreReport> installed_release(const std::string& store) {
+  using namespace fetch;
+  const std::string slot = active_slot(store);
+  const auto installed = slot.empty() ? std::nullopt : read_slot(slot);
+  if (!installed) return std::nullopt;
+  return StoreReport{installed->release.version, installed_paths(store, installed->release), false};
 }
 
 }  // namespace modar

@@ -148,6 +148,7 @@ Result<void> assemble(const Assembly& assembly, const PieceSource& source,
                       std::set<ObjectId>& damaged) {
   const std::size_t known_damage = damaged.size();
   MODAR_ASSIGN(auto file, OutputFile::open(assembly.file));
+  MODAR_TRY(file.resize(0));  // bytes that no piece covers are zero
   MODAR_TRY(file.resize(assembly.bundle.size));
   for (const PieceRecord& piece : assembly.recipe.pieces) {
     if (piece.stored_size == 0) continue;
@@ -222,9 +223,11 @@ class Installation {
   Result<void> run(FetchReport& report) {
     if (active_) source_.add(*active_);
     return bring_recipes()
-        .and_then([&] { return empty_folder(slot_); })
+        .and_then([&] { return find_kept(); })
         .and_then([&] { return tidy_pieces(); })
         .and_then([&] { return bring_pieces(); })
+        // The release before goes only now that every piece of the new one is here.
+        .and_then([&] { return store_.clear_slot(slot_, kept_); })
         .and_then([&] { return build(report); })
         .and_then([&] { return finish(); });
   }
@@ -233,9 +236,11 @@ class Installation {
   Result<void> bring_recipes() {
     assemblies_.reserve(chosen_.size());
     std::vector<Wanted> wanted;
+    std::set<ObjectId> known;  // bundles of equal content share a recipe
     for (const ReleaseBundle& bundle : chosen_) {
       const std::string file = piece_file(bundle.recipe);
-      if (!file_size(file)) wanted.push_back(want(bundle.recipe, bundle.recipe_size));
+      if (!known.insert(bundle.recipe).second || file_size(file)) continue;
+      wanted.push_back(want(bundle.recipe, bundle.recipe_size));
     }
     MODAR_TRY(transfers_.objects(wanted, [](std::int64_t) {}));
     for (const ReleaseBundle& bundle : chosen_) {
@@ -288,9 +293,18 @@ class Installation {
     std::set<std::string> needed;
     for (const auto& [id, size] : missing_pieces()) needed.insert(to_hex(id));
     for (const Assembly& assembly : assemblies_) needed.insert(to_hex(assembly.bundle.recipe));
-    for (const std::string& name : list_folder(store_.pieces())) {
-      if (needed.contains(name.substr(0, name.find('.')))) continue;
-      MODAR_TRY(remove_file(store_.pieces() + "/" + name));
+    return store_.remove_pieces(needed);
+  }
+
+  /// Bundles that the spare slot has already, from the release before.
+  Result<void> find_kept() {
+    const auto before = read_slot(slot_);
+    if (!before) return {};
+    for (const Assembly& assembly : assemblies_) {
+      for (const ReleaseBundle& old : before->release.bundles) {
+        if (old.name != assembly.bundle.name || old.hash != assembly.bundle.hash) continue;
+        if (has_hash(assembly.file, assembly.bundle)) kept_.insert(old.name);
+      }
     }
     return {};
   }
@@ -299,6 +313,7 @@ class Installation {
     std::vector<Wanted> wanted;
     std::uint64_t total = 0;
     std::uint64_t needed = kSpareBytes;
+    std::uint64_t reclaimed = 0;  // by clearing the spare slot once the pieces are here
     for (const auto& [id, size] : missing_pieces()) {
       if (is_whole(id, size)) continue;
       wanted.push_back(want(id, size));
@@ -306,9 +321,15 @@ class Installation {
       const auto part = file_size(wanted.back().file + ".part").value_or(0);
       needed += size - std::min(part, size);
     }
+    const std::uint64_t before_clearing = needed;
     for (const Assembly& assembly : assemblies_) {
-      needed += assembly.bundle.size - file_size(assembly.file).value_or(0);
+      if (!kept_.contains(assembly.bundle.name)) needed += assembly.bundle.size;
     }
+    for (const std::string& name : list_folder(slot_)) {
+      const bool kept = kept_.contains(name.substr(0, name.rfind('.')));
+      if (!kept) reclaimed += file_size(slot_ + "/" + name).value_or(0);
+    }
+    needed = std::max(before_clearing, needed - std::min(needed, reclaimed));
     MODAR_ASSIGN(const auto space, free_space(store_.path()));
     if (space < needed) {
       return fail(
@@ -335,24 +356,18 @@ class Installation {
 
   Result<void> build(FetchReport& report) {
     for (const Assembly& assembly : assemblies_) {
-      if (!link_old_bundle(assembly, report)) {
-        MODAR_TRY(build_bundle(assembly, report));
-        MODAR_TRY(verify_bundle(assembly.file, assembly.bundle));
+      if (kept_.contains(assembly.bundle.name)) {
+        report.reused_bytes += assembly.bundle.size;
+        report.reused_pieces += static_cast<std::uint32_t>(assembly.recipe.pieces.size());
+        continue;
       }
+      // The recipe first: clear_slot() takes it for the sign that the bundle is ours.
       MODAR_TRY(write_file(slot_ + "/" + assembly.bundle.name + ".recipe",
                            std::string_view(assembly.recipe_stored)));
+      MODAR_TRY(build_bundle(assembly, report));
+      MODAR_TRY(verify_bundle(assembly.file, assembly.bundle));
     }
     return {};
-  }
-
-  /// A bundle that did not change is one file (hard link) in both slots.
-  bool link_old_bundle(const Assembly& assembly, FetchReport& report) const {
-    if (!active_) return false;
-    const std::string old = active_->folder + "/" + assembly.bundle.name + ".modar";
-    if (!verify_bundle(old, assembly.bundle) || !share_file(old, assembly.file)) return false;
-    report.reused_bytes += assembly.bundle.size;
-    report.reused_pieces += static_cast<std::uint32_t>(assembly.recipe.pieces.size());
-    return true;
   }
 
   Result<void> build_bundle(const Assembly& assembly, FetchReport& report) {
@@ -398,9 +413,16 @@ class Installation {
   PieceSource source_;
   std::vector<Assembly> assemblies_;
   std::set<ObjectId> damaged_;
+  std::set<std::string> kept_;  // bundles that stay in the slot as they are
 };
 
 }  // namespace
+
+bool has_hash(const std::string& file, const ReleaseBundle& bundle) {
+  const auto mapped = MappedFile::open(file);
+  return mapped && mapped->bytes().size() == bundle.size &&
+         bundle_hash(mapped->bytes()) == bundle.hash;
+}
 
 Result<void> verify_bundle(const std::string& file, const ReleaseBundle& bundle) {
   MODAR_ASSIGN(const auto mapped, MappedFile::open(file));

@@ -4,10 +4,12 @@
 #include <array>
 #include <cinttypes>
 #include <cstdio>
+#include <ctime>
 #include <span>
 
 #include <rapidjson/prettywriter.h>
 
+#include "formats/atomic_file.hpp"
 #include "modar/fetch.hpp"
 #include "runtime/platform/command_line.hpp"
 #include "store.hpp"
@@ -27,7 +29,8 @@ Usage:
 
 URL is http(s)://HOST/PATH, or a folder (a USB stick), that `modar ship publish` filled. The installed
 bundles are DIR/NAME.modar. Interrupted at any moment, the release in use stays whole, and the next run
-resumes the download.
+resumes the download. DIR must be on a file system that can lock files; where it has no symbolic
+links (FAT, /sdcard), the bundles are DIR/slots/*/NAME.modar: the paths that are printed.
 
   --store DIR       where releases are installed; made where it is missing
   --trust K.pub     the publisher's public key, of `modar ship keygen`
@@ -36,6 +39,9 @@ resumes the download.
   --parallel N      pieces at once, 1 to 32 (4)
   --limit-rate N    bytes a second at most; 16k and 1M are understood
   --attempts N      give up after so many attempts in a row without any data (8)
+  --cacert FILE     authorities of HTTPS servers, PEM; else those of CURL_CA_BUNDLE, SSL_CERT_FILE and
+                    SSL_CERT_DIR, else the system's. Proxies as for curl: https_proxy, no_proxy
+  --status FILE     write what happened as JSON, also where it fails, for whoever looks after devices
   --verify          check what is installed; go back to the release before if it is damaged
   --json            print what was done as JSON
   --quiet           no progress, no summary
@@ -55,7 +61,8 @@ installed, 12 expired, 13 the server's files belong to different releases, 14 no
 struct CommandLine {
   FetchOptions options;
   std::string trust_file;
-  bool verify = false;  ///< only check what is installed
+  std::string status_file;  ///< empty: none
+  bool verify = false;      ///< only check what is installed
   bool json = false;
   bool quiet = false;
   bool help = false;
@@ -98,6 +105,11 @@ bool set_text(CommandLine& line, std::string_view value) {
   return true;
 }
 
+bool set_status(CommandLine& line, std::string_view value) {
+  line.status_file = value;
+  return true;
+}
+
 bool set_trust(CommandLine& line, std::string_view value) {
   line.trust_file = value;
   return true;
@@ -108,7 +120,7 @@ bool add_bundle(CommandLine& line, std::string_view value) {
   return true;
 }
 
-constexpr std::array<Option, 12> kOptions = {{
+constexpr std::array<Option, 14> kOptions = {{
     {{"store", "a folder"}, set_text<&FetchOptions::store>},
     {{"trust", "a file"}, set_trust},
     {{"device", "a name"}, set_text<&FetchOptions::device>},
@@ -116,6 +128,8 @@ constexpr std::array<Option, 12> kOptions = {{
     {{"parallel", "a number from 1 to 32"}, set_parallel},
     {{"limit-rate", "a number of bytes like 2000, 16k or 1M"}, set_rate},
     {{"attempts", "a number from 1 to 1000"}, set_attempts},
+    {{"cacert", "a file"}, set_text<&FetchOptions::authorities>},
+    {{"status", "a file"}, set_status},
     {{"verify"}, set_switch<&CommandLine::verify>},
     {{"json"}, set_switch<&CommandLine::json>},
     {{"quiet"}, set_switch<&CommandLine::quiet>},
@@ -182,7 +196,10 @@ void print_json(const FetchReport& report) {
     json.Key(key);
     json.Uint64(value);
   };
+  put("epoch", report.epoch);
   put("version", report.version);
+  json.Key("expires");
+  json.String(time_text(report.expires).c_str());
   json.Key("changed");
   json.Bool(report.changed);
   write_bundles(json, report.bundles);
@@ -196,9 +213,47 @@ void print_json(const FetchReport& report) {
   std::puts(buffer.GetString());
 }
 
+/// What the operator of many devices collects. The keys are a contract (formats/shipping.md).
+void write_status(const CommandLine& line, const Error* error, std::uint64_t version, bool changed,
+                  const std::vector<std::string>& bundles) {
+  if (line.status_file.empty()) return;
+  rapidjson::StringBuffer buffer;
+  Writer json(buffer);
+  const auto text = [&](const char* key, const std::string& value) {
+    json.Key(key);
+    json.String(value.c_str());
+  };
+  json.StartObject();
+  text("program", "modar-fetch " MODAR_VERSION);
+  text("time", time_text(std::time(nullptr)));
+  text("action", line.verify ? "verify" : "fetch");
+  text("result", error == nullptr ? "ok" : error->code);
+  json.Key("exit_code");
+  json.Int(error == nullptr ? 0 : static_cast<int>(error->exit));
+  text("message", error == nullptr ? "" : to_line(*error));
+  json.Key("version");
+  json.Uint64(version);
+  json.Key("changed");
+  json.Bool(changed);
+  write_bundles(json, bundles);
+  json.EndObject();
+  buffer.Put('\n');
+  const std::string_view all(buffer.GetString(), buffer.GetSize());
+  if (auto written = write_file(line.status_file, all); !written) answer(written.error());
+}
+
+int fail_with_status(const CommandLine& line, const Error& error) {
+  // What is installed stays in use.
+  const auto installed = installed_release(line.options.store);
+  write_status(line, &error, installed ? installed->version : 0, false,
+               installed ? installed->bundles : std::vector<std::string>());
+  return answer(error);
+}
+
 int run_verify(const CommandLine& line) {
   const auto report = verify_store(line.options.store);
-  if (!report) return answer(report.error());
+  if (!report) return fail_with_status(line, report.error());
+  write_status(line, nullptr, report->version, report->fell_back, report->bundles);
   if (line.json) {
     rapidjson::StringBuffer buffer;
     Writer json(buffer);
@@ -229,7 +284,13 @@ int run_fetch(CommandLine& line) {
   if (bar) line.options.progress = show_progress;
   const auto report = fetch_release(line.options);
   if (bar) std::fputs("\r\033[K", stderr);
-  if (!report) return answer(report.error());
+  if (!report) return fail_with_status(line, report.error());
+  write_status(line, nullptr, report->version, report->changed, report->bundles);
+  for (const std::string& path : report->blocked) {
+    std::fprintf(stderr,
+                 "modar-fetch: %s is a file of somebody else's and stays; see the paths below\n",
+                 path.c_str());
+  }
   if (line.json) {
     print_json(*report);
   } else if (!line.quiet) {

@@ -139,12 +139,10 @@ Result<Signature> parse_signature(std::string_view text) {
   if (!take_line(text).starts_with(kUntrusted))
     return bad_text("its first line is not an untrusted comment");
   std::array<std::uint8_t, 74> bytes{};
-  if (!from_base64(take_line(text), bytes) || bytes[0] != 'E' ||
-      (bytes[1] != 'D' && bytes[1] != 'd')) {
-    return bad_text("its second line is not an Ed25519 signature");
+  if (!from_base64(take_line(text), bytes) || bytes[0] != 'E' || bytes[1] != 'D') {
+    return bad_text("its second line is not an Ed25519 signature of the prehashed form");
   }
   Signature signature;
-  signature.prehashed = bytes[1] == 'D';
   std::copy_n(bytes.begin() + 2, 8, signature.key_id.begin());
   std::copy_n(bytes.begin() + 10, 64, signature.bytes.begin());
   const std::string_view comment = take_line(text);
@@ -157,8 +155,7 @@ Result<Signature> parse_signature(std::string_view text) {
 }
 
 std::string signature_text(const Signature& signature, std::string_view untrusted_comment) {
-  std::array<std::uint8_t, 74> bytes{'E',
-                                     static_cast<std::uint8_t>(signature.prehashed ? 'D' : 'd')};
+  std::array<std::uint8_t, 74> bytes{'E', 'D'};
   std::copy(signature.key_id.begin(), signature.key_id.end(), bytes.begin() + 2);
   std::copy(signature.bytes.begin(), signature.bytes.end(), bytes.begin() + 10);
   return std::string(kUntrusted) + std::string(untrusted_comment) + "\n" + to_base64(bytes) + "\n" +
@@ -177,7 +174,6 @@ Result<void> verify_signature(std::string_view message, const Signature& signatu
   std::vector<std::uint8_t> hash(crypto_generichash_BYTES_MAX);
   const auto* bytes = reinterpret_cast<const unsigned char*>(message.data());
   crypto_generichash(hash.data(), hash.size(), bytes, message.size(), nullptr, 0);
-  if (!signature.prehashed) hash.assign(bytes, bytes + message.size());
   std::vector<std::uint8_t> comment(signature.bytes.begin(), signature.bytes.end());
   comment.insert(comment.end(), signature.trusted_comment.begin(), signature.trusted_comment.end());
   if (crypto_sign_verify_detached(signature.bytes.data(), hash.data(), hash.size(),
@@ -196,6 +192,9 @@ namespace {
 
 constexpr const char* kReleaseFormat = "modar-release";
 constexpr const char* kKeyFormat = "modar-key";
+constexpr const char* kRootFormat = "modar-root";
+constexpr std::string_view kNeverText = "never";
+constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 53;  ///< exact in JSON
 
 tl::unexpected<Error> bad(std::string where, std::string cause) {
   return fail(ExitCode::kInvalidInput, "release.text", "release document: " + std::move(where),
@@ -331,17 +330,25 @@ Result<Release> parse_release(std::string_view json) {
   MODAR_ASSIGN(const auto document, parse_document(json, kReleaseFormat));
   Members members(document);
   Release release;
-  release.version = members.number("version", std::uint64_t{1} << 53);
+  release.version = members.number("version", kMaxNumber);
   const std::string expires = members.text("expires");
   const rapidjson::Value* bundles = members.array("bundles");
   if (!members.missing().empty()) return bad(members.missing(), "it is missing or wrong");
   if (release.version == 0) return bad("version", "versions begin at 1");
-  MODAR_ASSIGN(const auto time, parse_time(expires));
-  release.expires = time;
+  if (expires != kNeverText) {
+    MODAR_ASSIGN(release.expires, parse_time(expires));
+    if (release.expires == kNever) return bad("expires", "it is 1970");
+  }
+  if (document.HasMember("epoch")) {
+    release.epoch = members.number("epoch", kMaxNumber);
+    if (release.epoch == 0) return bad("epoch", "epochs begin at 1");
+  }
   std::set<std::string> names;
   for (const rapidjson::Value& json_bundle : bundles->GetArray()) {
     MODAR_ASSIGN(auto bundle, read_bundle(json_bundle));
-    if (!names.insert(bundle.name).second) return bad("bundles", "two have the same name");
+    if (!names.insert(lower_case(bundle.name)).second) {
+      return bad("bundles", "two have the same name, or names that differ by case only");
+    }
     release.bundles.push_back(std::move(bundle));
   }
   if (release.bundles.empty()) return bad("bundles", "there is none");
@@ -355,6 +362,7 @@ std::string release_text(const Release& release) {
   json.StartObject();
   put(json, "format", kReleaseFormat);
   put(json, "format_version", std::uint64_t{1});
+  if (release.epoch != 0) put(json, "epoch", release.epoch);
   put(json, "version", release.version);
   put(json, "expires", time_text(release.expires));
   json.Key("bundles");
@@ -363,6 +371,14 @@ std::string release_text(const Release& release) {
   json.EndArray();
   json.EndObject();
   return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+}
+
+std::string lower_case(std::string_view name) {
+  std::string lower(name);
+  for (char& c : lower) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return lower;
 }
 
 Result<std::int64_t> parse_time(std::string_view text) {
@@ -391,6 +407,7 @@ Result<std::int64_t> parse_time(std::string_view text) {
 }
 
 std::string time_text(std::int64_t seconds) {
+  if (seconds == kNever) return std::string(kNeverText);
   const std::time_t clock = seconds;
   std::tm time{};
   gmtime_r(&clock, &time);
@@ -419,6 +436,32 @@ std::string key_link_text(const KeyLink& link) {
   put(json, "format_version", std::uint64_t{1});
   put(json, "serial", std::uint64_t{link.serial});
   put(json, "key", link.key);
+  json.EndObject();
+  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+}
+
+Result<RootWord> parse_root_word(std::string_view json) {
+  MODAR_ASSIGN(const auto document, parse_document(json, kRootFormat));
+  Members members(document);
+  RootWord word;
+  word.epoch = members.number("epoch", kMaxNumber);
+  word.links = static_cast<std::uint32_t>(members.number("links", 1000000));
+  word.key = members.text("key");
+  if (!members.missing().empty()) return bad(members.missing(), "it is missing or wrong");
+  if (word.epoch == 0) return bad("epoch", "epochs begin at 1");
+  return word;
+}
+
+std::string root_word_text(const RootWord& word) {
+  rapidjson::StringBuffer buffer;
+  Writer json(buffer);
+  json.SetIndent(' ', 1);
+  json.StartObject();
+  put(json, "format", kRootFormat);
+  put(json, "format_version", std::uint64_t{1});
+  put(json, "epoch", word.epoch);
+  put(json, "links", std::uint64_t{word.links});
+  put(json, "key", word.key);
   json.EndObject();
   return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
 }

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <tuple>
 #include <utility>
 
 #include <rapidjson/document.h>
@@ -52,13 +53,6 @@ std::vector<std::string> list_folder(const std::string& path) {
   return names;
 }
 
-Result<void> empty_folder(const std::string& path) {
-  for (const std::string& name : list_folder(path)) {
-    MODAR_TRY(remove_file(path + "/" + name));
-  }
-  return {};
-}
-
 std::optional<std::string> read_small_file(const std::string& path, std::size_t limit) {
   const auto size = file_size(path);
   if (!size || *size > limit) return std::nullopt;
@@ -97,15 +91,21 @@ Result<void> sync_folder(const std::string& path) {
   return {};
 }
 
-Result<void> switch_link(const std::string& path, const std::string& target) {
+Result<bool> switch_link(const std::string& path, const std::string& target) {
   const std::string beside = path + ".new";
-  MODAR_TRY(remove_file(beside));
-  if (::symlink(target.c_str(), beside.c_str()) != 0) return io("io.link", beside, kStoreCure);
-  return rename_file(beside, path);
+  if (!link_target(beside).empty()) MODAR_TRY(remove_file(beside));
+  if (::symlink(target.c_str(), beside.c_str()) != 0) {
+    // FAT and Android's shared storage.
+    if (errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS || errno == EACCES) return false;
+    return io("io.link", beside, kStoreCure);
+  }
+  MODAR_TRY(rename_file(beside, path));
+  return true;
 }
 
-bool share_file(const std::string& path, const std::string& second) {
-  return ::link(path.c_str(), second.c_str()) == 0;
+bool path_exists(const std::string& path) {
+  struct stat info {};
+  return ::lstat(path.c_str(), &info) == 0;
 }
 
 std::string link_target(const std::string& path) {
@@ -137,7 +137,7 @@ OutputFile::~OutputFile() {
 }
 
 Result<OutputFile> OutputFile::open(const std::string& path) {
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
   if (descriptor < 0) return io("io.create", path, kStoreCure);
   return OutputFile(descriptor, path);
 }
@@ -171,14 +171,31 @@ Result<void> OutputFile::sync() {
 namespace {
 
 constexpr std::size_t kMaxStateBytes = 65536;
-constexpr const char* kExtension = ".modar";
+constexpr std::size_t kMaxPointerBytes = 64;
+constexpr std::string_view kBundle = ".modar";
+constexpr std::string_view kRecipe = ".recipe";
+constexpr std::string_view kLinkTarget = "current/";
 
-std::string slot_name(const std::string& store, const char* slot) {
-  return store + "/slots/" + slot;
+/// Temporary files of ours at the top of a store, left behind by a fetch that was killed.
+bool is_leftover(const std::string& store, const std::string& name) {
+  if (name.ends_with(".new")) return !link_target(store + "/" + name).empty();
+  return name.ends_with(".tmp") &&
+         (name.starts_with("state.json.") || name.starts_with("current."));
 }
 
-bool ends_with_extension(const std::string& name) {
-  return name.ends_with(kExtension);
+/// "0123456789abcdef0123456789abcdef", or that with ".part".
+bool is_piece_name(std::string_view name) {
+  if (name.ends_with(".part")) name.remove_suffix(5);
+  return object_id_of_hex(name).has_value();
+}
+
+/// What `current` says, as a link or as a file.
+std::string current_slot(const std::string& store) {
+  const std::string path = store + "/current";
+  std::string target = link_target(path);
+  if (target.empty()) target = read_small_file(path, kMaxPointerBytes).value_or("");
+  while (!target.empty() && target.back() == '\n') target.pop_back();
+  return target;
 }
 
 }  // namespace
@@ -193,39 +210,59 @@ Result<Store> Store::open(const std::string& path) {
   MODAR_ASSIGN(auto lock, FolderLock::take(path + "/lock", {kExitLocked, "store.locked", path,
                                                             "another fetch is using this store",
                                                             "wait until it ends"}));
-  // Left behind by a fetch that was killed.
   for (const std::string& name : list_folder(path)) {
-    if (!name.ends_with(".tmp") && !name.ends_with(".new")) continue;
-    MODAR_TRY(remove_file(path + "/" + name));
+    if (is_leftover(path, name)) MODAR_TRY(remove_file(path + "/" + name));
   }
   return Store(path, std::move(lock));
 }
 
-StoreState Store::state() const {
-  StoreState state;
-  const auto text = read_small_file(path_ + "/state.json", kMaxStateBytes);
-  if (!text) return state;
+std::optional<StoreState> parse_state(std::string_view text) {
   rapidjson::Document json;
-  json.Parse<rapidjson::kParseIterativeFlag>(text->data(), text->size());
-  if (json.HasParseError() || !json.IsObject()) return state;
-  const auto string = [&](const char* key) -> std::string {
-    return json.HasMember(key) && json[key].IsString() ? json[key].GetString() : "";
+  json.Parse<rapidjson::kParseIterativeFlag>(text.data(), text.size());
+  if (json.HasParseError() || !json.IsObject()) return std::nullopt;
+  StoreState state;
+  state.fresh = false;
+  const auto number = [&](const char* key, std::uint64_t& to) {
+    if (!json.HasMember(key)) return key == std::string_view("epoch");  // stores before epochs
+    if (!json[key].IsUint64()) return false;
+    to = json[key].GetUint64();
+    return true;
   };
-  if (json.HasMember("version") && json["version"].IsUint64()) {
-    state.version = json["version"].GetUint64();
+  const auto key_line = [&](const char* key, std::string& to) {
+    if (!json.HasMember(key) || !json[key].IsString()) return false;
+    to = json[key].GetString();
+    return parse_public_key(to).has_value();
+  };
+  std::uint64_t serial = 0;
+  if (!number("epoch", state.epoch) || !number("version", state.version) ||
+      !number("key_serial", serial) || serial > 0xFFFFFFFFu ||
+      !key_line("root_key", state.root_key) || !key_line("trusted_key", state.trusted_key)) {
+    return std::nullopt;
   }
-  if (json.HasMember("key_serial") && json["key_serial"].IsUint()) {
-    state.key_serial = json["key_serial"].GetUint();
-  }
-  state.root_key = string("root_key");
-  state.trusted_key = string("trusted_key");
+  state.key_serial = static_cast<std::uint32_t>(serial);
   return state;
+}
+
+StoreState Store::state() const {
+  StoreState best;
+  const auto rank = [](const StoreState& s) {
+    return std::tuple(s.epoch, s.key_serial, s.version);
+  };
+  for (const char* file : {"/state.json", "/slots/state.json"}) {
+    const auto text = read_small_file(path_ + file, kMaxStateBytes);
+    if (!text) continue;
+    auto state = parse_state(*text);
+    if (state && (best.fresh || rank(*state) > rank(best))) best = std::move(*state);
+  }
+  return best;
 }
 
 Result<void> Store::save_state(const StoreState& state) const {
   rapidjson::StringBuffer buffer;
   rapidjson::PrettyWriter<rapidjson::StringBuffer> json(buffer);
   json.StartObject();
+  json.Key("epoch");
+  json.Uint64(state.epoch);
   json.Key("version");
   json.Uint64(state.version);
   json.Key("root_key");
@@ -235,7 +272,9 @@ Result<void> Store::save_state(const StoreState& state) const {
   json.Key("key_serial");
   json.Uint(state.key_serial);
   json.EndObject();
-  return write_file(path_ + "/state.json", std::string_view(buffer.GetString(), buffer.GetSize()));
+  const std::string_view text(buffer.GetString(), buffer.GetSize());
+  MODAR_TRY(write_file(path_ + "/state.json", text));
+  return write_file(path_ + "/slots/state.json", text);
 }
 
 std::optional<InstalledRelease> read_slot(const std::string& folder) {
@@ -247,9 +286,8 @@ std::optional<InstalledRelease> read_slot(const std::string& folder) {
 }
 
 std::optional<InstalledRelease> Store::active() const {
-  const std::string target = link_target(path_ + "/current");
-  if (target != "slots/a" && target != "slots/b") return std::nullopt;
-  return read_slot(path_ + "/" + target);
+  const std::string slot = active_slot(path_);
+  return slot.empty() ? std::nullopt : read_slot(slot);
 }
 
 std::optional<InstalledRelease> Store::other() const {
@@ -257,43 +295,90 @@ std::optional<InstalledRelease> Store::other() const {
 }
 
 std::string Store::spare_folder() const {
-  return slot_name(path_, link_target(path_ + "/current") == "slots/a" ? "b" : "a");
+  return path_ + (current_slot(path_) == "slots/a" ? "/slots/b" : "/slots/a");
 }
 
 Result<void> Store::activate(const InstalledRelease& release) const {
   MODAR_TRY(sync_folder(release.folder));
   const std::string target = release.folder.substr(path_.size() + 1);
-  MODAR_TRY(switch_link(path_ + "/current", target));
+  MODAR_ASSIGN(const bool linked, switch_link(path_ + "/current", target));
+  if (!linked) MODAR_TRY(write_file(path_ + "/current", std::string_view(target + "\n")));
   MODAR_TRY(link_bundles(release.release));
   return sync_folder(path_);
 }
 
 Result<void> Store::link_bundles(const Release& release) const {
   for (const std::string& name : list_folder(path_)) {
-    if (!ends_with_extension(name)) continue;
-    bool wanted = false;
-    for (const ReleaseBundle& bundle : release.bundles) {
-      wanted = wanted || bundle.name + kExtension == name;
+    // A link of ours whose bundle is not in use any more.
+    const std::string link = path_ + "/" + name;
+    if (name.ends_with(kBundle) && link_target(link) == std::string(kLinkTarget) + name &&
+        !file_size(link)) {
+      MODAR_TRY(remove_file(link));
     }
-    if (wanted) continue;
-    MODAR_TRY(remove_file(path_ + "/" + name));
   }
+  if (link_target(path_ + "/current").empty()) return {};  // no symbolic links here
   for (const ReleaseBundle& bundle : release.bundles) {
-    const std::string target = "current/" + bundle.name + kExtension;
-    const std::string link = path_ + "/" + bundle.name + kExtension;
-    if (!file_size(path_ + "/" + target) || link_target(link) == target) continue;
-    MODAR_TRY(switch_link(link, target));
+    const std::string name = bundle.name + std::string(kBundle);
+    const std::string target = std::string(kLinkTarget) + name;
+    const std::string link = path_ + "/" + name;
+    if (!file_size(path_ + "/" + target) || path_exists(link)) continue;
+    MODAR_ASSIGN(const bool linked, switch_link(link, target));
+    if (!linked) return {};
   }
   return {};
 }
 
-std::vector<std::string> Store::bundle_paths(const Release& release) const {
+std::string active_slot(const std::string& store) {
+  const std::string target = current_slot(store);
+  return target == "slots/a" || target == "slots/b" ? store + "/" + target : std::string();
+}
+
+std::vector<std::string> installed_paths(const std::string& store, const Release& release) {
   std::vector<std::string> paths;
   for (const ReleaseBundle& bundle : release.bundles) {
-    const std::string path = path_ + "/" + bundle.name + ".modar";
-    if (file_size(path)) paths.push_back(path);
+    const std::string name = bundle.name + std::string(kBundle);
+    const std::string installed = current_slot(store) + "/" + name;
+    if (!file_size(store + "/" + installed)) continue;
+    const bool linked = link_target(store + "/" + name) == std::string(kLinkTarget) + name;
+    paths.push_back(store + "/" + (linked ? name : installed));
   }
   return paths;
+}
+
+std::vector<std::string> Store::blocked_links(const Release& release) const {
+  std::vector<std::string> blocked;
+  for (const ReleaseBundle& bundle : release.bundles) {
+    const std::string name = bundle.name + std::string(kBundle);
+    const std::string path = path_ + "/" + name;
+    if (path_exists(path) && link_target(path) != std::string(kLinkTarget) + name) {
+      blocked.push_back(path);
+    }
+  }
+  return blocked;
+}
+
+Result<void> Store::remove_pieces(const std::set<std::string>& keep) const {
+  for (const std::string& name : list_folder(pieces())) {
+    if (!is_piece_name(name) || keep.contains(name.substr(0, name.find('.')))) continue;
+    MODAR_TRY(remove_file(pieces() + "/" + name));
+  }
+  return {};
+}
+
+Result<void> Store::clear_slot(const std::string& slot, const std::set<std::string>& keep) const {
+  // Without its document the slot is no release. A bundle is ours if its recipe lies beside it:
+  // that is written first and removed last.
+  for (const char* name : {"/release.json", "/release.json.minisig"}) {
+    MODAR_TRY(remove_file(slot + name));
+  }
+  for (const std::string& name : list_folder(slot)) {
+    if (!name.ends_with(kRecipe)) continue;
+    const std::string bundle = name.substr(0, name.size() - kRecipe.size());
+    if (keep.contains(bundle)) continue;
+    MODAR_TRY(remove_file(slot + "/" + bundle + std::string(kBundle)));
+    MODAR_TRY(remove_file(slot + "/" + name));
+  }
+  return {};
 }
 
 }  // namespace modar::fetch

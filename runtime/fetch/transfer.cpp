@@ -1,6 +1,7 @@
 #include "transfer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -43,6 +44,28 @@ std::string server_address(const std::string& url_or_folder) {
   return base;
 }
 
+/// A PEM file of authorities, as curl and OpenSSL take it from the environment; empty: the
+/// system's.
+std::string authorities_of(const TransferOptions& options) {
+  if (!options.authorities.empty()) return options.authorities;
+  for (const char* name : {"CURL_CA_BUNDLE", "SSL_CERT_FILE"}) {
+    if (const char* value = std::getenv(name); value != nullptr && *value != '\0') return value;
+  }
+  return {};
+}
+
+bool is_tls_failure(CURLcode code) {
+  return code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CONNECT_ERROR ||
+         code == CURLE_SSL_CACERT_BADFILE || code == CURLE_SSL_CERTPROBLEM ||
+         code == CURLE_SSL_ISSUER_ERROR;
+}
+
+/// An attempt counts as progress if it brought so many bytes more than any before, or the rest: a
+/// server that sends a byte now and then cannot keep a fetch busy for ever. Set by hand.
+constexpr std::uint64_t kLeastProgress = 1024;
+/// Bytes a second below which a connection is closed after stall_s. Set by hand: 2G brings 3000.
+constexpr long kLeastSpeed = 64;
+
 class TransferLoop;
 
 /// One download. libcurl's callbacks point here, so it never moves.
@@ -62,8 +85,11 @@ struct Transfer {
   bool welcome = false;        ///< the body is the file, not an error page
   bool too_long = false;
   bool failed_to_write = false;
-  unsigned fruitless = 0;  ///< attempts in a row without any data
-  unsigned missing = 0;    ///< answers "no such file"
+  std::uint64_t furthest = 0;                  ///< most bytes that any attempt ended with
+  std::array<char, CURL_ERROR_SIZE> reason{};  ///< libcurl's words
+  unsigned fruitless = 0;                      ///< attempts in a row without any data
+  bool optional = false;                       ///< believe the first answer "no such file"
+  unsigned missing = 0;                        ///< answers "no such file"
   Clock::time_point not_before{};
   Error error;
 
@@ -77,7 +103,7 @@ class TransferLoop {
  public:
   explicit TransferLoop(TransferOptions options)
       : options_(std::move(options)),
-        base_(server_address(options_.url)),
+        base_(options_.source ? std::string("the release folder") : server_address(options_.url)),
         multi_(curl_multi_init()) {}
   TransferLoop(const TransferLoop&) = delete;
   TransferLoop& operator=(const TransferLoop&) = delete;
@@ -99,6 +125,9 @@ class TransferLoop {
   bool start(Transfer& transfer);
   void judge_status(Transfer& transfer);
   Outcome finish(Transfer& transfer, CURLcode code);
+  Outcome close(Transfer& transfer, Outcome outcome);
+  Outcome ask_source(Transfer& transfer);
+  Result<void> run_source(std::vector<std::unique_ptr<Transfer>>& transfers);
   Outcome judge_answer(Transfer& transfer, CURLcode code, long status);
   Outcome judge_object(Transfer& transfer);
   Outcome again(Transfer& transfer, const std::string& cause);
@@ -172,7 +201,19 @@ void set_common(CURL* handle, const TransferOptions& options) {
   curl_easy_setopt(handle, CURLOPT_PROTOCOLS_STR, "http,https,file");
   curl_easy_setopt(handle, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(handle, CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
-  curl_easy_setopt(handle, CURLOPT_LOW_SPEED_LIMIT, 1L);
+  const std::uint64_t capped = options.bytes_per_second / (2 * std::max(1u, options.parallel));
+  curl_easy_setopt(handle, CURLOPT_LOW_SPEED_LIMIT,
+                   options.bytes_per_second == 0
+                       ? kLeastSpeed
+                       : std::clamp(static_cast<long>(std::min<std::uint64_t>(capped, kLeastSpeed)),
+                                    1L, kLeastSpeed));
+  curl_easy_setopt(handle, CURLOPT_USERAGENT, options.user_agent.c_str());
+  if (const std::string file = authorities_of(options); !file.empty()) {
+    curl_easy_setopt(handle, CURLOPT_CAINFO, file.c_str());
+  }
+  if (const char* folder = std::getenv("SSL_CERT_DIR"); folder != nullptr && *folder != '\0') {
+    curl_easy_setopt(handle, CURLOPT_CAPATH, folder);
+  }
   curl_easy_setopt(handle, CURLOPT_LOW_SPEED_TIME,
                    std::max(1L, static_cast<long>(std::ceil(options.stall_s))));
   // Small reads keep the rate limit smooth on slow links.
@@ -212,6 +253,7 @@ bool TransferLoop::start(Transfer& transfer) {
   curl_easy_setopt(handle, CURLOPT_RESUME_FROM_LARGE, static_cast<curl_off_t>(transfer.have));
   curl_easy_setopt(handle, CURLOPT_WRITEFUNCTION, on_body);
   curl_easy_setopt(handle, CURLOPT_WRITEDATA, &transfer);
+  curl_easy_setopt(handle, CURLOPT_ERRORBUFFER, transfer.reason.data());
   curl_easy_setopt(handle, CURLOPT_PRIVATE, &transfer);
   if (curl_multi_add_handle(multi_, handle) == CURLM_OK) return true;
   transfer.error = {ExitCode::kInternal, "fetch.curl", base_, "libcurl refuses to start",
@@ -221,7 +263,9 @@ bool TransferLoop::start(Transfer& transfer) {
 
 /// Schedules another attempt, unless too many in a row brought no data.
 Outcome TransferLoop::again(Transfer& transfer, const std::string& cause) {
-  transfer.fruitless = transfer.received != 0 ? 0 : transfer.fruitless + 1;
+  const bool progress = transfer.have >= transfer.furthest + kLeastProgress;
+  transfer.furthest = std::max(transfer.furthest, transfer.have);
+  transfer.fruitless = progress ? 0 : transfer.fruitless + 1;
   if (transfer.fruitless >= options_.attempts) {
     transfer.error = {kExitNetwork, "fetch.network", base_ + "/" + transfer.path,
                       cause + ", " + std::to_string(transfer.fruitless) + " times in a row",
@@ -238,7 +282,8 @@ Outcome TransferLoop::again(Transfer& transfer, const std::string& cause) {
 
 Outcome TransferLoop::missing(Transfer& transfer) {
   transfer.received = 0;
-  if (++transfer.missing < kMissingAttempts) return again(transfer, "the server has no such file");
+  if (++transfer.missing < kMissingAttempts && !transfer.optional)
+    return again(transfer, "the server has no such file");
   transfer.error = {kExitMixed, "fetch.missing", base_ + "/" + transfer.path,
                     "the server has no such file", "publish the release again, whole"};
   return Outcome::kFailed;
@@ -267,6 +312,14 @@ Outcome TransferLoop::judge_answer(Transfer& transfer, CURLcode code, long statu
     discard(transfer);
     return again(transfer, "the server sends more than the file has");
   }
+  if (is_tls_failure(code)) {
+    transfer.error = {
+        kExitNetwork, "fetch.tls", base_ + "/" + transfer.path,
+        std::string("the TLS connection failed: ") +
+            (transfer.reason[0] != '\0' ? transfer.reason.data() : curl_easy_strerror(code)),
+        "give the authority of its certificate with --cacert, and check the clock"};
+    return Outcome::kFailed;
+  }
   if (status == 404 || status == 410 || code == CURLE_FILE_COULDNT_READ_FILE) {
     return missing(transfer);
   }
@@ -290,8 +343,11 @@ Outcome TransferLoop::finish(Transfer& transfer, CURLcode code) {
   curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &status);
   curl_multi_remove_handle(multi_, transfer.handle);
   idle_.push_back(std::exchange(transfer.handle, nullptr));
-  Outcome outcome = Outcome::kFailed;
-  if (!transfer.failed_to_write) outcome = judge_answer(transfer, code, status);
+  const bool written = !transfer.failed_to_write;
+  return close(transfer, written ? judge_answer(transfer, code, status) : Outcome::kFailed);
+}
+
+Outcome TransferLoop::close(Transfer& transfer, Outcome outcome) {
   if (transfer.failed_to_write) {
     transfer.error = {ExitCode::kIo, "io.write", transfer.part_path(), "it cannot be written",
                       "see that the store has room"};
@@ -299,6 +355,36 @@ Outcome TransferLoop::finish(Transfer& transfer, CURLcode code) {
   }
   transfer.part.reset();
   return outcome;
+}
+
+/// One attempt through the caller's ByteSource.
+Outcome TransferLoop::ask_source(Transfer& transfer) {
+  transfer.loop = this;
+  transfer.judged = transfer.welcome = true;
+  transfer.too_long = false;
+  if (transfer.wanted != nullptr && !open_part(transfer)) return Outcome::kFailed;
+  transfer.received = 0;
+  const auto handed =
+      options_.source(transfer.path, transfer.have, [&](std::span<const std::byte> bytes) {
+        return take(transfer, reinterpret_cast<const char*>(bytes.data()), bytes.size()) ==
+               bytes.size();
+      });
+  if (transfer.failed_to_write) return close(transfer, Outcome::kFailed);
+  if (!handed && handed.error().code == "fetch.missing") return close(transfer, missing(transfer));
+  // libcurl's codes for the same: the rest is judged alike.
+  return close(transfer, judge_answer(transfer, handed ? CURLE_OK : CURLE_RECV_ERROR, 0));
+}
+
+Result<void> TransferLoop::run_source(std::vector<std::unique_ptr<Transfer>>& transfers) {
+  for (const auto& transfer : transfers) {
+    Outcome outcome = Outcome::kAgain;
+    while (outcome == Outcome::kAgain) {
+      std::this_thread::sleep_until(transfer->not_before);
+      outcome = ask_source(*transfer);
+    }
+    if (outcome == Outcome::kFailed) return tl::unexpected(transfer->error);
+  }
+  return {};
 }
 
 /// Sleeps until the bytes received are within the rate limit. Meanwhile the socket fills up, and
@@ -315,6 +401,11 @@ void TransferLoop::limit_rate() const {
 Result<void> TransferLoop::run(std::vector<std::unique_ptr<Transfer>>& transfers,
                                const std::function<void(std::int64_t)>* on_bytes) {
   on_bytes_ = on_bytes;
+  if (options_.source) {
+    auto done = run_source(transfers);
+    on_bytes_ = nullptr;
+    return done;
+  }
   std::deque<Transfer*> waiting;
   for (const auto& transfer : transfers) waiting.push_back(transfer.get());
   unsigned busy = 0;
@@ -378,13 +469,14 @@ Result<Transfers> Transfers::create(const TransferOptions& options) {
   return Transfers(std::move(state));
 }
 
-Result<std::string> Transfers::text(const std::string& path, std::size_t limit) {
+Result<std::string> Transfers::text(const std::string& path, std::size_t limit, bool optional) {
   std::string text;
   std::vector<std::unique_ptr<Transfer>> transfers;
   transfers.push_back(std::make_unique<Transfer>());
   transfers.back()->path = path;
   transfers.back()->text = &text;
   transfers.back()->limit = limit;
+  transfers.back()->optional = optional;
   MODAR_TRY(state_->run(transfers, nullptr));
   return text;
 }

@@ -11,6 +11,7 @@
 
 #include "formats/error.hpp"
 #include "formats/transport/recipe.hpp"
+#include "modar/fetch.hpp"
 
 namespace modar::fetch {
 
@@ -21,7 +22,10 @@ struct TransferOptions {
   unsigned attempts = 8;               ///< in a row without any data, then it gives up
   double first_wait_s = 0.5;           ///< before the second attempt; doubles up to max_wait_s
   double max_wait_s = 30;
-  double stall_s = 30;  ///< a transfer without data for so long is aborted
+  std::string user_agent;
+  std::string authorities;  ///< PEM file; empty: of the environment, else the system's
+  ByteSource source;        ///< instead of libcurl
+  double stall_s = 30;      ///< a transfer without data for so long is aborted
 };
 
 /// One object to download.
@@ -49,7 +53,8 @@ class Transfers {
   /// A small file as text, at most `limit` bytes.
   /// Errors: kExitNetwork "fetch.network"; kExitMixed "fetch.missing" (the server has no such
   /// file).
-  Result<std::string> text(const std::string& path, std::size_t limit);
+  /// optional: "fetch.missing" at the first answer of that kind.
+  Result<std::string> text(const std::string& path, std::size_t limit, bool optional = false);
 
   /// Downloads objects into their files, each verified by its id. `on_bytes` receives the number of
   /// bytes since the last call (negative: discarded). Errors: as text(); kIo "io.*".

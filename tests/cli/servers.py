@@ -4,6 +4,7 @@ import pathlib
 import random
 import shutil
 import socket
+import ssl
 import subprocess
 import threading
 import time
@@ -16,7 +17,7 @@ CONFIG = """
 worker_processes 1; daemon off; master_process off; pid {folder}/nginx.pid; error_log {folder}/error.log;
 events {{ worker_connections 256; }}
 http {{
-  access_log {folder}/access.log; default_type application/octet-stream; sendfile off;
+  access_log {folder}/access.log combined; default_type application/octet-stream; sendfile off;
   client_body_temp_path {folder}/t1; proxy_temp_path {folder}/t2; fastcgi_temp_path {folder}/t3;
   uwsgi_temp_path {folder}/t4; scgi_temp_path {folder}/t5;
   server {{
@@ -113,9 +114,10 @@ class BreakingLine:
 
 
 class RudeServer:
-    """Serves `root`; `rude(path, attempt)` may name a way to answer wrongly: garbage, short, long, 416, 404, 500."""
+    """Serves `root`; `rude(path, attempt)` may name a way to answer wrongly:
+    garbage, short, long, 416, 404, 500, drip (a byte a second), byte (one byte, then the end)."""
 
-    def __init__(self, root, rude):
+    def __init__(self, root, rude, certificate=None):
         root = pathlib.Path(root)
         attempts = {}
 
@@ -146,15 +148,27 @@ class RudeServer:
                 self.send_header("Content-Length", str(length))
                 self.end_headers()
                 try:
+                    if way == "byte":
+                        data = data[:1]
+                    while way == "drip" and data:
+                        self.wfile.write(data[:1])
+                        data = data[1:]
+                        time.sleep(1)
                     self.wfile.write(data)
                 except OSError:
                     pass
 
         self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.scheme = "http"
+        if certificate:
+            self.scheme = "https"
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(*certificate)
+            self.server.socket = context.wrap_socket(self.server.socket, server_side=True)
         threading.Thread(target=self.server.serve_forever, daemon=True).start()
 
     def url(self):
-        return f"http://127.0.0.1:{self.server.server_address[1]}"
+        return f"{self.scheme}://127.0.0.1:{self.server.server_address[1]}"
 
     def stop(self):
         self.server.shutdown()

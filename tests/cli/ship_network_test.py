@@ -1,5 +1,6 @@
 """`modar-fetch` over a real nginx, over lines that break, and from servers that misbehave."""
 import pathlib
+import shutil
 import subprocess
 import time
 import unittest
@@ -37,6 +38,14 @@ class RealServer(ShipTest):
         report = self.fetch_json(self.nginx.url())
         self.assertTrue(report["changed"])
         self.assert_installed(self.shop.new)
+
+    def test_the_log_shows_programs_and_releases(self):
+        self.fetch_json(self.nginx.url())
+        self.publish(self.shop.new)
+        self.fetch_json(self.nginx.url())
+        log = self.nginx.log.read_text()
+        self.assertRegex(log, r'"modar-fetch/[0-9.]+ \(nothing installed\)"')
+        self.assertRegex(log, r'"modar-fetch/[0-9.]+ \(release 1\)"')
 
     def test_resumes_in_the_middle_of_a_piece(self):
         line = BreakingLine(self.nginx.port, seed=1, most=12000)
@@ -123,6 +132,30 @@ class RudeServers(ShipTest):
                 self.expect_recovery(lambda path, attempt: way if path == "/latest" and attempt == 1 else None)
         done = self.fetch_from(lambda path, attempt: "garbage" if path.endswith(".json") else None)
         self.assertEqual(done.returncode, 10, done.stderr)
+
+    def test_a_byte_an_answer_gives_up(self):
+        done = self.fetch_from(lambda path, _: "byte" if "objects" in path else None, "--attempts", "3")
+        self.assert_fails(done, 16, "fetch.network")
+
+    @unittest.skipUnless(soak(), "the connection is closed after 30 s; soak runs it")
+    def test_a_byte_a_second_gives_up(self):
+        done = self.fetch_from(lambda path, _: "drip" if "objects" in path else None, "--attempts", "1")
+        self.assert_fails(done, 16, "fetch.network")
+
+    @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
+    def test_a_private_authority(self):
+        key, certificate = self.folder / "tls.key", self.folder / "tls.pem"
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", certificate,
+                        "-days", "2", "-subj", "/CN=museum", "-addext", "subjectAltName=IP:127.0.0.1"],
+                       check=True, capture_output=True)
+        self.publish(self.shop.old)
+        server = RudeServer(self.site, lambda path, attempt: None, (certificate, key))
+        self.addCleanup(server.stop)
+        self.assert_fails(self.fetch(server.url()), 16, "fetch.tls", "--cacert")
+        self.fetch_json(server.url(), "--cacert", certificate)
+        for name in ("CURL_CA_BUNDLE", "SSL_CERT_FILE"):
+            self.fetch_json(server.url(), store=self.folder / name,
+                            env={"CURL_CA_BUNDLE": "", "SSL_CERT_FILE": "", name: str(certificate)})
 
     def test_garbage_for_ever_gives_up(self):
         done = self.fetch_from(lambda path, _: "garbage" if "objects" in path else None, "--attempts", "2")

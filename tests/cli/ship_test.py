@@ -1,12 +1,14 @@
 """`modar ship` and `modar-fetch` over folders: releases, keys, what is refused, what is reused."""
 import json
+import pathlib
 import shutil
 import stat
 import subprocess
+import time
 import unittest
 
 from programs import BIN, ROOT
-from ship_files import ShipTest, soak
+from ship_files import ShipTest, sheet, soak
 
 
 class Publish(ShipTest):
@@ -76,6 +78,54 @@ class Publish(ShipTest):
         self.assert_fails(done, 1, "ship.version")
         self.assertEqual(self.publish(self.shop.old)["release"]["version"], 6)
 
+    def test_a_release_is_the_whole_set(self):
+        other, third = self.folder / "other.modar", self.folder / "third.modar"
+        for copy in (other, third):
+            shutil.copy(self.shop.old, copy)
+        self.publish(self.shop.old, other, options=["--for", "other=ace2"])
+        report = self.publish(self.shop.new, third, options=["--drop", "other"])
+        self.assertEqual([(c["change"], c["name"]) for c in report["changes"]],
+                         [("changed", "museum"), ("dropped", "other"), ("added", "third")])
+        report = self.publish(other)
+        self.assertEqual([(c["change"], c["name"]) for c in report["changes"]],
+                         [("kept", "museum"), ("added", "other"), ("kept", "third")])
+        self.fetch_json()
+        self.assert_installed(self.shop.new, other, third)
+        done = self.modar("ship", "publish", "--to", self.site, "--key", self.shop.key, "--drop", "fourth")
+        self.assert_fails(done, 1, "ship.drop")
+        self.assert_fails(self.modar("ship", "publish", "--to", self.site, "--key", self.shop.key), 1, "ship.nothing")
+
+    def test_a_dry_run_writes_nothing(self):
+        self.publish(self.shop.old)
+        before = sorted((p, p.stat().st_mtime_ns) for p in self.site.rglob("*") if p.is_file() and p.name != ".lock")
+        report = self.publish(self.shop.new, options=["--dry-run"])
+        self.assertEqual(report["changes"], [{"change": "changed", "name": "museum"}])
+        after = sorted((p, p.stat().st_mtime_ns) for p in self.site.rglob("*") if p.is_file() and p.name != ".lock")
+        self.assertEqual(before, after)
+
+    def test_list_shows_releases_and_expiry(self):
+        self.publish(self.shop.old, options=["--expires", "2099-01-01T00:00:00Z"])
+        self.publish(self.shop.new, options=["--no-expiry"])
+        listed = json.loads(self.modar("ship", "list", "--to", self.site, "--json").stdout)["releases"]
+        self.assertEqual([r["release"]["expires"] for r in listed], ["2099-01-01T00:00:00Z", "never"])
+        self.assertEqual([r["current"] for r in listed], [False, True])
+        text = self.modar("ship", "list", "--to", self.site).stdout
+        self.assertIn("does not expire", text)
+        self.assertIn("museum", text)
+        done = self.modar("ship", "publish", self.shop.old, "--to", self.site, "--key", self.shop.key, "--valid-days", "2")
+        self.assertIn("devices believe it until", done.stderr)
+        self.publish(self.shop.new, options=["--no-expiry"])
+        self.assertEqual(self.fetch_json()["expires"], "never")
+
+    def test_names_that_differ_by_case_only_are_refused(self):
+        other = self.folder / "Museum.modar"
+        shutil.copy(self.shop.old, other)
+        done = self.modar("ship", "publish", self.shop.old, other, "--to", self.site, "--key", self.shop.key)
+        self.assert_fails(done, 3, "ship.name", "case")
+        self.publish(self.shop.old)
+        done = self.modar("ship", "publish", other, "--to", self.site, "--key", self.shop.key)
+        self.assert_fails(done, 3, "ship.name", "case")
+
     def test_patterns_need_no_text_on_the_way(self):
         report = self.publish(self.shop.pattern)
         forms = {form["form"]: form for form in report["forms"]}
@@ -105,12 +155,19 @@ class Keys(ShipTest):
         made = subprocess.run(["minisign", "-G", "-W", "-p", f"{theirs}.pub", "-s", theirs], capture_output=True)
         if made.returncode != 0:
             self.skipTest("this minisign makes no unencrypted keys")
+        self.site = self.folder / "theirs-site"
+        self.store = self.folder / "theirs-store"
+        document = self.site / "releases" / "1.json"
         self.publish(self.shop.old, key=theirs)
         self.fetch_json(trust=f"{theirs}.pub")
         signed = subprocess.run(["minisign", "-Sm", document, "-s", theirs], capture_output=True, input=b"\n")
         self.assertEqual(signed.returncode, 0, signed.stderr)
         (self.site / "latest").write_text("1\n")
         self.fetch_json(trust=f"{theirs}.pub", store=self.folder / "second")
+        # The old form, over the document itself, is not in the specification.
+        signed = subprocess.run(["minisign", "-l", "-Sm", document, "-s", theirs], capture_output=True, input=b"\n")
+        self.assertEqual(signed.returncode, 0, signed.stderr)
+        self.assert_fails(self.fetch(trust=f"{theirs}.pub", store=self.folder / "third"), 3, "signature.text")
 
     @unittest.skipUnless(soak(), "scrypt needs 1 GiB and seconds; soak runs it")
     def test_an_encrypted_key_wants_its_pass_phrase(self):
@@ -124,6 +181,88 @@ class Keys(ShipTest):
         self.assert_fails(self.modar(*publish, "--pass-phrase-file", wrong), 3, "key.pass-phrase")
         self.assertEqual(self.modar(*publish, "--pass-phrase-file", phrase, "--quiet").returncode, 0)
         self.fetch_json(trust=f"{key}.pub")
+
+    def test_only_the_key_that_devices_follow_publishes(self):
+        self.publish(self.shop.old)
+        other = self.folder / "other"
+        self.modar("ship", "keygen", "--out", other)
+        publish = ["ship", "publish", self.shop.new, "--to", self.site, "--key"]
+        self.assert_fails(self.modar(*publish, other), 1, "ship.key")
+        rotate = self.modar("ship", "rotate", "--to", self.site, "--key", other, "--next", f"{other}.pub")
+        self.assert_fails(rotate, 1, "ship.key")
+        self.modar("ship", "rotate", "--to", self.site, "--key", self.shop.key, "--next", f"{other}.pub")
+        self.assert_fails(self.modar(*publish, self.shop.key), 1, "ship.key")
+        self.assertEqual(self.modar(*publish, other).returncode, 0)
+
+    def test_the_root_key_takes_devices_back_from_a_thief(self):
+        root, signing, next_key = (self.folder / name for name in ("root", "signing", "next"))
+        for key in (root, signing, next_key):
+            self.modar("ship", "keygen", "--out", key)
+        trust = f"{root}.pub"
+        named = self.modar("ship", "root", "--to", self.site, "--key", root, "--next", f"{signing}.pub")
+        self.assertEqual(named.returncode, 0, named.stderr)
+        self.publish(self.shop.old, key=signing)
+        self.fetch_json(trust=trust)
+        # The thief has the signing key and the server: the greatest number there is, and a key of his own.
+        honest = self.folder / "honest"
+        shutil.copytree(self.site, honest)
+        thief = self.folder / "thief"
+        self.modar("ship", "keygen", "--out", thief)
+        self.modar("ship", "rotate", "--to", self.site, "--key", signing, "--next", f"{thief}.pub")
+        self.publish(self.shop.new, key=thief, options=["--release", str(2**53)])
+        self.assertEqual(self.fetch_json(trust=trust)["version"], 2**53)
+        # He cannot speak for the root.
+        forged = self.modar("ship", "root", "--to", self.site, "--key", thief, "--next", f"{thief}.pub")
+        self.assert_fails(forged, 1, "ship.root")
+        stolen = shutil.copytree(self.site, self.folder / "stolen")
+        # The publisher takes the folder back from a copy and lets the root name another key.
+        shutil.rmtree(self.site)
+        shutil.copytree(honest, self.site)
+        again = self.modar("ship", "root", "--to", self.site, "--key", root, "--next", f"{next_key}.pub")
+        self.assertEqual(again.returncode, 0, again.stderr)
+        report = self.publish(self.shop.old, key=next_key)
+        self.assertEqual((report["release"]["epoch"], report["release"]["version"]), (2, 2))
+        for _ in range(2):
+            fetched = self.fetch_json(trust=trust)
+            self.assertEqual((fetched["epoch"], fetched["version"]), (2, 2))
+        self.assert_installed(self.shop.old)
+        # What the thief still serves is refused, replayed root word included.
+        self.assertIn(self.fetch(stolen, trust=trust).returncode, (10, 11))
+        self.assert_installed(self.shop.old)
+
+    def test_a_lost_state_trusts_no_old_key(self):
+        self.publish(self.shop.old)
+        self.fetch_json()
+        other = self.folder / "other"
+        self.modar("ship", "keygen", "--out", other)
+        self.modar("ship", "rotate", "--to", self.site, "--key", self.shop.key, "--next", f"{other}.pub")
+        self.publish(self.shop.new, key=other)
+        self.fetch_json()
+        thief = self.folder / "thiefs-site"
+        self.publish(self.shop.old, site=thief, options=["--release", "9"])
+        for lost in (["state.json"], ["slots/state.json"]):
+            with self.subTest(lost):
+                for name in lost:
+                    (self.store / name).unlink()
+                self.assert_fails(self.fetch(thief), 10, "signature.key")
+                self.fetch_json()
+        (self.store / "state.json").write_text("{")
+        self.assert_fails(self.fetch(thief), 10, "signature.key")
+        # All is lost: the chain of the server is followed to its end.
+        for name in ("state.json", "slots/state.json"):
+            (self.store / name).unlink(missing_ok=True)
+        shutil.copytree(self.site / "keys", thief / "keys", dirs_exist_ok=True)
+        self.assert_fails(self.fetch(thief), 10, "signature.key")
+
+    def test_trust_is_saved_before_the_release_is(self):
+        self.publish(self.shop.old)
+        self.fetch_json()
+        other = self.folder / "other"
+        self.modar("ship", "keygen", "--out", other)
+        self.modar("ship", "rotate", "--to", self.site, "--key", self.shop.key, "--next", f"{other}.pub")
+        self.publish(self.shop.new, key=other, options=["--expires", "2020-01-01T00:00:00Z"])
+        self.assert_fails(self.fetch(), 12, "fetch.expired")
+        self.assertEqual(json.loads((self.store / "state.json").read_text())["key_serial"], 1)
 
     def test_another_key_is_refused(self):
         other = self.folder / "other"
@@ -147,9 +286,10 @@ class Keys(ShipTest):
         # A device that joins in the middle, and one that is new.
         self.fetch_json(store=self.folder / "middle", trust=f"{keys[1]}.pub")
         self.fetch_json(store=self.folder / "fresh")
-        # The old key is worth nothing any more.
-        self.publish(self.shop.old, key=keys[0])
-        self.assert_fails(self.fetch(), 10, "signature.key")
+        # The old key is worth nothing any more, whoever signs with it.
+        stale = self.folder / "stale"
+        self.publish(self.shop.old, key=keys[0], site=stale, options=["--release", "9"])
+        self.assert_fails(self.fetch(stale), 10, "signature.key")
 
     def test_a_chain_link_that_was_changed_is_refused(self):
         other = self.folder / "other"
@@ -197,6 +337,19 @@ class Refusals(ShipTest):
             if piece.is_file():
                 piece.unlink()
         self.assert_fails(self.fetch(), 13, "fetch.missing")
+
+    def test_status_for_operators(self):
+        status = self.folder / "status.json"
+        self.publish(self.shop.old)
+        self.fetch_json(self.site, "--status", status)
+        written = json.loads(status.read_text())
+        self.assertEqual((written["result"], written["exit_code"], written["version"]), ("ok", 0, 1))
+        self.assertRegex(written["program"], "^modar-fetch [0-9.]+$")
+        self.publish(self.shop.new, options=["--expires", "2020-01-01T00:00:00Z"])
+        self.assert_fails(self.fetch(self.site, "--status", status), 12, "fetch.expired")
+        written = json.loads(status.read_text())
+        self.assertEqual((written["result"], written["exit_code"], written["version"]), ("fetch.expired", 12, 1))
+        self.assertEqual(written["bundles"], [str(self.store / "museum.modar")])
 
     def test_another_fetch_is_at_work(self):
         self.publish(self.shop.old)
@@ -290,25 +443,148 @@ class Store(ShipTest):
         self.assertEqual(json.loads(done.stdout)["fell_back"], True)
         self.assert_installed(self.shop.old)
 
-    def test_an_unchanged_bundle_is_shared_by_both_slots(self):
+    def test_the_spare_slot_shares_nothing_with_the_active_one(self):
         other = self.folder / "other.modar"
-        shutil.copy(self.shop.pattern, other)
+        shutil.copy(self.shop.old, other)
         self.publish(self.shop.old, other)
         self.fetch_json()
-        self.publish(self.shop.new, other)
+        self.publish(self.shop.new)
         report = self.fetch_json()
-        self.assertEqual((self.store / "other.modar").stat().st_nlink, 2)
+        inodes = {p.stat().st_ino for p in (self.store / "slots").glob("*/other.modar")}
+        self.assertEqual(len(inodes), 2)
         self.assertGreaterEqual(report["reused_bytes"], other.stat().st_size)
         self.assert_installed(self.shop.new, other)
+        # The third release finds the unchanged bundle in its slot and leaves it there.
+        kept = {p.stat().st_ino for p in (self.store / "slots" / "a").glob("other.modar")}
+        self.publish(self.shop.old)
+        self.fetch_json()
+        self.assertEqual({p.stat().st_ino for p in (self.store / "slots" / "a").glob("other.modar")}, kept)
+        self.assert_installed(self.shop.old, other)
+
+    def test_the_spare_slot_stays_until_every_piece_is_there(self):
+        self.publish(self.shop.old)
+        self.fetch_json()
+        self.publish(self.shop.new)
+        self.fetch_json()
+        before = (self.store / "slots" / "a" / "museum.modar").read_bytes()
+        third = self.shop.bake("third", "--model", sheet(self.folder / "third.obj", 30, 1.1))
+        time.sleep(0.05)
+        (self.site / "releases" / "2.json").touch()
+        self.publish(third)
+        for piece in (self.site / "objects").rglob("*"):
+            if piece.is_file() and piece.stat().st_mtime > (self.site / "releases" / "2.json").stat().st_mtime:
+                piece.unlink()
+        self.assert_fails(self.fetch(), 13, "fetch.missing")
+        self.assertEqual((self.store / "slots" / "a" / "museum.modar").read_bytes(), before)
+        self.assertTrue((self.store / "slots" / "a" / "release.json").is_file())
 
     def test_a_bundle_that_left_the_release_leaves_the_store(self):
         other = self.folder / "other.modar"
         shutil.copy(self.shop.old, other)
         self.publish(self.shop.old, other)
         self.fetch_json()
-        self.publish(self.shop.old)
+        self.publish(options=["--drop", "other"])
         self.fetch_json()
         self.assertEqual(sorted(p.name for p in self.store.glob("*.modar")), ["museum.modar"])
+
+    def test_one_bundle_then_another_leaves_no_dangling_name(self):
+        other = self.folder / "other.modar"
+        shutil.copy(self.shop.old, other)  # the same recipe twice: its part files must not meet
+        self.publish(self.shop.old, other)
+        self.fetch_json(self.site, "--bundle", "museum")
+        self.fetch_json(self.site, "--bundle", "other")
+        self.assertEqual([p.name for p in self.store.glob("*.modar")], ["other.modar"])
+        self.assertTrue((self.store / "other.modar").exists())
+        self.fetch_json()
+        self.assert_installed(self.shop.old, other)
+
+    def test_files_of_others_stay(self):
+        self.publish(self.shop.old)
+        self.store.mkdir()
+        ours = ["pushed.modar", "museum.modar", "notes.tmp", "x.new", "pieces/holiday.jpg", "slots/b/readme.txt"]
+        for folder in ("pieces", "slots/a", "slots/b"):
+            (self.store / folder).mkdir(parents=True)
+        for name in ours:
+            (self.store / name).write_text("mine")
+        done = self.fetch(self.site, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("museum.modar", done.stderr)
+        self.publish(self.shop.new)
+        report = self.fetch_json()
+        for name in ours:
+            self.assertEqual((self.store / name).read_text(), "mine", name)
+        self.assertEqual(pathlib.Path(report["bundles"][0]).read_bytes(), self.shop.new.read_bytes())
+
+    def test_bit_rot_is_found_and_healed(self):
+        self.publish(self.shop.old)
+        self.fetch_json()
+        installed = self.store / "current" / "museum.modar"
+        with open(installed, "r+b") as bundle:
+            bundle.seek(5000)
+            bundle.write(b"rot")
+        done = self.run_program("modar-fetch", "--store", self.store, "--verify")
+        self.assert_fails(done, 17, "store.damaged")
+        report = self.fetch_json()
+        self.assertTrue(report["changed"])
+        self.assertGreater(report["reused_bytes"], report["downloaded_bytes"])
+        self.assert_installed(self.shop.old)
+        self.assertFalse(self.fetch_json()["changed"])
+
+    def test_part_files_follow_no_links(self):
+        self.publish(self.shop.old)
+        self.fetch_json()
+        self.publish(self.shop.new)
+        victim = self.folder / "victim"
+        victim.write_text("precious")
+        for piece in (self.site / "objects").rglob("*"):
+            if piece.is_file():
+                (self.store / "pieces" / f"{piece.name}.part").symlink_to(victim)
+        self.assertEqual(self.fetch().returncode, 2)
+        self.assertEqual(victim.read_text(), "precious")
+
+    def without_links(self):
+        """An environment in which links fail, as on FAT and Android's shared storage."""
+        source = self.folder / "nolinks.c"
+        source.write_text("#include <errno.h>\nint symlink(const char* a, const char* b) "
+                          "{ (void)a; (void)b; errno = EPERM; return -1; }\n"
+                          "int link(const char* a, const char* b) { return symlink(a, b); }\n")
+        library = self.folder / "nolinks.so"
+        subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
+        return {"LD_PRELOAD": str(library), "ASAN_OPTIONS": "verify_asan_link_order=0"}
+
+    def check_store_without_links(self, env):
+        for bundle, version in ((self.shop.old, 1), (self.shop.new, 2), (self.shop.old, 3)):
+            self.publish(bundle)
+            report = self.fetch_json(env=env)
+            self.assertEqual(report["version"], version)
+            self.assertEqual(pathlib.Path(report["bundles"][0]).read_bytes(), bundle.read_bytes())
+        self.assertFalse((self.store / "current").is_symlink())
+        self.assertIn((self.store / "current").read_text(), ("slots/a\n", "slots/b\n"))
+        self.assertFalse(self.fetch_json(env=env)["changed"])
+        with open(report["bundles"][0], "r+b") as bundle:
+            bundle.write(b"rot")
+        done = self.run_program("modar-fetch", "--store", self.store, "--verify", "--json", env=env)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["fell_back"], True)
+        self.assertEqual(pathlib.Path(json.loads(done.stdout)["bundles"][0]).read_bytes(), self.shop.new.read_bytes())
+
+    def test_a_store_without_symbolic_links(self):
+        self.check_store_without_links(self.without_links())
+
+    def test_a_store_on_fat(self):
+        image, mount = self.folder / "fat.img", self.folder / "fat"
+        mount.mkdir()
+        made = shutil.which("mkfs.vfat", path="/sbin:/usr/sbin:/bin:/usr/bin")
+        if not made:
+            self.skipTest("mkfs.vfat is not installed")
+        with open(image, "wb") as file:
+            file.truncate(64 << 20)
+        subprocess.run([made, image], check=True, capture_output=True)
+        if subprocess.run(["mount", "-o", "loop", image, mount], capture_output=True).returncode != 0:
+            self.skipTest("no right to mount a FAT image")
+        self.addCleanup(subprocess.run, ["umount", mount])
+        self.store = mount / "store"
+        self.check_store_without_links(None)
 
 
 class Programs(unittest.TestCase):

@@ -2,8 +2,11 @@
 // a thread of its own.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +21,13 @@ struct FetchProgress {
   double seconds_left = -1;  ///< -1: not known yet
 };
 
+/// For an app with a network stack of its own: hands the bytes of the file `path` below the release
+/// folder, from byte `from` to its end, to `take` in portions, until that returns false.
+/// Errors: kExitMixed "fetch.missing" (no such file); any other: the fetch tries again.
+using ByteSource =
+    std::function<Result<void>(const std::string& path, std::uint64_t from,
+                               const std::function<bool(std::span<const std::byte>)>& take)>;
+
 struct FetchOptions {
   std::string url;    ///< http://, https://, file:// or a folder that `modar ship publish` filled
   std::string store;  ///< folder of the installed bundles; made where it is missing
@@ -29,11 +39,17 @@ struct FetchOptions {
   unsigned attempts = 8;               ///< in a row without any data, then it gives up
   double first_wait_s = 0.5;           ///< before the second attempt, then twice as long each time
   double stall_s = 30;                 ///< a silent connection is closed after this
+  std::string
+      authorities;    ///< PEM file for HTTPS; empty: CURL_CA_BUNDLE, SSL_CERT_FILE, the system's
+  ByteSource source;  ///< instead of the URL, if not empty
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
 };
 
 struct FetchReport {
+  std::uint64_t epoch = 0;
   std::uint64_t version = 0;
+  std::int64_t expires = 0;            ///< seconds since 1970, UTC; kNever
+  std::vector<std::string> blocked;    ///< paths NAME.modar that belong to somebody else's file
   bool changed = false;                ///< false: this release was installed already
   std::vector<std::string> bundles;    ///< paths of the installed bundles
   std::uint64_t downloaded_bytes = 0;  ///< bodies of all responses
@@ -60,5 +76,9 @@ struct StoreReport {
 /// back to the release before if one is damaged.
 /// Errors: kExitLocked; kExitBadBundle "store.damaged" (no intact release is left); kIo.
 Result<StoreReport> verify_store(const std::string& store);
+
+/// The release in use and the paths of its bundles, read without the lock; nothing if there is
+/// none.
+std::optional<StoreReport> installed_release(const std::string& store);
 
 }  // namespace modar

@@ -62,14 +62,14 @@ std::string to_base64(std::span<const std::uint8_t> bytes);
 
 /// A detached minisign signature.
 struct Signature {
-  bool prehashed = true;
   std::array<std::uint8_t, 8> key_id{};
   std::array<std::uint8_t, 64> bytes{};
   std::string trusted_comment;
   std::array<std::uint8_t, 64> comment_bytes{};  ///< over `bytes` and the trusted comment
 };
 
-/// Reads a *.minisig file. Errors: kInvalidInput "signature.text".
+/// Reads a *.minisig file of the prehashed form ("ED"), the only one that devices accept.
+/// Errors: kInvalidInput "signature.text".
 Result<Signature> parse_signature(std::string_view text);
 /// Its text. untrusted_comment: one line that nothing signs.
 std::string signature_text(const Signature& signature, std::string_view untrusted_comment);
@@ -99,10 +99,15 @@ struct ReleaseBundle {
 };
 
 struct Release {
-  std::uint64_t version = 0;           ///< 1 or more; only grows
-  std::int64_t expires = 0;            ///< seconds since 1970-01-01, UTC
-  std::vector<ReleaseBundle> bundles;  ///< at least one, each name once
+  std::uint64_t epoch = 0;             ///< of the root's word that named the signing key; 0: none
+  std::uint64_t version = 0;           ///< 1 or more; only grows within an epoch
+  std::int64_t expires = 0;            ///< seconds since 1970-01-01, UTC; kNever: does not
+  std::vector<ReleaseBundle> bundles;  ///< at least one; names differ in more than case
 };
+inline constexpr std::int64_t kNever = 0;
+
+/// A bundle's name as file systems compare it that ignore case.
+std::string lower_case(std::string_view name);
 
 /// Errors: kInvalidInput "release.*"; kUnsupported "release.version".
 Result<Release> parse_release(std::string_view json);
@@ -121,6 +126,17 @@ struct KeyLink {
 /// Errors: kInvalidInput "release.text".
 Result<KeyLink> parse_key_link(std::string_view json);
 std::string key_link_text(const KeyLink& link);
+
+/// The word of the root key, which stays offline: the signing key from now on. Each word begins an
+/// epoch, in which versions count anew; the chain goes on behind its first `links` links.
+struct RootWord {
+  std::uint64_t epoch = 0;  ///< from 1; only grows
+  std::uint32_t links = 0;
+  std::string key;  ///< public_key_line()
+};
+/// Errors: kInvalidInput "release.text".
+Result<RootWord> parse_root_word(std::string_view json);
+std::string root_word_text(const RootWord& word);
 /// @}
 
 }  // namespace modar
