@@ -8,7 +8,11 @@
 #include <span>
 #include <string>
 
+#include "formats/error.hpp"
+
 namespace modar {
+
+class BundleView;
 
 enum class Severity : std::uint8_t { kError, kWarning, kInfo };
 
@@ -54,5 +58,10 @@ bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
 
 /// The first error that check_bundle() finds, as "ID where"; empty for a good bundle.
 std::string first_error(std::span<const std::byte> bytes);
+
+/// Checks the hash of every section, and nothing else: finds bytes that the storage has changed
+/// since the bundle was written, which BundleView::open() does not look at. Reads the whole file.
+/// Errors: kInvalidInput "section.hash".
+Result<void> verify_sections(const BundleView& bundle);
 
 }  // namespace modar

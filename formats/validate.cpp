@@ -1,5 +1,5 @@
 // Validates a bundle's structure: the header, the section table, every record of every table.
-// Payloads are bounded here and read by check.hpp.
+// Payloads are bounded here; verify_sections() hashes them, check_bundle() judges them.
 #include "formats/validate.hpp"
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <cstring>
 #include <tuple>
 
+#include "formats/check.hpp"
 #include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
 
@@ -787,6 +788,21 @@ void validate_assets(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.scenes.size() && !log.stop(); ++i) {
     check_scene(RecordCheck(log, parts, "scene", i), parts, parts.scenes[i]);
   }
+}
+
+Result<void> verify_sections(const BundleView& bundle) {
+  FaultLog log;
+  for (const SectionEntry& entry : bundle.sections()) {
+    const auto bytes = bundle.bytes().subspan(static_cast<std::size_t>(entry.offset),
+                                              static_cast<std::size_t>(entry.size));
+    if (XXH64(bytes.data(), bytes.size(), 0) == entry.hash) continue;
+    log.add(
+        Rule::kSectionHash, entry.offset,
+        "section " + std::to_string(&entry - bundle.sections().data()),
+        "it has " + std::to_string(entry.size) + " bytes of type " + std::to_string(entry.type));
+    return tl::unexpected(log.first());
+  }
+  return {};
 }
 
 }  // namespace modar

@@ -4,6 +4,7 @@
 #include <new>
 #include <utility>
 
+#include "formats/check.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
 
@@ -88,6 +89,11 @@ modar_bundle* modar_bundle_open_bytes(const void* bytes, size_t size, modar_erro
 
 void modar_bundle_close(modar_bundle* bundle) {
   delete bundle;
+}
+
+int modar_bundle_verify(const modar_bundle* bundle, modar_error* error) {
+  if (bundle == nullptr) return hand_over(modar::missing("bundle"), error);
+  return hand_over(modar::verify_sections(bundle->view), error);
 }
 
 uint32_t modar_model_count(const modar_bundle* bundle) {

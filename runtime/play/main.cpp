@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
 #include "modar/camera_file.hpp"
 #include "modar/mapped_file.hpp"
 #include "options.hpp"
@@ -108,6 +109,9 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
 Result<int> run(const PlayOptions& options) {
   MODAR_ASSIGN(MappedFile file, MappedFile::open(options.bundle));
   Result<BundleView> bundle = BundleView::open(file.bytes());
+  if (bundle && options.verify) {
+    if (auto whole = verify_sections(*bundle); !whole) bundle = tl::unexpected(whole.error());
+  }
   if (!bundle) {
     Error error = bundle.error();
     error.where = options.bundle + (error.where.empty() ? "" : ":" + error.where);

@@ -73,15 +73,16 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 9> kSwitches = {{{"json", &PlayOptions::json},
-                                                    {"window", &PlayOptions::window},
-                                                    {"realtime", &PlayOptions::realtime},
-                                                    {"find-focal", &PlayOptions::find_focal},
-                                                    {"outline", &PlayOptions::outline},
-                                                    {"osd", &PlayOptions::osd},
-                                                    {"quiet", &PlayOptions::quiet},
-                                                    {"help", &PlayOptions::help},
-                                                    {"version", &PlayOptions::version}}};
+constexpr std::array<SwitchOption, 10> kSwitches = {{{"json", &PlayOptions::json},
+                                                     {"window", &PlayOptions::window},
+                                                     {"realtime", &PlayOptions::realtime},
+                                                     {"find-focal", &PlayOptions::find_focal},
+                                                     {"outline", &PlayOptions::outline},
+                                                     {"osd", &PlayOptions::osd},
+                                                     {"quiet", &PlayOptions::quiet},
+                                                     {"verify", &PlayOptions::verify},
+                                                     {"help", &PlayOptions::help},
+                                                     {"version", &PlayOptions::version}}};
 
 /// All options, in the order of the three tables.
 std::vector<CommandOption> all_options() {
@@ -204,6 +205,7 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
   --qos FILE          a log for field trials: times, found and lost, reasons, memory by kind
   --turntable N       N pictures of each model turning, without any pattern
   --size WxH          of the turntable's pictures (default 640x480)
+  --verify            checks every byte of the bundle first, not its tables alone
   --quiet             no progress, no summary
   --help, --version
 

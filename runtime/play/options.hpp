@@ -38,6 +38,7 @@ struct PlayOptions {
   bool outline = false;
   bool osd = false;
   bool quiet = false;
+  bool verify = false;  ///< hash the whole bundle before playing it
   bool help = false;
   bool version = false;
 };

@@ -36,11 +36,11 @@ int main(int argc, char** argv) {
   char name[4] = "";
   if (argc < 3) return 9;
   if (modar_bundle_open("none.modar", &e) || e.exit_code != 2 || strcmp(e.code, "io.open")) return 10;
-  if (modar_bundle_open(NULL, NULL) || modar_bundle_open_bytes(NULL, 1, NULL)) return 11;
+  if (modar_bundle_verify(NULL, NULL) != 1 || modar_bundle_open(NULL, NULL) || modar_bundle_open_bytes(NULL, 1, NULL)) return 11;
   if (modar_renderer_create(NULL, NULL, 0, &e) || strcmp(e.code, "capi.null")) return 12;
   modar_context* context = modar_context_create(&e);
   modar_bundle* bundle = modar_bundle_open(argv[1], &e);
-  if (!context || !bundle) return 13;
+  if (!context || !bundle || modar_bundle_verify(bundle, &e)) return 13;
   if (modar_model_name(bundle, 0, name, sizeof name) != 7 || strcmp(name, "pot")) return 14;
   if (modar_model_name(bundle, 1, name, sizeof name) || modar_scene_at(bundle, 7, NULL)) return 15;
   if (modar_renderer_create(bundle, "nokia", 0, &e) || e.exit_code != 1) return 16;

@@ -36,6 +36,13 @@ class Play(ProgramTest):
         self.assert_fails(self.play("none.modar", "--input", COVER), 2, "none.modar")
         self.assert_fails(self.play(COVER, "--input", COVER), 3, str(COVER))
         self.assert_fails(self.play(bundle, "--input", "none.mp4"), 2, "none.mp4")
+        rotten = self.folder / "rotten.modar"
+        data = bytearray(bundle.read_bytes())
+        data[-100] ^= 1  # of a picture: opening looks at tables only
+        rotten.write_bytes(data)
+        self.assertEqual(self.play(rotten, "--input", COVER, "--quiet").returncode, 0)
+        self.assertEqual(self.play(bundle, "--input", COVER, "--quiet", "--verify").returncode, 0)
+        self.assert_fails(self.play(rotten, "--input", COVER, "--verify"), 3, "rotten.modar", "section.hash")
         self.assert_fails(self.play(bundle, "--input", bundle), 3, bundle.name)
         self.assert_fails(self.play(bundle, "--input", COVER, "--parameters", "x"), 1, "orb-2000")
         self.assert_fails(self.play(bundle, "--input", COVER, "--device", "x"), 1, "mali400")

@@ -63,6 +63,27 @@ TEST(Check, NoFlippedBitGoesUnseen) {
 }
 
 /// The faces of an octahedron lean atan(sqrt 2) out of its axis: the sine is sqrt(2/3).
+TEST(Check, VerifyingFindsEveryChangedByteOfASection) {
+  Bytes bytes = encode(pattern_content());
+  std::size_t opened = 0;
+  for (std::byte& byte : bytes) {
+    const auto offset = static_cast<std::size_t>(&byte - bytes.data());
+    const bool inside =
+        std::ranges::any_of(BundleView::open(bytes)->sections(), [&](const SectionEntry& entry) {
+          return offset >= entry.offset && offset - entry.offset < entry.size;
+        });
+    byte ^= std::byte{0x10};
+    if (const auto view = BundleView::open(bytes)) {
+      const auto whole = verify_sections(*view);
+      ASSERT_EQ(whole.has_value(), !inside) << offset;
+      ASSERT_TRUE(whole || whole.error().code == "section.hash");
+      ++opened;
+    }
+    byte ^= std::byte{0x10};
+  }
+  EXPECT_GT(opened, bytes.size() / 2) << "opening alone finds most changes";
+}
+
 TEST(Check, ConesHoldTheNormalsOfTheirTriangles) {
   const auto said = [](float cutoff, bool turned) {
     BundleContent content = model_content();
