@@ -29,7 +29,7 @@ constexpr std::uint32_t component_bytes(std::uint8_t type) {
   return 0;
 }
 
-/// IEEE 754 binary16. By the builtin: std::bit_cast is missing from the libc++ 13 of older NDKs.
+/// IEEE 754 binary16. By the builtin: libc++ 13 has no std::bit_cast.
 constexpr float half_to_float(std::uint16_t half) {
   const std::uint32_t sign = (half & 0x8000u) << 16;
   const std::uint32_t exponent = (half >> 10) & 0x1Fu;

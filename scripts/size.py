@@ -6,12 +6,15 @@ which symbols grew since those were written.
   scripts/size.py --update      writes the sizes of today; ceilings stay as they are
 
 A program weighs what `strip` leaves of it (libc, EGL and GLES are the phone's own), a library the
-code and data that its objects hold before a linker leaves anything out. Data goes to stdout. Exits 2
-where something is not built, 3 where something is above its ceiling.
+code and data that its objects hold before a linker leaves anything out. A target with a `triple` is
+another processor's, in a build folder beside, and left out with a word where that is not built or
+binutils for it are missing (scripts/foreign.sh armhf builds it). Data goes to stdout. Exits 2 where
+something is not built, 3 where something is above its ceiling.
 """
 import argparse
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -24,20 +27,20 @@ def output_of(*command):
     return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True).stdout
 
 
-def weight(path):
+def weight(path, tools):
     """Bytes of a stripped program, or of the sections that an archive's objects would load."""
     if path.suffix == ".a":
-        return int(output_of("size", "-t", path).splitlines()[-1].split()[3])
+        return int(output_of(tools + "size", "-t", path).splitlines()[-1].split()[3])
     with tempfile.TemporaryDirectory() as folder:
         stripped = pathlib.Path(folder) / path.name
-        output_of("strip", "-o", stripped, path)
+        output_of(tools + "strip", "-o", stripped, path)
         return stripped.stat().st_size
 
 
-def symbols(path):
+def symbols(path, tools):
     """Bytes of each symbol; those of one name are added up."""
     sizes = {}
-    for line in output_of("nm", "-C", "-S", "--radix=d", path).splitlines():
+    for line in output_of(tools + "nm", "-C", "-S", "--radix=d", path).splitlines():
         words = line.split(maxsplit=3)
         if len(words) == 4 and words[1].isdigit() and words[2] not in "bB":
             sizes[words[3]] = sizes.get(words[3], 0) + int(words[1])
@@ -61,12 +64,16 @@ def main():
     targets = json.loads(options.ceilings.read_text())
     rows = []
     for name, target in targets.items():
-        path = options.build / name
+        tools = target["triple"] + "-" if "triple" in target else ""
+        path = (options.build.parent if tools else options.build) / name
+        if tools and not (path.exists() and shutil.which(tools + "strip")):
+            print(f"size.py: {path} is left out", file=sys.stderr)
+            continue
         if not path.exists():
             print(f"size.py: {path} is not built; cmake --build --preset device builds it", file=sys.stderr)
             return 2
-        now = symbols(path)
-        rows.append({"target": name, "bytes": weight(path), "ceiling": target["ceiling"], "was": target["bytes"],
+        now = symbols(path, tools)
+        rows.append({"target": name, "bytes": weight(path, tools), "ceiling": target["ceiling"], "was": target["bytes"],
                      "grown": grown(target["symbols"], now, options.most)})
         target.update(bytes=rows[-1]["bytes"], symbols=now)
     if options.update:

@@ -12,6 +12,7 @@ struct modar_tracker {
   std::unique_ptr<modar::PoseLoop> loop;
   modar::Hysteresis hysteresis;
   modar::PoseSmoother smoother;
+  double smooth_ms = 0;
   double time_s = 0;
   modar::TrackResult result;
   std::vector<modar_pose> poses;  ///< one a pattern
@@ -63,6 +64,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
                            std::move(*loop),
                            modar::Hysteresis(patterns),
                            modar::PoseSmoother(patterns, smooth_ms),
+                           smooth_ms,
                            0,
                            {},
                            std::vector<modar_pose>(patterns)};
@@ -71,6 +73,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
 void modar_tracker_reset(modar_tracker* tracker) {
   tracker->loop->reset();
   tracker->hysteresis = modar::Hysteresis(tracker->poses.size());
+  tracker->smoother = modar::PoseSmoother(tracker->poses.size(), tracker->smooth_ms);
   tracker->poses.assign(tracker->poses.size(), modar_pose{});
 }
 

@@ -185,6 +185,9 @@ namespace {
 // Of ES 3, which gl2.h does not name.
 constexpr std::array<GLenum, 2> kPixelBuffers = {0x88EB, 0x88EC};  // pack, unpack
 constexpr std::array<GLenum, 2> kPixelBufferBindings = {0x88ED, 0x88EF};
+constexpr GLenum kReadFramebuffer = 0x8CA8;
+constexpr GLenum kDrawFramebuffer = 0x8CA9;
+constexpr GLenum kReadFramebufferBinding = 0x8CAA;
 constexpr GLenum kVertexArrayBinding = 0x85B5;
 constexpr GLenum kSamplerBinding = 0x8919;
 
@@ -213,6 +216,8 @@ GLuint name_of(GLint value) {
 
 SavedGlState::SavedGlState(const GlExtensions& extensions, bool all)
     : extensions_(extensions), all_(all), framebuffer_(integer(GL_FRAMEBUFFER_BINDING)) {
+  // ES 2 has one framebuffer for both; that of ES 3 is the one that is drawn into.
+  if (extensions_.bind_sampler != nullptr) read_framebuffer_ = integer(kReadFramebufferBinding);
   if (!all_) return;
   save_objects();
   glGetIntegerv(GL_VIEWPORT, viewport_.data());
@@ -260,7 +265,12 @@ void SavedGlState::save_objects() {
 }
 
 SavedGlState::~SavedGlState() {
-  glBindFramebuffer(GL_FRAMEBUFFER, name_of(framebuffer_));
+  if (extensions_.bind_sampler != nullptr) {
+    glBindFramebuffer(kDrawFramebuffer, name_of(framebuffer_));
+    glBindFramebuffer(kReadFramebuffer, name_of(read_framebuffer_));
+  } else {
+    glBindFramebuffer(GL_FRAMEBUFFER, name_of(framebuffer_));
+  }
   if (!all_) return;
   restore_objects();
   glViewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);

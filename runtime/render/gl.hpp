@@ -41,7 +41,7 @@ struct GlExtensions {
 /// caps: masked ones; what they lack is not looked up.
 GlExtensions load_gl_extensions(const GlCaps& caps);
 
-/// What GL calls of ours change, as the app had it, brought back when this ends: framebuffer,
+/// What GL calls of ours change, as the app had it, brought back when this ends: framebuffers,
 /// viewport, vertex array object, program, buffers, the textures and samplers of units 0 to 2, the
 /// active unit, blending, culling, depth, scissor, stencil test, polygon offset, masks, clear
 /// colour and the pixel store. Of the default vertex array object, the attributes 0 to 7 end
@@ -64,6 +64,7 @@ class SavedGlState {
   const GlExtensions& extensions_;
   bool all_;
   GLint framebuffer_ = 0;
+  GLint read_framebuffer_ = 0;  ///< of ES 3
   GLint renderbuffer_ = 0;
   GLint vertex_array_ = 0;
   std::array<GLint, 2> pixel_buffers_{};  ///< pack, unpack

@@ -25,8 +25,7 @@ void set_vector(GLint place, const glm::vec4& value, RenderStats& stats) {
   stats.bytes_uploaded += sizeof value;
 }
 
-// Loops of our own below and in batch_store.cpp: the libc++ 14 of the NDK has no algorithms of
-// std::ranges.
+// Loops of our own below and in batch_store.cpp: libc++ 14 has no algorithms of std::ranges.
 template <std::size_t kSize>
 bool equal(const float (&a)[kSize], const float (&b)[kSize]) {
   return std::equal(a, a + kSize, b);

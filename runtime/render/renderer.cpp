@@ -255,6 +255,7 @@ void Renderer::render(const RgbImage& background, const glm::mat4& projection,
 void Renderer::render(const CameraPicture& background, const glm::mat4& projection,
                       std::span<const DrawItem> items) {
   State& s = *state_;
+  if (s.target.width() == 0) return;
   const SavedGlState saved(s.extensions, !s.options.exclusive_context);
   s.begin_frame();
   const bool shown =
@@ -311,6 +312,7 @@ void Renderer::draw(const SurfaceView& surface, const CameraPicture& frame,
 }
 
 void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
+  if (state_->target.width() == 0) return;
   const SavedGlState saved(state_->extensions, !state_->options.exclusive_context);
   if (!state_->options.exclusive_context) state_->gl.reset();
   const int width = state_->target.width();
@@ -329,6 +331,7 @@ void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
 
 void Renderer::blit_to_window(int window_width, int window_height) {
   State& s = *state_;
+  if (s.target.width() == 0) return;
   const SavedGlState saved(s.extensions, !s.options.exclusive_context);
   if (!s.options.exclusive_context) s.gl.reset();
   const Viewport view = fit(s.target.width(), s.target.height(), window_width, window_height);

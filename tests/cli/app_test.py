@@ -1,5 +1,6 @@
 """What is installed: programs that run from there; the libraries, found by CMake and pkg-config; their headers."""
 import csv
+import math
 import os
 import pathlib
 import shutil
@@ -8,12 +9,14 @@ import tempfile
 import unittest
 
 from installed_headers import clang, declared_symbols, headers, program
-from programs import BIN, COVER, POTTERY, ROOT, ProgramTest
+from programs import BIN, COVER, POTTERY, QUICK, ROOT, ProgramTest
 
 BUILD = BIN.parent
 SANITIZE = os.environ.get("MODAR_SANITIZE", "")
 FLAGS = [f"-fsanitize={SANITIZE}"] if SANITIZE else []
 WIDTH, HEIGHT, FRAMES = 480, 360, 6
+# What bake_flags() models. The middle of the red one is that of the whole, (0, 0).
+FLAGS_SHOWN = {"red": ((-1, -0.75), (0.6, -0.4), (0.2, 0.7)), "green": ((0.7, -0.5), (1, 0.75), (0.4, 0.75))}
 
 # A project outside of the tree that links every function of the installed headers.
 EVERYTHING = """
@@ -203,6 +206,104 @@ class App(ProgramTest):
         symbols = run("nm", "-C", self.folder / "draw", text=True, check=True).stdout
         carried = [part for part in ("modar::Renderer::render", "PoseLoop", "refine_pose") if part in symbols]
         self.assertEqual(carried, ["modar::Renderer::render"])
+
+
+    def build_apps(self):
+        project = self.folder / "apps"
+        shutil.copytree(ROOT / "tests" / "cli" / "apps", project)
+        flags = " ".join(["-Wall -Wextra -Wpedantic -Werror", *FLAGS])
+        done = run("cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}",
+                   f"-DCMAKE_C_FLAGS={flags}", f"-DCMAKE_CXX_FLAGS={flags}", text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        done = run("cmake", "--build", project / "build", text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return project / "build"
+
+    def bake_flags(self):
+        """Two triangles in red and green, flat, on our cover: its largest side is from -1 to 1 as it stands."""
+        (self.folder / "flags.mtl").write_text("newmtl red\nKa 1 0 0\nKd 1 0 0\nnewmtl green\nKa 0 1 0\nKd 0 1 0\n")
+        lines = ["mtllib flags.mtl", *(f"v {x} {y} 0" for triangle in FLAGS_SHOWN.values() for x, y in triangle),
+                 "usemtl red", "f 1 2 3", "usemtl green", "f 4 5 6"]
+        (self.folder / "flags.obj").write_text("\n".join(lines) + "\n")
+        bundle = self.folder / "flags.modar"
+        done = self.modar("bake", "--model", self.folder / "flags.obj", "--pattern", f"{COVER}:210mm", "-o", bundle,
+                          "--quiet", *QUICK)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return bundle
+
+    def assert_over_the_hosts_picture(self, bundle, host):
+        """A frame of 160x120, turned clockwise and scaled by 1.5 over a viewport of 150x240 at (9, 4) of 170x250."""
+        angle = 0.5
+        to_eye = [[math.cos(angle), 0, math.sin(angle), 0.1], [0, 1, 0, -0.15],
+                  [-math.sin(angle), 0, math.cos(angle), -2.2], [0, 0, 0, 1]]
+        done = run(host, bundle, *(to_eye[i % 4][i // 4] for i in range(16)))
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+        def place(x, y):
+            """By hand: pinhole, a quarter turn, the scale, the crop; GL's rows go up."""
+            eye = [row[0] * x + row[1] * y + row[3] for row in to_eye]
+            u, v = 75.5 + 150 * eye[0] / -eye[2], 66.5 - 140 * eye[1] / -eye[2]
+            return 9 + 1.5 * (120 - v) - 15, 4 + 240 - 1.5 * u
+
+        shapes = {colour: [place(*corner) for corner in corners] for colour, corners in FLAGS_SHOWN.items()}
+        seen = {"red": 0, "green": 0, "host": 0}
+        for i in range(170 * 250):
+            x, y = i % 170, i // 170
+            depths = {colour: inside(x + 0.5, y + 0.5, shape) for colour, shape in shapes.items()}
+            red, green, blue, alpha = done.stdout[4 * i:4 * i + 4]
+            shown = next((colour for colour, depth in depths.items() if depth > 1), None)
+            if shown is None and max(depths.values()) > -1:
+                continue  # an edge
+            if shown is None or not (9 <= x < 159 and 4 <= y < 244):
+                shown = "host"
+                self.assertEqual((red, green), (x, y))
+                self.assertIn(blue, (127, 128))
+            else:
+                self.assertEqual((red > 100, green > 100, blue), (shown == "red", shown == "green", 0), (x, y))
+            self.assertEqual(alpha, 255)
+            seen[shown] += 1
+        self.assertGreater(min(seen.values()), 1500, seen)
+
+    def assert_asks_of_c(self, bundle, phone):
+        truth, nv21, _ = self.clip()
+        asset = self.folder / "app.apk"  # an asset lies at a multiple of 4
+        asset.write_bytes(b"x" * 12 + bundle.read_bytes() + b"tail")
+        done = run(phone, asset, 12, bundle.stat().st_size, WIDTH, HEIGHT, input=nv21)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        width, *poses, pick = (line.split() for line in done.stdout.decode().splitlines())
+        self.assertEqual(width, ["width_mm", "210"])
+        self.assertEqual(len(poses), FRAMES)
+        _, visible, fit, *place = (float(word) if word != "pose" else word for word in poses[-1])
+        self.assertEqual(visible, 1)
+        self.assertTrue(0.3 < fit <= 1, fit)
+        x, y = (WIDTH * place[i] / place[2] + (side - 1) / 2 for i, side in enumerate((WIDTH, HEIGHT)))
+        self.assertLess(abs(x - diagonals(truth[-1])[0]) + abs(y - diagonals(truth[-1])[1]), 3)
+        # The tap went to the pattern's middle, on which the model lies.
+        distance, *point = (float(word) for word in pick[1:])
+        self.assertAlmostEqual(distance, math.hypot(*place), delta=0.01)
+        self.assertLess(math.hypot(*point), 0.01)
+
+    def test_two_apps_outside_of_the_tree(self):
+        apps, bundle = self.build_apps(), self.bake_flags()
+        self.assert_over_the_hosts_picture(bundle, apps / "host")
+        self.assert_asks_of_c(bundle, apps / "phone")
+
+    def test_the_headers_name_their_standard(self):
+        for header in ("renderer", "pose_loop"):
+            (self.folder / "old.cpp").write_text(f"#include <modar/{header}.hpp>\n")
+            done = run("c++", "-std=c++17", "-fsyntax-only", self.folder / "old.cpp", *self.pkg_config("modar"), text=True)
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn("need C++20", done.stderr)
+
+
+def inside(x, y, triangle):
+    """Distance to the nearest side's line, negative outside; in pixels."""
+    sides = []
+    for (ax, ay), (bx, by) in zip(triangle, (*triangle[1:], triangle[0])):
+        sides.append(((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / math.hypot(bx - ax, by - ay))
+    (ax, ay), (bx, by), (cx, cy) = triangle
+    clockwise = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0
+    return min(-side if clockwise else side for side in sides)
 
 
 def diagonals(row):

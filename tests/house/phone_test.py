@@ -1,4 +1,4 @@
-"""The device's code in the phone's dialect: clang 14 with libc++ 14 (what NDK r25 has), for 32 and 64 bits."""
+"""The device's code for phones: clang 14 with libc++ 14 (older than the NDK r26 has them), for 32 and 64 bits."""
 import os
 import pathlib
 import shutil

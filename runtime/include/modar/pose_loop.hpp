@@ -1,6 +1,10 @@
 // The pose loop: detects a pattern once, then tracks it. Needs no OpenCV.
 #pragma once
 
+#if __cplusplus < 202002L
+#error "modar's headers for C++ need C++20 (-std=c++20); <modar/modar.h> is C99"
+#endif
+
 #include <memory>
 
 #include "formats/bundle_view.hpp"

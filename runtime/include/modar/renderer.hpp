@@ -2,6 +2,10 @@
 // half: any program with a current context can draw models with matrices of its own.
 #pragma once
 
+#if __cplusplus < 202002L
+#error "modar's headers for C++ need C++20 (-std=c++20); <modar/modar.h> is C99"
+#endif
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -55,7 +59,8 @@ struct CameraPicture {
 
 /// Where a camera's frame and its models go on a surface of the app's: pixels of the framebuffer
 /// that is bound, whose (0, 0) is at the bottom left. What is upright on the surface is the frame
-/// turned clockwise by `rotation`.
+/// turned clockwise by `rotation`. A phone held upright whose back camera's sensor lies across has
+/// 90; its front camera 270 and `mirror`, for the picture of a mirror.
 struct SurfaceView {
   int x = 0;
   int y = 0;
@@ -158,7 +163,8 @@ class Renderer {
   Result<void> resize(int width, int height);
 
   /// Draws the background (may be empty: clear colour) and the items over it. projection: of GL,
-  /// see gl_projection(). Allocates nothing after the first frame of a size.
+  /// see gl_projection(). Allocates nothing after the first frame of a size. Before resize(), this
+  /// and what reads or shows the picture do nothing.
   void render(const RgbImage& background, const glm::mat4& projection,
               std::span<const DrawItem> items);
 

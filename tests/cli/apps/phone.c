@@ -1,0 +1,102 @@
+/* phone FILE OFFSET LENGTH WIDTH HEIGHT < frames.nv21: what an app in C asks for, on a bundle inside another file.
+ * Prints "width_mm W", a line "pose VISIBLE FIT X Y Z" a frame and "pick DISTANCE X Y Z" of the last one. */
+#define _XOPEN_SOURCE 700
+#include <fcntl.h>
+#include <modar/modar.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+
+static modar_error error;
+
+static void need(int holds, int line) {
+  if (holds) return;
+  fprintf(stderr, "phone.c:%d: %s: %s\n", line, error.code, error.cause);
+  exit(9);
+}
+#define NEED(holds) need(holds, __LINE__)
+
+static void check_drawing(const modar_bundle* bundle) {
+  uint8_t rgba[8 * 8 * 4];
+  modar_render_options options;
+  modar_camera camera = modar_camera_default(8, 8);
+  modar_context* context = modar_context_create(&error);
+  NEED(context != NULL);
+  modar_renderer* renderer = modar_renderer_create(bundle, NULL, 0, &error);
+  NEED(renderer != NULL && modar_renderer_gpu_bytes(renderer) > 0);
+  modar_renderer_read_rgba(renderer, NULL); /* before a size is known: nothing */
+  NEED(modar_renderer_resize(renderer, 8, 8, &error) == 0);
+  modar_render_options_default(&options);
+  NEED(options.size == sizeof options && options.lod_pixels == 1.0f);
+  options.clear_colour[0] = 0.2f, options.clear_colour[1] = 0.4f, options.lod_pixels = 4.0f;
+  modar_renderer_set_options(renderer, &options);
+  modar_renderer_render(renderer, NULL, &camera, NULL, NULL, 0);
+  modar_renderer_read_rgba(renderer, rgba);
+  NEED(rgba[0] == 51 && rgba[1] == 102 && rgba[2] == 0 && rgba[3] == 255);
+  modar_renderer_destroy(renderer);
+  modar_context_destroy(context);
+}
+
+/* A search on a thread of its own ends some frames later. */
+static void check_search_apart(const modar_bundle* bundle, const modar_camera* camera, const uint8_t* frame) {
+  const struct timespec pause = {0, 5000000};
+  modar_tracker_options options = {.size = sizeof options, .async_search = 1};
+  modar_tracker* tracker = modar_tracker_create_with(bundle, camera, &options, &error);
+  modar_pose pose = {0};
+  NEED(tracker != NULL);
+  for (int i = 0; i < 4000 && !pose.visible; ++i) {
+    NEED(modar_tracker_step(tracker, frame, (size_t)camera->width, &error) == 0);
+    modar_tracker_pose(tracker, 0, &pose);
+    nanosleep(&pause, NULL);
+  }
+  NEED(pose.visible);
+  modar_tracker_reset(tracker);
+  NEED(!modar_tracker_pose(tracker, 0, &pose) && !pose.shown);
+  modar_tracker_destroy(tracker);
+}
+
+int main(int argc, char** argv) {
+  NEED(argc == 6 && modar_version() == MODAR_VERSION_NUMBER);
+  int file = open(argv[1], O_RDONLY);
+  modar_bundle* bundle = modar_bundle_open_fd(file, atol(argv[2]), atol(argv[3]), &error);
+  NEED(bundle != NULL && close(file) == 0);
+  printf("width_mm %g\n", modar_pattern_width_mm(bundle, 0));
+  modar_camera camera = modar_camera_default(atoi(argv[4]), atoi(argv[5]));
+  /* A caller of an older version knows no smoothing. */
+  modar_tracker_options older = {.size = offsetof(modar_tracker_options, smooth_ms), .smooth_ms = 1e300};
+  modar_tracker_options options = {.size = sizeof options, .search_every = 5, .smooth_ms = 20.0};
+  modar_tracker_destroy(modar_tracker_create_with(bundle, &camera, &older, &error));
+  modar_tracker* tracker = modar_tracker_create_with(bundle, &camera, &options, &error);
+  modar_focal_finder* finder = modar_focal_finder_create(bundle, camera.width, camera.height, &error);
+  NEED(tracker != NULL && finder != NULL);
+  size_t width = (size_t)camera.width, pixels = width * (size_t)camera.height;
+  uint8_t* frame = malloc(pixels * 3 / 2);
+  modar_scene scene = {0};
+  modar_pose pose = {0};
+  NEED(modar_scene_at(bundle, 0, &scene));
+  for (double time = 1; fread(frame, pixels * 3 / 2, 1, stdin) == 1; time += 0.04) {
+    NEED(modar_tracker_step_at(tracker, frame, width, time, &error) == 0);
+    modar_tracker_pose(tracker, scene.pattern, &pose);
+    printf("pose %d %g %g %g %g\n", pose.visible, pose.fit, pose.translation[0], pose.translation[1],
+           pose.translation[2]);
+    NEED(modar_focal_finder_look(finder, frame, width) >= 0.0);
+  }
+  NEED(pose.visible);
+  modar_item item;
+  modar_hit hit;
+  modar_item_place(&item, &scene, &pose);
+  const double x = camera.cx + camera.fx * pose.translation[0] / pose.translation[2];
+  const double y = camera.cy + camera.fy * pose.translation[1] / pose.translation[2];
+  NEED(modar_pick(bundle, &camera, x, y, &item, 1, &hit) == 1 && hit.item == 0);
+  NEED(modar_pick(bundle, &camera, -500, -500, &item, 1, &hit) == 0);
+  NEED(modar_pick(bundle, &camera, x, y, &item, 1, &hit) == 1);
+  printf("pick %g %g %g %g\n", hit.distance, hit.point[0], hit.point[1], hit.point[2]);
+  check_search_apart(bundle, &camera, frame);
+  check_drawing(bundle);
+  free(frame);
+  modar_focal_finder_destroy(finder);
+  modar_tracker_destroy(tracker);
+  modar_bundle_close(bundle);
+  return 0;
+}
