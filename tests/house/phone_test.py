@@ -17,8 +17,8 @@ TARGETS = {
     "i686-linux-gnu": [],
     "wasm32-unknown-unknown": ["-D__linux__", "-D__EMSCRIPTEN__", "-D_GNU_SOURCE"],
 }
-ROOMS = ("formats/**/*.cpp", "runtime/track/*.cpp", "runtime/render/*.cpp", "runtime/platform/*.cpp",
-         "runtime/capi/*.cpp")
+LIBRARIES = {"formats": ["formats/**/*.cpp"],
+             "runtime": [f"runtime/{room}/*.cpp" for room in ("track", "render", "platform", "capi")]}
 ONLY_64_BITS = "\nnamespace { unsigned long long planted; __UINTPTR_TYPE__ narrowed[] = {planted}; }\n"
 
 
@@ -35,10 +35,10 @@ class Phone(unittest.TestCase):
             (self.folder / name).parent.mkdir(exist_ok=True)
             (self.folder / name).write_text(text)
 
-    def compile(self, target, pattern, more=""):
-        """All files of a room as one: the headers are read once."""
-        files = sorted(ROOT.glob(pattern))
-        self.assertTrue(files, pattern)
+    def compile(self, target, patterns, more=""):
+        """All files of a library as one: the headers are read once."""
+        files = [file for pattern in patterns for file in sorted(ROOT.glob(pattern))]
+        self.assertGreaterEqual(len(files), len(patterns))
         unit = self.folder / "unit.cpp"
         unit.write_text("".join(f'#include "{file}"\n' for file in files) + more)
         includes = [ROOT, ROOT / "runtime" / "include", GENERATED / "shaders" / "generated",
@@ -52,14 +52,14 @@ class Phone(unittest.TestCase):
 
     def test_formats_and_runtime_compile_for_every_phone(self):
         for target in TARGETS:
-            for room in ROOMS:
-                with self.subTest(target=target, room=room):
-                    done = self.compile(target, room)
+            for library, patterns in LIBRARIES.items():
+                with self.subTest(target=target, library=library):
+                    done = self.compile(target, patterns)
                     self.assertEqual(done.returncode, 0, done.stderr[:4000])
 
     def test_a_line_that_needs_64_bits_is_seen(self):
         for target in TARGETS:
-            done = self.compile(target, "runtime/platform/device_profile.cpp", ONLY_64_BITS)
+            done = self.compile(target, ["runtime/platform/device_profile.cpp"], ONLY_64_BITS)
             self.assertEqual("narrowed" in done.stderr, target != "aarch64-linux-gnu", f"{target}: {done.stderr[:500]}")
 
 
