@@ -1,18 +1,70 @@
 #include "bake/output.hpp"
 
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 
+#include "bake/terminal.hpp"
+
 namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+}  // namespace
 
 Result<void> make_output_folder(const std::string& folder) {
   std::error_code error;
-  std::filesystem::create_directories(folder, error);
+  fs::create_directories(folder, error);
   if (error) {
     return fail(ExitCode::kIo, "io.folder", folder, error.message(),
                 "name a folder that can be made");
   }
   return {};
+}
+
+Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    if (!fs::equivalent(output, input, error) || error) continue;
+    return fail(ExitCode::kUsage, "out.input", output,
+                "the output would overwrite the input " + input, "name another output");
+  }
+  return {};
+}
+
+Result<void> try_output(const std::string& path, std::uint64_t bytes) {
+  std::error_code error;
+  const fs::path folder = fs::absolute(path, error).parent_path();
+  std::string probe = (folder / ".modar-XXXXXX").string();
+  const int file = ::mkstemp(probe.data());
+  if (file < 0) {
+    return fail(ExitCode::kIo, "io.folder", path,
+                "its folder cannot be written: " + std::string(std::strerror(errno)),
+                "name a place that can be written");
+  }
+  ::close(file);
+  ::unlink(probe.c_str());
+  const fs::space_info space = fs::space(folder, error);
+  if (error || space.available >= bytes) return {};
+  return fail(ExitCode::kIo, "io.space", path,
+              "only " + human_bytes(space.available) + " are free there, and it needs about " +
+                  human_bytes(bytes),
+              "free some space, or name another place");
+}
+
+std::uint64_t file_bytes(const std::vector<std::string>& paths) {
+  std::uint64_t sum = 0;
+  for (const std::string& path : paths) {
+    std::error_code error;
+    const std::uintmax_t bytes = fs::file_size(path, error);
+    if (!error) sum += bytes;
+  }
+  return sum;
 }
 
 }  // namespace modar

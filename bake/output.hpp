@@ -1,7 +1,10 @@
-// What commands do before they write files for people.
+// What commands do before they work: see that what they will write can be written, and destroys
+// nothing that they read.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "formats/error.hpp"
 
@@ -9,5 +12,16 @@ namespace modar {
 
 /// Makes the folder and those above it where they are missing. Errors: kIo "io.folder".
 Result<void> make_output_folder(const std::string& folder);
+
+/// Refuses an output that is one of the inputs: by its path, a symbolic link or a hard link.
+/// Errors: kUsage "out.input".
+Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs);
+
+/// Tries the folder of a file that will be written: it can be written, and `bytes` are free there.
+/// Leaves nothing behind. Errors: kIo "io.folder", "io.space".
+Result<void> try_output(const std::string& path, std::uint64_t bytes);
+
+/// Bytes of those of the files that are there.
+std::uint64_t file_bytes(const std::vector<std::string>& paths);
 
 }  // namespace modar

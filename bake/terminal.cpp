@@ -10,7 +10,26 @@
 
 namespace modar {
 
-ProgressBar::ProgressBar(bool quiet) : active_(!quiet && isatty(STDERR_FILENO) == 1) {}
+namespace {
+
+constexpr double kEstimateAfter = 5.0;  // seconds: shorter stages end before one has read it
+
+}  // namespace
+
+std::string time_left(double done, double elapsed_s) {
+  if (elapsed_s < kEstimateAfter || done <= 0 || done >= 1) return "";
+  const double left = elapsed_s * (1 - done) / done;
+  char text[48];
+  if (left < 100) {
+    std::snprintf(text, sizeof text, ", about %.0f s left", left);
+  } else {
+    std::snprintf(text, sizeof text, ", about %.0f min left", left / 60);
+  }
+  return text;
+}
+
+ProgressBar::ProgressBar(bool quiet)
+    : active_(!quiet), terminal_(isatty(STDERR_FILENO) == 1), start_(Clock::now()) {}
 
 ProgressBar::~ProgressBar() {
   clear();
@@ -18,12 +37,28 @@ ProgressBar::~ProgressBar() {
 
 void ProgressBar::show(const std::string& stage, double done) {
   if (!active_) return;
+  const bool begins = stage != stage_;
+  if (begins) {
+    stage_ = stage;
+    start_ = Clock::now();
+    next_words_s_ = kEstimateAfter;
+  }
+  const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
+  const std::string left = time_left(done, elapsed);
+  const int percent = static_cast<int>(done * 100 + 0.5);
+  if (!terminal_) {
+    if (begins) std::fprintf(stderr, "%s\n", stage.c_str());
+    if (left.empty() || elapsed < next_words_s_) return;
+    std::fprintf(stderr, "%s: %d %%%s\n", stage.c_str(), percent, left.c_str());
+    next_words_s_ = 2 * elapsed;
+    return;
+  }
   constexpr int kWidth = 30;
   const int filled = static_cast<int>(done * kWidth + 0.5);
   std::string bar(static_cast<std::size_t>(filled), '#');
   bar.resize(kWidth, '.');
-  std::fprintf(stderr, "\r\x1b[K[%s] %3d %% %s", bar.c_str(), static_cast<int>(done * 100 + 0.5),
-               stage.c_str());
+  std::fprintf(stderr, "\r\x1b[K[%s] %3d %% %s%s", bar.c_str(), percent, stage.c_str(),
+               left.c_str());
   std::fflush(stderr);
   drawn_ = true;
 }

@@ -1,6 +1,7 @@
 // What a person sees on stderr: a progress bar on a terminal, errors with their cure.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <string>
 
@@ -9,7 +10,9 @@
 
 namespace modar {
 
-/// Draws one line that is overwritten. Silent where stderr is no terminal or quiet is set.
+/// Shows what a command is at. On a terminal one line that is overwritten; elsewhere a line a
+/// stage. A stage that has run for 5 seconds gets an estimate of what is left, from the part that
+/// is done.
 class ProgressBar {
  public:
   explicit ProgressBar(bool quiet);
@@ -22,9 +25,19 @@ class ProgressBar {
   void clear();
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   bool active_;
+  bool terminal_;
   bool drawn_ = false;
+  std::string stage_;
+  Clock::time_point start_;
+  double next_words_s_ = 0;  ///< elsewhere: when the stage's next estimate is due
 };
+
+/// ", about 40 s left" from what is done after so long; empty before 5 s, and where nothing is
+/// done.
+std::string time_left(double done, double elapsed_s);
 
 /// "modar: error: where: cause; cure [code]" on stderr. Answers the exit code.
 int print_error(const Error& error);

@@ -331,6 +331,40 @@ Result<void> plan_for_device(const std::string& device, BakeRequest& request) {
   return {};
 }
 
+Result<void> require_shown(const BakeRequest& request) {
+  const bool whole = !request.models.empty() && !request.patterns.empty();
+  const bool one_scene =
+      request.scenes.empty() && request.models.size() == 1 && request.patterns.size() == 1;
+  if (!whole || one_scene) return {};
+  const auto shown = [&](const std::string& name, std::string SceneRequest::*side) {
+    return std::any_of(request.scenes.begin(), request.scenes.end(),
+                       [&](const SceneRequest& scene) { return scene.*side == name; });
+  };
+  std::vector<std::string> idle;  // patterns without a model
+  for (const PatternRequest& pattern : request.patterns) {
+    const std::string name = file_stem(pattern.path);
+    if (!shown(name, &SceneRequest::pattern)) idle.push_back(name);
+  }
+  std::string lines;
+  std::string what;
+  std::size_t next = 0;
+  for (const std::string& path : request.models) {
+    const std::string name = file_stem(path);
+    if (shown(name, &SceneRequest::model)) continue;
+    const std::string on =
+        next < idle.size() ? idle[next++] : file_stem(request.patterns.front().path);
+    lines += " --scene " + on + "=" + name;
+    if (what.empty()) what = "the model '" + name + "' stands on no pattern";
+  }
+  for (; next < idle.size(); ++next) {
+    lines += " --scene " + idle[next] + "=" + file_stem(request.models.front());
+    if (what.empty()) what = "no model stands on the pattern '" + idle[next] + "'";
+  }
+  if (lines.empty()) return {};
+  return fail(ExitCode::kUsage, "bake.never-shown", "", what + ", so it would never be shown",
+              "add" + lines);
+}
+
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
   if (request.models.empty() && request.patterns.empty()) {
     return fail(ExitCode::kUsage, "bake.nothing", "", "there is neither a model nor a pattern",

@@ -67,6 +67,10 @@ struct BakeRequest {
 /// "device.unknown" that lists the names.
 Result<void> plan_for_device(const std::string& device, BakeRequest& request);
 
+/// Refuses models that stand on no pattern, and patterns that carry no model, where there are both.
+/// Errors: kUsage "bake.never-shown", whose cure is what to add to the command line.
+Result<void> require_shown(const BakeRequest& request);
+
 /// Runs all stages. One model and one pattern without a scene make one by themselves.
 /// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown",
 /// "bake.max-error-unit".

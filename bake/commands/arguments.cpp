@@ -94,21 +94,6 @@ Result<std::array<PixelPoint, 4>> parse_corners(const std::string& text) {
   return corners;
 }
 
-Result<PatternRequest> parse_pattern(const std::string& text) {
-  PatternRequest request;
-  request.path = text;
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || !text.ends_with("mm")) return request;
-  const std::string_view width = std::string_view(text).substr(colon + 1, text.size() - colon - 3);
-  if (!parse_number(width, request.width_mm) || request.width_mm <= 0) {
-    return fail(ExitCode::kUsage, "cli.pattern", "--pattern " + text,
-                "'" + std::string(width) + "' is no width in millimetres",
-                "write FILE:WIDTHmm, as in cover.png:148mm");
-  }
-  request.path = text.substr(0, colon);
-  return request;
-}
-
 Result<double> parse_unit(const std::string& text) {
   struct Unit {
     const char* name;
@@ -121,6 +106,28 @@ Result<double> parse_unit(const std::string& text) {
   }
   return fail(ExitCode::kUsage, "cli.unit", "--unit " + text, "there is no such unit",
               "name one of mm, cm, m, km, in, ft");
+}
+
+Result<PatternRequest> parse_pattern(const std::string& text) {
+  PatternRequest request;
+  request.path = text;
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos) return request;
+  const std::string_view tail = std::string_view(text).substr(colon + 1);
+  const std::size_t digits = tail.find_last_of("0123456789.") + 1;  // 0 where there is none
+  const Result<double> unit = parse_unit(std::string(tail.substr(digits)));
+  double width = 0;
+  const bool number = parse_number(tail.substr(0, digits), width);
+  if (!unit || (!number && !tail.ends_with("mm"))) return request;  // a file with a colon
+  if (!number || width <= 0) {
+    return fail(ExitCode::kUsage, "cli.pattern", "--pattern " + text,
+                "'" + std::string(tail) + "' is no width",
+                "write FILE:WIDTH, as in cover.png:148mm");
+  }
+  request.width_mm = width * *unit * 1000;
+  if (tail.ends_with("mm")) request.width_mm = width;
+  request.path = text.substr(0, colon);
+  return request;
 }
 
 Result<MaxError> parse_max_error(const std::string& text) {

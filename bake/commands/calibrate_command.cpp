@@ -5,6 +5,7 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
+#include "bake/output.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/terminal.hpp"
 
@@ -57,6 +58,10 @@ Result<void> complete(CalibrateCommand& command) {
 
 Result<ExitCode> run_calibrate(CalibrateCommand& command) {
   MODAR_TRY(complete(command));
+  std::vector<std::string> inputs = command.options.inputs;
+  inputs.push_back(command.options.pattern);
+  MODAR_TRY(keep_inputs(command.output, inputs));
+  MODAR_TRY(try_output(command.output, 0));
   ProgressBar bar(command.quiet);
   const auto calibration = calibrate(
       command.options, [&](const std::string& what, double done) { bar.show(what, done); });

@@ -127,7 +127,11 @@ int run_check(const CheckCommand& command) {
     print_looks(extras.looks);
     print_ranges(extras.poses);
   }
-  return static_cast<int>(verdict.good() ? ExitCode::kOk : ExitCode::kInvalidInput);
+  if (verdict.good()) return static_cast<int>(ExitCode::kOk);
+  // A bundle of a newer version is not bad: only this program cannot read it.
+  const Result<BundleView> opened = BundleView::open(file->bytes());
+  const bool newer = !opened && opened.error().exit == ExitCode::kUnsupported;
+  return static_cast<int>(newer ? ExitCode::kUnsupported : ExitCode::kInvalidInput);
 }
 
 }  // namespace modar

@@ -1,9 +1,12 @@
 #include "bake/commands/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <type_traits>
+#include <utility>
 
 #include "bake/terminal.hpp"
 
@@ -18,14 +21,35 @@ struct CommandLine::Parts {
 
 namespace {
 
+/// What --help says of an option beyond its own text: "1 to 12, default 4, not with --no-lods".
+std::string rules_in_words(const OptionRules& rules, const CLI::Option& option) {
+  std::string words;
+  const auto add = [&words](const std::string& more) {
+    words += (words.empty() ? "" : ", ") + more;
+  };
+  char text[64];
+  if (rules.positive) add("above 0");
+  if (!std::isinf(rules.least)) {
+    std::snprintf(text, sizeof text, "%.8g to %.8g", rules.least, rules.most);
+    add(text);
+  }
+  if (rules.shows_default && !option.get_default_str().empty()) {
+    add("default " + option.get_default_str());
+  }
+  if (!rules.needs.empty()) add("needs " + rules.needs);
+  if (!rules.excludes.empty()) add("not with " + rules.excludes);
+  return words.empty() ? "" : " (" + words + ")";
+}
+
 void apply(const OptionRules& rules, CLI::App& app, CLI::Option& option) {
   if (!rules.choices.empty()) option.check(CLI::IsMember(rules.choices).description(""));
-  if (rules.positive) option.check(CLI::PositiveNumber);
+  if (rules.positive) option.check(CLI::Validator(CLI::PositiveNumber).description(""));
   if (rules.separator != 0) option.delimiter(rules.separator);
   if (rules.repeatable) option.allow_extra_args(false);
   if (!rules.type.empty()) option.type_name(rules.type);
   if (rules.required) option.required();
   if (rules.shows_default) option.capture_default_str();
+  option.description(option.get_description() + rules_in_words(rules, option));
   if (!rules.needs.empty()) option.needs(app.get_option(rules.needs));
   if (!rules.excludes.empty()) option.excludes(app.get_option(rules.excludes));
 }
@@ -33,9 +57,72 @@ void apply(const OptionRules& rules, CLI::App& app, CLI::Option& option) {
 template <class T>
 void limit(const OptionRules& rules, CLI::Option& option) {
   if constexpr (std::is_arithmetic_v<T>) {
+    option.type_name(std::is_floating_point_v<T> ? "NUMBER" : "N");
     if (std::isinf(rules.least)) return;
-    option.check(CLI::Range(static_cast<T>(rules.least), static_cast<T>(rules.most)));
+    option.check(CLI::Validator(
+        CLI::Range(static_cast<T>(rules.least), static_cast<T>(rules.most)).description("")));
   }
+}
+
+/// Options without their validators' notes, which apply() has put into words.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_name(const CLI::Option* option, bool positional) const override {
+    const std::string name = CLI::Formatter::make_option_name(option, positional);
+    return name.substr(0, name.find('{'));
+  }
+  std::string make_option_opts(const CLI::Option* option) const override {
+    if (option->get_type_size() == 0) return "";
+    std::string words = " " + option->get_type_name();
+    if (option->get_expected_max() == CLI::detail::expected_max_vector_size) words += " ...";
+    return words + (option->get_required() ? " REQUIRED" : "");
+  }
+};
+
+/// Edits of letters (Levenshtein 1966) that lead from one word to the other.
+std::size_t edits_between(const std::string& from, const std::string& to) {
+  std::vector<std::size_t> row(to.size() + 1);
+  for (std::size_t i = 0; i < row.size(); ++i) row[i] = i;
+  for (std::size_t i = 1; i <= from.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= to.size(); ++j) {
+      const std::size_t changed = diagonal + (from[i - 1] == to[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+/// The first word of the command line that nothing takes, and the name that it is nearest to.
+std::optional<Error> unknown_word(const CLI::App* app) {
+  while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
+  const std::vector<std::string> left = app->remaining();
+  if (left.empty()) return std::nullopt;
+  const std::string word = left.front().substr(0, left.front().find('='));
+  const bool is_option = word.starts_with('-');
+  std::vector<std::string> names;
+  if (is_option) {
+    for (const CLI::Option* option : app->get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+  } else {
+    for (const CLI::App* command : app->get_subcommands(nullptr)) {
+      names.push_back(command->get_name());
+    }
+    if (names.empty()) return std::nullopt;
+  }
+  std::string cure = "see " + app->get_display_name() + " --help";
+  std::size_t fewest = word.size() / 2 + 1;
+  for (const std::string& name : names) {
+    const std::size_t edits = edits_between(word, name);
+    if (edits < fewest) {
+      fewest = edits;
+      cure = "did you mean " + name + "?";
+    }
+  }
+  return Error{ExitCode::kUsage, "cli.unknown", word,
+               is_option ? "there is no such option" : "there is no such command", cure};
 }
 
 }  // namespace
@@ -45,6 +132,7 @@ CommandLine::CommandLine(const std::string& about, const std::string& version)
   parts_->own = std::make_unique<CLI::App>(about, "modar");
   parts_->app = parts_->own.get();
   parts_->app->set_version_flag("--version", version);
+  parts_->app->formatter(std::make_shared<HelpFormatter>());
 }
 
 CommandLine::CommandLine(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -73,7 +161,7 @@ void CommandLine::option(const std::string& names, Value value, const std::strin
 void CommandLine::size(const std::string& names, std::uint64_t& bytes, const std::string& help,
                        const OptionRules& rules) {
   CLI::Option* option = parts_->app->add_option(names, bytes, help);
-  option->transform(CLI::AsSizeValue(true));
+  option->transform(CLI::Validator(CLI::AsSizeValue(true)).description(""));
   apply(rules, *parts_->app, *option);
 }
 
@@ -111,6 +199,9 @@ int CommandLine::parse_and_run(int argc, char** argv) {
   try {
     parts_->app->parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) {
+      if (const auto unknown = unknown_word(parts_->app)) return print_error(*unknown);
+    }
     return parts_->app->exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
                                          : static_cast<int>(ExitCode::kUsage);
   }

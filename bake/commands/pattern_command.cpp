@@ -1,6 +1,7 @@
 // `modar pattern`: rectify, score, simulate and confusion, one after the other.
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -63,6 +64,12 @@ unsigned cores() {
 Result<ExitCode> run_rectify(RectifyCommand& command) {
   MODAR_ASSIGN(const auto corners, parse_corners(command.corners));
   command.options.corners = corners;
+  MODAR_TRY(keep_inputs(command.output, {command.photo}));
+  if (!command.output.ends_with(".png") && !command.output.ends_with(".PNG")) {
+    return fail(ExitCode::kUsage, "rectify.format", command.output,
+                "the picture and its width are written as PNG", "name it FILE.png");
+  }
+  MODAR_TRY(try_output(command.output, 0));
   MODAR_ASSIGN(auto photo, read_image(command.photo));
   Result<RgbaImage> image = rectify(photo, command.options);
   if (!image) {
@@ -106,57 +113,82 @@ void add_rectify(CommandLine& pattern) {
   line.run([command] { return run_rectify(*command); });
 }
 
-Json scores_json(const std::vector<NamedScore>& scores) {
-  Json out = Json::array();
-  for (const NamedScore& one : scores) {
-    Json causes = Json::array();
-    for (const ScoreCause& cause : one.score.causes) {
-      causes.push_back({{"id", cause.id}, {"value", cause.value}, {"advice", cause.advice}});
-    }
-    out.push_back({{"name", one.name},
-                   {"score", one.score.score},
-                   {"version", kScoreVersion},
-                   {"causes", causes}});
+/// In place of the document of a file that failed.
+Json failure_json(const std::string& path, const Error& error) {
+  return {{"name", file_stem(path)}, {"error", to_line(error)}};
+}
+
+Json score_json(const NamedScore& one) {
+  Json causes = Json::array();
+  for (const ScoreCause& cause : one.score.causes) {
+    causes.push_back({{"id", cause.id}, {"value", cause.value}, {"advice", cause.advice}});
   }
+  return {{"name", one.name},
+          {"score", one.score.score},
+          {"version", kScoreVersion},
+          {"causes", causes}};
+}
+
+/// Where a file's picture goes; the file itself is not overwritten.
+Result<std::string> picture_of(const std::string& path, const std::string& folder) {
+  std::string out = folder + "/" + file_stem(path) + ".png";
+  MODAR_TRY(keep_inputs(out, {path}));
   return out;
+}
+
+/// Prints what is wrong with one file, after which the others go on; the first such error is what
+/// the command answers.
+void print_failure(const Error& error, ExitCode& answer) {
+  print_error(error);
+  if (answer == ExitCode::kOk) answer = error.exit;
+}
+
+Result<NamedScore> score_file(const ScoreCommand& command, const std::string& path) {
+  bool shrunk = false;
+  MODAR_ASSIGN(const auto picture, load_pattern(path, shrunk));
+  TrackerRecordOptions loop;
+  loop.jobs = command.jobs;
+  auto score = bake_tracker_record(picture.view(), loop).and_then([&](const auto& record) {
+    return score_pattern(picture.view(), record, command.jobs);
+  });
+  if (!score) {
+    score.error().where = path;
+    return tl::unexpected(score.error());
+  }
+  if (!command.overlay_folder.empty()) {
+    MODAR_ASSIGN(const std::string out, picture_of(path, command.overlay_folder));
+    MODAR_TRY(write_png(score_overlay(picture.view(), *score), out));
+  }
+  return NamedScore{file_stem(path), std::move(*score)};
 }
 
 Result<ExitCode> run_score(ScoreCommand& command) {
   MODAR_TRY(open_folders(command.patterns));
   if (!command.overlay_folder.empty()) {
     MODAR_TRY(make_output_folder(command.overlay_folder));
+    for (const std::string& path : command.patterns) {
+      MODAR_TRY(picture_of(path, command.overlay_folder));
+    }
   }
-  std::vector<NamedScore> scores;
+  ExitCode answer = ExitCode::kOk;
+  Json list = Json::array();
   for (const std::string& path : command.patterns) {
-    bool shrunk = false;
-    MODAR_ASSIGN(const auto picture, load_pattern(path, shrunk));
-    TrackerRecordOptions loop;
-    loop.jobs = command.jobs;
-    auto score = bake_tracker_record(picture.view(), loop).and_then([&](const auto& record) {
-      return score_pattern(picture.view(), record, command.jobs);
-    });
-    if (!score) {
-      score.error().where = path;
-      return tl::unexpected(score.error());
+    const auto one = score_file(command, path);
+    if (!one) {
+      print_failure(one.error(), answer);
+      list.push_back(failure_json(path, one.error()));
+      continue;
     }
-    if (!command.overlay_folder.empty()) {
-      const std::string out = command.overlay_folder + "/" + file_stem(path) + ".png";
-      MODAR_TRY(write_png(score_overlay(picture.view(), *score), out));
-    }
-    scores.push_back({file_stem(path), std::move(*score)});
-  }
-  if (command.json) {
-    std::fputs(scores_json(scores).dump().c_str(), stdout);
-    return ExitCode::kOk;
-  }
-  for (const NamedScore& one : scores) {
-    std::printf("%s: %d of 100 (version %u)\n", one.name.c_str(), one.score.score, kScoreVersion);
-    for (const ScoreCause& cause : one.score.causes) {
+    list.push_back(score_json(*one));
+    if (command.json) continue;
+    std::printf("%s: %d of 100 (version %u)\n", one->name.c_str(), one->score.score, kScoreVersion);
+    for (const ScoreCause& cause : one->score.causes) {
       std::printf("  %-10s %3d%s%s\n", cause.id, cause.value, *cause.advice != 0 ? "  " : "",
                   cause.advice);
     }
   }
-  return ExitCode::kOk;
+  if (command.json) std::fputs(list.dump().c_str(), stdout);
+  return answer;
 }
 
 void add_score(CommandLine& pattern) {
@@ -187,27 +219,23 @@ Json value_json(const SimulatedValue& value) {
           {"jitter_px", row.jitter_px}};
 }
 
-Json simulations_json(const std::vector<Simulation>& simulations) {
-  Json out = Json::array();
-  for (const Simulation& simulation : simulations) {
-    Json bands = Json::array();
-    for (const SimulatedBand& band : simulation.bands) {
-      Json values = Json::array();
-      for (const SimulatedValue& value : band.values) values.push_back(value_json(value));
-      bands.push_back({{"name", band.name}, {"unit", band.unit}, {"values", values}});
-    }
-    const double width = simulation.width_mm;
-    out.push_back({{"name", simulation.name},
-                   {"width_mm", width},
-                   {"nearest_widths", simulation.range.nearest},
-                   {"farthest_widths", simulation.range.farthest},
-                   {"nearest_mm", width > 0 ? Json(simulation.range.nearest * width) : Json()},
-                   {"farthest_mm", width > 0 ? Json(simulation.range.farthest * width) : Json()},
-                   {"tilt_deg", simulation.range.tilt_deg},
-                   {"sentence", range_sentence(simulation)},
-                   {"bands", bands}});
+Json simulation_json(const Simulation& simulation) {
+  Json bands = Json::array();
+  for (const SimulatedBand& band : simulation.bands) {
+    Json values = Json::array();
+    for (const SimulatedValue& value : band.values) values.push_back(value_json(value));
+    bands.push_back({{"name", band.name}, {"unit", band.unit}, {"values", values}});
   }
-  return out;
+  const double width = simulation.width_mm;
+  return {{"name", simulation.name},
+          {"width_mm", width},
+          {"nearest_widths", simulation.range.nearest},
+          {"farthest_widths", simulation.range.farthest},
+          {"nearest_mm", width > 0 ? Json(simulation.range.nearest * width) : Json()},
+          {"farthest_mm", width > 0 ? Json(simulation.range.farthest * width) : Json()},
+          {"tilt_deg", simulation.range.tilt_deg},
+          {"sentence", range_sentence(simulation)},
+          {"bands", bands}};
 }
 
 void print_simulation(const Simulation& simulation) {
@@ -239,29 +267,43 @@ Result<void> complete(SimulateCommand& command) {
   return {};
 }
 
+Result<Simulation> simulate_file(const SimulateCommand& command, const std::string& path,
+                                 ProgressBar& bar) {
+  MODAR_ASSIGN(Simulation simulation,
+               simulate(path, command.options,
+                        [&](const std::string&, double done) { bar.show(file_stem(path), done); }));
+  if (!command.picture_folder.empty()) {
+    MODAR_ASSIGN(const std::string out, picture_of(path, command.picture_folder));
+    MODAR_TRY(write_png(simulation_picture(simulation), out));
+  }
+  return simulation;
+}
+
 Result<ExitCode> run_simulate(SimulateCommand& command) {
   MODAR_TRY(open_folders(command.patterns));
   MODAR_TRY(complete(command));
   if (!command.picture_folder.empty()) {
     MODAR_TRY(make_output_folder(command.picture_folder));
+    for (const std::string& path : command.patterns) {
+      MODAR_TRY(picture_of(path, command.picture_folder));
+    }
   }
   ProgressBar bar(command.quiet);
-  std::vector<Simulation> simulations;
+  ExitCode answer = ExitCode::kOk;
+  Json list = Json::array();
   for (const std::string& path : command.patterns) {
-    auto simulation = simulate(path, command.options, [&](const std::string&, double done) {
-      bar.show(file_stem(path), done);
-    });
+    const auto simulation = simulate_file(command, path, bar);
     bar.clear();
-    if (!simulation) return tl::unexpected(simulation.error());
-    if (!command.picture_folder.empty()) {
-      const std::string out = command.picture_folder + "/" + simulation->name + ".png";
-      MODAR_TRY(write_png(simulation_picture(*simulation), out));
+    if (!simulation) {
+      print_failure(simulation.error(), answer);
+      list.push_back(failure_json(path, simulation.error()));
+      continue;
     }
     if (!command.json) print_simulation(*simulation);
-    simulations.push_back(std::move(*simulation));
+    list.push_back(simulation_json(*simulation));
   }
-  if (command.json) std::fputs(simulations_json(simulations).dump().c_str(), stdout);
-  return ExitCode::kOk;
+  if (command.json) std::fputs(list.dump().c_str(), stdout);
+  return answer;
 }
 
 void add_simulate(CommandLine& pattern) {
@@ -339,7 +381,14 @@ Result<ExitCode> run_confusion(ConfusionCommand& command) {
     MODAR_ASSIGN(auto photos, pictures_of(command.photos));
     command.options.photos = std::move(photos);
   }
-  MODAR_ASSIGN(const auto patterns, read_patterns(command.inputs, command.options.jobs));
+  ExitCode answer = ExitCode::kOk;
+  std::vector<NamedPattern> patterns;
+  for (const std::string& input : command.inputs) {
+    auto some = read_patterns({input}, command.options.jobs);
+    if (!some) print_failure(some.error(), answer);
+    if (some) std::move(some->begin(), some->end(), std::back_inserter(patterns));
+  }
+  if (patterns.empty()) return answer;
   ProgressBar bar(command.quiet);
   const auto confusion =
       measure_confusion(patterns, command.options,
@@ -351,7 +400,7 @@ Result<ExitCode> run_confusion(ConfusionCommand& command) {
   } else {
     print_confusion(*confusion);
   }
-  return confusion->false_recognitions() == 0 ? ExitCode::kOk : ExitCode::kInvalidInput;
+  return confusion->false_recognitions() == 0 ? answer : ExitCode::kInvalidInput;
 }
 
 void add_confusion(CommandLine& pattern) {

@@ -99,7 +99,7 @@ class Bake(ProgramTest):
     def test_models_are_merged_in_the_same_buffers(self):
         out = self.folder / "two.modar"
         report = self.modar_json("bake", "--model", POTTERY, STATUE, "--pattern", COVER, "--scene",
-                                 "cover=statue,scale=0.5,up=z", "--no-lods", "-o", out, *QUICK)
+                                 "cover=statue,scale=0.5,up=z", "cover=pottery", "--no-lods", "-o", out, *QUICK)
         self.assertEqual([m["name"] for m in report["bundle"]["models"]], ["pottery", "statue"])
         self.assertEqual(report["bundle"]["scenes"][0]["scale"], 0.5)
         self.assertGreater(report["cpu_seconds"], 0)

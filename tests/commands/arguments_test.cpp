@@ -56,6 +56,12 @@ TEST(Pattern, WidthIsOptional) {
   ASSERT_TRUE(wide);
   EXPECT_EQ(wide->path, "c:cover.png");
   EXPECT_EQ(wide->width_mm, 148.5);
+  EXPECT_DOUBLE_EQ(parse_pattern("p.png:210cm")->width_mm, 2100);
+  EXPECT_DOUBLE_EQ(parse_pattern("p.png:0.5m")->width_mm, 500);
+  EXPECT_DOUBLE_EQ(parse_pattern("p.png:2in")->width_mm, 50.8);
+  EXPECT_EQ(parse_pattern("p.png:210cm")->path, "p.png");
+  EXPECT_EQ(parse_pattern("odd:name.m")->path, "odd:name.m");
+  EXPECT_FALSE(parse_pattern("cover.png:-3cm"));
   EXPECT_FALSE(parse_pattern("cover.png:-3mm"));
   EXPECT_FALSE(parse_pattern("cover.png:mm"));
 }

@@ -16,6 +16,14 @@ TEST(HumanBytes, ThreeDigits) {
   EXPECT_EQ(human_bytes(206700000), "207 MB");
 }
 
+TEST(TimeLeft, ComesFromThePartThatIsDone) {
+  EXPECT_EQ(time_left(0.25, 10), ", about 30 s left");
+  EXPECT_EQ(time_left(0.5, 600), ", about 10 min left");
+  EXPECT_EQ(time_left(0.5, 4.9), "");  // too early to tell
+  EXPECT_EQ(time_left(0, 60), "");
+  EXPECT_EQ(time_left(1, 60), "");
+}
+
 TEST(ProcessCost, IsPositive) {
   EXPECT_GT(process_cost().peak_rss_bytes, 100000u);
 }

@@ -1,0 +1,169 @@
+"""What people trust the programs with: no input is overwritten, nothing is lost on the way, mistakes are answered."""
+import json
+import os
+import resource
+import shutil
+import struct
+import unittest
+
+from programs import COVER, POTTERY, QUICK, STATUE, ProgramTest
+
+GAME = COVER.parent / "game.png"
+
+
+class Inputs(ProgramTest):
+    """An output that is an input: by its path, a symbolic link, a hard link."""
+
+    def aliases(self, original):
+        path = self.folder / original.name
+        shutil.copy(original, path)
+        soft, hard = self.folder / "soft", self.folder / "hard"
+        for link in (soft, hard):
+            link.unlink(missing_ok=True)
+        soft.symlink_to(path)
+        os.link(path, hard)
+        return path, [path, f"./{path.name}", soft, hard]
+
+    def assert_kept(self, path, done):
+        self.assert_fails(done, 1, "overwrite", "name another")
+        self.assertNotIn("\n", done.stderr.strip(), "work was begun")
+        original = {p.name: p for p in (COVER, POTTERY)}[path.name]
+        self.assertEqual(path.read_bytes(), original.read_bytes())
+
+    def test_bake(self):
+        for original, option in ((COVER, "--pattern"), (POTTERY, "--model")):
+            path, outputs = self.aliases(original)
+            for output in outputs:
+                self.assert_kept(path, self.modar("bake", option, path, "-o", output))
+
+    def test_rectify_and_calibrate(self):
+        path, outputs = self.aliases(COVER)
+        for output in outputs:
+            self.assert_kept(path, self.modar("pattern", "rectify", path, "--corners", "10,10,300,40,310,600,20,650",
+                                              "-o", output))
+            self.assert_kept(path, self.modar("calibrate", path, "--board", "9x6", "-o", output))
+
+    def test_pictures_beside_patterns(self):
+        path, _ = self.aliases(COVER)
+        self.assert_kept(path, self.modar("pattern", "score", path, "--overlay", "."))
+        self.assert_kept(path, self.modar("pattern", "simulate", path, "--picture", self.folder, "--quiet"))
+
+
+class Outputs(ProgramTest):
+    def test_the_folder_is_tried_before_the_work(self):
+        for output in ("no/such/folder/out.modar", "notes.txt/out.modar"):
+            (self.folder / "notes.txt").write_text("no folder")
+            done = self.modar("bake", "--model", "none.obj", "-o", output)
+            self.assert_fails(done, 2, output)
+            self.assertNotIn("none.obj", done.stderr)  # which is missing: it was not looked for
+        self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["notes.txt"])
+
+    def test_a_full_disk_names_the_file_and_leaves_the_earlier_one(self):
+        bundle = self.folder / "out.modar"
+        bundle.write_text("earlier")
+        # Python ignores SIGXFSZ, and so does what it starts: writes beyond the limit fail as on a full disk.
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20000, limits[1]))
+        try:
+            done = self.modar("bake", "--model", POTTERY, "--no-lods", "-o", bundle, "--quiet")
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        self.assert_fails(done, 2, "out.modar")
+        self.assertEqual(bundle.read_text(), "earlier")
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["out.modar"])
+
+    def test_rectify_writes_png_only(self):
+        done = self.modar("pattern", "rectify", COVER, "--corners", "10,10,300,40,310,600,20,650", "-o", "x.jpg")
+        self.assert_fails(done, 1, "x.jpg", ".png")
+        self.assertFalse((self.folder / "x.jpg").exists())
+
+
+class NeverShown(ProgramTest):
+    def test_the_line_to_add_is_printed(self):
+        two = ("--model", POTTERY, STATUE)
+        for words, line in (((*two, "--pattern", COVER), "--scene cover=pottery --scene cover=statue"),
+                            ((*two, "--pattern", COVER, "--scene", "cover=statue"), "--scene cover=pottery"),
+                            (("--model", POTTERY, "--pattern", COVER, GAME, "--scene", "cover=pottery"),
+                             "--scene game=pottery"),
+                            ((*two, "--pattern", COVER, GAME), "--scene cover=pottery --scene game=statue")):
+            done = self.modar("bake", *words, "-o", "out.modar")
+            self.assert_fails(done, 1, f"add {line} [bake.never-shown]")
+            self.assertFalse((self.folder / "out.modar").exists())
+
+
+class EachFile(ProgramTest):
+    """One bad picture fails that picture; the others' results stand."""
+
+    def setUp(self):
+        super().setUp()
+        self.project = self.folder / "project"
+        self.project.mkdir()
+        (self.project / "a_bad.png").write_text("no picture")
+        shutil.copy(GAME, self.project)
+
+    def run_json(self, *words):
+        done = self.modar("pattern", *words, "--json")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("a_bad.png", done.stderr)
+        return json.loads(done.stdout)
+
+    def test_score(self):
+        bad, good = self.run_json("score", self.project)
+        self.assertEqual((bad["name"], good["name"]), ("a_bad", "game"))
+        self.assertIn("a_bad.png", bad["error"])
+        self.assertGreater(good["score"], 0)
+        words = self.modar("pattern", "score", self.project)
+        self.assertEqual(words.returncode, 3)
+        self.assertIn("game: ", words.stdout)
+
+    def test_simulate(self):
+        bad, good = self.run_json("simulate", self.project, "--views", "1")
+        self.assertIn("error", bad)
+        self.assertEqual(len(good["bands"]), 7)
+
+    def test_confusion(self):
+        found = self.run_json("confusion", self.project, "--views", "1")
+        self.assertEqual([pattern["name"] for pattern in found["patterns"]], ["game"])
+
+
+class Words(ProgramTest):
+    def test_the_nearest_name_is_suggested(self):
+        for words, wrong, meant in ((["bak"], "bak", "bake"), (["bake", "--patern", "x"], "--patern", "--pattern"),
+                                    (["bake", "--modle=x.obj"], "--modle", "--model"),
+                                    (["pattern", "scroe", "x.png"], "scroe", "score"),
+                                    (["check", "x.modar", "--devise", "ace2"], "--devise", "--device")):
+            self.assert_fails(self.modar(*words), 1, wrong, f"did you mean {meant}?")
+        done = self.modar("zzzzzzzz")
+        self.assert_fails(done, 1, "zzzzzzzz", "--help")
+        self.assertNotIn("did you mean", done.stderr)
+
+    def test_help_says_ranges_and_exclusions_in_words(self):
+        for words in (["bake"], ["check"], ["pattern", "rectify"], ["ship", "publish"], ["bench"]):
+            text = self.modar(*words, "--help").stdout
+            for code in ("{false}", "Excludes:", "Needs:", " in [", "UINT", ":POSITIVE"):
+                self.assertNotIn(code, text)
+        text = " ".join(self.modar("bake", "--help").stdout.split())
+        self.assertIn("(1 to 12, default 4)", text)
+        self.assertIn("(not with --lods)", text)
+
+    def test_progress_without_a_terminal_is_a_line_a_stage(self):
+        done = self.modar("bake", "--model", POTTERY, "--no-lods", "-o", "a.modar")
+        lines = done.stderr.splitlines()
+        self.assertEqual([line for line in lines if line in ("read", "weld", "pack", "write")],
+                         ["read", "weld", "pack", "write"])
+        self.assertEqual(len(lines), len(set(lines)))
+        self.assertEqual(self.modar("bake", "--model", POTTERY, "--no-lods", "-o", "a.modar", "--quiet").stderr, "")
+
+    def test_a_newer_bundle_is_unsupported_not_bad(self):
+        bundle = self.bake_demo()
+        data = bytearray(bundle.read_bytes())
+        major, = struct.unpack_from("<H", data, 8)
+        struct.pack_into("<H", data, 8, major + 1)
+        bundle.write_bytes(data)
+        for words in (["check", bundle], ["inspect", bundle], ["check", bundle, "--json"]):
+            self.assertEqual(self.modar(*words).returncode, 5, words)
+        self.assertEqual(self.run_program("modar-play", bundle, "--input", COVER).returncode, 5)
+
+
+if __name__ == "__main__":
+    unittest.main()
