@@ -6,9 +6,9 @@
 #include <cstdio>
 #include <optional>
 #include <type_traits>
-#include <utility>
 
 #include "bake/terminal.hpp"
+#include "formats/nearest.hpp"
 
 namespace modar {
 
@@ -79,21 +79,6 @@ class HelpFormatter : public CLI::Formatter {
   }
 };
 
-/// Edits of letters (Levenshtein 1966) that lead from one word to the other.
-std::size_t edits_between(const std::string& from, const std::string& to) {
-  std::vector<std::size_t> row(to.size() + 1);
-  for (std::size_t i = 0; i < row.size(); ++i) row[i] = i;
-  for (std::size_t i = 1; i <= from.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= to.size(); ++j) {
-      const std::size_t changed = diagonal + (from[i - 1] == to[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row.back();
-}
-
 /// The first word of the command line that nothing takes, and the name that it is nearest to.
 std::optional<Error> unknown_word(const CLI::App* app) {
   while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
@@ -112,15 +97,9 @@ std::optional<Error> unknown_word(const CLI::App* app) {
     }
     if (names.empty()) return std::nullopt;
   }
-  std::string cure = "see " + app->get_display_name() + " --help";
-  std::size_t fewest = word.size() / 2 + 1;
-  for (const std::string& name : names) {
-    const std::size_t edits = edits_between(word, name);
-    if (edits < fewest) {
-      fewest = edits;
-      cure = "did you mean " + name + "?";
-    }
-  }
+  const std::string_view meant = nearest_name(word, names);
+  const std::string cure = meant.empty() ? "see `" + app->get_display_name() + " --help`"
+                                         : "did you mean " + std::string(meant) + "?";
   return Error{ExitCode::kUsage, "cli.unknown", word,
                is_option ? "there is no such option" : "there is no such command", cure};
 }

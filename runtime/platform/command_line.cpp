@@ -5,6 +5,8 @@
 
 #include <charconv>
 
+#include "formats/nearest.hpp"
+
 namespace modar {
 namespace {
 
@@ -26,7 +28,12 @@ tl::unexpected<Error> refused(const CommandSyntax& syntax, int answer,
                                      : argv[static_cast<std::size_t>(optind - 1)];
   if (answer == ':') return usage(syntax, ".value", current, "the option needs a value");
   if (optopt >= kFirst) return usage(syntax, ".value", current, "the option takes no value");
-  return usage(syntax, ".option", "", "'" + current + "' is not an option");
+  std::vector<std::string> names;
+  for (const CommandOption& each : syntax.options) names.push_back(std::string("--") + each.name);
+  const std::string_view meant = nearest_name(current.substr(0, current.find('=')), names);
+  return usage(syntax, ".option", "",
+               "'" + current + "' is not an option" +
+                   (meant.empty() ? "" : "; did you mean " + std::string(meant) + "?"));
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // A window through SDL2 with an OpenGL ES 2.0 context; letters by OpenCV, which throws: caught
 // here.
 #include <algorithm>
+#include <cstdlib>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -101,6 +103,12 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title) {
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   SDL_SetHint(SDL_HINT_OPENGL_ES_DRIVER, "1");
   if (SDL_InitSubSystem(SDL_INIT_VIDEO) != 0) return no_window();
+  // Without a display SDL may draw where nobody sees it; who wants that says so in SDL_VIDEODRIVER.
+  const std::string_view driver = SDL_GetCurrentVideoDriver();
+  if (std::getenv("SDL_VIDEODRIVER") == nullptr && (driver == "offscreen" || driver == "dummy")) {
+    SDL_SetError("there is no display");
+    return no_window();
+  }
   auto state = std::make_unique<State>();
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_ES);
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 2);

@@ -161,6 +161,7 @@ Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, doubl
   const bool movie = out.ends_with(".mp4");
   MODAR_TRY(make_folder(movie ? parent_of(out) : out));
   if (movie) return std::make_unique<Movie>(out, fps);
+  remove_frames(out);
   return std::make_unique<PngFolder>(out);
 }
 

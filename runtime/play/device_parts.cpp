@@ -62,6 +62,7 @@ Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input)
 Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, double /*fps*/) {
   if (out.ends_with(".mp4")) return left_out("out.unsupported", out, "movies");
   MODAR_TRY(make_folder(out));
+  remove_frames(out);
   return std::make_unique<PpmFolder>(out);
 }
 

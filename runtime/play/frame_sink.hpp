@@ -10,6 +10,7 @@
 #include "formats/error.hpp"
 #include "frame_report.hpp"
 #include "modar/image.hpp"
+#include "options.hpp"
 
 namespace modar {
 
@@ -52,6 +53,14 @@ struct ReportTitle {
 Result<std::unique_ptr<FrameSink>> open_report(const std::string& folder, double fps,
                                                const ReportTitle& title,
                                                std::span<const std::string> pattern_names);
+
+/// Refuses, before any work, an output that is an input (by its path, a symbolic or a hard link),
+/// and without --force folders of --out and --report that hold files which are not theirs.
+/// Errors: kUsage "out.input", "out.foreign".
+Result<void> check_outputs(const PlayOptions& options);
+
+/// Removes an earlier run's frame_NNNNNN.png or .ppm, which would stand among the new ones.
+void remove_frames(const std::string& folder);
 
 /// Makes a folder and its parents. Errors: kIo "out.create".
 Result<void> make_folder(const std::string& path);

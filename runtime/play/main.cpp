@@ -5,6 +5,7 @@
 
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
+#include "frame_sink.hpp"
 #include "modar/camera_file.hpp"
 #include "modar/mapped_file.hpp"
 #include "options.hpp"
@@ -107,6 +108,7 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
 }
 
 Result<int> run(const PlayOptions& options) {
+  MODAR_TRY(check_outputs(options));
   MODAR_ASSIGN(MappedFile file, MappedFile::open(options.bundle));
   Result<BundleView> bundle = BundleView::open(file.bytes());
   if (bundle && options.verify) {

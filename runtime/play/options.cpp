@@ -73,7 +73,8 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 10> kSwitches = {{{"json", &PlayOptions::json},
+constexpr std::array<SwitchOption, 11> kSwitches = {{{"json", &PlayOptions::json},
+                                                     {"force", &PlayOptions::force},
                                                      {"window", &PlayOptions::window},
                                                      {"realtime", &PlayOptions::realtime},
                                                      {"find-focal", &PlayOptions::find_focal},
@@ -180,6 +181,7 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
                       - for a pipe; i420, nv12, yuyv, gray alike)
   --out OUT           pictures into FILE.mp4, or as frame_000000.png ... into a folder
   --report FOLDER     overlay.mp4, contact_sheet.png, frames.jsonl and an index.html of them
+  --force             writes into a folder of --out or --report that holds other files
   --window            shows the pictures in a window; its keys: Q or Escape ends, space pauses,
                       M or arrows change the model, P the pattern, + and - its size, O the outline,
                       D the display

@@ -32,6 +32,7 @@ struct PlayOptions {
   int width = 640;               ///< of turntable pictures
   int height = 480;
   bool json = false;
+  bool force = false;  ///< into folders that hold other files
   bool window = false;
   bool find_focal = false;
   bool realtime = false;

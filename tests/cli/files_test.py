@@ -49,6 +49,61 @@ class Inputs(ProgramTest):
         self.assert_kept(path, self.modar("pattern", "simulate", path, "--picture", self.folder, "--quiet"))
 
 
+class Player(ProgramTest):
+    def play(self, *arguments, **options):
+        return self.run_program("modar-play", self.bundle, *arguments, "--quiet", **options)
+
+    def setUp(self):
+        super().setUp()
+        self.bundle = self.bake_demo()
+
+    def test_no_input_is_overwritten(self):
+        movie = self.folder / "v.mp4"
+        self.assertEqual(self.play("--input", COVER, "--out", movie).returncode, 0)
+        before = movie.read_bytes()
+        soft, hard = self.folder / "soft.mp4", self.folder / "hard.mp4"
+        soft.symlink_to(movie)
+        os.link(movie, hard)
+        for output in (movie, soft, hard):
+            self.assert_fails(self.play("--input", movie, "--out", output), 1, "overwrite")
+        self.assert_fails(self.play("--input", COVER, "--qos", self.bundle), 1, "overwrite")
+        report = self.folder / "report"
+        report.mkdir()
+        shutil.copy(movie, report / "overlay.mp4")
+        self.assert_fails(self.play("--input", report / "overlay.mp4", "--report", report), 1, "overwrite")
+        self.assertEqual(movie.read_bytes(), before)
+
+    def test_a_folder_with_other_files_is_refused(self):
+        photos = self.folder / "photos"
+        photos.mkdir()
+        (photos / "holiday.txt").write_text("mine")
+        for option in ("--out", "--report"):
+            self.assert_fails(self.play("--input", COVER, option, photos), 1, "holiday.txt", "--force")
+            self.assertEqual([p.name for p in photos.iterdir()], ["holiday.txt"])
+        self.assertEqual(self.play("--input", COVER, "--out", photos, "--force").returncode, 0)
+        self.assertEqual(sorted(p.name for p in photos.iterdir()), ["frame_000000.png", "holiday.txt"])
+
+    def test_frames_of_an_earlier_run_go(self):
+        out = self.folder / "out"
+        two = self.folder / "two"
+        two.mkdir()
+        for name in ("a.png", "b.png"):
+            shutil.copy(COVER, two / name)
+        self.assertEqual(self.play("--input", two, "--out", out).returncode, 0)
+        self.assertEqual(len(list(out.iterdir())), 2)
+        self.assertEqual(self.play("--input", COVER, "--out", out).returncode, 0)
+        self.assertEqual([p.name for p in out.iterdir()], ["frame_000000.png"])
+
+    def test_a_window_needs_a_display(self):
+        none = {name: "" for name in ("DISPLAY", "WAYLAND_DISPLAY")}
+        done = self.play("--input", COVER, "--window", env=none)
+        self.assert_fails(done, 5, "--window")
+
+    def test_the_nearest_option_is_suggested(self):
+        self.assert_fails(self.play("--imput", COVER), 1, "--imput", "did you mean --input?")
+        self.assert_fails(self.run_program("modar-fetch", "--stroe", "x"), 1, "did you mean --store?")
+
+
 class Outputs(ProgramTest):
     def test_the_folder_is_tried_before_the_work(self):
         for output in ("no/such/folder/out.modar", "notes.txt/out.modar"):
