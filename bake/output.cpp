@@ -39,6 +39,9 @@ Result<void> keep_inputs(const std::string& output, const std::vector<std::strin
 
 Result<void> try_output(const std::string& path, std::uint64_t bytes) {
   std::error_code error;
+  if (fs::is_directory(path, error)) {
+    return fail(ExitCode::kIo, "io.folder", path, "it is a folder", "name a file in it");
+  }
   const fs::path folder = fs::absolute(path, error).parent_path();
   std::string probe = (folder / ".modar-XXXXXX").string();
   const int file = ::mkstemp(probe.data());

@@ -18,7 +18,8 @@ Result<SceneRequest> parse_scene(const std::string& text);
 /// Errors: kUsage "cli.corners".
 Result<std::array<PixelPoint, 4>> parse_corners(const std::string& text);
 
-/// "FILE" or "FILE:WIDTH", a physical width with a unit of parse_unit(): 210mm, 21cm. Errors: kUsage "cli.pattern".
+/// "FILE" or "FILE:WIDTH", a physical width with a unit of parse_unit(): 210mm, 21cm. Errors:
+/// kUsage "cli.pattern".
 Result<PatternRequest> parse_pattern(const std::string& text);
 
 /// "mm", "cm", "m", "km", "in", "ft" to metres. Errors: kUsage "cli.unit".

@@ -1,7 +1,10 @@
 // `modar bake`: models and pattern images to one bundle.
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -154,11 +157,22 @@ Json bake_json(const BundleView& bundle, const Report& report) {
 /// and textures: who has not even an eighth free need not start.
 constexpr std::uint64_t kSourceBytesPerBundleByte = 8;
 
+/// Refuses to write over what is no bundle, such as a texture or a material file of the models.
+Result<void> keep_other_files(const std::string& output) {
+  std::ifstream file(output, std::ios::binary);
+  std::array<std::uint8_t, kMagic.size()> start{};
+  file.read(reinterpret_cast<char*>(start.data()), start.size());
+  if (file.gcount() == 0 || start == kMagic) return {};
+  return fail(ExitCode::kUsage, "out.foreign", output,
+              "the output would overwrite a file that is no bundle", "name another output");
+}
+
 /// Tries what will be written, before the work.
 Result<void> try_outputs(const BakeCommand& command) {
   std::vector<std::string> inputs = command.request.models;
   for (const PatternRequest& pattern : command.request.patterns) inputs.push_back(pattern.path);
   MODAR_TRY(keep_inputs(command.output, inputs));
+  MODAR_TRY(keep_other_files(command.output));
   MODAR_TRY(
       try_output(command.output, file_bytes(command.request.models) / kSourceBytesPerBundleByte));
   const std::string& folder = command.request.textures.picture_folder;

@@ -60,10 +60,20 @@ Result<std::vector<ModelLook>> compare_looks(const BundleView& bundle, const Che
   return check_looks(bundle, options, sink);
 }
 
+/// Refuses pictures of --visual that would overwrite a source.
+Result<void> keep_sources(const BundleView& bundle, const CheckCommand& command) {
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const std::string name(bundle.name(bundle.models()[m].name));
+    MODAR_TRY(keep_inputs(command.visual + "/" + name + ".png", command.sources));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
                                    const IssueSink& sink, CheckExtras& extras) {
+  if (!command.visual.empty()) MODAR_TRY(keep_sources(bundle, command));
   MODAR_ASSIGN(extras.source, bake_and_compare(bundle, command, sink));
   if (!command.visual.empty()) {
     MODAR_ASSIGN(extras.looks, compare_looks(bundle, command, sink));

@@ -36,6 +36,16 @@ class Inputs(ProgramTest):
             for output in outputs:
                 self.assert_kept(path, self.modar("bake", option, path, "-o", output))
 
+    def test_files_that_a_model_names(self):
+        (self.folder / "m.obj").write_text("mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        materials = self.folder / "m.mtl"
+        materials.write_text("newmtl a\nmap_Kd skin.png\n")
+        shutil.copy(COVER, self.folder / "skin.png")
+        for path in (materials, self.folder / "skin.png"):
+            before = path.read_bytes()
+            self.assert_fails(self.modar("bake", "--model", "m.obj", "-o", path), 1, path.name, "no bundle")
+            self.assertEqual(path.read_bytes(), before)
+
     def test_rectify_and_calibrate(self):
         path, outputs = self.aliases(COVER)
         for output in outputs:
@@ -47,6 +57,11 @@ class Inputs(ProgramTest):
         path, _ = self.aliases(COVER)
         self.assert_kept(path, self.modar("pattern", "score", path, "--overlay", "."))
         self.assert_kept(path, self.modar("pattern", "simulate", path, "--picture", self.folder, "--quiet"))
+        bundle = self.folder / "b.modar"
+        model = self.folder / "cover.obj"
+        model.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        self.assertEqual(self.modar("bake", "--model", model, "-o", bundle).returncode, 0)
+        self.assert_kept(path, self.modar("check", bundle, "--source", model, path, "--visual", "."))
 
 
 class Player(ProgramTest):
@@ -106,7 +121,7 @@ class Player(ProgramTest):
 
 class Outputs(ProgramTest):
     def test_the_folder_is_tried_before_the_work(self):
-        for output in ("no/such/folder/out.modar", "notes.txt/out.modar"):
+        for output in ("no/such/folder/out.modar", "notes.txt/out.modar", "."):
             (self.folder / "notes.txt").write_text("no folder")
             done = self.modar("bake", "--model", "none.obj", "-o", output)
             self.assert_fails(done, 2, output)
@@ -115,13 +130,15 @@ class Outputs(ProgramTest):
 
     def test_a_full_disk_names_the_file_and_leaves_the_earlier_one(self):
         bundle = self.folder / "out.modar"
-        bundle.write_text("earlier")
+        earlier = self.bake_demo("earlier.modar").read_bytes()
+        bundle.write_bytes(earlier)
+        (self.folder / "earlier.modar").unlink()
         # A limit on the size of files, with its signal ignored: writes beyond it fail as on a full disk.
         done = subprocess.run(["sh", "-c", 'trap "" XFSZ; ulimit -f 40; exec "$@"', "sh", str(BIN / "modar"), "bake",
                                "--model", str(POTTERY), "--no-lods", "-o", str(bundle), "--quiet"],
                               capture_output=True, text=True)
         self.assert_fails(done, 2, "out.modar")
-        self.assertEqual(bundle.read_text(), "earlier")
+        self.assertEqual(bundle.read_bytes(), earlier)
         self.assertEqual([p.name for p in self.folder.iterdir()], ["out.modar"])
 
     def test_rectify_writes_png_only(self):
