@@ -335,14 +335,16 @@ Result<void> require_shown(const BakeRequest& request) {
   const bool whole = !request.models.empty() && !request.patterns.empty();
   const bool one_scene =
       request.scenes.empty() && request.models.size() == 1 && request.patterns.size() == 1;
-  if (!whole || one_scene) return {};
+  std::vector<std::string> pattern_paths;
+  for (const PatternRequest& pattern : request.patterns) pattern_paths.push_back(pattern.path);
+  if (!whole || one_scene || !find_scenes(request, pattern_paths)) return {};
   const auto shown = [&](const std::string& name, std::string SceneRequest::*side) {
     return std::any_of(request.scenes.begin(), request.scenes.end(),
                        [&](const SceneRequest& scene) { return scene.*side == name; });
   };
   std::vector<std::string> idle;  // patterns without a model
-  for (const PatternRequest& pattern : request.patterns) {
-    const std::string name = file_stem(pattern.path);
+  for (const std::string& path : pattern_paths) {
+    const std::string name = file_stem(path);
     if (!shown(name, &SceneRequest::pattern)) idle.push_back(name);
   }
   std::string lines;

@@ -67,8 +67,9 @@ struct BakeRequest {
 /// "device.unknown" that lists the names.
 Result<void> plan_for_device(const std::string& device, BakeRequest& request);
 
-/// Refuses models that stand on no pattern, and patterns that carry no model, where there are both.
-/// Errors: kUsage "bake.never-shown", whose cure is what to add to the command line.
+/// Refuses models that stand on no pattern, and patterns that carry no model, where there are both;
+/// scenes of unknown names are left to build_bundle(). Errors: kUsage "bake.never-shown", whose
+/// cure is what to add to the command line.
 Result<void> require_shown(const BakeRequest& request);
 
 /// Runs all stages. One model and one pattern without a scene make one by themselves.

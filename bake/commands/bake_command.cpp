@@ -157,8 +157,10 @@ Json bake_json(const BundleView& bundle, const Report& report) {
 /// and textures: who has not even an eighth free need not start.
 constexpr std::uint64_t kSourceBytesPerBundleByte = 8;
 
-/// Refuses to write over what is no bundle, such as a texture or a material file of the models.
+/// Refuses to write over what is no bundle by its name and its bytes: textures and material files,
+/// which the models name, are known only later.
 Result<void> keep_other_files(const std::string& output) {
+  if (output.ends_with(".modar")) return {};
   std::ifstream file(output, std::ios::binary);
   std::array<std::uint8_t, kMagic.size()> start{};
   file.read(reinterpret_cast<char*>(start.data()), start.size());
