@@ -11,6 +11,11 @@ namespace {
 // Share of the inlier ratio of the frames before under which a fit may be a neighbouring place:
 // other starts are tried. Higher costs time under every passing hand; by hand.
 constexpr double kSuspicious = 0.75;
+// Pixels by which the last prediction missed: up to them, refinement starts on the finest level or one
+// above, whose patches reach that far, and starts anew two above where that does not fit. Smaller
+// values cost time, larger ones a lost start more often.
+constexpr double kNearSurprise = 1.0;
+constexpr double kCloseSurprise = 2.5;
 // Way of the pattern's centre between frames, pixels: less blurs too little to matter, and what
 // moves further is rarely found by the first alignment.
 constexpr double kMinBlurringWay = 4.0;
@@ -39,6 +44,34 @@ bool FrameTracker::locate(const TrackedPattern& pattern, const Track& track,
   return map_corners(pattern, map, detection.corners) && plausible(detection.corners);
 }
 
+/// Pixels between the pattern's centre at two poses.
+double FrameTracker::distance(const TrackedPattern& pattern, const Pose& a, const Pose& b) const {
+  const auto centre = [&](const Pose& at) {
+    bool in_front = false;
+    return map_of_pose(pattern, camera_, at)
+        .at({0.5 * pattern.width(), 0.5 * pattern.height()}, in_front);
+  };
+  return glm::length(centre(a) - centre(b));
+}
+
+/// Refines the predicted pose, from no further away than the last prediction missed.
+bool FrameTracker::refine_predicted(const TrackedPattern& pattern, const Track& track, Pose& pose,
+                                    PatchFit& fit) const {
+  const Pose predicted = pose;
+  if (track.has_motion && track.surprise < kCloseSurprise) {
+    const SearchRadius radius =
+        track.surprise < kNearSurprise ? SearchRadius::kNear : SearchRadius::kClose;
+    if (refine(pattern, frame(), radius, pose, fit) &&
+        fit.inlier_ratio() >= kSuspicious * track.inlier_ratio &&
+        fit.correlation >= kBlurred * track.correlation) {
+      return true;
+    }
+    pose = predicted;
+    fit = {};
+  }
+  return refine(pattern, frame(), SearchRadius::kFrame, pose, fit);
+}
+
 /// From further away: the predicted pose, then the last one, whichever shows more of the pattern.
 bool FrameTracker::reacquire(const TrackedPattern& pattern, const Track& track,
                              const Pose& predicted, Pose& pose, PatchFit& fit) const {
@@ -63,12 +96,7 @@ bool FrameTracker::reacquire(const TrackedPattern& pattern, const Track& track,
 /// templates blurred alike. Returns whether these fit better.
 bool FrameTracker::refine_blurred(const TrackedPattern& pattern, const Track& track,
                                   const Pose& predicted, Pose& pose, PatchFit& fit) {
-  const auto centre = [&](const Pose& at) {
-    bool in_front = false;
-    return map_of_pose(pattern, camera_, at)
-        .at({0.5 * pattern.width(), 0.5 * pattern.height()}, in_front);
-  };
-  const double way = glm::length(centre(pose) - centre(track.pose));
+  const double way = distance(pattern, pose, track.pose);
   if (!track.has_motion || !(fit.inliers > 0) || way < kMinBlurringWay || way > kMaxBlurringWay) {
     return false;
   }
@@ -105,7 +133,7 @@ bool FrameTracker::refine_blurred(const TrackedPattern& pattern, const Track& tr
 bool FrameTracker::update_pose(const TrackedPattern& pattern, Track& track, PatchFit& fit) {
   const Pose predicted = track.has_motion ? extrapolate(track.previous, track.pose) : track.pose;
   Pose pose = predicted;
-  bool found = refine(pattern, frame(), SearchRadius::kFrame, pose, fit);
+  bool found = refine_predicted(pattern, track, pose, fit);
   const bool blurred = refine_blurred(pattern, track, predicted, pose, fit);
   found = found || blurred;
   if (!blurred && fit.correlation > track.correlation) track.correlation = fit.correlation;
@@ -118,6 +146,7 @@ bool FrameTracker::update_pose(const TrackedPattern& pattern, Track& track, Patc
   }
   if (!found) return false;
   track.inlier_ratio = 0.8 * track.inlier_ratio + 0.2 * fit.inlier_ratio();
+  track.surprise = distance(pattern, predicted, pose);
   track.previous = track.pose;
   track.pose = pose;
   track.has_motion = true;

@@ -23,6 +23,7 @@ struct Track {
   PlaneMap map;             ///< if homography_only
   double inlier_ratio = 1;  ///< of the patches in view; running mean of the frames before
   double correlation = 0;   ///< of the patches, in the sharp frames before
+  double surprise = 1e9;    ///< pixels by which the last prediction missed the pattern's centre
   int frames_since_lost = kRecentFrames;
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
 };
@@ -44,6 +45,9 @@ class FrameTracker {
 
  private:
   bool update_pose(const TrackedPattern& pattern, Track& track, PatchFit& fit);
+  [[nodiscard]] double distance(const TrackedPattern& pattern, const Pose& a, const Pose& b) const;
+  bool refine_predicted(const TrackedPattern& pattern, const Track& track, Pose& pose,
+                        PatchFit& fit) const;
   bool reacquire(const TrackedPattern& pattern, const Track& track, const Pose& predicted,
                  Pose& pose, PatchFit& fit) const;
   bool refine_blurred(const TrackedPattern& pattern, const Track& track, const Pose& predicted,

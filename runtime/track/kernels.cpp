@@ -89,59 +89,78 @@ void blur_row(const std::uint16_t* in, std::uint8_t* out, int count) {
   }
 }
 
-/// The greatest of the least values of all 16 arcs of nine neighbours.
+/// The greatest of the least values of all 16 arcs of nine neighbours: an arc and the next share
+/// eight of them.
 inline V8 best_arc(const V8* difference) {
-  V8 two[16];
-  V8 four[16];
-  for (int k = 0; k < 16; ++k) two[k] = hn::Min(difference[k], difference[(k + 1) & 15]);
-  for (int k = 0; k < 16; ++k) four[k] = hn::Min(two[k], two[(k + 2) & 15]);
-  V8 best = hn::Min(hn::Min(four[0], four[4]), difference[8]);
-  for (int k = 1; k < 16; ++k) {
-    const V8 eight = hn::Min(four[k], four[(k + 4) & 15]);
-    best = hn::Max(best, hn::Min(eight, difference[(k + 8) & 15]));
+  V8 four[8];
+  for (int k = 0; k < 8; ++k) four[k] = hn::Min(difference[2 * k], difference[2 * k + 1]);
+  const V8 first = four[0];
+  for (int k = 0; k < 7; ++k) four[k] = hn::Min(four[k], four[k + 1]);
+  four[7] = hn::Min(four[7], first);
+  V8 best = hn::Zero(D8());
+  for (int k = 0; k < 8; ++k) {
+    const V8 eight = hn::Min(four[k], four[(k + 2) & 7]);
+    const V8 ends = hn::Max(difference[(2 * k + 15) & 15], difference[(2 * k + 8) & 15]);
+    best = hn::Max(best, hn::Min(eight, ends));
   }
   return best;
+}
+
+/// Bresenham circle of radius 3, clockwise from above.
+struct Ring {
+  std::ptrdiff_t at[16];
+  explicit Ring(std::ptrdiff_t stride)
+      : at{-3 * stride, -3 * stride + 1, -2 * stride + 2, -stride + 3,
+           3,           stride + 3,      2 * stride + 2,  3 * stride + 1,
+           3 * stride,  3 * stride - 1,  2 * stride - 2,  stride - 3,
+           -3,          -stride - 3,     -2 * stride - 2, -3 * stride - 1} {}
+};
+
+/// Scores of the arcs brighter (or darker) than their centres.
+template <bool kBrighter>
+inline V8 arc_scores(const std::uint8_t* at, const Ring& ring, V8 centre) {
+  const D8 d;
+  V8 difference[16];
+  for (int k = 0; k < 16; ++k) {
+    const V8 p = hn::LoadU(d, at + ring.at[k]);
+    difference[k] = kBrighter ? hn::SaturatedSub(p, centre) : hn::SaturatedSub(centre, p);
+  }
+  return best_arc(difference);
 }
 
 void corner_scores(const std::uint8_t* pixels, std::ptrdiff_t stride, int threshold, int count,
                    std::uint8_t* bright, std::uint8_t* score) {
   const D8 d;
-  // Bresenham circle of radius 3, clockwise from above.
-  const std::ptrdiff_t ring[16] = {-3 * stride, -3 * stride + 1, -2 * stride + 2, -stride + 3,
-                                   3,           stride + 3,      2 * stride + 2,  3 * stride + 1,
-                                   3 * stride,  3 * stride - 1,  2 * stride - 2,  stride - 3,
-                                   -3,          -stride - 3,     -2 * stride - 2, -3 * stride - 1};
+  const Ring ring(stride);
   const V8 zero = hn::Zero(d);
   const V8 least = hn::Set(d, static_cast<std::uint8_t>(threshold - 1));
   for (int i = 0; i < count; i += lanes8()) {
     const std::uint8_t* at = pixels + i;
     const V8 centre = hn::LoadU(d, at);
-    V8 up[16];
-    V8 down[16];
-    for (int k = 0; k < 16; k += 4) {
-      const V8 p = hn::LoadU(d, at + ring[k]);
-      up[k] = hn::SaturatedSub(p, centre);
-      down[k] = hn::SaturatedSub(centre, p);
+    // Nine in sequence contain one of each pair of opposite points: `up` and `down` bound what
+    // their arcs can reach.
+    V8 up = hn::Set(d, 255);
+    V8 down = zero;
+    const auto bound_by = [&](int k) {
+      const V8 p = hn::LoadU(d, at + ring.at[k]);
+      const V8 q = hn::LoadU(d, at + ring.at[k + 8]);
+      up = hn::Min(up, hn::Max(p, q));
+      down = hn::Max(down, hn::Min(p, q));
+    };
+    const auto any = [&](V8 difference) { return !hn::AllFalse(d, hn::Gt(difference, least)); };
+    bound_by(0);
+    bound_by(4);
+    V8 best_up = zero;
+    V8 best_down = zero;
+    if (any(hn::Max(hn::SaturatedSub(up, centre), hn::SaturatedSub(centre, down)))) {
+      bound_by(2);
+      bound_by(6);
+      if (any(hn::SaturatedSub(up, centre))) best_up = arc_scores<true>(at, ring, centre);
+      if (any(hn::SaturatedSub(centre, down))) best_down = arc_scores<false>(at, ring, centre);
     }
-    // Nine in sequence contain one of each pair of opposite compass points.
-    const V8 maybe_up = hn::Min(hn::Max(up[0], up[8]), hn::Max(up[4], up[12]));
-    const V8 maybe_down = hn::Min(hn::Max(down[0], down[8]), hn::Max(down[4], down[12]));
-    if (hn::AllFalse(d, hn::Gt(hn::Max(maybe_up, maybe_down), least))) {
-      hn::StoreU(zero, d, bright + i);
-      hn::StoreU(zero, d, score + i);
-      continue;
-    }
-    for (int k = 0; k < 16; ++k) {
-      if ((k & 3) == 0) continue;
-      const V8 p = hn::LoadU(d, at + ring[k]);
-      up[k] = hn::SaturatedSub(p, centre);
-      down[k] = hn::SaturatedSub(centre, p);
-    }
-    const V8 best_up = best_arc(up);
-    const V8 best = hn::Max(best_up, best_arc(down));
-    const auto corner = hn::Gt(best, least);
-    hn::StoreU(hn::IfThenElseZero(corner, best_up), d, bright + i);
-    hn::StoreU(hn::IfThenElseZero(corner, best), d, score + i);
+    const auto over = [&](V8 best) { return hn::IfThenElseZero(hn::Gt(best, least), best); };
+    hn::StoreU(over(best_up), d, bright + i);
+    hn::StoreU(over(hn::Max(best_up, best_down)), d, score + i);
   }
 }
 
@@ -159,36 +178,58 @@ void peaks(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_
   }
 }
 
-/// Adds the differing bits of bytes `first` to `last` of a block's codes.
-inline V8 count_bits(const std::uint8_t* code, const std::uint8_t* block, int first, int last,
-                     V8 sum) {
+/// Vectors that a block's byte k of all codes fills.
+constexpr int kBlockVectors = static_cast<int>(hn::MaxLanes(D8())) < kBlockCodes
+                                  ? kBlockCodes / static_cast<int>(hn::MaxLanes(D8()))
+                                  : 1;
+
+/// Adds the differing bits of 16 bytes of a block's codes. No sum exceeds a lane: 256 differing
+/// bits count as 255.
+template <bool kSecond>
+inline void count_bits(const std::uint8_t* code, const std::uint8_t* block, V8* sums) {
   const D8 d;
-  for (int k = first; k < last; ++k) {
-    const V8 differ = hn::Xor(hn::Set(d, code[k]), hn::LoadU(d, block + k * kBlockCodes));
-    sum = hn::SaturatedAdd(sum, hn::PopulationCount(differ));
+  const int step = lanes8();
+  const auto add_byte = [&](int k) HWY_ATTR {
+    const V8 byte = hn::Set(d, code[k]);
+#pragma GCC unroll 2
+    for (int v = 0; v < kBlockVectors; ++v) {
+      const V8 differ = hn::Xor(byte, hn::LoadU(d, block + k * kBlockCodes + v * step));
+      const V8 bits = hn::PopulationCount(differ);
+      sums[v] = kSecond ? hn::SaturatedAdd(sums[v], bits) : hn::Add(sums[v], bits);
+    }
+  };
+  for (int k = 0; k < kCodeBytes / 2; k += 4) {
+    add_byte(k);
+    add_byte(k + 1);
+    add_byte(k + 2);
+    add_byte(k + 3);
   }
-  return sum;
 }
 
 int distances(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t block_count,
-              int reach, std::uint8_t* out) {
+              int limit, std::uint8_t* out) {
   const D8 d;
-  const int step = lanes8() < kBlockCodes ? lanes8() : kBlockCodes;
-  const V8 limit = hn::Set(d, static_cast<std::uint8_t>(reach));
+  const int step = lanes8();
+  const V8 most = hn::Set(d, static_cast<std::uint8_t>(limit));
   V8 least = hn::Set(d, 255);
   for (std::size_t b = 0; b < block_count; ++b) {
     const std::uint8_t* block = blocks + b * kBlockCodes * kCodeBytes;
     std::uint8_t* answer = out + b * kBlockCodes;
-    V8 half[kBlockCodes];
-    bool near = false;
-    for (int i = 0, v = 0; i < kBlockCodes; i += step, ++v) {
-      half[v] = count_bits(code, block + i, 0, kCodeBytes / 2, hn::Zero(d));
-      near = near || !hn::AllFalse(d, hn::Eq(hn::Min(half[v], limit), half[v]));
+    V8 sums[kBlockVectors];
+#pragma GCC unroll 2
+    for (int v = 0; v < kBlockVectors; ++v) sums[v] = hn::Zero(d);
+    count_bits<false>(code, block, sums);
+    V8 nearest = sums[0];
+#pragma GCC unroll 2
+    for (int v = 1; v < kBlockVectors; ++v) nearest = hn::Min(nearest, sums[v]);
+    const bool near = !hn::AllFalse(d, hn::Eq(hn::Min(nearest, most), nearest));
+    if (near) {
+      count_bits<true>(code + kCodeBytes / 2, block + kCodeBytes / 2 * kBlockCodes, sums);
     }
-    for (int i = 0, v = 0; i < kBlockCodes; i += step, ++v) {
-      const V8 distance =
-          near ? count_bits(code, block + i, kCodeBytes / 2, kCodeBytes, half[v]) : hn::Set(d, 255);
-      hn::StoreU(distance, d, answer + i);
+#pragma GCC unroll 2
+    for (int v = 0; v < kBlockVectors; ++v) {
+      const V8 distance = near ? sums[v] : hn::Set(d, 255);
+      hn::StoreU(distance, d, answer + v * step);
       least = hn::Min(least, distance);
     }
   }
@@ -204,40 +245,40 @@ void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrd
                   float* out) {
   const hn::CappedTag<float, 4> d;
   const hn::RebindToSigned<decltype(d)> whole;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  for (int k = 0; k < kPatchPixels; k += lanes) {
+  const hn::Rebind<std::uint16_t, decltype(d)> halves;
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(d));
+  const auto x0 = hn::Set(d, place.x);
+  const auto y0 = hn::Set(d, place.y);
+  const auto right_x = hn::Set(d, place.right_x);
+  const auto right_y = hn::Set(d, place.right_y);
+  const auto down_x = hn::Set(d, place.down_x);
+  const auto down_y = hn::Set(d, place.down_y);
+  const auto row_bytes = hn::Set(whole, static_cast<std::int32_t>(stride));
+  const auto low = hn::Set(whole, 255);
+  for (int k = 0; k < kPatchPixels; k += kLanes) {
     const auto fu = hn::Load(d, kPatchOffsets.right + k);
     const auto fv = hn::Load(d, kPatchOffsets.down + k);
-    const auto at = [&](float centre, float right, float down) {
-      return hn::Add(hn::Add(hn::Set(d, centre), hn::Mul(fv, hn::Set(d, down))),
-                     hn::Mul(fu, hn::Set(d, right)));
-    };
-    const auto x = at(place.x, place.right_x, place.down_x);
-    const auto y = at(place.y, place.right_y, place.down_y);
+    const auto x = hn::Add(hn::Add(x0, hn::Mul(fv, down_x)), hn::Mul(fu, right_x));
+    const auto y = hn::Add(hn::Add(y0, hn::Mul(fv, down_y)), hn::Mul(fu, right_y));
     const auto column = hn::ConvertTo(whole, x);
     const auto row = hn::ConvertTo(whole, y);
-    alignas(16) std::int32_t columns[4];
-    alignas(16) std::int32_t rows[4];
-    hn::Store(column, whole, columns);
-    hn::Store(row, whole, rows);
-    // A lane holds the four neighbouring pixels, a byte each.
-    alignas(16) std::int32_t four[4];
-    for (int i = 0; i < lanes; ++i) {
-      const std::uint8_t* p = pixels + rows[i] * stride + columns[i];
-      std::uint16_t upper;
-      std::uint16_t lower;
-      std::memcpy(&upper, p, sizeof upper);
-      std::memcpy(&lower, p + stride, sizeof lower);
-      four[i] = static_cast<std::int32_t>(upper | static_cast<std::uint32_t>(lower) << 16);
+    alignas(16) std::int32_t offsets[kLanes];
+    hn::Store(hn::Add(hn::Mul(row, row_bytes), column), whole, offsets);
+    // A lane holds two neighbouring pixels, a byte each.
+    alignas(16) std::uint16_t above[kLanes];
+    alignas(16) std::uint16_t below[kLanes];
+#pragma GCC unroll 4
+    for (int i = 0; i < kLanes; ++i) {
+      const std::uint8_t* p = pixels + offsets[i];
+      std::memcpy(&above[i], p, sizeof above[i]);
+      std::memcpy(&below[i], p + stride, sizeof below[i]);
     }
-    const hn::RebindToUnsigned<decltype(d)> bits;
-    const auto bytes = hn::BitCast(bits, hn::Load(whole, four));
-    const auto low = hn::Set(bits, 255u);
-    const auto gray = [&](auto value) { return hn::ConvertTo(d, hn::BitCast(whole, value)); };
-    const auto a = gray(hn::And(bytes, low));
-    const auto b = gray(hn::And(hn::ShiftRight<8>(bytes), low));
-    const auto c = gray(hn::And(hn::ShiftRight<16>(bytes), low));
-    const auto e = gray(hn::ShiftRight<24>(bytes));
+    const auto two_above = hn::PromoteTo(whole, hn::Load(halves, above));
+    const auto two_below = hn::PromoteTo(whole, hn::Load(halves, below));
+    const auto a = hn::ConvertTo(d, hn::And(two_above, low));
+    const auto b = hn::ConvertTo(d, hn::ShiftRight<8>(two_above));
+    const auto c = hn::ConvertTo(d, hn::And(two_below, low));
+    const auto e = hn::ConvertTo(d, hn::ShiftRight<8>(two_below));
     const auto fx = hn::Sub(x, hn::ConvertTo(d, column));
     const auto fy = hn::Sub(y, hn::ConvertTo(d, row));
     const auto upper = hn::Add(a, hn::Mul(fx, hn::Sub(b, a)));

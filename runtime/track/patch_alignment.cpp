@@ -97,12 +97,18 @@ float sample_clamped(const GrayImage& image, float x, float y) {
 
 PatchCache::PatchCache() {
   scratch_.reserve(kMaxPatches);
+  linearisations_.reserve(kMaxPatches);
   for (Slot& slot : slots_) slot.patches.reserve(kMaxPatches);
 }
 
 std::vector<Patch>& PatchCache::scratch() {
   scratch_.clear();
   return scratch_;
+}
+
+std::vector<PatchLinearisation>& PatchCache::linearisations() {
+  linearisations_.clear();
+  return linearisations_;
 }
 
 void PatchCache::motion_blur(const TrackedPattern& pattern, int level, const Patch& patch,
@@ -303,19 +309,6 @@ constexpr float kTukey = 0.7f;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-/// Tukey's weight by the displacement that a patch still asks for once the others have converged: a
-/// patch on the edge of an occluder correlates well, but points elsewhere. It loses its weight at
-/// 1.2 template pixels, beyond what noise does; set by hand.
-void reweight(PatchNormalEquations& equations) {
-  constexpr float kFar = 1.2f;
-  const glm::vec2 d = displacement(equations);
-  const float far = std::min(1.0f, glm::dot(d, d) / (kFar * kFar));
-  const float weight = (1.0f - far) * (1.0f - far);
-  for (float* part : {&equations.xx, &equations.xy, &equations.yy, &equations.ex, &equations.ey}) {
-    *part *= weight;
-  }
-}
-
 /// Inverse of a patch's Jacobian: pixels of the level to template pixels.
 Eigen::Matrix2d to_template(const glm::dmat2& d) {
   const double inverse = 1.0 / (d[0].x * d[1].y - d[0].y * d[1].x);
@@ -324,32 +317,34 @@ Eigen::Matrix2d to_template(const glm::dmat2& d) {
   return m;
 }
 
-/// Normal equations of N parameters over the patches of a view, and how well these fit.
-template <int N>
-struct NormalEquations {
-  Eigen::Matrix<double, N, N> jtj = Eigen::Matrix<double, N, N>::Zero();
-  Eigen::Matrix<double, N, 1> jtr = Eigen::Matrix<double, N, 1>::Zero();
+using Vector8 = Eigen::Matrix<double, 8, 1>;
+
+/// Normal equations of a homography's eight parameters over the patches of a view, and how well these
+/// fit.
+struct MapEquations {
+  Eigen::Matrix<double, 8, 8> jtj = Eigen::Matrix<double, 8, 8>::Zero();
+  Vector8 jtr = Vector8::Zero();
   PatchFit fit;
 };
 
-/// jacobian(centre, pixel): derivative of a pattern pixel's place in the level by the parameters.
-template <int N, class Jacobian>
-NormalEquations<N> accumulate(const PatchView& view, const PlaneMap& map, float tukey,
-                              Jacobian&& jacobian) {
-  NormalEquations<N> out;
+MapEquations map_equations(const PatchView& view, const Camera& camera, const PlaneMap& map,
+                           float tukey) {
+  MapEquations out;
   out.fit.level = view.at.frame_level;
+  const double scale = camera.fx / static_cast<double>(1 << view.at.frame_level);
   for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
-    const Patch& patch = view.patches[i];
     PatchObservation seen;
-    if (!observe_patch(view, map, patch, tukey, seen)) continue;
+    if (!observe_patch(view, map, view.patches[i], tukey, seen)) continue;
     ++out.fit.visible;
-    PatchNormalEquations& one = seen.equations;
+    const PatchNormalEquations& one = seen.equations;
     if (one.correlation >= kInlierCorrelation) ++out.fit.inliers;
     out.fit.correlation += static_cast<double>(std::max(0.0f, one.correlation));
-    if (view.converged) reweight(one);
     if (one.xx == 0.0f && one.yy == 0.0f) continue;
-    const Eigen::Matrix<double, 2, N> j =
-        to_template(seen.jacobian) * jacobian(patch.centre, seen.pixel);
+    const double u = (seen.pixel.x - camera.cx) / camera.fx;
+    const double v = (seen.pixel.y - camera.cy) / camera.fx;
+    Eigen::Matrix<double, 2, 8> by_parameters;
+    by_parameters << 1, u, v, 0, 0, 0, u * u, u * v, 0, 0, 0, 1, u, v, u * v, v * v;
+    const Eigen::Matrix<double, 2, 8> j = to_template(seen.jacobian) * (scale * by_parameters);
     Eigen::Matrix2d g;
     g << static_cast<double>(one.xx), static_cast<double>(one.xy), static_cast<double>(one.xy),
         static_cast<double>(one.yy);
@@ -361,14 +356,13 @@ NormalEquations<N> accumulate(const PatchView& view, const PlaneMap& map, float 
   return out;
 }
 
-/// The Gauss-Newton step, with a trace of damping; false if the equations determine nothing.
-template <int N>
-bool solve(NormalEquations<N>& equations, Eigen::Matrix<double, N, 1>& change) {
+/// The same step as solve() takes on a pose.
+bool solve(MapEquations& equations, Vector8& change) {
   const double trace = equations.jtj.trace();
   if (equations.fit.visible < 4 || !(trace > 0.0)) return false;
   equations.jtj.diagonal().array() += 1e-9 * trace;
   change = solve_symmetric(equations.jtj, equations.jtr);
-  return change.allFinite();
+  return change.allFinite() && change.norm() <= kMaxRotation;
 }
 
 /// Replaces the patches of a view by blurred ones where the motion exceeds a pixel of the level.
@@ -401,26 +395,121 @@ void apply_motion_blur(const TrackedPattern& pattern, const FrameView& frame, co
   view.stride = 1;
 }
 
-/// One step on the pose. Returns the displacement of its corners, pixels of the level; negative if
-/// there is no step.
-double step_pose(const TrackedPattern& pattern, const FrameView& frame, const PatchView& view,
-                 float tukey, Pose& pose, PatchFit& fit) {
+/// The normal equations of a pose, lower triangle. Written out, not as products of Eigen's: on ARM
+/// those take three times the instructions.
+struct PoseEquations {
+  double jtj[6][6] = {};
+  double jtr[6] = {};
+
+  void add(const PatchLinearisation& patch, double weight) {
+    const double* jx = patch.jacobian.data();
+    const double* jy = jx + 6;
+    const double xx = weight * static_cast<double>(patch.equations.xx);
+    const double xy = weight * static_cast<double>(patch.equations.xy);
+    const double yy = weight * static_cast<double>(patch.equations.yy);
+    const double ex = weight * static_cast<double>(patch.equations.ex);
+    const double ey = weight * static_cast<double>(patch.equations.ey);
+    for (int row = 0; row < 6; ++row) {
+      const double gx = xx * jx[row] + xy * jy[row];
+      const double gy = xy * jx[row] + yy * jy[row];
+      for (int column = 0; column <= row; ++column) {
+        jtj[row][column] += gx * jx[column] + gy * jy[column];
+      }
+      jtr[row] += jx[row] * ex + jy[row] * ey;
+    }
+  }
+};
+
+/// The Gauss-Newton step, with a trace of damping; false if the equations determine nothing.
+bool solve(const PoseEquations& equations, const PatchFit& fit, Vector6& change) {
+  Eigen::Matrix<double, 6, 6> jtj = Eigen::Matrix<double, 6, 6>::Zero();
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column <= row; ++column) jtj(row, column) = equations.jtj[row][column];
+    change(row) = equations.jtr[row];
+  }
+  const double trace = jtj.trace();
+  if (fit.visible < 4 || !(trace > 0.0)) return false;
+  jtj.diagonal().array() += 1e-9 * trace;
+  change = solve_symmetric(jtj, change);
+  return change.allFinite() && change.head<3>().norm() <= kMaxRotation;
+}
+
+/// Observes the patches of a view, and keeps what a step on the pose needs of them.
+PatchFit linearise(const TrackedPattern& pattern, const FrameView& frame, const PatchView& view,
+                   float tukey, const Pose& pose, std::vector<PatchLinearisation>& out) {
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
-  NormalEquations<6> equations = accumulate<6>(
-      view, map_of_pose(pattern, frame.camera, pose), tukey, [&](glm::dvec2 centre, glm::dvec2) {
-        const PoseJacobian rows =
-            pose_jacobian(frame.camera, pose, pattern.to_world(centre), shrink);
-        Eigen::Matrix<double, 2, 6> j;
-        j.row(0) = Eigen::Map<const Eigen::Matrix<double, 1, 6>>(rows.x.data());
-        j.row(1) = Eigen::Map<const Eigen::Matrix<double, 1, 6>>(rows.y.data());
-        return j;
-      });
-  fit = equations.fit;
+  const PlaneMap map = map_of_pose(pattern, frame.camera, pose);
+  PatchFit fit;
+  fit.level = view.at.frame_level;
+  for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
+    const Patch& patch = view.patches[i];
+    PatchObservation seen;
+    if (!observe_patch(view, map, patch, tukey, seen)) continue;
+    ++fit.visible;
+    const PatchNormalEquations& one = seen.equations;
+    if (one.correlation >= kInlierCorrelation) ++fit.inliers;
+    fit.correlation += static_cast<double>(std::max(0.0f, one.correlation));
+    if (one.xx == 0.0f && one.yy == 0.0f) continue;
+    const PoseJacobian rows =
+        pose_jacobian(frame.camera, pose, pattern.to_world(patch.centre), shrink);
+    const glm::dmat2& d = seen.jacobian;
+    const double inverse = 1.0 / (d[0].x * d[1].y - d[0].y * d[1].x);
+    PatchLinearisation& kept = out.emplace_back();
+    kept.equations = one;
+    for (std::size_t k = 0; k < 6; ++k) {
+      kept.jacobian[k] = (d[1].y * rows.x[k] - d[1].x * rows.y[k]) * inverse;
+      kept.jacobian[6 + k] = (d[0].x * rows.y[k] - d[0].y * rows.x[k]) * inverse;
+    }
+  }
+  if (fit.visible > 0) fit.correlation /= fit.visible;
+  return fit;
+}
+
+/// Tukey's weight by the displacement that a patch still asks for after a step of the pose: a patch
+/// on the edge of an occluder correlates well, but points elsewhere. It loses its weight at 1.2
+/// template pixels, beyond what noise does; set by hand.
+double robust_weight(const PatchLinearisation& patch, const Vector6& change) {
+  constexpr float kFar = 1.2f;
+  double x = 0;
+  double y = 0;
+  for (int k = 0; k < 6; ++k) {
+    x += patch.jacobian[static_cast<std::size_t>(k)] * change(k);
+    y += patch.jacobian[static_cast<std::size_t>(6 + k)] * change(k);
+  }
+  PatchNormalEquations left = patch.equations;
+  left.ex -= left.xx * static_cast<float>(x) + left.xy * static_cast<float>(y);
+  left.ey -= left.xy * static_cast<float>(x) + left.yy * static_cast<float>(y);
+  const glm::vec2 d = displacement(left);
+  const float far = std::min(1.0f, glm::dot(d, d) / (kFar * kFar));
+  return static_cast<double>((1.0f - far) * (1.0f - far));
+}
+
+/// One step on the pose. Returns the displacement of its corners, pixels of the level; negative if
+/// there is no step. robust: a step that converges is solved again with the weights that it leaves,
+/// from the same observations: to sample all patches once more gained nothing.
+double step_pose(const TrackedPattern& pattern, const FrameView& frame, const PatchView& view,
+                 float tukey, bool robust, Pose& pose, PatchFit& fit) {
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  std::vector<PatchLinearisation>& patches = frame.patches.linearisations();
+  fit = linearise(pattern, frame, view, tukey, pose, patches);
+  PoseEquations equations;
+  for (const PatchLinearisation& patch : patches) equations.add(patch, 1.0);
   Vector6 change;
-  if (!solve(equations, change) || change.head<3>().norm() > kMaxRotation) return -1.0;
+  if (!solve(equations, fit, change)) return -1.0;
   std::array<double, 6> by{};
   Eigen::Map<Vector6>(by.data()) = change;
-  return move_pose(pattern, frame.camera, shrink, by, pose);
+  const Pose start = pose;
+  const double moved = move_pose(pattern, frame.camera, shrink, by, pose);
+  if (!robust || moved < 0.0 || moved >= kConverged) return moved;
+  PoseEquations weighted;
+  for (const PatchLinearisation& patch : patches) {
+    weighted.add(patch, robust_weight(patch, change));
+  }
+  if (!solve(weighted, fit, change)) return moved;
+  Eigen::Map<Vector6>(by.data()) = change;
+  Pose better = start;
+  if (move_pose(pattern, frame.camera, shrink, by, better) >= 0.0) pose = better;
+  return moved;
 }
 
 }  // namespace
@@ -436,7 +525,8 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
   apply_motion_blur(pattern, frame, pose, view);
   double moved = 0.0;
   for (int step = 0; step < steps; ++step) {
-    moved = step_pose(pattern, frame, view, step == 0 ? kTukeyFirst : kTukey, pose, fit);
+    moved =
+        step_pose(pattern, frame, view, step == 0 ? kTukeyFirst : kTukey, false, pose, fit);
     if (moved < kConverged) break;
   }
   if (precise) {
@@ -447,9 +537,8 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
   }
   for (int step = 0; step < (precise ? kPreciseSteps : 1) && moved >= 0.0; ++step) {
     // The fit is that of the pose before the step, which lies near enough to be judged by it.
-    moved = step_pose(pattern, frame, view, kTukey, pose, fit);
-    if (view.converged || (!precise && moved < kConverged)) break;
-    view.converged = precise && moved < kConverged;
+    moved = step_pose(pattern, frame, view, kTukey, precise, pose, fit);
+    if (moved < kConverged) break;
   }
   return fit;
 }
@@ -468,23 +557,15 @@ PatchFit align_map(const TrackedPattern& pattern, const FrameView& frame, int fr
   fit.level = frame_level;
   if (view.patches.empty()) return fit;
   const Camera& camera = frame.camera;
-  const double scale = camera.fx / static_cast<double>(1 << frame_level);
-  const auto jacobian = [&](glm::dvec2, glm::dvec2 pixel) {
-    const double u = (pixel.x - camera.cx) / camera.fx;
-    const double v = (pixel.y - camera.cy) / camera.fx;
-    Eigen::Matrix<double, 2, 8> j;
-    j << 1, u, v, 0, 0, 0, u * u, u * v, 0, 0, 0, 1, u, v, u * v, v * v;
-    return Eigen::Matrix<double, 2, 8>(scale * j);
-  };
   glm::dmat3 k(1.0);
   k[0][0] = k[1][1] = camera.fx;
   k[2] = {camera.cx, camera.cy, 1.0};
   for (int step = 0; step <= steps; ++step) {
-    NormalEquations<8> equations =
-        accumulate<8>(view, map, step == 0 ? kTukeyFirst : kTukey, jacobian);
+    MapEquations equations =
+        map_equations(view, camera, map, step == 0 ? kTukeyFirst : kTukey);
     fit = equations.fit;
-    Eigen::Matrix<double, 8, 1> e;
-    if (step == steps || !solve(equations, e) || e.norm() > kMaxRotation) break;
+    Vector8 e;
+    if (step == steps || !solve(equations, e)) break;
     glm::dmat3 change(1.0);
     change[0] = {1.0 + e(1), e(4), -e(6)};
     change[1] = {e(2), 1.0 + e(5), -e(7)};

@@ -37,6 +37,20 @@ struct Patch {
   PatchTemplate pixels{};
 };
 
+/// Normal equations of a patch's own displacement d, in template pixels: [xx xy; xy yy] d = e,
+/// multiplied by the patch's weight.
+struct PatchNormalEquations {
+  float xx = 0, xy = 0, yy = 0;
+  float ex = 0, ey = 0;
+  float correlation = 0;
+};
+
+/// A patch's normal equations and the Jacobian of its displacement by the pose, in template pixels.
+struct PatchLinearisation {
+  PatchNormalEquations equations;
+  std::array<double, 12> jacobian{};  ///< two rows of six
+};
+
 /// Patches of the levels used last: six, for two levels of three patterns tracked at once.
 /// Allocates nothing after construction.
 class PatchCache {
@@ -48,8 +62,10 @@ class PatchCache {
   /// exposure.
   static void motion_blur(const TrackedPattern& pattern, int level, const Patch& patch,
                           glm::dvec2 motion, Patch& blurred);
-  /// An empty buffer for blurred patches; valid until the next call.
+  /// Empty buffers of kMaxPatches, for blurred patches and for linearisations; valid until the next
+  /// call.
   std::vector<Patch>& scratch();
+  std::vector<PatchLinearisation>& linearisations();
 
  private:
   struct Slot {
@@ -60,6 +76,7 @@ class PatchCache {
   };
   std::array<Slot, 6> slots_;
   std::vector<Patch> scratch_;
+  std::vector<PatchLinearisation> linearisations_;
   std::uint64_t uses_ = 0;
 };
 
@@ -108,7 +125,8 @@ struct PatchFit {
 /// Gauss-Newton on the pose over the patches of the level of the pattern's image that fits
 /// `frame_level`. Each patch has its own gain and bias and is weighted by its correlation (Tukey);
 /// after Baker & Matthews, "Lucas-Kanade 20 years on" (2004). At most `steps` steps over about 40
-/// patches until the pose converges, then one more, or if `precise`, at most ten over all patches.
+/// patches until the pose converges, then one more, or if `precise`, at most ten over all patches, the
+/// last of them robust.
 PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_level, int steps,
                bool precise, Pose& pose);
 
@@ -123,14 +141,6 @@ PatchFit align_map(const TrackedPattern& pattern, const FrameView& frame, int fr
 
 // The parts, for refinement from features (pose_refinement.cpp).
 
-/// Normal equations of a patch's own displacement d, in template pixels: [xx xy; xy yy] d = e,
-/// multiplied by the patch's weight.
-struct PatchNormalEquations {
-  float xx = 0, xy = 0, yy = 0;
-  float ex = 0, ey = 0;
-  float correlation = 0;
-};
-
 /// The displacement that the equations ask for, in template pixels; zero without weight. A trace of
 /// damping keeps it short along an edge, where a patch of a single edge knows nothing.
 glm::vec2 displacement(const PatchNormalEquations& equations);
@@ -142,7 +152,6 @@ struct PatchView {
   Resolution at;
   std::span<const Patch> patches;
   std::size_t stride = 1;
-  bool converged = false;  ///< the pose is right to a fraction of a pixel
 };
 
 /// The patches for a level of the frame, about `count` of them; none if the pattern's image has no

@@ -141,7 +141,8 @@ int coarsest_level(const TrackedPattern& pattern, const Resolution& best, int le
 
 /// Levels above the finest.
 int levels_of(SearchRadius radius) {
-  return radius == SearchRadius::kFar ? 4 : radius == SearchRadius::kFrame ? 2 : 0;
+  constexpr std::array<int, 4> kLevels = {0, 1, 2, 4};
+  return kLevels[static_cast<std::size_t>(radius)];
 }
 
 }  // namespace

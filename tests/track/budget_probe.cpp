@@ -1,0 +1,165 @@
+// What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin: each
+// measured step lies between two writes to stdout. Frames are rendered from the bundle's own pattern,
+// so that nothing but the bundle is needed.
+// Usage: budget_probe track|search|clutter|open BUNDLE [WIDTH HEIGHT [FRAMES]]
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "formats/bundle_view.hpp"
+#include "formats/tracker_record_view.hpp"
+#include "modar/mapped_file.hpp"
+#include "modar/pose_loop.hpp"
+
+namespace modar {
+namespace {
+
+int give_up(const std::string& why) {
+  std::fprintf(stderr, "budget_probe: %s\n", why.c_str());
+  return 1;
+}
+
+/// A write that the plugin sees; nothing is buffered.
+void mark(const std::string& line) {
+  if (::write(1, line.data(), line.size()) < 0) std::abort();
+}
+
+/// The same numbers on every platform.
+struct Numbers {
+  std::uint32_t state = 1;
+  int next(int below) {
+    state = state * 1664525u + 1013904223u;
+    return static_cast<int>((state >> 16) % static_cast<std::uint32_t>(below));
+  }
+};
+
+struct Frame {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> pixels;
+  [[nodiscard]] GrayImage view() const { return {pixels.data(), width, height, width}; }
+};
+
+/// Overlapping discs and boxes of many sizes, the statistics of natural scenes: Lee, Mumford & Huang,
+/// "Occlusion models for natural images" (2001).
+Frame clutter(int width, int height, std::uint32_t seed) {
+  Frame frame{width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height))};
+  Numbers numbers{seed};
+  for (int i = 0; i < 6000; ++i) {
+    const int radius = std::min(120, 2 + 1000 / (4 + numbers.next(250)));
+    const int x0 = numbers.next(width);
+    const int y0 = numbers.next(height);
+    const bool round = numbers.next(2) == 0;
+    const int gray = 20 + numbers.next(216);
+    for (int y = std::max(0, y0 - radius); y < std::min(height, y0 + radius); ++y) {
+      for (int x = std::max(0, x0 - radius); x < std::min(width, x0 + radius); ++x) {
+        const int dx = x - x0;
+        const int dy = y - y0;
+        if (round && dx * dx + dy * dy > radius * radius) continue;
+        frame.pixels[static_cast<std::size_t>(y * width + x)] = static_cast<std::uint8_t>(gray);
+      }
+    }
+  }
+  return frame;
+}
+
+/// The pattern's image at a pose, over a background, with noise of three gray values.
+void draw(const GrayImage& pattern, const Camera& camera, const Pose& pose, Numbers& numbers,
+          Frame& frame) {
+  const double longest = std::max(pattern.width, pattern.height);
+  for (int y = 0; y < frame.height; ++y) {
+    for (int x = 0; x < frame.width; ++x) {
+      const glm::dvec3 ray{(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0};
+      const glm::dvec3 normal = pose.rotation[2];
+      const double depth = glm::dot(normal, pose.translation) / glm::dot(normal, ray);
+      const glm::dvec3 at = ray * depth - pose.translation;
+      const double u = (glm::dot(pose.rotation[0], at) * longest + pattern.width - 1.0) * 0.5;
+      const double v = (pattern.height - 1.0 - glm::dot(pose.rotation[1], at) * longest) * 0.5;
+      std::uint8_t& out = frame.pixels[static_cast<std::size_t>(y * frame.width + x)];
+      double gray = out;
+      if (u >= 0 && v >= 0 && u < pattern.width - 1 && v < pattern.height - 1) {
+        const int column = static_cast<int>(u);
+        const int row = static_cast<int>(v);
+        const std::uint8_t* p = pattern.pixels + row * pattern.stride + column;
+        const double top = p[0] + (u - column) * (p[1] - p[0]);
+        const double bottom =
+            p[pattern.stride] + (u - column) * (p[pattern.stride + 1] - p[pattern.stride]);
+        gray = top + (v - row) * (bottom - top);
+      }
+      const int noise = numbers.next(5) + numbers.next(5) + numbers.next(5) - 6;
+      out = static_cast<std::uint8_t>(std::clamp(gray + noise, 0.0, 255.0));
+    }
+  }
+}
+
+/// A calm hand before a pattern that fills about half of the frame.
+Pose pose_at(double time) {
+  Pose pose;
+  const glm::dmat3 flip(glm::dvec3{1, 0, 0}, glm::dvec3{0, -1, 0}, glm::dvec3{0, 0, -1});
+  pose.rotation = rotation_matrix({0.35 + 0.10 * std::sin(1.3 * time), 0.25 * std::cos(time),
+                                   0.15 * std::sin(0.7 * time)}) *
+                  flip;
+  pose.translation = {0.10 * std::sin(0.9 * time), 0.08 * std::cos(1.1 * time),
+                      2.4 + 0.2 * std::sin(0.5 * time)};
+  return pose;
+}
+
+int run_frames(const std::string& what, const BundleView& bundle, int width, int height,
+               int frames) {
+  TrackerRecordView record;
+  const auto bytes = bundle.section(SectionType::kTrackerRecord, 0);
+  if (bytes.empty() || view_tracker_record(bytes, record)) return give_up("no tracker record");
+  const GrayImage pattern{record.pixels.data(), static_cast<int>(record.header.width),
+                          static_cast<int>(record.header.height),
+                          static_cast<std::ptrdiff_t>(record.header.width)};
+  const Camera camera = default_camera(width, height);
+  PoseLoopOptions options;
+  options.track = what == "track";
+  const auto loop = PoseLoop::create(bundle, camera, options);
+  if (!loop) return give_up(to_line(loop.error()));
+  const Frame background = clutter(width, height, 7);
+  Frame frame = background;
+  Numbers numbers{11};
+  TrackResult result;
+  for (int i = 0; i < frames; ++i) {
+    frame = what == "track" ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
+    if (what != "clutter") draw(pattern, camera, pose_at(i / 30.0), numbers, frame);
+    mark("begin\n");
+    const auto done = (*loop)->step(frame.view(), result);
+    mark("end\n");
+    if (!done) return give_up(to_line(done.error()));
+    std::fprintf(stderr, "%s: %d features, %zu visible, %s\n", what.c_str(), result.features,
+                 result.visible.size(), to_string(result.reason));
+  }
+  return 0;
+}
+
+int run(int count, char** words) {
+  if (count < 3) return give_up("give track|search|clutter|open and a bundle");
+  const std::string what = words[1];
+  mark("begin\n");
+  auto file = MappedFile::open(words[2]);
+  if (!file) return give_up(to_line(file.error()));
+  const auto bundle = BundleView::open(file->bytes());
+  mark("end\n");
+  if (!bundle) return give_up(to_line(bundle.error()));
+  if (what == "open") return 0;
+  const int width = count > 4 ? std::atoi(words[3]) : 640;
+  const int height = count > 4 ? std::atoi(words[4]) : 480;
+  return run_frames(what, *bundle, width, height, count > 5 ? std::atoi(words[5]) : 30);
+}
+
+}  // namespace
+}  // namespace modar
+
+int main(int count, char** words) {
+  return modar::run(count, words);
+}
