@@ -1,25 +1,32 @@
 #!/bin/sh
-# Builds the pose loop for another processor and proves that it sees there, to the last bit, what it sees here. Not
-# part of CI. For ARM, the device's player too, with Debian's cross compilers, and its size; ARM runs under qemu, wasm
-# (SIMD of 128 bits) in node.
-# Usage: scripts/foreign.sh armhf|arm64|wasm BUNDLE VIDEO   (e.g. armhf build/box.modar box.mp4; 60 frames of it)
-# Needs ffmpeg and: g++-arm-linux-gnueabihf or g++-aarch64-linux-gnu with qemu-user, dpkg --add-architecture and
-# apt-get update; for wasm emscripten and node.
+# Builds the pose loop for another processor and proves that it sees there, to the last bit, what it sees here. For ARM,
+# the device's player too, with Debian's cross compilers, and its size; ARM runs under qemu, wasm (SIMD of 128 bits) in
+# node. Not part of CI.
+#   scripts/foreign.sh armhf|arm64|wasm BUNDLE VIDEO   e.g. armhf build/box.modar box.mp4; 60 frames of it
+#   scripts/foreign.sh budget [MODAR [BIG_BUNDLE]]     instructions on ARMv7, beside tests/bench/arm_budget.csv; fails
+#                                                      where one is 2 % above. MODAR: program that bakes the demo scene
+#                                                      (build/release/bin/modar); BIG_BUNDLE: of about 200 MB
+# Needs ffmpeg (not for the budget) and: g++-arm-linux-gnueabihf or g++-aarch64-linux-gnu with qemu-user,
+# dpkg --add-architecture and apt-get update; for wasm emscripten and node.
 set -eu
 arch=${1:-} bundle=${2:-} video=${3:-}
 case $arch in
+  budget) triple=arm-linux-gnueabihf ;;
   armhf) triple=arm-linux-gnueabihf run="qemu-arm build/armhf/bits-there" ;;
   arm64) triple=aarch64-linux-gnu run="qemu-aarch64 build/arm64/bits-there" ;;
   # Debian 12's emscripten takes the fetch() of newer nodes for a browser's.
   wasm) run="node --no-experimental-fetch build/wasm/bits-there.js" ;;
-  *) sed -n 2,7p "$0" >&2; exit 1 ;;
+  *) sed -n 2,10p "$0" >&2; exit 1 ;;
 esac
-if [ ! -f "$bundle" ] || [ ! -f "$video" ]; then
+if [ "$arch" = budget ]; then
+  arch=armhf
+  budget=${2:-build/release/bin/modar}
+  big=${3:-}
+elif [ ! -f "$bundle" ] || [ ! -f "$video" ]; then
   echo "foreign.sh: give a bundle and a video that shows its pattern" >&2
   exit 1
 fi
-bundle=$(realpath "$bundle")
-video=$(realpath "$video")
+[ -n "${budget:-}" ] || { bundle=$(realpath "$bundle") && video=$(realpath "$video"); }
 cd "$(dirname "$0")/.."
 build=$PWD/build/$arch
 mkdir -p "$build"
@@ -50,6 +57,7 @@ there_on_arm() {
 
   cmake --preset device -B "$build" --toolchain "$PWD/scripts/foreign.cmake" -DMODAR_FOREIGN="$arch" -DMODAR_FETCH=OFF \
     -DMODAR_FOREIGN_ROOT="$root" > /dev/null
+  [ -z "${budget:-}" ] || return 0
   cmake --build "$build" --target modar-play
   "$triple-strip" -o "$build/modar-play.stripped" "$build/bin/modar-play"
   echo "$arch player: $(wc -c < "$build/modar-play.stripped") bytes"
@@ -64,6 +72,49 @@ there_in_wasm() { # what the loop needs, without EGL
     $sources tests/track/pose_bits.cpp -sNODERAWFS=1 -sALLOW_MEMORY_GROWTH=1 -o "$build/bits-there.js"
   echo "pose loop and its test as wasm: $(wc -c < "$build/bits-there.wasm") bytes"
 }
+
+# Instructions of the steps between two writes of budget_probe: the median, and the greatest.
+count() { # STEP BUNDLE FRAMES
+  env -i qemu-arm -cpu cortex-a9 -plugin "$build/count.so" "$build/budget-probe" "$1" "$2" 640 480 "$3" 2>&1 > /dev/null |
+    awk '$1 == "count" { if (++n % 2) from = $2; else print $2 - from }' | tail -n +"$4" | sort -n |
+    awk '{ all[NR] = $1 } END { print all[int((NR + 1) / 2)], all[NR] }'
+}
+
+measure() { # NAME STEP BUNDLE FRAMES SKIP: prints a row beside the committed one
+  set -- "$1" "$(count "$2" "$3" "$4" "$5")"
+  median=${2% *}
+  before=$(awk -F, -v name="$1" '$1 == name { print $2 }' tests/bench/arm_budget.csv)
+  echo "$1,$median" >> "$build/arm_budget.csv"
+  awk -v name="$1" -v now="$median" -v most="${2#* }" -v before="${before:-0}" 'BEGIN {
+    printf "%-16s %11d instructions (most %d), committed %d\n", name, now, most, before
+    exit before > 0 && now > 1.02 * before }' || fat=yes
+}
+
+if [ -n "${budget:-}" ]; then
+  there_on_arm
+  cmake --build "$build" --target modar_runtime modar_formats
+  cc -O2 -shared -fPIC -o "$build/count.so" scripts/qemu_count.c
+  # The null driver: what null_gl.cpp does not have returns 0.
+  "$triple-g++" -O2 -c -idirafter /usr/include tests/track/null_gl.cpp -o "$build/null_gl.o"
+  "$triple-nm" "$build/runtime/libmodar_runtime.a" "$build/null_gl.o" 2> /dev/null | awk '
+    $NF ~ /^e?gl[A-Z]/ { if ($(NF - 1) == "T") has[$NF] = 1; else if ($(NF - 1) == "U") wants[$NF] = 1 }
+    END { for (name in wants) if (!has[name]) print "int " name "(void) { return 0; }" }' > "$build/null_rest.c"
+  "$triple-gcc" -w -O2 -c "$build/null_rest.c" -o "$build/null_rest.o"
+  "$triple-g++" -O2 -std=c++20 -ffp-contract=off -I. -Iruntime/include -static -idirafter /usr/include \
+    tests/track/budget_probe.cpp "$build/null_gl.o" "$build/runtime/libmodar_runtime.a" \
+    "$build/formats/libmodar_formats.a" "$build/null_rest.o" -pthread -o "$build/budget-probe"
+  "$budget" bake --quiet --model assets/models/pottery.obj --pattern assets/patterns/cover.png -o "$build/demo.modar"
+  echo measure,instructions > "$build/arm_budget.csv"
+  fat=no
+  # The first interval is the opening of the bundle; the first frames search, and fill caches.
+  measure track_640x480 track "$build/demo.modar" 30 4
+  measure search_640x480 search "$build/demo.modar" 7 3
+  measure clutter_640x480 clutter "$build/demo.modar" 7 3
+  measure render_demo render "$build/demo.modar" 8 4
+  [ -z "$big" ] || measure open_200mb open "$big" 1 1
+  [ $fat = no ] || { echo "foreign.sh: above the budget by more than 2 %" >&2; exit 3; }
+  exit 0
+fi
 
 cmake --preset device > /dev/null
 cmake --build --preset device --target modar_runtime modar_formats

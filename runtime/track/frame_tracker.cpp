@@ -11,9 +11,9 @@ namespace {
 // Share of the inlier ratio of the frames before under which a fit may be a neighbouring place:
 // other starts are tried. Higher costs time under every passing hand; by hand.
 constexpr double kSuspicious = 0.75;
-// Pixels by which the last prediction missed: up to them, refinement starts on the finest level or one
-// above, whose patches reach that far, and starts anew two above where that does not fit. Smaller
-// values cost time, larger ones a lost start more often.
+// Pixels by which the last prediction missed: up to them, refinement starts on the finest level or
+// one above, whose patches reach that far, and starts anew two above where that does not fit.
+// Smaller values cost time, larger ones a lost start more often.
 constexpr double kNearSurprise = 1.0;
 constexpr double kCloseSurprise = 2.5;
 // Way of the pattern's centre between frames, pixels: less blurs too little to matter, and what

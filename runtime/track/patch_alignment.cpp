@@ -319,8 +319,8 @@ Eigen::Matrix2d to_template(const glm::dmat2& d) {
 
 using Vector8 = Eigen::Matrix<double, 8, 1>;
 
-/// Normal equations of a homography's eight parameters over the patches of a view, and how well these
-/// fit.
+/// Normal equations of a homography's eight parameters over the patches of a view, and how well
+/// these fit.
 struct MapEquations {
   Eigen::Matrix<double, 8, 8> jtj = Eigen::Matrix<double, 8, 8>::Zero();
   Vector8 jtr = Vector8::Zero();
@@ -525,8 +525,7 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
   apply_motion_blur(pattern, frame, pose, view);
   double moved = 0.0;
   for (int step = 0; step < steps; ++step) {
-    moved =
-        step_pose(pattern, frame, view, step == 0 ? kTukeyFirst : kTukey, false, pose, fit);
+    moved = step_pose(pattern, frame, view, step == 0 ? kTukeyFirst : kTukey, false, pose, fit);
     if (moved < kConverged) break;
   }
   if (precise) {
@@ -561,8 +560,7 @@ PatchFit align_map(const TrackedPattern& pattern, const FrameView& frame, int fr
   k[0][0] = k[1][1] = camera.fx;
   k[2] = {camera.cx, camera.cy, 1.0};
   for (int step = 0; step <= steps; ++step) {
-    MapEquations equations =
-        map_equations(view, camera, map, step == 0 ? kTukeyFirst : kTukey);
+    MapEquations equations = map_equations(view, camera, map, step == 0 ? kTukeyFirst : kTukey);
     fit = equations.fit;
     Vector8 e;
     if (step == steps || !solve(equations, e)) break;

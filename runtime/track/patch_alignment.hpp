@@ -125,8 +125,8 @@ struct PatchFit {
 /// Gauss-Newton on the pose over the patches of the level of the pattern's image that fits
 /// `frame_level`. Each patch has its own gain and bias and is weighted by its correlation (Tukey);
 /// after Baker & Matthews, "Lucas-Kanade 20 years on" (2004). At most `steps` steps over about 40
-/// patches until the pose converges, then one more, or if `precise`, at most ten over all patches, the
-/// last of them robust.
+/// patches until the pose converges, then one more, or if `precise`, at most ten over all patches,
+/// the last of them robust.
 PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_level, int steps,
                bool precise, Pose& pose);
 

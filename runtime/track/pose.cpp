@@ -75,8 +75,8 @@ bool basis_to_points(std::span<const glm::dvec2, 4> points, const Eigen::Matrix3
 }
 
 /// Sum of squared distances, and the normal equations of the six increments (rotation on the left,
-/// then translation): of the matrix the lower triangle, which is all that the solver reads. Infinite
-/// cost if a point is not in front of the camera.
+/// then translation): of the matrix the lower triangle, which is all that the solver reads.
+/// Infinite cost if a point is not in front of the camera.
 struct NormalEquations {
   Matrix6 jtj = Matrix6::Zero();
   Vector6 jtr = Vector6::Zero();

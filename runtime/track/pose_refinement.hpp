@@ -29,9 +29,9 @@ PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap&
 int photometric_percent(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
                         int min_cells = kMinCells);
 
-/// How far the pose may be off, and so how many levels above the finest refinement starts: 0, 1, 2, 4.
-/// Coarse patches reach across the edge of an occluder and cost time, so the smallest sufficient
-/// radius is best.
+/// How far the pose may be off, and so how many levels above the finest refinement starts: 0, 1,
+/// 2, 4. Coarse patches reach across the edge of an occluder and cost time, so the smallest
+/// sufficient radius is best.
 enum class SearchRadius : std::uint8_t { kNear, kClose, kFrame, kFar };
 
 /// Aligns patches from the coarsest level of the radius to the finest. True if the finest level

@@ -1,7 +1,8 @@
-// What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin: each
-// measured step lies between two writes to stdout. Frames are rendered from the bundle's own pattern,
-// so that nothing but the bundle is needed.
-// Usage: budget_probe track|search|clutter|open BUNDLE [WIDTH HEIGHT [FRAMES]]
+// What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin:
+// each measured step lies between two writes to stdout. Frames are rendered from the bundle's own
+// pattern, so that nothing but the bundle is needed. Usage: budget_probe
+// track|search|clutter|render|open BUNDLE [WIDTH HEIGHT [FRAMES]] search: frames that show the
+// pattern; clutter: frames without it; render: by null_gl.cpp.
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include "formats/tracker_record_view.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"
+#include "modar/renderer.hpp"
 
 namespace modar {
 namespace {
@@ -48,8 +50,8 @@ struct Frame {
   [[nodiscard]] GrayImage view() const { return {pixels.data(), width, height, width}; }
 };
 
-/// Overlapping discs and boxes of many sizes, the statistics of natural scenes: Lee, Mumford & Huang,
-/// "Occlusion models for natural images" (2001).
+/// Overlapping discs and boxes of many sizes, the statistics of natural scenes: Lee, Mumford &
+/// Huang, "Occlusion models for natural images" (2001).
 Frame clutter(int width, int height, std::uint32_t seed) {
   Frame frame{width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height))};
   Numbers numbers{seed};
@@ -130,7 +132,8 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   Numbers numbers{11};
   TrackResult result;
   for (int i = 0; i < frames; ++i) {
-    frame = what == "track" ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
+    frame =
+        what == "track" ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
     if (what != "clutter") draw(pattern, camera, pose_at(i / 30.0), numbers, frame);
     mark("begin\n");
     const auto done = (*loop)->step(frame.view(), result);
@@ -142,8 +145,43 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   return 0;
 }
 
+/// A context as most phones have it.
+GlCaps phone_caps() {
+  GlCaps caps;
+  caps.half_float_vertices = true;
+  caps.etc1 = true;
+  caps.max_texture_size = 4096;
+  return caps;
+}
+
+int run_render(const BundleView& bundle, int width, int height, int frames) {
+  const auto renderer = Renderer::create(bundle, phone_caps());
+  if (!renderer) return give_up(to_line(renderer.error()));
+  if (const auto done = (*renderer)->resize(width, height); !done) {
+    return give_up(to_line(done.error()));
+  }
+  const Camera camera = default_camera(width, height);
+  const std::vector<std::uint8_t> picture(static_cast<std::size_t>(3 * width * height), 90);
+  std::vector<DrawItem> items;
+  for (int i = 0; i < frames; ++i) {
+    mark("begin\n");
+    const glm::mat4 view = gl_view(pose_at(i / 30.0));
+    items.clear();
+    for (std::uint32_t k = 0; k < bundle.scenes().size(); ++k) {
+      const SceneRecord& scene = bundle.scenes()[k];
+      items.push_back({scene.model, view * scene_matrix(scene)});
+    }
+    const DepthRange depth = depth_range(bundle, items);
+    (*renderer)->render(RgbImage{picture.data(), width, height, 3 * width},
+                        gl_projection(camera, depth.near_plane, depth.far_plane), items);
+    mark("end\n");
+  }
+  std::fprintf(stderr, "render: %d draw calls\n", (*renderer)->stats().draw_calls);
+  return 0;
+}
+
 int run(int count, char** words) {
-  if (count < 3) return give_up("give track|search|clutter|open and a bundle");
+  if (count < 3) return give_up("give track|search|clutter|render|open and a bundle");
   const std::string what = words[1];
   mark("begin\n");
   auto file = MappedFile::open(words[2]);
@@ -154,7 +192,9 @@ int run(int count, char** words) {
   if (what == "open") return 0;
   const int width = count > 4 ? std::atoi(words[3]) : 640;
   const int height = count > 4 ? std::atoi(words[4]) : 480;
-  return run_frames(what, *bundle, width, height, count > 5 ? std::atoi(words[5]) : 30);
+  const int frames = count > 5 ? std::atoi(words[5]) : 30;
+  if (what == "render") return run_render(*bundle, width, height, frames);
+  return run_frames(what, *bundle, width, height, frames);
 }
 
 }  // namespace
