@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -140,13 +141,19 @@ bool PlaneMatcher::unambiguous(const TrackedPattern& pattern, std::size_t first,
   return true;
 }
 
-void PlaneMatcher::match(const TrackedPattern& pattern, std::span<const TrackerFeature> features) {
-  matches_.clear();
+bool PlaneMatcher::match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
+                         std::size_t& next, std::int64_t& work) {
+  constexpr std::int64_t kCodeCost = 10;  // instructions, as scripts/foreign.sh counts them
+  constexpr std::int64_t kFeatureCost = 1000;
+  if (next == 0) matches_.clear();
   const Camera* lens = camera_.distortion == std::array<double, 5>{} ? nullptr : &camera_;
-  for (const TrackerFeature& feature : features) {
+  for (; next < features.size(); ++next) {
+    if (work <= 0) return false;
+    const TrackerFeature& feature = features[next];
     const std::size_t first = feature.dark != 0 ? pattern.bright_count : 0;
     const std::size_t last = feature.dark != 0 ? pattern.features.size() : pattern.bright_count;
     if (first == last) continue;
+    work -= kFeatureCost + kCodeCost * static_cast<std::int64_t>(last - first);
     const int best =
         kernels_.distances(feature.code.data(), pattern.codes + first * kCodeBytes,
                            (last - first) / kBlockCodes, kMaxHalfDistance, distances_.data());
@@ -156,6 +163,7 @@ void PlaneMatcher::match(const TrackedPattern& pattern, std::span<const TrackerF
     if (lens != nullptr) match.ideal = undistort(*lens, match.ideal);
     match.distance = best;
   }
+  return true;
 }
 
 /// Counts the matches that agree with one match's affine map.
@@ -300,7 +308,13 @@ void PlaneMatcher::rank_votes() {
 
 std::span<const HomographyHypothesis> PlaneMatcher::find(const TrackedPattern& pattern,
                                                          std::span<const TrackerFeature> features) {
-  match(pattern, features);
+  std::size_t next = 0;
+  std::int64_t work = std::numeric_limits<std::int64_t>::max();
+  match(pattern, features, next, work);
+  return hypotheses();
+}
+
+std::span<const HomographyHypothesis> PlaneMatcher::hypotheses() {
   if (matches_.size() < kMinMatches) return {};
   mask_.assign(matches_.size(), 0);
   explained_.assign(matches_.size(), 0);

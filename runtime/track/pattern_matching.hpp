@@ -53,6 +53,11 @@ class PlaneMatcher {
   /// At most four hypotheses, by falling inliers; valid until the next call.
   std::span<const HomographyHypothesis> find(const TrackedPattern& pattern,
                                              std::span<const TrackerFeature> features);
+  /// The same in slices: match() with `next` 0 at first until it returns true, then hypotheses().
+  /// work: about how many ARMv7 instructions match() may take; it subtracts what it took.
+  bool match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
+             std::size_t& next, std::int64_t& work);
+  std::span<const HomographyHypothesis> hypotheses();
   [[nodiscard]] std::size_t max_features() const { return matches_.capacity(); }
   /// Matches of the last find().
   [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
@@ -63,7 +68,6 @@ class PlaneMatcher {
   }
 
  private:
-  void match(const TrackedPattern& pattern, std::span<const TrackerFeature> features);
   bool unambiguous(const TrackedPattern& pattern, std::size_t first, std::size_t count, int best,
                    std::size_t& at) const;
   std::size_t support(const FeatureMatch& hypothesis, std::vector<std::uint8_t>* mask) const;

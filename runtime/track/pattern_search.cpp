@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include <glm/matrix.hpp>
 
@@ -130,54 +131,146 @@ void PatternSearch::select(std::span<const TrackerFeature> features,
 
 void PatternSearch::run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
                         DetectionCandidates& candidates) {
-  LapClock clock;
+  begin(extractor, priorities, candidates);
+  advance(std::numeric_limits<std::int64_t>::max());
+}
+
+void PatternSearch::begin(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
+                          DetectionCandidates& candidates) {
+  extractor_ = &extractor;
+  priorities_ = priorities;
+  candidates_ = &candidates;
   candidates.patterns.resize(patterns_.size());
   candidates.times = {};
-  const auto features = extractor.features();
-  candidates.features = static_cast<int>(features.size());
-  candidates.times.detect = clock.lap();
-  for (std::size_t i = 0; i < patterns_.size(); ++i) {
-    if (priorities[i] == SearchPriority::kNone) continue;
-    candidates.patterns[i] = {};
-    // Patterns that the index does not select have few matches, as far as it can tell.
-    if (!features.empty()) candidates.patterns[i].reason = Reason::kFewMatches;
-  }
-  if (features.empty()) return;
-  select(features, priorities);
-  candidates.times.match = clock.lap();
-  const FrameView frame{camera_, extractor.pyramid(), kernels_, patches_};
-  bool found = false;
-  for (std::size_t k = 0; k < selected_.size() && (k < likely_ || !found); ++k) {
-    DetectionCandidate& candidate = candidates.patterns[selected_[k]];
-    candidate = find(patterns_[selected_[k]], frame, features, candidates.times);
-    found = found || candidate.reason == Reason::kVisible;
+  stage_ = Stage::kFeatures;
+  at_ = 0;
+  found_ = false;
+  next_feature_ = 0;
+  extractor.begin();
+}
+
+/// Instructions of the next step, if it is one that is not divided; as scripts/foreign.sh counts
+/// them, at most.
+std::int64_t PatternSearch::cost_of_step() const {
+  switch (stage_) {
+    case Stage::kHypotheses:
+      return 4'000'000;
+    case Stage::kStart:
+      return 5'000'000;
+    case Stage::kRefine:
+      return 5'000'000;
+    case Stage::kMap:
+      return 2'000'000;
+    default:
+      return 0;
   }
 }
 
-DetectionCandidate PatternSearch::find(const TrackedPattern& pattern, const FrameView& frame,
-                                       std::span<const TrackerFeature> features,
-                                       TrackTimes& times) {
-  LapClock clock;
-  DetectionCandidate candidate;
-  const auto hypotheses = matcher_.find(pattern, features);
-  candidate.matches = matcher_.matches();
-  times.match += clock.lap();
-  candidate.reason =
-      candidate.matches < static_cast<int>(kMinMatches) ? Reason::kFewMatches : Reason::kNoGeometry;
-  PoseCandidate best;
-  for (const HomographyHypothesis& hypothesis : hypotheses) {
-    if (hypothesis.inliers < kMinInliers || best.unoccluded) break;
-    if (candidate.reason == Reason::kVisible && 2 * hypothesis.inliers < candidate.inliers) break;
-    if (candidate.reason == Reason::kNoGeometry) candidate.reason = Reason::kFailedVerification;
-    find_pose(pattern, frame, hypothesis, best, candidate);
+bool PatternSearch::advance(std::int64_t work) {
+  constexpr std::int64_t kLeast = 500'000;  // or a search would never end
+  work = std::max(work, kLeast);
+  for (bool first = true;; first = false) {
+    const std::int64_t cost = cost_of_step();
+    if (!first && work < std::max<std::int64_t>(cost, 1)) return false;
+    work -= cost;
+    if (!step(work)) return true;
   }
-  // Where a pose shows a part of the pattern only, a plane map may show all of it.
-  if (candidate.reason == Reason::kFailedVerification ||
-      (candidate.reason == Reason::kVisible && !best.unoccluded)) {
-    find_map(pattern, frame, hypotheses.front(), best.percent + kMapGain, candidate);
+}
+
+/// Extracts features; false if there are none.
+bool PatternSearch::take_features(std::int64_t& work) {
+  if (!extractor_->extend(work)) return true;
+  const bool any = !extractor_->found().empty();
+  candidates_->features = static_cast<int>(extractor_->found().size());
+  for (std::size_t i = 0; i < patterns_.size(); ++i) {
+    if (priorities_[i] == SearchPriority::kNone) continue;
+    candidates_->patterns[i] = {};
+    // Patterns that the index does not select have few matches, as far as it can tell.
+    if (any) candidates_->patterns[i].reason = Reason::kFewMatches;
+  }
+  stage_ = Stage::kSelect;
+  return any;
+}
+
+/// The next step of a search; false if there is none.
+bool PatternSearch::step(std::int64_t& work) {
+  LapClock clock;
+  TrackTimes& times = candidates_->times;
+  if (stage_ == Stage::kFeatures) {
+    const bool any = take_features(work);
+    times.detect += clock.lap();
+    return any;
+  }
+  const std::span<const TrackerFeature> features = extractor_->found();
+  if (stage_ == Stage::kSelect) {
+    select(features, priorities_);
+    times.match += clock.lap();
+    stage_ = Stage::kMatch;
+  }
+  if (at_ == selected_.size() || (at_ >= likely_ && found_)) return false;
+  const TrackedPattern& pattern = patterns_[selected_[at_]];
+  DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
+  const FrameView frame{camera_, extractor_->pyramid(), kernels_, patches_};
+  switch (stage_) {
+    case Stage::kMatch:
+      if (matcher_.match(pattern, features, next_feature_, work)) stage_ = Stage::kHypotheses;
+      times.match += clock.lap();
+      return true;
+    case Stage::kHypotheses:
+      hypotheses_ = matcher_.hypotheses();
+      candidate = {};
+      candidate.matches = matcher_.matches();
+      candidate.reason =
+          candidate.matches < static_cast<int>(kMinMatches) ? Reason::kFewMatches : Reason::kNoGeometry;
+      best_ = {};
+      hypothesis_ = 0;
+      times.match += clock.lap();
+      next_hypothesis();
+      return true;
+    case Stage::kStart:
+      if (candidate.reason == Reason::kNoGeometry) candidate.reason = Reason::kFailedVerification;
+      fit_starts(pattern, frame);
+      // The features may rule out one of two mirror images; otherwise each shows much of the
+      // pattern, and both are tried.
+      decided_ = start_count_ < 2 || !likely(1) || best_.complete;
+      break;
+    case Stage::kRefine:
+      consider(pattern, frame, refine_start(pattern, frame, starts_[start_]));
+      ++start_;
+      break;
+    default: {
+      // Where a pose shows a part of the pattern only, a plane map may show all of it.
+      if (candidate.reason == Reason::kFailedVerification ||
+          (candidate.reason == Reason::kVisible && !best_.unoccluded)) {
+        find_map(pattern, frame, hypotheses_.front(), best_.percent + kMapGain, candidate);
+      }
+      found_ = found_ || candidate.reason == Reason::kVisible;
+      ++at_;
+      next_feature_ = 0;
+      stage_ = Stage::kMatch;
+      times.homography += clock.lap();
+      return true;
+    }
   }
   times.homography += clock.lap();
-  return candidate;
+  while (start_ < start_count_ && !likely(start_)) ++start_;
+  stage_ = Stage::kRefine;
+  if (start_ >= start_count_ || (best_.unoccluded && decided_)) {
+    ++hypothesis_;
+    next_hypothesis();
+  }
+  return true;
+}
+
+/// Goes on with the next hypothesis if it may be better than what was found.
+void PatternSearch::next_hypothesis() {
+  const DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
+  stage_ = Stage::kMap;
+  if (hypothesis_ == hypotheses_.size() || best_.unoccluded) return;
+  const int inliers = hypotheses_[hypothesis_].inliers;
+  if (inliers < kMinInliers) return;
+  if (candidate.reason == Reason::kVisible && 2 * inliers < candidate.inliers) return;
+  stage_ = Stage::kStart;
 }
 
 /// Where the patches alone lead from a start, and how much of the pattern shows there.
@@ -224,46 +317,47 @@ PatternSearch::PoseCandidate PatternSearch::refine_start(const TrackedPattern& p
   return best;
 }
 
-/// Replaces `best` and the candidate if this hypothesis shows more of the pattern.
-void PatternSearch::find_pose(const TrackedPattern& pattern, const FrameView& frame,
-                              const HomographyHypothesis& hypothesis, PoseCandidate& best,
-                              DetectionCandidate& candidate) {
-  matcher_.select(pattern, hypothesis);
-  std::array<Pose, 2> starts;
-  const int count = fit_poses(pattern, camera_, hypothesis.homography, matcher_.inliers(), starts);
-  if (count == 0) return;
-  const bool many = hypothesis.inliers >= kManyInliers;
-  const auto convinces = [&](const PoseCandidate& one) {
-    if (one.finest) return one.percent >= (many ? kManyInliersPercent : kMinPercent);
-    return one.percent >= (many ? kMinPercent : kVaguePercent) &&
-           reprojection_rms(camera_, one.pose, matcher_.inliers()) <= kVagueRms &&
-           photometric_percent(pattern, frame, one.pose, kVagueCells) > 0;
-  };
-  const auto consider = [&](const PoseCandidate& one) {
-    std::array<glm::dvec2, 4> corners;
-    if (one.score <= best.score || !convinces(one) ||
-        !map_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners) ||
-        !plausible(corners)) {
-      return;
-    }
-    best = one;
-    candidate.reason = Reason::kVisible;
-    candidate.pose = one.pose;
-    candidate.inliers = hypothesis.inliers;
-  };
-  consider(evaluate_start(pattern, frame, SearchRadius::kNear, starts[0]));
-  // The features may rule out one of two mirror images; otherwise each shows much of the pattern,
-  // and both are tried.
-  const double least = reprojection_rms(camera_, starts[0], matcher_.inliers());
-  const auto likely = [&](std::size_t i) {
-    return reprojection_rms(camera_, starts[i], matcher_.inliers()) <= kMirrorRms * least + 0.5;
-  };
-  const bool decided = count == 1 || !likely(1) || best.complete;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count) && !(best.unoccluded && decided);
-       ++i) {
-    if (!likely(i)) continue;
-    consider(refine_start(pattern, frame, starts[i]));
+bool PatternSearch::convinces(const TrackedPattern& pattern, const FrameView& frame,
+                              const PoseCandidate& one) const {
+  const bool many = hypotheses_[hypothesis_].inliers >= kManyInliers;
+  if (one.finest) return one.percent >= (many ? kManyInliersPercent : kMinPercent);
+  return one.percent >= (many ? kMinPercent : kVaguePercent) &&
+         reprojection_rms(camera_, one.pose, matcher_.inliers()) <= kVagueRms &&
+         photometric_percent(pattern, frame, one.pose, kVagueCells) > 0;
+}
+
+/// Replaces the best pose, and the candidate, if this one shows more of the pattern.
+void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& frame,
+                             const PoseCandidate& one) {
+  std::array<glm::dvec2, 4> corners;
+  if (one.score <= best_.score || !convinces(pattern, frame, one) ||
+      !map_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners) ||
+      !plausible(corners)) {
+    return;
   }
+  best_ = one;
+  DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
+  candidate.reason = Reason::kVisible;
+  candidate.pose = one.pose;
+  candidate.inliers = hypotheses_[hypothesis_].inliers;
+}
+
+/// Whether the features do not rule a start out against the first.
+bool PatternSearch::likely(std::size_t start) const {
+  return reprojection_rms(camera_, starts_[start], matcher_.inliers()) <=
+         kMirrorRms * least_rms_ + 0.5;
+}
+
+/// The poses of a hypothesis, and where the first leads to by patches alone.
+void PatternSearch::fit_starts(const TrackedPattern& pattern, const FrameView& frame) {
+  const HomographyHypothesis& hypothesis = hypotheses_[hypothesis_];
+  matcher_.select(pattern, hypothesis);
+  start_ = 0;
+  start_count_ = static_cast<std::size_t>(
+      fit_poses(pattern, camera_, hypothesis.homography, matcher_.inliers(), starts_));
+  if (start_count_ == 0) return;
+  least_rms_ = reprojection_rms(camera_, starts_[0], matcher_.inliers());
+  consider(pattern, frame, evaluate_start(pattern, frame, SearchRadius::kNear, starts_[0]));
 }
 
 /// A wrong focal length bends every pose, but the plane's map still tells the corners: takes them,
@@ -283,16 +377,50 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
   candidate = {Reason::kVisible, *pose, true, map, candidate.matches, hypothesis.inliers};
 }
 
-// ---- On a thread of its own ----
+// ---- Of a copy of the frame, in slices or on a thread of its own ----
+
+FrameSearch::FrameSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
+                         const DetectOptions& options)
+    : extractor(FeatureExtractor::create(camera.width, camera.height, options)),
+      search(camera, patterns, options),
+      pixels(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)),
+      priorities(patterns.size(), SearchPriority::kNone) {
+  frame = {pixels.data(), camera.width, camera.height, camera.width};
+  found.patterns.resize(patterns.size());
+}
+
+void FrameSearch::set(const GrayImage& caller_frame,
+                      std::span<const SearchPriority> caller_priorities) {
+  for (int y = 0; y < frame.height; ++y) {
+    std::memcpy(pixels.data() + y * frame.stride, caller_frame.pixels + y * caller_frame.stride,
+                static_cast<std::size_t>(frame.width));
+  }
+  std::copy(caller_priorities.begin(), caller_priorities.end(), priorities.begin());
+}
+
+void SlicedDetector::start(const GrayImage& frame, std::span<const SearchPriority> priorities) {
+  job_.set(frame, priorities);
+  job_.extractor->set_frame(job_.frame);
+  job_.search.begin(*job_.extractor, job_.priorities, job_.found);
+  busy_ = true;
+}
+
+bool SlicedDetector::advance(std::int64_t work, DetectionCandidates& candidates,
+                             std::vector<SearchPriority>& priorities) {
+  if (!busy_) return false;
+  if (!finished_) {
+    finished_ = job_.search.advance(work);
+    return false;  // bringing a find to the present frame costs too much to do both
+  }
+  std::swap(candidates, job_.found);
+  priorities.swap(job_.priorities);
+  busy_ = finished_ = false;
+  return true;
+}
 
 AsyncDetector::AsyncDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
                              const DetectOptions& options)
-    : extractor_(FeatureExtractor::create(camera.width, camera.height, options)),
-      search_(camera, patterns, options),
-      pixels_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)),
-      priorities_(patterns.size(), SearchPriority::kNone) {
-  frame_ = {pixels_.data(), camera.width, camera.height, camera.width};
-  found_.patterns.resize(patterns.size());
+    : job_(camera, patterns, options) {
   thread_ = std::thread([this] { work(); });
 }
 
@@ -303,19 +431,15 @@ AsyncDetector::~AsyncDetector() {
 }
 
 void AsyncDetector::start(const GrayImage& frame, std::span<const SearchPriority> priorities) {
-  for (int y = 0; y < frame_.height; ++y) {
-    std::memcpy(pixels_.data() + y * frame_.stride, frame.pixels + y * frame.stride,
-                static_cast<std::size_t>(frame_.width));
-  }
-  std::copy(priorities.begin(), priorities.end(), priorities_.begin());
+  job_.set(frame, priorities);
   stage_.store(Stage::kSearching, std::memory_order_release);
   wake_.release();
 }
 
 bool AsyncDetector::take(DetectionCandidates& candidates, std::vector<SearchPriority>& priorities) {
   if (stage_.load(std::memory_order_acquire) != Stage::kFound) return false;
-  std::swap(candidates, found_);
-  priorities.swap(priorities_);
+  std::swap(candidates, job_.found);
+  priorities.swap(job_.priorities);
   stage_.store(Stage::kIdle, std::memory_order_release);
   return true;
 }
@@ -324,8 +448,8 @@ void AsyncDetector::work() {
   for (;;) {
     wake_.acquire();
     if (closing_.load(std::memory_order_acquire)) return;
-    extractor_->set_frame(frame_);
-    search_.run(*extractor_, priorities_, found_);
+    job_.extractor->set_frame(job_.frame);
+    job_.search.run(*job_.extractor, job_.priorities, job_.found);
     stage_.store(Stage::kFound, std::memory_order_release);
   }
 }

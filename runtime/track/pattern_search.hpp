@@ -51,11 +51,29 @@ class PatternSearch {
   /// call.
   void run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
            DetectionCandidates& candidates);
+  /// The same in slices: begin(), then advance() until it returns true. The arguments must stay
+  /// until then. work: about how many ARMv7 instructions advance() may take; the first step of a
+  /// call is always taken, and none is interrupted: the longest takes some 5 million.
+  void begin(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
+             DetectionCandidates& candidates);
+  bool advance(std::int64_t work);
 
  private:
   void select(std::span<const TrackerFeature> features, std::span<const SearchPriority> priorities);
-  DetectionCandidate find(const TrackedPattern& pattern, const FrameView& frame,
-                          std::span<const TrackerFeature> features, TrackTimes& times);
+  /// What advance() does next.
+  enum class Stage : std::uint8_t {
+    kFeatures,
+    kSelect,
+    kMatch,
+    kHypotheses,
+    kStart,
+    kRefine,
+    kMap
+  };
+  bool step(std::int64_t& work);
+  bool take_features(std::int64_t& work);
+  void next_hypothesis();
+  [[nodiscard]] std::int64_t cost_of_step() const;
   /// A refined pose and the evidence for it.
   struct PoseCandidate {
     Pose pose;
@@ -70,9 +88,11 @@ class PatternSearch {
                                              SearchRadius radius, const Pose& start) const;
   [[nodiscard]] PoseCandidate refine_start(const TrackedPattern& pattern, const FrameView& frame,
                                            Pose start) const;
-  void find_pose(const TrackedPattern& pattern, const FrameView& frame,
-                 const HomographyHypothesis& hypothesis, PoseCandidate& best,
-                 DetectionCandidate& candidate);
+  bool convinces(const TrackedPattern& pattern, const FrameView& frame,
+                 const PoseCandidate& one) const;
+  void consider(const TrackedPattern& pattern, const FrameView& frame, const PoseCandidate& one);
+  [[nodiscard]] bool likely(std::size_t start) const;
+  void fit_starts(const TrackedPattern& pattern, const FrameView& frame);
   void find_map(const TrackedPattern& pattern, const FrameView& frame,
                 const HomographyHypothesis& hypothesis, int min_percent,
                 DetectionCandidate& candidate) const;
@@ -87,6 +107,60 @@ class PatternSearch {
   std::vector<std::uint8_t> has_votes_;  ///< by pattern
   std::size_t likely_ = 0;               ///< the first of selected_, which are always matched
   std::uint32_t turn_ = 0;               ///< the pattern whose turn is next
+
+  // Of the search under way:
+  FeatureExtractor* extractor_ = nullptr;
+  std::span<const SearchPriority> priorities_;
+  DetectionCandidates* candidates_ = nullptr;
+  Stage stage_ = Stage::kFeatures;
+  std::size_t at_ = 0;            ///< of selected_
+  bool found_ = false;            ///< one of them
+  std::size_t next_feature_ = 0;  ///< to match
+  std::span<const HomographyHypothesis> hypotheses_;
+  std::size_t hypothesis_ = 0;
+  std::array<Pose, 2> starts_;  ///< of the hypothesis
+  std::size_t start_ = 0;
+  std::size_t start_count_ = 0;
+  double least_rms_ = 0;  ///< of starts_[0]
+  bool decided_ = true;   ///< which of two mirror images it is
+  PoseCandidate best_;
+};
+
+/// A search of its own copy of a frame.
+struct FrameSearch {
+  FrameSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
+              const DetectOptions& options);
+  void set(const GrayImage& caller_frame, std::span<const SearchPriority> caller_priorities);
+
+  std::unique_ptr<FeatureExtractor> extractor;
+  PatternSearch search;
+  GrayImage frame;
+  std::vector<std::uint8_t> pixels;
+  std::vector<SearchPriority> priorities;
+  DetectionCandidates found;
+};
+
+/// Runs a PatternSearch in slices between other work of the caller's.
+class SlicedDetector {
+ public:
+  /// The patterns must outlive it.
+  SlicedDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
+                 const DetectOptions& options)
+      : job_(camera, patterns, options) {}
+  [[nodiscard]] bool idle() const { return !busy_; }
+  /// Starts a search; only if idle().
+  void start(const GrayImage& frame, std::span<const SearchPriority> priorities);
+  /// Goes on with it (PatternSearch::advance). In the call after the one that finished it, swaps
+  /// out candidates and priorities, and returns true.
+  bool advance(std::int64_t work, DetectionCandidates& candidates,
+               std::vector<SearchPriority>& priorities);
+  /// Forgets the search under way.
+  void cancel() { busy_ = finished_ = false; }
+
+ private:
+  FrameSearch job_;
+  bool busy_ = false;
+  bool finished_ = false;
 };
 
 /// Runs a PatternSearch on a thread of its own, one frame at a time: on a copy, so that the
@@ -112,12 +186,7 @@ class AsyncDetector {
   enum class Stage : std::uint8_t { kIdle, kSearching, kFound };
   void work();
 
-  std::unique_ptr<FeatureExtractor> extractor_;
-  PatternSearch search_;
-  GrayImage frame_;
-  std::vector<std::uint8_t> pixels_;
-  std::vector<SearchPriority> priorities_;
-  DetectionCandidates found_;
+  FrameSearch job_;
   std::atomic<Stage> stage_{Stage::kIdle};  ///< kSearching: the fields above belong to thread_
   std::atomic<bool> closing_{false};
   Semaphore wake_{0};

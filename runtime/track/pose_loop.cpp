@@ -28,8 +28,9 @@ struct PoseLoop::State {
   std::vector<TrackedPattern> patterns;
   std::vector<Track> tracks;  ///< one a pattern
   tracker::FrameTracker frame_tracker;
-  std::unique_ptr<tracker::PatternSearch> search;  ///< on the caller's thread, or
-  std::unique_ptr<tracker::AsyncDetector> async;   ///< on its own
+  std::unique_ptr<tracker::PatternSearch> search;   ///< on the caller's thread, or
+  std::unique_ptr<tracker::AsyncDetector> async;    ///< on its own
+  std::unique_ptr<tracker::SlicedDetector> sliced;  ///< there, within the budget of a frame
   std::vector<SearchPriority> priorities;
   tracker::DetectionCandidates candidates;
   int frames_to_search = 0;
@@ -37,6 +38,7 @@ struct PoseLoop::State {
 
   void step(const GrayImage& frame, TrackResult& result);
   void track_all(TrackResult& result);
+  void advance_search(TrackResult& result);
   bool search_due(bool any_tracked);
   void accept(TrackResult& result);
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
@@ -72,6 +74,9 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   if (options.async_search) {
     state->async =
         std::make_unique<tracker::AsyncDetector>(camera, state->patterns, options.detect);
+  } else if (options.budget > 0) {
+    state->sliced =
+        std::make_unique<tracker::SlicedDetector>(camera, state->patterns, options.detect);
   } else {
     state->search =
         std::make_unique<tracker::PatternSearch>(camera, state->patterns, options.detect);
@@ -82,6 +87,7 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
 void PoseLoop::reset() {
   for (Track& track : state_->tracks) track = {};
   state_->frames_to_search = 0;
+  if (state_->sliced != nullptr) state_->sliced->cancel();
   state_->discard_found = state_->async != nullptr && !state_->async->idle();
 }
 
@@ -122,6 +128,7 @@ bool PoseLoop::State::search_due(bool any_tracked) {
   // While one is tracked, only patterns lost a moment ago are worth a search in every frame.
   if (!missing || (any_tracked && !recently && frames_to_search > 0)) return false;
   if (async != nullptr && !async->idle()) return false;
+  if (sliced != nullptr && !sliced->idle()) return false;
   frames_to_search = options.search_every;
   return true;
 }
@@ -139,10 +146,13 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
     if (!discard_found) accept(result);
     discard_found = false;
   }
+  if (sliced != nullptr) advance_search(result);
   result.times.pose = clock.lap();
   if (search_due(!result.visible.empty())) {
     if (async != nullptr) {
       async->start(frame, priorities);
+    } else if (sliced != nullptr) {
+      sliced->start(frame, priorities);
     } else {
       search->run(frame_tracker.extractor(), priorities, candidates);
       accept(result);
@@ -154,6 +164,17 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   }
   std::sort(result.visible.begin(), result.visible.end(),
             [](const Detection& a, const Detection& b) { return a.pattern < b.pattern; });
+}
+
+/// Goes on with the search by what tracking left of the frame's budget.
+void PoseLoop::State::advance_search(TrackResult& result) {
+  constexpr std::int64_t kFrameCost = 1'000'000;  // pyramid, and a copy of the frame
+  constexpr std::int64_t kTrackCost = 3'000'000;  // of a pattern; as much to bring a find here
+  const auto tracked =
+      std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.tracked; });
+  const std::int64_t work =
+      std::int64_t{1'000'000} * options.budget - kFrameCost - kTrackCost * (tracked + 1);
+  if (sliced->advance(work, candidates, priorities)) accept(result);
 }
 
 void PoseLoop::State::track_all(TrackResult& result) {
@@ -182,7 +203,7 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
   next.map = candidate.map;
   detection.matches = candidate.matches;
   detection.inliers = candidate.inliers;
-  if (async != nullptr) {
+  if (async != nullptr || sliced != nullptr) {
     // It was found in an earlier frame.
     PatchFit fit;
     const bool here = next.homography_only

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "kernels.hpp"
@@ -24,8 +25,11 @@ struct Corner {
 class CornerFinder {
  public:
   CornerFinder(int width, const DetectOptions& options);
-  /// Appends the corners of a level, ordered by rows of cells; never beyond the reserved capacity.
-  void find(const GrayImage& image, std::uint8_t level, std::vector<Corner>& corners);
+  /// Appends the corners of rows of a level, from `row` (0 at first) on, which it moves to the
+  /// next; false once there are no more. Corners are ordered by rows of cells, never beyond the
+  /// reserved capacity.
+  bool find(const GrayImage& image, std::uint8_t level, int rows, int& row,
+            std::vector<Corner>& corners);
 
  private:
   void keep(const Corner& corner, int cell);
@@ -70,9 +74,10 @@ void CornerFinder::flush(std::vector<Corner>& corners) {
   }
 }
 
-void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<Corner>& corners) {
+bool CornerFinder::find(const GrayImage& image, std::uint8_t level, int rows, int& row,
+                        std::vector<Corner>& corners) {
   const int count = image.width - 2 * kTrackerBorder;
-  if (count <= 0 || image.height <= 2 * kTrackerBorder) return;
+  if (count <= 0 || image.height <= 2 * kTrackerBorder) return false;
   const Kernels& run = kernels(options_.simd);
   // The pixel before the range is compared too, and never a corner.
   const auto row_at = [&](int slot) {
@@ -80,9 +85,13 @@ void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<
            kSlack;
   };
   std::uint8_t* peak = row_at(6);
-  std::fill(rows_.begin(), rows_.end(), std::uint8_t{0});
+  if (row == 0) {
+    std::fill(rows_.begin(), rows_.end(), std::uint8_t{0});
+    row = kTrackerBorder;
+  }
   const int last = image.height - kTrackerBorder;
-  for (int y = kTrackerBorder; y <= last; ++y) {
+  const int end = std::min(row + rows, last + 1);
+  for (int y = row; y < end; ++y) {
     std::uint8_t* score = row_at(y % 3);
     std::uint8_t* bright = row_at(3 + y % 3);
     if (y < last) {
@@ -113,6 +122,8 @@ void CornerFinder::find(const GrayImage& image, std::uint8_t level, std::vector<
     }
     if (y == last || (centre + 1) / options_.cell != cell_row) flush(corners);
   }
+  row = end;
+  return end <= last;
 }
 
 }  // namespace modar::tracker
@@ -223,7 +234,14 @@ struct FeatureExtractor::State {
   std::vector<Corner> corners;
   std::vector<std::uint8_t> weights;  ///< of the corners, where there are too many
   std::vector<TrackerFeature> features;
+  std::size_t slice_level = 0;  ///< of begin() and extend(): where the next slice starts
+  int row = 0;
+  std::size_t next = 0;  ///< corner
+  bool described = true;
+  bool smoothed = false;
 
+  bool extend_corners(std::int64_t& work);
+  bool extend_codes(std::int64_t& work);
   State(int width, const DetectOptions& with) : options(with), finder(width, with) {}
   void smooth_level(std::size_t level);
   void weigh();
@@ -385,24 +403,72 @@ void FeatureExtractor::State::describe(const Corner& corner) {
   feature.score = corner.score;
 }
 
-std::span<const TrackerFeature> FeatureExtractor::features() {
+void FeatureExtractor::begin() {
   State& state = *state_;
   state.corners.clear();
   state.features.clear();
-  const std::size_t levels = std::min<std::size_t>(state.levels.size(), kTrackerLevels);
-  for (std::size_t level = 0; level < levels; ++level) {
-    state.finder.find(state.levels[level], static_cast<std::uint8_t>(level), state.corners);
+  state.slice_level = 0;
+  state.row = 0;
+  state.next = 0;
+  state.described = false;
+  state.smoothed = false;
+}
+
+/// False while corners are left to find.
+bool FeatureExtractor::State::extend_corners(std::int64_t& work) {
+  constexpr int kRows = 16;
+  constexpr std::int64_t kPixelCost = 22;  // instructions, as scripts/foreign.sh counts them
+  const std::size_t count = std::min<std::size_t>(levels.size(), kTrackerLevels);
+  while (slice_level < count) {
+    if (work <= 0) return false;
+    work -= kPixelCost * kRows * levels[slice_level].width;
+    if (finder.find(levels[slice_level], static_cast<std::uint8_t>(slice_level), kRows, row,
+                    corners))
+      continue;
+    row = 0;
+    ++slice_level;
   }
-  state.strongest();
-  std::size_t next = 0;
-  for (std::size_t level = 0; level < levels; ++level) {
-    if (next == state.corners.size() || state.corners[next].level != level) continue;
-    state.smooth_level(level);
-    for (; next < state.corners.size() && state.corners[next].level == level; ++next) {
-      state.describe(state.corners[next]);
+  return true;
+}
+
+/// False while corners are left to describe.
+bool FeatureExtractor::State::extend_codes(std::int64_t& work) {
+  constexpr std::int64_t kSmoothCost = 7;       // instructions a pixel
+  constexpr std::int64_t kDescribeCost = 4600;  // and a feature
+  for (; next < corners.size(); ++next) {
+    if (work <= 0) return false;
+    const std::size_t at = corners[next].level;
+    if (!smoothed || at != slice_level) {
+      slice_level = at;
+      smoothed = true;
+      smooth_level(at);
+      work -= kSmoothCost * levels[at].width * levels[at].height;
     }
+    describe(corners[next]);
+    work -= kDescribeCost;
   }
-  return state.features;
+  return true;
+}
+
+bool FeatureExtractor::extend(std::int64_t& work) {
+  State& state = *state_;
+  if (!state.described) {
+    if (!state.extend_corners(work)) return false;
+    state.strongest();
+    state.described = true;
+  }
+  return state.extend_codes(work);
+}
+
+std::span<const TrackerFeature> FeatureExtractor::found() const {
+  return state_->features;
+}
+
+std::span<const TrackerFeature> FeatureExtractor::features() {
+  begin();
+  std::int64_t work = std::numeric_limits<std::int64_t>::max();
+  extend(work);
+  return found();
 }
 
 }  // namespace modar

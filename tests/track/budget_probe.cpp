@@ -124,7 +124,8 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
                           static_cast<std::ptrdiff_t>(record.header.width)};
   const Camera camera = default_camera(width, height);
   PoseLoopOptions options;
-  options.track = what == "track";
+  options.track = what == "track" || what == "sliced";
+  if (what == "sliced") options.budget = 12;
   const auto loop = PoseLoop::create(bundle, camera, options);
   if (!loop) return give_up(to_line(loop.error()));
   const Frame background = clutter(width, height, 7);
@@ -133,7 +134,7 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   TrackResult result;
   for (int i = 0; i < frames; ++i) {
     frame =
-        what == "track" ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
+        options.track ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
     if (what != "clutter") draw(pattern, camera, pose_at(i / 30.0), numbers, frame);
     mark("begin\n");
     const auto done = (*loop)->step(frame.view(), result);

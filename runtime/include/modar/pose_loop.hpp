@@ -26,6 +26,11 @@ struct PoseLoopOptions {
   /// Searches on a thread of its own, on the latest frame, while tracking goes on: no frame waits,
   /// but what is found depends on timing. False: the same frames always give the same results.
   bool async_search = false;
+  /// ARMv7 instructions that a frame may take, in millions, 0: no limit; without async_search. A
+  /// search goes on over several frames then, and what it found is brought to the present one.
+  /// Smaller budgets find later, and lose fast motion while they search. Counted, not clocked: the
+  /// same frames give the same results. 12 or more: the longest step takes 5, tracking a pattern 3.
+  int budget = 0;
 };
 
 /// Reads the patterns' tracker records (section type 258) from the bundle's mapped bytes, which

@@ -67,6 +67,11 @@ class FeatureExtractor {
   [[nodiscard]] std::span<const GrayImage> pyramid() const;
   /// Finds and describes the features of the frame. Valid until the next call.
   std::span<const TrackerFeature> features();
+  /// The same in slices: begin(), then extend() until it returns true; found() has the features
+  /// then. work: about how many ARMv7 instructions extend() may take; it subtracts what it took.
+  void begin();
+  bool extend(std::int64_t& work);
+  [[nodiscard]] std::span<const TrackerFeature> found() const;
 
  private:
   struct State;
