@@ -16,7 +16,7 @@
 #include <glm/geometric.hpp>
 
 #include "formats/bundle_view.hpp"
-#include "formats/tracker_record_view.hpp"
+#include "formats/tracker_record.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"
 #include "modar/renderer.hpp"
