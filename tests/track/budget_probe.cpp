@@ -150,7 +150,7 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
 GlCaps phone_caps() {
   GlCaps caps;
   caps.half_float_vertices = true;
-  caps.etc1 = true;
+  caps.texture_formats = 1u << static_cast<unsigned>(TextureFormat::kEtc1Rgb);
   caps.max_texture_size = 4096;
   return caps;
 }
