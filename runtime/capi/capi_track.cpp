@@ -33,7 +33,7 @@ void set_pose(const modar::Pose& from, modar_pose& to) {
 
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     modar_error* error) {
-  const modar_tracker_options options = {sizeof options, 0, 0, 0.0};
+  const modar_tracker_options options = {sizeof options, 0, 0, 0.0, 0};
   return modar_tracker_create_with(bundle, camera, &options, error);
 }
 
@@ -53,6 +53,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
   modar::PoseLoopOptions how;
   how.async_search = asked.async_search != 0;
   if (asked.search_every > 0) how.search_every = asked.search_every;
+  how.budget = asked.budget;
   auto loop = modar::PoseLoop::create(bundle->view, ours, how);
   if (!loop) {
     modar::hand_over(loop.error(), error);

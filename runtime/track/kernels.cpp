@@ -89,19 +89,22 @@ void blur_row(const std::uint16_t* in, std::uint8_t* out, int count) {
   }
 }
 
-/// The greatest of the least values of all 16 arcs of nine neighbours: an arc and the next share
-/// eight of them.
-inline V8 best_arc(const V8* difference) {
+/// The greatest of the least values of all 16 arcs of nine neighbours, or if not `kBrighter`, the
+/// least of their greatest: an arc and the next share eight of them.
+template <bool kBrighter>
+inline V8 best_arc(const V8* ring) {
+  const auto worst = [](V8 a, V8 b) { return kBrighter ? hn::Min(a, b) : hn::Max(a, b); };
+  const auto best_of = [](V8 a, V8 b) { return kBrighter ? hn::Max(a, b) : hn::Min(a, b); };
   V8 four[8];
-  for (int k = 0; k < 8; ++k) four[k] = hn::Min(difference[2 * k], difference[2 * k + 1]);
+  for (int k = 0; k < 8; ++k) four[k] = worst(ring[2 * k], ring[2 * k + 1]);
   const V8 first = four[0];
-  for (int k = 0; k < 7; ++k) four[k] = hn::Min(four[k], four[k + 1]);
-  four[7] = hn::Min(four[7], first);
-  V8 best = hn::Zero(D8());
+  for (int k = 0; k < 7; ++k) four[k] = worst(four[k], four[k + 1]);
+  four[7] = worst(four[7], first);
+  V8 best = hn::Set(D8(), kBrighter ? 0 : 255);
   for (int k = 0; k < 8; ++k) {
-    const V8 eight = hn::Min(four[k], four[(k + 2) & 7]);
-    const V8 ends = hn::Max(difference[(2 * k + 15) & 15], difference[(2 * k + 8) & 15]);
-    best = hn::Max(best, hn::Min(eight, ends));
+    const V8 eight = worst(four[k], four[(k + 2) & 7]);
+    const V8 ends = best_of(ring[(2 * k + 15) & 15], ring[(2 * k + 8) & 15]);
+    best = best_of(best, worst(eight, ends));
   }
   return best;
 }
@@ -115,18 +118,6 @@ struct Ring {
            3 * stride,  3 * stride - 1,  2 * stride - 2,  stride - 3,
            -3,          -stride - 3,     -2 * stride - 2, -3 * stride - 1} {}
 };
-
-/// Scores of the arcs brighter (or darker) than their centres.
-template <bool kBrighter>
-inline V8 arc_scores(const std::uint8_t* at, const Ring& ring, V8 centre) {
-  const D8 d;
-  V8 difference[16];
-  for (int k = 0; k < 16; ++k) {
-    const V8 p = hn::LoadU(d, at + ring.at[k]);
-    difference[k] = kBrighter ? hn::SaturatedSub(p, centre) : hn::SaturatedSub(centre, p);
-  }
-  return best_arc(difference);
-}
 
 void corner_scores(const std::uint8_t* pixels, std::ptrdiff_t stride, int threshold, int count,
                    std::uint8_t* bright, std::uint8_t* score) {
@@ -148,15 +139,21 @@ void corner_scores(const std::uint8_t* pixels, std::ptrdiff_t stride, int thresh
       down = hn::Max(down, hn::Min(p, q));
     };
     const auto any = [&](V8 difference) { return !hn::AllFalse(d, hn::Gt(difference, least)); };
-    bound_by(0);
-    bound_by(4);
     V8 best_up = zero;
     V8 best_down = zero;
+    bound_by(0);
+    bound_by(4);
     if (any(hn::Max(hn::SaturatedSub(up, centre), hn::SaturatedSub(centre, down)))) {
-      bound_by(2);
-      bound_by(6);
-      if (any(hn::SaturatedSub(up, centre))) best_up = arc_scores<true>(at, ring, centre);
-      if (any(hn::SaturatedSub(centre, down))) best_down = arc_scores<false>(at, ring, centre);
+      for (int k = 2; k < 8; k += 4) bound_by(k);
+      for (int k = 1; k < 8; k += 2) bound_by(k);
+      const bool any_up = any(hn::SaturatedSub(up, centre));
+      const bool any_down = any(hn::SaturatedSub(centre, down));
+      if (any_up || any_down) {
+        V8 points[16];
+        for (int k = 0; k < 16; ++k) points[k] = hn::LoadU(d, at + ring.at[k]);
+        if (any_up) best_up = hn::SaturatedSub(best_arc<true>(points), centre);
+        if (any_down) best_down = hn::SaturatedSub(centre, best_arc<false>(points));
+      }
     }
     const auto over = [&](V8 best) { return hn::IfThenElseZero(hn::Gt(best, least), best); };
     hn::StoreU(over(best_up), d, bright + i);
@@ -183,57 +180,98 @@ constexpr int kBlockVectors = static_cast<int>(hn::MaxLanes(D8())) < kBlockCodes
                                   ? kBlockCodes / static_cast<int>(hn::MaxLanes(D8()))
                                   : 1;
 
-/// Adds the differing bits of 16 bytes of a block's codes. No sum exceeds a lane: 256 differing
-/// bits count as 255.
-template <bool kSecond>
-inline void count_bits(const std::uint8_t* code, const std::uint8_t* block, V8* sums) {
-  const D8 d;
-  const int step = lanes8();
-  const auto add_byte = [&](int k) HWY_ATTR {
-    const V8 byte = hn::Set(d, code[k]);
+/// Byte k of a block's codes. On ARM one load takes even and odd codes apart; store_codes() puts
+/// them together again.
+inline void load_codes(const std::uint8_t* bytes, V8* vectors) {
+#if HWY_TARGET == HWY_NEON
+  hn::LoadInterleaved2(D8(), bytes, vectors[0], vectors[1]);
+#else
 #pragma GCC unroll 2
-    for (int v = 0; v < kBlockVectors; ++v) {
-      const V8 differ = hn::Xor(byte, hn::LoadU(d, block + k * kBlockCodes + v * step));
-      const V8 bits = hn::PopulationCount(differ);
-      sums[v] = kSecond ? hn::SaturatedAdd(sums[v], bits) : hn::Add(sums[v], bits);
+  for (int v = 0; v < kBlockVectors; ++v) vectors[v] = hn::LoadU(D8(), bytes + v * lanes8());
+#endif
+}
+
+inline void store_codes(const V8* vectors, std::uint8_t* bytes) {
+#if HWY_TARGET == HWY_NEON
+  hn::StoreInterleaved2(vectors[0], vectors[1], D8(), bytes);
+#else
+#pragma GCC unroll 2
+  for (int v = 0; v < kBlockVectors; ++v) hn::StoreU(vectors[v], D8(), bytes + v * lanes8());
+#endif
+}
+
+/// A number for each code of a block.
+struct BlockSums {
+  V8 vectors[kBlockVectors];
+};
+
+/// Adds the differing bits of 16 bytes of the codes of `kBlocks` blocks. No sum exceeds a lane: 256
+/// differing bits count as 255.
+template <bool kSecond, std::size_t kBlocks>
+inline void count_bits(const std::uint8_t* code, const std::uint8_t* blocks, BlockSums* sums) {
+#pragma GCC unroll 2
+  for (std::size_t k = 0; k < kCodeBytes / 2; ++k) {
+    const V8 byte = hn::Set(D8(), code[k]);
+#pragma GCC unroll 2
+    for (std::size_t b = 0; b < kBlocks; ++b) {
+      V8 others[kBlockVectors];
+      load_codes(blocks + (b * kCodeBytes + k) * kBlockCodes, others);
+#pragma GCC unroll 2
+      for (int v = 0; v < kBlockVectors; ++v) {
+        V8& sum = sums[b].vectors[v];
+        const V8 bits = hn::PopulationCount(hn::Xor(byte, others[v]));
+        sum = kSecond ? hn::SaturatedAdd(sum, bits) : hn::Add(sum, bits);
+      }
     }
-  };
-  for (int k = 0; k < kCodeBytes / 2; k += 4) {
-    add_byte(k);
-    add_byte(k + 1);
-    add_byte(k + 2);
-    add_byte(k + 3);
+  }
+}
+
+/// The distances of a code to those of `kBlocks` blocks; lowers `least` to the smallest. Two blocks
+/// at once share the code's bytes.
+template <std::size_t kBlocks>
+inline void compare_blocks(const std::uint8_t* code, const std::uint8_t* blocks, V8 most,
+                           std::uint8_t* out, V8& least) {
+  const D8 d;
+  BlockSums sums[kBlocks];
+#pragma GCC unroll 2
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+#pragma GCC unroll 2
+    for (int v = 0; v < kBlockVectors; ++v) sums[b].vectors[v] = hn::Zero(d);
+  }
+  count_bits<false, kBlocks>(code, blocks, sums);
+#pragma GCC unroll 2
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    BlockSums& mine = sums[b];
+    V8 nearest = mine.vectors[0];
+#pragma GCC unroll 2
+    for (int v = 1; v < kBlockVectors; ++v) nearest = hn::Min(nearest, mine.vectors[v]);
+    if (hn::AllFalse(d, hn::Eq(hn::Min(nearest, most), nearest))) {
+#pragma GCC unroll 2
+      for (int v = 0; v < kBlockVectors; ++v) mine.vectors[v] = hn::Set(d, 255);
+    } else {
+      const std::uint8_t* rest = blocks + (b * kCodeBytes + kCodeBytes / 2) * kBlockCodes;
+      count_bits<true, 1>(code + kCodeBytes / 2, rest, &mine);
+#pragma GCC unroll 2
+      for (int v = 0; v < kBlockVectors; ++v) least = hn::Min(least, mine.vectors[v]);
+    }
+    store_codes(mine.vectors, out + b * kBlockCodes);
   }
 }
 
 int distances(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t block_count,
               int limit, std::uint8_t* out) {
   const D8 d;
-  const int step = lanes8();
+  constexpr std::size_t kBytes = std::size_t{kBlockCodes} * kCodeBytes;
   const V8 most = hn::Set(d, static_cast<std::uint8_t>(limit));
   V8 least = hn::Set(d, 255);
-  for (std::size_t b = 0; b < block_count; ++b) {
-    const std::uint8_t* block = blocks + b * kBlockCodes * kCodeBytes;
-    std::uint8_t* answer = out + b * kBlockCodes;
-    V8 sums[kBlockVectors];
-#pragma GCC unroll 2
-    for (int v = 0; v < kBlockVectors; ++v) sums[v] = hn::Zero(d);
-    count_bits<false>(code, block, sums);
-    V8 nearest = sums[0];
-#pragma GCC unroll 2
-    for (int v = 1; v < kBlockVectors; ++v) nearest = hn::Min(nearest, sums[v]);
-    const bool near = !hn::AllFalse(d, hn::Eq(hn::Min(nearest, most), nearest));
-    if (near) {
-      count_bits<true>(code + kCodeBytes / 2, block + kCodeBytes / 2 * kBlockCodes, sums);
-    }
-#pragma GCC unroll 2
-    for (int v = 0; v < kBlockVectors; ++v) {
-      const V8 distance = near ? sums[v] : hn::Set(d, 255);
-      hn::StoreU(distance, d, answer + v * step);
-      least = hn::Min(least, distance);
-    }
+  std::size_t b = 0;
+  for (; b + 2 <= block_count; b += 2) {
+    compare_blocks<2>(code, blocks + b * kBytes, most, out + b * kBlockCodes, least);
   }
-  std::uint8_t lanes[256] = {};
+  if (b < block_count) {
+    compare_blocks<1>(code, blocks + b * kBytes, most, out + b * kBlockCodes, least);
+  }
+  std::uint8_t lanes[hn::MaxLanes(D8())];
   hn::StoreU(least, d, lanes);
   int smallest = 255;
   for (int i = 0; i < lanes8(); ++i) smallest = lanes[i] < smallest ? lanes[i] : smallest;

@@ -24,6 +24,7 @@ constexpr int kMaxHalfDistance = 44;
 // Ratio test, percent of the second best: 90 after the study of detectors that this loop follows.
 // Lower loses repeated texture, higher lets ambiguous matches through.
 constexpr int kRatio = 90;
+static_assert(kMaxDistance * 100 / kRatio < 128);  // what unambiguous() compares four at a time
 // Pattern pixels within which the second best is the same point seen in another baked view.
 constexpr double kSamePoint = 6.0;
 // Matches whose affine map is voted on, those of least distance first: their number times that of
@@ -95,9 +96,14 @@ bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other) {
   const glm::dvec2 miss = away + hypothesis.ideal - other.ideal;
   // Four pixels of the feature's level, and a quarter of the way for what orientation and scale of
   // one feature are off by, perspective included; in shape 0.6 of the map's norm. Set by hand: the
-  // fit that follows sorts out what they let in.
-  const double limit = 4.0 * other.sigma + 0.25 * glm::length(away);
-  if (!(glm::dot(miss, miss) < limit * limit)) return false;
+  // fit that follows sorts out what they let in. (a + b)^2 <= 2 a^2 + 2 b^2 rules most out without
+  // a root.
+  const double missed = glm::dot(miss, miss);
+  const double way = glm::dot(away, away);
+  const double near = 4.0 * other.sigma;
+  if (!(missed < 2.0 * near * near + 0.125 * way)) return false;
+  const double limit = near + 0.25 * std::sqrt(way);
+  if (!(missed < limit * limit)) return false;
   const glm::dmat2 gap = other.affine - a;
   const double size = glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]);
   return glm::dot(gap[0], gap[0]) + glm::dot(gap[1], gap[1]) < 0.36 * size;
@@ -126,12 +132,18 @@ bool PlaneMatcher::unambiguous(const TrackedPattern& pattern, std::size_t first,
       static_cast<const std::uint8_t*>(std::memchr(distances_.data(), best, count));
   at = static_cast<std::size_t>(nearest - distances_.data());
   const glm::dvec2 here = place(pattern.features[first + at]);
-  // Most blocks hold no code that near.
+  // Most blocks hold no code that near: four bytes are compared at a time. A byte below n <= 128
+  // leaves a top bit in (word - n in each byte) & ~word.
+  const std::uint32_t below = 0x01010101u * (limit + 1u);
   for (std::size_t block = 0; block < count; block += kBlockCodes) {
     const std::uint8_t* distances = distances_.data() + block;
-    unsigned any = 0;
-    for (std::size_t i = 0; i < kBlockCodes; ++i) any |= distances[i] <= limit ? 1u : 0u;
-    if (any == 0) continue;
+    std::uint32_t any = 0;
+    for (std::size_t i = 0; i < kBlockCodes; i += sizeof any) {
+      std::uint32_t four = 0;
+      std::memcpy(&four, distances + i, sizeof four);
+      any |= (four - below) & ~four;
+    }
+    if ((any & 0x80808080u) == 0) continue;
     for (std::size_t i = 0; i < kBlockCodes; ++i) {
       if (distances[i] > limit) continue;
       if (glm::length(place(pattern.features[first + block + i]) - here) > kSamePoint) return false;
@@ -242,8 +254,19 @@ bool PlaneMatcher::fit_homography(std::span<const std::uint8_t> mask,
   const Scaling from = scaling_of(mask, [&](std::size_t i) { return matches_[i].pattern; });
   const Scaling to = scaling_of(mask, [&](std::size_t i) { return matches_[i].ideal; });
   if (!(from.scale > 0.0) || !(to.scale > 0.0)) return false;
-  Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
-  Vector8 right = Vector8::Zero();
+  // The normal equations of rows (p 0 -qx p) and (0 p -qy p), written out: most of them is 0.
+  double pp[6] = {};      // of p p^T: xx, xy, x, yy, y, 1
+  double qpp[3][6] = {};  // the same, times qx, qy and qx^2 + qy^2
+  const auto add = [](double(&sums)[6], double w, glm::dvec2 p) {
+    const double wx = w * p.x;
+    const double wy = w * p.y;
+    sums[0] += wx * p.x;
+    sums[1] += wx * p.y;
+    sums[2] += wx;
+    sums[3] += wy * p.y;
+    sums[4] += wy;
+    sums[5] += w;
+  };
   for (std::size_t i = 0; i < mask.size(); ++i) {
     if (mask[i] == 0) continue;
     const glm::dvec2 p = from.apply(matches_[i].pattern);
@@ -251,12 +274,25 @@ bool PlaneMatcher::fit_homography(std::span<const std::uint8_t> mask,
     // Divided by the depth under the current map, the algebraic error is the geometric one.
     const double depth = (homography * glm::dvec3(matches_[i].pattern, 1.0)).z;
     const double w = 1.0 / (matches_[i].sigma * matches_[i].sigma * depth * depth);
-    Vector8 row_x;
-    Vector8 row_y;
-    row_x << p.x, p.y, 1, 0, 0, 0, -q.x * p.x, -q.x * p.y;
-    row_y << 0, 0, 0, p.x, p.y, 1, -q.y * p.x, -q.y * p.y;
-    normal += w * (row_x * row_x.transpose() + row_y * row_y.transpose());
-    right += w * (q.x * row_x + q.y * row_y);
+    add(pp, w, p);
+    add(qpp[0], w * q.x, p);
+    add(qpp[1], w * q.y, p);
+    add(qpp[2], w * (q.x * q.x + q.y * q.y), p);
+  }
+  // The lower triangle, which is all that the solver reads.
+  Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
+  Vector8 right = Vector8::Zero();
+  constexpr int kAt[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  for (int k = 0; k < 2; ++k) {
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column <= row; ++column) {
+        normal(3 * k + row, 3 * k + column) = pp[kAt[row][column]];
+      }
+      right(3 * k + row) = qpp[k][kAt[row][2]];
+      for (int of = 0; of < 2; ++of) normal(6 + of, 3 * k + row) = -qpp[k][kAt[row][of]];
+    }
+    for (int column = 0; column <= k; ++column) normal(6 + k, 6 + column) = qpp[2][kAt[k][column]];
+    right(6 + k) = -qpp[2][kAt[k][2]];
   }
   // A trace of damping keeps the perspective of few or crowded points near zero.
   normal(6, 6) += 1e-3 * normal(0, 0);

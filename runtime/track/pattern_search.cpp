@@ -220,8 +220,8 @@ bool PatternSearch::step(std::int64_t& work) {
       hypotheses_ = matcher_.hypotheses();
       candidate = {};
       candidate.matches = matcher_.matches();
-      candidate.reason =
-          candidate.matches < static_cast<int>(kMinMatches) ? Reason::kFewMatches : Reason::kNoGeometry;
+      candidate.reason = candidate.matches < static_cast<int>(kMinMatches) ? Reason::kFewMatches
+                                                                           : Reason::kNoGeometry;
       best_ = {};
       hypothesis_ = 0;
       times.match += clock.lap();

@@ -217,12 +217,12 @@ Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
     const Eigen::Vector3d next_translation = translation + change.tail<3>();
     const NormalEquations next =
         normal_equations(camera, world, pixels, next_rotation, next_translation);
+    const bool settled = std::abs(now.cost - next.cost) <= 1e-12 * now.cost;
     if (!(next.cost < now.cost)) {
-      if (damping > 1e8) break;
+      if (settled || damping > 1e8) break;
       damping *= 10.0;
       continue;
     }
-    const bool settled = now.cost - next.cost <= 1e-14 * now.cost;
     rotation = next_rotation;
     translation = next_translation;
     now = next;

@@ -133,8 +133,7 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   Numbers numbers{11};
   TrackResult result;
   for (int i = 0; i < frames; ++i) {
-    frame =
-        options.track ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
+    frame = options.track ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
     if (what != "clutter") draw(pattern, camera, pose_at(i / 30.0), numbers, frame);
     mark("begin\n");
     const auto done = (*loop)->step(frame.view(), result);

@@ -256,6 +256,53 @@ TEST(PoseLoopAsync, EndsAtAnyMoment) {
   }
 }
 
+PoseLoopOptions sliced_search(int budget) {
+  PoseLoopOptions options;
+  options.budget = budget;
+  return options;
+}
+
+GrayPicture moving_frame(int i) {
+  return frame_of(look_at(2.6, 15, 20, 10 + 0.2 * i, 0.004 * i), background()).picture;
+}
+
+// Frames until the pattern shows; 20 if it never does.
+int frames_to_find(PoseLoop& loop, TrackResult& result) {
+  int i = 0;
+  do {
+    EXPECT_TRUE(loop.step(moving_frame(i).view(), result));
+  } while (++i < 20 && result.visible.empty());
+  return i;
+}
+
+// What is found in an older frame is brought to the present one; less budget, more frames.
+TEST(PoseLoopSliced, FindsOverSeveralFramesAndTheSameEachTime) {
+  TrackResult first;
+  TrackResult again;
+  const int frames = frames_to_find(*loop_of(one_pattern(), sliced_search(12)), first);
+  ASSERT_EQ(first.visible.size(), 1u) << to_string(first.reason);
+  EXPECT_GT(frames, 3);
+  EXPECT_EQ(frames_to_find(*loop_of(one_pattern(), sliced_search(12)), again), frames);
+  ASSERT_EQ(again.visible.size(), 1u);
+  EXPECT_EQ(again.visible[0].corners, first.visible[0].corners);
+  const SceneFrame present =
+      frame_of(look_at(2.6, 15, 20, 10 + 0.2 * (frames - 1), 0.004 * (frames - 1)), background());
+  EXPECT_LT(worst_corner(first.visible[0], present), 1.0);
+  // A frame to copy, one to search, one to bring what was found here.
+  EXPECT_EQ(frames_to_find(*loop_of(one_pattern(), sliced_search(1000)), again), 3);
+}
+
+TEST(PoseLoopSliced, ForgetsWhatItSearchedForBeforeAReset) {
+  auto loop = loop_of(one_pattern(), sliced_search(1000));
+  TrackResult result;
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(loop->step(moving_frame(i).view(), result));
+  loop->reset();
+  // The search of before would be brought here now.
+  ASSERT_TRUE(loop->step(moving_frame(2).view(), result));
+  EXPECT_TRUE(result.visible.empty());
+  EXPECT_EQ(result.features, 0);
+}
+
 TEST(PoseLoopStates, EverySimdLevelGivesTheSameBits) {
   std::vector<std::vector<TrackResult>> runs;
   for (int level = 0; level < 3; ++level) {

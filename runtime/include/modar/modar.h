@@ -113,6 +113,8 @@ typedef struct modar_tracker_options {
   int async_search; /* 1: searches on a thread of its own; then results depend on time */
   int search_every; /* frames between searches for further patterns while one is tracked; 0: 10 */
   double smooth_ms; /* takes the trembling out of resting poses, which may lag by so much; 0: off */
+  int budget;       /* without async_search: ARMv7 instructions a frame may take, in millions, 12 or more: a search goes
+                     * on over several frames, with the same results on every phone; 0: no limit */
 } modar_tracker_options;
 modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar_camera* camera,
                                          const modar_tracker_options* options, modar_error* error);
