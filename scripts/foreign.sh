@@ -74,19 +74,20 @@ there_in_wasm() { # what the loop needs, without EGL
 }
 
 # Instructions of the steps between two writes of budget_probe: the median, and the greatest.
-count() { # STEP BUNDLE FRAMES
+count() { # STEP BUNDLE FRAMES SKIP
   env -i qemu-arm -cpu cortex-a9 -plugin "$build/count.so" "$build/budget-probe" "$1" "$2" 640 480 "$3" 2>&1 > /dev/null |
     awk '$1 == "count" { if (++n % 2) from = $2; else print $2 - from }' | tail -n +"$4" | sort -n |
     awk '{ all[NR] = $1 } END { print all[int((NR + 1) / 2)], all[NR] }'
 }
 
-measure() { # NAME STEP BUNDLE FRAMES SKIP: prints a row beside the committed one
-  set -- "$1" "$(count "$2" "$3" "$4" "$5")"
-  median=${2% *}
+measure() { # NAME STEP BUNDLE FRAMES SKIP [worst]: prints a row beside the committed one; worst: of the greatest
+  figures=$(count "$2" "$3" "$4" "$5")
+  median=${figures% *} most=${figures#* }
+  if [ "${6:-}" = worst ]; then now=$most; else now=$median; fi
   before=$(awk -F, -v name="$1" '$1 == name { print $2 }' tests/bench/arm_budget.csv)
-  echo "$1,$median" >> "$build/arm_budget.csv"
-  awk -v name="$1" -v now="$median" -v most="${2#* }" -v before="${before:-0}" 'BEGIN {
-    printf "%-16s %11d instructions (most %d), committed %d\n", name, now, most, before
+  echo "$1,$now" >> "$build/arm_budget.csv"
+  awk -v name="$1" -v now="$now" -v median="$median" -v most="$most" -v before="${before:-0}" 'BEGIN {
+    printf "%-18s %11d instructions, committed %d (median %d, greatest %d)\n", name, now, before, median, most
     exit before > 0 && now > 1.02 * before }' || fat=yes
 }
 
@@ -110,6 +111,8 @@ if [ -n "${budget:-}" ]; then
   measure track_640x480 track "$build/demo.modar" 30 4
   measure search_640x480 search "$build/demo.modar" 7 3
   measure clutter_640x480 clutter "$build/demo.modar" 7 3
+  # Searched and found in slices, then tracked, within PoseLoopOptions::budget of 12 million a frame.
+  measure sliced_640x480 sliced "$build/demo.modar" 30 2 worst
   measure render_demo render "$build/demo.modar" 8 4
   [ -z "$big" ] || measure open_200mb open "$big" 1 1
   [ $fat = no ] || { echo "foreign.sh: above the budget by more than 2 %" >&2; exit 3; }

@@ -1,8 +1,9 @@
 // What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin:
 // each measured step lies between two writes to stdout. Frames are rendered from the bundle's own
-// pattern, so that nothing but the bundle is needed. Usage: budget_probe
-// track|search|clutter|render|open BUNDLE [WIDTH HEIGHT [FRAMES]] search: frames that show the
-// pattern; clutter: frames without it; render: by null_gl.cpp.
+// pattern, so that nothing but the bundle is needed.
+// Usage: budget_probe track|search|clutter|sliced|render|open BUNDLE [WIDTH HEIGHT [FRAMES
+// [BUDGET]]] search: frames that show the pattern; clutter: frames without it; sliced: both, within
+// a budget of so many million instructions a frame; render: by null_gl.cpp.
 #include <unistd.h>
 
 #include <algorithm>
@@ -114,8 +115,8 @@ Pose pose_at(double time) {
   return pose;
 }
 
-int run_frames(const std::string& what, const BundleView& bundle, int width, int height,
-               int frames) {
+int run_frames(const std::string& what, const BundleView& bundle, int width, int height, int frames,
+               int budget) {
   TrackerRecordView record;
   const auto bytes = bundle.section(SectionType::kTrackerRecord, 0);
   if (bytes.empty() || view_tracker_record(bytes, record)) return give_up("no tracker record");
@@ -125,7 +126,7 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   const Camera camera = default_camera(width, height);
   PoseLoopOptions options;
   options.track = what == "track" || what == "sliced";
-  if (what == "sliced") options.budget = 12;
+  if (what == "sliced") options.budget = budget;
   const auto loop = PoseLoop::create(bundle, camera, options);
   if (!loop) return give_up(to_line(loop.error()));
   const Frame background = clutter(width, height, 7);
@@ -181,7 +182,7 @@ int run_render(const BundleView& bundle, int width, int height, int frames) {
 }
 
 int run(int count, char** words) {
-  if (count < 3) return give_up("give track|search|clutter|render|open and a bundle");
+  if (count < 3) return give_up("give track|search|clutter|sliced|render|open and a bundle");
   const std::string what = words[1];
   mark("begin\n");
   auto file = MappedFile::open(words[2]);
@@ -194,7 +195,7 @@ int run(int count, char** words) {
   const int height = count > 4 ? std::atoi(words[4]) : 480;
   const int frames = count > 5 ? std::atoi(words[5]) : 30;
   if (what == "render") return run_render(*bundle, width, height, frames);
-  return run_frames(what, *bundle, width, height, frames);
+  return run_frames(what, *bundle, width, height, frames, count > 6 ? std::atoi(words[6]) : 12);
 }
 
 }  // namespace
