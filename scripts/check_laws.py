@@ -41,7 +41,7 @@ THIRD_PARTIES = {
     "assimp/": (r"bake/lab/assimp_peer\.cpp", r"tests/mesh/assimp_oracle\.cpp"),
     "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),
     "bake/lab/tinyobj_library": (r"bake/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),
-    "curl/": (r"runtime/fetch/transfer\.cpp",),
+    "curl/": (r"runtime/fetch/curl_line\.cpp",),
     "SDL": (r"runtime/play/desk_.*\.cpp", r"tests/.*"),
     "png.h": (r"bake/image/png\.cpp",),
     "jpeglib.h": (r"bake/image/jpeg\.cpp",),

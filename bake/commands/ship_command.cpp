@@ -285,9 +285,10 @@ int run_plan(const PlanCommand& command) {
   std::printf("%s: %.1f minutes (%.0f s on the network, %.0f s to install)\n", link->name, minutes,
               plan->transfer_s, plan->install_s);
   std::printf(
-      "assumed to install: %.0f instructions a byte for geometry (%s), %.0f for the rest (%s), "
-      "measured "
-      "on x86-64; 800 million a second and 8 MB/s of flash\n",
+      "time to install: assumes %.0f instructions a byte of geometry (%s) and %.0f a byte of the "
+      "rest "
+      "(%s), as counted on x86-64, 800 million instructions a second and flash that writes 8 "
+      "MB/s\n",
       kGeometryInstructions, human_bytes(plan->geometry_bytes).c_str(), kOtherInstructions,
       human_bytes(plan->other_bytes).c_str());
   std::printf("free space that it needs: %s\n", human_bytes(plan->storage_bytes).c_str());

@@ -156,9 +156,10 @@ Result<void> OutputFile::write_at(std::uint64_t offset, const void* bytes, std::
 }
 
 Result<void> OutputFile::resize(std::uint64_t size) {
-  if (::ftruncate(descriptor_, static_cast<off_t>(size)) != 0)
-    return io("io.write", path_, kStoreCure);
-  return {};
+  if (::ftruncate(descriptor_, static_cast<off_t>(size)) == 0) return {};
+  // POSIX lets a file system refuse to make a file longer this way; some FAT drivers do.
+  if (errno == EPERM && size != 0) return write_at(size - 1, "", 1);
+  return io("io.write", path_, kStoreCure);
 }
 
 Result<void> OutputFile::sync() {

@@ -62,6 +62,7 @@ class OutputFile {
   ~OutputFile();
   /// Errors: kIo "io.write".
   Result<void> write_at(std::uint64_t offset, const void* bytes, std::size_t size);
+  /// Cuts the file off, or makes it longer by zeros: then its last byte may be overwritten with 0.
   Result<void> resize(std::uint64_t size);
   Result<void> sync();
 

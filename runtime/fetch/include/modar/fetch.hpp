@@ -21,9 +21,10 @@ struct FetchProgress {
   double seconds_left = -1;  ///< -1: not known yet
 };
 
-/// For an app with a network stack of its own: hands the bytes of the file `path` below the release
-/// folder, from byte `from` to its end, to `take` in portions, until that returns false.
-/// Errors: kExitMixed "fetch.missing" (no such file); any other: the fetch tries again.
+/// For an app with a network stack of its own, asked from the thread that calls fetch_release(),
+/// for one file at a time: hands the bytes of the file `path` below the release folder, from byte
+/// `from` to its end, to `take` in portions, until that returns false. Errors: kExitMixed
+/// "fetch.missing" (no such file); any other: the fetch tries again.
 using ByteSource =
     std::function<Result<void>(const std::string& path, std::uint64_t from,
                                const std::function<bool(std::span<const std::byte>)>& take)>;
@@ -35,13 +36,13 @@ struct FetchOptions {
   std::string device;                  ///< only bundles for this profile; empty: for any
   std::vector<std::string> bundles;    ///< only these; empty: all
   unsigned parallel = 4;               ///< pieces at once
-  std::uint64_t bytes_per_second = 0;  ///< cap; 0: none
+  std::uint64_t bytes_per_second = 0;  ///< cap, not for a ByteSource; 0: none
   unsigned attempts = 8;               ///< in a row without any data, then it gives up
   double first_wait_s = 0.5;           ///< before the second attempt, then twice as long each time
   double stall_s = 30;                 ///< a silent connection is closed after this
   std::string
       authorities;    ///< PEM file for HTTPS; empty: CURL_CA_BUNDLE, SSL_CERT_FILE, the system's
-  ByteSource source;  ///< instead of the URL, if not empty
+  ByteSource source;  ///< instead of the URL; a library built without libcurl needs it
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
 };
 

@@ -1,0 +1,146 @@
+#include "attempts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "modar/mapped_file.hpp"
+#include "modar/release.hpp"
+
+namespace modar::fetch {
+namespace {
+
+/// "No such file" answers before an object counts as missing: servers err while files are replaced.
+constexpr unsigned kMissingAttempts = 3;
+
+/// An attempt counts as progress if it ended so many bytes further than any before, or with the
+/// rest: a server that sends a byte now and then cannot keep a fetch busy for ever. Set by hand.
+constexpr std::uint64_t kLeastProgress = 1024;
+
+}  // namespace
+
+bool Attempts::begin(Transfer& transfer) {
+  transfer.too_long = false;
+  if (transfer.wanted == nullptr) return true;
+  const std::uint64_t have = file_size(transfer.part_path()).value_or(0);
+  auto file = OutputFile::open(transfer.part_path());
+  if (!file) {
+    transfer.error = file.error();
+    return false;
+  }
+  transfer.part.emplace(std::move(*file));
+  if (transfer.have == 0) tell(static_cast<std::int64_t>(have));
+  transfer.have = have;
+  // A complete part file was never verified (the run was killed): download it again.
+  if (have >= transfer.wanted->size) discard(transfer);
+  return true;
+}
+
+bool Attempts::take(Transfer& transfer, std::span<const std::byte> bytes) {
+  if (transfer.have + bytes.size() > transfer.limit) {
+    transfer.too_long = true;
+    return false;
+  }
+  if (transfer.wanted == nullptr) {
+    transfer.text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  } else if (auto written = transfer.part->write_at(transfer.have, bytes.data(), bytes.size());
+             !written) {
+    transfer.error = written.error();
+    return false;
+  } else {
+    tell(static_cast<std::int64_t>(bytes.size()));
+  }
+  transfer.have += bytes.size();
+  return true;
+}
+
+void Attempts::discard(Transfer& transfer) {
+  if (transfer.wanted != nullptr) {
+    tell(-static_cast<std::int64_t>(transfer.have));
+    if (auto emptied = transfer.part->resize(0); !emptied) transfer.error = emptied.error();
+  } else {
+    transfer.text.clear();
+  }
+  transfer.have = 0;
+}
+
+Outcome Attempts::end(Transfer& transfer, const Answer& answer) {
+  // What cannot be written is not tried again.
+  const bool written = transfer.error.code.empty();
+  Outcome outcome = written ? judge(transfer, answer) : Outcome::kFailed;
+  if (!transfer.error.code.empty()) outcome = Outcome::kFailed;
+  transfer.part.reset();
+  return outcome;
+}
+
+Outcome Attempts::judge(Transfer& transfer, const Answer& answer) {
+  if (transfer.too_long) {
+    discard(transfer);
+    return again(transfer, "the server sends more than the file has");
+  }
+  switch (answer.kind) {
+    case Answer::Kind::kFatal:
+      transfer.error = answer.error;
+      return Outcome::kFailed;
+    case Answer::Kind::kMissing:
+      if (++transfer.missing < kMissingAttempts && !transfer.optional) {
+        return again(transfer, "the server has no such file");
+      }
+      transfer.error = {kExitMixed, "fetch.missing", address_of(transfer),
+                        "the server has no such file", "publish the release again, whole"};
+      return Outcome::kFailed;
+    case Answer::Kind::kNoRange:
+      discard(transfer);
+      return again(transfer, "the server does not know the rest of the file");
+    case Answer::Kind::kBroken:
+    case Answer::Kind::kEnded:
+      break;
+  }
+  const bool ended = answer.kind == Answer::Kind::kEnded;
+  if (transfer.wanted == nullptr) {
+    if (ended) return Outcome::kDone;
+    discard(transfer);  // a text is not resumed: its length is not known
+    return again(transfer, answer.cause);
+  }
+  if (transfer.have == transfer.wanted->size) return judge_object(transfer);
+  return again(transfer, ended ? "the connection ended early" : answer.cause);
+}
+
+/// Verifies a complete object; discards it and tries again if it is wrong.
+Outcome Attempts::judge_object(Transfer& transfer) {
+  bool right = false;
+  if (const auto file = MappedFile::open(transfer.part_path())) {
+    right = object_id(file->bytes()) == transfer.wanted->id;
+  }
+  if (!right) {
+    ++stats_.corrupt;
+    discard(transfer);
+    return again(transfer, "what came is not what was published");
+  }
+  if (auto moved = rename_file(transfer.part_path(), transfer.wanted->file); !moved) {
+    transfer.error = moved.error();
+    return Outcome::kFailed;
+  }
+  return Outcome::kDone;
+}
+
+/// Schedules another attempt, unless too many in a row brought no data.
+Outcome Attempts::again(Transfer& transfer, const std::string& cause) {
+  const bool progress = transfer.have >= transfer.furthest + kLeastProgress;
+  transfer.furthest = std::max(transfer.furthest, transfer.have);
+  transfer.fruitless = progress ? 0 : transfer.fruitless + 1;
+  if (transfer.fruitless >= options_.attempts) {
+    transfer.error = {kExitNetwork, "fetch.network", address_of(transfer),
+                      cause + ", " + std::to_string(transfer.fruitless) + " times in a row",
+                      "run modar-fetch again: it resumes where it stopped"};
+    return Outcome::kFailed;
+  }
+  ++stats_.retries;
+  const double wait = std::min(options_.max_wait_s,
+                               options_.first_wait_s * std::exp2(double(transfer.fruitless) - 1));
+  transfer.not_before =
+      Transfer::Clock::now() +
+      std::chrono::duration_cast<Transfer::Clock::duration>(std::chrono::duration<double>(wait));
+  return Outcome::kAgain;
+}
+
+}  // namespace modar::fetch

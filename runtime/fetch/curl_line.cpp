@@ -1,0 +1,261 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <deque>
+#include <thread>
+#include <utility>
+
+#include <curl/curl.h>
+
+#include "line.hpp"
+#include "modar/release.hpp"
+
+namespace modar::fetch {
+namespace {
+
+using Clock = Transfer::Clock;
+
+/// Set by hand: a few round trips of a 2G link with lost packets.
+constexpr long kConnectSeconds = 15;
+/// Bytes a second below which a connection is closed after stall_s. Set by hand: 2G brings 3000.
+constexpr long kLeastSpeed = 64;
+
+/// A PEM file of authorities, as curl and OpenSSL take it from the environment; empty: the
+/// system's.
+std::string authorities_of(const TransferOptions& options) {
+  if (!options.authorities.empty()) return options.authorities;
+  for (const char* name : {"CURL_CA_BUNDLE", "SSL_CERT_FILE"}) {
+    if (const char* value = std::getenv(name); value != nullptr && *value != '\0') return value;
+  }
+  return {};
+}
+
+bool is_tls_failure(CURLcode code) {
+  return code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CONNECT_ERROR ||
+         code == CURLE_SSL_CACERT_BADFILE || code == CURLE_SSL_CERTPROBLEM ||
+         code == CURLE_SSL_ISSUER_ERROR;
+}
+
+void set_common(CURL* handle, const TransferOptions& options) {
+  curl_easy_setopt(handle, CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(handle, CURLOPT_FOLLOWLOCATION, 1L);
+  curl_easy_setopt(handle, CURLOPT_MAXREDIRS, 5L);
+  curl_easy_setopt(handle, CURLOPT_PROTOCOLS_STR, "http,https,file");
+  curl_easy_setopt(handle, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
+  curl_easy_setopt(handle, CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
+  const std::uint64_t capped = options.bytes_per_second / (2 * std::max(1u, options.parallel));
+  curl_easy_setopt(handle, CURLOPT_LOW_SPEED_LIMIT,
+                   options.bytes_per_second == 0
+                       ? kLeastSpeed
+                       : std::clamp(static_cast<long>(std::min<std::uint64_t>(capped, kLeastSpeed)),
+                                    1L, kLeastSpeed));
+  curl_easy_setopt(handle, CURLOPT_USERAGENT, options.user_agent.c_str());
+  if (const std::string file = authorities_of(options); !file.empty()) {
+    curl_easy_setopt(handle, CURLOPT_CAINFO, file.c_str());
+  }
+  if (const char* folder = std::getenv("SSL_CERT_DIR"); folder != nullptr && *folder != '\0') {
+    curl_easy_setopt(handle, CURLOPT_CAPATH, folder);
+  }
+  curl_easy_setopt(handle, CURLOPT_LOW_SPEED_TIME,
+                   std::max(1L, static_cast<long>(std::ceil(options.stall_s))));
+  // Small reads keep the rate limit smooth on slow links.
+  if (options.bytes_per_second != 0) curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 2048L);
+}
+
+/// A place for one attempt at a time; its handle keeps its connections.
+struct Download {
+  Transfer* transfer = nullptr;  ///< nullptr: the place is free
+  Attempts* attempts = nullptr;
+  CURL* handle = nullptr;
+  std::uint64_t asked_from = 0;
+  bool judged = false;                         ///< the status code was looked at
+  bool welcome = false;                        ///< the body is the file, not an error page
+  std::array<char, CURL_ERROR_SIZE> reason{};  ///< libcurl's words
+};
+
+void judge_status(Download& download) {
+  download.judged = true;
+  long status = 0;
+  curl_easy_getinfo(download.handle, CURLINFO_RESPONSE_CODE, &status);
+  // 0: not HTTP; file:// honours the range.
+  download.welcome = status == 0 || status == 206 || status == 200;
+  // A server without range requests sends the file from its beginning.
+  if (status == 200 && download.asked_from != 0) download.attempts->discard(*download.transfer);
+}
+
+std::size_t on_body(char* bytes, std::size_t unit, std::size_t count, void* user) {
+  auto& download = *static_cast<Download*>(user);
+  const std::size_t size = unit * count;
+  download.attempts->count(size);
+  if (!download.judged) judge_status(download);
+  if (!download.welcome) return size;
+  const auto body = std::as_bytes(std::span(bytes, size));
+  return download.attempts->take(*download.transfer, body) ? size : 0;
+}
+
+Answer answer_of(const Download& download, CURLcode code) {
+  long status = 0;
+  curl_easy_getinfo(download.handle, CURLINFO_RESPONSE_CODE, &status);
+  if (is_tls_failure(code)) {
+    const char* words =
+        download.reason[0] != '\0' ? download.reason.data() : curl_easy_strerror(code);
+    return {Answer::Kind::kFatal,
+            {},
+            {kExitNetwork, "fetch.tls", download.attempts->address_of(*download.transfer),
+             std::string("the TLS connection failed: ") + words,
+             "give the authority of its certificate with --cacert, and check the clock"}};
+  }
+  if (status == 404 || status == 410 || code == CURLE_FILE_COULDNT_READ_FILE) {
+    return {Answer::Kind::kMissing, {}, {}};
+  }
+  if (status == 416 || code == CURLE_RANGE_ERROR || code == CURLE_BAD_DOWNLOAD_RESUME) {
+    return {Answer::Kind::kNoRange, {}, {}};
+  }
+  if (status >= 400) {
+    return {Answer::Kind::kBroken, "the server answers " + std::to_string(status), {}};
+  }
+  if (code != CURLE_OK) return {Answer::Kind::kBroken, curl_easy_strerror(code), {}};
+  return {};
+}
+
+/// All transfers over one multi handle.
+class CurlLine : public Line {
+ public:
+  CurlLine(TransferOptions options, std::string address, CURLM* multi)
+      : options_(std::move(options)),
+        address_(std::move(address)),
+        multi_(multi),
+        places_(std::max(1u, options_.parallel)) {
+    for (Download& place : places_) place.handle = curl_easy_init();
+  }
+  CurlLine(const CurlLine&) = delete;
+  CurlLine& operator=(const CurlLine&) = delete;
+  ~CurlLine() override {
+    for (const Download& place : places_) curl_easy_cleanup(place.handle);
+    curl_multi_cleanup(multi_);
+  }
+
+  Result<void> run(std::vector<Transfer>& transfers, Attempts& attempts) override;
+
+ private:
+  bool start(Transfer& transfer, Attempts& attempts);
+  Outcome finish(Download& download, CURLcode code);
+  void limit_rate(const Attempts& attempts) const;
+
+  TransferOptions options_;
+  std::string address_;
+  CURLM* multi_;
+  std::vector<Download> places_;  // never grows: libcurl's callbacks point into it
+  Clock::time_point begin_ = Clock::now();
+};
+
+/// There is a free place. False: the transfer's error says why.
+bool CurlLine::start(Transfer& transfer, Attempts& attempts) {
+  if (!attempts.begin(transfer)) return false;
+  Download& download = *std::ranges::find(places_, nullptr, &Download::transfer);
+  CURL* handle = download.handle;
+  download = {&transfer, &attempts, handle, transfer.have};
+  curl_easy_reset(handle);
+  set_common(handle, options_);
+  curl_easy_setopt(handle, CURLOPT_URL, (address_ + "/" + transfer.path).c_str());
+  curl_easy_setopt(handle, CURLOPT_RESUME_FROM_LARGE, static_cast<curl_off_t>(transfer.have));
+  curl_easy_setopt(handle, CURLOPT_WRITEFUNCTION, on_body);
+  curl_easy_setopt(handle, CURLOPT_WRITEDATA, &download);
+  curl_easy_setopt(handle, CURLOPT_ERRORBUFFER, download.reason.data());
+  curl_easy_setopt(handle, CURLOPT_PRIVATE, &download);
+  if (curl_multi_add_handle(multi_, handle) == CURLM_OK) return true;
+  download.transfer = nullptr;
+  transfer.error = {ExitCode::kInternal, "fetch.curl", address_, "libcurl refuses to start",
+                    "report this as a bug"};
+  return false;
+}
+
+Outcome CurlLine::finish(Download& download, CURLcode code) {
+  const Answer answer = answer_of(download, code);
+  curl_multi_remove_handle(multi_, download.handle);
+  return download.attempts->end(*std::exchange(download.transfer, nullptr), answer);
+}
+
+/// Sleeps until the bytes received are within the rate limit. Meanwhile the socket fills up, and
+/// the server waits, too.
+void CurlLine::limit_rate(const Attempts& attempts) const {
+  if (options_.bytes_per_second == 0) return;
+  const double allowed = std::chrono::duration<double>(Clock::now() - begin_).count();
+  const double taken =
+      static_cast<double>(attempts.stats().bytes) / static_cast<double>(options_.bytes_per_second);
+  const double ahead = std::min(1.0, taken - allowed);
+  if (ahead > 0) std::this_thread::sleep_for(std::chrono::duration<double>(ahead));
+}
+
+Result<void> CurlLine::run(std::vector<Transfer>& transfers, Attempts& attempts) {
+  std::deque<Transfer*> waiting;
+  for (Transfer& transfer : transfers) waiting.push_back(&transfer);
+  std::size_t busy = 0;
+  std::optional<Error> error;
+  while (busy != 0 || (!waiting.empty() && !error)) {
+    const auto now = Clock::now();
+    for (std::size_t i = 0; !error && i < waiting.size() && busy < places_.size();) {
+      Transfer& next = *waiting[i];
+      if (next.not_before > now) {
+        ++i;
+        continue;
+      }
+      waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(i));
+      if (start(next, attempts)) {
+        ++busy;
+      } else {
+        error = next.error;
+      }
+    }
+    limit_rate(attempts);
+    int running = 0;
+    curl_multi_perform(multi_, &running);
+    int left = 0;
+    while (const CURLMsg* message = curl_multi_info_read(multi_, &left)) {
+      if (message->msg != CURLMSG_DONE) continue;
+      Download* download = nullptr;
+      curl_easy_getinfo(message->easy_handle, CURLINFO_PRIVATE, &download);
+      Transfer* transfer = download->transfer;
+      const Outcome outcome = finish(*download, message->data.result);
+      --busy;
+      if (outcome == Outcome::kAgain) waiting.push_back(transfer);
+      if (outcome == Outcome::kFailed && !error) error = transfer->error;
+    }
+    if (busy != 0 || !waiting.empty()) curl_multi_poll(multi_, nullptr, 0, 50, nullptr);
+  }
+  if (error) return tl::unexpected(*error);
+  return {};
+}
+
+}  // namespace
+
+std::string curl_address(const std::string& url_or_folder) {
+  std::string base = url_or_folder;
+  while (base.size() > 1 && base.back() == '/') base.pop_back();
+  if (base.find("://") != std::string::npos) return base;
+  char* absolute = ::realpath(base.c_str(), nullptr);
+  if (absolute == nullptr) return {};
+  CURLU* parts = curl_url();
+  curl_url_set(parts, CURLUPART_SCHEME, "file", 0);
+  curl_url_set(parts, CURLUPART_PATH, absolute, CURLU_URLENCODE);
+  char* text = nullptr;
+  if (curl_url_get(parts, CURLUPART_URL, &text, 0) == CURLUE_OK) base = text;
+  curl_free(text);
+  curl_url_cleanup(parts);
+  std::free(absolute);
+  return base;
+}
+
+Result<std::unique_ptr<Line>> make_curl_line(const TransferOptions& options,
+                                             const std::string& address) {
+  static const CURLcode global = curl_global_init(CURL_GLOBAL_DEFAULT);
+  CURLM* multi = global == CURLE_OK ? curl_multi_init() : nullptr;
+  if (multi == nullptr) {
+    return fail(ExitCode::kInternal, "fetch.curl", options.url, "libcurl does not start",
+                "report this as a bug");
+  }
+  return std::make_unique<CurlLine>(options, address, multi);
+}
+
+}  // namespace modar::fetch

@@ -1,0 +1,51 @@
+#include <thread>
+#include <utility>
+
+#include "line.hpp"
+
+namespace modar::fetch {
+namespace {
+
+class SourceLine : public Line {
+ public:
+  explicit SourceLine(ByteSource source) : source_(std::move(source)) {}
+
+  Result<void> run(std::vector<Transfer>& transfers, Attempts& attempts) override {
+    for (Transfer& transfer : transfers) {
+      Outcome outcome = Outcome::kAgain;
+      while (outcome == Outcome::kAgain) {
+        std::this_thread::sleep_until(transfer.not_before);
+        outcome = ask(transfer, attempts);
+      }
+      if (outcome == Outcome::kFailed) return tl::unexpected(transfer.error);
+    }
+    return {};
+  }
+
+ private:
+  Outcome ask(Transfer& transfer, Attempts& attempts) {
+    if (!attempts.begin(transfer)) return Outcome::kFailed;
+    const auto handed =
+        source_(transfer.path, transfer.have, [&](std::span<const std::byte> bytes) {
+          attempts.count(bytes.size());
+          return attempts.take(transfer, bytes);
+        });
+    Answer answer;
+    if (!handed) {
+      const bool missing = handed.error().code == "fetch.missing";
+      answer.kind = missing ? Answer::Kind::kMissing : Answer::Kind::kBroken;
+      answer.cause = handed.error().cause;
+    }
+    return attempts.end(transfer, answer);
+  }
+
+  ByteSource source_;
+};
+
+}  // namespace
+
+std::unique_ptr<Line> make_source_line(ByteSource source) {
+  return std::make_unique<SourceLine>(std::move(source));
+}
+
+}  // namespace modar::fetch

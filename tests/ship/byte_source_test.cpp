@@ -1,0 +1,129 @@
+// An app that brings the bytes itself: through a source that breaks, lies and ends.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "bake/ship/publish.hpp"
+#include "modar/fetch.hpp"
+#include "tests/formats/support.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string read(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class ByteSourceTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "modar-source-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    const auto bytes = encode_bundle(test::golden_content());
+    ASSERT_TRUE(bytes);
+    std::ofstream(folder_ / "golden.modar", std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes->data()),
+               static_cast<std::streamsize>(bytes->size()));
+    PublishRequest request;
+    request.bundles = {(folder_ / "golden.modar").string()};
+    request.folder = (folder_ / "site").string();
+    const auto key = make_key();
+    ASSERT_TRUE(key);
+    Report report;
+    ASSERT_TRUE(publish(request, *key, report));
+    options_.store = (folder_ / "store").string();
+    options_.trusted_key = public_key_line(key->public_key);
+    options_.first_wait_s = 0;
+    options_.attempts = 3;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// A file of the release folder, or fetch.missing.
+  [[nodiscard]] Result<std::string> file(const std::string& path) const {
+    const fs::path found = folder_ / "site" / path;
+    if (fs::is_regular_file(found)) return read(found);
+    return fail(ExitCode{13}, "fetch.missing", path, "no such file", "");
+  }
+
+  fs::path folder_;
+  FetchOptions options_;
+};
+
+Result<void> hand_over(std::string_view bytes, std::size_t portion,
+                       const std::function<bool(std::span<const std::byte>)>& take) {
+  while (!bytes.empty()) {
+    const auto now = bytes.substr(0, portion);
+    if (!take(std::as_bytes(std::span(now)))) return {};
+    bytes.remove_prefix(now.size());
+  }
+  return {};
+}
+
+TEST_F(ByteSourceTest, InstallsThroughALineThatBreaks) {
+  std::size_t breaks = 0;
+  std::size_t resumed = 0;
+  options_.source = [&](const std::string& path, std::uint64_t from,
+                        const auto& take) -> Result<void> {
+    const auto text = file(path);
+    if (!text) return tl::unexpected(text.error());
+    resumed += from != 0;
+    const std::string_view rest = std::string_view(*text).substr(from);
+    if (!path.starts_with("objects/") || from != 0 || rest.size() <= 200) {
+      return hand_over(rest, 100, take);
+    }
+    ++breaks;
+    MODAR_TRY(hand_over(rest.substr(0, 200), 70, take));
+    return fail(ExitCode::kIo, "app.network", path, "the tunnel", "");
+  };
+  const auto report = fetch_release(options_);
+  ASSERT_TRUE(report) << to_line(report.error());
+  EXPECT_EQ(report->version, 1u);
+  EXPECT_GT(breaks, 0u);
+  EXPECT_EQ(resumed, breaks);
+  EXPECT_EQ(report->retries, breaks);
+  ASSERT_EQ(report->bundles.size(), 1u);
+  EXPECT_EQ(read(report->bundles[0]), read(folder_ / "golden.modar"));
+  EXPECT_FALSE(fetch_release(options_)->changed);
+}
+
+TEST_F(ByteSourceTest, IsNeededWithoutLibcurl) {
+  options_.url = "http://127.0.0.1:1";
+  const auto report = fetch_release(options_);
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, "fetch.curl");
+}
+
+TEST_F(ByteSourceTest, GivesUpOnLiesAndSilence) {
+  const auto fetch_from = [&](ByteSource source) {
+    options_.source = std::move(source);
+    const auto report = fetch_release(options_);
+    EXPECT_FALSE(fs::exists(folder_ / "store" / "golden.modar"));
+    return report ? std::string() : report.error().code;
+  };
+  const auto silence = [](const std::string& path, std::uint64_t, const auto&) -> Result<void> {
+    return fail(ExitCode::kIo, "app.network", path, "no signal", "");
+  };
+  EXPECT_EQ(fetch_from(silence), "fetch.network");
+  const auto objects_as = [&](const auto& change) {
+    return [&, change](const std::string& path, std::uint64_t, const auto& take) -> Result<void> {
+      auto text = file(path);
+      if (!text) return tl::unexpected(text.error());
+      if (path.starts_with("objects/")) change(*text);
+      return hand_over(*text, 1000, take);
+    };
+  };
+  EXPECT_EQ(fetch_from(objects_as([](std::string& text) { text[0] ^= 1; })), "fetch.network");
+  EXPECT_EQ(fetch_from(objects_as([](std::string& text) { text += text; })), "fetch.network");
+  EXPECT_EQ(fetch_from(objects_as([](std::string& text) { text.pop_back(); })), "fetch.network");
+  fs::remove_all(folder_ / "site" / "objects");
+  EXPECT_EQ(fetch_from(objects_as([](std::string&) {})), "fetch.missing");
+}
+
+}  // namespace
+}  // namespace modar
