@@ -12,7 +12,7 @@ namespace {
 
 /// Entries of the cache that is planned for: the smallest that phones of the class have.
 constexpr std::uint32_t kCacheSize = 16;
-/// Vertices are sorted by counting on their first bits, then by comparison in their few.
+/// Vertices go through a counting sort on their first bits, then are compared within a bucket.
 constexpr unsigned kBucketShift = 64 - 12;
 constexpr std::size_t kBuckets = std::size_t{1} << (64 - kBucketShift);
 constexpr std::uint64_t kOut = ~std::uint64_t{0};  ///< no corners: they have 48 bits
@@ -30,7 +30,7 @@ void ChunkOrderer::rank_vertices(std::span<const std::byte> vertices, std::uint3
     for (std::size_t i = 0; i < head_bytes; ++i) {
       head = head << 8 | std::to_integer<std::uint64_t>(vertices[v * stride + i]);
     }
-    // Of short strides the head has fewer bytes: they are its highest.
+    // A stride below 8 bytes fills only the high bytes of the head.
     head <<= 8 * (8 - head_bytes);
     unsorted_[v] = {head, static_cast<std::uint32_t>(v)};
     ++buckets_[(head >> kBucketShift) + 1];
@@ -65,14 +65,14 @@ void ChunkOrderer::rank_vertices(std::span<const std::byte> vertices, std::uint3
   distinct_ = static_cast<std::uint32_t>(vertex_of_rank_.size());
 }
 
-/// Triangles over ranks, each from its lowest rank on, all sorted: by counting on the first corner,
-/// then by comparison in its few triangles.
+/// Writes the triangles as ranks, each starting at its lowest one, and sorts them: a counting sort
+/// on the first corner, then comparisons among the few triangles that share it.
 void ChunkOrderer::sort_triangles(std::span<std::uint16_t> indices) {
   first_.assign(distinct_ + 1, 0);
   for (std::size_t i = 0; i < indices.size(); i += 3) {
     std::uint16_t* t = indices.data() + i;
     for (std::size_t c = 0; c < 3; ++c) t[c] = rank_[t[c]];
-    // Of equal lowest corners the one whose successors are lower comes first.
+    // Where the lowest rank occurs twice, start at the one followed by lower ranks.
     const auto from = [&](std::size_t c) {
       return std::uint64_t{t[c]} << 32 | std::uint64_t{t[(c + 1) % 3]} << 16 | t[(c + 2) % 3];
     };
@@ -143,7 +143,7 @@ std::uint32_t ChunkOrderer::next_fan(std::size_t ring_begin) {
 }
 
 void ChunkOrderer::order_triangles(std::span<const std::uint16_t> indices) {
-  // One look at a triangle tells both whether it is out and what it is.
+  // One read tells whether the triangle has been emitted and what its corners are.
   waiting_.resize(indices.size() / 3);
   for (std::size_t t = 0; t < waiting_.size(); ++t) {
     waiting_[t] = std::uint64_t{indices[3 * t]} | std::uint64_t{indices[3 * t + 1]} << 16 |
@@ -207,7 +207,7 @@ void LevelOrderer::order(std::span<std::uint16_t> indices, std::uint32_t vertex_
   for (std::size_t v = numbers_.size(); v < vertex_count; ++v) {
     numbers_.push_back(static_cast<std::uint16_t>(v));
   }
-  // Vertices are told by their numbers, so that none becomes another.
+  // Vertices are ranked by number here, so that none are merged.
   const auto numbers = std::span<const std::uint16_t>(numbers_).first(vertex_count);
   const auto old = orderer_.order(std::as_bytes(numbers), sizeof numbers_[0], indices);
   for (std::uint16_t& index : indices) index = old[index];

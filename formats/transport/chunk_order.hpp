@@ -9,8 +9,8 @@
 
 namespace modar {
 
-/// Puts chunks in order. Holds its scratch between chunks: memory grows to the largest one (about
-/// 40 bytes a triangle), then nothing is allocated.
+/// Puts chunks in order. Keeps its working memory between calls; it grows to what the largest chunk
+/// needs, about 40 bytes a triangle.
 class ChunkOrderer {
  public:
   /// Merges vertices of equal bytes, orders the triangles for a vertex cache, then the vertices by
@@ -69,8 +69,8 @@ class ChunkOrderer {
 /// Orders the triangles of a coarser level, whose vertices stay where level 0 has them.
 class LevelOrderer {
  public:
-  /// indices: 3 a triangle, each below vertex_count (at most 65536). The result hangs on the set of
-  /// triangles alone.
+  /// indices: 3 a triangle, each below vertex_count (at most 65536). The result depends only on the
+  /// set of triangles.
   void order(std::span<std::uint16_t> indices, std::uint32_t vertex_count);
 
  private:

@@ -1,5 +1,5 @@
-// The text twin of a pattern's features, written from the mapped one: byte for byte what OpenCV's
-// FileStorage writes for them, so that the text never has to travel.
+// The YML text of a pattern's features, generated from the mapped ones: byte for byte what OpenCV's
+// FileStorage writes for them, so that the text need not be downloaded.
 #pragma once
 
 #include <string>

@@ -22,13 +22,13 @@ using ObjectId = std::array<std::uint8_t, 16>;
 /// BLAKE2b of a whole bundle, 32 bytes.
 using BundleHash = std::array<std::uint8_t, 32>;
 
-/// What a stored piece is, and how its raw bytes come back.
+/// How the stored bytes of a piece encode its raw bytes.
 enum class PieceForm : std::uint8_t {
   kStored = 1,      ///< the raw bytes
   kZstd = 2,        ///< a zstd frame of them
   kZstdHalves = 3,  ///< ETC1: a zstd frame of the blocks' first four bytes, then of their last four
   kMesh = 4,        ///< a mesh object (modar/piece.hpp)
-  kFeatureText = 5,  ///< nothing travels: the text of the feature twin at second_offset
+  kFeatureText = 5,  ///< nothing stored: the text of the mapped features at second_offset
   kLevel = 6,        ///< a coarser level's indices: zstd of meshoptimizer's index codec
 };
 
@@ -48,12 +48,13 @@ struct PieceRecord {
   std::uint8_t id[16];          ///< ObjectId of the stored bytes; zero for kFeatureText
   std::uint64_t raw_hash;       ///< XXH64, seed 0, of the raw bytes
   std::uint64_t offset;         ///< bytes into the bundle
-  std::uint64_t second_offset;  ///< kMesh: of the indices; kFeatureText: of the twin; else 0
+  std::uint64_t second_offset;  ///< kMesh: of the indices; kFeatureText: of the features; else 0
   std::uint32_t raw_size;       ///< bytes
   std::uint32_t stored_size;    ///< bytes; 0 for kFeatureText
-  std::uint32_t second_size;    ///< bytes: kMesh: of the indices; kFeatureText: of the twin; else 0
-  std::uint16_t index_base;     ///< kMesh, kLevel: added to each index; else 0
-  std::uint8_t form;            ///< PieceForm
+  std::uint32_t
+      second_size;  ///< bytes: kMesh: of the indices; kFeatureText: of the features; else 0
+  std::uint16_t index_base;  ///< kMesh, kLevel: added to each index; else 0
+  std::uint8_t form;         ///< PieceForm
   std::uint8_t reserved[9];
 };
 static_assert(sizeof(PieceRecord) == 64);

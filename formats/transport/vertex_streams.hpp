@@ -13,14 +13,14 @@
 
 namespace modar {
 
-/// A half in [-1,1] as a step of a grid of 2^-11, which predicts well, and what is finer than the
-/// grid, which does not: x = (coarse * 2^13 + fine) * 2^-24.
+/// A half in [-1,1], split into a step on a grid of 2^-11, which a codec predicts well, and the
+/// remainder, which it does not: x = (coarse * 2^13 + fine) * 2^-24.
 struct HalfParts {
   std::int32_t coarse = 0;  ///< -2048 to 2048
   std::uint32_t fine = 0;   ///< below 2^13; its lowest 13 - fine_bits(coarse) bits are zero
 };
 
-/// Nothing for -0, for what lies outside [-1,1] and for what is no number.
+/// Nothing for -0, values outside [-1,1] and NaN.
 std::optional<HalfParts> split_half(std::uint16_t half);
 std::uint16_t join_half(HalfParts parts);
 /// Bits of `fine` that are not known from `coarse`: 0 for |x| >= 1/2, one more for each halving.
@@ -30,11 +30,11 @@ int fine_bits(std::int32_t coarse);
 /// float_to_snorm8 gives for it. s, t: 0 to 2^bits - 2.
 std::array<std::int8_t, 3> snorm8_of_octahedral(std::int32_t s, std::int32_t t, int bits);
 
-/// The direction of a place of the map, its absolute values summing up to 2^(bits-1) - 1.
+/// The direction at a point of the map; its absolute values add up to 2^(bits-1) - 1.
 std::array<std::int32_t, 3> octahedral_direction(std::int32_t s, std::int32_t t, int bits);
 
-/// A direction of the map, near the normal, that gives these very bytes where there is one, else as
-/// near to them as there is. bits: 2 to 16.
+/// The direction of the map that decodes to exactly these bytes or, if there is none near the
+/// normal, to the nearest ones. bits: 2 to 16.
 std::array<std::int32_t, 3> octahedral_of_snorm8(std::array<std::int8_t, 3> bytes, int bits);
 
 /// How one attribute of a layout travels.
