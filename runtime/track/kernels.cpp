@@ -200,15 +200,11 @@ inline void store_codes(const V8* vectors, std::uint8_t* bytes) {
 #endif
 }
 
-/// A number for each code of a block.
-struct BlockSums {
-  V8 vectors[kBlockVectors];
-};
-
 /// Adds the differing bits of 16 bytes of the codes of `kBlocks` blocks. No sum exceeds a lane: 256
 /// differing bits count as 255.
 template <bool kSecond, std::size_t kBlocks>
-inline void count_bits(const std::uint8_t* code, const std::uint8_t* blocks, BlockSums* sums) {
+inline void count_bits(const std::uint8_t* code, const std::uint8_t* blocks,
+                       V8 (*sums)[kBlockVectors]) {
 #pragma GCC unroll 2
   for (std::size_t k = 0; k < kCodeBytes / 2; ++k) {
     const V8 byte = hn::Set(D8(), code[k]);
@@ -218,7 +214,7 @@ inline void count_bits(const std::uint8_t* code, const std::uint8_t* blocks, Blo
       load_codes(blocks + (b * kCodeBytes + k) * kBlockCodes, others);
 #pragma GCC unroll 2
       for (int v = 0; v < kBlockVectors; ++v) {
-        V8& sum = sums[b].vectors[v];
+        V8& sum = sums[b][v];
         const V8 bits = hn::PopulationCount(hn::Xor(byte, others[v]));
         sum = kSecond ? hn::SaturatedAdd(sum, bits) : hn::Add(sum, bits);
       }
@@ -232,29 +228,29 @@ template <std::size_t kBlocks>
 inline void compare_blocks(const std::uint8_t* code, const std::uint8_t* blocks, V8 most,
                            std::uint8_t* out, V8& least) {
   const D8 d;
-  BlockSums sums[kBlocks];
+  V8 sums[kBlocks][kBlockVectors];
 #pragma GCC unroll 2
   for (std::size_t b = 0; b < kBlocks; ++b) {
 #pragma GCC unroll 2
-    for (int v = 0; v < kBlockVectors; ++v) sums[b].vectors[v] = hn::Zero(d);
+    for (int v = 0; v < kBlockVectors; ++v) sums[b][v] = hn::Zero(d);
   }
   count_bits<false, kBlocks>(code, blocks, sums);
 #pragma GCC unroll 2
   for (std::size_t b = 0; b < kBlocks; ++b) {
-    BlockSums& mine = sums[b];
-    V8 nearest = mine.vectors[0];
+    V8* mine = sums[b];
+    V8 nearest = mine[0];
 #pragma GCC unroll 2
-    for (int v = 1; v < kBlockVectors; ++v) nearest = hn::Min(nearest, mine.vectors[v]);
+    for (int v = 1; v < kBlockVectors; ++v) nearest = hn::Min(nearest, mine[v]);
     if (hn::AllFalse(d, hn::Eq(hn::Min(nearest, most), nearest))) {
 #pragma GCC unroll 2
-      for (int v = 0; v < kBlockVectors; ++v) mine.vectors[v] = hn::Set(d, 255);
+      for (int v = 0; v < kBlockVectors; ++v) mine[v] = hn::Set(d, 255);
     } else {
       const std::uint8_t* rest = blocks + (b * kCodeBytes + kCodeBytes / 2) * kBlockCodes;
-      count_bits<true, 1>(code + kCodeBytes / 2, rest, &mine);
+      count_bits<true, 1>(code + kCodeBytes / 2, rest, sums + b);
 #pragma GCC unroll 2
-      for (int v = 0; v < kBlockVectors; ++v) least = hn::Min(least, mine.vectors[v]);
+      for (int v = 0; v < kBlockVectors; ++v) least = hn::Min(least, mine[v]);
     }
-    store_codes(mine.vectors, out + b * kBlockCodes);
+    store_codes(mine, out + b * kBlockCodes);
   }
 }
 
