@@ -64,6 +64,20 @@ there_on_arm() {
   probe "$triple-g++" "$build" "$build/bits-there" -static -idirafter /usr/include
 }
 
+# The tests of formats and runtime that need no library of the workstation.
+tests_there() {
+  google=/usr/src/googletest/googletest
+  [ -f "$build/gtest.o" ] || "$triple-g++" -O1 -std=c++20 -I$google/include -I$google -c $google/src/gtest-all.cc \
+    -o "$build/gtest.o"
+  "$triple-g++" -w -std=c++20 -ffp-contract=off -I. -Iruntime/include -I$google/include -static -idirafter /usr/include \
+    tests/track/hysteresis_test.cpp tests/track/pose_smoother_test.cpp tests/formats/bundle_test.cpp \
+    tests/formats/number_text_test.cpp tests/formats/utf8_test.cpp tests/formats/vertex_scan_test.cpp \
+    tests/formats/allocation_counter.cpp tests/formats/support.cpp tests/formats/contents.cpp \
+    $google/src/gtest_main.cc "$build/gtest.o" "$build/runtime/libmodar_runtime.a" \
+    "$build/formats/libmodar_formats.a" -pthread -o "$build/runtime-tests"
+  MODAR_SOURCE_DIR=$PWD ${run% *} "$build/runtime-tests" --gtest_brief=1
+}
+
 there_in_wasm() { # what the loop needs, without EGL
   sources="runtime/track/*.cpp formats/bundle_view.cpp formats/tracker_record.cpp formats/validate.cpp formats/rules.cpp formats/etc1.cpp"
   # shellcheck disable=SC2086
@@ -122,7 +136,7 @@ fi
 cmake --preset device > /dev/null
 cmake --build --preset device --target modar_runtime modar_formats
 probe g++ build/device "$build/bits-here"
-if [ "$arch" = wasm ]; then there_in_wasm; else there_on_arm; fi
+if [ "$arch" = wasm ]; then there_in_wasm; else there_on_arm && tests_there; fi
 frames=$build/frames.grey
 ffmpeg -loglevel error -y -i "$video" -frames:v 60 -pix_fmt gray -f rawvideo "$frames"
 size=$(ffprobe -loglevel error -select_streams v:0 -show_entries stream=width,height -of csv=p=0:s=x "$video" | tr x ' ')
