@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/report.hpp"
@@ -50,8 +51,9 @@ struct BakeRequest {
   double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
   MaxError max_error;
   std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
-  std::uint32_t levels = 4;               ///< of detail a chunk, the finest counted
-  bool topology = true;                   ///< measure and state each model's
+  /// Of detail a chunk at most, the finest counted: halving ends before for all but huge chunks.
+  std::uint32_t levels = kMaxLevels;
+  bool topology = true;            ///< measure and state each model's
   std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
   std::string device;              ///< profile that it is planned for; empty: none
   unsigned jobs = 1;               ///< the bytes do not depend on it

@@ -222,6 +222,31 @@ TEST(Levels, TheStatedErrorBoundsTheDistance) {
   }
 }
 
+TEST(Levels, GoOnUntilTheModelIsAFewPixelsWide) {
+  // A ball of 12,800 triangles, in one chunk and in some, whose borders stay.
+  for (const auto& [max_vertices, share] : {std::pair(65535u, 64u), std::pair(2500u, 12u)}) {
+    ChunkedMesh split = chunked(welded(parse(ball(40))), max_vertices);
+    LevelOptions options;
+    options.levels = kMaxLevels;
+    Report report;
+    ASSERT_TRUE(make_levels(split, options, report));
+    const PackedMesh mesh = testing::packed(split);
+    std::uint64_t finest = 0;
+    std::uint64_t drawn = 0;
+    for (const ChunkRecord& chunk : mesh.chunks) {
+      finest += mesh.levels[chunk.first_level].index_count / 3;
+      // What is off by no more than a pixel where the ball, of 2, is 13 pixels across.
+      std::uint32_t level = chunk.first_level;
+      for (std::uint32_t l = 1; l < chunk.level_count; ++l) {
+        const LevelRecord& coarser = mesh.levels[chunk.first_level + l];
+        if (coarser.error * 6.5f <= 1.0f) level = chunk.first_level + l;
+      }
+      drawn += mesh.levels[level].index_count / 3;
+    }
+    EXPECT_LT(drawn * share, finest) << mesh.chunks.size() << " chunks draw " << drawn;
+  }
+}
+
 TEST(Levels, DistancesOfKnownSurfaces) {
   // A square, and the same with its middle lifted by 0.5.
   const std::vector<glm::dvec3> p = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 0.5}};

@@ -19,9 +19,10 @@ namespace {
 constexpr std::size_t kFewTriangles = 24;
 /// A level that keeps more of the previous one's triangles is not worth its bytes. Set by hand.
 constexpr double kWorthwhile = 0.8;
-/// Of the chunk's diagonal: a collapse that moves the surface farther spoils even a coarse level.
-/// Set by hand.
-constexpr double kMaxCollapse = 0.03;
+/// Of the chunk's diagonal: no collapse moves the surface farther. A level that is off by a pixel
+/// is then good for chunks down to four pixels across; what is smaller costs a draw call either
+/// way.
+constexpr double kMaxCollapse = 0.25;
 /// Of the chunk's diagonal: the texture may slide this far. Set by hand.
 constexpr double kMaxSlide = 0.01;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar

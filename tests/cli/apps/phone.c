@@ -38,22 +38,24 @@ static void check_drawing(const modar_bundle* bundle) {
   modar_context_destroy(context);
 }
 
-/* A search on a thread of its own ends some frames later. */
-static void check_search_apart(const modar_bundle* bundle, const modar_camera* camera, const uint8_t* frame) {
+/* A search on a thread of its own, or within a budget, ends some frames later; counts the frames. */
+static int check_search_apart(const modar_bundle* bundle, const modar_camera* camera, const uint8_t* frame,
+                              modar_tracker_options options) {
   const struct timespec pause = {0, 5000000};
-  modar_tracker_options options = {.size = sizeof options, .async_search = 1};
+  int frames = 0;
   modar_tracker* tracker = modar_tracker_create_with(bundle, camera, &options, &error);
   modar_pose pose = {0};
   NEED(tracker != NULL);
-  for (int i = 0; i < 4000 && !pose.visible; ++i) {
+  while (!pose.visible && ++frames < 4000) {
     NEED(modar_tracker_step(tracker, frame, (size_t)camera->width, &error) == 0);
     modar_tracker_pose(tracker, 0, &pose);
-    nanosleep(&pause, NULL);
+    if (options.async_search) nanosleep(&pause, NULL);
   }
   NEED(pose.visible);
   modar_tracker_reset(tracker);
   NEED(!modar_tracker_pose(tracker, 0, &pose) && !pose.shown);
   modar_tracker_destroy(tracker);
+  return frames;
 }
 
 int main(int argc, char** argv) {
@@ -92,7 +94,12 @@ int main(int argc, char** argv) {
   NEED(modar_pick(bundle, &camera, -500, -500, &item, 1, &hit) == 0);
   NEED(modar_pick(bundle, &camera, x, y, &item, 1, &hit) == 1);
   printf("pick %g %g %g %g\n", hit.distance, hit.point[0], hit.point[1], hit.point[2]);
-  check_search_apart(bundle, &camera, frame);
+  modar_tracker_options apart = {.size = sizeof apart, .async_search = 1};
+  check_search_apart(bundle, &camera, frame, apart);
+  modar_tracker_options bounded = {.size = sizeof bounded, .budget = 12};
+  const int frames = check_search_apart(bundle, &camera, frame, bounded);
+  bounded.budget = 0;
+  NEED(frames > check_search_apart(bundle, &camera, frame, bounded) && frames < 30);
   check_drawing(bundle);
   free(frame);
   modar_focal_finder_destroy(finder);
