@@ -44,6 +44,7 @@ Bytes bytes_of(const T& record) {
 std::uint16_t flags_of(SectionType type) {
   switch (type) {
     case SectionType::kMeta:
+    case SectionType::kStatement:
     case SectionType::kContentSummary:
     case SectionType::kFeatureYml:
       return 0;
@@ -139,11 +140,12 @@ class SectionList {
     return true;
   }
 
-  [[nodiscard]] FileHeader header() const {
+  /// minor: of the format version that the content needs.
+  [[nodiscard]] FileHeader header(std::uint16_t minor) const {
     FileHeader header{};
     std::copy(kMagic.begin(), kMagic.end(), header.magic);
     header.major = kMajorVersion;
-    header.minor = kMinorVersion;
+    header.minor = minor;
     header.section_count = static_cast<std::uint32_t>(sections_.size());
     header.file_size = file_size_;
     header.table_offset = sizeof(FileHeader);
@@ -208,6 +210,12 @@ void collect(const BundleContent& content, SectionList& list) {
   for (const ExtraSection& extra : content.extra) list.add_extra(extra);
 }
 
+std::size_t feature_count(const BundleContent& content) {
+  std::size_t count = 0;
+  for (const auto& list : content.features) count += list.size();
+  return count;
+}
+
 /// Counts what went through, so that padding needs no bookkeeping elsewhere.
 class Stream {
  public:
@@ -225,9 +233,9 @@ class Stream {
   std::uint64_t position_ = 0;
 };
 
-bool stream(const SectionList& list, const ByteSink& sink) {
+bool stream(const SectionList& list, std::uint16_t minor, const ByteSink& sink) {
   Stream out(sink);
-  const FileHeader header = list.header();
+  const FileHeader header = list.header(minor);
   if (!out.put(bytes_of(header))) return false;
   for (const Section& section : list.sections()) {
     if (!out.put(bytes_of(section.entry))) return false;
@@ -262,11 +270,18 @@ NameRef BundleContent::intern(std::string_view name) {
   return {static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(clean.size())};
 }
 
+std::vector<SectionEntry> section_table(const BundleContent& content) {
+  SectionList list(feature_count(content));
+  if (contradiction(content) == nullptr) collect(content, list);
+  std::vector<SectionEntry> entries;
+  if (!list.finish()) return entries;  // write_bundle() reports it
+  for (const Section& section : list.sections()) entries.push_back(section.entry);
+  return entries;
+}
+
 Result<void> write_bundle(const BundleContent& content, const ByteSink& sink) {
   const char* wrong = contradiction(content);
-  std::size_t features = 0;
-  for (const auto& list : content.features) features += list.size();
-  SectionList list(features);
+  SectionList list(feature_count(content));
   if (wrong == nullptr) {
     collect(content, list);
     if (!list.finish()) wrong = "two sections of one type, owner and variant";
@@ -277,7 +292,9 @@ Result<void> write_bundle(const BundleContent& content, const ByteSink& sink) {
                 std::string("the content to write has ") + wrong,
                 "this is a bug of the program that fills the bundle; please report it");
   }
-  if (!stream(list, sink)) {
+  // Version 1.1 added the content summary; a bundle without one is readable as 1.0.
+  const std::uint16_t minor = content.summary.empty() ? 0 : kMinorVersion;
+  if (!stream(list, minor, sink)) {
     return fail(ExitCode::kIo, "io.write", "bundle", "the bundle could not be written in full",
                 "make room on the disk and try again");
   }

@@ -60,6 +60,9 @@ struct BundleContent {
   NameRef intern(std::string_view name);
 };
 
+/// The section table that write_bundle() gives a content, in its order: types, sizes, hashes.
+std::vector<SectionEntry> section_table(const BundleContent& content);
+
 /// Receives the file front to back. A false return stops the writing ("io.write").
 using ByteSink = std::function<bool(std::span<const std::byte>)>;
 

@@ -365,8 +365,7 @@ class GeometryCheck {
 
 }  // namespace
 
-void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes,
-                    SummaryCheck& summary) {
+void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes) {
   GeometryCheck check(log, parts);
   for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
     const ModelRecord& model = parts.models[i];
@@ -381,7 +380,6 @@ void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashe
         const LevelRecord& level = parts.levels[chunk.first_level + k];
         check.check_level(layout, scan, chunk, level,
                           [&] { return where() + ", level " + std::to_string(k); });
-        summary.level(chunk.first_level + k, layout.stride);
         // Hashed while the caches still hold it.
         hashes.vertices.read_to(level.vertex_offset +
                                 std::uint64_t{level.vertex_count} * layout.stride);

@@ -45,33 +45,12 @@ struct BufferHashes {
   SectionHash indices;
 };
 
-/// Compares the content summary with the bundle, line by line in its order. Does nothing where
-/// there is none.
-class SummaryCheck {
- public:
-  /// Both must outlive this.
-  SummaryCheck(FaultLog& log, const BundleParts& parts);
-  void records();
-  void level(std::uint32_t index, std::uint32_t stride);
-  void texture_level(std::uint32_t index, std::span<const std::byte> data);
-  /// Nothing may follow.
-  void finish();
-
- private:
-  void tracker_records();
-  void expect(std::string_view line, const char* subject, std::uint32_t index);
-
-  FaultLog& log_;
-  const BundleParts& parts_;
-  const SectionEntry* entry_;
-  std::string_view text_;
-  std::size_t read_ = 0;
-};
+/// Compares the content summary with the bundle, line by line. Does nothing where there is none.
+void check_summary(FaultLog& log, const BundleParts& parts);
 
 /// Every index and every vertex that one refers to. Time grows with the index buffer. Needs a
 /// bundle whose structure is valid.
-void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes,
-                    SummaryCheck& summary);
+void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes);
 
 /// Counts how often a rule is broken and remembers where first, so that a million bad vertices make
 /// one line.

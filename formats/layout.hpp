@@ -12,7 +12,7 @@ namespace modar {
 
 inline constexpr std::array<std::uint8_t, 8> kMagic = {0x89, 'M', 'O', 'D', 0x0D, 0x0A, 0x1A, 0x0A};
 inline constexpr std::uint16_t kMajorVersion = 1;    ///< must match
-inline constexpr std::uint16_t kMinorVersion = 0;    ///< additive
+inline constexpr std::uint16_t kMinorVersion = 1;    ///< additive
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;  ///< "no such index"
 inline constexpr std::uint64_t kNoOffset = 0xFFFFFFFFFFFFFFFFull;
 inline constexpr std::uint32_t kMaxSections = 65536;
@@ -30,7 +30,8 @@ inline constexpr std::uint64_t kGpuAlignment = 4096;
 enum class SectionType : std::uint32_t {
   kNames = 1,             ///< UTF-8 names, back to back
   kMeta = 2,              ///< JSON text: how the bundle was baked
-  kContentSummary = 3,    ///< JSON lines that follow from the rest: see content_summary.hpp
+  kStatement = 3,         ///< the content summary of version 1.0, which is no longer read
+  kContentSummary = 4,    ///< since 1.1: JSON lines derived from the rest, see content_summary.hpp
   kModels = 16,           ///< table of ModelRecord
   kChunks = 17,           ///< table of ChunkRecord
   kLevels = 18,           ///< table of LevelRecord

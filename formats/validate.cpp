@@ -28,6 +28,7 @@ struct KnownType {
 constexpr KnownType kKnownTypes[] = {
     {SectionType::kNames, kSectionRequired, false},
     {SectionType::kMeta, 0, false},
+    {SectionType::kStatement, 0, false},
     {SectionType::kContentSummary, 0, false},
     {SectionType::kModels, kSectionRequired, false},
     {SectionType::kChunks, kSectionRequired, false},

@@ -119,7 +119,7 @@ TABLES = {
     64: ("scenes", Record("pattern:I model:I scale:f offset:3f rotation:4f reserved:2I")),
 }
 KEYPOINT = struct.Struct("<5f2i")
-SINGLES = {1: 1, 2: 0, 3: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}}  # type: flags
+SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}}  # type: flags
 OWNED = {256: 1, 257: 0, 514: 3}
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
@@ -149,7 +149,7 @@ class Bundle:
         end = 64 + 48 * head["section_count"]
         need(head["section_count"] <= 65536 and end <= len(data), "BUNDLE_SECTION_COUNT", 12)
         need(xxh64(data[:56] + data[64:end]) == head["hash"], "BUNDLE_HEADER_HASH", 56)
-        self.strict = head["minor"] == 0
+        self.strict = head["minor"] <= 1
         self.clean(head)
 
     def clean(self, record):

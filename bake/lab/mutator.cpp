@@ -11,6 +11,7 @@
 #include <map>
 
 #include "formats/component.hpp"
+#include "formats/tracker_record.hpp"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -258,11 +259,52 @@ void with_type(FieldType type, Work work) {
 
 }  // namespace
 
+std::vector<ItemArray> item_arrays(const BundleView& bundle) {
+  std::vector<ItemArray> arrays;
+  const auto add = [&arrays](const char* name, std::uint64_t first, std::uint64_t size,
+                             std::uint64_t count) {
+    if (count > 1) arrays.push_back({name, first, size, count});
+  };
+  const auto place = [&bundle](const void* part) {
+    return static_cast<std::uint64_t>(static_cast<const std::byte*>(part) - bundle.bytes().data());
+  };
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const ModelRecord& model = bundle.models()[m];
+    const std::uint16_t stride = bundle.layouts()[model.layout].stride;
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        const LevelRecord& level = bundle.levels()[chunk.first_level + l];
+        add("vertices", place(bundle.vertices().data()) + level.vertex_offset, stride,
+            level.vertex_count);
+        add("triangles", place(bundle.indices().data()) + level.index_offset, 6,
+            level.index_count / 3);
+      }
+    }
+  }
+  for (const SectionEntry& entry : bundle.sections()) {
+    const std::byte* bytes = bundle.bytes().data() + entry.offset;
+    const auto type = static_cast<SectionType>(entry.type);
+    if (type == SectionType::kTextureData) {
+      add("blocks", entry.offset, 8, entry.size / 8);
+    } else if (type == SectionType::kMappedFeatures) {
+      const auto& header = *reinterpret_cast<const FeatureHeader*>(bytes);
+      add("descriptors", entry.offset + header.descriptors_offset, header.descriptor_bytes,
+          header.count);
+    } else if (type == SectionType::kTrackerRecord) {
+      const auto& header = *reinterpret_cast<const TrackerRecordHeader*>(bytes);
+      add("codes", entry.offset + header.codes_offset, kTrackerCodeBytes, header.feature_count);
+    }
+  }
+  return arrays;
+}
+
 Mutator::Mutator(std::span<const std::byte> bytes, std::uint64_t seed)
     : bytes_(bytes.begin(), bytes.end()), size_(bytes.size()), whole_(bytes.size()), random_(seed) {
   const Result<BundleView> view = BundleView::open(bytes);
   section_count_ = view->sections().size();
   fields_ = mutation_fields(*view);
+  arrays_ = item_arrays(*view);
   head_.assign(bytes.begin(),
                bytes.begin() + static_cast<std::ptrdiff_t>(sizeof(FileHeader) +
                                                            section_count_ * sizeof(SectionEntry)));
@@ -298,6 +340,7 @@ Mutation Mutator::next(bool rehashed) {
   const std::uint64_t pick = draw(rehashed ? 32 : 8);
   Mutation mutation = pick == 0                ? truncate(rehashed)
                       : pick == 1              ? swap_sections(rehashed)
+                      : rehashed && pick < 6   ? permute(rehashed)
                       : !rehashed && pick == 2 ? extend()
                       : !rehashed && pick < 6  ? flip_bit()
                                                : edit_field(rehashed);
@@ -356,6 +399,41 @@ Mutation Mutator::edit_field(bool rehashed) {
   mutation.kind = change(*field, mutation.offset);
   mutation.after.assign(at, at + size);
   if (rehashed) rehash(mutation.offset, mutation.offset + size);
+  return mutation;
+}
+
+/// Swaps two items, or rotates the parts of one: its two-byte parts for a triangle, which flips or
+/// turns it, its bytes otherwise.
+Mutation Mutator::permute(bool rehashed) {
+  if (arrays_.empty()) return edit_field(rehashed);
+  const ItemArray& array = arrays_[draw(arrays_.size())];
+  const bool triangle = std::strcmp(array.name, "triangles") == 0;
+  const bool swap = draw(2) == 0;
+  const std::uint64_t a = draw(array.count);
+  const std::uint64_t b = swap ? (a + 1 + draw(array.count - 1)) % array.count : a;
+  const std::uint64_t from = array.first + std::min(a, b) * array.size;
+  const std::uint64_t to = array.first + (std::max(a, b) + 1) * array.size;
+  std::byte* const at = bytes_.data() + from;
+  const std::vector<std::byte> before(at, bytes_.data() + to);
+  if (swap) {
+    std::swap_ranges(at, at + array.size, bytes_.data() + to - array.size);
+  } else if (triangle) {
+    std::swap_ranges(at, at + 2, at + 2 + 2 * draw(2));
+  } else {
+    std::rotate(at, at + 1 + draw(array.size - 1), at + array.size);
+  }
+  if (std::equal(before.begin(), before.end(), at)) return edit_field(rehashed);
+  saved_at_ = from;
+  saved_ = before;
+  if (rehashed) rehash(from, to);
+  Mutation mutation{std::string(array.name) + (swap       ? " swapped"
+                                               : triangle ? " flipped"
+                                                          : " rotated"),
+                    "",
+                    from,
+                    {},
+                    {},
+                    false};
   return mutation;
 }
 

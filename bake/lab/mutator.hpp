@@ -36,6 +36,18 @@ struct MutationField {
 /// Every field that has a place in the bundle, in a fixed order.
 std::vector<MutationField> mutation_fields(const BundleView& bundle);
 
+/// Items of one size, back to back, whose order a mutation changes.
+struct ItemArray {
+  const char* name = "";    ///< "vertices", "triangles", "blocks", "descriptors"
+  std::uint64_t first = 0;  ///< byte in the file
+  std::uint64_t size = 0;   ///< of an item, bytes
+  std::uint64_t count = 0;  ///< at least 2
+};
+
+/// The vertices and triangles of each level, the ETC1 blocks of each texture, the descriptors of
+/// each pattern, the codes of each tracker record.
+std::vector<ItemArray> item_arrays(const BundleView& bundle);
+
 /// What was done to the bytes.
 struct Mutation {
   std::string kind;
@@ -59,6 +71,7 @@ class Mutator {
 
  private:
   Mutation edit_field(bool rehashed);
+  Mutation permute(bool rehashed);
   Mutation flip_bit();
   Mutation truncate(bool rehashed);
   Mutation extend();
@@ -77,6 +90,7 @@ class Mutator {
   std::vector<std::byte> saved_;
   std::uint64_t saved_at_ = 0;
   std::vector<MutationField> fields_;
+  std::vector<ItemArray> arrays_;
   std::mt19937_64 random_;
 };
 

@@ -153,7 +153,7 @@ TEST(Bundle, ANewerMinorVersionReads) {
   content.extra.push_back({48, 1, kSectionRequired, kNone, 0, longer});
   bytes = encode(content);
   EXPECT_EQ(BundleView::open(bytes).error().code, "bundle.table-shape");
-  reinterpret_cast<FileHeader*>(bytes.data())->minor = 1;
+  reinterpret_cast<FileHeader*>(bytes.data())->minor = kMinorVersion + 1;
   reinterpret_cast<FileHeader*>(bytes.data())->reserved0 = 1;
   entry_of(bytes, SectionType::kMeta).flags |= 4;
   rehash(bytes);

@@ -9,6 +9,7 @@
 
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
+#include "formats/content_summary.hpp"
 #include "tests/formats/dump.hpp"
 #include "tests/formats/support.hpp"
 
@@ -41,13 +42,20 @@ std::string quoted(const std::string& path) {
   return "\"" + path + "\"";
 }
 
-/// A released file never changes; while 1.0 is the current version, its writer still makes it.
-TEST(Golden, WriterMakesTheReleasedBytes) {
-  EXPECT_EQ(encode(golden_content()), read_file(source_path("tests/golden/v1_0.modar")));
+/// A released file never changes. Version 1.1 is 1.0 and a content summary, so its writer makes
+/// both.
+TEST(GoldenFiles, WriterMakesTheReleasedBytes) {
+  BundleContent content = golden_content();
+  EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_0.modar")));
+  content.summary = content_summary_of(content);
+  EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_1.modar")));
 }
 
-TEST(Golden, BothReadersDecodeTheSame) {
-  const std::string path = source_path("tests/golden/v1_0.modar");
+class Golden : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Versions, Golden, ::testing::Values("v1_0", "v1_1"));
+
+TEST_P(Golden, BothReadersDecodeTheSame) {
+  const std::string path = source_path(std::string("tests/golden/") + GetParam() + ".modar");
   const Bytes bytes = read_file(path);
   const auto view = BundleView::open(bytes);
   ASSERT_TRUE(view) << to_line(view.error());
@@ -59,7 +67,7 @@ TEST(Golden, BothReadersDecodeTheSame) {
   EXPECT_EQ(ours, theirs) << nlohmann::json::diff(ours, theirs).dump(1);
 }
 
-TEST(Golden, FullOutputHasEveryValue) {
+TEST(GoldenFiles, FullOutputHasEveryValue) {
   const Answer answer =
       second_reader(quoted(source_path("tests/golden/v1_0.modar")) + " --json --full");
   ASSERT_EQ(answer.exit, 0) << answer.text;

@@ -203,6 +203,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
   const std::map<SectionType, std::string> names = {
       {SectionType::kNames, "names"},
       {SectionType::kMeta, "meta"},
+      {SectionType::kStatement, "statement"},
       {SectionType::kContentSummary, "content summary"},
       {SectionType::kModels, "models"},
       {SectionType::kChunks, "chunks"},

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "formats/atomic_file.hpp"
+#include "formats/content_summary.hpp"
 #include "tests/formats/support.hpp"
 
 int main(int count, char** arguments) {
@@ -9,6 +10,8 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "usage: make_golden OUT.modar\n");
     return 1;
   }
-  const modar::test::Bytes bytes = modar::test::encode(modar::test::golden_content());
+  modar::BundleContent content = modar::test::golden_content();
+  content.summary = modar::content_summary_of(content);
+  const modar::test::Bytes bytes = modar::test::encode(content);
   return modar::write_file(arguments[1], bytes) ? 0 : 2;
 }
