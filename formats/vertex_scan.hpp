@@ -1,5 +1,5 @@
 // Fast scans of a level's bytes, many vertices and indices at a time: their answer is "all of it is
-// valid" or "check one by one". Internal to formats/.
+// valid" or "check one by one". For the checker and the renderer.
 #pragma once
 
 #include <cstddef>

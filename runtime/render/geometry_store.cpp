@@ -2,7 +2,9 @@
 #include "runtime/render/geometry_store.hpp"
 
 #include <algorithm>
+#include <string>
 
+#include "formats/vertex_scan.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {
@@ -95,8 +97,24 @@ void GeometryStore::merge_vertex_ranges() {
   for (Range& range : index_ranges_) range.gpu_offset = range.source;
 }
 
-void GeometryStore::upload() {
-  if (!streams_) upload_whole();
+bool GeometryStore::indices_valid(std::uint32_t level) const {
+  const LevelRecord& record = bundle_.levels()[level];
+  const auto* first =
+      reinterpret_cast<const std::uint16_t*>(bundle_.indices().data() + record.index_offset);
+  return record.index_count == 0 ||
+         scan_indices({first, record.index_count}).greatest < record.vertex_count;
+}
+
+Result<void> GeometryStore::upload() {
+  if (streams_) return {};
+  for (std::uint32_t level = 0; level < bundle_.levels().size(); ++level) {
+    if (indices_valid(level)) continue;
+    return fail(ExitCode::kInvalidInput, "level.index", "level " + std::to_string(level),
+                "an index refers to a vertex that its level lacks",
+                "run modar check on the bundle");
+  }
+  upload_whole();
+  return {};
 }
 
 void GeometryStore::upload_whole() {
@@ -166,6 +184,7 @@ bool GeometryStore::use(std::uint32_t level, GlState& gl, LevelPlace& place) {
   // Stamped before room is made, so that making room for one does not throw out the other.
   vertices.last_used = frame_;
   indices.last_used = frame_;
+  if (indices.buffer == 0 && !indices_valid(level)) return false;
   if (!make_resident(vertices, gl) || !make_resident(indices, gl)) return false;
   place = {vertices.buffer, indices.buffer, 0, 0};
   return true;

@@ -28,8 +28,10 @@ class GeometryStore {
   GeometryStore(const BundleView& bundle, std::span<const VertexFormat> formats,
                 std::uint64_t budget);
 
-  /// Uploads what fits (all, or nothing yet) into the current context.
-  void upload();
+  /// Uploads what fits (all, or nothing yet) into the current context. Errors: kInvalidInput
+  /// "level.index" where an index refers to a vertex that its level lacks: GL need not bound what a
+  /// draw call reads. Levels that are uploaded later are checked then, and not drawn.
+  Result<void> upload();
   /// Deletes the GL buffers.
   void release(GlState& gl);
 
@@ -64,6 +66,7 @@ class GeometryStore {
 
   void collect_ranges();
   void merge_vertex_ranges();
+  [[nodiscard]] bool indices_valid(std::uint32_t level) const;
   void upload_whole();
   bool make_resident(Range& range, GlState& gl);
   bool evict(std::uint64_t bytes, GlState& gl);

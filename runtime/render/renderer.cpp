@@ -141,7 +141,7 @@ struct Renderer::State {
     const SavedGlState saved(extensions, !options.exclusive_context);
     MODAR_TRY(textures.upload(
         caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2)));
-    geometry.upload();
+    MODAR_TRY(geometry.upload());
     MODAR_TRY(painter.create(textures, extensions, caps));
     MODAR_TRY(background.create());
     gl.reset();

@@ -1,4 +1,5 @@
 // Vertices and indices straight from mapped bytes land where projection says, in every layout.
+#include <cstring>
 #include <random>
 
 #include <glm/gtc/matrix_transform.hpp>
@@ -94,6 +95,27 @@ class GeometryTest : public GlTest {
 TEST_F(GeometryTest, HalfFloatsDrawStraightFromTheMapping) {
   if (!probe_gl_caps().half_float_vertices) GTEST_SKIP() << "this driver has no half floats";
   check_layout(Layout::kHalfColoured, probe_gl_caps(), some_view(), true);
+}
+
+/// GL need not bound what a draw call reads.
+TEST_F(GeometryTest, IndicesBeyondTheirLevelAreNotUploaded) {
+  SceneMaker maker;
+  maker.add_plain_model(Layout::kHalfColoured, random_triangles(7, 60));
+  const auto beyond = static_cast<std::uint16_t>(maker.content.levels[0].vertex_count);
+  std::memcpy(maker.content.indices.data() + maker.content.levels[0].index_offset, &beyond,
+              sizeof beyond);
+  const MappedBundle bundle(maker.content);
+  GlCaps caps = probe_gl_caps();
+  const auto refused = Renderer::create(*bundle.view, caps);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "level.index");
+  // With a budget, levels are uploaded when they are drawn: this one never is.
+  caps.gpu_memory = 2;
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
+  ASSERT_TRUE(renderer);
+  const DrawItem item{0, glm::mat4(some_view())};
+  draw(*renderer, small_camera(), {&item, 1});
+  EXPECT_EQ(renderer->stats().draw_calls, 0);
 }
 
 TEST_F(GeometryTest, HalfFloatsWidenedDrawTheSame) {
