@@ -48,6 +48,11 @@ std::uint64_t get_number(const std::uint8_t* from) {
 /// Masks or unmasks the last part of the record.
 bool apply_mask(Record& record, const std::string& pass_phrase) {
   const std::uint8_t* salt = record.data() + kHead;
+  // Limits above minisign's own would keep a foreign file's reader busy for as long as it likes.
+  if (get_number(salt + kSalt) > crypto_pwhash_scryptsalsa208sha256_opslimit_sensitive() ||
+      get_number(salt + kSalt + 8) > crypto_pwhash_scryptsalsa208sha256_memlimit_sensitive()) {
+    return false;
+  }
   std::vector<std::uint8_t> stream(kMasked);
   if (crypto_pwhash_scryptsalsa208sha256(stream.data(), stream.size(), pass_phrase.data(),
                                          pass_phrase.size(), salt, get_number(salt + kSalt),
