@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -41,6 +42,7 @@ struct Issue {
   std::string where;
   std::uint64_t offset = 0;
   std::string detail;
+  std::optional<Severity> severity = {};  ///< where it differs from the kind's
 };
 
 using IssueSink = std::function<void(const Issue&)>;

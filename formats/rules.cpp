@@ -165,7 +165,7 @@ void FaultLog::add(Rule rule, std::uint64_t offset, std::string where, std::stri
   const bool is_error = kind.severity == Severity::kError;
   if (sink_ != nullptr) {
     if (is_error) ++errors_;
-    (*sink_)(Issue{&kind, std::move(where), offset, std::move(detail)});
+    (*sink_)(Issue{&kind, std::move(where), offset, std::move(detail), std::nullopt});
     return;
   }
   if (!is_error || errors_++ > 0) return;

@@ -399,7 +399,10 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
     content.scenes.push_back(
         place_scene(known.scene, known.pattern, known.model, (*sides)[known.model]));
   }
-  content.meta = bundle_meta(request, report);
+  BakeRequest stated = request;
+  stated.scenes.clear();
+  for (const KnownScene& known : *scenes) stated.scenes.push_back(known.scene);
+  content.meta = bundle_meta(stated, report);
   content.summary = content_summary_of(content);
   return content;
 }

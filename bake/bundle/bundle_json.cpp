@@ -189,6 +189,15 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
   for (const PatternRequest& pattern : request.patterns) {
     patterns.push_back({{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}});
   }
+  Json scenes = Json::array();
+  for (const SceneRequest& scene : request.scenes) {
+    scenes.push_back({{"pattern", scene.pattern},
+                      {"model", scene.model},
+                      {"scale", scene.scale},
+                      {"up", static_cast<int>(scene.up)},
+                      {"centred", scene.centred},
+                      {"offset", Json::list(scene.offset)}});
+  }
   const Json options = {{"device", request.device},
                         {"lods", request.levels},
                         {"max_error", request.max_error.value},
@@ -203,6 +212,7 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
   const Json meta = {{"tool", "modar " + request.tool_version},
                      {"models", models},
                      {"patterns", patterns},
+                     {"scenes", scenes},
                      {"options", options}};
   return meta.dump();
 }

@@ -1,4 +1,6 @@
 // Reads the options of a bake back from the meta text that bundle_meta() wrote.
+#include <algorithm>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -32,11 +34,66 @@ void take(const Json& options, const char* key, T& value) {
   }
 }
 
+/// A name of a scene or a pattern that is among the sources: others cannot be baked.
+template <class Range, class PathOf>
+bool is_given(const Range& sources, PathOf path_of, const std::string& stem) {
+  return std::any_of(sources.begin(), sources.end(),
+                     [&](const auto& source) { return file_stem(path_of(source)) == stem; });
+}
+
+void read_scenes(const Json& document, BakeRequest& request) {
+  const auto scenes = document.find("scenes");
+  if (scenes == document.end() || !scenes->is_array()) return;
+  for (const Json& stated : *scenes) {
+    if (!stated.is_object()) continue;
+    SceneRequest scene;
+    take(stated, "pattern", scene.pattern);
+    take(stated, "model", scene.model);
+    take(stated, "scale", scene.scale);
+    int up = 0;
+    take(stated, "up", up);
+    if (up <= static_cast<int>(UpAxis::kMinusZ)) scene.up = static_cast<UpAxis>(up);
+    take(stated, "centred", scene.centred);
+    const auto offset = stated.find("offset");
+    for (std::size_t i = 0; offset != stated.end() && offset->is_array() && i < 3; ++i) {
+      if (i < offset->size() && (*offset)[i].is_number()) {
+        scene.offset[i] = (*offset)[i].get<double>();
+      }
+    }
+    if (is_given(
+            request.models, [](const std::string& path) { return path; }, scene.model) &&
+        is_given(
+            request.patterns, [](const PatternRequest& p) { return p.path; }, scene.pattern)) {
+      request.scenes.push_back(scene);
+    }
+  }
+}
+
+/// The widths that patterns were baked with, where the user gives none.
+void read_widths(const Json& document, BakeRequest& request) {
+  const auto patterns = document.find("patterns");
+  if (patterns == document.end() || !patterns->is_array()) return;
+  for (const Json& stated : *patterns) {
+    if (!stated.is_object()) continue;
+    std::string file;
+    double width = 0;
+    take(stated, "file", file);
+    take(stated, "width_mm", width);
+    for (PatternRequest& pattern : request.patterns) {
+      const bool same = std::filesystem::path(pattern.path).filename().string() == file;
+      if (same && pattern.width_mm == 0 && width > 0) pattern.width_mm = width;
+    }
+  }
+}
+
 }  // namespace
 
 void read_bake_options(std::string_view meta, BakeRequest& request) {
   const Json document = Json::parse(meta, nullptr, false);
-  if (!document.is_object() || !document.contains("options")) return;
+  if (!document.is_object()) return;
+  read_scenes(document, request);
+  read_widths(document, request);
+  if (!document.contains("options")) return;
   const Json& options = document["options"];
   if (!options.is_object()) return;
   take(options, "device", request.device);

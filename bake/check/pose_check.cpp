@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -168,12 +169,13 @@ Result<PatternRange> sweep_pattern(PatternSweep& sweep, const std::function<void
 }
 
 void tell(const BundleView& bundle, const PatternRecord& record, const IssueSink& sink,
-          WorkstationRule rule, std::string detail) {
+          WorkstationRule rule, std::string detail,
+          std::optional<Severity> severity = std::nullopt) {
   sink(Issue{&workstation_issue_kind(rule),
              "pattern '" + std::string(bundle.name(record.name)) + "'",
              static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(&record) -
                                         bundle.bytes().data()),
-             std::move(detail)});
+             std::move(detail), severity});
 }
 
 }  // namespace
@@ -207,10 +209,12 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
     range.name = bundle.name(record.name);
     range.method = tracker.method();
     if (range.tilt_deg < kExpectedTilt) {
+      const bool missed = range.tilt_deg < 0;
       tell(bundle, record, sink, WorkstationRule::kPoseRange,
-           range.tilt_deg < 0 ? "it is missed from the front"
-                              : "it is found up to a tilt of " +
-                                    std::to_string(static_cast<int>(range.tilt_deg)) + " degrees");
+           missed ? "it is missed from the front"
+                  : "it is found up to a tilt of " +
+                        std::to_string(static_cast<int>(range.tilt_deg)) + " degrees",
+           missed ? Severity::kError : Severity::kWarning);
     }
     ranges.push_back(std::move(range));
   }

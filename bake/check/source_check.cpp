@@ -2,8 +2,11 @@
 #include "bake/check/source_check.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
+#include <map>
 #include <numeric>
 
 #include <glm/common.hpp>
@@ -15,6 +18,7 @@
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_codec.hpp"
+#include "formats/tracker_record.hpp"
 
 namespace modar {
 namespace {
@@ -27,6 +31,15 @@ constexpr double kRounding = 1e-12;
 constexpr double kColourLimit = 4.0 / 255.0;
 /// Two encodings of one texture that differ more are not of one picture.
 constexpr double kLeastTexturePsnr = 30.0;
+
+/// Of scales and offsets, which are floats made from doubles.
+constexpr float kSceneSlack = 1e-5f;
+/// Codes of 256 bits that describe one corner; random ones differ in 128, rarely in less than 96.
+/// Set by hand.
+constexpr std::size_t kSimilarBits = 64;
+/// The least share of a record's codes that its source gives again. Set by hand: another version
+/// of the baker may choose other views and features.
+constexpr double kLeastKnownCodes = 0.5;
 
 /// Triangles of a model in source units.
 struct Surface {
@@ -133,6 +146,7 @@ class SourceCheck {
     }
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
     for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) check_pattern(p);
+    if (!request.scenes.empty()) check_scenes();
     return std::move(fit_);
   }
 
@@ -217,6 +231,7 @@ class SourceCheck {
     timer.done(theirs.positions.size(), ours.positions.size(),
                std::max(fit.source_to_bundle, fit.bundle_to_source));
     judge_model(model, mesh, fit);
+    check_materials(model);
     fit_.models.push_back(fit);
     return {};
   }
@@ -251,6 +266,91 @@ class SourceCheck {
     }
   }
 
+  [[nodiscard]] std::string_view texture_of(const MaterialRecord& material) const {
+    if (material.texture == kNone) return "none";
+    return bundle_.name(bundle_.textures()[material.texture].name);
+  }
+
+  [[nodiscard]] std::string_view texture_again(const MaterialRecord& material) const {
+    if (material.texture == kNone) return "none";
+    return name_again(again_->textures[material.texture].name);
+  }
+
+  /// Materials by their order: names, colours, textures, and how many triangles each has.
+  void check_materials(const ModelRecord& model) {
+    const ModelRecord* other = namesake(again_->models, model.name);
+    if (other == nullptr) return;
+    const auto count = std::min(model.material_count, other->material_count);
+    std::vector<std::uint64_t> ours(count, 0);
+    std::vector<std::uint64_t> theirs(count, 0);
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle_.chunks()[model.first_chunk + c];
+      const std::uint32_t m = chunk.material - model.first_material;
+      if (m < count) ours[m] += bundle_.levels()[chunk.first_level].index_count / 3;
+    }
+    for (std::uint32_t c = 0; c < other->chunk_count; ++c) {
+      const ChunkRecord& chunk = again_->chunks[other->first_chunk + c];
+      const std::uint32_t m = chunk.material - other->first_material;
+      if (m < count) theirs[m] += again_->levels[chunk.first_level].index_count / 3;
+    }
+    for (std::uint32_t m = 0; m < count; ++m) {
+      const MaterialRecord& a = bundle_.materials()[model.first_material + m];
+      const MaterialRecord& b = again_->materials[other->first_material + m];
+      const std::string where = label("model", model.name) + ", " + label("material", a.name);
+      if (texture_of(a) != texture_again(b)) {
+        tell(WorkstationRule::kSourceColour, where, &a.texture,
+             "its texture is '" + std::string(texture_of(a)) + "', the source's is '" +
+                 std::string(texture_again(b)) + "'");
+      }
+      if (std::memcmp(a.ambient, b.ambient,
+                      offsetof(MaterialRecord, texture) - offsetof(MaterialRecord, ambient)) != 0 ||
+          a.flags != b.flags) {
+        tell(WorkstationRule::kSourceColour, where, &a, "its colours are not the source's");
+      }
+      if (ours[m] != theirs[m]) {
+        tell(WorkstationRule::kSourceColour, where, &a,
+             "it has " + std::to_string(ours[m]) + " triangles, the source's has " +
+                 std::to_string(theirs[m]));
+      }
+    }
+  }
+
+  /// Scenes of assets whose sources are given, as the bundle states that they were asked for.
+  void check_scenes() {
+    for (std::uint32_t s = 0; s < bundle_.scenes().size(); ++s) {
+      const SceneRecord& scene = bundle_.scenes()[s];
+      const PatternRecord& pattern = bundle_.patterns()[scene.pattern];
+      const ModelRecord& model = bundle_.models()[scene.model];
+      if (namesake(again_->patterns, pattern.name) == nullptr ||
+          namesake(again_->models, model.name) == nullptr) {
+        continue;
+      }
+      const std::string where =
+          "scene " + std::to_string(s) + ", " + label("pattern", pattern.name);
+      const bool found =
+          std::any_of(again_->scenes.begin(), again_->scenes.end(), [&](const SceneRecord& other) {
+            return name_again(again_->patterns[other.pattern].name) == bundle_.name(pattern.name) &&
+                   name_again(again_->models[other.model].name) == bundle_.name(model.name) &&
+                   same_place(scene, other);
+          });
+      if (found) continue;
+      tell(WorkstationRule::kSourceScene, where, &scene,
+           "scale " + std::to_string(scene.scale) + ", offset " + std::to_string(scene.offset[0]) +
+               " " + std::to_string(scene.offset[1]) + " " + std::to_string(scene.offset[2]));
+    }
+  }
+
+  static bool same_place(const SceneRecord& a, const SceneRecord& b) {
+    const auto near = [](float x, float y) {
+      return std::fabs(x - y) <= kSceneSlack * std::max(1.0f, std::fabs(y));
+    };
+    float turn = 0;
+    for (std::size_t i = 0; i < 4; ++i) turn += a.rotation[i] * b.rotation[i];
+    return near(a.scale, b.scale) && near(a.offset[0], b.offset[0]) &&
+           near(a.offset[1], b.offset[1]) && near(a.offset[2], b.offset[2]) &&
+           std::fabs(turn) >= 1.0f - kSceneSlack;
+  }
+
   void note(bool same, const std::string& where, const void* place) {
     (same ? fit_.same : fit_.different).push_back(where);
     if (!same) tell(WorkstationRule::kSourceBytes, where, place, "");
@@ -276,6 +376,16 @@ class SourceCheck {
     const RgbaImage theirs = picture(*other, again_->texture_levels[other->first_level], data);
     const bool size = ours.width == theirs.width && ours.height == theirs.height;
     const double psnr = size ? psnr_db(ours, theirs) : 0.0;
+    // Textures that look alike may have changed places.
+    for (std::size_t t = 0; t < again_->textures.size(); ++t) {
+      const TextureRecord& third = again_->textures[t];
+      if (&third == other || third.width != ours.width || third.height != ours.height) continue;
+      const RgbaImage rival =
+          picture(third, again_->texture_levels[third.first_level], again_->texture_data[t]);
+      if (psnr_db(ours, rival) <= psnr) continue;
+      return tell(WorkstationRule::kSourceColour, where, &texture,
+                  "it is nearer to texture '" + std::string(name_again(third.name)) + "'");
+    }
     if (psnr >= kLeastTexturePsnr) return;
     tell(WorkstationRule::kSourceColour, where, &texture,
          size ? std::to_string(psnr) + " dB from the picture, baked again"
@@ -286,15 +396,98 @@ class SourceCheck {
     const PatternRecord& pattern = bundle_.patterns()[index];
     const PatternRecord* other = namesake(again_->patterns, pattern.name);
     if (other == nullptr) return missing("pattern", pattern.name, &pattern);
+    const auto which = static_cast<std::uint32_t>(other - again_->patterns.data());
     bool same = pattern.width == other->width && pattern.height == other->height;
-    const auto& list = again_->features[static_cast<std::size_t>(other - again_->patterns.data())];
-    for (const FeatureContent& features : list) {
+    for (const FeatureContent& features : again_->features[which]) {
       const FeatureView view = bundle_.features(index, features.set_id);
       same = same &&
              equal(std::as_bytes(view.keypoints), std::as_bytes(std::span(features.keypoints))) &&
              equal(view.descriptors, features.descriptors);
     }
-    note(same, label("pattern", pattern.name), &pattern);
+    const auto record = bundle_.section(SectionType::kTrackerRecord, index);
+    const auto section = std::find_if(
+        again_->extra.begin(), again_->extra.end(), [which](const ExtraSection& extra) {
+          return extra.type == static_cast<std::uint32_t>(SectionType::kTrackerRecord) &&
+                 extra.owner == which;
+        });
+    const bool tracked = !record.empty() && section != again_->extra.end();
+    const bool same_record = !tracked || equal(record, section->bytes);
+    note(same && same_record, label("pattern", pattern.name), &pattern);
+    const std::string fault =
+        !same_record ? record_fault(record, section->bytes)
+        : other->width_mm > 0 && std::fabs(pattern.width_mm / other->width_mm - 1) > 1e-6
+            ? std::to_string(pattern.width_mm) + " mm wide, the source is " +
+                  std::to_string(other->width_mm)
+            : "";
+    if (fault.empty()) return;
+    tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern, fault);
+  }
+
+  /// How the image or the codes of a tracker record differ from those baked again; empty where
+  /// another version of the baker may have made them.
+  static std::string record_fault(std::span<const std::byte> ours,
+                                  std::span<const std::byte> theirs) {
+    TrackerRecordView a;
+    TrackerRecordView b;
+    // Sections are aligned by the format, vectors by their allocation.
+    if (view_tracker_record(ours, a) || view_tracker_record(theirs, b)) return "it is unreadable";
+    if (a.header.width != b.header.width || a.header.height != b.header.height ||
+        a.pixels.size() != b.pixels.size()) {
+      return "its image has another size than the source's";
+    }
+    double square = 0;
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+      const double off = static_cast<double>(a.pixels[i]) - b.pixels[i];
+      square += off * off / static_cast<double>(a.pixels.size());
+    }
+    if (square > 255.0 * 255.0 / std::pow(10.0, kLeastTexturePsnr / 10)) {
+      return "its image differs from the source's by " + std::to_string(std::sqrt(square)) +
+             " gray levels";
+    }
+    const double share = known_share(a, b);
+    if (share >= kLeastKnownCodes) return "";
+    return "only " + std::to_string(static_cast<int>(100 * share)) +
+           " percent of its codes are like the source's at their place";
+  }
+
+  static std::size_t code_distance(const TrackerRecordView& a, std::size_t i,
+                                   const TrackerRecordView& b, std::size_t j) {
+    const auto byte = [](const TrackerRecordView& view, std::size_t code, std::size_t k) {
+      const std::size_t block = code / kTrackerBlockCodes * kTrackerBlockCodes;
+      return view.codes[block * kTrackerCodeBytes + k * kTrackerBlockCodes + code - block];
+    };
+    std::size_t bits = 0;
+    for (std::size_t k = 0; k < kTrackerCodeBytes; ++k) {
+      bits += static_cast<std::size_t>(
+          std::popcount(static_cast<unsigned>(byte(a, i, k) ^ byte(b, j, k))));
+    }
+    return bits;
+  }
+
+  /// The share of a's features that b has, too: within a pixel, with a similar code.
+  static double known_share(const TrackerRecordView& a, const TrackerRecordView& b) {
+    if (a.features.empty()) return b.features.empty() ? 1.0 : 0.0;
+    constexpr int kPixel = 64;
+    const auto cell = [](int x, int y) { return y / kPixel * 2048 + x / kPixel; };
+    std::multimap<int, std::size_t> by_cell;
+    for (std::size_t j = 0; j < b.features.size(); ++j) {
+      by_cell.emplace(cell(b.features[j].x, b.features[j].y), j);
+    }
+    std::size_t known = 0;
+    for (std::size_t i = 0; i < a.features.size(); ++i) {
+      bool found = false;
+      for (int dy = -1; dy <= 1 && !found; ++dy) {
+        for (int dx = -1; dx <= 1 && !found; ++dx) {
+          const auto [first, last] = by_cell.equal_range(
+              cell(a.features[i].x + kPixel, a.features[i].y + kPixel) + (dy - 1) * 2048 + dx - 1);
+          found = std::any_of(first, last, [&](const auto& entry) {
+            return code_distance(a, i, b, entry.second) <= kSimilarBits;
+          });
+        }
+      }
+      known += found ? 1 : 0;
+    }
+    return static_cast<double>(known) / static_cast<double>(a.features.size());
   }
 
   const BundleView& bundle_;

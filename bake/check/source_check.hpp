@@ -27,15 +27,16 @@ struct SourceFit {
   std::vector<std::string> different;  ///< and those that do not
 };
 
-/// Bakes `request` (its models and patterns; scenes are left out) in memory, compares each asset of
-/// the bundle with its namesake byte for byte, and measures the surfaces of models both ways in
-/// double precision, at their vertices and the centres of their triangles: a surface may be off by
-/// no more than the bundle states. bundle: one that check_bundle() found good.
-/// Errors: those of the bake.
+/// Bakes `request` in memory and compares each asset of the bundle with its namesake: byte for
+/// byte, then the surfaces of models both ways in double precision, at their vertices and the
+/// centres of their triangles (a surface may be off by no more than the bundle states), materials
+/// and their textures, patterns' images, codes and widths, and scenes where the request has any.
+/// bundle: one that check_bundle() found good. Errors: those of the bake.
 Result<SourceFit> check_source(const BundleView& bundle, const BakeRequest& request,
                                const IssueSink& sink, Report& report);
 
-/// Options of the bake that made a bundle, from its meta text; what it does not tell stays.
+/// Options of the bake that made a bundle, from its meta text, which may be anyone's; what it does
+/// not state stays. Scenes of models and patterns that the request lacks are left out.
 void read_bake_options(std::string_view meta, BakeRequest& request);
 
 }  // namespace modar

@@ -41,7 +41,14 @@ constexpr IssueKind kKinds[] = {
      "bake it again from this source"},
     {"SOURCE_COUNTS", Severity::kError, "Counts differ from those of the source",
      "bake it again from this source"},
-    {"POSE_RANGE", Severity::kWarning, "A pattern is missed in easy views",
+    {"SOURCE_PATTERN", Severity::kError,
+     "A pattern's image, its codes or its physical width differ from its source's",
+     "bake it again from this source; give its width as FILE:WIDTHmm if it was baked with one"},
+    {"SOURCE_SCENE", Severity::kError,
+     "A scene differs from the one that the bundle was baked with",
+     "bake it again from this source"},
+    {"POSE_RANGE", Severity::kError,
+     "A pattern is missed in easy views (a warning where only tilted ones are missed)",
      "use a picture with more texture, evenly spread, or a larger print"},
     {"VISUAL_DIFFERS", Severity::kError, "A model does not look like its source",
      "look at the picture of the worst view; bake with larger textures or a smaller --max-error"},
@@ -97,7 +104,7 @@ Result<void> Verdict::override_severity(const std::string& text) {
 }
 
 void Verdict::add(const Issue& issue) {
-  Severity severity = issue.kind->severity;
+  Severity severity = issue.severity.value_or(issue.kind->severity);
   if (const auto found = overrides_.find(issue.kind->id); found != overrides_.end()) {
     if (!found->second) return;
     severity = *found->second;

@@ -30,6 +30,8 @@ enum class WorkstationRule : std::uint8_t {
   kSourceSurface,
   kSourceColour,
   kSourceCounts,
+  kSourcePattern,
+  kSourceScene,
   kPoseRange,
   kVisualDiffers,
   kCount

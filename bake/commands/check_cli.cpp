@@ -15,7 +15,7 @@ namespace {
 void add_source_options(CommandLine& line, CheckCommand& check) {
   line.option("--source", &check.sources,
               "Bake these models and pattern images again and compare; measure what differs",
-              {.type = "FILE"});
+              {.type = "FILE[:WIDTHmm]"});
   line.flag("--pose", check.pose,
             "Track the patterns of --source in rendered views: errors and working range",
             {.needs = "--source"});

@@ -3,6 +3,7 @@
 #include <string>
 #include <system_error>
 
+#include "bake/commands/arguments.hpp"
 #include "bake/commands/check_command.hpp"
 #include "bake/output.hpp"
 #include "bake/terminal.hpp"
@@ -22,9 +23,14 @@ Result<SourceFit> bake_and_compare(const BundleView& bundle, const CheckCommand&
     if (is_model(path)) {
       request.models.push_back(path);
     } else {
-      request.patterns.push_back({path, 0.0});
+      MODAR_ASSIGN(PatternRequest pattern, parse_pattern(path));
+      request.patterns.push_back(std::move(pattern));
     }
   }
+  for (std::uint32_t set = 0; set < bundle.parameter_sets().size(); ++set) {
+    request.parameters.emplace_back(bundle.name(bundle.parameter_sets()[set].name));
+  }
+  if (request.parameters.empty()) request.parameters = {"none"};
   read_bake_options(bundle.meta(), request);
   request.jobs = command.jobs;
   ProgressBar bar(command.json || command.sarif);
@@ -38,7 +44,9 @@ Result<std::vector<PatternRange>> track_patterns(const BundleView& bundle,
                                                  const IssueSink& sink) {
   PoseCheckOptions options;
   for (const std::string& path : command.sources) {
-    if (!is_model(path)) options.pictures.push_back(path);
+    if (is_model(path)) continue;
+    MODAR_ASSIGN(const PatternRequest pattern, parse_pattern(path));
+    options.pictures.push_back(pattern.path);
   }
   ProgressBar bar(command.json || command.sarif);
   options.views = command.pose_views;

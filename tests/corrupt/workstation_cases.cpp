@@ -1,4 +1,7 @@
 // Bundles that are good by their bytes, and bad for a device or beside a source.
+#include <cstring>
+
+#include "formats/tracker_record.hpp"
 #include "tests/corrupt/cases.hpp"
 
 namespace modar::test {
@@ -22,6 +25,39 @@ BundleContent picture(std::uint32_t width, std::uint32_t height) {
   return content;
 }
 
+/// A tracker record without features, of an image of zeros.
+ExtraSection empty_record(std::uint32_t width, std::uint32_t height) {
+  TrackerRecordHeader header{};
+  header.describer_version = kTrackerExtractorVersion;
+  header.width = width;
+  header.height = height;
+  header.level_count = 1;
+  header.features_offset = header.codes_offset = header.patches_offset = header.pixels_offset =
+      sizeof header;
+  ExtraSection section;
+  section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
+  section.owner = 0;
+  section.bytes.resize(sizeof header + std::size_t{width} * height);
+  std::memcpy(section.bytes.data(), &header, sizeof header);
+  return section;
+}
+
+/// The octahedron on the pattern, a tenth larger than the bundle says that it was asked for.
+Bytes scaled_scene() {
+  BundleContent content = model_content();
+  const BundleContent pattern = pattern_content();
+  content.patterns = pattern.patterns;
+  content.patterns[0].name = content.intern("box");
+  content.extra.push_back(empty_record(pattern.patterns[0].width, pattern.patterns[0].height));
+  content.meta = R"({"scenes":[{"pattern":"box","model":"octahedron","scale":1,"up":2}]})";
+  SceneRecord scene{};
+  scene.scale = 1.1f;
+  scene.offset[2] = 1.1f;
+  scene.rotation[3] = 1;
+  content.scenes.push_back(scene);
+  return encode(content);
+}
+
 constexpr CorruptCase kCases[] = {
     {"DEVICE_TEXTURE_SIZE", [] { return encode(picture(64, 8)); }},
     {"DEVICE_ATTRIBUTES", [] { return encode(model_content()); }},
@@ -38,6 +74,13 @@ constexpr CorruptCase kCases[] = {
     {"SOURCE_SURFACE", [] { return encode(model_content()); }},
     {"SOURCE_COLOUR", [] { return encode(texture_content()); }},
     {"SOURCE_COUNTS", [] { return encode(model_content()); }},
+    {"SOURCE_PATTERN",
+     [] {
+       BundleContent content = pattern_content();
+       content.extra.push_back(empty_record(content.patterns[0].width, content.patterns[0].height));
+       return encode(content);
+     }},
+    {"SOURCE_SCENE", scaled_scene},
     {"POSE_RANGE", [] { return encode(pattern_content()); }},
     {"VISUAL_DIFFERS", [] { return encode(model_content()); }},
 };
