@@ -208,6 +208,8 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
                         {"perceptual", request.textures.perceptual},
                         {"max_texture", request.textures.max_side},
                         {"mipmaps", request.textures.mipmaps},
+                        {"loop_views", request.loop.trial_views},
+                        {"score", request.loop.score},
                         {"unit_metres", request.unit_metres}};
   const Json meta = {{"tool", "modar " + request.tool_version},
                      {"models", models},

@@ -111,6 +111,10 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   take(options, "lods", levels);
   if (levels >= 1 && levels <= kMaxLevels) request.levels = levels;
   take(options, "mipmaps", request.textures.mipmaps);
+  TrackerRecordOptions loop = request.loop;
+  take(options, "loop_views", loop.trial_views);
+  take(options, "score", loop.score);
+  if (loop.validate()) request.loop = loop;
   take(options, "topology", request.topology);
   take(options, "unit_metres", request.unit_metres);
   take(options, "max_error", request.max_error.value);

@@ -34,6 +34,8 @@ constexpr double kLeastTexturePsnr = 30.0;
 
 /// Of scales and offsets, which are floats made from doubles.
 constexpr float kSceneSlack = 1e-5f;
+/// Of widths that were written in different units.
+constexpr double kWidthSlack = 1e-6;
 /// Codes of 256 bits that describe one corner; random ones differ in 128, rarely in less than 96.
 /// Set by hand.
 constexpr std::size_t kSimilarBits = 64;
@@ -413,14 +415,14 @@ class SourceCheck {
     const bool tracked = !record.empty() && section != again_->extra.end();
     const bool same_record = !tracked || equal(record, section->bytes);
     note(same && same_record, label("pattern", pattern.name), &pattern);
-    const std::string fault =
-        !same_record ? record_fault(record, section->bytes)
-        : other->width_mm > 0 && std::fabs(pattern.width_mm / other->width_mm - 1) > 1e-6
-            ? std::to_string(pattern.width_mm) + " mm wide, the source is " +
-                  std::to_string(other->width_mm)
-            : "";
-    if (fault.empty()) return;
-    tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern, fault);
+    const std::string fault = same_record ? "" : record_fault(record, section->bytes);
+    if (!fault.empty()) {
+      tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern, fault);
+    }
+    const double width = other->width_mm;
+    if (width <= 0 || std::fabs(pattern.width_mm / width - 1) <= kWidthSlack) return;
+    tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
+         std::to_string(pattern.width_mm) + " mm wide, the source is " + std::to_string(width));
   }
 
   /// How the image or the codes of a tracker record differ from those baked again; empty where

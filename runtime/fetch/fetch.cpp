@@ -2,7 +2,6 @@
 #include "modar/fetch.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <ctime>
 #include <optional>
 
@@ -18,18 +17,6 @@ constexpr std::size_t kMaxSignatureBytes = 4096;
 constexpr std::size_t kMaxLinkBytes = 4096;
 constexpr std::size_t kMaxLatestBytes = 32;
 constexpr std::uint32_t kMaxLinks = 1000;
-
-Result<std::uint64_t> parse_latest(std::string_view text) {
-  std::uint64_t version = 0;
-  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), version);
-  if (parsed.ec != std::errc() || version == 0 ||
-      std::string_view(parsed.ptr,
-                       static_cast<std::size_t>(text.data() + text.size() - parsed.ptr)) != "\n") {
-    return fail(kExitMixed, "fetch.latest", "latest", "it does not name a release",
-                "give the address of a folder that `modar ship publish` filled");
-  }
-  return version;
-}
 
 /// A signed document of the chain of trust. Errors: "fetch.missing" where the server has none.
 struct TrustDocument {

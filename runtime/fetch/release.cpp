@@ -381,6 +381,18 @@ std::string lower_case(std::string_view name) {
   return lower;
 }
 
+Result<std::uint64_t> parse_latest(std::string_view text) {
+  std::uint64_t version = 0;
+  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), version);
+  if (parsed.ec != std::errc() || version == 0 ||
+      std::string_view(parsed.ptr,
+                       static_cast<std::size_t>(text.data() + text.size() - parsed.ptr)) != "\n") {
+    return fail(kExitMixed, "fetch.latest", "latest", "it does not name a release",
+                "give the address of a folder that `modar ship publish` filled");
+  }
+  return version;
+}
+
 Result<std::int64_t> parse_time(std::string_view text) {
   std::tm time{};
   const auto field = [&](std::size_t at, std::size_t digits, int& out) {

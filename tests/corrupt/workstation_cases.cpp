@@ -1,4 +1,5 @@
 // Bundles that are good by their bytes, and bad for a device or beside a source.
+#include <algorithm>
 #include <cstring>
 
 #include "formats/tracker_record.hpp"
@@ -23,6 +24,18 @@ BundleContent picture(std::uint32_t width, std::uint32_t height) {
   level.alpha_offset = kNoOffset;
   content.texture_data[0].assign(level.size, std::byte{0});
   return content;
+}
+
+/// The octahedron with the material that an OBJ without one gets.
+Bytes plain_octahedron() {
+  BundleContent content = model_content();
+  MaterialRecord& material = content.materials[0];
+  std::fill_n(material.ambient, 3, 0.2f);
+  std::fill_n(material.diffuse, 3, 0.8f);
+  std::fill_n(material.specular, 3, 0.0f);
+  material.shininess = 0;
+  material.flags = 0;
+  return encode(content);
 }
 
 /// A tracker record without features, of an image of zeros.
@@ -70,7 +83,7 @@ constexpr CorruptCase kCases[] = {
     {"DEVICE_HALF_FLOAT", [] { return encode(model_content()); }},
     {"DEVICE_ETC1", [] { return encode(texture_content()); }},
     {"SOURCE_MISSING", [] { return encode(model_content()); }},
-    {"SOURCE_BYTES", [] { return encode(model_content()); }},
+    {"SOURCE_BYTES", plain_octahedron},
     {"SOURCE_SURFACE", [] { return encode(model_content()); }},
     {"SOURCE_COLOUR", [] { return encode(texture_content()); }},
     {"SOURCE_COUNTS", [] { return encode(model_content()); }},

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <string>
+#include <system_error>
 
 namespace modar::test {
 
@@ -21,8 +23,8 @@ class InputFile {
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
   ~InputFile() {
-    std::remove(path_.c_str());
-    std::remove(folder_.c_str());
+    std::error_code left;
+    std::filesystem::remove_all(folder_, left);  // and what readers made beside the file
   }
 
   const std::string& write(const std::uint8_t* data, std::size_t size) {

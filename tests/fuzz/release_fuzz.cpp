@@ -1,7 +1,8 @@
 // libFuzzer target: any text as what a server hands to a device before anything is trusted: a
-// release, a link of keys, a public key, a signature, a time.
+// release, the number of the newest, a link of keys, a public key, a signature, a time.
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "modar/release.hpp"
@@ -29,6 +30,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto signature = parse_signature(text)) {
     // Nobody has signed with a key of zeros.
     need(!verify_signature(text, *signature, key.value_or(PublicKey{})).has_value());
+  }
+  if (const auto latest = parse_latest(text)) {
+    const std::string digits = std::to_string(*latest) + "\n";
+    need(*latest > 0 && text.ends_with(digits));  // zeros may stand in front
   }
   if (const auto time = parse_time(text)) need(parse_time(time_text(*time)) == *time);
   return 0;

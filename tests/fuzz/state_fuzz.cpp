@@ -1,7 +1,9 @@
-// libFuzzer target: any bytes as a store's state.json give a state that is written and read again
-// as the same: a damaged file is one without what it lost.
+// libFuzzer target: any bytes as a store's own files. state.json gives nothing, or a state that is
+// written and read again as the same; the pointer file names one of the two slots, or none.
 #include <cstddef>
 #include <cstdint>
+#include <string>
+#include <string_view>
 
 #include "runtime/fetch/store.hpp"
 #include "tests/fuzz/input_file.hpp"
@@ -9,14 +11,22 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using modar::test::need;
-  static modar::test::InputFile file("state.json");
-  const std::string& path = file.write(data, size);
-  static const auto store = modar::fetch::Store::open(path.substr(0, path.rfind('/')));
+  static modar::test::InputFile pointer("current");
+  const std::string& path = pointer.write(data, size);
+  const std::string folder = path.substr(0, path.rfind('/'));
+  static const auto store = modar::fetch::Store::open(folder);
   need(store.has_value());
-  const modar::fetch::StoreState state = store->state();
-  need(store->save_state(state).has_value());
+  const std::string slot = modar::fetch::active_slot(folder);
+  need(slot.empty() || slot == folder + "/slots/a" || slot == folder + "/slots/b");
+  need(store->spare_folder() != slot);
+
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const auto state = modar::fetch::parse_state(text);
+  if (!state) return 0;
+  need(store->save_state(*state).has_value());
   const modar::fetch::StoreState again = store->state();
-  need(again.version == state.version && again.root_key == state.root_key &&
-       again.trusted_key == state.trusted_key && again.key_serial == state.key_serial);
+  need(!again.fresh && again.epoch == state->epoch && again.version == state->version &&
+       again.root_key == state->root_key && again.trusted_key == state->trusted_key &&
+       again.key_serial == state->key_serial);
   return 0;
 }

@@ -114,6 +114,10 @@ Result<Release> parse_release(std::string_view json);
 /// The document: the same release always gives the same bytes.
 std::string release_text(const Release& release);
 
+/// The number of the newest release, from the server's file `latest`. Errors: kExitMixed
+/// "fetch.latest".
+Result<std::uint64_t> parse_latest(std::string_view text);
+
 /// "2027-01-31T00:00:00Z" to seconds. Errors: kInvalidInput "release.time".
 Result<std::int64_t> parse_time(std::string_view text);
 std::string time_text(std::int64_t seconds);

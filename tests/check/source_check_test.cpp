@@ -1,0 +1,174 @@
+// A bundle beside its own source: a good one differs in nothing, and each thing that the device
+// uses is noticed where it is changed behind right hashes.
+#include "bake/check/source_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <functional>
+#include <random>
+#include <set>
+
+#include "bake/bundle/bundle_builder.hpp"
+#include "bake/image/image.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/tracker_record.hpp"
+#include "tests/formats/support.hpp"
+#include "tests/texture/texture_samples.hpp"
+
+namespace {
+
+using namespace modar;
+using namespace modar::test;
+
+constexpr const char* kModel = R"(mtllib two.mtl
+v 0 0 0
+v 2 0 0
+v 2 1 0
+v 0 1 1
+vt 0 0
+vt 1 0
+vt 1 1
+usemtl wood
+f 1/1 2/2 3/3
+usemtl stone
+f 1/1 3/2 4/3
+)";
+constexpr const char* kMaterials = "newmtl wood\nmap_Kd wood.png\nnewmtl stone\nmap_Kd stone.png\n";
+
+/// A ramp that ETC1 holds well; `more` is added to it.
+RgbaImage ramp(int more) {
+  RgbaImage image{32, 32, {}};
+  for (int i = 0; i < 32 * 32; ++i) {
+    const auto level = static_cast<std::uint8_t>(40 + 4 * (i % 32) + more);
+    image.pixels.insert(image.pixels.end(), {level, level, level, 255});
+  }
+  return image;
+}
+
+/// Squares of random gray levels.
+RgbaImage squares() {
+  constexpr std::uint32_t kWidth = 160, kHeight = 128, kSquare = 8;
+  std::mt19937 random(7);
+  std::vector<std::uint8_t> levels(kWidth / kSquare * kHeight / kSquare);
+  for (std::uint8_t& level : levels) level = static_cast<std::uint8_t>(random());
+  RgbaImage image{kWidth, kHeight, {}};
+  for (std::uint32_t i = 0; i < kWidth * kHeight; ++i) {
+    const std::uint32_t x = i % kWidth / kSquare;
+    const std::uint8_t level = levels[i / kWidth / kSquare * (kWidth / kSquare) + x];
+    image.pixels.insert(image.pixels.end(), {level, level, level, 255});
+  }
+  return image;
+}
+
+/// Two triangles with alike textures on a pattern 210 mm wide.
+class SourceTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    write_file(folder_.file("two.obj"), std::string_view(kModel));
+    write_file(folder_.file("two.mtl"), std::string_view(kMaterials));
+    ASSERT_TRUE(write_png(ramp(0), folder_.file("wood.png")));
+    ASSERT_TRUE(write_png(ramp(5), folder_.file("stone.png")));
+    ASSERT_TRUE(write_png(squares(), folder_.file("card.png")));
+    BakeRequest request = sources();
+    request.patterns[0].width_mm = 210;
+    request.parameters = {"none"};
+    request.loop.trial_views = 8;
+    request.loop.score = false;
+    request.scenes = {{"card", "two", 0.5, UpAxis::kY, false, {0.1, 0, 0}}};
+    Report report;
+    auto built = build_bundle(request, report);
+    ASSERT_TRUE(built) << to_line(built.error());
+    content_ = std::move(*built);
+    content_.summary.clear();
+  }
+
+  [[nodiscard]] BakeRequest sources() const {
+    BakeRequest request;
+    request.models = {folder_.file("two.obj")};
+    request.patterns = {{folder_.file("card.png"), 0.0}};
+    return request;
+  }
+
+  /// Ids of what the check finds in the bundle after `change`, with what it states of the bake.
+  std::set<std::string> issues(const std::function<void(BundleContent&)>& change = {}) {
+    BundleContent content = content_;
+    if (change) change(content);
+    const Bytes bytes = encode(content);
+    const auto bundle = BundleView::open(bytes);
+    if (!bundle) return {to_line(bundle.error())};
+    BakeRequest request = sources();
+    request.parameters = {"none"};
+    read_bake_options(bundle->meta(), request);
+    std::set<std::string> ids;
+    Report report;
+    const auto fit = check_source(
+        *bundle, request, [&](const Issue& issue) { ids.insert(issue.kind->id); }, report);
+    if (!fit) ids.insert(to_line(fit.error()));
+    return ids;
+  }
+
+  /// The tracker record with its codes (or its image) replaced by `fill`.
+  static void fill_record(BundleContent& content, bool codes,
+                          const std::function<std::uint8_t(std::uint8_t)>& fill) {
+    for (ExtraSection& section : content.extra) {
+      if (section.type != static_cast<std::uint32_t>(SectionType::kTrackerRecord)) continue;
+      TrackerRecordView record;
+      ASSERT_FALSE(view_tracker_record(section.bytes, record));
+      const auto part = codes ? record.codes : record.pixels;
+      ASSERT_FALSE(part.empty());
+      auto* bytes = const_cast<std::uint8_t*>(part.data());
+      std::transform(bytes, bytes + part.size(), bytes, fill);
+    }
+  }
+
+  ScratchFolder folder_;
+  BundleContent content_;
+};
+
+using Ids = std::set<std::string>;
+
+TEST_F(SourceTest, AGoodBundleDiffersInNothing) {
+  EXPECT_EQ(issues(), Ids());
+}
+
+TEST_F(SourceTest, TexturesThatAreAlikeHaveChangedPlaces) {
+  EXPECT_TRUE(issues([](BundleContent& content) {
+                std::swap(content.materials[0].texture, content.materials[1].texture);
+              }).count("SOURCE_COLOUR"));
+  EXPECT_TRUE(issues([](BundleContent& content) {
+                std::swap(content.texture_data[0], content.texture_data[1]);
+              }).count("SOURCE_COLOUR"));
+}
+
+TEST_F(SourceTest, ScenesAreWhereTheyWereAskedFor) {
+  const std::function<void(SceneRecord&)> changes[] = {
+      [](SceneRecord& scene) { scene.scale *= 1.1f; },
+      [](SceneRecord& scene) { scene.offset[0] += 0.01f; },
+      [](SceneRecord& scene) { scene.rotation[0] = -scene.rotation[0]; },
+  };
+  for (const auto& change : changes) {
+    EXPECT_EQ(issues([&](BundleContent& content) { change(content.scenes[0]); }),
+              Ids{"SOURCE_SCENE"});
+  }
+}
+
+TEST_F(SourceTest, PatternsHaveTheirCodesImagesAndWidths) {
+  std::mt19937 random(3);
+  const Ids found = {"SOURCE_BYTES", "SOURCE_PATTERN"};
+  EXPECT_EQ(issues([&](BundleContent& content) {
+              fill_record(content, true,
+                          [&](std::uint8_t) { return static_cast<std::uint8_t>(random()); });
+            }),
+            found);
+  EXPECT_EQ(issues([&](BundleContent& content) {
+              fill_record(content, false,
+                          [](std::uint8_t level) { return static_cast<std::uint8_t>(~level); });
+            }),
+            found);
+  EXPECT_EQ(issues([](BundleContent& content) { content.patterns[0].width_mm = 200; }),
+            Ids{"SOURCE_PATTERN"});
+}
+
+}  // namespace
