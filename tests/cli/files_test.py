@@ -212,7 +212,7 @@ class Words(ProgramTest):
             for code in ("{false}", "Excludes:", "Needs:", " in [", "UINT", ":POSITIVE"):
                 self.assertNotIn(code, text)
         text = " ".join(self.modar("bake", "--help").stdout.split())
-        self.assertIn("(1 to 12, default 4)", text)
+        self.assertIn("(1 to 12, default 12)", text)
         self.assertIn("(not with --lods)", text)
 
     def test_progress_without_a_terminal_is_a_line_a_stage(self):
