@@ -1,0 +1,559 @@
+// org.modar.Native over the C API: camera frames in, matrices out, drawing on GLSurfaceView's
+// thread. A frame costs no copy of ours, no allocation and no reference that outlives the call.
+#include "runtime/android/bridge.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "modar/camera.hpp"
+
+namespace modar::android {
+
+namespace {
+
+/// A caller's mistake, exit code 1.
+void misuse(JNIEnv* env, const char* code, const char* where, const char* cause, const char* cure) {
+  throw_error(env, 1, code, where, cause, cure);
+}
+
+// --- Sessions ---
+
+/// What a visitor's fingers did to the models.
+struct Gesture {
+  float scale = 1;
+  float turn = 0;  ///< radians about the pattern's normal
+  float x = 0;     ///< along the pattern, half largest sides
+  float y = 0;
+};
+
+/// A bundle with what was made of it. The camera's thread tracks while GL's thread draws.
+struct Session {
+  std::mutex tracking;  ///< holds tracker
+  std::mutex drawing;   ///< holds renderer, surface, items, gesture
+  // Both guards to write, either to read:
+  modar_bundle* bundle = nullptr;  ///< null once it is closed
+  modar_camera camera{};           ///< width 0: not known yet
+  std::vector<modar_scene> scenes;
+  modar_tracker* tracker = nullptr;
+  modar_renderer* renderer = nullptr;
+  modar_surface surface{};
+  std::vector<modar_item> items;
+  Gesture gesture;
+};
+
+/// Java holds numbers that are never given twice: a closed one is found nowhere.
+struct Sessions {
+  struct Entry {
+    jlong number = 0;
+    std::shared_ptr<Session> session;
+  };
+  std::mutex guard;
+  jlong last = 0;
+  std::vector<Entry> entries;
+
+  jlong add(std::shared_ptr<Session> session) {
+    const std::lock_guard lock(guard);
+    entries.push_back({++last, std::move(session)});
+    return last;
+  }
+
+  std::shared_ptr<Session> find(jlong number) {
+    const std::lock_guard lock(guard);
+    for (const Entry& entry : entries) {
+      if (entry.number == number) return entry.session;
+    }
+    return nullptr;
+  }
+
+  std::shared_ptr<Session> take(jlong number) {
+    const std::lock_guard lock(guard);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      if (entries[i].number != number) continue;
+      std::shared_ptr<Session> session = std::move(entries[i].session);
+      entries.erase(entries.begin() + static_cast<std::ptrdiff_t>(i));
+      return session;
+    }
+    return nullptr;
+  }
+};
+
+Sessions& sessions() {
+  static Sessions all;
+  return all;
+}
+
+/// A session that nobody closes while this lives, with one of its guards held. Where the number
+/// names none, it is empty and Java has an exception.
+class Use {
+ public:
+  Use(JNIEnv* env, jlong number, std::mutex Session::*guard) : session_(sessions().find(number)) {
+    if (session_) {
+      lock_ = std::unique_lock(session_.get()->*guard);
+      if (session_->bundle != nullptr) return;
+      lock_.unlock();
+      session_.reset();
+    }
+    misuse(env, "android.closed", "session", "it was closed, or never opened",
+           "open the bundle again");
+  }
+
+  explicit operator bool() const { return session_ != nullptr; }
+  Session* operator->() const { return session_.get(); }
+  Session& operator*() const { return *session_; }
+
+ private:
+  std::shared_ptr<Session> session_;
+  std::unique_lock<std::mutex> lock_;
+};
+
+jlong opened(JNIEnv* env, modar_bundle* bundle, const modar_error& error) {
+  if (bundle == nullptr) {
+    throw_error(env, error);
+    return 0;
+  }
+  auto session = std::make_shared<Session>();
+  session->bundle = bundle;
+  session->scenes.resize(modar_scene_count(bundle));
+  for (std::uint32_t i = 0; i < session->scenes.size(); ++i) {
+    modar_scene_at(bundle, i, &session->scenes[i]);
+  }
+  session->items.reserve(session->scenes.size());
+  return sessions().add(std::move(session));
+}
+
+/// The name of an index, by strlcpy's contract.
+jstring name_of(JNIEnv* env, jlong number, jint index,
+                size_t (*name)(const modar_bundle*, uint32_t, char*, size_t)) {
+  const Use session(env, number, &Session::tracking);
+  std::array<char, 256> text{};
+  if (!session) return nullptr;
+  if (index < 0 ||
+      name(session->bundle, static_cast<std::uint32_t>(index), text.data(), text.size()) == 0) {
+    misuse(env, "android.index", "index", "the bundle has nothing of that number", "count first");
+    return nullptr;
+  }
+  return env->NewStringUTF(text.data());
+}
+
+// --- Pixels and poses ---
+
+/// Floats of one pattern in a pose buffer, as org.modar.Poses reads them: visible, shown, inliers,
+/// fit, 9 of the rotation, 3 of the translation, 8 of the corners, 16 of the view matrix.
+constexpr std::size_t kPoseFloats = 40;
+constexpr std::size_t kView = 24;
+
+/// A direct buffer of at least `size` bytes, or null and an exception.
+void* direct(JNIEnv* env, jobject buffer, std::size_t size, const char* what) {
+  void* const address = buffer == nullptr ? nullptr : env->GetDirectBufferAddress(buffer);
+  if (address == nullptr) {
+    misuse(env, "android.buffer", what, "it is no direct buffer", "use ByteBuffer.allocateDirect");
+    return nullptr;
+  }
+  const jlong capacity = env->GetDirectBufferCapacity(buffer);
+  if (capacity < 0 || static_cast<std::uint64_t>(capacity) < size) {
+    misuse(env, "android.buffer", what, "it is too small", "see the sizes in Native.java");
+    return nullptr;
+  }
+  return address;
+}
+
+float* pose_floats(JNIEnv* env, const Session& session, jobject buffer) {
+  const std::size_t size = modar_pattern_count(session.bundle) * kPoseFloats * sizeof(float);
+  auto* floats = static_cast<float*>(direct(env, buffer, size, "poses"));
+  if (reinterpret_cast<std::uintptr_t>(floats) % alignof(float) == 0) return floats;
+  misuse(env, "android.buffer", "poses", "it is not aligned", "use the whole of a direct buffer");
+  return nullptr;
+}
+
+/// The bytes of a Java array while this lives. ART and Dalvik hand out arrays as large as frames
+/// where they lie; a VM that moves them copies.
+class ArrayBytes {
+ public:
+  ArrayBytes(JNIEnv* env, jbyteArray array, std::size_t size) : env_(env), array_(array) {
+    if (array == nullptr || static_cast<std::size_t>(env->GetArrayLength(array)) < size) {
+      misuse(env, "android.buffer", "nv21", array == nullptr ? "it is null" : "it is too small",
+             "pass width * height * 3 / 2 bytes");
+      return;
+    }
+    bytes_ = env->GetByteArrayElements(array, nullptr);
+  }
+  ArrayBytes(const ArrayBytes&) = delete;
+  ArrayBytes& operator=(const ArrayBytes&) = delete;
+  ~ArrayBytes() {
+    if (bytes_ != nullptr) env_->ReleaseByteArrayElements(array_, bytes_, JNI_ABORT);
+  }
+  [[nodiscard]] const std::uint8_t* get() const {
+    return reinterpret_cast<const std::uint8_t*>(bytes_);
+  }
+
+ private:
+  JNIEnv* env_;
+  jbyteArray array_;
+  jbyte* bytes_ = nullptr;
+};
+
+/// False and an exception where setCamera() was not called.
+bool has_camera(JNIEnv* env, const Session& session) {
+  if (session.camera.width > 0) return true;
+  misuse(env, "android.camera", "session", "the size of the camera's frames is not known",
+         "call setCamera first");
+  return false;
+}
+
+std::size_t luma_bytes(const modar_camera& camera) {
+  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+}
+
+/// Bytes that rows of `width` take, the last one without its padding.
+std::size_t plane_bytes(int stride, int width, int height) {
+  return static_cast<std::size_t>(stride) * static_cast<std::size_t>(height - 1) +
+         static_cast<std::size_t>(width);
+}
+
+/// Tracks a frame and writes the poses of all patterns; answers how many are visible.
+jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t stride,
+           double time_s, float* poses) {
+  modar_error error{};
+  if (modar_tracker_step_at(session.tracker, luma, stride, time_s, &error) != 0) {
+    throw_error(env, error);
+    return 0;
+  }
+  jint visible = 0;
+  const std::uint32_t patterns = modar_pattern_count(session.bundle);
+  for (std::uint32_t i = 0; i < patterns; ++i, poses += kPoseFloats) {
+    modar_pose pose{};
+    visible += modar_tracker_pose(session.tracker, i, &pose);
+    poses[0] = static_cast<float>(pose.visible);
+    poses[1] = static_cast<float>(pose.shown);
+    poses[2] = static_cast<float>(pose.inliers);
+    poses[3] = pose.fit;
+    std::memcpy(poses + 4, pose.rotation, sizeof pose.rotation);
+    std::memcpy(poses + 13, pose.translation, sizeof pose.translation);
+    std::memcpy(poses + 16, pose.corners, sizeof pose.corners);
+    modar_view(&pose, poses + kView);
+  }
+  return visible;
+}
+
+/// place := gesture * place, in the pattern's space.
+void apply(const Gesture& gesture, float place[16]) {
+  const float cosine = gesture.scale * std::cos(gesture.turn);
+  const float sine = gesture.scale * std::sin(gesture.turn);
+  for (int column = 0; column < 4; ++column) {
+    float* const v = place + 4 * column;
+    const float x = v[0];
+    const float y = v[1];
+    v[0] = cosine * x - sine * y + gesture.x * v[3];
+    v[1] = sine * x + cosine * y + gesture.y * v[3];
+    v[2] *= gesture.scale;
+  }
+}
+
+/// What stands on the patterns that are shown.
+void place_items(Session& session, const float* poses) {
+  session.items.clear();
+  const Gesture& gesture = session.gesture;
+  const bool moved = gesture.scale != 1 || gesture.turn != 0 || gesture.x != 0 || gesture.y != 0;
+  for (const modar_scene& each : session.scenes) {
+    const float* from = poses + each.pattern * kPoseFloats;
+    if (from[1] == 0) continue;
+    modar_pose pose{};
+    std::memcpy(pose.rotation, from + 4, sizeof pose.rotation);
+    std::memcpy(pose.translation, from + 13, sizeof pose.translation);
+    modar_scene scene = each;
+    if (moved) apply(gesture, scene.place);
+    session.items.emplace_back();
+    modar_item_place(&session.items.back(), &scene, &pose);
+  }
+}
+
+void draw(Session& session, const modar_picture* picture, const float* poses) {
+  place_items(session, poses);
+  modar_renderer_draw(session.renderer, &session.surface, picture, &session.camera, nullptr,
+                      session.items.data(), session.items.size());
+}
+
+/// False and an exception where there is no renderer or no surface yet.
+bool can_draw(JNIEnv* env, const Session& session) {
+  if (session.renderer != nullptr && session.surface.width > 0) return true;
+  misuse(env, "android.surface", "session", "there is nothing to draw on yet",
+         "call onSurfaceCreated and onSurfaceChanged first");
+  return false;
+}
+
+/// The planes of an Image in YUV_420_888: three planes, or luma and pairs of chroma that two of the
+/// planes share. False and an exception for anything else.
+bool chroma_planes(JNIEnv* env, modar_picture& picture, jobject u_buffer, jobject v_buffer,
+                   jint stride, jint pixel_stride) {
+  const int width = picture.width / 2;
+  const int height = picture.height / 2;
+  if ((pixel_stride != 1 && pixel_stride != 2) || stride < width * pixel_stride) {
+    misuse(env, "android.planes", "chroma", "these strides belong to no YUV_420_888",
+           "pass those of the Image's planes");
+    return false;
+  }
+  const std::size_t size = plane_bytes(stride, (width - 1) * pixel_stride + 1, height);
+  const auto* u = static_cast<const std::uint8_t*>(direct(env, u_buffer, size, "u"));
+  if (u == nullptr) return false;
+  const auto* v = static_cast<const std::uint8_t*>(direct(env, v_buffer, size, "v"));
+  if (v == nullptr) return false;
+  picture.strides[1] = picture.strides[2] = stride;
+  if (pixel_stride == 1) {
+    picture.format = MODAR_I420;
+    picture.planes[1] = u;
+    picture.planes[2] = v;
+  } else if (v + 1 == u || u + 1 == v) {
+    picture.format = v + 1 == u ? MODAR_NV21 : MODAR_NV12;
+    picture.planes[1] = v + 1 == u ? v : u;
+  } else {
+    throw_error(env, 5, "android.planes", "chroma", "samples of U and V lie apart with gaps",
+                "ask the camera for NV21");
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+}  // namespace modar::android
+
+// --- org.modar.Native ---
+
+using namespace modar::android;
+
+#define MODAR_NATIVE(type, name) extern "C" JNIEXPORT type JNICALL Java_org_modar_Native_##name
+
+MODAR_NATIVE(jint, version)(JNIEnv*, jclass) {
+  return static_cast<jint>(modar_version());
+}
+
+MODAR_NATIVE(jlong, openFd)(JNIEnv* env, jclass, jint fd, jlong offset, jlong length) {
+  modar_error error{};
+  return opened(env, modar_bundle_open_fd(fd, offset, length, &error), error);
+}
+
+MODAR_NATIVE(jlong, openFile)(JNIEnv* env, jclass, jstring path) {
+  modar_error error{};
+  return opened(env, modar_bundle_open(text_of(env, path).c_str(), &error), error);
+}
+
+MODAR_NATIVE(void, close)(JNIEnv*, jclass, jlong number) {
+  const std::shared_ptr<Session> session = sessions().take(number);
+  if (!session) return;  // closing twice is fine
+  const std::scoped_lock both(session->tracking, session->drawing);
+  modar_tracker_destroy(std::exchange(session->tracker, nullptr));
+  modar_renderer_destroy(std::exchange(session->renderer, nullptr));
+  modar_bundle_close(std::exchange(session->bundle, nullptr));
+}
+
+MODAR_NATIVE(void, verify)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::tracking);
+  modar_error error{};
+  if (session && modar_bundle_verify(session->bundle, &error) != 0) throw_error(env, error);
+}
+
+MODAR_NATIVE(jint, patternCount)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::tracking);
+  return session ? static_cast<jint>(modar_pattern_count(session->bundle)) : 0;
+}
+
+MODAR_NATIVE(jstring, patternName)(JNIEnv* env, jclass, jlong number, jint index) {
+  return name_of(env, number, index, modar_pattern_name);
+}
+
+MODAR_NATIVE(jstring, modelName)(JNIEnv* env, jclass, jlong number, jint index) {
+  return name_of(env, number, index, modar_model_name);
+}
+
+MODAR_NATIVE(void, setCamera)
+(JNIEnv* env, jclass, jlong number, jint width, jint height, jstring file, jboolean search_apart) {
+  const std::string path = text_of(env, file);
+  const Use session(env, number, &Session::tracking);
+  if (!session) return;
+  modar_error error{};
+  modar_camera camera = modar_camera_default(width, height);
+  if (!path.empty()) {
+    if (modar_camera_read(path.c_str(), &camera, &error) != 0) return throw_error(env, error);
+    modar::Camera lens{camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, {}};
+    if (lens.width > 0 && lens.height > 0 && width > 0 && height > 0) {
+      lens = modar::scaled_camera(lens, width, height);
+    }
+    camera.width = width;
+    camera.height = height;
+    camera.fx = lens.fx;
+    camera.fy = lens.fy;
+    camera.cx = lens.cx;
+    camera.cy = lens.cy;
+  }
+  modar_tracker_options options{};
+  options.size = sizeof options;
+  options.async_search = search_apart ? 1 : 0;
+  modar_tracker* tracker = modar_tracker_create_with(session->bundle, &camera, &options, &error);
+  if (tracker == nullptr) return throw_error(env, error);
+  modar_tracker_destroy(std::exchange(session->tracker, tracker));
+  const std::lock_guard drawing(session->drawing);
+  session->camera = camera;
+}
+
+MODAR_NATIVE(jint, onCameraFrame)
+(JNIEnv* env, jclass, jlong number, jbyteArray nv21, jdouble time_s, jobject poses) {
+  const Use session(env, number, &Session::tracking);
+  if (!session || !has_camera(env, *session)) return 0;
+  float* const out = pose_floats(env, *session, poses);
+  if (out == nullptr) return 0;
+  const ArrayBytes frame(env, nv21, luma_bytes(session->camera));
+  if (frame.get() == nullptr) return 0;
+  return track(env, *session, frame.get(), static_cast<std::size_t>(session->camera.width), time_s,
+               out);
+}
+
+MODAR_NATIVE(jint, onCameraPlane)
+(JNIEnv* env, jclass, jlong number, jobject luma, jint stride, jdouble time_s, jobject poses) {
+  const Use session(env, number, &Session::tracking);
+  if (!session || !has_camera(env, *session)) return 0;
+  float* const out = pose_floats(env, *session, poses);
+  if (out == nullptr) return 0;
+  const modar_camera& camera = session->camera;
+  if (stride < camera.width) {
+    misuse(env, "android.planes", "luma", "its rows are shorter than the frame",
+           "pass the plane's own stride");
+    return 0;
+  }
+  const auto* bytes = static_cast<const std::uint8_t*>(
+      direct(env, luma, plane_bytes(stride, camera.width, camera.height), "luma"));
+  if (bytes == nullptr) return 0;
+  return track(env, *session, bytes, static_cast<std::size_t>(stride), time_s, out);
+}
+
+MODAR_NATIVE(jstring, reason)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::tracking);
+  if (!session || !has_camera(env, *session)) return nullptr;
+  return env->NewStringUTF(modar_tracker_reason(session->tracker));
+}
+
+MODAR_NATIVE(void, reset)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::tracking);
+  if (session && session->tracker != nullptr) modar_tracker_reset(session->tracker);
+}
+
+MODAR_NATIVE(void, projection)
+(JNIEnv* env, jclass, jlong number, jdouble near_plane, jdouble far_plane, jobject matrix) {
+  const Use session(env, number, &Session::tracking);
+  if (!session || !has_camera(env, *session)) return;
+  std::array<float, 16> projection{};
+  void* const out = direct(env, matrix, sizeof projection, "matrix");
+  if (out == nullptr) return;
+  modar_projection(&session->camera, near_plane, far_plane, projection.data());
+  std::memcpy(out, projection.data(), sizeof projection);
+}
+
+MODAR_NATIVE(void, onSurfaceCreated)
+(JNIEnv* env, jclass, jlong number, jstring device) {
+  const std::string profile = text_of(env, device);
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  modar_error error{};
+  if (session->renderer != nullptr) {
+    // A second surface means that the context was lost with all that was in it.
+    if (modar_renderer_restore(session->renderer, &error) != 0) throw_error(env, error);
+    return;
+  }
+  session->renderer = modar_renderer_create(session->bundle,
+                                            profile.empty() ? nullptr : profile.c_str(), 0, &error);
+  if (session->renderer == nullptr) return throw_error(env, error);
+  modar_render_options options;
+  modar_render_options_default(&options);
+  options.exclusive = 1;  // GLSurfaceView's context is the app's alone
+  modar_renderer_set_options(session->renderer, &options);
+}
+
+MODAR_NATIVE(void, onSurfaceChanged)
+(JNIEnv* env, jclass, jlong number, jint width, jint height, jint rotation, jboolean mirror) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  modar_surface surface{};
+  surface.size = sizeof surface;
+  surface.width = width;
+  surface.height = height;
+  surface.rotation = rotation;
+  surface.mirror = mirror ? 1 : 0;
+  surface.cover = 1;
+  session->surface = surface;
+}
+
+MODAR_NATIVE(void, setGesture)
+(JNIEnv* env, jclass, jlong number, jfloat scale, jfloat turn, jfloat x, jfloat y) {
+  const Use session(env, number, &Session::drawing);
+  if (session) session->gesture = {scale, turn, x, y};
+}
+
+MODAR_NATIVE(void, onDrawFrame)
+(JNIEnv* env, jclass, jlong number, jbyteArray nv21, jobject poses) {
+  const Use session(env, number, &Session::drawing);
+  if (!session || !has_camera(env, *session) || !can_draw(env, *session)) return;
+  const float* const from = pose_floats(env, *session, poses);
+  if (from == nullptr) return;
+  const modar_camera& camera = session->camera;
+  const std::size_t luma = luma_bytes(camera);
+  const ArrayBytes frame(env, nv21, luma / 2 * 3);
+  if (frame.get() == nullptr) return;
+  modar_picture picture{};
+  picture.format = MODAR_NV21;
+  picture.width = camera.width;
+  picture.height = camera.height;
+  picture.planes[0] = frame.get();
+  picture.planes[1] = frame.get() + luma;
+  picture.strides[0] = picture.strides[1] = camera.width;
+  picture.full_range = 1;
+  draw(*session, &picture, from);
+}
+
+MODAR_NATIVE(void, onDrawPlanes)
+(JNIEnv* env, jclass, jlong number, jobject y, jint y_stride, jobject u, jobject v, jint uv_stride,
+ jint uv_pixel_stride, jobject poses) {
+  const Use session(env, number, &Session::drawing);
+  if (!session || !has_camera(env, *session) || !can_draw(env, *session)) return;
+  const float* const from = pose_floats(env, *session, poses);
+  if (from == nullptr) return;
+  const modar_camera& camera = session->camera;
+  modar_picture picture{};
+  picture.width = camera.width;
+  picture.height = camera.height;
+  picture.full_range = 1;
+  picture.strides[0] = y_stride;
+  if (y_stride < camera.width) {
+    return misuse(env, "android.planes", "luma", "its rows are shorter than the frame",
+                  "pass the plane's own stride");
+  }
+  picture.planes[0] = static_cast<const std::uint8_t*>(
+      direct(env, y, plane_bytes(y_stride, camera.width, camera.height), "luma"));
+  if (picture.planes[0] == nullptr) return;
+  if (!chroma_planes(env, picture, u, v, uv_stride, uv_pixel_stride)) return;
+  draw(*session, &picture, from);
+}
+
+MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) {
+  const Use session(env, number, &Session::drawing);
+  if (!session || !has_camera(env, *session) || !can_draw(env, *session)) return -1;
+  double frame_x = 0;
+  double frame_y = 0;
+  modar_surface_to_frame(&session->surface, &session->camera, double{x}, double{y}, &frame_x,
+                         &frame_y);
+  modar_hit hit{};
+  if (modar_pick(session->bundle, &session->camera, frame_x, frame_y, session->items.data(),
+                 session->items.size(), &hit) == 0) {
+    return -1;
+  }
+  return static_cast<jint>(session->items[hit.item].model);
+}
+
+MODAR_NATIVE(jlong, gpuBytes)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::drawing);
+  if (!session || session->renderer == nullptr) return 0;
+  return static_cast<jlong>(modar_renderer_gpu_bytes(session->renderer));
+}

@@ -1,0 +1,157 @@
+package org.modar;
+
+import android.content.Context;
+import android.content.res.AssetFileDescriptor;
+import android.graphics.Bitmap;
+import android.graphics.BitmapFactory;
+import android.os.ParcelFileDescriptor;
+import java.io.ByteArrayOutputStream;
+import java.io.File;
+import java.io.FileInputStream;
+import java.io.IOException;
+import java.io.InputStream;
+import java.io.InputStreamReader;
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.List;
+import java.util.Properties;
+
+/**
+ * Where bundles come from: the release that was fetched, the app's folder, the APK, in this order. One of the same
+ * name stands in for another that is damaged.
+ */
+final class Bundles {
+    /** A bundle: a file, or an asset of the APK. */
+    static final class Source {
+        final String name;
+        final File file;
+        final String origin;
+
+        Source(String name, File file, String origin) {
+            this.name = name;
+            this.file = file;
+            this.origin = origin;
+        }
+    }
+
+    private static final String ENDING = ".modar";
+    private static final String ASSETS = "bundles";
+    private final Context context;
+    /** What adb and file managers reach; the app needs no permission for it. */
+    final File folder;
+    final File store;
+
+    Bundles(Context context) {
+        this.context = context;
+        File outside = context.getExternalFilesDir(null);
+        folder = outside != null ? outside : context.getFilesDir();
+        store = new File(context.getFilesDir(), "store");
+    }
+
+    List<Source> list() {
+        List<Source> all = new ArrayList<>();
+        if (Fetch.AVAILABLE) {
+            for (String path : Fetch.installed(store.getPath())) {
+                all.add(new Source(nameOf(path), new File(path), "release"));
+            }
+        }
+        String[] files = folder.list();
+        for (String file : sorted(files)) all.add(new Source(nameOf(file), new File(folder, file), "folder"));
+        try {
+            for (String asset : sorted(context.getAssets().list(ASSETS))) all.add(new Source(nameOf(asset), null, "app"));
+        } catch (IOException none) {
+            return all; // an APK without assets
+        }
+        return all;
+    }
+
+    private static List<String> sorted(String[] names) {
+        List<String> bundles = new ArrayList<>();
+        if (names == null) return bundles;
+        Arrays.sort(names);
+        for (String name : names) {
+            if (name.endsWith(ENDING)) bundles.add(name);
+        }
+        return bundles;
+    }
+
+    private static String nameOf(String path) {
+        String file = new File(path).getName();
+        return file.endsWith(ENDING) ? file.substring(0, file.length() - ENDING.length()) : file;
+    }
+
+    /** Maps it: an asset through the APK's own descriptor, at its offset. */
+    long open(Source source) throws ModarException {
+        if (source.file != null) return Native.openFile(source.file.getPath());
+        String asset = ASSETS + "/" + source.name + ENDING;
+        try {
+            AssetFileDescriptor descriptor = context.getAssets().openFd(asset);
+            try {
+                ParcelFileDescriptor apk = descriptor.getParcelFileDescriptor();
+                return Native.openFd(apk.getFd(), descriptor.getStartOffset(), descriptor.getLength());
+            } finally {
+                descriptor.close();
+            }
+        } catch (IOException compressed) {
+            throw new ModarException(2, "android.asset", asset, "it cannot be opened in the APK: "
+                    + compressed.getMessage(), "make the APK with scripts/apk.sh, which stores bundles as they are");
+        }
+    }
+
+    /** A picture of what to look for, NAME.png or NAME.jpg beside the bundle, or null. */
+    Bitmap hint(Source source) {
+        for (String ending : new String[] {".png", ".jpg"}) {
+            try {
+                InputStream in = beside(source, ending);
+                try {
+                    return BitmapFactory.decodeStream(in);
+                } finally {
+                    in.close();
+                }
+            } catch (IOException none) {
+                continue;
+            }
+        }
+        return null;
+    }
+
+    /** Texts for visitors, NAME.properties beside the bundle: a line "pattern=text" or "model=text" each. */
+    Properties texts(Source source) {
+        Properties texts = new Properties();
+        try {
+            InputStream in = beside(source, ".properties");
+            try {
+                texts.load(new InputStreamReader(in, "UTF-8"));
+            } finally {
+                in.close();
+            }
+        } catch (IOException none) {
+            return texts;
+        }
+        return texts;
+    }
+
+    private InputStream beside(Source source, String ending) throws IOException {
+        if (source.file == null) return context.getAssets().open(ASSETS + "/" + source.name + ending);
+        File own = new File(source.file.getParentFile(), source.name + ending);
+        return new FileInputStream(own.exists() ? own : new File(folder, source.name + ending));
+    }
+
+    /** What `modar calibrate` wrote for this phone, or null. */
+    String lens() {
+        File file = new File(folder, "camera.yml");
+        return file.exists() ? file.getPath() : null;
+    }
+
+    String asset(String name) throws IOException {
+        InputStream in = context.getAssets().open(name);
+        try {
+            ByteArrayOutputStream text = new ByteArrayOutputStream();
+            byte[] part = new byte[1024];
+            for (int got = in.read(part); got > 0; got = in.read(part)) text.write(part, 0, got);
+            return text.toString("UTF-8").trim();
+        } finally {
+            in.close();
+        }
+    }
+}

@@ -1,0 +1,96 @@
+package org.modar;
+
+import java.nio.ByteBuffer;
+
+/**
+ * libmodar_jni.so: the C API (modar.h) with the entry points of the ModAR paper. A session is an open bundle
+ * with its tracker and renderer. The camera's thread tracks while GL's thread draws; close() waits for both.
+ * A closed session throws "android.closed", null or small buffers throw "android.buffer".
+ */
+public final class Native {
+    static {
+        System.loadLibrary("modar_jni");
+    }
+
+    private Native() {}
+
+    /** 10000 * major + 100 * minor + patch. */
+    public static native int version();
+
+    /** `length` bytes from `offset` of an open file (an asset of the APK); the descriptor may be closed then. */
+    public static native long openFd(int fd, long offset, long length) throws ModarException;
+
+    public static native long openFile(String path) throws ModarException;
+
+    /** Closing twice is fine. */
+    public static native void close(long session);
+
+    /** Reads the whole bundle and compares the hash of each section. */
+    public static native void verify(long session) throws ModarException;
+
+    public static native int patternCount(long session) throws ModarException;
+
+    public static native String patternName(long session, int index) throws ModarException;
+
+    public static native String modelName(long session, int index) throws ModarException;
+
+    /**
+     * The size of the camera's frames, and its lens.
+     *
+     * @param file what `modar calibrate` wrote; null: focal length = width
+     * @param searchApart searches for patterns on a thread of its own; then results depend on time
+     */
+    public static native void setCamera(long session, int width, int height, String file, boolean searchApart)
+            throws ModarException;
+
+    /**
+     * Tracks a frame in NV21.
+     *
+     * @param timeS seconds, rising
+     * @param poses direct, Poses.BYTES a pattern, native order; see {@link Poses}
+     * @return how many patterns are visible
+     */
+    public static native int onCameraFrame(long session, byte[] nv21, double timeS, ByteBuffer poses)
+            throws ModarException;
+
+    /** The same with the luma plane of YUV_420_888: a direct buffer. */
+    public static native int onCameraPlane(
+            long session, ByteBuffer luma, int stride, double timeS, ByteBuffer poses) throws ModarException;
+
+    /** Why nothing is visible: "few matches"...; "visible" where something is. */
+    public static native String reason(long session) throws ModarException;
+
+    /** Forgets what is tracked: after a pause. */
+    public static native void reset(long session) throws ModarException;
+
+    /** GL's projection of the camera into 16 floats of a direct buffer, column-major. */
+    public static native void projection(long session, double nearPlane, double farPlane, ByteBuffer matrix)
+            throws ModarException;
+
+    /** On GL's thread, each time there is a new context. device: a profile like "mali400", or null. */
+    public static native void onSurfaceCreated(long session, String device) throws ModarException;
+
+    /**
+     * @param rotation degrees that a frame is turned clockwise to be upright on the surface: 0, 90, 180, 270
+     * @param mirror true for the front camera
+     */
+    public static native void onSurfaceChanged(long session, int width, int height, int rotation, boolean mirror)
+            throws ModarException;
+
+    /** What the visitor's fingers did: a factor, radians about the pattern's normal, half largest sides along it. */
+    public static native void setGesture(long session, float scale, float turn, float x, float y)
+            throws ModarException;
+
+    /** Draws the frame and what stands on its patterns. */
+    public static native void onDrawFrame(long session, byte[] nv21, ByteBuffer poses) throws ModarException;
+
+    /** The same with the planes of YUV_420_888, with the strides that the Image states. */
+    public static native void onDrawPlanes(long session, ByteBuffer y, int yStride, ByteBuffer u, ByteBuffer v,
+            int uvStride, int uvPixelStride, ByteBuffer poses) throws ModarException;
+
+    /** The model drawn last under a touch (pixels from the surface's top left), or -1. */
+    public static native int pick(long session, float x, float y) throws ModarException;
+
+    /** GL memory that the bundle takes. */
+    public static native long gpuBytes(long session) throws ModarException;
+}

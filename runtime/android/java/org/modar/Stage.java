@@ -1,0 +1,191 @@
+package org.modar;
+
+import android.opengl.GLES20;
+import android.opengl.GLSurfaceView;
+import java.nio.ByteBuffer;
+import java.util.concurrent.atomic.AtomicReference;
+import javax.microedition.khronos.egl.EGLConfig;
+import javax.microedition.khronos.opengles.GL10;
+
+/** Between the camera's thread, which tracks, and GL's, which draws: the newest frame goes over, with its poses. */
+final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
+    interface Listener {
+        /** From any thread. */
+        void failed(ModarException error);
+
+        void cameraFailed(String cause);
+
+        /** On GL's thread: what was drawn, rows from the bottom up. */
+        void picture(ByteBuffer rgba, int width, int height);
+    }
+
+    private final GLSurfaceView view;
+    private final Listener listener;
+    private final Diagnostics diagnostics;
+    private final AtomicReference<Frame> next = new AtomicReference<>();
+    /** Set false by tests: searches in step with the frames, so that results do not depend on time. */
+    static volatile boolean searchApart = true;
+
+    private volatile long session;
+    private volatile String cameraFile;
+    private volatile boolean wantsPicture;
+    private volatile int displayDegrees;
+    private volatile int sensorDegrees;
+    private volatile int seen = -1;
+
+    // GL's thread alone:
+    private Frame shown;
+    private long prepared;
+    private int width;
+    private int height;
+    private int turned = -1;
+    private String profile;
+
+    Stage(GLSurfaceView view, Listener listener, Diagnostics diagnostics) {
+        this.view = view;
+        this.listener = listener;
+        this.diagnostics = diagnostics;
+    }
+
+    /** The bundle to show; the camera is stopped. The one before is closed by GL's thread, which holds its buffers. */
+    void show(long opened, String lens) {
+        final long before = session;
+        cameraFile = lens;
+        session = opened;
+        seen = -1;
+        dropFrames();
+        view.queueEvent(new Runnable() {
+            @Override
+            public void run() {
+                Native.close(before);
+            }
+        });
+    }
+
+    /** How the phone is held: what Display.getRotation() says, in degrees. */
+    void setDisplayDegrees(int degrees) {
+        displayDegrees = degrees;
+    }
+
+    /** The first pattern that something stands on in the newest frame, or -1. */
+    int seen() {
+        return seen;
+    }
+
+    void takePicture() {
+        wantsPicture = true;
+        view.requestRender();
+    }
+
+    /** With the camera stopped and GL paused, or before a new bundle: all frames go back. */
+    synchronized void dropFrames() {
+        Frame waiting = next.getAndSet(null);
+        if (waiting != null) waiting.release();
+        if (shown != null) shown.release();
+        shown = null;
+    }
+
+    // --- The camera's thread ---
+
+    @Override
+    public void cameraOpened(int frameWidth, int frameHeight, int turn) {
+        sensorDegrees = turn;
+        diagnostics.camera = frameWidth + " x " + frameHeight + ", turned by " + turn;
+        try {
+            Native.setCamera(session, frameWidth, frameHeight, cameraFile, searchApart);
+        } catch (ModarException error) {
+            listener.failed(error);
+        }
+    }
+
+    @Override
+    public void frame(Frame frame) {
+        long start = System.nanoTime();
+        try {
+            int visible = frame.track(session);
+            diagnostics.tracked(System.nanoTime() - start, visible > 0);
+            seen = firstShown(frame.poses);
+        } catch (ModarException error) {
+            frame.release();
+            listener.failed(error);
+            return;
+        }
+        Frame late = next.getAndSet(frame);
+        if (late != null) late.release();
+        view.requestRender();
+    }
+
+    private static int firstShown(Poses poses) {
+        for (int i = 0; i < poses.patterns; i++) {
+            if (poses.shown(i)) return i;
+        }
+        return -1;
+    }
+
+    @Override
+    public void cameraFailed(String cause) {
+        listener.cameraFailed(cause);
+    }
+
+    // --- GL's thread ---
+
+    @Override
+    public void onSurfaceCreated(GL10 gl, EGLConfig config) {
+        String renderer = gl.glGetString(GL10.GL_RENDERER);
+        profile = Diagnostics.profileOf(renderer);
+        diagnostics.gl = renderer + "; " + gl.glGetString(GL10.GL_VERSION);
+        diagnostics.profile = profile == null ? "none, the context's own limits" : profile;
+        prepared = 0;
+    }
+
+    @Override
+    public void onSurfaceChanged(GL10 gl, int newWidth, int newHeight) {
+        width = newWidth;
+        height = newHeight;
+        turned = -1;
+    }
+
+    @Override
+    public synchronized void onDrawFrame(GL10 gl) {
+        Frame newest = next.getAndSet(null);
+        if (newest != null) {
+            if (shown != null) shown.release();
+            shown = newest;
+        }
+        long start = System.nanoTime();
+        try {
+            prepare();
+            if (shown == null) {
+                GLES20.glClear(GLES20.GL_COLOR_BUFFER_BIT | GLES20.GL_DEPTH_BUFFER_BIT);
+                return;
+            }
+            shown.draw(session);
+        } catch (ModarException error) {
+            listener.failed(error);
+            return;
+        }
+        diagnostics.drawn(System.nanoTime() - start);
+        if (wantsPicture) {
+            wantsPicture = false;
+            ByteBuffer rgba = ByteBuffer.allocateDirect(4 * width * height);
+            GLES20.glReadPixels(0, 0, width, height, GLES20.GL_RGBA, GLES20.GL_UNSIGNED_BYTE, rgba);
+            listener.picture(rgba, width, height);
+        }
+    }
+
+    /** A new context, a new bundle, a turned phone. */
+    private void prepare() throws ModarException {
+        long now = session;
+        if (now == 0) return;
+        if (prepared != now) {
+            Native.onSurfaceCreated(now, profile);
+            diagnostics.gpuBytes = Native.gpuBytes(now);
+            prepared = now;
+            turned = -1;
+        }
+        int turn = ((sensorDegrees - displayDegrees) % 360 + 360) % 360;
+        if (turned == turn) return;
+        Native.onSurfaceChanged(now, width, height, turn, false);
+        turned = turn;
+    }
+}

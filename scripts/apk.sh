@@ -1,0 +1,160 @@
+#!/usr/bin/env bash
+# Makes an Android app of bundles: a signed, aligned APK, with Debian's packages only.
+#   scripts/apk.sh BUNDLE... [--title T] [--id org.museum.vases] [--key FILE] [--out FILE]
+#                  [--release URL --trust K.pub] [--words FILE]
+# --title, --id   what the phone calls the app (ModAR), and its application id (org.modar)
+# --key           keystore (PKCS 12) that signs; its password stands in APK_PASSWORD. Without: a key of your own is made
+#                 once in build/android/debug.p12. Phones take an update only from the key that signed before: keep it.
+# --release       address of a folder that `modar ship publish` filled, and the key to trust: adds the network permission
+# --words         words.properties: what the screen says, in your language
+# NAME.png, NAME.jpg (what to look for) and NAME.properties (texts) beside NAME.modar go with it.
+# With ANDROID_NDK set (r25 or newer) it builds the native library for armeabi-v7a, arm64-v8a and x86; without, the APK
+# holds everything else, and it says so. MODAR_NDK_FLAGS: further words for CMake.
+# dx and the signatures of Android's classes come from Debian's source packages, once, into build/android/debian (121 MB).
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+work=$root/build/android
+app=$root/runtime/android
+
+say() { echo "apk.sh: $*" >&2; }
+stop() { say "$2"; exit "$1"; }
+
+title=ModAR id=org.modar key="" out="" release="" trust="" words="" bundles=()
+while [ $# -gt 0 ]; do
+  case $1 in
+    -h | --help) sed -n '2,15s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    --title | --id | --key | --out | --release | --trust | --words)
+      [ $# -ge 2 ] || stop 1 "$1 wants a value"
+      printf -v "${1#--}" %s "$2"; shift 2 ;;
+    -*) stop 1 "unknown option '$1'; try --help" ;;
+    *) bundles+=("$1"); shift ;;
+  esac
+done
+[ ${#bundles[@]} -gt 0 ] || stop 1 "name a bundle: scripts/apk.sh vase.modar"
+[[ $id =~ ^[a-zA-Z][a-zA-Z0-9_]*(\.[a-zA-Z][a-zA-Z0-9_]*)+$ ]] || stop 1 "--id '$id' is no application id like org.museum.vases"
+[ -z "$release" ] || [ -r "$trust" ] || stop 1 "--release wants --trust K.pub, the key that signs the releases"
+out=${out:-$root/out/${id##*.}.apk}
+for bundle in "${bundles[@]}"; do
+  [ "$(head -c 8 "$bundle" 2>/dev/null | tr -d '\0')" != "" ] || stop 2 "$bundle cannot be read"
+done
+missing=()
+for tool in javac aapt zipalign apksigner keytool python3; do
+  command -v $tool >/dev/null || missing+=("$tool")
+done
+[ ${#missing[@]} -eq 0 ] ||
+  stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless python3"
+framework=/usr/share/android-framework-res/framework-res.apk
+[ -r $framework ] || stop 5 "missing: $framework; apt-get install android-framework-res"
+
+quick=(-J-XX:TieredStopAtLevel=1 -J-XX:+UseSerialGC -proc:none -nowarn -Xlint:-options -encoding utf-8)
+
+# Debian's source packages through apt, with a list of sources of our own: the system's may have no deb-src.
+fetch_source() { # PACKAGE
+  local dir=$work/debian
+  ls "$dir/$1"_*.orig.tar.* >/dev/null 2>&1 && return
+  mkdir -p "$dir/lists/partial" "$dir/cache"
+  # shellcheck source=/dev/null
+  . /etc/os-release
+  echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] ${DEBIAN_MIRROR:-http://deb.debian.org/debian} ${VERSION_CODENAME:-bookworm} main" > "$dir/sources.list"
+  local apt=(apt-get -qq -o "Dir::Etc::SourceList=$dir/sources.list" -o Dir::Etc::SourceParts=/dev/null
+    -o "Dir::State::Lists=$dir/lists" -o "Dir::Cache=$dir/cache" -o APT::Sandbox::User=root)
+  say "fetching the source package $1, once"
+  (cd "$dir" && "${apt[@]}" update && "${apt[@]}" source --download-only "$1") >&2 ||
+    stop 2 "Debian's source package $1 cannot be fetched; try again with a network"
+}
+
+# dx turns class files into a phone's: 408 files, compiled once.
+if [ ! -f "$work/dx.jar" ]; then
+  fetch_source android-platform-tools
+  rm -rf "$work/dx"
+  mkdir -p "$work/dx/src" "$work/dx/classes"
+  tar -xf "$work"/debian/android-platform-tools_*.orig.tar.* -C "$work/dx/src" --strip-components=4 --wildcards '*/dalvik/dx/src/*'
+  find "$work/dx/src" -name '*.java' > "$work/dx/files"
+  javac "${quick[@]}" -g:none -d "$work/dx/classes" "@$work/dx/files" 2>/dev/null
+  (cd "$work/dx/classes" && jar cf "$work/dx.jar.tmp" .)
+  mv "$work/dx.jar.tmp" "$work/dx.jar"
+  rm -rf "$work/dx"
+fi
+# Stubs of the classes that the app names, out of Android's own list of signatures.
+if [ ! -f "$work/current.txt" ]; then
+  fetch_source android-platform-frameworks-base
+  tar -xf "$work"/debian/android-platform-frameworks-base_*.orig.tar.* -O --occurrence=1 api/current.txt > "$work/current.txt.tmp"
+  mv "$work/current.txt.tmp" "$work/current.txt"
+fi
+
+step=$work/apk
+rm -rf "$step"
+mkdir -p "$step/stub-classes" "$step/classes" "$step/tree/assets/bundles" "$(dirname "$out")"
+python3 "$root/scripts/android_stubs.py" "$work/current.txt" "$app/java" "$step/stubs"
+find "$step/stubs" -name '*.java' > "$step/stubs.list"
+find "$app/java" -name '*.java' > "$step/app.list"
+javac "${quick[@]}" --release 7 -d "$step/stub-classes" "@$step/stubs.list"
+javac "${quick[@]}" -g:none --release 7 -cp "$step/stub-classes" -d "$step/classes" "@$step/app.list"
+java -XX:TieredStopAtLevel=1 -cp "$work/dx.jar" com.android.dx.command.Main --dex --min-sdk-version=19 \
+  --output="$step/tree/classes.dex" "$step/classes"
+
+for bundle in "${bundles[@]}"; do
+  cp "$bundle" "$step/tree/assets/bundles/"
+  for beside in png jpg properties; do
+    [ ! -f "${bundle%.modar}.$beside" ] || cp "${bundle%.modar}.$beside" "$step/tree/assets/bundles/"
+  done
+done
+[ -z "$words" ] || cp "$words" "$step/tree/assets/words.properties"
+if [ -n "$release" ]; then
+  printf '%s\n' "$release" > "$step/tree/assets/release.txt"
+  cp "$trust" "$step/tree/assets/release.pub"
+fi
+
+if [ -n "${ANDROID_NDK:-}" ]; then
+  includes=/usr/include/eigen3\;/usr/include
+  for abi in armeabi-v7a arm64-v8a x86; do
+    level=19
+    [ $abi != arm64-v8a ] || level=21
+    # shellcheck disable=SC2086
+    cmake -S "$root" -B "$work/$abi" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$ANDROID_NDK/build/cmake/android.toolchain.cmake" \
+      -DANDROID_ABI=$abi -DANDROID_PLATFORM=android-$level -DANDROID_STL=c++_static -DCMAKE_BUILD_TYPE=MinSizeRel \
+      -DMODAR_LIBRARY_ONLY=ON -DMODAR_TESTS=OFF "-DMODAR_INCLUDE_PATHS=$includes" ${MODAR_NDK_FLAGS:-} >&2
+    cmake --build "$work/$abi" --target modar_jni >&2
+    mkdir -p "$step/tree/lib/$abi"
+    find "$work/$abi" -name 'libmodar*_jni.so' -exec cp {} "$step/tree/lib/$abi/" \;
+    "$ANDROID_NDK"/toolchains/llvm/prebuilt/*/bin/llvm-strip "$step/tree/lib/$abi"/*.so
+  done
+else
+  say "ANDROID_NDK is not set: the APK holds no native library and will not start on a phone"
+fi
+
+python3 - "$app" "$step" "$title" "$release" <<'P'
+import html, pathlib, shutil, sys
+app, step, title, release = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4]
+manifest = (app / "AndroidManifest.xml").read_text()
+if release:
+    network = '    <uses-permission android:name="android.permission.INTERNET" />\n    <application'
+    manifest = manifest.replace("    <application", network, 1)
+    if release.startswith("http:"):
+        manifest = manifest.replace("<application ", '<application android:usesCleartextTraffic="true" ', 1)
+(step / "AndroidManifest.xml").write_text(manifest)
+shutil.copytree(app / "res", step / "res")
+strings = step / "res" / "values" / "strings.xml"
+quoted = html.escape(title, quote=False).replace("\\", "\\\\").replace("'", "\\'").replace('"', '\\"')
+strings.write_text(strings.read_text().replace(">ModAR<", f">{quoted}<"))
+P
+# Bundles are stored as they are, so that the phone maps them inside the APK.
+aapt package -f -M "$step/AndroidManifest.xml" -S "$step/res" -I $framework --rename-manifest-package "$id" -0 modar \
+  -F "$step/unaligned.apk" "$step/tree" >&2
+# 8: a bundle's own alignment; -p lays libraries on pages.
+zipalign -f -p 8 "$step/unaligned.apk" "$step/aligned.apk"
+if [ -z "$key" ]; then
+  key=$work/debug.p12
+  APK_PASSWORD=modar-debug
+  if [ ! -f "$key" ]; then
+    keytool -genkeypair -keystore "$key" -storetype PKCS12 -storepass $APK_PASSWORD -alias modar -keyalg RSA -keysize 2048 \
+      -validity 10000 -dname "CN=ModAR debug" >/dev/null 2>&1
+  fi
+fi
+export APK_PASSWORD=${APK_PASSWORD:?password of --key}
+apksigner sign --ks "$key" --ks-pass env:APK_PASSWORD --min-sdk-version 19 --v1-signing-enabled true \
+  --v2-signing-enabled true --v3-signing-enabled true --out "$out.tmp" "$step/aligned.apk"
+rm -f "$out.tmp.idsig"
+mv "$out.tmp" "$out"
+say "$(wc -c < "$out") bytes, $(wc -c < "$step/tree/classes.dex") of them code in Java"
+echo "$out"

@@ -1,0 +1,138 @@
+"""scripts/apk.sh: an APK with Debian's tools alone, and what Android's own tools say of it."""
+import os
+import pathlib
+import re
+import shutil
+import struct
+import subprocess
+import unittest
+import zipfile
+
+from machine import FAKES, HEIGHT, ROOT, WIDTH, ProgramTest, compile_java, have, make_clip, run_java
+
+TOOLS = ("javac", "aapt", "zipalign", "apksigner", "dexdump", "keytool")
+GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
+# What the app's code takes of the APK, packed: small beside its bundles.
+MAX_DEX = 30 * 1024
+
+
+def run(*words, **options):
+    return subprocess.run([str(word) for word in words], capture_output=True, text=True, **options)
+
+
+@unittest.skipUnless(have(*TOOLS) and pathlib.Path("/usr/share/android-framework-res/framework-res.apk").exists(),
+                     "no aapt, zipalign, apksigner, dexdump, android-framework-res or JDK")
+class Apk(ProgramTest):
+    def make(self, *words):
+        return run(ROOT / "scripts" / "apk.sh", *words)
+
+    def made(self, name, *words):
+        out = self.folder / f"{name}.apk"
+        done = self.make(*words, "--out", out)
+        if done.returncode == 2 and "cannot be fetched" in done.stderr:
+            self.skipTest("no network for Debian's source packages (dx, api/current.txt)")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stdout, f"{out}\n")
+        return out, done.stderr
+
+    def offset(self, apk, entry):
+        """Where an entry's bytes begin, by its local header."""
+        with zipfile.ZipFile(apk) as file:
+            info = file.getinfo(entry)
+        self.assertEqual(info.compress_type, zipfile.ZIP_STORED, entry)
+        name, extra = struct.unpack_from("<HH", apk.read_bytes(), info.header_offset + 26)
+        return info.header_offset + 30 + name + extra
+
+    def test_what_androids_tools_say(self):
+        bundle = self.folder / "vase.modar"
+        bundle.write_bytes(GOLDEN.read_bytes())
+        (self.folder / "vase.properties").write_text("cover=Found in 1922.\n")
+        apk, said = self.made("vases", bundle, "--title", "Vase's & more", "--id", "org.museum.vases")
+        self.assertIn("ANDROID_NDK is not set", said)
+        signed = run("apksigner", "verify", "--verbose", "--min-sdk-version", "19", apk)
+        self.assertEqual(signed.returncode, 0, signed.stderr)
+        for scheme in ("v1 scheme (JAR signing)", "v2 scheme (APK Signature Scheme v2)", "v3 scheme (APK Signature Scheme v3)"):
+            self.assertIn(f"Verified using {scheme}: true", signed.stdout)
+        self.assertEqual(run("zipalign", "-c", "-p", "8", apk).returncode, 0)
+        self.assertEqual(self.offset(apk, "assets/bundles/vase.modar") % 8, 0)
+        badging = run("aapt", "dump", "badging", apk).stdout
+        for line in ("package: name='org.museum.vases'", "sdkVersion:'19'", "targetSdkVersion:'29'",
+                     "launchable-activity: name='org.modar.MainActivity'", 'application-label:'):
+            self.assertIn(line, badging)
+        self.assertIn("Vase's & more", badging)
+        self.assertEqual(re.findall(r"uses-permission: name='(.*?)'", badging), ["android.permission.CAMERA"])
+        with zipfile.ZipFile(apk) as file:
+            dex = file.read("classes.dex")
+            self.assertEqual(file.read("assets/bundles/vase.modar"), GOLDEN.read_bytes())
+            self.assertEqual(file.read("assets/bundles/vase.properties"), b"cover=Found in 1922.\n")
+            self.assertLessEqual(file.getinfo("classes.dex").compress_size, MAX_DEX)
+        (self.folder / "classes.dex").write_bytes(dex)
+        dumped = run("dexdump", "-d", self.folder / "classes.dex")
+        self.assertEqual(dumped.returncode, 0, dumped.stderr)
+        classes = re.findall(r"Class descriptor\s*: '(L[^']+;)'", dumped.stdout)
+        self.assertIn("Lorg/modar/MainActivity;", classes)
+        # The phone's version is asked of the phone, not of the stubs.
+        self.assertIn("Landroid/os/Build$VERSION;.SDK_INT", dumped.stdout)
+        # Nothing of the stubs and nothing of anybody else's.
+        self.assertEqual([c for c in classes if not c.startswith("Lorg/modar/")], [])
+
+    def fakes(self):
+        """Compiled fakes of Android's classes, and the driver."""
+        for part in (FAKES.parent / "fake_android.txt").read_text().split("\n== ")[1:]:
+            name, _, text = part.partition("\n")
+            file = self.folder / "fakes" / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+        step = ROOT / "build" / "android" / "apk"
+        classes, app = self.folder / "fake-classes", step / "classes"
+        compile_java(classes, [*(self.folder / "fakes").rglob("*.java"), FAKES / "fake" / "GlContext.java",
+                               FAKES / "org" / "modar" / "AppRun.java"], [app])
+        return [classes, app, step / "stub-classes"]  # Camera2, which is named but not there
+
+    def test_a_day_of_the_app_in_a_jvm(self):
+        """The APK's own class files and assets, on a fake phone."""
+        bundle = self.bake_demo("vase.modar")
+        (self.folder / "vase.properties").write_text("cover=Found in 1922.\n")
+        key, home = self.folder / "museum.key", self.folder / "home"
+        home.mkdir()
+        for words in (["keygen", "--out", key], ["publish", bundle, "--to", home / "release", "--key", key]):
+            done = self.modar("ship", *words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        apk, _ = self.made("vases", bundle, "--release", "https://museum.example/ar", "--trust", f"{key}.pub")
+        with zipfile.ZipFile(f"{apk}.empty", "w") as empty:
+            empty.writestr("classes.dex", b"")
+        clip = make_clip(self.folder / "clip")
+        out = self.folder / "last.rgba"
+        done = run_java(self.fakes(), "org.modar.AppRun", apk, clip, WIDTH, HEIGHT, home, out)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("the day is over", done.stdout)
+        self.assertNotIn("WARNING", done.stdout + done.stderr)
+        told = (home / "diagnostics.txt").read_text()
+        for word in ("phone: fake phone", "bundle: none", "frames: "):
+            self.assertIn(word, told)
+        if os.environ.get("MODAR_KEEP"):
+            shutil.copy(out, os.environ["MODAR_KEEP"])
+
+    def test_a_release_adds_the_network(self):
+        bundle = self.folder / "vase.modar"
+        bundle.write_bytes(GOLDEN.read_bytes())
+        key = self.folder / "museum.pub"
+        key.write_text("untrusted comment: key\nRW\n")
+        apk, _ = self.made("net", bundle, "--release", "https://museum.example/ar", "--trust", key)
+        badging = run("aapt", "dump", "badging", apk).stdout
+        self.assertEqual(sorted(re.findall(r"uses-permission: name='(.*?)'", badging)),
+                         ["android.permission.CAMERA", "android.permission.INTERNET"])
+        with zipfile.ZipFile(apk) as file:
+            self.assertEqual(file.read("assets/release.txt"), b"https://museum.example/ar\n")
+
+    def test_wrong_words(self):
+        for words, code, text in (([], 1, "name a bundle"), (["x.modar", "--id", "vases"], 1, "application id"),
+                                  (["none.modar"], 2, "none.modar"), (["--frob"], 1, "--frob"),
+                                  ([GOLDEN, "--release", "http://x"], 1, "--trust")):
+            done = self.make(*words)
+            self.assertEqual(done.returncode, code, done.stderr)
+            self.assertIn(text, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

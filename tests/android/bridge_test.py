@@ -1,0 +1,137 @@
+"""The bridge (runtime/android/bridge.cpp) in a JVM that checks each JNI call, against modar-play."""
+import json
+import pathlib
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+
+from machine import APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest, compile_java, have, make_clip, run_java
+
+BRIDGE = ["Native", "ModarException", "Poses"]
+FLOATS = 40
+
+
+@unittest.skipUnless(have("javac", "java", "ffmpeg"), "no JDK or no ffmpeg")
+class Bridge(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="modar-android-"))
+        cls.addClassCleanup(shutil.rmtree, cls.shared, ignore_errors=True)
+        cls.classes = cls.shared / "classes"
+        compile_java(cls.classes, [*(APP / "org" / "modar" / f"{name}.java" for name in BRIDGE),
+                                   FAKES / "org" / "modar" / "BridgeRun.java", FAKES / "fake" / "GlContext.java"])
+        cls.clip = make_clip(cls.shared / "clip")
+
+    def bridge(self, word, bundle, *more):
+        done = run_java([self.classes], "org.modar.BridgeRun", word, bundle, self.clip, WIDTH, HEIGHT, *more)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        # -Xcheck:jni prints what it dislikes: references that stay, exceptions that nobody looked at.
+        self.assertNotIn("WARNING", done.stdout + done.stderr)
+        self.assertNotIn("FATAL", done.stdout + done.stderr)
+        return done.stdout
+
+    def play(self, bundle, *more):
+        return self.run_program("modar-play", bundle, "--input", f"nv21:{WIDTH}x{HEIGHT}@30:{self.clip}", *more)
+
+    def test_poses_are_the_players_to_the_last_bit(self):
+        bundle = self.bake_demo()
+        out = self.folder / "poses"
+        reasons = self.bridge("poses", bundle, out).splitlines()
+        done = self.play(bundle, "--json", "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = [json.loads(line) for line in done.stdout.splitlines()][:FRAMES]
+        floats = out.read_bytes()
+        self.assertEqual(len(floats), FRAMES * FLOATS * 4)
+        seen = 0
+        for i, line in enumerate(lines):
+            pose = struct.unpack_from(f"={FLOATS}f", floats, i * FLOATS * 4)
+            self.assertEqual(line["reason"], reasons[i])
+            self.assertEqual(bool(line["visible"]), bool(pose[0]), f"frame {i}")
+            self.assertEqual(line["state"] != "hidden", bool(pose[1]), f"frame {i}")
+            if not line["visible"]:
+                continue
+            seen += 1
+            detection = line["visible"][0]
+            exact = [*detection["rotation"], *detection["translation"],
+                     *(value for corner in detection["corners"] for value in corner)]
+            # The nearest float of each double, which C and Python round alike.
+            self.assertEqual(pose[4:24], struct.unpack("=20f", struct.pack("=20f", *exact)), f"frame {i}")
+            self.assertEqual(pose[2], detection["inliers"])
+            r, t = pose[4:13], pose[13:16]
+            view = [r[0], -r[3], -r[6], 0, r[1], -r[4], -r[7], 0, r[2], -r[5], -r[8], 0, t[0], -t[1], -t[2], 1]
+            self.assertEqual([v + 0.0 for v in pose[24:]], [v + 0.0 for v in view], f"frame {i}")
+        self.assertGreater(seen, FRAMES // 2)
+
+    def test_pictures_are_the_players(self):
+        bundle = self.bake_demo()
+        out = self.folder / "pictures"
+        self.bridge("pictures", bundle, out)
+        done = self.play(bundle, "--device", "mali400", "--out", self.folder / "frames", "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        decoded = subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", self.folder / "frames" / "*.png",
+                                  "-pix_fmt", "rgb24", "-f", "rawvideo", "-"], capture_output=True, check=True).stdout
+        self.assertEqual(len(decoded), FRAMES * WIDTH * HEIGHT * 3)
+        drawn = out.read_bytes()
+        for i in range(FRAMES):
+            frame = drawn[i * WIDTH * HEIGHT * 4:(i + 1) * WIDTH * HEIGHT * 4]
+            rows = [frame[y * WIDTH * 4:(y + 1) * WIDTH * 4] for y in reversed(range(HEIGHT))]
+            upright = b"".join(rows)
+            rgb = bytearray(WIDTH * HEIGHT * 3)
+            for channel in range(3):
+                rgb[channel::3] = upright[channel::4]
+            wanted = decoded[i * WIDTH * HEIGHT * 3:(i + 1) * WIDTH * HEIGHT * 3]
+            # The player draws into a texture of the frame's size, the app into its surface: rounding differs.
+            off = [abs(a - b) for a, b in zip(rgb, wanted)]
+            self.assertLessEqual(max(off), 8, f"frame {i}")
+            self.assertLess(sum(off) / len(off), 0.2, f"frame {i}")
+
+    def test_every_misuse_throws_and_crashes_nothing(self):
+        bundle = self.bake_demo()
+        damaged = self.folder / "damaged.modar"
+        damaged.write_bytes(bundle.read_bytes()[:5000])
+        self.assertIn("all thrown", self.bridge("misuse", bundle, damaged))
+
+    def test_closing_while_other_threads_are_busy(self):
+        self.assertIn("closed", self.bridge("close", self.bake_demo()))
+
+    def test_nothing_grows(self):
+        frames = 10000 if SOAK else 100
+        heap, resident = map(int, self.bridge("soak", self.bake_demo(), frames).split())
+        self.assertLess(heap, 100_000, "bytes of Java's heap")
+        self.assertLess(resident, 4_000 + (0 if SOAK else 4_000), "resident kilobytes")
+
+
+class Targets(unittest.TestCase):
+    """The bridge in the phone's dialect, against Android's own jni.h."""
+
+    def test_it_compiles_for_every_phone(self):
+        jni = pathlib.Path("/usr/include/android/nativehelper/jni.h")
+        if not have("clang++-14") or not jni.exists() or not pathlib.Path("/usr/lib/llvm-14/include/c++/v1").exists():
+            self.skipTest("no clang-14, libc++-14-dev or android-libnativehelper-dev")
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for file, text in {"gnu/stubs.h": "", "xlocale.h": "#include <stdlib.h>\n#include <wchar.h>\n",
+                               "bits/wordsize.h": "#define __WORDSIZE (__SIZEOF_POINTER__ * 8)\n"
+                                                  "#define __WORDSIZE_TIME64_COMPAT32 0\n",
+                               "jni.h": f'#include "{jni}"\n'}.items():
+                (folder / file).parent.mkdir(exist_ok=True)
+                (folder / file).write_text(text)
+            unit = folder / "unit.cpp"
+            unit.write_text("".join(f'#include "{file}"\n' for file in sorted((ROOT / "runtime" / "android").glob("*.cpp"))))
+            # glibc stands for bionic, so the compiler must not say that this is Android.
+            for target in ("armv7a-linux-androideabi19", "aarch64-linux-android21", "i686-linux-android19"):
+                with self.subTest(target=target):
+                    done = subprocess.run(
+                        ["clang++-14", f"--target={target}", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Wconversion",
+                         "-Werror", "-fno-exceptions", "-fno-rtti", "-nostdinc++", "-nostdlibinc", "-D__regparm__(x)=",
+                         "-U__ANDROID__", "-D_GNU_SOURCE", "-I", ROOT, "-I", ROOT / "runtime" / "include",
+                         "-I", ROOT / "runtime" / "fetch" / "include",
+                         "-isystem", "/usr/lib/llvm-14/include/c++/v1", "-isystem", folder, "-idirafter", "/usr/include",
+                         "-idirafter", "/usr/include/x86_64-linux-gnu", unit], capture_output=True, text=True)
+                    self.assertEqual(done.returncode, 0, done.stderr[:4000])
+
+
+if __name__ == "__main__":
+    unittest.main()

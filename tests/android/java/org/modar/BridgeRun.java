@@ -1,0 +1,327 @@
+package org.modar;
+
+import fake.GlContext;
+import java.io.FileInputStream;
+import java.io.FileOutputStream;
+import java.nio.ByteBuffer;
+import java.nio.ByteOrder;
+import java.nio.channels.FileChannel;
+import java.nio.file.Files;
+import java.nio.file.Paths;
+import java.util.concurrent.atomic.AtomicReference;
+
+/** Drives org.modar.Native as the app does, without android.*: what android_test.py asks for. */
+public final class BridgeRun {
+    private static byte[][] frames;
+    private static int width;
+    private static int height;
+
+    public static void main(String[] words) throws Exception {
+        width = Integer.parseInt(words[3]);
+        height = Integer.parseInt(words[4]);
+        byte[] all = Files.readAllBytes(Paths.get(words[2]));
+        frames = new byte[all.length / (width * height * 3 / 2)][width * height * 3 / 2];
+        for (int i = 0; i < frames.length; i++) System.arraycopy(all, i * frames[i].length, frames[i], 0, frames[i].length);
+        switch (words[0]) {
+            case "poses": poses(words[1], words[5]); break;
+            case "pictures": pictures(words[1], words[5]); break;
+            case "misuse": misuse(words[1], words[5]); break;
+            case "close": closeWhileBusy(words[1]); break;
+            default: soak(words[1], Integer.parseInt(words[5]));
+        }
+    }
+
+    private static long opened(String bundle) throws Exception {
+        long session = Native.openFile(bundle);
+        Native.setCamera(session, width, height, null, false);
+        return session;
+    }
+
+    /** A frame's luma with `padding` bytes behind each row, in a direct buffer. */
+    private static ByteBuffer luma(byte[] frame, int padding) {
+        int stride = width + padding;
+        ByteBuffer plane = ByteBuffer.allocateDirect(stride * (height - 1) + width);
+        for (int y = 0; y < height; y++) {
+            plane.position(y * stride);
+            plane.put(frame, y * width, width);
+        }
+        plane.rewind();
+        return plane;
+    }
+
+    /** V, U, V, U... as the two overlapping planes of an Image: {u, v}. */
+    private static ByteBuffer[] pairs(byte[] frame, int padding, boolean nv12) {
+        int stride = width + padding;
+        ByteBuffer both = ByteBuffer.allocateDirect(stride * (height / 2 - 1) + width);
+        for (int y = 0; y < height / 2; y++) {
+            for (int x = 0; x < width; x++) {
+                both.put(y * stride + x, frame[width * height + y * width + (nv12 ? x ^ 1 : x)]);
+            }
+        }
+        both.limit(both.capacity() - 1);
+        ByteBuffer first = both.slice();
+        both.limit(both.capacity());
+        both.position(1);
+        ByteBuffer second = both.slice();
+        return nv12 ? new ByteBuffer[] {first, second} : new ByteBuffer[] {second, first};
+    }
+
+    /** One plane of chroma apart. */
+    private static ByteBuffer apart(byte[] frame, int offset, int padding) {
+        int stride = width / 2 + padding;
+        ByteBuffer plane = ByteBuffer.allocateDirect(stride * height / 2);
+        for (int y = 0; y < height / 2; y++) {
+            for (int x = 0; x < width / 2; x++) {
+                plane.put(y * stride + x, frame[width * height + y * width + 2 * x + offset]);
+            }
+        }
+        return plane;
+    }
+
+    private static void check(boolean good, String what) {
+        if (!good) throw new AssertionError(what);
+    }
+
+    /** All floats of all frames; once as arrays, once as planes with padding, which must be the same. */
+    private static void poses(String bundle, String out) throws Exception {
+        long arrays = opened(bundle);
+        FileInputStream file = new FileInputStream(bundle);
+        java.lang.reflect.Field number = java.io.FileDescriptor.class.getDeclaredField("fd");
+        number.setAccessible(true);
+        long planes = Native.openFd(number.getInt(file.getFD()), 0, file.getChannel().size());
+        file.close(); // the mapping outlives it
+        Native.setCamera(planes, width, height, null, false);
+        Native.verify(planes);
+        int patterns = Native.patternCount(arrays);
+        Poses a = new Poses(patterns);
+        Poses b = new Poses(patterns);
+        FileChannel sink = new FileOutputStream(out).getChannel();
+        for (int i = 0; i < frames.length; i++) {
+            int seen = Native.onCameraFrame(arrays, frames[i], i / 30.0, a.bytes);
+            check(Native.onCameraPlane(planes, luma(frames[i], 17), width + 17, i / 30.0, b.bytes) == seen, "seen");
+            a.bytes.rewind();
+            b.bytes.rewind();
+            check(a.bytes.equals(b.bytes), "array and plane");
+            check(a.visible(0) == (seen > 0), "flag");
+            sink.write(a.bytes);
+            System.out.println(Native.reason(arrays));
+            a.bytes.rewind();
+        }
+        sink.close();
+        Native.close(arrays);
+        Native.close(planes);
+    }
+
+    /** What was drawn of all frames, RGBA from the bottom up; every layout of the planes must give the same. */
+    private static void pictures(String bundle, String out) throws Exception {
+        GlContext.create(width, height);
+        long session = opened(bundle);
+        Poses poses = new Poses(Native.patternCount(session));
+        Native.onSurfaceCreated(session, "mali400");
+        Native.onSurfaceChanged(session, width, height, 0, false);
+        check(Native.gpuBytes(session) > 0, "gpu bytes");
+        FileChannel sink = new FileOutputStream(out).getChannel();
+        ByteBuffer picture = ByteBuffer.allocateDirect(4 * width * height);
+        ByteBuffer other = ByteBuffer.allocateDirect(4 * width * height);
+        for (int i = 0; i < frames.length; i++) {
+            byte[] frame = frames[i];
+            Native.onCameraFrame(session, frame, i / 30.0, poses.bytes);
+            Native.onDrawFrame(session, frame, poses.bytes);
+            GlContext.read(picture);
+            sink.write(picture);
+            picture.rewind();
+            for (int kind = 0; kind < 3; kind++) {
+                if (kind < 2) {
+                    ByteBuffer[] pair = pairs(frame, 32, kind == 1);
+                    Native.onDrawPlanes(session, luma(frame, 32), width + 32, pair[0], pair[1], width + 32, 2, poses.bytes);
+                } else {
+                    Native.onDrawPlanes(session, luma(frame, 0), width, apart(frame, 1, 8), apart(frame, 0, 8),
+                            width / 2 + 8, 1, poses.bytes);
+                }
+                GlContext.read(other);
+                check(picture.equals(other), "layout " + kind + " of frame " + i);
+                other.rewind();
+            }
+            if (i == frames.length / 2) {
+                // The context goes with all that was in it: the next frame comes from a new one.
+                GlContext.destroy();
+                GlContext.create(width, height);
+                Native.onSurfaceCreated(session, "mali400");
+            }
+        }
+        sink.close();
+        // A finger's turn by a full circle changes nothing, a half one does.
+        Native.setGesture(session, 1, 0, 0.5f, 0);
+        Native.onDrawFrame(session, frames[0], poses.bytes);
+        GlContext.read(other);
+        check(!picture.equals(other), "gesture");
+        Native.close(session);
+        GlContext.destroy();
+    }
+
+    private interface Call {
+        void run() throws Exception;
+    }
+
+    private static void throwsCode(String code, Call call) throws Exception {
+        try {
+            call.run();
+        } catch (ModarException error) {
+            check(error.code.equals(code), code + " but " + error.code);
+            check(error.exitCode > 0 && !error.cause.isEmpty() && !error.cure.isEmpty(), "parts of " + code);
+            return;
+        }
+        throw new AssertionError("nothing was thrown: " + code);
+    }
+
+    private static void misuse(final String bundle, final String damaged) throws Exception {
+        final long session = Native.openFile(bundle);
+        final Poses poses = new Poses(Native.patternCount(session));
+        final ByteBuffer small = ByteBuffer.allocateDirect(8);
+        final ByteBuffer heap = ByteBuffer.allocate(1 << 20);
+        final ByteBuffer plane = luma(frames[0], 0);
+        throwsCode("io.open", () -> Native.openFile("none.modar"));
+        throwsCode("io.open", () -> Native.openFile(null));
+        throwsCode("io.map", () -> Native.openFd(-1, 0, 100));
+        throwsCode("io.range", () -> Native.openFd(0, -1, 100));
+        throwsCode("bundle.truncated", () -> Native.openFile(damaged));
+        throwsCode("android.camera", () -> Native.onCameraFrame(session, frames[0], 0, poses.bytes));
+        throwsCode("android.camera", () -> Native.reason(session));
+        throwsCode("camera.size", () -> Native.setCamera(session, 0, 480, null, false));
+        throwsCode("camera.open", () -> Native.setCamera(session, width, height, "none.yml", false));
+        Native.setCamera(session, width, height, null, false);
+        throwsCode("android.buffer", () -> Native.onCameraFrame(session, null, 0, poses.bytes));
+        throwsCode("android.buffer", () -> Native.onCameraFrame(session, new byte[9], 0, poses.bytes));
+        throwsCode("android.buffer", () -> Native.onCameraFrame(session, frames[0], 0, null));
+        throwsCode("android.buffer", () -> Native.onCameraFrame(session, frames[0], 0, small));
+        throwsCode("android.buffer", () -> Native.onCameraFrame(session, frames[0], 0, heap));
+        throwsCode("android.buffer", () -> Native.onCameraPlane(session, small, width, 0, poses.bytes));
+        throwsCode("android.planes", () -> Native.onCameraPlane(session, plane, width - 1, 0, poses.bytes));
+        throwsCode("android.buffer", () -> Native.onCameraPlane(session, plane, Integer.MAX_VALUE, 0, poses.bytes));
+        throwsCode("android.buffer", () -> Native.projection(session, 0.1, 10, small));
+        throwsCode("android.surface", () -> Native.onDrawFrame(session, frames[0], poses.bytes));
+        throwsCode("android.surface", () -> Native.pick(session, 1, 1));
+        throwsCode("android.index", () -> Native.patternName(session, 99));
+        throwsCode("android.index", () -> Native.modelName(session, -1));
+        GlContext.create(width, height);
+        throwsCode("device.unknown", () -> Native.onSurfaceCreated(session, "nokia"));
+        Native.onSurfaceCreated(session, null);
+        Native.onSurfaceChanged(session, width, height, 90, true);
+        ByteBuffer[] pair = pairs(frames[0], 0, false);
+        throwsCode("android.buffer", () -> Native.onDrawFrame(session, new byte[width * height], poses.bytes));
+        throwsCode("android.planes",
+                () -> Native.onDrawPlanes(session, plane, 1, pair[0], pair[1], width, 2, poses.bytes));
+        throwsCode("android.planes",
+                () -> Native.onDrawPlanes(session, plane, width, pair[0], pair[1], width, 3, poses.bytes));
+        throwsCode("android.planes",
+                () -> Native.onDrawPlanes(session, plane, width, pair[0], plane, width, 2, poses.bytes));
+        throwsCode("android.buffer",
+                () -> Native.onDrawPlanes(session, plane, width, pair[0], small, width, 2, poses.bytes));
+        Native.onDrawFrame(session, frames[0], poses.bytes); // still as good as new
+        ByteBuffer matrix = ByteBuffer.allocateDirect(64).order(ByteOrder.nativeOrder());
+        Native.projection(session, 0.5, 50, matrix);
+        // Focal length = width: the frame's sides are seen at x/z = 0.5.
+        check(Math.abs(matrix.getFloat(0) - 2) < 1e-6, "projection");
+        Native.close(session);
+        Native.close(session);
+        for (final long closed : new long[] {session, 0, -1, Long.MAX_VALUE}) {
+            throwsCode("android.closed", () -> Native.onCameraFrame(closed, frames[0], 0, poses.bytes));
+            throwsCode("android.closed", () -> Native.onCameraPlane(closed, plane, width, 0, poses.bytes));
+            throwsCode("android.closed", () -> Native.onDrawFrame(closed, frames[0], poses.bytes));
+            throwsCode("android.closed", () -> Native.onSurfaceCreated(closed, null));
+            throwsCode("android.closed", () -> Native.onSurfaceChanged(closed, 1, 1, 0, false));
+            throwsCode("android.closed", () -> Native.setCamera(closed, 4, 4, null, false));
+            throwsCode("android.closed", () -> Native.setGesture(closed, 1, 0, 0, 0));
+            throwsCode("android.closed", () -> Native.patternCount(closed));
+            throwsCode("android.closed", () -> Native.patternName(closed, 0));
+            throwsCode("android.closed", () -> Native.reason(closed));
+            throwsCode("android.closed", () -> Native.verify(closed));
+            throwsCode("android.closed", () -> Native.reset(closed));
+            throwsCode("android.closed", () -> Native.pick(closed, 0, 0));
+            throwsCode("android.closed", () -> Native.gpuBytes(closed));
+            throwsCode("android.closed", () -> Native.projection(closed, 1, 2, matrix));
+        }
+        GlContext.destroy();
+        System.out.println("all thrown");
+    }
+
+    /** One thread tracks, one draws, a third closes: both end with "android.closed". */
+    private static void closeWhileBusy(final String bundle) throws Exception {
+        for (int round = 0; round < 5; round++) {
+            final long session = opened(bundle);
+            final AtomicReference<Throwable> wrong = new AtomicReference<>();
+            final Call track = () -> {
+                Poses poses = new Poses(Native.patternCount(session));
+                for (int i = 0;; i++) Native.onCameraFrame(session, frames[i % frames.length], i, poses.bytes);
+            };
+            final Call draw = () -> {
+                GlContext.create(width, height);
+                Poses poses = new Poses(Native.patternCount(session));
+                Native.onSurfaceCreated(session, null);
+                Native.onSurfaceChanged(session, width, height, 0, false);
+                for (int i = 0;; i++) Native.onDrawFrame(session, frames[i % frames.length], poses.bytes);
+            };
+            Thread[] threads = new Thread[2];
+            for (int i = 0; i < 2; i++) {
+                final Call call = i == 0 ? track : draw;
+                threads[i] = new Thread(() -> {
+                    try {
+                        throwsCode("android.closed", call);
+                    } catch (Throwable other) {
+                        wrong.set(other);
+                    }
+                    if (call == draw) GlContext.destroy();
+                });
+                threads[i].start();
+            }
+            Thread.sleep(100 + 40 * round);
+            Native.close(session);
+            for (Thread thread : threads) thread.join();
+            if (wrong.get() != null) throw new AssertionError(wrong.get());
+        }
+        System.out.println("closed");
+    }
+
+    /** Resident kilobytes of this process. */
+    private static long resident() throws Exception {
+        for (String line : Files.readAllLines(Paths.get("/proc/self/status"))) {
+            if (line.startsWith("VmRSS:")) return Long.parseLong(line.replaceAll("[^0-9]", ""));
+        }
+        return 0;
+    }
+
+    private static long heap() {
+        for (int i = 0; i < 3; i++) System.gc();
+        return Runtime.getRuntime().totalMemory() - Runtime.getRuntime().freeMemory();
+    }
+
+    /** Frames through both halves; prints heap and resident growth of the second half of them. */
+    private static void soak(String bundle, int count) throws Exception {
+        GlContext.create(width, height);
+        long session = opened(bundle);
+        Poses poses = new Poses(Native.patternCount(session));
+        Native.onSurfaceCreated(session, null);
+        Native.onSurfaceChanged(session, width, height, 0, false);
+        ByteBuffer luma = luma(frames[0], 0);
+        long heap = 0;
+        long resident = 0;
+        for (int i = 0; i < count; i++) {
+            if (i == count / 2) {
+                heap = heap();
+                resident = resident();
+            }
+            byte[] frame = frames[i % frames.length];
+            if (i % 2 == 0) {
+                Native.onCameraFrame(session, frame, i / 30.0, poses.bytes);
+            } else {
+                luma.position(0);
+                luma.put(frame, 0, width * height);
+                Native.onCameraPlane(session, luma, width, i / 30.0, poses.bytes);
+            }
+            Native.onDrawFrame(session, frame, poses.bytes);
+        }
+        System.out.println((heap() - heap) + " " + (resident() - resident));
+        Native.close(session);
+        GlContext.destroy();
+    }
+}

@@ -1,0 +1,54 @@
+"""The Java machine of these tests: how it is compiled for and run, and the frames that it is fed."""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(ROOT / "tests" / "cli"))
+
+from programs import BIN, COVER, ProgramTest  # noqa: E402, F401
+
+JNI = os.environ.get("MODAR_JNI", str(BIN.parent / "runtime" / "android"))
+FAKE_GL = os.environ.get("MODAR_FAKE_GL", str(BIN.parent / "tests" / "android"))
+APP = ROOT / "runtime" / "android" / "java"
+FAKES = pathlib.Path(__file__).resolve().parent / "java"
+SOAK = os.environ.get("MODAR_SOAK", "1") != "0"
+WIDTH, HEIGHT, FRAMES = 480, 360, 10
+
+
+def compile_java(out, files, classpath=(), release="11"):
+    out.mkdir(parents=True, exist_ok=True)
+    words = ["javac", "-J-XX:TieredStopAtLevel=1", "-proc:none", "--release", release, "-Xlint:-options", "-d", out,
+             *(["-cp", os.pathsep.join(map(str, classpath))] if classpath else []), *files]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def run_java(classpath, *words, timeout=300):
+    """A JVM that checks each JNI call; with sanitizers in the libraries, their runtime comes first."""
+    env = {**os.environ}
+    if os.environ.get("MODAR_SANITIZE"):
+        names = ["libasan.so", "libubsan.so"]
+        found = [subprocess.run(["gcc", f"-print-file-name={n}"], capture_output=True, text=True).stdout.strip() for n in names]
+        env["LD_PRELOAD"] = " ".join(found)
+        # The JVM handles faults of its own and frees nothing at its end.
+        env["ASAN_OPTIONS"] = "handle_segv=0:detect_leaks=0:allow_user_segv_handler=1"
+    line = ["java", "-Xcheck:jni", "-XX:TieredStopAtLevel=1", "-Xmx256m", "--add-opens=java.base/java.io=ALL-UNNAMED",
+            f"-Djava.library.path={JNI}:{FAKE_GL}", "-cp", os.pathsep.join(map(str, classpath)), *words]
+    return subprocess.run(list(map(str, line)), capture_output=True, text=True, env=env, timeout=timeout)
+
+
+def make_clip(folder, frames=FRAMES):
+    """NV21 as a phone's camera gives it, one file: our cover before clutter, held in a hand."""
+    subprocess.run(["/usr/bin/python3", str(ROOT / "assets" / "make_clip.py"), "--pattern", str(COVER), "--frames", str(frames),
+                    "--size", f"{WIDTH}x{HEIGHT}", str(folder)], check=True)
+    file = folder / "clip.nv21"
+    subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", str(folder / "*.png"), "-vf", "scale=out_range=full",
+                    "-pix_fmt", "nv21", "-f", "rawvideo", str(file)], check=True)
+    return file
+
+
+def have(*programs):
+    return all(shutil.which(each) for each in programs)
