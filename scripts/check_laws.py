@@ -29,6 +29,7 @@ THIRD_PARTIES = {
     "tiny_gltf": (r"bake/(import/gltf|export)/(glb|gltf)_[a-z_]*\.cpp", r"bake/import/gltf/tinygltf_library\.[ch]pp",
                   r"tests/.*"),
     "bake/import/gltf/tinygltf_library": (r"bake/(import/gltf|export)/[a-z_]*gl(b|tf)[a-z_]*\.cpp",),
+    "toml++/": (r"bake/project/project_file\.cpp",),
     "CLI/": (r"bake/commands/command_line\.cpp",),
     "nlohmann/": (r"bake/json\.cpp", r"bake/check/(bake_options|device_file)_json\.cpp", r"tests/.*"),
     "rapidjson/": (r"runtime/play/(frame_report|recording)\.cpp",
@@ -74,7 +75,7 @@ def standard_header(name):
 
 # Rooms of the workstation from the bottom up: each includes those before it, and of its own rank itself only.
 BAKE_ROOMS = (("bake", "bake/memory"), ("bake/image", "bake/import", "bake/video"), ("bake/mesh",),
-              ("bake/texture", "bake/pattern"), ("bake/bundle", "bake/export", "bake/ship"), ("bake/check",), ("bake/lab",), ("bake/commands",))
+              ("bake/texture", "bake/pattern"), ("bake/bundle", "bake/export", "bake/ship"), ("bake/check", "bake/project"), ("bake/lab",), ("bake/commands",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
 # The door that the command line has to the proofs.
 LAB_DOORS = ("bake/lab/bench.hpp", "bake/lab/mutate.hpp")

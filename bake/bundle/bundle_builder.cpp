@@ -97,13 +97,25 @@ struct WeldedModel {
   std::vector<std::uint32_t> uses;  ///< of textures, one a material
 };
 
+/// Notes the files that a model refers to. Images from inside a file lie in temporary files.
+void note_files(const SourceModel& source, std::vector<std::string>& files) {
+  files.insert(files.end(), source.files.begin(), source.files.end());
+  for (const SourceMaterial& material : source.materials) {
+    if (material.keeper != nullptr) continue;
+    for (const std::string& map : {material.diffuse_map, material.alpha_map}) {
+      if (!map.empty()) files.push_back(map);
+    }
+  }
+}
+
 Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& request,
-                                  TextureUses& textures, Report& report) {
+                                  TextureUses& textures, Report& report, BakeTrace& trace) {
   StageTimer reading(report, "read");
   Result<SourceModel> source = read_model(path, request.jobs);
   if (!source) return tl::unexpected(source.error());
   report.diagnostics.insert(report.diagnostics.end(), source->diagnostics.begin(),
                             source->diagnostics.end());
+  note_files(*source, trace.files);
   reading.done(source->positions.size(), source->face_count());
   Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
   if (!mesh) return tl::unexpected(mesh.error());
@@ -179,18 +191,15 @@ Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& ou
   return {};
 }
 
-/// Side lengths of each model in source units.
-using ModelSides = std::vector<std::array<double, 3>>;
-
-Result<ModelSides> add_models(const BakeRequest& request, BundleContent& content, Report& report) {
-  ModelSides sides;
+Result<void> add_models(const BakeRequest& request, BundleContent& content, Report& report,
+                        BakeTrace& trace) {
   TextureUses textures;
   std::vector<WeldedModel> models;
   for (const std::string& path : request.models) {
-    Result<WeldedModel> welded = read_and_weld(path, request, textures, report);
+    Result<WeldedModel> welded = read_and_weld(path, request, textures, report, trace);
     if (!welded) return tl::unexpected(welded.error());
     const glm::dvec3 box = welded->mesh.source_max - welded->mesh.source_min;
-    sides.push_back({box.x, box.y, box.z});
+    trace.model_sides.push_back({box.x, box.y, box.z});
     models.push_back(std::move(*welded));
   }
   TextureOptions options = request.textures;
@@ -203,7 +212,7 @@ Result<ModelSides> add_models(const BakeRequest& request, BundleContent& content
       return tl::unexpected(added.error());
     }
   }
-  return sides;
+  return {};
 }
 
 /// Those that the request asks for.
@@ -367,7 +376,7 @@ Result<void> require_shown(const BakeRequest& request) {
               "add" + lines);
 }
 
-Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
+Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, BakeTrace* trace) {
   if (request.models.empty() && request.patterns.empty()) {
     return fail(ExitCode::kUsage, "bake.nothing", "", "there is neither a model nor a pattern",
                 "name files with --model and --pattern");
@@ -385,8 +394,8 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
   if (!scenes) return tl::unexpected(scenes.error());
 
   BundleContent content;
-  const Result<ModelSides> sides = add_models(request, content, report);
-  if (!sides) return tl::unexpected(sides.error());
+  BakeTrace traced;
+  MODAR_TRY(add_models(request, content, report, traced));
   if (!request.patterns.empty()) add_parameter_sets(request, content);
   TrackerRecordOptions loop = request.loop;
   loop.jobs = request.jobs;
@@ -397,13 +406,14 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report) {
   }
   for (const KnownScene& known : *scenes) {
     content.scenes.push_back(
-        place_scene(known.scene, known.pattern, known.model, (*sides)[known.model]));
+        place_scene(known.scene, known.pattern, known.model, traced.model_sides[known.model]));
   }
   BakeRequest stated = request;
   stated.scenes.clear();
   for (const KnownScene& known : *scenes) stated.scenes.push_back(known.scene);
   content.meta = bundle_meta(stated, report);
   content.summary = content_summary_of(content);
+  if (trace != nullptr) *trace = std::move(traced);
   return content;
 }
 

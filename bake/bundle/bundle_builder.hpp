@@ -74,10 +74,20 @@ Result<void> plan_for_device(const std::string& device, BakeRequest& request);
 /// cure is what to add to the command line.
 Result<void> require_shown(const BakeRequest& request);
 
-/// Runs all stages. One model and one pattern without a scene make one by themselves.
+/// What a bake learns of its inputs and no bundle states.
+struct BakeTrace {
+  /// Files that the models name, as paths; those that are missing too. The models' own and the
+  /// patterns' are not among them.
+  std::vector<std::string> files;
+  std::vector<std::array<double, 3>> model_sides;  ///< of each model's box, source units
+};
+
+/// Runs all stages. One model and one pattern without a scene make one by themselves. trace:
+/// filled where given.
 /// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown",
 /// "bake.max-error-unit".
-Result<BundleContent> build_bundle(const BakeRequest& request, Report& report);
+Result<BundleContent> build_bundle(const BakeRequest& request, Report& report,
+                                   BakeTrace* trace = nullptr);
 
 /// The scene's record for a model whose source box has these side lengths (source units).
 SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,

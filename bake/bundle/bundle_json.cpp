@@ -137,6 +137,12 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
           {"levels", levels ? level_json(*levels) : Json()}};
 }
 
+const char* severity_name(DiagnosticSeverity severity) {
+  return severity == DiagnosticSeverity::kInfo      ? "info"
+         : severity == DiagnosticSeverity::kWarning ? "warning"
+                                                    : "error";
+}
+
 Json texture_json(const BundleView& bundle, std::uint32_t index) {
   const TextureRecord& texture = bundle.textures()[index];
   return {{"name", bundle.name(texture.name)},
@@ -253,6 +259,19 @@ std::string level_words(const LevelFigures& levels) {
                 "levels of detail: off by at most %.3g, texture shifted by at most %.1f texels",
                 levels.position_error_max, levels.uv_shift_max_texels);
   return text;
+}
+
+Json diagnostics_json(const std::vector<Diagnostic>& diagnostics) {
+  Json list = Json::array();
+  for (const Diagnostic& diagnostic : diagnostics) {
+    list.push_back({{"id", diagnostic.id},
+                    {"severity", severity_name(diagnostic.severity)},
+                    {"file", diagnostic.file},
+                    {"line", diagnostic.line},
+                    {"message", diagnostic.message},
+                    {"cure", diagnostic.cure}});
+  }
+  return list;
 }
 
 Json bundle_json(const BundleView& bundle) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/json.hpp"
@@ -25,6 +26,9 @@ std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_
 /// "3 components, 1 boundary loop, ...", "levels of detail: off by at most ...": for people.
 std::string topology_words(const MeshTopology& topology);
 std::string level_words(const LevelFigures& levels);
+
+/// "findings" of the documents.
+Json diagnostics_json(const std::vector<Diagnostic>& diagnostics);
 
 /// All that a bundle holds: the document of `modar inspect --json`.
 Json bundle_json(const BundleView& bundle);

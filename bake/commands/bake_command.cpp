@@ -11,9 +11,10 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/request_text.hpp"
 #include "bake/check/reproduce.hpp"
-#include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
+#include "bake/commands/project_command.hpp"
 #include "bake/memory/memory_limit.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/output.hpp"
@@ -38,7 +39,23 @@ struct BakeCommand {
   std::string unit;
   std::string max_error;
   std::string device;
+  ProjectCommand project;
 };
+
+/// Of a bake by --model and --pattern.
+Result<void> refuse_project_options(const BakeCommand& command) {
+  if (command.output.empty()) {
+    return fail(ExitCode::kUsage, "bake.no-output", "-o", "the bundle has no name",
+                "add -o OUT.modar");
+  }
+  const ProjectCommand& project = command.project;
+  if (project.file.empty() && project.cache.empty() && project.asset.empty() &&
+      project.depfile.empty() && !project.dry_run && !project.explain) {
+    return {};
+  }
+  return fail(ExitCode::kUsage, "bake.project-option", "--model, --pattern",
+              "options of projects do not go with them", "name the files in modar.toml instead");
+}
 
 /// Reads what the options say as text into the request.
 Result<void> complete(BakeCommand& command) {
@@ -112,12 +129,6 @@ void report_memory(const BakeRequest& request, Report& report) {
                                 "fewer --jobs, smaller textures or several bundles take less"});
 }
 
-const char* severity_name(DiagnosticSeverity severity) {
-  return severity == DiagnosticSeverity::kInfo      ? "info"
-         : severity == DiagnosticSeverity::kWarning ? "warning"
-                                                    : "error";
-}
-
 Json bake_json(const BundleView& bundle, const Report& report) {
   Json stages = Json::array();
   for (const StageReport& stage : report.stages) {
@@ -126,15 +137,6 @@ Json bake_json(const BundleView& bundle, const Report& report) {
                       {"in", stage.in},
                       {"out", stage.out},
                       {"max_error", stage.max_error}});
-  }
-  Json diagnostics = Json::array();
-  for (const Diagnostic& diagnostic : report.diagnostics) {
-    diagnostics.push_back({{"id", diagnostic.id},
-                           {"severity", severity_name(diagnostic.severity)},
-                           {"file", diagnostic.file},
-                           {"line", diagnostic.line},
-                           {"message", diagnostic.message},
-                           {"cure", diagnostic.cure}});
   }
   Json half_edges = Json::array();
   for (const MeshTopology& topology : report.topologies) {
@@ -148,7 +150,7 @@ Json bake_json(const BundleView& bundle, const Report& report) {
   return {{"bundle", bundle_json(bundle)},
           {"half_edges", half_edges},
           {"stages", stages},
-          {"findings", diagnostics},
+          {"findings", diagnostics_json(report.diagnostics)},
           {"cpu_seconds", cost.cpu_seconds},
           {"peak_rss_bytes", cost.peak_rss_bytes}};
 }
@@ -182,6 +184,12 @@ Result<void> try_outputs(const BakeCommand& command) {
 }
 
 Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& words) {
+  if (command.request.models.empty() && command.patterns.empty()) {
+    return run_project(
+        command.project,
+        {command.request.jobs, command.request.memory_bytes, command.quiet, command.json}, words);
+  }
+  MODAR_TRY(refuse_project_options(command));
   MODAR_TRY(complete(command));
   MODAR_TRY(try_outputs(command));
   MODAR_TRY(require_shown(command.request));
@@ -292,8 +300,8 @@ void add_bake(CommandLine& program) {
   line.option("--scene", &command->scenes,
               "Which model stands on which pattern; needed where there is more than one of either",
               {.type = "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred]"});
-  line.option("-o,--output", &command->output, "The bundle to write",
-              {.type = "OUT.modar", .required = true});
+  line.option("-o,--output", &command->output, "The bundle to write", {.type = "OUT.modar"});
+  add_project_options(line, command->project);
   line.flag("--prove-reproducible", command->prove_reproducible,
             "Bake again with other threads, paths, locale, time zone; compare the bytes");
   add_geometry_options(line, *command);
@@ -311,7 +319,8 @@ void add_bake(CommandLine& program) {
   line.flag("--json", command->json, "Print what was baked, stages and diagnostics as JSON");
   line.footer(
       example("  modar bake --model spider.obj --pattern box.png:210mm"
-              " --scene box=spider,up=y,scale=0.8 -o spider.modar\n"));
+              " --scene box=spider,up=y,scale=0.8 -o spider.modar\n"
+              "  modar init && modar bake    # a whole folder, and next time what changed\n"));
   line.run([command, &program] { return run_bake(*command, program.words()); });
 }
 

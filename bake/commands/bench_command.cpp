@@ -4,7 +4,6 @@
 #include <memory>
 #include <thread>
 
-#include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
 #include "bake/lab/bench.hpp"

@@ -3,7 +3,6 @@
 #include <memory>
 #include <thread>
 
-#include "bake/commands/arguments.hpp"
 #include "bake/commands/check_command.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/terminal.hpp"

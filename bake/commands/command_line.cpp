@@ -106,6 +106,13 @@ std::optional<Error> unknown_word(const CLI::App* app) {
 
 }  // namespace
 
+std::string example(const std::string& text, const std::string& codes) {
+  return "\nExample:\n" + text +
+         "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
+         "4 a bug of ours, 5 not supported" +
+         codes + ".\n";
+}
+
 CommandLine::CommandLine(const std::string& about, const std::string& version)
     : parts_(std::make_unique<Parts>()) {
   parts_->own = std::make_unique<CLI::App>(about, "modar");

@@ -106,4 +106,8 @@ class CommandLine {
   std::vector<std::string> words_;
 };
 
+/// The foot of a command's --help: `text`, an example, and the exit codes, to which `codes` adds a
+/// command's own (", 15 ...").
+std::string example(const std::string& text, const std::string& codes = "");
+
 }  // namespace modar

@@ -13,5 +13,7 @@ void add_inspect(CommandLine& program);
 void add_bench(CommandLine& program);
 void add_ship(CommandLine& program);
 void add_calibrate(CommandLine& program);
+void add_init(CommandLine& program);
+void add_cache(CommandLine& program);
 
 }  // namespace modar

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "bake/bundle/bundle_json.hpp"
-#include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/export/extract.hpp"
 #include "bake/terminal.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/commands/arguments.hpp"
+#include "bake/bundle/request_text.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
 #include "bake/output.hpp"

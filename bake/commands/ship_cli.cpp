@@ -3,7 +3,6 @@
 #include <memory>
 #include <thread>
 
-#include "bake/commands/arguments.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/ship_command.hpp"
 #include "modar/device_profile.hpp"

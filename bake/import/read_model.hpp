@@ -29,10 +29,12 @@ Result<SourceModel> parse_obj(std::string_view text, const std::string& folder,
                               const std::string& label, const ReadOptions& options = {});
 
 /// Materials of an MTL text. Map paths are resolved against `folder` (backslashes, quotes, wrong
-/// case, options and blanks in names are handled). label: the file's name in diagnostics.
+/// case, options and blanks in names are handled). label: the file's name in diagnostics. missing:
+/// receives the paths of maps that are not there, where given.
 std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& folder,
                                       const std::string& label,
-                                      std::vector<Diagnostic>& diagnostics);
+                                      std::vector<Diagnostic>& diagnostics,
+                                      std::vector<std::string>* missing = nullptr);
 
 /// Reads a .gltf with its buffers, or a .glb, through tinygltf: the triangles of the default
 /// scene's meshes (of all root nodes where there is none), transformed by their nodes; normals, the

@@ -77,6 +77,9 @@ struct SourceModel {
   std::vector<FaceRun> smoothing_runs;
   std::vector<SourceMaterial> materials;
   std::vector<Diagnostic> diagnostics;
+  /// Other files that the model's own one names, those that are missing too; maps stand in the
+  /// materials, and here where they are missing.
+  std::vector<std::string> files;
 
   [[nodiscard]] std::size_t corner_count() const { return corner_positions.size(); }
   [[nodiscard]] Corner corner(std::size_t i) const {

@@ -426,6 +426,11 @@ Result<SourceModel> read_gltf(const std::string& path) {
   }
   SourceModel model;
   model.name = std::filesystem::path(path).stem().string();
+  const auto note_file = [&](const std::string& uri) {
+    if (!uri.empty() && !tinygltf::IsDataURI(uri)) model.files.push_back(folder + uri);
+  };
+  for (const tinygltf::Buffer& buffer : gltf.buffers) note_file(buffer.uri);
+  for (const tinygltf::Image& image : gltf.images) note_file(image.uri);
   model.materials = gltf_materials(gltf, folder, path, model.diagnostics);
   MODAR_TRY(SceneReader(gltf, model, path).run());
   if (model.corner_positions.empty()) {

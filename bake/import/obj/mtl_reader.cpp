@@ -236,6 +236,7 @@ struct MtlContext {
   const std::string& folder;
   const std::string& label;
   std::vector<Diagnostic>& diagnostics;
+  std::vector<std::string>* missing = nullptr;
   std::uint64_t line = 1;
 };
 
@@ -244,6 +245,9 @@ void take_map(std::string_view text, MtlContext& context, std::string& path) {
   bool transformed = false;
   path = find_map_file(text, context.folder, name, transformed);
   if (path.empty()) {
+    if (context.missing != nullptr) {
+      context.missing->push_back((fs::path(context.folder) / name).string());
+    }
     context.diagnostics.push_back({"mtl.missing-map", DiagnosticSeverity::kWarning, context.label,
                                    context.line, "texture '" + name + "' was not found",
                                    "put the image beside the MTL file, or correct its name"});
@@ -295,9 +299,10 @@ void take_property(std::string_view key, std::string_view text, MtlContext& cont
 
 std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& folder,
                                       const std::string& label,
-                                      std::vector<Diagnostic>& diagnostics) {
+                                      std::vector<Diagnostic>& diagnostics,
+                                      std::vector<std::string>* missing) {
   std::vector<SourceMaterial> materials;
-  MtlContext context{folder, label, diagnostics};
+  MtlContext context{folder, label, diagnostics, missing};
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   bool has_d = false;
   std::size_t at = 0;
@@ -384,15 +389,17 @@ void ObjMaterials::add_library(const std::string& text, std::uint64_t line) {
   libraries_.push_back({text, line});
 }
 
-std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
-                                                  const std::string& stem, const std::string& label,
-                                                  std::vector<Diagnostic>& diagnostics) {
-  std::vector<SourceMaterial> materials(used_.size());
+void ObjMaterials::resolve(const std::string& folder, const std::string& label,
+                           SourceModel& model) {
+  std::vector<Diagnostic>& diagnostics = model.diagnostics;
+  std::vector<SourceMaterial>& materials = model.materials;
+  materials.resize(used_.size());
   for (std::size_t i = 0; i < used_.size(); ++i) materials[i].name = used_[i].name;
-  if (folder.empty()) return materials;
+  if (folder.empty()) return;
 
   std::vector<std::string> paths;
   const auto missing = [&](const std::string& name, std::uint64_t line) {
+    model.files.push_back((fs::path(folder) / name).string());
     diagnostics.push_back({"obj.missing-mtl", DiagnosticSeverity::kWarning, label, line,
                            "material file '" + name + "' was not found",
                            "put it beside the OBJ file, or correct the mtllib line"});
@@ -412,7 +419,7 @@ std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
     }
   }
   if (paths.empty() && (used_.size() > 1 || !libraries_.empty())) {
-    if (std::string beside = find_named_file(stem + ".mtl", folder); !beside.empty()) {
+    if (std::string beside = find_named_file(model.name + ".mtl", folder); !beside.empty()) {
       diagnostics.push_back({"obj.mtl-beside", DiagnosticSeverity::kInfo, label, 0,
                              "'" + name_of(beside) + "' is taken for the material file",
                              "name it in an mtllib line"});
@@ -425,8 +432,9 @@ std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
   for (const std::string& path : paths) {
     if (std::find(read.begin(), read.end(), path) != read.end()) continue;
     read.push_back(path);
+    model.files.push_back(path);
     for (SourceMaterial& m :
-         parse_mtl(read_text(path), folder_of(path), name_of(path), diagnostics)) {
+         parse_mtl(read_text(path), folder_of(path), name_of(path), diagnostics, &model.files)) {
       std::string name = m.name;
       defined.try_emplace(std::move(name), std::move(m));
     }
@@ -440,7 +448,6 @@ std::vector<SourceMaterial> ObjMaterials::resolve(const std::string& folder,
                              "it is drawn in the default grey; define it or correct its name"});
     }
   }
-  return materials;
 }
 
 }  // namespace modar

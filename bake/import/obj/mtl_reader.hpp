@@ -31,10 +31,9 @@ class ObjMaterials {
   std::uint32_t use(const std::string& name, std::uint64_t line);
   void add_library(const std::string& text, std::uint64_t line);
   /// Reads the MTL files and fills in what they say of the materials in use; what is missing
-  /// becomes a diagnostic. folder: empty where nothing may be read.
-  std::vector<SourceMaterial> resolve(const std::string& folder, const std::string& stem,
-                                      const std::string& label,
-                                      std::vector<Diagnostic>& diagnostics);
+  /// becomes a diagnostic. folder: empty where nothing may be read. model: has its name; receives
+  /// materials, diagnostics and files.
+  void resolve(const std::string& folder, const std::string& label, SourceModel& model);
 
  private:
   struct Named {

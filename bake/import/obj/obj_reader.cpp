@@ -272,7 +272,7 @@ void ObjAssembler::finish(const std::string& folder, const std::string& label) {
     model_.diagnostics.push_back({text.id, text.severity, label, notes_[i].first_line,
                                   std::to_string(notes_[i].count) + " " + text.message, text.cure});
   }
-  model_.materials = materials_.resolve(folder, model_.name, label, model_.diagnostics);
+  materials_.resolve(folder, label, model_);
 }
 
 // The threads. Blocks are cut at fixed places, so the result does not depend on the number of

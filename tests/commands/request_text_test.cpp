@@ -1,5 +1,5 @@
 // Text forms of options: what is taken, and what is refused with a cure.
-#include "bake/commands/arguments.hpp"
+#include "bake/bundle/request_text.hpp"
 
 #include <gtest/gtest.h>
 

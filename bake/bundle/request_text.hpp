@@ -1,14 +1,25 @@
-// The text forms that options take: scenes, corners, lengths; and the foot of every --help.
+// The text forms that a request's parts take in options and project files: scenes, corners,
+// lengths.
 #pragma once
 
 #include <array>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "formats/error.hpp"
 
 namespace modar {
+
+/// The parts between separators; one part where there is none.
+std::vector<std::string_view> split(std::string_view text, char separator);
+/// The whole text as a finite number; false where it is none.
+bool parse_number(std::string_view text, double& value);
+
+/// "x", "-y". Errors: kUsage "cli.up".
+Result<UpAxis> parse_up(const std::string& text);
 
 /// "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred]".
 /// Errors: kUsage "cli.scene".
@@ -28,9 +39,5 @@ Result<double> parse_unit(const std::string& text);
 /// "0.002" (source units), "0.01%" (of the model's diagonal) or "2mm" (a unit of parse_unit).
 /// Errors: kUsage "cli.max-error".
 Result<MaxError> parse_max_error(const std::string& text);
-
-/// The foot of a command's --help: `text`, an example, and the exit codes, to which `codes` adds a
-/// command's own (", 15 ...").
-std::string example(const std::string& text, const std::string& codes = "");
 
 }  // namespace modar

@@ -1,5 +1,4 @@
-// The text forms that options take: scenes, corners, lengths.
-#include "bake/commands/arguments.hpp"
+#include "bake/bundle/request_text.hpp"
 
 #include <charconv>
 #include <cmath>
@@ -8,7 +7,6 @@
 #include <vector>
 
 namespace modar {
-namespace {
 
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;
@@ -21,28 +19,18 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
   }
 }
 
-/// The whole text as a finite number.
 bool parse_number(std::string_view text, double& value) {
   const char* last = text.data() + text.size();
   const auto [end, error] = std::from_chars(text.data(), last, value);
   return error == std::errc() && end == last && std::isfinite(value);
 }
 
+namespace {
+
 tl::unexpected<Error> scene_error(const std::string& text, const std::string& cause) {
   return fail(
       ExitCode::kUsage, "cli.scene", "--scene " + text, cause,
       "write PATTERN=MODEL, then any of ,scale=S ,up=x|y|z|-x|-y|-z ,offset=X:Y:Z ,centred");
-}
-
-bool parse_up(std::string_view text, UpAxis& up) {
-  constexpr std::string_view kNames[] = {"x", "y", "z", "-x", "-y", "-z"};
-  for (std::size_t i = 0; i < std::size(kNames); ++i) {
-    if (text == kNames[i]) {
-      up = static_cast<UpAxis>(i);
-      return true;
-    }
-  }
-  return false;
 }
 
 bool parse_offset(std::string_view text, std::array<double, 3>& offset) {
@@ -52,6 +40,15 @@ bool parse_offset(std::string_view text, std::array<double, 3>& offset) {
 }
 
 }  // namespace
+
+Result<UpAxis> parse_up(const std::string& text) {
+  constexpr std::string_view kNames[] = {"x", "y", "z", "-x", "-y", "-z"};
+  for (std::size_t i = 0; i < std::size(kNames); ++i) {
+    if (text == kNames[i]) return static_cast<UpAxis>(i);
+  }
+  return fail(ExitCode::kUsage, "cli.up", text, "there is no such axis",
+              "name one of x, y, z, -x, -y, -z");
+}
 
 Result<SceneRequest> parse_scene(const std::string& text) {
   const std::vector<std::string_view> parts = split(text, ',');
@@ -68,7 +65,9 @@ Result<SceneRequest> parse_scene(const std::string& text) {
     if (part.starts_with("scale=")) {
       good = parse_number(part.substr(6), scene.scale) && scene.scale > 0;
     } else if (part.starts_with("up=")) {
-      good = parse_up(part.substr(3), scene.up);
+      const Result<UpAxis> up = parse_up(std::string(part.substr(3)));
+      if (up) scene.up = *up;
+      good = up.has_value();
     } else if (part.starts_with("offset=")) {
       good = parse_offset(part.substr(7), scene.offset);
     } else if (part == "centred") {
@@ -152,13 +151,6 @@ Result<MaxError> parse_max_error(const std::string& text) {
               "this is no length above 0 that we understand",
               "write a number of source units, a percentage of the diagonal as 0.01%, or a length "
               "as 2mm");
-}
-
-std::string example(const std::string& text, const std::string& codes) {
-  return "\nExample:\n" + text +
-         "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
-         "4 a bug of ours, 5 not supported" +
-         codes + ".\n";
 }
 
 }  // namespace modar

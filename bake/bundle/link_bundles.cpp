@@ -1,0 +1,194 @@
+#include "bake/bundle/link_bundles.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "bake/bundle/bundle_json.hpp"
+#include "formats/content_summary.hpp"
+
+namespace modar {
+namespace {
+
+template <class T>
+bool same_bytes(const T& a, const T& b) {
+  return std::memcmp(&a, &b, sizeof(T)) == 0;
+}
+
+/// Index of the record in `list`, where it is appended if it is new.
+template <class T>
+std::uint32_t index_in(std::vector<T>& list, const T& record) {
+  const auto found = std::find_if(list.begin(), list.end(),
+                                  [&](const T& other) { return same_bytes(other, record); });
+  const auto index = static_cast<std::uint32_t>(found - list.begin());
+  if (found == list.end()) list.push_back(record);
+  return index;
+}
+
+tl::unexpected<Error> no_part(const LinkPart& part, const std::string& what) {
+  return fail(ExitCode::kInvalidInput, "link.part", part.name, "it is no bundle of one " + what,
+              "bake it again");
+}
+
+class Linker {
+ public:
+  Result<BundleContent> run(std::span<const LinkPart> models, std::span<const LinkPart> patterns,
+                            const BakeRequest& described) {
+    for (const LinkPart& part : models) {
+      if (part.bundle.models().size() != 1) return no_part(part, "model");
+      add_model(part);
+    }
+    // A bake interns the names of parameter sets before those of patterns.
+    for (const LinkPart& part : patterns) add_parameter_sets(part.bundle);
+    for (const LinkPart& part : patterns) {
+      if (part.bundle.patterns().size() != 1) return no_part(part, "pattern");
+      add_pattern(part);
+    }
+    for (const SceneRequest& scene : described.scenes) {
+      MODAR_ASSIGN(const std::uint32_t pattern, find(patterns, scene.pattern, "pattern"));
+      MODAR_ASSIGN(const std::uint32_t model, find(models, scene.model, "model"));
+      content_.scenes.push_back(place_scene(scene, pattern, model, models[model].model_sides));
+    }
+    Json meta = Json::parse(bundle_meta(described, {}));
+    meta.set("models", std::move(models_));
+    meta.set("patterns", std::move(patterns_));
+    content_.meta = meta.dump();
+    content_.summary = content_summary_of(content_);
+    return std::move(content_);
+  }
+
+ private:
+  static Result<std::uint32_t> find(std::span<const LinkPart> parts, const std::string& name,
+                                    const std::string& what) {
+    const auto found = std::find_if(parts.begin(), parts.end(),
+                                    [&](const LinkPart& part) { return part.name == name; });
+    if (found != parts.end()) return static_cast<std::uint32_t>(found - parts.begin());
+    return fail(ExitCode::kUsage, "bake.scene-unknown", name,
+                "the scene names a " + what + " that is not baked", "name one that is");
+  }
+
+  /// The new index of each texture of the part.
+  std::vector<std::uint32_t> add_textures(const BundleView& part) {
+    std::vector<std::uint32_t> indices;
+    for (std::uint32_t t = 0; t < part.textures().size(); ++t) {
+      const std::span<const std::byte> data = part.texture_data(t);
+      const auto same = std::find_if(
+          content_.textures.begin(), content_.textures.end(), [&](const TextureRecord& other) {
+            const auto& bytes =
+                content_.texture_data[static_cast<std::size_t>(&other - content_.textures.data())];
+            const TextureRecord& mine = part.textures()[t];
+            return other.width == mine.width && other.height == mine.height &&
+                   other.format == mine.format && other.flags == mine.flags &&
+                   other.level_count == mine.level_count &&
+                   std::equal(bytes.begin(), bytes.end(), data.begin(), data.end());
+          });
+      indices.push_back(static_cast<std::uint32_t>(same - content_.textures.begin()));
+      if (same == content_.textures.end()) add_texture(part, t);
+    }
+    return indices;
+  }
+
+  void add_texture(const BundleView& part, std::uint32_t index) {
+    TextureRecord record = part.textures()[index];
+    const std::uint32_t first = record.first_level;
+    record.name = content_.intern(part.name(record.name));
+    record.first_level = static_cast<std::uint32_t>(content_.texture_levels.size());
+    for (std::uint32_t l = 0; l < record.level_count; ++l) {
+      content_.texture_levels.push_back(part.texture_levels()[first + l]);
+    }
+    const std::span<const std::byte> data = part.texture_data(index);
+    content_.texture_data.emplace_back(data.begin(), data.end());
+    content_.textures.push_back(record);
+  }
+
+  void add_chunks(const BundleView& part, const ModelRecord& model, std::uint32_t first_material) {
+    for (std::uint32_t c = 0; c < part.chunks().size(); ++c) {
+      ChunkRecord chunk = part.chunks()[c];
+      chunk.material = chunk.material - model.first_material + first_material;
+      chunk.first_level += static_cast<std::uint32_t>(content_.levels.size());
+      content_.chunks.push_back(chunk);
+    }
+    for (std::uint32_t l = 0; l < part.levels().size(); ++l) {
+      LevelRecord level = part.levels()[l];
+      level.vertex_offset += content_.vertices.size();
+      level.index_offset += content_.indices.size();
+      content_.levels.push_back(level);
+    }
+    content_.vertices.insert(content_.vertices.end(), part.vertices().begin(),
+                             part.vertices().end());
+    content_.indices.insert(content_.indices.end(), part.indices().begin(), part.indices().end());
+  }
+
+  void add_model(const LinkPart& linked) {
+    const BundleView& part = linked.bundle;
+    const ModelRecord& source = part.models()[0];
+    const std::vector<std::uint32_t> textures = add_textures(part);
+    ModelRecord record = source;
+    record.name = content_.intern(linked.name);
+    record.layout = index_in(content_.layouts, part.layouts()[source.layout]);
+    record.first_chunk = static_cast<std::uint32_t>(content_.chunks.size());
+    record.first_material = static_cast<std::uint32_t>(content_.materials.size());
+    add_chunks(part, source, record.first_material);
+    for (std::uint32_t m = 0; m < source.material_count; ++m) {
+      MaterialRecord material = part.materials()[source.first_material + m];
+      material.name = content_.intern(part.name(material.name));
+      if (material.texture != kNone) material.texture = textures[material.texture];
+      content_.materials.push_back(material);
+    }
+    content_.models.push_back(record);
+    models_.push_back(stated_entry(part, "models"));
+  }
+
+  void add_parameter_sets(const BundleView& part) {
+    for (std::uint32_t s = 0; s < part.parameter_sets().size(); ++s) {
+      ParameterSetRecord set = part.parameter_sets()[s];
+      set.name = content_.intern(part.name(set.name));
+      index_in(content_.parameter_sets, set);
+    }
+  }
+
+  void add_pattern(const LinkPart& linked) {
+    const BundleView& part = linked.bundle;
+    PatternRecord record = part.patterns()[0];
+    record.name = content_.intern(linked.name);
+    ExtraSection section;
+    section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
+    section.owner = static_cast<std::uint32_t>(content_.patterns.size());
+    const auto tracker = part.section(SectionType::kTrackerRecord, 0);
+    section.bytes.assign(tracker.begin(), tracker.end());
+    content_.extra.push_back(std::move(section));
+    std::vector<FeatureContent> features;
+    for (std::uint32_t s = 0; s < part.parameter_sets().size(); ++s) {
+      const std::uint32_t set = part.parameter_sets()[s].id;
+      const FeatureView view = part.features(0, set);
+      if (view.descriptor_bytes == 0) continue;
+      features.push_back({set,
+                          view.descriptor_bytes,
+                          {view.keypoints.begin(), view.keypoints.end()},
+                          {view.descriptors.begin(), view.descriptors.end()},
+                          std::string(part.feature_yml(0, set))});
+    }
+    content_.patterns.push_back(record);
+    content_.features.push_back(std::move(features));
+    patterns_.push_back(stated_entry(part, "patterns"));
+  }
+
+  /// What the part's meta text says of its only asset.
+  static Json stated_entry(const BundleView& part, const char* kind) {
+    const std::optional<Json> entries = Json::parse(part.meta()).find(kind);
+    return entries ? entries->at(0).value_or(Json()) : Json();
+  }
+
+  BundleContent content_;
+  Json models_ = Json::array();  // entries of the meta text
+  Json patterns_ = Json::array();
+};
+
+}  // namespace
+
+Result<BundleContent> link_bundles(std::span<const LinkPart> models,
+                                   std::span<const LinkPart> patterns,
+                                   const BakeRequest& described) {
+  return Linker().run(models, patterns, described);
+}
+
+}  // namespace modar

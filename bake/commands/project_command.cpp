@@ -1,0 +1,296 @@
+// Collections: `modar bake` of a modar.toml, `modar init`, `modar cache`.
+#include "bake/commands/project_command.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include "bake/bundle/bundle_json.hpp"
+#include "bake/commands/commands.hpp"
+#include "bake/memory/memory_limit.hpp"
+#include "bake/output.hpp"
+#include "bake/project/project.hpp"
+#include "bake/terminal.hpp"
+#include "formats/atomic_file.hpp"
+
+namespace modar {
+namespace {
+
+using State = AssetOutcome::State;
+
+constexpr const char* kProjectWords[] = {"--project", "--cache",   "--asset", "--depfile",
+                                         "--dry-run", "--explain", "--jobs",  "--memory",
+                                         "--quiet",   "--json"};
+
+/// What of the bake stands on the command line would be ignored beside a project file.
+Result<void> refuse_other_options(const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (!name.starts_with("-") || std::find(std::begin(kProjectWords), std::end(kProjectWords),
+                                            name) != std::end(kProjectWords)) {
+      continue;
+    }
+    return fail(
+        ExitCode::kUsage, "bake.project-option", name,
+        "without --model and --pattern, a project is baked, and this belongs in its file",
+        name == "-o" || name == "--output" ? "set out and name in [project]" : "set it in [bake]");
+  }
+  return {};
+}
+
+const char* state_name(State state) {
+  switch (state) {
+    case State::kFresh:
+      return "fresh";
+    case State::kCached:
+      return "cached";
+    case State::kBaked:
+      return "baked";
+    case State::kFailed:
+      return "failed";
+    case State::kStale:
+      break;
+  }
+  return "stale";
+}
+
+/// A path in a makefile: blanks, "#" and "$" would end or change it.
+std::string make_quoted(const std::string& path) {
+  std::string out;
+  for (const char c : path) {
+    if (c == ' ' || c == '#') out += '\\';
+    if (c == '$') out += '$';
+    out += c;
+  }
+  return out;
+}
+
+Result<void> write_depfile(const std::string& path, const ProjectOutcome& outcome) {
+  std::string text;
+  for (const BundleOutcome& bundle : outcome.bundles) text += make_quoted(bundle.path) + " ";
+  text += ":";
+  for (const std::string& input : outcome.inputs) text += " \\\n  " + make_quoted(input);
+  return write_file(path, std::string_view(text + "\n"));
+}
+
+Json project_json(const ProjectOutcome& outcome) {
+  Json assets = Json::array();
+  for (const AssetOutcome& asset : outcome.assets) {
+    assets.push_back({{"name", asset.name},
+                      {"tier", asset.tier},
+                      {"state", state_name(asset.state)},
+                      {"reason", asset.reason}});
+  }
+  Json bundles = Json::array();
+  for (const BundleOutcome& bundle : outcome.bundles) {
+    bundles.push_back(
+        {{"path", bundle.path}, {"bytes", bundle.bytes}, {"written", bundle.written}});
+  }
+  Json errors = Json::array();
+  for (const Error& error : outcome.errors) {
+    errors.push_back({{"code", error.code},
+                      {"where", error.where},
+                      {"cause", error.cause},
+                      {"cure", error.cure}});
+  }
+  const ProcessCost cost = process_cost();
+  return {{"assets", assets},
+          {"bundles", bundles},
+          {"findings", diagnostics_json(outcome.diagnostics)},
+          {"errors", errors},
+          {"cpu_seconds", cost.cpu_seconds},
+          {"peak_rss_bytes", cost.peak_rss_bytes}};
+}
+
+/// "3 baked, 409 from the cache", the counts that are not 0.
+std::string counts_of(const ProjectOutcome& outcome) {
+  std::size_t counts[5] = {};
+  for (const AssetOutcome& asset : outcome.assets) ++counts[static_cast<std::size_t>(asset.state)];
+  const auto count = [&](State state) { return counts[static_cast<std::size_t>(state)]; };
+  std::string text =
+      std::to_string(outcome.assets.size()) + (outcome.assets.size() == 1 ? " asset" : " assets");
+  const auto add = [&](State state, const char* words) {
+    if (count(state) != 0) text += ", " + std::to_string(count(state)) + " " + words;
+  };
+  add(State::kStale, "to bake");
+  add(State::kBaked, "baked");
+  add(State::kCached, "from the cache");
+  add(State::kFresh, "up to date");
+  add(State::kFailed, "failed");
+  return text;
+}
+
+void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run) {
+  for (const AssetOutcome& asset : outcome.assets) {
+    if (!explain || asset.reason.empty()) continue;
+    std::fprintf(stderr, "%-7s %s%s%s: %s\n", state_name(asset.state), asset.name.c_str(),
+                 asset.tier.empty() ? "" : " for ", asset.tier.c_str(), asset.reason.c_str());
+  }
+  for (const Diagnostic& diagnostic : outcome.diagnostics) print_diagnostic(diagnostic);
+  for (const BundleOutcome& bundle : outcome.bundles) {
+    const char* what = bundle.fresh     ? "up to date"
+                       : bundle.written ? "written"
+                       : dry_run        ? "to write"
+                                        : "not written";
+    std::fprintf(stderr, "%s: %s, %s\n", bundle.path.c_str(), human_bytes(bundle.bytes).c_str(),
+                 what);
+  }
+  std::fprintf(stderr, "%s\n", counts_of(outcome).c_str());
+}
+
+}  // namespace
+
+void add_project_options(CommandLine& line, ProjectCommand& command) {
+  line.option("--project", &command.file,
+              "Bake this project; without --model and --pattern: modar.toml in the current folder",
+              {.type = "FILE"});
+  line.option("--cache", &command.cache,
+              "Of a project: folder of what is baked already; several machines may share it",
+              {.type = "DIR"});
+  line.flag("--dry-run", command.dry_run, "Of a project: say what would be baked, bake nothing");
+  line.flag("--explain", command.explain, "Of a project: say why each asset is baked");
+  line.option("--asset", &command.asset,
+              "Of a project: bake this model or pattern into the cache, and write no bundle",
+              {.type = "NAME"});
+  line.option("--depfile", &command.depfile,
+              "Of a project: write what the bundles depend on, as rules of make", {.type = "FILE"});
+}
+
+Result<ExitCode> run_project(const ProjectCommand& command, const CommonOptions& common,
+                             const std::vector<std::string>& words) {
+  MODAR_TRY(refuse_other_options(words));
+  MODAR_ASSIGN(const Project project,
+               read_project(command.file.empty() ? kProjectFile : command.file));
+  ProjectOptions options;
+  options.cache = command.cache;
+  options.only = command.asset;
+  options.jobs = common.jobs;
+  options.dry_run = command.dry_run;
+  options.tool_version = MODAR_VERSION;
+  std::unique_ptr<MemoryLimit> limit;
+  if (common.memory_bytes != 0) {
+    const std::string out = project.path(project.out);
+    MODAR_TRY(make_output_folder(out));
+    MODAR_ASSIGN(auto started, MemoryLimit::start(out, common.memory_bytes));
+    limit = std::move(started);
+    options.memory_limited = true;
+  }
+  ProgressBar bar(common.quiet);
+  auto baked = bake_project(project, options,
+                            [&](const std::string& stage, double done) { bar.show(stage, done); });
+  bar.clear();
+  MODAR_ASSIGN(const ProjectOutcome outcome, std::move(baked));
+  if (!command.depfile.empty() && !command.dry_run)
+    MODAR_TRY(write_depfile(command.depfile, outcome));
+  if (!common.quiet) print_outcome(outcome, command.explain || command.dry_run, command.dry_run);
+  if (common.json) std::fputs(project_json(outcome).dump().c_str(), stdout);
+  for (const Error& error : outcome.errors) print_error(error);
+  return outcome.errors.empty() ? ExitCode::kOk : outcome.errors.front().exit;
+}
+
+namespace {
+
+struct InitCommand {
+  std::string folder = ".";
+  bool force = false;
+};
+
+Result<ExitCode> run_init(const InitCommand& command) {
+  const std::string path =
+      (std::filesystem::path(command.folder) / kProjectFile).lexically_normal();
+  std::error_code error;
+  if (!command.force && std::filesystem::exists(path, error)) {
+    return fail(ExitCode::kUsage, "init.exists", path, "there is a project file already",
+                "edit it, or write a new one with --force");
+  }
+  MODAR_ASSIGN(const std::string text, initial_project(command.folder));
+  MODAR_TRY(write_file(path, std::string_view(text)));
+  std::fprintf(stderr, "%s: written; look through it, then `modar bake` in its folder\n",
+               path.c_str());
+  return ExitCode::kOk;
+}
+
+/// The folder that --cache names, or that of the project in the current folder.
+Result<std::string> cache_folder(const std::string& named) {
+  if (!named.empty()) return named;
+  std::error_code error;
+  if (!std::filesystem::exists(kProjectFile, error)) return std::string(kCacheFolder);
+  MODAR_ASSIGN(const Project project, read_project(kProjectFile));
+  return project.cache.empty() ? std::string(kCacheFolder) : project.cache;
+}
+
+struct CacheCommand {
+  std::string folder;
+  std::uint64_t bytes = 0;
+  bool json = false;
+};
+
+void print_summary(const CacheCommand& command, const CacheSummary& summary, const char* verb) {
+  if (command.json) {
+    const Json json = {{"entries", summary.entries},
+                       {"bytes", summary.bytes},
+                       {"damaged", Json::list(summary.damaged)}};
+    std::fputs(json.dump().c_str(), stdout);
+    return;
+  }
+  for (const std::string& path : summary.damaged)
+    std::printf("%s: damaged, removed\n", path.c_str());
+  std::printf("%s%llu entries, %s\n", verb, static_cast<unsigned long long>(summary.entries),
+              human_bytes(summary.bytes).c_str());
+}
+
+void add_cache_options(CommandLine& line, CacheCommand& command) {
+  line.option("--cache", &command.folder,
+              "The folder; without it, that of the project in the current folder", {.type = "DIR"});
+  line.flag("--json", command.json, "Print the counts as JSON");
+}
+
+}  // namespace
+
+void add_init(CommandLine& program) {
+  CommandLine& line =
+      program.command("init", "Write modar.toml for the models and pictures of a folder");
+  const auto command = std::make_shared<InitCommand>();
+  line.option("folder", &command->folder, "Looked through with all folders in it",
+              {.shows_default = true});
+  line.flag("--force", command->force, "Replace a modar.toml that is there");
+  line.footer(example("  modar init museum && cd museum && modar bake\n"));
+  line.run([command] { return run_init(*command); });
+}
+
+void add_cache(CommandLine& program) {
+  CommandLine& cache = program.command("cache", "Show, prune or verify what projects have baked");
+  const auto command = std::make_shared<CacheCommand>();
+  CommandLine& show = cache.command("show", "Count the entries and their bytes");
+  add_cache_options(show, *command);
+  show.run([command]() -> Result<ExitCode> {
+    MODAR_ASSIGN(const std::string folder, cache_folder(command->folder));
+    MODAR_ASSIGN(const CacheSummary summary, summarise_cache(folder));
+    print_summary(*command, summary, "");
+    return ExitCode::kOk;
+  });
+  CommandLine& prune = cache.command("prune", "Remove the entries that were used longest ago");
+  add_cache_options(prune, *command);
+  prune.size("--size", command->bytes, "Keep at most this much (1G, 800M)",
+             {.type = "SIZE", .required = true});
+  prune.run([command]() -> Result<ExitCode> {
+    MODAR_ASSIGN(const std::string folder, cache_folder(command->folder));
+    MODAR_ASSIGN(const CacheSummary removed, prune_cache(folder, command->bytes));
+    print_summary(*command, removed, "removed: ");
+    return ExitCode::kOk;
+  });
+  CommandLine& verify = cache.command("verify", "Read every entry, remove those that are damaged");
+  add_cache_options(verify, *command);
+  verify.footer(example("  modar cache verify --cache /srv/modar-cache\n"));
+  verify.run([command]() -> Result<ExitCode> {
+    MODAR_ASSIGN(const std::string folder, cache_folder(command->folder));
+    MODAR_ASSIGN(const CacheSummary summary, verify_cache(folder));
+    print_summary(*command, summary, "");
+    return summary.damaged.empty() ? ExitCode::kOk : ExitCode::kInvalidInput;
+  });
+}
+
+}  // namespace modar

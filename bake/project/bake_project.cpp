@@ -1,0 +1,633 @@
+// What of a project changed, baked; what it belongs to, linked.
+#include <fnmatch.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <set>
+
+#include "bake/bundle/link_bundles.hpp"
+#include "bake/json.hpp"
+#include "bake/parallel.hpp"
+#include "bake/project/file_digests.hpp"
+#include "bake/project/interrupts.hpp"
+#include "bake/project/part_cache.hpp"
+#include "bake/project/project.hpp"
+#include "bake/project/settings.hpp"
+#include "bake/terminal.hpp"
+#include "formats/atomic_file.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kState = ".modar/state.json";  // what the last bake saw; may be removed
+
+/// A file that went into an asset, with its digest.
+struct Input {
+  std::string path;
+  std::string digest;
+};
+
+/// One asset under the settings of one tier; tiers that set nothing for it share it.
+struct Task {
+  const ProjectAsset* asset = nullptr;
+  std::string tier;
+  Settings settings;               ///< that concern it
+  std::vector<Input> inputs;       ///< its own file first; the others only where they are known
+  std::string action;              ///< digest of its own file, settings and program
+  std::optional<std::string> key;  ///< digest of all inputs; nothing: they are not known yet
+  AssetOutcome::State state = AssetOutcome::State::kFresh;
+  std::string reason;
+  bool wanted = false;  ///< a bundle that is not up to date needs it
+  std::optional<CachedPart> part;
+  std::vector<Diagnostic> diagnostics;
+  std::optional<Error> error;
+};
+
+/// One file to write.
+struct Target {
+  std::string path;
+  const ProjectTier* tier = nullptr;
+  std::vector<std::size_t> models;    ///< of the tasks
+  std::vector<std::size_t> patterns;  ///< the same
+  std::vector<const ProjectScene*> scenes;
+  std::string link;  ///< digest of all that goes in; empty where an asset's key is not known
+  bool fresh = false;
+};
+
+std::string joined(const Settings& settings) {
+  std::string text;
+  for (const auto& [key, value] : settings) text += key + " " + value + "\n";
+  return text;
+}
+
+/// What of a file shows that it was written again: size, time and inode.
+std::string stamp_of(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return "";
+  return std::to_string(status.st_size) + " " + std::to_string(status.st_mtim.tv_sec) + "." +
+         std::to_string(status.st_mtim.tv_nsec) + " " + std::to_string(status.st_ino);
+}
+
+bool matches(const std::string& name, const std::vector<std::string>& globs) {
+  return std::any_of(globs.begin(), globs.end(), [&](const std::string& glob) {
+    return ::fnmatch(glob.c_str(), name.c_str(), 0) == 0;
+  });
+}
+
+class ProjectBake {
+ public:
+  ProjectBake(const Project& project, const ProjectOptions& options, PartCache cache,
+              const ProgressCallback& progress)
+      : project_(project), options_(options), cache_(std::move(cache)), progress_(progress) {}
+
+  Result<ProjectOutcome> run() {
+    read_state();
+    program_ = options_.tool_version + " " + digests_.of("/proc/self/exe");
+    for (const ProjectTier& tier : project_.tiers) {
+      for (const ProjectBundle& bundle : project_.bundles) add_target(bundle, tier);
+    }
+    for (Task& task : tasks_) plan(task);
+    for (Target& target : targets_) plan(target);
+    mark_wanted();
+    if (!options_.dry_run) {
+      MODAR_TRY(bake_and_link());
+    }
+    return outcome();
+  }
+
+ private:
+  // Planning.
+
+  std::size_t task_of(const ProjectAsset& asset, const ProjectTier& tier) {
+    Settings settings = project_.settings;
+    for (const auto& [key, value] : tier.settings) settings[key] = value;
+    for (const auto& [key, value] : asset.settings) settings[key] = value;
+    settings = settings_of(settings, asset.pattern);
+    for (std::size_t i = 0; i < tasks_.size(); ++i) {
+      if (tasks_[i].asset == &asset && tasks_[i].settings == settings) return i;
+    }
+    Task& task = tasks_.emplace_back();
+    task.asset = &asset;
+    task.tier = tier.name;
+    task.settings = std::move(settings);
+    return tasks_.size() - 1;
+  }
+
+  void add_target(const ProjectBundle& bundle, const ProjectTier& tier) {
+    Target target;
+    target.tier = &tier;
+    const std::string suffix = tier.name.empty() ? "" : "-" + tier.name;
+    target.path =
+        (fs::path(project_.path(project_.out)) / (bundle.name + suffix + ".modar")).string();
+    const bool all = bundle.models.empty() && bundle.patterns.empty();
+    std::set<std::string> shown;
+    std::set<std::string> patterns;
+    for (const ProjectAsset& pattern : project_.patterns) {
+      if (!all && !matches(pattern.name, bundle.patterns)) continue;
+      target.patterns.push_back(task_of(pattern, tier));
+      patterns.insert(pattern.name);
+    }
+    for (const ProjectScene& scene : project_.scenes) {
+      if (patterns.count(scene.request.pattern) == 0) continue;
+      target.scenes.push_back(&scene);
+      shown.insert(scene.request.model);
+    }
+    for (const ProjectAsset& model : project_.models) {
+      if (!all && shown.count(model.name) == 0 && !matches(model.name, bundle.models)) continue;
+      target.models.push_back(task_of(model, tier));
+    }
+    targets_.push_back(std::move(target));
+  }
+
+  /// Path of a file that an asset names: relative to the asset's own folder.
+  [[nodiscard]] std::string beside(const Task& task, const std::string& file) const {
+    if (file.starts_with('/')) return file;
+    return (fs::path(project_.path(task.asset->file)).parent_path() / file).string();
+  }
+
+  [[nodiscard]] std::string key_of(const Task& task) const {
+    std::string text = task.action + "\n";
+    for (std::size_t i = 1; i < task.inputs.size(); ++i) {
+      text += task.inputs[i].path + " " + task.inputs[i].digest + "\n";
+    }
+    return digest_of(text);
+  }
+
+  void plan(Task& task) {
+    const std::string file = project_.path(task.asset->file);
+    task.inputs = {{fs::path(task.asset->file).filename().string(), digests_.of(file)}};
+    task.action =
+        digest_of(std::string(task.asset->pattern ? "pattern" : "model") + "\n" + program_ + "\n" +
+                  task.inputs[0].path + "\n" + task.inputs[0].digest + "\n" +
+                  std::to_string(task.asset->width_mm) + "\n" + joined(task.settings));
+    const auto files =
+        task.asset->pattern ? std::vector<std::string>() : cache_.files_of(task.action);
+    if (files) take_inputs(task, *files);
+    const bool there = task.key && cache_.has(*task.key);
+    task.state = there ? AssetOutcome::State::kCached : AssetOutcome::State::kStale;
+    if (!there) task.reason = reason_of(task);
+  }
+
+  void take_inputs(Task& task, const std::vector<std::string>& files) {
+    task.inputs.resize(1);
+    for (const std::string& file : files) {
+      task.inputs.push_back({file, digests_.of(beside(task, file))});
+    }
+    task.key = key_of(task);
+  }
+
+  /// Why a task is baked: what differs from the last time.
+  std::string reason_of(const Task& task) const {
+    const std::optional<Json> before = last_of(task);
+    if (!before) return "it is new";
+    const auto text = [&](const char* key) {
+      return before->find(key).value_or("").text().value_or("");
+    };
+    if (text("program") != program_) return "modar itself changed";
+    if (text("settings") != joined(task.settings) ||
+        text("width") != std::to_string(task.asset->width_mm)) {
+      return "its settings in " + fs::path(project_.file).filename().string() + " changed";
+    }
+    const Json files = before->find("files").value_or(Json());
+    for (std::size_t i = 0; i + 1 < files.size(); i += 2) {
+      const std::string file = files.at(i)->text().value_or("");
+      const std::string digest = files.at(i + 1)->text().value_or("");
+      const std::string path = i == 0 ? project_.path(task.asset->file) : beside(task, file);
+      const std::string now = digests_.of(path);
+      if (now == digest) continue;
+      return path + (now == kNoFile      ? " is gone"
+                     : digest == kNoFile ? " is there now"
+                                         : " changed");
+    }
+    return "the cache does not have it";
+  }
+
+  [[nodiscard]] std::optional<Json> last_of(const Task& task) const {
+    const auto found =
+        last_assets_.find(task.asset->name + (task.asset->pattern ? "\np" : "\nm") + task.tier);
+    return found == last_assets_.end() ? std::nullopt : std::optional(found->second);
+  }
+
+  void plan(Target& target) {
+    target.link = link_of(target);
+    const auto last = last_bundles_.find(target.path);
+    target.fresh = !target.link.empty() && last != last_bundles_.end() &&
+                   last->second == target.link + " " + stamp_of(target.path);
+  }
+
+  /// Empty where the key of an asset is not known yet.
+  [[nodiscard]] std::string link_of(const Target& target) const {
+    std::string text = program_ + "\n" + joined(settings_in(target)) + gates_text();
+    for (const auto* list : {&target.models, &target.patterns}) {
+      for (const std::size_t index : *list) {
+        const Task& task = tasks_[index];
+        if (!task.key) return "";
+        text += task.asset->name + " " + *task.key + "\n";
+      }
+    }
+    for (const ProjectScene* scene : target.scenes) text += scene_text(*scene);
+    return digest_of(text);
+  }
+
+  [[nodiscard]] Settings settings_in(const Target& target) const {
+    Settings settings = project_.settings;
+    for (const auto& [key, value] : target.tier->settings) settings[key] = value;
+    return settings;
+  }
+
+  [[nodiscard]] std::string gates_text() const {
+    const ProjectGates& gates = project_.gates;
+    return std::to_string(gates.min_psnr_db) + " " + std::to_string(gates.min_ssim) + " " +
+           std::to_string(gates.min_score) + " " + std::to_string(gates.max_bytes) + "\n";
+  }
+
+  static std::string scene_text(const ProjectScene& scene) {
+    const SceneRequest& request = scene.request;
+    std::string text = request.pattern + "\n" + request.model + "\n" +
+                       std::to_string(static_cast<int>(request.up)) +
+                       (request.centred ? " c" : " s");
+    for (const double number :
+         {request.scale, request.offset[0], request.offset[1], request.offset[2]}) {
+      char digits[32];
+      std::snprintf(digits, sizeof digits, " %.17g", number);
+      text += digits;
+    }
+    for (const auto& [language, words] : scene.texts) text += "\n" + language + " " + words;
+    return text + "\n";
+  }
+
+  void mark_wanted() {
+    for (Target& target : targets_) {
+      if (target.fresh) continue;
+      for (const auto* list : {&target.models, &target.patterns}) {
+        for (const std::size_t index : *list) tasks_[index].wanted = true;
+      }
+    }
+    for (Task& task : tasks_) {
+      if (!options_.only.empty()) task.wanted = task.asset->name == options_.only;
+      if (!task.wanted) task.state = AssetOutcome::State::kFresh;
+    }
+  }
+
+  // Baking.
+
+  Result<void> bake_and_link() {
+    std::vector<std::size_t> wanted;
+    for (std::size_t i = 0; i < tasks_.size(); ++i) {
+      if (tasks_[i].wanted) wanted.push_back(i);
+    }
+    if (wanted.empty() && std::all_of(targets_.begin(), targets_.end(),
+                                      [](const Target& target) { return target.fresh; })) {
+      return digests_.learnt() ? write_state() : Result<void>();
+    }
+    interrupts_ = std::make_unique<Interrupts>();
+    bake(wanted);
+    if (options_.only.empty()) {
+      for (Target& target : targets_) {
+        if (target.fresh) continue;
+        if (auto linked = link(target); !linked) errors_.push_back(linked.error());
+      }
+      MODAR_TRY(write_state());
+    }
+    interrupts_.reset();
+    return {};
+  }
+
+  /// Large files first, so that no thread is left alone with one at the end.
+  void bake(std::vector<std::size_t>& wanted) {
+    const auto bytes = [&](std::size_t index) {
+      std::error_code error;
+      const auto size = fs::file_size(project_.path(tasks_[index].asset->file), error);
+      return error ? std::uintmax_t{0} : size;
+    };
+    std::vector<std::uintmax_t> sizes(tasks_.size());
+    for (const std::size_t index : wanted) sizes[index] = bytes(index) + 1;
+    std::stable_sort(wanted.begin(), wanted.end(),
+                     [&](std::size_t a, std::size_t b) { return sizes[a] > sizes[b]; });
+    const double total =
+        static_cast<double>(std::accumulate(sizes.begin(), sizes.end(), std::uintmax_t{0}));
+    const auto stale =
+        static_cast<unsigned>(std::count_if(wanted.begin(), wanted.end(), [&](std::size_t i) {
+          return tasks_[i].state == AssetOutcome::State::kStale;
+        }));
+    const unsigned workers = options_.memory_limited ? 1 : std::clamp(stale, 1U, options_.jobs);
+    const unsigned jobs = std::max(1U, options_.jobs / workers);
+    const std::string stage =
+        "bake " + std::to_string(stale) + " of " + std::to_string(tasks_.size()) + " assets";
+    double done = 0;
+    parallel_rows(static_cast<std::uint32_t>(wanted.size()), workers, [&](std::uint32_t row) {
+      Task& task = tasks_[wanted[row]];
+      if (auto got = obtain_guarded(task, jobs); !got) {
+        task.error = got.error();
+        task.state = AssetOutcome::State::kFailed;
+      }
+      const std::lock_guard lock(mutex_);
+      done += static_cast<double>(sizes[wanted[row]]);
+      if (stale != 0 && progress_) progress_(stage, done / total);
+    });
+    for (const Task& task : tasks_) {
+      if (task.error) errors_.push_back(*task.error);
+    }
+  }
+
+  /// Threads must not throw; what libraries throw ends one asset.
+  Result<void> obtain_guarded(Task& task, unsigned jobs) {
+    try {
+      return obtain(task, jobs);
+    } catch (const std::bad_alloc&) {
+      return fail(ExitCode::kIo, "modar.memory", task.asset->file, "there is not enough memory",
+                  "fewer --jobs, or --memory below what the machine has");
+    } catch (const std::exception& error) {
+      return fail(ExitCode::kInternal, "modar.bug", task.asset->file, error.what(),
+                  "this is a bug of ours: please report it with the file");
+    }
+  }
+
+  Result<void> obtain(Task& task, unsigned jobs) {
+    bool damaged = false;
+    if (task.key) task.part = cache_.read(*task.key, damaged);
+    if (task.part) {
+      task.state = AssetOutcome::State::kCached;
+    } else {
+      if (damaged) task.reason = "its entry in the cache was damaged";
+      MODAR_TRY(bake_part(task, jobs));
+      task.part = cache_.read(*task.key, damaged);
+      if (!task.part) {
+        return fail(ExitCode::kIo, "cache.folder", task.asset->file,
+                    "what was written to the cache cannot be read back", "check the disk");
+      }
+      task.state = AssetOutcome::State::kBaked;
+    }
+    task.diagnostics = task.part->notes.diagnostics;
+    return {};
+  }
+
+  Result<void> bake_part(Task& task, unsigned jobs) {
+    const std::string file = project_.path(task.asset->file);
+    BakeRequest request;
+    MODAR_TRY(apply_settings(task.settings, request));
+    request.tool_version = options_.tool_version;
+    request.jobs = jobs;
+    if (task.asset->pattern) {
+      request.patterns = {{file, task.asset->width_mm}};
+    } else {
+      request.models = {file};
+    }
+    Report report;
+    BakeTrace trace;
+    MODAR_ASSIGN(const BundleContent content, build_bundle(request, report, &trace));
+    if (digests_.of(file) != task.inputs[0].digest) {
+      return fail(ExitCode::kIo, "project.changing", file, "it changed while it was baked",
+                  "bake again");
+    }
+    take_inputs(task, named_files(task, trace.files));
+    PartNotes notes;
+    if (!trace.model_sides.empty()) notes.model_sides = trace.model_sides[0];
+    notes.diagnostics = std::move(report.diagnostics);
+    const auto lock = interrupts_->writing();
+    MODAR_TRY(cache_.write(*task.key, content, notes));
+    if (task.asset->pattern) return {};
+    std::vector<std::string> files;
+    for (std::size_t i = 1; i < task.inputs.size(); ++i) files.push_back(task.inputs[i].path);
+    return cache_.write_files(task.action, files);
+  }
+
+  /// Each once, relative to the asset's folder, in byte order.
+  [[nodiscard]] std::vector<std::string> named_files(const Task& task,
+                                                     const std::vector<std::string>& paths) const {
+    const fs::path folder =
+        (fs::path(project_.path(task.asset->file)).parent_path() / "").lexically_normal();
+    std::set<std::string> files;
+    for (const std::string& path : paths) {
+      const fs::path whole = fs::path(path).lexically_normal();
+      const fs::path relative = whole.is_absolute() == folder.is_absolute()
+                                    ? whole.lexically_relative(folder.empty() ? "." : folder)
+                                    : whole;
+      files.insert(relative.empty() ? whole.string() : relative.string());
+    }
+    return {files.begin(), files.end()};
+  }
+
+  // Linking.
+
+  Result<void> link(Target& target) {
+    std::vector<LinkPart> models;
+    std::vector<LinkPart> patterns;
+    for (auto [from, to] :
+         {std::pair(&target.models, &models), std::pair(&target.patterns, &patterns)}) {
+      for (const std::size_t index : *from) {
+        const Task& task = tasks_[index];
+        if (!task.part) return {};  // its own error is told
+        to->push_back({task.part->bundle, task.asset->name, task.part->notes.model_sides});
+      }
+    }
+    BakeRequest described;
+    MODAR_TRY(apply_settings(settings_in(target), described));
+    described.tool_version = options_.tool_version;
+    for (const ProjectScene* scene : target.scenes) described.scenes.push_back(scene->request);
+    if (models.empty() && patterns.empty()) {
+      return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
+                  "it would hold neither a model nor a pattern", "name some that there are");
+    }
+    MODAR_ASSIGN(BundleContent content, link_bundles(models, patterns, described));
+    add_texts(target, content);
+    MODAR_TRY(hold_gates(target, content));
+    note_budget(target, described, content);
+    return write(target, content);
+  }
+
+  static void add_texts(const Target& target, BundleContent& content) {
+    Json texts = Json::array();
+    for (const ProjectScene* scene : target.scenes) {
+      if (scene->texts.empty()) continue;
+      Json words = Json::object();
+      for (const auto& [language, text] : scene->texts) words.set(language, text);
+      texts.push_back({{"pattern", scene->request.pattern},
+                       {"model", scene->request.model},
+                       {"text", std::move(words)}});
+    }
+    if (texts.size() == 0) return;
+    Json meta = Json::parse(content.meta);
+    meta.set("texts", std::move(texts));
+    content.meta = meta.dump();
+  }
+
+  [[nodiscard]] Result<void> hold_gates(const Target& target, const BundleContent& content) const {
+    const ProjectGates& gates = project_.gates;
+    const auto failed = [&](const NameRef& name, const char* what, double value, double least) {
+      char text[160];
+      std::snprintf(text, sizeof text, "%s: its %s is %.4g, and [gates] asks for %.4g",
+                    content.names.substr(name.offset, name.length).c_str(), what, value, least);
+      return fail(ExitCode::kInvalidInput, "project.gate", target.path, text,
+                  "mend the source, or lower the gate; the bundle is not written");
+    };
+    for (const TextureRecord& texture : content.textures) {
+      const double psnr = static_cast<double>(texture.psnr_db);
+      const double ssim = static_cast<double>(texture.ssim);
+      if (psnr < gates.min_psnr_db) return failed(texture.name, "PSNR", psnr, gates.min_psnr_db);
+      if (ssim < gates.min_ssim) return failed(texture.name, "SSIM", ssim, gates.min_ssim);
+    }
+    for (const PatternRecord& pattern : content.patterns) {
+      const double score = static_cast<double>(pattern.score);
+      if (gates.min_score > 0 && score < gates.min_score)
+        return failed(pattern.name, "score", score, gates.min_score);
+    }
+    return {};
+  }
+
+  void note_budget(const Target& target, const BakeRequest& described,
+                   const BundleContent& content) {
+    std::uint64_t bytes = 0;
+    for (const auto& data : content.texture_data) bytes += data.size();
+    if (described.texture_budget == 0 || bytes <= described.texture_budget) return;
+    notes_.push_back({"project.texture-budget", DiagnosticSeverity::kWarning, target.path, 0,
+                      "its textures take " + human_bytes(bytes) + " of the GPU memory, and " +
+                          described.device + " should give " +
+                          human_bytes(described.texture_budget) + " at most",
+                      "lower max-texture, or make several bundles"});
+  }
+
+  Result<void> write(Target& target, const BundleContent& content) {
+    std::error_code error;
+    fs::create_directories(fs::path(target.path).parent_path(), error);
+    const auto lock = interrupts_->writing();
+    const std::string own = target.path + "." + std::to_string(::getpid());
+    MODAR_TRY(save_bundle(content, own));
+    const std::uintmax_t bytes = fs::file_size(own, error);
+    if (project_.gates.max_bytes != 0 && bytes > project_.gates.max_bytes) {
+      ::unlink(own.c_str());
+      return fail(ExitCode::kInvalidInput, "project.gate", target.path,
+                  "it takes " + human_bytes(bytes) + ", and [gates] allows " +
+                      human_bytes(project_.gates.max_bytes),
+                  "make several bundles, or raise max-bytes; the bundle is not written");
+    }
+    if (std::rename(own.c_str(), target.path.c_str()) != 0) {
+      const std::string cause = std::strerror(errno);
+      ::unlink(own.c_str());
+      return fail(ExitCode::kIo, "io.commit", target.path, "cannot rename: " + cause,
+                  "name another folder as out in [project]");
+    }
+    target.link = link_of(target);
+    written_.insert(target.path);
+    return {};
+  }
+
+  // What the next bake wants to know.
+
+  void read_state() {
+    const auto file = MappedFile::open(project_.path(kState));
+    if (!file) return;
+    const Json json =
+        Json::parse({reinterpret_cast<const char*>(file->bytes().data()), file->bytes().size()});
+    digests_.read(json.find("digests").value_or(Json()));
+    const Json assets = json.find("assets").value_or(Json());
+    for (std::size_t i = 0; i < assets.size(); ++i) {
+      const Json one = *assets.at(i);
+      last_assets_[one.find("id").value_or("").text().value_or("")] = one;
+    }
+    const Json bundles = json.find("bundles").value_or(Json());
+    for (std::size_t i = 0; i < bundles.size(); ++i) {
+      const Json one = *bundles.at(i);
+      last_bundles_[one.at(0).value_or("").text().value_or("")] =
+          one.at(1).value_or("").text().value_or("");
+    }
+  }
+
+  Result<void> write_state() {
+    std::unique_lock<std::mutex> lock;
+    if (interrupts_ != nullptr) lock = interrupts_->writing();
+    Json assets = Json::array();
+    for (const Task& task : tasks_) {
+      if (!task.key || task.error) continue;
+      Json files = Json::array();
+      for (const Input& input : task.inputs) {
+        files.push_back(input.path);
+        files.push_back(input.digest);
+      }
+      assets.push_back(
+          {{"id", task.asset->name + (task.asset->pattern ? "\np" : "\nm") + task.tier},
+           {"program", program_},
+           {"settings", joined(task.settings)},
+           {"width", std::to_string(task.asset->width_mm)},
+           {"files", std::move(files)}});
+    }
+    Json bundles = Json::array();
+    for (const Target& target : targets_) {
+      if (!target.fresh && written_.count(target.path) == 0) continue;
+      bundles.push_back(Json::array({target.path, target.link + " " + stamp_of(target.path)}));
+    }
+    std::error_code error;
+    const std::string path = project_.path(kState);
+    fs::create_directories(fs::path(path).parent_path(), error);
+    return write_file(path, std::string_view(Json({{"digests", digests_.json()},
+                                                   {"assets", std::move(assets)},
+                                                   {"bundles", std::move(bundles)}})
+                                                 .dump()));
+  }
+
+  ProjectOutcome outcome() {
+    ProjectOutcome outcome;
+    std::set<std::string> inputs = {project_.file};
+    for (const Task& task : tasks_) {
+      outcome.assets.push_back({task.asset->name, task.tier, task.state, task.reason});
+      const bool told =
+          task.state == AssetOutcome::State::kFresh || task.state == AssetOutcome::State::kCached;
+      if (told) outcome.assets.back().reason.clear();
+      outcome.diagnostics.insert(outcome.diagnostics.end(), task.diagnostics.begin(),
+                                 task.diagnostics.end());
+      inputs.insert(project_.path(task.asset->file));
+      for (std::size_t i = 1; i < task.inputs.size(); ++i) {
+        if (task.inputs[i].digest != kNoFile) inputs.insert(beside(task, task.inputs[i].path));
+      }
+    }
+    outcome.inputs.assign(inputs.begin(), inputs.end());
+    outcome.diagnostics.insert(outcome.diagnostics.end(), notes_.begin(), notes_.end());
+    if (options_.only.empty()) {
+      for (const Target& target : targets_) {
+        std::error_code error;
+        const std::uintmax_t bytes = fs::file_size(target.path, error);
+        outcome.bundles.push_back(
+            {target.path, error ? 0 : bytes, written_.count(target.path) != 0, target.fresh});
+      }
+    }
+    outcome.errors = std::move(errors_);
+    return outcome;
+  }
+
+  const Project& project_;
+  const ProjectOptions& options_;
+  PartCache cache_;
+  const ProgressCallback& progress_;
+  mutable FileDigests digests_;
+  std::string program_;  ///< version and digest of this very program
+  std::vector<Task> tasks_;
+  std::vector<Target> targets_;
+  std::map<std::string, Json> last_assets_;
+  std::map<std::string, std::string> last_bundles_;
+  std::unique_ptr<Interrupts> interrupts_;
+  std::mutex mutex_;  ///< of the progress
+  std::set<std::string> written_;
+  std::vector<Diagnostic> notes_;
+  std::vector<Error> errors_;
+};
+
+}  // namespace
+
+Result<ProjectOutcome> bake_project(const Project& project, const ProjectOptions& options,
+                                    const ProgressCallback& progress) {
+  const std::string own = project.cache.empty() ? kCacheFolder : project.cache;
+  PartCache cache(options.cache.empty() ? project.path(own) : options.cache);
+  return ProjectBake(project, options, std::move(cache), progress).run();
+}
+
+}  // namespace modar

@@ -1,0 +1,203 @@
+// Writes the first modar.toml from what lies in a folder.
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <set>
+
+#include "bake/process.hpp"
+#include "bake/project/project.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string lower(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
+bool one_of(const std::string& extension, std::initializer_list<const char*> list) {
+  return std::any_of(list.begin(), list.end(), [&](const char* one) { return extension == one; });
+}
+
+struct Found {
+  std::vector<fs::path> models;    ///< relative to the folder, in byte order
+  std::vector<fs::path> pictures;  ///< the same
+  std::string material_text;       ///< of all MTL and glTF files, in lower case
+};
+
+/// Hidden folders, and the one that the bundles go to, are left out.
+bool left_out(const fs::path& name) {
+  return name.string().starts_with('.') || name == "out";
+}
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return lower(std::string(std::istreambuf_iterator<char>(file), {}));
+}
+
+Result<Found> look_through(const std::string& folder) {
+  Found found;
+  std::error_code error;
+  fs::recursive_directory_iterator it(folder, error);
+  if (error) {
+    return fail(ExitCode::kIo, "io.folder", folder, error.message(),
+                "name a folder to look through");
+  }
+  for (; it != fs::recursive_directory_iterator(); it.increment(error)) {
+    if (error) break;
+    if (left_out(it->path().filename())) {
+      if (it->is_directory(error)) it.disable_recursion_pending();
+      continue;
+    }
+    if (!it->is_regular_file(error)) continue;
+    const fs::path relative = it->path().lexically_relative(folder);
+    const std::string extension = lower(relative.extension().string());
+    if (one_of(extension, {".obj", ".gltf", ".glb"})) found.models.push_back(relative);
+    if (one_of(extension, {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"})) {
+      found.pictures.push_back(relative);
+    }
+    if (one_of(extension, {".mtl", ".gltf"})) found.material_text += text_of(it->path()) + "\n";
+  }
+  std::sort(found.models.begin(), found.models.end());
+  std::sort(found.pictures.begin(), found.pictures.end());
+  // What a material names is a texture.
+  std::erase_if(found.pictures, [&](const fs::path& picture) {
+    return found.material_text.find(lower(picture.filename().string())) != std::string::npos;
+  });
+  return found;
+}
+
+/// A TOML text in quotes, of a file name that a glob matches as it is.
+std::string quoted(const std::string& text, bool as_glob) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (as_glob && (c == '*' || c == '?' || c == '[')) {
+      out += std::string("[") + c + "]";
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+/// "[[model]]" tables of the files: one glob a folder and extension where all names differ, else a
+/// table a file. names: receives what scenes call them.
+std::string tables(const std::string& kind, const std::vector<fs::path>& files,
+                   const std::string& comment, std::vector<std::string>& names) {
+  std::map<std::string, int> stems;
+  for (const fs::path& file : files) ++stems[file.stem().string()];
+  std::map<std::string, std::vector<fs::path>> groups;  // by glob
+  for (const fs::path& file : files) {
+    const fs::path folder = file.parent_path();
+    const std::string prefix = folder.empty() ? "" : quoted((folder / "").string(), true);
+    groups[(prefix.empty() ? "" : prefix.substr(1, prefix.size() - 2)) + "*" +
+           file.extension().string()]
+        .push_back(file);
+  }
+  std::string text;
+  std::set<std::string> taken;
+  for (const auto& [glob, group] : groups) {
+    const bool plain = std::all_of(group.begin(), group.end(), [&](const fs::path& file) {
+      return stems[file.stem().string()] == 1;
+    });
+    if (plain && group.size() > 1) {
+      text += "[[" + kind + "]]\nfile = \"" + glob + "\"" + comment + "\n\n";
+      for (const fs::path& file : group) taken.insert(file.stem().string());
+      continue;
+    }
+    for (const fs::path& file : group) {
+      std::string name = file.stem().string();
+      text += "[[" + kind + "]]\nfile = " + quoted(file.string(), true) + "\n";
+      if (!taken.insert(name).second) {
+        name = file.string();
+        std::replace(name.begin(), name.end(), '/', '-');
+        taken.insert(name);
+        text += "name = " + quoted(name, false) + "\n";
+      }
+      text += comment.empty() ? "\n" : comment.substr(1) + "\n\n";
+    }
+  }
+  names.assign(taken.begin(), taken.end());
+  return text;
+}
+
+/// Pairs in order, where names do not say what belongs together.
+std::string scenes(const std::vector<std::string>& models,
+                   const std::vector<std::string>& patterns) {
+  if (models.empty() || patterns.empty()) return "";
+  const bool by_name = std::any_of(models.begin(), models.end(), [&](const std::string& name) {
+    return std::find(patterns.begin(), patterns.end(), name) != patterns.end();
+  });
+  std::string text =
+      "# Which model stands on which pattern. Without any [[scene]], models stand on patterns of "
+      "their\n"
+      "# own name, and a single one on a single one.\n";
+  if (by_name || (models.size() == 1 && patterns.size() == 1)) {
+    return text + "#[[scene]]\n#pattern = " + quoted(patterns[0], false) +
+           "\n#model = " + quoted(models[0], false) + "\n#up = \"y\"\n#scale = 0.8\n\n";
+  }
+  for (std::size_t i = 0; i < std::min(models.size(), patterns.size()); ++i) {
+    text += "[[scene]]\npattern = " + quoted(patterns[i], false) +
+            "\nmodel = " + quoted(models[i], false) + "\n" +
+            (i == 0 ? "#up = \"y\"      # the axis of the model that points out of the pattern\n"
+                      "#scale = 0.8   # of the pattern's largest side\n"
+                      "#text.en = \"A vase.\"\n"
+                    : "") +
+            "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+Result<std::string> initial_project(const std::string& folder) {
+  MODAR_ASSIGN(const Found found, look_through(folder));
+  if (found.models.empty() && found.pictures.empty()) {
+    return fail(ExitCode::kInvalidInput, "project.nothing", folder,
+                "there is neither a model (OBJ, glTF, GLB) nor a picture in it",
+                "put some there, or name another folder");
+  }
+  std::error_code error;
+  const std::string name = fs::absolute(folder, error).lexically_normal().string();
+  std::string stem = fs::path(name).filename().string();
+  if (stem.empty()) stem = fs::path(name).parent_path().filename().string();
+  const fs::path schema = fs::path(program_folder()) / "../share/modar/modar.schema.json";
+  std::string text;
+  if (fs::exists(schema, error)) text += "#:schema " + schema.lexically_normal().string() + "\n";
+  text +=
+      "# A ModAR project: `modar bake` in this folder bakes what changed.\n\n"
+      "[project]\n"
+      "name = " +
+      quoted(stem, false) +
+      "          # of the bundle: out/NAME.modar\n"
+      "#out = \"out\"\n\n"
+      "[bake]\n"
+      "parameters = [\"none\"]     # the ModAR paper's features are for other programs only\n"
+      "#device = \"ace2\"          # plan textures for a device\n"
+      "#effort = \"best\"          # of textures: fast, good, best\n"
+      "#unit = \"mm\"              # of the models' coordinates\n"
+      "#max-error = \"0.01%\"      # of positions\n\n"
+      "#[[tier]]                 # the same bundles once more, for other devices\n"
+      "#name = \"low\"\n"
+      "#device = \"mali400\"\n"
+      "#max-texture = 512\n\n"
+      "#[gates]                  # a bundle that does not reach them is not written\n"
+      "#min-psnr = 30\n"
+      "#min-score = 40\n\n";
+  std::vector<std::string> models;
+  std::vector<std::string> patterns;
+  text += tables("model", found.models, "", models);
+  text +=
+      tables("pattern", found.pictures,
+             "\n#width-mm = 210          # as printed, where the file does not state it", patterns);
+  text += scenes(models, patterns);
+  while (text.ends_with("\n\n")) text.pop_back();
+  return text;
+}
+
+}  // namespace modar

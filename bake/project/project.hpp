@@ -1,0 +1,139 @@
+// The door of this room: a collection that is described by a file, modar.toml, and baked as far as
+// something changed.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bake/bundle/bundle_builder.hpp"
+#include "bake/report.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+inline constexpr const char* kProjectFile = "modar.toml";
+inline constexpr const char* kCacheFolder = ".modar/cache";  ///< where the project names none
+
+/// Options of the bake by their names in modar.toml, as text: {"effort", "best"}.
+using Settings = std::map<std::string, std::string>;
+
+/// One model or one pattern of a project.
+struct ProjectAsset {
+  std::string name;       ///< what scenes and bundles call it
+  std::string file;       ///< relative to the project's folder
+  bool pattern = false;   ///< else a model
+  double width_mm = 0.0;  ///< of a pattern; 0: what the file states, or unknown
+  Settings settings;      ///< of its own, above those of [bake] and of the tier
+};
+
+struct ProjectScene {
+  SceneRequest request;
+  std::map<std::string, std::string> texts;  ///< by language: {"en", "A vase."}
+};
+
+/// Which assets go into one file. Models of the patterns' scenes come along.
+struct ProjectBundle {
+  std::string name;
+  std::vector<std::string> models;    ///< names, * and ? match; both empty: everything
+  std::vector<std::string> patterns;  ///< the same
+};
+
+/// The same bundles once more, for another kind of device.
+struct ProjectTier {
+  std::string name;  ///< empty: the only one; else part of the files' names
+  Settings settings;
+};
+
+/// What a bundle has to reach to be written.
+struct ProjectGates {
+  double min_psnr_db = 0;       ///< of each texture
+  double min_ssim = 0;          ///< the same
+  double min_score = 0;         ///< of each pattern, 0 to 100
+  std::uint64_t max_bytes = 0;  ///< of the file; 0: any
+};
+
+/// A project file as it was read, globs expanded.
+struct Project {
+  std::string file;         ///< path of the project file
+  std::string folder;       ///< its folder, with a slash at its end; empty: the current one
+  std::string out = "out";  ///< folder of the bundles, relative to the project's
+  std::string cache;        ///< folder of the cache, relative; empty: kCacheFolder
+  std::vector<ProjectAsset> models;
+  std::vector<ProjectAsset> patterns;
+  std::vector<ProjectScene> scenes;
+  std::vector<ProjectBundle> bundles;  ///< at least one
+  std::vector<ProjectTier> tiers;      ///< at least one
+  Settings settings;                   ///< of [bake]
+  ProjectGates gates;
+
+  /// A path of the project as the current folder sees it.
+  [[nodiscard]] std::string path(const std::string& relative) const {
+    return relative.starts_with('/') ? relative : folder + relative;
+  }
+};
+
+/// Errors: kIo "project.open"; kInvalidInput with file, line and column: "project.toml" (no TOML),
+/// "project.key" (unknown; names the nearest one there is), "project.value", "project.no-match" (a
+/// glob that matches nothing), "project.same-name", "project.scene-unknown".
+Result<Project> read_project(const std::string& path);
+
+/// The text of a project file, with comments, for the models and pictures in a folder and below it
+/// (hidden ones and `out` left out). A picture that a model uses as a texture is no pattern.
+/// Errors: kIo "io.folder"; kInvalidInput "project.nothing" where there are none.
+Result<std::string> initial_project(const std::string& folder);
+
+struct ProjectOptions {
+  std::string cache;            ///< folder; empty: the project's
+  std::string only;             ///< bake this asset into the cache and link nothing; empty: all
+  unsigned jobs = 1;            ///< threads, shared out over assets
+  bool memory_limited = false;  ///< a MemoryLimit holds: assets are baked one after the other
+  bool dry_run = false;         ///< plan only
+  std::string tool_version;
+};
+
+/// What happens to an asset in a tier.
+struct AssetOutcome {
+  std::string name;
+  std::string tier;
+  enum class State : std::uint8_t { kFresh, kCached, kBaked, kFailed, kStale } state;
+  std::string reason;  ///< why it is baked: "cover.png changed"; empty for kFresh and kCached
+};
+
+struct BundleOutcome {
+  std::string path;
+  std::uint64_t bytes = 0;
+  bool written = false;
+  bool fresh = false;  ///< it was there and is as it would be written
+};
+
+struct ProjectOutcome {
+  std::vector<AssetOutcome> assets;  ///< kStale: of a dry run, it would be baked
+  std::vector<BundleOutcome> bundles;
+  std::vector<Diagnostic> diagnostics;  ///< of assets that went into a bundle that was written
+  std::vector<std::string> inputs;      ///< paths of all files that were read, for a depfile
+  std::vector<Error> errors;            ///< of assets and bundles that failed; the others stand
+};
+
+/// Bakes what changed and links the bundles that it belongs to. What is finished stays in the
+/// cache, whatever happens then. Errors: those of the folders that it writes to; what concerns one
+/// asset or one bundle is in the outcome.
+Result<ProjectOutcome> bake_project(const Project& project, const ProjectOptions& options,
+                                    const ProgressCallback& progress);
+
+/// What a cache holds. Errors of all three: kIo "cache.folder".
+struct CacheSummary {
+  std::uint64_t entries = 0;
+  std::uint64_t bytes = 0;
+  std::vector<std::string> damaged;  ///< of verify_cache(): files that were removed
+};
+Result<CacheSummary> summarise_cache(const std::string& folder);
+/// Removes those that were used longest ago until at most `bytes` are left, and what interrupted
+/// processes left more than a day ago. Answers what was removed.
+Result<CacheSummary> prune_cache(const std::string& folder, std::uint64_t bytes);
+/// Reads every entry and removes those that are damaged: they are baked again when needed.
+Result<CacheSummary> verify_cache(const std::string& folder);
+
+}  // namespace modar

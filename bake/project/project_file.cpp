@@ -1,0 +1,447 @@
+// Reads modar.toml. toml++ is known to this file alone.
+#define TOML_EXCEPTIONS 0
+#include <toml++/toml.h>
+
+#include <glob.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "bake/bundle/request_text.hpp"
+#include "bake/project/project.hpp"
+#include "bake/project/settings.hpp"
+#include "formats/nearest.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Keys = std::vector<std::string_view>;
+
+std::string place(const std::string& file, const toml::source_region& region) {
+  return file + ":" + std::to_string(region.begin.line) + ":" + std::to_string(region.begin.column);
+}
+
+/// A table of the file, whose keys are taken one by one.
+class TableReader {
+ public:
+  TableReader(const std::string& file, const toml::table& table, std::string name)
+      : file_(file), table_(table), name_(std::move(name)) {}
+
+  /// Refuses keys that are not in the list.
+  [[nodiscard]] Result<void> allow(const Keys& keys) const {
+    for (const auto& [key, node] : table_) {
+      const std::string_view word = key.str();
+      if (std::find(keys.begin(), keys.end(), word) != keys.end()) continue;
+      std::string list;
+      for (const std::string_view known : keys)
+        list += (list.empty() ? "" : ", ") + std::string(known);
+      const std::string_view nearest = nearest_name(word, keys);
+      return fail(ExitCode::kInvalidInput, "project.key", place(file_, key.source()),
+                  "there is no key '" + std::string(word) + "' in " + name_,
+                  nearest.empty() ? "the keys are " + list
+                                  : "did you mean '" + std::string(nearest) + "'?");
+    }
+    return {};
+  }
+
+  [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
+
+  Result<void> take(std::string_view key, std::string& value) const {
+    return take_as<std::string>(key, "a text in quotes", value);
+  }
+  Result<void> take(std::string_view key, bool& value) const {
+    return take_as<bool>(key, "true or false", value);
+  }
+  /// least: the least value that is allowed.
+  Result<void> take(std::string_view key, double& value, double least) const {
+    MODAR_TRY(take_as<double>(key, "a number", value));
+    if (has(key) && !(value >= least && std::isfinite(value))) {
+      return wrong(key, "a number from " + std::to_string(static_cast<int>(least)));
+    }
+    return {};
+  }
+  /// A text, or a list of texts.
+  Result<void> take(std::string_view key, std::vector<std::string>& values) const {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) return {};
+    if (const auto* text = node->as_string()) {
+      values.push_back(text->get());
+      return {};
+    }
+    const auto* list = node->as_array();
+    if (list == nullptr || !list->is_homogeneous<std::string>()) {
+      return wrong(key, "a text in quotes, or a list of them");
+    }
+    for (const auto& element : *list) values.push_back(element.as_string()->get());
+    return {};
+  }
+  Result<void> take(std::string_view key, std::array<double, 3>& values) const {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) return {};
+    const auto* list = node->as_array();
+    if (list == nullptr || list->size() != values.size()) return wrong(key, "three numbers");
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const auto number = list->get(i)->value<double>();
+      if (!number) return wrong(key, "three numbers");
+      values[i] = *number;
+    }
+    return {};
+  }
+  /// Every key of a table within: {"en", "A vase."}.
+  Result<void> take(std::string_view key, std::map<std::string, std::string>& texts) const {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) return {};
+    const auto* within = node->as_table();
+    if (within == nullptr) return wrong(key, "a table of texts by language");
+    const TableReader reader(file_, *within, name_ + "." + std::string(key));
+    for (const auto& [language, text] : *within) {
+      MODAR_TRY(reader.take(language.str(), texts[std::string(language.str())]));
+    }
+    return {};
+  }
+
+  /// The settings of the bake that stand in this table.
+  Result<void> take_settings(Settings& settings) const {
+    for (const Setting& setting : all_settings()) {
+      if (!has(setting.key)) continue;
+      std::string value;
+      MODAR_TRY(take_setting(setting, value));
+      settings[setting.key] = value;
+      BakeRequest trial;
+      if (auto good = setting.apply(value, trial); !good) {
+        return fail(ExitCode::kInvalidInput, "project.value", at(setting.key),
+                    std::string(setting.key) + ": " + good.error().cause, good.error().cure);
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] std::string at(std::string_view key) const {
+    const toml::node* node = table_.get(key);
+    return place(file_, node != nullptr ? node->source() : table_.source());
+  }
+
+  [[nodiscard]] tl::unexpected<Error> wrong(std::string_view key,
+                                            const std::string& expected) const {
+    return fail(ExitCode::kInvalidInput, "project.value", at(key),
+                "'" + std::string(key) + "' in " + name_ + " is not what it should be",
+                "write " + expected);
+  }
+
+ private:
+  template <class T>
+  Result<void> take_as(std::string_view key, const char* expected, T& value) const {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) return {};
+    // An integer is a number, too; nothing else changes its type.
+    const auto got = std::is_same_v<T, double> ? node->value<T>() : node->value_exact<T>();
+    if (!got) return wrong(key, expected);
+    value = *got;
+    return {};
+  }
+
+  Result<void> take_setting(const Setting& setting, std::string& value) const {
+    if (setting.kind == Setting::Kind::kTruth) {
+      bool truth = false;
+      MODAR_TRY(take(setting.key, truth));
+      value = truth ? "true" : "false";
+    } else if (setting.kind == Setting::Kind::kNumber) {
+      double number = 0;
+      MODAR_TRY(take(setting.key, number, 0));
+      value = std::to_string(static_cast<long long>(number));
+      if (number != std::floor(number)) return wrong(setting.key, "a whole number");
+    } else if (setting.kind == Setting::Kind::kTexts) {
+      std::vector<std::string> words;
+      MODAR_TRY(take(setting.key, words));
+      for (const std::string& word : words) value += (value.empty() ? "" : ",") + word;
+    } else {
+      MODAR_TRY(take(setting.key, value));
+    }
+    return {};
+  }
+
+  const std::string& file_;
+  const toml::table& table_;
+  std::string name_;
+};
+
+/// Files that a glob matches, relative to the folder, in byte order. "**/" stands for any number of
+/// folders.
+std::vector<std::string> expand(const std::string& folder, const std::string& pattern) {
+  std::vector<std::string> globs = {folder + pattern};
+  if (const std::size_t deep = pattern.find("**/"); deep != std::string::npos) {
+    const std::string base = folder + pattern.substr(0, deep);
+    const std::string rest = pattern.substr(deep + 3);
+    globs = {base + rest};
+    std::error_code error;
+    fs::recursive_directory_iterator it(base.empty() ? "." : base, error);
+    for (; !error && it != fs::recursive_directory_iterator(); it.increment(error)) {
+      if (it->is_directory()) globs.push_back((it->path() / rest).string());
+    }
+  }
+  std::vector<std::string> files;
+  for (const std::string& one : globs) {
+    glob_t found{};
+    if (::glob(one.c_str(), GLOB_NOSORT, nullptr, &found) == 0) {
+      for (std::size_t i = 0; i < found.gl_pathc; ++i) {
+        std::string path = fs::path(found.gl_pathv[i]).lexically_normal().string();
+        const std::string root = fs::path(folder).lexically_normal().string();
+        if (!root.empty() && path.starts_with(root)) path.erase(0, root.size());
+        std::error_code error;
+        if (fs::is_regular_file(found.gl_pathv[i], error)) files.push_back(std::move(path));
+      }
+    }
+    ::globfree(&found);
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+Keys keys_with_settings(Keys keys, bool models, bool patterns) {
+  for (const Setting& setting : all_settings()) {
+    if (setting.of_patterns ? patterns : models) keys.push_back(setting.key);
+  }
+  return keys;
+}
+
+/// The tables of an array "[[name]]".
+Result<std::vector<TableReader>> tables(const std::string& file, const toml::table& root,
+                                        const std::string& name) {
+  std::vector<TableReader> list;
+  const toml::node* node = root.get(name);
+  if (node == nullptr) return list;
+  const auto* array = node->as_array();
+  if (array == nullptr || !array->is_homogeneous<toml::table>()) {
+    return TableReader(file, root, "the file").wrong(name, "[[" + name + "]] above each of them");
+  }
+  for (const auto& element : *array) {
+    list.emplace_back(file, *element.as_table(), "[[" + name + "]]");
+  }
+  return list;
+}
+
+/// "[name]", or nothing.
+Result<std::optional<TableReader>> table(const std::string& file, const toml::table& root,
+                                         const std::string& name) {
+  const toml::node* node = root.get(name);
+  if (node == nullptr) return std::nullopt;
+  if (node->as_table() == nullptr) {
+    return TableReader(file, root, "the file").wrong(name, "[" + name + "] above its keys");
+  }
+  return TableReader(file, *node->as_table(), "[" + name + "]");
+}
+
+class ProjectReader {
+ public:
+  ProjectReader(const std::string& file, const toml::table& root) : root_(root) {
+    project_.file = file;
+    const fs::path folder = fs::path(file).parent_path();
+    if (!folder.empty()) project_.folder = (folder / "").string();
+  }
+
+  Result<Project> run() {
+    MODAR_TRY(
+        TableReader(project_.file, root_, "the file")
+            .allow({"project", "bake", "tier", "model", "pattern", "scene", "bundle", "gates"}));
+    MODAR_TRY(read_project_table());
+    MODAR_TRY(read_bake());
+    MODAR_TRY(read_assets("model", false, project_.models));
+    MODAR_TRY(read_assets("pattern", true, project_.patterns));
+    MODAR_TRY(read_scenes());
+    MODAR_TRY(read_bundles());
+    MODAR_TRY(read_gates());
+    return std::move(project_);
+  }
+
+ private:
+  Result<void> read_project_table() {
+    name_ = fs::absolute(project_.file).lexically_normal().parent_path().filename().string();
+    MODAR_ASSIGN(const auto reader, table(project_.file, root_, "project"));
+    if (!reader) return {};
+    MODAR_TRY(reader->allow({"name", "out", "cache"}));
+    MODAR_TRY(reader->take("name", name_));
+    MODAR_TRY(reader->take("out", project_.out));
+    return reader->take("cache", project_.cache);
+  }
+
+  Result<void> read_bake() {
+    MODAR_ASSIGN(const auto reader, table(project_.file, root_, "bake"));
+    if (reader) {
+      MODAR_TRY(reader->allow(keys_with_settings({}, true, true)));
+      MODAR_TRY(reader->take_settings(project_.settings));
+    }
+    MODAR_ASSIGN(const auto tiers, tables(project_.file, root_, "tier"));
+    for (const TableReader& tier : tiers) {
+      MODAR_TRY(tier.allow(keys_with_settings({"name"}, true, true)));
+      ProjectTier read;
+      MODAR_TRY(tier.take("name", read.name));
+      if (read.name.empty()) return tier.wrong("name", "a name, which the files get");
+      MODAR_TRY(tier.take_settings(read.settings));
+      project_.tiers.push_back(std::move(read));
+    }
+    if (project_.tiers.empty()) project_.tiers.emplace_back();
+    return {};
+  }
+
+  Result<void> read_assets(const std::string& kind, bool pattern,
+                           std::vector<ProjectAsset>& assets) {
+    MODAR_ASSIGN(const auto readers, tables(project_.file, root_, kind));
+    Keys keys = keys_with_settings({"file", "name"}, !pattern, pattern);
+    if (pattern) keys.push_back("width-mm");
+    std::set<std::string> seen;
+    for (const TableReader& reader : readers) {
+      MODAR_TRY(reader.allow(keys));
+      MODAR_TRY(add_assets(reader, pattern, seen, assets));
+    }
+    return {};
+  }
+
+  /// The files of a table's globs; those after a "!" are left out.
+  Result<void> add_assets(const TableReader& reader, bool pattern, std::set<std::string>& seen,
+                          std::vector<ProjectAsset>& assets) {
+    std::vector<std::string> globs;
+    MODAR_TRY(reader.take("file", globs));
+    if (globs.empty()) return reader.wrong("file", "file = \"NAME\", where * matches any letters");
+    ProjectAsset asset;
+    asset.pattern = pattern;
+    MODAR_TRY(reader.take("name", asset.name));
+    MODAR_TRY(reader.take("width-mm", asset.width_mm, 0));
+    MODAR_TRY(reader.take_settings(asset.settings));
+    const std::string name = asset.name;
+    std::set<std::string> left_out;
+    for (const std::string& glob : globs) {
+      if (!glob.starts_with('!')) continue;
+      for (std::string& file : expand(project_.folder, glob.substr(1)))
+        left_out.insert(std::move(file));
+    }
+    for (const std::string& glob : globs) {
+      if (glob.starts_with('!')) continue;
+      const std::vector<std::string> files = expand(project_.folder, glob);
+      if (files.empty()) {
+        return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("file"),
+                    "there is no file '" + glob + "'", "correct the name, or take the line out");
+      }
+      for (const std::string& file : files) {
+        if (left_out.count(file) != 0) continue;
+        asset.file = file;
+        asset.name = name.empty() ? file_stem(file) : name;
+        if (!seen.insert(asset.name).second) {
+          return fail(ExitCode::kInvalidInput, "project.same-name", reader.at("file"),
+                      "two files are named '" + asset.name + "', the second is " + file,
+                      "give each a table of its own with another name = \"...\"");
+        }
+        assets.push_back(asset);
+      }
+    }
+    return {};
+  }
+
+  Result<void> read_scenes() {
+    MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
+    for (const TableReader& reader : readers) {
+      MODAR_TRY(reader.allow({"pattern", "model", "scale", "up", "offset", "centred", "text"}));
+      ProjectScene scene;
+      MODAR_TRY(reader.take("pattern", scene.request.pattern));
+      MODAR_TRY(reader.take("model", scene.request.model));
+      MODAR_TRY(known(reader, "pattern", scene.request.pattern, project_.patterns));
+      MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
+      MODAR_TRY(reader.take("scale", scene.request.scale, 0));
+      if (!(scene.request.scale > 0)) return reader.wrong("scale", "a factor above 0");
+      std::string up = "z";
+      MODAR_TRY(reader.take("up", up));
+      const Result<UpAxis> axis = parse_up(up);
+      if (!axis) return reader.wrong("up", "x, y, z, -x, -y or -z in quotes");
+      scene.request.up = *axis;
+      MODAR_TRY(reader.take("offset", scene.request.offset));
+      MODAR_TRY(reader.take("centred", scene.request.centred));
+      MODAR_TRY(reader.take("text", scene.texts));
+      project_.scenes.push_back(std::move(scene));
+    }
+    if (readers.empty()) make_scenes();
+    return {};
+  }
+
+  static Result<void> known(const TableReader& reader, const char* key, const std::string& name,
+                            const std::vector<ProjectAsset>& assets) {
+    std::vector<std::string> names;
+    for (const ProjectAsset& asset : assets) names.push_back(asset.name);
+    if (std::find(names.begin(), names.end(), name) != names.end()) return {};
+    const std::string_view nearest = nearest_name(name, names);
+    return fail(ExitCode::kInvalidInput, "project.scene-unknown", reader.at(key),
+                "there is no " + std::string(key) + " '" + name + "'",
+                nearest.empty() ? "name the file without folder and extension"
+                                : "did you mean '" + std::string(nearest) + "'?");
+  }
+
+  /// Without [[scene]]: models stand on patterns of their name, and one on one.
+  void make_scenes() {
+    for (const ProjectAsset& model : project_.models) {
+      for (const ProjectAsset& pattern : project_.patterns) {
+        const bool pair = project_.models.size() == 1 && project_.patterns.size() == 1;
+        if (!pair && model.name != pattern.name) continue;
+        ProjectScene scene;
+        scene.request.pattern = pattern.name;
+        scene.request.model = model.name;
+        project_.scenes.push_back(std::move(scene));
+      }
+    }
+  }
+
+  Result<void> read_bundles() {
+    MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "bundle"));
+    for (const TableReader& reader : readers) {
+      MODAR_TRY(reader.allow({"name", "models", "patterns"}));
+      ProjectBundle bundle;
+      MODAR_TRY(reader.take("name", bundle.name));
+      MODAR_TRY(reader.take("models", bundle.models));
+      MODAR_TRY(reader.take("patterns", bundle.patterns));
+      if (bundle.name.empty() || bundle.name.find('/') != std::string::npos) {
+        return reader.wrong("name", "a name without a slash, which the file gets");
+      }
+      project_.bundles.push_back(std::move(bundle));
+    }
+    if (project_.bundles.empty()) project_.bundles.push_back({name_, {}, {}});
+    return {};
+  }
+
+  Result<void> read_gates() {
+    MODAR_ASSIGN(const auto reader, table(project_.file, root_, "gates"));
+    if (!reader) return {};
+    MODAR_TRY(reader->allow({"min-psnr", "min-ssim", "min-score", "max-bytes"}));
+    MODAR_TRY(reader->take("min-psnr", project_.gates.min_psnr_db, 0));
+    MODAR_TRY(reader->take("min-ssim", project_.gates.min_ssim, 0));
+    MODAR_TRY(reader->take("min-score", project_.gates.min_score, 0));
+    double bytes = 0;
+    MODAR_TRY(reader->take("max-bytes", bytes, 0));
+    project_.gates.max_bytes = static_cast<std::uint64_t>(bytes);
+    return {};
+  }
+
+  const toml::table& root_;
+  Project project_;
+  std::string name_;  // of the only bundle
+};
+
+}  // namespace
+
+Result<Project> read_project(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) {
+    return fail(ExitCode::kIo, "project.open", path, "there is no project file",
+                "`modar init` writes one from the models and pictures of a folder; or name files "
+                "with --model and --pattern");
+  }
+  const toml::parse_result parsed = toml::parse_file(path);
+  if (!parsed) {
+    return fail(ExitCode::kInvalidInput, "project.toml", place(path, parsed.error().source()),
+                std::string(parsed.error().description()),
+                "correct the line: toml.io has the rules");
+  }
+  return ProjectReader(path, parsed.table()).run();
+}
+
+}  // namespace modar

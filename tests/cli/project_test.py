@@ -1,0 +1,401 @@
+"""Projects: modar.toml, what of it is baked again and what is not, the cache, `modar init`."""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import struct
+import subprocess
+import time
+import tomllib
+import unittest
+import zlib
+from random import Random
+
+from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest
+
+SCHEMA = json.loads((ROOT / "bake/project/modar.schema.json").read_text())
+# Few views of a pattern, no scores, one level: enough for tests.
+FAST = "loop-views = 8\nscore = false\nlods = 1\nparameters = [\"none\"]\n"
+DIRECT = ["--loop-views", "8", "--no-score", "--no-lods", "--parameters", "none", "--quiet"]
+
+CUBE = """mtllib cube.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 1
+vt 0 0
+vt 1 0
+vt 1 1
+usemtl wall
+f 1/1 2/2 3/3
+f 1/1 3/3 4/2
+"""
+CUBE_MTL = "newmtl wall\nKd 1 1 1\nmap_Kd wall.png\n"
+
+
+def picture(path, width=200, height=150):
+    """A PNG of gray rectangles, small enough to bake in no time."""
+    random = Random(7)
+    rows = [bytearray([128] * width) for _ in range(height)]
+    for _ in range(150):
+        x, y, shade = random.randrange(width), random.randrange(height), random.randrange(256)
+        for row in rows[y:y + random.randrange(4, 20)]:
+            row[x:x + 16] = bytes([shade] * len(row[x:x + 16]))
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
+              (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b"")]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
+
+
+class ProjectTest(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.place = self.folder / "museum"
+        (self.place / "models").mkdir(parents=True)
+        (self.place / "pictures").mkdir()
+        for name in ("a", "b"):
+            text = CUBE if name == "a" else CUBE.replace("1 1 0", "1 2 0").replace("mtllib cube.mtl\n", "")
+            (self.place / f"models/{name}.obj").write_text(text)
+        (self.place / "models/cube.mtl").write_text(CUBE_MTL)
+        shutil.copy(ROOT / "assets/models/bust.png", self.place / "models/wall.png")
+        picture(self.place / "pictures/a.png")
+        self.write("[bake]\n" + FAST + "[[model]]\nfile = \"models/*.obj\"\n[[pattern]]\nfile = \"pictures/*\"\n")
+
+    def write(self, text):
+        (self.place / "modar.toml").write_text(text)
+
+    def bake(self, *arguments, cwd=None):
+        done = self.modar("bake", "--json", *arguments, cwd=cwd or self.place)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.told = done.stderr
+        return json.loads(done.stdout)
+
+    def states(self, report):
+        return {asset["name"] + asset["tier"]: asset["state"] for asset in report["assets"]}
+
+    def findings(self, report):
+        return [finding["id"] for finding in report["findings"]]
+
+    def reasons(self, *arguments):
+        return {asset["name"]: asset["reason"] for asset in self.bake("--dry-run", *arguments)["assets"]
+                if asset["state"] == "stale"}
+
+
+class Files(ProjectTest):
+    def test_one_model_and_one_pattern_are_the_bytes_of_a_single_bake(self):
+        self.write("[project]\nname = \"both\"\n[bake]\n" + FAST + f"[[model]]\nfile = \"{STATUE}\"\n"
+                   f"[[model]]\nfile = \"{POTTERY}\"\n[[pattern]]\nfile = \"{COVER}\"\nwidth-mm = 210\n"
+                   "[[scene]]\npattern = \"cover\"\nmodel = \"pottery\"\nup = \"y\"\nscale = 0.8\noffset = [0, 0.1, 0]\n"
+                   "[[bundle]]\nname = \"one\"\npatterns = \"cov*\"\n")
+        self.bake()
+        direct = self.folder / "direct.modar"
+        done = self.modar("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene",
+                          "cover=pottery,up=y,scale=0.8,offset=0:0.1:0", *DIRECT, "-o", direct)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((self.place / "out/one.modar").read_bytes(), direct.read_bytes())
+
+    def test_several_assets_are_as_baked_alone(self):
+        self.write("[bake]\n" + FAST + f"[[model]]\nfile = [\"{STATUE}\", \"{POTTERY}\", \"models/*.obj\"]\n"
+                   f"[[pattern]]\nfile = [\"{COVER}\", \"{COVER.parent}/painting.png\"]\n")
+        self.bake()
+        bundle = self.place / "out/museum.modar"
+        self.assertEqual(self.modar_json("check", bundle)["errors"], 0)
+        whole = self.modar_json("inspect", bundle)
+        self.assertEqual([model["name"] for model in whole["models"]], ["statue", "pottery", "a", "b"])
+        for model, path in zip(whole["models"], [STATUE, POTTERY]):
+            alone = self.folder / "alone.modar"
+            self.modar("bake", "--model", path, "-o", alone, *DIRECT)
+            self.assertEqual(model, self.modar_json("inspect", alone)["models"][0])
+        for pattern, path in zip(whole["patterns"], [COVER, COVER.parent / "painting.png"]):
+            self.modar("bake", "--pattern", path, "-o", alone, *DIRECT)
+            self.assertEqual(pattern, self.modar_json("inspect", alone)["patterns"][0])
+
+    def test_equal_textures_are_stored_once(self):
+        shutil.copy(self.place / "models/a.obj", self.place / "models/b.obj")
+        self.bake()
+        self.assertEqual(len(self.modar_json("inspect", self.place / "out/museum.modar")["textures"]), 1)
+
+    def test_tiers_gates_and_texts(self):
+        text = (self.place / "modar.toml").read_text()
+        self.write(text + "[[tier]]\nname = \"low\"\nmax-texture = 64\n[[tier]]\nname = \"high\"\n"
+                   "[[scene]]\npattern = \"a\"\nmodel = \"a\"\ntext.en = \"A house.\"\ntext.de = \"Ein Haus.\"\n")
+        states = self.states(self.bake())
+        self.assertEqual(set(states.values()), {"baked"})
+        self.assertNotIn("ahigh", [name for name in states if name.startswith("picture")])
+        sides = [self.modar_json("inspect", self.place / f"out/museum-{tier}.modar")["textures"][0]["width"]
+                 for tier in ("low", "high")]
+        self.assertEqual(sides[0], 64)
+        self.assertGreater(sides[1], 64)
+        words = (self.place / "out/museum-low.modar").read_bytes()
+        self.assertIn("Ein Haus.".encode(), words)
+        for gate, value in (("min-psnr", 98), ("max-bytes", 1000)):
+            shutil.rmtree(self.place / "out", ignore_errors=True)
+            self.write(text + f"[gates]\n{gate} = {value}\n")
+            self.assert_fails(self.modar("bake", cwd=self.place), 3, "project.gate")
+            self.assertEqual(list((self.place / "out").glob("*")), [])
+
+    def test_globs(self):
+        (self.place / "models/deep/er").mkdir(parents=True)
+        shutil.copy(self.place / "models/b.obj", self.place / "models/deep/er/c.obj")
+        self.write("[bake]\n" + FAST + "[[model]]\nfile = [\"models/**/*.obj\", \"!models/a*\"]\n")
+        report = self.bake("--dry-run")
+        self.assertEqual([asset["name"] for asset in report["assets"]], ["b", "c"])
+        self.assertFalse((self.place / ".modar").exists())
+        self.assertFalse((self.place / "out").exists())
+
+    def test_mistakes_name_their_line_and_cure(self):
+        mistakes = [
+            ("[bake]\neffrot = \"best\"\n", "modar.toml:2:1", "did you mean 'effort'", "project.key"),
+            ("[modle]\n", "modar.toml:1", "did you mean 'model'", "project.key"),
+            ("[bake]\neffort = \"better\"\n", "modar.toml:2", "best, fast, good", "project.value"),
+            ("[bake]\nlods = 99\n", "modar.toml:2", "1 to 12", "project.value"),
+            ("[bake]\nmipmaps = 1\n", "modar.toml:2", "true or false", "project.value"),
+            ("[bake]\ndevice = \"ace3\"\n", "modar.toml:2", "ace2", "project.value"),
+            ("[[model]]\nfile = \"*.fbx\"\n", "modar.toml:2", "'*.fbx'", "project.no-match"),
+            ("[[model]]\nwidth-mm = 3\n", "modar.toml:2", "there is no key 'width-mm'", "project.key"),
+            ("[[model]]\nfile = [\"models/a.obj\", \"models/a.obj\"]\n", "modar.toml:2", "'a'", "project.same-name"),
+            ("[[pattern]]\nfile = \"pictures/a.png\"\n[[scene]]\npattern = \"aa\"\n", "modar.toml:4", "did you mean 'a'",
+             "project.scene-unknown"),
+            ("[bake\n", "modar.toml:1", "project.toml"),
+            ("[tier]\nname = \"low\"\n", "modar.toml:1", "[[tier]]", "project.value"),
+        ]
+        for text, *words in mistakes:
+            with self.subTest(text=text):
+                self.write(text)
+                self.assert_fails(self.modar("bake", cwd=self.place), 3, *words)
+        self.assert_fails(self.modar("bake", cwd=self.folder), 2, "modar.toml", "modar init", "project.open")
+        for option in ("--effort=fast", "-ox.modar", "--output=x.modar"):
+            self.assert_fails(self.modar("bake", option, cwd=self.place), 1, "bake.project-option")
+        self.assert_fails(self.modar("bake", "--model", POTTERY, "-o", "x.modar", "--explain"), 1, "bake.project-option")
+        self.assert_fails(self.modar("bake", "--model", POTTERY), 1, "-o")
+
+    def test_the_schema_knows_the_keys_of_the_program(self):
+        tables = {key: value.get("items", value)["properties"] for key, value in SCHEMA["properties"].items()}
+        tables[""] = SCHEMA["properties"]
+        for table, properties in tables.items():
+            head = "" if table == "" else f"[[{table}]]\n" if SCHEMA["properties"][table]["type"] == "array" else f"[{table}]\n"
+            self.write(head + "qqqqqqqqqqqqqqqqqqqqqqqqqqqqqqqq = 1\n")
+            done = self.modar("bake", cwd=self.place)
+            known = done.stderr.split("the keys are ")[1].split(" [project.key]")[0].split(", ")
+            self.assertEqual(sorted(known), sorted(properties), table)
+
+    def test_the_schema_and_the_program_refuse_the_same(self):
+        try:
+            import jsonschema
+        except ImportError:
+            self.skipTest("python3-jsonschema is not installed")
+        jsonschema.Draft7Validator.check_schema(SCHEMA)
+        head = "[[model]]\nfile = \"models/*.obj\"\n[[pattern]]\nfile = \"pictures/*\"\n"
+        for text in ("[bake]\nmax-texture = 3", "[bake]\nmax-texture = 8192", "[bake]\nlods = 13", "[bake]\nlods = 12",
+                     "[bake]\nloop-views = 0", "[bake]\nunit = \"ell\"", "[bake]\nunit = \"ft\"", "[bake]\nscore = \"no\"",
+                     "[bake]\nparameters = \"none\"", "[bake]\nparameters = 4", "[project]\nname = 3", "[bake]\nlods = 2.5",
+                     "[[scene]]\npattern = \"a\"\nmodel = \"a\"\nscale = 0", "[[scene]]\npattern = \"a\"\nmodel = \"a\"\nup = \"-y\"",
+                     "[[scene]]\npattern = \"a\"\nmodel = \"a\"\noffset = [1, 2]", "[[tier]]\nlods = 1",
+                     "[[bundle]]\npatterns = \"a\"", "[gates]\nmin-psnr = -1", "[gates]\nmin-psnr = 30"):
+            with self.subTest(text=text):
+                self.write(head + text + "\n")
+                valid = jsonschema.Draft7Validator(SCHEMA).is_valid(tomllib.loads(head + text))
+                self.assertEqual(self.modar("bake", "--dry-run", cwd=self.place).returncode == 0, valid)
+
+
+class Again(ProjectTest):
+    def test_nothing_changed_nothing_is_done(self):
+        self.assertEqual(self.states(self.bake()), {"a": "baked", "b": "baked"} | {"a": "baked"})
+        bundle = self.place / "out/museum.modar"
+        before = bundle.stat()
+        report = self.bake()
+        self.assertEqual({asset["state"] for asset in report["assets"]}, {"fresh"})
+        self.assertFalse(report["bundles"][0]["written"])
+        self.assertEqual((before.st_ino, before.st_mtime_ns), (bundle.stat().st_ino, bundle.stat().st_mtime_ns))
+        self.assertIn("3 assets, 3 up to date", self.told)
+
+    def test_one_changed_file_bakes_one_asset(self):
+        self.bake()
+        for change, name, words in [
+                ("models/b.obj", "b", "models/b.obj changed"),
+                ("models/cube.mtl", "a", "models/cube.mtl changed"),
+                ("models/wall.png", "a", "models/wall.png changed")]:
+            path = self.place / change
+            path.write_bytes(path.read_bytes() + b"\n# more")
+            self.assertEqual(self.reasons(), {name: words})
+            report = self.bake("--explain")
+            self.assertEqual([asset["name"] for asset in report["assets"] if asset["state"] == "baked"], [name])
+            self.assertIn(f"baked   {name}: {words}", self.told)
+        (self.place / "models/b.obj").touch()  # a new time, the same bytes
+        self.assertEqual(self.reasons(), {})
+
+    def test_settings_bake_what_they_concern(self):
+        self.bake()
+        text = (self.place / "modar.toml").read_text()
+        self.write(text.replace("lods = 1", "lods = 2"))
+        self.assertEqual(sorted(self.reasons()), ["a", "b"])
+        self.write(text.replace("loop-views = 8", "loop-views = 9"))
+        self.assertEqual(self.reasons(), {"a": "its settings in modar.toml changed"})
+        self.write(text + "[[scene]]\npattern = \"a\"\nmodel = \"b\"\n")
+        report = self.bake()
+        self.assertEqual({asset["state"] for asset in report["assets"]}, {"cached"})
+        self.assertTrue(report["bundles"][0]["written"])
+
+    def test_a_missing_file_is_noticed_when_it_comes(self):
+        wall = (self.place / "models/wall.png").read_bytes()
+        (self.place / "models/wall.png").unlink()
+        first = self.bake()
+        self.assertIn("mtl.missing-map", self.findings(first))
+        self.assertEqual({asset["state"] for asset in self.bake()["assets"]}, {"fresh"})
+        (self.place / "models/wall.png").write_bytes(wall)
+        self.assertEqual(self.reasons(), {"a": "models/wall.png is there now"})
+        self.assertNotIn("mtl.missing-map", self.findings(self.bake()))
+
+    def test_a_cached_asset_says_again_what_is_wrong_with_it(self):
+        (self.place / "models/wall.png").unlink()
+        self.bake()
+        shutil.rmtree(self.place / "out")
+        again = self.bake()
+        self.assertEqual({asset["state"] for asset in again["assets"]}, {"cached"})
+        self.assertIn("mtl.missing-map", self.findings(again))
+
+    def test_one_bad_file_fails_alone(self):
+        (self.place / "models/b.obj").write_text("no model")
+        done = self.modar("bake", "--json", cwd=self.place)
+        self.assertEqual(done.returncode, 3)
+        report = json.loads(done.stdout)
+        self.assertEqual([e["code"] for e in report["errors"]], ["obj.no-faces"])
+        self.assertFalse((self.place / "out/museum.modar").exists())
+        shutil.copy(self.place / "models/a.obj", self.place / "models/b.obj")
+        self.assertEqual(sorted(a["state"] for a in self.bake()["assets"]), ["baked", "cached", "cached"])
+
+    def test_what_make_is_told(self):
+        self.bake("--depfile", "deps")
+        text = (self.place / "deps").read_text().replace("\\\n", " ")
+        target, inputs = text.split(" :")
+        self.assertEqual(target, "out/museum.modar")
+        self.assertEqual(sorted(inputs.split()), sorted(
+            ["modar.toml", "models/a.obj", "models/b.obj", "models/cube.mtl", "models/wall.png", "pictures/a.png"]))
+
+
+class Cache(ProjectTest):
+    def parts(self, cache):
+        return sorted(pathlib.Path(cache).rglob("*.modar"))
+
+    def leftovers(self):
+        return [p.name for p in self.folder.rglob("*")
+                if p.is_file() and p.suffix not in (".modar", ".json", ".txt", ".TAG", ".toml", ".obj", ".mtl", ".png")]
+
+    def test_damaged_entries_heal(self):
+        cache = self.folder / "cache"
+        self.bake("--cache", cache)
+        good = (self.place / "out/museum.modar").read_bytes()
+        for number, damage in enumerate([lambda b: b[:-100], lambda b: b[:-10] + bytes([b[-10] ^ 1]) + b[-9:],
+                                         lambda b: b"", lambda b: bytes(200) + b[200:]]):
+            part = self.parts(cache)[number % 3]
+            part.write_bytes(damage(part.read_bytes()))
+            shutil.rmtree(self.place / "out")
+            report = self.bake("--cache", cache, "--explain")
+            self.assertEqual(sorted(a["state"] for a in report["assets"]), ["baked", "cached", "cached"])
+            self.assertIn("was damaged", self.told)
+            self.assertEqual((self.place / "out/museum.modar").read_bytes(), good)
+
+    def test_show_verify_and_prune(self):
+        cache = self.folder / "cache"
+        self.bake("--cache", cache)
+        shown = self.modar_json("cache", "show", "--cache", cache)
+        files = self.parts(cache)
+        self.assertEqual(shown["entries"], 3)
+        self.assertEqual(shown["bytes"], sum(f.stat().st_size + f.with_suffix(".json").stat().st_size for f in files))
+        self.assertEqual(self.modar_json("cache", "verify", "--cache", cache)["damaged"], [])
+        notes = files[0].with_suffix(".json")
+        notes.write_text(notes.read_text().replace("0", "1", 1))
+        done = self.modar("cache", "verify", "--cache", cache)
+        self.assertEqual(done.returncode, 3)
+        self.assertIn(files[0].name, done.stdout)
+        self.assertEqual(len(self.parts(cache)), 2)
+        os.utime(files[2], (1, 1))
+        left_behind = files[1].with_name(files[1].name + ".host.77")
+        left_behind.write_text("half of it")
+        os.utime(left_behind, (1, 1))
+        self.modar("cache", "prune", "--size",
+                   files[1].stat().st_size + files[1].with_suffix(".json").stat().st_size, "--cache", cache)
+        self.assertNotIn(files[2], self.parts(cache))
+        self.assertFalse(left_behind.exists())
+        self.modar("cache", "prune", "--size", 0, "--cache", cache)
+        self.assertEqual(self.parts(cache), [])
+        self.assert_fails(self.modar("cache", "show", "--cache", self.folder / "none"), 2, "cache.folder")
+
+    def test_several_processes_share_it(self):
+        copies = [self.folder / f"copy{i}" for i in range(3)]
+        for copy in copies:
+            shutil.copytree(self.place, copy)
+            (copy / "modar.toml").write_text("[project]\nname = \"museum\"\n" + (copy / "modar.toml").read_text())
+        cache = self.folder / "shared"
+        bakes = [subprocess.Popen([BIN / "modar", "bake", "--quiet", "--cache", cache], cwd=copy) for copy in copies]
+        self.assertEqual([bake.wait() for bake in bakes], [0, 0, 0])
+        self.assertEqual(len({(copy / "out/museum.modar").read_bytes() for copy in copies}), 1)
+        self.assertEqual(len(self.parts(cache)), 3)
+        self.assertEqual(self.modar_json("cache", "verify", "--cache", cache)["damaged"], [])
+        self.assertEqual(self.leftovers(), [])
+        shutil.rmtree(copies[0] / ".modar", ignore_errors=True)
+        self.assertEqual({a["state"] for a in self.bake("--cache", cache, cwd=copies[0])["assets"]}, {"cached"})
+
+    def test_an_interrupted_bake_resumes(self):
+        self.write((self.place / "modar.toml").read_text().replace("loop-views = 8", "loop-views = 400"))
+        bake = subprocess.Popen([BIN / "modar", "bake", "--jobs", "1"], cwd=self.place, stderr=subprocess.PIPE)
+        cache = self.place / ".modar/cache"
+        while len(self.parts(cache)) < 1 and bake.poll() is None:
+            time.sleep(0.01)
+        bake.send_signal(signal.SIGINT)
+        told = bake.communicate()[1].decode()
+        self.assertEqual(bake.returncode, 130, told)
+        self.assertIn("interrupted", told)
+        self.assertEqual(self.leftovers(), [])
+        self.assertFalse((self.place / "out/museum.modar").exists())
+        done = len(self.parts(cache))
+        states = [a["state"] for a in self.bake()["assets"]]
+        self.assertEqual(states.count("cached"), done)
+
+    def test_an_asset_alone_goes_to_the_cache(self):
+        self.bake("--asset", "b", "--cache", self.folder / "cache")
+        self.assertEqual(len(self.parts(self.folder / "cache")), 1)
+        self.assertFalse((self.place / "out").exists())
+        self.assertEqual(sorted(self.states(self.bake("--cache", self.folder / "cache")).values()), ["baked", "cached"])
+
+
+class Init(ProjectTest):
+    def test_a_folder_becomes_a_project(self):
+        (self.place / "modar.toml").unlink()
+        done = self.modar("init", self.place)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        text = (self.place / "modar.toml").read_text()
+        self.assertIn("#", text)
+        project = tomllib.loads(text)
+        self.assertEqual([m["file"] for m in project["model"]], ["models/*.obj"])
+        self.assertEqual([p["file"] for p in project["pattern"]], ["pictures/a.png"])  # wall.png is a texture
+        self.assert_fails(self.modar("init", self.place), 1, "--force")
+        self.write(text.replace("[bake]", "[bake]\nloop-views = 8\nscore = false"))
+        self.bake()
+        scenes = self.modar_json("inspect", self.place / "out/museum.modar")["scenes"]
+        self.assertEqual([(s["pattern"], s["model"]) for s in scenes], [("a", "a")])  # by their name
+
+    def test_names_that_collide_and_odd_ones(self):
+        (self.place / "more").mkdir()
+        shutil.copy(self.place / "models/b.obj", self.place / "more/b.obj")
+        shutil.copy(self.place / "models/b.obj", self.place / "more/odd [1] \"x\".obj")
+        (self.place / "modar.toml").unlink()
+        self.modar("init", cwd=self.place)
+        report = self.bake("--dry-run")
+        self.assertEqual(sorted(a["name"] for a in report["assets"]),
+                         sorted(["a", "a", "b", "more-b.obj", "odd [1] \"x\""]))
+        try:
+            import jsonschema
+        except ImportError:
+            self.skipTest("python3-jsonschema is not installed")
+        jsonschema.validate(tomllib.loads((self.place / "modar.toml").read_text()), SCHEMA)
+
+    def test_a_folder_without_anything(self):
+        (self.folder / "empty").mkdir()
+        self.assert_fails(self.modar("init", self.folder / "empty"), 3, "project.nothing")
+        self.assert_fails(self.modar("init", self.folder / "nowhere"), 2, "io.folder")
+
+
+if __name__ == "__main__":
+    unittest.main()
