@@ -1,0 +1,63 @@
+// `modar report`: a bundle as one HTML file.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "bake/commands/commands.hpp"
+#include "bake/output.hpp"
+#include "bake/page/report_page.hpp"
+#include "bake/terminal.hpp"
+#include "formats/atomic_file.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+struct ReportCommand {
+  std::string bundle;
+  std::string output;
+  ReportOptions options;
+  bool quiet = false;
+};
+
+Result<ExitCode> run_report(ReportCommand& command) {
+  MODAR_TRY(keep_inputs(command.output, {command.bundle}));
+  MODAR_TRY(try_output(command.output, 0));
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
+  MODAR_ASSIGN(const BundleView bundle, BundleView::open(file.bytes()));
+  command.options.title = std::filesystem::path(command.bundle).filename().string();
+  command.options.tool_version = MODAR_VERSION;
+  ProgressBar bar(command.quiet);
+  auto page = report_page(bundle, command.options,
+                          [&](const std::string& stage, double done) { bar.show(stage, done); });
+  bar.clear();
+  MODAR_ASSIGN(const std::string text, std::move(page));
+  MODAR_TRY(write_file(command.output, std::string_view(text)));
+  if (!command.quiet) {
+    std::fprintf(stderr, "%s: %s\n", command.output.c_str(), human_bytes(text.size()).c_str());
+  }
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void add_report(CommandLine& program) {
+  CommandLine& line =
+      program.command("report", "A bundle as one HTML file: pictures, sizes, errors, verdict");
+  const auto command = std::make_shared<ReportCommand>();
+  command->options.jobs = std::max(1u, std::thread::hardware_concurrency());
+  line.option("bundle", &command->bundle, "The bundle", {.type = "BUNDLE.modar", .required = true});
+  line.option("-o,--output", &command->output, "The page to write",
+              {.type = "FILE.html", .required = true});
+  line.flag("--range", command->options.range,
+            "Simulate each pattern's working range, too: seconds each");
+  line.option("--jobs", &command->options.jobs, "Threads",
+              {.shows_default = true, .least = 1, .most = 256});
+  line.flag("--quiet", command->quiet, "No progress, no summary on stderr");
+  line.footer(example("  modar report museum.modar -o museum.html\n"));
+  line.run([command] { return run_report(*command); });
+}
+
+}  // namespace modar
