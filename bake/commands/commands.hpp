@@ -15,6 +15,7 @@ void add_ship(CommandLine& program);
 void add_calibrate(CommandLine& program);
 void add_init(CommandLine& program);
 void add_cache(CommandLine& program);
+void add_plan(CommandLine& program);
 void add_report(CommandLine& program);
 
 }  // namespace modar

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <set>
 
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/commands/commands.hpp"
@@ -68,9 +69,12 @@ std::string make_quoted(const std::string& path) {
   return out;
 }
 
+/// Rules of make. The target of an asset alone is the depfile without its extension: the stamp of
+/// `modar plan`.
 Result<void> write_depfile(const std::string& path, const ProjectOutcome& outcome) {
   std::string text;
   for (const BundleOutcome& bundle : outcome.bundles) text += make_quoted(bundle.path) + " ";
+  if (outcome.bundles.empty()) text = make_quoted(path.substr(0, path.rfind('.'))) + " ";
   text += ":";
   for (const std::string& input : outcome.inputs) text += " \\\n  " + make_quoted(input);
   return write_file(path, std::string_view(text + "\n"));
@@ -222,6 +226,82 @@ Result<std::string> cache_folder(const std::string& named) {
   return project.cache.empty() ? std::string(kCacheFolder) : project.cache;
 }
 
+struct PlanCommand {
+  std::string file = kProjectFile;
+  std::string cache;
+  std::string runner;
+  bool ninja = false;
+};
+
+/// A path in a build file of Ninja.
+std::string ninja_quoted(const std::string& path) {
+  std::string out;
+  for (const char c : path) {
+    if (c == ' ' || c == ':' || c == '$') out += '$';
+    out += c;
+  }
+  return out;
+}
+
+/// A word of a shell, in a build file of Ninja.
+std::string shell_quoted(const std::string& word) {
+  std::string out = "'";
+  for (const char c : word) {
+    if (c == '\'') {
+      out += "'\\''";
+    } else {
+      out += c == '$' ? "$$" : std::string(1, c);
+    }
+  }
+  return out + "'";
+}
+
+/// An edge for each asset, which bakes it into the cache, and one for all bundles. Stamps stand for
+/// entries of the cache, whose names nobody knows before the bake.
+std::string ninja_plan(const PlanCommand& command, const Project& project,
+                       const ProjectOutcome& planned) {
+  const std::string runner = command.runner.empty() ? "" : command.runner + " ";
+  const std::string bake = "modar bake --quiet --project " + shell_quoted(command.file) +
+                           " --cache " + shell_quoted(command.cache);
+  std::string text =
+      "# modar plan --ninja: run by `ninja -f FILE`, as often as something changes.\n"
+      "ninja_required_version = 1.5\n"
+      "rule asset\n  command = " +
+      runner + bake + " --jobs 1 --asset $name --depfile $out.d && touch $out\n" +
+      "  depfile = $out.d\n  deps = gcc\n  description = bake $name\n"
+      "rule bundles\n  command = " +
+      bake + "\n  description = link the bundles\n\n";
+  std::string stamps;
+  std::set<std::string> names;
+  for (const AssetOutcome& asset : planned.assets) {
+    if (!names.insert(asset.name).second) continue;
+    std::string file = asset.name;
+    std::replace(file.begin(), file.end(), '/', '_');
+    const std::string stamp = ninja_quoted(project.path(".modar/plan/" + file));
+    text += "build " + stamp + ": asset " + ninja_quoted(command.file) +
+            "\n  name = " + shell_quoted(asset.name) + "\n";
+    stamps += " " + stamp;
+  }
+  std::string bundles;
+  for (const BundleOutcome& bundle : planned.bundles) bundles += " " + ninja_quoted(bundle.path);
+  return text + "build" + bundles + ": bundles" + stamps + "\n";
+}
+
+Result<ExitCode> run_plan(PlanCommand& command) {
+  MODAR_ASSIGN(const Project project, read_project(command.file));
+  if (command.cache.empty()) {
+    command.cache = project.path(project.cache.empty() ? kCacheFolder : project.cache);
+  }
+  ProjectOptions options;
+  options.cache = command.cache;
+  options.dry_run = true;
+  options.tool_version = MODAR_VERSION;
+  MODAR_ASSIGN(const ProjectOutcome planned, bake_project(project, options, {}));
+  MODAR_TRY(make_output_folder(project.path(".modar/plan")));
+  std::fputs(ninja_plan(command, project, planned).c_str(), stdout);
+  return ExitCode::kOk;
+}
+
 struct CacheCommand {
   std::string folder;
   std::uint64_t bytes = 0;
@@ -259,6 +339,23 @@ void add_init(CommandLine& program) {
   line.flag("--force", command->force, "Replace a modar.toml that is there");
   line.footer(example("  modar init museum && cd museum && modar bake\n"));
   line.run([command] { return run_init(*command); });
+}
+
+void add_plan(CommandLine& program) {
+  CommandLine& line =
+      program.command("plan", "Write a build file that bakes a project's assets apart");
+  const auto command = std::make_shared<PlanCommand>();
+  line.flag("--ninja", command->ninja,
+            "For Ninja, to stdout: one edge an asset, and one for the bundles", {.required = true});
+  line.option("--project", &command->file, "The project", {.type = "FILE", .shows_default = true});
+  line.option("--cache", &command->cache, "Of what is baked; all machines see it under this path",
+              {.type = "DIR"});
+  line.option("--run", &command->runner,
+              "Put before each asset's command: srun -Q -n1, or ssh HOST", {.type = "WORDS"});
+  line.footer(
+      example("  modar plan --ninja --run 'srun -Q -n1' --cache /srv/modar-cache > build.ninja && "
+              "ninja\n"));
+  line.run([command] { return run_plan(*command); });
 }
 
 void add_cache(CommandLine& program) {

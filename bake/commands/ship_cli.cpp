@@ -114,7 +114,7 @@ void add_prune(CommandLine& ship) {
   line.run([prune] { return ExitCode{run_prune(*prune)}; });
 }
 
-void add_plan(CommandLine& ship) {
+void add_ship_plan(CommandLine& ship) {
   CommandLine& line = ship.command("plan", "Bytes and minutes of an update, before publishing");
   const auto plan = std::make_shared<PlanCommand>();
   plan->recipe.jobs = std::max(1u, std::thread::hardware_concurrency());
@@ -143,7 +143,7 @@ void add_ship(CommandLine& program) {
   add_root(line);
   add_rotate(line);
   add_prune(line);
-  add_plan(line);
+  add_ship_plan(line);
 }
 
 }  // namespace modar

@@ -585,6 +585,7 @@ class ProjectBake {
       if (told) outcome.assets.back().reason.clear();
       outcome.diagnostics.insert(outcome.diagnostics.end(), task.diagnostics.begin(),
                                  task.diagnostics.end());
+      if (!options_.only.empty() && !task.wanted) continue;
       inputs.insert(project_.path(task.asset->file));
       for (std::size_t i = 1; i < task.inputs.size(); ++i) {
         if (task.inputs[i].digest != kNoFile) inputs.insert(beside(task, task.inputs[i].path));

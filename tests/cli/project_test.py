@@ -360,6 +360,38 @@ class Cache(ProjectTest):
         self.assertEqual(sorted(self.states(self.bake("--cache", self.folder / "cache")).values()), ["baked", "cached"])
 
 
+class Plan(ProjectTest):
+    def ninja(self):
+        done = subprocess.run(["ninja", "-j2"], cwd=self.place, capture_output=True, text=True,
+                              env={**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"})
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return done.stdout
+
+    def test_ninja_bakes_each_asset_apart(self):
+        if shutil.which("ninja") is None:
+            self.skipTest("ninja is not installed")
+        shutil.move(self.place / "models/b.obj", self.place / "models/b $x's: 1.obj")
+        log = self.folder / "log"
+        runner = self.folder / "runner"
+        runner.write_text(f"#!/bin/sh\necho ran >> {log}\nexec \"$@\"\n")
+        runner.chmod(0o755)
+        plan = self.modar("plan", "--ninja", "--cache", self.folder / "cache", "--run", runner, cwd=self.place)
+        self.assertEqual(plan.returncode, 0, plan.stderr)
+        (self.place / "build.ninja").write_text(plan.stdout)
+        self.ninja()
+        self.assertEqual(log.read_text().count("ran"), 2)  # "a" is a model and a pattern
+        by_ninja = (self.place / "out/museum.modar").read_bytes()
+        self.assertIn("no work to do", self.ninja())
+        (self.place / "models/cube.mtl").write_text(CUBE_MTL + "Ks 1 1 1\n")
+        self.ninja()
+        self.assertEqual(log.read_text().count("ran"), 3)
+        self.assertNotEqual((self.place / "out/museum.modar").read_bytes(), by_ninja)
+        (self.place / "models/cube.mtl").write_text(CUBE_MTL)
+        shutil.rmtree(self.place / "out")
+        self.bake()
+        self.assertEqual((self.place / "out/museum.modar").read_bytes(), by_ninja)
+
+
 class Init(ProjectTest):
     def test_a_folder_becomes_a_project(self):
         (self.place / "modar.toml").unlink()
