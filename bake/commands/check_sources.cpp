@@ -3,7 +3,7 @@
 #include <string>
 #include <system_error>
 
-#include "bake/commands/arguments.hpp"
+#include "bake/bundle/request_text.hpp"
 #include "bake/commands/check_command.hpp"
 #include "bake/output.hpp"
 #include "bake/terminal.hpp"
