@@ -46,6 +46,10 @@ done
 framework=/usr/share/android-framework-res/framework-res.apk
 [ -r $framework ] || stop 5 "missing: $framework; apt-get install android-framework-res"
 
+mkdir -p "$work"
+exec 9> "$work/lock"
+flock 9  # two of these at once share the folders below
+
 quick=(-J-XX:TieredStopAtLevel=1 -J-XX:+UseSerialGC -proc:none -nowarn -Xlint:-options -encoding utf-8)
 
 # Debian's source packages through apt, with a list of sources of our own: the system's may have no deb-src.
@@ -117,7 +121,8 @@ if [ -n "${ANDROID_NDK:-}" ]; then
     cmake --build "$work/$abi" --target modar_jni >&2
     mkdir -p "$step/tree/lib/$abi"
     find "$work/$abi" -name 'libmodar*_jni.so' -exec cp {} "$step/tree/lib/$abi/" \;
-    "$ANDROID_NDK"/toolchains/llvm/prebuilt/*/bin/llvm-strip "$step/tree/lib/$abi"/*.so
+    strip=("$ANDROID_NDK"/toolchains/llvm/prebuilt/*/bin/llvm-strip)
+    "${strip[0]}" "$step/tree/lib/$abi"/*.so
   done
 else
   say "ANDROID_NDK is not set: the APK holds no native library and will not start on a phone"
