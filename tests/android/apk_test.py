@@ -111,7 +111,7 @@ class Apk(ProgramTest):
         self.assertIn("the day is over", done.stdout)
         self.assertNotIn("WARNING", done.stdout + done.stderr)
         told = (home / "diagnostics.txt").read_text()
-        for word in ("phone: fake phone", "bundle: none", "frames: "):
+        for word in ("phone: fake phone", "bundle: vase (app)", "store.damaged"):
             self.assertIn(word, told)
         if os.environ.get("MODAR_KEEP"):
             shutil.copy(out, os.environ["MODAR_KEEP"])
