@@ -109,11 +109,9 @@ MODAR_FETCH(jboolean, fetch)
   options.store = text_of(env, store);
   options.trusted_key = text_of(env, key);
   Transfer java(env, transfer);
-  if (options.url.starts_with("http://") || options.url.starts_with("https://")) {
-    options.source = [&java](const std::string& path, std::uint64_t from, const auto& take) {
-      return java.bring(path, from, take);
-    };
-  }
+  options.source = [&java](const std::string& path, std::uint64_t from, const auto& take) {
+    return java.bring(path, from, take);
+  };
   options.progress = [&java](const modar::FetchProgress& now) { java.progress(now); };
   const auto report = modar::fetch_release(options);
   if (report) return report->changed ? JNI_TRUE : JNI_FALSE;

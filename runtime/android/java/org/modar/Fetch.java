@@ -19,7 +19,7 @@ public final class Fetch {
      * Brings the store up to the newest release, or throws and leaves the installed one in use. What was downloaded
      * stays for the next try.
      *
-     * @param url http(s)://, which `transfer` brings, or a folder
+     * @param url for messages; `transfer` brings the files
      * @param key text of the publisher's public key
      * @return whether something new was installed
      */

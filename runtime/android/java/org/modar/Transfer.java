@@ -1,5 +1,6 @@
 package org.modar;
 
+import java.io.FileInputStream;
 import java.io.FileNotFoundException;
 import java.io.IOException;
 import java.io.InputStream;
@@ -27,6 +28,11 @@ class Transfer {
     final int open(String path, long from) {
         close();
         try {
+            if (base.startsWith("/")) { // a stick's folder
+                stream = new FileInputStream(base + path);
+                skip(from);
+                return 0;
+            }
             HttpURLConnection connection = (HttpURLConnection) new URL(base + path).openConnection();
             connection.setConnectTimeout(TIMEOUT_MS);
             connection.setReadTimeout(TIMEOUT_MS);
