@@ -1,9 +1,13 @@
-// Decimates chunk by chunk, on several threads, and measures the error.
+// Decimates chunk by chunk, on several threads, shares the triangles out, and measures the error.
 #include "bake/mesh/lod/mesh_levels.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <limits>
 #include <span>
+#include <tuple>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -25,20 +29,67 @@ constexpr double kWorthwhile = 0.8;
 constexpr double kMaxCollapse = 0.25;
 /// Of the chunk's diagonal: the texture may slide this far. Set by hand.
 constexpr double kMaxSlide = 0.01;
+/// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
+/// a flat chunk may lose more than its share. Set by hand.
+constexpr std::uint32_t kFurther = 1;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
-/// The chunk that uses each source position, kShared where there are several.
-constexpr std::uint32_t kShared = kNoIndex - 1;
+/// Which vertices of each chunk must stay, so that it meets its neighbours at any level: those
+/// whose position another vertex has as well, of another chunk or across a seam. A rim of the model
+/// is free.
+using LockedVertices = std::vector<std::vector<std::uint8_t>>;
 
-Array<std::uint32_t> owners_of_positions(const ChunkedMesh& mesh) {
-  Array<std::uint32_t> owners(mesh.mesh.source_vertex_count, kNoIndex);
-  for (std::uint32_t c = 0; c < mesh.chunks.size(); ++c) {
-    for (const std::uint32_t v : mesh.chunks[c].vertices) {
-      std::uint32_t& owner = owners[mesh.mesh.source_position(v)];
-      owner = owner == kNoIndex || owner == c ? c : kShared;
+/// A vertex at an edge of one triangle.
+struct OpenVertex {
+  glm::dvec3 position;
+  std::uint32_t chunk = 0;
+  std::uint32_t vertex = 0;
+};
+
+/// Adds the vertices of a chunk whose triangles form no closed fans. Around a closed fan every
+/// neighbour follows the vertex in one triangle and precedes it in another: numbers cancel.
+void find_open_vertices(const TriMesh& mesh, const Chunk& chunk, std::uint32_t number,
+                        std::vector<OpenVertex>& open) {
+  std::vector<std::int64_t> sums(chunk.vertices.size(), 0);
+  for (std::size_t i = 0; i < chunk.indices.size(); i += 3) {
+    const std::uint16_t* t = &chunk.indices[i];
+    for (std::size_t k = 0; k < 3; ++k) {
+      sums[t[k]] += std::int64_t{t[(k + 1) % 3]} - std::int64_t{t[(k + 2) % 3]};
     }
   }
-  return owners;
+  for (std::uint32_t v = 0; v < sums.size(); ++v) {
+    if (sums[v] != 0) open.push_back({mesh.positions[chunk.vertices[v]], number, v});
+  }
+}
+
+LockedVertices lock_vertices(const ChunkedMesh& mesh) {
+  // By the file's numbers, and for files that write a position twice, by place where edges are
+  // open.
+  Array<std::uint8_t> uses(mesh.mesh.source_vertex_count, 0);
+  std::vector<OpenVertex> open;
+  for (std::uint32_t c = 0; c < mesh.chunks.size(); ++c) {
+    for (const std::uint32_t v : mesh.chunks[c].vertices) {
+      std::uint8_t& count = uses[mesh.mesh.source_position(v)];
+      count = count == 0 ? 1 : 2;
+    }
+    find_open_vertices(mesh.mesh, mesh.chunks[c], c, open);
+  }
+  LockedVertices locked(mesh.chunks.size());
+  for (std::size_t c = 0; c < mesh.chunks.size(); ++c) {
+    for (const std::uint32_t v : mesh.chunks[c].vertices) {
+      locked[c].push_back(uses[mesh.mesh.source_position(v)] > 1 ? 1 : 0);
+    }
+  }
+  const auto key = [](const OpenVertex& v) {
+    return std::tuple(v.position.x, v.position.y, v.position.z);
+  };
+  std::sort(open.begin(), open.end(),
+            [&](const OpenVertex& a, const OpenVertex& b) { return key(a) < key(b); });
+  for (std::size_t i = 1; i < open.size(); ++i) {
+    if (open[i].position != open[i - 1].position) continue;
+    for (const OpenVertex& v : {open[i - 1], open[i]}) locked[v.chunk][v.vertex] = 1;
+  }
+  return locked;
 }
 
 double diagonal_of(std::span<const glm::dvec3> positions) {
@@ -77,41 +128,197 @@ std::vector<glm::dvec2> texels_of(const TriMesh& mesh, const Chunk& chunk,
   return texels;
 }
 
-/// Fills one chunk's coarser levels.
-void level_chunk(const TriMesh& mesh, const Array<std::uint32_t>& owners, const ChunkGrid& grid,
-                 const LevelOptions& options, Chunk& chunk) {
-  std::vector<std::size_t> targets;
-  std::size_t count = chunk.indices.size() / 3;
-  while (targets.size() + 1 < options.levels && count / 2 >= kFewTriangles) {
-    count /= 2;
-    targets.push_back(count);
-  }
-  if (targets.empty()) return;
+std::vector<glm::dvec3> decoded_positions(const TriMesh& mesh, const Chunk& chunk,
+                                          PositionKind kind, const ChunkGrid& grid) {
   std::vector<glm::dvec3> positions;
-  std::vector<std::uint8_t> locked;
+  positions.reserve(chunk.vertices.size());
   for (const std::uint32_t v : chunk.vertices) {
-    positions.push_back(decoded_position(mesh.positions[v], options.positions, grid));
-    locked.push_back(owners[mesh.source_position(v)] == kShared ? 1 : 0);
+    positions.push_back(decoded_position(mesh.positions[v], kind, grid));
   }
-  double error = 0;
-  std::size_t before = chunk.indices.size();
-  LevelSurface finest(positions, chunk.indices);
-  const std::vector<std::uint32_t> on_finest = finest.triangles_of_vertices();
+  return positions;
+}
+
+CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const ChunkGrid& grid,
+                          std::span<const std::uint8_t> locked, const LevelOptions& options) {
+  const std::size_t triangles = chunk.indices.size() / 3;
+  if (triangles < 2 * kFewTriangles) return {};
+  const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);
   DecimateLimits limits;
   limits.max_error = kMaxCollapse * diagonal_of(positions);
+  limits.least_triangles = std::max(kFewTriangles, triangles >> (options.levels + kFurther));
   const std::vector<glm::dvec2> texels =
       texels_of(mesh, chunk, positions, options.texture_sides, limits);
-  for (auto& [indices, nearby, uv_shift] :
-       decimate_chunk({positions, texels}, chunk.indices, locked, targets, limits)) {
-    if (indices.empty() ||
-        static_cast<double>(indices.size()) > kWorthwhile * static_cast<double>(before)) {
-      break;
+  return decimate_chunk({positions, texels}, chunk.indices, locked, limits);
+}
+
+/// Where the sequences of all chunks are cut: all collapses below a price, and a share of those at
+/// it.
+struct Cut {
+  float price = 0;
+  double share = 0;
+};
+
+/// Collapses of one chunk ahead of the cut.
+std::size_t collapses_at(const CollapseSequence& sequence, const Cut& cut) {
+  const auto [begin, end] =
+      std::equal_range(sequence.prices.begin(), sequence.prices.end(), cut.price);
+  const auto at_price = static_cast<double>(end - begin);
+  return static_cast<std::size_t>(begin - sequence.prices.begin()) +
+         static_cast<std::size_t>(cut.share * at_price);
+}
+
+/// Triangles of a chunk that has `all` after some collapses.
+std::size_t triangles_after(const CollapseSequence& sequence, std::size_t all,
+                            std::size_t collapses) {
+  return collapses == 0 ? all : sequence.triangles[collapses - 1];
+}
+
+/// The cut that leaves the model `target` triangles or a few less: one for all chunks, so that
+/// triangles are where they matter.
+Cut cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequences,
+            std::size_t target) {
+  const auto fits = [&](const Cut& cut) {
+    std::size_t count = 0;
+    for (std::size_t c = 0; c < sequences.size(); ++c) {
+      count += triangles_after(sequences[c], mesh.chunks[c].indices.size() / 3,
+                               collapses_at(sequences[c], cut));
     }
-    before = indices.size();
-    LevelSurface coarser(positions, indices);
+    return count <= target;
+  };
+  // Floats of one sign are in the order of their bits.
+  std::uint32_t low = 0;
+  std::uint32_t high = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max());
+  while (low < high) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (fits({std::bit_cast<float>(middle), 1.0})) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  Cut cut{std::bit_cast<float>(low), 1.0};
+  double less = 0.0;
+  for (int i = 0; i < 30; ++i) {
+    const double middle = 0.5 * (less + cut.share);
+    (fits({cut.price, middle}) ? cut.share : less) = middle;
+  }
+  return cut;
+}
+
+/// A triangle near a point, by a walk over nearer and nearer neighbours; around a vertex or along
+/// an edge that is nearest, over some equally near ones.
+std::uint32_t walk_to(const LevelSurface& surface, const glm::dvec3& point, std::uint32_t start) {
+  constexpr double kEqual = 1e-9;  // relative: rounding tells equal distances apart
+  constexpr int kMostEqual = 12;   // twice the triangles of a usual fan
+  std::uint32_t best_triangle = start;
+  std::uint32_t at = start;
+  std::uint32_t before = kNoIndex;
+  double best = distance_square(point, surface.triangle(at));
+  for (int equal = 0; equal < kMostEqual && best > 0;) {
+    std::uint32_t next = kNoIndex;
+    double least = best * (1 + kEqual);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t beside = surface.neighbour(at, i);
+      if (beside == kNoIndex || beside == before) continue;
+      const double distance = distance_square(point, surface.triangle(beside));
+      if (distance > least) continue;
+      least = distance;
+      next = beside;
+    }
+    if (next == kNoIndex) break;
+    before = at;
+    at = next;
+    equal = least < best * (1 - kEqual) ? 0 : equal + 1;
+    if (least < best) {
+      best = least;
+      best_triangle = at;
+    }
+  }
+  return best_triangle;
+}
+
+std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> indices,
+                                               const std::vector<std::uint16_t>& become) {
+  std::vector<std::uint16_t> result;
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    const std::array<std::uint16_t, 3> t = {become[indices[i]], become[indices[i + 1]],
+                                            become[indices[i + 2]]};
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    result.insert(result.end(), t.begin(), t.end());
+  }
+  return result;
+}
+
+/// For each vertex a triangle of the coarser surface near it; kNoIndex for vertices of no triangle.
+std::vector<std::uint32_t> nearby_triangles(const LevelSurface& surface,
+                                            std::span<const glm::dvec3> positions,
+                                            const std::vector<std::uint16_t>& become) {
+  std::vector<std::uint32_t> nearby = surface.triangles_of_vertices();
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    if (become[v] == v || nearby[become[v]] == kNoIndex) continue;
+    nearby[v] = walk_to(surface, positions[v], nearby[become[v]]);
+  }
+  return nearby;
+}
+
+/// Greatest distance of the uv of a removed vertex from that of the surface at the nearest point.
+/// limit: what collapses were held to; where the walk found more, it has missed, and the nearest of
+/// all triangles is looked at as well.
+double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
+                         const std::vector<std::uint16_t>& become,
+                         const std::vector<std::uint32_t>& nearby, double limit) {
+  const auto shift_on = [&](std::size_t v, const std::array<std::uint32_t, 3>& t) {
+    const auto& [a, b, c] = t;
+    const Foot foot =
+        nearest_foot(vertices.positions[v],
+                     {vertices.positions[a], vertices.positions[b], vertices.positions[c]});
+    const std::span<const glm::dvec2> uvs = vertices.uvs;
+    return glm::length(uvs[a] + foot.b * (uvs[b] - uvs[a]) + foot.c * (uvs[c] - uvs[a]) - uvs[v]);
+  };
+  double greatest = 0;
+  for (std::size_t v = 0; v < vertices.uvs.size(); ++v) {
+    if (become[v] == v || nearby[v] == kNoIndex) continue;
+    const std::uint16_t* t = &surface.indices()[3 * std::size_t{nearby[v]}];
+    double shift = shift_on(v, {t[0], t[1], t[2]});
+    if (shift > limit) {
+      surface.tree().nearest(vertices.positions[v]);
+      shift = std::min(shift, shift_on(v, surface.tree().last_triangle()));
+    }
+    greatest = std::max(greatest, shift);
+  }
+  return greatest;
+}
+
+/// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut.
+void level_chunk(const TriMesh& mesh, const ChunkGrid& grid, const LevelOptions& options,
+                 const CollapseSequence& sequence, const std::vector<Cut>& cuts, Chunk& chunk) {
+  const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);
+  DecimateLimits limits;
+  const std::vector<glm::dvec2> texels =
+      texels_of(mesh, chunk, positions, options.texture_sides, limits);
+  LevelSurface finest(positions, chunk.indices);
+  const std::vector<std::uint32_t> on_finest = finest.triangles_of_vertices();
+  std::size_t before = chunk.indices.size() / 3;
+  double error = 0;
+  for (std::uint32_t step = 0; step < cuts.size(); ++step) {
+    const std::size_t collapses = collapses_at(sequence, cuts[step]);
+    const std::size_t count = triangles_after(sequence, chunk.indices.size() / 3, collapses);
+    if (count == 0 || static_cast<double>(count) > kWorthwhile * static_cast<double>(before)) {
+      continue;
+    }
+    before = count;
+    const std::vector<std::uint16_t> become =
+        collapsed_vertices(sequence, collapses, positions.size());
+    ChunkLevel& level = chunk.coarser.emplace_back();
+    level.indices = collapsed_triangles(chunk.indices, become);
+    LevelSurface coarser(positions, level.indices);
+    const std::vector<std::uint32_t> nearby = nearby_triangles(coarser, positions, become);
     error = surface_distance(finest, coarser, nearby, error);
     error = surface_distance(coarser, finest, on_finest, error);
-    chunk.coarser.push_back({std::move(indices), error, uv_shift});
+    level.error = error;
+    level.halvings = step + 1;
+    level.uv_shift =
+        greatest_uv_shift(coarser, {positions, texels}, become, nearby, limits.max_uv_shift);
   }
 }
 
@@ -127,18 +334,32 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
   MODAR_TRY(options.validate());
   if (options.levels == 1) return {};
   StageTimer timer(report, "levels");
-  const Array<std::uint32_t> owners = owners_of_positions(mesh);
+  const LockedVertices locked = lock_vertices(mesh);
   const std::vector<ChunkGrid> grids = make_grids(mesh, options.positions);
-  for (std::size_t first = 0; first < mesh.chunks.size(); first += kChunksPerUpdate) {
-    const std::size_t count = std::min(kChunksPerUpdate, mesh.chunks.size() - first);
-    parallel_rows(static_cast<std::uint32_t>(count), options.jobs, [&](std::uint32_t i) {
-      level_chunk(mesh.mesh, owners, grids[first + i], options, mesh.chunks[first + i]);
-    });
-    if (report.progress) {
-      report.progress("levels",
-                      static_cast<double>(first + count) / static_cast<double>(mesh.chunks.size()));
+  const std::size_t chunks = mesh.chunks.size();
+  const auto each_chunk = [&](double begin, const auto& body) {
+    for (std::size_t first = 0; first < chunks; first += kChunksPerUpdate) {
+      const std::size_t count = std::min(kChunksPerUpdate, chunks - first);
+      parallel_rows(static_cast<std::uint32_t>(count), options.jobs,
+                    [&](std::uint32_t i) { body(first + i); });
+      const double done = static_cast<double>(first + count) / static_cast<double>(chunks);
+      if (report.progress) report.progress("levels", begin + 0.5 * done);
     }
+  };
+  std::vector<CollapseSequence> sequences(chunks);
+  each_chunk(0.0, [&](std::size_t c) {
+    sequences[c] = decimate(mesh.mesh, mesh.chunks[c], grids[c], locked[c], options);
+  });
+  std::size_t triangles_in_all = 0;
+  for (const Chunk& chunk : mesh.chunks) triangles_in_all += chunk.indices.size() / 3;
+  std::vector<Cut> cuts;
+  for (std::uint32_t level = 1; level < options.levels; ++level) {
+    cuts.push_back(cut_for(mesh, sequences, triangles_in_all >> level));
   }
+  each_chunk(0.5, [&](std::size_t c) {
+    level_chunk(mesh.mesh, grids[c], options, sequences[c], cuts, mesh.chunks[c]);
+    sequences[c] = {};
+  });
   std::uint64_t fine = 0;
   std::uint64_t triangles = 0;
   LevelFigures figures;

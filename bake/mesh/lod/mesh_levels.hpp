@@ -20,13 +20,14 @@ struct LevelOptions {
 
 inline constexpr std::uint32_t kMaxLevels = 12;
 
-/// Gives each chunk coarser levels, each of about half the triangles of the one before, over the
-/// chunk's vertices. Positions shared with other chunks, borders and seams stay, so that chunks of
-/// any two levels meet without a crack. A level's error bounds the distance between it
-/// and level 0, both as the device decodes them, measured from either to the other (see
-/// surface_distance()). At vertices of level 0 that were taken out, the texture has slid by no more
-/// than 1 % of the chunk's diagonal: collapses that may shift it farther are refused. A chunk ends
-/// where halving is no longer possible. Figures go to report.levels.
+/// Gives chunks coarser levels over their own vertices. Level k of the model has about 1/2^k of its
+/// triangles, shared out among the chunks so that the price of the last collapse is the same in
+/// all; a chunk that would lose less than a fifth has no level of its own there. Positions shared
+/// with other chunks and seams stay, so that chunks of any two levels meet without a crack; open
+/// rims of the model are simplified too. A level's error bounds the distance between it and level
+/// 0, both as the device decodes them, measured from either to the other (see surface_distance()).
+/// At removed vertices of level 0, the texture has slid by no more than 1 % of the chunk's
+/// diagonal: collapses that may shift it farther are refused. Figures go to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
 }  // namespace modar

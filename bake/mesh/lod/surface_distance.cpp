@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "bake/import/source_model.hpp"
@@ -53,6 +54,24 @@ TriangleTree& LevelSurface::tree() {
   if (!tree_) tree_ = std::make_unique<TriangleTree>(positions_, indices_);
   return *tree_;
 }
+
+const EdgePlanes& LevelSurface::planes(std::uint32_t t) {
+  if (planes_.empty()) planes_.resize(indices_.size() / 3);
+  EdgePlanes& planes = planes_[t];
+  if (planes.known) return planes;
+  planes.known = true;
+  const std::array<glm::dvec3, 3> corners = triangle(t);
+  const glm::dvec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+  const double square = glm::dot(normal, normal);
+  planes.has_area = square > 0;
+  if (!planes.has_area) return planes;
+  planes.normal = normal / std::sqrt(square);
+  for (std::size_t i = 0; i < 3; ++i) {
+    planes.outwards[i] = glm::normalize(glm::cross(corners[(i + 1) % 3] - corners[i], normal));
+  }
+  return planes;
+}
+
 namespace {
 
 /// The bound may exceed a distance that was found by this factor: 1.5 keeps coarse levels usable at
@@ -94,6 +113,19 @@ double off_plane(const glm::dvec3& p, const glm::dvec3& point, const glm::dvec3&
   return std::abs(off) < kSliver ? 0.0 : off;
 }
 
+/// Is all of a piece behind a plane, or all of it before, but for slivers?
+enum class Side : std::uint8_t { kBehind, kBefore, kBoth };
+Side side_of(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal) {
+  double low = 0;
+  double high = 0;
+  for (const glm::dvec3& corner : piece.all()) {
+    const double off = glm::dot(corner - point, normal);
+    low = std::min(low, off);
+    high = std::max(high, off);
+  }
+  return high < kSliver ? Side::kBehind : low > -kSliver ? Side::kBefore : Side::kBoth;
+}
+
 /// The parts of a piece on either side of a plane through `point`, whose normal has unit length: at
 /// most one corner more each.
 void cut(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal, Piece& behind,
@@ -122,25 +154,92 @@ void cut(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal, 
   if (high < kSliver) before.count = 0;
 }
 
+/// Sees points along the normal of a triangle: x and y in its plane, z the height over it.
+class PlaneFrame {
+ public:
+  /// normal: of unit length.
+  PlaneFrame(const std::array<glm::dvec3, 3>& t, const glm::dvec3& normal)
+      : origin_(t[0]), x_(glm::normalize(t[1] - t[0])), y_(glm::cross(normal, x_)), z_(normal) {
+    for (std::size_t i = 0; i < 3; ++i) corners_[i] = seen(t[i]);
+    low_ = glm::min(glm::min(corners_[0], corners_[1]), corners_[2]);
+    high_ = glm::max(glm::max(corners_[0], corners_[1]), corners_[2]);
+  }
+
+  [[nodiscard]] glm::dvec3 seen(const glm::dvec3& p) const {
+    const glm::dvec3 d = p - origin_;
+    return {glm::dot(d, x_), glm::dot(d, y_), glm::dot(d, z_)};
+  }
+
+  /// Does a triangle, as seen, meet the inside of this one? Touching it by less than a sliver is no
+  /// meeting (separating axes).
+  [[nodiscard]] bool meets(const std::array<glm::dvec3, 3>& t) const {
+    for (int i = 0; i < 2; ++i) {
+      if (std::max({t[0][i], t[1][i], t[2][i]}) <= low_[i]) return false;
+      if (std::min({t[0][i], t[1][i], t[2][i]}) >= high_[i]) return false;
+    }
+    return !parted(corners_, t) && !parted(t, corners_);
+  }
+
+  /// Does the line between two points, as seen, meet the inside?
+  [[nodiscard]] bool crosses(const glm::dvec3& a, const glm::dvec3& b) const {
+    return !parted(corners_, std::array<glm::dvec3, 3>{a, b, b}) && !beside(a, b, corners_) &&
+           !beside(b, a, corners_);
+  }
+
+ private:
+  /// Are all points right of the line from a to b, but for slivers?
+  static bool beside(const glm::dvec3& a, const glm::dvec3& b,
+                     const std::array<glm::dvec3, 3>& points) {
+    const double dx = b.x - a.x;
+    const double dy = b.y - a.y;
+    const double slack = kSliver * (std::abs(dx) + std::abs(dy));
+    for (const glm::dvec3& p : points) {
+      if (dx * (p.y - a.y) - dy * (p.x - a.x) > slack) return false;
+    }
+    return true;
+  }
+  /// Is there an edge of `from`, which turns left or right, with all of `from` on one side and all
+  /// points on the other?
+  static bool parted(const std::array<glm::dvec3, 3>& from,
+                     const std::array<glm::dvec3, 3>& points) {
+    const double area = (from[1].x - from[0].x) * (from[2].y - from[0].y) -
+                        (from[1].y - from[0].y) * (from[2].x - from[0].x);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const glm::dvec3& a = from[i];
+      const glm::dvec3& b = from[(i + 1) % 3];
+      if (area >= 0 ? beside(a, b, points) : beside(b, a, points)) return true;
+    }
+    return false;
+  }
+
+  glm::dvec3 origin_;
+  glm::dvec3 x_;
+  glm::dvec3 y_;
+  glm::dvec3 z_;
+  std::array<glm::dvec3, 3> corners_{};
+  glm::dvec3 low_;
+  glm::dvec3 high_;
+};
+
 class Bounder {
  public:
-  Bounder(LevelSurface& to, double least) : to_(to), least_(least), bound_(least) {}
+  Bounder(LevelSurface& to, double least)
+      : to_(to), limit_(std::max(kDistanceFloor, least)), bound_(least) {}
 
   /// Finds the distance of the farthest of some points, whose squared distances are at most these.
   void probe(std::vector<std::pair<double, std::uint16_t>> points) {
     std::make_heap(points.begin(), points.end());
     while (!points.empty() && points.front().first > std::max(lower_ * lower_, limit_square())) {
       const glm::dvec3& point = to_.position(points.front().second);
-      lower_ = std::max(lower_, std::sqrt(to_.tree().nearest(point, lower_ * lower_)));
+      raise_lower(std::sqrt(to_.tree().nearest(point, lower_ * lower_)));
       std::pop_heap(points.begin(), points.end());
       points.pop_back();
     }
   }
 
-  /// Raises the bound to hold for every point of the triangle; tries `nearby` first.
+  /// Raises the bound to hold for every point of the triangle; starts at one of `nearby`.
   void cover(Piece whole, const std::array<std::uint32_t, 3>& nearby) {
     for (const std::uint32_t near : nearby) {
-      if (near != kNoIndex && accept_by(whole, to_.triangle(near))) return;
       if (whole.target == kNoIndex) whole.target = near;
     }
     pieces_.assign(1, whole);
@@ -155,6 +254,56 @@ class Bounder {
         divide(piece);
       }
     }
+  }
+
+  /// Raises the bound to hold for the triangle, where the other surface is a graph over it: seen
+  /// along the triangle's normal, those of its triangles that meet this one all look the same way
+  /// and end outside of it. Then (by the degree of the projection) they cover it, and no point of
+  /// it lies farther from them than they do. start: a triangle of the other surface that shares a
+  /// vertex with this one, `shared`. False, with nothing done, where it is no such graph or too far
+  /// off.
+  bool cover_by_graph(const std::array<glm::dvec3, 3>& t, std::uint32_t start,
+                      std::uint16_t shared) {
+    const glm::dvec3 across = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const double square = glm::dot(across, across);
+    if (start == kNoIndex || !(square > 0)) return false;
+    const PlaneFrame frame(t, across / std::sqrt(square));
+    seen_.resize(to_.indices().size() / 3, 0);
+    ++stamp_;
+    waiting_.assign(1, start);
+    seen_[start] = stamp_;
+    double greatest = 0;
+    bool met = false;
+    while (!waiting_.empty()) {
+      const std::uint32_t at = waiting_.back();
+      waiting_.pop_back();
+      std::array<glm::dvec3, 3> seen;
+      for (std::size_t i = 0; i < 3; ++i) seen[i] = frame.seen(to_.triangle(at)[i]);
+      const bool meets = frame.meets(seen);
+      if (meets) {
+        met = true;
+        const double area = (seen[1].x - seen[0].x) * (seen[2].y - seen[0].y) -
+                            (seen[1].y - seen[0].y) * (seen[2].x - seen[0].x);
+        if (!(area > 0)) return false;
+        for (const glm::dvec3& corner : seen) greatest = std::max(greatest, std::abs(corner.z));
+        if (greatest > limit()) return false;
+      }
+      const std::uint16_t* v = &to_.indices()[3 * std::size_t{at}];
+      for (std::size_t i = 0; i < 3; ++i) {
+        const bool at_shared = v[i] == shared || v[(i + 1) % 3] == shared;
+        if (!meets && !at_shared) continue;
+        const std::uint32_t next = to_.neighbour(at, i);
+        if (next == kNoIndex) {
+          if (meets && frame.crosses(seen[i], seen[(i + 1) % 3])) return false;
+        } else if (seen_[next] != stamp_) {
+          seen_[next] = stamp_;
+          waiting_.push_back(next);
+        }
+      }
+    }
+    if (!met) return false;
+    bound_ = std::max(bound_, greatest);
+    return true;
   }
 
   [[nodiscard]] double bound() const { return bound_; }
@@ -174,33 +323,49 @@ class Bounder {
   }
 
   /// Cuts off what lies beyond the edges of the piece's target and hands it to the neighbours
-  /// there.
+  /// there. What is left lies over the target: its distance is that from the target's plane.
   void step(Piece piece) {
     const std::uint32_t target = piece.target;
-    const std::array<glm::dvec3, 3> t = to_.triangle(target);
-    if (accept_by(piece, t)) return;
+    const EdgePlanes& planes = to_.planes(target);
     const std::uint32_t came_from = std::exchange(piece.before, target);
     piece.target = kNoIndex;
-    const glm::dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
-    if (!(glm::dot(normal, normal) > 0)) {
+    if (!planes.has_area) {
       pieces_.push_back(piece);
       return;
     }
-    Piece outside;
-    Piece inside;
+    const std::array<glm::dvec3, 3> t = to_.triangle(target);
     for (std::size_t i = 0; i < 3 && piece.count < Piece::kMost; ++i) {
-      cut(piece, t[i], glm::normalize(glm::cross(t[(i + 1) % 3] - t[i], normal)), inside, outside);
-      if (outside.count < 3) continue;
+      const Side side = side_of(piece, t[i], planes.outwards[i]);
+      if (side == Side::kBehind) continue;
+      if (side == Side::kBefore) return hand_over(piece, target, i, came_from);
+      Piece outside;
+      Piece inside;
+      cut(piece, t[i], planes.outwards[i], inside, outside);
       outside.before = target;
-      outside.target = to_.neighbour(target, i);
-      // Near an edge, a piece may lie outside of both triangles that share it.
-      if (outside.target == came_from) outside.target = kNoIndex;
-      if (outside.target != kNoIndex || !accept_by(outside, t)) pieces_.push_back(outside);
+      if (outside.count >= 3) hand_over(outside, target, i, came_from);
       if (inside.count < 3) return;
       piece.corners = inside.corners;
       piece.count = inside.count;
     }
-    if (!accept_by(piece, t)) pieces_.push_back(piece);
+    double greatest = 0;
+    for (const glm::dvec3& corner : piece.all()) {
+      greatest = std::max(greatest, std::abs(glm::dot(corner - t[0], planes.normal)));
+    }
+    greatest += 2 * kSliver;  // corners may lie so far outside of the prism
+    if (piece.count < Piece::kMost && greatest <= limit()) {
+      bound_ = std::max(bound_, greatest);
+    } else if (!accept_by(piece, t)) {
+      pieces_.push_back(piece);
+    }
+  }
+
+  /// Sends a piece that lies beyond edge i of a triangle to the neighbour there.
+  void hand_over(Piece& piece, std::uint32_t from, std::size_t i, std::uint32_t came_from) {
+    piece.target = to_.neighbour(from, i);
+    // Over an edge between two triangles, a piece may lie outside of both: it is nearest to the
+    // edge.
+    if (piece.target == came_from) piece.target = kNoIndex;
+    if (piece.target != kNoIndex || !accept_by(piece, to_.triangle(from))) pieces_.push_back(piece);
   }
 
   bool accept(const Piece& piece, bool at_once) {
@@ -213,7 +378,7 @@ class Bounder {
     const double margin = std::max(0.0, limit() - radius);
     const double distance = std::sqrt(tree.nearest(middle, margin * margin));
     // A triangle found within the margin need not be the nearest: it proves no distance.
-    if (distance > margin) lower_ = std::max(lower_, distance);
+    if (distance > margin) raise_lower(distance);
     // Within the radius no point is farther off than so.
     const double upper = std::min(distance + radius, corner_bound(piece));
     if (upper > limit() && !at_once) return false;
@@ -282,14 +447,21 @@ class Bounder {
     }
   }
 
-  [[nodiscard]] double limit() const { return std::max({kDistanceFloor, least_, kSlack * lower_}); }
-  [[nodiscard]] double limit_square() const { return limit() * limit(); }
+  void raise_lower(double distance) {
+    lower_ = std::max(lower_, distance);
+    limit_ = std::max(limit_, kSlack * lower_);
+  }
+  [[nodiscard]] double limit() const { return limit_; }
+  [[nodiscard]] double limit_square() const { return limit_ * limit_; }
 
   LevelSurface& to_;
-  double least_;
-  double lower_ = 0;
+  double lower_ = 0;  ///< a distance that was found
+  double limit_;      ///< pieces within it need no closer look
   double bound_;
   std::vector<Piece> pieces_;
+  std::vector<std::uint32_t> seen_;  ///< stamp_ where a triangle was, in cover_by_graph()
+  std::uint32_t stamp_ = 0;
+  std::vector<std::uint32_t> waiting_;
 };
 
 /// A triangle from its lowest corner on, as one number.
@@ -332,9 +504,13 @@ double surface_distance(const LevelSurface& from, LevelSurface& to,
   }
   bounder.probe(std::move(probes));
   for (const std::size_t i : triangles) {
+    const std::array<glm::dvec3, 3> corner = from.triangle(static_cast<std::uint32_t>(i / 3));
+    const std::array<std::uint32_t, 3> near = {nearby[corners[i]], nearby[corners[i + 1]],
+                                               nearby[corners[i + 2]]};
+    if (bounder.cover_by_graph(corner, near[0], corners[i])) continue;
     Piece whole;
-    for (std::size_t k = i; k < i + 3; ++k) whole.add(from.position(corners[k]));
-    bounder.cover(whole, {nearby[corners[i]], nearby[corners[i + 1]], nearby[corners[i + 2]]});
+    for (const glm::dvec3& c : corner) whole.add(c);
+    bounder.cover(whole, near);
   }
   return bounder.bound();
 }

@@ -13,6 +13,15 @@
 
 namespace modar {
 
+/// Unit normals of a triangle and of the planes that stand on its edges, looking outwards.
+struct EdgePlanes {
+  glm::dvec3 normal{0.0};
+  std::array<glm::dvec3, 3> outwards{};
+  bool known = false;
+  bool has_area = false;
+};
+
+/// The triangles of one level of a chunk: which are adjacent, which is near a point.
 class LevelSurface {
  public:
   /// Of at least one triangle. Both spans are the caller's and must outlive it.
@@ -34,12 +43,15 @@ class LevelSurface {
   [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
   /// Built on first use.
   TriangleTree& tree();
+  /// Computed on first use.
+  const EdgePlanes& planes(std::uint32_t t);
 
  private:
   std::span<const glm::dvec3> positions_;
   std::span<const std::uint16_t> indices_;
   std::vector<std::uint32_t> neighbours_;
   std::unique_ptr<TriangleTree> tree_;
+  std::vector<EdgePlanes> planes_;
 };
 
 /// An upper bound on the distance of any point of one surface from the other. It exceeds the true
