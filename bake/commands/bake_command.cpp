@@ -264,7 +264,8 @@ void add_geometry_options(CommandLine& line, BakeCommand& command) {
               {.shows_default = true, .least = 1, .most = kMaxLevels});
   line.flag("--no-lods", [&request] { request.levels = 1; }, "The finest level only",
             {.excludes = "--lods"});
-  line.flag("!--no-topology", request.topology, "Do not measure the models' topology");
+  line.flag("--topology,!--no-topology", request.topology,
+            "Measure the models' topology and state it in the bundle");
 }
 
 void add_pattern_options(CommandLine& line, BakeRequest& request) {

@@ -122,7 +122,7 @@ class ModelBench {
     const std::string report = folder_ + "/report.json";
     const ProcessOutcome outcome =
         run_measured({{program_folder() + "/modar", "bake", "--model", obj_, "--no-lods",
-                       "--no-topology", "--positions", positions, "--jobs", std::to_string(jobs),
+                       "--positions", positions, "--jobs", std::to_string(jobs),
                        "--quiet", "--json", "-o", folder_ + "/ours.modar"},
                       {},
                       report});

@@ -71,7 +71,7 @@ class Bake(ProgramTest):
 
     def test_the_shape_of_models_is_told(self):
         out = self.folder / "shape.modar"
-        report = self.modar_json("bake", "--model", STATUE, "--no-lods", "-o", out)
+        report = self.modar_json("bake", "--model", STATUE, "--no-lods", "--topology", "-o", out)
         shape = report["bundle"]["models"][0]["topology"]
         faces = [[int(corner.split("/")[0]) for corner in line.split()[1:]]
                  for line in STATUE.read_text().splitlines() if line.startswith("f ")]
@@ -86,7 +86,7 @@ class Bake(ProgramTest):
         self.assertEqual(shape["euler"], len({v for face in faces for v in face}) - len(edges) + len(faces))
         self.assertEqual([h["model"] for h in report["half_edges"]], ["statue"])
         self.assertIn("boundary loops", self.modar("inspect", out).stdout)
-        without = self.modar_json("bake", "--model", STATUE, "--no-lods", "--no-topology", "-o", out)
+        without = self.modar_json("bake", "--model", STATUE, "--no-lods", "-o", out)
         self.assertIsNone(without["bundle"]["models"][0]["topology"])
 
     def test_models_only_and_patterns_only_are_legal(self):
