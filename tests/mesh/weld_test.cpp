@@ -147,6 +147,18 @@ TEST(Weld, DropsWhatCannotBeSeenAndSaysSo) {
   std::map<std::string, std::string> found;
   for (const Diagnostic& f : report.diagnostics) found[f.id] = f.message;
   EXPECT_EQ(found["model.degenerate"].substr(0, 2), "2 ");
+  // Two of a handful are many; two of a thousand are not.
+  const auto severity_of = [](const std::string& text) {
+    Report told;
+    EXPECT_TRUE(weld(parse(text), told));
+    const auto at = std::find_if(told.diagnostics.begin(), told.diagnostics.end(),
+                                 [](const Diagnostic& d) { return d.id == "model.degenerate"; });
+    EXPECT_NE(at, told.diagnostics.end());
+    return at == told.diagnostics.end() ? DiagnosticSeverity::kError : at->severity;
+  };
+  EXPECT_EQ(severity_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\n"),
+            DiagnosticSeverity::kWarning);
+  EXPECT_EQ(severity_of(testing::grid(30, 1) + "f 1 1 2\nf 2 2 1\n"), DiagnosticSeverity::kInfo);
   EXPECT_EQ(found["model.not-finite"].substr(0, 2), "1 ");
   Report other;
   EXPECT_EQ(weld(parse("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), other).error().code, "model.empty");

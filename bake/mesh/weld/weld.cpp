@@ -530,15 +530,24 @@ void keep_used_materials(const SourceModel& source, TriMesh& mesh) {
   for (std::uint32_t& m : mesh.triangle_material) m = to[m];
 }
 
-void report_counts(const std::string& name, const WeldCounts& counts, Report& report) {
+/// Share of a model's triangles whose loss is worth a warning.
+constexpr double kMuchLoss = 0.01;
+
+/// triangles: that are left.
+void report_counts(const std::string& name, const WeldCounts& counts, std::size_t triangles,
+                   Report& report) {
   const auto add = [&](std::uint64_t count, const char* id, DiagnosticSeverity severity,
                        const char* message, const char* cure) {
     if (count == 0) return;
     report.diagnostics.push_back(
         {id, severity, name, 0, std::to_string(count) + " " + message, cure});
   };
-  add(counts.flat, "model.degenerate", DiagnosticSeverity::kInfo, "triangles without area left out",
-      "");
+  const double all = static_cast<double>(counts.flat + counts.not_finite + triangles);
+  const bool much = static_cast<double>(counts.flat) > kMuchLoss * all;
+  add(counts.flat, "model.degenerate",
+      much ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo,
+      "triangles without area left out (corners on one line, or one corner twice)",
+      much ? "check that the model was exported as it should be" : "");
   add(counts.not_finite, "model.not-finite", DiagnosticSeverity::kWarning,
       "triangles with vertices at no finite place left out", "export the model again");
   add(counts.tangled, "model.tangled-polygon", DiagnosticSeverity::kWarning,
@@ -571,7 +580,7 @@ Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& op
   }
   normalise(mesh);
   keep_used_materials(source, mesh);
-  report_counts(source.name, counts, report);
+  report_counts(source.name, counts, mesh.triangles.size(), report);
   timer.done(mesh.source_face_count, mesh.positions.size());
   return mesh;
 }
