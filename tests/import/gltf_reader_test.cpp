@@ -129,6 +129,68 @@ TEST_F(Gltf, BrokenFilesAreErrors) {
   EXPECT_EQ(read_gltf("/no/such.glb").error().code, "gltf.open");
 }
 
+TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
+  const std::string scene =
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
+      R"("nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])";
+  const auto requires_these = [&](const std::string& names) {
+    return read(kOneTriangle + scene + R"(,"extensionsUsed":[)" + names +
+                    R"(],"extensionsRequired":[)" + names + "]",
+                one_triangle());
+  };
+  EXPECT_TRUE(requires_these(R"("KHR_mesh_quantization","KHR_texture_transform")"));
+  const auto refused = requires_these(R"("EXT_meshopt_compression","KHR_texture_basisu")");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().exit, ExitCode::kUnsupported);
+  EXPECT_EQ(refused.error().code, "gltf.extension");
+  EXPECT_NE(refused.error().cause.find("EXT_meshopt_compression, KHR_texture_basisu"),
+            std::string::npos);
+  // Only used: read without, and said.
+  const auto used =
+      read(kOneTriangle + scene + R"(,"extensionsUsed":["KHR_materials_clearcoat"],)" +
+               R"("animations":[{"channels":[],"samplers":[]}],)" +
+               R"("materials":[{"normalTexture":{"index":0},"alphaMode":"MASK"}])",
+           one_triangle());
+  ASSERT_TRUE(used) << to_line(used.error());
+  std::vector<std::string> ids;
+  for (const Diagnostic& d : used->diagnostics) ids.push_back(d.id);
+  std::sort(ids.begin(), ids.end());
+  EXPECT_EQ(ids, (std::vector<std::string>{"gltf.alpha-mask", "gltf.animation",
+                                           "gltf.extension-ignored", "gltf.normal-map"}));
+}
+
+TEST_F(Gltf, VersionOneIsRefusedAsSuch) {
+  std::ofstream(folder_ / "one.gltf") << R"({"asset":{"version":"1.0"},"meshes":{"a":{}}})";
+  const auto text = read_gltf((folder_ / "one.gltf").string());
+  ASSERT_FALSE(text);
+  EXPECT_EQ(text.error().code, "gltf.version");
+  // A header of version 1: length 20, scene length 0, format JSON.
+  std::ofstream(folder_ / "one.glb", std::ios::binary)
+      << "glTF" << raw<std::uint32_t>({1, 20, 0, 0});
+  const auto binary = read_gltf((folder_ / "one.glb").string());
+  ASSERT_FALSE(binary);
+  EXPECT_EQ(binary.error().exit, ExitCode::kUnsupported);
+  EXPECT_EQ(binary.error().code, "gltf.version");
+}
+
+TEST_F(Gltf, ImageNamesArePercentDecodedAndMayBeWebp) {
+  std::ofstream(folder_ / "my wall.webp") << "RIFF";
+  std::ofstream(folder_ / "100%.png") << "png";
+  const auto model = read(
+      std::string(kOneTriangle) +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "images":[{"uri":"my%20wall.webp"},{"uri":"100%.png"}],
+          "textures":[{"extensions":{"EXT_texture_webp":{"source":0}}},{"source":1}],
+          "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":1}}}],
+          "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],"extensionsUsed":["EXT_texture_webp"])",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  EXPECT_EQ(fs::path(model->materials[0].diffuse_map).filename(), "my wall.webp");
+  EXPECT_EQ(fs::path(model->materials[1].diffuse_map).filename(), "100%.png");
+  EXPECT_TRUE(model->diagnostics.empty());
+}
+
 TEST_F(Gltf, SparseAccessorsReplaceWhatTheyList) {
   const auto file = [&](const char* base, int index) {
     // The base's third vertex moves to (5, 6, 7); without a base the others are zero, bar the

@@ -50,6 +50,27 @@ std::string plain_name(const std::string& name, const std::string& other) {
   return plain.empty() ? other : plain;
 }
 
+/// A URI with %XX as the byte that it stands for (RFC 3986, 2.1); what is no such pair stays.
+std::string percent_decoded(const std::string& uri) {
+  const auto digit = [](char c) {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+  };
+  std::string decoded;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    const int high = uri[i] == '%' && i + 2 < uri.size() ? digit(uri[i + 1]) : -1;
+    const int low = high >= 0 ? digit(uri[i + 2]) : -1;
+    if (low < 0) {
+      decoded += uri[i];
+      continue;
+    }
+    decoded += static_cast<char>(16 * high + low);
+    i += 2;
+  }
+  return decoded;
+}
+
 class MaterialReader {
  public:
   MaterialReader(const tinygltf::Model& gltf, std::string folder, std::string label,
@@ -89,22 +110,35 @@ class MaterialReader {
 
   std::string image_path(int texture) {
     if (texture < 0 || static_cast<std::size_t>(texture) >= gltf_.textures.size()) return {};
-    const int source = gltf_.textures[static_cast<std::size_t>(texture)].source;
+    const int source = source_of(gltf_.textures[static_cast<std::size_t>(texture)]);
     if (source < 0 || static_cast<std::size_t>(source) >= gltf_.images.size()) return {};
     const auto index = static_cast<std::size_t>(source);
     if (!paths_[index]) paths_[index] = find_image(gltf_.images[index], index);
     return *paths_[index];
   }
 
+  /// The image of a texture: its PNG or JPEG, or else its WebP (EXT_texture_webp).
+  static int source_of(const tinygltf::Texture& texture) {
+    const auto found = texture.extensions.find("EXT_texture_webp");
+    if (texture.source >= 0 || found == texture.extensions.end()) return texture.source;
+    if (!found->second.IsObject() || !found->second.Has("source")) return -1;
+    const tinygltf::Value& source = found->second.Get("source");
+    return source.IsInt() ? source.GetNumberAsInt() : -1;
+  }
+
   std::string find_image(const tinygltf::Image& image, std::size_t index) {
     std::error_code error;
-    const std::string beside = folder_ + image.uri;
-    if (!image.uri.empty() && std::filesystem::is_regular_file(beside, error)) return beside;
+    for (const std::string& name : {image.uri, percent_decoded(image.uri)}) {
+      if (name.empty() || name.find('\0') != std::string::npos) continue;
+      if (std::filesystem::is_regular_file(folder_ + name, error)) return folder_ + name;
+    }
     if (!image.image.empty()) {
       if (folder_of_images_ == nullptr) folder_of_images_ = std::make_shared<TemporaryFolder>();
       const std::string path = folder_of_images_->path() + "/" +
                                plain_name(image.name, "image" + std::to_string(index)) +
-                               (image.mimeType == "image/jpeg" ? ".jpg" : ".png");
+                               (image.mimeType == "image/jpeg"   ? ".jpg"
+                                : image.mimeType == "image/webp" ? ".webp"
+                                                                 : ".png");
       const auto bytes = std::as_bytes(std::span(image.image));
       if (!folder_of_images_->path().empty() && write_file(path, bytes)) return path;
     }

@@ -394,6 +394,74 @@ bool read_bytes(const std::string& path, std::string& bytes) {
   return !file.bad();
 }
 
+/// Extensions that are read in full; a file that requires others cannot be shown as it is meant.
+constexpr const char* kKnownExtensions[] = {"EXT_texture_webp", "KHR_draco_mesh_compression",
+                                            "KHR_materials_unlit", "KHR_mesh_quantization",
+                                            "KHR_texture_transform"};
+
+bool is_known(const std::string& extension) {
+  return std::find(std::begin(kKnownExtensions), std::end(kKnownExtensions), extension) !=
+         std::end(kKnownExtensions);
+}
+
+/// Refuses glTF 1.0 and required extensions that are not read. gltf: may be half read.
+Result<void> require_support(const tinygltf::Model& gltf, std::string_view bytes,
+                             const std::string& path) {
+  const bool old_binary = bytes.starts_with("glTF") && bytes.size() > 4 && bytes[4] == 1;
+  if (old_binary || gltf.asset.version.starts_with("1")) {
+    return fail(ExitCode::kUnsupported, "gltf.version", path, "this is glTF 1.0",
+                "convert it to glTF 2.0, for instance with Blender or gltf-pipeline");
+  }
+  std::string unknown;
+  for (const std::string& extension : gltf.extensionsRequired) {
+    if (!is_known(extension)) unknown += (unknown.empty() ? "" : ", ") + extension;
+  }
+  if (unknown.empty()) return {};
+  return fail(ExitCode::kUnsupported, "gltf.extension", path,
+              "it requires extensions that are not read: " + unknown,
+              "export it without them (meshes uncompressed or by Draco, textures as PNG, JPEG or "
+              "WebP)");
+}
+
+/// One diagnostic for each kind of thing that is left out of materials and scene.
+void report_left_out(const tinygltf::Model& gltf, const std::string& label,
+                     std::vector<Diagnostic>& diagnostics) {
+  const auto add = [&](std::size_t count, const char* id, DiagnosticSeverity severity,
+                       const std::string& what, const char* cure) {
+    if (count == 0) return;
+    diagnostics.push_back({id, severity, label, 0, std::to_string(count) + " " + what, cure});
+  };
+  const auto materials = [&](const auto& test) {
+    return static_cast<std::size_t>(
+        std::count_if(gltf.materials.begin(), gltf.materials.end(), test));
+  };
+  const auto warning = DiagnosticSeverity::kWarning;
+  const auto info = DiagnosticSeverity::kInfo;
+  add(gltf.animations.size(), "gltf.animation", warning, "animations are left out",
+      "the model stands as its nodes have it");
+  add(materials([](const auto& m) { return m.normalTexture.index >= 0; }), "gltf.normal-map", info,
+      "materials have a normal map, which is left out", "");
+  add(materials([](const auto& m) { return m.occlusionTexture.index >= 0; }), "gltf.occlusion-map",
+      info, "materials have an occlusion map, which is left out", "bake it into the base colour");
+  add(materials([](const auto& m) { return m.emissiveTexture.index >= 0; }), "gltf.emissive-map",
+      info, "materials have an emissive map, which is left out; the emissive factor is kept", "");
+  add(materials(
+          [](const auto& m) { return m.pbrMetallicRoughness.metallicRoughnessTexture.index >= 0; }),
+      "gltf.metal-map", info,
+      "materials have a metallic-roughness map, which is left out; the roughness factor is folded "
+      "into the highlight",
+      "");
+  add(materials([](const auto& m) { return m.alphaMode == "MASK"; }), "gltf.alpha-mask", info,
+      "materials cut their texture out at an alpha value; it is blended instead", "");
+  add(gltf.cameras.size(), "gltf.camera", info, "cameras are left out", "");
+  for (const std::string& extension : gltf.extensionsUsed) {
+    if (is_known(extension)) continue;
+    diagnostics.push_back({"gltf.extension-ignored", info, label, 0,
+                           "the extension " + extension + " is not read; the file does without",
+                           ""});
+  }
+}
+
 }  // namespace
 
 Result<SourceModel> read_gltf(const std::string& path) {
@@ -419,9 +487,10 @@ Result<SourceModel> read_gltf(const std::string& path) {
   } catch (const std::exception& thrown) {
     error = thrown.what();
   }
+  MODAR_TRY(require_support(gltf, bytes, path));
   if (!good) {
     std::replace(error.begin(), error.end(), '\n', ' ');
-    return fail(ExitCode::kInvalidInput, "gltf.read", path, "no glTF 2.0: " + error,
+    return fail(ExitCode::kInvalidInput, "gltf.read", path, "this is not glTF 2.0: " + error,
                 "check the file with the glTF validator and export it again");
   }
   SourceModel model;
@@ -433,6 +502,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   for (const tinygltf::Image& image : gltf.images) note_file(image.uri);
   model.materials = gltf_materials(gltf, folder, path, model.diagnostics);
   MODAR_TRY(SceneReader(gltf, model, path).run());
+  report_left_out(gltf, path, model.diagnostics);
   if (model.corner_positions.empty()) {
     return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it shows no triangles",
                 "export a mesh in its default scene");
