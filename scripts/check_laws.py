@@ -24,7 +24,7 @@ OPENCV_FILES = (
 )
 THIRD_PARTIES = {
     "opencv2/": OPENCV_FILES,
-    "OpenMesh/": (r"bake/mesh/(topology|lod)/[a-z_]*(topology|decimat)[a-z_]*\.cpp", r"tests/.*"),
+    "OpenMesh/": (r"bake/mesh/topology/mesh_topology\.cpp", r"tests/.*"),
     "draco/": (r"(bake|runtime)/[a-z_/]*draco[a-z_]*\.cpp", r"tests/.*"),
     "tiny_gltf": (r"bake/(import/gltf|export)/(glb|gltf)_[a-z_]*\.cpp", r"bake/import/gltf/tinygltf_library\.[ch]pp",
                   r"tests/.*"),
@@ -38,7 +38,7 @@ THIRD_PARTIES = {
     "zstd.h": (r"runtime/fetch/piece\.cpp",
                r"bake/ship/(mesh_encoder|recipe_maker)\.cpp", r"bake/lab/ship_bench\.cpp", r"tests/.*"),
     "meshoptimizer": (r"runtime/fetch/piece\.cpp",
-                      r"bake/ship/mesh_encoder\.cpp", r"bake/lab/(meshopt_peer|ship_bench)\.cpp", r"tests/.*"),
+                      r"bake/ship/mesh_encoder\.cpp", r"bake/lab/(lod_bench|meshopt_peer|ship_bench)\.cpp", r"tests/.*"),
     "assimp/": (r"bake/lab/assimp_peer\.cpp", r"tests/mesh/assimp_oracle\.cpp"),
     "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),
     "bake/lab/tinyobj_library": (r"bake/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),

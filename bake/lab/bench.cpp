@@ -11,6 +11,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/etc1_bench.hpp"
+#include "bake/lab/lod_bench.hpp"
 #include "bake/lab/ship_bench.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
@@ -127,6 +128,8 @@ const std::vector<Bench>& benches() {
        "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "
        "gltfpack, Draco and the goals",
        [](const BenchOptions& command) { return bench_model_rows(command.inputs, command.model); }},
+      {"lod", true, "MODEL...", "levels of detail against meshopt_simplify on the whole mesh",
+       [](const BenchOptions& command) { return bench_lod(command.inputs, command.model.jobs); }},
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
        "our pose loop against the ModAR paper's method, on the same frames",
        [](const BenchOptions& command) { return bench_pose_rows(command.pose); }},

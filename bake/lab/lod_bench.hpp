@@ -1,0 +1,19 @@
+// `modar bench lod`: our levels of detail beside meshoptimizer's simplifier. Internal to bake/lab.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bake/lab/bench.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// For each model and level: triangles against the number asked for; rms, 99th percentile and
+/// greatest distance (percent of the diagonal, sampled evenly by area, the worse of both ways)
+/// against meshopt_simplify on the whole mesh at the same number of triangles; our stated bound
+/// against the distance found; how far the texture slides, where there is one; and CPU seconds of
+/// all levels against meshopt_simplify's. Errors: those of reading and of the stages.
+Result<std::vector<BenchRow>> bench_lod(const std::vector<std::string>& models, unsigned jobs);
+
+}  // namespace modar
