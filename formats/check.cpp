@@ -417,7 +417,7 @@ void check_blocks(FaultLog& log, const BundleParts& parts, const TextureRecord& 
   }
 }
 
-void check_textures(FaultLog& log, const BundleParts& parts) {
+void check_texture_blocks(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.textures.size(); ++i) {
     const TextureRecord& texture = parts.textures[i];
     check_sides(log, parts, texture);
@@ -587,7 +587,7 @@ void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes) {
   check_model_records(log, parts);
   check_summary(log, parts);
   check_geometry(log, parts, hashes);
-  check_textures(log, parts);
+  check_texture_blocks(log, parts);
   check_patterns(log, parts);
 }
 

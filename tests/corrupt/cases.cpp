@@ -34,7 +34,7 @@ BundleContent scene_content() {
   return content;
 }
 
-constexpr CorruptCase kCases[] = {
+constexpr CorruptCase kSectionCases[] = {
     {"BUNDLE_TRUNCATED", [] { return broken(pattern_content(), [](Bytes& b) { b.pop_back(); }); }},
     {"BUNDLE_MAGIC",
      [] { return broken(pattern_content(), [](Bytes& b) { header_of(b).magic[0] = 'M'; }); }},
@@ -192,7 +192,7 @@ constexpr CorruptCase kCases[] = {
 }  // namespace
 
 std::span<const CorruptCase> structure_cases() {
-  return kCases;
+  return kSectionCases;
 }
 
 }  // namespace modar::test

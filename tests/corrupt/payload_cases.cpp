@@ -36,7 +36,7 @@ KeypointRecord& keypoint(BundleContent& content) {
   return content.features[0][0].keypoints[3];
 }
 
-constexpr CorruptCase kCases[] = {
+constexpr CorruptCase kPayloadCases[] = {
     {"SECTION_HASH",
      [] {
        Bytes bytes = encode(pattern_content());
@@ -193,7 +193,7 @@ constexpr CorruptCase kCases[] = {
 }  // namespace
 
 std::span<const CorruptCase> payload_cases() {
-  return kCases;
+  return kPayloadCases;
 }
 
 }  // namespace modar::test

@@ -71,7 +71,7 @@ Bytes scaled_scene() {
   return encode(content);
 }
 
-constexpr CorruptCase kCases[] = {
+constexpr CorruptCase kWorkstationCases[] = {
     {"DEVICE_TEXTURE_SIZE", [] { return encode(picture(64, 8)); }},
     {"DEVICE_ATTRIBUTES", [] { return encode(model_content()); }},
     {"DEVICE_UNIFORMS", [] { return encode(model_content()); }},
@@ -101,7 +101,7 @@ constexpr CorruptCase kCases[] = {
 }  // namespace
 
 std::span<const CorruptCase> workstation_cases() {
-  return kCases;
+  return kWorkstationCases;
 }
 
 }  // namespace modar::test

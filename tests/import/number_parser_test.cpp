@@ -18,7 +18,7 @@ struct Parsed {
   std::size_t length = 0;
 };
 
-Parsed parse(const std::string& text) {
+Parsed parse_text(const std::string& text) {
   const std::string padded = text + std::string(kTextPadding, '\0');
   Parsed result;
   const char* end =
@@ -28,7 +28,7 @@ Parsed parse(const std::string& text) {
 }
 
 void expect_same_as_strtod(const std::string& text) {
-  const Parsed ours = parse(text);
+  const Parsed ours = parse_text(text);
   char* end = nullptr;
   const double theirs = std::strtod(text.c_str(), &end);
   EXPECT_EQ(ours.kind, NumberKind::kFinite) << text;
@@ -94,20 +94,20 @@ TEST(NumberParser, RandomNumbersAreCorrectlyRounded) {
 
 TEST(NumberParser, WhatIsNoFiniteNumberSaysSo) {
   for (const char* text : {"nan", "NaN", "-nan", "inf", "-INF", "Infinity", "1e999"}) {
-    EXPECT_EQ(parse(text).kind, NumberKind::kNotFinite) << text;
-    EXPECT_EQ(parse(text).length, std::string(text).size()) << text;
+    EXPECT_EQ(parse_text(text).kind, NumberKind::kNotFinite) << text;
+    EXPECT_EQ(parse_text(text).length, std::string(text).size()) << text;
   }
   for (const char* text : {"", "-", "+", ".", "-.", "x", "e5", "--1"}) {
-    EXPECT_EQ(parse(text).kind, NumberKind::kNone) << text;
-    EXPECT_EQ(parse(text).length, 0u) << text;
+    EXPECT_EQ(parse_text(text).kind, NumberKind::kNone) << text;
+    EXPECT_EQ(parse_text(text).length, 0u) << text;
   }
 }
 
 TEST(NumberParser, StopsAtWhatBelongsToNoNumber) {
-  EXPECT_EQ(parse("3.1+e2").length, 3u);
-  EXPECT_EQ(parse("1.5.5").length, 3u);
-  EXPECT_EQ(parse("7/8").length, 1u);
-  EXPECT_EQ(parse("1,5").length, 1u);
+  EXPECT_EQ(parse_text("3.1+e2").length, 3u);
+  EXPECT_EQ(parse_text("1.5.5").length, 3u);
+  EXPECT_EQ(parse_text("7/8").length, 1u);
+  EXPECT_EQ(parse_text("1,5").length, 1u);
 }
 
 }  // namespace

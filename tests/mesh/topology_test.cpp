@@ -154,25 +154,25 @@ std::size_t parts(const std::set<Node>& nodes, const std::vector<std::pair<Node,
 
 /// Boundary edges are joined where triangles of one fan at a vertex lead from one to the other.
 std::size_t count_loops(const std::vector<Face>& faces, const std::set<std::pair<int, int>>& rim) {
-  using Edge = std::pair<int, int>;
-  std::set<Edge> nodes;  // all edges of the mesh, seen from one of their ends: (end, other end)
-  std::vector<std::pair<Edge, Edge>> links;
+  using HalfEdge = std::pair<int, int>;
+  std::set<HalfEdge> nodes;  // all edges of the mesh, seen from one of their ends: (end, other end)
+  std::vector<std::pair<HalfEdge, HalfEdge>> links;
   for (const Face& f : faces) {
     for (std::size_t i = 0; i < 3; ++i) {
-      const Edge out(f[i], f[(i + 1) % 3]);
-      const Edge in(f[i], f[(i + 2) % 3]);
+      const HalfEdge out(f[i], f[(i + 1) % 3]);
+      const HalfEdge in(f[i], f[(i + 2) % 3]);
       nodes.insert({out, in});
       links.emplace_back(out, in);
     }
   }
   for (const auto& [a, b] : rim) links.push_back({{a, b}, {b, a}});
   // Parts without a boundary edge are no loops.
-  std::map<Edge, Edge> mark;
-  for (const Edge& n : nodes) mark[n] = n;
+  std::map<HalfEdge, HalfEdge> mark;
+  for (const HalfEdge& n : nodes) mark[n] = n;
   for (std::size_t round = 0; round < nodes.size(); ++round) {
     for (const auto& [a, b] : links) mark[a] = mark[b] = std::min(mark[a], mark[b]);
   }
-  std::set<Edge> loops;
+  std::set<HalfEdge> loops;
   for (const auto& [a, b] : rim) loops.insert(mark[{a, b}]);
   return loops.size();
 }

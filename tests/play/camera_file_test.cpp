@@ -50,7 +50,7 @@ TEST(CameraFile, ReadsTheOtherNamesFloatsAndRows) {
   EXPECT_EQ(fitted.fx, 500);
 }
 
-std::string code_of(const std::string& text) {
+std::string read_code(const std::string& text) {
   const test::Folder folder;
   test::write_text(folder / "camera.yml", text);
   const Result<Camera> camera = read_camera_file(folder / "camera.yml");
@@ -59,17 +59,17 @@ std::string code_of(const std::string& text) {
 
 TEST(CameraFile, SaysWhatIsWrong) {
   EXPECT_EQ(read_camera_file("/nowhere/camera.yml").error().code, "camera.open");
-  EXPECT_EQ(code_of("%YAML:1.0\n---\nx: 1\n"), "camera.matrix");
-  EXPECT_EQ(code_of("%YAML:1.0\n---\nK: [ -1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"), "camera.matrix");
-  EXPECT_EQ(code_of("%YAML:1.0\n---\nK: [ 1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"), "read");
-  EXPECT_EQ(code_of("%YAML:1.0\n---\nK: [ 1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"
-                    "D: [ 0., 0., 0., 0., 0., 0.5, 0., 0. ]\n"),
+  EXPECT_EQ(read_code("%YAML:1.0\n---\nx: 1\n"), "camera.matrix");
+  EXPECT_EQ(read_code("%YAML:1.0\n---\nK: [ -1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"), "camera.matrix");
+  EXPECT_EQ(read_code("%YAML:1.0\n---\nK: [ 1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"), "read");
+  EXPECT_EQ(read_code("%YAML:1.0\n---\nK: [ 1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"
+                      "D: [ 0., 0., 0., 0., 0., 0.5, 0., 0. ]\n"),
             "camera.distortion");
-  EXPECT_EQ(code_of("%YAML:1.0\n---\nK: [ 1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"
-                    "image_width: 640\nimage_height: 0\n"),
+  EXPECT_EQ(read_code("%YAML:1.0\n---\nK: [ 1., 0, 0, 0, 1, 0, 0, 0, 1 ]\n"
+                      "image_width: 640\nimage_height: 0\n"),
             "camera.size");
   const std::string broken =
-      code_of("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: [\n");
+      read_code("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: [\n");
   EXPECT_TRUE(broken == "camera.syntax" || broken == "camera.matrix") << broken;
 }
 

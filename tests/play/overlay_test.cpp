@@ -9,14 +9,14 @@
 namespace modar {
 namespace {
 
-constexpr int kWidth = 50;
-constexpr int kHeight = 40;
+constexpr int kSheetWidth = 50;
+constexpr int kSheetHeight = 40;
 
 struct Paper {
-  std::vector<std::uint8_t> rgba = std::vector<std::uint8_t>(kWidth * kHeight * 4, 0);
-  Canvas canvas{rgba, kWidth, kHeight};
+  std::vector<std::uint8_t> rgba = std::vector<std::uint8_t>(kSheetWidth * kSheetHeight * 4, 0);
+  Canvas canvas{rgba, kSheetWidth, kSheetHeight};
   [[nodiscard]] int red(int x, int y) const {
-    return rgba[static_cast<std::size_t>((y * kWidth + x) * 4)];
+    return rgba[static_cast<std::size_t>((y * kSheetWidth + x) * 4)];
   }
 };
 
@@ -34,8 +34,8 @@ TEST(Overlay, ALineCoversItsWidthAndNothingElse) {
   for (const auto& [from, to] : segments) {
     Paper paper;
     draw_line(paper.canvas, from, to, 3, {255, 0, 0});
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < kSheetHeight; ++y) {
+      for (int x = 0; x < kSheetWidth; ++x) {
         const double away = distance(x, y, from, to);
         if (away < 0.99) {
           ASSERT_EQ(paper.red(x, y), 255) << x << ' ' << y;
@@ -51,7 +51,7 @@ TEST(Overlay, ALineCoversItsWidthAndNothingElse) {
 TEST(Overlay, ALineThatLeavesThePictureIsClipped) {
   Paper paper;
   draw_line(paper.canvas, {-1e7, 20}, {1e7, 20}, 1, {255, 0, 0});
-  for (int x = 0; x < kWidth; ++x) EXPECT_EQ(paper.red(x, 20), 255);
+  for (int x = 0; x < kSheetWidth; ++x) EXPECT_EQ(paper.red(x, 20), 255);
   EXPECT_EQ(paper.red(0, 22), 0);
   draw_line(paper.canvas, {-5, -5}, {-5, 500}, 1, {255, 0, 0});
   draw_line(paper.canvas, {NAN, 0}, {3, 3}, 1, {255, 0, 0});

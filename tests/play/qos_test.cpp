@@ -13,7 +13,7 @@ namespace modar {
 namespace {
 
 using nlohmann::json;
-const std::vector<std::string> kNames = {"box"};
+const std::vector<std::string> kOneName = {"box"};
 
 TEST(Qos, LogsHeadEventsSecondsAndSummary) {
   const test::Folder folder;
@@ -38,7 +38,7 @@ TEST(Qos, LogsHeadEventsSecondsAndSummary) {
       memory.gpu_textures = 77;
       ASSERT_TRUE(log->window(memory));
     }
-    ASSERT_TRUE(log->add(report, kNames));
+    ASSERT_TRUE(log->add(report, kOneName));
   }
   EXPECT_FALSE(std::filesystem::exists(path)) << "not before it is whole";
   ASSERT_TRUE(log->finish("{\"summary\":{}}"));

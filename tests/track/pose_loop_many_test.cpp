@@ -11,8 +11,6 @@ namespace {
 
 using namespace test;  // the samples
 
-constexpr int kWidth = 640;
-constexpr int kHeight = 480;
 constexpr std::size_t kMany = 16;
 
 const cv::Mat& picture_of(std::size_t i) {

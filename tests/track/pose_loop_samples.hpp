@@ -12,6 +12,10 @@
 
 namespace modar::test {
 
+/// Frames of the tests, pixels.
+constexpr int kWidth = 640;
+constexpr int kHeight = 480;
+
 /// The pattern of most tests, 300x240.
 const cv::Mat& picture();
 /// A small record of a picture: fewer codes and trials than a bake makes by default.

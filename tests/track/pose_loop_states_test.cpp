@@ -15,9 +15,6 @@ namespace {
 
 using namespace test;  // the samples
 
-constexpr int kWidth = 640;
-constexpr int kHeight = 480;
-
 std::unique_ptr<PoseLoop> loop_of(const std::vector<std::byte>& bundle,
                                   const PoseLoopOptions& options = {},
                                   const Camera& camera = default_camera(kWidth, kHeight)) {
