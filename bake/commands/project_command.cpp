@@ -226,7 +226,7 @@ Result<std::string> cache_folder(const std::string& named) {
   return project.cache.empty() ? std::string(kCacheFolder) : project.cache;
 }
 
-struct PlanCommand {
+struct NinjaPlanCommand {
   std::string file = kProjectFile;
   std::string cache;
   std::string runner;
@@ -258,7 +258,7 @@ std::string shell_quoted(const std::string& word) {
 
 /// An edge for each asset, which bakes it into the cache, and one for all bundles. Stamps stand for
 /// entries of the cache, whose names nobody knows before the bake.
-std::string ninja_plan(const PlanCommand& command, const Project& project,
+std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
                        const ProjectOutcome& planned) {
   const std::string runner = command.runner.empty() ? "" : command.runner + " ";
   const std::string bake = "modar bake --quiet --project " + shell_quoted(command.file) +
@@ -287,7 +287,7 @@ std::string ninja_plan(const PlanCommand& command, const Project& project,
   return text + "build" + bundles + ": bundles" + stamps + "\n";
 }
 
-Result<ExitCode> run_plan(PlanCommand& command) {
+Result<ExitCode> write_ninja_plan(NinjaPlanCommand& command) {
   MODAR_ASSIGN(const Project project, read_project(command.file));
   if (command.cache.empty()) {
     command.cache = project.path(project.cache.empty() ? kCacheFolder : project.cache);
@@ -344,7 +344,7 @@ void add_init(CommandLine& program) {
 void add_plan(CommandLine& program) {
   CommandLine& line =
       program.command("plan", "Write a build file that bakes a project's assets apart");
-  const auto command = std::make_shared<PlanCommand>();
+  const auto command = std::make_shared<NinjaPlanCommand>();
   line.flag("--ninja", command->ninja,
             "For Ninja, to stdout: one edge an asset, and one for the bundles", {.required = true});
   line.option("--project", &command->file, "The project", {.type = "FILE", .shows_default = true});
@@ -355,7 +355,7 @@ void add_plan(CommandLine& program) {
   line.footer(
       example("  modar plan --ninja --run 'srun -Q -n1' --cache /srv/modar-cache > build.ninja && "
               "ninja\n"));
-  line.run([command] { return run_plan(*command); });
+  line.run([command] { return write_ninja_plan(*command); });
 }
 
 void add_cache(CommandLine& program) {
