@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "bake/commands/ship_json.hpp"
+#include "bake/output.hpp"
 #include "bake/ship/keys.hpp"
 #include "bake/ship/release_folder.hpp"
 #include "bake/terminal.hpp"
@@ -130,6 +131,10 @@ int run_keygen(const KeygenCommand& command) {
   }
   std::string pass_phrase;
   if (!command.pass_phrase_file.empty()) {
+    for (const std::string& file : {command.out, public_file}) {
+      const auto kept = keep_inputs(file, {command.pass_phrase_file});
+      if (!kept) return print_error(kept.error());
+    }
     const auto text = read_text(command.pass_phrase_file);
     if (!text) return print_error(text.error());
     pass_phrase = first_line(*text);

@@ -182,6 +182,14 @@ class Keys(ShipTest):
         self.assertEqual(self.modar(*publish, "--pass-phrase-file", phrase, "--quiet").returncode, 0)
         self.fetch_json(trust=f"{key}.pub")
 
+    def test_keygen_keeps_the_file_of_the_pass_phrase(self):
+        phrase = self.folder / "phrase.pub"
+        phrase.write_text("open sesame\n")
+        for out in (phrase, self.folder / "phrase"):  # the secret key, and the public one beside it
+            done = self.modar("ship", "keygen", "--force", "--out", out, "--pass-phrase-file", phrase)
+            self.assert_fails(done, 1, "out.input")
+            self.assertEqual(phrase.read_text(), "open sesame\n")
+
     def test_only_the_key_that_devices_follow_publishes(self):
         self.publish(self.shop.old)
         other = self.folder / "other"
