@@ -25,7 +25,7 @@ struct FloatMesh {
   std::vector<std::uint32_t> indices;
 };
 
-FloatMesh read_model(const BundleView& bundle, const ModelRecord& model) {
+FloatMesh floats_of(const BundleView& bundle, const ModelRecord& model) {
   FloatMesh mesh;
   const VertexDecoder decoder(bundle.layouts()[model.layout]);
   const auto append = [](std::vector<float>& to, const auto& values, int count) {
@@ -104,7 +104,7 @@ DracoPeer encode_with_draco(const BundleView& bundle, std::uint32_t model) {
     ++peer.position_bits;
   }
   draco::Mesh mesh;
-  to_draco(read_model(bundle, record), mesh);
+  to_draco(floats_of(bundle, record), mesh);
   draco::Encoder encoder;
   encoder.SetSpeedOptions(0, 0);
   encoder.SetAttributeQuantization(draco::GeometryAttribute::POSITION, peer.position_bits);
