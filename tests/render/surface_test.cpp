@@ -88,7 +88,7 @@ std::vector<Triangle> some_triangles() {
   return triangles;
 }
 
-glm::dmat4 some_view() {
+glm::dmat4 tilted_view() {
   return glm::rotate(glm::translate(glm::dmat4(1.0), glm::dvec3(0.1, 0.05, -2.25)), 0.4,
                      glm::normalize(glm::dvec3(0.2, 1.0, 0.1)));
 }
@@ -149,7 +149,7 @@ class SurfaceTest : public GlTest {
     renderer_ = make_renderer(*bundle_->view, probe_gl_caps());
     ASSERT_TRUE(renderer_);
     host_ = std::make_unique<HostSurface>();
-    hits_ = cast_rays(frame_camera(), to_eye_space(triangles_, some_view(), false));
+    hits_ = cast_rays(frame_camera(), to_eye_space(triangles_, tilted_view(), false));
     for (std::size_t i = 0; i < picture_.size(); ++i) {
       picture_[i] = static_cast<std::uint8_t>(i * 37 % 251);
     }
@@ -169,7 +169,7 @@ class SurfaceTest : public GlTest {
     return frame;
   }
   void draw(const SurfaceView& surface, bool with_picture, std::uint32_t model = 0) {
-    const DrawItem items[] = {{model, glm::mat4(some_view())}};
+    const DrawItem items[] = {{model, glm::mat4(tilted_view())}};
     host_->clear(0.2f, 0.4f, 0.6f, 1.0f);
     renderer_->draw(surface, frame(with_picture), gl_projection(frame_camera(), 0.1, 100.0), items);
   }
@@ -249,7 +249,7 @@ TEST_F(SurfaceTest, ATouchFindsTheFramesPixel) {
 
 TEST_F(SurfaceTest, AlphaIsTheCoverageOfTheModels) {
   const SurfaceView surface{0, 0, kWidth, kHeight, 0, false, false, true};
-  const DrawItem items[] = {{1, glm::mat4(some_view())}};
+  const DrawItem items[] = {{1, glm::mat4(tilted_view())}};
   host_->clear(0, 0, 0, 0);
   renderer_->draw(surface, frame(false), gl_projection(frame_camera(), 0.1, 100.0), items);
   const std::vector<std::uint8_t> pixels = host_->pixels();
@@ -274,7 +274,7 @@ TEST_F(SurfaceTest, TwoBundlesShareOneFrameAndItsDepth) {
   const std::vector<std::uint8_t> first = host_->pixels();
   // The same in gray, a little farther away: what the first covers stays.
   const glm::mat4 away = glm::translate(glm::mat4(1.0f), glm::vec3(0, 0, -0.5f));
-  const DrawItem behind[] = {{2, away * glm::mat4(some_view())}};
+  const DrawItem behind[] = {{2, away * glm::mat4(tilted_view())}};
   surface.clear_depth = false;
   second->draw(surface, frame(false), gl_projection(frame_camera(), 0.1, 100.0), behind);
   const std::vector<std::uint8_t> both = host_->pixels();
@@ -415,7 +415,7 @@ TEST_F(SurfaceTest, TheAppsStateIsAsItWas) {
   host_->clear(0, 0, 0, 1);
   const Host app;
   const std::vector<GLint> before = host_state();
-  const DrawItem items[] = {{0, glm::mat4(some_view())}};
+  const DrawItem items[] = {{0, glm::mat4(tilted_view())}};
   const glm::mat4 projection = gl_projection(frame_camera(), 0.1, 100.0);
   const auto expect_unchanged = [&](const char* what, const std::function<void()>& call) {
     call();
@@ -441,7 +441,7 @@ TEST_F(SurfaceTest, TheAppsStateIsAsItWas) {
 
 TEST_F(SurfaceTest, NoPictureNeverStretches) {
   ASSERT_TRUE(renderer_->resize(kWidth, 2 * kHeight));
-  const DrawItem items[] = {{0, glm::mat4(some_view())}};
+  const DrawItem items[] = {{0, glm::mat4(tilted_view())}};
   renderer_->render(frame(false), gl_projection(frame_camera(), 0.1, 100.0), items);
   std::vector<std::uint8_t> pixels(std::size_t{kWidth} * 2 * kHeight * 4);
   renderer_->read_pixels(pixels);
