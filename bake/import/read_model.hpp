@@ -42,8 +42,9 @@ std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& 
 /// roughness and opacity of materials; Draco-compressed primitives. Images inside the file become
 /// temporary files that live as long as the model's materials. Whatever is left out (points, lines,
 /// skins, morph targets) becomes a diagnostic. Errors: kIo "gltf.open", kInvalidInput "gltf.read",
-/// "gltf.no-faces", "gltf.accessor" (data outside of its buffer, an index beyond its vertices); kUnsupported
-/// "gltf.version" (glTF 1.0), "gltf.extension" (required extensions that are not read, by name).
+/// "gltf.no-faces", "gltf.accessor" (data outside of its buffer, an index beyond its vertices);
+/// kUnsupported "gltf.version" (glTF 1.0), "gltf.extension" (required extensions that are not read,
+/// by name).
 Result<SourceModel> read_gltf(const std::string& path);
 
 }  // namespace modar

@@ -122,8 +122,8 @@ class ModelBench {
     const std::string report = folder_ + "/report.json";
     const ProcessOutcome outcome =
         run_measured({{program_folder() + "/modar", "bake", "--model", obj_, "--no-lods",
-                       "--positions", positions, "--jobs", std::to_string(jobs),
-                       "--quiet", "--json", "-o", folder_ + "/ours.modar"},
+                       "--positions", positions, "--jobs", std::to_string(jobs), "--quiet",
+                       "--json", "-o", folder_ + "/ours.modar"},
                       {},
                       report});
     std::ifstream file(report);
