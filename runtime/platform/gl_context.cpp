@@ -158,6 +158,8 @@ GlCaps probe_gl_caps() {
   caps.depth24 = es3 || has("GL_OES_depth24");
   caps.debug_groups = has("GL_KHR_debug") || has("GL_EXT_debug_marker");
   caps.instanced_arrays = es3 || has("GL_EXT_instanced_arrays") || has("GL_ANGLE_instanced_arrays");
+  caps.vertex_arrays = es3 || has("GL_OES_vertex_array_object");
+  caps.es3 = es3;
   caps.max_texture_size = gl_integer(GL_MAX_TEXTURE_SIZE, 64);
   caps.max_vertex_uniform_vectors = gl_integer(GL_MAX_VERTEX_UNIFORM_VECTORS, 128);
   caps.max_vertex_attributes = gl_integer(GL_MAX_VERTEX_ATTRIBS, 8);
@@ -188,6 +190,8 @@ Result<GlCaps> mask_gl_caps(const GlCaps& caps, const std::string& device) {
     masked.instanced_arrays =
         masked.instanced_arrays && (profile->has_extension("GL_EXT_instanced_arrays") ||
                                     profile->has_extension("GL_ANGLE_instanced_arrays"));
+    mask(masked.vertex_arrays, "GL_OES_vertex_array_object");
+    masked.es3 = false;
   }
   masked.max_texture_size = std::min(caps.max_texture_size, profile->max_texture_size);
   masked.max_vertex_uniform_vectors =

@@ -164,10 +164,10 @@ GlExtensions load_gl_extensions(const GlCaps& caps) {
       look_up(found.vertex_attrib_divisor, "glVertexAttribDivisor");
     }
   }
-  if (text_of(GL_VERSION).starts_with("OpenGL ES 3")) {
+  if (caps.es3) {
     look_up(found.bind_vertex_array, "glBindVertexArray");
     look_up(found.bind_sampler, "glBindSampler");
-  } else if (lists_extension(list, "GL_OES_vertex_array_object")) {
+  } else if (caps.vertex_arrays && lists_extension(list, "GL_OES_vertex_array_object")) {
     look_up(found.bind_vertex_array, "glBindVertexArrayOES");
   }
   if (caps.debug_groups && lists_extension(list, "GL_KHR_debug")) {

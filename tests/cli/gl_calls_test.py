@@ -29,6 +29,10 @@ def extensions():
     return owners
 
 
+# Constants of ES 3 with the number of one of ES 2.0: the tracer writes the former.
+SAME_NUMBER = {"GL_DRAW_FRAMEBUFFER_BINDING": "GL_FRAMEBUFFER_BINDING"}
+
+
 def strangers(dump, allowed):
     """Calls and constants of a dump that neither ES 2.0 nor an allowed extension has."""
     known, owners = core(), extensions()
@@ -39,7 +43,7 @@ def strangers(dump, allowed):
         if not call or line.endswith("// fake"):
             continue
         constants = [] if "Source" in call[1] else re.findall(r"\bGL_\w+", re.sub(r'"[^"]*"', "", call[2]))
-        for word in [call[1], *constants]:
+        for word in [call[1], *(SAME_NUMBER.get(name, name) for name in constants)]:
             # The tracer writes constants without the suffix that they have on ES 2.0.
             names = [word, *(word + suffix for suffix in ("_OES", "_KHR", "_EXT"))]
             if word not in known and not any(owners[name] & allowed for name in names):

@@ -22,6 +22,8 @@ struct GlCaps {
   bool depth24 = false;               ///< GL_OES_depth24
   bool debug_groups = false;          ///< GL_KHR_debug or GL_EXT_debug_marker
   bool instanced_arrays = false;      ///< GL_EXT/ANGLE_instanced_arrays, or the core of ES 3
+  bool vertex_arrays = false;         ///< GL_OES_vertex_array_object, or the core of ES 3
+  bool es3 = false;                   ///< has the state of ES 3 besides
   int max_texture_size = 64;
   int max_vertex_uniform_vectors = 128;
   int max_vertex_attributes = 8;
