@@ -43,6 +43,9 @@ THIRD_PARTIES = {
     "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),
     "bake/lab/tinyobj_library": (r"bake/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),
     "curl/": (r"runtime/fetch/curl_line\.cpp",),
+    "httplib.h": (r"bake/web/serve\.cpp",),
+    "openssl/": (r"bake/web/serve\.cpp",),
+    "qrencode.h": (r"bake/web/serve\.cpp",),
     "SDL": (r"runtime/play/desk_.*\.cpp", r"tests/.*"),
     "png.h": (r"bake/image/png\.cpp",),
     "jpeglib.h": (r"bake/image/jpeg\.cpp",),
@@ -75,7 +78,7 @@ def standard_header(name):
 
 # Rooms of the workstation from the bottom up: each includes those before it, and of its own rank itself only.
 BAKE_ROOMS = (("bake", "bake/memory"), ("bake/image", "bake/import", "bake/video"), ("bake/mesh",),
-              ("bake/texture", "bake/pattern"), ("bake/bundle", "bake/export", "bake/ship"), ("bake/check",), ("bake/page", "bake/project"), ("bake/lab",), ("bake/commands",))
+              ("bake/texture", "bake/pattern"), ("bake/bundle", "bake/export", "bake/ship", "bake/web"), ("bake/check",), ("bake/page", "bake/project"), ("bake/lab",), ("bake/commands",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
 # The door that the command line has to the proofs.
 LAB_DOORS = ("bake/lab/bench.hpp", "bake/lab/mutate.hpp")

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # First light: bakes a model and a pattern, checks the bundle, plays a video with the model on it.
 #   scripts/demo.sh          spider.obj on the box of a real hand-held video (Debian packages)
+#   scripts/demo.sh --web    the same as a page for browsers in out/web (Debian's emscripten compiles its engine)
 #   scripts/demo.sh --own    our own pottery on our own cover, on a clip that we render: needs no
 #                            package but the build's
 # Leaves everything in out/demo (out/demo-own) and prints where to look.
@@ -9,10 +10,12 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 own=no
+web=no
 case ${1:-} in
   "") ;;
   --own) own=yes ;;
-  -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
+  --web) web=yes ;;
+  -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "demo.sh: '$1' is not understood; try --help" >&2; exit 1 ;;
 esac
 
@@ -33,7 +36,7 @@ package_file() {
 }
 
 step "Packages"
-if [ $own = yes ]; then scripts/setup.sh; else scripts/setup.sh demo; fi
+if [ $own = yes ]; then scripts/setup.sh; elif [ $web = yes ]; then scripts/setup.sh demo test; else scripts/setup.sh demo; fi
 
 step "Build (release)"
 cmake --preset release >build-release.log 2>&1 || { cat build-release.log >&2; exit 4; }
@@ -75,6 +78,17 @@ bundle=$out/demo.modar
 step "Check"
 "$bin/modar" check "$bundle"
 "$bin/modar" inspect "$bundle"
+
+if [ $web = yes ]; then
+  step "Page"
+  cmake --preset web >/dev/null
+  cmake --build --preset web
+  "$bin/modar" web "$bundle" -o out/web --title "A spider on a box"
+  step "Done. Open it"
+  echo "here:       python3 -m http.server --bind 127.0.0.1 --directory $root/out/web   (http://localhost:8000)"
+  echo "on a phone: $root/$bin/modar web $root/$bundle -o $root/out/web --title 'A spider on a box' --serve"
+  exit
+fi
 
 step "Play"
 # Our own loop, the default, holds this small, tilted picture throughout; --method paper finds it in few

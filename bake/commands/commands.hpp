@@ -17,5 +17,6 @@ void add_init(CommandLine& program);
 void add_cache(CommandLine& program);
 void add_plan(CommandLine& program);
 void add_report(CommandLine& program);
+void add_web(CommandLine& program);
 
 }  // namespace modar

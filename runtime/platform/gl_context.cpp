@@ -149,8 +149,17 @@ GlCaps probe_gl_caps() {
   const auto has = [&](std::string_view name) { return lists_extension(extensions, name); };
   const bool es3 = es_major(caps.version) >= 3;
   caps.half_float_vertices = has("GL_OES_vertex_half_float");
+  if (es3 && caps.version.find("WebGL") != std::string::npos) {
+    caps.half_float_vertices = true;
+    caps.half_float_type = 0x140B;
+  }
   for (const TextureFormatInfo& format : kTextureFormats) {
     if (has(format.gl_extension)) caps.texture_formats |= bit_of(format);
+  }
+  if (has("GL_WEBGL_compressed_texture_etc1") || has("GL_WEBGL_compressed_texture_etc")) {
+    caps.texture_formats |=
+        bit_of(*find_texture_format(static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb)));
+    if (!has("GL_WEBGL_compressed_texture_etc1")) caps.etc1_format = 0x9274;
   }
   caps.etc1_sub_texture =
       caps.reads(TextureFormat::kEtc1Rgb) && has("GL_EXT_compressed_ETC1_RGB8_sub_texture");

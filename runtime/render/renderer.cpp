@@ -24,7 +24,8 @@ namespace {
 std::vector<VertexFormat> vertex_formats(const BundleView& bundle, const GlCaps& caps) {
   std::vector<VertexFormat> formats;
   for (std::uint32_t i = 0; i < bundle.layouts().size(); ++i) {
-    formats.push_back(vertex_format(bundle.layouts()[i], caps.half_float_vertices));
+    formats.push_back(
+        vertex_format(bundle.layouts()[i], caps.half_float_vertices ? caps.half_float_type : 0));
   }
   return formats;
 }
@@ -344,6 +345,8 @@ void Renderer::blit_to_window(int window_width, int window_height) {
 }
 
 void Renderer::set_options(const RenderOptions& options) {
+  // The state that later frames build on: what was uploaded before left the app's behind.
+  if (options.exclusive_context && !state_->options.exclusive_context) state_->gl.reset();
   state_->options = options;
 }
 

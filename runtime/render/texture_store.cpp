@@ -19,6 +19,7 @@ bool power_of_two(const TextureRecord& texture) {
 TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
     : bundle_(bundle),
       formats_(caps.texture_formats),
+      etc1_format_(caps.etc1_format),
       npot_mipmaps_(caps.npot_mipmaps),
       max_side_(static_cast<std::uint32_t>(caps.max_texture_size)) {
   const std::uint32_t count = bundle.textures().size();
@@ -121,7 +122,9 @@ GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
     const GLsizei width = static_cast<GLsizei>(level.width);
     const GLsizei height = static_cast<GLsizei>(level.height);
     if (reads(record)) {
-      glCompressedTexImage2D(GL_TEXTURE_2D, target_level, format.gl_format, width, height, 0,
+      const GLenum gl_format =
+          format.format == TextureFormat::kEtc1Rgb ? etc1_format_ : format.gl_format;
+      glCompressedTexImage2D(GL_TEXTURE_2D, target_level, gl_format, width, height, 0,
                              static_cast<GLsizei>(level.size), blocks.data());
       uploaded_bytes_ += level.size;
     } else {

@@ -40,6 +40,7 @@ class TextureStore {
 
   const BundleView& bundle_;
   std::uint32_t formats_ = 0;  ///< as in GlCaps
+  GLenum etc1_format_ = 0;
   bool npot_mipmaps_ = false;
   std::uint32_t max_side_ = 64;
   std::vector<bool> used_;

@@ -8,10 +8,10 @@
 namespace modar {
 namespace {
 
-GLenum gl_type(ComponentType type) {
+GLenum gl_type(ComponentType type, GLenum half_type) {
   switch (type) {
     case ComponentType::kHalf:
-      return GL_HALF_FLOAT_OES;
+      return half_type;
     case ComponentType::kI16:
       return GL_SHORT;
     case ComponentType::kU16:
@@ -51,10 +51,10 @@ bool has_halves(const LayoutRecord& layout) {
 
 }  // namespace
 
-VertexFormat vertex_format(const LayoutRecord& layout, bool halves) {
+VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type) {
   VertexFormat format;
   format.source_stride = layout.stride;
-  format.widened = !halves && has_halves(layout);
+  format.widened = half_type == 0 && has_halves(layout);
   std::uint32_t end = 0;
   for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
     const AttributeRecord& record = layout.attributes[i];
@@ -65,7 +65,7 @@ VertexFormat vertex_format(const LayoutRecord& layout, bool halves) {
     const bool widen = format.widened && type == ComponentType::kHalf;
     VertexAttribute& attribute = format.attributes[location];
     attribute.components = record.components;
-    attribute.type = widen ? GLenum{GL_FLOAT} : gl_type(type);
+    attribute.type = widen ? GLenum{GL_FLOAT} : gl_type(type, half_type);
     attribute.normalised = record.normalised != 0 ? GLboolean{GL_TRUE} : GLboolean{GL_FALSE};
     attribute.source_offset = record.offset;
     attribute.bytes = component_bytes(record.type) * record.components;

@@ -31,8 +31,9 @@ struct VertexFormat {
   std::uint32_t enabled = 0;  ///< bit mask of AttributeSlot
 };
 
-/// halves: the context reads half floats. Attributes of unknown semantics are left out.
-VertexFormat vertex_format(const LayoutRecord& layout, bool halves);
+/// half_type: what the context calls half floats; 0: it reads none. Attributes of unknown semantics
+/// are left out.
+VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type);
 
 /// Rewrites vertices of format.source_stride to format.stride. to.size() and from.size() hold the
 /// same number of whole vertices.

@@ -439,6 +439,17 @@ TEST_F(SurfaceTest, TheAppsStateIsAsItWas) {
   EXPECT_EQ(wrong, 0);
 }
 
+TEST_F(SurfaceTest, AContextOfItsOwnFromNowOnShowsTheSame) {
+  const SurfaceView surface = surface_of(0, false, false);
+  // This frame ends by unbinding all: the next one must not rely on what it had bound.
+  draw(surface, true);
+  RenderOptions options;
+  options.exclusive_context = true;
+  renderer_->set_options(options);
+  draw(surface, true);
+  expect_surface(surface, true);
+}
+
 TEST_F(SurfaceTest, NoPictureNeverStretches) {
   ASSERT_TRUE(renderer_->resize(kWidth, 2 * kHeight));
   const DrawItem items[] = {{0, glm::mat4(tilted_view())}};

@@ -1,0 +1,84 @@
+// `modar web`: a page for browsers from bundles, and a server to try it on a phone.
+#include <cstdio>
+#include <memory>
+
+#include "bake/commands/commands.hpp"
+#include "bake/json.hpp"
+#include "bake/terminal.hpp"
+#include "bake/web/serve.hpp"
+#include "bake/web/site.hpp"
+
+namespace modar {
+namespace {
+
+struct WebCommand {
+  SiteOptions options;
+  bool serve = false;
+  int port = 8443;
+  bool quiet = false;
+  bool json = false;
+};
+
+void print_addresses(const WebCommand& command, const std::vector<std::string>& urls) {
+  for (const std::string& url : urls) std::printf("%s\n", url.c_str());
+  std::fflush(stdout);
+  if (command.quiet) return;
+  std::fprintf(
+      stderr,
+      "%s\nThe phone has to be in the same network. Its browser warns of the certificate, which "
+      "this command has made: go on all the same. Ctrl-C ends the server.\n",
+      qr_code(urls.front()).c_str());
+}
+
+Result<ExitCode> run_web(const WebCommand& command) {
+  MODAR_ASSIGN(const Site site, write_site(command.options));
+  if (command.json) {
+    const Json json = {{"folder", command.options.output},
+                       {"page_bytes", site.page_bytes},
+                       {"bundle_bytes", site.bundle_bytes},
+                       {"files", Json::list(site.files)}};
+    std::fputs(json.dump().c_str(), stdout);
+  } else if (!command.quiet) {
+    std::fprintf(stderr, "wrote %s: %zu files, page and engines %s, bundles %s\n",
+                 command.options.output.c_str(), site.files.size(),
+                 human_bytes(site.page_bytes).c_str(), human_bytes(site.bundle_bytes).c_str());
+  }
+  if (!command.serve) return ExitCode::kOk;
+  MODAR_TRY(serve_site({command.options.output, command.port},
+                       [&](const auto& urls) { print_addresses(command, urls); }));
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void add_web(CommandLine& program) {
+  CommandLine& line = program.command("web", "A page that plays bundles in a browser, offline too");
+  const auto command = std::make_shared<WebCommand>();
+  SiteOptions& options = command->options;
+  line.option("bundles", &options.bundles, "What the page plays",
+              {.type = "BUNDLE...", .required = true});
+  line.option("-o,--output", &options.output, "The folder to write: any web server serves it",
+              {.type = "DIR", .required = true});
+  line.option("--title", &options.title, "Its title; else the first bundle's name",
+              {.type = "TEXT"});
+  line.option("--languages", &options.languages, "Of its words, the first for all others: de,en",
+              {.type = "LANGUAGE", .separator = ','});
+  line.option("--texts", &options.texts, "Names and texts of the patterns, in these languages",
+              {.type = "JSON"});
+  line.option("--page", &options.page, "The page's files; else those installed or built with modar",
+              {.type = "DIR"});
+  line.flag("--serve", command->serve, "Serve it by HTTPS, with a QR code of the address");
+  line.option("--port", &command->port, "Of that server; 0: any that is free",
+              {.shows_default = true, .least = 0, .most = 65535});
+  line.flag("--quiet", command->quiet, "Print nothing but errors and addresses");
+  line.flag("--json", command->json, "Print what was written as JSON");
+  line.footer(example(
+      "  modar web vase.modar -o site --title 'The red vase' --languages de,en --texts texts.json\n"
+      "  modar web vase.modar -o site --serve\n"
+      "\n"
+      "texts.json: {\"cover\": {\"en\": {\"name\": \"The cover\", \"text\": \"Printed in "
+      "1890.\"}}}\n"));
+  line.run([command] { return run_web(*command); });
+}
+
+}  // namespace modar

@@ -1,0 +1,130 @@
+// HTTPS by cpp-httplib (whose package says that it has OpenSSL), a certificate by OpenSSL, the
+// address as a QR code by libqrencode.
+#include "bake/web/serve.hpp"
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+
+#include <array>
+#include <memory>
+
+#include <httplib.h>
+#include <openssl/evp.h>
+#include <openssl/x509v3.h>
+#include <qrencode.h>
+
+namespace modar {
+namespace {
+
+/// A certificate serves one run of the command, days at most.
+constexpr long kValidSeconds = 7L * 24 * 3600;
+
+using Key = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
+using Certificate = std::unique_ptr<X509, decltype(&X509_free)>;
+
+/// This machine's addresses in its networks, as IPv4 has them.
+std::vector<std::string> own_addresses() {
+  std::vector<std::string> found;
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return found;
+  for (const ifaddrs* each = all; each != nullptr; each = each->ifa_next) {
+    if (each->ifa_addr == nullptr || each->ifa_addr->sa_family != AF_INET) continue;
+    if ((each->ifa_flags & IFF_LOOPBACK) != 0 || (each->ifa_flags & IFF_UP) == 0) continue;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    const auto* address = reinterpret_cast<const sockaddr_in*>(each->ifa_addr);
+    if (inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size()) != nullptr) {
+      found.emplace_back(text.data());
+    }
+  }
+  freeifaddrs(all);
+  return found;
+}
+
+/// Signed by its own key, for localhost and the addresses. Null where OpenSSL fails.
+Certificate make_certificate(EVP_PKEY* key, const std::vector<std::string>& addresses) {
+  Certificate certificate(X509_new(), X509_free);
+  X509* x509 = certificate.get();
+  std::string names = "DNS:localhost,IP:127.0.0.1";
+  for (const std::string& address : addresses) names += ",IP:" + address;
+  X509_NAME* subject = X509_get_subject_name(x509);
+  const auto* common = reinterpret_cast<const unsigned char*>("ModAR on this machine");
+  const bool made =
+      X509_set_version(x509, 2) == 1 && ASN1_INTEGER_set(X509_get_serialNumber(x509), 1) == 1 &&
+      X509_gmtime_adj(X509_getm_notBefore(x509), -3600) != nullptr &&
+      X509_gmtime_adj(X509_getm_notAfter(x509), kValidSeconds) != nullptr &&
+      X509_set_pubkey(x509, key) == 1 &&
+      X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_ASC, common, -1, -1, 0) == 1 &&
+      X509_set_issuer_name(x509, subject) == 1;
+  if (!made) return {nullptr, X509_free};
+  X509_EXTENSION* extension =
+      X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name, names.c_str());
+  const bool named = extension != nullptr && X509_add_ext(x509, extension, -1) == 1;
+  X509_EXTENSION_free(extension);
+  if (!named || X509_sign(x509, key, EVP_sha256()) == 0) return {nullptr, X509_free};
+  return certificate;
+}
+
+tl::unexpected<Error> no_server(int port, const char* cause) {
+  return fail(ExitCode::kIo, "web.port", "port " + std::to_string(port), cause,
+              "name another port: --port");
+}
+
+}  // namespace
+
+Result<void> serve_site(const ServeOptions& options,
+                        const std::function<void(const std::vector<std::string>&)>& ready) {
+  const std::vector<std::string> addresses = own_addresses();
+  const Key key(EVP_EC_gen("P-256"), EVP_PKEY_free);
+  const Certificate certificate =
+      key == nullptr ? Certificate(nullptr, X509_free) : make_certificate(key.get(), addresses);
+  if (certificate == nullptr) return no_server(options.port, "OpenSSL makes no certificate");
+  httplib::SSLServer server(certificate.get(), key.get());
+  if (!server.is_valid() || !server.set_mount_point("/", options.folder)) {
+    return no_server(options.port, "the server does not start");
+  }
+  server.set_file_extension_and_mimetype_mapping("js", "text/javascript");
+  server.set_file_extension_and_mimetype_mapping("wasm", "application/wasm");
+  server.set_file_extension_and_mimetype_mapping("modar", "application/octet-stream");
+  server.set_file_extension_and_mimetype_mapping("webmanifest", "application/manifest+json");
+  int port = options.port;
+  if (port == 0) {
+    port = server.bind_to_any_port("0.0.0.0");
+  } else if (!server.bind_to_port("0.0.0.0", port)) {
+    port = -1;
+  }
+  if (port < 0) return no_server(options.port, "another program has it, or this one may not");
+  std::vector<std::string> urls;
+  for (const std::string& address : addresses)
+    urls.push_back("https://" + address + ":" + std::to_string(port) + "/");
+  urls.push_back("https://localhost:" + std::to_string(port) + "/");
+  ready(urls);
+  if (!server.listen_after_bind()) return no_server(port, "the server stopped");
+  return {};
+}
+
+std::string qr_code(const std::string& text) {
+  const std::unique_ptr<QRcode, decltype(&QRcode_free)> code(
+      QRcode_encodeString(text.c_str(), 0, QR_ECLEVEL_L, QR_MODE_8, 1), QRcode_free);
+  if (code == nullptr) return {};
+  constexpr int kQuiet =
+      2;  // modules of light around it: cameras read 2 as well as the standard's 4
+  const auto dark = [&](int x, int y) {
+    if (x < 0 || y < 0 || x >= code->width || y >= code->width) return false;
+    return (code->data[y * code->width + x] & 1) != 0;
+  };
+  // Terminals are dark as a rule: light modules are drawn, dark ones left out.
+  std::string lines;
+  for (int y = -kQuiet; y < code->width + kQuiet; y += 2) {
+    for (int x = -kQuiet; x < code->width + kQuiet; ++x) {
+      const bool upper = !dark(x, y);
+      const bool lower = !dark(x, y + 1);
+      lines += upper && lower ? "\u2588" : upper ? "\u2580" : lower ? "\u2584" : " ";
+    }
+    lines += '\n';
+  }
+  return lines;
+}
+
+}  // namespace modar

@@ -1,0 +1,27 @@
+// A site opened on this machine, for phones in the same network.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct ServeOptions {
+  std::string folder;
+  int port = 8443;  ///< 0: any that is free
+};
+
+/// Serves the folder by HTTPS until the process is ended: browsers give the camera to nothing less.
+/// The certificate is made on the spot and signed by nobody, so that browsers ask once.
+/// ready: called with the addresses, the first for other devices, once they answer.
+/// Errors: kIo "web.port".
+Result<void> serve_site(const ServeOptions& options,
+                        const std::function<void(const std::vector<std::string>&)>& ready);
+
+/// The text as a QR code of block letters, two modules a letter; empty where it is too long.
+std::string qr_code(const std::string& text);
+
+}  // namespace modar

@@ -1,0 +1,305 @@
+// The page's files, copied; and what depends on the bundles: site.json, hints, manifest, sw.js.
+#include "bake/web/site.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "bake/image/image.hpp"
+#include "bake/json.hpp"
+#include "bake/output.hpp"
+#include "bake/process.hpp"
+#include "formats/atomic_file.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
+#include "formats/tracker_record.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What is copied as it is; index.html, sw.js and the words are written with changes.
+constexpr std::array<std::string_view, 13> kPageFiles = {
+    "app.js",           "engine.js",    "engine-plain.js", "engine-plain.wasm", "engine-simd.js",
+    "engine-simd.wasm", "icon-180.png", "icon-512.png",    "icon.svg",          "modar-view.js",
+    "modar-worker.js",  "modar.js",     "style.css"};
+
+struct Draft {
+  const SiteOptions& options;
+  std::string page;
+  std::vector<std::string> languages;
+  Json texts;
+  std::size_t texts_used = 0;
+  std::uint64_t hash = 14695981039346656037u;
+  Site site;
+};
+
+/// FNV-1a: enough to tell one version of a site from the next.
+void add_to_hash(std::uint64_t& hash, std::span<const std::byte> bytes) {
+  for (const std::byte byte : bytes)
+    hash = (hash ^ static_cast<std::uint64_t>(byte)) * 1099511628211u;
+}
+
+Result<void> put(Draft& draft, const std::string& name, std::span<const std::byte> bytes) {
+  const std::string path = draft.options.output + "/" + name;
+  MODAR_TRY(write_file(path, bytes));
+  add_to_hash(draft.hash, std::as_bytes(std::span(name)));
+  add_to_hash(draft.hash, bytes);
+  draft.site.files.push_back(name);
+  return {};
+}
+
+Result<void> put(Draft& draft, const std::string& name, const std::string& text) {
+  return put(draft, name, std::as_bytes(std::span(text)));
+}
+
+Result<std::string> page_text(const Draft& draft, const std::string& name) {
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.page + "/" + name));
+  return std::string(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
+}
+
+/// A text as it stands in HTML.
+std::string escaped(std::string_view text) {
+  std::string html;
+  for (const char letter : text) {
+    switch (letter) {
+      case '&':
+        html += "&amp;";
+        break;
+      case '<':
+        html += "&lt;";
+        break;
+      case '"':
+        html += "&quot;";
+        break;
+      default:
+        html += letter;
+    }
+  }
+  return html;
+}
+
+/// A name as part of an address: what is no letter, digit or dash becomes a dash.
+std::string address(std::string_view name) {
+  std::string word;
+  for (const char c : name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    word += plain ? c : '-';
+  }
+  return word.empty() ? "bundle" : word;
+}
+
+/// "red_vase" as people write it.
+std::string title_of(std::string_view name) {
+  std::string title(name);
+  std::replace(title.begin(), title.end(), '_', ' ');
+  return title;
+}
+
+Result<void> choose_languages(Draft& draft) {
+  std::vector<std::string> known;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(draft.page + "/words", error)) {
+    if (entry.path().extension() == ".json") known.push_back(entry.path().stem().string());
+  }
+  // English first: it serves where a visitor reads none of the others.
+  std::sort(known.begin(), known.end(), [](const std::string& a, const std::string& b) {
+    return (a == "en") != (b == "en") ? a == "en" : a < b;
+  });
+  draft.languages = draft.options.languages.empty() ? known : draft.options.languages;
+  for (const std::string& language : draft.languages) {
+    if (std::find(known.begin(), known.end(), language) != known.end()) continue;
+    std::string all;
+    for (const std::string& each : known) all += (all.empty() ? "" : ", ") + each;
+    return fail(ExitCode::kUsage, "web.language", language,
+                "the page has no words of this language", "name some of " + all);
+  }
+  return {};
+}
+
+Result<void> read_texts(Draft& draft) {
+  if (draft.options.texts.empty()) return {};
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.options.texts));
+  draft.texts =
+      Json::parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
+  if (!draft.texts.is_null() && !draft.texts.is_array()) return {};
+  return fail(ExitCode::kInvalidInput, "web.texts", draft.options.texts, "this is no JSON object",
+              R"(write {"cover": {"en": {"name": "The cover", "text": "Printed in 1890."}}})");
+}
+
+/// The pattern's texts in the site's languages; null where none are given.
+Result<Json> texts_of(Draft& draft, const std::string& pattern) {
+  const auto given = draft.texts.find(pattern);
+  if (!given) return Json();
+  ++draft.texts_used;
+  Json texts = Json::object();
+  for (const std::string& language : draft.languages) {
+    const auto name = given->find(language + "/name");
+    if (!given->find(language)) continue;
+    if (!name || !name->text()) {
+      return fail(ExitCode::kInvalidInput, "web.texts",
+                  draft.options.texts + ", " + pattern + ", " + language, "there is no name",
+                  R"(write {"name": "...", "text": "..."})");
+    }
+    const auto text = given->find(language + "/text");
+    texts.set(language, {{"name", *name}, {"text", text ? *text : Json("")}});
+  }
+  return texts;
+}
+
+/// The picture that the tracker looks for, as a hint for visitors.
+Result<Json> put_hint(Draft& draft, const BundleView& bundle, std::uint32_t pattern,
+                      const std::string& file) {
+  const std::string name(bundle.name(bundle.patterns()[pattern].name));
+  TrackerRecordView record;
+  const auto bytes = bundle.section(SectionType::kTrackerRecord, pattern);
+  if (bytes.empty() || view_tracker_record(bytes, record)) {
+    return fail(ExitCode::kInvalidInput, "web.pattern", "pattern '" + name + "'",
+                "it has no tracker record", "bake the bundle with this version of modar");
+  }
+  RgbaImage image{record.header.width, record.header.height, {}};
+  const std::size_t pixels = std::size_t{image.width} * image.height;
+  image.pixels.resize(4 * pixels);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    std::fill_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(4 * i), 3, record.pixels[i]);
+    image.pixels[4 * i + 3] = 255;
+  }
+  MODAR_ASSIGN(const std::vector<std::byte> png, encode_png(image));
+  MODAR_TRY(put(draft, file, png));
+  Json json = {{"name", name},
+               {"title", title_of(name)},
+               {"image", file},
+               {"width", image.width},
+               {"height", image.height}};
+  MODAR_ASSIGN(const Json texts, texts_of(draft, name));
+  if (!texts.is_null()) json.set("texts", texts);
+  return json;
+}
+
+Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::string>& names) {
+  const auto named = [&](Error error) {
+    error.where = path + (error.where.empty() ? "" : ", " + error.where);
+    return tl::unexpected(std::move(error));
+  };
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+  const Result<BundleView> bundle = BundleView::open(file.bytes());
+  if (!bundle) return named(bundle.error());
+  if (const auto whole = verify_sections(*bundle); !whole) return named(whole.error());
+  if (bundle->patterns().empty()) {
+    return fail(ExitCode::kInvalidInput, "web.pattern", path,
+                "it has no pattern that a camera could find", "bake it with --pattern");
+  }
+  const std::string stem = fs::path(path).stem().string();
+  const std::string name = address(stem);
+  if (std::find(names.begin(), names.end(), name) != names.end()) {
+    return fail(ExitCode::kUsage, "web.twice", path, "another bundle has the same name",
+                "rename one");
+  }
+  names.push_back(name);
+  const std::string to = "bundles/" + name + ".modar";
+  MODAR_TRY(put(draft, to, file.bytes()));
+  draft.site.bundle_bytes += file.bytes().size();
+  Json patterns = Json::array();
+  for (std::uint32_t p = 0; p < bundle->patterns().size(); ++p) {
+    MODAR_ASSIGN(
+        const Json pattern,
+        put_hint(draft, *bundle, p, "patterns/" + name + "-" + std::to_string(p) + ".png"));
+    patterns.push_back(pattern);
+  }
+  return Json{{"title", title_of(stem)},
+              {"file", to},
+              {"bytes", file.bytes().size()},
+              {"patterns", patterns}};
+}
+
+Result<void> put_page(Draft& draft) {
+  for (const std::string_view name : kPageFiles) {
+    MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.page + "/" + std::string(name)));
+    MODAR_TRY(put(draft, std::string(name), file.bytes()));
+    draft.site.page_bytes += file.bytes().size();
+  }
+  for (const std::string& language : draft.languages) {
+    const std::string name = "words/" + language + ".json";
+    MODAR_ASSIGN(const std::string words, page_text(draft, name));
+    MODAR_TRY(put(draft, name, words));
+    draft.site.page_bytes += words.size();
+  }
+  return {};
+}
+
+/// index.html, the manifest and, last of all, sw.js.
+Result<void> put_entry(Draft& draft, const std::string& title) {
+  MODAR_ASSIGN(std::string html, page_text(draft, "index.html"));
+  constexpr std::string_view kTitle = "<title>ModAR</title>";
+  if (const std::size_t at = html.find(kTitle); at != std::string::npos) {
+    html.replace(at, kTitle.size(), "<title>" + escaped(title) + "</title>");
+  }
+  MODAR_TRY(put(draft, "index.html", html));
+  const auto icon = [](const char* file, const char* sizes, const char* type) {
+    return Json{{"src", file}, {"sizes", sizes}, {"type", type}};
+  };
+  const Json manifest = {{"name", title},
+                         {"short_name", title},
+                         {"start_url", "./"},
+                         {"display", "standalone"},
+                         {"background_color", "#f4f0e7"},
+                         {"theme_color", "#f4f0e7"},
+                         {"icons", Json::array({icon("icon.svg", "any", "image/svg+xml"),
+                                                icon("icon-512.png", "512x512", "image/png")})}};
+  MODAR_TRY(put(draft, "manifest.webmanifest", manifest.dump()));
+  MODAR_ASSIGN(const std::string worker, page_text(draft, "sw.js"));
+  add_to_hash(draft.hash, std::as_bytes(std::span(worker)));
+  const Json kept = {{"hash", std::to_string(draft.hash)}, {"files", Json::list(draft.site.files)}};
+  draft.site.page_bytes += html.size() + worker.size();
+  return put(draft, "sw.js", "const SITE = " + kept.dump() + ";\n" + worker);
+}
+
+}  // namespace
+
+Result<std::string> find_page() {
+  const fs::path programs = program_folder();
+  for (const fs::path& folder : {programs / "../share/modar/web", programs / "../../web/web"}) {
+    if (fs::exists(folder / "engine-plain.wasm")) return folder.lexically_normal().string();
+  }
+  return fail(ExitCode::kUnsupported, "web.page", "modar web", "the page's engine was not built",
+              "cmake --preset web && cmake --build --preset web (Debian: emscripten), or name its "
+              "folder with --page");
+}
+
+Result<Site> write_site(const SiteOptions& options) {
+  Draft draft{options, options.page, {}, {}, 0, 14695981039346656037u, {}};
+  if (draft.page.empty()) {
+    MODAR_ASSIGN(draft.page, find_page());
+  }
+  MODAR_TRY(choose_languages(draft));
+  MODAR_TRY(read_texts(draft));
+  for (const char* folder : {"/bundles", "/patterns", "/words"}) {
+    MODAR_TRY(make_output_folder(options.output + folder));
+  }
+  std::vector<std::string> names;
+  Json bundles = Json::array();
+  for (const std::string& path : options.bundles) {
+    MODAR_ASSIGN(const Json bundle, put_bundle(draft, path, names));
+    bundles.push_back(bundle);
+  }
+  if (draft.texts_used < draft.texts.size()) {
+    return fail(ExitCode::kInvalidInput, "web.texts", options.texts,
+                "it has texts for a pattern that is in none of the bundles",
+                "name patterns as `modar inspect` prints them");
+  }
+  const std::string title = options.title.empty()
+                                ? title_of(fs::path(options.bundles.front()).stem().string())
+                                : options.title;
+  const Json site = {
+      {"title", title}, {"languages", Json::list(draft.languages)}, {"bundles", bundles}};
+  MODAR_TRY(put(draft, "site.json", site.dump()));
+  MODAR_TRY(put_page(draft));
+  MODAR_TRY(put_entry(draft, title));
+  return draft.site;
+}
+
+}  // namespace modar

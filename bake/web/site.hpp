@@ -1,0 +1,38 @@
+// A page that plays bundles in a browser, as a folder that any web server serves: the door of
+// bake/web, with serve.hpp.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct SiteOptions {
+  std::vector<std::string> bundles;  ///< files, shown in this order
+  std::string title;                 ///< empty: the first bundle's name
+  std::vector<std::string>
+      languages;  ///< of the page's words, the first for those who have none of them; empty: all
+  std::string texts;   ///< JSON {PATTERN: {LANGUAGE: {"name", "text"}}}; empty: names alone
+  std::string page;    ///< folder that the preset `web` built; empty: find_page()
+  std::string output;  ///< folder, made if absent
+};
+
+struct Site {
+  std::vector<std::string> files;  ///< relative to the folder, in the order of writing
+  std::uint64_t page_bytes = 0;    ///< of page and engines: what every site has
+  std::uint64_t bundle_bytes = 0;
+};
+
+/// The page as it was installed with the programs, or built beside them.
+/// Errors: kUnsupported "web.page".
+Result<std::string> find_page();
+
+/// Writes the folder. The same bundles and options give the same bytes. sw.js comes last: what a
+/// visitor keeps changes when all else is there. Errors: those of the bundles; kInvalidInput
+/// "web.pattern", "web.texts"; kUsage "web.language", "web.twice"; kUnsupported "web.page"; kIo.
+Result<Site> write_site(const SiteOptions& options);
+
+}  // namespace modar

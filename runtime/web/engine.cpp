@@ -1,0 +1,260 @@
+// The engine of the page: modar.h for JavaScript, which reads numbers and texts but no structs.
+// A worker tracks with one instance of this module, the page draws with another. An instance holds
+// one bundle. Built by the preset `web` only.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <iterator>
+
+#include <GLES2/gl2.h>
+#include <emscripten.h>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/type_ptr.hpp>
+
+#include "modar/modar.h"
+
+namespace {
+
+/// A pose as JavaScript reads it (modar.js knows the order).
+struct WebPose {
+  float visible;
+  float shown;
+  float inliers;
+  float fit;
+  float rotation[9];
+  float translation[3];
+  float corners[8];
+  float view[16];
+};
+static_assert(sizeof(WebPose) == 40 * sizeof(float));
+
+struct Engine {
+  modar_error error;
+  modar_bundle* bundle = nullptr;
+  modar_tracker* tracker = nullptr;
+  modar_focal_finder* finder = nullptr;
+  modar_renderer* renderer = nullptr;
+  modar_camera camera;
+  WebPose* poses = nullptr;  ///< one a pattern
+  modar_item* items = nullptr;
+  char text[256];
+};
+Engine engine;
+
+/// The turn and the size that the visitor gave a model: about the place on the pattern where it
+/// stands.
+glm::mat4 with_gesture(const modar_scene& scene, float turn, float size) {
+  const glm::mat4 place = glm::make_mat4(scene.place);
+  const glm::vec3 foot(place[3].x, place[3].y, 0.0f);
+  glm::mat4 gesture = glm::translate(glm::mat4(1.0f), foot);
+  gesture = glm::rotate(gesture, turn, glm::vec3(0.0f, 0.0f, 1.0f));
+  gesture = glm::scale(gesture, glm::vec3(size));
+  return glm::translate(gesture, -foot) * place;
+}
+
+/// Shown scenes as items; answers how many.
+size_t collect_items(float turn, float size) {
+  size_t count = 0;
+  modar_scene scene;
+  for (uint32_t s = 0; modar_scene_at(engine.bundle, s, &scene) != 0; ++s) {
+    const WebPose& pose = engine.poses[scene.pattern];
+    if (pose.shown == 0.0f) continue;
+    const glm::mat4 to_eye = glm::make_mat4(pose.view) * with_gesture(scene, turn, size);
+    engine.items[count].model = scene.model;
+    std::memcpy(engine.items[count].to_eye, glm::value_ptr(to_eye),
+                sizeof engine.items[count].to_eye);
+    ++count;
+  }
+  return count;
+}
+
+}  // namespace
+
+extern "C" {
+
+/// EGL's look-up for the renderer: the few entry points that it asks for. Emscripten's own knows
+/// every name of OpenGL ES and would link them all.
+typedef void (*web_function)(void);
+void glDrawElementsInstanced(GLenum mode, GLsizei count, GLenum type, const void* indices,
+                             GLsizei instances);
+void glVertexAttribDivisor(GLuint index, GLuint divisor);
+web_function eglGetProcAddress(const char* name) {
+  const auto is = [name](const char* other) {
+    return std::strncmp(name, other, std::strlen(other)) == 0;
+  };
+  if (is("glDrawElementsInstanced")) return reinterpret_cast<web_function>(glDrawElementsInstanced);
+  if (is("glVertexAttribDivisor")) return reinterpret_cast<web_function>(glVertexAttribDivisor);
+  // The page's renderer has its context to itself: there is nobody's vertex array to leave.
+  return nullptr;
+}
+
+/// Memory for a bundle or a frame, aligned to 8; 0 where the browser gives no more.
+EMSCRIPTEN_KEEPALIVE void* web_reserve(size_t size) {
+  return std::malloc(size);
+}
+EMSCRIPTEN_KEEPALIVE void web_free(void* memory) {
+  std::free(memory);
+}
+
+/// Opens the bundle; its bytes, of web_reserve(), stay in use. 0, or the exit code of an error.
+EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size) {
+  engine.bundle = modar_bundle_open_bytes(bytes, size, &engine.error);
+  if (engine.bundle == nullptr) return engine.error.exit_code;
+  const int damaged = modar_bundle_verify(engine.bundle, &engine.error);
+  if (damaged != 0) return damaged;
+  engine.poses = new WebPose[modar_pattern_count(engine.bundle) + 1]();
+  engine.items = new modar_item[modar_scene_count(engine.bundle) + 1]();
+  return 0;
+}
+
+/// Of the last function that failed. field: 0 code, 1 where, 2 cause, 3 cure.
+EMSCRIPTEN_KEEPALIVE const char* web_error(int field) {
+  const char* const fields[] = {engine.error.code, engine.error.where, engine.error.cause,
+                                engine.error.cure};
+  return fields[field];
+}
+
+EMSCRIPTEN_KEEPALIVE uint32_t web_pattern_count() {
+  return modar_pattern_count(engine.bundle);
+}
+EMSCRIPTEN_KEEPALIVE uint32_t web_scene_count() {
+  return modar_scene_count(engine.bundle);
+}
+EMSCRIPTEN_KEEPALIVE const char* web_pattern_name(uint32_t index) {
+  modar_pattern_name(engine.bundle, index, engine.text, sizeof engine.text);
+  return engine.text;
+}
+EMSCRIPTEN_KEEPALIVE const char* web_model_name(uint32_t index) {
+  modar_model_name(engine.bundle, index, engine.text, sizeof engine.text);
+  return engine.text;
+}
+EMSCRIPTEN_KEEPALIVE double web_pattern_width_mm(uint32_t index) {
+  return modar_pattern_width_mm(engine.bundle, index);
+}
+/// Which models stand on which patterns. part: 0 pattern, 1 model.
+EMSCRIPTEN_KEEPALIVE uint32_t web_scene(uint32_t index, int part) {
+  modar_scene scene{};
+  modar_scene_at(engine.bundle, index, &scene);
+  return part == 0 ? scene.pattern : scene.model;
+}
+
+/// The camera's frames have this size. focal: pixels; 0: the width, as for every unknown camera.
+EMSCRIPTEN_KEEPALIVE void web_camera(int width, int height, double focal) {
+  engine.camera = modar_camera_default(width, height);
+  if (focal > 0) engine.camera.fx = engine.camera.fy = focal;
+}
+EMSCRIPTEN_KEEPALIVE double web_focal() {
+  return engine.camera.fx;
+}
+
+/// A tracker for web_camera(), in place of the one before. find_focal: 1 to measure the focal
+/// length on the way.
+EMSCRIPTEN_KEEPALIVE int web_track(int find_focal) {
+  modar_tracker_destroy(engine.tracker);
+  modar_focal_finder_destroy(engine.finder);
+  engine.finder = nullptr;
+  engine.tracker = modar_tracker_create(engine.bundle, &engine.camera, &engine.error);
+  if (engine.tracker == nullptr) return engine.error.exit_code;
+  if (find_focal == 0) return 0;
+  engine.finder = modar_focal_finder_create(engine.bundle, engine.camera.width,
+                                            engine.camera.height, &engine.error);
+  return engine.finder == nullptr ? engine.error.exit_code : 0;
+}
+EMSCRIPTEN_KEEPALIVE void web_reset() {
+  modar_tracker_reset(engine.tracker);
+}
+
+/// The poses of a frame's patterns, then in web_poses(). gray: of web_camera()'s size.
+EMSCRIPTEN_KEEPALIVE int web_step(const uint8_t* gray, size_t stride, double time_s) {
+  const int failed = modar_tracker_step_at(engine.tracker, gray, stride, time_s, &engine.error);
+  if (failed != 0) return failed;
+  modar_pose pose;
+  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p) {
+    modar_tracker_pose(engine.tracker, p, &pose);
+    WebPose& to = engine.poses[p];
+    to.visible = static_cast<float>(pose.visible);
+    to.shown = static_cast<float>(pose.shown);
+    to.inliers = static_cast<float>(pose.inliers);
+    to.fit = pose.fit;
+    std::memcpy(to.rotation, pose.rotation, sizeof to.rotation);
+    std::memcpy(to.translation, pose.translation, sizeof to.translation);
+    std::memcpy(to.corners, pose.corners, sizeof to.corners);
+    modar_view(&pose, to.view);
+  }
+  return 0;
+}
+EMSCRIPTEN_KEEPALIVE WebPose* web_poses() {
+  return engine.poses;
+}
+EMSCRIPTEN_KEEPALIVE const char* web_reason() {
+  return modar_tracker_reason(engine.tracker);
+}
+/// The focal length once the finder of web_track() knows it, else 0.
+EMSCRIPTEN_KEEPALIVE double web_find_focal(const uint8_t* gray, size_t stride) {
+  return engine.finder == nullptr ? 0.0 : modar_focal_finder_look(engine.finder, gray, stride);
+}
+
+/// Gray in place of RGBA, by the weights of BT.601, which sum to 1 << 16 here.
+EMSCRIPTEN_KEEPALIVE void web_gray_from_rgba(uint8_t* pixels, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    const uint8_t* rgba = pixels + 4 * i;
+    pixels[i] =
+        static_cast<uint8_t>((19595 * rgba[0] + 38470 * rgba[1] + 7471 * rgba[2] + 32768) >> 16);
+  }
+}
+/// Luma of video (16 to 235) brought to 0 to 255, as the player does.
+EMSCRIPTEN_KEEPALIVE void web_widen_luma(uint8_t* gray, size_t count) {
+  static uint8_t full[256];
+  if (full[255] == 0) {
+    for (int i = 0; i < 256; ++i) {
+      const int value = ((i - 16) * static_cast<int>(255.0 / 219.0 * 65536 + 0.5) + 32768) >> 16;
+      full[i] = static_cast<uint8_t>(value < 0 ? 0 : value > 255 ? 255 : value);
+    }
+  }
+  for (size_t i = 0; i < count; ++i) gray[i] = full[gray[i]];
+}
+/// Mean of every 16th row's every 16th pixel: whether it is dark.
+EMSCRIPTEN_KEEPALIVE double web_brightness(const uint8_t* gray, size_t stride) {
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y < engine.camera.height; y += 16) {
+    for (int x = 0; x < engine.camera.width; x += 16, ++count)
+      sum += gray[static_cast<size_t>(y) * stride + static_cast<size_t>(x)];
+  }
+  return count == 0 ? 0 : sum / count;
+}
+
+/// Uploads the models into the current context. lost: 1 where that context is new after a loss.
+EMSCRIPTEN_KEEPALIVE int web_upload(int lost) {
+  if (lost != 0 && engine.renderer != nullptr)
+    return modar_renderer_restore(engine.renderer, &engine.error);
+  engine.renderer = modar_renderer_create(engine.bundle, nullptr, 0, &engine.error);
+  if (engine.renderer == nullptr) return engine.error.exit_code;
+  modar_render_options options;
+  modar_render_options_default(&options);
+  options.exclusive = 1;
+  modar_renderer_set_options(engine.renderer, &options);
+  return 0;
+}
+
+/// Draws the models of the poses in web_poses() into the canvas, transparent elsewhere, for a frame
+/// of web_camera() that covers the canvas. turn: radians, and size: a factor, of all models.
+EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn, float size) {
+  glViewport(0, 0, width, height);
+  glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
+  glClear(GL_COLOR_BUFFER_BIT);
+  const size_t count = collect_items(turn, size);
+  modar_surface surface{};
+  surface.size = sizeof surface;
+  surface.width = width;
+  surface.height = height;
+  surface.mirror = mirror;
+  surface.cover = 1;
+  modar_renderer_draw(engine.renderer, &surface, nullptr, &engine.camera, nullptr, engine.items,
+                      count);
+}
+EMSCRIPTEN_KEEPALIVE double web_gpu_bytes() {
+  return static_cast<double>(modar_renderer_gpu_bytes(engine.renderer));
+}
+
+}  // extern "C"

@@ -1,0 +1,169 @@
+// The engine (engine.cpp) as an object: WebAssembly with vectors of 128 bits where the browser has
+// them, without elsewhere.
+
+/** A module of one function that answers a v128: browsers without SIMD refuse it. */
+const NEEDS_SIMD = Uint8Array.of(
+  0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11);
+
+/** Numbers in a pose of Engine.poses(), and where its parts begin; see WebPose in engine.cpp. */
+export const POSE_FLOATS = 40;
+export const POSE = {
+  visible: 0, shown: 1, inliers: 2, fit: 3, rotation: 4, translation: 13, corners: 16, view: 24,
+};
+
+/** What went wrong: `code` is stable, `cure` says what to do. */
+export class ModarError extends Error {
+  constructor({ code, where = '', cause, cure = '' }) {
+    super(`${where ? `${where}: ` : ''}${cause}${cure ? `; ${cure}` : ''} [${code}]`);
+    this.name = 'ModarError';
+    this.code = code;
+    this.where = where;
+    this.reason = cause;
+    this.cure = cure;
+  }
+
+  /** For postMessage(), which drops what a subclass of Error adds. */
+  plain() {
+    return { code: this.code, where: this.where, cause: this.reason, cure: this.cure };
+  }
+}
+
+export function hasSimd() {
+  return WebAssembly.validate(NEEDS_SIMD);
+}
+
+export class Engine {
+  #module;
+
+  constructor(module, kind) {
+    this.#module = module;
+    this.kind = kind;
+    this.frameAt = 0;
+    this.frameBytes = 0;
+  }
+
+  /** @param {{simd?: boolean}} options simd: false for the plain build. */
+  static async create({ simd = true } = {}) {
+    if (typeof WebAssembly !== 'object') {
+      throw new ModarError({ code: 'web.wasm', cause: 'this browser has no WebAssembly', cure: 'update the browser' });
+    }
+    const vectors = simd && hasSimd();
+    const { default: load } = await (vectors ? import('./engine-simd.js') : import('./engine-plain.js'));
+    return new Engine(await load(), vectors ? 'simd' : 'plain');
+  }
+
+  #check(exitCode) {
+    if (exitCode === 0) return;
+    const text = (field) => this.#module.UTF8ToString(this.#module._web_error(field));
+    throw new ModarError({ code: text(0), where: text(1), cause: text(2), cure: text(3) });
+  }
+
+  #reserve(bytes) {
+    const address = this.#module._web_reserve(bytes);
+    if (address !== 0) return address;
+    throw new ModarError({
+      code: 'web.memory', cause: `this browser gives no ${Math.ceil(bytes / 1e6)} MB of memory`,
+      cure: 'close other pages, or bake the bundle smaller (--max-texture, --device)',
+    });
+  }
+
+  /** Copies the bundle in and verifies it. @param {Uint8Array} bytes */
+  open(bytes) {
+    const address = this.#reserve(bytes.length);
+    this.#module.HEAPU8.set(bytes, address);
+    this.#check(this.#module._web_open(address, bytes.length));
+    const m = this.#module;
+    this.patterns = Array.from({ length: m._web_pattern_count() }, (_, i) => ({
+      name: m.UTF8ToString(m._web_pattern_name(i)), widthMm: m._web_pattern_width_mm(i),
+    }));
+    this.scenes = Array.from({ length: m._web_scene_count() }, (_, i) => ({
+      pattern: m._web_scene(i, 0), model: m.UTF8ToString(m._web_model_name(m._web_scene(i, 1))),
+    }));
+  }
+
+  /** Of the camera's frames. focal: in pixels, 0: unknown (assumed to be the width). */
+  setCamera(width, height, focal) {
+    this.width = width;
+    this.height = height;
+    this.#module._web_camera(width, height, focal);
+  }
+
+  get focal() {
+    return this.#module._web_focal();
+  }
+
+  /** Starts tracking anew for the camera. */
+  track(findFocal) {
+    this.#check(this.#module._web_track(findFocal ? 1 : 0));
+  }
+
+  reset() {
+    this.#module._web_reset();
+  }
+
+  /** Room for a frame in the heap, the same until a larger one is asked for. */
+  frameBuffer(bytes) {
+    if (bytes > this.frameBytes) {
+      if (this.frameAt !== 0) this.#module._web_free(this.frameAt);
+      this.frameAt = this.#reserve(bytes);
+      this.frameBytes = bytes;
+    }
+    return this.#module.HEAPU8.subarray(this.frameAt, this.frameAt + bytes);
+  }
+
+  /** The frame buffer's RGBA becomes gray, in place. */
+  grayFromRgba() {
+    this.#module._web_gray_from_rgba(this.frameAt, this.width * this.height);
+  }
+
+  /** The frame buffer's luma of video (16 to 235) becomes 0 to 255. */
+  widenLuma(stride) {
+    this.#module._web_widen_luma(this.frameAt, stride * this.height);
+  }
+
+  /** Tracks the gray frame in the frame buffer. @returns poses, a view that the next call changes. */
+  step(stride, time) {
+    this.#check(this.#module._web_step(this.frameAt, stride, time));
+    return this.poses();
+  }
+
+  /** The focal length, once frames have told it; else 0. */
+  findFocal(stride) {
+    return this.#module._web_find_focal(this.frameAt, stride);
+  }
+
+  brightness(stride) {
+    return this.#module._web_brightness(this.frameAt, stride);
+  }
+
+  get reason() {
+    return this.#module.UTF8ToString(this.#module._web_reason());
+  }
+
+  poses() {
+    return new Float32Array(
+      this.#module.HEAPU8.buffer, this.#module._web_poses(), this.patterns.length * POSE_FLOATS);
+  }
+
+  get heapBytes() {
+    return this.#module.HEAPU8.length;
+  }
+
+  /** Makes a WebGL context current. @param {1 | 2} version */
+  useContext(context, version) {
+    const { GL } = this.#module;
+    GL.makeContextCurrent(GL.registerContext(context, { majorVersion: version, enableExtensionsByDefault: true }));
+  }
+
+  upload(afterLoss) {
+    this.#check(this.#module._web_upload(afterLoss ? 1 : 0));
+  }
+
+  draw(width, height, { mirror = false, turn = 0, size = 1 } = {}) {
+    this.#module._web_draw(width, height, mirror ? 1 : 0, turn, size);
+  }
+
+  get gpuBytes() {
+    return this.#module._web_gpu_bytes();
+  }
+}

@@ -1,0 +1,98 @@
+// Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. Both change in the same
+// task, so picture and models never part.
+import { Engine, ModarError } from './engine.js';
+
+/** Screens of phones have more pixels than a camera's picture or a scan's texture fills. */
+const MOST_PIXELS_A_CSS_PIXEL = 2;
+
+function openContext(canvas, webgl1) {
+  const attributes = { alpha: true, premultipliedAlpha: true, depth: true, stencil: false, antialias: true };
+  const context2 = webgl1 ? null : canvas.getContext('webgl2', attributes);
+  const context = context2 ?? canvas.getContext('webgl', attributes);
+  if (!context) {
+    throw new ModarError({
+      code: 'web.webgl', cause: 'this browser draws no WebGL',
+      cure: 'switch on hardware acceleration in its settings, or use another browser',
+    });
+  }
+  return { context, version: context2 ? 2 : 1 };
+}
+
+export class View {
+  #engine;
+  #picture;
+  #models;
+  #gl;
+  #lost = false;
+
+  /** @param {Uint8Array} bytes the bundle; @param canvases {picture, models}: laid over each other by the page. */
+  static async create(bytes, { picture, models, simd = true, webgl1 = false }) {
+    const view = new View();
+    view.#picture = picture;
+    view.#models = models;
+    view.#gl = openContext(models, webgl1);
+    view.#engine = await Engine.create({ simd });
+    view.#engine.open(bytes);
+    view.#engine.useContext(view.#gl.context, view.#gl.version);
+    view.#engine.upload(false);
+    models.addEventListener('webglcontextlost', (event) => {
+      event.preventDefault();  // without this it is never restored
+      view.#lost = true;
+    });
+    models.addEventListener('webglcontextrestored', () => view.#restore(webgl1));
+    return view;
+  }
+
+  #restore(webgl1) {
+    this.#gl = openContext(this.#models, webgl1);
+    this.#engine.useContext(this.#gl.context, this.#gl.version);
+    this.#engine.upload(true);
+    this.#lost = false;
+  }
+
+  /** Width, height of both canvases, as large as they are shown. */
+  #fit() {
+    const scale = Math.min(globalThis.devicePixelRatio || 1, MOST_PIXELS_A_CSS_PIXEL);
+    const width = Math.max(1, Math.round(this.#models.clientWidth * scale));
+    const height = Math.max(1, Math.round(this.#models.clientHeight * scale));
+    for (const canvas of [this.#picture, this.#models]) {
+      if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    }
+    return { width, height };
+  }
+
+  /** frame: the detail of modar.js's event. gesture: {mirror, turn (radians), size}. */
+  draw({ source, camera, poses }, gesture = {}) {
+    const { width, height } = this.#fit();
+    const context = this.#picture.getContext('2d', { alpha: false });
+    const cover = Math.max(width / camera.width, height / camera.height);
+    context.setTransform(gesture.mirror ? -cover : cover, 0, 0, cover, width / 2, height / 2);
+    context.drawImage(source, -camera.width / 2, -camera.height / 2, camera.width, camera.height);
+    if (this.#lost) return;
+    this.#engine.setCamera(camera.width, camera.height, camera.focal);
+    this.#engine.poses().set(poses);
+    this.#engine.draw(width, height, gesture);
+  }
+
+  /** Both canvases in one picture. */
+  async photograph(type = 'image/jpeg') {
+    const photo = document.createElement('canvas');
+    Object.assign(photo, { width: this.#picture.width, height: this.#picture.height });
+    const context = photo.getContext('2d', { alpha: false });
+    context.drawImage(this.#picture, 0, 0);
+    context.drawImage(this.#models, 0, 0);
+    return new Promise((resolve) => { photo.toBlob(resolve, type, 0.92); });
+  }
+
+  get webgl() {
+    return this.#gl.version;
+  }
+
+  get heapBytes() {
+    return this.#engine.heapBytes;
+  }
+
+  get gpuBytes() {
+    return this.#engine.gpuBytes;
+  }
+}

@@ -1,0 +1,102 @@
+// The worker: one engine that tracks. modar.js sends it one frame at a time.
+import { Engine, ModarError } from './engine.js';
+
+/** Frames with a pattern between looks for the focal length: a look costs as much as a search. */
+const FOCAL_EVERY = 5;
+
+let engine;
+let camera = { focal: 0, findFocal: false };
+let seen = 0;
+
+function useSize(width, height) {
+  if (engine.width === width && engine.height === height) return;
+  // A phone that was turned has another camera: what was measured for its other size holds scaled by the long side.
+  const scale = camera.side ? Math.max(width, height) / camera.side : 1;
+  engine.setCamera(width, height, camera.focal * scale);
+  engine.track(camera.findFocal && camera.focal === 0);
+}
+
+/** The frame's luma into the engine's buffer; its stride, or 0 where this frame cannot be read so. */
+async function takeVideoFrame(frame) {
+  const planar = frame.format === 'I420' || frame.format === 'NV12';
+  if (!planar || frame.rotation || frame.flip) return 0;
+  const { width, height } = frame.visibleRect;
+  const layout = await frame.copyTo(engine.frameBuffer(frame.allocationSize()));
+  useSize(width, height);
+  if (layout[0].offset !== 0) return 0;
+  if (frame.colorSpace?.fullRange === false) engine.widenLuma(layout[0].stride);
+  return layout[0].stride;
+}
+
+function takePixels({ width, height, pixels, kind }) {
+  engine.frameBuffer(pixels.byteLength).set(new Uint8Array(pixels));
+  useSize(width, height);
+  if (kind === 'rgba') engine.grayFromRgba();
+  return width;
+}
+
+async function track(message) {
+  const began = performance.now();
+  let stride = 0;
+  if (message.frame) {
+    stride = await takeVideoFrame(message.frame);
+    message.frame.close();
+  } else {
+    stride = takePixels(message);
+  }
+  if (stride === 0) return { type: 'unreadable', id: message.id };
+  const copied = performance.now();
+  const poses = engine.step(stride, message.time).slice();
+  const stepped = performance.now();
+  const answer = {
+    type: 'poses', id: message.id, width: engine.width, height: engine.height, focal: engine.focal, poses,
+    reason: engine.reason, brightness: engine.brightness(stride), heapBytes: engine.heapBytes,
+    copyMs: copied - began, stepMs: stepped - copied,
+  };
+  if (message.keepLuma) answer.luma = lumaOf(stride);
+  const unknown = camera.findFocal && camera.focal === 0;
+  if (unknown && answer.reason === 'visible' && ++seen % FOCAL_EVERY === 0) lookForFocal(stride, answer);
+  return answer;
+}
+
+function lumaOf(stride) {
+  const { width, height } = engine;
+  const from = engine.frameBuffer(stride * height);
+  const luma = new Uint8Array(width * height);
+  for (let y = 0; y < height; ++y) luma.set(from.subarray(y * stride, y * stride + width), y * width);
+  return luma;
+}
+
+function lookForFocal(stride, answer) {
+  const focal = engine.findFocal(stride);
+  if (focal === 0) return;
+  camera = { ...camera, focal, side: Math.max(engine.width, engine.height) };
+  answer.foundFocal = focal;
+  engine.setCamera(engine.width, engine.height, focal);
+  engine.track(false);
+}
+
+const answers = {
+  async open({ bytes, simd }) {
+    engine = await Engine.create({ simd });
+    engine.open(new Uint8Array(bytes));
+    return { type: 'opened', patterns: engine.patterns, scenes: engine.scenes, kind: engine.kind };
+  },
+  camera(options) {
+    camera = options;
+    if (engine.width) engine.setCamera(0, 0, 0);  // the next frame starts a new tracker
+    return { type: 'ready' };
+  },
+  frame: track,
+};
+
+self.onmessage = async ({ data }) => {
+  try {
+    const answer = await answers[data.type](data);
+    self.postMessage({ ...answer, call: data.call });
+  } catch (error) {
+    data.frame?.close();
+    const told = error instanceof ModarError ? error.plain() : { code: 'web.worker', cause: String(error.message ?? error) };
+    self.postMessage({ type: 'failed', call: data.call, error: told });
+  }
+};

@@ -1,0 +1,116 @@
+/** ModAR in a page: finds the pictures of a bundle in a video and says where they are. */
+
+export class ModarError extends Error {
+  /** Stable, like "bundle.truncated". */
+  readonly code: string;
+  readonly where: string;
+  readonly reason: string;
+  /** What to do about it. */
+  readonly cure: string;
+}
+
+export interface Pattern {
+  name: string;
+  /** The width it is printed in, millimetres; 0: the bundle does not state it. */
+  widthMm: number;
+}
+
+export interface Scene {
+  /** Index into patterns. */
+  pattern: number;
+  model: string;
+}
+
+/** Of the frames: pixels; the focal length is the same both ways. */
+export interface Camera {
+  width: number;
+  height: number;
+  focal: number;
+}
+
+/**
+ * A pattern's place in a frame. Pattern space: x right, y up, z towards the viewer, the picture's
+ * largest side from -1 to 1.
+ */
+export interface Sighting {
+  pattern: number;
+  name: string;
+  /** Seconds, of the frame. */
+  time: number;
+  camera: Camera;
+  /** Measured in this frame; else kept from the last frame but one. */
+  visible: boolean;
+  inliers: number;
+  /** Share of the features looked at that agree, 0 to 1. */
+  fit: number;
+  /** 3 x 3, row by row, to camera space: x right, y down, z forward. */
+  rotation: Float32Array;
+  translation: Float32Array;
+  /** x, y in pixels: top left, top right, bottom right, bottom left. */
+  corners: Float32Array;
+  /** Pattern space to GL's eye space, column-major: three.js' Matrix4.fromArray() takes it. */
+  view: Float32Array;
+  /** GL's projection for a viewport that shows the whole frame; near 0.05, far 100. */
+  projection: Float32Array;
+}
+
+export interface Frame {
+  /** Draw it while the event is handled; afterwards it is closed. */
+  source: VideoFrame | HTMLCanvasElement;
+  time: number;
+  camera: Camera;
+  /** 40 numbers a pattern, for View.draw(). */
+  poses: Float32Array;
+  /** Why nothing is visible: "few matches", "lost by blur"...; "visible" where something is. */
+  reason: string;
+  /** Mean of the frame's gray values, 0 to 255. */
+  brightness: number;
+  /** Set once, when the focal length has been measured: keep it for start(). */
+  foundFocal?: number;
+  /** Bytes of the engine's heap in the worker. */
+  heapBytes: number;
+  copyMs: number;
+  stepMs: number;
+  /** With keepLuma: what was tracked. */
+  luma?: Uint8Array;
+}
+
+interface ModarEvents {
+  found: CustomEvent<Sighting>;
+  updated: CustomEvent<Sighting>;
+  lost: CustomEvent<{ pattern: number; name: string; time: number; reason: string }>;
+  frame: CustomEvent<Frame>;
+  error: CustomEvent<ModarError>;
+}
+
+export class Modar extends EventTarget {
+  readonly patterns: Pattern[];
+  readonly scenes: Scene[];
+  /** Of the bundle, for View.create(). */
+  readonly bytes: Uint8Array;
+  /** Which build of the engine runs. */
+  readonly kind: 'simd' | 'plain';
+  /**
+   * Tracks in the video, which is to play, until stop(). focal: in pixels where the frame's long side
+   * has focalSide of them; 0: unknown, then the width is assumed and, with findFocal, measured.
+   */
+  start(video: HTMLVideoElement, options?: {
+    focal?: number; focalSide?: number; findFocal?: boolean; keepLuma?: boolean;
+  }): Promise<void>;
+  stop(): void;
+  /** Ends the worker. */
+  close(): void;
+  /** Tracks one gray frame, a byte a pixel, that comes from elsewhere. */
+  step(gray: Uint8Array, width: number, height: number, time: number): Promise<Frame>;
+  addEventListener<K extends keyof ModarEvents>(type: K, listener: (event: ModarEvents[K]) => void): void;
+}
+
+/** Opens a bundle: its address, or its bytes. Errors: ModarError. */
+export function load(bundle: string | URL | ArrayBuffer, options?: {
+  /** false: the build without SIMD, which sees the same. */
+  simd?: boolean;
+  onProgress?: (got: number, total: number) => void;
+}): Promise<Modar>;
+
+/** GL's projection for a viewport that shows the whole frame. */
+export function projectionOf(camera: Camera, near?: number, far?: number): Float32Array;

@@ -1,0 +1,260 @@
+// ModAR in a page: finds the pictures of a bundle in a video and says where they are.
+//
+//   import { load } from './modar.js';
+//   const modar = await load('museum.modar');
+//   modar.addEventListener('updated', ({ detail }) => { ... detail.view, detail.projection ... });
+//   await modar.start(video);
+//
+// Types and words: modar.d.ts. The drawing of a bundle's own models is in modar-view.js.
+import { ModarError, POSE, POSE_FLOATS } from './engine.js';
+
+export { ModarError };
+
+async function fetchBundle(address, onProgress) {
+  const failed = (cause) => new ModarError({
+    code: 'web.download', where: String(address), cause, cure: 'check the network and load the page again',
+  });
+  let response;
+  try {
+    response = await fetch(address);
+  } catch {
+    throw failed('the bundle could not be loaded');
+  }
+  if (!response.ok) throw failed(`the server answered ${response.status}`);
+  const total = Number(response.headers.get('content-length')) || 0;
+  const parts = [];
+  let got = 0;
+  try {
+    const reader = response.body.getReader();
+    for (let part = await reader.read(); !part.done; part = await reader.read()) {
+      parts.push(part.value);
+      got += part.value.length;
+      onProgress?.(got, Math.max(total, got));
+    }
+  } catch {
+    throw failed(`the network broke off after ${got} bytes`);
+  }
+  return new Uint8Array(await new Blob(parts).arrayBuffer());
+}
+
+/** A worker whose answers are promises; frames wait for one another. */
+class Tracker {
+  #worker = new Worker(new URL('./modar-worker.js', import.meta.url), { type: 'module' });
+  #waiting = new Map();
+  #calls = 0;
+
+  constructor() {
+    this.#worker.onmessage = ({ data }) => {
+      const { resolve, reject } = this.#waiting.get(data.call);
+      this.#waiting.delete(data.call);
+      if (data.type === 'failed') reject(new ModarError(data.error));
+      else resolve(data);
+    };
+    this.#worker.onerror = (event) => {
+      event.preventDefault();
+      this.#giveUp(event.message || 'the engine did not load');
+    };
+  }
+
+  #giveUp(cause) {
+    const error = new ModarError({ code: 'web.worker', cause, cure: 'load the page again' });
+    for (const { reject } of this.#waiting.values()) reject(error);
+    this.#waiting.clear();
+  }
+
+  ask(message, transfer = []) {
+    const call = ++this.#calls;
+    return new Promise((resolve, reject) => {
+      this.#waiting.set(call, { resolve, reject });
+      this.#worker.postMessage({ ...message, call }, transfer);
+    });
+  }
+
+  close() {
+    this.#worker.terminate();
+    this.#giveUp('it was closed');
+  }
+}
+
+/** Takes frames from a video: VideoFrame where the browser has it, else a canvas that is read back. */
+class FrameGrabber {
+  #video;
+  #canvas = document.createElement('canvas');
+  #context = null;
+  useCanvas = typeof VideoFrame !== 'function';
+
+  constructor(video) {
+    this.#video = video;
+  }
+
+  /** {source, message, transfer}: what to draw, and what the worker is told. */
+  grab(time) {
+    const { videoWidth: width, videoHeight: height } = this.#video;
+    if (!this.useCanvas) {
+      const source = new VideoFrame(this.#video, { timestamp: Math.round(time * 1e6) });
+      const frame = source.clone();
+      return { source, time, message: { type: 'frame', time, frame }, transfer: [frame] };
+    }
+    this.#context ??= this.#canvas.getContext('2d', { willReadFrequently: true, alpha: false });
+    if (this.#canvas.width !== width || this.#canvas.height !== height) {
+      Object.assign(this.#canvas, { width, height });
+    }
+    this.#context.drawImage(this.#video, 0, 0);
+    const pixels = this.#context.getImageData(0, 0, width, height).data.buffer;
+    return {
+      source: this.#canvas, time, transfer: [pixels],
+      message: { type: 'frame', kind: 'rgba', time, width, height, pixels },
+    };
+  }
+}
+
+function release(grabbed) {
+  grabbed?.message.frame?.close();
+  if (typeof VideoFrame === 'function' && grabbed?.source instanceof VideoFrame) grabbed.source.close();
+}
+
+/** Calls back for each new frame of the video; answers a function that ends it. */
+function onFrames(video, callback) {
+  let handle = 0;
+  const byFrame = 'requestVideoFrameCallback' in video;
+  let seen = -1;
+  const next = (now, metadata) => {
+    // Without that callback, the screen's pace: a frame counts when the video's time has moved on.
+    if (byFrame || video.currentTime !== seen) {
+      seen = video.currentTime;
+      if (video.videoWidth > 0) callback((metadata?.captureTime ?? now) / 1000);
+    }
+    handle = byFrame ? video.requestVideoFrameCallback(next) : requestAnimationFrame(next);
+  };
+  handle = byFrame ? video.requestVideoFrameCallback(next) : requestAnimationFrame(next);
+  return () => (byFrame ? video.cancelVideoFrameCallback(handle) : cancelAnimationFrame(handle));
+}
+
+/** GL's projection: pixels of a frame land on a viewport that shows it, as modar_projection() has it. */
+export function projectionOf({ width, height, focal }, near = 0.05, far = 100) {
+  return Float32Array.of(
+    (2 * focal) / width, 0, 0, 0,
+    0, (2 * focal) / height, 0, 0,
+    0, 0, -(far + near) / (far - near), -1,
+    0, 0, (-2 * far * near) / (far - near), 0);
+}
+
+export class Modar extends EventTarget {
+  #tracker = new Tracker();
+  #stopFrames = null;
+  #waiting = null;
+  #busy = false;
+  #known = [];
+  #grabber = null;
+  #runs = 0;
+
+  /** @see load */
+  static async open(bundle, { simd = true, onProgress } = {}) {
+    const given = typeof bundle === 'string' || bundle instanceof URL;
+    const bytes = given ? await fetchBundle(bundle, onProgress) : new Uint8Array(bundle);
+    const modar = new Modar();
+    modar.bytes = bytes;
+    const copy = bytes.slice().buffer;
+    try {
+      const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', bytes: copy, simd }, [copy]);
+      Object.assign(modar, { patterns, scenes, kind });
+    } catch (error) {
+      modar.close();
+      throw error;
+    }
+    return modar;
+  }
+
+  /** Tracks in the video, which is to play, until stop(). focal: in pixels of its width; 0: unknown. */
+  async start(video, { focal = 0, focalSide = 0, findFocal = true, keepLuma = false } = {}) {
+    this.stop();
+    await this.#tracker.ask({ type: 'camera', focal, side: focalSide, findFocal });
+    this.#known = this.patterns.map(() => false);
+    this.#grabber = new FrameGrabber(video);
+    this.keepLuma = keepLuma;
+    const run = ++this.#runs;
+    this.#stopFrames = onFrames(video, (time) => this.#take(time, run));
+  }
+
+  stop() {
+    this.#stopFrames?.();
+    this.#stopFrames = null;
+    ++this.#runs;
+    release(this.#waiting);
+    this.#waiting = null;
+  }
+
+  close() {
+    this.stop();
+    this.#tracker.close();
+  }
+
+  /** Tracks one gray frame (width * height bytes): for pictures that come from elsewhere. */
+  async step(gray, width, height, time) {
+    const pixels = gray.slice().buffer;
+    return this.#tracker.ask({ type: 'frame', kind: 'gray', time, width, height, pixels }, [pixels]);
+  }
+
+  /** The newest frame waits while one is tracked; older ones are dropped. */
+  #take(time, run) {
+    let grabbed;
+    try {
+      grabbed = this.#grabber.grab(time);
+    } catch (error) {
+      this.#grabber.useCanvas = true;
+      return;
+    }
+    release(this.#waiting);
+    this.#waiting = grabbed;
+    if (!this.#busy) this.#pump(run);
+  }
+
+  async #pump(run) {
+    this.#busy = true;
+    while (this.#waiting) {
+      const grabbed = this.#waiting;
+      this.#waiting = null;
+      try {
+        const answer = await this.#tracker.ask({ ...grabbed.message, keepLuma: this.keepLuma }, grabbed.transfer);
+        if (answer.type === 'unreadable') this.#grabber.useCanvas = true;
+        else if (run === this.#runs) this.#tell(answer, grabbed);
+      } catch (error) {
+        if (run === this.#runs) this.dispatchEvent(new CustomEvent('error', { detail: error }));
+      }
+      // The worker closed its own copy.
+      if (grabbed.source !== undefined) release({ message: {}, source: grabbed.source });
+    }
+    this.#busy = false;
+  }
+
+  #tell(answer, { source, time }) {
+    const { poses } = answer;
+    const camera = { width: answer.width, height: answer.height, focal: answer.focal };
+    this.dispatchEvent(new CustomEvent('frame', { detail: { ...answer, camera, source, time } }));
+    let projection = null;
+    for (let pattern = 0; pattern < this.patterns.length; ++pattern) {
+      const pose = poses.subarray(pattern * POSE_FLOATS, (pattern + 1) * POSE_FLOATS);
+      const shown = pose[POSE.shown] !== 0;
+      const { name } = this.patterns[pattern];
+      if (shown) {
+        projection ??= projectionOf(camera);
+        const part = (from, count) => pose.slice(from, from + count);
+        const detail = {
+          pattern, name, time, camera, projection, visible: pose[POSE.visible] !== 0,
+          inliers: pose[POSE.inliers], fit: pose[POSE.fit], rotation: part(POSE.rotation, 9),
+          translation: part(POSE.translation, 3), corners: part(POSE.corners, 8), view: part(POSE.view, 16),
+        };
+        if (!this.#known[pattern]) this.dispatchEvent(new CustomEvent('found', { detail }));
+        this.dispatchEvent(new CustomEvent('updated', { detail }));
+      } else if (this.#known[pattern]) {
+        this.dispatchEvent(new CustomEvent('lost', { detail: { pattern, name, time, reason: answer.reason } }));
+      }
+      this.#known[pattern] = shown;
+    }
+  }
+}
+
+/** Opens a bundle: its address, or its bytes. */
+export function load(bundle, options) {
+  return Modar.open(bundle, options);
+}

@@ -1,0 +1,28 @@
+// Keeps the page for visits without a network. `modar web` writes a line before this one: SITE, with
+// the folder's files and a hash of them all. A new hash is a new site: it is fetched whole, and takes
+// the place of the old one when all of it is there and no page of the old one is open.
+const OURS = `modar ${self.registration.scope} `;  // other sites may live on the same host
+const CACHE = OURS + SITE.hash;
+/** As in engine.js: of the two builds of the engine, only the one that will run is kept. */
+const SIMD = WebAssembly.validate(Uint8Array.of(
+  0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11));
+
+self.addEventListener('install', (event) => {
+  const other = SIMD ? 'engine-plain.' : 'engine-simd.';
+  const files = SITE.files.filter((file) => !file.startsWith(other));
+  // Past the browser's own cache, where files of an older site may lie.
+  const requests = ['./', ...files].map((file) => new Request(file, { cache: 'no-cache' }));
+  event.waitUntil(caches.open(CACHE).then((cache) => cache.addAll(requests)));
+});
+
+self.addEventListener('activate', (event) => {
+  event.waitUntil(caches.keys().then((names) => Promise.all(
+    names.filter((name) => name.startsWith(OURS) && name !== CACHE).map((name) => caches.delete(name)))));
+});
+
+self.addEventListener('fetch', (event) => {
+  if (event.request.method !== 'GET') return;
+  event.respondWith(caches.open(CACHE)
+    .then((cache) => cache.match(event.request, { ignoreSearch: true }))
+    .then((kept) => kept ?? fetch(event.request)));
+});

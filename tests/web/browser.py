@@ -1,0 +1,147 @@
+"""Chromium without a screen, driven by its DevTools protocol over a pair of pipes, and a server that can go away."""
+import base64
+import functools
+import http.server
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import threading
+import time
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+# SwiftShader: the same pixels on every machine.
+FLAGS = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+         "--use-fake-device-for-media-stream", "--no-first-run", "--disable-background-networking",
+         "--disable-component-update", "--disable-default-apps", "--disable-sync", "--hide-scrollbars",
+         "--force-color-profile=srgb", "--remote-debugging-pipe"]
+
+
+class Browser:
+    """One browser with one page. Collects what a visitor's console and network would show."""
+
+    def __init__(self, folder, video, size=(640, 480), extra=()):
+        commands_out, commands_in = os.pipe()
+        answers_out, answers_in = os.pipe()
+
+        def wire():  # the protocol's ends are the descriptors 3 and 4; 10 and 11 are out of their way
+            os.dup2(commands_out, 10)
+            os.dup2(answers_in, 11)
+            os.dup2(10, 3)
+            os.dup2(11, 4)
+
+        words = [CHROMIUM, *FLAGS, f"--user-data-dir={folder}", f"--window-size={size[0]},{size[1]}",
+                 f"--use-file-for-fake-video-capture={video}", *extra, "about:blank"]
+        self.process = subprocess.Popen(words, preexec_fn=wire, close_fds=False, stdout=subprocess.DEVNULL,
+                                        stderr=subprocess.DEVNULL)
+        os.close(commands_out)
+        os.close(answers_in)
+        self.commands = os.fdopen(commands_in, "wb", buffering=0)
+        self.answers = os.fdopen(answers_out, "rb", buffering=0)
+        self.rest, self.calls, self.session = b"", 0, None
+        self.errors, self.requests = [], []
+        target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
+        self.session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network", "Accessibility"):
+            self.call(domain + ".enable")
+
+    def _message(self):
+        while b"\0" not in self.rest:
+            part = self.answers.read(1 << 20)
+            if not part:
+                raise RuntimeError("the browser has ended")
+            self.rest += part
+        message, self.rest = self.rest.split(b"\0", 1)
+        return json.loads(message)
+
+    def _note(self, message):
+        method, params = message.get("method"), message.get("params", {})
+        if method == "Runtime.exceptionThrown":
+            details = params["exceptionDetails"]
+            self.errors.append(details.get("exception", {}).get("description", details["text"]))
+        elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "assert", "warning"):
+            self.errors.append(" ".join(str(a.get("value", a.get("description"))) for a in params["args"]))
+        elif method == "Log.entryAdded" and params["entry"]["level"] == "error":
+            self.errors.append(params["entry"]["text"] + " " + params["entry"].get("url", ""))
+        elif method == "Network.requestWillBeSent":
+            self.requests.append(params["request"]["url"])
+
+    def call(self, method, **params):
+        self.calls += 1
+        message = {"id": self.calls, "method": method, "params": params}
+        if self.session:
+            message["sessionId"] = self.session
+        self.commands.write(json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._message()
+            if answer.get("id") == self.calls:
+                if "error" in answer:
+                    raise RuntimeError(f"{method}: {answer['error']['message']}")
+                return answer["result"]
+            self._note(answer)
+
+    def run(self, script):
+        """The value of an expression, awaited, as by a visitor's own click."""
+        done = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True, userGesture=True)
+        if "exceptionDetails" in done:
+            details = done["exceptionDetails"]
+            raise RuntimeError(details.get("exception", {}).get("description", details["text"]))
+        return done["result"].get("value")
+
+    def wait(self, condition, what, seconds=90):
+        """Until the expression holds. The limit is for a page that hangs, on a machine however loaded."""
+        end = time.monotonic() + seconds
+        while not self.run(condition):
+            if time.monotonic() > end:
+                raise AssertionError(f"{what} did not happen; console: {self.errors}")
+            time.sleep(0.1)
+
+    def open(self, url):
+        self.call("Page.navigate", url=url)
+        self.wait(f"location.href.startsWith({url!r}) && document.readyState === 'complete'", f"loading {url}")
+
+    def resize(self, width, height, scale=1, mobile=False):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=mobile)
+
+    def camera(self, setting):
+        """"granted" or "denied"."""
+        session, self.session = self.session, None
+        self.call("Browser.setPermission", permission={"name": "camera"}, setting=setting)
+        self.session = session
+
+    def screenshot(self, path):
+        pathlib.Path(path).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+
+    def close(self):
+        try:
+            self.session = None
+            self.call("Browser.close")
+        except (RuntimeError, OSError):
+            pass
+        self.commands.close()
+        self.answers.close()
+        try:
+            self.process.wait(20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    extensions_map = {**http.server.SimpleHTTPRequestHandler.extensions_map, ".js": "text/javascript",
+                      ".wasm": "application/wasm", ".modar": "application/octet-stream"}
+
+    def log_message(self, *_):
+        pass
+
+
+class Server:
+    def __init__(self, folder):
+        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder)))
+        self.url = f"http://localhost:{self.http.server_port}/"
+        threading.Thread(target=self.http.serve_forever, daemon=True).start()
+
+    def close(self):
+        self.http.shutdown()
+        self.http.server_close()

@@ -1,0 +1,335 @@
+"""The page in Chromium with a fake camera: what a visitor sees, and that its poses are the player's."""
+import base64
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
+from browser import Browser, Server  # noqa: E402
+from programs import COVER, POTTERY, QUICK, ROOT, ProgramTest  # noqa: E402
+
+WIDTH, HEIGHT, FRAMES = 640, 480, 6
+# A folder that keeps the pictures, for people.
+KEEP = os.environ.get("MODAR_WEB_PICTURES")
+
+FEED = """(async () => {
+  const { load } = await import('/modar.js');
+  const modar = await load('/bundles/demo.modar', { simd: %s });
+  await modar.start(document.createElement('video'), { findFocal: false });
+  modar.stop();
+  const frames = new Uint8Array(await (await fetch('/frames.gray')).arrayBuffer());
+  const size = %d * %d, seen = [];
+  for (let i = 0; i * size < frames.length; ++i) {
+    const { poses, reason, heapBytes } = await modar.step(frames.subarray(i * size, (i + 1) * size), %d, %d, i / 30);
+    seen.push({ reason, heapBytes, pose: Array.from(poses) });
+  }
+  modar.close();
+  return { kind: modar.kind, seen };
+})()"""
+
+RECORD = """(async () => {
+  const { load } = await import('/modar.js');
+  const modar = await load('/bundles/demo.modar');
+  const stream = await navigator.mediaDevices.getUserMedia({ video: { width: %d, height: %d } });
+  const video = document.createElement('video');
+  Object.assign(video, { srcObject: stream, muted: true, playsInline: true });
+  document.body.append(video);
+  await video.play();
+  const seen = [];
+  await new Promise((resolve, reject) => {
+    modar.addEventListener('error', ({ detail }) => reject(detail));
+    modar.addEventListener('frame', ({ detail: { luma, poses, reason, source } }) => {
+      if (seen.length === 6) return;
+      let text = '';
+      for (let i = 0; i < luma.length; i += 4096) text += String.fromCharCode(...luma.subarray(i, i + 4096));
+      seen.push({ luma: btoa(text), reason, pose: Array.from(poses), source: source.constructor.name });
+      if (seen.length === 6) resolve();
+    });
+    modar.start(video, { findFocal: false, keepLuma: true });
+  });
+  modar.close();
+  for (const track of stream.getTracks()) track.stop();
+  return seen;
+})()"""
+
+
+def rounded(value):
+    """To a float and back, as C does."""
+    return struct.unpack("f", struct.pack("f", value))[0]
+
+
+class Page(ProgramTest):
+    """One browser for all: starting it costs more than most tests."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.base = pathlib.Path(tempfile.mkdtemp(prefix="modar-web-"))
+        cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
+        test = cls("run_program")
+        test.folder = cls.base
+        bundle, site = cls.base / "demo.modar", cls.base / "site"
+        for words in (["bake", "--model", POTTERY, "--pattern", COVER, "--scene", "cover=pottery,scale=0.5", "-o", bundle,
+                       "--quiet", "--no-lods", *QUICK],
+                      ["web", bundle, "-o", site, "--title", "Pots & pans", "--quiet"]):
+            done = test.modar(*words)
+            if done.returncode != 0:
+                raise AssertionError(done.stderr)
+        clip = cls.base / "clip"
+        subprocess.run([sys.executable, ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", str(FRAMES), "--size",
+                        f"{WIDTH}x{HEIGHT}", clip], check=True, capture_output=True)
+        cls.video = cls.base / "camera.y4m"
+        convert = ["ffmpeg", "-loglevel", "error", "-y", "-framerate", "30", "-i", clip / "frame_%05d.png"]
+        subprocess.run([*convert, "-pix_fmt", "yuv420p", cls.video], check=True)
+        subprocess.run([*convert, "-pix_fmt", "gray", "-f", "rawvideo", site / "frames.gray"], check=True)
+        (site / "played").mkdir()
+        shutil.copytree(clip, site / "clip")
+        test.run_program("modar-play", bundle, "--input", clip, "--out", site / "played")
+        cls.server = Server(site)
+        cls.site = site
+        cls.bundle = bundle
+        cls.browser = Browser(cls.base / "profile", cls.video)
+        cls.addClassCleanup(cls.browser.close)
+        cls.browser.camera("granted")
+
+    def setUp(self):
+        super().setUp()
+        self.browser.errors.clear()
+        self.browser.requests.clear()
+
+    def keep(self, name):
+        if KEEP:
+            pathlib.Path(KEEP).mkdir(parents=True, exist_ok=True)
+            self.browser.screenshot(pathlib.Path(KEEP) / name)
+
+    def played(self, frames):
+        """What modar-play sees in gray frames: a dictionary a frame."""
+        done = self.run_program("modar-play", self.bundle, "--input", f"grey:{WIDTH}x{HEIGHT}:{frames}", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return [line for line in map(json.loads, done.stdout.splitlines()) if "frame" in line]
+
+    def assert_same_poses(self, seen, frames):
+        expected = self.played(frames)
+        self.assertEqual(len(seen), len(expected))
+        for web, play in zip(seen, expected):
+            self.assertEqual(web["reason"], play["reason"])
+            self.assertEqual(web["pose"][0], len(play["visible"]))
+            for each in play["visible"]:
+                numbers = [*each["rotation"], *each["translation"], *sum(each["corners"], [])]
+                self.assertEqual(web["pose"][4:24], [rounded(n) for n in numbers])
+                self.assertEqual(web["pose"][2], each["inliers"])
+        return sum(len(play["visible"]) for play in expected)
+
+    def test_poses_are_the_players_to_the_last_bit(self):
+        self.browser.open(self.server.url)
+        for simd in ("true", "false"):
+            done = self.browser.run(FEED % (simd, WIDTH, HEIGHT, WIDTH, HEIGHT))
+            self.assertEqual(done["kind"], "simd" if simd == "true" else "plain")
+            self.assertGreater(self.assert_same_poses(done["seen"], self.site / "frames.gray"), FRAMES // 2)
+            print(f"{done['kind']}: heap {done['seen'][-1]['heapBytes']} bytes")
+
+    def test_camera_frames_arrive_without_a_read_back_and_track_alike(self):
+        self.browser.open(self.server.url)
+        for canvas in (False, True):
+            script = RECORD % (WIDTH, HEIGHT)
+            if canvas:
+                script = "(delete globalThis.VideoFrame, " + script + ")"
+            seen = self.browser.run(script)
+            self.assertEqual({each["source"] for each in seen}, {"HTMLCanvasElement" if canvas else "VideoFrame"})
+            frames = self.folder / "seen.gray"
+            frames.write_bytes(b"".join(base64.b64decode(each["luma"]) for each in seen))
+            self.assert_same_poses(seen, frames)
+        self.assertEqual(self.browser.errors, [])
+
+    def start(self, state="seen"):
+        self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
+        self.browser.run("performance.clearMarks(), document.getElementById('start').click()")
+        self.browser.wait(f"document.documentElement.dataset.state === '{state}'", f"state {state}")
+
+    def test_a_visit(self):
+        self.browser.resize(390, 844, 2, True)
+        self.browser.open(self.server.url)
+        self.browser.wait("document.images[0]?.complete && document.getElementById('start').textContent !== ''", "the cover")
+        self.keep("cover-portrait.png")
+        self.assertEqual(self.browser.run("document.title"), "Pots & pans")
+        self.start()
+        ms = self.browser.run("performance.getEntriesByName('seen')[0].startTime - performance.getEntriesByName('camera')[0].startTime")
+        print(f"camera to first tracked frame: {ms:.0f} ms")
+        self.keep("stage-portrait.png")
+        self.assertEqual(self.browser.run("document.getElementById('label-name').textContent"), "cover")
+        self.browser.run("document.getElementById('shoot').click()")
+        self.browser.wait("document.getElementById('photo').open && document.getElementById('photo-image').naturalWidth > 0", "a photo")
+        self.assertEqual(self.browser.run("document.getElementById('photo-image').naturalWidth"), 780)
+        self.keep("photo-portrait.png")
+        self.browser.run("document.getElementById('photo').close()")
+        self.browser.resize(844, 390, 2, True)
+        self.browser.wait("document.getElementById('models').width === 1688", "the turn")
+        self.keep("stage-landscape.png")
+        self.browser.run("document.getElementById('close').click()")
+        self.browser.wait("!document.getElementById('cover').hidden && !document.getElementById('video').srcObject", "the end")
+        self.keep("cover-landscape.png")
+        self.assertEqual(self.browser.errors, [])
+        own = (self.server.url, "blob:" + self.server.url, "data:", "about:")
+        self.assertEqual([url for url in self.browser.requests if not url.startswith(own)], [])
+
+    def test_everything_has_a_name(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
+        for stage in (False, True):
+            if stage:
+                self.start()
+            nodes = [n for n in self.browser.call("Accessibility.getFullAXTree")["nodes"] if not n.get("ignored")]
+            roles = {}
+            for node in nodes:
+                role = node["role"]["value"]
+                if role in ("button", "image", "combobox", "heading", "link", "toolbar", "region"):
+                    roles.setdefault(role, []).append(node.get("name", {}).get("value", ""))
+            self.assertIn("button", roles)
+            for role, names in roles.items():
+                self.assertNotIn("", names, role)
+        self.assertIn("pottery stands on the picture cover.", roles["image"])
+
+    def test_keys_turn_and_resize(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.start()
+        self.assertEqual(self.browser.run("document.activeElement.id"), "models")
+        key = "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{}', bubbles: true, cancelable: true }}))"
+        self.assertFalse(self.browser.run(key.format("ArrowLeft")))  # taken
+        self.assertTrue(self.browser.run(key.format("x")))
+        self.assertFalse(self.browser.run(key.format("Escape")))
+        self.browser.wait("!document.getElementById('cover').hidden", "the end")
+
+    def test_a_lost_context_is_restored(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.start()
+        self.browser.run("globalThis.loser = document.getElementById('models').getContext('webgl2').getExtension('WEBGL_lose_context'), loser.loseContext()")
+        self.browser.wait("document.getElementById('models').getContext('webgl2').isContextLost()", "the loss")
+        self.browser.run("loser.restoreContext()")
+        self.browser.wait(f"({DRAWN}) > 500", "models after the loss")
+        self.assertEqual(self.browser.run("document.documentElement.dataset.error ?? ''"), "")
+
+    def test_a_hidden_page_stops_the_camera(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.start()
+        hide = "Object.defineProperty(document, 'hidden', {{ value: {}, configurable: true }}), document.dispatchEvent(new Event('visibilitychange'))"
+        self.browser.run(hide.format("true"))
+        self.assertTrue(self.browser.run("document.getElementById('video').srcObject === null"))
+        self.browser.run(hide.format("false"))
+        self.browser.wait("document.getElementById('video').srcObject !== null", "the camera again")
+
+    def test_a_refused_camera_is_told(self):
+        self.browser.resize(390, 844, 2, True)
+        self.browser.open(self.server.url)
+        self.browser.camera("denied")
+        try:
+            self.start("error")
+            self.assertEqual(self.browser.run("document.documentElement.dataset.error"), "refused")
+            self.assertIn("settings", self.browser.run("document.getElementById('problem').textContent"))
+            self.keep("refused.png")
+        finally:
+            self.browser.camera("granted")
+        self.browser.run("document.getElementById('again').click()")
+        self.browser.wait("document.documentElement.dataset.state === 'seen'", "the second try")
+
+    def test_webgl_2_and_1_draw_the_players_pictures(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        for webgl in (2, 1):
+            drawn = self.browser.run(COMPARE % ("true" if webgl == 1 else "false", FRAMES))
+            self.assertEqual(drawn["webgl"], webgl)
+            self.assertGreater(max(frame["lit"] for frame in drawn["frames"]), 5000)
+            for frame in drawn["frames"]:
+                # The page smooths edges of models, the player does not.
+                self.assertLess(frame["mean"], 1, frame)
+                self.assertLess(frame["off"], 0.005, frame)
+            print(f"WebGL {webgl}: {drawn}")
+
+    def test_without_the_server_the_second_visit_works(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.browser.wait("navigator.serviceWorker.ready.then(() => true)", "the service worker")
+        type(self).server.close()
+        try:
+            self.browser.open(self.server.url + "?again")
+            self.start()
+            self.assertEqual(self.browser.errors, [])
+        finally:
+            type(self).server = Server(self.site)
+
+
+# Pixels of the models' canvas that are not transparent.
+DRAWN = """(() => {
+  const canvas = document.getElementById('models');
+  const copy = document.createElement('canvas');
+  Object.assign(copy, { width: canvas.width, height: canvas.height });
+  const context = copy.getContext('2d');
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, copy.width, copy.height);
+  let lit = 0;
+  for (let i = 3; i < data.length; i += 4) lit += data[i] > 0;
+  return lit;
+})()"""
+
+# The clip's pictures through engine and view, each beside the player's: mean difference of the colour values, share of
+# pixels that are off by more than 64 in one of them, pixels of the model.
+COMPARE = """(async () => {
+  const { load } = await import('/modar.js');
+  const { View } = await import('/modar-view.js');
+  const modar = await load('/bundles/demo.modar');
+  await modar.start(document.createElement('video'), { findFocal: false });
+  modar.stop();
+  const canvas = () => {
+    const made = document.createElement('canvas');
+    made.style.cssText = 'position:fixed;left:0;top:0;width:640px;height:480px';
+    document.body.append(made);
+    return made;
+  };
+  const pixels = async (source) => {
+    const copy = new OffscreenCanvas(640, 480);
+    const context = copy.getContext('2d', { willReadFrequently: true });
+    context.drawImage(source, 0, 0);
+    return context.getImageData(0, 0, 640, 480).data;
+  };
+  const picture = async (address) => createImageBitmap(await (await fetch(address)).blob());
+  const models = canvas();
+  const view = await View.create(modar.bytes, { picture: canvas(), models, webgl1: %s });
+  const frames = [];
+  for (let i = 0; i < %d; ++i) {
+    const number = String(i).padStart(5, '0');
+    const source = await picture(`/clip/frame_${number}.png`);
+    const rgba = await pixels(source);
+    const gray = new Uint8Array(640 * 480);
+    for (let p = 0; p < gray.length; ++p) gray[p] = (19595 * rgba[4 * p] + 38470 * rgba[4 * p + 1] + 7471 * rgba[4 * p + 2] + 32768) >> 16;
+    const frame = await modar.step(gray, 640, 480, i / 30);
+    view.draw({ source, poses: frame.poses, camera: frame });
+    const shown = await pixels(models);
+    const ours = await pixels(await createImageBitmap(await view.photograph('image/png')));
+    const theirs = await pixels(await picture(`/played/frame_0${number}.png`));
+    let sum = 0, off = 0, lit = 0;
+    for (let p = 0; p < ours.length; p += 4) {
+      let worst = 0;
+      for (let c = 0; c < 3; ++c) {
+        const difference = Math.abs(ours[p + c] - theirs[p + c]);
+        sum += difference;
+        worst = Math.max(worst, difference);
+      }
+      off += worst > 64;
+      lit += shown[p + 3] > 0;
+    }
+    frames.push({ mean: sum / (ours.length * 0.75), off: off / (ours.length / 4), lit });
+  }
+  modar.close();
+  return { frames, webgl: view.webgl, heap: view.heapBytes, gpu: view.gpuBytes };
+})()"""
+
+if __name__ == "__main__":
+    unittest.main()
