@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds with ASan + UBSan and runs the tests under CTest.
 #   scripts/test.sh           installs the build's packages only; names what it skips
-#   scripts/test.sh --all     also installs every oracle and tool, so that nothing is skipped (CI runs this)
+#   scripts/test.sh --all     also installs every oracle and tool, and names what is still skipped (CI runs this)
 #   scripts/test.sh --soak    --all with the long tests (label soak) in full
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
