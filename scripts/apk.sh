@@ -8,7 +8,7 @@
 # --release       address of a folder that `modar ship publish` filled, and the key to trust: adds the network permission
 # --words         words.properties: what the screen says, in your language
 # NAME.png, NAME.jpg (what to look for) and NAME.properties (texts) beside NAME.modar go with it.
-# With ANDROID_NDK set (r25 or newer) it builds the native library for armeabi-v7a, arm64-v8a and x86; without, the APK
+# With ANDROID_NDK set (r26 or newer) it builds the native library for armeabi-v7a, arm64-v8a and x86; without, the APK
 # holds everything else, and it says so. MODAR_NDK_FLAGS: further words for CMake.
 # dx and the signatures of Android's classes come from Debian's source packages, once, into build/android/debian (121 MB).
 set -euo pipefail

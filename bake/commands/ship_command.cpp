@@ -120,6 +120,21 @@ std::string expiry_text(std::int64_t expires) {
          time_text(expires);
 }
 
+/// What `ship rotate` and `ship root` work on.
+struct KeyChange {
+  SecretKey key;   ///< signs the change
+  PublicKey next;  ///< signs releases from now on
+  ReleaseFolder folder;
+};
+
+Result<KeyChange> open_key_change(const RotateCommand& command) {
+  MODAR_ASSIGN(auto key, load_key(command.key_file, command.pass_phrase_file));
+  MODAR_ASSIGN(const auto text, read_text(command.next_key));
+  MODAR_ASSIGN(const auto next, parse_public_key(text));
+  MODAR_ASSIGN(auto folder, ReleaseFolder::open(command.folder));
+  return KeyChange{std::move(key), next, std::move(folder)};
+}
+
 }  // namespace
 
 int run_keygen(const KeygenCommand& command) {
@@ -194,34 +209,24 @@ int run_publish(ShipPublishCommand& command) {
 }
 
 int run_rotate(const RotateCommand& command) {
-  const auto key = load_key(command.key_file, command.pass_phrase_file);
-  if (!key) return print_error(key.error());
-  const auto next_text = read_text(command.next_key);
-  if (!next_text) return print_error(next_text.error());
-  const auto next = parse_public_key(*next_text);
-  if (!next) return print_error(next.error());
-  const auto folder = ReleaseFolder::open(command.folder);
-  if (!folder) return print_error(folder.error());
-  if (auto fine = folder->check_signer(key->public_key); !fine) return print_error(fine.error());
-  if (auto added = folder->add_key(*next, *key); !added) return print_error(added.error());
-  std::fprintf(stderr, "link %u of the chain: devices follow to key %s\n", folder->key_links(),
-               to_hex(next->id).c_str());
+  const auto change = open_key_change(command);
+  if (!change) return print_error(change.error());
+  const auto& [key, next, folder] = *change;
+  if (auto fine = folder.check_signer(key.public_key); !fine) return print_error(fine.error());
+  if (auto added = folder.add_key(next, key); !added) return print_error(added.error());
+  std::fprintf(stderr, "link %u of the chain: devices follow to key %s\n", folder.key_links(),
+               to_hex(next.id).c_str());
   return static_cast<int>(ExitCode::kOk);
 }
 
 int run_root(const RotateCommand& command) {
-  const auto key = load_key(command.key_file, command.pass_phrase_file);
-  if (!key) return print_error(key.error());
-  const auto next_text = read_text(command.next_key);
-  if (!next_text) return print_error(next_text.error());
-  const auto next = parse_public_key(*next_text);
-  if (!next) return print_error(next.error());
-  const auto folder = ReleaseFolder::open(command.folder);
-  if (!folder) return print_error(folder.error());
-  const auto word = folder->add_root_word(*next, *key);
+  const auto change = open_key_change(command);
+  if (!change) return print_error(change.error());
+  const auto& [key, next, folder] = *change;
+  const auto word = folder.add_root_word(next, key);
   if (!word) return print_error(word.error());
   std::fprintf(stderr, "epoch %llu: key %s signs; publish the next release with it\n",
-               static_cast<unsigned long long>(word->epoch), to_hex(next->id).c_str());
+               static_cast<unsigned long long>(word->epoch), to_hex(next.id).c_str());
   return static_cast<int>(ExitCode::kOk);
 }
 
