@@ -28,6 +28,8 @@ as_root=()
 if [ "$(id -u)" -ne 0 ]; then as_root=(sudo); fi
 echo "Installing ${#missing[@]} Debian packages: ${missing[*]}" >&2
 export DEBIAN_FRONTEND=noninteractive
-"${as_root[@]}" apt-get update -qq >&2
+# One list that a mirror serves broken (another architecture's, say) does not stop what the other lists hold.
+"${as_root[@]}" apt-get update -qq >&2 ||
+  echo "setup.sh: some package lists could not be fetched; going on with the others" >&2
 "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
   "${missing[@]}" >&2
