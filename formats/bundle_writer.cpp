@@ -100,7 +100,8 @@ class SectionList {
     feature_headers_.push_back(header);
     add(SectionType::kMappedFeatures, pattern, features.set_id,
         {bytes_of(feature_headers_.back()), std::as_bytes(std::span(features.keypoints)),
-         Bytes(kZeros).first(header.descriptors_offset - end), Bytes(features.descriptors)});
+         Bytes(kZeros).first(static_cast<std::size_t>(header.descriptors_offset - end)),
+         Bytes(features.descriptors)});
     if (!features.yml.empty()) {
       add(SectionType::kFeatureYml, pattern, features.set_id,
           {std::as_bytes(std::span(features.yml.data(), features.yml.size()))});

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <limits>
 
+#include "formats/bits.hpp"
 #include "formats/check_rules.hpp"
 #include "formats/tracker_record.hpp"
 #include "formats/utf8.hpp"
@@ -376,7 +376,7 @@ struct Range {
 };
 
 void check_sides(FaultLog& log, const BundleParts& parts, const TextureRecord& texture) {
-  const bool powers = std::has_single_bit(texture.width) && std::has_single_bit(texture.height);
+  const bool powers = is_power_of_two(texture.width) && is_power_of_two(texture.height);
   if (powers || (texture.level_count == 1 && (texture.flags & kTextureRepeat) == 0)) return;
   log.add(
       Rule::kTextureSides, offset_of(parts, &texture.width), label(parts, "texture", texture.name),
@@ -387,7 +387,7 @@ void check_sides(FaultLog& log, const BundleParts& parts, const TextureRecord& t
 void check_blocks(FaultLog& log, const BundleParts& parts, const TextureRecord& texture,
                   const SectionEntry& data) {
   // A side has at most 14 levels, and each has at most a twin.
-  std::array<Range, 2 * std::bit_width(kMaxTextureSide)> ranges;
+  std::array<Range, 2 * bit_width(kMaxTextureSide)> ranges;
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < texture.level_count; ++i) {
     const TextureLevelRecord& level = parts.texture_levels[texture.first_level + i];

@@ -9,6 +9,7 @@
 #include "formats/check_rules.hpp"
 #include "formats/component.hpp"
 #include "formats/field_table.hpp"
+#include "formats/shortest_number.hpp"
 #include "formats/validate.hpp"
 
 namespace modar {
@@ -25,6 +26,14 @@ void append(std::string& line, T value) {
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
   line.append(text.data(), end.ptr);
 }
+#ifndef __cpp_lib_to_chars  // libc++ knows integers only
+void append(std::string& line, float value) {
+  line += shortest_text(value);
+}
+void append(std::string& line, double value) {
+  line += shortest_text(value);
+}
+#endif
 
 void append_name(std::string& line, const BundleParts& parts, NameRef ref) {
   const auto* text = reinterpret_cast<const char*>(parts.names.data());

@@ -3,11 +3,11 @@
 #include "formats/validate.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <tuple>
 
+#include "formats/bits.hpp"
 #include "formats/check.hpp"
 #include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
@@ -577,7 +577,7 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
                     " pixels are no possible size");
     return;
   }
-  const auto chain = static_cast<std::uint32_t>(std::bit_width(side));
+  const auto chain = static_cast<std::uint32_t>(bit_width(side));
   if (texture.level_count != 1 && texture.level_count != chain) {
     check.fault(Rule::kTextureRange, &texture.level_count,
                 std::to_string(texture.level_count) +

@@ -228,7 +228,10 @@ void add_parameter_sets(const BakeRequest& request, BundleContent& content) {
 }
 
 Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptions& loop,
-                         BundleContent& content, Report& report) {
+                         BundleContent& content, Report& report, BakeTrace& trace) {
+  if (is_target_file(request.path)) {
+    MODAR_ASSIGN(trace.files.emplace_back(), target_picture(request.path));
+  }
   Result<PatternFeatures> baked =
       bake_pattern(request.path, request.width_mm, content.parameter_sets, loop, report);
   if (!baked) return tl::unexpected(baked.error());
@@ -400,7 +403,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
   TrackerRecordOptions loop = request.loop;
   loop.jobs = request.jobs;
   for (const PatternRequest& pattern : request.patterns) {
-    if (auto added = add_pattern(pattern, loop, content, report); !added) {
+    if (auto added = add_pattern(pattern, loop, content, report, traced); !added) {
       return tl::unexpected(added.error());
     }
   }

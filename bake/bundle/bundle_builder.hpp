@@ -76,8 +76,8 @@ Result<void> require_shown(const BakeRequest& request);
 
 /// What a bake learns of its inputs and no bundle states.
 struct BakeTrace {
-  /// Files that the models name, as paths; those that are missing too. The models' own and the
-  /// patterns' are not among them.
+  /// Files that models and image targets name, as paths; those that are missing too. Their own and
+  /// pictures that are patterns are not among them.
   std::vector<std::string> files;
   std::vector<std::array<double, 3>> model_sides;  ///< of each model's box, source units
 };

@@ -65,6 +65,11 @@ void add_web(CommandLine& program) {
               {.type = "LANGUAGE", .separator = ','});
   line.option("--texts", &options.texts, "Names and texts of the patterns, in these languages",
               {.type = "JSON"});
+  line.option("--release", &options.release,
+              "Address of a folder of `modar ship publish`: the page updates its bundles from it",
+              {.type = "URL"});
+  line.option("--trust", &options.trusted_key, "The key that signs those releases: K.pub",
+              {.type = "FILE"});
   line.option("--page", &options.page, "The page's files; else those installed or built with modar",
               {.type = "DIR"});
   line.flag("--serve", command->serve, "Serve it by HTTPS, with a QR code of the address");
@@ -75,6 +80,7 @@ void add_web(CommandLine& program) {
   line.footer(example(
       "  modar web vase.modar -o site --title 'The red vase' --languages de,en --texts texts.json\n"
       "  modar web vase.modar -o site --serve\n"
+      "  modar web vase.modar -o site --release release --trust museum.key.pub\n"
       "\n"
       "texts.json: {\"cover\": {\"en\": {\"name\": \"The cover\", \"text\": \"Printed in "
       "1890.\"}}}\n"));

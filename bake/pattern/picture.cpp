@@ -7,6 +7,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "bake/pattern/target_file.hpp"
+
 namespace modar {
 namespace {
 
@@ -37,7 +39,12 @@ Result<GrayPicture> load_gray(const std::string& path) {
 }
 
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
-  MODAR_ASSIGN(GrayPicture gray, load_gray(path));
+  if (path.ends_with(".mind")) {
+    return fail(ExitCode::kUnsupported, "pattern.mind", path,
+                "a compiled file of MindAR holds small copies of its pictures only",
+                "name the pictures that it was compiled from, in their order");
+  }
+  MODAR_ASSIGN(GrayPicture gray, is_target_file(path) ? load_target(path) : load_gray(path));
   const int longest = std::max(gray.width, gray.height);
   shrunk = longest > kLargestPattern;
   if (!shrunk) return gray;

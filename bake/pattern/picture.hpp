@@ -23,7 +23,9 @@ struct GrayPicture {
 GrayPicture gray_of(const RgbaImage& image);
 /// Reads an image file as gray. Errors: those of read_image().
 Result<GrayPicture> load_gray(const std::string& path);
-/// The same, its longer side at most 720 pixels. shrunk: whether it was made smaller.
+/// The same of a picture, or of the one that an image target of 8th Wall names (target_file.hpp),
+/// its longer side at most 720 pixels. shrunk: whether it was made smaller. Errors: also
+/// kUnsupported "pattern.mind", and those of load_target().
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
 /// The PNG and JPEG files of a folder sorted by name, or the file itself. Errors: kIo
 /// "pictures.folder" where there is none.

@@ -23,6 +23,7 @@
 #include "bake/project/settings.hpp"
 #include "bake/terminal.hpp"
 #include "formats/atomic_file.hpp"
+#include "formats/content_summary.hpp"
 
 namespace modar {
 namespace {
@@ -155,6 +156,11 @@ class ProjectBake {
     return (fs::path(project_.path(task.asset->file)).parent_path() / file).string();
   }
 
+  /// Pictures stand alone; models and image targets name other files.
+  [[nodiscard]] static bool names_files(const ProjectAsset& asset) {
+    return !asset.pattern || is_target_file(asset.file);
+  }
+
   [[nodiscard]] std::string key_of(const Task& task) const {
     std::string text = task.action + "\n";
     for (std::size_t i = 1; i < task.inputs.size(); ++i) {
@@ -171,7 +177,7 @@ class ProjectBake {
                   task.inputs[0].path + "\n" + task.inputs[0].digest + "\n" +
                   std::to_string(task.asset->width_mm) + "\n" + joined(task.settings));
     const auto files =
-        task.asset->pattern ? std::vector<std::string>() : cache_.files_of(task.action);
+        names_files(*task.asset) ? cache_.files_of(task.action) : std::vector<std::string>();
     if (files) take_inputs(task, *files);
     const bool there = task.key && cache_.has(*task.key);
     task.state = there ? AssetOutcome::State::kCached : AssetOutcome::State::kStale;
@@ -396,7 +402,7 @@ class ProjectBake {
     notes.diagnostics = std::move(report.diagnostics);
     const auto lock = interrupts_->writing();
     MODAR_TRY(cache_.write(*task.key, content, notes));
-    if (task.asset->pattern) return {};
+    if (!names_files(*task.asset)) return {};
     std::vector<std::string> files;
     for (std::size_t i = 1; i < task.inputs.size(); ++i) files.push_back(task.inputs[i].path);
     return cache_.write_files(task.action, files);
@@ -460,6 +466,7 @@ class ProjectBake {
     Json meta = Json::parse(content.meta);
     meta.set("texts", std::move(texts));
     content.meta = meta.dump();
+    content.summary = content_summary_of(content);  // it states the meta's hash
   }
 
   [[nodiscard]] Result<void> hold_gates(const Target& target, const BundleContent& content) const {

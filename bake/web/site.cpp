@@ -16,6 +16,7 @@
 #include "formats/check.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/mapped_file.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 namespace {
@@ -23,10 +24,13 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What is copied as it is; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 13> kPageFiles = {
-    "app.js",           "engine.js",    "engine-plain.js", "engine-plain.wasm", "engine-simd.js",
-    "engine-simd.wasm", "icon-180.png", "icon-512.png",    "icon.svg",          "modar-view.js",
-    "modar-worker.js",  "modar.js",     "style.css"};
+constexpr std::array<std::string_view, 14> kPageFiles = {
+    "app.js",           "engine.js",       "engine-plain.js", "engine-plain.wasm", "engine-simd.js",
+    "engine-simd.wasm", "icon-180.png",    "icon-512.png",    "icon.svg",          "installed.js",
+    "modar-view.js",    "modar-worker.js", "modar.js",        "style.css"};
+/// Beside them where the page updates itself.
+constexpr std::array<std::string_view, 3> kUpdateFiles = {"engine-update.js", "engine-update.wasm",
+                                                          "update-worker.js"};
 
 struct Draft {
   const SiteOptions& options;
@@ -131,10 +135,36 @@ Result<void> read_texts(Draft& draft) {
               R"(write {"cover": {"en": {"name": "The cover", "text": "Printed in 1890."}}})");
 }
 
-/// The pattern's texts in the site's languages; null where none are given.
-Result<Json> texts_of(Draft& draft, const std::string& pattern) {
+/// Of a pattern, what modar.toml has to say of its scenes in these languages; null where that is
+/// nothing.
+Json bundle_texts(const BundleView& bundle, const std::string& pattern,
+                  const std::vector<std::string>& languages) {
+  const auto meta = bundle.section(SectionType::kMeta);
+  const Json scenes = Json::parse({reinterpret_cast<const char*>(meta.data()), meta.size()})
+                          .find("texts")
+                          .value_or(Json());
+  Json texts;
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    const Json scene = *scenes.at(i);
+    if (scene.find("pattern").value_or("").text() != pattern) continue;
+    const Json words = scene.find("text").value_or(Json());
+    for (const std::string& language : languages) {
+      const auto text = words.find(language);
+      if (!text || !text->text()) continue;
+      const auto before = texts.find(language + "/text");
+      texts.set(language,
+                {{"name", title_of(pattern)},
+                 {"text", before ? *before->text() + " " + *text->text() : *text->text()}});
+    }
+  }
+  return texts;
+}
+
+/// The pattern's texts in the site's languages, else those of the bundle; null where none are
+/// given.
+Result<Json> texts_of(Draft& draft, const BundleView& bundle, const std::string& pattern) {
   const auto given = draft.texts.find(pattern);
-  if (!given) return Json();
+  if (!given) return bundle_texts(bundle, pattern, draft.languages);
   ++draft.texts_used;
   Json texts = Json::object();
   for (const std::string& language : draft.languages) {
@@ -175,7 +205,7 @@ Result<Json> put_hint(Draft& draft, const BundleView& bundle, std::uint32_t patt
                {"image", file},
                {"width", image.width},
                {"height", image.height}};
-  MODAR_ASSIGN(const Json texts, texts_of(draft, name));
+  MODAR_ASSIGN(const Json texts, texts_of(draft, bundle, name));
   if (!texts.is_null()) json.set("texts", texts);
   return json;
 }
@@ -213,11 +243,16 @@ Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::
   return Json{{"title", title_of(stem)},
               {"file", to},
               {"bytes", file.bytes().size()},
+              {"hash", to_hex(bundle_hash(file.bytes()))},
               {"patterns", patterns}};
 }
 
 Result<void> put_page(Draft& draft) {
-  for (const std::string_view name : kPageFiles) {
+  std::vector<std::string_view> names(kPageFiles.begin(), kPageFiles.end());
+  if (!draft.options.release.empty()) {
+    names.insert(names.end(), kUpdateFiles.begin(), kUpdateFiles.end());
+  }
+  for (const std::string_view name : names) {
     MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.page + "/" + std::string(name)));
     MODAR_TRY(put(draft, std::string(name), file.bytes()));
     draft.site.page_bytes += file.bytes().size();
@@ -231,12 +266,44 @@ Result<void> put_page(Draft& draft) {
   return {};
 }
 
+/// Scheme and host of an address elsewhere; empty for one below the page's own.
+std::string origin_of(const std::string& url) {
+  const std::size_t scheme = url.find("://");
+  if (scheme == std::string::npos) return "";
+  return url.substr(0, url.find('/', scheme + 3));
+}
+
+/// Where updates come from; null where the page gets none.
+Result<Json> release_of(const SiteOptions& options, const std::string& page) {
+  if (options.release.empty() && options.trusted_key.empty()) return Json();
+  if (options.release.empty() || options.trusted_key.empty()) {
+    return fail(ExitCode::kUsage, "web.trust", "--release, --trust",
+                "one is given without the other",
+                "name the release folder's address and the key that signs it, K.pub");
+  }
+  if (!fs::exists(page + "/engine-update.wasm")) {
+    return fail(ExitCode::kUnsupported, "web.page", page, "its engine was built without updates",
+                "scripts/sources.sh --libraries, then cmake --preset web and build it again");
+  }
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(options.trusted_key));
+  MODAR_ASSIGN(
+      const PublicKey key,
+      parse_public_key({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
+  const bool folder = options.release.ends_with('/');
+  return Json{{"url", options.release + (folder ? "" : "/")}, {"key", public_key_line(key)}};
+}
+
 /// index.html, the manifest and, last of all, sw.js.
 Result<void> put_entry(Draft& draft, const std::string& title) {
   MODAR_ASSIGN(std::string html, page_text(draft, "index.html"));
   constexpr std::string_view kTitle = "<title>ModAR</title>";
   if (const std::size_t at = html.find(kTitle); at != std::string::npos) {
     html.replace(at, kTitle.size(), "<title>" + escaped(title) + "</title>");
+  }
+  constexpr std::string_view kConnect = "connect-src 'self'";
+  if (const std::size_t at = html.find(kConnect); at != std::string::npos) {
+    const std::string origin = origin_of(draft.options.release);
+    if (!origin.empty()) html.insert(at + kConnect.size(), " " + escaped(origin));
   }
   MODAR_TRY(put(draft, "index.html", html));
   const auto icon = [](const char* file, const char* sizes, const char* type) {
@@ -277,6 +344,7 @@ Result<Site> write_site(const SiteOptions& options) {
   }
   MODAR_TRY(choose_languages(draft));
   MODAR_TRY(read_texts(draft));
+  MODAR_ASSIGN(const Json release, release_of(options, draft.page));
   for (const char* folder : {"/bundles", "/patterns", "/words"}) {
     MODAR_TRY(make_output_folder(options.output + folder));
   }
@@ -294,8 +362,8 @@ Result<Site> write_site(const SiteOptions& options) {
   const std::string title = options.title.empty()
                                 ? title_of(fs::path(options.bundles.front()).stem().string())
                                 : options.title;
-  const Json site = {
-      {"title", title}, {"languages", Json::list(draft.languages)}, {"bundles", bundles}};
+  Json site = {{"title", title}, {"languages", Json::list(draft.languages)}, {"bundles", bundles}};
+  if (!release.is_null()) site.set("release", release);
   MODAR_TRY(put(draft, "site.json", site.dump()));
   MODAR_TRY(put_page(draft));
   MODAR_TRY(put_entry(draft, title));

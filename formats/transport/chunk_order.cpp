@@ -88,7 +88,9 @@ void ChunkOrderer::sort_triangles(std::span<std::uint16_t> indices) {
         std::uint64_t{indices[i + 1]} << 16 | std::uint64_t{indices[i + 2]};
   }
   for (std::uint32_t v = 0; v < distinct_; ++v) {
-    std::sort(triangles_.begin() + first_[v], triangles_.begin() + first_[v + 1]);
+    const auto all = triangles_.begin();
+    std::sort(all + static_cast<std::ptrdiff_t>(first_[v]),
+              all + static_cast<std::ptrdiff_t>(first_[v + 1]));
     for (std::size_t t = first_[v]; t < first_[v + 1]; ++t) {
       indices[3 * t] = static_cast<std::uint16_t>(v);
       indices[3 * t + 1] = static_cast<std::uint16_t>(triangles_[t] >> 16);

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "formats/shortest_number.hpp"
+
 namespace modar {
 namespace {
 
@@ -18,9 +20,7 @@ std::string number(float value) {
     end = std::to_chars(end, text.data() + text.size(), static_cast<std::int64_t>(value)).ptr;
     *end++ = '.';
   } else {
-    end = std::to_chars(end, text.data() + text.size(), static_cast<double>(value),
-                        std::chars_format::scientific, 16)
-              .ptr;
+    return scientific_text(static_cast<double>(value), 16);
   }
   return {text.data(), end};
 }

@@ -1,8 +1,9 @@
 #include "formats/transport/vertex_streams.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
+
+#include "formats/bits.hpp"
 
 namespace modar {
 namespace {
@@ -46,8 +47,7 @@ std::uint16_t join_half(HalfParts parts) {
   const auto magnitude = static_cast<std::uint32_t>(value < 0 ? -value : value);
   const std::uint32_t sign = value < 0 ? 0x8000u : 0u;
   if (magnitude < 1024) return static_cast<std::uint16_t>(sign | magnitude);
-  const int exponent =
-      static_cast<int>(std::bit_width(magnitude)) - 11;  // at least 0: the implied bit is bit 10
+  const int exponent = bit_width(magnitude) - 11;  // at least 0: the implied bit is bit 10
   return static_cast<std::uint16_t>(sign | static_cast<std::uint32_t>(exponent + 1) << 10 |
                                     (magnitude >> exponent & 1023u));
 }
@@ -55,7 +55,7 @@ std::uint16_t join_half(HalfParts parts) {
 int fine_bits(std::int32_t coarse) {
   const std::int32_t least = coarse >= 0 ? coarse : -coarse - 1;
   if (least == 0) return kFineBits;
-  return std::max(0, 11 - static_cast<int>(std::bit_width(static_cast<std::uint32_t>(least))));
+  return std::max(0, 11 - bit_width(static_cast<std::uint32_t>(least)));
 }
 
 std::array<std::int32_t, 3> octahedral_direction(std::int32_t s, std::int32_t t, int bits) {

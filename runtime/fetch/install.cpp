@@ -85,8 +85,10 @@ std::optional<std::vector<std::byte>> PieceSource::raw(const ObjectId& id) const
   if (place == places_.end()) return std::nullopt;
   const auto& [old, piece] = place->second;
   const auto bytes = old->bundle.bytes();
-  const auto first = bytes.subspan(piece->offset, piece->raw_size - piece->second_size);
-  const auto second = bytes.subspan(piece->second_offset, piece->second_size);
+  const auto first =
+      bytes.subspan(static_cast<std::size_t>(piece->offset), piece->raw_size - piece->second_size);
+  const auto second =
+      bytes.subspan(static_cast<std::size_t>(piece->second_offset), piece->second_size);
   std::vector<std::byte> raw(first.begin(), first.end());
   raw.insert(raw.end(), second.begin(), second.end());
   const bool level = static_cast<PieceForm>(piece->form) == PieceForm::kLevel;
@@ -128,8 +130,9 @@ Result<void> write_texts(const Assembly& assembly, OutputFile& file) {
   MODAR_ASSIGN(const auto mapped, MappedFile::open(assembly.file));
   for (const PieceRecord& piece : assembly.recipe.pieces) {
     if (static_cast<PieceForm>(piece.form) != PieceForm::kFeatureText) continue;
-    MODAR_ASSIGN(auto raw, decode_piece(piece, mapped.bytes().subspan(piece.second_offset,
-                                                                      piece.second_size)));
+    MODAR_ASSIGN(auto raw, decode_piece(piece, mapped.bytes().subspan(
+                                                   static_cast<std::size_t>(piece.second_offset),
+                                                   piece.second_size)));
     MODAR_TRY(write_raw(file, piece, raw));
   }
   return {};

@@ -50,11 +50,13 @@ Result<std::vector<std::byte>> text_bytes(std::span<const std::byte> twin) {
   }
   std::vector<KeypointRecord> keypoints(header.count);
   if (keypoint_bytes != 0) {
-    std::memcpy(keypoints.data(), twin.data() + header.keypoints_offset, keypoint_bytes);
+    std::memcpy(keypoints.data(), twin.data() + header.keypoints_offset,
+                static_cast<std::size_t>(keypoint_bytes));
   }
   FeatureView view;
   view.keypoints = keypoints;
-  view.descriptors = twin.subspan(header.descriptors_offset, descriptor_bytes);
+  view.descriptors = twin.subspan(static_cast<std::size_t>(header.descriptors_offset),
+                                  static_cast<std::size_t>(descriptor_bytes));
   view.descriptor_bytes = header.descriptor_bytes;
   const std::string text = feature_text(view);
   const auto bytes = std::as_bytes(std::span(text));
@@ -64,7 +66,8 @@ Result<std::vector<std::byte>> text_bytes(std::span<const std::byte> twin) {
 Result<std::vector<std::byte>> level_bytes(const PieceRecord& piece,
                                            std::span<const std::byte> stored) {
   const auto size = ZSTD_getFrameContentSize(stored.data(), stored.size());
-  MODAR_ASSIGN(const auto buffer, unpack_zstd(stored, size <= kMaxPieceBytes ? size : 0));
+  MODAR_ASSIGN(const auto buffer,
+               unpack_zstd(stored, static_cast<std::size_t>(size <= kMaxPieceBytes ? size : 0)));
   MODAR_ASSIGN(const auto indices, decode_level(buffer, piece.raw_size / 2));
   const auto bytes = std::as_bytes(std::span(indices));
   return std::vector<std::byte>(bytes.begin(), bytes.end());

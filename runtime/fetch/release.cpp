@@ -20,9 +20,11 @@ namespace {
 
 template <class Hash>
 Hash blake2b(std::span<const std::byte> bytes) {
+#ifndef MODAR_PLAIN_SODIUM
   // Without it libsodium does not choose its SIMD code: half the speed.
   static const int ready = sodium_init();
   static_cast<void>(ready);
+#endif
   Hash hash{};
   crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(bytes.data()),
                      bytes.size(), nullptr, 0);
@@ -420,7 +422,7 @@ Result<std::int64_t> parse_time(std::string_view text) {
 
 std::string time_text(std::int64_t seconds) {
   if (seconds == kNever) return std::string(kNeverText);
-  const std::time_t clock = seconds;
+  const auto clock = static_cast<std::time_t>(seconds);
   std::tm time{};
   gmtime_r(&clock, &time);
   std::array<char, 80> text{};

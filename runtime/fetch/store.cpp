@@ -58,7 +58,7 @@ std::optional<std::string> read_small_file(const std::string& path, std::size_t 
   if (!size || *size > limit) return std::nullopt;
   std::FILE* file = std::fopen(path.c_str(), "rbe");
   if (file == nullptr) return std::nullopt;
-  std::string text(*size, '\0');
+  std::string text(static_cast<std::size_t>(*size), '\0');
   const bool whole = std::fread(text.data(), 1, text.size(), file) == text.size();
   std::fclose(file);
   if (!whole) return std::nullopt;

@@ -47,7 +47,7 @@ Result<void> Transfers::objects(std::span<const Wanted> wanted,
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     transfers[i].path = wanted[i].path;
     transfers[i].wanted = &wanted[i];
-    transfers[i].limit = wanted[i].size;
+    transfers[i].limit = static_cast<std::size_t>(wanted[i].size);
   }
   state_->attempts.tell_progress(on_bytes);
   auto done = state_->run(transfers);

@@ -99,8 +99,8 @@ void BatchStore::write_part(const BatchPart& part, std::uint32_t layout, Batch& 
   const VertexFormat& format = formats_[layout];
   const LevelRecord& level = bundle_.levels()[part.mesh.level];
   const std::size_t count = part.mesh.vertex_count;
-  const std::span<const std::byte> source =
-      bundle_.vertices().subspan(level.vertex_offset, count * format.source_stride);
+  const std::span<const std::byte> source = bundle_.vertices().subspan(
+      static_cast<std::size_t>(level.vertex_offset), count * format.source_stride);
   BatchPlace place;
   place.mesh = part.mesh;
   place.copies = part.copies;

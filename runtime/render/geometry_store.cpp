@@ -144,7 +144,8 @@ void GeometryStore::upload_whole() {
 void GeometryStore::fill(const Range& range, GLenum target, std::uint64_t offset) {
   const bool is_vertices = range.layout != kNone;
   const std::span<const std::byte> section = is_vertices ? bundle_.vertices() : bundle_.indices();
-  const std::span<const std::byte> source = section.subspan(range.source, range.size);
+  const std::span<const std::byte> source =
+      section.subspan(static_cast<std::size_t>(range.source), static_cast<std::size_t>(range.size));
   uploaded_bytes_ += range.gpu_size;
   if (!is_vertices || !formats_[range.layout].widened) {
     glBufferSubData(target, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(source.size()),

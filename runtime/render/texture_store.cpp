@@ -2,8 +2,8 @@
 #include "runtime/render/texture_store.hpp"
 
 #include <algorithm>
-#include <bit>
 
+#include "formats/bits.hpp"
 #include "formats/texture_format.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -11,7 +11,7 @@ namespace modar {
 namespace {
 
 bool power_of_two(const TextureRecord& texture) {
-  return std::has_single_bit(texture.width) && std::has_single_bit(texture.height);
+  return is_power_of_two(texture.width) && is_power_of_two(texture.height);
 }
 
 }  // namespace
@@ -50,8 +50,7 @@ std::uint64_t TextureStore::bytes_from(std::uint32_t texture, std::uint32_t firs
 
 bool TextureStore::mipmapped(const TextureRecord& texture) const {
   if (texture.level_count < 2) return false;
-  return npot_mipmaps_ ||
-         (std::has_single_bit(texture.width) && std::has_single_bit(texture.height));
+  return npot_mipmaps_ || (is_power_of_two(texture.width) && is_power_of_two(texture.height));
 }
 
 Result<void> TextureStore::choose_levels(std::uint64_t budget) {
@@ -117,7 +116,8 @@ GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
   for (std::uint32_t i = first; i < end; ++i) {
     const TextureLevelRecord& level = bundle_.texture_levels()[record.first_level + i];
     const std::uint64_t offset = alpha ? level.alpha_offset : level.offset;
-    const std::span<const std::byte> blocks = data.subspan(offset, level.size);
+    const std::span<const std::byte> blocks =
+        data.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(level.size));
     const GLint target_level = static_cast<GLint>(i - first);
     const GLsizei width = static_cast<GLsizei>(level.width);
     const GLsizei height = static_cast<GLsizei>(level.height);

@@ -2,9 +2,11 @@
 import { load, ModarError } from './modar.js';
 import { POSE, POSE_FLOATS } from './engine.js';
 import { View } from './modar-view.js';
+import { forgetInstalled, installedBundles, installedFile } from './installed.js';
 
 const $ = (id) => document.getElementById(id);
 const root = document.documentElement;
+const SCOPE = new URL('./', location).href;
 
 /** Milliseconds without a sighting before the visitor is told why: shorter ones flicker. */
 const PATIENCE_MS = 900;
@@ -21,6 +23,8 @@ let site;
 let words;
 let modar = null;
 let view = null;
+/** {bundle, done}: what is or was loaded, and the promise of it. */
+let loading = null;
 let stream = null;
 let facing = 'environment';
 let chosenCamera = '';
@@ -60,10 +64,11 @@ function showWords() {
   $('photo-image').alt = say('photoAlt');
 }
 
-/** What the site says of a pattern in this language: {name, text}; else its own name. */
+/** What the site says of a pattern in this language, else in its first, else in any: {name, text}; else its own name. */
 function labelOf(bundle, pattern) {
   const texts = bundle.patterns[pattern].texts ?? {};
-  return texts[root.lang] ?? texts[site.languages[0]] ?? { name: bundle.patterns[pattern].title, text: '' };
+  return texts[root.lang] ?? texts[site.languages[0]] ?? Object.values(texts)[0]
+    ?? { name: bundle.patterns[pattern].title, text: '' };
 }
 
 // ---- the cover ----
@@ -73,10 +78,12 @@ function currentBundle() {
 }
 
 function showPlates() {
-  const { patterns } = currentBundle();
+  const { patterns, installed } = currentBundle();
   const plate = ({ image, width, height, title }, described) => {
     const picture = document.createElement('img');
-    Object.assign(picture, { src: image, width, height, alt: described ? title : '', decoding: 'async' });
+    Object.assign(picture, { width, height, alt: described ? title : '', decoding: 'async' });
+    if (!installed) picture.src = image;
+    else installedFile(SCOPE, image).then((blob) => { if (blob) picture.src = URL.createObjectURL(blob); });
     return picture;
   };
   $('plates').replaceChildren(...patterns.map((pattern) => plate(pattern, true)));
@@ -86,16 +93,44 @@ function showPlates() {
   $('lead').textContent = say(patterns.length > 1 ? 'leadMany' : 'lead');
 }
 
+/** The site's own bundles, or those of the release that the last visit brought. */
+async function chooseBundles() {
+  const installed = site.release && await installedBundles(SCOPE).catch(() => undefined);
+  site.own ??= site.bundles;
+  site.bundles = installed ?? site.own;
+  $('bundle').replaceChildren(...site.bundles.map(({ title }, i) => new Option(title, i)));
+  $('choice').hidden = site.bundles.length < 2;
+}
+
+/** What a release folder has of newer bundles is brought meanwhile; the next visit shows it. */
+function update() {
+  if (!site.release || !navigator.onLine || !('caches' in globalThis)) return;
+  const worker = new Worker('update-worker.js', { type: 'module' });
+  const end = ({ state, code = '', text = '' }) => {
+    worker.terminate();
+    root.dataset.update = `${state} ${code}`.trim();
+    if (text) console.info(`No update: ${text} [${code}]`);
+  };
+  worker.onmessage = ({ data }) => end(data);
+  worker.onerror = (event) => {
+    event.preventDefault();
+    end({ state: 'failed' });
+  };
+  const { url, key } = site.release;
+  worker.postMessage({ scope: SCOPE, url: new URL(url, location).href, key, hashes: site.own.map(({ hash }) => hash) });
+}
+
 async function prepare() {
   site = await fetchJson('site.json');
   root.lang = chooseLanguage(site.languages);
   words = await fetchJson(`words/${root.lang}.json`);
   document.title = site.title;
   $('title').textContent = site.title;
-  $('bundle').replaceChildren(...site.bundles.map(({ title }, i) => new Option(title, i)));
-  $('choice').hidden = site.bundles.length < 2;
+  await chooseBundles();
   showWords();
   showPlates();
+  if (!navigator.connection?.saveData) loadBundle().catch(() => {});  // the start button tells what is wrong
+  update();
 }
 
 // ---- errors ----
@@ -149,7 +184,8 @@ function rememberFocal({ foundFocal, camera }) {
   } catch { /* as above */ }
 }
 
-async function openCamera() {
+/** Asks for the camera and shows it. */
+async function openStream() {
   if (!globalThis.isSecureContext) throw new ModarError({ code: 'web.insecure', cause: 'the page came by http' });
   if (!navigator.mediaDevices?.getUserMedia) throw new ModarError({ code: 'web.old', cause: 'this browser opens no camera' });
   const video = { width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } };
@@ -164,12 +200,17 @@ async function openCamera() {
   $('video').srcObject = stream;
   await $('video').play();
   performance.mark('camera');
+}
+
+/** Tracks in what the camera brings, with the tools that it has. */
+async function follow() {
+  const [track] = stream.getVideoTracks();
+  await modar.start($('video'), rememberedFocal(track));
   const devices = (await navigator.mediaDevices.enumerateDevices()).filter(({ kind }) => kind === 'videoinput');
   $('flip').hidden = devices.length < 2;
   $('torch').hidden = !track.getCapabilities?.().torch;
   $('torch').setAttribute('aria-pressed', 'false');
   $('full').hidden = !document.fullscreenEnabled;
-  await modar.start($('video'), rememberedFocal(track));
 }
 
 function closeCamera() {
@@ -182,7 +223,8 @@ function closeCamera() {
 async function reopenCamera() {
   closeCamera();
   try {
-    await openCamera();
+    await openStream();
+    await follow();
   } catch (error) {
     tell(error);
   }
@@ -190,20 +232,48 @@ async function reopenCamera() {
 
 // ---- start and stop ----
 
-async function loadBundle() {
-  const bundle = currentBundle();
-  if (modar?.file === bundle.file && view) return;
-  modar?.close();
-  modar = view = null;
-  modar = await load(bundle.file, {
+async function openBundle(bundle) {
+  let bytes = bundle.file;
+  if (bundle.installed) bytes = await (await installedFile(SCOPE, bundle.file))?.arrayBuffer() ?? new ArrayBuffer(0);
+  const opened = await load(bytes, {
     onProgress: (got, total) => { $('progress').textContent = say('loading', { percent: Math.floor((100 * got) / total) }); },
   });
   $('progress').textContent = say('preparing');
-  view = await View.create(modar.bytes, { picture: $('picture'), models: freshCanvas() });
+  try {
+    view = await View.create(opened.bytes, { picture: $('picture'), models: freshCanvas() });
+  } catch (error) {
+    opened.close();
+    throw error;
+  }
+  modar = opened;
   modar.bytes = null;  // the engines have their own copies
-  modar.file = bundle.file;
   modar.addEventListener('frame', ({ detail }) => onFrame(detail));
   modar.addEventListener('error', ({ detail }) => tell(detail));
+}
+
+/** The chosen bundle, once: begun before the visitor starts, and waited for then. */
+function loadBundle() {
+  const bundle = currentBundle();
+  if (loading?.bundle === bundle) return loading.done;
+  const before = loading?.done.catch(() => {});
+  const done = Promise.resolve(before).then(async () => {
+    modar?.close();
+    modar = view = null;
+    try {
+      await openBundle(bundle);
+    } catch (error) {
+      const newest = loading?.done === done;
+      if (newest) loading = null;  // the next start tries again
+      if (!bundle.installed) throw error;
+      // What was installed has rotted: the site's own bundles stand in.
+      await forgetInstalled(SCOPE);
+      await chooseBundles();
+      showPlates();
+      if (newest) await loadBundle();
+    }
+  }).finally(() => { $('progress').textContent = ''; });
+  loading = { bundle, done };
+  return done;
 }
 
 /** A canvas keeps its first context: another bundle's renderer gets a new one. */
@@ -221,8 +291,11 @@ function freshCanvas() {
 async function start() {
   $('start').disabled = true;
   try {
-    await loadBundle();
-    await openCamera();
+    const loaded = loadBundle();
+    loaded.catch(() => {});  // told below, after the camera's own troubles
+    await openStream();
+    await loaded;
+    await follow();
     $('cover').hidden = true;
     $('stage').hidden = false;
     unseenSince = performance.now();
@@ -234,7 +307,6 @@ async function start() {
     tell(error);
   } finally {
     $('start').disabled = false;
-    $('progress').textContent = '';
   }
 }
 
@@ -398,7 +470,10 @@ async function showCameras() {
 
 function listen() {
   $('start').addEventListener('click', start);
-  $('bundle').addEventListener('change', showPlates);
+  $('bundle').addEventListener('change', () => {
+    showPlates();
+    loadBundle().catch(() => {});
+  });
   $('close').addEventListener('click', stop);
   $('flip').addEventListener('click', flip);
   $('shoot').addEventListener('click', shoot);

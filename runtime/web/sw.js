@@ -3,6 +3,7 @@
 // the place of the old one when all of it is there and no page of the old one is open.
 const OURS = `modar ${self.registration.scope} `;  // other sites may live on the same host
 const CACHE = OURS + SITE.hash;
+const INSTALLED = `${OURS}installed`;  // by updates, see installed.js
 /** As in engine.js: of the two builds of the engine, only the one that will run is kept. */
 const SIMD = WebAssembly.validate(Uint8Array.of(
   0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11));
@@ -17,7 +18,7 @@ self.addEventListener('install', (event) => {
 
 self.addEventListener('activate', (event) => {
   event.waitUntil(caches.keys().then((names) => Promise.all(
-    names.filter((name) => name.startsWith(OURS) && name !== CACHE).map((name) => caches.delete(name)))));
+    names.filter((name) => name.startsWith(OURS) && name !== CACHE && name !== INSTALLED).map((name) => caches.delete(name)))));
 });
 
 self.addEventListener('fetch', (event) => {

@@ -1,5 +1,7 @@
 """`modar pattern score|simulate|confusion` and `modar calibrate`: what they print, write and refuse."""
+import json
 import shutil
+import subprocess
 import unittest
 
 from programs import COVER, QUICK, ROOT, ProgramTest
@@ -59,6 +61,64 @@ class Pattern(ProgramTest):
         self.assertIn("printed 20 cm wide, this camera recognises it from", one["sentence"])
         self.assertLess(one["nearest_mm"], one["farthest_mm"])
         self.assertTrue((self.folder / "sheets/part.png").read_bytes().startswith(b"\x89PNG"))
+
+    def target(self, name, **changes):
+        """An image target as 8th Wall's tools write it: its picture lies on its side."""
+        folder = self.folder / "image-targets"
+        folder.mkdir(exist_ok=True)
+        subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", self.part, "-vf", "transpose=clock", folder / f"{name}_cropped.png"],
+                       check=True)
+        target = {"imagePath": f"image-targets/{name}_luminance.png", "metadata": None, "name": name, "type": "PLANAR",
+                  "properties": {"left": 0, "top": 0, "width": 130, "height": 160, "isRotated": True, "originalWidth": 130,
+                                 "originalHeight": 160},
+                  "resources": {"croppedImage": f"{name}_cropped.png", "luminanceImage": f"{name}_luminance.png"},
+                  "created": 1, "updated": 1, **changes}
+        file = folder / f"{name}.json"
+        file.write_text(json.dumps(target))
+        return file
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
+    def test_targets_of_8th_wall_are_taken_as_they_are(self):
+        target = self.target("part")
+        for file, out in ((target, "theirs.modar"), (self.part, "ours.modar")):
+            done = self.modar("bake", "--pattern", file, "-o", out, "--quiet", *QUICK)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        theirs, ours = (self.modar_json("inspect", out) for out in ("theirs.modar", "ours.modar"))
+        self.assertEqual(theirs["patterns"], ours["patterns"])
+        # Scores tell one pixel more or less.
+        self.assertEqual(self.modar_json("pattern", "score", target)[0]["causes"],
+                         self.modar_json("pattern", "score", self.part)[0]["causes"])
+        # As the documents for moving have it: one picture, no resources.
+        shutil.copy(self.part, target.parent / "poster.png")
+        poster = self.target("poster", imagePath="./poster.png", resources=None, properties=None, xrMetadata={"isRotated": False})
+        self.assertEqual(self.modar_json("pattern", "score", poster)[0]["score"], self.modar_json("pattern", "score", self.part)[0]["score"])
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
+    def test_what_of_other_projects_is_refused(self):
+        refuse = lambda file, code, *words: self.assert_fails(
+            self.modar("bake", "--pattern", file, "-o", "b.modar", "--quiet", *QUICK), code, *words)
+        refuse(self.target("can", type="CYLINDER"), 5, "curved")
+        gone = self.target("gone")
+        (gone.parent / "gone_cropped.png").unlink()
+        refuse(gone, 2, "gone_cropped.png, gone_luminance.png")
+        mind = self.folder / "targets.mind"
+        mind.write_bytes(b"\x82")
+        refuse(mind, 5, "compiled from")
+        wrong = self.folder / "wrong.json"
+        wrong.write_text("[]")
+        refuse(wrong, 3, "no image target")
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
+    def test_a_project_follows_the_pictures_of_targets(self):
+        target = self.target("part")
+        (self.folder / "modar.toml").write_text('[bake]\nloop-views = 8\nscore = false\nparameters = ["none"]\n'
+                                                '[[pattern]]\nfile = "image-targets/*.json"\n')
+        states = lambda: [asset["state"] for asset in self.modar_json("bake", cwd=self.folder)["assets"]]
+        self.assertEqual(states(), ["baked"])
+        self.assertEqual(states(), ["fresh"])
+        picture = target.parent / "part_cropped.png"
+        subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", self.part, "-vf", "transpose=clock,negate", picture], check=True)
+        self.assertEqual(states(), ["baked"])
 
     def test_confusion_of_a_bundle_with_itself(self):
         done = self.modar("bake", "--pattern", self.part, "-o", "b.modar", "--quiet", *QUICK)

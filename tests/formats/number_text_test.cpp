@@ -1,5 +1,7 @@
 // Numbers in the checker's words: the fewest digits that read back the same, in any locale.
 #include <locale.h>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -10,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/rules.hpp"
+#include "formats/shortest_number.hpp"
 
 namespace modar {
 namespace {
@@ -36,14 +39,65 @@ TEST(NumberText, AnyDoubleReadsBack) {
   }
 }
 
+template <class T>
+std::string standard_text(T value) {
+  std::array<char, 512> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
+template <class T, class Bits>
+void compare_with_standard(Bits bits) {
+  T value = 0;
+  std::memcpy(&value, &bits, sizeof value);
+  if (!std::isfinite(value)) return;
+  EXPECT_EQ(shortest_text(value), standard_text(value));
+}
+
+TEST(ShortestText, IsWhatToCharsWrites) {
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 10000; ++i) {
+    compare_with_standard<double>(random());
+    compare_with_standard<float>(static_cast<std::uint32_t>(random()));
+    // Numbers of the size that bundles hold, and whole ones.
+    const double usual = std::ldexp(static_cast<double>(random() >> 40), -static_cast<int>(i % 40));
+    EXPECT_EQ(shortest_text(usual), standard_text(usual));
+    const auto narrow = static_cast<float>(usual * 1e-3);
+    EXPECT_EQ(shortest_text(narrow), standard_text(narrow));
+  }
+  // Powers of two: their neighbours are not at equal distances.
+  for (int power = -1074; power < 1024; ++power) {
+    EXPECT_EQ(shortest_text(std::ldexp(1.0, power)), standard_text(std::ldexp(1.0, power)));
+  }
+  for (int power = -149; power < 128; ++power) {
+    EXPECT_EQ(shortest_text(std::ldexp(-1.0f, power)), standard_text(std::ldexp(-1.0f, power)));
+  }
+  EXPECT_EQ(shortest_text(0.0), "0");
+  EXPECT_EQ(shortest_text(-0.0f), "-0");
+}
+
+TEST(ShortestText, ScientificIsWhatToCharsWrites) {
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 10000; ++i) {
+    const double value = std::ldexp(static_cast<double>(random() >> 11), i % 200 - 150) - 1.5;
+    std::array<char, 64> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), value,
+                                   std::chars_format::scientific, 16);
+    EXPECT_EQ(scientific_text(value, 16), std::string(text.data(), end.ptr));
+  }
+}
+
 TEST(NumberText, NoLocaleShows) {
   const locale_t german = newlocale(LC_NUMERIC_MASK, "de_DE.UTF-8", nullptr);
   if (german == nullptr) GTEST_SKIP() << "no locale with a decimal comma is installed";
   const locale_t before = uselocale(german);
   const std::string text = number_text(0.25);
+  const std::string shortest = shortest_text(0.25);
+  const std::string scientific = scientific_text(0.25, 3);
   uselocale(before);
   freelocale(german);
   EXPECT_EQ(text, "0.25");
+  EXPECT_EQ(shortest, "0.25");
+  EXPECT_EQ(scientific, "2.500e-01");
 }
 
 }  // namespace

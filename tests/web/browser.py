@@ -40,7 +40,7 @@ class Browser:
         self.commands = os.fdopen(commands_in, "wb", buffering=0)
         self.answers = os.fdopen(answers_out, "rb", buffering=0)
         self.rest, self.calls, self.session = b"", 0, None
-        self.errors, self.requests = [], []
+        self.errors, self.told, self.requests = [], [], []
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
         self.session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network", "Accessibility"):
@@ -60,8 +60,9 @@ class Browser:
         if method == "Runtime.exceptionThrown":
             details = params["exceptionDetails"]
             self.errors.append(details.get("exception", {}).get("description", details["text"]))
-        elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "assert", "warning"):
-            self.errors.append(" ".join(str(a.get("value", a.get("description"))) for a in params["args"]))
+        elif method == "Runtime.consoleAPICalled":
+            told = self.errors if params["type"] in ("error", "assert", "warning") else self.told
+            told.append(" ".join(str(a.get("value", a.get("description"))) for a in params["args"]))
         elif method == "Log.entryAdded" and params["entry"]["level"] == "error":
             self.errors.append(params["entry"]["text"] + " " + params["entry"].get("url", ""))
         elif method == "Network.requestWillBeSent":

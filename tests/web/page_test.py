@@ -1,5 +1,6 @@
 """The page in Chromium with a fake camera: what a visitor sees, and that its poses are the player's."""
 import base64
+import hashlib
 import json
 import os
 import pathlib
@@ -14,6 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Server  # noqa: E402
 from programs import COVER, POTTERY, QUICK, ROOT, ProgramTest  # noqa: E402
 
+PAGE = ROOT / "build" / "web" / "web"
 WIDTH, HEIGHT, FRAMES = 640, 480, 6
 # A folder that keeps the pictures, for people.
 KEEP = os.environ.get("MODAR_WEB_PICTURES")
@@ -264,6 +266,160 @@ class Page(ProgramTest):
             self.assertEqual(self.browser.errors, [])
         finally:
             type(self).server = Server(self.site)
+
+
+    def test_the_package_installs_and_three_js_draws_on_a_picture(self):
+        npm, project = shutil.which("npm"), self.site / "project"
+        if npm is None:
+            self.skipTest("no npm")
+        project.mkdir()
+        run = lambda *words: subprocess.run([npm, *words], cwd=project, capture_output=True, text=True)
+        packed = run("pack", "--silent", PAGE)
+        self.assertEqual(packed.returncode, 0, packed.stderr)
+        (project / "package.json").write_text('{"name": "museum", "private": true}')
+        installed = run("install", "--no-audit", "--no-fund", packed.stdout.strip(), "three@0.160.0")
+        if installed.returncode != 0:
+            self.skipTest("npm cannot fetch three.js: " + installed.stderr[-200:])
+        names = {file.name for file in (project / "node_modules" / "modar").iterdir()}
+        self.assertEqual(names, {"package.json", "modar.js", "modar.d.ts", "modar-view.js", "modar-worker.js", "engine.js",
+                                 *(f"engine-{kind}.{end}" for kind in ("simd", "plain") for end in ("js", "wasm"))})
+        shutil.copy(ROOT / "runtime" / "web" / "example" / "three.html", project)
+        shutil.copy(self.bundle, project)
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url + "project/three.html")
+        self.browser.wait("globalThis.sighting !== undefined", "a sighting")
+        # The cube's green over the middle of the picture, by the corners that the tracker states.
+        self.browser.wait("""(() => {
+          const { corners, camera } = sighting;
+          const mean = (first) => (corners[first] + corners[first + 2] + corners[first + 4] + corners[first + 6]) / 4;
+          const source = document.querySelector('canvas');
+          const gl = source.getContext('webgl2');
+          const copy = document.createElement('canvas');
+          copy.width = source.width, copy.height = source.height;
+          const context = copy.getContext('2d', { willReadFrequently: true });
+          return new Promise((resolve) => requestAnimationFrame(() => {
+            context.drawImage(source, 0, 0);
+            const x = mean(0) / camera.width * copy.width, y = mean(1) / camera.height * copy.height;
+            const [r, g, b] = context.getImageData(x, y, 1, 1).data;
+            resolve(g > 200 && r < 50 && b < 50);
+          }));
+        })()""", "the cube", 30)
+        self.assertEqual(self.browser.errors, [])
+
+
+class Updates(ProgramTest):
+    """A page with a release folder: what it brings, and what it refuses."""
+
+    INSTALLED = """(async () => {
+      const scope = new URL('./', location).href;
+      const { installedBundles, installedFile } = await import('./installed.js');
+      const bundles = await installedBundles(scope);
+      if (!bundles) return null;
+      const bytes = await (await installedFile(scope, bundles[0].file)).arrayBuffer();
+      const digest = new Uint8Array(await crypto.subtle.digest('SHA-256', bytes));
+      const hint = await createImageBitmap(await installedFile(scope, bundles[0].patterns[0].image));
+      const { width, height, texts } = bundles[0].patterns[0];
+      return { sha: Array.from(digest, (b) => b.toString(16).padStart(2, '0')).join(''), texts,
+        hint: hint.width === width && hint.height === height };
+    })()"""
+
+    @classmethod
+    def setUpClass(cls):
+        if not (PAGE / "engine-update.wasm").exists():
+            raise unittest.SkipTest("the engine was built without updates: no network for scripts/sources.sh --libraries")
+
+    def check(self, done):
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def project(self, text):
+        """A bundle by modar.toml, with a text."""
+        folder = self.folder / "project"
+        folder.mkdir(exist_ok=True)
+        for file in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png"), COVER):
+            shutil.copy(file, folder)
+        (folder / "modar.toml").write_text(f"""
+[project]
+name = "demo"
+[bake]
+loop-views = 8
+score = false
+lods = 1
+parameters = ["none"]
+[[model]]
+file = "pottery.obj"
+[[pattern]]
+file = "cover.png"
+[[scene]]
+pattern = "cover"
+model = "pottery"
+text.en = "{text}"
+text.de = "Deutsch: {text}"
+""")
+        self.check(self.modar("bake", "--quiet", cwd=folder))
+        return folder / "out" / "demo.modar"
+
+    def publish(self, bundle):
+        self.check(self.modar("ship", "publish", bundle, "--to", self.release, "--key", self.folder / "museum.key"))
+
+    def visit(self, result):
+        """Opens the page; the update's result, and what is installed afterwards."""
+        self.browser.errors.clear()
+        self.browser.open(self.server.url + "?" + result.replace(" ", "-"))
+        self.browser.wait("document.documentElement.dataset.update !== undefined", "an update")
+        told = self.browser.run("document.documentElement.dataset.update")
+        self.assertEqual(told, result, self.browser.told)
+        return self.browser.run(self.INSTALLED)
+
+    def test_releases_come_whole_or_not_at_all(self):
+        first = self.bake_demo()
+        site = self.folder / "site"
+        self.release = site / "release"
+        self.check(self.modar("ship", "keygen", "--out", self.folder / "museum.key"))
+        self.check(self.modar("web", first, "-o", site, "--release", "release", "--trust", self.folder / "museum.key.pub", "--quiet"))
+        self.publish(first)
+        self.server = Server(site)
+        self.addCleanup(self.server.close)
+        self.browser = Browser(self.folder / "profile", "/dev/null")
+        self.addCleanup(self.browser.close)
+        # The site's own bundle is the release: nothing to bring.
+        self.assertIsNone(self.visit("current"))
+        second = self.project("Printed in 1890.")
+        self.publish(second)
+        installed = self.visit("updated")
+        sha = hashlib.sha256(second.read_bytes()).hexdigest()
+        self.assertEqual(installed["sha"], sha)
+        self.assertTrue(installed["hint"])
+        self.assertEqual(installed["texts"]["en"], {"name": "cover", "text": "Printed in 1890."})
+        # The next visit shows it, and has nothing to bring.
+        self.assertEqual(self.visit("current")["sha"], sha)
+        self.browser.wait("document.getElementById('caption').textContent === 'cover'", "the cover")
+        self.browser.wait("document.images[0].naturalWidth > 0 && document.images[0].src.startsWith('blob:')", "the hint")
+        self.refuses(sha)
+
+    def refuses(self, sha):
+        latest = (self.release / "latest").read_text()
+        # Rolled back.
+        (self.release / "latest").write_text("1\n")
+        self.assertEqual(self.visit("failed fetch.roll-back")["sha"], sha)
+        (self.release / "latest").write_text(latest)
+        # Forged: another document under the signature.
+        third = self.project("Printed in 1891.")
+        self.publish(third)
+        document = next(iter(sorted(self.release.glob("releases/*.json"), reverse=True)))
+        good = document.read_bytes()
+        document.write_bytes(good.replace(b"demo", b"dema"))
+        self.assertEqual(self.visit("failed signature.bad")["sha"], sha)
+        document.write_bytes(good)
+        # Torn: a piece that lacks its end.
+        objects = sorted(self.release.glob("objects/*/*"), key=lambda file: file.stat().st_mtime)
+        piece = objects[-1]
+        whole = piece.read_bytes()
+        piece.write_bytes(whole[:len(whole) // 2])
+        self.assertEqual(self.visit("failed fetch.network")["sha"], sha)
+        # Mended.
+        piece.write_bytes(whole)
+        self.assertEqual(self.visit("updated")["sha"], hashlib.sha256(third.read_bytes()).hexdigest())
+        self.assertEqual([error for error in self.browser.errors if "404" not in error], [])
 
 
 # Pixels of the models' canvas that are not transparent.

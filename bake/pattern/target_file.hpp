@@ -1,0 +1,23 @@
+// Image targets of 8th Wall: a JSON file beside its pictures, as its tools leave them in a project.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "bake/pattern/picture.hpp"
+
+namespace modar {
+
+/// Whether the file's name ends in .json.
+bool is_target_file(std::string_view path);
+
+/// The picture that a target file names, beside it: the cropped one, else the one whose luminance
+/// is tracked. Errors: kIo "target.picture" (none is there), "io.open"; kInvalidInput
+/// "target.json"; kUnsupported "target.curved".
+Result<std::string> target_picture(const std::string& path);
+
+/// That picture in gray, upright: targets that are wider than high are stored on their side.
+/// Errors: those above, and of read_image().
+Result<GrayPicture> load_target(const std::string& path);
+
+}  // namespace modar

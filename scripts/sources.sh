@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# Sources out of Debian's source packages, for what Debian has no binary packages of.
+#   scripts/sources.sh FOLDER PACKAGE...   fetches their archives into FOLDER; what is there stays
+#   scripts/sources.sh --libraries         what modar::fetch needs for WebAssembly and Android (libsodium, zstd,
+#                                          meshoptimizer, Draco), unpacked in build/sources (40 MB to fetch, once)
+# Exit code 2 where there is no network.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+
+# Through apt, with a list of sources of our own: the system's may have no deb-src.
+fetch() { # FOLDER PACKAGE...
+  local dir=$1 package missing=()
+  shift
+  for package in "$@"; do
+    compgen -G "$dir/${package}_*.orig.tar.*" >/dev/null || missing+=("$package")
+  done
+  [ ${#missing[@]} -gt 0 ] || return 0
+  mkdir -p "$dir/lists/partial" "$dir/cache"
+  # shellcheck source=/dev/null
+  . /etc/os-release
+  echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] ${DEBIAN_MIRROR:-http://deb.debian.org/debian} ${VERSION_CODENAME:-bookworm} main" > "$dir/sources.list"
+  local apt=(apt-get -qq -o "Dir::Etc::SourceList=$dir/sources.list" -o Dir::Etc::SourceParts=/dev/null
+    -o "Dir::State::Lists=$dir/lists" -o "Dir::Cache=$dir/cache" -o APT::Sandbox::User=root)
+  echo "sources.sh: fetching the source packages ${missing[*]}, once" >&2
+  (cd "$dir" && "${apt[@]}" update && "${apt[@]}" source --download-only "${missing[@]}") >&2 || {
+    echo "sources.sh: Debian's source packages ${missing[*]} cannot be fetched; try again with a network" >&2
+    exit 2
+  }
+}
+
+unpack() { # FOLDER PACKAGE PART...: the parts of the package's tree, as FOLDER/PACKAGE
+  local dir=$1 package=$2 archives
+  shift 2
+  [ ! -d "$dir/$package" ] || return 0
+  rm -rf "$dir/$package.new"
+  mkdir "$dir/$package.new"
+  archives=("$dir/${package}"_*.orig.tar.?z)
+  tar -xf "${archives[0]}" -C "$dir/$package.new" --strip-components=1 --wildcards "${@/#/*/}"
+  mv "$dir/$package.new" "$dir/$package"
+}
+
+if [ "${1:-}" = --libraries ]; then
+  dir=$root/build/sources
+  mkdir -p "$dir"
+  exec 9> "$dir/lock"
+  flock 9
+  fetch "$dir" libsodium libzstd meshoptimizer draco
+  unpack "$dir" libsodium src/libsodium
+  unpack "$dir" libzstd lib
+  unpack "$dir" meshoptimizer src
+  unpack "$dir" draco src/draco
+elif [ $# -ge 2 ]; then
+  fetch "$@"
+else
+  sed -n '2,7s/^# \{0,1\}//p' "$0"
+  exit 1
+fi
