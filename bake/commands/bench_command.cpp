@@ -51,6 +51,12 @@ void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
   line.flag(
       "--many", pose.many, 50,
       "pose: 1, 10 and 50 (--many=N: N) patterns: detection, set-up, return from behind things");
+  line.flag("--field", pose.field,
+            "pose: frames as phones take them: blur, low light, JPEG, glare, rolling shutter, bent "
+            "paper, mirrored prints, other editions");
+  line.option("--path", &pose.path,
+              "pose: replay a camera path: a homography (9 numbers) or pose (12) a line");
+  line.flag("--sift", pose.sift, "pose: OpenCV's SIFT with MAGSAC on the same frames");
   line.option("--parameters", &pose.parameters,
               "pose: set of the ModAR paper's method, none: ours alone");
   line.option("--only", &pose.only, "pose: bands whose name holds this text");

@@ -23,6 +23,9 @@ struct PoseBenchRequest {
   int clutter = 0;                      ///< frames without a pattern, in all; 0: as the others
   bool tables = false;                  ///< print the ModAR paper's tables instead
   bool scores = false;                  ///< hold scores against working ranges instead
+  bool field = false;                   ///< phones' conditions instead: blur, noise, glare, bend
+  std::string path;                     ///< replay this camera path instead; see bench_path()
+  bool sift = false;                    ///< OpenCV's SIFT with MAGSAC beside the others
   int many = 0;                         ///< measure bundles of 1 to so many patterns instead
   unsigned seed = 1;
   bool quiet = false;

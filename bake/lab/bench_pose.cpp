@@ -28,33 +28,46 @@ double percent(int part, int whole) {
   return whole > 0 ? 100.0 * part / whole : 0.0;
 }
 
-/// Rows of one band: ours and, where it ran, the paper's.
+/// Rows of one band of one method; reference: of the same band, null: none.
+void add_band(const PoseBenchRow& own, const PoseBenchRow* reference, const std::string& band,
+              std::vector<BenchRow>& rows) {
+  const auto add = [&](const std::string& what, auto&& value) {
+    const double theirs = reference != nullptr ? value(*reference) : kNoFigure;
+    rows.push_back(
+        {what + " " + band, value(own), theirs, theirs != 0.0 ? value(own) / theirs : kNoFigure});
+  };
+  const auto with = [](const PoseBenchRow& row) { return row.frames - row.without_pattern; };
+  if (own.without_pattern > 0) {
+    add("false_pct",
+        [](const PoseBenchRow& row) { return percent(row.false_found, row.without_pattern); });
+  }
+  if (own.frames > own.without_pattern) {
+    add("recognised_pct",
+        [&](const PoseBenchRow& row) { return percent(row.recognised, with(row)); });
+    add("right_pct", [&](const PoseBenchRow& row) { return percent(row.right, with(row)); });
+    if (own.detailed) {
+      // As benchmarks of planar tracking report them: precision within 5 and within 15 pixels, of
+      // all frames.
+      add("P@5", [&](const PoseBenchRow& row) { return percent(row.right, with(row)); });
+      add("P@15", [&](const PoseBenchRow& row) { return percent(row.within_15, with(row)); });
+      add("worst_px", [](const PoseBenchRow& row) { return row.worst_px; });
+    }
+    add("error_px", [](const PoseBenchRow& row) { return row.error_px; });
+  }
+  if (own.sequence) add("jitter_px", [](const PoseBenchRow& row) { return row.jitter_px; });
+  add("cpu_ms", [](const PoseBenchRow& row) { return row.ms; });
+}
+
+/// Rows of all bands: ours beside the paper's where it ran, and SIFT's.
 void add_rows(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>& rows) {
-  for (const PoseBenchRow& ours : measured) {
-    if (ours.method != "ours") continue;
+  for (const PoseBenchRow& own : measured) {
+    if (own.method == "paper") continue;
     const PoseBenchRow* paper = nullptr;
     for (const PoseBenchRow& other : measured) {
-      if (other.band == ours.band && other.method == "paper") paper = &other;
+      if (other.band == own.band && other.method == "paper") paper = &other;
     }
-    const auto add = [&](const std::string& what, auto&& value) {
-      const double reference = paper != nullptr ? value(*paper) : kNoFigure;
-      const double own = value(ours);
-      rows.push_back(
-          {what + " " + ours.band, own, reference, reference != 0.0 ? own / reference : kNoFigure});
-    };
-    if (ours.without_pattern > 0) {
-      add("false_pct",
-          [](const PoseBenchRow& row) { return percent(row.false_found, row.without_pattern); });
-    }
-    if (ours.frames > ours.without_pattern) {
-      const auto with = [](const PoseBenchRow& row) { return row.frames - row.without_pattern; };
-      add("recognised_pct",
-          [&](const PoseBenchRow& row) { return percent(row.recognised, with(row)); });
-      add("right_pct", [&](const PoseBenchRow& row) { return percent(row.right, with(row)); });
-      add("error_px", [](const PoseBenchRow& row) { return row.error_px; });
-    }
-    if (ours.sequence) add("jitter_px", [](const PoseBenchRow& row) { return row.jitter_px; });
-    add("cpu_ms", [](const PoseBenchRow& row) { return row.ms; });
+    const bool ours = own.method == "ours";
+    add_band(own, ours ? paper : nullptr, ours ? own.band : own.band + " " + own.method, rows);
   }
 }
 
@@ -65,7 +78,7 @@ void add_stages(const std::vector<PoseBenchRow>& measured, std::vector<BenchRow>
     double sums[2] = {0, 0};
     double frames[2] = {0, 0};
     for (const PoseBenchRow& row : measured) {
-      if (row.sequence) continue;
+      if (row.sequence || row.method == "sift") continue;
       const std::size_t method = row.method == "ours" ? 0 : 1;
       sums[method] += row.stages_ms[stage] * row.frames;
       frames[method] += row.frames;
@@ -83,6 +96,7 @@ Result<PoseBenchOptions> options_of(const PoseBenchRequest& command) {
   options.seed = command.seed;
   options.clutter_frames = command.clutter;
   options.many = command.many;
+  options.sift = command.sift;
   options.paper_set = 0;
   for (const ParameterSetRecord& set : paper_parameter_sets()) {
     if (command.parameters == parameter_set_name(set.id)) options.paper_set = set.id;
@@ -154,12 +168,25 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
     bar.clear();
     return rows;
   }
-  if (!options.bands.empty()) {
+  const auto take_detailed = [&take](std::vector<PoseBenchRow> rows) {
+    for (PoseBenchRow& row : rows) row.detailed = true;
+    take(rows);
+  };
+  const bool others = command.field || !command.path.empty();
+  if (command.field) {
+    MODAR_ASSIGN(auto rows, bench_field(options, command.only, progress));
+    take_detailed(std::move(rows));
+  }
+  if (!command.path.empty()) {
+    MODAR_ASSIGN(auto rows, bench_path(options, command.path, progress));
+    take_detailed(std::move(rows));
+  }
+  if (!others && !options.bands.empty()) {
     MODAR_ASSIGN(const auto rows, bench_detection(options, progress));
     take(rows);
   }
   for (const Path& path : kPaths) {
-    if (std::string(path.name).find(command.only) == std::string::npos) continue;
+    if (others || std::string(path.name).find(command.only) == std::string::npos) continue;
     MODAR_ASSIGN(const auto rows,
                  bench_tracking(options, path.name, path.speed, path.blur, progress));
     take(rows);
@@ -172,7 +199,7 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
   bar.clear();
   std::vector<BenchRow> rows;
   add_rows(measured, rows);
-  add_stages(measured, rows);
+  if (!others) add_stages(measured, rows);
   return rows;
 }
 

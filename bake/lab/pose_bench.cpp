@@ -14,6 +14,8 @@
 #include <glm/geometric.hpp>
 #include <opencv2/core.hpp>
 
+#include "bake/lab/field_scene.hpp"
+#include "bake/lab/sift_peer.hpp"
 #include "bake/thread_clock.hpp"
 #include "bake/video/video.hpp"
 #include "formats/bundle_view.hpp"
@@ -30,6 +32,7 @@ struct Fixture {
   std::vector<std::byte> bytes;
   std::unique_ptr<PaperTracker> paper;  ///< null where options.paper_set is 0
   std::unique_ptr<PoseLoop> ours;
+  std::unique_ptr<SiftTracker> sift;  ///< of the first pattern; null unless options.sift
 };
 
 /// track: whether ours tracks patterns from frame to frame. Errors: those of reading pictures,
@@ -60,6 +63,7 @@ Result<Fixture> make_fixture(const std::vector<std::string>& paths, const PoseBe
     how.track = track;
     MODAR_ASSIGN(fixture.ours, PoseLoop::create(bundle, camera, how));
   }
+  if (options.sift) fixture.sift = SiftTracker::create(fixture.pictures[0].view());
   return fixture;
 }
 
@@ -98,30 +102,36 @@ class MethodTally {
   PoseTally poses_;
 };
 
-/// Both methods on the same frames.
+/// All methods on the same frames.
 class MethodTallies {
  public:
   MethodTallies(const std::string& band, bool sequence)
-      : paper_(band, "paper", sequence), ours_(band, "ours", sequence) {}
+      : paper_(band, "paper", sequence),
+        ours_(band, "ours", sequence),
+        sift_(band, "sift", sequence) {}
   void cut() {
     paper_.cut();
     ours_.cut();
+    sift_.cut();
   }
   /// Runs the fixture's trackers on a frame. Errors: those of the trackers.
   Result<void> run(Fixture& fixture, const GrayImage& frame, const FrameTruth& truth) {
     if (fixture.paper) MODAR_TRY(paper_.run(*fixture.paper, frame, truth));
     if (fixture.ours) MODAR_TRY(ours_.run(*fixture.ours, frame, truth));
+    if (fixture.sift) MODAR_TRY(sift_.run(*fixture.sift, frame, truth));
     return {};
   }
   /// Appends a row for each method that ran.
   void finish(const PoseBenchOptions& options, std::vector<PoseBenchRow>& rows) {
     if (options.paper_set != 0) rows.push_back(paper_.finish());
     if (options.ours) rows.push_back(ours_.finish());
+    if (options.sift) rows.push_back(sift_.finish());
   }
 
  private:
   MethodTally paper_;
   MethodTally ours_;
+  MethodTally sift_;
 };
 
 Result<std::vector<GrayPicture>> backgrounds_of(const PoseBenchOptions& options) {
@@ -189,37 +199,73 @@ Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const Gray
 
 using Truths = std::map<std::uint64_t, FrameTruth>;
 
-tl::unexpected<Error> bad_truth(const std::string& path, std::size_t line, const char* cause) {
-  return fail(ExitCode::kInvalidInput, "bench.truth", path + ":" + std::to_string(line), cause,
-              "write a line a frame: its number, 1 or 0 for a pattern that shows or not, and at "
-              "last the corners' eight coordinates");
+/// A line of numbers, and where it stands in the file.
+struct NumberLine {
+  std::size_t number = 0;
+  std::vector<double> values;
+};
+
+/// Lines of numbers separated by blanks or commas, without comments. code: of errors.
+Result<std::vector<NumberLine>> read_numbers(const std::string& path, const char* code) {
+  std::ifstream file(path);
+  if (!file) return fail(ExitCode::kIo, code, path, "the file cannot be read", "check its path");
+  std::vector<NumberLine> lines;
+  std::string line;
+  for (std::size_t number = 1; std::getline(file, line); ++number) {
+    if (line.empty() || line[0] == '#') continue;
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream words(line);
+    words.imbue(std::locale::classic());
+    NumberLine out{number, {}};
+    for (double value = 0; words >> value;) out.values.push_back(value);
+    if (!words.eof()) {
+      return fail(ExitCode::kInvalidInput, code, path + ":" + std::to_string(number),
+                  "this is not a number", "write numbers separated by blanks or commas");
+    }
+    lines.push_back(std::move(out));
+  }
+  return lines;
 }
 
 Result<Truths> read_truth(const std::string& path) {
   Truths truths;
   if (path.empty()) return truths;
-  std::ifstream file(path);
-  if (!file) {
-    return fail(ExitCode::kIo, "bench.truth", path, "the file cannot be read", "check its path");
-  }
-  std::string line;
-  for (std::size_t number = 1; std::getline(file, line); ++number) {
-    if (line.empty() || line[0] == '#') continue;
-    for (char& letter : line) letter = letter == ',' ? ' ' : letter;
-    std::istringstream words(line);
-    words.imbue(std::locale::classic());
-    std::vector<double> values;
-    for (double value = 0; words >> value;) values.push_back(value);
-    if (!words.eof() || values.size() < 2) return bad_truth(path, number, "this is no number");
+  MODAR_ASSIGN(const auto lines, read_numbers(path, "bench.truth"));
+  for (const auto& [number, values] : lines) {
     FrameTruth truth;
-    truth.pattern = values[1] == 1.0;
-    if (truth.pattern && values.size() < 10) return bad_truth(path, number, "corners are missing");
+    truth.pattern = values.size() > 1 && values[1] == 1.0;
+    if (values.size() < (truth.pattern ? 10 : 2)) {
+      return fail(
+          ExitCode::kInvalidInput, "bench.truth", path + ":" + std::to_string(number),
+          "corners are missing",
+          "write a line for each frame: its number, 1 or 0 for a pattern that shows or not, "
+          "and at last the corners' eight coordinates");
+    }
     for (std::size_t i = 0; i < 8 && truth.pattern; ++i) {
       truth.corners[i / 2][static_cast<int>(i % 2)] = values[values.size() - 8 + i];
     }
     truths[static_cast<std::uint64_t>(values[0])] = truth;
   }
   return truths;
+}
+
+/// A frame of a recorded path.
+FieldFrame path_frame(const std::vector<double>& values, const GrayImage& picture,
+                      const Camera& camera, const GrayPicture& background, Random& random) {
+  FieldFrame frame;
+  if (values.size() == 9) {
+    std::array<double, 9> map;
+    std::copy(values.begin(), values.end(), map.begin());
+    frame = render_homography(picture, map, background);
+  } else {
+    Pose pose;
+    for (int i = 0; i < 9; ++i) pose.rotation[i % 3][i / 3] = values[static_cast<std::size_t>(i)];
+    pose.translation = {values[9], values[10], values[11]};
+    SceneFrame scene = render_still(picture, camera, pose, background, {}, random, 0.65, {});
+    frame = {std::move(scene.picture), {true, scene.corners}};
+  }
+  expose(frame.picture, {}, random, frame.picture);
+  return frame;
 }
 
 std::vector<std::string> patterns_of(const PoseBenchOptions& options, const VideoBench& video) {
@@ -290,6 +336,77 @@ Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options
     MODAR_TRY(run_path(options, p, background, speed, blur, tallies));
     if (progress) {
       progress(name, static_cast<double>(p + 1) / static_cast<double>(options.patterns.size()));
+    }
+  }
+  std::vector<PoseBenchRow> rows;
+  tallies.finish(options, rows);
+  return rows;
+}
+
+Result<std::vector<PoseBenchRow>> bench_field(const PoseBenchOptions& options,
+                                              const std::string& only,
+                                              const ProgressCallback& progress) {
+  cv::setNumThreads(1);
+  MODAR_ASSIGN(const auto backgrounds, backgrounds_of(options));
+  const Camera camera = default_camera(options.width, options.height);
+  std::vector<FieldCondition> conditions;
+  std::vector<MethodTallies> tallies;
+  for (FieldCondition& condition : field_conditions()) {
+    const std::string name = "field " + condition.name;
+    if (name.find(only) == std::string::npos) continue;
+    tallies.emplace_back(name, false);
+    conditions.push_back(std::move(condition));
+  }
+  for (std::size_t p = 0; p < options.patterns.size(); ++p) {
+    MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, false));
+    bool shrunk = false;
+    MODAR_ASSIGN(const GrayPicture other,
+                 load_pattern(options.patterns[(p + 1) % options.patterns.size()], shrunk));
+    for (std::size_t c = 0; c < conditions.size(); ++c) {
+      // The same poses under every condition.
+      Random random(options.seed + 1000003 * p);
+      for (int i = 0; i < options.frames; ++i) {
+        const auto& photo =
+            backgrounds[static_cast<std::size_t>(random.next() % backgrounds.size())];
+        Random own(random.next());
+        const FieldFrame frame = render_field(fixture.pictures[0].view(), other.view(), camera,
+                                              photo, conditions[c], own);
+        MODAR_TRY(tallies[c].run(fixture, frame.picture.view(), frame.truth));
+      }
+    }
+    if (progress) {
+      progress("field", static_cast<double>(p + 1) / static_cast<double>(options.patterns.size()));
+    }
+  }
+  std::vector<PoseBenchRow> rows;
+  for (MethodTallies& each : tallies) each.finish(options, rows);
+  return rows;
+}
+
+Result<std::vector<PoseBenchRow>> bench_path(const PoseBenchOptions& options,
+                                             const std::string& path,
+                                             const ProgressCallback& progress) {
+  cv::setNumThreads(1);
+  MODAR_ASSIGN(const auto backgrounds, backgrounds_of(options));
+  MODAR_ASSIGN(const auto lines, read_numbers(path, "bench.path"));
+  for (const auto& [number, values] : lines) {
+    if (values.size() == 9 || values.size() == 12) continue;
+    return fail(ExitCode::kInvalidInput, "bench.path", path + ":" + std::to_string(number),
+                "a line holds neither 9 nor 12 numbers", "write a homography or a pose a line");
+  }
+  const Camera camera = default_camera(options.width, options.height);
+  MethodTallies tallies("path " + std::filesystem::path(path).filename().string(), true);
+  for (std::size_t p = 0; p < options.patterns.size(); ++p) {
+    MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, true));
+    Random random(options.seed + 1000003 * p);
+    tallies.cut();
+    for (const auto& [number, values] : lines) {
+      const FieldFrame frame = path_frame(values, fixture.pictures[0].view(), camera,
+                                          backgrounds[p % backgrounds.size()], random);
+      MODAR_TRY(tallies.run(fixture, frame.picture.view(), frame.truth));
+    }
+    if (progress) {
+      progress("path", static_cast<double>(p + 1) / static_cast<double>(options.patterns.size()));
     }
   }
   std::vector<PoseBenchRow> rows;

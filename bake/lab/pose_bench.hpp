@@ -24,7 +24,8 @@ struct PoseBenchOptions {
   int height = 720;
   std::uint32_t paper_set = 1;  ///< parameter set of the paper's method; 0: without that method
   bool ours = true;
-  int many = 50;  ///< bench_many(): patterns in the greatest bundle, 2 or more
+  bool sift = false;  ///< beside them OpenCV's SIFT with MAGSAC
+  int many = 50;      ///< bench_many(): patterns in the greatest bundle, 2 or more
   std::uint64_t seed = 1;
   std::vector<SceneBand> bands;  ///< empty: pose_bands()
 };
@@ -32,8 +33,9 @@ struct PoseBenchOptions {
 /// One method on one band, over all patterns.
 struct PoseBenchRow : PoseFigures {
   std::string band;
-  std::string method;                  ///< "paper" or "ours"
+  std::string method;                  ///< "paper", "ours" or "sift"
   bool sequence = false;               ///< frames followed each other and were tracked
+  bool detailed = false;               ///< P@5, P@15 and the greatest error are printed, too
   double ms = 0;                       ///< thread-CPU milliseconds of a frame, mean
   double stages_ms[4] = {0, 0, 0, 0};  ///< wall time: detect, describe, match, homography
 };
@@ -47,6 +49,19 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
 Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options,
                                                  const std::string& name, double speed, double blur,
                                                  const ProgressCallback& progress);
+
+/// Detection under each of field_conditions() whose name, after "field ", holds `only`.
+Result<std::vector<PoseBenchRow>> bench_field(const PoseBenchOptions& options,
+                                              const std::string& only,
+                                              const ProgressCallback& progress);
+
+/// Tracking along a recorded camera path: a text file with a line for each frame, of 9 numbers (a
+/// homography from the picture's pixels to the frame's, row by row) or 12 (a pose: rotation row by
+/// row, then translation in half pattern widths), separated by blanks or commas; '#' starts a
+/// comment. Every pattern replays it. Errors: kIo, kInvalidInput "bench.path".
+Result<std::vector<PoseBenchRow>> bench_path(const PoseBenchOptions& options,
+                                             const std::string& path,
+                                             const ProgressCallback& progress);
 
 /// A real video.
 struct VideoBench {

@@ -267,8 +267,13 @@ SceneFrame render_still(const GrayImage& pattern, const Camera& camera, const Po
     lay_over(show(pattern, camera, pose, covered, side), frame);
   }
   cv::GaussianBlur(frame, frame, cv::Size(5, 5), focus);
-  if (blur.length > 1.0) cv::filter2D(frame, frame, -1, motion_kernel(blur.length, blur.angle));
+  if (blur.length > 1.0) blur_motion(blur, scene.picture);
   return scene;
+}
+
+void blur_motion(MotionBlur blur, GrayPicture& picture) {
+  cv::Mat frame(picture.height, picture.width, CV_8UC1, picture.pixels.data());
+  cv::filter2D(frame, frame, -1, motion_kernel(blur.length, blur.angle));
 }
 
 void expose(const GrayPicture& still, const SceneLight& light, Random& random,

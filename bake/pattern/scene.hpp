@@ -57,6 +57,9 @@ struct MotionBlur {
   double angle = 0;   ///< radians
 };
 
+/// Blurs along a line.
+void blur_motion(MotionBlur blur, GrayPicture& picture);
+
 /// Renders the pattern at the pose through the camera's lens over the background, then applies
 /// blur, exposure and noise. light: null draws one.
 SceneFrame render_scene(const GrayImage& pattern, const Camera& camera, const Pose& pose,

@@ -219,10 +219,13 @@ void PoseTally::add(const TrackResult& result, const FrameTruth& truth) {
   const Detection& seen = *std::min_element(result.visible.begin(), result.visible.end(), better);
   std::array<glm::dvec2, 4> miss;
   for (std::size_t i = 0; i < 4; ++i) miss[i] = seen.corners[i] - truth.corners[i];
+  const double error = corner_error(seen, truth);
   const bool right = is_right(seen, truth);
+  figures_.within_15 += error < 15 ? 1 : 0;
+  figures_.worst_px = std::max(figures_.worst_px, error);
   if (right) {
     ++figures_.right;
-    errors_.push_back(corner_error(seen, truth));
+    errors_.push_back(error);
   }
   for (std::size_t i = 0; i < 4 && right && have_last_; ++i) {
     const glm::dvec2 d = miss[i] - last_[i];

@@ -63,6 +63,8 @@ struct PoseFigures {
   int false_found = 0;      ///< recognitions in those
   int recognised = 0;       ///< recognitions in the others
   int right = 0;            ///< of those, see is_right()
+  int within_15 = 0;        ///< of those, with a mean error of the corners under 15 pixels
+  double worst_px = 0;      ///< greatest error of a recognition
   double error_px = 0;      ///< median over the right ones
   double jitter_px = 0;     ///< rms change of the corners' error from frame to frame
 };
