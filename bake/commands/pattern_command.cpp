@@ -37,6 +37,7 @@ struct ScoreCommand {
 struct NamedScore {
   std::string name;
   PatternScore score;
+  double width_mm = 0;  ///< that the file states; 0: none
 };
 
 struct ConfusionCommand {
@@ -123,9 +124,17 @@ Json score_json(const NamedScore& one) {
   for (const ScoreCause& cause : one.score.causes) {
     causes.push_back({{"id", cause.id}, {"value", cause.value}, {"advice", cause.advice}});
   }
+  const ScoreRange& range = one.score.range;
   return {{"name", one.name},
           {"score", one.score.score},
           {"version", kScoreVersion},
+          {"grade", std::string(1, one.score.grade)},
+          {"range",
+           {{"nearest_widths", range.nearest},
+            {"farthest_widths", range.farthest},
+            {"tilt_deg", range.tilt_deg},
+            {"half_covered_right_pct", 100 * range.covered_share},
+            {"sentence", range_sentence(range, one.width_mm)}}},
           {"causes", causes}};
 }
 
@@ -159,7 +168,7 @@ Result<NamedScore> score_file(const ScoreCommand& command, const std::string& pa
     MODAR_ASSIGN(const std::string out, picture_of(path, command.overlay_folder));
     MODAR_TRY(write_png(score_overlay(picture.view(), *score), out));
   }
-  return NamedScore{file_stem(path), std::move(*score)};
+  return NamedScore{file_stem(path), std::move(*score), png_width_mm(path)};
 }
 
 Result<ExitCode> run_score(ScoreCommand& command) {
@@ -181,7 +190,9 @@ Result<ExitCode> run_score(ScoreCommand& command) {
     }
     list.push_back(score_json(*one));
     if (command.json) continue;
-    std::printf("%s: %d of 100 (version %u)\n", one->name.c_str(), one->score.score, kScoreVersion);
+    std::printf("%s: %c: %s; %d of 100 (version %u)\n", one->name.c_str(), one->score.grade,
+                range_sentence(one->score.range, one->width_mm).c_str(), one->score.score,
+                kScoreVersion);
     for (const ScoreCause& cause : one->score.causes) {
       std::printf("  %-10s %3d%s%s\n", cause.id, cause.value, *cause.advice != 0 ? "  " : "",
                   cause.advice);
@@ -347,12 +358,18 @@ Json confusion_json(const Confusion& confusion) {
     patterns.push_back({{"name", confusion.names[shown]},
                         {"recognised", confusion.recognised[shown * count + shown]},
                         {"taken_for", taken_for},
+                        {"mirrored", confusion.mirrored[shown]},
                         {"in_photos", confusion.in_photos[shown]}});
+  }
+  Json keep_apart = Json::array();
+  for (const auto& [a, b] : confusion.keep_apart()) {
+    keep_apart.push_back(Json{{"a", confusion.names[a]}, {"b", confusion.names[b]}});
   }
   return {{"views", confusion.views},
           {"photo_views", confusion.photo_views},
           {"false_recognitions", confusion.false_recognitions()},
           {"false_together", confusion.together},
+          {"keep_apart", keep_apart},
           {"patterns", patterns}};
 }
 
@@ -370,6 +387,14 @@ void print_confusion(const Confusion& confusion) {
       }
     }
     std::printf("\n");
+  }
+  for (const auto& [a, b] : confusion.keep_apart()) {
+    std::printf("keep apart: %s and %s\n", confusion.names[a].c_str(), confusion.names[b].c_str());
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (confusion.mirrored[i] == 0) continue;
+    std::printf("%s is recognised in its mirror image (%d of %d)\n", confusion.names[i].c_str(),
+                confusion.mirrored[i], confusion.views);
   }
   std::printf("false recognitions: %d, each asked for alone; %d with all in one bundle\n",
               confusion.false_recognitions(), confusion.together);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "bake/parallel.hpp"
 #include "formats/bundle_view.hpp"
@@ -40,7 +41,7 @@ std::vector<GrayPicture> photo_views(const GrayPicture& photo, int count, Random
 }
 
 /// In how many of the views each pattern is recognised by a device that knows it alone.
-Result<std::vector<int>> count_alone(const std::vector<NamedPattern>& patterns,
+Result<std::vector<int>> count_alone(std::span<const NamedPattern> patterns,
                                      const std::vector<GrayPicture>& views,
                                      const ConfusionOptions& options) {
   PoseLoopOptions loop_options;
@@ -99,9 +100,20 @@ int Confusion::false_recognitions() const {
     for (std::size_t asked = 0; asked < names.size(); ++asked) {
       if (asked != shown) sum += recognised[shown * names.size() + asked];
     }
-    sum += in_photos[shown];
+    sum += in_photos[shown] + mirrored[shown];
   }
   return sum;
+}
+
+std::vector<std::array<std::size_t, 2>> Confusion::keep_apart() const {
+  std::vector<std::array<std::size_t, 2>> pairs;
+  for (std::size_t a = 0; a < names.size(); ++a) {
+    for (std::size_t b = a + 1; b < names.size(); ++b) {
+      const int times = recognised[a * names.size() + b] + recognised[b * names.size() + a];
+      if (times > 0) pairs.push_back({a, b});
+    }
+  }
+  return pairs;
 }
 
 Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
@@ -126,7 +138,7 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   };
   Random random(options.seed);
   const GrayPicture background = made_background(options.width, options.height, random);
-  const double all = static_cast<double>(patterns.size() + options.photos.size());
+  const double all = static_cast<double>(2 * patterns.size() + options.photos.size());
   double done = 0;
   const auto step_done = [&] {
     if (progress) progress("confusion", ++done / all);
@@ -137,6 +149,19 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
     MODAR_ASSIGN(const auto counts,
                  recognise(easy_views(shown, options, background, random), index));
     confusion.recognised.insert(confusion.recognised.end(), counts.begin(), counts.end());
+    step_done();
+  }
+  Random mirror_random(options.seed + 1);
+  for (const NamedPattern& pattern : patterns) {
+    NamedPattern mirror{pattern.name, pattern.picture, {}};
+    for (int y = 0; y < mirror.picture.height; ++y) {
+      const auto row = mirror.picture.pixels.begin() + std::ptrdiff_t{y} * mirror.picture.width;
+      std::reverse(row, row + mirror.picture.width);
+    }
+    MODAR_ASSIGN(const auto counts,
+                 count_alone({&pattern, 1}, easy_views(mirror, options, background, mirror_random),
+                             options));
+    confusion.mirrored.push_back(counts[0]);
     step_done();
   }
   for (const std::string& path : options.photos) {

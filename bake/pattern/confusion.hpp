@@ -2,6 +2,8 @@
 // recognises one in photos that show none.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -29,11 +31,17 @@ struct Confusion {
   std::vector<int> recognised;
   int photo_views = 0;
   std::vector<int> in_photos;  ///< of each pattern: recognitions in views of photos
+  /// Of each pattern: recognitions in as many views of its mirror image, by a device that knows it
+  /// alone.
+  std::vector<int> mirrored;
   /// Recognitions of patterns that were not there, in all views, by a device that knows all
   /// patterns: of those that claim one place it keeps the one that the frame agrees with best.
   int together = 0;
   /// The same by devices that know one pattern each.
   [[nodiscard]] int false_recognitions() const;
+  /// Pairs of patterns, a series' prints say, of which one was recognised in views of the other: to
+  /// be kept out of each other's sight, or told apart by more than a detail.
+  [[nodiscard]] std::vector<std::array<std::size_t, 2>> keep_apart() const;
 };
 
 /// Runs the device's tracker for each pattern on views of every other and on photos. The views are

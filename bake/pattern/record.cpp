@@ -460,7 +460,7 @@ Result<FeatureContent> paper_features(const GrayImage& image,
 
 Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned jobs,
                        PatternFeatures& out, Report& report) {
-  MODAR_ASSIGN(const PatternScore score, score_pattern(gray, out.loop_record, jobs));
+  MODAR_ASSIGN(const PatternScore score, score_pattern(gray, out.loop_record, jobs, false));
   out.record.score = static_cast<float>(score.score);
   out.record.score_version = kScoreVersion;
   const auto worst =

@@ -20,9 +20,19 @@ inline constexpr std::uint32_t kScoreVersion = 1;
 inline constexpr int kWeakScore = 30;
 
 struct ScoreCause {
-  const char* id;      ///< "texture", "spread", "contrast", "repetition", "aspect", "size", "blur"
+  /// "texture", "spread", "contrast", "repetition", "aspect", "size", "blur", "mirror"
+  const char* id;
   int value = 0;       ///< 0 to 100, the best
   const char* advice;  ///< what a person can do; empty where the value is good
+};
+
+/// Where the device's tracker was right in rendered views, by a camera 1280 pixels wide whose focal
+/// length is its width.
+struct ScoreRange {
+  double nearest = 0;        ///< pattern widths; 0 with farthest 0: nowhere
+  double farthest = 0;       ///< the same
+  double tilt_deg = 0;       ///< from the front to there
+  double covered_share = 0;  ///< of views with half of the pattern covered
 };
 
 /// A corner of the picture, and in how many of the test views it was matched unambiguously.
@@ -34,6 +44,8 @@ struct ScorePlace {
 
 struct PatternScore {
   int score = 0;  ///< 0 to 100
+  ScoreRange range;
+  char grade = 'E';  ///< 'A' to 'E', see grade_of()
   std::vector<ScoreCause> causes;
   std::vector<ScorePlace> places;
   int views = 0;  ///< test views
@@ -43,9 +55,17 @@ struct PatternScore {
 /// device's tracker on them: the score is the share of these views in which it is right. The causes
 /// come from the picture and from the features that are matched again. A count of decisions, which
 /// depends neither on the machine nor on the number of threads. record: the picture's tracker
-/// record. Errors: those of the tracker.
+/// record. with_range: false spares the views that only the range, its grade and the cause "mirror"
+/// need, as a bake does. Errors: those of the tracker.
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
-                                   unsigned jobs);
+                                   unsigned jobs, bool with_range = true);
+
+/// 'A' (the best) to 'E', from the range alone: distance, tilt and half-covered views as factors.
+char grade_of(const ScoreRange& range);
+
+/// "recognised from 13 cm to 1.3 m, to 70 degrees, 90 % right when half covered". width_mm: printed
+/// width, 0: unknown, distances are told in widths.
+std::string range_sentence(const ScoreRange& range, double width_mm);
 
 /// The picture with its reliable features (green), unreliable ones (orange), and places without any
 /// darkened.

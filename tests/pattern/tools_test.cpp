@@ -193,6 +193,41 @@ TEST(Score, NamesWhatIsWrongWithAPicture) {
   }
 }
 
+TEST(Score, SaysWhereAPatternWorksAndHowGoodThatIs) {
+  const ScoreRange range{0.65, 6.5, 70.4, 0.9};
+  EXPECT_EQ(range_sentence(range, 200),
+            "recognised from 13 cm to 1.3 m, to 70 degrees, 90 % right when half covered");
+  EXPECT_EQ(
+      range_sentence(range, 0),
+      "recognised from 0.65 to 6.5 times its width, to 70 degrees, 90 % right when half covered");
+  EXPECT_EQ(range_sentence({}, 200), "recognised at no distance");
+  // A farther, steeper or better covered range is never graded worse.
+  for (const double far : {1.0, 5.0, 9.0, 14.0, 20.0}) {
+    EXPECT_LE(grade_of({0.5, far + 2, 70, 0.5}), grade_of({0.5, far, 70, 0.5}));
+    EXPECT_LE(grade_of({0.5, far, 75, 0.5}), grade_of({0.5, far, 60, 0.5}));
+    EXPECT_LE(grade_of({0.5, far, 70, 1.0}), grade_of({0.5, far, 70, 0.2}));
+  }
+  EXPECT_EQ(grade_of({}), 'E');
+  const PatternScore& good = good_score();
+  EXPECT_GT(good.range.farthest, 5 * good.range.nearest);
+  EXPECT_GT(good.range.tilt_deg, 55);
+  EXPECT_EQ(value_of(good, "mirror"), 100);
+}
+
+TEST(Score, APatternBelowTheBestGradeIsAdvised) {
+  cv::Mat symmetric = picture().clone();
+  cv::Mat left = symmetric(cv::Rect(0, 0, 110, 180));
+  cv::Mat right = symmetric(cv::Rect(110, 0, 110, 180));
+  cv::flip(left, right, 1);
+  const PatternScore score = score_of(symmetric);
+  EXPECT_EQ(value_of(score, "mirror"), 0);
+  for (const PatternScore& one : {score, good_score()}) {
+    const bool advised = std::any_of(one.causes.begin(), one.causes.end(),
+                                     [](const ScoreCause& cause) { return *cause.advice != 0; });
+    EXPECT_TRUE(advised || one.grade == 'A') << one.grade;
+  }
+}
+
 TEST(Score, APictureWithoutFeaturesHasNoRecordToScore) {
   const cv::Mat blank(120, 120, CV_8UC1, cv::Scalar(128));
   const auto record = bake_tracker_record(test::gray(blank), quick_bake());
@@ -293,6 +328,8 @@ TEST(Confusion, CountsWhoIsTakenForWhom) {
   // A pattern and its copy are taken for each other, and for no third.
   EXPECT_EQ(confusion->recognised, (std::vector<int>{2, 0, 2, 0, 2, 0, 2, 0, 2}));
   EXPECT_EQ(confusion->false_recognitions(), 4);
+  EXPECT_EQ(confusion->mirrored, (std::vector<int>{0, 0, 0}));
+  EXPECT_EQ(confusion->keep_apart(), (std::vector<std::array<std::size_t, 2>>{{0, 2}}));
   // Of a pattern and its copy, the first is believed: both views of the copy are false.
   EXPECT_EQ(confusion->together, 2);
 }
