@@ -22,7 +22,7 @@ distortion_coefficients: !!opencv-matrix
    data: [ -0.1, 0., 0., 0., 0. ]
 """
 GAME = ROOT / "assets" / "patterns" / "game.png"
-CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur"]
+CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur", "mirror"]
 
 
 class Pattern(ProgramTest):
@@ -43,6 +43,9 @@ class Pattern(ProgramTest):
         self.assertEqual((one["name"], one["version"]), ("part", 1))
         self.assertTrue(0 <= one["score"] <= 100)
         self.assertEqual([cause["id"] for cause in one["causes"]], CAUSES)
+        self.assertIn(one["grade"], "ABCDE")
+        self.assertLess(one["range"]["nearest_widths"], one["range"]["farthest_widths"])
+        self.assertIn("times its width, to", one["range"]["sentence"])
         self.assertTrue((self.folder / "overlays/part.png").read_bytes().startswith(b"\x89PNG"))
         baked = self.modar("bake", "--pattern", self.part, "-o", "b.modar", "--jobs", "1", "--quiet",
                            "--parameters", "none")
@@ -124,8 +127,9 @@ class Pattern(ProgramTest):
         done = self.modar("bake", "--pattern", self.part, "-o", "b.modar", "--quiet", *QUICK)
         self.assertEqual(done.returncode, 0, done.stderr)
         alone = self.modar_json("pattern", "confusion", "b.modar", "--views", "2")
-        self.assertEqual(alone["false_recognitions"], 0)
-        self.assertEqual(alone["patterns"], [{"name": "part", "recognised": 2, "taken_for": {}, "in_photos": 0}])
+        self.assertEqual((alone["false_recognitions"], alone["keep_apart"]), (0, []))
+        self.assertEqual(alone["patterns"], [{"name": "part", "recognised": 2, "taken_for": {}, "mirrored": 0,
+                                              "in_photos": 0}])
         twice = self.modar("pattern", "confusion", "b.modar", "b.modar", "--views", "2")
         self.assertEqual(twice.returncode, 3)
         self.assertIn("false recognitions: 4", twice.stdout)
