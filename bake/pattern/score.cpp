@@ -494,12 +494,11 @@ ScoreCause cause(const char* id, int value, const char* advice) {
   return {id, value, value >= kGood ? "" : advice};
 }
 
-/// A pattern below the best grade says what to do: the advice of its worst cause, where none is
-/// bad.
+/// The advice of the worst cause, where none is bad.
 void advise(const char* const (&advices)[8], PatternScore& score) {
   const bool advised = std::any_of(score.causes.begin(), score.causes.end(),
                                    [](const ScoreCause& one) { return *one.advice != 0; });
-  if (score.grade == 'A' || advised) return;
+  if (advised) return;
   const auto worst =
       std::min_element(score.causes.begin(), score.causes.end(),
                        [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
@@ -568,7 +567,7 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
   constexpr const char* kIds[8] = {"texture", "spread", "contrast", "repetition",
                                    "aspect",  "size",   "blur",     "mirror"};
   for (std::size_t i = 0; i < 8; ++i) out.causes.push_back(cause(kIds[i], values[i], advices[i]));
-  advise(advices, out);
+  if (with_range ? out.grade != 'A' : out.score < kWeakScore) advise(advices, out);
   return out;
 }
 

@@ -30,18 +30,18 @@ TrackerRecordOptions quick_bake() {
   return options;
 }
 
-PatternScore score_of(const cv::Mat& image, unsigned jobs = 1) {
+PatternScore score_of(const cv::Mat& image, unsigned jobs = 1, bool with_range = false) {
   const auto record = bake_tracker_record(test::gray(image), quick_bake());
   EXPECT_TRUE(record) << to_line(record.error());
   if (!record) return {};
-  const auto score = score_pattern(test::gray(image), *record, jobs);
+  const auto score = score_pattern(test::gray(image), *record, jobs, with_range);
   EXPECT_TRUE(score) << to_line(score.error());
   return score.value_or(PatternScore{});
 }
 
-/// That of picture() on one thread, made once.
+/// That of picture() on one thread, with its range, made once.
 const PatternScore& good_score() {
-  static const PatternScore kScore = score_of(picture());
+  static const PatternScore kScore = score_of(picture(), 1, true);
   return kScore;
 }
 
@@ -219,7 +219,7 @@ TEST(Score, APatternBelowTheBestGradeIsAdvised) {
   cv::Mat left = symmetric(cv::Rect(0, 0, 110, 180));
   cv::Mat right = symmetric(cv::Rect(110, 0, 110, 180));
   cv::flip(left, right, 1);
-  const PatternScore score = score_of(symmetric);
+  const PatternScore score = score_of(symmetric, 1, true);
   EXPECT_EQ(value_of(score, "mirror"), 0);
   for (const PatternScore& one : {score, good_score()}) {
     const bool advised = std::any_of(one.causes.begin(), one.causes.end(),
