@@ -100,7 +100,7 @@ int Confusion::false_recognitions() const {
     for (std::size_t asked = 0; asked < names.size(); ++asked) {
       if (asked != shown) sum += recognised[shown * names.size() + asked];
     }
-    sum += in_photos[shown] + mirrored[shown];
+    sum += in_photos[shown];
   }
   return sum;
 }

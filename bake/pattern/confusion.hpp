@@ -37,7 +37,7 @@ struct Confusion {
   /// Recognitions of patterns that were not there, in all views, by a device that knows all
   /// patterns: of those that claim one place it keeps the one that the frame agrees with best.
   int together = 0;
-  /// The same by devices that know one pattern each.
+  /// The same by devices that know one pattern each; mirror images are not counted.
   [[nodiscard]] int false_recognitions() const;
   /// Pairs of patterns, a series' prints say, of which one was recognised in views of the other: to
   /// be kept out of each other's sight, or told apart by more than a detail.
