@@ -248,6 +248,7 @@ async function openBundle(bundle) {
   modar = opened;
   modar.bytes = null;  // the engines have their own copies
   modar.addEventListener('frame', ({ detail }) => onFrame(detail));
+  modar.addEventListener('dropped', ({ detail }) => { if (stream) view.show(detail.source, gesture); });
   modar.addEventListener('error', ({ detail }) => tell(detail));
 }
 

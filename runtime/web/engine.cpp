@@ -148,12 +148,16 @@ EMSCRIPTEN_KEEPALIVE double web_focal() {
 }
 
 /// A tracker for web_camera(), in place of the one before. find_focal: 1 to measure the focal
-/// length on the way.
-EMSCRIPTEN_KEEPALIVE int web_track(int find_focal) {
+/// length on the way. budget: millions of ARM instructions a frame, 0: no limit.
+EMSCRIPTEN_KEEPALIVE int web_track(int find_focal, int budget) {
   modar_tracker_destroy(engine.tracker);
   modar_focal_finder_destroy(engine.finder);
   engine.finder = nullptr;
-  engine.tracker = modar_tracker_create(engine.bundle, &engine.camera, &engine.error);
+  modar_tracker_options options{};
+  options.size = sizeof options;
+  options.budget = budget;
+  engine.tracker =
+      modar_tracker_create_with(engine.bundle, &engine.camera, &options, &engine.error);
   if (engine.tracker == nullptr) return engine.error.exit_code;
   if (find_focal == 0) return 0;
   engine.finder = modar_focal_finder_create(engine.bundle, engine.camera.width,

@@ -93,8 +93,8 @@ export class Engine {
   }
 
   /** Starts tracking anew for the camera. */
-  track(findFocal) {
-    this.#check(this.#module._web_track(findFocal ? 1 : 0));
+  track(findFocal, budget = 0) {
+    this.#check(this.#module._web_track(findFocal ? 1 : 0, budget));
   }
 
   reset() {

@@ -61,13 +61,24 @@ export class View {
     return { width, height };
   }
 
-  /** frame: the detail of modar.js's event. gesture: {mirror, turn (radians), size}. */
-  draw({ source, camera, poses }, gesture = {}) {
+  /** The picture alone, of a frame that nothing is known of. */
+  show(source, gesture = {}) {
+    const width = source.displayWidth ?? source.width;
+    this.#drawPicture(source, { width, height: source.displayHeight ?? source.height }, gesture);
+  }
+
+  #drawPicture(source, camera, gesture) {
     const { width, height } = this.#fit();
     const context = this.#picture.getContext('2d', { alpha: false });
     const cover = Math.max(width / camera.width, height / camera.height);
     context.setTransform(gesture.mirror ? -cover : cover, 0, 0, cover, width / 2, height / 2);
     context.drawImage(source, -camera.width / 2, -camera.height / 2, camera.width, camera.height);
+    return { width, height };
+  }
+
+  /** frame: the detail of modar.js's event. gesture: {mirror, turn (radians), size}. */
+  draw({ source, camera, poses }, gesture = {}) {
+    const { width, height } = this.#drawPicture(source, camera, gesture);
     if (this.#lost) return;
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
     this.#engine.poses().set(poses);

@@ -80,6 +80,8 @@ interface ModarEvents {
   updated: CustomEvent<Sighting>;
   lost: CustomEvent<{ pattern: number; name: string; time: number; reason: string }>;
   frame: CustomEvent<Frame>;
+  /** While nothing is known: a frame that came during a search and is not looked at. Draw it as in `frame`. */
+  dropped: CustomEvent<{ source: VideoFrame | HTMLCanvasElement; time: number }>;
   error: CustomEvent<ModarError>;
 }
 
@@ -96,6 +98,8 @@ export class Modar extends EventTarget {
    */
   start(video: HTMLVideoElement, options?: {
     focal?: number; focalSide?: number; findFocal?: boolean; keepLuma?: boolean;
+    /** Millions of ARM instructions that a frame may take, 12 or more: searches go on over several frames. 0: no limit. */
+    budget?: number;
   }): Promise<void>;
   stop(): void;
   /** Ends the worker. */

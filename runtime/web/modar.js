@@ -166,9 +166,9 @@ export class Modar extends EventTarget {
   }
 
   /** Tracks in the video, which is to play, until stop(). focal: in pixels of its width; 0: unknown. */
-  async start(video, { focal = 0, focalSide = 0, findFocal = true, keepLuma = false } = {}) {
+  async start(video, { focal = 0, focalSide = 0, findFocal = true, keepLuma = false, budget = 0 } = {}) {
     this.stop();
-    await this.#tracker.ask({ type: 'camera', focal, side: focalSide, findFocal });
+    await this.#tracker.ask({ type: 'camera', focal, side: focalSide, findFocal, budget });
     this.#known = this.patterns.map(() => false);
     this.#grabber = new FrameGrabber(video);
     this.keepLuma = keepLuma;
@@ -203,6 +203,11 @@ export class Modar extends EventTarget {
     } catch (error) {
       this.#grabber.useCanvas = true;
       return;
+    }
+    // A search may take longer than a frame: what is dropped meanwhile can still be shown.
+    if (this.#waiting && !this.#known.includes(true)) {
+      const { source } = this.#waiting;
+      this.dispatchEvent(new CustomEvent('dropped', { detail: { source, time: this.#waiting.time } }));
     }
     release(this.#waiting);
     this.#waiting = grabbed;
