@@ -90,7 +90,7 @@ double FocalFinder::State::scatter_deg(double focal) const {
   xx = share * xx - share * share * sum.x * sum.x;
   xy = share * xy - share * share * sum.x * sum.y;
   yy = share * yy - share * share * sum.y * sum.y;
-  const double largest = 0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy);
+  const double largest = 0.5 * (xx + yy) + glm::length(glm::dvec2(0.5 * (xx - yy), xy));
   return glm::degrees(std::sqrt(std::max(0.0, largest)));
 }
 
@@ -175,7 +175,7 @@ bool FocalFinder::add_frame(const GrayImage& frame) {
     const glm::dmat3 from_world =
         centre * map.homography * glm::inverse(pattern.world_from_pixels());
     const glm::dmat3 homography = from_world * (1.0 / from_world[2][2]);
-    if (std::hypot(homography[0].z, homography[1].z) < kMinPerspective) {
+    if (glm::length(glm::dvec2(homography[0].z, homography[1].z)) < kMinPerspective) {
       ++state.frontal;
       continue;
     }

@@ -119,8 +119,7 @@ void PatchCache::motion_blur(const TrackedPattern& pattern, int level, const Pat
   const double grow = static_cast<double>(1 << level);
   const auto x0 = static_cast<float>((patch.centre.x + 0.5) / grow - 0.5) - kPatchHalf - kRing;
   const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - kRing;
-  const int samples =
-      std::clamp(static_cast<int>(std::ceil(std::hypot(motion.x, motion.y))), 2, kMaxSamples);
+  const int samples = std::clamp(static_cast<int>(std::ceil(glm::length(motion))), 2, kMaxSamples);
   Surroundings gray{};
   for (int i = 0; i < samples; ++i) {
     const double time = (i + 0.5) / samples - 0.5;
@@ -269,9 +268,9 @@ double move_pose(const TrackedPattern& pattern, const Camera& camera, double sca
   double most = 0.0;
   for (const glm::dvec2 corner : {glm::dvec2{0, 0}, {right, 0}, {0, bottom}, {right, bottom}}) {
     const PoseJacobian j = pose_jacobian(camera, pose, pattern.to_world(corner), scale);
-    most =
-        std::max(most, std::hypot(std::inner_product(j.x.begin(), j.x.end(), change.begin(), 0.0),
-                                  std::inner_product(j.y.begin(), j.y.end(), change.begin(), 0.0)));
+    const glm::dvec2 moved{std::inner_product(j.x.begin(), j.x.end(), change.begin(), 0.0),
+                           std::inner_product(j.y.begin(), j.y.end(), change.begin(), 0.0)};
+    most = std::max(most, glm::length(moved));
   }
   pose.rotation = rotation_matrix({change[0], change[1], change[2]}) * pose.rotation;
   pose.translation = translation;
@@ -282,7 +281,7 @@ Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_
   const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
   // Frame pixels per pattern pixel.
   const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
-  const int octaves = static_cast<int>(std::lround(std::log2(std::clamp(scale, 1e-3, 1e3))));
+  const int octaves = nearest_octave(std::clamp(scale, 1e-3, 1e3));
   Resolution out;
   out.frame_level = std::clamp(octaves, 0, frame_levels - 1);
   out.pattern_level = std::clamp(out.frame_level - octaves, 0, pattern.level_count - 1);

@@ -22,12 +22,20 @@ Pose mirrored(const Pose& pose) {
   const glm::dvec3 sight = glm::normalize(pose.translation);
   const glm::dvec3 normal = pose.rotation[2];
   const glm::dvec3 axis = glm::cross(normal, sight);
-  const double sine = glm::length(axis);
-  if (sine < 1e-9) return pose;
-  // The normal points towards the camera: rotate it through the line of sight to the other side.
-  const double angle = std::atan2(sine, -glm::dot(normal, sight));
+  const double sine_2 = glm::dot(axis, axis);
+  if (sine_2 < 1e-18) return pose;
+  // The normal points towards the camera: turn it through the line of sight to the other side, by
+  // twice the angle between them. Rodrigues' formula, from that angle's sine and cosine.
+  const double cosine = -glm::dot(normal, sight);
+  const glm::dvec3 x = -2.0 * cosine * axis;
+  const glm::dmat3 across(0, x.z, -x.y, -x.z, 0, x.x, x.y, -x.x, 0);
+  const double cosine_2 = cosine * cosine;
+  const double length_2 = cosine_2 + sine_2;
+  const glm::dmat3 turn =
+      ((cosine_2 - sine_2) * glm::dmat3(1.0) + across + 2.0 * glm::outerProduct(axis, axis)) /
+      length_2;
   Pose other = pose;
-  other.rotation = rotation_matrix(-2.0 * angle / sine * axis) * pose.rotation;
+  other.rotation = turn * pose.rotation;
   return other;
 }
 
@@ -43,6 +51,12 @@ double area_of(const std::array<glm::dvec2, 4>& corners) {
 }
 
 }  // namespace
+
+int nearest_octave(double scale) {
+  int exponent = 0;
+  const double part = std::frexp(scale, &exponent);  // 0.5 to 1
+  return part * part < 0.5 ? exponent - 1 : exponent;
+}
 
 glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& in_front) const {
   const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);

@@ -18,6 +18,10 @@
 
 namespace modar::tracker {
 
+/// The power of two that is nearest to a positive scale, exactly: a libm's log2 may round to
+/// another.
+int nearest_octave(double scale);
+
 /// Point correspondences of a pattern: on its plane (ModAR Eq. 1) and in the frame.
 struct PlanePoints {
   std::span<const glm::dvec2> world;

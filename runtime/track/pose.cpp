@@ -129,10 +129,35 @@ NormalEquations normal_equations(const Camera& camera, std::span<const glm::dvec
   return out;
 }
 
+/// Rodrigues' formula by quaternions, without a libm, whose sines differ in their last bits from
+/// phone to phone: a small part of the turn as a power series, then doubled.
 Eigen::Matrix3d exponential(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (angle == 0.0) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+  constexpr double kSmall = 1.0 / 16;  // the square up to which the series below are exact to 1e-17
+  constexpr int kDoublings = 64;       // bounds the loop where the vector is not finite
+  Eigen::Vector3d half = 0.5 * vector;
+  double x = half.squaredNorm();
+  int doublings = 0;
+  for (; x > kSmall && doublings < kDoublings; ++doublings) {
+    half *= 0.5;
+    x *= 0.25;
+  }
+  double cosine = 1.0;
+  double sine = 1.0;  // over the angle
+  double even = 1.0;
+  double odd = 1.0;
+  for (int n = 1; n <= 6; ++n) {
+    even *= -x / ((2 * n - 1) * (2 * n));
+    odd *= -x / ((2 * n) * (2 * n + 1));
+    cosine += even;
+    sine += odd;
+  }
+  Eigen::Quaterniond turn(cosine, sine * half.x(), sine * half.y(), sine * half.z());
+  for (; doublings > 0; --doublings) {
+    const double w = turn.w();
+    turn.w() = w * w - turn.vec().squaredNorm();
+    turn.vec() *= 2.0 * w;
+  }
+  return turn.toRotationMatrix();
 }
 
 /// Nearest rotation matrix (ModAR Eq. 4-5): U V^T of its singular value decomposition.
@@ -237,8 +262,27 @@ Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
 }
 
 glm::dvec3 rotation_vector(const glm::dmat3& rotation) {
-  const Eigen::AngleAxisd turn(to_eigen(rotation));
-  const Eigen::Vector3d vector = turn.angle() * turn.axis();
+  // The other way: the turn is halved until the series of the arc sine is short.
+  constexpr double kSmall = 1.0 / 64;  // square of the sine up to which it is exact to 1e-17
+  constexpr int kHalvings = 8;         // 3 for half a turn; more where the matrix is no rotation
+  Eigen::Quaterniond turn(to_eigen(rotation));
+  turn.normalize();
+  if (turn.w() < 0.0) turn.coeffs() = -turn.coeffs();
+  double scale = 2.0;
+  for (int i = 0; i < kHalvings && turn.vec().squaredNorm() > kSmall; ++i) {
+    const double w = std::sqrt(0.5 * (1.0 + turn.w()));
+    turn.vec() *= 0.5 / w;
+    turn.w() = w;
+    scale *= 2.0;
+  }
+  const double x = turn.vec().squaredNorm();
+  double sum = 1.0;  // of asin(s) / s
+  double term = 1.0;
+  for (int n = 1; n <= 8; ++n) {
+    term *= x * (2 * n - 1) / (2 * n);
+    sum += term / (2 * n + 1);
+  }
+  const Eigen::Vector3d vector = scale * sum * turn.vec();
   return {vector.x(), vector.y(), vector.z()};
 }
 

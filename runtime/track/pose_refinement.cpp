@@ -48,8 +48,7 @@ PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap&
       std::max(pattern.width(), pattern.height()) / static_cast<double>(kCells * kSamples);
   const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
   const auto level_of = [](double pixels, int count) {
-    return std::clamp(static_cast<int>(std::lround(std::log2(std::max(pixels, 1.0)))), 0,
-                      count - 1);
+    return std::clamp(nearest_octave(std::max(pixels, 1.0)), 0, count - 1);
   };
   const auto pattern_level = static_cast<std::size_t>(level_of(step, pattern.level_count));
   const auto frame_level =
