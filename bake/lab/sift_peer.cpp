@@ -13,7 +13,7 @@ constexpr float kRatio = 0.8f;      // Lowe's, of the best match's distance to t
 constexpr double kInlierPx = 3;     // OpenCV's default threshold
 constexpr int kFewestInliers = 12;  // the 8 of the ModAR paper pass on clutter. Set by hand
 
-cv::Mat mat_of(const GrayImage& image) {
+cv::Mat matrix_of(const GrayImage& image) {
   return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels),
           static_cast<std::size_t>(image.stride)};
 }
@@ -33,7 +33,7 @@ SiftTracker::~SiftTracker() = default;
 
 std::unique_ptr<SiftTracker> SiftTracker::create(const GrayImage& pattern) {
   auto state = std::make_unique<State>();
-  state->sift->detectAndCompute(mat_of(pattern), cv::noArray(), state->keypoints,
+  state->sift->detectAndCompute(matrix_of(pattern), cv::noArray(), state->keypoints,
                                 state->descriptors);
   const double right = pattern.width - 0.5;
   const double bottom = pattern.height - 0.5;
@@ -46,7 +46,7 @@ Result<TrackResult> SiftTracker::step(const GrayImage& frame) {
   try {
     std::vector<cv::KeyPoint> seen;
     cv::Mat descriptors;
-    state_->sift->detectAndCompute(mat_of(frame), cv::noArray(), seen, descriptors);
+    state_->sift->detectAndCompute(matrix_of(frame), cv::noArray(), seen, descriptors);
     if (descriptors.rows < 2 || state_->descriptors.rows < 2) return result;
     std::vector<std::vector<cv::DMatch>> matches;
     state_->matcher.knnMatch(descriptors, state_->descriptors, matches, 2);
