@@ -8,8 +8,9 @@
 # --release       address of a folder that `modar ship publish` filled, and the key to trust: adds the network permission
 # --words         words.properties: what the screen says, in your language
 # NAME.png, NAME.jpg (what to look for) and NAME.properties (texts) beside NAME.modar go with it.
-# With ANDROID_NDK set (r26 or newer) it builds the native library for armeabi-v7a, arm64-v8a and x86; without, the APK
-# holds everything else, and it says so. MODAR_NDK_FLAGS: further words for CMake.
+# With ANDROID_NDK set (r25 or newer) it builds the native library for armeabi-v7a, arm64-v8a and x86 (or ANDROID_ABIS), and with
+# --release the installer; without, the APK holds everything else, and it says so. r25 builds for Android 4.4 (API 19)
+# and later, newer ones for 5.0 (API 21): the manifest says which. MODAR_NDK_FLAGS: further words for CMake.
 # dx and the signatures of Android's classes come from Debian's source packages, once, into build/android/debian (121 MB).
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -19,10 +20,10 @@ app=$root/runtime/android
 say() { echo "apk.sh: $*" >&2; }
 stop() { say "$2"; exit "$1"; }
 
-title=ModAR id=org.modar key="" out="" release="" trust="" words="" bundles=()
+least=19 title=ModAR id=org.modar key="" out="" release="" trust="" words="" bundles=()
 while [ $# -gt 0 ]; do
   case $1 in
-    -h | --help) sed -n '2,15s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,16s/^# \{0,1\}//p' "$0"; exit 0 ;;
     --title | --id | --key | --out | --release | --trust | --words)
       [ $# -ge 2 ] || stop 1 "$1 wants a value"
       printf -v "${1#--}" %s "$2"; shift 2 ;;
@@ -52,19 +53,8 @@ flock 9  # two of these at once share the folders below
 
 quick=(-J-XX:TieredStopAtLevel=1 -J-XX:+UseSerialGC -proc:none -nowarn -Xlint:-options -encoding utf-8)
 
-# Debian's source packages through apt, with a list of sources of our own: the system's may have no deb-src.
 fetch_source() { # PACKAGE
-  local dir=$work/debian
-  ls "$dir/$1"_*.orig.tar.* >/dev/null 2>&1 && return
-  mkdir -p "$dir/lists/partial" "$dir/cache"
-  # shellcheck source=/dev/null
-  . /etc/os-release
-  echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] ${DEBIAN_MIRROR:-http://deb.debian.org/debian} ${VERSION_CODENAME:-bookworm} main" > "$dir/sources.list"
-  local apt=(apt-get -qq -o "Dir::Etc::SourceList=$dir/sources.list" -o Dir::Etc::SourceParts=/dev/null
-    -o "Dir::State::Lists=$dir/lists" -o "Dir::Cache=$dir/cache" -o APT::Sandbox::User=root)
-  say "fetching the source package $1, once"
-  (cd "$dir" && "${apt[@]}" update && "${apt[@]}" source --download-only "$1") >&2 ||
-    stop 2 "Debian's source package $1 cannot be fetched; try again with a network"
+  "$root/scripts/sources.sh" "$work/debian" "$1" || exit $?
 }
 
 # dx turns class files into a phone's: 408 files, compiled once.
@@ -110,15 +100,25 @@ if [ -n "$release" ]; then
 fi
 
 if [ -n "${ANDROID_NDK:-}" ]; then
+  [ -z "$release" ] || "$root/scripts/sources.sh" --libraries || exit $?
   includes=/usr/include/eigen3\;/usr/include
-  for abi in armeabi-v7a arm64-v8a x86; do
-    level=19
-    [ $abi != arm64-v8a ] || level=21
+  revision=$(sed -n 's/^Pkg.Revision *= *\([0-9]*\).*/\1/p' "$ANDROID_NDK/source.properties" 2>/dev/null)
+  [ "${revision:-0}" -ge 25 ] || stop 5 "ANDROID_NDK: $ANDROID_NDK is no NDK of r25 or newer (its source.properties says '$revision')"
+  [ "$revision" -lt 26 ] || least=21
+  for abi in ${ANDROID_ABIS:-armeabi-v7a arm64-v8a x86}; do
+    level=$least
+    [ "$abi" != arm64-v8a ] || level=21
+    # An app that fetches carries the installer and its libraries, out of Debian's sources.
+    target=(modar_jni) sources=()
+    if [ -n "$release" ]; then
+      target+=(modar_fetch_jni)
+      sources=("-DMODAR_SOURCES=$root/build/sources")
+    fi
     # shellcheck disable=SC2086
     cmake -S "$root" -B "$work/$abi" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$ANDROID_NDK/build/cmake/android.toolchain.cmake" \
       -DANDROID_ABI=$abi -DANDROID_PLATFORM=android-$level -DANDROID_STL=c++_static -DCMAKE_BUILD_TYPE=MinSizeRel \
-      -DMODAR_LIBRARY_ONLY=ON -DMODAR_TESTS=OFF "-DMODAR_INCLUDE_PATHS=$includes" ${MODAR_NDK_FLAGS:-} >&2
-    cmake --build "$work/$abi" --target modar_jni >&2
+      -DMODAR_LIBRARY_ONLY=ON -DMODAR_TESTS=OFF "-DMODAR_INCLUDE_PATHS=$includes" "${sources[@]}" ${MODAR_NDK_FLAGS:-} >&2
+    cmake --build "$work/$abi" --target "${target[@]}" >&2
     mkdir -p "$step/tree/lib/$abi"
     find "$work/$abi" -name 'libmodar*_jni.so' -exec cp {} "$step/tree/lib/$abi/" \;
     strip=("$ANDROID_NDK"/toolchains/llvm/prebuilt/*/bin/llvm-strip)
@@ -128,10 +128,10 @@ else
   say "ANDROID_NDK is not set: the APK holds no native library and will not start on a phone"
 fi
 
-python3 - "$app" "$step" "$title" "$release" <<'P'
+python3 - "$app" "$step" "$title" "$release" $least <<'P'
 import html, pathlib, shutil, sys
 app, step, title, release = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4]
-manifest = (app / "AndroidManifest.xml").read_text()
+manifest = (app / "AndroidManifest.xml").read_text().replace('minSdkVersion="19"', f'minSdkVersion="{sys.argv[5]}"')
 if release:
     network = '    <uses-permission android:name="android.permission.INTERNET" />\n    <application'
     manifest = manifest.replace("    <application", network, 1)

@@ -5,10 +5,15 @@ import re
 import shutil
 import struct
 import subprocess
+import threading
+import time
 import unittest
 import zipfile
 
-from machine import FAKES, HEIGHT, ROOT, WIDTH, ProgramTest, compile_java, have, make_clip, run_java
+from machine import COVER, FAKES, HEIGHT, ROOT, WIDTH, ProgramTest, compile_java, have, make_clip, run_java
+
+from programs import POTTERY, QUICK  # noqa: E402
+from servers import NGINX, Nginx  # noqa: E402
 
 TOOLS = ("javac", "aapt", "zipalign", "apksigner", "dexdump", "keytool")
 GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
@@ -115,6 +120,47 @@ class Apk(ProgramTest):
             self.assertIn(word, told)
         if os.environ.get("MODAR_KEEP"):
             shutil.copy(out, os.environ["MODAR_KEEP"])
+
+    @unittest.skipUnless(NGINX, "no nginx")
+    def test_releases_from_a_web_server_while_the_app_runs(self):
+        bundle = self.bake_demo("vase.modar")
+        other = self.folder / "other" / "vase.modar"
+        other.parent.mkdir()
+        done = self.modar("bake", "--model", POTTERY, "--pattern", COVER, "--scene", "cover=pottery,scale=0.7", "-o", other,
+                          "--quiet", "--no-lods", *QUICK)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        key, home, steps, release = (self.folder / name for name in ("museum.key", "home", "steps", "release"))
+        home.mkdir()
+        steps.mkdir()
+        ship = lambda *words: self.assertEqual(self.modar("ship", *words).returncode, 0)
+        ship("keygen", "--out", key)
+        ship("publish", bundle, "--to", release, "--key", key)
+        server = Nginx(release, self.folder / "nginx")
+        self.addCleanup(server.stop)
+        apk, _ = self.made("vases", bundle, "--release", server.url(), "--trust", f"{key}.pub")
+        clip = make_clip(self.folder / "clip")
+
+        def forge():
+            ship("publish", bundle, "--to", release, "--key", key)
+            document = release / "releases" / "3.json"
+            document.write_bytes(document.read_bytes().replace(b"vase", b"vasa"))
+
+        def serve():
+            actions = {"second": lambda: ship("publish", other, "--to", release, "--key", key), "forged": forge, "gone": server.stop}
+            for name, action in actions.items():
+                while not (steps / name).exists():
+                    time.sleep(0.05)
+                action()
+                (steps / f"{name}.done").touch()
+
+        threading.Thread(target=serve, daemon=True).start()
+        done = run_java(self.fakes(), "org.modar.AppRun", apk, clip, WIDTH, HEIGHT, home, self.folder / "none", steps)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("the day is over", done.stdout)
+        self.assertNotIn("WARNING", done.stdout + done.stderr)
+        told = (home / "diagnostics.txt").read_text()
+        for word in ("signature.bad", "fetch.network", "bundle: vase (release)"):
+            self.assertIn(word, told)
 
     def test_wrong_words(self):
         for words, code, text in (([], 1, "name a bundle"), (["x.modar", "--id", "vases"], 1, "application id"),

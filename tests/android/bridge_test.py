@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import struct
 import subprocess
@@ -100,6 +101,7 @@ class Bridge(ProgramTest):
     def test_nothing_grows(self):
         frames = 10000 if SOAK else 100
         heap, resident = map(int, self.bridge("soak", self.bake_demo(), frames).split())
+        print(f"the second half of {frames} frames: heap {heap:+} bytes, resident {resident:+} kB")
         self.assertLess(heap, 100_000, "bytes of Java's heap")
         if not os.environ.get("MODAR_SANITIZE"):  # ASan keeps what was freed for a while
             self.assertLess(resident, 4_000, "resident kilobytes")
@@ -107,6 +109,19 @@ class Bridge(ProgramTest):
 
 class Targets(unittest.TestCase):
     """The bridge in the phone's dialect, against Android's own jni.h."""
+
+    def test_nothing_is_named_that_older_ndks_lack(self):
+        """r25, the last NDK for Android 4.4, has libc++ of April 2020."""
+        lacking = re.compile(r"std::(bit_width|has_single_bit|bit_ceil|bit_floor|bit_cast|numbers|ranges|source_location|chars_format|"
+                             r"format|jthread|bind_front)\b|#include <(numbers|ranges|concepts|source_location|format)>")
+        rooms = ["formats", "formats/transport", *(f"runtime/{room}" for room in (
+            "include/modar", "platform", "track", "render", "capi", "android", "fetch", "fetch/include/modar"))]
+        desk = {"curl_line.cpp", "main.cpp"}
+        files = [file for room in rooms for file in (ROOT / room).glob("*.[hc]pp") if file.name not in desk]
+        self.assertGreater(len(files), 80)
+        found = [f"{file.relative_to(ROOT)}: {match[0]}" for file in files
+                 for match in lacking.finditer(re.sub("//.*", "", file.read_text()))]
+        self.assertEqual(found, [])
 
     def test_it_compiles_for_every_phone(self):
         jni = pathlib.Path("/usr/include/android/nativehelper/jni.h")

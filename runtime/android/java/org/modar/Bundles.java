@@ -8,6 +8,7 @@ import android.os.ParcelFileDescriptor;
 import java.io.ByteArrayOutputStream;
 import java.io.File;
 import java.io.FileInputStream;
+import java.io.FileOutputStream;
 import java.io.IOException;
 import java.io.InputStream;
 import java.io.InputStreamReader;
@@ -36,16 +37,20 @@ final class Bundles {
 
     private static final String ENDING = ".modar";
     private static final String ASSETS = "bundles";
+    /** Bytes: then the list of what was verified begins anew. */
+    private static final int MOST_STAMPS = 10000;
     private final Context context;
     /** What adb and file managers reach; the app needs no permission for it. */
     final File folder;
     final File store;
+    private final File verified;
 
     Bundles(Context context) {
         this.context = context;
         File outside = context.getExternalFilesDir(null);
         folder = outside != null ? outside : context.getFilesDir();
         store = new File(context.getFilesDir(), "store");
+        verified = new File(context.getFilesDir(), "verified");
     }
 
     List<Source> list() {
@@ -129,6 +134,41 @@ final class Bundles {
             return texts;
         }
         return texts;
+    }
+
+    /** What changes when the bundle does: its own file, or the APK that it lies in. */
+    private static String stamp(File file) {
+        return file.getPath() + " " + file.length() + " " + file.lastModified() + "\n";
+    }
+
+    private String stampOf(Source source) {
+        return source.name + " " + stamp(source.file != null ? source.file : new File(context.getPackageCodePath()));
+    }
+
+    /** Whether every byte of it has been checked since it came. */
+    boolean isVerified(Source source) {
+        try {
+            byte[] stamps = new byte[(int) verified.length()];
+            FileInputStream in = new FileInputStream(verified);
+            try {
+                int got = in.read(stamps);
+                return got > 0 && new String(stamps, 0, got, "UTF-8").contains(stampOf(source));
+            } finally {
+                in.close();
+            }
+        } catch (IOException none) {
+            return false;
+        }
+    }
+
+    /** On any thread. A phone whose storage is full checks again next time. */
+    synchronized void setVerified(Source source) throws IOException {
+        FileOutputStream out = new FileOutputStream(verified, verified.length() < MOST_STAMPS);
+        try {
+            out.write(stampOf(source).getBytes("UTF-8"));
+        } finally {
+            out.close();
+        }
     }
 
     private InputStream beside(Source source, String ending) throws IOException {

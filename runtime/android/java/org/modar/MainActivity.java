@@ -282,6 +282,52 @@ public final class MainActivity extends Activity
         diagnostics.release = Fetch.AVAILABLE ? Fetch.version(bundles.store.getPath()) : "none";
         stage.show(opened, bundles.lens());
         fingers.reset();
+        if (!bundles.isVerified(from)) new Thread(new Check(from, opened), "modar-verify").start();
+    }
+
+    /** Reads every byte of a bundle once after it came, beside what the visitor does. */
+    private final class Check implements Runnable {
+        private final Bundles.Source from;
+        private final long opened;
+        private String damage;
+
+        Check(Bundles.Source from, long opened) {
+            this.from = from;
+            this.opened = opened;
+        }
+
+        @Override
+        public void run() {
+            if (damage != null) { // on the main thread, the second time
+                drop(from, damage);
+                return;
+            }
+            try {
+                Native.verify(opened);
+                bundles.setVerified(from);
+            } catch (ModarException damaged) {
+                diagnostics.error(damaged.getMessage());
+                if (damaged.code.equals("android.closed")) return; // another is shown by now
+                damage = damaged.getMessage();
+                main.post(this);
+            } catch (IOException full) {
+                diagnostics.error(full.getMessage());
+            }
+        }
+    }
+
+    /** A bundle that is shown turned out to be damaged: the next one, or the reason. */
+    private void drop(Bundles.Source damaged, String cause) {
+        if (source < 0 || sources.get(source) != damaged) return;
+        sources.remove(source);
+        source = -1;
+        stopCamera();
+        closeCamera();
+        session = 0;
+        stage.show(0, null);
+        showNext();
+        if (session == 0) trouble = words.get("bundle", cause);
+        follow();
     }
 
     private void startUpdate() {

@@ -5,6 +5,9 @@ import android.content.Context;
 import android.content.res.AssetManager;
 import android.graphics.Bitmap;
 import android.hardware.Camera;
+import android.hardware.camera2.CameraDevice;
+import android.hardware.camera2.CameraManager;
+import android.media.ImageReader;
 import android.opengl.GLSurfaceView;
 import android.os.Handler;
 import android.view.MotionEvent;
@@ -32,13 +35,20 @@ public final class AppRun {
         Context.folder = new File(words[4]);
         Stage.searchApart = false;
 
+        if (words.length > 6) {
+            network(Paths.get(words[6]));
+            System.out.println("the day is over");
+            return;
+        }
         permission();
         frames(words[5]);
+        camera2();
         fingers();
         pauses();
         pictures();
         damage();
         AssetManager.apk = words[0];
+        rot();
         update();
         System.out.println("the day is over");
     }
@@ -75,9 +85,41 @@ public final class AppRun {
     private static boolean deliver(int index) {
         byte[] frame = new byte[size];
         System.arraycopy(clip, index * size, frame, 0, size);
-        boolean taken = Camera.current.deliver(frame);
+        boolean taken = android.os.Build.VERSION.SDK_INT >= 21 && CameraManager.full ? ImageReader.current.deliver(frame)
+                : Camera.current.deliver(frame);
         view.frame();
         return taken;
+    }
+
+    /** All frames once, from a camera that was opened anew: the last picture. */
+    private static byte[] shown() throws Exception {
+        for (int i = 0; i < clip.length / size; i++) check(deliver(i), "frame " + i);
+        return picture();
+    }
+
+    /** The same frames through Camera2 give the same picture; another app may take the camera. */
+    private static void camera2() throws Exception {
+        app.onPause();
+        app.onResume();
+        byte[] old = shown();
+        app.onPause();
+        CameraManager.full = true;
+        app.onResume();
+        check(Camera.opened == 0 && CameraDevice.current.running, "Camera2");
+        check(changed(old, shown()) == 0, "the same picture by Camera2");
+        for (int i = 0; i < 40; i++) check(deliver(i % 2), "round " + i);
+        check(ImageReader.current.open <= 2, "images go back");
+        CameraDevice.current.callback.onDisconnected(CameraDevice.current);
+        check(status().contains("another app took the camera"), "disconnected");
+        check(!deliver(0), "no frame from a camera that is gone");
+        app.onPause();
+        check(ImageReader.current.closed && ImageReader.current.open == 0, "all images are back");
+        app.onResume();
+        check(deliver(0) && deliver(1), "goes on with Camera2");
+        app.onPause();
+        CameraManager.full = false;
+        app.onResume();
+        shown();
     }
 
     /** Refused: it says so and opens no camera; a touch asks again; allowed, frames flow. */
@@ -219,6 +261,37 @@ public final class AppRun {
         app.onDestroy();
     }
 
+    /** A bundle that opens, with one byte wrong in what is drawn: found in the background, once; then another is shown. */
+    private static void rot() throws Exception {
+        start();
+        joinAll("modar-verify");
+        check(deliver(0), "the APK's bundle");
+        app.onPause();
+        app.onDestroy();
+        start();
+        for (Thread thread : Thread.getAllStackTraces().keySet()) {
+            check(!thread.getName().equals("modar-verify"), "it is not verified twice");
+        }
+        byte[] bundle;
+        try (java.util.zip.ZipFile apk = new java.util.zip.ZipFile(AssetManager.apk)) {
+            bundle = apk.getInputStream(apk.getEntry("assets/bundles/vase.modar")).readAllBytes();
+        }
+        app.onPause();
+        app.onDestroy();
+        bundle[bundle.length - 1] ^= 1;
+        Path pushed = new File(Context.folder, "vase.modar").toPath();
+        Files.write(pushed, bundle);
+        start();
+        joinAll("modar-verify");
+        check(!status().startsWith("The models cannot be read"), "the APK's own stands in");
+        check(Camera.opened == 1 && deliver(0), "goes on with the APK's bundle");
+        app.onPause();
+        String told = new String(Files.readAllBytes(new File(Context.folder, "diagnostics.txt").toPath()));
+        check(told.contains("bundle: vase (app)") && told.contains("section.hash"), "which one was wrong: " + told);
+        app.onDestroy();
+        Files.delete(pushed);
+    }
+
     /** A release from a stick while the app runs; then its file rots: the APK's bundle stands in. */
     private static void update() throws Exception {
         start();
@@ -240,6 +313,49 @@ public final class AppRun {
         check(Camera.opened == 1 && deliver(0), "the APK's bundle after a rotten release");
         app.onPause();
         app.onDestroy();
+    }
+
+    private static void joinAll(String name) throws Exception {
+        for (Thread thread : Thread.getAllStackTraces().keySet()) {
+            if (thread.getName().equals(name)) thread.join();
+        }
+    }
+
+    private static String updated() throws Exception {
+        labelled("Update").click();
+        joinAll("modar-update");
+        return status();
+    }
+
+    /**
+     * Releases from a web server while the app runs. The server is the test's: it goes on to the next step when a file
+     * of that name appears in `folder`, and answers by NAME.done.
+     */
+    private static void network(Path folder) throws Exception {
+        start();
+        check(deliver(0) && deliver(1), "the APK's bundle");
+        check(updated().equals("Updated") && installed().length == 1, "the first release");
+        check(deliver(0) && deliver(1), "goes on with the first release");
+        check(updated().equals("What is installed is the newest"), "nothing new");
+        step(folder, "second");
+        check(updated().equals("Updated"), "the second release");
+        check(deliver(0) && deliver(1), "goes on with the second release");
+        String before = Fetch.version(new File(Context.folder, "store").getPath());
+        check(before.equals("2"), "the second release is in use");
+        for (String trouble : new String[] {"forged", "gone"}) {
+            step(folder, trouble);
+            check(updated().startsWith("No update: "), trouble);
+            check(Fetch.version(new File(Context.folder, "store").getPath()).equals(before), trouble + ": the release stays");
+            check(deliver(0) && deliver(1), trouble + ": the app goes on");
+        }
+        app.onPause();
+        app.onDestroy();
+    }
+
+    private static void step(Path folder, String name) throws Exception {
+        Files.write(folder.resolve(name), new byte[0]);
+        for (int i = 0; i < 600 && !Files.exists(folder.resolve(name + ".done")); i++) Thread.sleep(50);
+        check(Files.exists(folder.resolve(name + ".done")), "the server's step " + name);
     }
 
     private static String[] installed() {
