@@ -89,6 +89,7 @@ function showPlates() {
   $('plates').replaceChildren(...patterns.map((pattern) => plate(pattern, true)));
   $('hint-plates').replaceChildren(...patterns.slice(0, 4).map((pattern) => plate(pattern, false)));
   for (const id of ['plates', 'hint-plates']) $(id).classList.toggle('many', patterns.length > 1);
+  $('plates').tabIndex = patterns.length > 1 ? 0 : -1;  // they scroll
   $('caption').textContent = patterns.length === 1 ? labelOf(currentBundle(), 0).name : '';
   $('lead').textContent = say(patterns.length > 1 ? 'leadMany' : 'lead');
 }

@@ -26,7 +26,7 @@ def compile_java(out, files, classpath=(), release="11"):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def run_java(classpath, *words, timeout=300):
+def run_java(classpath, *words, timeout=1800 if SOAK else 300):
     """A JVM that checks each JNI call; with sanitizers in the libraries, their runtime comes first."""
     env = {**os.environ}
     if os.environ.get("MODAR_SANITIZE"):
