@@ -50,8 +50,8 @@ class BentPaper {
         pose_(pose),
         back_(glm::transpose(pose.rotation)),
         origin_(-(back_ * pose.translation)),
-        radius_(2 * radius),
-        half_height_(pattern_corners(pattern.width, pattern.height)[1].y) {}
+        radius_(2 * radius * pattern_corners(pattern.width, pattern.height)[1].x),
+        half_(pattern_corners(pattern.width, pattern.height)[1]) {}
 
   /// Frame pixel of a point of the paper, in the flat pattern's coordinates.
   [[nodiscard]] glm::dvec2 project_paper(glm::dvec2 p) const {
@@ -79,8 +79,8 @@ class BentPaper {
   [[nodiscard]] cv::Rect outline() const {
     std::vector<cv::Point2f> points;
     for (int i = 0; i <= 20; ++i) {
-      for (const double y : {-half_height_, half_height_}) {
-        const glm::dvec2 p = project_paper({0.1 * i - 1, y});
+      for (const double y : {-half_.y, half_.y}) {
+        const glm::dvec2 p = project_paper({(0.1 * i - 1) * half_.x, y});
         points.emplace_back(static_cast<float>(p.x), static_cast<float>(p.y));
       }
     }
@@ -100,8 +100,8 @@ class BentPaper {
     if (!(root > 0)) return behind;
     const glm::dvec3 hit = origin_ + (-b - std::sqrt(root)) / a * ray;
     const double across = radius_ * std::atan2(hit.x, hit.z + radius_);
-    const double u = 0.5 * (across + 1) * picture_.cols - 0.5;
-    const double v = 0.5 * (1 - hit.y / half_height_) * picture_.rows - 0.5;
+    const double u = 0.5 * (across / half_.x + 1) * picture_.cols - 0.5;
+    const double v = 0.5 * (1 - hit.y / half_.y) * picture_.rows - 0.5;
     if (u < -0.5 || v < -0.5 || u > picture_.cols - 0.5 || v > picture_.rows - 0.5) return behind;
     const int x = std::clamp(static_cast<int>(u), 0, picture_.cols - 2);
     const int y = std::clamp(static_cast<int>(v), 0, picture_.rows - 2);
@@ -117,8 +117,8 @@ class BentPaper {
   Pose pose_;
   glm::dmat3 back_;
   glm::dvec3 origin_;
-  double radius_;  ///< half pattern widths, the unit of poses
-  double half_height_;
+  double radius_;    ///< in the unit of poses, half of the longer side
+  glm::dvec2 half_;  ///< half width and height, the same unit
 };
 
 /// Signed distance of pixels to a line through the pattern's centre.
