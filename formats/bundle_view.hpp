@@ -31,6 +31,14 @@ class Table {
   std::uint32_t stride_ = sizeof(T);
 };
 
+/// The byte of a layout's vertices that holds occlusion, or kNone.
+inline std::uint32_t occlusion_byte(const Table<OcclusionRecord>& records, std::uint32_t layout) {
+  for (std::uint32_t i = 0; i < records.size(); ++i) {
+    if (records[i].layout == layout) return records[i].offset;
+  }
+  return kNone;
+}
+
 /// One pattern under one parameter set, as mapped arrays.
 struct FeatureView {
   std::span<const KeypointRecord> keypoints;
@@ -55,6 +63,8 @@ struct BundleParts {
   Table<PatternRecord> patterns;
   Table<ParameterSetRecord> parameter_sets;
   Table<SceneRecord> scenes;
+  Table<LightRecord> lights;
+  Table<OcclusionRecord> occlusion;
 };
 
 /// A validated bundle. Holds pointers into the caller's bytes, which must outlive it.
@@ -90,6 +100,9 @@ class BundleView {
   [[nodiscard]] Table<PatternRecord> patterns() const { return parts_.patterns; }
   [[nodiscard]] Table<ParameterSetRecord> parameter_sets() const { return parts_.parameter_sets; }
   [[nodiscard]] Table<SceneRecord> scenes() const { return parts_.scenes; }
+
+  [[nodiscard]] Table<LightRecord> lights() const { return parts_.lights; }
+  [[nodiscard]] Table<OcclusionRecord> occlusion() const { return parts_.occlusion; }
 
   [[nodiscard]] std::span<const std::byte> vertices() const { return parts_.vertices; }
   [[nodiscard]] std::span<const std::byte> indices() const { return parts_.indices; }

@@ -46,7 +46,10 @@ std::uint16_t flags_of(SectionType type) {
     case SectionType::kMeta:
     case SectionType::kStatement:
     case SectionType::kContentSummary:
+    case SectionType::kLights:
+    case SectionType::kOcclusion:
     case SectionType::kFeatureYml:
+    case SectionType::kShadow:
       return 0;
     case SectionType::kVertices:
     case SectionType::kIndices:
@@ -198,10 +201,15 @@ void collect(const BundleContent& content, SectionList& list) {
   list.add_table(SectionType::kPatterns, content.patterns);
   list.add_table(SectionType::kParameterSets, content.parameter_sets);
   list.add_table(SectionType::kScenes, content.scenes);
+  list.add_table(SectionType::kLights, content.lights);
+  list.add_table(SectionType::kOcclusion, content.occlusion);
   for (std::uint32_t pattern = 0; pattern < content.features.size(); ++pattern) {
     for (const FeatureContent& features : content.features[pattern]) {
       list.add_features(pattern, features);
     }
+  }
+  for (std::uint32_t scene = 0; scene < content.shadows.size(); ++scene) {
+    list.add_blob(SectionType::kShadow, scene, content.shadows[scene]);
   }
   list.add_blob(SectionType::kVertices, kNone, content.vertices);
   list.add_blob(SectionType::kIndices, kNone, content.indices);
@@ -252,6 +260,16 @@ bool stream(const SectionList& list, std::uint16_t minor, const ByteSink& sink) 
 
 }  // namespace
 
+std::uint16_t minor_version_of(const BundleContent& content) {
+  const bool shadowed = std::any_of(content.shadows.begin(), content.shadows.end(),
+                                    [](const auto& shadow) { return !shadow.empty(); });
+  const bool hiding =
+      std::any_of(content.materials.begin(), content.materials.end(),
+                  [](const MaterialRecord& m) { return (m.flags & kMaterialOccluder) != 0; });
+  if (shadowed || hiding || !content.lights.empty() || !content.occlusion.empty()) return 2;
+  return 1;
+}
+
 NameRef BundleContent::intern(std::string_view name) {
   std::string clean;
   while (!name.empty()) {
@@ -294,7 +312,8 @@ Result<void> write_bundle(const BundleContent& content, const ByteSink& sink) {
                 "this is a bug of the program that fills the bundle; please report it");
   }
   // Version 1.1 added the content summary; a bundle without one is readable as 1.0.
-  const std::uint16_t minor = content.summary.empty() ? 0 : kMinorVersion;
+  const std::uint16_t needed = minor_version_of(content);
+  const std::uint16_t minor = content.summary.empty() && needed == 1 ? std::uint16_t{0} : needed;
   if (!stream(list, minor, sink)) {
     return fail(ExitCode::kIo, "io.write", "bundle", "the bundle could not be written in full",
                 "make room on the disk and try again");

@@ -50,15 +50,21 @@ struct BundleContent {
   std::vector<PatternRecord> patterns;
   std::vector<ParameterSetRecord> parameter_sets;
   std::vector<SceneRecord> scenes;
+  std::vector<LightRecord> lights;
+  std::vector<OcclusionRecord> occlusion;
   std::vector<std::vector<FeatureContent>> features;  ///< one list a pattern
   std::vector<std::byte> vertices;
   std::vector<std::byte> indices;
   std::vector<std::vector<std::byte>> texture_data;  ///< one a texture
+  std::vector<std::vector<std::byte>> shadows;       ///< one a scene, empty: none
   std::vector<ExtraSection> extra;
 
   /// Stores a name once and refers to it. Names longer than kMaxNameBytes are cut at a character.
   NameRef intern(std::string_view name);
 };
+
+/// The least minor version that has all that a content holds, a summary included.
+std::uint16_t minor_version_of(const BundleContent& content);
 
 /// The section table that write_bundle() gives a content, in its order: types, sizes, hashes.
 std::vector<SectionEntry> section_table(const BundleContent& content);

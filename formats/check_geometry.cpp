@@ -165,6 +165,9 @@ class GeometryCheck {
  public:
   GeometryCheck(FaultLog& log, const BundleParts& parts) : log_(log), parts_(parts) {}
 
+  /// used: the byte of its vertices that holds occlusion, or kNone.
+  void start_model(std::uint32_t used) { occlusion_byte_ = used; }
+
   /// `where()` makes the words for "model, chunk, level" if they are needed.
   template <class Where>
   void check_level(const LayoutRecord& layout, const VertexScan& scan, const ChunkRecord& chunk,
@@ -285,6 +288,7 @@ class GeometryCheck {
 
   void check_vertex(const LayoutRecord& layout, const ChunkRecord& chunk, const std::byte* vertex) {
     std::array<bool, kMaxVertexStride> owned{};
+    if (occlusion_byte_ < owned.size()) owned[occlusion_byte_] = true;
     for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
       const AttributeRecord& attribute = layout.attributes[i];
       const std::uint32_t size = component_bytes(attribute.type);
@@ -353,6 +357,7 @@ class GeometryCheck {
   FaultLog& log_;
   const BundleParts& parts_;
   std::array<std::uint64_t, 1024> marks_{};  // a bit for every possible index
+  std::uint32_t occlusion_byte_ = kNone;
   Tally wrong_index_;
   Tally degenerate_;
   Tally not_finite_;
@@ -370,7 +375,9 @@ void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashe
   for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
     const ModelRecord& model = parts.models[i];
     const LayoutRecord& layout = parts.layouts[model.layout];
-    const VertexScan scan(layout);
+    const std::uint32_t used = occlusion_byte(parts.occlusion, model.layout);
+    const VertexScan scan(layout, used);
+    check.start_model(used);
     for (std::uint32_t j = 0; j < model.chunk_count; ++j) {
       const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];
       const auto where = [&] {

@@ -127,6 +127,8 @@ BundleParts parts_of(const BundleContent& content) {
   parts.patterns = table_of(content.patterns);
   parts.parameter_sets = table_of(content.parameter_sets);
   parts.scenes = table_of(content.scenes);
+  parts.lights = table_of(content.lights);
+  parts.occlusion = table_of(content.occlusion);
   return parts;
 }
 
@@ -161,6 +163,8 @@ void summarise(const BundleParts& parts, std::uint16_t minor,
   summarise_table(parts, "PatternRecord", parts.patterns, sink);
   summarise_table(parts, "ParameterSetRecord", parts.parameter_sets, sink);
   summarise_table(parts, "SceneRecord", parts.scenes, sink);
+  summarise_table(parts, "LightRecord", parts.lights, sink);
+  summarise_table(parts, "OcclusionRecord", parts.occlusion, sink);
   std::uint32_t index = 0;
   for (const SectionEntry& entry : sections) {
     if (entry.type != static_cast<std::uint32_t>(SectionType::kContentSummary)) {
@@ -183,7 +187,7 @@ std::string around(std::string_view line, std::size_t at) {
 
 std::string content_summary_of(const BundleContent& content) {
   std::string text;
-  summarise(parts_of(content), kMinorVersion, section_table(content),
+  summarise(parts_of(content), minor_version_of(content), section_table(content),
             [&text](std::string_view line, const char*, std::uint32_t) { (text += line) += '\n'; });
   return text;
 }

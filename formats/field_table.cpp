@@ -123,6 +123,16 @@ constexpr FieldInfo kSceneRecord[] = {
     MODAR_FIELD(SceneRecord, pattern),  MODAR_FIELD(SceneRecord, model),
     MODAR_FIELD(SceneRecord, scale),    MODAR_FIELD(SceneRecord, offset),
     MODAR_FIELD(SceneRecord, rotation), MODAR_FIELD(SceneRecord, reserved)};
+constexpr FieldInfo kLightRecord[] = {
+    MODAR_FIELD(LightRecord, scene), MODAR_FIELD(LightRecord, reserved0),
+    MODAR_FIELD(LightRecord, sky),   MODAR_FIELD(LightRecord, direction),
+    MODAR_FIELD(LightRecord, key),   MODAR_FIELD(LightRecord, reserved1)};
+constexpr FieldInfo kOcclusionRecord[] = {MODAR_FIELD(OcclusionRecord, layout),
+                                          MODAR_FIELD(OcclusionRecord, offset)};
+constexpr FieldInfo kShadowHeader[] = {
+    MODAR_FIELD(ShadowHeader, width), MODAR_FIELD(ShadowHeader, height),
+    MODAR_FIELD(ShadowHeader, low), MODAR_FIELD(ShadowHeader, high),
+    MODAR_FIELD(ShadowHeader, reserved)};
 constexpr FieldInfo kFileHeader[] = {
     MODAR_FIELD(FileHeader, magic),      MODAR_FIELD(FileHeader, major),
     MODAR_FIELD(FileHeader, minor),      MODAR_FIELD(FileHeader, section_count),
@@ -167,12 +177,16 @@ constexpr RecordInfo kRecords[] = {
     {"ParameterSetRecord", "parameter_sets", SectionType::kParameterSets,
      sizeof(ParameterSetRecord), kParameterSetRecord},
     {"SceneRecord", "scenes", SectionType::kScenes, sizeof(SceneRecord), kSceneRecord},
+    {"LightRecord", "lights", SectionType::kLights, sizeof(LightRecord), kLightRecord},
+    {"OcclusionRecord", "occlusion", SectionType::kOcclusion, sizeof(OcclusionRecord),
+     kOcclusionRecord},
     {"FileHeader", nullptr, SectionType::kNames, sizeof(FileHeader), kFileHeader},
     {"SectionEntry", nullptr, SectionType::kNames, sizeof(SectionEntry), kSectionEntry},
     {"TableHeader", nullptr, SectionType::kNames, sizeof(TableHeader), kTableHeader},
     {"AttributeRecord", nullptr, SectionType::kNames, sizeof(AttributeRecord), kAttributeRecord},
     {"FeatureHeader", nullptr, SectionType::kNames, sizeof(FeatureHeader), kFeatureHeader},
     {"KeypointRecord", nullptr, SectionType::kNames, sizeof(KeypointRecord), kKeypointRecord},
+    {"ShadowHeader", nullptr, SectionType::kNames, sizeof(ShadowHeader), kShadowHeader},
 };
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace modar {
 
 inline constexpr std::array<std::uint8_t, 8> kMagic = {0x89, 'M', 'O', 'D', 0x0D, 0x0A, 0x1A, 0x0A};
 inline constexpr std::uint16_t kMajorVersion = 1;    ///< must match
-inline constexpr std::uint16_t kMinorVersion = 1;    ///< additive
+inline constexpr std::uint16_t kMinorVersion = 2;    ///< additive
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;  ///< "no such index"
 inline constexpr std::uint64_t kNoOffset = 0xFFFFFFFFFFFFFFFFull;
 inline constexpr std::uint32_t kMaxSections = 65536;
@@ -20,6 +20,7 @@ inline constexpr std::uint32_t kMaxChunkVertices = 65535;
 inline constexpr std::uint32_t kMaxNameBytes = 1024;
 inline constexpr std::uint32_t kMaxTextureSide = 8192;
 inline constexpr std::uint32_t kMaxPatternSide = 65535;
+inline constexpr std::uint32_t kMaxShadowSide = 256;
 inline constexpr std::uint32_t kMaxVertexStride = 252;  ///< bytes
 inline constexpr std::uint32_t kMaxDescriptorBits = 4096;
 inline constexpr std::uint64_t kSectionAlignment = 64;
@@ -42,9 +43,12 @@ enum class SectionType : std::uint32_t {
   kPatterns = 48,         ///< table of PatternRecord
   kParameterSets = 49,    ///< table of ParameterSetRecord
   kScenes = 64,           ///< table of SceneRecord
+  kLights = 65,           ///< since 1.2: table of LightRecord
+  kOcclusion = 66,        ///< since 1.2: table of OcclusionRecord
   kMappedFeatures = 256,  ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
   kFeatureYml = 257,      ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
   kTrackerRecord = 258,   ///< owner: pattern, variant: 0; see tracker_record.hpp
+  kShadow = 260,          ///< since 1.2; owner: scene, variant: 0; ShadowHeader and its texels
   kVertices = 512,        ///< GPU: merged vertex buffer of all models
   kIndices = 513,         ///< GPU: merged 16-bit index buffer of all models
   kTextureData = 514,     ///< GPU: owner: texture; ETC1 blocks of all its levels
@@ -160,6 +164,7 @@ static_assert(sizeof(LevelRecord) == 32);
 
 enum MaterialFlags : std::uint32_t {
   kMaterialTwoSided = 1,
+  kMaterialOccluder = 2,  ///< since 1.2: hides what is behind it and shows the camera's picture
 };
 
 struct MaterialRecord {
@@ -297,6 +302,39 @@ struct SceneRecord {
   std::uint32_t reserved[2];
 };
 static_assert(sizeof(SceneRecord) == 48);
+
+/// The light that falls on a scene, in linear light; 1: a white surface shows as the picture's
+/// white. Coefficients of 1, y, z, x, xy, yz, 3 z^2 - 1, zx, x^2 - y^2 for a unit normal (x, y, z)
+/// in the pattern's space.
+struct LightRecord {
+  std::uint32_t scene;
+  std::uint32_t reserved0;
+  float sky[27];       ///< what a white surface gets from all around: 9 times red, green, blue
+  float direction[3];  ///< to the key light, unit length
+  float key[3];        ///< what a white surface that faces it gets of it: red, green, blue
+  std::uint32_t reserved1;
+};
+static_assert(sizeof(LightRecord) == 144);
+
+/// Vertices of a layout hold, in a byte of no attribute, the share of the light from all around
+/// that reaches them, 0 to 127 (127: all of it). Behind a normal of three i8, a shader gets it as
+/// the normal's fourth component.
+struct OcclusionRecord {
+  std::uint32_t layout;
+  std::uint32_t offset;  ///< bytes from the start of the vertex
+};
+static_assert(sizeof(OcclusionRecord) == 8);
+
+/// Start of a kShadow section: the share of light that a scene's model leaves on its pattern's
+/// plane (255: all), width * height bytes behind it, first row at the greatest y.
+struct ShadowHeader {
+  std::uint32_t width;  ///< texels, 1 to 256
+  std::uint32_t height;
+  float low[2];  ///< pattern plane units: the rectangle's corners
+  float high[2];
+  std::uint32_t reserved[2];
+};
+static_assert(sizeof(ShadowHeader) == 32);
 
 /// Start of a kMappedFeatures section.
 struct FeatureHeader {

@@ -61,8 +61,8 @@ constexpr IssueKind kIssueKinds[] = {
     {"BUNDLE_FEATURES", Severity::kError, "A pattern's features do not fill their section",
      kRebake},
     {"BUNDLE_SCENE", Severity::kError,
-     "A scene refers to a pattern or model that does not exist, or its rotation is not a unit "
-     "quaternion",
+     "A scene refers to a pattern or model that does not exist, its rotation is not a unit "
+     "quaternion, or its light or shadow is none",
      kRebake},
     {"SECTION_HASH", Severity::kError, "A section's bytes do not match its hash", kFetch},
     {"SECTION_PADDING", Severity::kError, "Bytes between sections are not zero", kFetch},

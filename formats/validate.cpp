@@ -40,9 +40,12 @@ constexpr KnownType kKnownTypes[] = {
     {SectionType::kPatterns, kSectionRequired, false},
     {SectionType::kParameterSets, kSectionRequired, false},
     {SectionType::kScenes, kSectionRequired, false},
+    {SectionType::kLights, 0, false},
+    {SectionType::kOcclusion, 0, false},
     {SectionType::kMappedFeatures, kSectionRequired, true},
     {SectionType::kFeatureYml, 0, true},
     {SectionType::kTrackerRecord, 0, true},
+    {SectionType::kShadow, 0, true},
     {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
     {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
     {SectionType::kTextureData, kSectionRequired | kSectionGpu, true},
@@ -291,6 +294,8 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   walkable &= find_table(log, parts, SectionType::kPatterns, parts.patterns);
   walkable &= find_table(log, parts, SectionType::kParameterSets, parts.parameter_sets);
   walkable &= find_table(log, parts, SectionType::kScenes, parts.scenes);
+  walkable &= find_table(log, parts, SectionType::kLights, parts.lights);
+  walkable &= find_table(log, parts, SectionType::kOcclusion, parts.occlusion);
   return walkable && !log.stop();
 }
 
@@ -412,7 +417,7 @@ void check_material(const RecordCheck& check, const BundleParts& parts,
   check.numbers(material.emission, "emission");
   check.number(material.shininess, "shininess");
   check.number(material.opacity, "opacity");
-  check.flags(material.flags, kMaterialTwoSided);
+  check.flags(material.flags, kMaterialTwoSided | kMaterialOccluder);
   check.reserved(material.reserved, sizeof(material.reserved));
   if (material.texture != kNone && material.texture >= parts.textures.size()) {
     check.fault(Rule::kMaterialRange, &material.texture,
@@ -713,6 +718,29 @@ void check_twin(const RecordCheck& check, const BundleParts& parts, const Sectio
   }
 }
 
+void check_shadow(const RecordCheck& check, const BundleParts& parts, const SectionEntry& entry) {
+  if (entry.owner >= parts.scenes.size() || entry.variant != 0) {
+    return check.fault(Rule::kSectionOwner, &entry.owner,
+                       "scene " + std::to_string(entry.owner) + " is not there");
+  }
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  if (bytes.size() < sizeof(ShadowHeader)) {
+    return check.fault(Rule::kScene, &entry.size, "its shadow is too small for its header");
+  }
+  const auto& header = *reinterpret_cast<const ShadowHeader*>(bytes.data());
+  check.numbers(header.low, "low");
+  check.numbers(header.high, "high");
+  check.reserved(header.reserved, sizeof(header.reserved));
+  const bool sized = std::min(header.width, header.height) >= 1 &&
+                     std::max(header.width, header.height) <= kMaxShadowSide;
+  if (!sized || bytes.size() - sizeof(ShadowHeader) != header.width * header.height ||
+      !(header.low[0] < header.high[0]) || !(header.low[1] < header.high[1])) {
+    check.fault(Rule::kScene, &header.width,
+                std::to_string(header.width) + " x " + std::to_string(header.height) +
+                    " texels of a shadow do not fill its section, or its rectangle is empty");
+  }
+}
+
 /// Sections that belong to a record: the record is there, and so is the parameter set.
 void check_owned_sections(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.sections.size() && !log.stop(); ++i) {
@@ -733,6 +761,8 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
       } else if (type == SectionType::kMappedFeatures) {
         check_twin(check, parts, entry, parts.parameter_sets[set]);
       }
+    } else if (type == SectionType::kShadow) {
+      check_shadow(check, parts, entry);
     } else if (type == SectionType::kTrackerRecord) {
       if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
         check.fault(Rule::kSectionOwner, &entry.owner,
@@ -758,6 +788,48 @@ void check_scene(const RecordCheck& check, const BundleParts& parts, const Scene
   }
   if (!(std::fabs(square - 1.0) <= 1e-4)) {
     check.fault(Rule::kScene, scene.rotation, "its rotation is no unit quaternion");
+  }
+}
+
+void check_light(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
+  const LightRecord& light = parts.lights[index];
+  check.numbers(light.sky, "sky");
+  check.numbers(light.key, "key");
+  check.numbers(light.direction, "direction");
+  check.reserved(&light.reserved0, sizeof(light.reserved0));
+  check.reserved(&light.reserved1, sizeof(light.reserved1));
+  if (light.scene >= parts.scenes.size() ||
+      (index > 0 && parts.lights[index - 1].scene >= light.scene)) {
+    check.fault(Rule::kScene, &light.scene,
+                "scene " + std::to_string(light.scene) + " is not there or out of order");
+  }
+  double square = 0.0;
+  for (const float part : light.direction) {
+    square += static_cast<double>(part) * static_cast<double>(part);
+  }
+  if (!(std::fabs(square - 1.0) <= 1e-4)) {
+    check.fault(Rule::kScene, light.direction, "the direction to its light has no unit length");
+  }
+}
+
+/// The byte belongs to no attribute of the layout.
+void check_occlusion(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
+  const OcclusionRecord& record = parts.occlusion[index];
+  const bool first = index == 0 || parts.occlusion[index - 1].layout < record.layout;
+  bool good = first && record.layout < parts.layouts.size();
+  if (good) {
+    const LayoutRecord& layout = parts.layouts[record.layout];
+    good = record.offset < layout.stride;
+    for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
+      const AttributeRecord& other = layout.attributes[i];
+      const std::uint32_t end = other.offset + component_bytes(other.type) * other.components;
+      good = good && (record.offset < other.offset || record.offset >= end);
+    }
+  }
+  if (!good) {
+    check.fault(Rule::kLayout, &record.layout,
+                "byte " + std::to_string(record.offset) + " of layout " +
+                    std::to_string(record.layout) + " is not free, or the layout out of order");
   }
 }
 
@@ -788,6 +860,13 @@ void validate_assets(FaultLog& log, const BundleParts& parts) {
   if (!log.stop()) check_owned_sections(log, parts);
   for (std::uint32_t i = 0; i < parts.scenes.size() && !log.stop(); ++i) {
     check_scene(RecordCheck(log, parts, "scene", i), parts, parts.scenes[i]);
+  }
+  for (std::uint32_t i = 0; i < parts.lights.size() && !log.stop(); ++i) {
+    check_light(RecordCheck(log, parts, "light", i), parts, i);
+  }
+  if (!log.clean()) return;  // layouts may be anything then
+  for (std::uint32_t i = 0; i < parts.occlusion.size() && !log.stop(); ++i) {
+    check_occlusion(RecordCheck(log, parts, "occlusion", i), parts, i);
   }
 }
 

@@ -92,7 +92,7 @@ IndexScan scan_indices(std::span<const std::uint16_t> indices) {
   return scan;
 }
 
-VertexScan::VertexScan(const LayoutRecord& layout)
+VertexScan::VertexScan(const LayoutRecord& layout, std::uint32_t used)
     : stride_(layout.stride), vectors_((layout.stride + kVectorBytes - 1) / kVectorBytes) {
   if (vectors_ > kMaxVectors) {
     possible_ = false;
@@ -106,6 +106,7 @@ VertexScan::VertexScan(const LayoutRecord& layout)
                 component_bytes(attribute.type) * attribute.components, std::byte{0});
     plan(attribute);
   }
+  if (used < stride_) padding[used] = std::byte{0};
   std::memcpy(padding_, padding.data(), padding.size());
 }
 

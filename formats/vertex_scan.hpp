@@ -23,7 +23,9 @@ IndexScan scan_indices(std::span<const std::uint16_t> indices);
 /// How vertices of one layout are scanned.
 class VertexScan {
  public:
-  explicit VertexScan(const LayoutRecord& layout);
+  /// used: a byte of a vertex that belongs to no attribute and may be anything (OcclusionRecord),
+  /// or kNone.
+  explicit VertexScan(const LayoutRecord& layout, std::uint32_t used = kNone);
 
   /// False: the layout has attributes (32-bit floats, say) that have to be checked one by one.
   [[nodiscard]] bool possible() const { return possible_; }

@@ -117,10 +117,13 @@ TABLES = {
         "pattern_scale:f descriptor_bits:I max_distance:I min_matches:I min_inliers:I "
         "ransac_threshold:f reserved:3I")),
     64: ("scenes", Record("pattern:I model:I scale:f offset:3f rotation:4f reserved:2I")),
+    65: ("lights", Record("scene:I reserved0:I sky:27f direction:3f key:3f reserved1:I")),
+    66: ("occlusion", Record("layout:I offset:I")),
 }
+SHADOW = Record("width:I height:I low:2f high:2f reserved:2I")
 KEYPOINT = struct.Struct("<5f2i")
-SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}}  # type: flags
-OWNED = {256: 1, 257: 0, 514: 3}
+SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0}  # type: flags
+OWNED = {256: 1, 257: 0, 260: 0, 514: 3}
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
 
@@ -149,7 +152,7 @@ class Bundle:
         end = 64 + 48 * head["section_count"]
         need(head["section_count"] <= 65536 and end <= len(data), "BUNDLE_SECTION_COUNT", 12)
         need(xxh64(data[:56] + data[64:end]) == head["hash"], "BUNDLE_HEADER_HASH", 56)
-        self.strict = head["minor"] <= 1
+        self.strict = head["minor"] <= 2
         self.clean(head)
 
     def clean(self, record):

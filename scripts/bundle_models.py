@@ -34,12 +34,25 @@ def check_layout(bundle, row):
     need("positions" in seen, "BUNDLE_LAYOUT", row["at"], "no position")
 
 
+def check_occlusion(bundle):
+    """Bytes of vertices that belong to no attribute, a layout at most one, in the layouts' order."""
+    tables, last = bundle.tables, -1
+    for row in tables["occlusion"]:
+        need(last < row["layout"] < len(tables["layouts"]), "BUNDLE_LAYOUT", row["at"], "occlusion")
+        last = row["layout"]
+        layout = tables["layouts"][last]
+        used = {part["offset"] + byte for part in layout["attributes"]
+                for byte in range(struct.calcsize(f"{part['components']}{COMPONENTS[part['type']]}"))}
+        need(row["offset"] < layout["stride"] and row["offset"] not in used, "BUNDLE_LAYOUT", row["at"], "occlusion")
+
+
 def check_models(bundle):
     tables = bundle.tables
     for row in tables["layouts"]:
         check_layout(bundle, row)
+    check_occlusion(bundle)
     for row in tables["materials"]:
-        flags_known(bundle, row, 1)
+        flags_known(bundle, row, 3)
         need(row["texture"] == NONE or row["texture"] < len(tables["textures"]),
              "BUNDLE_MATERIAL_RANGE", row["at"], "texture")
         values = [row["shininess"], row["opacity"]]
@@ -210,7 +223,9 @@ def decode_level(bundle, layout, chunk, level, full):
         out[SEMANTICS[part["semantic"]]] = digest(struct.pack(f"<{len(flat)}d", *flat))
         if full:
             out[SEMANTICS[part["semantic"]] + "_values"] = values
-    owned = {part["offset"] + byte for part in layout["attributes"]
+    owned = {row["offset"] for row in bundle.tables["occlusion"]
+             if bundle.tables["layouts"][row["layout"]] is layout}
+    owned |= {part["offset"] + byte for part in layout["attributes"]
              for byte in range(struct.calcsize(f"{part['components']}{COMPONENTS[part['type']]}"))}
     stride, first = layout["stride"], level["vertex_offset"]
     for byte in set(range(stride)) - owned:

@@ -11,7 +11,7 @@ import math
 import struct
 import sys
 
-from bundle_bytes import (FEATURES, KEYPOINT, NO_OFFSET, NONE, Bundle, Fault, at_least, digest, flags_known, follow,
+from bundle_bytes import (FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, Bundle, Fault, at_least, digest, flags_known, follow,
                           need)
 from bundle_models import check_models, check_tight, decode_level
 from bundle_summary import check_summary
@@ -94,6 +94,21 @@ def check_patterns(bundle):
              abs(sum(part * part for part in row["rotation"]) - 1) <= 1e-4, "BUNDLE_SCENE",
              row["at"])
         need(row["scale"] > 0, "BUNDLE_NUMBER", row["at"], "scale")
+    lit = [row["scene"] for row in tables["lights"]]
+    need(lit == sorted(set(lit)) and all(scene < len(tables["scenes"]) for scene in lit) and
+         all(abs(sum(part * part for part in row["direction"]) - 1) <= 1e-4 for row in tables["lights"]),
+         "BUNDLE_SCENE", 0, "lights")
+
+
+def read_shadow(bundle, owner, variant, data):
+    """The shadow of a scene: its rectangle, and as many bytes as it has texels."""
+    need(owner < len(bundle.tables["scenes"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+    need(len(data) >= 32, "BUNDLE_SCENE", 0, "a shadow is too small")
+    head = SHADOW.decode(data, 0)
+    bundle.clean(head)
+    sides = (head["width"], head["height"])
+    need(1 <= min(sides) and max(sides) <= 256 and len(data) == 32 + sides[0] * sides[1] and
+         all(low < high for low, high in zip(head["low"], head["high"])), "BUNDLE_SCENE", 0, "a shadow")
 
 
 def read_features(bundle):
@@ -102,6 +117,8 @@ def read_features(bundle):
     for (kind, owner, variant), data in bundle.payload.items():
         if kind == 514:
             need(owner < len(tables["textures"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+        if kind == 260:
+            read_shadow(bundle, owner, variant, data)
         if kind in (256, 257):
             need(owner < len(tables["patterns"]) and variant in sets, "BUNDLE_SECTION_OWNER", 0)
         if kind == 258:

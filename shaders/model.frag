@@ -1,8 +1,11 @@
-// Lit surface: base colour (texture, vertex colour, or white) times light, plus highlights.
-// Defines: TEXTURED; ALPHA_TWIN (alpha is the luminance of a second texture); COLOURED.
+// Lit surface: base colour (texture, vertex colour, or white) times light, plus what is added; both
+// come from model.vert as factors and summands of sRGB.
+// Defines: TEXTURED; ALPHA_TWIN (alpha is the luminance of a second texture); COLOURED; SHINY.
 precision mediump float;
 varying vec3 v_light;
+#ifdef SHINY
 varying vec3 v_shine;
+#endif
 uniform float u_opacity;
 #ifdef TEXTURED
 // Not touched before the look-up: some GPUs keep more bits of a coordinate then.
@@ -33,5 +36,9 @@ void main() {
 #ifdef COLOURED
   base *= v_colour;
 #endif
-  gl_FragColor = vec4(base.rgb * v_light + v_shine, base.a);
+  base.rgb *= v_light;
+#ifdef SHINY
+  base.rgb += v_shine;
+#endif
+  gl_FragColor = base;
 }

@@ -9,8 +9,11 @@
 #include <glm/geometric.hpp>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/light_image.hpp"
+#include "bake/bundle/scene_shadow.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/occlusion.hpp"
 #include "bake/mesh/pack/pack.hpp"
 #include "bake/mesh/topology/mesh_topology.hpp"
 #include "bake/mesh/weld/weld.hpp"
@@ -35,6 +38,16 @@ std::uint32_t layout_index(const LayoutRecord& layout, BundleContent& content) {
   }
   content.layouts.push_back(layout);
   return static_cast<std::uint32_t>(content.layouts.size() - 1);
+}
+
+/// Models of one layout are baked alike: all of them have occlusion, or none.
+void add_occlusion(std::uint32_t layout, std::uint32_t byte, BundleContent& content) {
+  if (byte == kNone) return;
+  const auto place =
+      std::find_if(content.occlusion.begin(), content.occlusion.end(),
+                   [&](const OcclusionRecord& other) { return other.layout >= layout; });
+  if (place != content.occlusion.end() && place->layout == layout) return;
+  content.occlusion.insert(place, {layout, byte});
 }
 
 /// A texture of one colour becomes a factor of the material, which the shader multiplies alike.
@@ -62,6 +75,7 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
   ModelRecord record = packed.record;
   record.name = content.intern(packed.name);
   record.layout = layout_index(packed.layout, content);
+  add_occlusion(record.layout, packed.occlusion_byte, content);
   record.first_chunk = static_cast<std::uint32_t>(content.chunks.size());
   record.chunk_count = static_cast<std::uint32_t>(packed.chunks.size());
   record.first_material = static_cast<std::uint32_t>(content.materials.size());
@@ -169,6 +183,9 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   level_options.texture_sides = texture_sides;
   if (auto made = make_levels(*chunked, level_options, report); !made) {
     return tl::unexpected(made.error());
+  }
+  if (request.occlusion && plan->kind == PositionKind::kHalf) {
+    chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
   }
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
@@ -286,6 +303,7 @@ Result<std::vector<KnownScene>> find_scenes(const BakeRequest& request,
     SceneRequest scene;
     scene.pattern = file_stem(pattern_paths[0]);
     scene.model = file_stem(request.models[0]);
+    scene.light = request.light;
     scenes.push_back(scene);
   }
   std::vector<KnownScene> known;
@@ -414,10 +432,29 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
   BakeRequest stated = request;
   stated.scenes.clear();
   for (const KnownScene& known : *scenes) stated.scenes.push_back(known.scene);
+  MODAR_TRY(light_scenes(stated.scenes, request, content, report));
   content.meta = bundle_meta(stated, report);
   content.summary = content_summary_of(content);
   if (trace != nullptr) *trace = std::move(traced);
   return content;
+}
+
+Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeRequest& request,
+                          BundleContent& content, Report& report) {
+  if (scenes.empty()) return {};
+  StageTimer timer(report, "light");
+  for (std::uint32_t s = 0; s < scenes.size(); ++s) {
+    if (scenes[s].light.empty()) continue;
+    MODAR_ASSIGN(LightRecord light, read_light(scenes[s].light));
+    light.scene = s;
+    content.lights.push_back(light);
+  }
+  content.shadows.resize(request.shadows ? scenes.size() : 0);
+  for (std::uint32_t s = 0; s < content.shadows.size(); ++s) {
+    content.shadows[s] = scene_shadow(content, s, request.jobs);
+  }
+  timer.done(content.lights.size(), content.shadows.size());
+  return {};
 }
 
 SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,

@@ -28,6 +28,7 @@ struct SceneRequest {
   UpAxis up = UpAxis::kZ;
   bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
   std::array<double, 3> offset{};  ///< pattern units (half of its largest side), added at last
+  std::string light;               ///< picture of its room, see read_light(); empty: a neutral room
 };
 
 struct PatternRequest {
@@ -46,13 +47,16 @@ struct BakeRequest {
   std::vector<std::string> models;
   std::vector<PatternRequest> patterns;
   std::vector<SceneRequest> scenes;
+  std::string light;  ///< of the scene that one model and one pattern make by themselves
   TextureOptions textures;
   std::uint64_t texture_budget = 0;  ///< GPU bytes that all textures may take; 0: any
+  bool shadows = true;               ///< of each scene's model on its pattern's plane
   double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
   MaxError max_error;
   std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
   /// Of detail a chunk at most, the finest counted: halving ends before for all but huge chunks.
   std::uint32_t levels = kMaxLevels;
+  bool occlusion = true;           ///< measure and store it; only with half floats
   bool topology = false;           ///< measure and state each model's
   std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
   std::string device;              ///< profile that it is planned for; empty: none
@@ -88,6 +92,11 @@ struct BakeTrace {
 /// "bake.max-error-unit".
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report,
                                    BakeTrace* trace = nullptr);
+
+/// Bakes what each scene of the content needs to be lit: the light of its picture, where the
+/// request names one, and its shadow. scenes: as content.scenes. Errors: those of read_light().
+Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeRequest& request,
+                          BundleContent& content, Report& report);
 
 /// The scene's record for a model whose source box has these side lengths (source units).
 SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,

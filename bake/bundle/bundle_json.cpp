@@ -197,18 +197,19 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
   }
   Json scenes = Json::array();
   for (const SceneRequest& scene : request.scenes) {
-    scenes.push_back({{"pattern", scene.pattern},
-                      {"model", scene.model},
-                      {"scale", scene.scale},
-                      {"up", static_cast<int>(scene.up)},
-                      {"centred", scene.centred},
-                      {"offset", Json::list(scene.offset)}});
+    Json stated = {{"pattern", scene.pattern}, {"model", scene.model},
+                   {"scale", scene.scale},     {"up", static_cast<int>(scene.up)},
+                   {"centred", scene.centred}, {"offset", Json::list(scene.offset)}};
+    if (!scene.light.empty()) stated.set("light", name(scene.light));
+    scenes.push_back(std::move(stated));
   }
   const Json options = {{"device", request.device},
                         {"lods", request.levels},
                         {"max_error", request.max_error.value},
                         {"max_error_unit", max_error_unit(request.max_error)},
                         {"positions", positions_name(request)},
+                        {"occlusion", request.occlusion},
+                        {"shadows", request.shadows},
                         {"topology", request.topology},
                         {"effort", static_cast<int>(request.textures.effort)},
                         {"perceptual", request.textures.perceptual},

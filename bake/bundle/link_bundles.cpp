@@ -48,6 +48,10 @@ class Linker {
       MODAR_ASSIGN(const std::uint32_t model, find(models, scene.model, "model"));
       content_.scenes.push_back(place_scene(scene, pattern, model, models[model].model_sides));
     }
+    std::sort(content_.occlusion.begin(), content_.occlusion.end(),
+              [](const auto& a, const auto& b) { return a.layout < b.layout; });
+    Report quiet;
+    MODAR_TRY(light_scenes(described.scenes, described, content_, quiet));
     Json meta = Json::parse(bundle_meta(described, {}));
     meta.set("models", std::move(models_));
     meta.set("patterns", std::move(patterns_));
@@ -125,6 +129,8 @@ class Linker {
     ModelRecord record = source;
     record.name = content_.intern(linked.name);
     record.layout = index_in(content_.layouts, part.layouts()[source.layout]);
+    const std::uint32_t byte = occlusion_byte(part.occlusion(), source.layout);
+    if (byte != kNone) index_in(content_.occlusion, OcclusionRecord{record.layout, byte});
     record.first_chunk = static_cast<std::uint32_t>(content_.chunks.size());
     record.first_material = static_cast<std::uint32_t>(content_.materials.size());
     add_chunks(part, source, record.first_material);

@@ -28,9 +28,9 @@ bool parse_number(std::string_view text, double& value) {
 namespace {
 
 tl::unexpected<Error> scene_error(const std::string& text, const std::string& cause) {
-  return fail(
-      ExitCode::kUsage, "cli.scene", "--scene " + text, cause,
-      "write PATTERN=MODEL, then any of ,scale=S ,up=x|y|z|-x|-y|-z ,offset=X:Y:Z ,centred");
+  return fail(ExitCode::kUsage, "cli.scene", "--scene " + text, cause,
+              "write PATTERN=MODEL, then any of ,scale=S ,up=x|y|z|-x|-y|-z ,offset=X:Y:Z ,centred "
+              ",light=FILE");
 }
 
 bool parse_offset(std::string_view text, std::array<double, 3>& offset) {
@@ -70,6 +70,9 @@ Result<SceneRequest> parse_scene(const std::string& text) {
       good = up.has_value();
     } else if (part.starts_with("offset=")) {
       good = parse_offset(part.substr(7), scene.offset);
+    } else if (part.starts_with("light=")) {
+      scene.light = std::string(part.substr(6));
+      good = !scene.light.empty();
     } else if (part == "centred") {
       good = scene.centred = true;
     }

@@ -115,6 +115,10 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   take(options, "loop_views", loop.trial_views);
   take(options, "score", loop.score);
   if (loop.validate()) request.loop = loop;
+  // Of bundles that were baked before there was any.
+  request.occlusion = request.shadows = false;
+  take(options, "occlusion", request.occlusion);
+  take(options, "shadows", request.shadows);
   take(options, "topology", request.topology);
   take(options, "unit_metres", request.unit_metres);
   take(options, "max_error", request.max_error.value);

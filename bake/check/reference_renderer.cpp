@@ -17,11 +17,30 @@ struct Lit {
   double x = 0;  ///< pixels
   double y = 0;
   double inverse_depth = 0;  ///< 0: behind the camera
-  glm::dvec3 light{1.0};
-  glm::dvec3 shine{0.0};
+  glm::dvec3 light{1.0};     ///< linear
+  glm::dvec3 added{0.0};     ///< linear
+  glm::dvec3 diffuse{1.0};   ///< as stored
   glm::dvec2 uv{0.0};
   glm::dvec4 colour{1.0};
 };
+
+/// IEC 61966-2-1, both ways, channel by channel.
+glm::dvec3 linear(const glm::dvec3& stored) {
+  glm::dvec3 out;
+  for (int i = 0; i < 3; ++i) {
+    out[i] = stored[i] <= 0.04045 ? stored[i] / 12.92 : std::pow((stored[i] + 0.055) / 1.055, 2.4);
+  }
+  return out;
+}
+
+glm::dvec3 stored(const glm::dvec3& linear) {
+  glm::dvec3 out;
+  for (int i = 0; i < 3; ++i) {
+    out[i] =
+        linear[i] <= 0.0031308 ? 12.92 * linear[i] : 1.055 * std::pow(linear[i], 1 / 2.4) - 0.055;
+  }
+  return out;
+}
 
 /// Texel of a level, wrapped or clamped.
 glm::dvec4 texel(const RgbaImage& image, long x, long y, bool repeat) {
@@ -65,7 +84,8 @@ class Canvas {
         camera_(camera),
         to_eye_(to_eye),
         turn_(glm::transpose(glm::inverse(glm::dmat3(to_eye)))),
-        light_(glm::normalize(glm::dvec3(options.light))),
+        to_world_(glm::transpose(glm::dmat3(DrawItem().world_to_eye))),
+        light_(options.light ? *options.light : neutral_room()),
         options_(options) {
     image_.width = static_cast<std::uint32_t>(camera.width);
     image_.height = static_cast<std::uint32_t>(camera.height);
@@ -91,18 +111,35 @@ class Canvas {
     return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 1.0) * 255.0));
   }
 
+  /// What a white surface of that normal gets from all around.
+  [[nodiscard]] glm::dvec3 sky(const glm::dvec3& n) const {
+    const double x = n.x;
+    const double y = n.y;
+    const double z = n.z;
+    const std::array<double, 9> terms = {
+        1, y, z, x, x * y, y * z, 3 * z * z - 1, z * x, x * x - y * y};
+    glm::dvec3 sum(0.0);
+    for (std::size_t i = 0; i < terms.size(); ++i) sum += terms[i] * glm::dvec3(light_.sky[i]);
+    return sum;
+  }
+
   [[nodiscard]] Lit shade(std::uint32_t v, std::uint32_t material) const {
     const SourceMaterial& m = mesh_.materials[material];
     const glm::dvec3 eye(to_eye_ * glm::dvec4(mesh_.positions[v], 1.0));
     const glm::dvec3 n = glm::normalize(turn_ * glm::dvec3(mesh_.normals[v]));
-    const glm::dvec3 halfway = glm::normalize(light_ - glm::normalize(eye));
-    const double diffuse = std::max(glm::dot(n, light_), 0.0);
-    const double shine = std::pow(std::max(glm::dot(n, halfway), 0.0) + 1e-4, m.shininess);
-    const auto strength = static_cast<double>(options_.light_strength);
+    const glm::dvec3 world = to_world_ * n;
+    const glm::dvec3 to_key = glm::normalize(glm::dvec3(light_.direction));
+    const glm::dvec3 halfway = glm::normalize(to_key - glm::normalize(to_world_ * eye));
+    const glm::dvec3 key = glm::dvec3(light_.key) * static_cast<double>(options_.light_strength);
+    const double shine = m.shininess > 0
+                             ? std::pow(std::max(glm::dot(world, halfway), 1e-4),
+                                        static_cast<double>(std::min(m.shininess, kMostShininess)))
+                             : 0.0;
     Lit lit;
-    lit.light = glm::dvec3(m.ambient) * static_cast<double>(options_.ambient_strength) +
-                glm::dvec3(m.diffuse) * strength * diffuse;
-    lit.shine = glm::dvec3(m.emission) + glm::dvec3(m.specular) * strength * shine;
+    lit.light = glm::max(sky(world), 0.0) * static_cast<double>(options_.ambient_strength) +
+                key * std::max(glm::dot(world, to_key), 0.0);
+    lit.added = linear(glm::dvec3(m.emission)) + linear(glm::dvec3(m.specular)) * key * shine;
+    lit.diffuse = glm::dvec3(m.diffuse);
     if (!mesh_.uvs.empty()) lit.uv = mesh_.uvs[v];
     if (!mesh_.colours.empty()) lit.colour = glm::dvec4(mesh_.colours[v]) / 255.0;
     if (eye.z >= 0) return lit;
@@ -162,8 +199,9 @@ class Canvas {
       base *= glm::dvec4(glm::dvec3(trilinear(texture, uv, std::log2(texels))), 1.0);
     }
     const glm::dvec3 light = w.x * v[0].light + w.y * v[1].light + w.z * v[2].light;
-    const glm::dvec3 shine = w.x * v[0].shine + w.y * v[1].shine + w.z * v[2].shine;
-    const glm::dvec3 colour = glm::dvec3(base) * light + shine;
+    const glm::dvec3 added = w.x * v[0].added + w.y * v[1].added + w.z * v[2].added;
+    const glm::dvec3 colour =
+        stored(linear(v[0].diffuse) * linear(glm::dvec3(base)) * light + added);
     for (int c = 0; c < 3; ++c)
       image_.pixels[4 * at + static_cast<std::size_t>(c)] = to_byte(colour[c]);
   }
@@ -173,7 +211,8 @@ class Canvas {
   Camera camera_;
   glm::dmat4 to_eye_;
   glm::dmat3 turn_;
-  glm::dvec3 light_;
+  glm::dmat3 to_world_;
+  RoomLight light_;
   const RenderOptions& options_;
   RgbaImage image_;
   std::vector<double> depth_;  // 1 / z of what is nearest

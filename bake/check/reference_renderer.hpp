@@ -19,9 +19,10 @@ struct SoftTexture {
   bool repeat = false;
 };
 
-/// Draws a mesh over the clear colour of `options`, lit like shaders/model.vert lights vertices,
-/// with perspective-correct attributes and trilinear textures; opaque. to_eye: mesh space to GL eye
-/// space. textures: one a material. Pixels are sampled at their centres.
+/// Draws a mesh over the clear colour of `options`, in the world of a level camera: light is summed
+/// at vertices as shaders/model.vert does, and multiplied with colours in linear light with sRGB's
+/// own transfer function. Perspective-correct attributes, trilinear textures; opaque. to_eye: mesh
+/// space to GL eye space. textures: one a material. Pixels are sampled at their centres.
 RgbaImage render_reference(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
                            const Camera& camera, const glm::dmat4& to_eye,
                            const RenderOptions& options);

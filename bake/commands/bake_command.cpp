@@ -39,6 +39,7 @@ struct BakeCommand {
   std::string unit;
   std::string max_error;
   std::string device;
+  std::string light;
   ProjectCommand project;
 };
 
@@ -66,6 +67,7 @@ Result<void> complete(BakeCommand& command) {
   }
   for (const std::string& text : command.scenes) {
     MODAR_ASSIGN(SceneRequest scene, parse_scene(text));
+    if (scene.light.empty()) scene.light = command.light;
     request.scenes.push_back(std::move(scene));
   }
   if (!command.unit.empty()) {
@@ -74,6 +76,7 @@ Result<void> complete(BakeCommand& command) {
   if (!command.max_error.empty()) {
     MODAR_ASSIGN(request.max_error, parse_max_error(command.max_error));
   }
+  request.light = command.light;
   if (!command.device.empty()) MODAR_TRY(plan_for_device(command.device, request));
   request.tool_version = MODAR_VERSION;
   return {};
@@ -264,6 +267,13 @@ void add_geometry_options(CommandLine& line, BakeCommand& command) {
               {.shows_default = true, .least = 1, .most = kMaxLevels});
   line.flag("--no-lods", [&request] { request.levels = 1; }, "The finest level only",
             {.excludes = "--lods"});
+  line.option(
+      "--light", &command.light,
+      "Radiance HDR panorama or photo of the room whose light falls on scenes without one of "
+      "their own",
+      {.type = "FILE"});
+  line.flag("!--no-shadows", request.shadows, "Do not bake models' shadows on their patterns");
+  line.flag("!--no-ao", request.occlusion, "Do not store how much light reaches each vertex");
   line.flag("--topology,!--no-topology", request.topology,
             "Measure the models' topology and state it in the bundle");
 }
@@ -298,9 +308,11 @@ void add_bake(CommandLine& program) {
       "--pattern", &command->patterns,
       "Images of flat things, frontal; :WIDTH tells the printed width (:210mm, :21cm, :8.3in)",
       {.type = "FILE[:WIDTH]"});
-  line.option("--scene", &command->scenes,
-              "Which model stands on which pattern; needed where there is more than one of either",
-              {.type = "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred]"});
+  line.option(
+      "--scene", &command->scenes,
+      "Which model stands on which pattern; needed where there is more than one of either",
+      {.type =
+           "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred][,light=FILE]"});
   line.option("-o,--output", &command->output, "The bundle to write", {.type = "OUT.modar"});
   add_project_options(line, command->project);
   line.flag("--prove-reproducible", command->prove_reproducible,

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "bake/image/image.hpp"
+#include "bake/image/resample.hpp"
 
 namespace modar {
 
@@ -61,5 +62,12 @@ Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::str
 Result<StoredImage> decode_webp(std::span<const std::byte> bytes, const std::string& name);
 Result<StoredImage> decode_tiff(std::span<const std::byte> bytes, const std::string& name);
 Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::string& name);
+
+/// Radiance's signature.
+inline bool is_radiance(std::span<const std::byte> bytes) {
+  return bytes.size() > 2 && bytes[0] == std::byte{'#'} && bytes[1] == std::byte{'?'};
+}
+/// A Radiance HDR file (RGBE, -Y +X). Errors: as decode_stb().
+Result<LinearImage> decode_radiance(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace modar

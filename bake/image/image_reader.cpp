@@ -136,4 +136,15 @@ Result<RgbaImage> read_image(const std::string& path) {
   return decode_image(bytes, path);
 }
 
+Result<LinearImage> decode_linear_image(std::span<const std::byte> bytes, const std::string& name) {
+  if (is_radiance(bytes)) return decode_radiance(bytes, name);
+  MODAR_ASSIGN(const RgbaImage image, decode_image(bytes, name));
+  return to_linear(image);
+}
+
+Result<LinearImage> read_linear_image(const std::string& path) {
+  MODAR_ASSIGN(const std::vector<std::byte> bytes, read_bytes(path));
+  return decode_linear_image(bytes, path);
+}
+
 }  // namespace modar

@@ -26,6 +26,11 @@ struct ResampleOptions {
   unsigned jobs = 1;    ///< the result does not depend on it
 };
 
+/// Any image that read_image() reads, or a Radiance HDR (RGBE), whose alpha is 1 without the floor.
+/// Errors: as read_image() and decode_image().
+Result<LinearImage> read_linear_image(const std::string& path);
+Result<LinearImage> decode_linear_image(std::span<const std::byte> bytes, const std::string& name);
+
 LinearImage to_linear(const RgbaImage& image);
 RgbaImage to_srgb(const LinearImage& image);
 

@@ -1,11 +1,12 @@
-// BMP and Truevision TGA files through stb_image, which fills what a truncated file lacks with
-// anything: reads beyond the end are noted, and refused.
+// BMP, Truevision TGA and Radiance HDR files through stb_image, which fills what a truncated file
+// lacks with anything: reads beyond the end are noted, and refused.
 #include <cmath>
 #include <memory>
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_ONLY_BMP
+#define STBI_ONLY_HDR
 #define STBI_ONLY_TGA
 #define STBI_NO_STDIO
 #include <stb/stb_image.h>
@@ -60,17 +61,44 @@ TgaQuirks tga_quirks(std::span<const std::byte> bytes) {
   return {(at(17) & 0x10) != 0, !gray && (at(17) & 15) == 0, at(1) == 1 && (at(3) | at(4)) != 0};
 }
 
+/// Pixels of the longest run that a packet of two bytes can hold.
+constexpr std::size_t kLongestRun = 128;
+
 }  // namespace
 
-Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::string& name) {
-  constexpr std::size_t kTgaHeader = 18;
-  /// Pixels of the longest run that a packet of two bytes can hold.
-  constexpr std::size_t kLongestRun = 128;
+Result<LinearImage> decode_radiance(std::span<const std::byte> bytes, const std::string& name) {
   StbFile header{{bytes}};
   int width = 0;
   int height = 0;
   int channels = 0;
-  if (bytes.size() < kTgaHeader ||
+  if (stbi_info_from_callbacks(&kCallbacks, &header, &width, &height, &channels) == 0) {
+    return damaged_image(name, "its header is none of a Radiance file that we read");
+  }
+  const auto columns = static_cast<std::uint64_t>(std::max(width, 0));
+  const auto rows = static_cast<std::uint64_t>(std::max(height, 0));
+  MODAR_TRY(check_image_size(columns, rows, name));
+  const auto truncated = [&] { return damaged_image(name, "the file ends before its image does"); };
+  if (columns * rows > bytes.size() * kLongestRun) return truncated();  // before it is allocated
+  StbFile file{{bytes}};
+  const std::unique_ptr<float, void (*)(void*)> pixels(
+      stbi_loadf_from_callbacks(&kCallbacks, &file, &width, &height, &channels, 4),
+      &stbi_image_free);
+  if (file.beyond_end) return truncated();
+  if (!pixels) return damaged_image(name, "as a Radiance file it is damaged or of an unknown kind");
+  LinearImage image;
+  image.width = static_cast<std::uint32_t>(width);
+  image.height = static_cast<std::uint32_t>(height);
+  image.pixels.assign(pixels.get(), pixels.get() + 4 * columns * rows);
+  return image;
+}
+
+Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::string& name) {
+  constexpr std::size_t kTgaHeader = 18;
+  StbFile header{{bytes}};
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  if (bytes.size() < kTgaHeader || is_radiance(bytes) ||
       stbi_info_from_callbacks(&kCallbacks, &header, &width, &height, &channels) == 0) {
     return fail(ExitCode::kInvalidInput, "image.decode", name,
                 "this is no PNG, JPEG, BMP, TGA, WebP or TIFF file that can be read",

@@ -27,6 +27,8 @@ struct SourceMaterial {
   std::string diffuse_map;
   std::string alpha_map;
   bool two_sided = false;
+  /// Named "occluder": stands for a real thing, hides what is behind it and is not seen itself.
+  [[nodiscard]] bool occluder() const { return name == "occluder"; }
   std::shared_ptr<const void> keeper;  ///< owner of temporary files that hold the maps, or null
 };
 

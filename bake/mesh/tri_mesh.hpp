@@ -33,6 +33,7 @@ struct TriMesh {
   Array<glm::vec3> normals;  ///< unit length
   Array<glm::dvec2> uvs;
   Array<glm::u8vec4> colours;
+  Array<std::uint8_t> occlusion;  ///< see measure_occlusion(); only where it was measured
   Array<std::array<std::uint32_t, 3>> triangles;
   Array<std::uint32_t> triangle_material;
   std::vector<SourceMaterial> materials;

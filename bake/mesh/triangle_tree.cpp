@@ -2,7 +2,6 @@
 #include "bake/mesh/triangle_tree.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -170,6 +169,67 @@ double TriangleTree::nearest(const glm::dvec3& point, double enough) {
     Entry near{node.first, box_distance_square(point, left.low, left.high)};
     Entry far{node.first + 1, box_distance_square(point, right.low, right.high)};
     if (far.distance < near.distance) std::swap(near, far);
+    stack[size++] = far;
+    stack[size++] = near;
+  }
+  return best;
+}
+
+namespace {
+
+/// Where the ray enters the box, or infinity where it misses it before `to`.
+double box_entry(const glm::dvec3& origin, const glm::dvec3& inverse, const glm::dvec3& low,
+                 const glm::dvec3& high, double from, double to) {
+  for (int axis = 0; axis < 3; ++axis) {
+    double near = (low[axis] - origin[axis]) * inverse[axis];
+    double far = (high[axis] - origin[axis]) * inverse[axis];
+    if (near > far) std::swap(near, far);
+    from = near > from ? near : from;
+    to = far < to ? far : to;
+  }
+  return from <= to ? from : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+std::optional<TriangleTree::Hit> TriangleTree::first_hit(const glm::dvec3& origin,
+                                                         const glm::dvec3& direction, double from,
+                                                         double to) const {
+  const glm::dvec3 inverse = 1.0 / direction;
+  std::optional<Hit> best;
+  std::array<std::pair<std::uint32_t, double>, 64> stack;  // as in nearest()
+  std::size_t size = 0;
+  stack[size++] = {0, box_entry(origin, inverse, nodes_[0].low, nodes_[0].high, from, to)};
+  while (size > 0) {
+    const auto [index, entry] = stack[--size];
+    if (!(entry <= to)) continue;
+    const Node& node = nodes_[index];
+    for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
+      // Moeller and Trumbore, "Fast, Minimum Storage Ray-Triangle Intersection", 1997.
+      const auto [p, q, r] = corners(t);
+      const glm::dvec3 ab = q - p;
+      const glm::dvec3 ac = r - p;
+      const glm::dvec3 h = glm::cross(direction, ac);
+      const double volume = glm::dot(ab, h);
+      if (volume == 0) continue;
+      const glm::dvec3 offset = origin - p;
+      const double b = glm::dot(offset, h) / volume;
+      if (b < 0 || b > 1) continue;
+      const glm::dvec3 k = glm::cross(offset, ab);
+      const double c = glm::dot(direction, k) / volume;
+      const double distance = glm::dot(ac, k) / volume;
+      if (c < 0 || b + c > 1 || distance < from || distance > to) continue;
+      to = distance;
+      best = Hit{distance, triangles_[t], b, c};
+    }
+    if (node.count != 0) continue;
+    std::pair<std::uint32_t, double> near{node.first, 0.0};
+    std::pair<std::uint32_t, double> far{node.first + 1, 0.0};
+    for (auto* child : {&near, &far}) {
+      const Node& box = nodes_[child->first];
+      child->second = box_entry(origin, inverse, box.low, box.high, from, to);
+    }
+    if (far.second < near.second) std::swap(near, far);
     stack[size++] = far;
     stack[size++] = near;
   }

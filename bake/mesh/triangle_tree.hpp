@@ -1,9 +1,11 @@
-// A tree of boxes over triangles: which triangle is nearest to a point?
+// A tree of boxes over triangles: which triangle is nearest to a point, which does a ray meet
+// first?
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,6 +42,18 @@ class TriangleTree {
   /// square), that of any such triangle. Remembers the answer: neighbouring points ask for it
   /// again.
   double nearest(const glm::dvec3& point, double enough = 0);
+  /// What a ray meets first.
+  struct Hit {
+    double distance = 0;  ///< in lengths of the direction
+    Triangle triangle{};
+    double b = 0;  ///< weights of the second and the third corner
+    double c = 0;
+  };
+  /// The first triangle, from either side, that the ray meets between two distances. Changes
+  /// nothing: any number of threads may ask.
+  [[nodiscard]] std::optional<Hit> first_hit(const glm::dvec3& origin, const glm::dvec3& direction,
+                                             double from, double to) const;
+
   /// The triangle that nearest() answered last, and its corners.
   [[nodiscard]] const Triangle& last_triangle() const { return triangles_[last_]; }
   [[nodiscard]] std::array<glm::dvec3, 3> last() const { return corners(last_); }

@@ -35,10 +35,13 @@ glm::dmat4 upright(const BundleView& bundle, std::uint32_t model) {
   return glm::dmat4(1.0);
 }
 
-glm::dmat4 model_view(const BundleView& bundle, std::uint32_t model) {
+glm::dmat4 table_view() {
   return glm::lookAt(kDistance * glm::normalize(glm::dvec3(0.55, -1.0, 0.4)), glm::dvec3(0.0),
-                     glm::dvec3(0, 0, 1)) *
-         upright(bundle, model);
+                     glm::dvec3(0, 0, 1));
+}
+
+glm::dmat4 model_view(const BundleView& bundle, std::uint32_t model) {
+  return table_view() * upright(bundle, model);
 }
 
 /// Calls body(eye, chunk) for each vertex of the coarsest levels, in eye space.
@@ -130,7 +133,8 @@ Result<std::unique_ptr<ModelCamera>> ModelCamera::create(const BundleView& bundl
 RgbaImage ModelCamera::model(std::uint32_t index) {
   Camera& camera = state_->camera;
   camera.fx = camera.fy = model_focal(state_->bundle, index, camera.width, camera.height);
-  return state_->shoot(RgbImage{}, {index, glm::mat4(model_view(state_->bundle, index))});
+  return state_->shoot(RgbImage{}, {index, glm::mat4(model_view(state_->bundle, index)), kNone,
+                                    glm::mat4(table_view())});
 }
 
 RgbaImage ModelCamera::scene(std::uint32_t index) {
@@ -181,7 +185,8 @@ RgbaImage ModelCamera::scene(std::uint32_t index) {
     }
   }
   const RgbImage picture{background.data(), camera.width, camera.height, 3L * camera.width};
-  return state_->shoot(picture, {scene.model, glm::mat4(view) * scene_matrix(scene)});
+  return state_->shoot(
+      picture, {scene.model, glm::mat4(view) * scene_matrix(scene), index, glm::mat4(view)});
 }
 
 namespace {

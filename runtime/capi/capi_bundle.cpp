@@ -140,6 +140,7 @@ int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scen
   scene->pattern = record.pattern;
   scene->model = record.model;
   modar::copy_matrix(modar::scene_matrix(record), scene->place);
+  scene->number = index + 1;
   return 1;
 }
 

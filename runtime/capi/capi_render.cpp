@@ -55,12 +55,23 @@ modar::SurfaceView surface_of(const modar_surface& surface) {
           asked.rotation, asked.mirror != 0, asked.cover != 0, asked.keep_depth == 0};
 }
 
+/// A neutral room with its key light there; zeros: each scene's own light.
+void set_key(modar::RenderOptions& options, const float* direction) {
+  const glm::vec3 to_light = glm::make_vec3(direction);
+  if (to_light == glm::vec3(0.0f)) return;
+  options.light = modar::neutral_room();
+  options.light->direction = to_light;
+}
+
 /// The items of models that there are, into the renderer's own list.
 void take_items(modar_renderer& renderer, const modar_item* items, size_t count) {
   renderer.items.clear();
   for (size_t i = 0; i < count; ++i) {
     if (items[i].model >= renderer.view.models().size()) continue;
-    renderer.items.push_back({items[i].model, glm::make_mat4(items[i].to_eye)});
+    modar::DrawItem item{items[i].model, glm::make_mat4(items[i].to_eye), items[i].scene - 1};
+    const glm::mat4 world = glm::make_mat4(items[i].world_to_eye);
+    if (world != glm::mat4(0.0f)) item.world_to_eye = world;
+    renderer.items.push_back(item);
   }
 }
 
@@ -143,7 +154,7 @@ int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar
 
 void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive) {
   modar::RenderOptions options;
-  options.light = glm::make_vec3(direction);
+  set_key(options, direction);
   options.exclusive_context = exclusive != 0;
   renderer->renderer->set_options(options);
 }
@@ -176,7 +187,7 @@ int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double fr
                double frame_y, const modar_item* items, size_t count, modar_hit* hit) {
   std::vector<modar::DrawItem> ours;
   for (size_t i = 0; i < count; ++i)
-    ours.push_back({items[i].model, glm::make_mat4(items[i].to_eye)});
+    ours.push_back({items[i].model, glm::make_mat4(items[i].to_eye), modar::kNone, {}});
   const auto found = modar::pick(bundle->view, modar::camera_of(*camera), {frame_x, frame_y}, ours);
   if (!found) return 0;
   *hit = {found->item, {found->point.x, found->point.y, found->point.z}, found->distance};
@@ -186,7 +197,7 @@ int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double fr
 void modar_render_options_default(modar_render_options* options) {
   const modar::RenderOptions ours;
   *options = {sizeof *options,
-              {ours.light.x, ours.light.y, ours.light.z},
+              {0.0f, 0.0f, 0.0f},
               ours.light_strength,
               ours.ambient_strength,
               {ours.clear_colour.r, ours.clear_colour.g, ours.clear_colour.b, ours.clear_colour.a},
@@ -197,7 +208,7 @@ void modar_render_options_default(modar_render_options* options) {
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options) {
   const modar_render_options asked = modar::grown(*options);
   modar::RenderOptions ours;
-  ours.light = glm::make_vec3(asked.light);
+  set_key(ours, asked.light);
   ours.light_strength = asked.light_strength;
   ours.ambient_strength = asked.ambient_strength;
   ours.clear_colour = glm::make_vec4(asked.clear_colour);

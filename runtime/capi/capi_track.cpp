@@ -148,6 +148,8 @@ void modar_item_place(modar_item* item, const modar_scene* scene, const modar_po
   modar_view(pose, view);
   item->model = scene->model;
   modar::copy_matrix(glm::make_mat4(view) * glm::make_mat4(scene->place), item->to_eye);
+  item->scene = scene->number;
+  std::memcpy(item->world_to_eye, view, sizeof view);
 }
 
 struct modar_focal_finder {

@@ -84,8 +84,9 @@ void Controls::collect(std::span<const Hysteresis::State> states,
     const SceneRecord& scene = bundle_.scenes()[i];
     const Hysteresis::State& state = states[scene.pattern];
     if (!wants(scene.pattern) || !state.shown) continue;
-    const glm::mat4 place = gl_view(state.pose) * scene_matrix(scene);
-    items.push_back({scene.model, glm::scale(place, glm::vec3(scale_))});
+    const glm::mat4 view = gl_view(state.pose);
+    const glm::mat4 place = view * scene_matrix(scene);
+    items.push_back({scene.model, glm::scale(place, glm::vec3(scale_)), i, view});
   }
 }
 
@@ -105,8 +106,9 @@ void Controls::add_standard(const Hysteresis::State& state, std::uint32_t model,
   SceneRecord standard{};
   standard.scale = 1;
   standard.rotation[3] = 1;
-  const glm::mat4 place = gl_view(state.pose) * scene_matrix(standard);
-  items.push_back({model, glm::scale(place, glm::vec3(scale_))});
+  const glm::mat4 view = gl_view(state.pose);
+  const glm::mat4 place = view * scene_matrix(standard);
+  items.push_back({model, glm::scale(place, glm::vec3(scale_)), kNone, view});
 }
 
 bool Controls::take_corners(std::array<glm::dvec2, 4>& corners) {

@@ -131,8 +131,8 @@ Result<bool> Player::show(const Job& job) {
   if (options_.find_focal && !options_.quiet) report_focal(job);
   FrameReport report = begin_report(job);
   const std::int64_t before = now_ns();
-  screen_->draw(job.frame.picture(), job.camera, items_);
-  const bool painted = screen_->has_window() && (controls_.display() || controls_.outline());
+  draw(job, report);
+  const bool painted = screen_->has_window() && controls_.display();
   if (painted || !sinks_.empty()) screen_->picture();
   report.at(Stage::kRender) = ms_since(before);
   if (painted || !sinks_.empty()) {
@@ -238,12 +238,21 @@ FrameReport Player::begin_report(const Job& job) {
   return report;
 }
 
-Result<void> Player::paint(const FrameReport& report) {
+/// Outlines lie on the camera's picture, behind the models.
+void Player::draw(const Job& job, const FrameReport& report) {
   constexpr Colour kOutline{64, 255, 96};
-  const Canvas canvas = screen_->canvas();
-  if (controls_.outline()) {
-    for (const Detection& seen : report.visible) draw_outline(canvas, seen.corners, kOutline);
+  if (!controls_.outline() || report.visible.empty()) {
+    return screen_->draw(job.frame.picture(), job.camera, items_);
   }
+  screen_->draw(job.frame.picture(), job.camera, {});
+  screen_->picture();
+  const Canvas canvas = screen_->canvas();
+  for (const Detection& seen : report.visible) draw_outline(canvas, seen.corners, kOutline);
+  screen_->draw_on_canvas(job.camera, items_);
+}
+
+Result<void> Player::paint(const FrameReport& report) {
+  const Canvas canvas = screen_->canvas();
   if (!controls_.display()) return {};
   // A file's pictures are the same in each run, so no clock is painted on them.
   const bool clock = setup_.source.live || options_.realtime || options_.window;

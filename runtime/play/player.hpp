@@ -66,6 +66,7 @@ class Player {
   Result<void> open_logs();
   FrameReport begin_report(const Job& job);
   void follow_spot(const Job& job);
+  void draw(const Job& job, const FrameReport& report);
   Result<void> paint(const FrameReport& report);
   Result<void> write_picture(const FrameReport& report);
   Result<void> write_line(const FrameReport& report, const Frame& frame);

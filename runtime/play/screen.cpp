@@ -2,6 +2,12 @@
 #include "screen.hpp"
 
 namespace modar {
+namespace {
+
+/// Light enough for a shadow to be seen, and no colour that the model could be thought to have.
+constexpr glm::vec4 kTurntableGround{0.86f, 0.86f, 0.85f, 1.0f};
+
+}  // namespace
 
 Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const PlayOptions& options) {
   std::unique_ptr<Screen> screen(new Screen(bundle, options));
@@ -17,6 +23,7 @@ Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const Pla
   screen->renderer_ = std::move(renderer);
   RenderOptions drawing;
   drawing.exclusive_context = true;
+  if (options.turntable > 0) drawing.clear_colour = kTurntableGround;
   screen->renderer_->set_options(drawing);
   return screen;
 }
@@ -66,6 +73,24 @@ Canvas Screen::canvas() {
   return {rgba_, width_, height_};
 }
 
+RgbImage Screen::canvas_picture() {
+  rgb_.resize(rgba_.size() / 4 * 3);
+  for (std::size_t i = 0; i < rgb_.size() / 3; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) rgb_[3 * i + c] = rgba_[4 * i + c];
+  }
+  return {rgb_.data(), width_, height_, std::ptrdiff_t{3} * width_};
+}
+
+void Screen::draw_on_canvas(const Camera& camera, std::span<const DrawItem> items) {
+  const RgbImage image = canvas_picture();
+  CameraPicture painted;
+  painted.width = image.width;
+  painted.height = image.height;
+  painted.planes[0] = image.pixels;
+  painted.strides[0] = image.stride;
+  draw(painted, camera, items);
+}
+
 void Screen::present() {
   if (!window_) return;
   renderer_->blit_to_window(window_->width(), window_->height());
@@ -74,12 +99,7 @@ void Screen::present() {
 
 void Screen::present_canvas() {
   if (!window_) return;
-  rgb_.resize(rgba_.size() / 4 * 3);
-  for (std::size_t i = 0; i < rgb_.size() / 3; ++i) {
-    for (std::size_t c = 0; c < 3; ++c) rgb_[3 * i + c] = rgba_[4 * i + c];
-  }
-  renderer_->render({rgb_.data(), width_, height_, std::ptrdiff_t{3} * width_}, glm::mat4(1.0f),
-                    {});
+  renderer_->render(canvas_picture(), glm::mat4(1.0f), {});
   present();
 }
 

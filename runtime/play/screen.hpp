@@ -66,6 +66,8 @@ class Screen {
   Result<void> resize(int width, int height);
   /// Draws the background and the items as the camera sees them.
   void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items);
+  /// The same over the canvas as it was painted on.
+  void draw_on_canvas(const Camera& camera, std::span<const DrawItem> items);
   /// Reads the picture back. The canvas of the same pixels may be painted on.
   RgbaView picture();
   Canvas canvas();
@@ -85,6 +87,7 @@ class Screen {
   Screen(const BundleView& bundle, const PlayOptions& options)
       : bundle_(bundle), options_(options) {}
   Result<void> read_caps();
+  RgbImage canvas_picture();
 
   const BundleView& bundle_;
   const PlayOptions& options_;

@@ -42,14 +42,37 @@ double distance_of(const Camera& camera, double radius) {
   return 1.05 * radius / std::sin(std::atan(half_side / camera.fx));
 }
 
+/// A world whose z is up, seen from there.
 glm::mat4 turned(double degrees, double distance) {
   const auto radians = [](double value) {
     return static_cast<float>(value * std::numbers::pi / 180.0);
   };
   const glm::mat4 back =
       glm::translate(glm::mat4(1.0f), glm::vec3(0.0f, 0.0f, -static_cast<float>(distance)));
-  const glm::mat4 tilted = glm::rotate(back, radians(kTiltDegrees), glm::vec3(1, 0, 0));
-  return glm::rotate(tilted, radians(degrees), glm::vec3(0, 1, 0));
+  const glm::mat4 tilted = glm::rotate(back, radians(kTiltDegrees - 90), glm::vec3(1, 0, 0));
+  return glm::rotate(tilted, radians(degrees), glm::vec3(0, 0, 1));
+}
+
+/// The first scene of a model; its own with y up, as most files have it, where it is in none.
+struct Stand {
+  std::uint32_t scene = kNone;
+  SceneRecord record{};
+};
+
+Stand stand_of(const BundleView& bundle, std::uint32_t model) {
+  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
+    if (bundle.scenes()[s].model == model) return {s, bundle.scenes()[s]};
+  }
+  Stand upright;
+  upright.record.scale = 1.0f;
+  upright.record.rotation[0] = upright.record.rotation[3] = std::numbers::sqrt2_v<float> / 2;
+  return upright;
+}
+
+DrawItem on_turntable(const Stand& stand, std::uint32_t model, const glm::mat4& turn) {
+  const float* offset = stand.record.offset;
+  const glm::mat4 plane = glm::translate(turn, -glm::vec3(offset[0], offset[1], offset[2]));
+  return {model, plane * scene_matrix(stand.record), stand.scene, plane};
 }
 
 }  // namespace
@@ -68,11 +91,14 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
   TurntableReport turn;
   FrameReport report;
   for (std::uint32_t model = 0; model < bundle.models().size(); ++model) {
-    const double distance = distance_of(camera, radius_of(bundle, model));
+    const Stand stand = stand_of(bundle, model);
+    const double radius = radius_of(bundle, model) * static_cast<double>(stand.record.scale);
+    const double distance = distance_of(camera, radius);
     turn.model = bundle.name(bundle.models()[model].name);
     for (int i = 0; i < options.turntable; ++i) {
       turn.angle_deg = 360.0 * i / options.turntable;
-      const std::array<DrawItem, 1> items = {{{model, turned(turn.angle_deg, distance)}}};
+      const std::array<DrawItem, 1> items = {
+          on_turntable(stand, model, turned(turn.angle_deg, distance))};
       const std::int64_t before = now_ns();
       screen->draw({}, camera, items);
       const RgbaView picture = screen->picture();

@@ -134,6 +134,7 @@ void DrawList::build(const BundleView& bundle, std::span<const ChunkSetup> setup
       // A matrix with a NaN must not upset the order.
       const float distance = eye_distance(view, chunk);
       command.distance = distance >= 0.0f ? distance : 0.0f;
+      command.hides = setups[c].hides;
       command.blended = setups[c].blended;
       if (levels[command.level].index_count > 0) commands_.push_back(command);
     }
@@ -149,6 +150,7 @@ void DrawList::sort_by_distance() {
 void DrawList::sort_by_state(const BundleView& bundle) {
   const Table<LevelRecord> levels = bundle.levels();
   std::sort(commands_.begin(), commands_.end(), [&](const DrawCommand& a, const DrawCommand& b) {
+    if (a.hides != b.hides) return a.hides;
     if (a.blended != b.blended) return b.blended;
     if (a.blended && a.distance != b.distance) return a.distance > b.distance;
     const std::uint64_t a_indices = levels[a.level].index_offset;

@@ -55,6 +55,7 @@ struct DrawCommand {
   std::uint32_t texture = 0;  ///< kNone: none
   std::uint32_t material = 0;
   float distance = 0.0f;  ///< eye space
+  bool hides = false;     ///< fills the depth buffer only
   bool blended = false;
 };
 
@@ -62,6 +63,7 @@ struct DrawCommand {
 struct ChunkSetup {
   std::uint32_t program = 0;
   std::uint32_t material = 0;  ///< the first one of its values
+  bool hides = false;
   bool blended = false;
 };
 
@@ -74,7 +76,8 @@ class DrawList {
              float lod_pixels);
   /// Nearest first: the order in which GPU memory is given out.
   void sort_by_distance();
-  /// Opaque ones by program, texture and material, then blended ones from far to near.
+  /// What only hides, opaque ones by program, texture and material, then blended ones from far to
+  /// near.
   void sort_by_state(const BundleView& bundle);
 
   [[nodiscard]] std::vector<DrawCommand>& commands() { return commands_; }

@@ -120,6 +120,16 @@ void GlState::set_depth_test(bool enabled) {
   if (differs(depth_test_, enabled, changes)) toggle(GL_DEPTH_TEST, enabled);
 }
 
+void GlState::set_depth_writes(bool enabled) {
+  if (differs(depth_writes_, enabled, changes)) glDepthMask(enabled ? GL_TRUE : GL_FALSE);
+}
+
+void GlState::set_colour_writes(bool enabled) {
+  if (!differs(colour_writes_, enabled, changes)) return;
+  const GLboolean on = enabled ? GL_TRUE : GL_FALSE;
+  glColorMask(on, on, on, on);
+}
+
 void GlState::forget_buffer(GLuint buffer) {
   if (array_buffer_ == buffer) array_buffer_ = kUnknown;
   if (index_buffer_ == buffer) index_buffer_ = kUnknown;

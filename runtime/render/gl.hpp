@@ -129,6 +129,8 @@ class GlState {
   void set_front_face(GLenum winding);
   void set_blending(bool enabled);
   void set_depth_test(bool enabled);
+  void set_depth_writes(bool enabled);
+  void set_colour_writes(bool enabled);
 
   /// Call this after putting a program in use by other means.
   void forget_program() { program_ = kUnknown; }
@@ -152,6 +154,8 @@ class GlState {
   bool culling_ = false;
   bool blending_ = false;
   bool depth_test_ = false;
+  bool depth_writes_ = true;
+  bool colour_writes_ = true;
   GLenum front_face_ = GL_CCW;
 };
 

@@ -3,6 +3,7 @@
 #include "runtime/render/model_painter.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <tuple>
 
@@ -16,8 +17,17 @@ namespace {
 /// call). Set by hand.
 constexpr int kMostSlots = 64;
 
-glm::vec4 colour(const float (&rgb)[3], float factor, float fourth) {
-  return {rgb[0] * factor, rgb[1] * factor, rgb[2] * factor, fourth};
+/// Of a colour as it is stored (sRGB); above 1 it goes on.
+float linear(float stored) {
+  return stored <= 0.04045f ? stored / 12.92f : std::pow((stored + 0.055f) / 1.055f, 2.4f);
+}
+
+glm::vec4 stored_colour(const float (&rgb)[3], float fourth) {
+  return {rgb[0], rgb[1], rgb[2], fourth};
+}
+
+glm::vec4 linear_colour(const float (&rgb)[3], float factor, float fourth) {
+  return {linear(rgb[0]) * factor, linear(rgb[1]) * factor, linear(rgb[2]) * factor, fourth};
 }
 
 void set_vector(GLint place, const glm::vec4& value, RenderStats& stats) {
@@ -42,6 +52,19 @@ bool equal_surface(const MaterialRecord& a, const MaterialRecord& b) {
          equal(a.specular, b.specular) && equal(a.emission, b.emission) &&
          a.shininess == b.shininess && a.opacity == b.opacity && a.texture == b.texture &&
          a.flags == b.flags;
+}
+
+bool dark(const float (&colour)[3]) {
+  return colour[0] + colour[1] + colour[2] <= 0.0f;
+}
+
+/// An exponent of 0 would make the whole surface one highlight.
+bool shines(const MaterialRecord& material) {
+  return material.shininess > 0.0f && !dark(material.specular);
+}
+
+bool glows(const MaterialRecord& material) {
+  return !dark(material.emission);
 }
 
 bool equal_layout(const LayoutRecord& a, const LayoutRecord& b) {
@@ -99,10 +122,12 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       key.coloured = format.attributes[kAttributeColour].components != 0;
       key.textured = material.texture != kNone && format.attributes[kAttributeUv].components != 0;
       key.alpha_twin = key.textured && textures.alpha(material.texture) != 0;
+      key.shiny = shines(material) || glows(material);
       MODAR_ASSIGN(const std::uint32_t program, program_of(key));
       setups_[c].program = program;
       setups_[c].material = equal_material_[bundle_.chunks()[c].material];
-      setups_[c].blended = key.alpha_twin || material.opacity < 1.0f;
+      setups_[c].hides = (material.flags & kMaterialOccluder) != 0;
+      setups_[c].blended = !setups_[c].hides && (key.alpha_twin || material.opacity < 1.0f);
       chunk_layouts_[c] = equal_layout_[model.layout];
     }
   }
@@ -163,43 +188,61 @@ void ModelPainter::set_surface(const PaintJob& job, ProgramState& state, const P
   const MaterialRecord& material = bundle_.materials()[piece.material];
   job.gl.use_program(state.program.id);
   set_frame(job, state);
+  set_light(job, state, piece.light);
   set_material(job, state, piece.material);
   if (state.program.key.textured) job.gl.bind_texture(0, job.textures.colour(material.texture));
   if (state.program.key.alpha_twin) job.gl.bind_texture(1, job.textures.alpha(material.texture));
   job.gl.set_culling((material.flags & kMaterialTwoSided) == 0);
   job.gl.set_front_face(piece.mirrored ? GL_CW : GL_CCW);
   job.gl.set_blending(piece.blended);
+  // What is seen through must not hide what is drawn after it, which is nearer.
+  job.gl.set_depth_writes(!piece.blended);
+  job.gl.set_colour_writes((material.flags & kMaterialOccluder) == 0);
 }
 
 void ModelPainter::set_frame(const PaintJob& job, ProgramState& state) {
   if (state.frame == frame_) return;
   state.frame = frame_;
+  state.light = kNone;
   state.material = kNone;
   state.item = kNone;
   glUniformMatrix4fv(state.program.projection, 1, GL_FALSE, glm::value_ptr(job.projection));
   job.stats.bytes_uploaded += sizeof job.projection;
-  set_vector(state.program.light, glm::vec4(glm::normalize(job.options.light), 0.0f), job.stats);
+}
+
+void ModelPainter::set_light(const PaintJob& job, ProgramState& state, std::uint32_t light) {
+  if (state.light == light) return;
+  state.light = light;
+  state.material = kNone;  // a highlight has the light's colour
+  const EyeLight& eye = lights_.light(light);
+  glUniform4fv(state.program.sky, static_cast<GLsizei>(eye.sky.size()), glm::value_ptr(eye.sky[0]));
+  job.stats.bytes_uploaded += sizeof eye.sky;
+  set_vector(state.program.to_key, eye.key, job.stats);
+  set_vector(state.program.key_colour, eye.key_colour, job.stats);
 }
 
 void ModelPainter::set_material(const PaintJob& job, ProgramState& state, std::uint32_t material) {
   if (state.material == material) return;
   state.material = material;
   const MaterialRecord& record = bundle_.materials()[material];
-  const float strength = job.options.light_strength;
-  // Many MTL files leave the ambient colour black: then the diffuse one stands for it.
-  const bool black = record.ambient[0] + record.ambient[1] + record.ambient[2] <= 0.0f;
   const bool two_sided = (record.flags & kMaterialTwoSided) != 0;
-  // An exponent of 0 would make the whole surface one highlight.
-  const bool shines = record.shininess > 0.0f;
   const ModelProgram& program = state.program;
-  set_vector(program.ambient,
-             colour(black ? record.diffuse : record.ambient, job.options.ambient_strength, 0.0f),
-             job.stats);
-  set_vector(program.diffuse, colour(record.diffuse, strength, two_sided ? 1.0f : 0.0f), job.stats);
-  set_vector(program.specular,
-             colour(record.specular, shines ? strength : 0.0f, shines ? record.shininess : 1.0f),
-             job.stats);
-  set_vector(program.emission, colour(record.emission, 1.0f, 0.0f), job.stats);
+  set_vector(program.diffuse, stored_colour(record.diffuse, two_sided ? 1.0f : 0.0f), job.stats);
+  if (program.key.shiny) {
+    const bool shining = shines(record);
+    const glm::vec4 key = lights_.light(state.light).key_colour;
+    glm::vec4 specular = linear_colour(record.specular, shining ? 1.0f : 0.0f, 0.0f) * key;
+    specular.w = shining ? std::min(record.shininess, kMostShininess) : 1.0f;
+    set_vector(program.specular, specular, job.stats);
+    set_vector(program.emission, linear_colour(record.emission, 1.0f, 0.0f), job.stats);
+    glm::vec4 albedo = linear_colour(record.diffuse, 1.0f, 0.0f);
+    if (program.key.textured) {
+      const Rgb8 mean = job.textures.mean(record.texture);
+      for (int c = 0; c < 3; ++c)
+        albedo[c] *= linear(static_cast<float>(mean[static_cast<std::size_t>(c)]) / 255.0f);
+    }
+    set_vector(program.albedo, albedo, job.stats);
+  }
   glUniform1f(program.opacity, record.opacity);
   job.stats.bytes_uploaded += sizeof record.opacity;
 }
@@ -239,17 +282,21 @@ const void* index_pointer(std::uintptr_t offset) {
 void ModelPainter::draw(const PaintJob& job) {
   ++frame_;
   job.gl.set_depth_test(true);
+  lights_.build(bundle_, job.items, job.options);
   make_pieces(job);
   for (std::size_t i = 0; i < pieces_.size();) {
     const auto same_state = [&](const Piece& a, const Piece& b) {
       return a.program == b.program && a.material == b.material && a.layout == b.layout &&
-             a.mirrored == b.mirrored && !a.blended && !b.blended;
+             a.mirrored == b.mirrored && a.light == b.light && !a.blended && !b.blended;
     };
     std::size_t end = i + 1;
     while (end < pieces_.size() && same_state(pieces_[i], pieces_[end])) ++end;
     draw_group(job, std::span(pieces_).subspan(i, end - i));
     i = end;
   }
+  // Clearing obeys the masks.
+  job.gl.set_depth_writes(true);
+  job.gl.set_colour_writes(true);
 }
 
 void ModelPainter::make_pieces(const PaintJob& job) {
@@ -269,6 +316,7 @@ void ModelPainter::make_pieces(const PaintJob& job) {
     piece.program = command.program;
     piece.material = command.material;
     piece.layout = chunk_layouts_[command.chunk];
+    piece.light = lights_.of_item(command.item);
     piece.mesh = {command.level, level.vertex_count, level.index_count};
     piece.chunks = 1;
     piece.blended = command.blended;

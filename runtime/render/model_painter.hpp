@@ -13,6 +13,7 @@
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
 #include "runtime/render/gl.hpp"
+#include "runtime/render/light.hpp"
 #include "runtime/render/program.hpp"
 #include "runtime/render/texture_store.hpp"
 #include "runtime/render/vertex_format.hpp"
@@ -59,7 +60,8 @@ class ModelPainter {
   /// What a program's uniforms were last set to.
   struct ProgramState {
     ModelProgram program;
-    std::uint64_t frame = 0;  ///< projection and light are of this frame
+    std::uint64_t frame = 0;  ///< projection is of this frame
+    std::uint32_t light = kNone;
     std::uint32_t material = kNone;
     std::uint32_t item = kNone;
     std::uint32_t chunk = kNone;  ///< the one whose decoding is set
@@ -77,6 +79,7 @@ class ModelPainter {
     std::uint32_t program = 0;
     std::uint32_t material = 0;
     std::uint32_t layout = 0;
+    std::uint32_t light = 0;
     MeshRange mesh;
     int chunks = 0;
     bool blended = false;
@@ -99,6 +102,7 @@ class ModelPainter {
 
   void set_surface(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_frame(const PaintJob& job, ProgramState& state);
+  void set_light(const PaintJob& job, ProgramState& state, std::uint32_t light);
   void set_material(const PaintJob& job, ProgramState& state, std::uint32_t material);
   void set_slot(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,
@@ -116,6 +120,7 @@ class ModelPainter {
   std::vector<std::uint32_t> chunk_layouts_;
   std::vector<std::uint32_t> equal_material_;  ///< the first material with the same values
   std::vector<std::uint32_t> equal_layout_;    ///< the first layout with the same values
+  LightList lights_;
   std::vector<Piece> pieces_;
   std::vector<BatchPart> parts_;
   std::vector<Slot> slots_;

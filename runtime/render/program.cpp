@@ -17,6 +17,13 @@ const char* background_fragment_source() {
   return kBackgroundFragmentSource;
 }
 
+const char* shadow_vertex_source() {
+  return kShadowVertexSource;
+}
+const char* shadow_fragment_source() {
+  return kShadowFragmentSource;
+}
+
 namespace {
 
 std::string shader_log(GLuint shader) {
@@ -60,6 +67,7 @@ std::string model_defines(const ProgramKey& key) {
   if (key.textured) define("TEXTURED");
   if (key.alpha_twin) define("ALPHA_TWIN");
   if (key.coloured) define("COLOURED");
+  if (key.shiny) define("SHINY");
   if (key.slots == SlotKind::kAttributes) define("SLOT_ATTRIBUTES");
   if (key.slots == SlotKind::kStream) {
     char digits[12] = "";
@@ -106,11 +114,13 @@ Result<ModelProgram> make_model_program(const ProgramKey& key) {
   const auto place = [&](const char* name) { return glGetUniformLocation(program.id, name); };
   program.slots = place("u_slots");
   program.projection = place("u_projection");
-  program.ambient = place("u_ambient");
+  program.sky = place("u_sky");
+  program.to_key = place("u_key");
+  program.key_colour = place("u_key_colour");
   program.diffuse = place("u_diffuse");
   program.specular = place("u_specular");
   program.emission = place("u_emission");
-  program.light = place("u_light");
+  program.albedo = place("u_albedo");
   program.opacity = place("u_opacity");
   glUseProgram(program.id);
   glUniform1i(place("u_texture"), 0);

@@ -20,6 +20,7 @@ struct ProgramKey {
   bool textured = false;
   bool alpha_twin = false;
   bool coloured = false;
+  bool shiny = false;  ///< has a highlight or emission
   int slot_count = 1;  ///< of kStream
   bool operator==(const ProgramKey&) const = default;
 };
@@ -30,16 +31,18 @@ struct ModelProgram {
   GLuint id = 0;
   GLint slots = -1;
   GLint projection = -1;
-  GLint ambient = -1;
+  GLint sky = -1;
+  GLint to_key = -1;  ///< direction of the key light
+  GLint key_colour = -1;
   GLint diffuse = -1;
   GLint specular = -1;
   GLint emission = -1;
-  GLint light = -1;
+  GLint albedo = -1;
   GLint opacity = -1;
 };
 
 /// Vertex uniform vectors that a model program needs beside its slots.
-inline constexpr int kFixedUniformVectors = 4 + 5;
+inline constexpr int kFixedUniformVectors = 4 + 7 + 2 + 4;
 
 /// Links sources under "#version 100" and `defines` (each a line). Attribute locations are those of
 /// AttributeSlot by name. Errors: kUnsupported "gl.shader", "gl.program" with the driver's log.
@@ -48,6 +51,9 @@ Result<GLuint> link_program(const std::string& defines, const char* vertex, cons
 /// The camera picture's shaders; their defines: see shaders/background.frag.
 const char* background_vertex_source();
 const char* background_fragment_source();
+
+const char* shadow_vertex_source();
+const char* shadow_fragment_source();
 
 /// Leaves the program in use, its samplers set to units 0 and 1.
 Result<ModelProgram> make_model_program(const ProgramKey& key);

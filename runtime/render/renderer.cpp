@@ -13,6 +13,7 @@
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
 #include "runtime/render/gl.hpp"
+#include "runtime/render/ground.hpp"
 #include "runtime/render/model_painter.hpp"
 #include "runtime/render/picture.hpp"
 #include "runtime/render/program.hpp"
@@ -24,8 +25,9 @@ namespace {
 std::vector<VertexFormat> vertex_formats(const BundleView& bundle, const GlCaps& caps) {
   std::vector<VertexFormat> formats;
   for (std::uint32_t i = 0; i < bundle.layouts().size(); ++i) {
-    formats.push_back(
-        vertex_format(bundle.layouts()[i], caps.half_float_vertices ? caps.half_float_type : 0));
+    formats.push_back(vertex_format(bundle.layouts()[i],
+                                    caps.half_float_vertices ? caps.half_float_type : 0,
+                                    occlusion_byte(bundle.occlusion(), i)));
   }
   return formats;
 }
@@ -145,6 +147,7 @@ struct Renderer::State {
     MODAR_TRY(geometry.upload());
     MODAR_TRY(painter.create(textures, extensions, caps));
     MODAR_TRY(background.create());
+    MODAR_TRY(ground.create(bundle));
     gl.reset();
     return {};
   }
@@ -165,6 +168,7 @@ struct Renderer::State {
   }
 
   void draw_models(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
+    ground.draw_shadows(bundle, projection, items, gl, stats);
     list.build(bundle, painter.setups(), projection, height, items, options.lod_pixels);
     stats.chunks_culled = list.culled();
     if (geometry.streams()) {
@@ -172,6 +176,7 @@ struct Renderer::State {
       stats.chunks_skipped = keep_resident();
     }
     list.sort_by_state(bundle);
+    if (options.plane_hides) ground.hide_below(bundle, projection, items, gl, stats);
     painter.draw({list, items, projection, options, geometry, textures, gl, stats});
   }
 
@@ -202,6 +207,7 @@ struct Renderer::State {
   TextureStore textures;
   ModelPainter painter;
   Background background;
+  Ground ground;
   Target target;
   DrawList list;
   RenderOptions options;
@@ -223,6 +229,7 @@ Renderer::~Renderer() {
   state_->textures.release(state_->gl);
   state_->painter.release(state_->gl);
   state_->background.release(state_->gl);
+  state_->ground.release(state_->gl);
   state_->target.release(state_->gl);
 }
 

@@ -14,6 +14,18 @@ bool power_of_two(const TextureRecord& texture) {
   return is_power_of_two(texture.width) && is_power_of_two(texture.height);
 }
 
+/// Middle gray where the texture has no level of one texel.
+Rgb8 mean_of(const BundleView& bundle, std::uint32_t texture) {
+  Rgb8 mean{127, 127, 127};
+  const TextureRecord& record = bundle.textures()[texture];
+  const TextureLevelRecord& last =
+      bundle.texture_levels()[record.first_level + record.level_count - 1];
+  if (last.width != 1 || last.height != 1) return mean;
+  find_texture_format(record.format)
+      ->decode(bundle.texture_data(texture).subspan(last.offset, last.size), 1, 1, 3, mean);
+  return mean;
+}
+
 }  // namespace
 
 TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
@@ -27,6 +39,7 @@ TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
   first_level_.assign(count, 0);
   colours_.assign(count, 0);
   alphas_.assign(count, 0);
+  for (std::uint32_t i = 0; i < count; ++i) means_.push_back(mean_of(bundle, i));
   for (std::uint32_t i = 0; i < bundle.materials().size(); ++i) {
     const std::uint32_t texture = bundle.materials()[i].texture;
     if (texture != kNone) used_[texture] = true;

@@ -51,7 +51,7 @@ bool has_halves(const LayoutRecord& layout) {
 
 }  // namespace
 
-VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type) {
+VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type, std::uint32_t occlusion) {
   VertexFormat format;
   format.source_stride = layout.stride;
   format.widened = half_type == 0 && has_halves(layout);
@@ -69,6 +69,11 @@ VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type) {
     attribute.normalised = record.normalised != 0 ? GLboolean{GL_TRUE} : GLboolean{GL_FALSE};
     attribute.source_offset = record.offset;
     attribute.bytes = component_bytes(record.type) * record.components;
+    if (semantic == Semantic::kNormal && type == ComponentType::kI8 && record.normalised != 0 &&
+        occlusion == record.offset + attribute.bytes) {
+      ++attribute.components;
+      ++attribute.bytes;
+    }
     attribute.offset = format.widened ? end : record.offset;
     // Attributes of a rewritten vertex start at multiples of 4, which every GPU reads fastest.
     end += ((widen ? 2 * attribute.bytes : attribute.bytes) + 3) & ~3u;

@@ -32,8 +32,9 @@ struct VertexFormat {
 };
 
 /// half_type: what the context calls half floats; 0: it reads none. Attributes of unknown semantics
-/// are left out.
-VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type);
+/// are left out. occlusion: see occlusion_byte(); behind a normal of bytes, it is that attribute's
+/// fourth component, elsewhere it is not looked at.
+VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type, std::uint32_t occlusion);
 
 /// Rewrites vertices of format.source_stride to format.stride. to.size() and from.size() hold the
 /// same number of whole vertices.

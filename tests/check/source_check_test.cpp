@@ -76,7 +76,7 @@ class SourceTest : public ::testing::Test {
     request.parameters = {"none"};
     request.loop.trial_views = 8;
     request.loop.score = false;
-    request.scenes = {{"card", "two", 0.5, UpAxis::kY, false, {0.1, 0, 0}}};
+    request.scenes = {{"card", "two", 0.5, UpAxis::kY, false, {0.1, 0, 0}, ""}};
     Report report;
     auto built = build_bundle(request, report);
     ASSERT_TRUE(built) << to_line(built.error());

@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
   if (modar_renderer_create(bundle, "nokia", 0, &e) || e.exit_code != 1) return 16;
   modar_renderer* renderer = modar_renderer_create(bundle, argv[2], 0, &e);
   if (!renderer || modar_renderer_resize(renderer, 64, 48, &e)) return 17;
-  modar_item items[2] = {{0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -4, 1}}, {99, {0}}};
+  modar_item items[2] = {{0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -4, 1}, 0, {0}}, {99, {0}, 0, {0}}};
   modar_renderer_render(renderer, NULL, &camera, NULL, items, 2);
   modar_renderer_read_rgba(renderer, rgba);
   modar_render_stats stats = modar_renderer_stats(renderer);

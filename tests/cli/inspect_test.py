@@ -19,7 +19,7 @@ KEYS = {
 class Inspect(ProgramTest):
     def test_the_keys_are_a_contract(self):
         report = self.modar_json("inspect", self.bake_demo())
-        self.assertEqual(report["format"], {"major": 1, "minor": 1})
+        self.assertEqual(report["format"], {"major": 1, "minor": 2})
         for table, keys in KEYS.items():
             self.assertEqual(len(report[table]), 1, table)
             self.assertLessEqual(keys, set(report[table][0]), table)

@@ -31,7 +31,8 @@ void expect_bytes(std::span<const std::byte> got, std::span<const std::byte> wan
 }
 
 TEST(Bundle, RoundTripGivesTheSameContent) {
-  const BundleContent content = golden_content();
+  BundleContent content = golden_content();
+  add_looks(content);
   const Bytes bytes = encode(content);
   const auto view = BundleView::open(bytes);
   ASSERT_TRUE(view) << to_line(view.error());
@@ -47,6 +48,10 @@ TEST(Bundle, RoundTripGivesTheSameContent) {
   expect_table(view->patterns(), content.patterns, "patterns");
   expect_table(view->parameter_sets(), content.parameter_sets, "parameter sets");
   expect_table(view->scenes(), content.scenes, "scenes");
+  expect_table(view->lights(), content.lights, "lights");
+  expect_table(view->occlusion(), content.occlusion, "occlusion");
+  expect_bytes(view->section(SectionType::kShadow, 1), content.shadows[1], "shadow");
+  EXPECT_TRUE(view->section(SectionType::kShadow, 0).empty());
   expect_bytes(view->vertices(), content.vertices, "vertices");
   expect_bytes(view->indices(), content.indices, "indices");
   expect_bytes(view->texture_data(0), content.texture_data[0], "texture data");

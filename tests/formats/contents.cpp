@@ -360,4 +360,26 @@ BundleContent golden_content() {
   return content;
 }
 
+void add_looks(BundleContent& content) {
+  LightRecord light{};
+  light.scene = 1;
+  for (int i = 0; i < 27; ++i) light.sky[i] = 0.5f - 0.03125f * static_cast<float>(i);
+  light.direction[0] = 0.6f;
+  light.direction[2] = 0.8f;
+  light.key[0] = 0.5f;
+  light.key[1] = 0.25f;
+  content.lights.push_back(light);
+  // Behind the three bytes of the normal, of the first model's six vertices.
+  content.occlusion.push_back({0, 11});
+  for (std::size_t v = 0; v < 6; ++v) {
+    content.vertices[v * 16 + 11] = static_cast<std::byte>(127 - 20 * v);
+  }
+  const ShadowHeader shadow{3, 2, {-1.0f, -0.5f}, {1.25f, 0.75f}, {}};
+  content.shadows.resize(2);
+  const auto header = std::as_bytes(std::span(&shadow, 1));
+  content.shadows[1].assign(header.begin(), header.end());
+  for (int i = 0; i < 6; ++i) put(content.shadows[1], static_cast<std::uint8_t>(255 - 30 * i));
+  content.materials[1].flags |= kMaterialOccluder;
+}
+
 }  // namespace modar::test

@@ -287,6 +287,28 @@ json dump_scenes(const BundleView& view) {
   return rows;
 }
 
+json dump_lights(const BundleView& view) {
+  json rows = json::array();
+  for (std::uint32_t i = 0; i < view.lights().size(); ++i) {
+    const LightRecord& record = view.lights()[i];
+    json out;
+    GET(scene), GET(sky), GET(direction), GET(key);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_occlusion(const BundleView& view) {
+  json rows = json::array();
+  for (std::uint32_t i = 0; i < view.occlusion().size(); ++i) {
+    const OcclusionRecord& record = view.occlusion()[i];
+    json out;
+    GET(layout), GET(offset);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
 json dump_sections_and_features(const BundleView& view, json& features) {
   json rows = json::array();
   features = json::array();
@@ -330,6 +352,8 @@ json dump(const BundleView& view) {
           {"patterns", dump_patterns(view)},
           {"parameter_sets", dump_parameter_sets(view)},
           {"scenes", dump_scenes(view)},
+          {"lights", dump_lights(view)},
+          {"occlusion", dump_occlusion(view)},
           {"features", features}};
 }
 

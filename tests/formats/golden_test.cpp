@@ -42,17 +42,20 @@ std::string quoted(const std::string& path) {
   return "\"" + path + "\"";
 }
 
-/// A released file never changes. Version 1.1 is 1.0 and a content summary, so its writer makes
-/// both.
+/// A released file never changes. Version 1.1 is 1.0 and a content summary, 1.2 that with light,
+/// occlusion and a shadow, so its writer makes all.
 TEST(GoldenFiles, WriterMakesTheReleasedBytes) {
   BundleContent content = golden_content();
   EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_0.modar")));
   content.summary = content_summary_of(content);
   EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_1.modar")));
+  add_looks(content);
+  content.summary = content_summary_of(content);
+  EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_2.modar")));
 }
 
 class Golden : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Versions, Golden, ::testing::Values("v1_0", "v1_1"));
+INSTANTIATE_TEST_SUITE_P(Versions, Golden, ::testing::Values("v1_0", "v1_1", "v1_2"));
 
 TEST_P(Golden, BothReadersDecodeTheSame) {
   const std::string path = source_path(std::string("tests/golden/") + GetParam() + ".modar");

@@ -131,6 +131,9 @@ std::map<std::string, Struct> compiled() {
                F(descriptor_bits), F(max_distance), F(min_matches), F(min_inliers),
                F(ransac_threshold), F(reserved))
   MODAR_STRUCT(SceneRecord, F(pattern), F(model), F(scale), F(offset), F(rotation), F(reserved))
+  MODAR_STRUCT(LightRecord, F(scene), F(reserved0), F(sky), F(direction), F(key), F(reserved1))
+  MODAR_STRUCT(OcclusionRecord, F(layout), F(offset))
+  MODAR_STRUCT(ShadowHeader, F(width), F(height), F(low), F(high), F(reserved))
   MODAR_STRUCT(FeatureHeader, F(count), F(descriptor_bytes), F(keypoints_offset),
                F(descriptors_offset), F(reserved))
   MODAR_STRUCT(KeypointRecord, F(x), F(y), F(size), F(angle), F(response), F(octave), F(class_id))
@@ -215,9 +218,12 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
       {SectionType::kPatterns, "patterns"},
       {SectionType::kParameterSets, "parameter sets"},
       {SectionType::kScenes, "scenes"},
+      {SectionType::kLights, "lights"},
+      {SectionType::kOcclusion, "occlusion"},
       {SectionType::kMappedFeatures, "feature twin"},
       {SectionType::kFeatureYml, "feature text"},
       {SectionType::kTrackerRecord, "tracker record"},
+      {SectionType::kShadow, "shadow"},
       {SectionType::kVertices, "vertices"},
       {SectionType::kIndices, "indices"},
       {SectionType::kTextureData, "texture data"}};

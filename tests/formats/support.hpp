@@ -27,6 +27,10 @@ BundleContent texture_content();
 /// patterns, 2 scenes, an unknown optional section.
 BundleContent golden_content();
 
+/// Adds what version 1.2 added to a golden_content(): lights, occlusion, a shadow, a material that
+/// hides.
+void add_looks(BundleContent& content);
+
 /// Encodes or ends the program: test contents are never wrong.
 Bytes encode(const BundleContent& content);
 

@@ -66,4 +66,45 @@ TEST(TriangleTree, FindsWhatTryingAllFinds) {
   }
 }
 
+TEST(TriangleTree, RaysMeetWhatTryingAllMeets) {
+  std::mt19937 random(5);
+  std::vector<glm::dvec3> positions;
+  std::vector<TriangleTree::Triangle> triangles;
+  for (std::uint32_t t = 0; t < 200; ++t) {
+    const glm::dvec3 at = draw(random);
+    for (int corner = 0; corner < 3; ++corner) positions.push_back(at + 0.3 * draw(random));
+    triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  const TriangleTree tree(positions, triangles);
+  int hits = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const glm::dvec3 origin = 1.5 * draw(random);
+    const glm::dvec3 direction = draw(random);
+    double nearest = 2.0;
+    for (const auto& t : triangles) {
+      // A plane and three half planes, by signed volumes.
+      const glm::dvec3 n =
+          glm::cross(positions[t[1]] - positions[t[0]], positions[t[2]] - positions[t[0]]);
+      const double at = glm::dot(positions[t[0]] - origin, n) / glm::dot(direction, n);
+      const glm::dvec3 p = origin + at * direction;
+      bool inside = at >= 0.05 && at < nearest;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const glm::dvec3& a = positions[t[i]];
+        inside = inside && glm::dot(glm::cross(positions[t[(i + 1) % 3]] - a, p - a), n) >= 0;
+      }
+      if (inside) nearest = at;
+    }
+    const auto found = tree.first_hit(origin, direction, 0.05, 2.0);
+    ASSERT_EQ(found.has_value(), nearest < 2.0) << trial;
+    if (!found) continue;
+    ++hits;
+    EXPECT_NEAR(found->distance, nearest, 1e-9);
+    const auto& t = found->triangle;
+    const glm::dvec3 point = positions[t[0]] + found->b * (positions[t[1]] - positions[t[0]]) +
+                             found->c * (positions[t[2]] - positions[t[0]]);
+    EXPECT_NEAR(glm::length(point - (origin + nearest * direction)), 0.0, 1e-9);
+  }
+  EXPECT_GT(hits, 50);
+}
+
 }  // namespace

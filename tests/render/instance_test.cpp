@@ -93,8 +93,8 @@ TEST_F(InstanceTest, TenCopiesAreOneCallByMatrixArray) {
   const RenderStats stats = compare(models(1), without_instances(), scattered(10, 1));
   EXPECT_EQ(stats.draw_calls, 1);
   EXPECT_EQ(stats.chunks_drawn, 10);
-  // Ten slots of four vectors, the projection, light and five material uniforms; no buffer.
-  EXPECT_EQ(stats.bytes_uploaded, 10u * 64 + 64 + 16 + 4 * 16 + 4);
+  // Ten slots of four vectors, the projection, nine of light, a colour and the opacity; no buffer.
+  EXPECT_EQ(stats.bytes_uploaded, 10u * 64 + 64 + 9 * 16 + 16 + 4);
 }
 
 TEST_F(InstanceTest, TenCopiesAreOneCallByInstancedArrays) {
@@ -134,7 +134,7 @@ TEST_F(InstanceTest, TenCopiesLookAsTheRaysSay) {
 }
 
 TEST_F(InstanceTest, CallsAreSplitByTheUniformLimit) {
-  // 128 vectors less 9 for the rest: 29 slots of 4.
+  // 128 vectors less 17 for the rest: 27 slots of 4.
   EXPECT_EQ(compare(models(1), without_instances(), scattered(70, 1)).draw_calls, 3);
 }
 

@@ -274,8 +274,8 @@ MaterialRecord flat_material() {
 
 RenderOptions flat_light() {
   RenderOptions options;
-  options.ambient_strength = 0.0f;
-  options.light_strength = 1.0f;
+  options.light = RoomLight{};
+  options.light->key = glm::vec3(1.0f);
   return options;
 }
 

@@ -31,7 +31,8 @@ MaterialRecord material_record(const SourceMaterial& source) {
   m.shininess = source.shininess;
   m.opacity = source.opacity;
   m.texture = kNone;
-  m.flags = source.two_sided ? kMaterialTwoSided : 0u;
+  m.flags =
+      (source.two_sided ? kMaterialTwoSided : 0u) | (source.occluder() ? kMaterialOccluder : 0u);
   return m;
 }
 
@@ -237,6 +238,7 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   out.name = mesh.name;
   VertexOffsets offsets;
   out.layout = make_layout(mesh, options.positions, offsets);
+  if (offsets.occlusion != 0) out.occlusion_byte = offsets.occlusion;
   fill_model_record(chunked, options, out.record);
   for (const SourceMaterial& m : mesh.materials) out.materials.push_back(material_record(m));
   out.sources = mesh.materials;

@@ -18,6 +18,7 @@ struct PackedMesh {
   std::string name;
   ModelRecord record{};
   LayoutRecord layout{};
+  std::uint32_t occlusion_byte = kNone;  ///< of each vertex; see OcclusionRecord
   std::vector<ChunkRecord> chunks;
   std::vector<LevelRecord> levels;
   std::vector<MaterialRecord> materials;

@@ -152,6 +152,7 @@ LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& 
   if (kind == PositionKind::kHalf) {
     offsets.normal = 8;
     offsets.stride = 12;
+    if (!mesh.occlusion.empty()) offsets.occlusion = 11;
     add(Semantic::kPosition, ComponentType::kHalf, 3, false, 0);
     add(Semantic::kNormal, ComponentType::kI8, 3, true, offsets.normal);
   } else {
@@ -235,6 +236,7 @@ void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange
     }
     errors_.position.add(glm::length(glm::dvec3(decoded[i]) - p));
     if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
+    if (offsets_.occlusion != 0) bytes[offsets_.occlusion] = std::byte{mesh_.occlusion[v]};
     if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
   }
 }

@@ -73,6 +73,7 @@ typedef struct modar_scene {
   uint32_t pattern;
   uint32_t model;
   float place[16];
+  uint32_t number; /* its index plus 1 */
 } modar_scene;
 /* 1 and the scene, or 0 for no such index. */
 int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scene);
@@ -154,12 +155,14 @@ void modar_view(const modar_pose* pose, float view[16]);
 modar_context* modar_context_create(modar_error* error);
 void modar_context_destroy(modar_context* context);
 
-/* A model of the bundle to draw. to_eye: model space to GL's eye space. */
+/* A model of the bundle to draw. to_eye: model space to GL's eye space. Set to 0 what you do not know. */
 typedef struct modar_item {
   uint32_t model;
   float to_eye[16];
+  uint32_t scene;         /* the number of the scene whose light it has; 0: a neutral room's */
+  float world_to_eye[16]; /* the pattern, which light is fixed to, to GL's eye space; zeros: a level camera's world */
 } modar_item;
-/* to_eye = view * place. */
+/* to_eye = view * place, world_to_eye = view. */
 void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose);
 
 enum { MODAR_RGB = 0, MODAR_NV21 = 1, MODAR_NV12 = 2, MODAR_I420 = 3 };
@@ -195,9 +198,9 @@ int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar
 /* How to draw. modar_render_options_default() fills it, `size` too; later versions append. */
 typedef struct modar_render_options {
   size_t size;
-  float light[3]; /* direction to the light in eye space, any length > 0 */
-  float light_strength;
-  float ambient_strength;
+  float light[3];         /* to a key light, pattern space (z towards the viewer); zeros: each scene's own light */
+  float light_strength;   /* factor on the key light */
+  float ambient_strength; /* factor on what comes from all around */
   float clear_colour[4];
   float lod_pixels; /* a level of detail may be off by so much on the screen */
   int exclusive;    /* 1 if nobody else draws in the context; 0: every call leaves GL's state as it found it */
@@ -206,7 +209,7 @@ void modar_render_options_default(modar_render_options* options);
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options);
 /* Bytes that the bundle takes in GL memory now. */
 uint64_t modar_renderer_gpu_bytes(const modar_renderer* renderer);
-/* exclusive: 1 if nobody else draws in the context between frames: what is set then stays set. */
+/* direction: as modar_render_options.light. exclusive: 1 if nobody else draws in the context between frames: what is set then stays set. */
 void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive);
 /* Where a camera's frame and its models go in the framebuffer that is bound: pixels, (0, 0) at the bottom left. What is
  * upright there is the frame turned clockwise. Set `size` to sizeof(modar_surface) and what you do not know to 0. */

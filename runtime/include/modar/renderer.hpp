@@ -32,7 +32,31 @@ namespace modar {
 struct DrawItem {
   std::uint32_t model = 0;
   glm::mat4 to_eye{1.0f};
+  std::uint32_t scene = kNone;  ///< whose light falls on it; kNone: a neutral room's
+  /// The world that light is fixed to (a pattern's: x right, y up, z towards the viewer, which is
+  /// where the ceiling is) to eye space; see gl_view(). Else the world of a camera held level.
+  glm::mat4 world_to_eye{1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
 };
+
+/// Light in a world whose z points up to the ceiling. Linear light; 1: a white surface that gets so
+/// much is as bright as the picture's white.
+struct RoomLight {
+  /// What a white surface of unit normal (x, y, z) gets from all around: the sum of each
+  /// coefficient times its polynomial 1, y, z, x, xy, yz, 3 z^2 - 1, zx, x^2 - y^2. Those are
+  /// spherical harmonics without their factors.
+  std::array<glm::vec3, 9> sky{};
+  glm::vec3 direction{0.0f, 0.0f, 1.0f};  ///< to the key light, any length > 0
+  glm::vec3 key{0.0f};  ///< what the key light gives a white surface that faces it
+};
+/// Materials with a greater exponent have this one: lit by vertex, narrower highlights flicker. Set
+/// by hand, on pictures.
+inline constexpr float kMostShininess = 40.0f;
+
+/// A neutral room, lit from above: what everything stands in that has no light of its own.
+RoomLight neutral_room();
+RoomLight light_of_record(const LightRecord& record);
+/// What the bundle states of a scene's light, else neutral_room(). scene: any number.
+RoomLight scene_light(const BundleView& bundle, std::uint32_t scene);
 
 enum class PictureFormat : std::uint8_t {
   kRgb,   ///< one plane, 3 bytes a pixel
@@ -101,9 +125,10 @@ struct GpuMemory {
 
 /// How to draw. May change from frame to frame.
 struct RenderOptions {
-  glm::vec3 light{0.25f, 0.45f, 0.85f};  ///< direction to the light in eye space, any length > 0
-  float light_strength = 0.7f;           ///< times a material's diffuse and specular colour
-  float ambient_strength = 0.3f;         ///< times its ambient colour
+  std::optional<RoomLight> light;  ///< of all items; nothing: each scene's own
+  float light_strength = 1.0f;     ///< factor on the key light
+  float ambient_strength = 1.0f;   ///< factor on what comes from all around
+  bool plane_hides = false;  ///< the patterns of items' scenes hide what lies under their planes
   glm::vec4 clear_colour{0.0f, 0.0f, 0.0f, 1.0f};
   /// Nobody else draws in the context between frames: what is set then stays set. False: every call
   /// leaves the context as it found it (framebuffer, vertex array object, program, buffers,

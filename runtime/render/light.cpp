@@ -1,0 +1,106 @@
+// A room's light as a polynomial of the normal, and its turn from world to eye.
+#include "runtime/render/light.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+namespace modar {
+namespace {
+
+glm::mat3 rotation_of(const glm::mat4& matrix) {
+  glm::mat3 turn;
+  for (int i = 0; i < 3; ++i) {
+    const glm::vec3 axis(matrix[i]);
+    const float length = glm::length(axis);
+    turn[i] = length > 0.0f ? axis / length : axis;
+  }
+  return turn;
+}
+
+bool same_light(const DrawItem& a, const DrawItem& b) {
+  return a.scene == b.scene &&
+         std::memcmp(&a.world_to_eye, &b.world_to_eye, sizeof a.world_to_eye) == 0;
+}
+
+}  // namespace
+
+RoomLight neutral_room() {
+  // A bright ceiling, gray walls and a floor that gives back some of it; a lamp over the viewer's
+  // left shoulder. White that looks up gets 1.0 in all, a wall 0.4, what looks down 0.25: set by
+  // hand, on pictures.
+  RoomLight room;
+  room.sky[0] = {0.425f, 0.430f, 0.440f};
+  room.sky[1] = glm::vec3(-0.020f);
+  room.sky[2] = {0.175f, 0.180f, 0.190f};
+  room.sky[3] = glm::vec3(-0.030f);
+  room.direction = {-0.47f, -0.33f, 0.82f};
+  room.key = {0.520f, 0.505f, 0.480f};
+  return room;
+}
+
+RoomLight light_of_record(const LightRecord& record) {
+  RoomLight light;
+  for (std::size_t k = 0; k < light.sky.size(); ++k) {
+    light.sky[k] = {record.sky[3 * k], record.sky[3 * k + 1], record.sky[3 * k + 2]};
+  }
+  light.direction = {record.direction[0], record.direction[1], record.direction[2]};
+  light.key = {record.key[0], record.key[1], record.key[2]};
+  return light;
+}
+
+RoomLight scene_light(const BundleView& bundle, std::uint32_t scene) {
+  for (std::uint32_t i = 0; i < bundle.lights().size(); ++i) {
+    if (bundle.lights()[i].scene == scene) return light_of_record(bundle.lights()[i]);
+  }
+  return neutral_room();
+}
+
+EyeLight turn_light(const RoomLight& light, const glm::mat4& world_to_eye, float ambient_strength,
+                    float light_strength) {
+  const glm::mat3 turn = rotation_of(world_to_eye);
+  const glm::mat3 back = glm::transpose(turn);
+  EyeLight eye;
+  for (int c = 0; c < 3; ++c) {
+    const auto at = [&](std::size_t i) { return light.sky[i][c] * ambient_strength; };
+    // The quadratic part as a symmetric matrix without trace: p = n^T q n.
+    const glm::mat3 q = {glm::vec3(at(8) - at(6), 0.5f * at(4), 0.5f * at(7)),
+                         glm::vec3(0.5f * at(4), -at(8) - at(6), 0.5f * at(5)),
+                         glm::vec3(0.5f * at(7), 0.5f * at(5), 2.0f * at(6))};
+    const glm::mat3 e = turn * q * back;
+    const glm::vec3 linear = turn * glm::vec3(at(3), at(1), at(2));
+    // With x^2 + y^2 + z^2 = 1: the diagonal is (e00 - e11) / 2 (x^2 - y^2) + 3/2 e22 z^2 - e22
+    // / 2.
+    const std::size_t channel = static_cast<std::size_t>(c);
+    eye.sky[channel] = glm::vec4(linear, at(0) - 0.5f * e[2][2]);
+    eye.sky[3 + channel] = {2.0f * e[1][0], 2.0f * e[2][1], 1.5f * e[2][2], 2.0f * e[2][0]};
+    eye.sky[6][c] = 0.5f * (e[0][0] - e[1][1]);
+  }
+  const float length = glm::length(light.direction);
+  eye.key = glm::vec4(length > 0.0f ? turn * light.direction / length : glm::vec3(0.0f), 0.0f);
+  eye.key_colour = glm::vec4(light.key * light_strength, 1.0f);
+  return eye;
+}
+
+void LightList::build(const BundleView& bundle, std::span<const DrawItem> items,
+                      const RenderOptions& options) {
+  lights_.clear();
+  first_item_.clear();
+  of_item_.clear();
+  for (std::uint32_t i = 0; i < items.size(); ++i) {
+    const auto same =
+        std::find_if(first_item_.begin(), first_item_.end(),
+                     [&](std::uint32_t first) { return same_light(items[first], items[i]); });
+    of_item_.push_back(static_cast<std::uint32_t>(same - first_item_.begin()));
+    if (same != first_item_.end()) continue;
+    first_item_.push_back(i);
+    RoomLight light = options.light ? *options.light : scene_light(bundle, items[i].scene);
+    lights_.push_back(
+        turn_light(light, items[i].world_to_eye, options.ambient_strength, options.light_strength));
+  }
+}
+
+}  // namespace modar
