@@ -2,6 +2,7 @@
 // lacks with anything: reads beyond the end are noted, and refused.
 #include <cmath>
 #include <memory>
+#include <string_view>
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -64,6 +65,34 @@ TgaQuirks tga_quirks(std::span<const std::byte> bytes) {
 /// Pixels of the longest run that a packet of two bytes can hold.
 constexpr std::size_t kLongestRun = 128;
 
+/// Whether the rows of a Radiance file with runs are all there: stb_image waits for ever for what
+/// lacks. Rows without runs are left to it.
+bool whole_runs(std::span<const std::byte> bytes, std::size_t width, std::size_t height) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::size_t header = text.find("\n\n");
+  if (header == std::string_view::npos) return false;
+  const std::size_t size_line = text.find('\n', header + 2);
+  if (size_line == std::string_view::npos) return false;
+  std::size_t at = size_line + 1;
+  const auto byte = [&](std::size_t i) {
+    return i < bytes.size() ? std::to_integer<std::size_t>(bytes[i]) : 0;
+  };
+  for (std::size_t row = 0; row < height; ++row) {
+    const bool runs = byte(at) == 2 && byte(at + 1) == 2 && byte(at + 2) < 128;
+    if (!runs) return row == 0;
+    at += 4;
+    for (std::size_t left = 4 * width; left > 0;) {
+      const std::size_t code = byte(at);
+      const std::size_t count = code > 128 ? code - 128 : code;
+      if (count == 0 || count > (left - 1) % width + 1) return false;
+      left -= count;
+      at += code > 128 ? 2 : 1 + count;
+    }
+    if (at > bytes.size()) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Result<LinearImage> decode_radiance(std::span<const std::byte> bytes, const std::string& name) {
@@ -79,6 +108,8 @@ Result<LinearImage> decode_radiance(std::span<const std::byte> bytes, const std:
   MODAR_TRY(check_image_size(columns, rows, name));
   const auto truncated = [&] { return damaged_image(name, "the file ends before its image does"); };
   if (columns * rows > bytes.size() * kLongestRun) return truncated();  // before it is allocated
+  const bool with_runs = columns >= 8 && columns < 32768;
+  if (with_runs && !whole_runs(bytes, columns, rows)) return truncated();
   StbFile file{{bytes}};
   const std::unique_ptr<float, void (*)(void*)> pixels(
       stbi_loadf_from_callbacks(&kCallbacks, &file, &width, &height, &channels, 4),

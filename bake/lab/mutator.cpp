@@ -87,8 +87,9 @@ const char* semantic_name(std::uint8_t semantic) {
   return "vertex";
 }
 
+/// occlusion: the byte of a vertex that holds it, or kNone.
 void add_level(Collector& out, const LayoutRecord& layout, const LevelRecord& level,
-               std::uint64_t vertices, std::uint64_t indices) {
+               std::uint32_t occlusion, std::uint64_t vertices, std::uint64_t indices) {
   std::array<bool, kMaxVertexStride> owned{};
   const std::uint64_t first = vertices + level.vertex_offset;
   for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
@@ -103,7 +104,8 @@ void add_level(Collector& out, const LayoutRecord& layout, const LevelRecord& le
   }
   for (std::uint64_t byte = 0; byte < layout.stride; ++byte) {
     if (owned[byte]) continue;
-    out.add("vertex padding", FieldType::kU8, {first + byte, layout.stride, level.vertex_count});
+    out.add(byte == occlusion ? "vertex occlusion" : "vertex padding", FieldType::kU8,
+            {first + byte, layout.stride, level.vertex_count});
   }
   out.add("index", FieldType::kU16, {indices + level.index_offset, 2, level.index_count});
 }
@@ -118,7 +120,8 @@ void add_geometry(Collector& out, const BundleView& bundle) {
       const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         add_level(out, bundle.layouts()[model.layout], bundle.levels()[chunk.first_level + l],
-                  place(bundle.vertices()), place(bundle.indices()));
+                  occlusion_byte(bundle.occlusion(), model.layout), place(bundle.vertices()),
+                  place(bundle.indices()));
       }
     }
   }
@@ -131,6 +134,12 @@ void add_twin(Collector& out, const SectionEntry& entry, const FeatureHeader& he
   out.add("descriptor", FieldType::kU8,
           {entry.offset + header.descriptors_offset, 1,
            std::uint64_t{header.count} * header.descriptor_bytes});
+}
+
+void add_shadow(Collector& out, const SectionEntry& entry) {
+  out.add_records(record_info("ShadowHeader"), entry.offset, sizeof(ShadowHeader), 1);
+  out.add("shadow texel", FieldType::kU8,
+          {entry.offset + sizeof(ShadowHeader), 1, entry.size - sizeof(ShadowHeader)});
 }
 
 void add_section(Collector& out, const BundleView& bundle, const SectionEntry& entry) {
@@ -160,6 +169,8 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
       return add_twin(
           out, entry,
           *reinterpret_cast<const FeatureHeader*>(bundle.bytes().data() + entry.offset));
+    case SectionType::kShadow:
+      return add_shadow(out, entry);
     default:
       return;
   }

@@ -63,6 +63,9 @@ size_t collect_items(float turn, float size) {
     engine.items[count].model = scene.model;
     std::memcpy(engine.items[count].to_eye, glm::value_ptr(to_eye),
                 sizeof engine.items[count].to_eye);
+    engine.items[count].scene = scene.number;
+    std::memcpy(engine.items[count].world_to_eye, pose.view,
+                sizeof engine.items[count].world_to_eye);
     ++count;
   }
   return count;

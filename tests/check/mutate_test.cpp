@@ -21,6 +21,7 @@ using namespace modar::test;
 /// All of the format, with a content summary.
 Bytes summarised_bundle() {
   BundleContent content = golden_content();
+  add_looks(content);
   content.summary = content_summary_of(content);
   return encode(content);
 }
@@ -71,7 +72,8 @@ TEST(Mutate, SpreadsOverEveryFieldOfTheSpecification) {
   for (const char* payload :
        {"names", "meta", "statement", "feature text", "descriptor", "texture block", "index",
         "vertex position", "vertex normal", "vertex octahedral normal", "vertex uv",
-        "vertex colour", "vertex padding", "padding between sections"}) {
+        "vertex colour", "vertex occlusion", "vertex padding", "shadow texel",
+        "padding between sections"}) {
     EXPECT_TRUE(names.contains(payload)) << payload;
   }
 }

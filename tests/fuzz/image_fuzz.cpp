@@ -4,9 +4,12 @@
 #include <cstdlib>
 
 #include "bake/image/image.hpp"
+#include "bake/image/resample.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto bytes = std::as_bytes(std::span(data, size));
+  const modar::Result<modar::LinearImage> light = modar::decode_linear_image(bytes, "fuzz");
+  if (light && light->pixels.size() != std::size_t{4} * light->width * light->height) std::abort();
   const modar::Result<modar::RgbaImage> image = modar::decode_image(bytes, "fuzz");
   if (!image) {
     if (image.error().code.empty()) std::abort();
