@@ -39,11 +39,11 @@ for bundle in "${bundles[@]}"; do
   [ "$(head -c 8 "$bundle" 2>/dev/null | tr -d '\0')" != "" ] || stop 2 "$bundle cannot be read"
 done
 missing=()
-for tool in javac aapt zipalign apksigner keytool python3; do
+for tool in javac aapt zipalign apksigner keytool python3 xz; do
   command -v $tool >/dev/null || missing+=("$tool")
 done
 [ ${#missing[@]} -eq 0 ] ||
-  stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless python3"
+  stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless python3 xz-utils"
 framework=/usr/share/android-framework-res/framework-res.apk
 [ -r $framework ] || stop 5 "missing: $framework; apt-get install android-framework-res"
 
