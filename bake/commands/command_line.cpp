@@ -17,6 +17,7 @@ struct CommandLine::Parts {
   CLI::App* app = nullptr;
   std::function<Result<ExitCode>()> work;
   std::vector<std::unique_ptr<CommandLine>> commands;
+  std::map<const CLI::Option*, std::vector<std::string>> choices;
 };
 
 namespace {
@@ -140,6 +141,7 @@ void CommandLine::option(const std::string& names, Value value, const std::strin
         CLI::Option* option = parts_->app->add_option(names, *target, help);
         limit<std::remove_pointer_t<decltype(target)>>(rules, *option);
         apply(rules, *parts_->app, *option);
+        parts_->choices[option] = rules.choices;
       },
       value);
 }
@@ -171,6 +173,7 @@ void CommandLine::choose(const std::string& names, std::function<void(int)> take
   CLI::Option* option = parts_->app->add_option_function<int>(names, std::move(take), help);
   option->transform(CLI::CheckedTransformer(words).description(""));
   apply(rules, *parts_->app, *option);
+  for (const auto& [word, number] : words) parts_->choices[option].push_back(word);
 }
 
 void CommandLine::footer(const std::string& text) {
@@ -179,6 +182,29 @@ void CommandLine::footer(const std::string& text) {
 
 void CommandLine::run(std::function<Result<ExitCode>()> work) {
   parts_->work = std::move(work);
+}
+
+CommandText CommandLine::describe() const {
+  const CLI::App& app = *parts_->app;
+  CommandText text{app.get_display_name(), app.get_description(), app.get_footer(), {}, {}};
+  for (const CLI::App* up = app.get_parent(); up != nullptr; up = up->get_parent()) {
+    text.name = up->get_name() + " " + text.name;
+  }
+  for (const CLI::Option* option : app.get_options()) {
+    const auto known = parts_->choices.find(option);
+    OptionText one{{}, "", option->get_description(), option->get_required(), {}};
+    for (const std::string& name : option->get_snames()) one.names.push_back("-" + name);
+    for (const std::string& name : option->get_lnames()) one.names.push_back("--" + name);
+    if (option->get_positional()) one.names = {option->get_name(true)};
+    if (option->get_type_size() != 0) {
+      one.value = option->get_type_name();
+      if (option->get_expected_max() == CLI::detail::expected_max_vector_size) one.value += " ...";
+    }
+    if (known != parts_->choices.end()) one.choices = known->second;
+    text.options.push_back(std::move(one));
+  }
+  for (const auto& command : parts_->commands) text.commands.push_back(command->describe());
+  return text;
 }
 
 int CommandLine::parse_and_run(int argc, char** argv) {

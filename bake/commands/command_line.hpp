@@ -33,6 +33,24 @@ struct OptionRules {
   std::string excludes = {};              ///< the same
 };
 
+/// An option as --help shows it.
+struct OptionText {
+  std::vector<std::string> names;  ///< "-o", "--output"; of a positional argument its name
+  std::string value;               ///< "FILE", "FILE ..."; empty: it takes none
+  std::string help;
+  bool required = false;
+  std::vector<std::string> choices;  ///< empty: any value
+};
+
+/// A command as --help shows it.
+struct CommandText {
+  std::string name;  ///< with those before it: "modar pattern score"
+  std::string about;
+  std::string footer;
+  std::vector<OptionText> options;
+  std::vector<CommandText> commands;
+};
+
 /// A command with its options and subcommands. Variables must live until parse_and_run() returns.
 class CommandLine {
  public:
@@ -81,6 +99,9 @@ class CommandLine {
   void footer(const std::string& text);
   /// What the command does. Its answer is the program's exit code; an error is printed to stderr.
   void run(std::function<Result<ExitCode>()> work);
+
+  /// The command and all below it, for manual pages and completion.
+  [[nodiscard]] CommandText describe() const;
 
   /// What followed the program's name.
   [[nodiscard]] const std::vector<std::string>& words() const { return words_; }

@@ -18,5 +18,6 @@ void add_cache(CommandLine& program);
 void add_plan(CommandLine& program);
 void add_report(CommandLine& program);
 void add_web(CommandLine& program);
+void add_document(CommandLine& program);
 
 }  // namespace modar

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
     modar::add_plan(program);
     modar::add_report(program);
     modar::add_web(program);
+    modar::add_document(program);
     program.footer("\n`modar COMMAND --help` shows the options and an example of each command.\n");
     return program.parse_and_run(argc, argv);
   });

@@ -21,7 +21,8 @@ namespace {
 
 struct RectifyCommand {
   std::string photo;
-  std::string corners;
+  std::string corners;  ///< empty: they are looked for
+  std::string picture;  ///< of the corners that were found; empty: beside the output
   RectifyOptions options;
   std::string output;
   bool json = false;
@@ -62,9 +63,45 @@ unsigned cores() {
   return std::max(1u, std::thread::hardware_concurrency());
 }
 
+/// As --corners takes them.
+std::string corners_text(const std::array<PixelPoint, 4>& corners) {
+  std::string text;
+  for (const PixelPoint& corner : corners) {
+    char one[64];
+    std::snprintf(one, sizeof one, "%s%.1f,%.1f", text.empty() ? "" : ",", corner.x, corner.y);
+    text += one;
+  }
+  return text;
+}
+
+Json corners_json(const std::array<PixelPoint, 4>& corners) {
+  Json json = Json::array();
+  for (const PixelPoint& corner : corners) json.push_back(Json::array({corner.x, corner.y}));
+  return json;
+}
+
+/// The corners of --corners, or those that are found, shown in a picture.
+Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
+  if (!command.corners.empty()) {
+    MODAR_ASSIGN(command.options.corners, parse_corners(command.corners));
+    return {};
+  }
+  MODAR_ASSIGN(const FoundCorners found, find_corners(photo));
+  command.options.corners = found.corners;
+  if (command.picture.empty()) {
+    command.picture = command.output.substr(0, command.output.size() - 4) + ".corners.png";
+  }
+  MODAR_TRY(keep_inputs(command.picture, {command.photo, command.output}));
+  MODAR_ASSIGN(const RgbaImage picture, corners_picture(photo, found.corners));
+  MODAR_TRY(write_png(picture, command.picture));
+  std::fprintf(stderr,
+               "found the corners %s, see %s; if they are wrong, give others with --corners\n",
+               corners_text(found.corners).c_str(), command.picture.c_str());
+  return {};
+}
+
 Result<ExitCode> run_rectify(RectifyCommand& command) {
-  MODAR_ASSIGN(const auto corners, parse_corners(command.corners));
-  command.options.corners = corners;
+  if (!command.corners.empty()) MODAR_TRY(parse_corners(command.corners));
   MODAR_TRY(keep_inputs(command.output, {command.photo}));
   if (!command.output.ends_with(".png") && !command.output.ends_with(".PNG")) {
     return fail(ExitCode::kUsage, "rectify.format", command.output,
@@ -72,7 +109,8 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
   }
   MODAR_TRY(try_output(command.output, 0));
   MODAR_ASSIGN(auto photo, read_image(command.photo));
-  Result<RgbaImage> image = rectify(photo, command.options);
+  Result<RgbaImage> image =
+      take_corners(command, photo).and_then([&] { return rectify(photo, command.options); });
   if (!image) {
     Error error = image.error();
     if (error.where.empty()) error.where = command.photo;
@@ -85,6 +123,7 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
     const Json json = {{"image", command.output},
                        {"width", image->width},
                        {"height", image->height},
+                       {"corners", corners_json(command.options.corners)},
                        {"width_mm", command.options.width_mm}};
     std::fputs(json.dump().c_str(), stdout);
   }
@@ -92,12 +131,16 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
 }
 
 void add_rectify(CommandLine& pattern) {
-  CommandLine& line = pattern.command("rectify", "A frontal picture from a photo and four corners");
+  CommandLine& line = pattern.command("rectify", "A frontal picture of a flat thing from a photo");
   const auto command = std::make_shared<RectifyCommand>();
   line.option("photo", &command->photo, "The photo", {.type = "PHOTO", .required = true});
   line.option("--corners", &command->corners,
-              "Pixels of the top-left, top-right, bottom-right and bottom-left corner",
-              {.type = "x,y,x,y,x,y,x,y", .required = true});
+              "Pixels of the top-left, top-right, bottom-right and bottom-left corner; without it, "
+              "they are looked for, and a picture shows them",
+              {.type = "x,y,x,y,x,y,x,y"});
+  line.option("--picture", &command->picture,
+              "Where the picture of the corners goes (default: OUTPUT.corners.png)",
+              {.type = "FILE", .excludes = "--corners"});
   line.option("--width-mm", &command->options.width_mm, "Physical width of the thing",
               {.positive = true});
   line.option("--height-mm", &command->options.height_mm,
@@ -109,7 +152,8 @@ void add_rectify(CommandLine& pattern) {
               {.type = "IMAGE", .required = true});
   line.flag("--json", command->json, "Print the image's size as JSON");
   line.footer(
-      example("  modar pattern rectify photo.jpg --corners 212,80,905,131,870,640,190,602"
+      example("  modar pattern rectify photo.jpg --width-mm 210 -o cover.png\n"
+              "  modar pattern rectify photo.jpg --corners 212,80,905,131,870,640,190,602"
               " --width-mm 210 -o cover.png\n"));
   line.run([command] { return run_rectify(*command); });
 }

@@ -1,6 +1,8 @@
 // Collections: `modar bake` of a modar.toml, `modar init`, `modar cache`.
 #include "bake/commands/project_command.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -8,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <set>
+#include <thread>
 
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/commands/commands.hpp"
@@ -24,7 +27,7 @@ using State = AssetOutcome::State;
 
 constexpr const char* kProjectWords[] = {"--project", "--cache",   "--asset", "--depfile",
                                          "--dry-run", "--explain", "--jobs",  "--memory",
-                                         "--quiet",   "--json"};
+                                         "--quiet",   "--json",    "--watch"};
 
 /// What of the bake stands on the command line would be ignored beside a project file.
 Result<void> refuse_other_options(const std::vector<std::string>& words) {
@@ -161,13 +164,43 @@ void add_project_options(CommandLine& line, ProjectCommand& command) {
               {.type = "NAME"});
   line.option("--depfile", &command.depfile,
               "Of a project: write what the bundles depend on, as rules of make", {.type = "FILE"});
+  line.flag("--watch", command.watch,
+            "Of a project: bake again whenever a file is saved, until Ctrl-C",
+            {.excludes = "--dry-run"});
 }
 
-Result<ExitCode> run_project(const ProjectCommand& command, const CommonOptions& common,
-                             const std::vector<std::string>& words) {
-  MODAR_TRY(refuse_other_options(words));
-  MODAR_ASSIGN(const Project project,
-               read_project(command.file.empty() ? kProjectFile : command.file));
+namespace {
+
+/// Sizes and times of files and folders, as text that changes when one of them does.
+std::string states_of(const std::set<std::string>& paths) {
+  std::string text;
+  for (const std::string& path : paths) {
+    struct stat status {};
+    const bool there = ::stat(path.c_str(), &status) == 0;
+    text += path + ' ' + std::to_string(there ? status.st_size : -1) + ' ' +
+            std::to_string(status.st_mtim.tv_sec) + '.' + std::to_string(status.st_mtim.tv_nsec) +
+            '\n';
+  }
+  return text;
+}
+
+/// What a bake of the project reads, and the folders where a glob may match more: not the project's
+/// own, in which a bake itself makes folders.
+std::set<std::string> watched_paths(const std::string& file, const ProjectOutcome& outcome) {
+  namespace fs = std::filesystem;
+  const fs::path own = fs::path(file).parent_path();
+  std::set<std::string> paths = {file};
+  for (const std::string& input : outcome.inputs) {
+    paths.insert(input);
+    const fs::path folder = fs::path(input).parent_path();
+    if (folder != own) paths.insert(folder.string());
+  }
+  return paths;
+}
+
+Result<ProjectOutcome> bake_once(const ProjectCommand& command, const std::string& file,
+                                 const CommonOptions& common) {
+  MODAR_ASSIGN(const Project project, read_project(file));
   ProjectOptions options;
   options.cache = command.cache;
   options.only = command.asset;
@@ -186,12 +219,48 @@ Result<ExitCode> run_project(const ProjectCommand& command, const CommonOptions&
   auto baked = bake_project(project, options,
                             [&](const std::string& stage, double done) { bar.show(stage, done); });
   bar.clear();
-  MODAR_ASSIGN(const ProjectOutcome outcome, std::move(baked));
+  MODAR_ASSIGN(ProjectOutcome outcome, std::move(baked));
   if (!command.depfile.empty() && !command.dry_run)
     MODAR_TRY(write_depfile(command.depfile, outcome));
   if (!common.quiet) print_outcome(outcome, command.explain || command.dry_run, command.dry_run);
   if (common.json) std::fputs(project_json(outcome).dump().c_str(), stdout);
   for (const Error& error : outcome.errors) print_error(error);
+  return outcome;
+}
+
+/// Bakes, and again once something that was read has changed and rested for a moment: until a
+/// signal ends the process. What fails is printed, and waits for the next change.
+void watch_project(const ProjectCommand& command, const std::string& file,
+                   const CommonOptions& common) {
+  constexpr std::chrono::milliseconds kLook(200);
+  std::set<std::string> paths = {file};
+  for (;;) {
+    // Before the bake: what is saved while it runs is a change.
+    std::string before = states_of(paths);
+    const auto outcome = bake_once(command, file, common);
+    if (!outcome) print_error(outcome.error());
+    if (outcome) {
+      const std::set<std::string> now = watched_paths(file, *outcome);
+      if (now != paths) before = states_of(now);
+      paths = now;
+    }
+    if (!common.quiet) std::fprintf(stderr, "watching %zu files and folders\n", paths.size());
+    while (states_of(paths) == before) std::this_thread::sleep_for(kLook);
+    for (std::string last; last != states_of(paths);) {
+      last = states_of(paths);
+      std::this_thread::sleep_for(kLook);
+    }
+  }
+}
+
+}  // namespace
+
+Result<ExitCode> run_project(const ProjectCommand& command, const CommonOptions& common,
+                             const std::vector<std::string>& words) {
+  MODAR_TRY(refuse_other_options(words));
+  const std::string file = command.file.empty() ? kProjectFile : command.file;
+  if (command.watch) watch_project(command, file, common);
+  MODAR_ASSIGN(const ProjectOutcome outcome, bake_once(command, file, common));
   return outcome.errors.empty() ? ExitCode::kOk : outcome.errors.front().exit;
 }
 
@@ -206,6 +275,16 @@ Result<ExitCode> run_init(const InitCommand& command) {
   const std::string path =
       (std::filesystem::path(command.folder) / kProjectFile).lexically_normal();
   std::error_code error;
+  if (!std::filesystem::exists(command.folder, error)) {
+    for (const char* folder : {"models", "patterns"}) {
+      MODAR_TRY(make_output_folder((std::filesystem::path(command.folder) / folder).string()));
+    }
+    std::fprintf(stderr,
+                 "%s: made, with folders for models and for pictures of patterns; fill them, then "
+                 "`modar init %s` once more\n",
+                 command.folder.c_str(), command.folder.c_str());
+    return ExitCode::kOk;
+  }
   if (!command.force && std::filesystem::exists(path, error)) {
     return fail(ExitCode::kUsage, "init.exists", path, "there is a project file already",
                 "edit it, or write a new one with --force");

@@ -17,6 +17,7 @@ struct ProjectCommand {
   std::string depfile;  ///< empty: none
   bool dry_run = false;
   bool explain = false;
+  bool watch = false;  ///< bake again whenever something changes
 };
 
 /// Declares them.

@@ -18,16 +18,22 @@ namespace {
 struct ReportCommand {
   std::string bundle;
   std::string output;
+  std::string bake_file;  ///< empty: none
   ReportOptions options;
   bool quiet = false;
 };
 
 Result<ExitCode> run_report(ReportCommand& command) {
-  MODAR_TRY(keep_inputs(command.output, {command.bundle}));
+  MODAR_TRY(keep_inputs(command.output, {command.bundle, command.bake_file}));
   MODAR_TRY(try_output(command.output, 0));
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
   MODAR_ASSIGN(const BundleView bundle, BundleView::open(file.bytes()));
   command.options.title = std::filesystem::path(command.bundle).filename().string();
+  if (!command.bake_file.empty()) {
+    MODAR_ASSIGN(const MappedFile json, MappedFile::open(command.bake_file));
+    const auto bytes = json.bytes();
+    command.options.bake_json.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  }
   command.options.tool_version = MODAR_VERSION;
   ProgressBar bar(command.quiet);
   auto page = report_page(bundle, command.options,
@@ -53,6 +59,13 @@ void add_report(CommandLine& program) {
               {.type = "FILE.html", .required = true});
   line.flag("--range", command->options.range,
             "Simulate each pattern's working range, too: seconds each");
+  line.option("--bake", &command->bake_file,
+              "What `modar bake --json` printed of it: adds what each stage took",
+              {.type = "FILE.json"});
+  line.option(
+      "--texture-pictures", &command->options.texture_pictures,
+      "Of `modar bake --texture-pictures`: adds each texture's source, decoded and difference",
+      {.type = "DIR"});
   line.option("--jobs", &command->options.jobs, "Threads",
               {.shows_default = true, .least = 1, .most = 256});
   line.flag("--quiet", command->quiet, "No progress, no summary on stderr");

@@ -37,6 +37,8 @@ constexpr std::size_t kManyModels = 20;
 constexpr std::size_t kWireTriangles = 1500;  // a path of 50 bytes each
 constexpr std::size_t kShownFeatures = 700;   // more hide the pattern
 constexpr std::uint32_t kTextureSide = 256;   // of a thumbnail, pixels
+constexpr std::uint32_t kComparisonSide =
+    1200;  // of three textures beside each other: a page's width
 
 std::string escaped(std::string_view text) {
   std::string out;
@@ -114,6 +116,7 @@ class Page {
     MODAR_TRY(textures());
     MODAR_TRY(patterns());
     sizes();
+    MODAR_TRY(timings());
     devices();
     issues();
     html_ +=
@@ -276,8 +279,63 @@ class Page {
                row("Bytes", human_bytes(bundle_.texture_data(t).size())) +
                row("Alpha", (texture.flags & kTextureAlpha) != 0 ? "yes" : "no") +
                "</dl></div></article>\n";
+      MODAR_TRY(comparison(title));
     }
     html_ += "</div>\n</section>\n";
+    return {};
+  }
+
+  /// Source, decoded and difference, as the bake has written them beside each other.
+  Result<void> comparison(const std::string& texture) {
+    const std::string path = options_.texture_pictures + "/" + texture + ".png";
+    std::error_code error;
+    if (options_.texture_pictures.empty() || !std::filesystem::exists(path, error)) return {};
+    MODAR_ASSIGN(RgbaImage image, read_image(path));
+    if (image.width > kComparisonSide) {
+      for (RgbaImage& level : mip_chain(image)) {
+        image = std::move(level);
+        if (image.width <= kComparisonSide) break;
+      }
+    }
+    MODAR_ASSIGN(const std::string shown,
+                 picture(image, "Source, decoded and difference of " + texture));
+    html_ += "<article class=\"card triple\">" + shown + "<div><h3>" + escaped(texture) +
+             ": source, decoded, difference</h3></div></article>\n";
+    return {};
+  }
+
+  /// What each stage of the bake took.
+  Result<void> timings() {
+    if (options_.bake_json.empty()) return {};
+    const Json json = Json::parse(options_.bake_json);
+    const std::optional<Json> stages = json.find("stages");
+    if (!stages || !stages->is_array()) {
+      return fail(ExitCode::kInvalidInput, "report.bake", "--bake",
+                  "the file holds no stages of a bake",
+                  "give what `modar bake --model ... --json` printed");
+    }
+    section("timings", "What the bake took");
+    html_ +=
+        "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Stage</th><th "
+        "scope=\"col\">Seconds</th><th scope=\"col\">In</th><th scope=\"col\">Out</th></tr></thead>"
+        "<tbody>\n";
+    const auto number = [](const Json& stage, const char* key) {
+      const std::optional<Json> found = stage.find(key);
+      return found ? found->number().value_or(0) : 0;
+    };
+    for (std::size_t i = 0; i < stages->size(); ++i) {
+      const Json stage = *stages->at(i);
+      const std::optional<Json> label = stage.find("name");
+      html_ += "<tr><th scope=\"row\">" +
+               escaped(label ? label->text().value_or("") : std::string()) + "</th><td>" +
+               print("%.2f", number(stage, "ms") / 1000) + "</td><td>" +
+               print("%.0f", number(stage, "in")) + "</td><td>" +
+               print("%.0f", number(stage, "out")) + "</td></tr>\n";
+    }
+    const auto total = json.find("cpu_seconds");
+    html_ += "</tbody></table></div>\n<p class=\"note\">" +
+             print("%.1f CPU seconds in all.", total ? total->number().value_or(0) : 0) +
+             "</p>\n</section>\n";
     return {};
   }
 

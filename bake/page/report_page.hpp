@@ -11,8 +11,10 @@
 namespace modar {
 
 struct ReportOptions {
-  std::string title;   ///< of the page: the file's name
-  bool range = false;  ///< simulate each pattern's working range: seconds each
+  std::string title;             ///< of the page: the file's name
+  std::string texture_pictures;  ///< folder of `modar bake --texture-pictures`; empty: none
+  std::string bake_json;         ///< what `modar bake --json` printed; empty: no timings
+  bool range = false;            ///< simulate each pattern's working range: seconds each
   unsigned jobs = 1;
   std::string tool_version;
 };

@@ -63,6 +63,12 @@ void Controls::apply(const UserAct& act) {
   }
 }
 
+void Controls::load(const BundleView& bundle) {
+  bundle_ = bundle;
+  if (model_ != kNone && model_ >= bundle.models().size()) model_ = kNone;
+  if (only_pattern_ != kNone && only_pattern_ >= bundle.patterns().size()) only_pattern_ = kNone;
+}
+
 /// Through all models and "as the scenes say", which comes after the last.
 void Controls::turn_model(int step) {
   const auto places = static_cast<std::int64_t>(bundle_.models().size()) + 1;

@@ -39,6 +39,8 @@ class Controls {
   Controls(const BundleView& bundle, bool outline, bool display);
 
   void apply(const UserAct& act);
+  /// Another version of the bundle: choices that it has no longer fall back to its scenes.
+  void load(const BundleView& bundle);
 
   /// The models to draw: each shown pattern's scenes, or the model that the user chose for it.
   /// states: one a pattern, as Hysteresis answers. Allocates nothing once `items` has its room.
@@ -68,7 +70,7 @@ class Controls {
   void add_standard(const Hysteresis::State& state, std::uint32_t model,
                     std::vector<DrawItem>& items) const;
 
-  const BundleView& bundle_;
+  BundleView bundle_;
   bool quit_ = false;
   bool outline_;
   bool display_;

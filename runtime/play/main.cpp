@@ -84,12 +84,15 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   // Only where frames may be dropped may a result depend on time.
   const bool newest = info.live || options.realtime;
   SpotSlot spot;
-  MODAR_ASSIGN(TrackStep track, open_vision(bundle, {options.method == "ours", set, plan.camera,
-                                                     &spot, newest, options.find_focal}));
+  LiveSlot live;
+  MODAR_ASSIGN(TrackStep track,
+               open_vision(bundle, {options.method == "ours", set, plan.camera, &spot,
+                                    options.live ? &live : nullptr, newest, options.find_focal}));
 
   Player player(options, bundle);
   const std::string name(bundle.name(parameter_set(bundle, set).name));
-  MODAR_TRY(player.open({info, set, name, plan.camera.value_or(Camera{}), &spot}));
+  MODAR_TRY(player.open(
+      {info, set, name, plan.camera.value_or(Camera{}), &spot, options.live ? &live : nullptr}));
   if (!options.record.empty() || plan.golden) track = with_gray_of_rgb(std::move(track));
   if (plan.golden) player.compare(std::move(*plan.golden));
   if (bundle.scenes().empty() && !options.quiet) {

@@ -73,10 +73,11 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 11> kSwitches = {{{"json", &PlayOptions::json},
+constexpr std::array<SwitchOption, 12> kSwitches = {{{"json", &PlayOptions::json},
                                                      {"force", &PlayOptions::force},
                                                      {"window", &PlayOptions::window},
                                                      {"realtime", &PlayOptions::realtime},
+                                                     {"live", &PlayOptions::live},
                                                      {"find-focal", &PlayOptions::find_focal},
                                                      {"outline", &PlayOptions::outline},
                                                      {"osd", &PlayOptions::osd},
@@ -122,6 +123,10 @@ Result<void> validate(const PlayOptions& options) {
   }
   if (!options.golden.empty() && (options.realtime || !options.record.empty())) {
     return usage("usage.conflict", "--golden", "it replays every frame, and records none");
+  }
+  if (options.live &&
+      !(options.golden.empty() && options.record.empty() && options.turntable == 0)) {
+    return usage("usage.conflict", "--live", "recordings and turntables are of one bundle");
   }
   if (options.find_focal && !(options.golden.empty() && options.record.empty())) {
     return usage("usage.conflict", "--find-focal",
@@ -178,13 +183,15 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
 
   --input INPUT       frames: a video, a picture, a folder of pictures (by name), a camera,
                       - or FILE.y4m (Y4M from a pipe or file), nv21:640x480@30:FILE (raw frames,
-                      - for a pipe; i420, nv12, yuyv, gray alike)
+                      - for a pipe; i420, nv12, yuyv, grey alike)
   --out OUT           pictures into FILE.mp4, or as frame_000000.png ... into a folder
   --report FOLDER     overlay.mp4, contact_sheet.png, frames.jsonl and an index.html of them
   --force             writes into a folder of --out or --report that holds other files
   --window            shows the pictures in a window; its keys: Q or Escape ends, space pauses,
                       M or arrows change the model, P the pattern, + and - its size, O the outline,
-                      D the display
+                      D the display; F holds the picture, and four clicks on the corners of
+                      something flat make it the pattern
+  --live              goes on with the new bundle when its file is replaced (see modar bake --watch)
   --outline           draws the outline of each pattern that is seen
   --osd               paints state, reason and inliers on the pictures
   --json              one JSON line a frame and a summary, to standard output

@@ -36,6 +36,7 @@ struct PlayOptions {
   bool window = false;
   bool find_focal = false;
   bool realtime = false;
+  bool live = false;  ///< play newer versions of the bundle as they come
   bool outline = false;
   bool osd = false;
   bool quiet = false;

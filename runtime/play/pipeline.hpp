@@ -137,6 +137,7 @@ class Mailbox {
   bool closed_ = false;
 };
 
+struct LiveBundle;
 struct SpotPattern;
 
 /// What travels from thread to thread.
@@ -147,6 +148,7 @@ struct Job {
   double track_ms = 0;
   FocalProgress focal;                      ///< of the search for it, while it goes on
   std::shared_ptr<const SpotPattern> spot;  ///< what `track` is about; null: the bundle's patterns
+  std::shared_ptr<const LiveBundle> live;   ///< that bundle; null: the one that was opened first
 };
 
 /// Runs on the vision thread: fills camera, track and track_ms.

@@ -75,6 +75,7 @@ void catch_interrupts() {
 Player::Player(const PlayOptions& options, const BundleView& bundle)
     : options_(options),
       bundle_(bundle),
+      watch_(options.bundle),
       names_(pattern_names(bundle)),
       hysteresis_(names_.size()),
       smoother_(names_.size(), options.smooth_ms),
@@ -127,6 +128,7 @@ Result<void> Player::open_logs() {
 
 Result<bool> Player::show(const Job& job) {
   MODAR_TRY(screen_->resize(job.frame.width, job.frame.height));
+  MODAR_TRY(follow_live(job));
   follow_spot(job);
   if (options_.find_focal && !options_.quiet) report_focal(job);
   FrameReport report = begin_report(job);
@@ -165,6 +167,29 @@ void Player::follow_spot(const Job& job) {
   names_ = pattern_names(spot_ ? spot_->view : bundle_);
   hysteresis_ = Hysteresis(names_.size());
   smoother_ = PoseSmoother(names_.size(), options_.smooth_ms);
+}
+
+/// The vision thread looks for the patterns of a newer version of the bundle: it is drawn from now
+/// on. What is shown stays where the patterns are the same ones.
+Result<void> Player::follow_live(const Job& job) {
+  if (job.live == live_ || !job.live) return {};
+  MODAR_TRY(screen_->load(job.live->view));
+  live_ = job.live;
+  bundle_ = live_->view;
+  controls_.load(bundle_);
+  items_.reserve(std::max(bundle_.scenes().size(), bundle_.patterns().size()));
+  std::vector<std::string> names = pattern_names(bundle_);
+  if (!spot_ && names != names_) {
+    hysteresis_ = Hysteresis(names.size());
+    smoother_ = PoseSmoother(names.size(), options_.smooth_ms);
+    names_ = std::move(names);
+  }
+  if (!options_.quiet) {
+    progress_.end();
+    std::fprintf(stderr, "modar-play: the bundle was replaced, at frame %llu\n",
+                 static_cast<unsigned long long>(job.frame.index));
+  }
+  return {};
 }
 
 /// The vision thread has measured the focal length of frames of this size: says so once.
@@ -300,6 +325,11 @@ void Player::take_acts(std::chrono::milliseconds limit) {
 }
 
 bool Player::idle() {
+  if (setup_.live != nullptr) {
+    auto newer = watch_.look();
+    if (!newer) std::fprintf(stderr, "modar-play: %s\n", to_line(newer.error()).c_str());
+    if (newer && *newer) setup_.live->put(std::move(*newer));
+  }
   take_acts(std::chrono::milliseconds(0));
   return !was_interrupted() && !controls_.quit();
 }

@@ -12,6 +12,7 @@
 #include "frame_report.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
+#include "live_bundle.hpp"
 #include "modar/pose_smoother.hpp"
 #include "overlay.hpp"
 #include "pipeline.hpp"
@@ -42,11 +43,12 @@ struct PlayerSetup {
   std::string parameters;           ///< its name
   Camera camera;                    ///< calibrated; width 0: the default for each frame
   SpotSlot* spot = nullptr;         ///< where patterns made on the spot go
+  LiveSlot* live = nullptr;  ///< where newer versions of the bundle go; null: none is looked for
 };
 
 class Player {
  public:
-  /// Both outlive it.
+  /// The options and the bundle's bytes outlive it.
   Player(const PlayOptions& options, const BundleView& bundle);
 
   /// Opens screen, sinks and logs on this thread.
@@ -67,6 +69,7 @@ class Player {
   FrameReport begin_report(const Job& job);
   void follow_spot(const Job& job);
   void draw(const Job& job, const FrameReport& report);
+  Result<void> follow_live(const Job& job);
   Result<void> paint(const FrameReport& report);
   Result<void> write_picture(const FrameReport& report);
   Result<void> write_line(const FrameReport& report, const Frame& frame);
@@ -80,7 +83,9 @@ class Player {
   void report_focal_unknown() const;
 
   const PlayOptions& options_;
-  const BundleView& bundle_;
+  BundleView bundle_;
+  BundleWatch watch_;
+  std::shared_ptr<const LiveBundle> live_;  ///< holds the bytes of bundle_ where it is a newer one
   PlayerSetup setup_;
   std::vector<std::string> names_;  ///< of the patterns that are looked for
   Hysteresis hysteresis_;

@@ -19,13 +19,20 @@ Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const Pla
     screen->context_ = std::move(context);
   }
   MODAR_TRY(screen->read_caps());
-  MODAR_ASSIGN(auto renderer, Renderer::create(bundle, screen->caps_));
-  screen->renderer_ = std::move(renderer);
+  MODAR_TRY(screen->load(bundle));
+  return screen;
+}
+
+Result<void> Screen::load(const BundleView& bundle) {
+  MODAR_ASSIGN(auto renderer, Renderer::create(bundle, caps_));
   RenderOptions drawing;
   drawing.exclusive_context = true;
-  if (options.turntable > 0) drawing.clear_colour = kTurntableGround;
-  screen->renderer_->set_options(drawing);
-  return screen;
+  if (options_.turntable > 0) drawing.clear_colour = kTurntableGround;
+  renderer->set_options(drawing);
+  if (width_ > 0) MODAR_TRY(renderer->resize(width_, height_));
+  renderer_ = std::move(renderer);
+  bundle_ = bundle;
+  return {};
 }
 
 Result<void> Screen::read_caps() {

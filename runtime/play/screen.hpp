@@ -54,13 +54,16 @@ class Window {
 
 class Screen {
  public:
-  /// Opens the context that the options ask for on this thread, and uploads the bundle. Both
-  /// outlive it.
+  /// Opens the context that the options ask for on this thread, and uploads the bundle. Its bytes
+  /// and the options outlive it.
   /// Errors: those of GlContext, Window, mask_gl_caps() and Renderer.
   static Result<std::unique_ptr<Screen>> open(const BundleView& bundle, const PlayOptions& options);
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
+  /// Uploads another bundle in the place of the first, in the same context. Errors: those of
+  /// Renderer; the first one stays then.
+  Result<void> load(const BundleView& bundle);
   /// Sets the picture's size; nothing happens where it stands already. Where the window's context
   /// was lost, makes everything anew in another one first.
   Result<void> resize(int width, int height);
@@ -89,7 +92,7 @@ class Screen {
   Result<void> read_caps();
   RgbImage canvas_picture();
 
-  const BundleView& bundle_;
+  BundleView bundle_;
   const PlayOptions& options_;
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<Window> window_;

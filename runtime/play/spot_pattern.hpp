@@ -32,26 +32,28 @@ Result<std::shared_ptr<const SpotPattern>> make_spot_pattern(
     const RgbImage& frame, const std::array<glm::dvec2, 4>& clicked,
     const ParameterSetRecord& parameters);
 
-/// Hands a new pattern from the render thread to the vision thread.
-class SpotSlot {
+/// Hands a new T from the render thread to the vision thread.
+template <class T>
+class Slot {
  public:
-  void put(std::shared_ptr<const SpotPattern> pattern) {
+  void put(std::shared_ptr<const T> fresh) {
     guard_.acquire();
-    pattern_.swap(pattern);
+    held_.swap(fresh);
     guard_.release();
   }
   /// Null where nothing was put since the last call.
-  std::shared_ptr<const SpotPattern> take() {
-    std::shared_ptr<const SpotPattern> taken;
+  std::shared_ptr<const T> take() {
+    std::shared_ptr<const T> taken;
     guard_.acquire();
-    taken.swap(pattern_);
+    taken.swap(held_);
     guard_.release();
     return taken;
   }
 
  private:
   Semaphore guard_{1};
-  std::shared_ptr<const SpotPattern> pattern_;
+  std::shared_ptr<const T> held_;
 };
+using SpotSlot = Slot<SpotPattern>;
 
 }  // namespace modar

@@ -13,10 +13,14 @@ namespace {
 constexpr int kLookEvery = 5;
 
 struct OurVision {
-  const BundleView& bundle;
+  BundleView bundle;
   VisionOptions options;
   Camera camera;
+  std::shared_ptr<const LiveBundle> live;  ///< holds the bytes of `bundle` where it is a newer one
   std::unique_ptr<PoseLoop> loop;
+  std::shared_ptr<const LiveBundle> next;  ///< with next_loop: to come
+  std::unique_ptr<PoseLoop> next_loop;
+  int frames_beside = 0;
   std::unique_ptr<FocalFinder> finder;
   int frames_to_look = 0;
   FocalProgress focal;
@@ -40,6 +44,30 @@ struct OurVision {
     return {};
   }
 
+  /// A newer bundle's loop works beside the one before it until it sees something too, or that sees
+  /// nothing any more: the pose is not lost on the way.
+  Result<void> follow_live(Job& job) {
+    constexpr int kMostFrames = 60;  // two seconds: then the new one has no such pattern
+    if (auto newer = options.live == nullptr ? nullptr : options.live->take()) {
+      PoseLoopOptions how;
+      how.async_search = options.apart;
+      MODAR_ASSIGN(next_loop, PoseLoop::create(newer->view, camera, how));
+      next = std::move(newer);
+      frames_beside = 0;
+    }
+    if (!next_loop) return {};
+    TrackResult seen;
+    MODAR_TRY(next_loop->step(job.frame.gray_image(), seen));
+    const bool lost = seen.visible.empty() && !job.track.visible.empty();
+    if (lost && ++frames_beside < kMostFrames) return {};
+    job.track = std::move(seen);
+    loop = std::move(next_loop);
+    finder.reset();
+    live = std::move(next);
+    bundle = live->view;
+    return {};
+  }
+
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
     const std::int64_t before = now_ns();
@@ -53,12 +81,17 @@ struct OurVision {
       how.async_search = options.apart;
       MODAR_ASSIGN(auto created, PoseLoop::create(bundle, camera, how));
       loop = std::move(created);
+      if (next) {
+        MODAR_ASSIGN(next_loop, PoseLoop::create(next->view, camera, how));
+      }
     }
     MODAR_TRY(loop->step(frame.gray_image(), job.track));
+    MODAR_TRY(follow_live(job));
     job.track_ms = ms_since(before);
     job.camera = camera;
     job.focal = focal;
     job.spot = nullptr;
+    job.live = live;
     return {};
   }
 };
@@ -67,7 +100,7 @@ struct OurVision {
 
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options) {
   const auto state =
-      std::make_shared<OurVision>(OurVision{bundle, options, {}, nullptr, nullptr, 0, {}});
+      std::make_shared<OurVision>(OurVision{bundle, options, {}, {}, {}, {}, {}, 0, {}, 0, {}});
   return [state](Job& job) { return state->step(job); };
 }
 

@@ -6,6 +6,7 @@
 
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
+#include "live_bundle.hpp"
 #include "pipeline.hpp"
 #include "spot_pattern.hpp"
 
@@ -16,6 +17,7 @@ struct VisionOptions {
   std::uint32_t parameter_set = 0;  ///< id, see choose_parameter_set()
   std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
   SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
+  LiveSlot* live = nullptr;         ///< newer versions of the bundle come here; may be null
   bool apart = false;               ///< our loop searches on a thread of its own (PoseLoopOptions)
   bool find_focal = false;          ///< without a camera, ours measures the focal length it has
 };

@@ -3,10 +3,14 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import threading
+import time
 import unittest
 
-from programs import BIN, COVER, ROOT, ProgramTest
+from programs import BIN, COVER, QUICK, ROOT, ProgramTest
+
+BUST = ROOT / "assets" / "models" / "bust.obj"
 
 
 def lines_of(done):
@@ -86,6 +90,46 @@ class Play(ProgramTest):
         self.assertEqual(json.loads(same.stdout)["golden"]["worst_px"], 0.0)
         other = self.play(bundle, "--golden", "kept", "--quiet", "--parameters", "brisk-3", "--tolerance", "0")
         self.assertEqual(other.returncode, 10, other.stdout + other.stderr)
+
+    def test_a_bundle_that_is_replaced_is_played_on(self):
+        bundle = self.bake_demo()
+        sys.path.insert(0, str(ROOT / "assets"))
+        from kit import png
+        picture = png.read(COVER)
+        gray = bytes(picture.pixels[1::3])
+        with subprocess.Popen([BIN / "modar-play", bundle, "--input", f"grey:{picture.width}x{picture.height}@30:-",
+                               "--json", "--live"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE) as player:
+            def play(count):
+                frames = []
+                for _ in range(count):
+                    player.stdin.write(gray)
+                    player.stdin.flush()
+                    frames.append(json.loads(player.stdout.readline()))
+                return frames
+            for _ in range(500):  # a pipe is live: the search works apart
+                time.sleep(0.02)
+                if play(1)[0]["visible"]:
+                    break
+            other = self.folder / "other.modar"
+            done = self.modar("bake", "--model", BUST, "--pattern", COVER, "-o", other, "--quiet", "--no-lods", *QUICK)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            other.replace(bundle)
+            time.sleep(0.4)
+            after = play(20)
+            self.assertTrue(all(frame["visible"] for frame in after), "the pose is never lost")
+            self.assertEqual([frame["state"] for frame in after], ["shown"] * 20)
+            (self.folder / "new.modar").write_bytes(b"no bundle")
+            (self.folder / "new.modar").replace(bundle)
+            time.sleep(0.4)
+            self.assertTrue(all(frame["visible"] for frame in play(2)), "a bad file is told, and the old one plays on")
+            player.stdin.close()
+            said = player.stderr.read().decode()
+            player.stdout.read()
+        self.assertEqual(player.returncode, 0, said)
+        self.assertEqual(said.count("the bundle was replaced"), 1, said)
+        self.assertIn("demo.modar", said)
+        self.assert_fails(self.play(bundle, "--input", COVER, "--live", "--record", "r"), 1, "--live")
 
     def test_a_video_is_played_beside_the_article_s_table_9(self):
         bundle, clip = self.bake_demo(), self.clip()

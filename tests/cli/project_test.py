@@ -393,6 +393,32 @@ class Plan(ProjectTest):
         self.assertEqual((self.place / "out/museum.modar").read_bytes(), by_ninja)
 
 
+class Watch(ProjectTest):
+    def test_a_saved_file_is_baked_again(self):
+        bundle = self.place / "out/museum.modar"
+        with subprocess.Popen([BIN / "modar", "bake", "--watch"], cwd=self.place, stderr=subprocess.PIPE,
+                              text=True) as baker:
+            try:
+                said = []
+                wait = lambda: next(line for line in iter(baker.stderr.readline, "")
+                                    if said.append(line) or line.startswith("watching"))
+                wait()
+                first = bundle.read_bytes()
+                (self.place / "models/cube.mtl").write_text(CUBE_MTL + "Ks 1 1 1\n")
+                wait()
+                self.assertNotEqual(bundle.read_bytes(), first)
+                (self.place / "modar.toml").write_text("[bake\n")  # a broken file waits for its repair
+                wait()
+                self.assertIn("project.toml", "".join(said))
+                self.write("[bake]\n" + FAST + "[[model]]\nfile = \"models/*.obj\"\n")
+                wait()
+                self.assertNotEqual(bundle.read_bytes(), first)
+            finally:
+                baker.send_signal(signal.SIGINT)
+        self.assertNotEqual(baker.returncode, 0)
+        self.assert_fails(self.modar("bake", "--watch", "--dry-run", cwd=self.place), 1, "--dry-run")
+
+
 class Init(ProjectTest):
     def test_a_folder_becomes_a_project(self):
         (self.place / "modar.toml").unlink()
@@ -427,7 +453,12 @@ class Init(ProjectTest):
     def test_a_folder_without_anything(self):
         (self.folder / "empty").mkdir()
         self.assert_fails(self.modar("init", self.folder / "empty"), 3, "project.nothing")
-        self.assert_fails(self.modar("init", self.folder / "nowhere"), 2, "io.folder")
+        fresh = self.folder / "nowhere"
+        done = self.modar("init", fresh)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("once more", done.stderr)
+        self.assertEqual(sorted(path.name for path in fresh.iterdir()), ["models", "patterns"])
+        self.assert_fails(self.modar("init", fresh), 3, "project.nothing")
 
 
 if __name__ == "__main__":

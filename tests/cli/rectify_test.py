@@ -1,8 +1,11 @@
 """`modar pattern rectify`: sizes, and corners that are no corners."""
+import json
+import math
 import struct
+import sys
 import unittest
 
-from programs import COVER, QUICK, ProgramTest
+from programs import COVER, QUICK, ROOT, ProgramTest
 
 
 def png_size(path):
@@ -24,6 +27,28 @@ class Rectify(ProgramTest):
         bundle = self.folder / "b.modar"
         self.assertEqual(self.modar("bake", "--pattern", "out.png", "-o", bundle, *QUICK).returncode, 0)
         self.assertAlmostEqual(self.modar_json("inspect", bundle)["patterns"][0]["width_mm"], 200, delta=0.5)
+
+    def test_corners_that_are_found_are_shown(self):
+        sys.path.insert(0, str(ROOT / "assets"))
+        from kit import png
+        from kit.canvas import Canvas
+        true = [120, 60, 330, 90, 310, 260, 90, 230]
+        photo = Canvas(420, 320, (190, 180, 160), 2)
+        photo.polygon(list(zip(true[::2], true[1::2])), (40, 60, 120))
+        photo.box(180, 130, 240, 180, (220, 200, 40))
+        png.write(self.folder / "photo.png", photo.picture(), 6)
+        png.write(self.folder / "empty.png", Canvas(420, 320, (190, 180, 160), 2).picture(), 6)
+        done = self.modar("pattern", "rectify", "photo.png", "-o", "cover.png", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = [number for corner in json.loads(done.stdout)["corners"] for number in corner]
+        width = math.hypot(true[2] - true[0], true[3] - true[1])
+        for one, other in zip(found, true):
+            self.assertAlmostEqual(one, other, delta=0.01 * width)
+        self.assertIn("--corners", done.stderr)
+        self.assertEqual(png_size(self.folder / "cover.corners.png"), (420, 320))
+        self.assert_fails(self.modar("pattern", "rectify", "empty.png", "-o", "again.png"), 3, "--corners",
+                          "rectify.not-found")
+        self.assertFalse((self.folder / "again.png").exists())
 
     def test_corners_that_are_none(self):
         for corners, code in (("1,2,3", 1), ("1,2,3,4,5,6,7,x", 1), ("10,10,20,20,30,30,40,40", 3),

@@ -1,4 +1,5 @@
 """`modar report`: one page that needs nothing else, says what `modar inspect` says, and opens in a browser."""
+import json
 import re
 import shutil
 import subprocess
@@ -79,6 +80,19 @@ class Report(ProgramTest):
         for issue in self.modar("check", bundle).stdout.split("\n"):
             if "error" in issue.split(" "):
                 self.assertIn(re.search(r"[A-Z]+_[A-Z_]+", issue).group(), page.words)
+
+    def test_what_the_bake_said_is_in_it(self):
+        bundle = self.folder / "b.modar"
+        done = self.modar("bake", "--model", POTTERY, "--no-lods", "-o", bundle, "--quiet", "--json",
+                          "--texture-pictures", "lost")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        (self.folder / "bake.json").write_text(done.stdout)
+        page = self.report(bundle, "--bake", "bake.json", "--texture-pictures", "lost")
+        for stage in json.loads(done.stdout)["stages"]:
+            self.assertIn(stage["name"], page.words)
+        self.assertEqual(len([i for i in page.all("img") if "difference" in i["alt"]]), 1)
+        (self.folder / "bake.json").write_text("{}")
+        self.assert_fails(self.modar("report", bundle, "-o", "x.html", "--bake", "bake.json", "--quiet"), 3, "report.bake")
 
     def test_areas_are_as_sizes(self):
         bundle = self.bake_demo()

@@ -1,19 +1,23 @@
-// Videos, pictures, folders of pictures and cameras through OpenCV, which throws: caught here.
+// The library that is loaded for pictures and videos: OpenCV and FFmpeg, which throw: caught here.
 #include <dirent.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cstdio>
+#include <cstdlib>
 #include <vector>
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 
-#include "desk_v4l2_source.hpp"
-#include "frame_source.hpp"
+#include "desk_media.hpp"
+#include "formats/atomic_file.hpp"
+#include "modar/mapped_file.hpp"
 #include "modar/video_reader.hpp"
-#include "raw_source.hpp"
 
 namespace modar {
 namespace {
@@ -132,15 +136,9 @@ Result<std::unique_ptr<FrameSource>> open_folder(const std::string& folder) {
   return std::make_unique<PictureSource>(std::move(paths));
 }
 
-/// Ours first; a camera that sends compressed pictures only goes through OpenCV.
-Result<std::unique_ptr<FrameSource>> open_camera(const std::string& input) {
-  MODAR_ASSIGN(const int number, camera_number(input));
-  MODAR_ASSIGN(auto device, open_video_device("/dev/video" + std::to_string(number)));
-  auto source = start_camera(std::move(device), input, {});
-  if (source || source.error().code != "camera.format") return source;
-  auto reader = VideoReader::open_camera(number, input);
-  if (!reader) return source;
-  return std::make_unique<VideoSource>(std::move(*reader), true);
+Result<std::unique_ptr<FrameSource>> open_camera(int number, const std::string& name) {
+  MODAR_ASSIGN(VideoReader reader, VideoReader::open_camera(number, name));
+  return std::make_unique<VideoSource>(std::move(reader), true);
 }
 
 Result<std::unique_ptr<FrameSource>> open_file(const std::string& path) {
@@ -151,13 +149,9 @@ Result<std::unique_ptr<FrameSource>> open_file(const std::string& path) {
   return std::make_unique<VideoSource>(std::move(reader), false);
 }
 
-}  // namespace
-
-Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
+Result<std::unique_ptr<FrameSource>> open_path(const std::string& input) {
   try {
     silence_opencv();
-    if (is_raw_input(input)) return open_raw_source(input);
-    if (input == "camera" || input.starts_with("camera:")) return open_camera(input);
     struct stat status {};
     if (stat(input.c_str(), &status) != 0) {
       return fail(ExitCode::kIo, "input.open", input, "there is no such file or folder",
@@ -169,4 +163,114 @@ Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input)
   }
 }
 
+tl::unexpected<Error> opencv_failed(const std::string& where, const char* what) {
+  return fail(ExitCode::kIo, "out.write", where, std::string("OpenCV: ") + what,
+              "check the free space and the size of the pictures");
+}
+
+/// The pixels as OpenCV takes them, not copied; nothing here writes through it.
+cv::Mat wrap(const RgbaView& image) {
+  return {image.height, image.width, CV_8UC4, const_cast<std::uint8_t*>(image.pixels.data())};
+}
+
+/// The encoder writes beside the movie's place; finish() puts it there.
+class Movie final : public FrameSink {
+ public:
+  Movie(std::string path, double fps)
+      : path_(std::move(path)),
+        temporary_(path_ + "." + std::to_string(getpid()) + ".encoding.mp4"),
+        fps_(fps) {}
+
+  ~Movie() override {
+    writer_.release();
+    std::remove(temporary_.c_str());
+  }
+
+  Result<void> picture(const RgbaView& image, const FrameReport& report) override {
+    try {
+      if (!writer_.isOpened()) {
+        MODAR_TRY(open(image));
+      }
+      if (image.width != width_ || image.height != height_) {
+        return fail(ExitCode::kInvalidInput, "out.size-changed", path_,
+                    "frame " + std::to_string(report.frame) + " is of another size than the first",
+                    "write pictures into a folder instead");
+      }
+      cv::cvtColor(wrap(image)(even_), bgr_, cv::COLOR_RGBA2BGR);
+      writer_.write(bgr_);
+    } catch (const std::exception& error) {
+      return opencv_failed(path_, error.what());
+    }
+    return {};
+  }
+
+  Result<void> finish(std::string_view /*summary*/) override {
+    if (!writer_.isOpened()) {
+      return fail(ExitCode::kInvalidInput, "out.empty", path_, "there is no frame to write",
+                  "give an input with frames");
+    }
+    try {
+      writer_.release();
+    } catch (const std::exception& error) {
+      return opencv_failed(path_, error.what());
+    }
+    MODAR_ASSIGN(const MappedFile movie, MappedFile::open(temporary_));
+    return write_file(path_, movie.bytes());
+  }
+
+ private:
+  Result<void> open(const RgbaView& image) {
+    width_ = image.width;
+    height_ = image.height;
+    // Chroma of half size needs even sides: an odd last row or column is left out.
+    even_ = cv::Rect(0, 0, width_ & ~1, height_ & ~1);
+    if (even_.area() == 0) {
+      return fail(ExitCode::kInvalidInput, "out.size", path_, "a movie needs two pixels a side",
+                  "write pictures into a folder instead");
+    }
+    // One thread: the encoder's choices depend on how many it has, and so would the bytes.
+    setenv("OPENCV_FFMPEG_WRITER_OPTIONS", "threads;1|preset;veryfast|crf;20", 0);
+    const int code = cv::VideoWriter::fourcc('a', 'v', 'c', '1');
+    if (!writer_.open(temporary_, cv::CAP_FFMPEG, code, fps_, even_.size())) {
+      return fail(ExitCode::kIo, "out.create", path_, "the movie cannot be opened for writing",
+                  "check that its folder is there, and that FFmpeg has an H.264 encoder");
+    }
+    return {};
+  }
+
+  std::string path_;
+  std::string temporary_;
+  double fps_;
+  int width_ = 0;
+  int height_ = 0;
+  cv::Rect even_;
+  cv::Mat bgr_;
+  cv::VideoWriter writer_;
+};
+
+Result<std::unique_ptr<FrameSink>> open_movie(const std::string& path, double fps) {
+  return std::make_unique<Movie>(path, fps);
+}
+
+Result<std::vector<std::uint8_t>> encode_png(const std::uint8_t* pixels, int width, int height,
+                                             int channels) {
+  try {
+    const cv::Mat source(height, width, CV_8UC(channels), const_cast<std::uint8_t*>(pixels));
+    cv::Mat bgr;
+    cv::cvtColor(source, bgr, channels == 4 ? cv::COLOR_RGBA2BGR : cv::COLOR_RGB2BGR);
+    std::vector<std::uint8_t> file;
+    if (cv::imencode(".png", bgr, file)) return file;
+    return opencv_failed("", "the picture is not encoded");
+  } catch (const std::exception& error) {
+    return opencv_failed("", error.what());
+  }
+}
+
+}  // namespace
 }  // namespace modar
+
+extern "C" const modar::Media* modar_media() {
+  static const modar::Media media = {modar::open_path, modar::open_camera, modar::open_movie,
+                                     modar::encode_png};
+  return &media;
+}

@@ -1,0 +1,448 @@
+// Segments to lines, lines to four-sided figures, and the best one's sides to sub-pixels.
+#include "bake/pattern/find_corners.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <opencv2/imgproc.hpp>
+
+namespace modar {
+namespace {
+
+// The longer side that figures are looked for at: larger costs time and finds more texture. Set by
+// hand; the corners are measured on the photo itself.
+constexpr double kSearchSide = 800;
+constexpr std::size_t kMostLines = 60;  // the longest; their pairs of pairs are tried
+constexpr double kJoinDegrees = 2.0;    // segments of one line: a photo bends lines by as much
+constexpr double kJoinPixels = 3.0;
+// Steps of a colour channel, a pixel: an edge. With 5, weak sides are lost, and 120 lines find more
+// wrong figures: 29 of 40 rendered photos were right then, 50 of 60 with these.
+constexpr double kEdge = 3;
+// A figure: of the photo's area at least so much, and each corner so far from straight and closed.
+constexpr double kLeastArea = 0.04;
+constexpr double kLeastCornerDegrees = 35;
+// Share of a side along which an edge is seen. Fingers, shadows and glare hide the rest. Set by
+// hand.
+constexpr double kLeastSupport = 0.62;
+constexpr double kLeastSide = 0.5;  // below, a side is not even tried
+// Of a figure around the best one, and its area at most, times the best one's.
+constexpr double kOutlineSupport = 0.9;
+constexpr double kOutlineScore = 0.25;
+constexpr double kMostMargin = 1.7;
+
+using Point = cv::Point2d;
+
+struct Line {
+  Point origin;              // nearest to the first segment's middle
+  Point along;               // of length 1
+  double length = 0;         // of all its segments
+  std::vector<int> covered;  // before each pixel from `first`: those that show an edge
+  double first = 0;
+};
+
+struct Figure {
+  std::array<Point, 4> corners;
+  double support = 0;
+  double score = 0;
+};
+
+double cross(const Point& a, const Point& b) {
+  return a.x * b.y - a.y * b.x;
+}
+
+double norm_of(const Point& a) {
+  return std::hypot(a.x, a.y);
+}
+
+/// Gradients across all colours: of each pixel that of the channel which changes most.
+struct Gradients {
+  cv::Mat dx;
+  cv::Mat dy;
+
+  explicit Gradients(const cv::Mat& rgb) {
+    std::array<cv::Mat, 3> channels;
+    cv::split(rgb, channels.data());
+    for (const cv::Mat& channel : channels) {
+      cv::Mat x;
+      cv::Mat y;
+      cv::Sobel(channel, x, CV_32F, 1, 0, 3, 0.125);
+      cv::Sobel(channel, y, CV_32F, 0, 1, 3, 0.125);
+      if (dx.empty()) {
+        dx = x;
+        dy = y;
+        continue;
+      }
+      cv::Mat stronger = x.mul(x) + y.mul(y) > dx.mul(dx) + dy.mul(dy);
+      x.copyTo(dx, stronger);
+      y.copyTo(dy, stronger);
+    }
+  }
+
+  /// Across a line of that normal; 0 outside of the photo.
+  [[nodiscard]] double across(const Point& at, const Point& normal) const {
+    const int x = static_cast<int>(std::lround(at.x));
+    const int y = static_cast<int>(std::lround(at.y));
+    if (x < 1 || y < 1 || x >= dx.cols - 1 || y >= dx.rows - 1) return 0;
+    const double gx = static_cast<double>(dx.at<float>(y, x));
+    const double gy = static_cast<double>(dy.at<float>(y, x));
+    const double strength = gx * normal.x + gy * normal.y;
+    // A gradient that points elsewhere by more than 30 degrees belongs to something else.
+    return std::fabs(strength) > 0.87 * std::hypot(gx, gy) ? strength : 0;
+  }
+};
+
+/// Segments that lie on one another's line become one line. The longest come first.
+std::vector<Line> join_segments(std::vector<cv::Vec4f> segments) {
+  const auto size = [](const cv::Vec4f& s) {
+    return std::hypot(static_cast<double>(s[2] - s[0]), static_cast<double>(s[3] - s[1]));
+  };
+  std::sort(segments.begin(), segments.end(),
+            [&](const cv::Vec4f& a, const cv::Vec4f& b) { return size(a) > size(b); });
+  std::vector<Line> lines;
+  for (const cv::Vec4f& s : segments) {
+    const Point from(static_cast<double>(s[0]), static_cast<double>(s[1]));
+    const Point to(static_cast<double>(s[2]), static_cast<double>(s[3]));
+    const double long_as = norm_of(to - from);
+    if (long_as < 12) break;
+    const Point along = (to - from) / long_as;
+    const auto same = std::find_if(lines.begin(), lines.end(), [&](const Line& line) {
+      return std::fabs(cross(line.along, along)) < std::sin(kJoinDegrees * CV_PI / 180) &&
+             std::fabs(cross(line.along, from - line.origin)) < kJoinPixels &&
+             std::fabs(cross(line.along, to - line.origin)) < kJoinPixels;
+    });
+    if (same != lines.end()) {
+      same->length += long_as;
+    } else {
+      lines.push_back({(from + to) / 2, along, long_as, {}, 0});
+    }
+  }
+  std::sort(lines.begin(), lines.end(),
+            [](const Line& a, const Line& b) { return a.length > b.length; });
+  if (lines.size() > kMostLines) lines.resize(kMostLines);
+  return lines;
+}
+
+/// Counts where along a line an edge is seen, one place a pixel.
+void cover(Line& line, const Gradients& gradients, double threshold) {
+  const Point normal(-line.along.y, line.along.x);
+  const double reach = std::hypot(gradients.dx.cols, gradients.dx.rows);
+  line.first = -reach;
+  line.covered.assign(1, 0);
+  for (double s = -reach; s < reach; s += 1) {
+    bool seen = false;
+    for (const double off : {0.0, -1.0, 1.0, -2.0, 2.0}) {
+      const Point at = line.origin + s * line.along + off * normal;
+      seen = seen || std::fabs(gradients.across(at, normal)) > threshold;
+    }
+    line.covered.push_back(line.covered.back() + (seen ? 1 : 0));
+  }
+}
+
+/// Share of the line between two of its points that shows an edge.
+double support(const Line& line, const Point& a, const Point& b) {
+  double from = (a - line.origin).dot(line.along) - line.first;
+  double to = (b - line.origin).dot(line.along) - line.first;
+  if (from > to) std::swap(from, to);
+  const auto last = static_cast<double>(line.covered.size() - 1);
+  const auto begin = static_cast<std::size_t>(std::clamp(from, 0.0, last));
+  const auto end = static_cast<std::size_t>(std::clamp(to, 0.0, last));
+  return end > begin ? (line.covered[end] - line.covered[begin]) / static_cast<double>(end - begin)
+                     : 0;
+}
+
+bool intersect(const Line& a, const Line& b, Point& at) {
+  const double turn = cross(a.along, b.along);
+  if (std::fabs(turn) < std::sin(kLeastCornerDegrees * CV_PI / 180)) return false;
+  at = a.origin + cross(b.origin - a.origin, b.along) / turn * a.along;
+  return true;
+}
+
+/// Clockwise on the screen, the corner nearest to the photo's top-left first.
+std::array<Point, 4> clockwise(std::array<Point, 4> corners) {
+  if (cross(corners[1] - corners[0], corners[2] - corners[1]) < 0) {
+    std::swap(corners[1], corners[3]);
+  }
+  const auto first =
+      std::min_element(corners.begin(), corners.end(),
+                       [](const Point& a, const Point& b) { return a.x + a.y < b.x + b.y; });
+  std::rotate(corners.begin(), first, corners.end());
+  return corners;
+}
+
+double area_of(const std::array<Point, 4>& c) {
+  return std::fabs(cross(c[2] - c[0], c[3] - c[1])) / 2;
+}
+
+bool convex(const std::array<Point, 4>& c) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point side = c[(i + 1) % 4] - c[i];
+    const Point next = c[(i + 2) % 4] - c[(i + 1) % 4];
+    if (cross(side, next) <=
+        std::sin(kLeastCornerDegrees * CV_PI / 180) * norm_of(side) * norm_of(next)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+class Search {
+ public:
+  Search(const cv::Mat& rgb, std::vector<Line> lines)
+      : size_(rgb.size()), lines_(std::move(lines)) {}
+
+  /// Every two lines with every two of those that cross both and show an edge between them.
+  std::vector<Figure> figures() {
+    for (std::size_t a = 0; a < lines_.size(); ++a) {
+      for (std::size_t c = a + 1; c < lines_.size(); ++c) {
+        if (std::fabs(lines_[a].along.dot(lines_[c].along)) < 0.7) continue;
+        std::vector<std::size_t> across;
+        for (std::size_t b = 0; b < lines_.size(); ++b) {
+          Point from;
+          Point to;
+          if (b != a && b != c && intersect(lines_[a], lines_[b], from) &&
+              intersect(lines_[b], lines_[c], to) && within(from) && within(to) &&
+              support(lines_[b], from, to) >= kLeastSide) {
+            across.push_back(b);
+          }
+        }
+        for (std::size_t i = 0; i < across.size(); ++i) {
+          for (std::size_t k = i + 1; k < across.size(); ++k) {
+            try_figure(a, across[i], c, across[k]);
+          }
+        }
+      }
+    }
+    std::sort(found_.begin(), found_.end(),
+              [](const Figure& a, const Figure& b) { return a.score > b.score; });
+    return std::move(found_);
+  }
+
+ private:
+  [[nodiscard]] bool within(const Point& at) const {
+    return at.x >= 1 && at.y >= 1 && at.x <= size_.width - 2 && at.y <= size_.height - 2;
+  }
+
+  void try_figure(std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
+    std::array<Point, 4> corners;
+    const std::array<std::size_t, 4> sides = {a, b, c, d};
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (!intersect(lines_[sides[i]], lines_[sides[(i + 1) % 4]], corners[i])) return;
+    }
+    const double share = area_of(corners) / (static_cast<double>(size_.width) * size_.height);
+    if (share < kLeastArea) return;
+    double weakest = 1;
+    double sum = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double one = support(lines_[sides[(i + 1) % 4]], corners[i], corners[(i + 1) % 4]);
+      weakest = std::min(weakest, one);
+      sum += one;
+      if (one < kLeastSide) return;
+    }
+    corners = clockwise(corners);
+    if (!convex(corners)) return;
+    // An edge that goes on beyond a corner belongs to something larger.
+    double beyond = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Point& from = corners[i];
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Line& line = lines_[sides[k]];
+        if (std::fabs(cross(line.along, from - line.origin)) > 1e-6) continue;
+        const bool forward = line.along.dot(from - (corners[0] + corners[2]) / 2) > 0;
+        const Point outward = (forward ? 1.0 : -1.0) * line.along;
+        beyond += support(line, from + 4 * outward, from + 24 * outward) / 8;
+      }
+    }
+    found_.push_back(
+        {corners, weakest, sum / 4 + weakest - 0.6 * beyond + 0.35 * std::sqrt(share)});
+  }
+
+  cv::Size size_;
+  std::vector<Line> lines_;
+  std::vector<Figure> found_;
+};
+
+/// The edge nearest to a side, as a line through places along it: to sub-pixels.
+bool fit_side(const Gradients& gradients, const Point& from, const Point& to, double reach,
+              Line& out) {
+  const double long_as = norm_of(to - from);
+  const Point along = (to - from) / long_as;
+  const Point normal(-along.y, along.x);
+  std::vector<cv::Point2f> places;
+  constexpr int kPlaces = 160;
+  for (int i = 0; i < kPlaces; ++i) {
+    const Point at = from + (0.04 + 0.92 * i / (kPlaces - 1)) * (to - from);
+    double best = 0;
+    double where = 0;
+    const auto strength = [&](double off) {
+      // The nearer edge counts more: a printed frame may lie within reach.
+      return std::fabs(gradients.across(at + off * normal, normal)) *
+             std::exp(-off * off / (reach * reach));
+    };
+    for (double off = -reach; off <= reach; off += 1) {
+      if (strength(off) > best) {
+        best = strength(off);
+        where = off;
+      }
+    }
+    if (best < 2) continue;
+    // The middle of the edge, as the gradients around it weigh.
+    double weight = 0;
+    double moment = 0;
+    for (double off = where - 2; off <= where + 2; off += 1) {
+      weight += strength(off);
+      moment += strength(off) * off;
+    }
+    const Point place = at + moment / weight * normal;
+    places.emplace_back(static_cast<float>(place.x), static_cast<float>(place.y));
+  }
+  if (places.size() < kPlaces / 4) return false;
+  cv::Vec4f line;
+  cv::fitLine(places, line, cv::DIST_WELSCH, 0, 1e-3, 1e-4);
+  out.along = {static_cast<double>(line[0]), static_cast<double>(line[1])};
+  out.origin = {static_cast<double>(line[2]), static_cast<double>(line[3])};
+  return true;
+}
+
+std::array<Point, 4> refine(const cv::Mat& rgb, std::array<Point, 4> corners, double scale) {
+  const Gradients gradients(rgb);
+  for (const double reach : {1.5 * scale + 1, 3.0, 3.0}) {
+    std::array<Line, 4> sides;
+    std::array<Point, 4> next = corners;
+    bool good = true;
+    for (std::size_t i = 0; i < 4; ++i) {
+      good = good && fit_side(gradients, corners[i], corners[(i + 1) % 4], reach, sides[i]);
+    }
+    for (std::size_t i = 0; i < 4 && good; ++i) {
+      good = intersect(sides[(i + 3) % 4], sides[i], next[i]) &&
+             norm_of(next[i] - corners[i]) < 4 * scale + 4;
+    }
+    if (!good) break;
+    corners = next;
+  }
+  return corners;
+}
+
+/// Printed frames lie within a thing's own edges: the largest figure around the best one that
+/// stands out nearly as well.
+const Figure& outermost(const std::vector<Figure>& figures) {
+  const Figure& best = figures.front();
+  const Figure* chosen = &best;
+  for (const Figure& other : figures) {
+    if (other.score < best.score - kOutlineScore) break;
+    if (other.support < kOutlineSupport || area_of(other.corners) <= area_of(chosen->corners) ||
+        area_of(other.corners) > kMostMargin * area_of(best.corners)) {
+      continue;
+    }
+    bool around = true;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Point side = other.corners[(i + 1) % 4] - other.corners[i];
+      for (const Point& corner : best.corners) {
+        around = around && cross(side, corner - other.corners[i]) > -2 * norm_of(side);
+      }
+    }
+    if (around) chosen = &other;
+  }
+  return *chosen;
+}
+
+tl::unexpected<Error> not_found(const char* cause) {
+  return fail(
+      ExitCode::kInvalidInput, "rectify.not-found", "", cause,
+      "give the four corners with --corners, or take the photo with all of the thing's edges "
+      "in it, before an even background");
+}
+
+/// Another figure of about the same score that is neither within the best one nor nearly it.
+bool rivalled(const std::vector<Figure>& figures) {
+  const Figure& best = figures.front();
+  const double side = std::sqrt(area_of(best.corners));
+  for (const Figure& other : figures) {
+    if (other.score < best.score - 0.08) break;
+    double apart = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      apart = std::max(apart, norm_of(other.corners[i] - best.corners[i]));
+    }
+    const Point middle = (other.corners[0] + other.corners[2]) / 2;
+    const Point centre = (best.corners[0] + best.corners[2]) / 2;
+    if (apart > 0.5 * side && norm_of(middle - centre) > 0.35 * side) return true;
+  }
+  return false;
+}
+
+Result<FoundCorners> search(const RgbaImage& photo) {
+  const cv::Mat rgba(static_cast<int>(photo.height), static_cast<int>(photo.width), CV_8UC4,
+                     const_cast<std::uint8_t*>(photo.pixels.data()));
+  cv::Mat rgb;
+  cv::cvtColor(rgba, rgb, cv::COLOR_RGBA2RGB);
+  const double scale = std::max(1.0, std::max(rgb.cols, rgb.rows) / kSearchSide);
+  cv::Mat small;
+  cv::resize(rgb, small, cv::Size(), 1 / scale, 1 / scale, cv::INTER_AREA);
+  std::vector<cv::Vec4f> segments;
+  const auto detector = cv::createLineSegmentDetector(cv::LSD_REFINE_STD);
+  std::array<cv::Mat, 3> channels;
+  cv::split(small, channels.data());
+  for (const cv::Mat& channel : channels) {
+    std::vector<cv::Vec4f> some;
+    detector->detect(channel, some);
+    segments.insert(segments.end(), some.begin(), some.end());
+  }
+  const Gradients gradients(small);
+  std::vector<Line> lines = join_segments(std::move(segments));
+  for (Line& line : lines) cover(line, gradients, kEdge);
+  std::vector<Figure> figures = Search(small, std::move(lines)).figures();
+  if (figures.empty() || figures.front().support < kLeastSupport) {
+    return not_found("no four-sided figure stands out in the photo");
+  }
+  if (rivalled(figures)) return not_found("several four-sided figures stand out in the photo");
+  const Figure& figure = outermost(figures);
+  FoundCorners found;
+  found.support = figure.support;
+  std::array<Point, 4> corners = figure.corners;
+  for (Point& corner : corners) corner = (corner + Point(0.5, 0.5)) * scale - Point(0.5, 0.5);
+  corners = refine(rgb, corners, scale);
+  for (std::size_t i = 0; i < 4; ++i) found.corners[i] = {corners[i].x, corners[i].y};
+  return found;
+}
+
+}  // namespace
+
+Result<FoundCorners> find_corners(const RgbaImage& photo) {
+  try {
+    return search(photo);
+  } catch (const std::exception& thrown) {
+    return fail(ExitCode::kInternal, "rectify.opencv", "", thrown.what(), "report this as a bug");
+  }
+}
+
+Result<RgbaImage> corners_picture(const RgbaImage& photo,
+                                  const std::array<PixelPoint, 4>& corners) {
+  try {
+    const cv::Mat source(static_cast<int>(photo.height), static_cast<int>(photo.width), CV_8UC4,
+                         const_cast<std::uint8_t*>(photo.pixels.data()));
+    const double scale = std::min(1.0, 1200.0 / photo.width);
+    cv::Mat shown;
+    cv::resize(source, shown, cv::Size(), scale, scale, cv::INTER_AREA);
+    std::vector<cv::Point> outline;
+    for (const PixelPoint& c : corners) {
+      outline.emplace_back(static_cast<int>(std::lround((c.x + 0.5) * scale - 0.5)),
+                           static_cast<int>(std::lround((c.y + 0.5) * scale - 0.5)));
+    }
+    const cv::Scalar ink(255, 48, 96, 255);
+    cv::polylines(shown, outline, true, ink, 2, cv::LINE_AA);
+    for (std::size_t i = 0; i < 4; ++i) {
+      cv::circle(shown, outline[i], 7, ink, 2, cv::LINE_AA);
+      cv::putText(shown, std::to_string(i + 1), outline[i] + cv::Point(10, 22),
+                  cv::FONT_HERSHEY_SIMPLEX, 0.8, ink, 2, cv::LINE_AA);
+    }
+    RgbaImage out{
+        static_cast<std::uint32_t>(shown.cols), static_cast<std::uint32_t>(shown.rows), {}};
+    out.pixels.assign(shown.data, shown.data + shown.total() * 4);
+    return out;
+  } catch (const std::exception& thrown) {
+    return fail(ExitCode::kInternal, "rectify.opencv", "", thrown.what(), "report this as a bug");
+  }
+}
+
+}  // namespace modar

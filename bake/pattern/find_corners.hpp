@@ -1,0 +1,27 @@
+// Where a flat, four-sided thing lies in a photo.
+#pragma once
+
+#include <array>
+
+#include "bake/image/image.hpp"
+#include "bake/pattern/rectify.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct FoundCorners {
+  std::array<PixelPoint, 4> corners{};  ///< top-left, top-right, bottom-right, bottom-left
+  double support = 0;                   ///< share of the weakest side that shows an edge, 0 to 1
+};
+
+/// The largest four-sided figure whose sides stand out all along: straight segments (LSD: von Gioi,
+/// Jakubowicz, Morel and Randall, "LSD: a line segment detector", IPOL 2012) are joined to lines,
+/// lines to figures, and the best one's sides are fitted to the photo's edges to sub-pixels. Which
+/// corner is the thing's own top-left nobody can tell: it is taken to be upright. Errors:
+/// kInvalidInput "rectify.not-found", where no figure stands out or two do.
+Result<FoundCorners> find_corners(const RgbaImage& photo);
+
+/// The photo, at most 1,200 pixels wide, with the figure and its corners' numbers drawn on it.
+Result<RgbaImage> corners_picture(const RgbaImage& photo, const std::array<PixelPoint, 4>& corners);
+
+}  // namespace modar

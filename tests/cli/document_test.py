@@ -1,0 +1,59 @@
+"""`modar document`: manual pages and completions say what --help says, and the shells take them."""
+import re
+import shutil
+import subprocess
+import unittest
+
+from programs import ProgramTest
+
+
+class Document(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        done = self.modar("document", "-o", "share")
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
+        self.share = self.folder / "share"
+
+    def complete(self, *words):
+        """What bash offers for the last word."""
+        script = ("source share/bash-completion/completions/modar; COMP_WORDS=(\"$@\"); COMP_CWORD=$(($# - 1)); "
+                  "_modar; printf '%s\\n' \"${COMPREPLY[@]}\"")
+        done = subprocess.run(["bash", "-c", script, "bash", *words], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(done.stderr, "")
+        return done.stdout.split()
+
+    def test_every_command_has_a_page_with_the_words_of_its_help(self):
+        commands = re.findall(r"^  ([a-z]+) ", self.modar("--help").stdout, re.MULTILINE)
+        self.assertGreater(len(commands), 10)
+        for name in commands:
+            page = (self.share / f"man/man1/modar-{name}.1").read_text().replace("\\-", "-")
+            for option in re.findall(r"^  .*?(--[a-z-]+)", self.modar(name, "--help").stdout, re.MULTILINE):
+                self.assertIn(option, page)
+        self.assertIn("0 to 100", (self.share / "man/man1/modar-pattern-score.1").read_text())
+
+    def test_pages_are_clean_roff(self):
+        if shutil.which("groff") is None:
+            self.skipTest("groff is not installed")
+        for page in sorted((self.share / "man/man1").iterdir()):
+            done = subprocess.run(["groff", "-man", "-Tutf8", "-ww", "-z", page], capture_output=True, text=True)
+            self.assertEqual(done.stderr, "", page.name)
+
+    def test_bash_completes(self):
+        self.assertIn("pattern", self.complete("modar", "pat"))
+        self.assertEqual(self.complete("modar", "pattern", "rec"), ["rectify"])
+        self.assertIn("--width-mm", self.complete("modar", "pattern", "rectify", "--wi"))
+        self.assertEqual(self.complete("modar", "bake", "--effort", "b"), ["best"])
+        (self.folder / "vase.obj").touch()
+        self.assertEqual(self.complete("modar", "bake", "--model", "va"), ["vase.obj"])
+
+    def test_zsh_and_fish_read_theirs(self):
+        for shell, file in (("zsh", "zsh/site-functions/_modar"), ("fish", "fish/vendor_completions.d/modar.fish")):
+            with self.subTest(shell):
+                if shutil.which(shell) is None:
+                    self.skipTest(f"{shell} is not installed")
+                done = subprocess.run([shell, "-n", self.share / file], capture_output=True, text=True)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,110 @@
+// Corners found in photos that OpenCV renders: where they are is known exactly.
+#include "bake/pattern/find_corners.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace modar {
+namespace {
+
+cv::Mat asset(const std::string& name) {
+  const char* root = std::getenv("MODAR_SOURCE_DIR");
+  return cv::imread(std::string(root == nullptr ? "." : root) + "/assets/patterns/" + name);
+}
+
+RgbaImage as_photo(const cv::Mat& bgr) {
+  cv::Mat rgba;
+  cv::cvtColor(bgr, rgba, cv::COLOR_BGR2RGBA);
+  RgbaImage photo{static_cast<std::uint32_t>(rgba.cols), static_cast<std::uint32_t>(rgba.rows), {}};
+  photo.pixels.assign(rgba.data, rgba.data + rgba.total() * 4);
+  return photo;
+}
+
+using Corners = std::array<cv::Point2f, 4>;
+
+/// The pattern at those corners before a background, twice as large and then shrunk, with noise.
+cv::Mat photograph(const cv::Mat& pattern, const cv::Mat& background, const Corners& corners) {
+  cv::Mat large;
+  cv::resize(background, large, cv::Size(1920, 1440), 0, 0, cv::INTER_CUBIC);
+  const auto right = static_cast<float>(pattern.cols) - 0.5f;
+  const auto bottom = static_cast<float>(pattern.rows) - 0.5f;
+  const Corners from = {{{-0.5f, -0.5f}, {right, -0.5f}, {right, bottom}, {-0.5f, bottom}}};
+  Corners to = corners;
+  for (cv::Point2f& corner : to)
+    corner = 2 * (corner + cv::Point2f(0.5f, 0.5f)) - cv::Point2f(0.5f, 0.5f);
+  cv::warpPerspective(pattern, large, cv::getPerspectiveTransform(from.data(), to.data()),
+                      large.size(), cv::INTER_LINEAR, cv::BORDER_TRANSPARENT);
+  cv::Mat photo;
+  cv::resize(large, photo, cv::Size(960, 720), 0, 0, cv::INTER_AREA);
+  cv::Mat noise(photo.size(), CV_16SC3);
+  cv::theRNG().state = 7;
+  cv::randn(noise, 0, 3);
+  cv::add(photo, noise, photo, cv::noArray(), CV_8UC3);
+  return photo;
+}
+
+/// A table's colour that fades, or a blurred picture behind.
+cv::Mat backdrop(const std::string& picture) {
+  cv::Mat table(720, 960, CV_8UC3);
+  for (int y = 0; y < table.rows; ++y) {
+    for (int x = 0; x < table.cols; ++x) {
+      table.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<std::uint8_t>(96 + x / 16),
+                                            static_cast<std::uint8_t>(120 + y / 24), 150);
+    }
+  }
+  if (picture.empty()) return table;
+  cv::resize(asset(picture), table, table.size());
+  cv::GaussianBlur(table, table, cv::Size(), 9);
+  return table;
+}
+
+TEST(FindCorners, WithinOnePercentOfTheWidth) {
+  struct Case {
+    const char* pattern;
+    const char* background;
+    Corners corners;
+  };
+  const std::vector<Case> cases = {
+      {"mural.png", "", {{{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}}},
+      {"game.png", "", {{{180.5f, 250.2f}, {560.6f, 90.7f}, {790.3f, 470.4f}, {380.8f, 640.2f}}}}};
+  for (const Case& each : cases) {
+    const cv::Mat photo = photograph(asset(each.pattern), backdrop(each.background), each.corners);
+    const auto found = find_corners(as_photo(photo));
+    ASSERT_TRUE(found) << each.pattern << ": " << found.error().cause;
+    const double width = cv::norm(each.corners[1] - each.corners[0]);
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_NEAR(found->corners[i].x, static_cast<double>(each.corners[i].x), 0.01 * width)
+          << each.pattern << " corner " << i;
+      EXPECT_NEAR(found->corners[i].y, static_cast<double>(each.corners[i].y), 0.01 * width)
+          << each.pattern << " corner " << i;
+    }
+  }
+}
+
+TEST(FindCorners, NothingThatStandsOutIsAnError) {
+  const auto empty = find_corners(as_photo(backdrop("")));
+  ASSERT_FALSE(empty);
+  EXPECT_EQ(empty.error().code, "rectify.not-found");
+  EXPECT_NE(empty.error().cure.find("--corners"), std::string::npos);
+}
+
+TEST(FindCorners, ThePictureShowsThem) {
+  const RgbaImage photo = as_photo(backdrop(""));
+  const auto picture = corners_picture(photo, {{{100, 100}, {800, 100}, {800, 600}, {100, 600}}});
+  ASSERT_TRUE(picture);
+  ASSERT_EQ(picture->width, 960U);
+  const std::uint8_t* edge = &picture->pixels[4 * (100 * std::size_t{960} + 400)];
+  EXPECT_GT(edge[0], 200);
+  EXPECT_LT(edge[1], 100);
+}
+
+}  // namespace
+}  // namespace modar
