@@ -250,7 +250,7 @@ std::vector<ScorePlace> places_of(const std::vector<Matched>& views) {
 }
 
 /// What a step of the test varies.
-enum class Vary : std::uint8_t { kSize, kTilt, kNear, kCover, kMirror };
+enum class Vary : std::uint8_t { kSize, kTilt, kClose, kCover, kMirror };
 
 /// One step of the test: views of one size and tilt.
 struct Step {
@@ -274,7 +274,7 @@ std::vector<Step> test_steps() {
   }
   for (const double side : {120, 140, 170, 200}) steps.push_back({Vary::kSize, side, 1.1});
   for (const double tilt : {2.0, 1.7, 1.4}) steps.push_back({Vary::kTilt, kEasySide, tilt});
-  for (const double side : {400, 560, 800}) steps.push_back({Vary::kNear, side, 1.1});
+  for (const double side : {400, 560, 800}) steps.push_back({Vary::kClose, side, 1.1});
   for (const double tilt : {1.05, 1.15, 1.25, 1.4}) steps.push_back({Vary::kCover, 200, tilt});
   steps.push_back({Vary::kMirror, kEasySide, 1.1});
   return steps;
@@ -295,8 +295,8 @@ constexpr int kNearFrame = 360;
 
 /// Side of a step's frames: the pattern fits in, however it is rotated; near ones overflow.
 int frame_side(const Step& step) {
-  return step.vary == Vary::kNear ? kNearFrame
-                                  : static_cast<int>(1.6 * step.side) + 2 * kViewMargin;
+  return step.vary == Vary::kClose ? kNearFrame
+                                   : static_cast<int>(1.6 * step.side) + 2 * kViewMargin;
 }
 
 AffineView centred(AffineView view, int side) {
@@ -337,7 +337,7 @@ void cover_half(const GrayPicture& picture, const AffineView& view, int side,
 /// The view of that index of a step.
 AffineView view_of(const GrayPicture& picture, const Step& step, int i) {
   const double own = std::sqrt(1.0 * picture.width * picture.height);
-  const double scale = step.vary == Vary::kNear ? step.side / own : std::min(1.0, step.side / own);
+  const double scale = step.vary == Vary::kClose ? step.side / own : std::min(1.0, step.side / own);
   return centred(make_view(picture.width, picture.height, scale, step.tilt, kTurns[i],
                            kTurns[(i + 2) % 6], kViewMargin),
                  frame_side(step));
@@ -447,7 +447,7 @@ ScoreRange range_of_steps(const StepShares& all, const GrayImage& pattern) {
   // Frames of the near steps have half of the camera's pixels.
   double near_side = 200;
   for (std::size_t i = 0; i < all.steps.size(); ++i) {
-    const bool near = all.steps[i].vary == Vary::kNear && all.shares[i] >= 0.8;
+    const bool near = all.steps[i].vary == Vary::kClose && all.shares[i] >= 0.8;
     if (near) near_side = std::max(near_side, 2 * all.steps[i].side);
   }
   range.nearest = std::min(range.farthest, kFocal / (near_side * aspect));
