@@ -31,7 +31,7 @@ TEST(LimitedProcess, GivesResultsInOrderWhateverHappensToTheOthers) {
 }
 
 TEST(LimitedProcess, HoldsTheMemoryLimit) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef MODAR_SANITIZED
   GTEST_SKIP() << "a sanitizer needs terabytes of addresses";
 #else
   ProcessLimits limits;
