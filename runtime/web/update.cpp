@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
+#include <set>
 #include <string>
 
 #include <emscripten.h>
@@ -47,9 +48,13 @@ struct Freed {
   void operator()(void* memory) const { std::free(memory); }
 };
 
-/// What is written over in a release folder, and must not come from a cache.
-bool is_overwritten(const std::string& path) {
-  return path == "latest" || path.starts_with("root.json");
+/// Paths that this visit has asked for.
+std::set<std::string> asked;
+
+/// What must not come from the browser's cache: what is written over in a release folder, and what
+/// is asked for again, since the copy that came first was no good and the browser may have kept it.
+bool past_caches(const std::string& path) {
+  return !asked.insert(path).second || path == "latest" || path.starts_with("root.json");
 }
 
 Result<void> bring(const std::string& folder, const std::string& path, std::uint64_t from,
@@ -57,8 +62,8 @@ Result<void> bring(const std::string& folder, const std::string& path, std::uint
   const std::string url = folder + path;
   void* bytes = nullptr;
   std::size_t size = 0;
-  const int status = update_get(url.c_str(), is_overwritten(path) ? 1 : 0,
-                                static_cast<double>(from), &bytes, &size);
+  const int status =
+      update_get(url.c_str(), past_caches(path) ? 1 : 0, static_cast<double>(from), &bytes, &size);
   const std::unique_ptr<void, Freed> keeper(bytes);
   if (status == 404 || status == 410) {
     return fail(kExitMixed, "fetch.missing", path, "the server has no such file",
