@@ -51,10 +51,10 @@ struct Freed {
 /// Paths that this visit has asked for.
 std::set<std::string> asked;
 
-/// What must not come from the browser's cache: what is written over in a release folder, and what
-/// is asked for again, since the copy that came first was no good and the browser may have kept it.
+/// What must not come from the browser's cache: documents, which may have been mended since, and
+/// pieces that are asked for again, since the copy that came first was no good.
 bool past_caches(const std::string& path) {
-  return !asked.insert(path).second || path == "latest" || path.starts_with("root.json");
+  return !asked.insert(path).second || !path.starts_with("objects/");
 }
 
 Result<void> bring(const std::string& folder, const std::string& path, std::uint64_t from,
