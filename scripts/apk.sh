@@ -39,11 +39,11 @@ for bundle in "${bundles[@]}"; do
   [ "$(head -c 8 "$bundle" 2>/dev/null | tr -d '\0')" != "" ] || stop 2 "$bundle cannot be read"
 done
 missing=()
-for tool in javac aapt zipalign apksigner keytool python3 xz; do
+for tool in javac aapt zipalign apksigner keytool proguard python3 xz; do
   command -v $tool >/dev/null || missing+=("$tool")
 done
 [ ${#missing[@]} -eq 0 ] ||
-  stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless python3 xz-utils"
+  stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless proguard-cli python3 xz-utils"
 framework=/usr/share/android-framework-res/framework-res.apk
 [ -r $framework ] || stop 5 "missing: $framework; apt-get install android-framework-res"
 
@@ -76,24 +76,49 @@ if [ ! -f "$work/current.txt" ]; then
   mv "$work/current.txt.tmp" "$work/current.txt"
 fi
 
+# The app's code, once for all APKs: compiled beside the stubs, shrunk (to $code/classes), turned into a phone's.
+code=$work/code
+made_of=$(cat "$work/current.txt" "$0" "$root/scripts/android_stubs.py" "$app/proguard-rules.pro" "$app/AndroidManifest.xml" \
+  "$app"/res/*/* "$app"/java/org/modar/* | sha256sum)
+if [ "$made_of" != "$(cat "$code/made_of" 2>/dev/null)" ]; then
+  rm -rf "$code"
+  mkdir -p "$code/stub-classes" "$code/all-classes" "$code/names"
+  python3 "$root/scripts/android_stubs.py" "$work/current.txt" "$app/java" "$code/stubs"
+  find "$code/stubs" -name '*.java' > "$code/stubs.list"
+  aapt package -m -J "$code/names" -M "$app/AndroidManifest.xml" -S "$app/res" -I $framework >&2
+  find "$app/java" "$code/names" -name '*.java' > "$code/app.list"
+  javac "${quick[@]}" --release 7 -d "$code/stub-classes" "@$code/stubs.list"
+  javac "${quick[@]}" -g:none --release 7 -cp "$code/stub-classes" -d "$code/all-classes" "@$code/app.list"
+  # Java's own classes as the JDK lists them for --release 7. Its lists are in a format newer than ProGuard; what the format
+  # added is not in them.
+  python3 - "$(dirname "$(dirname "$(readlink -f "$(command -v javac)")")")/lib/ct.sym" "$code/java.jar" <<'P'
+import sys, zipfile
+with zipfile.ZipFile(sys.argv[1]) as lists, zipfile.ZipFile(sys.argv[2], "w") as out:
+    for name in lists.namelist():
+        releases, _, path = name.partition("/java.base/")
+        if "7" in releases and path.endswith(".sig"):
+            content = lists.read(name)
+            out.writestr(path[:-4] + ".class", content[:4] + bytes((0, 0, 0, 51)) + content[8:])
+P
+  proguard -injars "$code/all-classes" -outjars "$code/classes" -libraryjars "$code/java.jar" -libraryjars "$code/stub-classes" \
+    "@$app/proguard-rules.pro" > "$code/proguard.log" || stop 4 "$(cat "$code/proguard.log")"
+  java -XX:TieredStopAtLevel=1 -cp "$work/dx.jar" com.android.dx.command.Main --dex --min-sdk-version=19 \
+    --output="$code/classes.dex" "$code/classes"
+  echo "$made_of" > "$code/made_of"
+fi
+
 step=$work/apk
 rm -rf "$step"
-mkdir -p "$step/stub-classes" "$step/classes" "$step/tree/assets/bundles" "$(dirname "$out")"
-python3 "$root/scripts/android_stubs.py" "$work/current.txt" "$app/java" "$step/stubs"
-find "$step/stubs" -name '*.java' > "$step/stubs.list"
-find "$app/java" -name '*.java' > "$step/app.list"
-javac "${quick[@]}" --release 7 -d "$step/stub-classes" "@$step/stubs.list"
-javac "${quick[@]}" -g:none --release 7 -cp "$step/stub-classes" -d "$step/classes" "@$step/app.list"
-java -XX:TieredStopAtLevel=1 -cp "$work/dx.jar" com.android.dx.command.Main --dex --min-sdk-version=19 \
-  --output="$step/tree/classes.dex" "$step/classes"
-
+mkdir -p "$step/tree/assets/bundles" "$(dirname "$out")"
+cp "$code/classes.dex" "$step/tree/"
 for bundle in "${bundles[@]}"; do
   cp "$bundle" "$step/tree/assets/bundles/"
   for beside in png jpg properties; do
     [ ! -f "${bundle%.modar}.$beside" ] || cp "${bundle%.modar}.$beside" "$step/tree/assets/bundles/"
   done
 done
-[ -z "$words" ] || cp "$words" "$step/tree/assets/words.properties"
+# Of a key that is there twice, the later line counts.
+cat "$app/assets/words.properties" ${words:+"$words"} > "$step/tree/assets/words.properties"
 if [ -n "$release" ]; then
   printf '%s\n' "$release" > "$step/tree/assets/release.txt"
   cp "$trust" "$step/tree/assets/release.pub"

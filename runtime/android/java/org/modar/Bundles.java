@@ -11,7 +11,7 @@ import java.io.FileInputStream;
 import java.io.FileOutputStream;
 import java.io.IOException;
 import java.io.InputStream;
-import java.io.InputStreamReader;
+import java.io.StringReader;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
@@ -27,6 +27,10 @@ final class Bundles {
         final String name;
         final File file;
         final String origin;
+        /** While it is shown. */
+        long session;
+        /** What verifying found; null: nothing. */
+        volatile String damage;
 
         Source(String name, File file, String origin) {
             this.name = name;
@@ -107,12 +111,8 @@ final class Bundles {
     Bitmap hint(Source source) {
         for (String ending : new String[] {".png", ".jpg"}) {
             try {
-                InputStream in = beside(source, ending);
-                try {
-                    return BitmapFactory.decodeStream(in);
-                } finally {
-                    in.close();
-                }
+                byte[] file = bytes(beside(source, ending));
+                return BitmapFactory.decodeByteArray(file, 0, file.length);
             } catch (IOException none) {
                 continue;
             }
@@ -124,12 +124,7 @@ final class Bundles {
     Properties texts(Source source) {
         Properties texts = new Properties();
         try {
-            InputStream in = beside(source, ".properties");
-            try {
-                texts.load(new InputStreamReader(in, "UTF-8"));
-            } finally {
-                in.close();
-            }
+            texts.load(new StringReader(text(beside(source, ".properties"))));
         } catch (IOException none) {
             return texts;
         }
@@ -148,14 +143,7 @@ final class Bundles {
     /** Whether every byte of it has been checked since it came. */
     boolean isVerified(Source source) {
         try {
-            byte[] stamps = new byte[(int) verified.length()];
-            FileInputStream in = new FileInputStream(verified);
-            try {
-                int got = in.read(stamps);
-                return got > 0 && new String(stamps, 0, got, "UTF-8").contains(stampOf(source));
-            } finally {
-                in.close();
-            }
+            return text(new FileInputStream(verified)).contains(stampOf(source));
         } catch (IOException none) {
             return false;
         }
@@ -163,12 +151,7 @@ final class Bundles {
 
     /** On any thread. A phone whose storage is full checks again next time. */
     synchronized void setVerified(Source source) throws IOException {
-        FileOutputStream out = new FileOutputStream(verified, verified.length() < MOST_STAMPS);
-        try {
-            out.write(stampOf(source).getBytes("UTF-8"));
-        } finally {
-            out.close();
-        }
+        write(verified, stampOf(source), verified.length() < MOST_STAMPS);
     }
 
     private InputStream beside(Source source, String ending) throws IOException {
@@ -184,14 +167,31 @@ final class Bundles {
     }
 
     String asset(String name) throws IOException {
-        InputStream in = context.getAssets().open(name);
+        return text(context.getAssets().open(name)).trim();
+    }
+
+    /** All of a file, which is closed. */
+    static byte[] bytes(InputStream in) throws IOException {
         try {
-            ByteArrayOutputStream text = new ByteArrayOutputStream();
-            byte[] part = new byte[1024];
-            for (int got = in.read(part); got > 0; got = in.read(part)) text.write(part, 0, got);
-            return text.toString("UTF-8").trim();
+            ByteArrayOutputStream all = new ByteArrayOutputStream();
+            byte[] part = new byte[1 << 12];
+            for (int got = in.read(part); got > 0; got = in.read(part)) all.write(part, 0, got);
+            return all.toByteArray();
         } finally {
             in.close();
+        }
+    }
+
+    static String text(InputStream in) throws IOException {
+        return new String(bytes(in), "UTF-8");
+    }
+
+    static void write(File file, String text, boolean append) throws IOException {
+        FileOutputStream out = new FileOutputStream(file, append);
+        try {
+            out.write(text.getBytes("UTF-8"));
+        } finally {
+            out.close();
         }
     }
 }

@@ -4,60 +4,43 @@ import android.content.Context;
 import android.os.Build;
 import android.os.Handler;
 import android.os.HandlerThread;
+import android.os.Message;
 
-/** The back camera, as frames on a thread of its own. */
-abstract class CameraFeed {
+/** The back camera, as frames for the stage on a thread of its own. */
+abstract class CameraFeed implements Handler.Callback {
     /** Frames of some 640 x 480: features are found there as well as in larger ones, for a fraction of the time. */
     static final int PIXELS = 640 * 480;
     /** One that fills, one that is tracked, one that waits, one that is drawn. */
     static final int BUFFERS = 4;
+    private static final int OPEN = 0;
+    private static final int HALT = 1;
 
-    interface Sink {
-        /** Before the first frame. turn: degrees that a frame is turned clockwise to be upright on the sensor's phone. */
-        void cameraOpened(int width, int height, int turn);
-
-        /** Hands over a frame; the sink releases it. */
-        void frame(Frame frame);
-
-        void cameraFailed(String cause);
-    }
-
-    final Sink sink;
+    final Stage stage;
     final int patterns;
     Handler handler;
     private HandlerThread thread;
 
-    CameraFeed(Sink sink, int patterns) {
-        this.sink = sink;
+    CameraFeed(Stage stage, int patterns) {
+        this.stage = stage;
         this.patterns = patterns;
     }
 
     /** Camera2 where the phone has it in full; its emulation over the old interface is slower than that itself. */
-    static CameraFeed create(Context context, Sink sink, int patterns) {
-        if (Build.VERSION.SDK_INT >= 21 && NewCamera.isNative(context)) return new NewCamera(context, sink, patterns);
-        return new OldCamera(sink, patterns);
+    static CameraFeed create(Context context, Stage stage, int patterns) {
+        if (Build.VERSION.SDK_INT >= 21 && NewCamera.isNative(context)) return new NewCamera(context, stage, patterns);
+        return new OldCamera(stage, patterns);
     }
 
     final void start() {
         thread = new HandlerThread("modar-camera");
         thread.start();
-        handler = new Handler(thread.getLooper());
-        handler.post(new Runnable() {
-            @Override
-            public void run() {
-                open();
-            }
-        });
+        handler = new Handler(thread.getLooper(), this);
+        handler.sendEmptyMessage(OPEN);
     }
 
     /** Returns when no more frames come. Those that were handed over stay whole until close(). */
     final void stop() {
-        handler.post(new Runnable() {
-            @Override
-            public void run() {
-                halt();
-            }
-        });
+        handler.sendEmptyMessage(HALT);
         thread.quitSafely();
         try {
             thread.join();
@@ -66,8 +49,22 @@ abstract class CameraFeed {
         }
     }
 
+    @Override
+    public final boolean handleMessage(Message message) {
+        try {
+            if (message.what == OPEN) {
+                open();
+            } else {
+                halt();
+            }
+        } catch (Exception failed) { // cameras throw what they like: another app has it, or there is none
+            stage.cameraFailed(failed.getMessage());
+        }
+        return true;
+    }
+
     /** On the camera's thread. */
-    abstract void open();
+    abstract void open() throws Exception;
 
     /** On the camera's thread: frees the camera for other apps. */
     abstract void halt();

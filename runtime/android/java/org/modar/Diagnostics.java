@@ -2,7 +2,6 @@ package org.modar;
 
 import android.os.Build;
 import java.util.Arrays;
-import java.util.Locale;
 
 /** What whoever looks after forty phones wants to know of one. */
 final class Diagnostics {
@@ -17,30 +16,33 @@ final class Diagnostics {
     volatile long gpuBytes;
     private final float[] trackMs = new float[WINDOW];
     private final float[] drawMs = new float[WINDOW];
-    private long tracked;
-    private long drawn;
-    private long seen;
-    private long firstNs;
-    private long lastNs;
-    private final StringBuilder errors = new StringBuilder();
+    private volatile long tracked;
+    private volatile long drawn;
+    private volatile long seen;
+    private volatile long firstNs;
+    private volatile long lastNs;
+    private final StringBuffer errors = new StringBuffer();
 
-    synchronized void tracked(long nanoseconds, boolean visible) {
+    /** By the camera's thread alone. */
+    void tracked(long nanoseconds, boolean visible) {
         trackMs[(int) (tracked++ % WINDOW)] = nanoseconds * 1e-6f;
         if (visible) seen++;
         lastNs = System.nanoTime();
         if (firstNs == 0) firstNs = lastNs;
     }
 
-    synchronized void drawn(long nanoseconds) {
+    /** By GL's thread alone. */
+    void drawn(long nanoseconds) {
         drawMs[(int) (drawn++ % WINDOW)] = nanoseconds * 1e-6f;
     }
 
-    synchronized void error(String text) {
+    /** By any thread. */
+    void error(String text) {
         if (errors.length() > 4000) errors.delete(0, 2000);
         errors.append(text).append('\n');
     }
 
-    synchronized long frames() {
+    long frames() {
         return tracked;
     }
 
@@ -53,41 +55,20 @@ final class Diagnostics {
     }
 
     /** Lines of "name: value", for the screen and the file alike. */
-    synchronized String text() {
+    String text(Words words) {
         int version = Native.version();
         double seconds = (lastNs - firstNs) * 1e-9;
-        StringBuilder out = new StringBuilder();
-        line(out, "phone", Build.MANUFACTURER + " " + Build.MODEL + ", Android " + Build.VERSION.RELEASE + " (API "
-                + Build.VERSION.SDK_INT + ")");
-        line(out, "modar", version / 10000 + "." + version / 100 % 100 + "." + version % 100);
-        line(out, "gl", gl);
-        line(out, "profile", profile);
-        line(out, "bundle", bundle);
-        line(out, "release", release);
-        line(out, "camera", camera);
-        line(out, "frames", tracked + ", a pattern seen in " + seen + ", drawn " + drawn);
-        line(out, "frames a second", seconds > 0 ? number((tracked - 1) / seconds) : "-");
-        line(out, "tracking ms", times(trackMs, tracked));
-        line(out, "drawing ms", times(drawMs, drawn));
-        line(out, "gl memory kB", String.valueOf(gpuBytes / 1000));
-        line(out, "errors", errors.length() == 0 ? "none" : "\n" + errors);
-        return out.toString();
+        return words.get("diagnostics", Build.MANUFACTURER, Build.MODEL, Build.VERSION.RELEASE, Build.VERSION.SDK_INT,
+                version / 10000, version / 100 % 100, version % 100, gl, profile, bundle, release, camera, tracked, seen,
+                drawn, tracked > 1 ? (tracked - 1) / seconds : 0, share(trackMs, tracked, 50), share(trackMs, tracked, 95),
+                share(drawMs, drawn, 50), share(drawMs, drawn, 95), gpuBytes / 1000, errors);
     }
 
-    private static void line(StringBuilder out, String name, String value) {
-        out.append(name).append(": ").append(value).append('\n');
-    }
-
-    private static String number(double value) {
-        return String.format(Locale.ROOT, "%.1f", value);
-    }
-
-    /** Median and 95th percentile. */
-    private static String times(float[] ms, long count) {
+    /** What so many of a hundred values are within. */
+    private static float share(float[] ms, long count, int percent) {
         int length = (int) Math.min(count, ms.length);
-        if (length == 0) return "-";
         float[] sorted = Arrays.copyOf(ms, length);
         Arrays.sort(sorted);
-        return number(sorted[length / 2]) + ", 95 % within " + number(sorted[length * 95 / 100]);
+        return length == 0 ? 0 : sorted[length * percent / 100];
     }
 }

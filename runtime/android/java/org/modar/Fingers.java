@@ -4,42 +4,29 @@ import android.view.MotionEvent;
 
 /** Pinch: size. Drag with one finger: turn across, shift along. A tap: what was touched. */
 final class Fingers {
-    interface Listener {
-        void moved(float scale, float turn, float x, float y);
-
-        void tapped(float x, float y);
-    }
+    static final int NOTHING = 0;
+    static final int MOVED = 1;
+    static final int TAPPED = 2;
 
     private static final float MIN_SCALE = 0.2f;
     private static final float MAX_SCALE = 5;
     /** A finger that moves less than this share of the screen taps. */
     private static final float TAP = 0.02f;
 
-    private final Listener listener;
-    private float scale = 1;
-    private float turn;
-    private float shift;
+    /** A factor; radians; half largest sides of the pattern. */
+    float scale = 1;
+    float turn;
+    float shift;
     private float lastX;
     private float lastY;
     private float lastSpread;
     private boolean tap;
 
-    Fingers(Listener listener) {
-        this.listener = listener;
-    }
-
-    /** Back to how the bundle has it. */
-    void reset() {
-        scale = 1;
-        turn = 0;
-        shift = 0;
-        listener.moved(scale, turn, 0, shift);
-    }
-
-    void touch(MotionEvent event, int width, int height) {
+    /** What the event came to: NOTHING, MOVED or TAPPED. */
+    int touch(MotionEvent event, int width, int height) {
         float x = event.getX();
         float y = event.getY();
-        int size = Math.min(width, height);
+        int done = NOTHING;
         switch (event.getActionMasked()) {
             case MotionEvent.ACTION_DOWN:
                 tap = true;
@@ -48,37 +35,34 @@ final class Fingers {
             case MotionEvent.ACTION_POINTER_UP:
                 tap = false;
                 lastSpread = 0;
-                return;
+                return NOTHING;
             case MotionEvent.ACTION_UP:
-                if (tap) listener.tapped(x, y);
-                return;
+                return tap ? TAPPED : NOTHING;
             case MotionEvent.ACTION_MOVE:
                 if (event.getPointerCount() > 1) {
-                    pinch(event);
-                    return;
+                    done = pinch(event);
+                    break;
                 }
-                if (tap && Math.abs(x - lastX) + Math.abs(y - lastY) < TAP * size) return;
+                if (tap && Math.abs(x - lastX) + Math.abs(y - lastY) < TAP * Math.min(width, height)) return NOTHING;
                 tap = false;
                 // Across the screen is half a turn; along it, two patterns.
                 turn += (float) Math.PI * (x - lastX) / width;
                 shift -= 4 * (y - lastY) / height;
-                listener.moved(scale, turn, 0, shift);
+                done = MOVED;
                 break;
             default:
-                return;
+                return NOTHING;
         }
         lastX = x;
         lastY = y;
+        return done;
     }
 
-    private void pinch(MotionEvent event) {
-        float spread = (float) Math.hypot(event.getX(0) - event.getX(1), event.getY(0) - event.getY(1));
-        if (lastSpread > 0) {
-            scale = Math.max(MIN_SCALE, Math.min(MAX_SCALE, scale * spread / lastSpread));
-            listener.moved(scale, turn, 0, shift);
-        }
-        lastSpread = spread;
-        lastX = event.getX();
-        lastY = event.getY();
+    private int pinch(MotionEvent event) {
+        float before = lastSpread;
+        lastSpread = (float) Math.hypot(event.getX(0) - event.getX(1), event.getY(0) - event.getY(1));
+        if (before <= 0) return NOTHING;
+        scale = Math.max(MIN_SCALE, Math.min(MAX_SCALE, scale * lastSpread / before));
+        return MOVED;
     }
 }

@@ -5,23 +5,17 @@ import android.app.Activity;
 import android.content.pm.PackageManager;
 import android.content.res.Configuration;
 import android.graphics.Bitmap;
-import android.graphics.Color;
 import android.opengl.GLSurfaceView;
 import android.os.Build;
 import android.os.Bundle;
 import android.os.Handler;
 import android.os.Looper;
+import android.os.Message;
 import android.view.Display;
-import android.view.Gravity;
 import android.view.MotionEvent;
 import android.view.View;
-import android.view.ViewGroup;
 import android.view.WindowManager;
-import android.widget.Button;
-import android.widget.FrameLayout;
 import android.widget.ImageView;
-import android.widget.LinearLayout;
-import android.widget.ScrollView;
 import android.widget.TextView;
 import java.io.File;
 import java.io.FileOutputStream;
@@ -31,15 +25,20 @@ import java.util.List;
 import java.util.Properties;
 
 /** The one screen: the camera's picture with models on it, a line of advice, four buttons. */
-public final class MainActivity extends Activity
-        implements Stage.Listener, Fingers.Listener, View.OnTouchListener, View.OnClickListener {
+public final class MainActivity extends Activity implements Handler.Callback {
     /** How often the line of advice follows what the tracker says. */
     private static final int TICK_MS = 500;
     private static final int ASKED_FOR_CAMERA = 1;
+    // What the main thread is told:
+    private static final int TICK = 0;
+    private static final int NOTICE = 1;
+    private static final int TROUBLE = 2;
+    private static final int DAMAGED = 3;
+    private static final int FETCHED = 4;
 
-    private final Handler main = new Handler(Looper.getMainLooper());
-    private final Diagnostics diagnostics = new Diagnostics();
-    private final Fingers fingers = new Fingers(this);
+    private final Handler main = new Handler(Looper.getMainLooper(), this);
+    private Diagnostics diagnostics;
+    private Fingers fingers = new Fingers();
     private Words words;
     private Bundles bundles;
     private Stage stage;
@@ -61,27 +60,24 @@ public final class MainActivity extends Activity
     private GLSurfaceView view;
     private TextView status;
     private ImageView hint;
-    private Button picture;
-    private Button models;
-    private Button update;
-    private Button about;
-    private ScrollView info;
-    private TextView infoText;
-
-    private final Runnable tick = new Runnable() {
-        @Override
-        public void run() {
-            follow();
-            main.postDelayed(this, TICK_MS);
-        }
-    };
+    private View info;
 
     @Override
     protected void onCreate(Bundle state) {
         super.onCreate(state);
         words = new Words(getAssets());
         bundles = new Bundles(this);
-        buildScreen();
+        diagnostics = new Diagnostics();
+        setContentView(R.layout.main);
+        view = (GLSurfaceView) findViewById(R.id.view);
+        status = (TextView) findViewById(R.id.status);
+        hint = (ImageView) findViewById(R.id.hint);
+        info = findViewById(R.id.info);
+        label(R.id.picture, "picture");
+        label(R.id.models, "models");
+        label(R.id.update, "update");
+        label(R.id.about, "about");
+        showIf(findViewById(R.id.update), Fetch.AVAILABLE);
         stage = new Stage(view, this, diagnostics);
         view.setEGLContextClientVersion(2);
         view.setEGLConfigChooser(8, 8, 8, 0, 16, 0);
@@ -92,50 +88,36 @@ public final class MainActivity extends Activity
         showNext();
     }
 
-    private void buildScreen() {
-        view = new GLSurfaceView(this);
-        view.setKeepScreenOn(true);
-        view.setOnTouchListener(this);
-        hint = new ImageView(this);
-        hint.setAlpha(0.6f);
-        status = label(18);
-        LinearLayout buttons = new LinearLayout(this);
-        picture = button(buttons, "picture");
-        models = button(buttons, "models");
-        update = button(buttons, "update");
-        about = button(buttons, "about");
-        infoText = label(14);
-        info = new ScrollView(this);
-        info.setBackgroundColor(Color.BLACK);
-        info.setVisibility(View.GONE);
-        info.addView(infoText);
-        int wrap = ViewGroup.LayoutParams.WRAP_CONTENT;
-        int match = ViewGroup.LayoutParams.MATCH_PARENT;
-        FrameLayout root = new FrameLayout(this);
-        root.addView(view, new FrameLayout.LayoutParams(match, match, Gravity.CENTER));
-        root.addView(hint, new FrameLayout.LayoutParams(wrap, wrap, Gravity.CENTER));
-        root.addView(info, new FrameLayout.LayoutParams(match, match, Gravity.CENTER));
-        root.addView(status, new FrameLayout.LayoutParams(match, wrap, Gravity.BOTTOM));
-        root.addView(buttons, new FrameLayout.LayoutParams(match, wrap, Gravity.TOP));
-        setContentView(root);
-        update.setVisibility(Fetch.AVAILABLE ? View.VISIBLE : View.GONE);
+    private void label(int id, String word) {
+        ((TextView) findViewById(id)).setText(words.get(word));
     }
 
-    private TextView label(int size) {
-        TextView text = new TextView(this);
-        text.setTextColor(Color.WHITE);
-        text.setTextSize(size);
-        text.setPadding(16, 16, 16, 16);
-        text.setBackgroundColor(0xA0000000);
-        return text;
+    private static void showIf(View view, boolean shown) {
+        view.setVisibility(shown ? View.VISIBLE : View.GONE);
     }
 
-    private Button button(LinearLayout row, String word) {
-        Button made = new Button(this);
-        made.setText(words.get(word));
-        made.setOnClickListener(this);
-        row.addView(made);
-        return made;
+    @Override
+    public boolean handleMessage(Message message) {
+        switch (message.what) {
+            case TICK:
+                follow();
+                main.sendEmptyMessageDelayed(TICK, TICK_MS);
+                break;
+            case NOTICE:
+                notice((String) message.obj);
+                break;
+            case TROUBLE:
+                trouble = (String) message.obj;
+                follow();
+                break;
+            case DAMAGED:
+                drop((Bundles.Source) message.obj);
+                break;
+            default:
+                findViewById(R.id.update).setEnabled(true);
+                if (message.arg1 != 0) showAll();
+        }
+        return true;
     }
 
     // --- Life ---
@@ -150,13 +132,13 @@ public final class MainActivity extends Activity
         } else {
             startCamera();
         }
-        main.post(tick);
+        main.sendEmptyMessage(TICK);
     }
 
     @Override
     protected void onPause() {
         resumed = false;
-        main.removeCallbacks(tick);
+        main.removeMessages(TICK);
         stopCamera();
         view.onPause();
         closeCamera();
@@ -190,9 +172,7 @@ public final class MainActivity extends Activity
     private void askForCamera() {
         asked = true;
         trouble = words.get("permission");
-        if (Build.VERSION.SDK_INT >= 23) {
-            requestPermissions(new String[] {Manifest.permission.CAMERA}, ASKED_FOR_CAMERA);
-        }
+        requestPermissions(new String[] {Manifest.permission.CAMERA}, ASKED_FOR_CAMERA);
     }
 
     @Override
@@ -251,7 +231,7 @@ public final class MainActivity extends Activity
             trouble = damage != null ? words.get("bundle", damage.getMessage()) : words.get("empty", bundles.folder);
         }
         closeCamera();
-        models.setVisibility(sources.size() > 1 ? View.VISIBLE : View.GONE);
+        showIf(findViewById(R.id.models), sources.size() > 1);
         if (resumed && mayUseCamera()) startCamera();
         follow();
     }
@@ -264,10 +244,14 @@ public final class MainActivity extends Activity
             diagnostics.error(gone.getMessage());
             return false;
         }
+        showAll();
+        return true;
+    }
+
+    private void showAll() {
         sources = bundles.list();
         source = -1;
         showNext();
-        return true;
     }
 
     private void use(int index, long opened) throws ModarException {
@@ -281,43 +265,29 @@ public final class MainActivity extends Activity
         diagnostics.bundle = from.name + " (" + from.origin + ")";
         diagnostics.release = Fetch.AVAILABLE ? Fetch.version(bundles.store.getPath()) : "none";
         stage.show(opened, bundles.lens());
-        fingers.reset();
-        if (!bundles.isVerified(from)) new Thread(new Check(from, opened), "modar-verify").start();
+        fingers = new Fingers();
+        move();
+        from.session = opened;
+        if (!bundles.isVerified(from)) new Job("modar-verify", from).start();
     }
 
     /** Reads every byte of a bundle once after it came, beside what the visitor does. */
-    private final class Check implements Runnable {
-        private final Bundles.Source from;
-        private final long opened;
-        private String damage;
-
-        Check(Bundles.Source from, long opened) {
-            this.from = from;
-            this.opened = opened;
-        }
-
-        @Override
-        public void run() {
-            if (damage != null) { // on the main thread, the second time
-                drop(from, damage);
-                return;
-            }
-            try {
-                Native.verify(opened);
-                bundles.setVerified(from);
-            } catch (ModarException damaged) {
-                diagnostics.error(damaged.getMessage());
-                if (damaged.code.equals("android.closed")) return; // another is shown by now
-                damage = damaged.getMessage();
-                main.post(this);
-            } catch (IOException full) {
-                diagnostics.error(full.getMessage());
-            }
+    private void verify(Bundles.Source from) {
+        try {
+            Native.verify(from.session);
+            bundles.setVerified(from);
+        } catch (ModarException damaged) {
+            diagnostics.error(damaged.getMessage());
+            if (damaged.code.equals("android.closed")) return; // another is shown by now
+            from.damage = damaged.getMessage();
+            main.obtainMessage(DAMAGED, from).sendToTarget();
+        } catch (IOException full) {
+            diagnostics.error(full.getMessage());
         }
     }
 
     /** A bundle that is shown turned out to be damaged: the next one, or the reason. */
-    private void drop(Bundles.Source damaged, String cause) {
+    private void drop(Bundles.Source damaged) {
         if (source < 0 || sources.get(source) != damaged) return;
         sources.remove(source);
         source = -1;
@@ -326,7 +296,7 @@ public final class MainActivity extends Activity
         session = 0;
         stage.show(0, null);
         showNext();
-        if (session == 0) trouble = words.get("bundle", cause);
+        if (session == 0) trouble = words.get("bundle", damaged.damage);
         follow();
     }
 
@@ -340,55 +310,57 @@ public final class MainActivity extends Activity
         }
         try {
             if (url.isEmpty()) url = bundles.asset("release.txt");
-            update.setEnabled(false);
-            new Thread(new Update(url, bundles.asset("release.pub")), "modar-update").start();
+            findViewById(R.id.update).setEnabled(false);
+            new Job("modar-update", new Update(url, bundles.asset("release.pub"))).start();
         } catch (IOException none) {
             notice(words.get("not-updated", "release.txt"));
         }
     }
 
-    /** A thread that fetches; the app goes on with what it has. */
-    private final class Update implements Runnable, Transfer.Progress {
+    /** A release that comes, beside what the visitor does. */
+    private final class Update extends Transfer {
         private final String url;
         private final String key;
 
         Update(String url, String key) {
+            super(url);
             this.url = url;
             this.key = key;
         }
 
         @Override
-        public void bytes(long done, long total) {
-            say(words.get("fetching", done / 1000, total / 1000));
+        void progress(long done, long total) {
+            say(NOTICE, words.get("fetching", done / 1000, total / 1000));
+        }
+    }
+
+    private void fetch(Update from) {
+        boolean changed = false;
+        try {
+            changed = Fetch.fetch(from.url, bundles.store.getPath(), from.key, from);
+            say(NOTICE, words.get(changed ? "updated" : "current"));
+        } catch (ModarException error) {
+            diagnostics.error(error.getMessage());
+            say(NOTICE, words.get("not-updated", error.getMessage()));
+        }
+        main.obtainMessage(FETCHED, changed ? 1 : 0, 0).sendToTarget();
+    }
+
+    /** What takes a while, on a thread of its own: to verify a bundle, to fetch, to save a picture. */
+    private final class Job extends Thread {
+        private final Object of;
+
+        Job(String name, Object of) {
+            super(name);
+            this.of = of;
         }
 
         @Override
         public void run() {
-            boolean changed = false;
-            String text;
-            try {
-                changed = Fetch.fetch(url, bundles.store.getPath(), key, new Transfer(url, this));
-                text = words.get(changed ? "updated" : "current");
-            } catch (ModarException error) {
-                diagnostics.error(error.getMessage());
-                text = words.get("not-updated", error.getMessage());
-            }
-            say(text);
-            final boolean installed = changed;
-            main.post(new Runnable() {
-                @Override
-                public void run() {
-                    update.setEnabled(true);
-                    if (installed) showInstalled();
-                }
-            });
+            if (of instanceof Bundles.Source) verify((Bundles.Source) of);
+            if (of instanceof Update) fetch((Update) of);
+            if (of instanceof Bitmap) save((Bitmap) of);
         }
-    }
-
-    private void showInstalled() {
-        sources = bundles.list();
-        source = -1;
-        showNext();
     }
 
     // --- What the screen says ---
@@ -396,7 +368,9 @@ public final class MainActivity extends Activity
     /** The line at the bottom: trouble, a notice, what is seen, or what to do. */
     private void follow() {
         if (resumed) followDisplay();
-        if (info.getVisibility() == View.VISIBLE) infoText.setText(diagnostics.text());
+        if (info.getVisibility() == View.VISIBLE) {
+            ((TextView) findViewById(R.id.info_text)).setText(diagnostics.text(words));
+        }
         if (System.nanoTime() < noticeUntil) return;
         boolean looking = false;
         String text = trouble;
@@ -406,8 +380,8 @@ public final class MainActivity extends Activity
             text = looking ? advice() : texts.getProperty(patterns[seen], "");
         }
         status.setText(text);
-        status.setVisibility(text.isEmpty() ? View.GONE : View.VISIBLE);
-        hint.setVisibility(looking ? View.VISIBLE : View.GONE);
+        showIf(status, !text.isEmpty());
+        showIf(hint, looking);
     }
 
     /** What to look for, and what the tracker misses. */
@@ -429,60 +403,49 @@ public final class MainActivity extends Activity
     private void notice(String text) {
         noticeUntil = System.nanoTime() + 3000000000L;
         status.setText(text);
-        status.setVisibility(View.VISIBLE);
+        showIf(status, true);
+    }
+
+    /** From any thread. what: NOTICE or TROUBLE. */
+    private void say(int what, String text) {
+        main.obtainMessage(what, text).sendToTarget();
+    }
+
+    private void complain(String text) {
+        diagnostics.error(text);
+        say(TROUBLE, text);
     }
 
     /** From any thread. */
-    private void say(final String text) {
-        main.post(new Runnable() {
-            @Override
-            public void run() {
-                notice(text);
-            }
-        });
-    }
-
-    private void complain(final String text) {
-        diagnostics.error(text);
-        main.post(new Runnable() {
-            @Override
-            public void run() {
-                trouble = text;
-                follow();
-            }
-        });
-    }
-
-    @Override
-    public void failed(ModarException error) {
+    void failed(ModarException error) {
         complain(words.get(error.code.startsWith("gl.") ? "gl" : "bundle", error.getMessage()));
     }
 
-    @Override
-    public void cameraFailed(String cause) {
+    /** From any thread. */
+    void cameraFailed(String cause) {
         complain(words.get("camera", cause));
     }
 
     // --- Fingers ---
 
     @Override
-    public boolean onTouch(View touched, MotionEvent event) {
-        fingers.touch(event, touched.getWidth(), touched.getHeight());
+    public boolean onTouchEvent(MotionEvent event) {
+        int done = fingers.touch(event, view.getWidth(), view.getHeight());
+        if (done == Fingers.MOVED) move();
+        if (done == Fingers.TAPPED) tapped(event.getX(), event.getY());
         return true;
     }
 
-    @Override
-    public void moved(float scale, float turn, float x, float y) {
+    private void move() {
         if (session == 0) return;
         try {
-            Native.setGesture(session, scale, turn, x, y);
+            Native.setGesture(session, fingers.scale, fingers.turn, 0, fingers.shift);
         } catch (ModarException error) {
             failed(error);
         }
     }
 
-    @Override
-    public void tapped(float x, float y) {
+    private void tapped(float x, float y) {
         if (!mayUseCamera()) {
             askForCamera();
             return;
@@ -497,22 +460,29 @@ public final class MainActivity extends Activity
         }
     }
 
-    @Override
+    /** Of the buttons, by res/layout/main.xml. */
     public void onClick(View clicked) {
-        if (clicked == picture) stage.takePicture();
-        if (clicked == models) showNext();
-        if (clicked == update) startUpdate();
-        if (clicked == about) {
-            info.setVisibility(info.getVisibility() == View.VISIBLE ? View.GONE : View.VISIBLE);
-            follow();
-            writeDiagnostics();
+        switch (clicked.getId()) {
+            case R.id.picture:
+                stage.takePicture();
+                break;
+            case R.id.models:
+                showNext();
+                break;
+            case R.id.update:
+                startUpdate();
+                break;
+            default:
+                showIf(info, info.getVisibility() != View.VISIBLE);
+                follow();
+                writeDiagnostics();
         }
     }
 
     // --- Files ---
 
-    @Override
-    public void picture(ByteBuffer rgba, int width, int height) {
+    /** On GL's thread: what was drawn, rows from the bottom up. */
+    void picture(ByteBuffer rgba, int width, int height) {
         int[] pixels = new int[width * height];
         for (int y = 0; y < height; y++) {
             for (int x = 0; x < width; x++) {
@@ -521,13 +491,8 @@ public final class MainActivity extends Activity
                         | (rgba.get(at + 2) & 0xFF);
             }
         }
-        final Bitmap bitmap = Bitmap.createBitmap(pixels, width, height, Bitmap.Config.ARGB_8888);
-        new Thread(new Runnable() {
-            @Override
-            public void run() {
-                save(bitmap);
-            }
-        }, "modar-picture").start();
+        Bitmap bitmap = Bitmap.createBitmap(pixels, width, height, Bitmap.Config.ARGB_8888);
+        new Job("modar-picture", bitmap).start();
     }
 
     private void save(Bitmap bitmap) {
@@ -540,23 +505,18 @@ public final class MainActivity extends Activity
             } finally {
                 out.close();
             }
-            say(words.get("saved", file.getPath()));
+            say(NOTICE, words.get("saved", file.getPath()));
         } catch (IOException failed) {
             file.delete(); // nothing half-written stays
             diagnostics.error(failed.getMessage());
-            say(words.get("space", failed.getMessage()));
+            say(NOTICE, words.get("space", failed.getMessage()));
         }
     }
 
     /** diagnostics.txt in the app's folder, for `adb pull`. */
     private void writeDiagnostics() {
         try {
-            FileOutputStream out = new FileOutputStream(new File(bundles.folder, "diagnostics.txt"));
-            try {
-                out.write(diagnostics.text().getBytes("UTF-8"));
-            } finally {
-                out.close();
-            }
+            Bundles.write(new File(bundles.folder, "diagnostics.txt"), diagnostics.text(words), false);
         } catch (IOException full) {
             diagnostics.error(full.getMessage());
         }

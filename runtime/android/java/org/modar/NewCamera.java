@@ -15,21 +15,21 @@ import android.media.ImageReader;
 import android.util.Size;
 import android.view.Surface;
 import java.util.Collections;
-import java.util.concurrent.ArrayBlockingQueue;
 
 /** Camera2, from API 21 on: frames stay in the camera's own memory. */
 @TargetApi(21)
-final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailableListener, Frame.Planes.Owner {
+final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailableListener {
     private final CameraManager manager;
-    private final ArrayBlockingQueue<Frame.Planes> idle = new ArrayBlockingQueue<>(BUFFERS);
+    /** As many as may be held of an ImageReader's images, less the one that it fills. */
+    private final Planes[] frames = new Planes[BUFFERS - 1];
     private CameraDevice device;
     private ImageReader reader;
     private boolean halted;
 
-    NewCamera(Context context, Sink sink, int patterns) {
-        super(sink, patterns);
+    NewCamera(Context context, Stage stage, int patterns) {
+        super(stage, patterns);
         manager = (CameraManager) context.getSystemService(Context.CAMERA_SERVICE);
-        for (int i = 0; i < BUFFERS - 1; i++) idle.add(new Frame.Planes(patterns, this));
+        for (int i = 0; i < frames.length; i++) frames[i] = new Planes();
     }
 
     /** False where Camera2 is but emulated, or refuses to answer. */
@@ -39,10 +39,44 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
             Integer level = manager.getCameraCharacteristics(backCamera(manager))
                     .get(CameraCharacteristics.INFO_SUPPORTED_HARDWARE_LEVEL);
             return level != null && level != CameraCharacteristics.INFO_SUPPORTED_HARDWARE_LEVEL_LEGACY;
-        } catch (CameraAccessException refused) {
+        } catch (Exception refused) { // the old camera may be luckier
             return false;
-        } catch (RuntimeException refused) {
-            return false;
+        }
+    }
+
+    /** The planes of an Image. */
+    private final class Planes extends Frame {
+        private Image.Plane[] planes;
+        /** Null: free to take the next. */
+        volatile Image image;
+
+        Planes() {
+            super(patterns);
+        }
+
+        void take(Image next) {
+            planes = next.getPlanes();
+            timeS = next.getTimestamp() * 1e-9;
+            image = next;
+        }
+
+        @Override
+        int track(long session) throws ModarException {
+            Image.Plane luma = planes[0];
+            return Native.onCameraPlane(session, luma.getBuffer(), luma.getRowStride(), timeS, poses.bytes);
+        }
+
+        @Override
+        void draw(long session) throws ModarException {
+            Image.Plane u = planes[1];
+            Native.onDrawPlanes(session, planes[0].getBuffer(), planes[0].getRowStride(), u.getBuffer(),
+                    planes[2].getBuffer(), u.getRowStride(), u.getPixelStride(), poses.bytes);
+        }
+
+        @Override
+        void release() {
+            image.close();
+            image = null;
         }
     }
 
@@ -52,26 +86,19 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
             Integer facing = manager.getCameraCharacteristics(id).get(CameraCharacteristics.LENS_FACING);
             if (facing != null && facing == CameraCharacteristics.LENS_FACING_BACK) return id;
         }
-        if (ids.length == 0) throw new IllegalStateException("the phone has no camera");
         return ids[0];
     }
 
     @Override
-    void open() {
-        try {
-            String id = backCamera(manager);
-            CameraCharacteristics traits = manager.getCameraCharacteristics(id);
-            Size size = sizeOf(traits.get(CameraCharacteristics.SCALER_STREAM_CONFIGURATION_MAP));
-            Integer turn = traits.get(CameraCharacteristics.SENSOR_ORIENTATION);
-            reader = ImageReader.newInstance(size.getWidth(), size.getHeight(), ImageFormat.YUV_420_888, BUFFERS);
-            reader.setOnImageAvailableListener(this, handler);
-            sink.cameraOpened(size.getWidth(), size.getHeight(), turn == null ? 90 : turn);
-            manager.openCamera(id, new Opened(), handler);
-        } catch (CameraAccessException failed) {
-            sink.cameraFailed(failed.getMessage());
-        } catch (RuntimeException failed) {
-            sink.cameraFailed(failed.getMessage());
-        }
+    void open() throws Exception {
+        String id = backCamera(manager);
+        CameraCharacteristics traits = manager.getCameraCharacteristics(id);
+        Size size = sizeOf(traits.get(CameraCharacteristics.SCALER_STREAM_CONFIGURATION_MAP));
+        Integer turn = traits.get(CameraCharacteristics.SENSOR_ORIENTATION);
+        reader = ImageReader.newInstance(size.getWidth(), size.getHeight(), ImageFormat.YUV_420_888, BUFFERS);
+        reader.setOnImageAvailableListener(this, handler);
+        stage.cameraOpened(size.getWidth(), size.getHeight(), turn == null ? 90 : turn);
+        manager.openCamera(id, new Opened(), handler);
     }
 
     private static Size sizeOf(StreamConfigurationMap map) {
@@ -82,7 +109,6 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
                 best = size;
             }
         }
-        if (best == null) throw new IllegalStateException("the camera names no size of frames");
         return best;
     }
 
@@ -97,23 +123,21 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
             try {
                 opened.createCaptureSession(
                         Collections.singletonList(reader.getSurface()), new Configured(), handler);
-            } catch (CameraAccessException failed) {
-                sink.cameraFailed(failed.getMessage());
-            } catch (IllegalStateException failed) {
-                sink.cameraFailed(failed.getMessage()); // a call came, and the camera was closed meanwhile
+            } catch (Exception failed) { // a call came, and the camera was closed meanwhile
+                stage.cameraFailed(failed.getMessage());
             }
         }
 
         @Override
         public void onDisconnected(CameraDevice lost) {
             lost.close();
-            sink.cameraFailed("another app took the camera");
+            stage.cameraFailed("another app took the camera");
         }
 
         @Override
         public void onError(CameraDevice broken, int error) {
             broken.close();
-            sink.cameraFailed("the camera answers with error " + error);
+            stage.cameraFailed("the camera answers with error " + error);
         }
     }
 
@@ -127,36 +151,28 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
                 request.addTarget(reader.getSurface());
                 CameraCaptureSession.CaptureCallback nobody = null;
                 session.setRepeatingRequest(request.build(), nobody, handler);
-            } catch (CameraAccessException failed) {
-                sink.cameraFailed(failed.getMessage());
-            } catch (IllegalStateException failed) {
-                sink.cameraFailed(failed.getMessage());
+            } catch (Exception failed) {
+                stage.cameraFailed(failed.getMessage());
             }
         }
 
         @Override
         public void onConfigureFailed(CameraCaptureSession session) {
-            sink.cameraFailed("the camera refuses this size of frames");
+            stage.cameraFailed("the camera refuses this size of frames");
         }
     }
 
     @Override
     public void onImageAvailable(ImageReader from) {
-        if (halted) return;
-        Frame.Planes frame = idle.poll();
-        if (frame == null) return; // all are in use: the next frame finds one
-        Image image = from.acquireLatestImage();
-        if (image == null) {
-            idle.add(frame);
+        for (Planes frame : frames) {
+            if (halted || frame.image != null) continue;
+            Image image = from.acquireLatestImage();
+            if (image == null) return;
+            frame.take(image);
+            stage.frame(frame);
             return;
         }
-        frame.take(image);
-        sink.frame(frame);
-    }
-
-    @Override
-    public void free(Frame.Planes frame) {
-        idle.add(frame);
+        // All are in use: the next frame finds one.
     }
 
     @Override

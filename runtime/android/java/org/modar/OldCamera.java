@@ -3,46 +3,64 @@ package org.modar;
 import android.graphics.ImageFormat;
 import android.graphics.SurfaceTexture;
 import android.hardware.Camera;
-import java.io.IOException;
 import java.util.List;
 
 /** android.hardware.Camera: the only camera below API 21, and the better one on many phones above. */
 @SuppressWarnings("deprecation")
-final class OldCamera extends CameraFeed implements Camera.PreviewCallback, Frame.Nv21.Owner {
+final class OldCamera extends CameraFeed implements Camera.PreviewCallback {
     /** A texture that nobody draws: previews want one. */
     private static final int NO_TEXTURE = 10;
 
     private Camera camera;
     private SurfaceTexture texture;
-    private final Frame.Nv21[] frames = new Frame.Nv21[BUFFERS];
+    private final Nv21[] frames = new Nv21[BUFFERS];
     private boolean halted;
 
-    OldCamera(Sink sink, int patterns) {
-        super(sink, patterns);
+    OldCamera(Stage stage, int patterns) {
+        super(stage, patterns);
+    }
+
+    /** NV21 in a callback buffer. */
+    private final class Nv21 extends Frame {
+        final byte[] pixels;
+
+        Nv21(int bytes) {
+            super(patterns);
+            pixels = new byte[bytes];
+        }
+
+        @Override
+        int track(long session) throws ModarException {
+            return Native.onCameraFrame(session, pixels, timeS, poses.bytes);
+        }
+
+        @Override
+        void draw(long session) throws ModarException {
+            Native.onDrawFrame(session, pixels, poses.bytes);
+        }
+
+        @Override
+        void release() {
+            free(pixels);
+        }
     }
 
     @Override
-    void open() {
-        try {
-            int id = backCamera();
-            camera = Camera.open(id);
-            Camera.Size size = configure();
-            Camera.CameraInfo info = new Camera.CameraInfo();
-            Camera.getCameraInfo(id, info);
-            texture = new SurfaceTexture(NO_TEXTURE);
-            camera.setPreviewTexture(texture);
-            sink.cameraOpened(size.width, size.height, info.orientation);
-            for (int i = 0; i < BUFFERS; i++) {
-                frames[i] = new Frame.Nv21(patterns, new byte[size.width * size.height * 3 / 2], this);
-                camera.addCallbackBuffer(frames[i].pixels);
-            }
-            camera.setPreviewCallbackWithBuffer(this);
-            camera.startPreview();
-        } catch (IOException failed) {
-            sink.cameraFailed(failed.getMessage());
-        } catch (RuntimeException failed) {
-            sink.cameraFailed(failed.getMessage()); // another app has it, or there is none
+    void open() throws Exception {
+        int id = backCamera();
+        camera = Camera.open(id);
+        Camera.Size size = configure();
+        Camera.CameraInfo info = new Camera.CameraInfo();
+        Camera.getCameraInfo(id, info);
+        texture = new SurfaceTexture(NO_TEXTURE);
+        camera.setPreviewTexture(texture);
+        stage.cameraOpened(size.width, size.height, info.orientation);
+        for (int i = 0; i < BUFFERS; i++) {
+            frames[i] = new Nv21(size.width * size.height * 3 / 2);
+            camera.addCallbackBuffer(frames[i].pixels);
         }
+        camera.setPreviewCallbackWithBuffer(this);
+        camera.startPreview();
     }
 
     private static int backCamera() {
@@ -60,7 +78,6 @@ final class OldCamera extends CameraFeed implements Camera.PreviewCallback, Fram
         for (Camera.Size size : parameters.getSupportedPreviewSizes()) {
             if (best == null || distance(size.width, size.height) < distance(best.width, best.height)) best = size;
         }
-        if (best == null) throw new IllegalStateException("the camera names no size of frames");
         parameters.setPreviewSize(best.width, best.height);
         parameters.setPreviewFormat(ImageFormat.NV21);
         List<String> focus = parameters.getSupportedFocusModes();
@@ -73,15 +90,14 @@ final class OldCamera extends CameraFeed implements Camera.PreviewCallback, Fram
 
     @Override
     public void onPreviewFrame(byte[] data, Camera from) {
-        for (Frame.Nv21 frame : frames) {
+        for (Nv21 frame : frames) {
             if (frame.pixels != data) continue;
             frame.timeS = System.nanoTime() * 1e-9;
-            sink.frame(frame);
+            stage.frame(frame);
         }
     }
 
-    @Override
-    public synchronized void free(byte[] buffer) {
+    private synchronized void free(byte[] buffer) {
         if (!halted) camera.addCallbackBuffer(buffer);
     }
 

@@ -8,19 +8,9 @@ import javax.microedition.khronos.egl.EGLConfig;
 import javax.microedition.khronos.opengles.GL10;
 
 /** Between the camera's thread, which tracks, and GL's, which draws: the newest frame goes over, with its poses. */
-final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
-    interface Listener {
-        /** From any thread. */
-        void failed(ModarException error);
-
-        void cameraFailed(String cause);
-
-        /** On GL's thread: what was drawn, rows from the bottom up. */
-        void picture(ByteBuffer rgba, int width, int height);
-    }
-
+final class Stage implements GLSurfaceView.Renderer {
     private final GLSurfaceView view;
-    private final Listener listener;
+    private final MainActivity screen;
     private final Diagnostics diagnostics;
     private final AtomicReference<Frame> next = new AtomicReference<>();
     /** Set false by tests: searches in step with the frames, so that results do not depend on time. */
@@ -41,9 +31,9 @@ final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
     private int turned = -1;
     private String profile;
 
-    Stage(GLSurfaceView view, Listener listener, Diagnostics diagnostics) {
+    Stage(GLSurfaceView view, MainActivity screen, Diagnostics diagnostics) {
         this.view = view;
-        this.listener = listener;
+        this.screen = screen;
         this.diagnostics = diagnostics;
     }
 
@@ -87,19 +77,19 @@ final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
 
     // --- The camera's thread ---
 
-    @Override
-    public void cameraOpened(int frameWidth, int frameHeight, int turn) {
+    /** Before the first frame. turn: degrees that a frame is turned clockwise to be upright on the sensor's phone. */
+    void cameraOpened(int frameWidth, int frameHeight, int turn) {
         sensorDegrees = turn;
         diagnostics.camera = frameWidth + " x " + frameHeight + ", turned by " + turn;
         try {
             Native.setCamera(session, frameWidth, frameHeight, cameraFile, searchApart);
         } catch (ModarException error) {
-            listener.failed(error);
+            screen.failed(error);
         }
     }
 
-    @Override
-    public void frame(Frame frame) {
+    /** Takes a frame over, to release it. */
+    void frame(Frame frame) {
         long start = System.nanoTime();
         try {
             int visible = frame.track(session);
@@ -107,7 +97,7 @@ final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
             seen = firstShown(frame.poses);
         } catch (ModarException error) {
             frame.release();
-            listener.failed(error);
+            screen.failed(error);
             return;
         }
         Frame late = next.getAndSet(frame);
@@ -122,9 +112,8 @@ final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
         return -1;
     }
 
-    @Override
-    public void cameraFailed(String cause) {
-        listener.cameraFailed(cause);
+    void cameraFailed(String cause) {
+        screen.cameraFailed(cause);
     }
 
     // --- GL's thread ---
@@ -161,7 +150,7 @@ final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
             }
             shown.draw(session);
         } catch (ModarException error) {
-            listener.failed(error);
+            screen.failed(error);
             return;
         }
         diagnostics.drawn(System.nanoTime() - start);
@@ -169,7 +158,7 @@ final class Stage implements GLSurfaceView.Renderer, CameraFeed.Sink {
             wantsPicture = false;
             ByteBuffer rgba = ByteBuffer.allocateDirect(4 * width * height);
             GLES20.glReadPixels(0, 0, width, height, GLES20.GL_RGBA, GLES20.GL_UNSIGNED_BYTE, rgba);
-            listener.picture(rgba, width, height);
+            screen.picture(rgba, width, height);
         }
     }
 

@@ -8,20 +8,14 @@ import java.net.HttpURLConnection;
 import java.net.URL;
 
 /** One file of a release at a time, by the phone's own HTTP: its certificates, its proxy. Called by Fetch's thread. */
-class Transfer {
-    interface Progress {
-        void bytes(long done, long total);
-    }
-
+abstract class Transfer {
     private static final int TIMEOUT_MS = 30000;
     private final String base;
-    private final Progress progress;
     private final byte[] part = new byte[1 << 15];
     private InputStream stream;
 
-    Transfer(String base, Progress progress) {
+    Transfer(String base) {
         this.base = base.endsWith("/") ? base : base + "/";
-        this.progress = progress;
     }
 
     /** 0: opened from byte `from`; 1: there is no such file; 2: try again. */
@@ -80,7 +74,6 @@ class Transfer {
         stream = null;
     }
 
-    final void progress(long done, long total) {
-        progress.bytes(done, total);
-    }
+    /** Bytes of the release so far. */
+    abstract void progress(long done, long total);
 }

@@ -25,7 +25,7 @@ public final class AppRun {
     private static MainActivity app;
     private static GLSurfaceView view;
 
-    /** words: APK, clip, width, height, the app's folder, where to put the last picture. */
+    /** words: APK, clip, width, height, the app's folder, where to put the last picture, the layout; for releases, more. */
     public static void main(String[] words) throws Exception {
         AssetManager.apk = words[0];
         clip = Files.readAllBytes(Paths.get(words[1]));
@@ -33,10 +33,12 @@ public final class AppRun {
         Camera.height = Integer.parseInt(words[3]);
         size = Camera.width * Camera.height * 3 / 2;
         Context.folder = new File(words[4]);
+        Activity.layout = new File(words[6]);
+        Activity.numbers = R.id.class;
         Stage.searchApart = false;
 
-        if (words.length > 6) {
-            network(Paths.get(words[6]));
+        if (words.length > 7) {
+            network(Paths.get(words[7]));
             System.out.println("the day is over");
             return;
         }
@@ -57,21 +59,17 @@ public final class AppRun {
         if (!good) throw new AssertionError(what + "; the screen says: " + status());
     }
 
-    /** The line of advice is the first label that the activity makes. */
+    /** The line of advice. */
     private static String status() {
         Handler.pump();
-        return TextView.ALL.get(0).text;
+        return ((TextView) app.findViewById(R.id.status)).text;
     }
 
-    private static TextView labelled(String text) {
-        for (TextView each : TextView.ALL) {
-            if (each.text.equals(text)) return each;
-        }
-        throw new AssertionError("no button " + text);
+    private static void click(int button) {
+        app.findViewById(button).click();
     }
 
     private static void start() throws Exception {
-        TextView.ALL.clear();
         app = new MainActivity();
         app.onCreate(null);
         view = GLSurfaceView.last;
@@ -145,7 +143,6 @@ public final class AppRun {
         boolean seen = false;
         for (int i = 0; i < clip.length / size; i++) {
             check(deliver(i), "frame " + i);
-            app.onClick(null); // nothing was clicked
             app.onResume(); // a resume more does no harm
             Handler.pump();
             seen |= status().equals("Found in 1922.");
@@ -221,7 +218,7 @@ public final class AppRun {
     }
 
     private static void savedPicture() throws Exception {
-        labelled("Picture").click();
+        click(R.id.picture);
         view.frame();
         for (Thread thread : Thread.getAllStackTraces().keySet()) {
             if (thread.getName().equals("modar-picture")) thread.join();
@@ -297,7 +294,7 @@ public final class AppRun {
         start();
         deliver(0);
         check(installed().length == 0, "no release yet");
-        labelled("Update").click();
+        click(R.id.update);
         for (Thread thread : Thread.getAllStackTraces().keySet()) {
             if (thread.getName().equals("modar-update")) thread.join();
         }
@@ -322,7 +319,7 @@ public final class AppRun {
     }
 
     private static String updated() throws Exception {
-        labelled("Update").click();
+        click(R.id.update);
         joinAll("modar-update");
         return status();
     }
@@ -334,6 +331,11 @@ public final class AppRun {
     private static void network(Path folder) throws Exception {
         start();
         check(deliver(0) && deliver(1), "the APK's bundle");
+        if (Files.exists(folder.resolve("full"))) {
+            check(updated().startsWith("No update: ") && status().contains("No space left"), "a full storage");
+            check(installed().length == 0 && deliver(0) && deliver(1), "goes on with the APK's bundle");
+            step(folder, "freed");
+        }
         check(updated().equals("Updated") && installed().length == 1, "the first release");
         check(deliver(0) && deliver(1), "goes on with the first release");
         check(updated().equals("What is installed is the newest"), "nothing new");
@@ -359,6 +361,6 @@ public final class AppRun {
     }
 
     private static String[] installed() {
-        return Fetch.AVAILABLE ? Fetch.installed(new File(Context.folder, "store").getPath()) : new String[0];
+        return Fetch.installed(new File(Context.folder, "store").getPath());
     }
 }
