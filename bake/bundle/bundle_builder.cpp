@@ -201,6 +201,9 @@ Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& ou
   for (std::size_t m = 0; m < welded.uses.size(); ++m) {
     if (welded.uses[m] != kNone) textures[m] = outcomes[welded.uses[m]];
     sides[m] = textures[m].side;
+    welded.mesh.materials[m].see_through =
+        textures[m].texture != kNone &&
+        (content.textures[textures[m].texture].flags & kTextureAlpha) != 0;
   }
   Result<PackedMesh> packed = shape_model(std::move(welded.mesh), sides, request, report);
   if (!packed) return tl::unexpected(packed.error());

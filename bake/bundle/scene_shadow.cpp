@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <optional>
+#include <set>
 
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
@@ -12,6 +14,7 @@
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/parallel.hpp"
+#include "bake/texture/texture_codec.hpp"
 #include "formats/component.hpp"
 #include "modar/renderer.hpp"
 
@@ -28,7 +31,8 @@ constexpr double kKeySpread = 0.2;
 constexpr std::size_t kMostTriangles = 200'000;  ///< of the tree, where levels allow
 /// Around the model's own box, in parts of its height: beyond, a shadow is too faint to see.
 constexpr double kMargin = 0.9;
-constexpr double kLift = 1e-4;  ///< pattern units: above what stands on the plane
+constexpr std::uint32_t kAlphaSide = 128;  ///< texels of a mask: finer than the shadow's are
+constexpr double kLift = 1e-4;             ///< pattern units: above what stands on the plane
 
 /// Triangles of a level of detail, or of the coarsest that a chunk has.
 const LevelRecord& level_at(const BundleContent& content, const ChunkRecord& chunk,
@@ -36,8 +40,96 @@ const LevelRecord& level_at(const BundleContent& content, const ChunkRecord& chu
   return content.levels[chunk.first_level + std::min(depth, chunk.level_count - 1)];
 }
 
-/// The scene's model on the pattern: corners of triangles, three after three.
-std::vector<glm::dvec3> placed_triangles(const BundleContent& content, const SceneRecord& scene) {
+/// A texture's alpha, at a level that a soft shadow needs.
+struct AlphaMask {
+  RgbaImage image;  ///< empty: opaque
+  bool repeat = false;
+
+  [[nodiscard]] double at(const glm::dvec2& uv) const {
+    if (image.pixels.empty()) return 1;
+    const auto texel = [this](double x, std::uint32_t side) {
+      const double place = repeat ? x - std::floor(x) : std::clamp(x, 0.0, 1.0);
+      return std::min(static_cast<std::uint32_t>(place * side), side - 1);
+    };
+    const std::size_t row = texel(uv.y, image.height);
+    return image.pixels[4 * (row * image.width + texel(uv.x, image.width))] / 255.0;
+  }
+};
+
+AlphaMask alpha_mask(const BundleContent& content, std::uint32_t texture) {
+  AlphaMask mask;
+  if (texture == kNone || (content.textures[texture].flags & kTextureAlpha) == 0) return mask;
+  const TextureRecord& record = content.textures[texture];
+  std::uint32_t level = record.first_level;
+  while (level + 1 < record.first_level + record.level_count &&
+         std::max(content.texture_levels[level].width, content.texture_levels[level].height) >
+             kAlphaSide) {
+    ++level;
+  }
+  const TextureLevelRecord& place = content.texture_levels[level];
+  mask.image = decode_texture(
+      static_cast<TextureFormat>(record.format),
+      std::span(content.texture_data[texture]).subspan(place.alpha_offset, place.size), place.width,
+      place.height);
+  mask.repeat = (record.flags & kTextureRepeat) != 0;
+  return mask;
+}
+
+/// What stands on the plane: corners of triangles, three after three, and what they let through.
+class Casters {
+ public:
+  Casters(const BundleContent& content, const SceneRecord& scene) {
+    place(content, scene);
+    masks_.resize(content.materials.size());
+    for (const MaterialRecord& material : content.materials) {
+      opacities_.push_back(static_cast<double>(material.opacity));
+    }
+    const std::set<std::uint32_t> used(materials_.begin(), materials_.end());
+    for (const std::uint32_t m : used)
+      masks_[m] = alpha_mask(content, content.materials[m].texture);
+    std::vector<TriangleTree::Triangle> triangles;
+    for (std::uint32_t i = 0; i < corners_.size(); i += 3) triangles.push_back({i, i + 1, i + 2});
+    if (!triangles.empty()) tree_.emplace(corners_, std::move(triangles));
+  }
+
+  [[nodiscard]] const std::vector<glm::dvec3>& corners() const { return corners_; }
+
+  /// The share of a ray's light that gets past all of them. At least one triangle.
+  [[nodiscard]] double left(const glm::dvec3& origin, const glm::dvec3& direction,
+                            double reach) const {
+    double left = 1;
+    double from = 0;
+    while (left > 0.01) {
+      const auto hit = tree_->first_hit(origin, direction, from, reach);
+      if (!hit) return left;
+      left *= 1 - alpha(*hit);
+      from = hit->distance + 1e-6;
+    }
+    return 0;
+  }
+
+ private:
+  [[nodiscard]] double alpha(const TriangleTree::Hit& hit) const {
+    const std::uint32_t first = hit.triangle[0];
+    const std::uint32_t material = materials_[first / 3];
+    const AlphaMask& mask = masks_[material];
+    if (mask.image.pixels.empty()) return opacities_[material];
+    const glm::dvec2 uv =
+        (1 - hit.b - hit.c) * uvs_[first] + hit.b * uvs_[first + 1] + hit.c * uvs_[first + 2];
+    return opacities_[material] * mask.at(uv);
+  }
+
+  void place(const BundleContent& content, const SceneRecord& scene);
+
+  std::vector<glm::dvec3> corners_;
+  std::vector<glm::dvec2> uvs_;           ///< of each corner
+  std::vector<std::uint32_t> materials_;  ///< of each triangle
+  std::vector<double> opacities_;         ///< of each material
+  std::vector<AlphaMask> masks_;
+  std::optional<TriangleTree> tree_;
+};
+
+void Casters::place(const BundleContent& content, const SceneRecord& scene) {
   const ModelRecord& model = content.models[scene.model];
   const auto count_at = [&](std::uint32_t depth) {
     std::size_t count = 0;
@@ -49,28 +141,33 @@ std::vector<glm::dvec3> placed_triangles(const BundleContent& content, const Sce
   std::uint32_t depth = 0;
   while (depth + 1 < model.level_count && count_at(depth) > kMostTriangles) ++depth;
   const VertexDecoder decoder(content.layouts[model.layout]);
-  const glm::dmat4 place(scene_matrix(scene));
-  std::vector<glm::dvec3> corners;
+  const bool textured = decoder.has(Semantic::kUv);
+  const glm::dmat4 to_pattern(scene_matrix(scene));
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     const ChunkRecord& chunk = content.chunks[model.first_chunk + c];
     const MaterialRecord& material = content.materials[chunk.material];
-    if (material.opacity < 1.0f || (material.flags & kMaterialOccluder) != 0) continue;
+    if ((material.flags & kMaterialOccluder) != 0) continue;
     const LevelRecord& level = level_at(content, chunk, depth);
     for (std::uint32_t i = 0; i < level.index_count; ++i) {
       std::uint16_t index = 0;
       std::memcpy(&index, content.indices.data() + level.index_offset + 2 * std::uint64_t{i}, 2);
       const std::byte* vertex =
           content.vertices.data() + level.vertex_offset + std::uint64_t{index} * decoder.stride();
-      corners.emplace_back(place * glm::dvec4(decoder.position(vertex, chunk), 1.0));
+      corners_.emplace_back(to_pattern * glm::dvec4(decoder.position(vertex, chunk), 1.0));
+      uvs_.push_back(textured ? decoder.uv(vertex, chunk) : glm::dvec2(0.0));
+      if (i % 3 == 0) materials_.push_back(chunk.material);
     }
   }
-  return corners;
 }
 
 struct Ray {
   glm::dvec3 direction;
-  double light = 0;  ///< that it brings to a plane that nothing hides, of 1 in all
+  double light = 0;  ///< that it brings to a plane that nothing hides
 };
+
+/// Texels that are neighbours cast each its own part of the rays; blurred() gives all parts of a
+/// two by two square the same weight, so that what is left is hardly more than all rays' grain.
+constexpr std::uint32_t kParts = 4;
 
 /// What reaches the plane from all around: cosine-weighted, brighter where the light says so.
 std::vector<Ray> light_rays(const RoomLight& light) {
@@ -108,9 +205,12 @@ std::vector<Ray> light_rays(const RoomLight& light) {
       if (d.z > 0.02) rays.push_back({glm::normalize(d), key / kKeyRays});
     }
   }
-  double all = 0;
-  for (const Ray& ray : rays) all += ray.light;
-  for (Ray& ray : rays) ray.light /= all > 0 ? all : 1.0;
+  // All light is 1 for each part.
+  std::array<double, kParts> all{};
+  for (std::size_t i = 0; i < rays.size(); ++i) all[i % kParts] += rays[i].light;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    rays[i].light /= all[i % kParts] > 0 ? all[i % kParts] : 1.0;
+  }
   return rays;
 }
 
@@ -156,7 +256,8 @@ double faded(double left, double u, double v) {
 
 std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t scene,
                                     unsigned jobs) {
-  const std::vector<glm::dvec3> corners = placed_triangles(content, content.scenes[scene]);
+  const Casters casters(content, content.scenes[scene]);
+  const std::vector<glm::dvec3>& corners = casters.corners();
   glm::dvec3 low(1e30);
   glm::dvec3 high(-1e30);
   for (const glm::dvec3& corner : corners) {
@@ -170,9 +271,6 @@ std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t 
     header.low[axis] = static_cast<float>(low[axis] - margin);
     header.high[axis] = static_cast<float>(high[axis] + margin);
   }
-  std::vector<TriangleTree::Triangle> triangles;
-  for (std::uint32_t i = 0; i + 2 < corners.size(); i += 3) triangles.push_back({i, i + 1, i + 2});
-  const TriangleTree tree(corners, std::move(triangles));
   const std::vector<Ray> rays = light_rays(light_of(content, scene));
   const double reach = 2 * glm::length(high - low) + 1;
   std::vector<double> shares(std::size_t{kSide} * kSide);
@@ -184,8 +282,8 @@ std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t 
       const double y = glm::mix(static_cast<double>(header.high[1]),
                                 static_cast<double>(header.low[1]), place(row));
       double& left = shares[row * kSide + column];
-      for (const Ray& ray : rays) {
-        if (!tree.first_hit({x, y, kLift}, ray.direction, 0, reach)) left += ray.light;
+      for (std::size_t i = row % 2 * 2 + column % 2; i < rays.size(); i += kParts) {
+        left += rays[i].light * casters.left({x, y, kLift}, rays[i].direction, reach);
       }
     }
   });

@@ -9,6 +9,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "bake/mesh/repeating.hpp"
+
 namespace modar {
 namespace {
 
@@ -23,24 +25,6 @@ struct Lit {
   glm::dvec2 uv{0.0};
   glm::dvec4 colour{1.0};
 };
-
-/// IEC 61966-2-1, both ways, channel by channel.
-glm::dvec3 linear(const glm::dvec3& stored) {
-  glm::dvec3 out;
-  for (int i = 0; i < 3; ++i) {
-    out[i] = stored[i] <= 0.04045 ? stored[i] / 12.92 : std::pow((stored[i] + 0.055) / 1.055, 2.4);
-  }
-  return out;
-}
-
-glm::dvec3 stored(const glm::dvec3& linear) {
-  glm::dvec3 out;
-  for (int i = 0; i < 3; ++i) {
-    out[i] =
-        linear[i] <= 0.0031308 ? 12.92 * linear[i] : 1.055 * std::pow(linear[i], 1 / 2.4) - 0.055;
-  }
-  return out;
-}
 
 /// Texel of a level, wrapped or clamped.
 glm::dvec4 texel(const RgbaImage& image, long x, long y, bool repeat) {
@@ -65,7 +49,26 @@ glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, bool repeat) {
       glm::mix(texel(image, left, top + 1, repeat), texel(image, left + 1, top + 1, repeat), u), v);
 }
 
-glm::dvec4 trilinear(const SoftTexture& texture, const glm::dvec2& uv, double level) {
+}  // namespace
+
+glm::dvec3 srgb_to_linear(const glm::dvec3& stored) {
+  glm::dvec3 out;
+  for (int i = 0; i < 3; ++i) {
+    out[i] = stored[i] <= 0.04045 ? stored[i] / 12.92 : std::pow((stored[i] + 0.055) / 1.055, 2.4);
+  }
+  return out;
+}
+
+glm::dvec3 linear_to_srgb(const glm::dvec3& linear) {
+  glm::dvec3 out;
+  for (int i = 0; i < 3; ++i) {
+    out[i] =
+        linear[i] <= 0.0031308 ? 12.92 * linear[i] : 1.055 * std::pow(linear[i], 1 / 2.4) - 0.055;
+  }
+  return out;
+}
+
+glm::dvec4 look_up(const SoftTexture& texture, const glm::dvec2& uv, double level) {
   const double top = static_cast<double>(texture.levels.size() - 1);
   level = std::clamp(level, 0.0, top);
   const auto fine = static_cast<std::size_t>(level);
@@ -74,6 +77,20 @@ glm::dvec4 trilinear(const SoftTexture& texture, const glm::dvec2& uv, double le
                   bilinear(texture.levels[coarse], uv, texture.repeat),
                   level - static_cast<double>(fine));
 }
+
+Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned jobs) {
+  std::vector<SoftTexture> textures(mesh.materials.size());
+  const std::vector<bool> repeats = repeating_materials(mesh);
+  for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+    if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
+    MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
+    textures[m].repeat = repeats[m];
+    textures[m].levels = mip_chain(image, repeats[m], jobs);
+  }
+  return textures;
+}
+
+namespace {
 
 class Canvas {
  public:
@@ -138,7 +155,8 @@ class Canvas {
     Lit lit;
     lit.light = glm::max(sky(world), 0.0) * static_cast<double>(options_.ambient_strength) +
                 key * std::max(glm::dot(world, to_key), 0.0);
-    lit.added = linear(glm::dvec3(m.emission)) + linear(glm::dvec3(m.specular)) * key * shine;
+    lit.added = srgb_to_linear(glm::dvec3(m.emission)) +
+                srgb_to_linear(glm::dvec3(m.specular)) * key * shine;
     lit.diffuse = glm::dvec3(m.diffuse);
     if (!mesh_.uvs.empty()) lit.uv = mesh_.uvs[v];
     if (!mesh_.colours.empty()) lit.colour = glm::dvec4(mesh_.colours[v]) / 255.0;
@@ -196,12 +214,12 @@ class Canvas {
         return glm::length((uv_at(change) - uv * (change.x + change.y + change.z)) * size);
       };
       const double texels = std::max({slope(step_x), slope(step_y), 1e-9});
-      base *= glm::dvec4(glm::dvec3(trilinear(texture, uv, std::log2(texels))), 1.0);
+      base *= glm::dvec4(glm::dvec3(look_up(texture, uv, std::log2(texels))), 1.0);
     }
     const glm::dvec3 light = w.x * v[0].light + w.y * v[1].light + w.z * v[2].light;
     const glm::dvec3 added = w.x * v[0].added + w.y * v[1].added + w.z * v[2].added;
-    const glm::dvec3 colour =
-        stored(linear(v[0].diffuse) * linear(glm::dvec3(base)) * light + added);
+    const glm::dvec3 colour = linear_to_srgb(
+        srgb_to_linear(v[0].diffuse) * srgb_to_linear(glm::dvec3(base)) * light + added);
     for (int c = 0; c < 3; ++c)
       image_.pixels[4 * at + static_cast<std::size_t>(c)] = to_byte(colour[c]);
   }

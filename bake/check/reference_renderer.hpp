@@ -5,9 +5,13 @@
 #include <vector>
 
 #include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include "bake/image/image.hpp"
 #include "bake/mesh/tri_mesh.hpp"
+#include "formats/error.hpp"
 #include "modar/camera.hpp"
 #include "modar/renderer.hpp"
 
@@ -18,6 +22,16 @@ struct SoftTexture {
   std::vector<RgbaImage> levels;
   bool repeat = false;
 };
+
+/// Uncompressed pictures of all materials, at their own size. Errors: those of read_image().
+Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned jobs);
+
+/// As stored, trilinear. level: any number; 0 is the picture itself. texture: with levels.
+glm::dvec4 look_up(const SoftTexture& texture, const glm::dvec2& uv, double level);
+
+/// IEC 61966-2-1, both ways, channel by channel.
+glm::dvec3 srgb_to_linear(const glm::dvec3& stored);
+glm::dvec3 linear_to_srgb(const glm::dvec3& linear);
 
 /// Draws a mesh over the clear colour of `options`, in the world of a level camera: light is summed
 /// at vertices as shaders/model.vert does, and multiplied with colours in linear light with sRGB's

@@ -14,7 +14,6 @@
 #include "bake/check/reference_renderer.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/import/read_model.hpp"
-#include "bake/mesh/repeating.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_quality.hpp"
 #include "modar/gl_context.hpp"
@@ -38,30 +37,6 @@ std::array<glm::dvec3, kViews> view_directions() {
     }
   }
   return views;
-}
-
-double linear(std::uint8_t byte) {
-  const double c = byte / 255.0;
-  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-}
-
-/// sRGB to CIELAB (D65).
-glm::dvec3 lab_of(const std::uint8_t* pixel) {
-  static const std::vector<double> table = [] {
-    std::vector<double> values;
-    for (int i = 0; i < 256; ++i) values.push_back(linear(static_cast<std::uint8_t>(i)));
-    return values;
-  }();
-  const double r = table[pixel[0]];
-  const double g = table[pixel[1]];
-  const double b = table[pixel[2]];
-  const auto f = [](double t) {
-    return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116;
-  };
-  const double x = f((0.4124564 * r + 0.3575761 * g + 0.1804375 * b) / 0.95047);
-  const double y = f(0.2126729 * r + 0.7151522 * g + 0.0721750 * b);
-  const double z = f((0.0193339 * r + 0.1191920 * g + 0.9503041 * b) / 1.08883);
-  return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
 }
 
 /// The part of both images that shows something, so that empty surroundings earn nothing.
@@ -103,19 +78,6 @@ bool translucent(const TriMesh& mesh) {
   return std::any_of(mesh.materials.begin(), mesh.materials.end(), [](const SourceMaterial& m) {
     return m.opacity < 1.0f || !m.alpha_map.empty();
   });
-}
-
-/// Uncompressed pictures of all materials, at their own size.
-Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned jobs) {
-  std::vector<SoftTexture> textures(mesh.materials.size());
-  const std::vector<bool> repeats = repeating_materials(mesh);
-  for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
-    if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
-    MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
-    textures[m].repeat = repeats[m];
-    textures[m].levels = mip_chain(image, repeats[m], jobs);
-  }
-  return textures;
 }
 
 class Looker {
@@ -227,6 +189,24 @@ class Looker {
 };
 
 }  // namespace
+
+glm::dvec3 lab_of(const std::uint8_t* pixel) {
+  static const std::vector<double> table = [] {
+    std::vector<double> values;
+    for (int i = 0; i < 256; ++i) values.push_back(srgb_to_linear(glm::dvec3(i / 255.0)).x);
+    return values;
+  }();
+  const double r = table[pixel[0]];
+  const double g = table[pixel[1]];
+  const double b = table[pixel[2]];
+  const auto f = [](double t) {
+    return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116;
+  };
+  const double x = f((0.4124564 * r + 0.3575761 * g + 0.1804375 * b) / 0.95047);
+  const double y = f(0.2126729 * r + 0.7151522 * g + 0.0721750 * b);
+  const double z = f((0.0193339 * r + 0.1191920 * g + 0.9503041 * b) / 1.08883);
+  return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
+}
 
 double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
                     const std::array<std::uint8_t, 3>& clear) {

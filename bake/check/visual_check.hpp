@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 #include "bake/image/image.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
@@ -35,6 +37,9 @@ struct ModelLook {
   int worst_view = 0;
   std::string picture;  ///< source and bundle side by side; empty: not written
 };
+
+/// An sRGB pixel in CIELAB (D65).
+glm::dvec3 lab_of(const std::uint8_t* pixel);
 
 /// Mean CIE 1976 colour difference over the pixels where both images differ from `clear`; 0 where
 /// there are none: outlines are for SSIM to judge. Images of one size, sRGB.

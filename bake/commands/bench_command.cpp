@@ -34,7 +34,7 @@ Result<ExitCode> print_rows(const BenchOptions& bench) {
 }
 
 void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
-  line.option("--patterns", &pose.patterns, "pose: folder of pattern pictures, or one picture");
+  line.option("--patterns", &pose.patterns, "pose: folder of pattern pictures, or one picture; light: one");
   line.option("--backgrounds", &pose.backgrounds, "pose: folder of photos without a pattern");
   line.option("--video", &pose.video, "pose: a video as well; render: the player on it instead");
   line.option("--truth", &pose.truth, "pose: corners of the video's pattern (CSV)");
@@ -74,6 +74,8 @@ void add_bench(CommandLine& program) {
               {.type = "NAME", .required = true});
   line.option("inputs", &bench->inputs, "Its input files");
   line.option("--crop", &bench->crop, "etc1: side of the centre crop, in pixels");
+  line.option("-o,--output", &bench->output, "light: folder that exists, for the pictures",
+              {.type = "FOLDER"});
   line.option("--device", &bench->device, "render: draw as this device would (assets/devices)");
   line.option("--obj", &bench->model.obj, "model: measure this OBJ instead of making one");
   line.flag("--big", bench->model.big, "model: of 14.6 million triangles, some minutes");

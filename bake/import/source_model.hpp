@@ -27,6 +27,7 @@ struct SourceMaterial {
   std::string diffuse_map;
   std::string alpha_map;
   bool two_sided = false;
+  bool see_through = false;  ///< its picture has alpha; unknown (false) until it has been read
   /// Named "occluder": stands for a real thing, hides what is behind it and is not seen itself.
   [[nodiscard]] bool occluder() const { return name == "occluder"; }
   std::shared_ptr<const void> keeper;  ///< owner of temporary files that hold the maps, or null

@@ -11,6 +11,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/etc1_bench.hpp"
+#include "bake/lab/light_bench.hpp"
 #include "bake/lab/lod_bench.hpp"
 #include "bake/lab/ship_bench.hpp"
 #include "bake/terminal.hpp"
@@ -110,6 +111,22 @@ BenchResult bench_render_rows(const BenchOptions& command) {
   return rows;
 }
 
+/// Shading beside plain shading, both as they differ from a path tracer.
+BenchResult bench_light_rows(const BenchOptions& command) {
+  if (command.pose.patterns.empty()) {
+    return fail(ExitCode::kUsage, "bench.inputs", command.name, "models need something to stand on",
+                "modar bench light MODEL[,up=y]... --patterns PICTURE [-o FOLDER]");
+  }
+  ProgressBar bar(command.pose.quiet || command.json);
+  LightBenchOptions options;
+  options.models = command.inputs;
+  options.pattern = command.pose.patterns;
+  options.folder = command.output;
+  options.jobs = command.model.jobs;
+  options.progress = [&bar](double done) { bar.show("drawing", done); };
+  return bench_light(options);
+}
+
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
       {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
@@ -124,6 +141,10 @@ const std::vector<Bench>& benches() {
        "or "
        "the player on a video, against the ModAR paper's Table 9",
        bench_render_rows},
+      {"light", false, "MODEL[,up=y]... --patterns PICTURE [-o FOLDER]",
+       "models on a pattern, a plant and a glass besides: colour error (CIEDE2000) beside a path "
+       "tracer, against plain shading",
+       bench_light_rows},
       {"model", false, "SCAN [--big] | --obj FILE",
        "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "
        "gltfpack, Draco and the goals",

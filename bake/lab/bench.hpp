@@ -42,6 +42,7 @@ struct BenchOptions {
   std::string name;
   std::vector<std::string> inputs;
   unsigned crop = 0;   ///< etc1: side of the centre crop in pixels, 0: whole images
+  std::string output;  ///< light: folder for pictures; empty: none are written
   std::string device;  ///< render: profile that masks the context; empty: none
   PoseBenchRequest pose;
   ModelBenchRequest model;

@@ -433,6 +433,69 @@ Result<void> add_load(const BenchStage& stage, const std::string& path, Rows& ro
   return {};
 }
 
+/// A model as an app shows it: on its pattern where it is in a scene, the camera's picture behind
+/// it.
+struct ShownModel {
+  DrawItem item;
+  std::vector<std::uint8_t> picture;  ///< RGB
+};
+
+ShownModel shown_model(const BundleView& bundle, std::uint32_t model,
+                       const RenderBenchOptions& options) {
+  ShownModel shown;
+  const glm::mat4 world = glm::lookAt(glm::vec3(0.8f, -2.4f, 2.0f), glm::vec3(0.0f, 0.0f, 0.3f),
+                                      glm::vec3(0.0f, 0.0f, 1.0f));
+  shown.item = {model, world, kNone, world};
+  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
+    if (bundle.scenes()[s].model != model) continue;
+    shown.item.to_eye = world * scene_matrix(bundle.scenes()[s]);
+    shown.item.scene = s;
+  }
+  const auto pixels =
+      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  for (std::size_t i = 0; i < 3 * pixels; ++i) {
+    shown.picture.push_back(static_cast<std::uint8_t>(i * 37 >> 5));
+  }
+  return shown;
+}
+
+/// CPU time of a frame, the driver's threads included, beside plain shading without a shadow; frame
+/// by frame in turn, so that both see the same machine.
+Result<void> add_shading_cost(const BenchStage& stage, std::uint32_t model, const std::string& name,
+                              const RenderBenchOptions& options, Rows& rows) {
+  MODAR_ASSIGN(const auto ours, renderer_of(stage, true, options));
+  std::unique_ptr<Renderer> plain;
+  {
+    const PlainShading plainly;
+    MODAR_ASSIGN(plain, renderer_of(stage, true, options));
+  }
+  const ShownModel shown = shown_model(stage.bundle, model, options);
+  const RgbImage picture{shown.picture.data(), options.width, options.height, 3L * options.width};
+  DrawItem bare = shown.item;
+  bare.scene = kNone;
+  const DepthRange range = depth_range(stage.bundle, {&shown.item, 1});
+  const glm::mat4 projection = gl_projection(default_camera(options.width, options.height),
+                                             range.near_plane, range.far_plane);
+  const auto spent = [&](Renderer& renderer, const DrawItem& item) {
+    const double start = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
+    renderer.render(picture, projection, {&item, 1});
+    glFinish();
+    return clock_ms(CLOCK_PROCESS_CPUTIME_ID) - start;
+  };
+  std::vector<double> our_times;
+  std::vector<double> plain_times;
+  constexpr int kWarm = 3;  // frames that compile and upload
+  for (int i = 0; i < 2 * options.frames + kWarm; ++i) {
+    const double our_time = spent(*ours, shown.item);
+    const double plain_time = spent(*plain, bare);
+    if (i < kWarm) continue;
+    our_times.push_back(our_time);
+    plain_times.push_back(plain_time);
+  }
+  rows.add(name + " x1 shading_cpu_ms", median(our_times), median(plain_times));
+  return {};
+}
+
 /// All rows of one bundle.
 Result<void> add_bundle(const std::string& path, std::span<const CurvePoint> idle,
                         const RenderBenchOptions& options, Rows& rows) {
@@ -449,6 +512,7 @@ Result<void> add_bundle(const std::string& path, std::span<const CurvePoint> idl
     for (std::size_t way = kIndexVbo; way < kWays; ++way) add_curve(curves, way, rows);
     add_paper_gains(curves, rows);
     first += kWays * copies;
+    MODAR_TRY(add_shading_cost(stage, model, curves.name, options, rows));
   }
   MODAR_TRY(add_load(stage, path, rows));
   for (std::uint32_t model = 0; model < stage.bundle.models().size(); ++model) {

@@ -24,6 +24,11 @@ const char* shadow_fragment_source() {
   return kShadowFragmentSource;
 }
 
+ModelSources& model_sources() {
+  static ModelSources sources = {kModelVertexSource, kModelFragmentSource};
+  return sources;
+}
+
 namespace {
 
 std::string shader_log(GLuint shader) {
@@ -107,7 +112,7 @@ Result<GLuint> link_program(const std::string& defines, const char* vertex, cons
 
 Result<ModelProgram> make_model_program(const ProgramKey& key) {
   MODAR_ASSIGN(const GLuint linked,
-               link_program(model_defines(key), kModelVertexSource, kModelFragmentSource));
+               link_program(model_defines(key), model_sources().vertex, model_sources().fragment));
   ModelProgram program;
   program.key = key;
   program.id = linked;

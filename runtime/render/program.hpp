@@ -55,6 +55,14 @@ const char* background_fragment_source();
 const char* shadow_vertex_source();
 const char* shadow_fragment_source();
 
+/// The models' shaders: shaders/model.vert and model.frag, unless a bench has put others in their
+/// place, which programs that are made from then on have.
+struct ModelSources {
+  const char* vertex = nullptr;
+  const char* fragment = nullptr;
+};
+ModelSources& model_sources();
+
 /// Leaves the program in use, its samplers set to units 0 and 1.
 Result<ModelProgram> make_model_program(const ProgramKey& key);
 

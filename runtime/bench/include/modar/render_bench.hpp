@@ -2,6 +2,7 @@
 // side by side in one run, loading against copying, culling against brute force.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -11,6 +12,20 @@
 #include "formats/error.hpp"
 
 namespace modar {
+
+/// While one lives, renderers that are created shade models plainly: Lambert in stored colours,
+/// hardly any ambient light, a light that turns with the camera. Items without a scene have no
+/// shadow then. One at a time.
+class PlainShading {
+ public:
+  PlainShading();
+  ~PlainShading();
+  PlainShading(const PlainShading&) = delete;
+  PlainShading& operator=(const PlainShading&) = delete;
+
+ private:
+  std::array<const char*, 2> before_{};
+};
 
 struct RenderBenchOptions {
   std::string device;     ///< profile that masks the context; empty: none
@@ -39,7 +54,9 @@ struct RenderBenchRow {
 /// frame_ms (wall clock until the driver has finished), cpu_ms (of the process while the driver
 /// rasterises nothing: Mesa's no-op driver, in a child process; left out where Mesa is not the
 /// driver). "MODEL x10 WAY gain_low_end" and "gain_mid_range": how often our frame time of
-/// index_arrays holds that of the way, and the paper's.
+/// index_arrays holds that of the way, and the paper's. "MODEL x1 shading_cpu_ms" (CPU time of a
+/// frame with a camera picture, the model on its pattern, its shadow): the reference is plain
+/// shading.
 /// Then, a bundle (by its path): open_ms; load_cpu_ms (buffers into GL) and
 /// driver_cpu_ms (glBufferData of the same bytes alone), both against memcpy; bytes in GL by kind;
 /// and, a model, triangles sent from inside it against those whose own boxes meet the frustum. Call

@@ -1,0 +1,47 @@
+// `modar bench light`: models as the device shades them, beside plain shading and a path tracer.
+// Internal to bake/lab.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "bake/lab/bench.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+struct LightBenchOptions {
+  /// Files, each with ",up=y" behind it where that axis points up (else z).
+  std::vector<std::string> models;
+  std::string pattern;  ///< the picture that all of them stand on
+  std::string folder;   ///< for the pictures; empty: none are written
+  bool made = true;     ///< a cut-out plant and a glass besides, which are made here
+  int width = 320;      ///< of a picture, pixels
+  int height = 240;
+  int samples = 64;  ///< paths a pixel of the reference
+  unsigned jobs = 1;
+  std::function<void(double done)> progress;  ///< may be empty
+};
+
+/// A row a model and region, in CIEDE2000, the mean over pixels: "NAME model" where it is,
+/// "NAME ground" where its shadow and its light change the ground by 1 % and more. ours: the
+/// renderer beside the reference; reference: the same with plain shading and no shadow; "NAME
+/// noise" (ours alone): two references of half the paths, which differ by about twice the
+/// reference's own error. Then the means over all models. Writes FOLDER/NAME.png (camera picture,
+/// plain, ours, reference) and FOLDER/light.png (all of them). Errors: those of baking and of GL;
+/// kIo where a picture cannot be written.
+Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options);
+
+/// CIEDE2000 of two colours in CIELAB. Sharma, Wu, Dalal, "The CIEDE2000 Color-Difference Formula",
+/// 2005.
+double ciede2000(const glm::dvec3& a, const glm::dvec3& b);
+
+/// Writes plant.obj (crossed cards with a picture of leaves, in a pot) and glass.obj (a bowl that
+/// is half transparent, a ball in it) with their materials and pictures into a folder that exists,
+/// and answers their paths. z is up. Errors: kIo "io.write".
+Result<std::vector<std::string>> make_light_subjects(const std::string& folder);
+
+}  // namespace modar

@@ -1,0 +1,180 @@
+// Models that no package has at hand: leaves on cards, and a glass.
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+
+#include "bake/image/image.hpp"
+#include "bake/lab/light_bench.hpp"
+#include "formats/atomic_file.hpp"
+
+namespace modar {
+namespace {
+
+constexpr double kTurn = 6.283185307179586;
+
+/// The text of an OBJ file as it grows.
+class ObjText {
+ public:
+  explicit ObjText(const std::string& materials) : text_("mtllib " + materials + "\n") {}
+
+  void material(const std::string& name) { text_ += "usemtl " + name + "\n"; }
+
+  /// A surface of revolution about z; rings from below to above as seen from outside: radius, z.
+  void lathe(const std::vector<glm::dvec2>& rings) {
+    constexpr int kSectors = 48;
+    const int first = vertices_ + 1;
+    for (const glm::dvec2& ring : rings) {
+      for (int i = 0; i < kSectors; ++i) {
+        const double angle = kTurn * i / kSectors;
+        vertex(ring.x * std::cos(angle), ring.x * std::sin(angle), ring.y);
+      }
+    }
+    for (int r = 0; r + 1 < static_cast<int>(rings.size()); ++r) {
+      for (int i = 0; i < kSectors; ++i) {
+        const int a = first + r * kSectors + i;
+        const int b = first + r * kSectors + (i + 1) % kSectors;
+        face({a, b, b + kSectors, a + kSectors}, false);
+      }
+    }
+  }
+
+  /// A standing card through the z axis, seen from both sides, with all of a picture on it.
+  void card(double angle, double half_width, double low, double high) {
+    const double x = half_width * std::cos(angle);
+    const double y = half_width * std::sin(angle);
+    const int first = vertices_ + 1;
+    vertex(-x, -y, low);
+    vertex(x, y, low);
+    vertex(x, y, high);
+    vertex(-x, -y, high);
+    if (!pictured_) text_ += "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    pictured_ = true;
+    face({first, first + 1, first + 2, first + 3}, true);
+    // Vertices of its own, so that the normals of both sides do not cancel out.
+    vertex(-x, -y, low);
+    vertex(x, y, low);
+    vertex(x, y, high);
+    vertex(-x, -y, high);
+    face({first + 7, first + 6, first + 5, first + 4}, true, true);
+  }
+
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  void vertex(double x, double y, double z) {
+    std::array<char, 96> line{};
+    std::snprintf(line.data(), line.size(), "v %.6f %.6f %.6f\n", x, y, z);
+    text_ += line.data();
+    ++vertices_;
+  }
+
+  void face(const std::array<int, 4>& corners, bool pictured, bool reversed = false) {
+    text_ += "f";
+    for (int i = 0; i < 4; ++i) {
+      text_ += " " + std::to_string(corners[static_cast<std::size_t>(i)]);
+      if (pictured) text_ += "/" + std::to_string(reversed ? 4 - i : i + 1);
+    }
+    text_ += "\n";
+  }
+
+  std::string text_;
+  int vertices_ = 0;
+  bool pictured_ = false;
+};
+
+struct Leaf {
+  glm::dvec2 root{0.0};  ///< of the picture's sides, y up
+  glm::dvec2 along{0.0};
+  double width = 0;
+};
+
+/// Leaves in pairs up a bent stem, on nothing: alpha is 1 in leaves, and falls to 0 in a texel.
+RgbaImage leaves() {
+  constexpr std::uint32_t kSide = 256;
+  std::vector<Leaf> all;
+  const auto stem = [](double t) { return glm::dvec2(0.5 + 0.06 * std::sin(4 * t), 0.95 * t); };
+  for (int i = 0; i < 9; ++i) {
+    const double t = 0.12 + 0.095 * i;
+    const double length = 0.36 * std::sin(2.6 * (t + 0.12)) + 0.06;
+    for (const double side : {-1.0, 1.0}) {
+      const double lift = 0.35 + 0.5 * t + 0.06 * side;
+      all.push_back({stem(t), length * glm::dvec2(side * std::cos(lift), std::sin(lift)), 0.3});
+    }
+  }
+  RgbaImage image{kSide, kSide, std::vector<std::uint8_t>(4 * kSide * kSide)};
+  for (std::uint32_t row = 0; row < kSide; ++row) {
+    for (std::uint32_t column = 0; column < kSide; ++column) {
+      const glm::dvec2 p((column + 0.5) / kSide, 1 - (row + 0.5) / kSide);
+      double inside = 0.012 - std::fabs(p.x - stem(p.y).x);  // distance from the edge, of the sides
+      double shade = 0.75;
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        const double length = glm::length(all[i].along);
+        const glm::dvec2 axis = all[i].along / length;
+        const glm::dvec2 from = p - all[i].root;
+        const double u = glm::dot(from, axis) / length;
+        const double v = glm::dot(from, glm::dvec2(-axis.y, axis.x));
+        const double half = u > 0 && u < 1 ? all[i].width * length * std::sin(kTurn / 2 * u) : -1.0;
+        if (half - std::fabs(v) < inside) continue;
+        inside = half - std::fabs(v);
+        shade = 0.7 + 0.04 * static_cast<double>(i % 7) + (std::fabs(v) < 0.005 ? 0.12 : 0.0);
+      }
+      const double alpha = std::clamp(0.5 + inside * kSide, 0.0, 1.0);
+      const std::array<double, 4> colour = {88 * shade, 168 * shade, 62 * shade, 255 * alpha};
+      for (std::size_t c = 0; c < 4; ++c) {
+        image.pixels[4 * (std::size_t{row} * kSide + column) + c] =
+            static_cast<std::uint8_t>(std::lround(colour[c]));
+      }
+    }
+  }
+  return image;
+}
+
+Result<void> write_text(const std::filesystem::path& path, const std::string& text) {
+  return write_file(path.string(), std::as_bytes(std::span(text)));
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> make_light_subjects(const std::string& folder) {
+  const std::filesystem::path in(folder);
+  MODAR_TRY(write_png(leaves(), (in / "leaves.png").string()));
+  MODAR_TRY(write_text(in / "plant.mtl",
+                       "newmtl leaves\nKd 1 1 1\nKs 0 0 0\nmap_Kd leaves.png\n"
+                       "newmtl pot\nKd 0.72 0.45 0.32\nKs 0 0 0\n"));
+  ObjText plant("plant.mtl");
+  plant.material("pot");
+  plant.lathe({{0.0, 0.0}, {0.30, 0.0}, {0.42, 0.55}, {0.46, 0.55}, {0.46, 0.62}, {0.0, 0.58}});
+  plant.material("leaves");
+  for (int i = 0; i < 3; ++i) plant.card(kTurn * i / 6 + 0.3, 0.8, 0.55, 2.1);
+  MODAR_TRY(write_text(in / "plant.obj", plant.text()));
+  MODAR_TRY(write_text(in / "glass.mtl",
+                       "newmtl glass\nKd 0.55 0.72 0.78\nKs 0.9 0.9 0.9\nNs 60\nd 0.35\n"
+                       "newmtl ball\nKd 0.85 0.35 0.2\nKs 0.3 0.3 0.3\nNs 30\n"));
+  ObjText glass("glass.mtl");
+  glass.material("ball");
+  std::vector<glm::dvec2> ball;
+  for (int i = 0; i <= 24; ++i) {
+    const double angle = kTurn / 2 * i / 24;
+    ball.emplace_back(0.4 * std::sin(angle), 0.5 - 0.4 * std::cos(angle));
+  }
+  glass.lathe(ball);
+  glass.material("glass");
+  std::vector<glm::dvec2> bowl;
+  for (int i = 0; i <= 24; ++i) {
+    const double t = i / 24.0;
+    bowl.emplace_back(0.9 * std::sin(kTurn / 4 * std::min(1.0, 0.03 + 1.3 * t)), 1.3 * t * t);
+  }
+  glass.lathe(bowl);
+  MODAR_TRY(write_text(in / "glass.obj", glass.text()));
+  return std::vector<std::string>{(in / "plant.obj").string(), (in / "glass.obj").string()};
+}
+
+}  // namespace modar
