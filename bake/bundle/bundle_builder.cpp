@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <string_view>
 
 #include <glm/geometric.hpp>
 
@@ -13,6 +14,7 @@
 #include "bake/bundle/scene_shadow.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/lod/reduce.hpp"
 #include "bake/mesh/occlusion.hpp"
 #include "bake/mesh/pack/pack.hpp"
 #include "bake/mesh/topology/mesh_topology.hpp"
@@ -138,6 +140,9 @@ Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& re
     options.jobs = request.jobs;
     options.half_edge_bytes = request.memory_bytes / 4;
     report.topologies.push_back(measure_topology(*mesh, options, report));
+  }
+  if (request.most_triangles != 0) {
+    *mesh = reduce(std::move(*mesh), request.most_triangles, report);
   }
   WeldedModel welded{std::move(*mesh), {}};
   welded.uses = collect_textures(welded.mesh, textures);
@@ -345,6 +350,19 @@ AxisTurn turn_to_z(UpAxis up) {
   return {{0, 0, 0, 1}, 2};
 }
 
+/// Sizes that collections publish their scans in.
+struct Tier {
+  std::string_view name;
+  std::size_t triangles;
+  std::uint32_t texture_side;
+};
+constexpr Tier kTiers[] = {
+    {"thumb", 20000, 512}, {"phone", 100000, 2048}, {"desktop", 150000, 4096}};
+
+void lower_budget(std::uint64_t bytes, BakeRequest& request) {
+  if (request.texture_budget == 0 || bytes < request.texture_budget) request.texture_budget = bytes;
+}
+
 }  // namespace
 
 std::string file_stem(const std::string& path) {
@@ -359,9 +377,25 @@ Result<void> plan_for_device(const std::string& device, BakeRequest& request) {
   }
   const auto side = static_cast<std::uint32_t>(profile->max_texture_size);
   request.textures.max_side = std::min(request.textures.max_side, side);
-  request.texture_budget = std::uint64_t{profile->gpu_memory_mib} * 1024 * 1024 / 2;
+  lower_budget(std::uint64_t{profile->gpu_memory_mib} * 1024 * 1024 / 2, request);
   request.device = device;
   return {};
+}
+
+Result<void> plan_for_tier(const std::string& tier, BakeRequest& request) {
+  std::string names;
+  for (const Tier& known : kTiers) {
+    names += (names.empty() ? "" : ", ") + std::string(known.name);
+    if (tier != known.name) continue;
+    request.most_triangles = known.triangles;
+    request.textures.max_side = std::min(request.textures.max_side, known.texture_side);
+    // Four such textures in ETC1, with their mip levels.
+    lower_budget(std::uint64_t{4} * known.texture_side * known.texture_side / 2 * 4 / 3, request);
+    request.tier = tier;
+    return {};
+  }
+  return fail(ExitCode::kUsage, "bake.tier", "--tier " + tier, "there is no such tier",
+              "name one of: " + names);
 }
 
 Result<void> require_shown(const BakeRequest& request) {

@@ -50,6 +50,7 @@ struct BakeRequest {
   std::string light;  ///< of the scene that one model and one pattern make by themselves
   TextureOptions textures;
   std::uint64_t texture_budget = 0;  ///< GPU bytes that all textures may take; 0: any
+  std::size_t most_triangles = 0;    ///< of each model, before its levels of detail; 0: any
   bool shadows = true;               ///< of each scene's model on its pattern's plane
   double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
   MaxError max_error;
@@ -60,6 +61,7 @@ struct BakeRequest {
   bool topology = false;           ///< measure and state each model's
   std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
   std::string device;              ///< profile that it is planned for; empty: none
+  std::string tier;                ///< that it is made for; empty: none
   unsigned jobs = 1;               ///< the bytes do not depend on it
   TrackerRecordOptions loop;       ///< of patterns; its jobs are those above
   /// The article's parameter sets to describe patterns with; empty: all; "none": our loop's record
@@ -72,6 +74,10 @@ struct BakeRequest {
 /// so that as much is left for vertices, camera picture and framebuffers. Errors: kUsage
 /// "device.unknown" that lists the names.
 Result<void> plan_for_device(const std::string& device, BakeRequest& request);
+
+/// Lowers triangles, texture sizes and their budget to what a tier allows: "thumb", "phone" or
+/// "desktop". Errors: kUsage "bake.tier" that lists the names.
+Result<void> plan_for_tier(const std::string& tier, BakeRequest& request);
 
 /// Refuses models that stand on no pattern, and patterns that carry no model, where there are both;
 /// scenes of unknown names are left to build_bundle(). Errors: kUsage "bake.never-shown", whose

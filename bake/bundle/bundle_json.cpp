@@ -204,6 +204,7 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
     scenes.push_back(std::move(stated));
   }
   const Json options = {{"device", request.device},
+                        {"tier", request.tier},
                         {"lods", request.levels},
                         {"max_error", request.max_error.value},
                         {"max_error_unit", max_error_unit(request.max_error)},

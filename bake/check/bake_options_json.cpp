@@ -98,6 +98,9 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   if (!options.is_object()) return;
   take(options, "device", request.device);
   if (!request.device.empty() && !plan_for_device(request.device, request)) request.device.clear();
+  std::string tier;
+  take(options, "tier", tier);
+  static_cast<void>(plan_for_tier(tier, request));
   int effort = static_cast<int>(request.textures.effort);
   take(options, "effort", effort);
   if (effort >= 0 && effort <= static_cast<int>(TextureEffort::kBest)) {

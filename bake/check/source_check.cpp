@@ -14,6 +14,7 @@
 
 #include "bake/check/verdict.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/mesh/lod/reduce.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
@@ -144,7 +145,7 @@ class SourceCheck {
         missing("model", model.name, &model);
         continue;
       }
-      MODAR_TRY(check_model(model, *path, request.jobs, report));
+      MODAR_TRY(check_model(model, *path, request, report));
     }
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
     for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) check_pattern(p);
@@ -213,11 +214,12 @@ class SourceCheck {
     return true;
   }
 
-  Result<void> check_model(const ModelRecord& model, const std::string& path, unsigned jobs,
-                           Report& report) {
+  Result<void> check_model(const ModelRecord& model, const std::string& path,
+                           const BakeRequest& request, Report& report) {
     Report quiet;
-    MODAR_ASSIGN(SourceModel source, read_model(path, jobs));
-    MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), quiet, {jobs}));
+    MODAR_ASSIGN(SourceModel source, read_model(path, request.jobs));
+    MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {request.jobs}));
+    if (request.most_triangles != 0) mesh = reduce(std::move(mesh), request.most_triangles, quiet);
     StageTimer timer(report, "measure");
     const Surface ours = surface_of(bundle_, model);
     const Surface theirs = surface_of(mesh);

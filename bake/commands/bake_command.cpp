@@ -39,6 +39,7 @@ struct BakeCommand {
   std::string unit;
   std::string max_error;
   std::string device;
+  std::string tier;
   std::string light;
   ProjectCommand project;
 };
@@ -77,6 +78,7 @@ Result<void> complete(BakeCommand& command) {
     MODAR_ASSIGN(request.max_error, parse_max_error(command.max_error));
   }
   request.light = command.light;
+  if (!command.tier.empty()) MODAR_TRY(plan_for_tier(command.tier, request));
   if (!command.device.empty()) MODAR_TRY(plan_for_device(command.device, request));
   request.tool_version = MODAR_VERSION;
   return {};
@@ -319,6 +321,10 @@ void add_bake(CommandLine& program) {
             "Bake again with other threads, paths, locale, time zone; compare the bytes");
   add_geometry_options(line, *command);
   add_texture_options(line, request.textures);
+  line.option("--tier", &command->tier,
+              "Make models for thumb (20,000 triangles, textures of 512), phone (100,000, 2048) or "
+              "desktop (150,000, 4096)",
+              {.type = "TIER", .choices = {"thumb", "phone", "desktop"}});
   line.option("--device", &command->device,
               "Plan for a device: its texture size and GPU memory (" + device_profile_names() + ")",
               {.type = "NAME"});

@@ -107,7 +107,9 @@ constexpr Setting kSettings[] = {
        request.topology = value == "true";
        return Result<void>();
      }},
-    // After max-texture, which it lowers.
+    // After max-texture, which both lower.
+    {"tier", Kind::kText, false,
+     [](const std::string& value, BakeRequest& request) { return plan_for_tier(value, request); }},
     {"device", Kind::kText, false,
      [](const std::string& value, BakeRequest& request) {
        return plan_for_device(value, request);

@@ -158,6 +158,29 @@ class Bake(ProgramTest):
         done = self.modar("bake", "--model", POTTERY, "--device", "toaster", "-o", out)
         self.assert_fails(done, 1, "toaster", "ace2")
 
+    def test_a_tier_reduces_models_before_their_levels(self):
+        side = 106
+        lines = [f"v {x} {y} {(x * 7 + y * 13) % 5 * 0.05}" for y in range(side) for x in range(side)]
+        for y in range(side - 1):
+            for x in range(side - 1):
+                a = y * side + x + 1
+                lines += [f"f {a} {a + 1} {a + side + 1}", f"f {a} {a + side + 1} {a + side}"]
+        hill = self.folder / "hill.obj"
+        hill.write_text("\n".join(lines) + "\n")
+        faces = 2 * (side - 1) ** 2
+        out = self.folder / "thumb.modar"
+        report = self.modar_json("bake", "--model", hill, "--tier", "thumb", "--no-ao", "--lods", 2, "-o", out)
+        model = report["bundle"]["models"][0]
+        self.assertEqual(model["source_faces"], faces)
+        self.assertLessEqual(model["triangles"], 20000)
+        self.assertGreaterEqual(model["triangles"], 19400)
+        stated = [finding for finding in report["findings"] if finding["id"] == "model.reduced"]
+        self.assertEqual([finding["severity"] for finding in stated], ["info"])
+        self.assertIn(f"from {faces} to {model['triangles']} triangles", stated[0]["message"])
+        self.assertEqual(self.modar_json("check", out, "--source", hill)["issues"], [])
+        done = self.modar("bake", "--model", POTTERY, "--tier", "poster", "-o", out)
+        self.assert_fails(done, 1, "poster", "phone")
+
     def test_an_image_of_two_models_is_stored_once(self):
         for name in ("a", "b"):
             text = POTTERY.read_text()
