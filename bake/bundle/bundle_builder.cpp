@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <set>
 #include <string_view>
@@ -169,6 +170,54 @@ Result<double> max_error_of(const BakeRequest& request, const TriMesh& mesh) {
   return request.max_error.value / request.unit_metres;
 }
 
+/// Of the mean edge: beyond it, half floats bend what triangles show. A scan of 0.9 million
+/// triangles has 7 %, one of 0.1 million 2 %. Set by hand.
+constexpr double kVisibleError = 0.05;
+
+/// Mean length of the edges of level 0, source units.
+double mean_edge(const ChunkedMesh& mesh) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const Chunk& chunk : mesh.chunks) {
+    for (std::size_t i = 0; i < chunk.indices.size(); ++i) {
+      const std::size_t next = i % 3 == 2 ? i - 2 : i + 1;
+      sum += glm::length(mesh.mesh.positions[chunk.vertices[chunk.indices[i]]] -
+                         mesh.mesh.positions[chunk.vertices[chunk.indices[next]]]);
+    }
+    count += chunk.indices.size();
+  }
+  return count == 0 ? 0.0 : sum / static_cast<double>(count) * mesh.mesh.placement.scale;
+}
+
+/// Says how positions are stored where the user did not: floats, or half floats that 16-bit
+/// integers would be better than.
+void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, PositionKind kind,
+                    const BakeRequest& request, Report& report) {
+  char text[256];
+  std::string cure;
+  if (kind == PositionKind::kFloat) {
+    std::snprintf(text, sizeof text,
+                  "positions are stored as floats, %u bytes a vertex: no grid of 16-bit integers "
+                  "is as fine as was asked and spans the longest triangle",
+                  packed.layout.stride);
+    cure = "a greater --max-error takes less";
+  } else {
+    const double edge = mean_edge(mesh);
+    const double error = packed.record.position_error_max;
+    if (kind != PositionKind::kHalf || request.positions || error <= kVisibleError * edge) return;
+    const double step = make_grids(mesh, PositionKind::kInt16).front().step;
+    std::snprintf(
+        text, sizeof text,
+        "half floats (%u bytes a vertex) move vertices by up to %.3g, %.0f %% of the mean "
+        "edge; 16-bit integers (%u bytes) would by %.3g at most",
+        packed.layout.stride, error, 100 * error / edge, packed.layout.stride - 4u,
+        step * std::sqrt(0.75) * mesh.mesh.placement.scale);
+    cure = "bake with --positions int16, which leaves ambient occlusion out";
+  }
+  report.diagnostics.push_back(
+      {"model.positions", DiagnosticSeverity::kInfo, packed.name, 0, text, cure});
+}
+
 /// Splits and packs a model as finely as was asked.
 Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
                                const BakeRequest& request, Report& report) {
@@ -189,14 +238,16 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   if (auto made = make_levels(*chunked, level_options, report); !made) {
     return tl::unexpected(made.error());
   }
-  if (request.occlusion && plan->kind == PositionKind::kHalf) {
+  if (request.occlusion && plan->kind != PositionKind::kInt16) {
     chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
   }
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
   pack_options.positions = plan->kind;
   pack_options.jobs = request.jobs;
-  return pack(*chunked, texture_sides, pack_options, report);
+  MODAR_ASSIGN(PackedMesh packed, pack(*chunked, texture_sides, pack_options, report));
+  tell_positions(*chunked, packed, plan->kind, request, report);
+  return packed;
 }
 
 Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& outcomes,

@@ -68,6 +68,7 @@ const char* layout_name(const LayoutRecord& layout) {
   for (std::uint16_t a = 0; a < layout.attribute_count; ++a) {
     const AttributeRecord& attribute = layout.attributes[a];
     if (attribute.semantic != static_cast<std::uint8_t>(Semantic::kPosition)) continue;
+    if (attribute.type == static_cast<std::uint8_t>(ComponentType::kF32)) return "float";
     return attribute.type == static_cast<std::uint8_t>(ComponentType::kHalf) ? "half" : "int16";
   }
   return "none";

@@ -260,10 +260,11 @@ void add_geometry_options(CommandLine& line, BakeCommand& command) {
               "Of packed positions: source units, a percentage of the diagonal (0.01%), or a "
               "length (2mm, with --unit)",
               {.type = "LENGTH"});
-  line.choice<PositionKind>("--positions", request.positions,
-                            {{"half", PositionKind::kHalf}, {"int16", PositionKind::kInt16}},
-                            "Store them as half or int16 (else: int16 where --max-error needs it)",
-                            {.type = "LAYOUT"});
+  line.choice<PositionKind>(
+      "--positions", request.positions,
+      {{"half", PositionKind::kHalf}, {"int16", PositionKind::kInt16}},
+      "Store them as half or int16 (else: int16 or float where --max-error needs it)",
+      {.type = "LAYOUT"});
   line.option("--lods", &request.levels,
               "Levels of detail at most, the finest counted, each of half the triangles before it",
               {.shows_default = true, .least = 1, .most = kMaxLevels});

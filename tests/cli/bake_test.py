@@ -121,6 +121,9 @@ class Bake(ProgramTest):
         self.assertEqual(fine["layout"], "int16")
         self.assertLessEqual(fine["position_error_max"], 3e-5 * fine["diagonal"])
         self.assertLess(fine["bytes_per_triangle"], plain["bytes_per_triangle"])
+        exact = baked("--max-error", "0.00002%")  # no grid so fine spans its triangles
+        self.assertEqual(exact["layout"], "float")
+        self.assertLessEqual(exact["position_error_max"], 2e-7 * exact["diagonal"])
         length = 1e-5 * fine["diagonal"]
         for options in ([f"{length:.9f}"], [f"{1000 * length:.6f}mm", "--unit", "m"]):
             self.assertLessEqual(baked("--max-error", *options)["position_error_max"], length)

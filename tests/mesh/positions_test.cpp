@@ -39,7 +39,11 @@ glm::dvec3 decoded(const PackedMesh& mesh, const ChunkRecord& chunk, std::size_t
   glm::dvec3 p;
   for (int i = 0; i < 3; ++i) {
     double a = 0;
-    if (mesh.layout.attributes[0].type == static_cast<std::uint8_t>(ComponentType::kHalf)) {
+    if (mesh.layout.attributes[0].type == static_cast<std::uint8_t>(ComponentType::kF32)) {
+      float value = 0;
+      std::memcpy(&value, at + 4 * i, 4);
+      a = static_cast<double>(value);
+    } else if (mesh.layout.attributes[0].type == static_cast<std::uint8_t>(ComponentType::kHalf)) {
       _Float16 value;
       std::memcpy(&value, at + 2 * i, 2);
       a = static_cast<double>(value);
@@ -94,10 +98,11 @@ void expect_no_cracks(const ChunkedMesh& mesh, const PackedMesh& bytes) {
   EXPECT_NEAR(std::sqrt(squares / double(count)), bytes.record.position_error_rms, 1e-9 * greatest);
 }
 
-TEST(Positions, SharedVerticesDecodeToOnePointInBothLayouts) {
+TEST(Positions, SharedVerticesDecodeToOnePointInAllLayouts) {
   const TriMesh mesh = welded(parse(grid(40, 2)));
   const ChunkedMesh split = chunked(mesh, 250);
-  for (const PositionKind kind : {PositionKind::kHalf, PositionKind::kInt16}) {
+  for (const PositionKind kind :
+       {PositionKind::kHalf, PositionKind::kInt16, PositionKind::kFloat}) {
     const PackedMesh bytes = packed_as(split, kind);
     expect_no_cracks(split, bytes);
   }
@@ -145,6 +150,23 @@ TEST(Positions, TheAskedErrorIsKept) {
     EXPECT_LE(bytes.record.position_error_max, part * diagonal);
     if (plan->kind == PositionKind::kInt16) expect_no_cracks(*split, bytes);
   }
+}
+
+TEST(Positions, FloatsTakeWhatNoGridSpans) {
+  // A floor of 200 units under a grid of small triangles, an error of a millionth of it.
+  std::string text = grid(40, 1);
+  text += "v -100 -100 0\nv 100 -100 0\nv 100 100 0\nf -3//1 -2//1 -1//1\n";
+  const TriMesh mesh = welded(parse("vn 0 0 1\n" + text));
+  const auto plan = plan_positions(mesh, {std::nullopt, 2e-4});
+  ASSERT_TRUE(plan);
+  EXPECT_EQ(plan->kind, PositionKind::kFloat);
+  EXPECT_EQ(plan->max_side, 0.0);
+  EXPECT_FALSE(plan_positions(mesh, {PositionKind::kInt16, 2e-4}));
+  const ChunkedMesh split = chunked(mesh, 250);
+  const PackedMesh bytes = packed_as(split, plan->kind);
+  EXPECT_EQ(bytes.layout.stride, 20);
+  EXPECT_LE(bytes.record.position_error_max, 2e-4);
+  expect_no_cracks(split, bytes);
 }
 
 TEST(Positions, WhatCannotBeReachedIsSaid) {

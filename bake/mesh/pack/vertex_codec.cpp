@@ -22,6 +22,7 @@ namespace {
 constexpr double kFinestStep = 0x1p-23;
 constexpr double kSteps = 65534.0;                    ///< that 16 bits span, with both ends at hand
 constexpr double kHalfDiagonal = 0.8660254037844387;  ///< of a cube of side 1
+constexpr double kFloatStep = 0x1p-24;                ///< between the floats next to 1, below it
 
 /// Lowest and highest point of the grid that a chunk's vertices fall on.
 struct GridBox {
@@ -79,6 +80,7 @@ double half_error(const TriMesh& mesh) {
 }
 
 glm::dvec3 decoded_position(const glm::dvec3& position, PositionKind kind, const ChunkGrid& grid) {
+  if (kind == PositionKind::kFloat) return glm::dvec3(glm::vec3(position));
   glm::dvec3 decoded;
   for (int i = 0; i < 3; ++i) {
     decoded[i] =
@@ -88,6 +90,23 @@ glm::dvec3 decoded_position(const glm::dvec3& position, PositionKind kind, const
   }
   return decoded;
 }
+
+namespace {
+
+/// The longest side of any triangle's box, model space.
+double longest_triangle(const TriMesh& mesh) {
+  double longest = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const glm::dvec3& p = mesh.positions[a];
+    const glm::dvec3& q = mesh.positions[b];
+    const glm::dvec3& r = mesh.positions[c];
+    const glm::dvec3 side = glm::max(glm::max(p, q), r) - glm::min(glm::min(p, q), r);
+    longest = std::max({longest, side.x, side.y, side.z});
+  }
+  return longest;
+}
+
+}  // namespace
 
 Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& request) {
   PositionPlan plan;
@@ -104,19 +123,24 @@ Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& 
   }
   plan.kind = PositionKind::kInt16;
   const double step = std::exp2(std::floor(std::log2(wanted / kHalfDiagonal)));
-  if (step < kFinestStep) {
-    return too_fine(mesh, request,
-                    "the finest grid has one of " +
-                        std::to_string(kFinestStep * kHalfDiagonal * mesh.placement.scale));
-  }
   // Rounding to the grid moves each end by up to half a step.
   plan.max_side = step * (kSteps - 1);
-  return plan;
+  const bool grid_holds = step >= kFinestStep && longest_triangle(mesh) <= plan.max_side;
+  if (grid_holds) return plan;
+  if (!request.kind && kFloatStep * kHalfDiagonal <= wanted) {
+    return PositionPlan{PositionKind::kFloat, 0.0};
+  }
+  if (request.kind) {
+    return too_fine(mesh, request, "no grid of 16-bit integers that fine spans its triangles");
+  }
+  return too_fine(
+      mesh, request,
+      "floats have one of " + std::to_string(kFloatStep * kHalfDiagonal * mesh.placement.scale));
 }
 
 std::vector<ChunkGrid> make_grids(const ChunkedMesh& chunked, PositionKind kind) {
   std::vector<ChunkGrid> grids(chunked.chunks.size());
-  if (kind == PositionKind::kHalf) return grids;
+  if (kind != PositionKind::kInt16) return grids;
   double side = 0;
   for (const Chunk& chunk : chunked.chunks) {
     side = std::max(side, longest_side(grid_box(chunked.mesh, chunk, kFinestStep)));
@@ -149,11 +173,12 @@ LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& 
     a.offset = offset;
   };
   offsets = VertexOffsets{};
-  if (kind == PositionKind::kHalf) {
-    offsets.normal = 8;
-    offsets.stride = 12;
-    if (!mesh.occlusion.empty()) offsets.occlusion = 11;
-    add(Semantic::kPosition, ComponentType::kHalf, 3, false, 0);
+  if (kind != PositionKind::kInt16) {
+    const bool half = kind == PositionKind::kHalf;
+    offsets.normal = half ? 8 : 12;
+    offsets.stride = static_cast<std::uint16_t>(offsets.normal + 4);
+    if (!mesh.occlusion.empty()) offsets.occlusion = static_cast<std::uint16_t>(offsets.normal + 3);
+    add(Semantic::kPosition, half ? ComponentType::kHalf : ComponentType::kF32, 3, false, 0);
     add(Semantic::kNormal, ComponentType::kI8, 3, true, offsets.normal);
   } else {
     offsets.normal = 6;
@@ -227,18 +252,24 @@ void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange
     const std::uint32_t v = chunk.vertices[i];
     const glm::dvec3& p = mesh_.positions[v];
     const glm::dvec3 n(mesh_.normals[v]);
-    if (kind_ == PositionKind::kHalf) {
-      decoded[i] = put_half(p, bytes);
-      put_normal(n, bytes + offsets_.normal);
-    } else {
+    if (kind_ == PositionKind::kInt16) {
       decoded[i] = put_int16(p, grid, bytes);
       put_oct(n, bytes + offsets_.normal);
+    } else {
+      decoded[i] = kind_ == PositionKind::kHalf ? put_half(p, bytes) : put_float(p, bytes);
+      put_normal(n, bytes + offsets_.normal);
     }
     errors_.position.add(glm::length(glm::dvec3(decoded[i]) - p));
     if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
     if (offsets_.occlusion != 0) bytes[offsets_.occlusion] = std::byte{mesh_.occlusion[v]};
     if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
   }
+}
+
+glm::vec3 VertexPacker::put_float(const glm::dvec3& p, std::byte* bytes) {
+  const glm::vec3 decoded = glm::vec3(p) + 0.0f;  // one point, one spelling: no -0
+  std::memcpy(bytes, &decoded, sizeof decoded);
+  return decoded;
 }
 
 glm::vec3 VertexPacker::put_half(const glm::dvec3& p, std::byte* bytes) {

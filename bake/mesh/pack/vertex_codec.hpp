@@ -21,12 +21,14 @@ namespace modar {
 enum class PositionKind : std::uint8_t {
   kHalf,   ///< half floats in the model's [-1,1]
   kInt16,  ///< 16-bit integers, counted from a point of each chunk, on one grid for all chunks
+  kFloat,  ///< floats in the model's [-1,1], where no grid is exact enough
 };
 
 /// What the user asks for.
 struct PositionRequest {
-  std::optional<PositionKind> kind;  ///< unset: half floats where they are exact enough
-  double max_error = 0.0;            ///< source units; 0: no limit
+  /// Unset: half floats where they are exact enough, else 16-bit integers, else floats.
+  std::optional<PositionKind> kind;
+  double max_error = 0.0;  ///< source units; 0: no limit
 };
 
 struct PositionPlan {
@@ -49,7 +51,7 @@ struct ChunkGrid {
 
 /// One grid for all chunks, so that a vertex of two chunks decodes to one point from both: its step
 /// is the smallest power of two with which 16 bits span the largest chunk, but no finer than what a
-/// float holds exactly in [-1,1]. For PositionKind::kHalf the grid of every chunk is the whole.
+/// float holds exactly in [-1,1]. For the other kinds the grid of every chunk is the whole.
 std::vector<ChunkGrid> make_grids(const ChunkedMesh& chunked, PositionKind kind);
 
 /// The point of the grid nearest to a coordinate, in steps.
@@ -68,8 +70,8 @@ struct VertexOffsets {
 };
 
 /// Half floats: 3 halves, 2 bytes of padding, 3 x i8 normal, 1 of occlusion (or padding). 16-bit
-/// integers: 3 of them and an octahedral normal of 2 x i8. Then, where the mesh has them, uv as 2 x
-/// u16 and colour as 4 x u8.
+/// integers: 3 of them and an octahedral normal of 2 x i8. Floats: 3 of them, 3 x i8 normal, 1 of
+/// occlusion (or padding). Then, where the mesh has them, uv as 2 x u16 and colour as 4 x u8.
 LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets);
 
 /// uv = shift + offset + scale * attribute; shift holds whole numbers, which are not stored.
@@ -127,6 +129,7 @@ class VertexPacker {
   [[nodiscard]] const PackErrors& errors() const { return errors_; }
 
  private:
+  static glm::vec3 put_float(const glm::dvec3& p, std::byte* bytes);
   glm::vec3 put_half(const glm::dvec3& p, std::byte* bytes);
   glm::vec3 put_int16(const glm::dvec3& p, const ChunkGrid& grid, std::byte* bytes);
   void put_normal(const glm::dvec3& n, std::byte* bytes);
