@@ -1,4 +1,5 @@
-// Levels of detail: no crack between any two, errors that hold against brute force.
+// Levels of detail: no crack between any two, errors that hold against brute
+// force.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,7 +40,8 @@ ChunkedMesh levelled(const TriMesh& mesh, std::uint32_t max_vertices, unsigned j
   return split;
 }
 
-/// A bumpy closed ball of about 8 n^2 triangles, without uv or normals: nothing is a seam.
+/// A bumpy closed ball of about 8 n^2 triangles, without uv or normals: nothing
+/// is a seam.
 std::string ball(int n) {
   std::string text;
   const auto number = [](double x) { return std::to_string(x) + " "; };
@@ -108,8 +110,8 @@ std::multiset<Edge> border_of(const std::vector<std::array<Point, 3>>& triangles
   return edges;
 }
 
-/// Every level of a chunk has the border of level 0, to the bit, but for the model's own rim:
-/// whatever levels neighbours are drawn at, they meet.
+/// Every level of a chunk has the border of level 0, to the bit, but for the
+/// model's own rim: whatever levels neighbours are drawn at, they meet.
 void expect_no_cracks(const PackedMesh& mesh, std::uint32_t least_levels) {
   EXPECT_GE(mesh.record.level_count, least_levels);
   std::vector<std::array<Point, 3>> all;
@@ -150,9 +152,52 @@ TEST(Levels, NeighboursOfAnyTwoLevelsMeet) {
   expect_no_cracks(testing::packed(levelled(welded(parse(ball(16))), 400)), 3);
 }
 
+using Place = std::array<double, 3>;
+
+Place place_of(const glm::dvec3& p) {
+  return {p.x, p.y, p.z};
+}
+
+/// twice: places on a seam, with a vertex of each side. At every level of the
+/// only chunk, the seam is there from both sides or from neither, no edge that
+/// one triangle has lies inside the grid, and the coarsest level has a simpler
+/// seam.
+void expect_closed_seam(const ChunkedMesh& split, const std::set<Place>& twice) {
+  const Chunk& chunk = split.chunks[0];
+  ASSERT_GE(chunk.coarser.size(), 2u);
+  const auto place = [&](std::uint16_t i) {
+    return place_of(split.mesh.positions[chunk.vertices[i]]);
+  };
+  const auto open_edges = [&](const std::vector<std::uint16_t>& indices) {
+    std::map<std::set<Place>, int> uses;
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      ++uses[{place(indices[i]), place(indices[i % 3 == 2 ? i - 2 : i + 1])}];
+    }
+    std::set<Place> ends;
+    for (const auto& [edge, count] : uses) {
+      if (count == 1) ends.insert(edge.begin(), edge.end());
+    }
+    return ends;
+  };
+  const std::set<Place> rim = open_edges(chunk.indices);
+  std::size_t left_at_last = twice.size();
+  for (const ChunkLevel& level : chunk.coarser) {
+    std::map<Place, std::set<std::uint16_t>> left;
+    for (const std::uint16_t i : level.indices) left[place(i)].insert(i);
+    left_at_last = 0;
+    for (const Place& p : twice) {
+      if (!left.contains(p)) continue;
+      EXPECT_EQ(left[p].size(), 2u);
+      ++left_at_last;
+    }
+    for (const Place& p : open_edges(level.indices)) EXPECT_TRUE(rim.contains(p)) << "a crack";
+  }
+  EXPECT_LT(2 * left_at_last, twice.size());
+}
+
 TEST(Levels, PositionsWrittenTwiceStayTogether) {
-  // Every triangle has vertices of its own but for pairs that make strips: no number tells that
-  // neighbours meet, only their places do.
+  // Every triangle has vertices of its own but for pairs that make strips: no
+  // number tells that neighbours meet, only their places do.
   const TriMesh whole = welded(parse(grid(24, 1)));
   TriMesh cut = whole;
   std::map<std::pair<std::uint32_t, bool>, std::uint32_t> copies;
@@ -175,23 +220,12 @@ TEST(Levels, PositionsWrittenTwiceStayTogether) {
   }
   cut.source_positions.release();
   cut.source_vertex_count = cut.positions.size();
-  std::set<std::array<double, 3>> twice;
+  std::set<Place> twice;
   for (const auto& [key, v] : copies) {
-    const glm::dvec3& p = cut.positions[v];
-    if (copies.contains({key.first, !key.second})) twice.insert({p.x, p.y, p.z});
+    if (copies.contains({key.first, !key.second})) twice.insert(place_of(cut.positions[v]));
   }
   ASSERT_GT(twice.size(), 10u);
-  const ChunkedMesh split = levelled(cut, 65535);
-  ASSERT_GE(split.chunks[0].coarser.size(), 2u);
-  for (const ChunkLevel& level : split.chunks[0].coarser) {
-    std::map<std::array<double, 3>, std::set<std::uint32_t>> left;
-    for (const std::uint16_t i : level.indices) {
-      const std::uint32_t v = split.chunks[0].vertices[i];
-      const glm::dvec3& p = cut.positions[v];
-      left[{p.x, p.y, p.z}].insert(v);
-    }
-    for (const auto& place : twice) EXPECT_EQ(left[place].size(), 2u);
-  }
+  expect_closed_seam(levelled(cut, 65535), twice);
 }
 
 TEST(Levels, CountsAreThoseAsked) {
@@ -213,8 +247,9 @@ TEST(Levels, CountsAreThoseAsked) {
   }
 }
 
-TEST(Levels, SeamsOfUvAndNormalsStay) {
-  // Two halves with uv of their own along the middle, as the exporters of atlases write them.
+TEST(Levels, SeamsOfUvAndNormalsStayClosed) {
+  // Two halves with uv of their own along the middle, as the exporters of
+  // atlases write them.
   std::string text = grid(30, 1);
   const ChunkedMesh plain = levelled(welded(parse(text)), 65535);
   TriMesh cut = welded(parse(text));
@@ -240,23 +275,17 @@ TEST(Levels, SeamsOfUvAndNormalsStay) {
         std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return cut.uvs[v].x > 0.5 + 1e-9; });
     for (std::uint32_t& v : t) v = right && twin.contains(v) ? twin[v] : v;
   }
-  const ChunkedMesh split = levelled(cut, 65535);
-  ASSERT_GE(split.chunks[0].coarser.size(), 1u);
-  for (const ChunkLevel& level : split.chunks[0].coarser) {
-    std::set<std::uint32_t> used;
-    for (const std::uint16_t i : level.indices) used.insert(split.chunks[0].vertices[i]);
-    for (const auto& [v, w] : twin) {
-      EXPECT_TRUE(used.contains(v));
-      EXPECT_TRUE(used.contains(w));
-    }
-  }
+  std::set<Place> twice;
+  for (const auto& [v, w] : twin) twice.insert(place_of(cut.positions[v]));
+  expect_closed_seam(levelled(cut, 65535), twice);
   ASSERT_GE(plain.chunks[0].coarser.size(), 2u);
 }
 
 double brute_distance(const glm::dvec3& p, const std::vector<std::array<glm::dvec3, 3>>& surface) {
   double least = 1e9;
   for (const auto& t : surface) {
-    // By minimising over a fine barycentric lattice: slow, and nothing like the code under test.
+    // By minimising over a fine barycentric lattice: slow, and nothing like the
+    // code under test.
     for (int i = 0; i <= 12; ++i) {
       for (int j = 0; i + j <= 12; ++j) {
         const glm::dvec3 q =
@@ -299,7 +328,8 @@ TEST(Levels, TheStatedErrorBoundsTheDistance) {
       }
     }
     EXPECT_LE(greatest, stated + lattice);
-    // And it says something: half as much would be too little for random points, or nearly so.
+    // And it says something: half as much would be too little for random
+    // points, or nearly so.
     EXPECT_GT(greatest + lattice, stated * 0.4) << "level " << l;
   }
 }
@@ -317,7 +347,8 @@ TEST(Levels, GoOnUntilTheModelIsAFewPixelsWide) {
     std::uint64_t drawn = 0;
     for (const ChunkRecord& chunk : mesh.chunks) {
       finest += mesh.levels[chunk.first_level].index_count / 3;
-      // What is off by no more than a pixel where the ball, of 2, is 13 pixels across.
+      // What is off by no more than a pixel where the ball, of 2, is 13 pixels
+      // across.
       std::uint32_t level = chunk.first_level;
       for (std::uint32_t l = 1; l < chunk.level_count; ++l) {
         const LevelRecord& coarser = mesh.levels[chunk.first_level + l];
@@ -336,7 +367,8 @@ TEST(Levels, DistancesOfKnownSurfaces) {
   const std::vector<std::uint16_t> roof = {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4};
   LevelSurface low(p, flat);
   LevelSurface high(p, roof);
-  // Known, not known and wrong: the hints change the way, never the answer's truth.
+  // Known, not known and wrong: the hints change the way, never the answer's
+  // truth.
   for (const std::uint32_t near : {1u, kNoIndex, 0u}) {
     const std::vector<std::uint32_t> nearby(p.size(), near);
     const double up = surface_distance(high, low, nearby, 0);
@@ -353,7 +385,8 @@ TEST(Levels, DistancesOfKnownSurfaces) {
 }
 
 TEST(Levels, DistancesOfTrianglesWithoutArea) {
-  // As half floats leave the finest scans: corners fall together or on one line.
+  // As half floats leave the finest scans: corners fall together or on one
+  // line.
   constexpr std::uint16_t kSide = 9;
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform(-0.6, 0.6);
@@ -405,7 +438,7 @@ TEST(Levels, ThreeTrianglesAtAnEdgeAreKept) {
   const std::vector<glm::dvec3> p = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}};
   const std::vector<std::uint16_t> fan = {0, 1, 2, 0, 1, 3, 0, 1, 4};
   const std::vector<std::uint8_t> free(p.size(), 0);
-  const CollapseSequence result = decimate_chunk({p, {}}, fan, free, {1.0, 0.0, 0.0, 1});
+  const CollapseSequence result = decimate_chunk({p, {}}, fan, free, {1.0, 0.0, 0.0, 0.0, 1});
   EXPECT_TRUE(result.collapses.empty());
 }
 
@@ -439,7 +472,8 @@ glm::dvec2 uv_at(const TriMesh& mesh, const Chunk& chunk, std::span<const std::u
 }
 
 TEST(Levels, TexturesSlideNoFartherThanStated) {
-  // Flat, so that the surface alone forbids nothing, under a texture that is sheared unevenly.
+  // Flat, so that the surface alone forbids nothing, under a texture that is
+  // sheared unevenly.
   constexpr std::uint32_t kSide = 1024;
   constexpr double kRounding =
       1.0;  // texels: half floats move the vertices that levels are made of
@@ -462,12 +496,16 @@ TEST(Levels, TexturesSlideNoFartherThanStated) {
   const ChunkedMesh bounded = levelled(mesh, 65535, 2, kSide);
   ASSERT_EQ(bounded.chunks.size(), 1u);
   ASSERT_GE(bounded.chunks[0].coarser.size(), 2u);
-  // The grid is 28 by 40: 1 % of its diagonal, in texels of an even texture of its area.
+  // The grid is 28 by 40: 1 % of its diagonal, in texels of an even texture of
+  // its area.
   const double bound = 0.01 * std::hypot(28, 40) / std::sqrt(28.0 * 40) * kSide;
+  const double texel = std::sqrt(28.0 * 40) / kSide / 20;  // model space
   for (std::size_t l = 0; l < bounded.chunks[0].coarser.size(); ++l) {
     const double stated = bounded.chunks[0].coarser[l].uv_shift;
     EXPECT_NEAR(greatest_shift(bounded, l), stated, kRounding) << "level " << l + 1;
-    EXPECT_LE(stated, 1.05 * bound) << "level " << l + 1;
+    // A slide beyond it counts as an error of the level.
+    const double error = bounded.chunks[0].coarser[l].error;
+    EXPECT_TRUE(stated <= 1.05 * bound || error >= 0.5 * stated * texel) << "level " << l + 1;
     EXPECT_GT(stated, 0.02 * bound) << "level " << l + 1;
   }
   // Without a texture nothing is stated, and the uvs are off by far more.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <queue>
 #include <tuple>
 
@@ -49,16 +50,17 @@ double shift_at(const ChunkVertices& vertices, std::uint16_t vertex, const Proje
   return glm::length(there - uvs[vertex]);
 }
 
-/// The distance between a vertex' uv and the uv of the nearest point of some triangles (at least
-/// one).
+/// The distance between a vertex' uv and the uv of the nearest point of some
+/// triangles (at least one).
 double uv_shift_of(const ChunkVertices& vertices, std::uint16_t vertex,
                    std::span<const KeptTriangle> faces) {
   return shift_at(vertices, vertex, nearest_of(vertices, vertex, faces));
 }
 
-/// Maps every removed vertex to a triangle of the remaining surface: the nearest of those that
-/// replaced its triangles, updated whenever one of them changes. Measures how far the texture has
-/// slid there. Does nothing for vertices without uv.
+/// Maps every removed vertex to a triangle of the remaining surface: the
+/// nearest of those that replaced its triangles, updated whenever one of them
+/// changes. Measures how far the texture has slid there. Does nothing for
+/// vertices without uv.
 class RemovedVertexMap {
  public:
   /// The vertices are the caller's and must outlive it.
@@ -82,7 +84,8 @@ class RemovedVertexMap {
   void detach_vertex(std::uint16_t vertex) {
     if (!vertices_.uvs.empty()) detached_.push_back(vertex);
   }
-  /// Maps all detached vertices to the nearest of some triangles (at least one).
+  /// Maps all detached vertices to the nearest of some triangles (at least
+  /// one).
   void reattach(std::span<const KeptTriangle> faces) {
     for (const std::uint16_t vertex : detached_) {
       const Projection projection = nearest_of(vertices_, vertex, faces);
@@ -105,17 +108,21 @@ class RemovedVertexMap {
   std::vector<std::uint16_t> detached_;
 };
 
-/// Square of the cosine of 60 degrees: no triangle may turn farther in one collapse. Set by hand.
+/// Square of the cosine of 60 degrees: no triangle may turn farther in one
+/// collapse. Set by hand.
 constexpr double kLeastTurn = 0.25;
-/// Weight of the texture's slide beside the surface's own error in the price of a collapse. Set by
-/// hand.
+/// Weight of the texture's slide beside the surface's own error in the price of
+/// a collapse. Set by hand.
 constexpr double kShiftWeight = 0.25;
-/// Weight of the squared length of a rim's edge in the quadrics, beside the areas of triangles:
-/// keeps the outline. Set by hand.
+/// Weight of the squared length of a rim's edge in the quadrics, beside the
+/// areas of triangles: keeps the outline. Set by hand.
 constexpr double kRimWeight = 1.0;
+/// Factor on the prices of collapses that shift textures far: the least of them
+/// (a slide of a hundredth of a chunk) is 1e-10, the greatest of the others 10.
+constexpr double kLatePrice = 1e12;
 
-/// Sum of the squared distances from planes, each weighted by its triangle's area (Garland and
-/// Heckbert): p^T A p + 2 b p + c.
+/// Sum of the squared distances from planes, each weighted by its triangle's
+/// area (Garland and Heckbert): p^T A p + 2 b p + c.
 struct Quadric {
   double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
   glm::dvec3 b{0.0};
@@ -142,8 +149,9 @@ struct Quadric {
   }
 };
 
-/// Half-edge collapses, cheapest first. A price in the queue is a lower bound at first (the
-/// quadrics alone, legal or not); it becomes exact when it reaches the front.
+/// Half-edge collapses, cheapest first. A price in the queue is a lower bound
+/// at first (the quadrics alone, legal or not); it becomes exact when it
+/// reaches the front.
 class Decimator {
  public:
   Decimator(const ChunkVertices& vertices, std::span<const std::uint16_t> indices,
@@ -161,10 +169,17 @@ class Decimator {
       const Kind kind = kind_of(static_cast<std::uint16_t>(v));
       if (locked[v] == 0) kinds_[v] = kind;
     }
+    for (std::uint32_t v = 0; v < vertices.twins.size(); ++v) {
+      const std::uint16_t twin = vertices.twins[v];
+      if (twin == kNoTwin || (kinds_[v] == Kind::kRim && kinds_[twin] == Kind::kRim)) continue;
+      kinds_[v] = kinds_[twin] = Kind::kLocked;
+    }
   }
 
   CollapseSequence run() {
-    for (std::uint32_t v = 0; v < first_.size(); ++v) estimate(static_cast<std::uint16_t>(v));
+    for (std::uint32_t v = 0; v < first_.size(); ++v) {
+      if (const auto w = static_cast<std::uint16_t>(v); first_of(w) == w) estimate(w);
+    }
     while (alive_count_ > limits_.least_triangles && step()) continue;
     return std::move(sequence_);
   }
@@ -178,11 +193,26 @@ class Decimator {
     float price = 0;
     std::uint32_t stamp = 0;
     std::uint16_t to = 0;
+    std::uint16_t across = kNoTwin;
     bool exact = false;
+  };
+  /// A vertex' way to a neighbour, and its twin's to the same place.
+  struct Move {
+    double price = 0;
+    std::uint16_t to = 0;
+    std::uint16_t across = kNoTwin;
+    bool operator<(const Move& other) const {
+      return std::tie(price, to) < std::tie(other.price, other.to);
+    }
   };
   using Entry = std::tuple<float, std::uint16_t, std::uint32_t>;  // price, vertex, stamp
 
   [[nodiscard]] const glm::dvec3& position(std::uint16_t v) const { return vertices_.positions[v]; }
+  [[nodiscard]] std::uint16_t twin(std::uint16_t v) const {
+    return vertices_.twins.empty() ? kNoTwin : vertices_.twins[v];
+  }
+  /// The one of two twins that stands for both in the queue.
+  [[nodiscard]] std::uint16_t first_of(std::uint16_t v) const { return std::min(v, twin(v)); }
 
   void add_triangles(std::span<const std::uint16_t> indices) {
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
@@ -205,7 +235,8 @@ class Decimator {
     alive_count_ = triangles_.size();
   }
 
-  /// Calls back with the number of each triangle at v and the two vertices that follow v in it.
+  /// Calls back with the number of each triangle at v and the two vertices that
+  /// follow v in it.
   template <typename Callback>
   void around(std::uint16_t v, const Callback& callback) {
     std::uint32_t* link = &first_[v];
@@ -222,8 +253,9 @@ class Decimator {
     }
   }
 
-  /// A vertex whose triangles form one closed fan is inside, one with one open fan on a rim; others
-  /// are not manifold and stay. Adds the quadric of the rim's edge that leaves the vertex.
+  /// A vertex whose triangles form one closed fan is inside, one with one open
+  /// fan on a rim; others are not manifold and stay. Adds the quadric of the
+  /// rim's edge that leaves the vertex.
   Kind kind_of(std::uint16_t v) {
     fan_.clear();
     ++mark_;
@@ -268,7 +300,8 @@ class Decimator {
     quadrics_[w] += plane;
   }
 
-  /// Calls back with each vertex that v may collapse to: its neighbours, on a rim those of the rim.
+  /// Calls back with each vertex that v may collapse to: its neighbours, on a
+  /// rim those of the rim.
   template <typename Callback>
   void targets_of(std::uint16_t v, const Callback& callback) {
     if (kinds_[v] == Kind::kInside) {
@@ -285,34 +318,50 @@ class Decimator {
     }
   }
 
-  /// Of a collapse, by the quadrics: the squared distance summed over the area, over its root. A
-  /// sum alone leaves spikes and a mean spends triangles on small ones: on a bust at an eighth the
-  /// root has the least rms (2.21e-4 of the diagonal; sum 2.27, mean 2.26 at 0.7) and a greatest
-  /// error between (1.8e-3; 2.6, 1.5).
+  /// Of a collapse, by the quadrics: the squared distance summed over the area,
+  /// over its root. A sum alone leaves spikes and a mean spends triangles on
+  /// small ones: on a bust at an eighth the root has the least rms (2.21e-4 of
+  /// the diagonal; sum 2.27, mean 2.26 at 0.7) and a greatest error between
+  /// (1.8e-3; 2.6, 1.5).
   [[nodiscard]] double price_of(std::uint16_t v, std::uint16_t u) const {
     const double sum = quadrics_[v].at(position(u)) + quadrics_[u].at(position(u));
     const double area = quadrics_[v].area + quadrics_[u].area;
     return area > 0 ? std::max(0.0, sum) / std::sqrt(area) : 0.0;
   }
 
-  void enqueue(std::uint16_t v, double price, std::uint16_t to, bool exact) {
-    best_[v] = {static_cast<float>(price), best_[v].stamp + 1, to, exact};
-    queue_.emplace(best_[v].price, v, best_[v].stamp);
+  /// Lists where v may go, with its twin, priced by the quadrics alone.
+  void list_moves(std::uint16_t v) {
+    moves_.clear();
+    targets_of(v, [&](std::uint16_t u) { moves_.push_back({price_of(v, u), u}); });
+    if (twin(v) == kNoTwin) return;
+    across_.clear();
+    targets_of(twin(v), [&](std::uint16_t u) { across_.push_back(u); });
+    std::size_t kept = 0;
+    for (Move move : moves_) {
+      const auto there = std::find_if(across_.begin(), across_.end(), [&](std::uint16_t u) {
+        return position(u) == position(move.to);
+      });
+      if (there == across_.end()) continue;
+      move.across = *there;
+      move.price += price_of(twin(v), *there);
+      moves_[kept++] = move;
+    }
+    moves_.resize(kept);
   }
 
   /// Queues the cheapest collapse of v by the quadrics alone.
   void estimate(std::uint16_t v) {
     if (kinds_[v] == Kind::kLocked) return;
-    double least = std::numeric_limits<double>::max();
-    std::uint16_t to = v;
-    targets_of(v, [&](std::uint16_t u) {
-      const double price = price_of(v, u);
-      if (price < least) least = price, to = u;
-    });
-    if (to != v) enqueue(v, least, to, false);
+    list_moves(v);
+    const auto least = std::min_element(moves_.begin(), moves_.end());
+    if (least == moves_.end()) return;
+    best_[v] = {static_cast<float>(least->price), best_[v].stamp + 1, least->to, least->across,
+                false};
+    queue_.emplace(best_[v].price, v, best_[v].stamp);
   }
 
-  /// Takes the front of the queue: makes its price exact, or collapses. False where it is empty.
+  /// Takes the front of the queue: makes its price exact, or collapses. False
+  /// where it is empty.
   bool step() {
     while (!queue_.empty()) {
       const auto [price, v, stamp] = queue_.top();
@@ -323,7 +372,9 @@ class Decimator {
         queue_.emplace(best_[v].price, v, best_[v].stamp);
         continue;
       }
-      collapse(v, best_[v].to);
+      const Best best = best_[v];
+      collapse(v, best.to, best.price, best.across != kNoTwin);
+      if (best.across != kNoTwin) collapse(twin(v), best.across, best.price, false);
       return true;
     }
     return false;
@@ -331,32 +382,45 @@ class Decimator {
 
   /// Finds the cheapest legal collapse of v, exactly priced.
   bool find_legal(std::uint16_t v) {
-    double least = std::numeric_limits<double>::max();
-    std::uint16_t to = v;
-    candidates_.clear();
-    targets_of(v, [&](std::uint16_t u) { candidates_.emplace_back(price_of(v, u), u); });
-    std::sort(candidates_.begin(), candidates_.end());
-    for (auto [price, u] : candidates_) {
-      if (price >= least) break;
-      const double root = std::sqrt(quadrics_[v].area + quadrics_[u].area);
-      if (price > limits_.max_error * limits_.max_error * root) continue;
-      if (folds(v, u) || turns(v, u)) continue;
-      if (!vertices_.uvs.empty()) {
-        const double shift = shift_after(v, u);
-        if (shift > limits_.max_uv_shift) continue;
-        const double slide = shift * limits_.length_of_uv;
-        price += kShiftWeight * quadrics_[v].area * slide * slide / root;
+    list_moves(v);
+    std::sort(moves_.begin(), moves_.end());
+    Move best;
+    best.price = std::numeric_limits<double>::max();
+    best.to = v;
+    for (Move move : moves_) {
+      if (move.price >= best.price) break;
+      std::optional<double> price = legal_price(v, move.to);
+      if (price && move.across != kNoTwin) {
+        const std::optional<double> other = legal_price(twin(v), move.across);
+        price = other ? std::optional(*price + *other) : std::nullopt;
       }
-      if (price < least) least = price, to = u;
+      if (!price || *price >= best.price) continue;
+      best = move;
+      best.price = *price;
     }
     ++best_[v].stamp;
-    if (to == v) return false;
-    best_[v] = {static_cast<float>(least), best_[v].stamp, to, true};
+    if (best.to == v) return false;
+    best_[v] = {static_cast<float>(best.price), best_[v].stamp, best.to, best.across, true};
     return true;
   }
 
-  /// Have v and u other common neighbours than those of the triangles between them, or no triangle
-  /// beside those? Then the surface would fold onto itself, or vanish.
+  /// The exact price of a collapse; nothing where it is not allowed.
+  std::optional<double> legal_price(std::uint16_t v, std::uint16_t u) {
+    double price = price_of(v, u);
+    const double root = std::sqrt(quadrics_[v].area + quadrics_[u].area);
+    if (price > limits_.max_error * limits_.max_error * root) return std::nullopt;
+    if (folds(v, u) || turns(v, u)) return std::nullopt;
+    if (vertices_.uvs.empty()) return price;
+    const double shift = shift_after(v, u);
+    if (shift > limits_.max_uv_shift) return std::nullopt;
+    const double slide = shift * limits_.length_of_uv;
+    price += kShiftWeight * quadrics_[v].area * slide * slide / root;
+    return shift > limits_.early_uv_shift ? price * kLatePrice : price;
+  }
+
+  /// Have v and u other common neighbours than those of the triangles between
+  /// them, or no triangle beside those? Then the surface would fold onto
+  /// itself, or vanish.
   bool folds(std::uint16_t v, std::uint16_t u) {
     ++mark_;
     int between = 0;
@@ -402,7 +466,8 @@ class Decimator {
     });
   }
 
-  /// The shift that the collapse may lead to: that of v, beside what its triangles are off by.
+  /// The shift that the collapse may lead to: that of v, beside what its
+  /// triangles are off by.
   double shift_after(std::uint16_t v, std::uint16_t u) {
     double before = 0;
     around(v, [&](std::uint32_t t, std::uint16_t, std::uint16_t) {
@@ -412,7 +477,8 @@ class Decimator {
     return before + uv_shift_of(vertices_, v, kept_);
   }
 
-  void collapse(std::uint16_t v, std::uint16_t u) {
+  /// paired: the twin's collapse follows.
+  void collapse(std::uint16_t v, std::uint16_t u, float price, bool paired) {
     removed_.detach_vertex(v);
     collect(v, u);
     ring_.clear();
@@ -424,7 +490,8 @@ class Decimator {
       alive_[t] = 0;
       --alive_count_;
     });
-    // What is left in the list of v are the triangles that stay: they become those of u.
+    // What is left in the list of v are the triangles that stay: they become
+    // those of u.
     std::uint32_t last = kNoIndex;
     for (std::uint32_t corner = first_[v]; corner != kNoIndex; corner = next_[corner]) {
       triangles_[corner / 3][corner % 3] = u;
@@ -440,19 +507,25 @@ class Decimator {
     quadrics_[u] += quadrics_[v];
     const float before = sequence_.prices.empty() ? 0.0f : sequence_.prices.back();
     sequence_.collapses.push_back({v, u});
-    sequence_.prices.push_back(std::max(before, best_[v].price));
+    sequence_.prices.push_back(std::max(before, price));
+    sequence_.paired.push_back(paired ? 1 : 0);
     sequence_.triangles.push_back(static_cast<std::uint32_t>(alive_count_));
     update(u);
   }
 
-  /// Prices again what a collapse to u has changed: u, the vertices around the removed one (ring_),
-  /// and those that would collapse to u.
+  /// Prices again what a collapse to u has changed: u, the vertices around the
+  /// removed one (ring_), and those that would collapse to u.
   void update(std::uint16_t u) {
+    const auto aims_at_u = [&](std::uint16_t a) {
+      const Best& best = best_[first_of(a)];
+      return best.to == u || best.across == u;
+    };
     around(u, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) {
-      if (best_[a].to == u) ring_.push_back(a);
-      if (best_[b].to == u) ring_.push_back(b);
+      if (aims_at_u(a)) ring_.push_back(a);
+      if (aims_at_u(b)) ring_.push_back(b);
     });
     ring_.push_back(u);
+    for (std::uint16_t& w : ring_) w = first_of(w);
     std::sort(ring_.begin(), ring_.end());
     ring_.erase(std::unique(ring_.begin(), ring_.end()), ring_.end());
     for (const std::uint16_t w : ring_) estimate(w);
@@ -475,7 +548,8 @@ class Decimator {
   CollapseSequence sequence_;
   std::vector<std::uint16_t> ring_;
   std::vector<std::pair<std::uint16_t, std::uint16_t>> fan_;
-  std::vector<std::pair<double, std::uint16_t>> candidates_;
+  std::vector<Move> moves_;
+  std::vector<std::uint16_t> across_;
   std::vector<KeptTriangle> kept_;
 };
 
@@ -492,7 +566,8 @@ std::vector<std::uint16_t> collapsed_vertices(const CollapseSequence& sequence, 
                                               std::size_t vertex_count) {
   std::vector<std::uint16_t> become(vertex_count);
   std::iota(become.begin(), become.end(), std::uint16_t{0});
-  // From the last collapse back: what a vertex collapses to has its final place already.
+  // From the last collapse back: what a vertex collapses to has its final place
+  // already.
   for (std::size_t i = count; i-- > 0;) {
     become[sequence.collapses[i].from] = become[sequence.collapses[i].to];
   }

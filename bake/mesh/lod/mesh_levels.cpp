@@ -1,4 +1,5 @@
-// Decimates chunk by chunk, on several threads, shares the triangles out, and measures the error.
+// Decimates chunk by chunk, on several threads, shares the triangles out, and
+// measures the error.
 #include "bake/mesh/lod/mesh_levels.hpp"
 
 #include <algorithm>
@@ -19,25 +20,35 @@
 namespace modar {
 namespace {
 
-/// Chunks of fewer triangles get no coarser level: they cost a draw call either way. Set by hand.
+/// Chunks of fewer triangles get no coarser level: they cost a draw call either
+/// way. Set by hand.
 constexpr std::size_t kFewTriangles = 24;
-/// A level that keeps more of the previous one's triangles is not worth its bytes. Set by hand.
+/// A level that keeps more of the previous one's triangles is not worth its
+/// bytes. Set by hand.
 constexpr double kWorthwhile = 0.8;
-/// Of the chunk's diagonal: no collapse moves the surface farther. A level that is off by a pixel
-/// is then good for chunks down to four pixels across; what is smaller costs a draw call either
-/// way.
+/// Of the chunk's diagonal: no collapse moves the surface farther. A level that
+/// is off by a pixel is then good for chunks down to four pixels across; what
+/// is smaller costs a draw call either way.
 constexpr double kMaxCollapse = 0.25;
-/// Of the chunk's diagonal: the texture may slide this far. Set by hand.
+/// Of the chunk's diagonal: the texture slides no farther as long as there are
+/// other ways to reach a level. What does counts in the level's error, so that
+/// it is drawn where that is a pixel. Set by hand.
 constexpr double kMaxSlide = 0.01;
-/// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
-/// a flat chunk may lose more than its share. Set by hand.
+/// Halvings of a chunk beyond the coarsest level: the model's triangles are
+/// shared out by need, and a flat chunk may lose more than its share. Set by
+/// hand.
 constexpr std::uint32_t kFurther = 1;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
-/// Which vertices of each chunk must stay, so that it meets its neighbours at any level: those
-/// whose position another vertex has as well, of another chunk or across a seam. A rim of the model
-/// is free.
-using LockedVertices = std::vector<std::vector<std::uint8_t>>;
+/// The vertices of a chunk that share their place with others. A rim of the
+/// model is free.
+struct SharedVertices {
+  /// 1: must stay, so that the chunk meets its neighbours at any level.
+  std::vector<std::uint8_t> locked;
+  /// The vertex across a seam inside the chunk, see ChunkVertices; empty where
+  /// there is none.
+  std::vector<std::uint16_t> twins;
+};
 
 /// A vertex at an edge of one triangle.
 struct OpenVertex {
@@ -46,8 +57,9 @@ struct OpenVertex {
   std::uint32_t vertex = 0;
 };
 
-/// Adds the vertices of a chunk whose triangles form no closed fans. Around a closed fan every
-/// neighbour follows the vertex in one triangle and precedes it in another: numbers cancel.
+/// Adds the vertices of a chunk whose triangles form no closed fans. Around a
+/// closed fan every neighbour follows the vertex in one triangle and precedes
+/// it in another: numbers cancel.
 void find_open_vertices(const TriMesh& mesh, const Chunk& chunk, std::uint32_t number,
                         std::vector<OpenVertex>& open) {
   std::vector<std::int64_t> sums(chunk.vertices.size(), 0);
@@ -62,22 +74,38 @@ void find_open_vertices(const TriMesh& mesh, const Chunk& chunk, std::uint32_t n
   }
 }
 
-LockedVertices lock_vertices(const ChunkedMesh& mesh) {
-  // By the file's numbers, and for files that write a position twice, by place where edges are
-  // open.
+/// Vertices of equal place: two of one chunk at open edges are twins, all
+/// others stay.
+void share_place(std::span<const OpenVertex> place, bool nowhere_else,
+                 std::vector<SharedVertices>& shared) {
+  const auto chunk = place[0].chunk;
+  if (place.size() == 2 && place[1].chunk == chunk && nowhere_else) {
+    SharedVertices& mine = shared[chunk];
+    if (mine.twins.empty()) mine.twins.assign(mine.locked.size(), kNoTwin);
+    mine.twins[place[0].vertex] = static_cast<std::uint16_t>(place[1].vertex);
+    mine.twins[place[1].vertex] = static_cast<std::uint16_t>(place[0].vertex);
+    for (const OpenVertex& v : place) mine.locked[v.vertex] = 0;
+    return;
+  }
+  for (const OpenVertex& v : place) shared[v.chunk].locked[v.vertex] = 1;
+}
+
+std::vector<SharedVertices> find_shared(const ChunkedMesh& mesh) {
+  // By the file's numbers, and for files that write a position twice, by place
+  // where edges are open.
   Array<std::uint8_t> uses(mesh.mesh.source_vertex_count, 0);
   std::vector<OpenVertex> open;
   for (std::uint32_t c = 0; c < mesh.chunks.size(); ++c) {
     for (const std::uint32_t v : mesh.chunks[c].vertices) {
       std::uint8_t& count = uses[mesh.mesh.source_position(v)];
-      count = count == 0 ? 1 : 2;
+      count = static_cast<std::uint8_t>(std::min(count + 1, 3));
     }
     find_open_vertices(mesh.mesh, mesh.chunks[c], c, open);
   }
-  LockedVertices locked(mesh.chunks.size());
+  std::vector<SharedVertices> shared(mesh.chunks.size());
   for (std::size_t c = 0; c < mesh.chunks.size(); ++c) {
     for (const std::uint32_t v : mesh.chunks[c].vertices) {
-      locked[c].push_back(uses[mesh.mesh.source_position(v)] > 1 ? 1 : 0);
+      shared[c].locked.push_back(uses[mesh.mesh.source_position(v)] > 1 ? 1 : 0);
     }
   }
   const auto key = [](const OpenVertex& v) {
@@ -85,11 +113,21 @@ LockedVertices lock_vertices(const ChunkedMesh& mesh) {
   };
   std::sort(open.begin(), open.end(),
             [&](const OpenVertex& a, const OpenVertex& b) { return key(a) < key(b); });
-  for (std::size_t i = 1; i < open.size(); ++i) {
-    if (open[i].position != open[i - 1].position) continue;
-    for (const OpenVertex& v : {open[i - 1], open[i]}) locked[v.chunk][v.vertex] = 1;
+  const auto source = [&](const OpenVertex& v) {
+    return mesh.mesh.source_position(mesh.chunks[v.chunk].vertices[v.vertex]);
+  };
+  for (std::size_t i = 0; i < open.size();) {
+    std::size_t end = i + 1;
+    while (end < open.size() && open[end].position == open[i].position) ++end;
+    const std::span<const OpenVertex> place(&open[i], end - i);
+    i = end;
+    if (place.size() < 2) continue;
+    const bool once = source(place[0]) != source(place[1]);
+    const int expected = once ? 1 : 2;
+    share_place(place, uses[source(place[0])] == expected && uses[source(place[1])] == expected,
+                shared);
   }
-  return locked;
+  return shared;
 }
 
 double diagonal_of(std::span<const glm::dvec3> positions) {
@@ -124,7 +162,8 @@ std::vector<glm::dvec2> texels_of(const TriMesh& mesh, const Chunk& chunk,
   // One colour everywhere: nothing can slide.
   if (!(texel_area > 0)) return {};
   limits.length_of_uv = std::sqrt(area / texel_area);
-  limits.max_uv_shift = kMaxSlide * diagonal_of(positions) / limits.length_of_uv;
+  limits.early_uv_shift = kMaxSlide * diagonal_of(positions) / limits.length_of_uv;
+  limits.max_uv_shift = kMaxCollapse / kMaxSlide * limits.early_uv_shift;
   return texels;
 }
 
@@ -139,7 +178,7 @@ std::vector<glm::dvec3> decoded_positions(const TriMesh& mesh, const Chunk& chun
 }
 
 CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const ChunkGrid& grid,
-                          std::span<const std::uint8_t> locked, const LevelOptions& options) {
+                          const SharedVertices& shared, const LevelOptions& options) {
   const std::size_t triangles = chunk.indices.size() / 3;
   if (triangles < 2 * kFewTriangles) return {};
   const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);
@@ -148,11 +187,11 @@ CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const ChunkGr
   limits.least_triangles = std::max(kFewTriangles, triangles >> (options.levels + kFurther));
   const std::vector<glm::dvec2> texels =
       texels_of(mesh, chunk, positions, options.texture_sides, limits);
-  return decimate_chunk({positions, texels}, chunk.indices, locked, limits);
+  return decimate_chunk({positions, texels, shared.twins}, chunk.indices, shared.locked, limits);
 }
 
-/// Where the sequences of all chunks are cut: all collapses below a price, and a share of those at
-/// it.
+/// Where the sequences of all chunks are cut: all collapses below a price, and
+/// a share of those at it.
 struct Cut {
   float price = 0;
   double share = 0;
@@ -163,8 +202,10 @@ std::size_t collapses_at(const CollapseSequence& sequence, const Cut& cut) {
   const auto [begin, end] =
       std::equal_range(sequence.prices.begin(), sequence.prices.end(), cut.price);
   const auto at_price = static_cast<double>(end - begin);
-  return static_cast<std::size_t>(begin - sequence.prices.begin()) +
-         static_cast<std::size_t>(cut.share * at_price);
+  const std::size_t count = static_cast<std::size_t>(begin - sequence.prices.begin()) +
+                            static_cast<std::size_t>(cut.share * at_price);
+  // Both sides of a seam go together.
+  return count > 0 && sequence.paired[count - 1] != 0 ? count - 1 : count;
 }
 
 /// Triangles of a chunk that has `all` after some collapses.
@@ -173,8 +214,8 @@ std::size_t triangles_after(const CollapseSequence& sequence, std::size_t all,
   return collapses == 0 ? all : sequence.triangles[collapses - 1];
 }
 
-/// The cut that leaves the model `target` triangles or a few less: one for all chunks, so that
-/// triangles are where they matter.
+/// The cut that leaves the model `target` triangles or a few less: one for all
+/// chunks, so that triangles are where they matter.
 Cut cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequences,
             std::size_t target) {
   const auto fits = [&](const Cut& cut) {
@@ -205,8 +246,8 @@ Cut cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequen
   return cut;
 }
 
-/// A triangle near a point, by a walk over nearer and nearer neighbours; around a vertex or along
-/// an edge that is nearest, over some equally near ones.
+/// A triangle near a point, by a walk over nearer and nearer neighbours; around
+/// a vertex or along an edge that is nearest, over some equally near ones.
 std::uint32_t walk_to(const LevelSurface& surface, const glm::dvec3& point, std::uint32_t start) {
   constexpr double kEqual = 1e-9;  // relative: rounding tells equal distances apart
   constexpr int kMostEqual = 12;   // twice the triangles of a usual fan
@@ -249,7 +290,8 @@ std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> in
   return result;
 }
 
-/// For each vertex a triangle of the coarser surface near it; kNoIndex for vertices of no triangle.
+/// For each vertex a triangle of the coarser surface near it; kNoIndex for
+/// vertices of no triangle.
 std::vector<std::uint32_t> nearby_triangles(const LevelSurface& surface,
                                             std::span<const glm::dvec3> positions,
                                             const std::vector<std::uint16_t>& become) {
@@ -261,9 +303,9 @@ std::vector<std::uint32_t> nearby_triangles(const LevelSurface& surface,
   return nearby;
 }
 
-/// Greatest distance of the uv of a removed vertex from that of the surface at the nearest point.
-/// limit: what collapses were held to; where the walk found more, it has missed, and the nearest of
-/// all triangles is looked at as well.
+/// Greatest distance of the uv of a removed vertex from that of the surface at
+/// the nearest point. limit: what collapses were held to; where the walk found
+/// more, it has missed, and the nearest of all triangles is looked at as well.
 double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
                          const std::vector<std::uint16_t>& become,
                          const std::vector<std::uint32_t>& nearby, double limit) {
@@ -289,7 +331,8 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
   return greatest;
 }
 
-/// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut.
+/// Fills one chunk's coarser levels: what it is after the collapses ahead of
+/// each cut.
 void level_chunk(const TriMesh& mesh, const ChunkGrid& grid, const LevelOptions& options,
                  const CollapseSequence& sequence, const std::vector<Cut>& cuts, Chunk& chunk) {
   const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);
@@ -315,10 +358,13 @@ void level_chunk(const TriMesh& mesh, const ChunkGrid& grid, const LevelOptions&
     const std::vector<std::uint32_t> nearby = nearby_triangles(coarser, positions, become);
     error = surface_distance(finest, coarser, nearby, error);
     error = surface_distance(coarser, finest, on_finest, error);
-    level.error = error;
     level.halvings = step + 1;
     level.uv_shift =
-        greatest_uv_shift(coarser, {positions, texels}, become, nearby, limits.max_uv_shift);
+        greatest_uv_shift(coarser, {positions, texels}, become, nearby, limits.early_uv_shift);
+    if (level.uv_shift > limits.early_uv_shift) {
+      error = std::max(error, level.uv_shift * limits.length_of_uv);
+    }
+    level.error = error;
   }
 }
 
@@ -334,7 +380,7 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
   MODAR_TRY(options.validate());
   if (options.levels == 1) return {};
   StageTimer timer(report, "levels");
-  const LockedVertices locked = lock_vertices(mesh);
+  const std::vector<SharedVertices> shared = find_shared(mesh);
   const std::vector<ChunkGrid> grids = make_grids(mesh, options.positions);
   const std::size_t chunks = mesh.chunks.size();
   const auto each_chunk = [&](double begin, const auto& body) {
@@ -348,7 +394,7 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
   };
   std::vector<CollapseSequence> sequences(chunks);
   each_chunk(0.0, [&](std::size_t c) {
-    sequences[c] = decimate(mesh.mesh, mesh.chunks[c], grids[c], locked[c], options);
+    sequences[c] = decimate(mesh.mesh, mesh.chunks[c], grids[c], shared[c], options);
   });
   std::size_t triangles_in_all = 0;
   for (const Chunk& chunk : mesh.chunks) triangles_in_all += chunk.indices.size() / 3;

@@ -72,7 +72,7 @@ Array<std::uint32_t> simplify(const TriMesh& mesh, const MaterialCorners& corner
 }
 
 template <class T>
-void take(const Array<T>& from, std::size_t at, Array<T>& to) {
+void take_over(const Array<T>& from, std::size_t at, Array<T>& to) {
   if (!from.empty()) to.push_back(from[at]);
 }
 
@@ -96,9 +96,9 @@ TriMesh mesh_of(const TriMesh& source, const MaterialCorners& corners,
         places[v] = static_cast<std::uint32_t>(mesh.positions.size());
         mesh.positions.push_back(source.positions[v]);
         mesh.source_positions.push_back(source.source_position(v));
-        take(source.normals, v, mesh.normals);
-        take(source.uvs, v, mesh.uvs);
-        take(source.colours, v, mesh.colours);
+        take_over(source.normals, v, mesh.normals);
+        take_over(source.uvs, v, mesh.uvs);
+        take_over(source.colours, v, mesh.colours);
       }
       triangle[k] = places[v];
     }
@@ -109,18 +109,18 @@ TriMesh mesh_of(const TriMesh& source, const MaterialCorners& corners,
 }
 
 /// Distances of the source's vertices from the mesh, model space.
-struct Distances {
+struct Loss {
   double greatest = 0;
   double rms = 0;
   std::size_t samples = 0;
 };
 
-Distances distances(const TriMesh& source, const TriMesh& mesh) {
+Loss measure_loss(const TriMesh& source, const TriMesh& mesh) {
   TriangleTree tree({mesh.positions.data(), mesh.positions.size()},
                     {mesh.triangles.begin(), mesh.triangles.end()});
   const std::size_t count = source.positions.size();
   const std::size_t step = (count + kDistanceSamples - 1) / kDistanceSamples;
-  Distances found;
+  Loss found;
   double sum = 0;
   for (std::size_t v = 0; v < count; v += step, ++found.samples) {
     const double square = tree.nearest(source.positions[v]);
@@ -133,7 +133,7 @@ Distances distances(const TriMesh& source, const TriMesh& mesh) {
 }
 
 Diagnostic what_was_lost(const TriMesh& source, const TriMesh& mesh, std::size_t most_triangles,
-                         const Distances& lost) {
+                         const Loss& lost) {
   const double scale = source.placement.scale;
   const double diagonal = glm::length(source.source_max - source.source_min);
   char text[256];
@@ -164,7 +164,7 @@ TriMesh reduce(TriMesh mesh, std::size_t most_triangles, Report& report) {
   const Array<std::uint32_t> left = simplify(mesh, corners, most_triangles);
   if (left.empty()) return mesh;
   TriMesh reduced = mesh_of(mesh, corners, left);
-  const Distances lost = distances(mesh, reduced);
+  const Loss lost = measure_loss(mesh, reduced);
   report.diagnostics.push_back(what_was_lost(mesh, reduced, most_triangles, lost));
   timer.done(mesh.triangles.size(), reduced.triangles.size(), lost.greatest * mesh.placement.scale);
   return reduced;
