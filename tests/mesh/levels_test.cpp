@@ -1,5 +1,4 @@
-// Levels of detail: no crack between any two, errors that hold against brute
-// force.
+// Levels of detail: no crack between any two, errors that hold against brute force.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,8 +39,7 @@ ChunkedMesh levelled(const TriMesh& mesh, std::uint32_t max_vertices, unsigned j
   return split;
 }
 
-/// A bumpy closed ball of about 8 n^2 triangles, without uv or normals: nothing
-/// is a seam.
+/// A bumpy closed ball of about 8 n^2 triangles, without uv or normals: nothing is a seam.
 std::string ball(int n) {
   std::string text;
   const auto number = [](double x) { return std::to_string(x) + " "; };
@@ -110,8 +108,8 @@ std::multiset<Edge> border_of(const std::vector<std::array<Point, 3>>& triangles
   return edges;
 }
 
-/// Every level of a chunk has the border of level 0, to the bit, but for the
-/// model's own rim: whatever levels neighbours are drawn at, they meet.
+/// Every level of a chunk has the border of level 0, to the bit, but for the model's own rim:
+/// whatever levels neighbours are drawn at, they meet.
 void expect_no_cracks(const PackedMesh& mesh, std::uint32_t least_levels) {
   EXPECT_GE(mesh.record.level_count, least_levels);
   std::vector<std::array<Point, 3>> all;
@@ -158,10 +156,9 @@ Place place_of(const glm::dvec3& p) {
   return {p.x, p.y, p.z};
 }
 
-/// twice: places on a seam, with a vertex of each side. At every level of the
-/// only chunk, the seam is there from both sides or from neither, no edge that
-/// one triangle has lies inside the grid, and the coarsest level has a simpler
-/// seam.
+/// twice: places on a seam, with a vertex of each side. At every level of the only chunk, the seam
+/// is there from both sides or from neither, no edge that one triangle has lies inside the grid,
+/// and the coarsest level has a simpler seam.
 void expect_closed_seam(const ChunkedMesh& split, const std::set<Place>& twice) {
   const Chunk& chunk = split.chunks[0];
   ASSERT_GE(chunk.coarser.size(), 2u);
@@ -196,8 +193,8 @@ void expect_closed_seam(const ChunkedMesh& split, const std::set<Place>& twice) 
 }
 
 TEST(Levels, PositionsWrittenTwiceStayTogether) {
-  // Every triangle has vertices of its own but for pairs that make strips: no
-  // number tells that neighbours meet, only their places do.
+  // Every triangle has vertices of its own but for pairs that make strips: no number tells that
+  // neighbours meet, only their places do.
   const TriMesh whole = welded(parse(grid(24, 1)));
   TriMesh cut = whole;
   std::map<std::pair<std::uint32_t, bool>, std::uint32_t> copies;
@@ -247,22 +244,16 @@ TEST(Levels, CountsAreThoseAsked) {
   }
 }
 
-TEST(Levels, SeamsOfUvAndNormalsStayClosed) {
-  // Two halves with uv of their own along the middle, as the exporters of
-  // atlases write them.
-  std::string text = grid(30, 1);
-  const ChunkedMesh plain = levelled(welded(parse(text)), 65535);
-  TriMesh cut = welded(parse(text));
+/// A grid in two halves with uv of their own along the middle, as the exporters of atlases write
+/// them. twice: the places there.
+TriMesh cut_grid(int n, std::set<Place>& twice) {
+  TriMesh cut = welded(parse(grid(n, 1)));
   std::map<std::uint32_t, std::uint32_t> twin;
-  std::set<std::uint32_t> middle;
-  for (std::uint32_t v = 0; v < cut.positions.size(); ++v) {
-    if (std::abs(cut.uvs[v].x - 0.5) < 1e-9) middle.insert(v);
-  }
-  ASSERT_EQ(middle.size(), 31u);
   const std::size_t count = cut.positions.size();
   Array<std::uint32_t> sources(count);
   for (std::uint32_t v = 0; v < count; ++v) sources[v] = cut.source_position(v);
-  for (const std::uint32_t v : middle) {
+  for (std::uint32_t v = 0; v < count; ++v) {
+    if (std::abs(cut.uvs[v].x - 0.5) >= 1e-9) continue;
     twin[v] = static_cast<std::uint32_t>(cut.positions.size());
     cut.positions.push_back(cut.positions[v]);
     cut.normals.push_back(cut.normals[v]);
@@ -275,17 +266,27 @@ TEST(Levels, SeamsOfUvAndNormalsStayClosed) {
         std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return cut.uvs[v].x > 0.5 + 1e-9; });
     for (std::uint32_t& v : t) v = right && twin.contains(v) ? twin[v] : v;
   }
-  std::set<Place> twice;
   for (const auto& [v, w] : twin) twice.insert(place_of(cut.positions[v]));
+  return cut;
+}
+
+TEST(Levels, SeamsOfUvAndNormalsStayClosed) {
+  std::set<Place> twice;
+  const TriMesh cut = cut_grid(30, twice);
+  ASSERT_EQ(twice.size(), 31u);
   expect_closed_seam(levelled(cut, 65535), twice);
-  ASSERT_GE(plain.chunks[0].coarser.size(), 2u);
+  // Levels end anywhere among the collapses, between the two sides of a seam, too: not there.
+  for (int n = 10; n < 40; n += 2) {
+    twice.clear();
+    const TriMesh mesh = cut_grid(n, twice);
+    expect_closed_seam(levelled(mesh, 65535), twice);
+  }
 }
 
 double brute_distance(const glm::dvec3& p, const std::vector<std::array<glm::dvec3, 3>>& surface) {
   double least = 1e9;
   for (const auto& t : surface) {
-    // By minimising over a fine barycentric lattice: slow, and nothing like the
-    // code under test.
+    // By minimising over a fine barycentric lattice: slow, and nothing like the code under test.
     for (int i = 0; i <= 12; ++i) {
       for (int j = 0; i + j <= 12; ++j) {
         const glm::dvec3 q =
@@ -328,8 +329,7 @@ TEST(Levels, TheStatedErrorBoundsTheDistance) {
       }
     }
     EXPECT_LE(greatest, stated + lattice);
-    // And it says something: half as much would be too little for random
-    // points, or nearly so.
+    // And it says something: half as much would be too little for random points, or nearly so.
     EXPECT_GT(greatest + lattice, stated * 0.4) << "level " << l;
   }
 }
@@ -347,8 +347,7 @@ TEST(Levels, GoOnUntilTheModelIsAFewPixelsWide) {
     std::uint64_t drawn = 0;
     for (const ChunkRecord& chunk : mesh.chunks) {
       finest += mesh.levels[chunk.first_level].index_count / 3;
-      // What is off by no more than a pixel where the ball, of 2, is 13 pixels
-      // across.
+      // What is off by no more than a pixel where the ball, of 2, is 13 pixels across.
       std::uint32_t level = chunk.first_level;
       for (std::uint32_t l = 1; l < chunk.level_count; ++l) {
         const LevelRecord& coarser = mesh.levels[chunk.first_level + l];
@@ -367,8 +366,7 @@ TEST(Levels, DistancesOfKnownSurfaces) {
   const std::vector<std::uint16_t> roof = {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4};
   LevelSurface low(p, flat);
   LevelSurface high(p, roof);
-  // Known, not known and wrong: the hints change the way, never the answer's
-  // truth.
+  // Known, not known and wrong: the hints change the way, never the answer's truth.
   for (const std::uint32_t near : {1u, kNoIndex, 0u}) {
     const std::vector<std::uint32_t> nearby(p.size(), near);
     const double up = surface_distance(high, low, nearby, 0);
@@ -385,8 +383,7 @@ TEST(Levels, DistancesOfKnownSurfaces) {
 }
 
 TEST(Levels, DistancesOfTrianglesWithoutArea) {
-  // As half floats leave the finest scans: corners fall together or on one
-  // line.
+  // As half floats leave the finest scans: corners fall together or on one line.
   constexpr std::uint16_t kSide = 9;
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform(-0.6, 0.6);
@@ -472,8 +469,7 @@ glm::dvec2 uv_at(const TriMesh& mesh, const Chunk& chunk, std::span<const std::u
 }
 
 TEST(Levels, TexturesSlideNoFartherThanStated) {
-  // Flat, so that the surface alone forbids nothing, under a texture that is
-  // sheared unevenly.
+  // Flat, so that the surface alone forbids nothing, under a texture that is sheared unevenly.
   constexpr std::uint32_t kSide = 1024;
   constexpr double kRounding =
       1.0;  // texels: half floats move the vertices that levels are made of
@@ -496,8 +492,7 @@ TEST(Levels, TexturesSlideNoFartherThanStated) {
   const ChunkedMesh bounded = levelled(mesh, 65535, 2, kSide);
   ASSERT_EQ(bounded.chunks.size(), 1u);
   ASSERT_GE(bounded.chunks[0].coarser.size(), 2u);
-  // The grid is 28 by 40: 1 % of its diagonal, in texels of an even texture of
-  // its area.
+  // The grid is 28 by 40: 1 % of its diagonal, in texels of an even texture of its area.
   const double bound = 0.01 * std::hypot(28, 40) / std::sqrt(28.0 * 40) * kSide;
   const double texel = std::sqrt(28.0 * 40) / kSide / 20;  // model space
   for (std::size_t l = 0; l < bounded.chunks[0].coarser.size(); ++l) {

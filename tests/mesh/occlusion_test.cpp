@@ -65,6 +65,27 @@ TEST(Occlusion, HillsSeeAllAndPitsLittle) {
   }
 }
 
+TEST(Occlusion, ClustersOfDenseMeshesSeeAboutTheSame) {
+  const ChunkedMesh mesh =
+      chunked(welded(parse(grid(
+                  60, [](double x, double y) { return -0.9 * std::exp(-12 * (x * x + y * y)); }))),
+              65535);
+  const std::vector<int> exact = occlusion_of(mesh, 1);
+  Report report;
+  const Array<std::uint8_t> clusters = measure_occlusion(mesh, 1, report, 1000);
+  EXPECT_EQ(measure_occlusion(mesh, 3, report, 1000), clusters) << "threads make no difference";
+  EXPECT_GT(report.stages[0].out, 300u);
+  EXPECT_LT(report.stages[0].out, 2000u);
+  double squares = 0;
+  int least = 127;
+  for (std::size_t v = 0; v < exact.size(); ++v) {
+    squares += std::pow(exact[v] - clusters[v], 2);
+    least = std::min(least, exact[v]);
+  }
+  EXPECT_LT(least, 90);
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(exact.size())), 127 * 0.03);
+}
+
 TEST(Occlusion, WhatIsTransparentHidesNothing) {
   ChunkedMesh mesh =
       chunked(welded(parse(grid(

@@ -50,17 +50,16 @@ double shift_at(const ChunkVertices& vertices, std::uint16_t vertex, const Proje
   return glm::length(there - uvs[vertex]);
 }
 
-/// The distance between a vertex' uv and the uv of the nearest point of some
-/// triangles (at least one).
+/// The distance between a vertex' uv and the uv of the nearest point of some triangles (at least
+/// one).
 double uv_shift_of(const ChunkVertices& vertices, std::uint16_t vertex,
                    std::span<const KeptTriangle> faces) {
   return shift_at(vertices, vertex, nearest_of(vertices, vertex, faces));
 }
 
-/// Maps every removed vertex to a triangle of the remaining surface: the
-/// nearest of those that replaced its triangles, updated whenever one of them
-/// changes. Measures how far the texture has slid there. Does nothing for
-/// vertices without uv.
+/// Maps every removed vertex to a triangle of the remaining surface: the nearest of those that
+/// replaced its triangles, updated whenever one of them changes. Measures how far the texture has
+/// slid there. Does nothing for vertices without uv.
 class RemovedVertexMap {
  public:
   /// The vertices are the caller's and must outlive it.
@@ -84,8 +83,7 @@ class RemovedVertexMap {
   void detach_vertex(std::uint16_t vertex) {
     if (!vertices_.uvs.empty()) detached_.push_back(vertex);
   }
-  /// Maps all detached vertices to the nearest of some triangles (at least
-  /// one).
+  /// Maps all detached vertices to the nearest of some triangles (at least one).
   void reattach(std::span<const KeptTriangle> faces) {
     for (const std::uint16_t vertex : detached_) {
       const Projection projection = nearest_of(vertices_, vertex, faces);
@@ -108,21 +106,20 @@ class RemovedVertexMap {
   std::vector<std::uint16_t> detached_;
 };
 
-/// Square of the cosine of 60 degrees: no triangle may turn farther in one
-/// collapse. Set by hand.
+/// Square of the cosine of 60 degrees: no triangle may turn farther in one collapse. Set by hand.
 constexpr double kLeastTurn = 0.25;
-/// Weight of the texture's slide beside the surface's own error in the price of
-/// a collapse. Set by hand.
+/// Weight of the texture's slide beside the surface's own error in the price of a collapse. Set by
+/// hand.
 constexpr double kShiftWeight = 0.25;
-/// Weight of the squared length of a rim's edge in the quadrics, beside the
-/// areas of triangles: keeps the outline. Set by hand.
+/// Weight of the squared length of a rim's edge in the quadrics, beside the areas of triangles:
+/// keeps the outline. Set by hand.
 constexpr double kRimWeight = 1.0;
-/// Factor on the prices of collapses that shift textures far: the least of them
-/// (a slide of a hundredth of a chunk) is 1e-10, the greatest of the others 10.
+/// Factor on the prices of collapses that shift textures far: the least of them (a slide of a
+/// hundredth of a chunk) is 1e-10, the greatest of the others 10.
 constexpr double kLatePrice = 1e12;
 
-/// Sum of the squared distances from planes, each weighted by its triangle's
-/// area (Garland and Heckbert): p^T A p + 2 b p + c.
+/// Sum of the squared distances from planes, each weighted by its triangle's area (Garland and
+/// Heckbert): p^T A p + 2 b p + c.
 struct Quadric {
   double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
   glm::dvec3 b{0.0};
@@ -149,9 +146,8 @@ struct Quadric {
   }
 };
 
-/// Half-edge collapses, cheapest first. A price in the queue is a lower bound
-/// at first (the quadrics alone, legal or not); it becomes exact when it
-/// reaches the front.
+/// Half-edge collapses, cheapest first. A price in the queue is a lower bound at first (the
+/// quadrics alone, legal or not); it becomes exact when it reaches the front.
 class Decimator {
  public:
   Decimator(const ChunkVertices& vertices, std::span<const std::uint16_t> indices,
@@ -235,8 +231,7 @@ class Decimator {
     alive_count_ = triangles_.size();
   }
 
-  /// Calls back with the number of each triangle at v and the two vertices that
-  /// follow v in it.
+  /// Calls back with the number of each triangle at v and the two vertices that follow v in it.
   template <typename Callback>
   void around(std::uint16_t v, const Callback& callback) {
     std::uint32_t* link = &first_[v];
@@ -253,9 +248,8 @@ class Decimator {
     }
   }
 
-  /// A vertex whose triangles form one closed fan is inside, one with one open
-  /// fan on a rim; others are not manifold and stay. Adds the quadric of the
-  /// rim's edge that leaves the vertex.
+  /// A vertex whose triangles form one closed fan is inside, one with one open fan on a rim; others
+  /// are not manifold and stay. Adds the quadric of the rim's edge that leaves the vertex.
   Kind kind_of(std::uint16_t v) {
     fan_.clear();
     ++mark_;
@@ -300,8 +294,7 @@ class Decimator {
     quadrics_[w] += plane;
   }
 
-  /// Calls back with each vertex that v may collapse to: its neighbours, on a
-  /// rim those of the rim.
+  /// Calls back with each vertex that v may collapse to: its neighbours, on a rim those of the rim.
   template <typename Callback>
   void targets_of(std::uint16_t v, const Callback& callback) {
     if (kinds_[v] == Kind::kInside) {
@@ -318,11 +311,10 @@ class Decimator {
     }
   }
 
-  /// Of a collapse, by the quadrics: the squared distance summed over the area,
-  /// over its root. A sum alone leaves spikes and a mean spends triangles on
-  /// small ones: on a bust at an eighth the root has the least rms (2.21e-4 of
-  /// the diagonal; sum 2.27, mean 2.26 at 0.7) and a greatest error between
-  /// (1.8e-3; 2.6, 1.5).
+  /// Of a collapse, by the quadrics: the squared distance summed over the area, over its root. A
+  /// sum alone leaves spikes and a mean spends triangles on small ones: on a bust at an eighth the
+  /// root has the least rms (2.21e-4 of the diagonal; sum 2.27, mean 2.26 at 0.7) and a greatest
+  /// error between (1.8e-3; 2.6, 1.5).
   [[nodiscard]] double price_of(std::uint16_t v, std::uint16_t u) const {
     const double sum = quadrics_[v].at(position(u)) + quadrics_[u].at(position(u));
     const double area = quadrics_[v].area + quadrics_[u].area;
@@ -336,17 +328,18 @@ class Decimator {
     if (twin(v) == kNoTwin) return;
     across_.clear();
     targets_of(twin(v), [&](std::uint16_t u) { across_.push_back(u); });
-    std::size_t kept = 0;
-    for (Move move : moves_) {
+    // Where a seam ends at a rim, the two sides part: the end stays.
+    bool alike = moves_.size() == across_.size();
+    for (Move& move : moves_) {
       const auto there = std::find_if(across_.begin(), across_.end(), [&](std::uint16_t u) {
         return position(u) == position(move.to);
       });
-      if (there == across_.end()) continue;
+      alike = alike && there != across_.end();
+      if (!alike) break;
       move.across = *there;
       move.price += price_of(twin(v), *there);
-      moves_[kept++] = move;
     }
-    moves_.resize(kept);
+    if (!alike) moves_.clear();
   }
 
   /// Queues the cheapest collapse of v by the quadrics alone.
@@ -360,8 +353,7 @@ class Decimator {
     queue_.emplace(best_[v].price, v, best_[v].stamp);
   }
 
-  /// Takes the front of the queue: makes its price exact, or collapses. False
-  /// where it is empty.
+  /// Takes the front of the queue: makes its price exact, or collapses. False where it is empty.
   bool step() {
     while (!queue_.empty()) {
       const auto [price, v, stamp] = queue_.top();
@@ -418,9 +410,8 @@ class Decimator {
     return shift > limits_.early_uv_shift ? price * kLatePrice : price;
   }
 
-  /// Have v and u other common neighbours than those of the triangles between
-  /// them, or no triangle beside those? Then the surface would fold onto
-  /// itself, or vanish.
+  /// Have v and u other common neighbours than those of the triangles between them, or no triangle
+  /// beside those? Then the surface would fold onto itself, or vanish.
   bool folds(std::uint16_t v, std::uint16_t u) {
     ++mark_;
     int between = 0;
@@ -466,8 +457,7 @@ class Decimator {
     });
   }
 
-  /// The shift that the collapse may lead to: that of v, beside what its
-  /// triangles are off by.
+  /// The shift that the collapse may lead to: that of v, beside what its triangles are off by.
   double shift_after(std::uint16_t v, std::uint16_t u) {
     double before = 0;
     around(v, [&](std::uint32_t t, std::uint16_t, std::uint16_t) {
@@ -490,8 +480,7 @@ class Decimator {
       alive_[t] = 0;
       --alive_count_;
     });
-    // What is left in the list of v are the triangles that stay: they become
-    // those of u.
+    // What is left in the list of v are the triangles that stay: they become those of u.
     std::uint32_t last = kNoIndex;
     for (std::uint32_t corner = first_[v]; corner != kNoIndex; corner = next_[corner]) {
       triangles_[corner / 3][corner % 3] = u;
@@ -513,8 +502,8 @@ class Decimator {
     update(u);
   }
 
-  /// Prices again what a collapse to u has changed: u, the vertices around the
-  /// removed one (ring_), and those that would collapse to u.
+  /// Prices again what a collapse to u has changed: u, the vertices around the removed one (ring_),
+  /// and those that would collapse to u.
   void update(std::uint16_t u) {
     const auto aims_at_u = [&](std::uint16_t a) {
       const Best& best = best_[first_of(a)];
@@ -566,8 +555,7 @@ std::vector<std::uint16_t> collapsed_vertices(const CollapseSequence& sequence, 
                                               std::size_t vertex_count) {
   std::vector<std::uint16_t> become(vertex_count);
   std::iota(become.begin(), become.end(), std::uint16_t{0});
-  // From the last collapse back: what a vertex collapses to has its final place
-  // already.
+  // From the last collapse back: what a vertex collapses to has its final place already.
   for (std::size_t i = count; i-- > 0;) {
     become[sequence.collapses[i].from] = become[sequence.collapses[i].to];
   }

@@ -1,5 +1,4 @@
-// Decimates a chunk: a sequence of edge collapses over its vertices. Internal
-// to lod.
+// Decimates a chunk: a sequence of edge collapses over its vertices. Internal to lod.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +12,9 @@ namespace modar {
 
 inline constexpr std::uint16_t kNoTwin = 0xFFFF;
 
-/// The vertices of a chunk. uvs: one a position, in a unit of the caller's, or
-/// none. twins: for each vertex the other one at its place, across a seam;
-/// kNoTwin where there is none; or none at all.
+/// The vertices of a chunk. uvs: one a position, in a unit of the caller's, or none. twins: for
+/// each vertex the other one at its place, across a seam; kNoTwin where there is none; or none at
+/// all.
 struct ChunkVertices {
   std::span<const glm::dvec3> positions;
   std::span<const glm::dvec2> uvs;
@@ -23,22 +22,20 @@ struct ChunkVertices {
 };
 
 struct DecimateLimits {
-  /// No collapse whose vertex lies farther from the planes that it stands for
-  /// (root mean square, weighted by area).
+  /// No collapse whose vertex lies farther from the planes that it stands for (root mean square,
+  /// weighted by area).
   double max_error = 0;
   /// No collapse that may shift the uv of a removed vertex by more.
   double max_uv_shift = 0;
   /// Those that may shift it by more than this come after all others.
   double early_uv_shift = 0;
-  /// Length on the surface that a unit of uv covers: the price of a collapse
-  /// counts both.
+  /// Length on the surface that a unit of uv covers: the price of a collapse counts both.
   double length_of_uv = 0;
   /// Stops at so few triangles.
   std::size_t least_triangles = 0;
 };
 
-/// Collapses of one chunk, cheapest first: any number of the first of them is a
-/// coarser level.
+/// Collapses of one chunk, cheapest first: any number of the first of them is a coarser level.
 struct CollapseSequence {
   struct Collapse {
     std::uint16_t from = 0;
@@ -50,13 +47,11 @@ struct CollapseSequence {
   std::vector<std::uint32_t> triangles;  ///< left after each collapse
 };
 
-/// Collapses edges in the order of quadric errors (Garland and Heckbert,
-/// "Surface simplification using quadric error metrics", 1997) and of the shift
-/// of uvs. Every collapse keeps one of its two vertices as it is, so that the
-/// result indexes the same vertices. Vertices on a rim (an edge of one
-/// triangle) move along it, twins along their seam, both to one place in two
-/// successive collapses. Kept as they are: vertices that are `locked`, and what
-/// is not manifold.
+/// Collapses edges in the order of quadric errors (Garland and Heckbert, "Surface simplification
+/// using quadric error metrics", 1997) and of the shift of uvs. Every collapse keeps one of its two
+/// vertices as it is, so that the result indexes the same vertices. Vertices on a rim (an edge of
+/// one triangle) move along it, twins along their seam, both to one place in two successive
+/// collapses. Kept as they are: vertices that are `locked`, and what is not manifold.
 CollapseSequence decimate_chunk(const ChunkVertices& vertices,
                                 std::span<const std::uint16_t> indices,
                                 std::span<const std::uint8_t> locked, const DecimateLimits& limits);

@@ -1,5 +1,4 @@
-// Decimates chunk by chunk, on several threads, shares the triangles out, and
-// measures the error.
+// Decimates chunk by chunk, on several threads, shares the triangles out, and measures the error.
 #include "bake/mesh/lod/mesh_levels.hpp"
 
 #include <algorithm>
@@ -20,33 +19,28 @@
 namespace modar {
 namespace {
 
-/// Chunks of fewer triangles get no coarser level: they cost a draw call either
-/// way. Set by hand.
+/// Chunks of fewer triangles get no coarser level: they cost a draw call either way. Set by hand.
 constexpr std::size_t kFewTriangles = 24;
-/// A level that keeps more of the previous one's triangles is not worth its
-/// bytes. Set by hand.
+/// A level that keeps more of the previous one's triangles is not worth its bytes. Set by hand.
 constexpr double kWorthwhile = 0.8;
-/// Of the chunk's diagonal: no collapse moves the surface farther. A level that
-/// is off by a pixel is then good for chunks down to four pixels across; what
-/// is smaller costs a draw call either way.
+/// Of the chunk's diagonal: no collapse moves the surface farther. A level that is off by a pixel
+/// is then good for chunks down to four pixels across; what is smaller costs a draw call either
+/// way.
 constexpr double kMaxCollapse = 0.25;
-/// Of the chunk's diagonal: the texture slides no farther as long as there are
-/// other ways to reach a level. What does counts in the level's error, so that
-/// it is drawn where that is a pixel. Set by hand.
+/// Of the chunk's diagonal: the texture slides no farther as long as there are other ways to reach
+/// a level. What does counts in the level's error, so that it is drawn where that is a pixel. Set
+/// by hand.
 constexpr double kMaxSlide = 0.01;
-/// Halvings of a chunk beyond the coarsest level: the model's triangles are
-/// shared out by need, and a flat chunk may lose more than its share. Set by
-/// hand.
+/// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
+/// a flat chunk may lose more than its share. Set by hand.
 constexpr std::uint32_t kFurther = 1;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
-/// The vertices of a chunk that share their place with others. A rim of the
-/// model is free.
+/// The vertices of a chunk that share their place with others. A rim of the model is free.
 struct SharedVertices {
   /// 1: must stay, so that the chunk meets its neighbours at any level.
   std::vector<std::uint8_t> locked;
-  /// The vertex across a seam inside the chunk, see ChunkVertices; empty where
-  /// there is none.
+  /// The vertex across a seam inside the chunk, see ChunkVertices; empty where there is none.
   std::vector<std::uint16_t> twins;
 };
 
@@ -57,9 +51,8 @@ struct OpenVertex {
   std::uint32_t vertex = 0;
 };
 
-/// Adds the vertices of a chunk whose triangles form no closed fans. Around a
-/// closed fan every neighbour follows the vertex in one triangle and precedes
-/// it in another: numbers cancel.
+/// Adds the vertices of a chunk whose triangles form no closed fans. Around a closed fan every
+/// neighbour follows the vertex in one triangle and precedes it in another: numbers cancel.
 void find_open_vertices(const TriMesh& mesh, const Chunk& chunk, std::uint32_t number,
                         std::vector<OpenVertex>& open) {
   std::vector<std::int64_t> sums(chunk.vertices.size(), 0);
@@ -74,8 +67,7 @@ void find_open_vertices(const TriMesh& mesh, const Chunk& chunk, std::uint32_t n
   }
 }
 
-/// Vertices of equal place: two of one chunk at open edges are twins, all
-/// others stay.
+/// Vertices of equal place: two of one chunk at open edges are twins, all others stay.
 void share_place(std::span<const OpenVertex> place, bool nowhere_else,
                  std::vector<SharedVertices>& shared) {
   const auto chunk = place[0].chunk;
@@ -91,8 +83,8 @@ void share_place(std::span<const OpenVertex> place, bool nowhere_else,
 }
 
 std::vector<SharedVertices> find_shared(const ChunkedMesh& mesh) {
-  // By the file's numbers, and for files that write a position twice, by place
-  // where edges are open.
+  // By the file's numbers, and for files that write a position twice, by place where edges are
+  // open.
   Array<std::uint8_t> uses(mesh.mesh.source_vertex_count, 0);
   std::vector<OpenVertex> open;
   for (std::uint32_t c = 0; c < mesh.chunks.size(); ++c) {
@@ -190,8 +182,8 @@ CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const ChunkGr
   return decimate_chunk({positions, texels, shared.twins}, chunk.indices, shared.locked, limits);
 }
 
-/// Where the sequences of all chunks are cut: all collapses below a price, and
-/// a share of those at it.
+/// Where the sequences of all chunks are cut: all collapses below a price, and a share of those at
+/// it.
 struct Cut {
   float price = 0;
   double share = 0;
@@ -214,8 +206,8 @@ std::size_t triangles_after(const CollapseSequence& sequence, std::size_t all,
   return collapses == 0 ? all : sequence.triangles[collapses - 1];
 }
 
-/// The cut that leaves the model `target` triangles or a few less: one for all
-/// chunks, so that triangles are where they matter.
+/// The cut that leaves the model `target` triangles or a few less: one for all chunks, so that
+/// triangles are where they matter.
 Cut cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequences,
             std::size_t target) {
   const auto fits = [&](const Cut& cut) {
@@ -246,8 +238,8 @@ Cut cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequen
   return cut;
 }
 
-/// A triangle near a point, by a walk over nearer and nearer neighbours; around
-/// a vertex or along an edge that is nearest, over some equally near ones.
+/// A triangle near a point, by a walk over nearer and nearer neighbours; around a vertex or along
+/// an edge that is nearest, over some equally near ones.
 std::uint32_t walk_to(const LevelSurface& surface, const glm::dvec3& point, std::uint32_t start) {
   constexpr double kEqual = 1e-9;  // relative: rounding tells equal distances apart
   constexpr int kMostEqual = 12;   // twice the triangles of a usual fan
@@ -290,8 +282,7 @@ std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> in
   return result;
 }
 
-/// For each vertex a triangle of the coarser surface near it; kNoIndex for
-/// vertices of no triangle.
+/// For each vertex a triangle of the coarser surface near it; kNoIndex for vertices of no triangle.
 std::vector<std::uint32_t> nearby_triangles(const LevelSurface& surface,
                                             std::span<const glm::dvec3> positions,
                                             const std::vector<std::uint16_t>& become) {
@@ -303,9 +294,9 @@ std::vector<std::uint32_t> nearby_triangles(const LevelSurface& surface,
   return nearby;
 }
 
-/// Greatest distance of the uv of a removed vertex from that of the surface at
-/// the nearest point. limit: what collapses were held to; where the walk found
-/// more, it has missed, and the nearest of all triangles is looked at as well.
+/// Greatest distance of the uv of a removed vertex from that of the surface at the nearest point.
+/// limit: what collapses were held to; where the walk found more, it has missed, and the nearest of
+/// all triangles is looked at as well.
 double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
                          const std::vector<std::uint16_t>& become,
                          const std::vector<std::uint32_t>& nearby, double limit) {
@@ -331,8 +322,7 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
   return greatest;
 }
 
-/// Fills one chunk's coarser levels: what it is after the collapses ahead of
-/// each cut.
+/// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut.
 void level_chunk(const TriMesh& mesh, const ChunkGrid& grid, const LevelOptions& options,
                  const CollapseSequence& sequence, const std::vector<Cut>& cuts, Chunk& chunk) {
   const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);

@@ -13,25 +13,22 @@ struct LevelOptions {
   std::uint32_t levels = 4;  ///< greatest number a chunk, the finest counted; 1 to kMaxLevels
   PositionKind positions = PositionKind::kHalf;  ///< whose decoded positions the errors are of
   unsigned jobs = 1;                             ///< threads; the result does not depend on it
-  /// Pixels of each material's texture along a side, 0 where it has none; may
-  /// be empty.
+  /// Pixels of each material's texture along a side, 0 where it has none; may be empty.
   std::vector<std::uint32_t> texture_sides;
   [[nodiscard]] Result<void> validate() const;
 };
 
 inline constexpr std::uint32_t kMaxLevels = 12;
 
-/// Gives chunks coarser levels over their own vertices. Level k of the model
-/// has about 1/2^k of its triangles, shared out among the chunks so that the
-/// price of the last collapse is the same in all; a chunk that would lose less
-/// than a fifth has no level of its own there. Positions shared with other
-/// chunks stay, so that chunks of any two levels meet without a crack; seams
-/// inside a chunk are simplified on both sides alike, open rims of the model
-/// too. A level's error bounds the distance between it and level 0, both as the
-/// device decodes them, measured from either to the other (see
-/// surface_distance()). Where the texture has slid at a removed vertex of level
-/// 0 by more than 1 % of the chunk's diagonal, which collapses do last, the
-/// error counts that slide as well. Figures go to report.levels.
+/// Gives chunks coarser levels over their own vertices. Level k of the model has about 1/2^k of its
+/// triangles, shared out among the chunks so that the price of the last collapse is the same in
+/// all; a chunk that would lose less than a fifth has no level of its own there. Positions shared
+/// with other chunks stay, so that chunks of any two levels meet without a crack; seams inside a
+/// chunk are simplified on both sides alike, open rims of the model too. A level's error bounds the
+/// distance between it and level 0, both as the device decodes them, measured from either to the
+/// other (see surface_distance()). Where the texture has slid at a removed vertex of level 0 by
+/// more than 1 % of the chunk's diagonal, which collapses do last, the error counts that slide as
+/// well. Figures go to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
 }  // namespace modar

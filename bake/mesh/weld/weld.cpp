@@ -111,10 +111,29 @@ std::uint32_t NormalMaker::flat_node() {
   return static_cast<std::uint32_t>(sums_.size() - 1);
 }
 
+/// atan2(sine, cosine) for a sine of 0 or more, off by 2e-8 at most (Abramowitz and
+/// Stegun, 4.4.49): a weight needs no more, and libm's took a tenth of the bake of a scan without
+/// normals.
+double angle_of(double sine, double cosine) {
+  const double width = std::fabs(cosine);
+  const double greater = std::max(sine, width);
+  if (!(greater > 0)) return greater;
+  const double x = std::min(sine, width) / greater;
+  const double s = x * x;
+  double angle = 0.0028662257;
+  for (const double factor : {-0.0161657367, 0.0429096138, -0.0752896400, 0.1065626393,
+                              -0.1420889944, 0.1999355085, -0.3333314528, 1.0}) {
+    angle = angle * s + factor;
+  }
+  angle *= x;
+  constexpr double kPi = 3.141592653589793;
+  if (sine > width) angle = kPi / 2 - angle;
+  return cosine < 0 ? kPi - angle : angle;
+}
+
 void NormalMaker::add(std::uint32_t node, const glm::dvec3& cross, const glm::dvec3& a,
                       const glm::dvec3& b, const glm::dvec3& c) {
-  const double angle = std::atan2(glm::length(cross), glm::dot(b - a, c - a));
-  sums_[node] += cross * angle;
+  sums_[node] += cross * angle_of(glm::length(cross), glm::dot(b - a, c - a));
 }
 
 Array<glm::dvec3> NormalMaker::take_normals() {
