@@ -34,7 +34,8 @@ Result<ExitCode> print_rows(const BenchOptions& bench) {
 }
 
 void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
-  line.option("--patterns", &pose.patterns, "pose: folder of pattern pictures, or one picture; light: one");
+  line.option("--patterns", &pose.patterns,
+              "pose: folder of pattern pictures, or one picture; light: one");
   line.option("--backgrounds", &pose.backgrounds, "pose: folder of photos without a pattern");
   line.option("--video", &pose.video, "pose: a video as well; render: the player on it instead");
   line.option("--truth", &pose.truth, "pose: corners of the video's pattern (CSV)");

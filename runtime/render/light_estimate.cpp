@@ -33,9 +33,13 @@ constexpr float kGray = 2.5f;
 constexpr std::size_t kMostCells = kMaxColourCells * kMaxColourCells;
 
 /// sRGB (0 to 1) to linear, off by 0.002 at most: a cubic needs no libm.
-float linear(float c) { return c * (c * (c * 0.305306011f + 0.682171111f) + 0.012522878f); }
+float linear(float c) {
+  return c * (c * (c * 0.305306011f + 0.682171111f) + 0.012522878f);
+}
 
-float luma(const glm::vec3& c) { return 0.2126f * c.r + 0.7152f * c.g + 0.0722f * c.b; }
+float luma(const glm::vec3& c) {
+  return 0.2126f * c.r + 0.7152f * c.g + 0.0722f * c.b;
+}
 
 /// A pixel as sRGB, 0 to 255.
 glm::vec3 pixel_of(const CameraPicture& frame, int x, int y) {
@@ -61,9 +65,9 @@ glm::vec3 pixel_of(const CameraPicture& frame, int x, int y) {
   const float luma = (at(0, x, y) - (frame.full_range ? 0.0f : 16.0f)) * scale;
   u = (u - 128) * chroma;
   v = (v - 128) * chroma;
-  return glm::clamp(glm::vec3(luma + 1.402f * v, luma - 0.344136f * u - 0.714136f * v,
-                              luma + 1.772f * u),
-                    0.0f, 255.0f);
+  return glm::clamp(
+      glm::vec3(luma + 1.402f * v, luma - 0.344136f * u - 0.714136f * v, luma + 1.772f * u), 0.0f,
+      255.0f);
 }
 
 /// A cell of the pattern as it is and as it is seen, linear.
@@ -132,8 +136,8 @@ class Look {
           return false;
         }
         const glm::vec3 pixel = pixel_of(frame_, static_cast<int>(x), static_cast<int>(y));
-        most_colour_ = std::max({most_colour_, std::fabs(pixel.r - pixel.g),
-                                 std::fabs(pixel.b - pixel.g)});
+        most_colour_ =
+            std::max({most_colour_, std::fabs(pixel.r - pixel.g), std::fabs(pixel.b - pixel.g)});
         for (int c = 0; c < 3; ++c) cell.seen[c] += linear(pixel[c] / 255.0f);
       }
     }
@@ -184,8 +188,7 @@ class Look {
     glm::vec3 lit(0.0f);
     for (std::uint32_t i = 0; i < count_; ++i) {
       seen += cells_[i].seen;
-      lit += cells_[i].stored *
-             (light.middle * (1.0f + glm::dot(light.slope, cells_[i].place)));
+      lit += cells_[i].stored * (light.middle * (1.0f + glm::dot(light.slope, cells_[i].place)));
     }
     light.middle *= glm::clamp(seen / glm::max(lit, 1e-4f), 0.5f, 2.0f);
   }
