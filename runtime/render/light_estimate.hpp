@@ -18,8 +18,8 @@ namespace modar {
 
 /// Light on the pattern's plane at a place, linear; 1: as bright as in the pattern's picture.
 struct PlaneLight {
-  glm::vec3 middle{1.0f};   ///< red, green, blue in the pattern's middle
-  glm::vec2 slope{0.0f};    ///< change of the factor on `middle`, pattern units, right and up
+  glm::vec3 middle{1.0f};  ///< red, green, blue in the pattern's middle
+  glm::vec2 slope{0.0f};   ///< change of the factor on `middle`, pattern units, right and up
   bool known = false;
 };
 
