@@ -139,7 +139,7 @@ TransferOptions transfer_options(const FetchOptions& options, const std::string&
 /// Refuses a release that is older than what was installed, has expired, or differs from the
 /// installed one of the same number.
 Result<void> judge_release(const SignedRelease& news, const StoreState& state,
-                           const std::optional<InstalledRelease>& active) {
+                           const std::optional<InstalledRelease>& active, std::int64_t now) {
   // The active release counts too, in case the state was lost; not one of an epoch before.
   const bool counts = active && active->release.epoch == state.epoch;
   const std::uint64_t known =
@@ -156,7 +156,7 @@ Result<void> judge_release(const SignedRelease& news, const StoreState& state,
                 "release " + std::to_string(known) + " was installed before",
                 "publish it under a higher number");
   }
-  if (news.release.expires != kNever && news.release.expires <= std::time(nullptr)) {
+  if (news.release.expires != kNever && news.release.expires <= now) {
     return fail(kExitExpired, "fetch.expired", where,
                 "it expired at " + time_text(news.release.expires),
                 "publish it again, or set this device's clock");
@@ -224,7 +224,8 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   StoreState state = store.state();
   MODAR_TRY(recall_trust(options.trusted_key, state));
   MODAR_ASSIGN(const auto news, download_release(transfers, store, state));
-  MODAR_TRY(judge_release(news, state, active));
+  MODAR_TRY(
+      judge_release(news, state, active, options.now != 0 ? options.now : std::time(nullptr)));
   MODAR_ASSIGN(const auto chosen, choose_bundles(news.release, options));
 
   FetchReport report;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <set>
 
 #include <rapidjson/document.h>
@@ -395,39 +395,42 @@ Result<std::uint64_t> parse_latest(std::string_view text) {
   return version;
 }
 
+// By the calendar of the standard library: time_t ends in 2038 on 32-bit phones and in WebAssembly.
 Result<std::int64_t> parse_time(std::string_view text) {
-  std::tm time{};
-  const auto field = [&](std::size_t at, std::size_t digits, int& out) {
-    const auto parsed = std::from_chars(text.data() + at, text.data() + at + digits, out);
-    return parsed.ec == std::errc() && parsed.ptr == text.data() + at + digits && out >= 0;
-  };
-  const bool shaped = text.size() == 20 && text[4] == '-' && text[7] == '-' && text[10] == 'T' &&
-                      text[13] == ':' && text[16] == ':' && text[19] == 'Z';
-  if (!shaped || !field(0, 4, time.tm_year) || !field(5, 2, time.tm_mon) ||
-      !field(8, 2, time.tm_mday) || !field(11, 2, time.tm_hour) || !field(14, 2, time.tm_min) ||
-      !field(17, 2, time.tm_sec)) {
+  std::array<unsigned, 6> fields{};  // year, month, day, hour, minute, second
+  constexpr std::array<std::size_t, 6> kStarts = {0, 5, 8, 11, 14, 17};
+  bool shaped = text.size() == 20 && text[4] == '-' && text[7] == '-' && text[10] == 'T' &&
+                text[13] == ':' && text[16] == ':' && text[19] == 'Z';
+  for (std::size_t i = 0; shaped && i < fields.size(); ++i) {
+    const char* end = text.data() + kStarts[i] + (i == 0 ? 4 : 2);
+    const auto parsed = std::from_chars(text.data() + kStarts[i], end, fields[i]);
+    shaped = parsed.ec == std::errc() && parsed.ptr == end;
+  }
+  if (!shaped) {
     return fail(ExitCode::kInvalidInput, "release.time", std::string(text), "it is not a time",
                 "write it as 2027-01-31T00:00:00Z");
   }
-  time.tm_year -= 1900;
-  time.tm_mon -= 1;
-  const std::int64_t seconds = timegm(&time);
-  // timegm() turns a date that does not exist into another.
-  if (time_text(seconds) != text) {
+  const auto [year, month, day, hour, minute, second] = fields;
+  const std::chrono::year_month_day date{std::chrono::year(static_cast<int>(year)),
+                                         std::chrono::month(month), std::chrono::day(day)};
+  if (!date.ok() || hour > 23 || minute > 59 || second > 59) {
     return fail(ExitCode::kInvalidInput, "release.time", std::string(text),
                 "there is no such date or time", "check the day and the hour");
   }
-  return seconds;
+  const std::int64_t days = std::chrono::sys_days(date).time_since_epoch().count();
+  return ((days * 24 + hour) * 60 + minute) * 60 + second;
 }
 
 std::string time_text(std::int64_t seconds) {
   if (seconds == kNever) return std::string(kNeverText);
-  const auto clock = static_cast<std::time_t>(seconds);
-  std::tm time{};
-  gmtime_r(&clock, &time);
+  const std::chrono::sys_time<std::chrono::seconds> time{std::chrono::seconds(seconds)};
+  const auto midnight = std::chrono::floor<std::chrono::days>(time);
+  const std::chrono::year_month_day date{midnight};
+  const auto of_day = static_cast<int>((time - midnight).count());
   std::array<char, 80> text{};
-  std::snprintf(text.data(), text.size(), "%04d-%02d-%02dT%02d:%02d:%02dZ", time.tm_year + 1900,
-                time.tm_mon + 1, time.tm_mday, time.tm_hour, time.tm_min, time.tm_sec);
+  std::snprintf(text.data(), text.size(), "%04d-%02u-%02uT%02d:%02d:%02dZ",
+                static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
+                static_cast<unsigned>(date.day()), of_day / 3600, of_day / 60 % 60, of_day % 60);
   return text.data();
 }
 

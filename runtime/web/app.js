@@ -236,12 +236,15 @@ async function reopenCamera() {
 async function openBundle(bundle) {
   let bytes = bundle.file;
   if (bundle.installed) bytes = await (await installedFile(SCOPE, bundle.file))?.arrayBuffer() ?? new ArrayBuffer(0);
-  const opened = await load(bytes, {
+  const opening = load(bytes, {
     onProgress: (got, total) => { $('progress').textContent = say('loading', { percent: Math.floor((100 * got) / total) }); },
   });
+  const creating = View.create(opening.then((opened) => opened.bytes), { picture: $('picture'), models: freshCanvas() });
+  creating.catch(() => {});  // told below, after what ails the bundle
+  const opened = await opening;
   $('progress').textContent = say('preparing');
   try {
-    view = await View.create(opened.bytes, { picture: $('picture'), models: freshCanvas() });
+    view = await creating;
   } catch (error) {
     opened.close();
     throw error;

@@ -25,14 +25,17 @@ export class View {
   #gl;
   #lost = false;
 
-  /** @param {Uint8Array} bytes the bundle; @param canvases {picture, models}: laid over each other by the page. */
+  /**
+   * @param {Uint8Array | Promise<Uint8Array>} bytes the bundle, which may still be on its way
+   * @param canvases {picture, models}: laid over each other by the page
+   */
   static async create(bytes, { picture, models, simd = true, webgl1 = false }) {
     const view = new View();
     view.#picture = picture;
     view.#models = models;
     view.#gl = openContext(models, webgl1);
     view.#engine = await Engine.create({ simd });
-    view.#engine.open(bytes);
+    view.#engine.open(await bytes);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
     view.#engine.upload(false);
     models.addEventListener('webglcontextlost', (event) => {

@@ -77,8 +77,11 @@ function lookForFocal(stride, answer) {
 }
 
 const answers = {
-  async open({ bytes, simd }) {
+  async prepare({ simd }) {
     engine = await Engine.create({ simd });
+    return { type: 'prepared' };
+  },
+  open({ bytes }) {
     engine.open(new Uint8Array(bytes));
     return { type: 'opened', patterns: engine.patterns, scenes: engine.scenes, kind: engine.kind };
   },

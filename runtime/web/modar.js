@@ -151,12 +151,15 @@ export class Modar extends EventTarget {
   /** @see load */
   static async open(bundle, { simd = true, onProgress } = {}) {
     const given = typeof bundle === 'string' || bundle instanceof URL;
-    const bytes = given ? await fetchBundle(bundle, onProgress) : new Uint8Array(bundle);
     const modar = new Modar();
-    modar.bytes = bytes;
-    const copy = bytes.slice().buffer;
+    // The engine is compiled while the bundle comes.
+    const prepared = modar.#tracker.ask({ type: 'prepare', simd });
+    prepared.catch(() => {});  // told below
     try {
-      const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', bytes: copy, simd }, [copy]);
+      modar.bytes = given ? await fetchBundle(bundle, onProgress) : new Uint8Array(bundle);
+      await prepared;
+      const copy = modar.bytes.slice().buffer;
+      const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', bytes: copy }, [copy]);
       Object.assign(modar, { patterns, scenes, kind });
     } catch (error) {
       modar.close();

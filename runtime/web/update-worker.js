@@ -134,7 +134,7 @@ async function update({ scope, url, key, hashes }) {
   if (await isCurrent(url, cache, scope, hashes)) return { state: 'current' };
   const module = await load();
   await restore(module.FS, cache, scope);
-  const done = module.ccall('update_run', 'number', ['string', 'string', 'string'], [url, key, STORE]);
+  const done = module.ccall('update_run', 'number', ['string', 'string', 'string', 'number'], [url, key, STORE, Date.now() / 1000]);
   const told = (field) => module.UTF8ToString(module._update_error(field));
   if (done > 0) writePage(module);
   // A failed one, too: what it learnt of keys and versions, and the pieces that it brought.

@@ -99,13 +99,15 @@ const char* kept(std::string_view text) {
 
 extern "C" {
 
-/// Brings the store in `store` up to date. 1: something new is installed; 0: nothing is; -1:
-/// update_error().
-EMSCRIPTEN_KEEPALIVE int update_run(const char* url, const char* key, const char* store) {
+/// Brings the store in `store` up to date. now: seconds since 1970, of JavaScript's clock. 1:
+/// something new is installed; 0: nothing is; -1: update_error().
+EMSCRIPTEN_KEEPALIVE int update_run(const char* url, const char* key, const char* store,
+                                    double now) {
   FetchOptions options;
   options.url = url;
   options.store = store;
   options.trusted_key = key;
+  options.now = static_cast<std::int64_t>(now);
   // The next visit tries again, with the pieces that this one has brought.
   options.attempts = 2;
   options.first_wait_s = 0.1;

@@ -33,6 +33,7 @@ class ByteSourceTest : public ::testing::Test {
     PublishRequest request;
     request.bundles = {(folder_ / "golden.modar").string()};
     request.folder = (folder_ / "site").string();
+    request.expires = kExpires;
     const auto key = make_key();
     ASSERT_TRUE(key);
     Report report;
@@ -50,6 +51,8 @@ class ByteSourceTest : public ::testing::Test {
     if (fs::is_regular_file(found)) return read(found);
     return fail(ExitCode{13}, "fetch.missing", path, "no such file", "");
   }
+
+  static constexpr std::int64_t kExpires = 4102444800;  ///< 2100-01-01
 
   fs::path folder_;
   FetchOptions options_;
@@ -90,6 +93,20 @@ TEST_F(ByteSourceTest, InstallsThroughALineThatBreaks) {
   ASSERT_EQ(report->bundles.size(), 1u);
   EXPECT_EQ(read(report->bundles[0]), read(folder_ / "golden.modar"));
   EXPECT_FALSE(fetch_release(options_)->changed);
+}
+
+TEST_F(ByteSourceTest, ExpiresByTheAppsClock) {
+  options_.source = [&](const std::string& path, std::uint64_t from,
+                        const auto& take) -> Result<void> {
+    MODAR_ASSIGN(const std::string text, file(path));
+    return hand_over(std::string_view(text).substr(from), 4096, take);
+  };
+  options_.now = kExpires;
+  const auto late = fetch_release(options_);
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, "fetch.expired");
+  options_.now = kExpires - 1;
+  EXPECT_TRUE(fetch_release(options_));
 }
 
 TEST_F(ByteSourceTest, IsNeededWithoutLibcurl) {

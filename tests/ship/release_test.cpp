@@ -111,6 +111,9 @@ TEST(Release, SecretKeysComeBack) {
 
 TEST(Release, TimesAreReadStrictly) {
   EXPECT_EQ(parse_time("1970-01-02T00:00:01Z").value(), 86401);
+  // By GNU date, behind where 32 bits end.
+  EXPECT_EQ(parse_time("2050-06-30T23:59:58Z").value(), 2540246398);
+  EXPECT_EQ(time_text(2540246398), "2050-06-30T23:59:58Z");
   for (const char* text :
        {"2027-02-30T00:00:00Z", "2027-13-01T00:00:00Z", "2027-01-01 00:00:00Z",
         "2027-01-01T00:00:00", "2027-01-01T25:00:00Z", "tomorrow", "", "2027-1-01T00:00:000Z"}) {

@@ -41,7 +41,10 @@ struct FetchOptions {
   double first_wait_s = 0.5;           ///< before the second attempt, then twice as long each time
   double stall_s = 30;                 ///< a silent connection is closed after this
   std::string
-      authorities;    ///< PEM file for HTTPS; empty: CURL_CA_BUNDLE, SSL_CERT_FILE, the system's
+      authorities;  ///< PEM file for HTTPS; empty: CURL_CA_BUNDLE, SSL_CERT_FILE, the system's
+  /// Seconds since 1970, of a caller whose clock goes on where std::time() ends in 2038 (32-bit
+  /// devices, WebAssembly); 0: std::time().
+  std::int64_t now = 0;
   ByteSource source;  ///< instead of the URL; a library built without libcurl needs it
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
 };
