@@ -250,7 +250,7 @@ bool PlaneMatcher::fit_affine(std::span<const std::uint8_t> mask, glm::dmat3& ho
 
 bool PlaneMatcher::fit_homography(std::span<const std::uint8_t> mask,
                                   glm::dmat3& homography) const {
-  using Vector8 = Eigen::Matrix<double, 8, 1>;
+  using Unknowns = Eigen::Matrix<double, 8, 1>;
   const Scaling from = scaling_of(mask, [&](std::size_t i) { return matches_[i].pattern; });
   const Scaling to = scaling_of(mask, [&](std::size_t i) { return matches_[i].ideal; });
   if (!(from.scale > 0.0) || !(to.scale > 0.0)) return false;
@@ -281,7 +281,7 @@ bool PlaneMatcher::fit_homography(std::span<const std::uint8_t> mask,
   }
   // The lower triangle, which is all that the solver reads.
   Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
-  Vector8 right = Vector8::Zero();
+  Unknowns right = Unknowns::Zero();
   constexpr int kAt[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   for (int k = 0; k < 2; ++k) {
     for (int row = 0; row < 3; ++row) {
@@ -297,7 +297,7 @@ bool PlaneMatcher::fit_homography(std::span<const std::uint8_t> mask,
   // A trace of damping keeps the perspective of few or crowded points near zero.
   normal(6, 6) += 1e-3 * normal(0, 0);
   normal(7, 7) += 1e-3 * normal(1, 1);
-  const Vector8 h = solve_symmetric(normal, right);
+  const Unknowns h = solve_symmetric(normal, right);
   if (!h.allFinite()) return false;
   glm::dmat3 m;
   m[0] = {h(0), h(3), h(6)};

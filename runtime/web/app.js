@@ -361,6 +361,7 @@ function showLabel(pattern) {
 
 function onFrame(frame) {
   if (!stream) return;
+  if (root.dataset.state === 'looking' && frame.reason === 'visible') performance.mark('tracked');
   try {
     view.draw(frame, gesture);
   } catch (error) {
