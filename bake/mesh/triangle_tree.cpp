@@ -2,6 +2,7 @@
 #include "bake/mesh/triangle_tree.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -181,11 +182,11 @@ namespace {
 double box_entry(const glm::dvec3& origin, const glm::dvec3& inverse, const glm::dvec3& low,
                  const glm::dvec3& high, double from, double to) {
   for (int axis = 0; axis < 3; ++axis) {
-    double near = (low[axis] - origin[axis]) * inverse[axis];
-    double far = (high[axis] - origin[axis]) * inverse[axis];
-    if (near > far) std::swap(near, far);
-    from = near > from ? near : from;
-    to = far < to ? far : to;
+    const double a = (low[axis] - origin[axis]) * inverse[axis];
+    const double b = (high[axis] - origin[axis]) * inverse[axis];
+    // No branches: rays of all directions would take them at random.
+    from = std::max(from, std::min(a, b));
+    to = std::min(to, std::max(a, b));
   }
   return from <= to ? from : std::numeric_limits<double>::infinity();
 }
@@ -195,9 +196,18 @@ double box_entry(const glm::dvec3& origin, const glm::dvec3& inverse, const glm:
 std::optional<TriangleTree::Hit> TriangleTree::first_hit(const glm::dvec3& origin,
                                                          const glm::dvec3& direction, double from,
                                                          double to) const {
-  const glm::dvec3 inverse = 1.0 / direction;
+  // Finite: along an axis, infinity times no distance would be no number.
+  constexpr double kParallel = 1e-300;
+  glm::dvec3 inverse;
+  for (int axis = 0; axis < 3; ++axis) {
+    inverse[axis] = 1.0 / (std::fabs(direction[axis]) < kParallel ? kParallel : direction[axis]);
+  }
+  struct Entry {
+    std::uint32_t node;
+    double distance;
+  };
   std::optional<Hit> best;
-  std::array<std::pair<std::uint32_t, double>, 64> stack;  // as in nearest()
+  std::array<Entry, 64> stack;  // as in nearest()
   std::size_t size = 0;
   stack[size++] = {0, box_entry(origin, inverse, nodes_[0].low, nodes_[0].high, from, to)};
   while (size > 0) {
@@ -223,13 +233,13 @@ std::optional<TriangleTree::Hit> TriangleTree::first_hit(const glm::dvec3& origi
       best = Hit{distance, triangles_[t], b, c};
     }
     if (node.count != 0) continue;
-    std::pair<std::uint32_t, double> near{node.first, 0.0};
-    std::pair<std::uint32_t, double> far{node.first + 1, 0.0};
-    for (auto* child : {&near, &far}) {
-      const Node& box = nodes_[child->first];
-      child->second = box_entry(origin, inverse, box.low, box.high, from, to);
+    Entry near{node.first, 0.0};
+    Entry far{node.first + 1, 0.0};
+    for (Entry* child : {&near, &far}) {
+      const Node& box = nodes_[child->node];
+      child->distance = box_entry(origin, inverse, box.low, box.high, from, to);
     }
-    if (far.second < near.second) std::swap(near, far);
+    if (far.distance < near.distance) std::swap(near, far);
     stack[size++] = far;
     stack[size++] = near;
   }
