@@ -21,8 +21,9 @@ namespace {
 /// Against 1024 rays, the share is off by 0.016 (pottery) and 0.021 (spider), root of the mean
 /// square; with 64 rays by 0.009 and 0.012, in twice the time.
 constexpr std::size_t kRays = 32;
-/// Of a cluster, whose share is averaged with those around it.
-constexpr std::size_t kClusterRays = 16;
+/// Of all clusters, whose shares are averaged with those around them, and of one at least.
+constexpr std::size_t kClusterRays = 1'000'000;
+constexpr std::size_t kLeastRays = 8;
 /// Model space, half a side is 1: farther surfaces hide nothing. Rooms seen from inside would be
 /// dark without a limit. Set by hand, on pictures.
 constexpr double kReach = 0.7;
@@ -59,8 +60,7 @@ void each_triangle(const ChunkedMesh& chunked, const Callback& callback) {
   }
 }
 
-/// Side of the cells that a surface is to be cut into: a cell holds a piece of about half of its
-/// side's square, for surfaces pass at a slant and look several ways.
+/// Side of the cells that a surface is to be cut into: about as many hold some of it.
 double cell_side(const ChunkedMesh& chunked, std::size_t cells) {
   const Array<glm::dvec3>& p = chunked.mesh.positions;
   double area = 0;
@@ -68,7 +68,7 @@ double cell_side(const ChunkedMesh& chunked, std::size_t cells) {
     area += 0.5 * glm::length(glm::cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]]));
   });
   constexpr double kLeastSide = 1e-4;  // 15 bits a coordinate
-  return std::max(kLeastSide, std::sqrt(2 * area / static_cast<double>(cells)));
+  return std::max(kLeastSide, std::sqrt(area / static_cast<double>(cells)));
 }
 
 /// One number for the cell and the axis that the normal is nearest to.
@@ -200,14 +200,29 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> cluster_pairs(const Chunked
   return pairs;
 }
 
-/// Shares of the vertices from those of the clusters around: near ones that look the same way weigh
-/// most.
+/// Shares of the vertices from those of the clusters, which are averaged with those around them,
+/// twice: near ones that look the same way weigh most.
 Array<float> spread_shares(const ChunkedMesh& chunked, const OcclusionPoints& points,
-                           const Array<float>& shares, unsigned jobs) {
+                           Array<float> shares, unsigned jobs) {
   const auto pairs = cluster_pairs(chunked, points);
   std::vector<std::size_t> first(points.positions.size() + 1, 0);
   for (const auto& [a, b] : pairs) ++first[a + 1];
   std::partial_sum(first.begin(), first.end(), first.begin());
+  for (int pass = 0; pass < 2; ++pass) {
+    Array<float> means = shares;
+    for (std::size_t c = 0; c < means.size(); ++c) {
+      double sum = static_cast<double>(shares[c]);
+      double weights = 1;
+      for (std::size_t i = first[c]; i < first[c + 1]; ++i) {
+        const std::uint32_t beside = pairs[i].second;
+        const double facing = std::max(0.0, glm::dot(points.normals[c], points.normals[beside]));
+        sum += facing * static_cast<double>(shares[beside]);
+        weights += facing;
+      }
+      means[c] = static_cast<float>(sum / weights);
+    }
+    shares.swap(means);
+  }
   const TriMesh& mesh = chunked.mesh;
   Array<float> result(mesh.positions.size());
   const double near = 0.1 * points.side * points.side;  // where weights stop growing; set by hand
@@ -241,14 +256,15 @@ Array<std::uint8_t> measure_occlusion(const ChunkedMesh& chunked, unsigned jobs,
   if (points.hiding.empty()) return occlusion;
   const std::size_t measured = points.positions.size();
   const TriangleTree tree({points.positions.data(), measured}, std::move(points.hiding));
-  const std::vector<glm::dvec3> directions =
-      cosine_directions(points.of_vertices.empty() ? kRays : kClusterRays);
+  const std::size_t rays =
+      points.of_vertices.empty() ? kRays : std::clamp(kClusterRays / measured, kLeastRays, kRays);
+  const std::vector<glm::dvec3> directions = cosine_directions(rays);
   Array<float> shares(measured);
   each_row(measured, jobs, [&](std::size_t i) {
     shares[i] =
         static_cast<float>(visible_share(tree, points.positions[i], points.normals[i], directions));
   });
-  if (!points.of_vertices.empty()) shares = spread_shares(chunked, points, shares, jobs);
+  if (!points.of_vertices.empty()) shares = spread_shares(chunked, points, std::move(shares), jobs);
   for (std::size_t v = 0; v < count; ++v) {
     // Light that bounces between surfaces of one albedo, summed over all bounces.
     const double share = std::clamp(static_cast<double>(shares[v]), 0.0, 1.0);

@@ -9,8 +9,10 @@
 
 namespace modar {
 
-/// Costs 16 to 32 rays each, of about 1 us. Set by hand: clusters of a scan that fills the box are
-/// then a hundredth of its side wide, a small part of the 0.7 that rays reach.
+/// Cost 8 to 32 rays each, of about 1 us. Clusters of a scan that fills the box are then a
+/// hundredth of its side wide. Against 64 rays from every vertex, a bust of 35,000 vertices in
+/// 11,600 clusters is off by 0.026 (root of the mean square), a scan in loose layers of 96,900 in
+/// 41,800 by 0.13.
 inline constexpr std::size_t kOcclusionPoints = 62'500;
 
 /// One a vertex of the mesh, 0 to 127 (all of it): cosine-weighted rays over the vertex's half
