@@ -25,6 +25,7 @@ struct RectifyCommand {
   std::string picture;  ///< of the corners that were found; empty: beside the output
   RectifyOptions options;
   std::string output;
+  bool doubtful = false;  ///< the corners that were found
   bool json = false;
 };
 
@@ -97,6 +98,12 @@ Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   std::fprintf(stderr,
                "found the corners %s, see %s; if they are wrong, give others with --corners\n",
                corners_text(found.corners).c_str(), command.picture.c_str());
+  command.doubtful = found.sharpness < kDoubtfulSharpness;
+  if (command.doubtful) {
+    print_diagnostic({"rectify.doubtful", DiagnosticSeverity::kWarning, command.photo, 0,
+                      "an edge is hidden or blurred: the corners may be wrong",
+                      "look at " + command.picture + ", and give --corners where they are"});
+  }
   return {};
 }
 
@@ -120,11 +127,10 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
   std::fprintf(stderr, "wrote %s, %u x %u pixels\n", command.output.c_str(), image->width,
                image->height);
   if (command.json) {
-    const Json json = {{"image", command.output},
-                       {"width", image->width},
-                       {"height", image->height},
-                       {"corners", corners_json(command.options.corners)},
-                       {"width_mm", command.options.width_mm}};
+    const Json json = {
+        {"image", command.output},      {"width", image->width},
+        {"height", image->height},      {"corners", corners_json(command.options.corners)},
+        {"doubtful", command.doubtful}, {"width_mm", command.options.width_mm}};
     std::fputs(json.dump().c_str(), stdout);
   }
   return ExitCode::kOk;

@@ -16,6 +16,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/memory/memory_limit.hpp"
 #include "bake/output.hpp"
+#include "bake/process.hpp"
 #include "bake/project/project.hpp"
 #include "bake/terminal.hpp"
 #include "formats/atomic_file.hpp"
@@ -322,17 +323,24 @@ std::string ninja_quoted(const std::string& path) {
   return out;
 }
 
-/// A word of a shell, in a build file of Ninja.
+/// A word of a shell.
 std::string shell_quoted(const std::string& word) {
   std::string out = "'";
-  for (const char c : word) {
-    if (c == '\'') {
-      out += "'\\''";
-    } else {
-      out += c == '$' ? "$$" : std::string(1, c);
-    }
-  }
+  for (const char c : word) out += c == '\'' ? "'\\''" : std::string(1, c);
   return out + "'";
+}
+
+/// Text in a build file of Ninja, as the value of a variable.
+std::string ninja_value(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += c == '$' ? "$$" : std::string(1, c);
+  return out;
+}
+
+/// ssh starts in another folder, and its words go through a second shell.
+bool runs_by_ssh(const std::string& runner) {
+  const std::string program = runner.substr(0, runner.find(' '));
+  return program.substr(program.rfind('/') + 1) == "ssh";
 }
 
 /// An edge for each asset, which bakes it into the cache, and one for all bundles. Stamps stand for
@@ -340,30 +348,45 @@ std::string shell_quoted(const std::string& word) {
 std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
                        const ProjectOutcome& planned) {
   const std::string runner = command.runner.empty() ? "" : command.runner + " ";
-  const std::string bake = "modar bake --quiet --project " + shell_quoted(command.file) +
-                           " --cache " + shell_quoted(command.cache);
+  const bool ssh = runs_by_ssh(command.runner);
+  const auto word = [ssh](const std::string& text) {
+    return ninja_value(ssh ? shell_quoted(shell_quoted(text)) : shell_quoted(text));
+  };
+  const auto path = [ssh](const std::string& name) {
+    std::error_code error;
+    return ssh ? std::filesystem::absolute(name, error).lexically_normal().string() : name;
+  };
   std::string text =
       "# modar plan --ninja: run by `ninja -f FILE`, as often as something changes.\n"
       "ninja_required_version = 1.5\n"
       "rule asset\n  command = " +
-      runner + bake + " --jobs 1 --asset $name --depfile $out.d && touch $out\n" +
+      runner + "modar bake --quiet --project " + word(path(command.file)) + " --cache " +
+      word(path(command.cache)) + " --jobs 1 --asset $name --depfile $told && touch $out\n" +
       "  depfile = $out.d\n  deps = gcc\n  description = bake $name\n"
-      "rule bundles\n  command = " +
-      bake + "\n  description = link the bundles\n\n";
+      "rule bundles\n  command = modar bake --quiet --project " +
+      ninja_value(shell_quoted(command.file) + " --cache " + shell_quoted(command.cache)) +
+      "\n  restat = 1\n  description = link the bundles\n\n";
+  const std::string program = " | " + ninja_quoted(program_folder() + "/modar");
   std::string stamps;
   std::set<std::string> names;
   for (const AssetOutcome& asset : planned.assets) {
     if (!names.insert(asset.name).second) continue;
     std::string file = asset.name;
     std::replace(file.begin(), file.end(), '/', '_');
-    const std::string stamp = ninja_quoted(project.path(".modar/plan/" + file));
-    text += "build " + stamp + ": asset " + ninja_quoted(command.file) +
-            "\n  name = " + shell_quoted(asset.name) + "\n";
-    stamps += " " + stamp;
+    const std::string stamp = project.path(".modar/plan/" + file);
+    text += "build " + ninja_quoted(stamp) + ": asset " + ninja_quoted(command.file) + program +
+            "\n  name = " + word(asset.name) + "\n  told = " + word(path(stamp + ".d")) + "\n";
+    stamps += " " + ninja_quoted(stamp);
   }
   std::string bundles;
   for (const BundleOutcome& bundle : planned.bundles) bundles += " " + ninja_quoted(bundle.path);
-  return text + "build" + bundles + ": bundles" + stamps + "\n";
+  std::set<std::string> lights;
+  for (const ProjectScene& scene : project.scenes) {
+    if (!scene.request.light.empty()) lights.insert(project.path(scene.request.light));
+  }
+  text += "build" + bundles + ": bundles" + stamps + " |";
+  for (const std::string& light : lights) text += " " + ninja_quoted(light);
+  return text + "\n";
 }
 
 Result<ExitCode> write_ninja_plan(NinjaPlanCommand& command) {

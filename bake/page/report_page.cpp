@@ -20,6 +20,7 @@
 #include "bake/process.hpp"
 #include "bake/terminal.hpp"
 #include "bake/texture/texture_codec.hpp"
+#include "formats/html.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/release.hpp"
@@ -40,32 +41,6 @@ constexpr std::uint32_t kTextureSide = 256;   // of a thumbnail, pixels
 constexpr std::uint32_t kComparisonSide =
     1200;  // of three textures beside each other: a page's width
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 [[gnu::format(printf, 1, 2)]] std::string print(const char* format, ...) {
   va_list arguments;
   va_start(arguments, format);
@@ -82,8 +57,28 @@ std::string grouped(std::uint64_t number) {
   return digits;
 }
 
+/// "1 model", "2 models": the noun alone.
+std::string noun(std::uint64_t count, const char* one) {
+  return count == 1 ? one : std::string(one) + "s";
+}
+
+/// Begins with a capital and ends with a full stop.
+std::string sentence(std::string words) {
+  if (!words.empty() && words[0] >= 'a' && words[0] <= 'z')
+    words[0] = static_cast<char>(words[0] - 'a' + 'A');
+  return words.ends_with('.') ? words : words + ".";
+}
+
+/// At most so many bytes of a text, whole characters of UTF-8, and a sign that some are missing.
+std::string shortened(const std::string& text, std::size_t room) {
+  if (text.size() <= room) return text;
+  std::size_t end = room - 1;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  return text.substr(0, end) + "…";
+}
+
 std::string row(const char* name, const std::string& value) {
-  return std::string("<dt>") + name + "</dt><dd>" + escaped(value) + "</dd>";
+  return std::string("<dt>") + name + "</dt><dd>" + escape_html(value) + "</dd>";
 }
 
 Result<std::string> data_uri(const RgbaImage& image) {
@@ -96,7 +91,7 @@ Result<std::string> picture(const RgbaImage& image, const std::string& alt) {
   MODAR_ASSIGN(const std::string uri, data_uri(image));
   return print("<img width=\"%u\" height=\"%u\" loading=\"lazy\" alt=\"", image.width,
                image.height) +
-         escaped(alt) + "\" src=\"" + uri + "\">";
+         escape_html(alt) + "\" src=\"" + uri + "\">";
 }
 
 class Page {
@@ -120,7 +115,7 @@ class Page {
     devices();
     issues();
     html_ +=
-        "</main>\n<footer>Made by modar " + escaped(options_.tool_version) +
+        "</main>\n<footer>Made by modar " + escape_html(options_.tool_version) +
         " from the bundle alone. Lengths are in source units of each model; errors are measured "
         "on the packed bytes.</footer>\n</body>\n</html>\n";
     return std::move(html_);
@@ -145,27 +140,29 @@ class Page {
     html_ =
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
         "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>" +
-        escaped(options_.title) + "</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>" +
-        kStyle + "</style>\n</head>\n<body>\n<header><div>\n<h1>" + escaped(options_.title) +
+        escape_html(options_.title) + "</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>" +
+        kStyle + "</style>\n</head>\n<body>\n<header><div>\n<h1>" + escape_html(options_.title) +
         "</h1>\n<div class=\"lead\">" +
         print("<span class=\"chip %s\">%s</span>", verdict_.good() ? "good" : "bad",
               verdict_.good() ? "Good" : "Bad") +
-        print("<span>%zu errors, %zu warnings</span>", verdict_.errors(), verdict_.warnings()) +
+        "<span>" + std::to_string(verdict_.errors()) + " " + noun(verdict_.errors(), "error") +
+        ", " + std::to_string(verdict_.warnings()) + " " + noun(verdict_.warnings(), "warning") +
+        "</span>" +
         print("<span>bundle version %u.%u</span></div>\n<ul class=\"counts\">",
               bundle_.header().major, bundle_.header().minor);
     std::uint64_t triangles = 0;
     for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
       triangles += bundle_.models()[m].triangle_count;
     }
-    const auto count = [&](const std::string& number, const char* what) {
-      html_ += "<li><b>" + number + "</b>" + what + "</li>";
+    html_ += "<li><b>" + human_bytes(bundle_.bytes().size()) + "</b>in one file</li>";
+    const auto count = [&](std::uint64_t number, const char* what) {
+      html_ += "<li><b>" + grouped(number) + "</b>" + noun(number, what) + "</li>";
     };
-    count(human_bytes(bundle_.bytes().size()), "in one file");
-    count(std::to_string(bundle_.scenes().size()), "scenes");
-    count(std::to_string(bundle_.models().size()), "models");
-    count(grouped(triangles), "triangles");
-    count(std::to_string(bundle_.textures().size()), "textures");
-    count(std::to_string(bundle_.patterns().size()), "patterns");
+    count(bundle_.scenes().size(), "scene");
+    count(bundle_.models().size(), "model");
+    count(triangles, "triangle");
+    count(bundle_.textures().size(), "texture");
+    count(bundle_.patterns().size(), "pattern");
     html_ += "</ul>\n</div></header>\n<main>\n";
   }
 
@@ -173,7 +170,7 @@ class Page {
     if (bundle_.scenes().empty()) return {};
     section("scenes", "Scenes");
     if (camera_ == nullptr)
-      html_ += "<p class=\"note\">No pictures: " + escaped(no_pictures_) + "</p>";
+      html_ += "<p class=\"note\">No pictures: " + escape_html(no_pictures_) + "</p>";
     html_ += "<div class=\"grid wide\">\n";
     for (std::uint32_t s = 0; s < bundle_.scenes().size(); ++s) {
       told("scenes", s, bundle_.scenes().size());
@@ -186,7 +183,7 @@ class Page {
                      picture(camera_->scene(s), model + " standing on the pattern " + pattern));
         html_ += image;
       }
-      html_ += "<div><h3>" + escaped(model) + " on " + escaped(pattern) + "</h3><dl>" +
+      html_ += "<div><h3>" + escape_html(model) + " on " + escape_html(pattern) + "</h3><dl>" +
                row("Scale", print("%.3g", static_cast<double>(scene.scale))) +
                "</dl></div></article>\n";
     }
@@ -209,11 +206,11 @@ class Page {
                      picture(camera_->model(m), title + " as the device draws it"));
         html_ += image;
       }
-      html_ += "<svg viewBox=\"0 0 400 300\" role=\"img\" aria-label=\"" + escaped(title) +
+      html_ += "<svg viewBox=\"0 0 400 300\" role=\"img\" aria-label=\"" + escape_html(title) +
                ": its triangles, each chunk in a colour of its own\" stroke=\"#fff\" "
                "stroke-width=\".25\" "
                "stroke-linejoin=\"round\">" +
-               wires + "</svg></div><div><h3>" + escaped(title) + "</h3><dl>" + model_rows(m) +
+               wires + "</svg></div><div><h3>" + escape_html(title) + "</h3><dl>" + model_rows(m) +
                "</dl></div></article>\n";
     }
     html_ += "</div>\n</section>\n";
@@ -271,7 +268,7 @@ class Page {
       const std::string title = name(texture.name);
       MODAR_ASSIGN(const std::string image,
                    picture(texture_image(t), "The texture " + title + ", decoded"));
-      html_ += "<article class=\"card\">" + image + "<div><h3>" + escaped(title) + "</h3><dl>" +
+      html_ += "<article class=\"card\">" + image + "<div><h3>" + escape_html(title) + "</h3><dl>" +
                row("Size", print("%u × %u", texture.width, texture.height)) +
                row("Source", print("%u × %u", texture.source_width, texture.source_height)) +
                row("PSNR", print("%.1f dB", static_cast<double>(texture.psnr_db))) +
@@ -299,7 +296,7 @@ class Page {
     }
     MODAR_ASSIGN(const std::string shown,
                  picture(image, "Source, decoded and difference of " + texture));
-    html_ += "<article class=\"card triple\">" + shown + "<div><h3>" + escaped(texture) +
+    html_ += "<article class=\"card triple\">" + shown + "<div><h3>" + escape_html(texture) +
              ": source, decoded, difference</h3></div></article>\n";
     return {};
   }
@@ -316,7 +313,7 @@ class Page {
     }
     section("timings", "What the bake took");
     html_ +=
-        "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Stage</th><th "
+        "<div class=\"scroll\"><table class=\"figures\"><thead><tr><th scope=\"col\">Stage</th><th "
         "scope=\"col\">Seconds</th><th scope=\"col\">In</th><th scope=\"col\">Out</th></tr></thead>"
         "<tbody>\n";
     const auto number = [](const Json& stage, const char* key) {
@@ -327,10 +324,10 @@ class Page {
       const Json stage = *stages->at(i);
       const std::optional<Json> label = stage.find("name");
       html_ += "<tr><th scope=\"row\">" +
-               escaped(label ? label->text().value_or("") : std::string()) + "</th><td>" +
+               escape_html(label ? label->text().value_or("") : std::string()) + "</th><td>" +
                print("%.2f", number(stage, "ms") / 1000) + "</td><td>" +
-               print("%.0f", number(stage, "in")) + "</td><td>" +
-               print("%.0f", number(stage, "out")) + "</td></tr>\n";
+               grouped(static_cast<std::uint64_t>(number(stage, "in"))) + "</td><td>" +
+               grouped(static_cast<std::uint64_t>(number(stage, "out"))) + "</td></tr>\n";
     }
     const auto total = json.find("cpu_seconds");
     html_ += "</tbody></table></div>\n<p class=\"note\">" +
@@ -363,20 +360,14 @@ class Page {
                    picture(image, "The pattern " + title + ", as the tracker sees it"));
       html_ += "<div class=\"over\">" + shown + feature_dots(index, image, title) + "</div>";
     }
-    html_ += "<div><h3>" + escaped(title) + "</h3><dl>" +
+    html_ += "<div><h3>" + escape_html(title) + "</h3><dl>" +
              row("Picture", print("%u × %u", record.width, record.height)) +
              row("Printed width",
                  record.width_mm > 0 ? print("%.4g mm", record.width_mm) : "not stated");
-    if (record.score >= 0)
-      html_ += row("Score", print("%.0f of 100", static_cast<double>(record.score)));
-    html_ += "</dl>";
     if (record.score >= 0) {
-      html_ += print(
-                   "<meter min=\"0\" max=\"100\" low=\"30\" high=\"60\" optimum=\"100\" "
-                   "value=\"%.0f\" aria-label=\"Score of ",
-                   static_cast<double>(record.score)) +
-               escaped(title) + "\"></meter>";
-      MODAR_TRY(advice(index, image));
+      MODAR_TRY(score(index, image, title));
+    } else {
+      html_ += "</dl>";
     }
     if (options_.range && image.width != 0) MODAR_TRY(range(index, image));
     html_ += "</div></article>\n";
@@ -394,14 +385,15 @@ class Page {
     }
     return print("<svg viewBox=\"0 0 %u %u\" role=\"img\" aria-label=\"", image.width,
                  image.height) +
-           print("%zu features of ", record.features.size()) + escaped(title) + "\"><path d=\"" +
-           dots +
+           print("%zu features of ", record.features.size()) + escape_html(title) +
+           "\"><path d=\"" + dots +
            "\" stroke=\"#00d68f\" stroke-opacity=\".75\" stroke-linecap=\"round\" stroke-width=\"" +
            print("%u", std::max(2U, image.width / 110)) + "\"/></svg>";
   }
 
-  /// What the score's causes advise.
-  Result<void> advice(std::uint32_t index, const RgbaImage& image) {
+  /// Score and grade as the last rows of a list, then the working range and what the causes advise.
+  Result<void> score(std::uint32_t index, const RgbaImage& image, const std::string& title) {
+    const PatternRecord& record = bundle_.patterns()[index];
     std::vector<std::uint8_t> gray;
     for (std::size_t i = 0; i < image.pixels.size(); i += 4) gray.push_back(image.pixels[i]);
     const GrayImage view{gray.data(), static_cast<int>(image.width), static_cast<int>(image.height),
@@ -409,9 +401,18 @@ class Page {
     MODAR_ASSIGN(
         const PatternScore score,
         score_pattern(view, bundle_.section(SectionType::kTrackerRecord, index), options_.jobs));
+    const auto stored = static_cast<double>(record.score);
+    html_ += row("Score", print("%.0f of 100", stored)) + row("Grade, A to E", {score.grade}) +
+             "</dl>" +
+             print(
+                 "<meter min=\"0\" max=\"100\" low=\"30\" high=\"60\" optimum=\"100\" "
+                 "value=\"%.0f\" aria-label=\"Score of ",
+                 stored) +
+             escape_html(title) + "\"></meter><p class=\"note\">" +
+             escape_html(sentence(range_sentence(score.range, record.width_mm))) + "</p>";
     std::string list;
     for (const ScoreCause& cause : score.causes) {
-      if (*cause.advice != 0) list += "<li>" + escaped(cause.advice) + "</li>";
+      if (*cause.advice != 0) list += "<li>" + escape_html(sentence(cause.advice)) + "</li>";
     }
     html_ += list.empty() ? "<p class=\"note\">Nothing to improve.</p>"
                           : "<ul class=\"advice\">" + list + "</ul>";
@@ -426,7 +427,7 @@ class Page {
     simulation.jobs = options_.jobs;
     simulation.width_mm = bundle_.patterns()[index].width_mm;
     MODAR_ASSIGN(const Simulation simulated, simulate(path, simulation, {}));
-    html_ += "<p class=\"note\">" + escaped(range_sentence(simulated)) + "</p>";
+    html_ += "<p class=\"note\">" + escape_html(sentence(range_sentence(simulated))) + "</p>";
     return {};
   }
 
@@ -475,7 +476,7 @@ class Page {
       label += (i == 0 ? "" : ", ") + items[i].label + " " +
                human_bytes(static_cast<std::uint64_t>(items[i].size));
     }
-    html_ += escaped(label) + "\">";
+    html_ += escape_html(label) + "\">";
     for (std::size_t i = 0; i < items.size(); ++i) {
       const TreemapBox& box = boxes[i];
       const std::string bytes = human_bytes(static_cast<std::uint64_t>(items[i].size));
@@ -483,26 +484,27 @@ class Page {
                    "<g><rect class=\"%s\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" "
                    "stroke=\"#fff\"/><title>",
                    items[i].kind.c_str(), box.x, box.y, box.width, box.height) +
-               escaped(items[i].label) + ", " + bytes + "</title>";
+               escape_html(items[i].label) + ", " + bytes + "</title>";
       const auto room = static_cast<std::size_t>(std::max(0.0, (box.width - 14) / 8));
       if (box.height > 40 && room >= 6) {
-        const std::string shown = items[i].label.size() <= room
-                                      ? items[i].label
-                                      : items[i].label.substr(0, room - 1) + "…";
-        html_ += print("<text x=\"%.1f\" y=\"%.1f\">", box.x + 8, box.y + 20) + escaped(shown) +
-                 "</text>" +
+        html_ += print("<text x=\"%.1f\" y=\"%.1f\">", box.x + 8, box.y + 20) +
+                 escape_html(shortened(items[i].label, room)) + "</text>" +
                  print("<text class=\"bytes\" x=\"%.1f\" y=\"%.1f\">", box.x + 8, box.y + 37) +
                  bytes + "</text>";
       }
       html_ += "</g>";
     }
     html_ += "</svg></div>\n<ul class=\"key\">";
+    // With bytes: on a phone, the boxes' own are too small to be read.
     for (const auto& [kind, words] : std::map<std::string, std::string>{{"model", "models"},
                                                                         {"texture", "textures"},
                                                                         {"pattern", "patterns"},
                                                                         {"rest", "the rest"}}) {
+      double bytes = 0;
+      for (const TreemapItem& item : items) bytes += item.kind == kind ? item.size : 0;
       html_ += "<li><svg viewBox=\"0 0 1 1\" aria-hidden=\"true\"><rect class=\"" + kind +
-               "\" width=\"1\" height=\"1\"/></svg>" + words + "</li>";
+               "\" width=\"1\" height=\"1\"/></svg>" + words + " " +
+               human_bytes(static_cast<std::uint64_t>(bytes)) + "</li>";
     }
     html_ += "</ul>\n</section>\n";
   }
@@ -519,11 +521,11 @@ class Page {
         if (!why.empty()) why += "; ";
         why += std::string(issue.kind->message) + " (" + issue.detail + ")";
       });
-      html_ += "<tr><th scope=\"row\">" + escaped(device.title) +
+      html_ += "<tr><th scope=\"row\">" + escape_html(device.title) +
                print("</th><td><span class=\"chip %s\">%s</span></td><td>",
                      good ? (why.empty() ? "good" : "warn") : "bad",
                      good ? (why.empty() ? "yes" : "with care") : "no") +
-               escaped(why) + "</td></tr>\n";
+               escape_html(why) + "</td></tr>\n";
     }
     html_ += "</tbody></table></div>\n</section>\n";
   }
@@ -543,10 +545,10 @@ class Page {
       html_ += print("<tr><th scope=\"row\"><span class=\"chip %s\">%s</span><br>",
                      weighed.severity == Severity::kError ? "bad" : "warn",
                      severity_name(weighed.severity)) +
-               escaped(issue.kind->id) + "</th><td>" + escaped(issue.where) + "</td><td>" +
-               escaped(std::string(issue.kind->message) +
-                       (issue.detail.empty() ? "" : ": " + issue.detail)) +
-               "</td><td>" + escaped(issue.kind->cure) + "</td></tr>\n";
+               escape_html(issue.kind->id) + "</th><td>" + escape_html(issue.where) + "</td><td>" +
+               escape_html(std::string(issue.kind->message) +
+                           (issue.detail.empty() ? "" : ": " + issue.detail)) +
+               "</td><td>" + escape_html(issue.kind->cure) + "</td></tr>\n";
     }
     html_ += "</tbody></table></div>\n</section>\n";
   }

@@ -31,6 +31,14 @@ constexpr double kLeastSide = 0.5;  // below, a side is not even tried
 constexpr double kOutlineSupport = 0.9;
 constexpr double kOutlineScore = 0.25;
 constexpr double kMostMargin = 1.7;
+// How far outside of a printed frame the thing's own edge is looked for, times the figure's size.
+constexpr double kMostFrame = 0.06;
+// Share of a side that is sharp: on the thing's own edge, and below which a figure is none. Of 94
+// rendered photos (18 pictures before plain, blurred and sharp backgrounds, tilted at random), 85
+// came out within 1.4 % of the width, all but four of them at 0.92 or more; of 6 wrong ones one was
+// above it, off by 1.7 %, and the others below 0.91; none that was right was below 0.8.
+constexpr double kSharpOutline = 0.9;
+constexpr double kLeastSharp = 0.6;
 
 using Point = cv::Point2d;
 
@@ -271,6 +279,7 @@ bool fit_side(const Gradients& gradients, const Point& from, const Point& to, do
   const Point normal(-along.y, along.x);
   std::vector<cv::Point2f> places;
   constexpr int kPlaces = 160;
+  const double window = std::min(2.0, reach);
   for (int i = 0; i < kPlaces; ++i) {
     const Point at = from + (0.04 + 0.92 * i / (kPlaces - 1)) * (to - from);
     double best = 0;
@@ -290,7 +299,7 @@ bool fit_side(const Gradients& gradients, const Point& from, const Point& to, do
     // The middle of the edge, as the gradients around it weigh.
     double weight = 0;
     double moment = 0;
-    for (double off = where - 2; off <= where + 2; off += 1) {
+    for (double off = where - window; off <= where + window; off += window / 2) {
       weight += strength(off);
       moment += strength(off) * off;
     }
@@ -305,9 +314,66 @@ bool fit_side(const Gradients& gradients, const Point& from, const Point& to, do
   return true;
 }
 
-std::array<Point, 4> refine(const cv::Mat& rgb, std::array<Point, 4> corners, double scale) {
-  const Gradients gradients(rgb);
-  for (const double reach : {1.5 * scale + 1, 3.0, 3.0}) {
+/// The share of places along a side where an edge is seen that is sharpest there.
+double sharp_along(const Gradients& gradients, const Point& from, const Point& to) {
+  const Point along = (to - from) / norm_of(to - from);
+  const Point normal(-along.y, along.x);
+  int sharp = 0;
+  constexpr int kPlaces = 120;
+  for (int i = 0; i < kPlaces; ++i) {
+    const Point at = from + (0.06 + 0.88 * i / (kPlaces - 1)) * (to - from);
+    const auto strength = [&](double off) {
+      return std::fabs(gradients.across(at + off * normal, normal));
+    };
+    const double here = std::max({strength(0), strength(-0.7), strength(0.7)});
+    if (here > kEdge && here >= std::max(strength(-2), strength(-3))) ++sharp;
+  }
+  return static_cast<double>(sharp) / kPlaces;
+}
+
+double least_sharp(const Gradients& gradients, const std::array<Point, 4>& corners) {
+  double least = 1;
+  for (std::size_t i = 0; i < 4; ++i) {
+    least = std::min(least, sharp_along(gradients, corners[i], corners[(i + 1) % 4]));
+  }
+  return least;
+}
+
+/// Sides that stopped at a printed frame, with one end or both, go on to the thing's own edge: the
+/// outermost that is sharp all along.
+std::array<Point, 4> push_out(const Gradients& gradients, const std::array<Point, 4>& corners) {
+  const double reach = kMostFrame * std::sqrt(area_of(corners));
+  std::array<Line, 4> sides;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point& from = corners[i];
+    const Point& to = corners[(i + 1) % 4];
+    const double long_as = norm_of(to - from);
+    const Point along = (to - from) / long_as;
+    const Point outward(along.y, -along.x);
+    double farthest = 0;
+    sides[i] = {from, along, long_as, {}, 0};
+    for (double a = -1; a <= reach; a += 1) {
+      for (double b = -1; b <= reach; b += 1) {
+        if (a + b <= farthest) continue;
+        const Point start = from + a * outward;
+        const Point end = to + b * outward;
+        if (sharp_along(gradients, start, end) < kSharpOutline) continue;
+        farthest = a + b;
+        sides[i] = {start, (end - start) / norm_of(end - start), long_as, {}, 0};
+      }
+    }
+  }
+  std::array<Point, 4> next = corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!intersect(sides[(i + 3) % 4], sides[i], next[i])) return corners;
+  }
+  return next;
+}
+
+/// Fits each side to the edges that are nearer than each of the reaches, one after the other.
+std::array<Point, 4> refine(const Gradients& gradients, std::array<Point, 4> corners,
+                            std::initializer_list<double> reaches) {
+  for (const double reach : reaches) {
     std::array<Line, 4> sides;
     std::array<Point, 4> next = corners;
     bool good = true;
@@ -316,7 +382,7 @@ std::array<Point, 4> refine(const cv::Mat& rgb, std::array<Point, 4> corners, do
     }
     for (std::size_t i = 0; i < 4 && good; ++i) {
       good = intersect(sides[(i + 3) % 4], sides[i], next[i]) &&
-             norm_of(next[i] - corners[i]) < 4 * scale + 4;
+             norm_of(next[i] - corners[i]) < 3 * reach + 4;
     }
     if (!good) break;
     corners = next;
@@ -396,12 +462,15 @@ Result<FoundCorners> search(const RgbaImage& photo) {
     return not_found("no four-sided figure stands out in the photo");
   }
   if (rivalled(figures)) return not_found("several four-sided figures stand out in the photo");
-  const Figure& figure = outermost(figures);
   FoundCorners found;
-  found.support = figure.support;
-  std::array<Point, 4> corners = figure.corners;
+  std::array<Point, 4> corners = outermost(figures).corners;
+  corners = push_out(gradients, refine(gradients, corners, {2.5, 3.0}));
+  corners = refine(gradients, corners, {1.2, 1.2});
+  found.sharpness = least_sharp(gradients, corners);
+  if (found.sharpness < kLeastSharp)
+    return not_found("no four-sided figure stands out sharply in the photo");
   for (Point& corner : corners) corner = (corner + Point(0.5, 0.5)) * scale - Point(0.5, 0.5);
-  corners = refine(rgb, corners, scale);
+  corners = refine(Gradients(rgb), corners, {1.2 * scale, 1.2, 1.2});
   for (std::size_t i = 0; i < 4; ++i) found.corners[i] = {corners[i].x, corners[i].y};
   return found;
 }

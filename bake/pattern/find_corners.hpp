@@ -9,16 +9,22 @@
 
 namespace modar {
 
+/// Rendered photos that came out wrong, all but one, were below it (see find_corners.cpp).
+inline constexpr double kDoubtfulSharpness = 0.92;
+
 struct FoundCorners {
   std::array<PixelPoint, 4> corners{};  ///< top-left, top-right, bottom-right, bottom-left
-  double support = 0;                   ///< share of the weakest side that shows an edge, 0 to 1
+  /// Share of the weakest side where the edge is sharp, 0 to 1; below kDoubtfulSharpness the figure
+  /// may be another thing's, or a corner is hidden.
+  double sharpness = 0;
 };
 
 /// The largest four-sided figure whose sides stand out all along: straight segments (LSD: von Gioi,
 /// Jakubowicz, Morel and Randall, "LSD: a line segment detector", IPOL 2012) are joined to lines,
-/// lines to figures, and the best one's sides are fitted to the photo's edges to sub-pixels. Which
-/// corner is the thing's own top-left nobody can tell: it is taken to be upright. Errors:
-/// kInvalidInput "rectify.not-found", where no figure stands out or two do.
+/// lines to figures, and the best one's sides are fitted to the photo's edges to sub-pixels, those
+/// of the thing rather than of a frame printed on it. Which corner is the thing's own top-left
+/// nobody can tell: it is taken to be upright. Errors: kInvalidInput "rectify.not-found", where no
+/// figure stands out sharply or two do.
 Result<FoundCorners> find_corners(const RgbaImage& photo);
 
 /// The photo, at most 1,200 pixels wide, with the figure and its corners' numbers drawn on it.

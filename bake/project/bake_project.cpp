@@ -113,7 +113,8 @@ class ProjectBake {
     Settings settings = project_.settings;
     for (const auto& [key, value] : tier.settings) settings[key] = value;
     for (const auto& [key, value] : asset.settings) settings[key] = value;
-    settings = settings_of(settings, asset.pattern);
+    settings =
+        settings_of(settings, asset.pattern ? Setting::Part::kPattern : Setting::Part::kModel);
     for (std::size_t i = 0; i < tasks_.size(); ++i) {
       if (tasks_[i].asset == &asset && tasks_[i].settings == settings) return i;
     }
@@ -257,7 +258,7 @@ class ProjectBake {
            std::to_string(gates.min_score) + " " + std::to_string(gates.max_bytes) + "\n";
   }
 
-  static std::string scene_text(const ProjectScene& scene) {
+  [[nodiscard]] std::string scene_text(const ProjectScene& scene) const {
     const SceneRequest& request = scene.request;
     std::string text = request.pattern + "\n" + request.model + "\n" +
                        std::to_string(static_cast<int>(request.up)) +
@@ -267,6 +268,9 @@ class ProjectBake {
       char digits[32];
       std::snprintf(digits, sizeof digits, " %.17g", number);
       text += digits;
+    }
+    if (!request.light.empty()) {
+      text += "\n" + request.light + " " + digests_.of(project_.path(request.light));
     }
     for (const auto& [language, words] : scene.texts) text += "\n" + language + " " + words;
     return text + "\n";
@@ -440,7 +444,11 @@ class ProjectBake {
     BakeRequest described;
     MODAR_TRY(apply_settings(settings_in(target), described));
     described.tool_version = options_.tool_version;
-    for (const ProjectScene* scene : target.scenes) described.scenes.push_back(scene->request);
+    for (const ProjectScene* scene : target.scenes) {
+      described.scenes.push_back(scene->request);
+      std::string& light = described.scenes.back().light;
+      if (!light.empty()) light = project_.path(light);
+    }
     if (models.empty() && patterns.empty()) {
       return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
                   "it would hold neither a model nor a pattern", "name some that there are");
@@ -596,6 +604,11 @@ class ProjectBake {
       inputs.insert(project_.path(task.asset->file));
       for (std::size_t i = 1; i < task.inputs.size(); ++i) {
         if (task.inputs[i].digest != kNoFile) inputs.insert(beside(task, task.inputs[i].path));
+      }
+    }
+    for (const ProjectScene& scene : project_.scenes) {
+      if (options_.only.empty() && !scene.request.light.empty()) {
+        inputs.insert(project_.path(scene.request.light));
       }
     }
     outcome.inputs.assign(inputs.begin(), inputs.end());

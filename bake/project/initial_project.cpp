@@ -175,7 +175,9 @@ Result<std::string> initial_project(const std::string& folder) {
       "name = " +
       quoted(stem, false) +
       "          # of the bundle: out/NAME.modar\n"
-      "#out = \"out\"\n\n"
+      "#out = \"out\"\n"
+      "#light = \"room.hdr\"      # panorama or photo of the room whose light falls on the "
+      "scenes\n\n"
       "[bake]\n"
       "parameters = [\"none\"]     # the ModAR paper's features are for other programs only\n"
       "#device = \"ace2\"          # plan textures for a device\n"

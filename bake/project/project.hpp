@@ -30,7 +30,7 @@ struct ProjectAsset {
 };
 
 struct ProjectScene {
-  SceneRequest request;
+  SceneRequest request;                      ///< its light: relative to the project's folder
   std::map<std::string, std::string> texts;  ///< by language: {"en", "A vase."}
 };
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <set>
 
 #include "bake/bundle/request_text.hpp"
@@ -201,9 +202,10 @@ std::vector<std::string> expand(const std::string& folder, const std::string& pa
   return files;
 }
 
-Keys keys_with_settings(Keys keys, bool models, bool patterns) {
+/// part: nothing for those of all parts.
+Keys keys_with_settings(Keys keys, std::optional<Setting::Part> part) {
   for (const Setting& setting : all_settings()) {
-    if (setting.of_patterns ? patterns : models) keys.push_back(setting.key);
+    if (!part || setting.part == *part) keys.push_back(setting.key);
   }
   return keys;
 }
@@ -262,21 +264,22 @@ class ProjectReader {
     name_ = fs::absolute(project_.file).lexically_normal().parent_path().filename().string();
     MODAR_ASSIGN(const auto reader, table(project_.file, root_, "project"));
     if (!reader) return {};
-    MODAR_TRY(reader->allow({"name", "out", "cache"}));
+    MODAR_TRY(reader->allow({"name", "out", "cache", "light"}));
     MODAR_TRY(reader->take("name", name_));
     MODAR_TRY(reader->take("out", project_.out));
-    return reader->take("cache", project_.cache);
+    MODAR_TRY(reader->take("cache", project_.cache));
+    return take_light(*reader, light_);
   }
 
   Result<void> read_bake() {
     MODAR_ASSIGN(const auto reader, table(project_.file, root_, "bake"));
     if (reader) {
-      MODAR_TRY(reader->allow(keys_with_settings({}, true, true)));
+      MODAR_TRY(reader->allow(keys_with_settings({}, std::nullopt)));
       MODAR_TRY(reader->take_settings(project_.settings));
     }
     MODAR_ASSIGN(const auto tiers, tables(project_.file, root_, "tier"));
     for (const TableReader& tier : tiers) {
-      MODAR_TRY(tier.allow(keys_with_settings({"name"}, true, true)));
+      MODAR_TRY(tier.allow(keys_with_settings({"name"}, std::nullopt)));
       ProjectTier read;
       MODAR_TRY(tier.take("name", read.name));
       if (read.name.empty()) return tier.wrong("name", "a name, which the files get");
@@ -290,7 +293,8 @@ class ProjectReader {
   Result<void> read_assets(const std::string& kind, bool pattern,
                            std::vector<ProjectAsset>& assets) {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, kind));
-    Keys keys = keys_with_settings({"file", "name"}, !pattern, pattern);
+    Keys keys = keys_with_settings({"file", "name"},
+                                   pattern ? Setting::Part::kPattern : Setting::Part::kModel);
     if (pattern) keys.push_back("width-mm");
     std::set<std::string> seen;
     for (const TableReader& reader : readers) {
@@ -343,7 +347,8 @@ class ProjectReader {
   Result<void> read_scenes() {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
     for (const TableReader& reader : readers) {
-      MODAR_TRY(reader.allow({"pattern", "model", "scale", "up", "offset", "centred", "text"}));
+      MODAR_TRY(
+          reader.allow({"pattern", "model", "scale", "up", "offset", "centred", "light", "text"}));
       ProjectScene scene;
       MODAR_TRY(reader.take("pattern", scene.request.pattern));
       MODAR_TRY(reader.take("model", scene.request.model));
@@ -358,11 +363,22 @@ class ProjectReader {
       scene.request.up = *axis;
       MODAR_TRY(reader.take("offset", scene.request.offset));
       MODAR_TRY(reader.take("centred", scene.request.centred));
+      scene.request.light = light_;
+      MODAR_TRY(take_light(reader, scene.request.light));
       MODAR_TRY(reader.take("text", scene.texts));
       project_.scenes.push_back(std::move(scene));
     }
     if (readers.empty()) make_scenes();
     return {};
+  }
+
+  /// The picture of a room; relative to the project's folder, as models are.
+  Result<void> take_light(const TableReader& reader, std::string& light) const {
+    MODAR_TRY(reader.take("light", light));
+    std::error_code error;
+    if (light.empty() || fs::is_regular_file(project_.path(light), error)) return {};
+    return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("light"),
+                "there is no file '" + light + "'", "correct the name, or take the line out");
   }
 
   static Result<void> known(const TableReader& reader, const char* key, const std::string& name,
@@ -386,6 +402,7 @@ class ProjectReader {
         ProjectScene scene;
         scene.request.pattern = pattern.name;
         scene.request.model = model.name;
+        scene.request.light = light_;
         project_.scenes.push_back(std::move(scene));
       }
     }
@@ -423,7 +440,8 @@ class ProjectReader {
 
   const toml::table& root_;
   Project project_;
-  std::string name_;  // of the only bundle
+  std::string name_;   // of the only bundle
+  std::string light_;  // of scenes that name none
 };
 
 }  // namespace

@@ -58,18 +58,19 @@ Result<void> take_parameters(const std::string& value, BakeRequest& request) {
 }
 
 using Kind = Setting::Kind;
+using Part = Setting::Part;
 
 constexpr Setting kSettings[] = {
-    {"max-texture", Kind::kNumber, false,
+    {"max-texture", Kind::kNumber, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        return take_number(value, 4, kMaxTextureSide, request.textures.max_side);
      }},
-    {"mipmaps", Kind::kTruth, false,
+    {"mipmaps", Kind::kTruth, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        request.textures.mipmaps = value == "true";
        return Result<void>();
      }},
-    {"effort", Kind::kText, false,
+    {"effort", Kind::kText, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        return take_word<TextureEffort, TextureEffort>(value,
                                                       {{"fast", TextureEffort::kFast},
@@ -77,49 +78,59 @@ constexpr Setting kSettings[] = {
                                                        {"best", TextureEffort::kBest}},
                                                       request.textures.effort);
      }},
-    {"perceptual", Kind::kTruth, false,
+    {"perceptual", Kind::kTruth, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        request.textures.perceptual = value == "true";
        return Result<void>();
      }},
-    {"unit", Kind::kText, false,
+    {"unit", Kind::kText, Part::kModel,
      [](const std::string& value, BakeRequest& request) -> Result<void> {
        MODAR_ASSIGN(request.unit_metres, parse_unit(value));
        return {};
      }},
-    {"max-error", Kind::kText, false,
+    {"max-error", Kind::kText, Part::kModel,
      [](const std::string& value, BakeRequest& request) -> Result<void> {
        MODAR_ASSIGN(request.max_error, parse_max_error(value));
        return {};
      }},
-    {"positions", Kind::kText, false,
+    {"positions", Kind::kText, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        return take_word<std::optional<PositionKind>, PositionKind>(
            value, {{"half", PositionKind::kHalf}, {"int16", PositionKind::kInt16}},
            request.positions);
      }},
-    {"lods", Kind::kNumber, false,
+    {"lods", Kind::kNumber, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        return take_number(value, 1, kMaxLevels, request.levels);
      }},
-    {"topology", Kind::kTruth, false,
+    {"topology", Kind::kTruth, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        request.topology = value == "true";
        return Result<void>();
      }},
+    {"occlusion", Kind::kTruth, Part::kModel,
+     [](const std::string& value, BakeRequest& request) {
+       request.occlusion = value == "true";
+       return Result<void>();
+     }},
+    {"shadows", Kind::kTruth, Part::kScene,
+     [](const std::string& value, BakeRequest& request) {
+       request.shadows = value == "true";
+       return Result<void>();
+     }},
     // After max-texture, which both lower.
-    {"tier", Kind::kText, false,
+    {"tier", Kind::kText, Part::kModel,
      [](const std::string& value, BakeRequest& request) { return plan_for_tier(value, request); }},
-    {"device", Kind::kText, false,
+    {"device", Kind::kText, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        return plan_for_device(value, request);
      }},
-    {"loop-views", Kind::kNumber, true,
+    {"loop-views", Kind::kNumber, Part::kPattern,
      [](const std::string& value, BakeRequest& request) {
        return take_number(value, 1, 10000, request.loop.trial_views);
      }},
-    {"parameters", Kind::kTexts, true, take_parameters},
-    {"score", Kind::kTruth, true,
+    {"parameters", Kind::kTexts, Part::kPattern, take_parameters},
+    {"score", Kind::kTruth, Part::kPattern,
      [](const std::string& value, BakeRequest& request) {
        request.loop.score = value == "true";
        return Result<void>();
@@ -144,11 +155,11 @@ Result<void> apply_settings(const Settings& settings, BakeRequest& request) {
   return {};
 }
 
-Settings settings_of(const Settings& settings, bool pattern) {
+Settings settings_of(const Settings& settings, Setting::Part part) {
   Settings mine;
   for (const Setting& setting : kSettings) {
     const auto found = settings.find(setting.key);
-    if (setting.of_patterns == pattern && found != settings.end()) mine.insert(*found);
+    if (setting.part == part && found != settings.end()) mine.insert(*found);
   }
   return mine;
 }

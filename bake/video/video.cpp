@@ -42,7 +42,7 @@ Result<Video> Video::open(const std::string& path) {
   if (library.open == nullptr || library.next == nullptr || library.close == nullptr) {
     return fail(ExitCode::kIo, "video.library", library_file(),
                 "the library that reads videos cannot be loaded",
-                "install libopencv-videoio406, or build ModAR again");
+                "install modar-player and libopencv-videoio406, or build ModAR again");
   }
   Video video;
   if (void* reader = library.open(path.c_str(), &video.frames_)) {

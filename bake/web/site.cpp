@@ -14,6 +14,7 @@
 #include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
+#include "formats/html.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/release.hpp"
@@ -64,27 +65,6 @@ Result<void> put(Draft& draft, const std::string& name, const std::string& text)
 Result<std::string> page_text(const Draft& draft, const std::string& name) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.page + "/" + name));
   return std::string(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
-}
-
-/// A text as it stands in HTML.
-std::string escaped(std::string_view text) {
-  std::string html;
-  for (const char letter : text) {
-    switch (letter) {
-      case '&':
-        html += "&amp;";
-        break;
-      case '<':
-        html += "&lt;";
-        break;
-      case '"':
-        html += "&quot;";
-        break;
-      default:
-        html += letter;
-    }
-  }
-  return html;
 }
 
 /// A name as part of an address: what is no letter, digit or dash becomes a dash.
@@ -298,12 +278,12 @@ Result<void> put_entry(Draft& draft, const std::string& title) {
   MODAR_ASSIGN(std::string html, page_text(draft, "index.html"));
   constexpr std::string_view kTitle = "<title>ModAR</title>";
   if (const std::size_t at = html.find(kTitle); at != std::string::npos) {
-    html.replace(at, kTitle.size(), "<title>" + escaped(title) + "</title>");
+    html.replace(at, kTitle.size(), "<title>" + escape_html(title) + "</title>");
   }
   constexpr std::string_view kConnect = "connect-src 'self'";
   if (const std::size_t at = html.find(kConnect); at != std::string::npos) {
     const std::string origin = origin_of(draft.options.release);
-    if (!origin.empty()) html.insert(at + kConnect.size(), " " + escaped(origin));
+    if (!origin.empty()) html.insert(at + kConnect.size(), " " + escape_html(origin));
   }
   MODAR_TRY(put(draft, "index.html", html));
   const auto icon = [](const char* file, const char* sizes, const char* type) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "formats/html.hpp"
+
 namespace modar {
 namespace {
 
@@ -79,29 +81,6 @@ film.addEventListener('seeked',show);
 (function tick(){show();requestAnimationFrame(tick)})();
 )";
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 /// A number with that many decimals, 1 to 6, and a point in any locale.
 std::string fixed(double value, int decimals) {
   if (!(std::abs(value) < 1e9)) return "-";
@@ -121,7 +100,7 @@ std::string what(const PageFrame& frame) {
 }
 
 void add_card(std::string& page, const std::string& value, const std::string& label) {
-  page += "<div class=card><b>" + value + "</b><span>" + escaped(label) + "</span></div>\n";
+  page += "<div class=card><b>" + value + "</b><span>" + escape_html(label) + "</span></div>\n";
 }
 
 void add_cards(std::string& page, const RunStats& stats) {
@@ -150,7 +129,7 @@ void add_strip(std::string& page, std::span<const PageFrame> frames) {
     while (end < frames.size() && what(frames[end]) == text) ++end;
     page += "<rect class=" + std::string(to_string(frames[first].state)) +
             " x=" + std::to_string(first) + " width=" + std::to_string(end - first) +
-            " height=1><title>" + escaped(text) + "</title></rect>\n";
+            " height=1><title>" + escape_html(text) + "</title></rect>\n";
     first = end;
   }
   page += "</svg><i id=head></i></div>\n";
@@ -162,8 +141,8 @@ void add_reasons(std::string& page, const RunStats& stats) {
       "<span class=hidden>hidden</span>";
   for (const Reason reason : kReasons) {
     if (reason == Reason::kVisible || stats.count(reason) == 0) continue;
-    page +=
-        "<em>" + escaped(to_string(reason)) + ": " + std::to_string(stats.count(reason)) + "</em>";
+    page += "<em>" + escape_html(to_string(reason)) + ": " + std::to_string(stats.count(reason)) +
+            "</em>";
   }
   page += "</p>\n";
 }
@@ -175,7 +154,7 @@ void add_table(std::string& page, std::span<const PageFrame> frames) {
   for (const PageFrame& frame : frames) {
     page += "<tr class=" + std::string(to_string(frame.state)) + "><td>" +
             std::to_string(frame.frame) + "<td>" + fixed(frame.time_s, 2) + "<td>" +
-            escaped(what(frame)) + "<td>" + escaped(frame.patterns);
+            escape_html(what(frame)) + "<td>" + escape_html(frame.patterns);
     page += "<td>" + (frame.seen ? std::to_string(frame.inliers) : std::string());
     page += "<td>" + (frame.seen ? std::to_string(frame.matches) : std::string()) + "</tr>\n";
   }
@@ -189,10 +168,10 @@ std::string report_page(const ReportTitle& title, double fps, std::span<const Pa
   std::string page =
       "<!doctype html>\n<html lang=en><head><meta charset=utf-8>\n"
       "<meta name=viewport content=\"width=device-width,initial-scale=1\">\n<title>";
-  page += escaped(title.bundle) + " on " + escaped(title.input) + "</title>\n<style>" +
+  page += escape_html(title.bundle) + " on " + escape_html(title.input) + "</title>\n<style>" +
           std::string(kReportStyle) + "</style></head>\n<body><main>\n";
-  page += "<h1>" + escaped(title.bundle) + " <small>on " + escaped(title.input) + ", method " +
-          escaped(title.method) + "</small></h1>\n";
+  page += "<h1>" + escape_html(title.bundle) + " <small>on " + escape_html(title.input) +
+          ", method " + escape_html(title.method) + "</small></h1>\n";
   add_cards(page, stats);
   page += "<video id=film src=overlay.mp4 controls loop muted playsinline preload=auto></video>\n";
   add_strip(page, frames);

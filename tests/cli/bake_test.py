@@ -71,7 +71,7 @@ class Bake(ProgramTest):
 
     def test_the_shape_of_models_is_told(self):
         out = self.folder / "shape.modar"
-        report = self.modar_json("bake", "--model", STATUE, "--no-lods", "--topology", "-o", out)
+        report = self.modar_json("bake", "--model", STATUE, "--no-lods", "--no-ao", "--topology", "-o", out)
         shape = report["bundle"]["models"][0]["topology"]
         faces = [[int(corner.split("/")[0]) for corner in line.split()[1:]]
                  for line in STATUE.read_text().splitlines() if line.startswith("f ")]
@@ -86,11 +86,11 @@ class Bake(ProgramTest):
         self.assertEqual(shape["euler"], len({v for face in faces for v in face}) - len(edges) + len(faces))
         self.assertEqual([h["model"] for h in report["half_edges"]], ["statue"])
         self.assertIn("boundary loops", self.modar("inspect", out).stdout)
-        without = self.modar_json("bake", "--model", STATUE, "--no-lods", "-o", out)
+        without = self.modar_json("bake", "--model", STATUE, "--no-lods", "--no-ao", "-o", out)
         self.assertIsNone(without["bundle"]["models"][0]["topology"])
 
     def test_models_only_and_patterns_only_are_legal(self):
-        for arguments in (["--model", STATUE], ["--pattern", COVER, *QUICK]):
+        for arguments in (["--model", STATUE, "--no-ao"], ["--pattern", COVER, *QUICK]):
             out = self.folder / "one.modar"
             done = self.modar("bake", *arguments, "--no-lods", "-o", out)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -99,7 +99,7 @@ class Bake(ProgramTest):
     def test_models_are_merged_in_the_same_buffers(self):
         out = self.folder / "two.modar"
         report = self.modar_json("bake", "--model", POTTERY, STATUE, "--pattern", COVER, "--scene",
-                                 "cover=statue,scale=0.5,up=z", "cover=pottery", "--no-lods", "-o", out, *QUICK)
+                                 "cover=statue,scale=0.5,up=z", "cover=pottery", "--no-lods", "--no-ao", "-o", out, *QUICK)
         self.assertEqual([m["name"] for m in report["bundle"]["models"]], ["pottery", "statue"])
         self.assertEqual(report["bundle"]["scenes"][0]["scale"], 0.5)
         self.assertGreater(report["cpu_seconds"], 0)
@@ -110,7 +110,7 @@ class Bake(ProgramTest):
         out = self.folder / "fine.modar"
 
         def baked(*options):
-            done = self.modar("bake", "--model", STATUE, "-o", out, "--no-lods", *options)
+            done = self.modar("bake", "--model", STATUE, "-o", out, "--no-lods", "--no-ao", *options)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(self.modar("check", out).returncode, 0)
             return self.modar_json("inspect", out)["models"][0]
@@ -155,7 +155,7 @@ class Bake(ProgramTest):
 
     def test_a_device_profile_bounds_the_textures(self):
         out = self.folder / "small.modar"
-        report = self.modar_json("bake", "--model", POTTERY, "--max-texture", 64, "--device", "ace2", "-o", out)
+        report = self.modar_json("bake", "--model", POTTERY, "--max-texture", 64, "--device", "ace2", "--no-ao", "-o", out)
         texture = report["bundle"]["textures"][0]
         self.assertEqual((texture["width"], texture["height"], texture["levels"]), (64, 64, 7))
         done = self.modar("bake", "--model", POTTERY, "--device", "toaster", "-o", out)
@@ -190,11 +190,11 @@ class Bake(ProgramTest):
             (self.folder / f"{name}.obj").write_text(text)
         shutil.copy(POTTERY.parent / "pottery.mtl", self.folder)
         shutil.copy(POTTERY.parent / "pottery.png", self.folder)
-        report = self.modar_json("bake", "--model", "a.obj", "b.obj", "-o", "ab.modar")
+        report = self.modar_json("bake", "--model", "a.obj", "b.obj", "--no-ao", "--max-texture", 64, "-o", "ab.modar")
         self.assertEqual(len(report["bundle"]["textures"]), 1)
 
     def test_a_progress_bar_stays_out_of_pipes(self):
-        done = self.modar("bake", "--model", POTTERY, "-o", self.folder / "a.modar")
+        done = self.modar("bake", "--model", POTTERY, "--no-lods", "--no-ao", "-o", self.folder / "a.modar")
         self.assertNotIn("\r", done.stderr)
         self.assertNotIn("\x1b", done.stderr)
         self.assertEqual(done.stdout, "")

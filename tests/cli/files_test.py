@@ -6,7 +6,7 @@ import struct
 import subprocess
 import unittest
 
-from programs import BIN, COVER, POTTERY, QUICK, STATUE, ProgramTest
+from programs import BIN, COVER, POTTERY, STATUE, ProgramTest, picture
 
 GAME = COVER.parent / "game.png"
 
@@ -168,7 +168,7 @@ class EachFile(ProgramTest):
         self.project = self.folder / "project"
         self.project.mkdir()
         (self.project / "a_bad.png").write_text("no picture")
-        shutil.copy(GAME, self.project)
+        picture(self.project / "game.png")
 
     def run_json(self, *words):
         done = self.modar("pattern", *words, "--json")

@@ -3,9 +3,12 @@ import json
 import os
 import pathlib
 import shutil
+import struct
 import subprocess
 import tempfile
 import unittest
+import zlib
+from random import Random
 
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
 BIN = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin"))
@@ -16,6 +19,20 @@ COVER = ROOT / "assets" / "patterns" / "cover.png"
 
 # Few views of a pattern: enough for tests.
 QUICK = ["--loop-views", "8", "--no-score"]
+
+
+def picture(path, width=200, height=150):
+    """A PNG of gray rectangles, small enough to be a pattern in no time."""
+    random = Random(7)
+    rows = [bytearray([128] * width) for _ in range(height)]
+    for _ in range(150):
+        x, y, shade = random.randrange(width), random.randrange(height), random.randrange(256)
+        for row in rows[y:y + random.randrange(4, 20)]:
+            row[x:x + 16] = bytes([shade] * len(row[x:x + 16]))
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
+              (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b"")]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
 
 
 class ProgramTest(unittest.TestCase):

@@ -4,20 +4,19 @@ import os
 import pathlib
 import shutil
 import signal
-import struct
 import subprocess
 import time
 import tomllib
 import unittest
-import zlib
-from random import Random
 
-from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest
+from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest, picture
 
 SCHEMA = json.loads((ROOT / "bake/project/modar.schema.json").read_text())
 # Few views of a pattern, no scores, one level: enough for tests.
-FAST = "loop-views = 8\nscore = false\nlods = 1\nparameters = [\"none\"]\n"
-DIRECT = ["--loop-views", "8", "--no-score", "--no-lods", "--parameters", "none", "--quiet"]
+LIT = "loop-views = 8\nscore = false\nlods = 1\nparameters = [\"none\"]\n"
+FAST = LIT + "occlusion = false\nshadows = false\n"
+LIT_DIRECT = ["--loop-views", "8", "--no-score", "--no-lods", "--parameters", "none", "--quiet"]
+DIRECT = [*LIT_DIRECT, "--no-ao", "--no-shadows"]
 
 CUBE = """mtllib cube.mtl
 v 0 0 0
@@ -32,20 +31,6 @@ f 1/1 2/2 3/3
 f 1/1 3/3 4/2
 """
 CUBE_MTL = "newmtl wall\nKd 1 1 1\nmap_Kd wall.png\n"
-
-
-def picture(path, width=200, height=150):
-    """A PNG of gray rectangles, small enough to bake in no time."""
-    random = Random(7)
-    rows = [bytearray([128] * width) for _ in range(height)]
-    for _ in range(150):
-        x, y, shade = random.randrange(width), random.randrange(height), random.randrange(256)
-        for row in rows[y:y + random.randrange(4, 20)]:
-            row[x:x + 16] = bytes([shade] * len(row[x:x + 16]))
-    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
-              (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b"")]
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
 
 
 class ProjectTest(ProgramTest):
@@ -84,14 +69,15 @@ class ProjectTest(ProgramTest):
 
 class Files(ProjectTest):
     def test_one_model_and_one_pattern_are_the_bytes_of_a_single_bake(self):
-        self.write("[project]\nname = \"both\"\n[bake]\n" + FAST + f"[[model]]\nfile = \"{STATUE}\"\n"
+        self.write("[project]\nname = \"both\"\n[bake]\n" + LIT + f"[[model]]\nfile = \"{STATUE}\"\n"
                    f"[[model]]\nfile = \"{POTTERY}\"\n[[pattern]]\nfile = \"{COVER}\"\nwidth-mm = 210\n"
                    "[[scene]]\npattern = \"cover\"\nmodel = \"pottery\"\nup = \"y\"\nscale = 0.8\noffset = [0, 0.1, 0]\n"
+                   f"light = \"{COVER}\"\n"
                    "[[bundle]]\nname = \"one\"\npatterns = \"cov*\"\n")
         self.bake()
         direct = self.folder / "direct.modar"
         done = self.modar("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene",
-                          "cover=pottery,up=y,scale=0.8,offset=0:0.1:0", *DIRECT, "-o", direct)
+                          f"cover=pottery,up=y,scale=0.8,offset=0:0.1:0,light={COVER}", *LIT_DIRECT, "-o", direct)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((self.place / "out/one.modar").read_bytes(), direct.read_bytes())
 
@@ -231,12 +217,28 @@ class Again(ProjectTest):
         text = (self.place / "modar.toml").read_text()
         self.write(text.replace("lods = 1", "lods = 2"))
         self.assertEqual(sorted(self.reasons()), ["a", "b"])
+        self.write(text.replace("shadows = false", "shadows = true"))
+        self.assertEqual(self.reasons(), {})
         self.write(text.replace("loop-views = 8", "loop-views = 9"))
         self.assertEqual(self.reasons(), {"a": "its settings in modar.toml changed"})
         self.write(text + "[[scene]]\npattern = \"a\"\nmodel = \"b\"\n")
         report = self.bake()
         self.assertEqual({asset["state"] for asset in report["assets"]}, {"cached"})
         self.assertTrue(report["bundles"][0]["written"])
+
+    def test_light_concerns_the_bundle_alone(self):
+        room = self.place / "room.png"
+        picture(room, 64, 32)
+        self.write("[project]\nlight = \"room.png\"\n" + (self.place / "modar.toml").read_text())
+        self.bake("--depfile", "deps")
+        self.assertIn("room.png", (self.place / "deps").read_text())
+        dark = (self.place / "out/museum.modar").read_bytes()
+        picture(room, 32, 64)
+        report = self.bake()
+        self.assertEqual({asset["state"] for asset in report["assets"]}, {"cached"})
+        self.assertNotEqual((self.place / "out/museum.modar").read_bytes(), dark)
+        room.unlink()
+        self.assert_fails(self.modar("bake", cwd=self.place), 3, "modar.toml:2", "'room.png'", "project.no-match")
 
     def test_a_missing_file_is_noticed_when_it_comes(self):
         wall = (self.place / "models/wall.png").read_bytes()
@@ -368,6 +370,25 @@ class Plan(ProjectTest):
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         return done.stdout
 
+    def test_ssh_starts_elsewhere_and_takes_words_apart(self):
+        if shutil.which("ninja") is None:
+            self.skipTest("ninja is not installed")
+        shutil.move(self.place / "models/b.obj", self.place / "models/b $x 1.obj")
+        ssh = self.folder / "ssh"
+        ssh.write_text("#!/bin/sh\nshift\ncd / && exec sh -c \"$*\"\n")  # what sshd does with words
+        ssh.chmod(0o755)
+        shutil.copy(ROOT / "assets/models/bust.png", self.place / "room.png")
+        self.write("[project]\nlight = \"room.png\"\n" + (self.place / "modar.toml").read_text())
+        plan = self.modar("plan", "--ninja", "--run", f"{ssh} baker", cwd=self.place)
+        self.assertEqual(plan.returncode, 0, plan.stderr)
+        (self.place / "build.ninja").write_text(plan.stdout)
+        self.ninja()
+        bundle = (self.place / "out/museum.modar").read_bytes()
+        self.assertIn("no work to do", self.ninja())
+        (self.place / "room.png").write_bytes((self.place / "pictures/a.png").read_bytes())
+        self.assertIn("[1/1] link the bundles", self.ninja())
+        self.assertNotEqual((self.place / "out/museum.modar").read_bytes(), bundle)
+
     def test_ninja_bakes_each_asset_apart(self):
         if shutil.which("ninja") is None:
             self.skipTest("ninja is not installed")
@@ -391,6 +412,9 @@ class Plan(ProjectTest):
         shutil.rmtree(self.place / "out")
         self.bake()
         self.assertEqual((self.place / "out/museum.modar").read_bytes(), by_ninja)
+        (self.place / "modar.toml").touch()  # every edge runs, and the bundle stays as it is
+        self.ninja()
+        self.assertIn("no work to do", self.ninja())
 
 
 class Watch(ProjectTest):
@@ -430,7 +454,7 @@ class Init(ProjectTest):
         self.assertEqual([m["file"] for m in project["model"]], ["models/*.obj"])
         self.assertEqual([p["file"] for p in project["pattern"]], ["pictures/a.png"])  # wall.png is a texture
         self.assert_fails(self.modar("init", self.place), 1, "--force")
-        self.write(text.replace("[bake]", "[bake]\nloop-views = 8\nscore = false"))
+        self.write(text.replace("[bake]", "[bake]\nloop-views = 8\nscore = false\nocclusion = false"))
         self.bake()
         scenes = self.modar_json("inspect", self.place / "out/museum.modar")["scenes"]
         self.assertEqual([(s["pattern"], s["model"]) for s in scenes], [("a", "a")])  # by their name

@@ -37,6 +37,8 @@ class Rectify(ProgramTest):
         photo.polygon(list(zip(true[::2], true[1::2])), (40, 60, 120))
         photo.box(180, 130, 240, 180, (220, 200, 40))
         png.write(self.folder / "photo.png", photo.picture(), 6)
+        photo.box(80, 120, 130, 160, (190, 180, 160))  # a finger over a fifth of the left side
+        png.write(self.folder / "held.png", photo.picture(), 6)
         png.write(self.folder / "empty.png", Canvas(420, 320, (190, 180, 160), 2).picture(), 6)
         done = self.modar("pattern", "rectify", "photo.png", "-o", "cover.png", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -46,6 +48,12 @@ class Rectify(ProgramTest):
             self.assertAlmostEqual(one, other, delta=0.01 * width)
         self.assertIn("--corners", done.stderr)
         self.assertEqual(png_size(self.folder / "cover.corners.png"), (420, 320))
+        self.assertFalse(json.loads(done.stdout)["doubtful"])
+        self.assertNotIn("rectify.doubtful", done.stderr)
+        done = self.modar("pattern", "rectify", "held.png", "-o", "held-cover.png", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue(json.loads(done.stdout)["doubtful"])
+        self.assertIn("rectify.doubtful", done.stderr)
         self.assert_fails(self.modar("pattern", "rectify", "empty.png", "-o", "again.png"), 3, "--corners",
                           "rectify.not-found")
         self.assertFalse((self.folder / "again.png").exists())

@@ -6,7 +6,7 @@ import subprocess
 import unittest
 from html.parser import HTMLParser
 
-from programs import POTTERY, ProgramTest
+from programs import POTTERY, ProgramTest, picture
 
 VOID = {"meta", "link", "img", "br", "rect", "path"}
 
@@ -93,6 +93,16 @@ class Report(ProgramTest):
         self.assertEqual(len([i for i in page.all("img") if "difference" in i["alt"]]), 1)
         (self.folder / "bake.json").write_text("{}")
         self.assert_fails(self.modar("report", bundle, "-o", "x.html", "--bake", "bake.json", "--quiet"), 3, "report.bake")
+
+    def test_a_pattern_shows_its_grade_and_range(self):
+        picture(self.folder / "small.png")  # 200 x 150 pixels of full contrast
+        done = self.modar("bake", "--pattern", "small.png:150mm", "-o", "b.modar", "--loop-views", "8", "--parameters", "none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        page = self.report(self.folder / "b.modar")
+        self.assertIn(page.words[page.words.index("Grade, A to E") + 1], list("ABCDE"))
+        words = " ".join(page.words)
+        self.assertRegex(words, r"Recognised from [\d.]+ c?m to [\d.]+ m, to \d+ degrees, \d+ % right when half covered\.")
+        self.assertIn("Give a larger picture", words)
 
     def test_areas_are_as_sizes(self):
         bundle = self.bake_demo()

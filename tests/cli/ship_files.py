@@ -1,4 +1,5 @@
 """Keys, bundles and releases for the tests of shipping."""
+import atexit
 import functools
 import json
 import math
@@ -63,14 +64,17 @@ class Shop:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
+@functools.cache
+def the_shop():
+    shop = Shop()
+    atexit.register(shop.close)
+    return shop
+
+
 class ShipTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        cls.shop = Shop()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.shop.close()
+        cls.shop = the_shop()
 
     def setUp(self):
         super().setUp()
