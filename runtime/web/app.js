@@ -510,8 +510,11 @@ function listen() {
   });
 }
 
-listen();
-prepare().catch(tell);
-if ('serviceWorker' in navigator && globalThis.isSecureContext) {
+/** Keeps the page for visits without a network, once it has what it needs now. */
+function keep() {
+  if (!('serviceWorker' in navigator) || !globalThis.isSecureContext) return;
   navigator.serviceWorker.register('sw.js').catch(() => {});  // the page works without it, but not offline
 }
+
+listen();
+prepare().catch(tell).then(() => loading?.done.catch(() => {})).then(keep);
