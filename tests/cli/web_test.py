@@ -1,4 +1,5 @@
 """`modar web`: the folder that it writes, what it refuses, and its server. The page itself: tests/web."""
+import html
 import json
 import os
 import re
@@ -49,7 +50,7 @@ class Web(ProgramTest):
         hint = self.read(pattern["image"])
         self.assertEqual(hint[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(struct.unpack(">II", hint[16:24]), (pattern["width"], pattern["height"]))
-        self.assertIn("<title>A &lt;b> &amp; &quot;c&quot;</title>", self.read("index.html").decode())
+        self.assertIn(f"<title>{html.escape(site['title'])}</title>", self.read("index.html").decode())
         self.assertEqual(json.loads(self.read("manifest.webmanifest"))["name"], 'A <b> & "c"')
         # What a visitor keeps is all that there is, but for the worker that keeps it.
         kept = re.match(r"const SITE = (\{.*?\n\})\s*;\n", self.read("sw.js").decode(), re.S)
