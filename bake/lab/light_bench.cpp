@@ -1,8 +1,6 @@
 // One bundle of all models on one pattern; each drawn twice by the renderer and once by paths.
 #include "bake/lab/light_bench.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,6 +19,7 @@
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/path_tracer.hpp"
 #include "bake/mesh/weld/weld.hpp"
+#include "bake/process.hpp"
 #include "formats/bundle_writer.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/render_bench.hpp"
@@ -35,27 +34,6 @@ constexpr glm::dvec3 kTable(0.66, 0.58, 0.49);
 constexpr double kScale = 0.6;
 /// A pixel belongs to the shadow where the reference differs by so much of the ground alone.
 constexpr double kChange = 0.01;
-
-/// A folder of its own under the system's for temporary files, gone at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder()
-      : path_(std::filesystem::temp_directory_path() /
-              ("modar_light_" + std::to_string(::getpid()))) {
-    std::error_code error;
-    std::filesystem::create_directories(path_, error);
-  }
-  ~TemporaryFolder() {
-    std::error_code error;
-    std::filesystem::remove_all(path_, error);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 struct Subject {
   std::string path;
@@ -354,7 +332,7 @@ Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options) {
   std::vector<Subject> subjects;
   for (const std::string& argument : options.models) subjects.push_back(subject_of(argument));
   if (options.made) {
-    MODAR_ASSIGN(const auto made, make_light_subjects(folder.path().string()));
+    MODAR_ASSIGN(const auto made, make_light_subjects(folder.path()));
     for (const std::string& path : made) subjects.push_back({path, UpAxis::kZ});
   }
   MODAR_ASSIGN(const std::vector<std::byte> bytes, bake_scenes(subjects, options));

@@ -18,7 +18,7 @@
 namespace modar {
 namespace {
 
-constexpr double kTurn = 6.283185307179586;
+constexpr double kFullTurn = 6.283185307179586;
 
 /// The text of an OBJ file as it grows.
 class ObjText {
@@ -33,7 +33,7 @@ class ObjText {
     const int first = vertices_ + 1;
     for (const glm::dvec2& ring : rings) {
       for (int i = 0; i < kSectors; ++i) {
-        const double angle = kTurn * i / kSectors;
+        const double angle = kFullTurn * i / kSectors;
         vertex(ring.x * std::cos(angle), ring.x * std::sin(angle), ring.y);
       }
     }
@@ -121,7 +121,8 @@ RgbaImage leaves() {
         const glm::dvec2 from = p - all[i].root;
         const double u = glm::dot(from, axis) / length;
         const double v = glm::dot(from, glm::dvec2(-axis.y, axis.x));
-        const double half = u > 0 && u < 1 ? all[i].width * length * std::sin(kTurn / 2 * u) : -1.0;
+        const double half =
+            u > 0 && u < 1 ? all[i].width * length * std::sin(kFullTurn / 2 * u) : -1.0;
         if (half - std::fabs(v) < inside) continue;
         inside = half - std::fabs(v);
         shade = 0.7 + 0.04 * static_cast<double>(i % 7) + (std::fabs(v) < 0.005 ? 0.12 : 0.0);
@@ -153,7 +154,7 @@ Result<std::vector<std::string>> make_light_subjects(const std::string& folder) 
   plant.material("pot");
   plant.lathe({{0.0, 0.0}, {0.30, 0.0}, {0.42, 0.55}, {0.46, 0.55}, {0.46, 0.62}, {0.0, 0.58}});
   plant.material("leaves");
-  for (int i = 0; i < 3; ++i) plant.card(kTurn * i / 6 + 0.3, 0.8, 0.55, 2.1);
+  for (int i = 0; i < 3; ++i) plant.card(kFullTurn * i / 6 + 0.3, 0.8, 0.55, 2.1);
   MODAR_TRY(write_text(in / "plant.obj", plant.text()));
   MODAR_TRY(write_text(in / "glass.mtl",
                        "newmtl glass\nKd 0.55 0.72 0.78\nKs 0.9 0.9 0.9\nNs 60\nd 0.35\n"
@@ -162,7 +163,7 @@ Result<std::vector<std::string>> make_light_subjects(const std::string& folder) 
   glass.material("ball");
   std::vector<glm::dvec2> ball;
   for (int i = 0; i <= 24; ++i) {
-    const double angle = kTurn / 2 * i / 24;
+    const double angle = kFullTurn / 2 * i / 24;
     ball.emplace_back(0.4 * std::sin(angle), 0.5 - 0.4 * std::cos(angle));
   }
   glass.lathe(ball);
@@ -170,7 +171,7 @@ Result<std::vector<std::string>> make_light_subjects(const std::string& folder) 
   std::vector<glm::dvec2> bowl;
   for (int i = 0; i <= 24; ++i) {
     const double t = i / 24.0;
-    bowl.emplace_back(0.9 * std::sin(kTurn / 4 * std::min(1.0, 0.03 + 1.3 * t)), 1.3 * t * t);
+    bowl.emplace_back(0.9 * std::sin(kFullTurn / 4 * std::min(1.0, 0.03 + 1.3 * t)), 1.3 * t * t);
   }
   glass.lathe(bowl);
   MODAR_TRY(write_text(in / "glass.obj", glass.text()));
