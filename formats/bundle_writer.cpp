@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "formats/atomic_file.hpp"
+#include "formats/colour_grid.hpp"
+#include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
 
 #define XXH_INLINE_ALL
@@ -266,7 +268,16 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   const bool hiding =
       std::any_of(content.materials.begin(), content.materials.end(),
                   [](const MaterialRecord& m) { return (m.flags & kMaterialOccluder) != 0; });
-  if (shadowed || hiding || !content.lights.empty() || !content.occlusion.empty()) return 2;
+  const bool coloured =
+      std::any_of(content.extra.begin(), content.extra.end(), [](const ExtraSection& section) {
+        return section.type == static_cast<std::uint32_t>(kPatternColours);
+      });
+  const bool cut_out =
+      std::any_of(content.textures.begin(), content.textures.end(),
+                  [](const TextureRecord& t) { return (t.flags & kTextureCutOut) != 0; });
+  if (shadowed || hiding || coloured || cut_out || !content.lights.empty() ||
+      !content.occlusion.empty())
+    return 2;
   return 1;
 }
 

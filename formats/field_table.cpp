@@ -1,5 +1,6 @@
 // Names, places and types of all fields, taken from the structs by the compiler.
 #include "formats/field_table.hpp"
+#include "formats/colour_grid.hpp"
 
 #include <cstring>
 #include <type_traits>
@@ -129,6 +130,9 @@ constexpr FieldInfo kLightRecord[] = {
     MODAR_FIELD(LightRecord, key),   MODAR_FIELD(LightRecord, reserved1)};
 constexpr FieldInfo kOcclusionRecord[] = {MODAR_FIELD(OcclusionRecord, layout),
                                           MODAR_FIELD(OcclusionRecord, offset)};
+constexpr FieldInfo kColourGridHeader[] = {MODAR_FIELD(ColourGridHeader, columns),
+                                           MODAR_FIELD(ColourGridHeader, rows),
+                                           MODAR_FIELD(ColourGridHeader, reserved)};
 constexpr FieldInfo kShadowHeader[] = {
     MODAR_FIELD(ShadowHeader, width), MODAR_FIELD(ShadowHeader, height),
     MODAR_FIELD(ShadowHeader, low), MODAR_FIELD(ShadowHeader, high),
@@ -186,6 +190,7 @@ constexpr RecordInfo kRecords[] = {
     {"AttributeRecord", nullptr, SectionType::kNames, sizeof(AttributeRecord), kAttributeRecord},
     {"FeatureHeader", nullptr, SectionType::kNames, sizeof(FeatureHeader), kFeatureHeader},
     {"KeypointRecord", nullptr, SectionType::kNames, sizeof(KeypointRecord), kKeypointRecord},
+    {"ColourGridHeader", nullptr, SectionType::kNames, sizeof(ColourGridHeader), kColourGridHeader},
     {"ShadowHeader", nullptr, SectionType::kNames, sizeof(ShadowHeader), kShadowHeader},
 };
 

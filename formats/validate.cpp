@@ -9,6 +9,7 @@
 
 #include "formats/bits.hpp"
 #include "formats/check.hpp"
+#include "formats/colour_grid.hpp"
 #include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
 
@@ -45,6 +46,7 @@ constexpr KnownType kKnownTypes[] = {
     {SectionType::kMappedFeatures, kSectionRequired, true},
     {SectionType::kFeatureYml, 0, true},
     {SectionType::kTrackerRecord, 0, true},
+    {kPatternColours, 0, true},
     {SectionType::kShadow, 0, true},
     {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
     {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
@@ -568,7 +570,7 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
   check.name(texture.name);
   check.number(texture.psnr_db, "psnr_db", 0.0, kMaxPsnr);
   check.number(texture.ssim, "ssim", -1.0, 1.0);
-  check.flags(texture.flags, kTextureAlpha | kTextureRepeat);
+  check.flags(texture.flags, kTextureAlpha | kTextureRepeat | kTextureCutOut);
   check.reserved(texture.reserved, sizeof(texture.reserved));
   if (find_texture_format(texture.format) == nullptr) {
     check.fault(Rule::kEnum, &texture.format,
@@ -741,6 +743,27 @@ void check_shadow(const RecordCheck& check, const BundleParts& parts, const Sect
   }
 }
 
+void check_colours(const RecordCheck& check, const BundleParts& parts, const SectionEntry& entry) {
+  if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
+    return check.fault(Rule::kSectionOwner, &entry.owner,
+                       "pattern " + std::to_string(entry.owner) + " is not there");
+  }
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  if (bytes.size() < sizeof(ColourGridHeader)) {
+    return check.fault(Rule::kPattern, &entry.size, "its colours are too few for their header");
+  }
+  const auto& header = *reinterpret_cast<const ColourGridHeader*>(bytes.data());
+  check.reserved(header.reserved, sizeof(header.reserved));
+  const bool sized = std::min(header.columns, header.rows) >= 1 &&
+                     std::max(header.columns, header.rows) <= kMaxColourCells;
+  constexpr std::size_t kCell = 3 * sizeof(std::uint16_t);
+  if (!sized || bytes.size() - sizeof header != header.columns * header.rows * kCell) {
+    check.fault(Rule::kPattern, &header.columns,
+                std::to_string(header.columns) + " x " + std::to_string(header.rows) +
+                    " colours do not fill their section");
+  }
+}
+
 /// Sections that belong to a record: the record is there, and so is the parameter set.
 void check_owned_sections(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.sections.size() && !log.stop(); ++i) {
@@ -761,6 +784,8 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
       } else if (type == SectionType::kMappedFeatures) {
         check_twin(check, parts, entry, parts.parameter_sets[set]);
       }
+    } else if (type == kPatternColours) {
+      check_colours(check, parts, entry);
     } else if (type == SectionType::kShadow) {
       check_shadow(check, parts, entry);
     } else if (type == SectionType::kTrackerRecord) {

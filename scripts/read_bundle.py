@@ -11,7 +11,7 @@ import math
 import struct
 import sys
 
-from bundle_bytes import (FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, Bundle, Fault, at_least, digest, flags_known, follow,
+from bundle_bytes import (COLOURS, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, Bundle, Fault, at_least, digest, flags_known, follow,
                           need)
 from bundle_models import check_models, check_tight, decode_level
 from bundle_summary import check_summary
@@ -27,7 +27,7 @@ def check_textures(bundle):
            "BUNDLE_TEXTURE_RANGE")
     for number, row in enumerate(tables["textures"]):
         width, height, at = row["width"], row["height"], row["at"]
-        flags_known(bundle, row, 3)
+        flags_known(bundle, row, 7)
         need(row["format"] == 1, "BUNDLE_ENUM", at, "format")
         need(-1 <= row["ssim"] <= 1 and 0 <= row["psnr_db"] <= 140, "BUNDLE_NUMBER", at, "quality")
         need(1 <= min(width, height) and max(width, height) <= 8192 and
@@ -111,12 +111,25 @@ def read_shadow(bundle, owner, variant, data):
          all(low < high for low, high in zip(head["low"], head["high"])), "BUNDLE_SCENE", 0, "a shadow")
 
 
+def read_colours(bundle, owner, variant, data):
+    """The colours of a pattern: three 16-bit numbers a cell."""
+    need(owner < len(bundle.tables["patterns"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+    need(len(data) >= 16, "BUNDLE_PATTERN", 0, "colours are too few")
+    head = COLOURS.decode(data, 0)
+    bundle.clean(head)
+    sides = (head["columns"], head["rows"])
+    need(1 <= min(sides) and max(sides) <= 16 and len(data) == 16 + 6 * sides[0] * sides[1], "BUNDLE_PATTERN", 0,
+         "colours")
+
+
 def read_features(bundle):
     tables, out = bundle.tables, []
     sets = {row["id"]: row for row in tables["parameter_sets"]}
     for (kind, owner, variant), data in bundle.payload.items():
         if kind == 514:
             need(owner < len(tables["textures"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+        if kind == 259:
+            read_colours(bundle, owner, variant, data)
         if kind == 260:
             read_shadow(bundle, owner, variant, data)
         if kind in (256, 257):

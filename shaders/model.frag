@@ -1,6 +1,7 @@
 // Lit surface: base colour (texture, vertex colour, or white) times light, plus what is added; both
 // come from model.vert as factors and summands of sRGB.
-// Defines: TEXTURED; ALPHA_TWIN (alpha is the luminance of a second texture); COLOURED; SHINY.
+// Defines: TEXTURED; ALPHA_TWIN (alpha is the luminance of a second texture), and with it
+// CUT_OUT (there or not); COLOURED; SHINY.
 precision mediump float;
 varying vec3 v_light;
 #ifdef SHINY
@@ -30,8 +31,13 @@ void main() {
 #endif
 #ifdef ALPHA_TWIN
   base.a *= texture2D(u_alpha, v_uv).g;
+#ifdef CUT_OUT
+  if (base.a < 0.5) discard;
+  base.a = 1.0;
+#else
   // Empty texels must not fill the depth buffer.
   if (base.a < 0.03) discard;
+#endif
 #endif
 #ifdef COLOURED
   base *= v_colour;

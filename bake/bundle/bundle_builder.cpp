@@ -22,6 +22,7 @@
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/texture/texture_stage.hpp"
+#include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/features.hpp"
@@ -319,6 +320,14 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   section.owner = static_cast<std::uint32_t>(content.patterns.size());
   section.bytes = std::move(baked->loop_record);
   content.extra.push_back(std::move(section));
+  if (!is_target_file(request.path)) {
+    // A target file names a part of a picture: its light is not estimated.
+    ExtraSection colours;
+    colours.type = static_cast<std::uint32_t>(kPatternColours);
+    colours.owner = static_cast<std::uint32_t>(content.patterns.size());
+    MODAR_ASSIGN(colours.bytes, pattern_colours(request.path));
+    content.extra.push_back(std::move(colours));
+  }
   content.patterns.push_back(record);
   content.features.push_back(std::move(baked->features));
   return {};

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
 
 namespace modar {
@@ -162,6 +163,14 @@ class Linker {
     const auto tracker = part.section(SectionType::kTrackerRecord, 0);
     section.bytes.assign(tracker.begin(), tracker.end());
     content_.extra.push_back(std::move(section));
+    const auto colours = part.section(kPatternColours, 0);
+    if (!colours.empty()) {
+      ExtraSection grid;
+      grid.type = static_cast<std::uint32_t>(kPatternColours);
+      grid.owner = static_cast<std::uint32_t>(content_.patterns.size());
+      grid.bytes.assign(colours.begin(), colours.end());
+      content_.extra.push_back(std::move(grid));
+    }
     std::vector<FeatureContent> features;
     for (std::uint32_t s = 0; s < part.parameter_sets().size(); ++s) {
       const std::uint32_t set = part.parameter_sets()[s].id;

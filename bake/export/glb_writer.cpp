@@ -10,6 +10,7 @@
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/atomic_file.hpp"
+#include "formats/texture_format.hpp"
 
 namespace modar {
 namespace {
@@ -124,12 +125,15 @@ void GlbBuilder::add_materials() {
     }
     pbr.baseColorFactor[3] = std::clamp(static_cast<double>(source.opacity), 0.0, 1.0);
     bool blend = source.opacity < 1.0f;
+    bool cut_out = false;
     for (const auto& [texture, index] : textures_) {
       if (texture != source.texture) continue;
       pbr.baseColorTexture.index = index;
-      blend = blend || (bundle_.textures()[texture].flags & kTextureAlpha) != 0;
+      const std::uint32_t flags = bundle_.textures()[texture].flags;
+      cut_out = (flags & kTextureCutOut) != 0;
+      blend = blend || ((flags & kTextureAlpha) != 0 && !cut_out);
     }
-    if (blend) material.alphaMode = "BLEND";
+    if (blend || cut_out) material.alphaMode = blend ? "BLEND" : "MASK";
     material.doubleSided = (source.flags & kMaterialTwoSided) != 0;
     gltf_.materials.push_back(material);
   }

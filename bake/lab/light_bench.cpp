@@ -32,6 +32,8 @@ namespace {
 constexpr glm::dvec3 kTable(0.66, 0.58, 0.49);
 /// Of the largest side of the pattern, so that shadows fall on it.
 constexpr double kScale = 0.6;
+/// Of a lamp in the evening: darker and warmer than what models are lit with by themselves.
+constexpr glm::vec3 kEvening(0.50f, 0.38f, 0.24f);
 /// A pixel belongs to the shadow where the reference differs by so much of the ground alone.
 constexpr double kChange = 0.01;
 
@@ -126,6 +128,9 @@ struct Pictures {
   RgbaImage halves[2];  ///< of the reference's paths
   Region model;
   Region ground;
+  RgbaImage evening_follows;
+  RgbaImage evening_fixed;
+  RgbaImage evening_reference;
 };
 
 class LightStage {
@@ -142,7 +147,13 @@ class LightStage {
       const PlainShading plainly;
       MODAR_ASSIGN(plain_, Renderer::create(bundle_, probe_gl_caps()));
     }
+    MODAR_ASSIGN(follows_, Renderer::create(bundle_, probe_gl_caps()));
+    RenderOptions fixed;
+    fixed.estimate_light = false;
+    ours_->set_options(fixed);
+    plain_->set_options(fixed);
     MODAR_TRY(ours_->resize(options_.width, options_.height));
+    MODAR_TRY(follows_->resize(options_.width, options_.height));
     MODAR_TRY(plain_->resize(options_.width, options_.height));
     MODAR_ASSIGN(const RgbaImage print, read_image(options_.pattern));
     const PatternRecord& pattern = bundle_.patterns()[0];
@@ -187,10 +198,30 @@ class LightStage {
         pictures.ground.pixels.push_back(i);
       }
     }
+    add_evening(scene, view, index, pictures);
     return pictures;
   }
 
  private:
+  /// The same in another light, of which the renderer knows the camera's picture alone.
+  void add_evening(TracedScene scene, const glm::dmat4& view, std::uint32_t index,
+                   Pictures& pictures) {
+    for (glm::vec3& coefficient : scene.light.sky) coefficient *= kEvening;
+    scene.light.key *= kEvening;
+    const PathTracer tracer(scene);
+    const int samples = std::max(1, options_.samples / 2);
+    const RgbaImage camera =
+        stored_picture(tracer.draw_ground(camera_, view, samples, options_.jobs));
+    pictures.evening_reference =
+        stored_picture(tracer.draw(camera_, view, samples, 3, options_.jobs));
+    const SceneRecord& record = bundle_.scenes()[index];
+    // A new scene of the same pattern: what was seen before is followed away.
+    for (int frame = 0; frame < 60; ++frame) {
+      pictures.evening_follows = draw(*follows_, camera, view, record, index);
+    }
+    pictures.evening_fixed = draw(*ours_, camera, view, record, index);
+  }
+
   /// From before and above, so near that the model and the pattern around it fill the picture.
   [[nodiscard]] glm::dmat4 view_of(const TracedScene& scene) const {
     std::vector<glm::dvec3> points;
@@ -246,6 +277,7 @@ class LightStage {
   TracedGround ground_;
   std::unique_ptr<GlContext> context_;  // outlives the renderers
   std::unique_ptr<Renderer> ours_;
+  std::unique_ptr<Renderer> follows_;
   std::unique_ptr<Renderer> plain_;
 };
 
@@ -255,13 +287,18 @@ class Rows {
   void add(const std::string& name, const Pictures& p) {
     add_region(name, "model", p.model, p);
     add_region(name, "ground", p.ground, p);
+    const double follows = p.model.difference(p.evening_follows, p.evening_reference);
+    const double fixed = p.model.difference(p.evening_fixed, p.evening_reference);
+    rows_.push_back({name + " evening", follows, fixed, ratio(follows, fixed)});
+    evenings_ = {evenings_.ours + follows, evenings_.plain + fixed, evenings_.count + 1};
     rows_.push_back(
         {name + " noise", p.model.difference(p.halves[0], p.halves[1]), kNoFigure, kNoFigure});
   }
 
   std::vector<BenchRow> finish() {
-    for (const auto& [region, sum] :
-         {std::pair{"mean model", models_}, {"mean ground", grounds_}}) {
+    for (const auto& [region, sum] : {std::pair{"mean model", models_},
+                                      {"mean ground", grounds_},
+                                      {"mean evening", evenings_}}) {
       if (sum.count == 0) continue;
       rows_.push_back(
           {region, sum.ours / sum.count, sum.plain / sum.count, ratio(sum.ours, sum.plain)});
@@ -289,6 +326,7 @@ class Rows {
   std::vector<BenchRow> rows_;
   Sum models_;
   Sum grounds_;
+  Sum evenings_;
 };
 
 }  // namespace
@@ -346,7 +384,9 @@ Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options) {
     const std::string name = file_stem(subjects[i].path);
     rows.add(name, pictures);
     sheet.push_back(
-        joined({pictures.camera, pictures.plain, pictures.ours, pictures.reference}, true));
+        joined({pictures.camera, pictures.plain, pictures.ours, pictures.reference,
+                pictures.evening_fixed, pictures.evening_follows, pictures.evening_reference},
+               true));
     if (!options.folder.empty()) {
       const std::filesystem::path into(options.folder);
       MODAR_TRY(write_png(sheet.back(), (into / (name + ".png")).string()));

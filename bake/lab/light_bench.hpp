@@ -26,13 +26,15 @@ struct LightBenchOptions {
   std::function<void(double done)> progress;  ///< may be empty
 };
 
-/// A row a model and region, in CIEDE2000, the mean over pixels: "NAME model" where it is,
-/// "NAME ground" where its shadow and its light change the ground by 1 % and more. ours: the
-/// renderer beside the reference; reference: the same with plain shading and no shadow; "NAME
-/// noise" (ours alone): two references of half the paths, which differ by about twice the
-/// reference's own error. Then the means over all models. Writes FOLDER/NAME.png (camera picture,
-/// plain, ours, reference) and FOLDER/light.png (all of them). Errors: those of baking and of GL;
-/// kIo where a picture cannot be written.
+/// A row a model and region, in CIEDE2000, the mean over pixels. "NAME model": where the model is,
+/// and "NAME ground": where its shadow and its light change the ground by 1 % and more. ours: the
+/// renderer beside the reference; reference: plain shading and no shadow beside it. "NAME evening":
+/// the model in darker, warmer light, of which the renderer knows the camera's picture alone; the
+/// reference does not follow it. "NAME noise" (ours alone): two references of half the paths, which
+/// differ by about twice the reference's own error. Then the means over all models. Writes
+/// FOLDER/NAME.png (camera picture, plain, ours, reference; of the evening fixed, following,
+/// reference) and FOLDER/light.png (all of them). Errors: those of baking and of GL; kIo where a
+/// picture cannot be written.
 Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options);
 
 /// CIEDE2000 of two colours in CIELAB. Sharma, Wu, Dalal, "The CIEDE2000 Color-Difference Formula",

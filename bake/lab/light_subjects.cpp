@@ -63,7 +63,7 @@ class ObjText {
     vertex(x, y, low);
     vertex(x, y, high);
     vertex(-x, -y, high);
-    face({first + 7, first + 6, first + 5, first + 4}, true, true);
+    face({first + 4, first + 7, first + 6, first + 5}, true, true);
   }
 
   [[nodiscard]] const std::string& text() const { return text_; }
@@ -80,7 +80,7 @@ class ObjText {
     text_ += "f";
     for (int i = 0; i < 4; ++i) {
       text_ += " " + std::to_string(corners[static_cast<std::size_t>(i)]);
-      if (pictured) text_ += "/" + std::to_string(reversed ? 4 - i : i + 1);
+      if (pictured) text_ += "/" + std::to_string(reversed ? (4 - i) % 4 + 1 : i + 1);
     }
     text_ += "\n";
   }

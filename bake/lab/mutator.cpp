@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 
+#include "formats/colour_grid.hpp"
 #include "formats/component.hpp"
 #include "formats/tracker_record.hpp"
 
@@ -136,6 +137,13 @@ void add_twin(Collector& out, const SectionEntry& entry, const FeatureHeader& he
            std::uint64_t{header.count} * header.descriptor_bytes});
 }
 
+void add_colours(Collector& out, const SectionEntry& entry) {
+  out.add_records(record_info("ColourGridHeader"), entry.offset, sizeof(ColourGridHeader), 1);
+  out.add(
+      "pattern colour", FieldType::kU16,
+      {entry.offset + sizeof(ColourGridHeader), 2, (entry.size - sizeof(ColourGridHeader)) / 2});
+}
+
 void add_shadow(Collector& out, const SectionEntry& entry) {
   out.add_records(record_info("ShadowHeader"), entry.offset, sizeof(ShadowHeader), 1);
   out.add("shadow texel", FieldType::kU8,
@@ -151,6 +159,7 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
     out.add_records(record_info("TableHeader"), entry.offset, sizeof(TableHeader), 1);
     out.add_records(record, entry.offset + sizeof(TableHeader), header.stride, header.count);
   }
+  if (static_cast<SectionType>(entry.type) == kPatternColours) return add_colours(out, entry);
   const PlaceRange all{entry.offset, 1, entry.size};
   switch (static_cast<SectionType>(entry.type)) {
     case SectionType::kNames:

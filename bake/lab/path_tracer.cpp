@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include <glm/common.hpp>
@@ -89,12 +90,25 @@ class PathTracer::Scene {
       : scene_(scene), turn_(glm::transpose(glm::inverse(glm::dmat3(scene.place)))) {
     // Corners of their own, so that what a ray meets tells its triangle.
     std::vector<TriangleTree::Triangle> triangles;
+    two_sided_.resize(scene.mesh.triangles.size());
+    std::map<std::array<std::array<double, 3>, 3>, std::uint32_t> known;
     for (std::uint32_t t = 0; t < scene.mesh.triangles.size(); ++t) {
-      for (const std::uint32_t v : scene.mesh.triangles[t]) {
-        positions_.emplace_back(scene.place * glm::dvec4(scene.mesh.positions[v], 1.0));
+      std::array<std::array<double, 3>, 3> places;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const glm::dvec3& p = scene.mesh.positions[scene.mesh.triangles[t][i]];
+        places[i] = {p.x, p.y, p.z};
+        positions_.emplace_back(scene.place * glm::dvec4(p, 1.0));
       }
-      if (!scene.mesh.materials[scene.mesh.triangle_material[t]].occluder()) {
+      const SourceMaterial& material = scene.mesh.materials[scene.mesh.triangle_material[t]];
+      if (material.occluder()) continue;
+      two_sided_[t] = material.two_sided;
+      // Two triangles back to back are one with two sides: a ray could not tell which is first.
+      std::sort(places.begin(), places.end());
+      const auto [twin, added] = known.try_emplace(places, t);
+      if (added) {
         triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+      } else {
+        two_sided_[twin->second] = true;
       }
     }
     if (!triangles.empty()) tree_.emplace(positions_, std::move(triangles));
@@ -199,7 +213,7 @@ class PathTracer::Scene {
                                        weights.y * glm::dvec3(mesh.normals[q]) +
                                        weights.z * glm::dvec3(mesh.normals[r])));
     if (glm::dot(s.flat, ray.direction) > 0) {
-      s.back = !m.two_sided;
+      s.back = !two_sided_[triangle];
       s.flat = -s.flat;
       s.normal = -s.normal;
     }
@@ -243,6 +257,7 @@ class PathTracer::Scene {
   const TracedScene& scene_;
   glm::dmat3 turn_;
   std::vector<glm::dvec3> positions_;  ///< three a triangle, in the world
+  std::vector<bool> two_sided_;        ///< of each triangle
   std::optional<TriangleTree> tree_;
   glm::dvec3 to_key_{0, 0, 1};
   glm::dvec3 given_{0.0};  ///< irradiance over pi of the open ground

@@ -2,12 +2,15 @@
 #include "bake/pattern/picture.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 
 #include <opencv2/imgproc.hpp>
 
 #include "bake/pattern/target_file.hpp"
+#include "formats/colour_grid.hpp"
 
 namespace modar {
 namespace {
@@ -15,6 +18,10 @@ namespace {
 // Pixels. The patterns of the ModAR paper are 245 to 717 on a side. A larger picture only moves the
 // scales at which features are found away from those at which a 1280x720 camera sees the pattern.
 constexpr int kLargestPattern = 720;
+
+/// Cells across and down: fine enough to see a shadow that falls on a part of a pattern, coarse
+/// enough that a few samples tell a cell's mean.
+constexpr std::uint32_t kColourCells = 8;
 
 }  // namespace
 
@@ -61,6 +68,40 @@ Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
   } catch (const std::exception& thrown) {
     return fail(ExitCode::kInternal, "pattern.opencv", path, thrown.what(), "report this as a bug");
   }
+}
+
+Result<std::vector<std::byte>> pattern_colours(const std::string& path) {
+  MODAR_ASSIGN(const RgbaImage image, read_image(path));
+  // Sums of rows first: each pixel is read once.
+  std::array<std::array<double, 4>, kColourCells * kColourCells> sums{};
+  std::array<double, 256> linear{};
+  for (std::size_t i = 0; i < linear.size(); ++i) {
+    const double c = static_cast<double>(i) / 255;
+    linear[i] = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+  }
+  for (std::size_t i = 0; i + 3 < image.pixels.size(); i += 4) {
+    const std::size_t x = i / 4 % image.width;
+    const std::size_t y = i / 4 / image.width;
+    auto& sum =
+        sums[y * kColourCells / image.height * kColourCells + x * kColourCells / image.width];
+    const double alpha = image.pixels[i + 3] / 255.0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      sum[c] += alpha * linear[image.pixels[i + c]] + (1 - alpha);
+    }
+    sum[3] += 1;
+  }
+  const ColourGridHeader header{kColourCells, kColourCells, {}};
+  std::vector<std::byte> section(sizeof header + 6 * sums.size());
+  std::memcpy(section.data(), &header, sizeof header);
+  for (std::size_t cell = 0; cell < sums.size(); ++cell) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      // A picture of fewer pixels than cells leaves some empty: white.
+      const double mean = sums[cell][3] > 0 ? sums[cell][c] / sums[cell][3] : 1.0;
+      const auto code = static_cast<std::uint16_t>(std::lround(65535 * mean));
+      std::memcpy(section.data() + sizeof header + 6 * cell + 2 * c, &code, sizeof code);
+    }
+  }
+  return section;
 }
 
 Result<std::vector<std::string>> pictures_of(const std::string& path) {

@@ -34,6 +34,8 @@ struct Texture {
   std::uint32_t source_height = 0;
   bool repeat = false;
   bool alpha = false;
+  bool cut_out =
+      false;  ///< alpha is nearly everywhere 0 or 1: coarser levels keep the covered share
   /// All that is shown has one colour and alpha: `levels` is a single texel, and a material that
   /// multiplies itself with this colour needs no texture at all.
   bool constant = false;

@@ -7,6 +7,7 @@
 
 #include "bake/mesh/repeating.hpp"
 #include "formats/layout.hpp"
+#include "formats/texture_format.hpp"
 
 namespace modar {
 namespace {
@@ -39,7 +40,8 @@ TextureOutcome append_texture(const Texture& baked, BundleContent& content) {
   record.source_width = baked.source_width;
   record.source_height = baked.source_height;
   record.format = static_cast<std::uint32_t>(baked.format);
-  record.flags = (baked.alpha ? kTextureAlpha : 0u) | (baked.repeat ? kTextureRepeat : 0u);
+  record.flags = (baked.alpha ? kTextureAlpha : 0u) | (baked.repeat ? kTextureRepeat : 0u) |
+                 (baked.cut_out ? kTextureCutOut : 0u);
   record.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
   record.level_count = static_cast<std::uint32_t>(baked.levels.size());
   record.psnr_db = static_cast<float>(baked.levels.front().psnr_db);

@@ -129,7 +129,12 @@ void main() {
 #endif
 #ifdef ALPHA_TWIN
   base.a *= texture2D(u_alpha, v_uv).g;
+#ifdef CUT_OUT
+  if (base.a < 0.5) discard;
+  base.a = 1.0;
+#else
   if (base.a < 0.03) discard;
+#endif
 #endif
 #ifdef COLOURED
   base *= v_colour;

@@ -202,7 +202,8 @@ void modar_render_options_default(modar_render_options* options) {
               ours.ambient_strength,
               {ours.clear_colour.r, ours.clear_colour.g, ours.clear_colour.b, ours.clear_colour.a},
               ours.lod_pixels,
-              ours.exclusive_context ? 1 : 0};
+              ours.exclusive_context ? 1 : 0,
+              ours.estimate_light ? 0 : 1};
 }
 
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options) {
@@ -214,6 +215,7 @@ void modar_renderer_set_options(modar_renderer* renderer, const modar_render_opt
   ours.clear_colour = glm::make_vec4(asked.clear_colour);
   ours.lod_pixels = asked.lod_pixels;
   ours.exclusive_context = asked.exclusive != 0;
+  ours.estimate_light = asked.fixed_light == 0;
   renderer->renderer->set_options(ours);
 }
 

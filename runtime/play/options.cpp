@@ -73,18 +73,20 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 12> kSwitches = {{{"json", &PlayOptions::json},
-                                                     {"force", &PlayOptions::force},
-                                                     {"window", &PlayOptions::window},
-                                                     {"realtime", &PlayOptions::realtime},
-                                                     {"live", &PlayOptions::live},
-                                                     {"find-focal", &PlayOptions::find_focal},
-                                                     {"outline", &PlayOptions::outline},
-                                                     {"osd", &PlayOptions::osd},
-                                                     {"quiet", &PlayOptions::quiet},
-                                                     {"verify", &PlayOptions::verify},
-                                                     {"help", &PlayOptions::help},
-                                                     {"version", &PlayOptions::version}}};
+constexpr std::array<SwitchOption, 13> kSwitches = {
+    {{"json", &PlayOptions::json},
+     {"force", &PlayOptions::force},
+     {"window", &PlayOptions::window},
+     {"realtime", &PlayOptions::realtime},
+     {"live", &PlayOptions::live},
+     {"find-focal", &PlayOptions::find_focal},
+     {"outline", &PlayOptions::outline},
+     {"osd", &PlayOptions::osd},
+     {"no-light-estimate", &PlayOptions::no_light_estimate},
+     {"quiet", &PlayOptions::quiet},
+     {"verify", &PlayOptions::verify},
+     {"help", &PlayOptions::help},
+     {"version", &PlayOptions::version}}};
 
 /// All options, in the order of the three tables.
 std::vector<CommandOption> all_options() {
@@ -193,6 +195,7 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
                       something flat make it the pattern
   --live              goes on with the new bundle when its file is replaced (see modar bake --watch)
   --outline           draws the outline of each pattern that is seen
+  --no-light-estimate models keep their light, whatever the camera shows of the patterns
   --osd               paints state, reason and inliers on the pictures
   --json              one JSON line a frame and a summary, to standard output
   --camera FILE.yml   camera matrix and distortion as OpenCV writes them

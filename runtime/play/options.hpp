@@ -38,6 +38,7 @@ struct PlayOptions {
   bool realtime = false;
   bool live = false;  ///< play newer versions of the bundle as they come
   bool outline = false;
+  bool no_light_estimate = false;
   bool osd = false;
   bool quiet = false;
   bool verify = false;  ///< hash the whole bundle before playing it

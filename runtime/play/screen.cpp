@@ -27,6 +27,7 @@ Result<void> Screen::load(const BundleView& bundle) {
   MODAR_ASSIGN(auto renderer, Renderer::create(bundle, caps_));
   RenderOptions drawing;
   drawing.exclusive_context = true;
+  drawing.estimate_light = !options_.no_light_estimate;
   if (options_.turntable > 0) drawing.clear_colour = kTurntableGround;
   renderer->set_options(drawing);
   if (width_ > 0) MODAR_TRY(renderer->resize(width_, height_));

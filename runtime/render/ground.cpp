@@ -2,6 +2,7 @@
 #include "runtime/render/ground.hpp"
 
 #include <glm/gtc/type_ptr.hpp>
+#include <glm/matrix.hpp>
 
 #include "runtime/render/program.hpp"
 
@@ -21,6 +22,15 @@ GLuint shadow_texture(std::span<const std::byte> section) {
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   return texture;
+}
+
+/// The shadow goes with the model where a visitor has turned, moved or enlarged that, and stays in
+/// the plane.
+glm::mat4 shadow_to_eye(const DrawItem& item, const SceneRecord& scene) {
+  glm::mat4 moved =
+      glm::inverse(item.world_to_eye) * item.to_eye * glm::inverse(scene_matrix(scene));
+  for (int column = 0; column < 4; ++column) moved[column][2] = 0.0f;
+  return item.world_to_eye * moved;
 }
 
 }  // namespace
@@ -79,7 +89,7 @@ void Ground::draw_shadows(const BundleView& bundle, const glm::mat4& projection,
     gl.bind_texture(0, textures_[item.scene]);
     gl.set_depth_test(false);
     gl.set_blending(true);
-    draw_rectangle(projection * item.world_to_eye,
+    draw_rectangle(projection * shadow_to_eye(item, bundle.scenes()[item.scene]),
                    {header.low[0], header.low[1], header.high[0] - header.low[0],
                     header.high[1] - header.low[1]},
                    0.0f, gl, stats);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
@@ -59,6 +60,17 @@ RoomLight scene_light(const BundleView& bundle, std::uint32_t scene) {
   return neutral_room();
 }
 
+RoomLight scaled_light(const RoomLight& light, const glm::vec3& gain) {
+  const float length = glm::length(light.direction);
+  const float height = length > 0.0f ? std::max(light.direction.z / length, 0.0f) : 0.0f;
+  const glm::vec3 up = light.sky[0] + light.sky[2] + 2.0f * light.sky[6] + light.key * height;
+  const glm::vec3 factor = gain / glm::max(up, 0.05f);
+  RoomLight scaled = light;
+  for (glm::vec3& coefficient : scaled.sky) coefficient *= factor;
+  scaled.key *= factor;
+  return scaled;
+}
+
 EyeLight turn_light(const RoomLight& light, const glm::mat4& world_to_eye, float ambient_strength,
                     float light_strength) {
   const glm::mat3 turn = rotation_of(world_to_eye);
@@ -86,7 +98,7 @@ EyeLight turn_light(const RoomLight& light, const glm::mat4& world_to_eye, float
 }
 
 void LightList::build(const BundleView& bundle, std::span<const DrawItem> items,
-                      const RenderOptions& options) {
+                      const RenderOptions& options, const LightEstimator* estimator) {
   lights_.clear();
   first_item_.clear();
   of_item_.clear();
@@ -98,6 +110,9 @@ void LightList::build(const BundleView& bundle, std::span<const DrawItem> items,
     if (same != first_item_.end()) continue;
     first_item_.push_back(i);
     RoomLight light = options.light ? *options.light : scene_light(bundle, items[i].scene);
+    if (estimator != nullptr) {
+      if (const auto gain = estimator->at_model(items[i].scene)) light = scaled_light(light, *gain);
+    }
     lights_.push_back(
         turn_light(light, items[i].world_to_eye, options.ambient_strength, options.light_strength));
   }

@@ -11,6 +11,7 @@
 #include <glm/vec4.hpp>
 
 #include "modar/renderer.hpp"
+#include "runtime/render/light_estimate.hpp"
 
 namespace modar {
 
@@ -22,15 +23,18 @@ struct EyeLight {
 };
 
 /// world_to_eye: its first three columns turn; their lengths do not matter.
+/// gain: what a white surface that looks up gets then, in parts of 1 (see LightEstimator).
+RoomLight scaled_light(const RoomLight& light, const glm::vec3& gain);
+
 EyeLight turn_light(const RoomLight& light, const glm::mat4& world_to_eye, float ambient_strength,
                     float light_strength);
 
 /// One light for all items that share one, so that they can share draw calls.
 class LightList {
  public:
-  /// Keeps its memory from call to call.
+  /// Keeps its memory from call to call. estimator: null where light is as stated.
   void build(const BundleView& bundle, std::span<const DrawItem> items,
-             const RenderOptions& options);
+             const RenderOptions& options, const LightEstimator* estimator);
   [[nodiscard]] std::uint32_t of_item(std::uint32_t item) const { return of_item_[item]; }
   [[nodiscard]] const EyeLight& light(std::uint32_t index) const { return lights_[index]; }
 

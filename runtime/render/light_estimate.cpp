@@ -1,5 +1,6 @@
 // Samples the pattern's cells, throws out what does not fit, fits a plane of light.
 #include "runtime/render/light_estimate.hpp"
+#include "formats/colour_grid.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -28,12 +29,16 @@ constexpr float kBright = 0.94f;
 /// Cells whose brightness lies beyond this factor of the middle one's show something else: a hand,
 /// a reflection.
 constexpr float kOdd = 1.8f;
+/// The same for a cell beside the plane of light through all, and how often such cells are looked
+/// for: what covers cells in part bends the plane at first.
+constexpr float kOff = 1.12f;
+constexpr int kPasses = 3;
 /// A frame whose samples differ less between red, green and blue has no colour (of 255).
 constexpr float kGray = 2.5f;
 constexpr std::size_t kMostCells = kMaxColourCells * kMaxColourCells;
 
 /// sRGB (0 to 1) to linear, off by 0.002 at most: a cubic needs no libm.
-float linear(float c) {
+float light_of(float c) {
   return c * (c * (c * 0.305306011f + 0.682171111f) + 0.012522878f);
 }
 
@@ -62,11 +67,11 @@ glm::vec3 pixel_of(const CameraPicture& frame, int x, int y) {
   // ITU-R BT.601, as shaders/background.frag has it.
   const float scale = frame.full_range ? 1.0f : 255.0f / 219.0f;
   const float chroma = frame.full_range ? 1.0f : 255.0f / 224.0f;
-  const float luma = (at(0, x, y) - (frame.full_range ? 0.0f : 16.0f)) * scale;
+  const float gray = (at(0, x, y) - (frame.full_range ? 0.0f : 16.0f)) * scale;
   u = (u - 128) * chroma;
   v = (v - 128) * chroma;
   return glm::clamp(
-      glm::vec3(luma + 1.402f * v, luma - 0.344136f * u - 0.714136f * v, luma + 1.772f * u), 0.0f,
+      glm::vec3(gray + 1.402f * v, gray - 0.344136f * u - 0.714136f * v, gray + 1.772f * u), 0.0f,
       255.0f);
 }
 
@@ -85,6 +90,8 @@ class Look {
       : frame_(frame), matrix_(matrix), half_(pattern.half_width, pattern.half_height) {
     std::memcpy(&header_, colours.data(), sizeof header_);
     texels_ = colours.data() + sizeof header_;
+    columns_ = static_cast<float>(header_.columns);
+    rows_ = static_cast<float>(header_.rows);
   }
 
   PlaneLight result() {
@@ -93,6 +100,10 @@ class Look {
     if (4 * count_ < header_.columns * header_.rows || count_ < 4) return light;
     drop_odd();
     if (count_ < 4 || !fit(light)) return light;
+    for (int pass = 0; pass < kPasses; ++pass) {
+      drop_covered(light);
+      if (!fit(light)) return light;
+    }
     tint(light);
     light.known = true;
     return light;
@@ -119,13 +130,14 @@ class Look {
   /// False where a part of the cell is out of the frame, or brighter than the camera tells.
   bool sample(std::uint32_t column, std::uint32_t row, Cell& cell) {
     const auto place = [&](float x, float y) {
-      return half_ * glm::vec2(2 * (static_cast<float>(column) + x) / header_.columns - 1,
-                               1 - 2 * (static_cast<float>(row) + y) / header_.rows);
+      return half_ * glm::vec2(2 * (static_cast<float>(column) + x) / columns_ - 1,
+                               1 - 2 * (static_cast<float>(row) + y) / rows_);
     };
+    const auto inner = [](int i) { return (static_cast<float>(i) + 0.5f) / kSamples; };
     cell.place = place(0.5f, 0.5f);
     for (int j = 0; j < kSamples; ++j) {
       for (int i = 0; i < kSamples; ++i) {
-        const glm::vec2 p = place((i + 0.5f) / kSamples, (j + 0.5f) / kSamples);
+        const glm::vec2 p = place(inner(i), inner(j));
         const glm::vec4 clip = matrix_ * glm::vec4(p, 0.0f, 1.0f);
         // Also false for NaN.
         if (!(clip.w > 0)) return false;
@@ -138,7 +150,7 @@ class Look {
         const glm::vec3 pixel = pixel_of(frame_, static_cast<int>(x), static_cast<int>(y));
         most_colour_ =
             std::max({most_colour_, std::fabs(pixel.r - pixel.g), std::fabs(pixel.b - pixel.g)});
-        for (int c = 0; c < 3; ++c) cell.seen[c] += linear(pixel[c] / 255.0f);
+        for (int c = 0; c < 3; ++c) cell.seen[c] += light_of(pixel[c] / 255.0f);
       }
     }
     cell.seen /= static_cast<float>(kSamples * kSamples);
@@ -151,11 +163,28 @@ class Look {
     for (std::uint32_t i = 0; i < count_; ++i) ratios[i] = cells_[i].ratio;
     std::nth_element(ratios.begin(), ratios.begin() + count_ / 2, ratios.begin() + count_);
     const float middle = ratios[count_ / 2];
-    const auto odd = [&](const Cell& cell) {
-      return !(cell.ratio * kOdd >= middle && cell.ratio <= middle * kOdd);
+    keep([&](const Cell& cell) {
+      return cell.ratio * kOdd >= middle && cell.ratio <= middle * kOdd;
+    });
+  }
+
+  template <class Good>
+  void keep(const Good& good) {
+    std::uint32_t kept = 0;
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      if (good(cells_[i])) cells_[kept++] = cells_[i];
+    }
+    count_ = kept;
+  }
+
+  /// A cell that something covers in part is still near the middle ratio, and off the plane.
+  void drop_covered(const PlaneLight& light) {
+    const auto fits = [&](const Cell& cell) {
+      const float plane = light.middle.g * (1.0f + glm::dot(light.slope, cell.place));
+      return cell.ratio * kOff >= plane && cell.ratio <= plane * kOff;
     };
-    const auto end = std::remove_if(cells_.begin(), cells_.begin() + count_, odd);
-    count_ = static_cast<std::uint32_t>(end - cells_.begin());
+    const auto left = std::count_if(cells_.begin(), cells_.begin() + count_, fits);
+    if (2 * left >= static_cast<std::ptrdiff_t>(count_)) keep(fits);
   }
 
   /// Least squares of seen = stored * (a + b x + c y) in brightness.
@@ -198,6 +227,8 @@ class Look {
   glm::vec2 half_;
   ColourGridHeader header_{};
   const std::byte* texels_ = nullptr;
+  float columns_ = 1;
+  float rows_ = 1;
   std::array<Cell, kMostCells> cells_;
   std::uint32_t count_ = 0;
   float most_colour_ = 0;
@@ -211,7 +242,7 @@ PlaneLight look_at_pattern(const CameraPicture& frame, const glm::mat4& matrix,
 }
 
 void LightEstimator::create(const BundleView& bundle) {
-  bundle_ = &bundle;
+  bundle_ = bundle;
   patterns_.assign(bundle.patterns().size(), {});
   frame_ = 0;
 }
@@ -220,14 +251,14 @@ void LightEstimator::observe(const CameraPicture& frame, const glm::mat4& projec
                              std::span<const DrawItem> items) {
   ++frame_;
   for (const DrawItem& item : items) {
-    if (item.scene >= bundle_->scenes().size()) continue;
-    const std::uint32_t pattern = bundle_->scenes()[item.scene].pattern;
+    if (item.scene >= bundle_.scenes().size()) continue;
+    const std::uint32_t pattern = bundle_.scenes()[item.scene].pattern;
     Watched& watched = patterns_[pattern];
     if (watched.light.known && frame_ < watched.looked + kPause) continue;
-    const auto colours = bundle_->section(SectionType::kPatternColours, pattern);
+    const auto colours = bundle_.section(kPatternColours, pattern);
     if (colours.empty()) continue;
     const PlaneLight light = look_at_pattern(frame, projection * item.world_to_eye,
-                                             bundle_->patterns()[pattern], colours);
+                                             bundle_.patterns()[pattern], colours);
     if (!light.known) continue;
     const bool first = !watched.light.known || frame_ > watched.looked + kForget;
     const float share = first ? 1.0f : kFollow;
@@ -238,11 +269,11 @@ void LightEstimator::observe(const CameraPicture& frame, const glm::mat4& projec
   }
 }
 
-glm::vec3 LightEstimator::at_model(std::uint32_t scene) const {
-  if (bundle_ == nullptr || scene >= bundle_->scenes().size()) return glm::vec3(1.0f);
-  const SceneRecord& record = bundle_->scenes()[scene];
+std::optional<glm::vec3> LightEstimator::at_model(std::uint32_t scene) const {
+  if (scene >= bundle_.scenes().size()) return std::nullopt;
+  const SceneRecord& record = bundle_.scenes()[scene];
   const PlaneLight& light = patterns_[record.pattern].light;
-  if (!light.known) return glm::vec3(1.0f);
+  if (!light.known) return std::nullopt;
   const glm::vec2 place = glm::clamp(glm::vec2(record.offset[0], record.offset[1]), -1.0f, 1.0f);
   return light.middle * std::max(0.1f, 1.0f + glm::dot(light.slope, place));
 }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,7 +27,7 @@ struct PlaneLight {
 /// Follows the light of each pattern from frame to frame.
 class LightEstimator {
  public:
-  /// Forgets everything. The bundle outlives the estimator.
+  /// Forgets everything. The bundle's bytes outlive the estimator.
   void create(const BundleView& bundle);
 
   /// Looks at the patterns of the items' scenes in a frame with planes, every fourth time. Patterns
@@ -34,9 +35,9 @@ class LightEstimator {
   void observe(const CameraPicture& frame, const glm::mat4& projection,
                std::span<const DrawItem> items);
 
-  /// What reaches the place of the scene's model, as a factor on light that shows white as white;
-  /// 1 where nothing is known. scene: any number.
-  [[nodiscard]] glm::vec3 at_model(std::uint32_t scene) const;
+  /// What a white surface in the plane gets at the place of the scene's model; nothing where nobody
+  /// has seen it. scene: any number.
+  [[nodiscard]] std::optional<glm::vec3> at_model(std::uint32_t scene) const;
 
  private:
   struct Watched {
@@ -44,7 +45,7 @@ class LightEstimator {
     std::uint64_t looked = 0;  ///< the frame of the last look that found something
   };
 
-  const BundleView* bundle_ = nullptr;
+  BundleView bundle_;
   std::vector<Watched> patterns_;
   std::uint64_t frame_ = 0;
 };

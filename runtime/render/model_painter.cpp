@@ -1,6 +1,7 @@
 // Programs and uniforms of a bundle's surfaces; pieces, groups of equal state, and the three ways
 // to draw a group.
 #include "runtime/render/model_painter.hpp"
+#include "formats/texture_format.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -122,12 +123,15 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       key.coloured = format.attributes[kAttributeColour].components != 0;
       key.textured = material.texture != kNone && format.attributes[kAttributeUv].components != 0;
       key.alpha_twin = key.textured && textures.alpha(material.texture) != 0;
+      key.cut_out = key.alpha_twin && material.opacity >= 1.0f &&
+                    (bundle_.textures()[material.texture].flags & kTextureCutOut) != 0;
       key.shiny = shines(material) || glows(material);
       MODAR_ASSIGN(const std::uint32_t program, program_of(key));
       setups_[c].program = program;
       setups_[c].material = equal_material_[bundle_.chunks()[c].material];
       setups_[c].hides = (material.flags & kMaterialOccluder) != 0;
-      setups_[c].blended = !setups_[c].hides && (key.alpha_twin || material.opacity < 1.0f);
+      setups_[c].blended =
+          !setups_[c].hides && !key.cut_out && (key.alpha_twin || material.opacity < 1.0f);
       chunk_layouts_[c] = equal_layout_[model.layout];
     }
   }
@@ -282,7 +286,7 @@ const void* index_pointer(std::uintptr_t offset) {
 void ModelPainter::draw(const PaintJob& job) {
   ++frame_;
   job.gl.set_depth_test(true);
-  lights_.build(bundle_, job.items, job.options);
+  lights_.build(bundle_, job.items, job.options, job.estimator);
   make_pieces(job);
   for (std::size_t i = 0; i < pieces_.size();) {
     const auto same_state = [&](const Piece& a, const Piece& b) {

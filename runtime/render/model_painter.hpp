@@ -34,6 +34,7 @@ struct PaintJob {
   const TextureStore& textures;
   GlState& gl;
   RenderStats& stats;
+  const LightEstimator* estimator = nullptr;  ///< null: light is as stated
 };
 
 class ModelPainter {

@@ -71,6 +71,7 @@ std::string model_defines(const ProgramKey& key) {
   if (key.normal == NormalKind::kOctahedral) define("NORMAL_OCT");
   if (key.textured) define("TEXTURED");
   if (key.alpha_twin) define("ALPHA_TWIN");
+  if (key.cut_out) define("CUT_OUT");
   if (key.coloured) define("COLOURED");
   if (key.shiny) define("SHINY");
   if (key.slots == SlotKind::kAttributes) define("SLOT_ATTRIBUTES");

@@ -19,6 +19,7 @@ struct ProgramKey {
   SlotKind slots = SlotKind::kSingle;
   bool textured = false;
   bool alpha_twin = false;
+  bool cut_out = false;  ///< drawn where the twin's alpha is 1/2 and more, and opaque there
   bool coloured = false;
   bool shiny = false;  ///< has a highlight or emission
   int slot_count = 1;  ///< of kStream

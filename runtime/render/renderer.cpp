@@ -118,7 +118,9 @@ struct Renderer::State {
         formats(vertex_formats(bundle, caps)),
         geometry(bundle, formats, geometry_budget(view, context_caps)),
         textures(bundle, caps),
-        painter(bundle, formats, batch_budget()) {}
+        painter(bundle, formats, batch_budget()) {
+    estimator.create(bundle);
+  }
 
   /// Half of the memory is for each kind, unless all the geometry needs less.
   static std::uint64_t geometry_budget(const BundleView& view, const GlCaps& caps) {
@@ -177,7 +179,8 @@ struct Renderer::State {
     }
     list.sort_by_state(bundle);
     if (options.plane_hides) ground.hide_below(bundle, projection, items, gl, stats);
-    painter.draw({list, items, projection, options, geometry, textures, gl, stats});
+    painter.draw({list, items, projection, options, geometry, textures, gl, stats,
+                  options.estimate_light ? &estimator : nullptr});
   }
 
   /// Gives GPU memory to the nearest chunks first, at a coarser level where there is little. Drops
@@ -208,6 +211,7 @@ struct Renderer::State {
   ModelPainter painter;
   Background background;
   Ground ground;
+  LightEstimator estimator;
   Target target;
   DrawList list;
   RenderOptions options;
@@ -280,6 +284,7 @@ void Renderer::render(const CameraPicture& background, const glm::mat4& projecti
     const bool exact = view.width == background.width && view.height == background.height;
     s.stats.bytes_uploaded += s.background.upload(background, s.gl);
     s.stats.draw_calls += s.background.draw(exact, {}, s.gl);
+    if (s.options.estimate_light) s.estimator.observe(background, projection, items);
   }
   if (!items.empty()) {
     const DebugGroup group(s.extensions, "models");
@@ -308,6 +313,7 @@ void Renderer::draw(const SurfaceView& surface, const CameraPicture& frame,
         turn == glm::mat2(1.0f) && view.width == frame.width && view.height == frame.height;
     s.stats.bytes_uploaded += s.background.upload(frame, s.gl);
     s.stats.draw_calls += s.background.draw(exact, texture_map(turn), s.gl);
+    if (s.options.estimate_light) s.estimator.observe(frame, projection, items);
   }
   if (!items.empty()) {
     const DebugGroup group(s.extensions, "models");

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <string>
 
+#include "formats/colour_grid.hpp"
 #include "formats/quantise.hpp"
 
 namespace modar::test {
@@ -380,6 +381,14 @@ void add_looks(BundleContent& content) {
   content.shadows[1].assign(header.begin(), header.end());
   for (int i = 0; i < 6; ++i) put(content.shadows[1], static_cast<std::uint8_t>(255 - 30 * i));
   content.materials[1].flags |= kMaterialOccluder;
+  const ColourGridHeader grid{2, 1, {}};
+  ExtraSection colours;
+  colours.type = static_cast<std::uint32_t>(kPatternColours);
+  colours.owner = 1;
+  const auto grid_bytes = std::as_bytes(std::span(&grid, 1));
+  colours.bytes.assign(grid_bytes.begin(), grid_bytes.end());
+  for (int i = 0; i < 6; ++i) put(colours.bytes, static_cast<std::uint16_t>(9000 * i + 77));
+  content.extra.push_back(colours);
 }
 
 }  // namespace modar::test

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "formats/colour_grid.hpp"
 #include "formats/field_table.hpp"
 #include "formats/layout.hpp"
 #include "formats/tracker_record.hpp"
@@ -133,6 +134,7 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(SceneRecord, F(pattern), F(model), F(scale), F(offset), F(rotation), F(reserved))
   MODAR_STRUCT(LightRecord, F(scene), F(reserved0), F(sky), F(direction), F(key), F(reserved1))
   MODAR_STRUCT(OcclusionRecord, F(layout), F(offset))
+  MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
   MODAR_STRUCT(ShadowHeader, F(width), F(height), F(low), F(high), F(reserved))
   MODAR_STRUCT(FeatureHeader, F(count), F(descriptor_bytes), F(keypoints_offset),
                F(descriptors_offset), F(reserved))
@@ -223,6 +225,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
       {SectionType::kMappedFeatures, "feature twin"},
       {SectionType::kFeatureYml, "feature text"},
       {SectionType::kTrackerRecord, "tracker record"},
+      {modar::kPatternColours, "pattern colours"},
       {SectionType::kShadow, "shadow"},
       {SectionType::kVertices, "vertices"},
       {SectionType::kIndices, "indices"},

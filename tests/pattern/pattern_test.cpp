@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -42,6 +43,35 @@ struct RemoveAtEnd {
   std::string path;
   ~RemoveAtEnd() { std::remove(path.c_str()); }
 };
+
+TEST(PatternColours, AreMeansInLinearLight) {
+  // Cells of 2 x 2 pixels: two black, two of 188, which is 1/2 in linear light (IEC 61966-2-1);
+  // blue only where nothing else is.
+  RgbaImage image{16, 16, std::vector<std::uint8_t>(16 * 16 * 4, 255)};
+  for (std::size_t i = 0; i < 16 * 16; ++i) {
+    std::uint8_t* p = &image.pixels[4 * i];
+    p[0] = p[1] = i % 2 == 0 ? 0 : 188;
+    p[2] = i < 128 ? 0 : 255;
+  }
+  image.pixels[3] = 0;  // the first pixel is paper
+  const std::string path = temporary("colours.png");
+  const RemoveAtEnd remove{path};
+  ASSERT_TRUE(write_png(image, path));
+  const auto section = pattern_colours(path);
+  ASSERT_TRUE(section) << to_line(section.error());
+  ASSERT_EQ(section->size(), 16u + 8 * 8 * 6);
+  const auto value = [&](std::size_t cell, std::size_t channel) {
+    std::uint16_t code = 0;
+    std::memcpy(&code, section->data() + 16 + 6 * cell + 2 * channel, 2);
+    return code / 65535.0;
+  };
+  EXPECT_NEAR(value(9, 0), 0.25, 0.002);
+  EXPECT_NEAR(value(9, 2), 0.0, 1e-9);
+  EXPECT_NEAR(value(63, 1), 0.25, 0.002);
+  EXPECT_NEAR(value(63, 2), 1.0, 1e-9);
+  EXPECT_NEAR(value(0, 0), 0.5, 0.002);
+  EXPECT_NEAR(value(0, 2), 0.25, 1e-4);
+}
 
 TEST(Rectify, AnUprightRectangleIsCutOutAsItIs) {
   const RgbaImage photo = waves(640, 480);

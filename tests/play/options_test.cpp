@@ -23,10 +23,26 @@ std::string code_of(std::vector<const char*> arguments) {
 }
 
 TEST(Options, ReadsEachOption) {
-  const auto options =
-      parse({"--json", "a.modar", "--input", "v.mp4", "--out=o.mp4", "--camera", "c.yml",
-             "--method", "paper", "--parameters", "brisk-3", "--device", "mali400", "--window",
-             "--realtime", "--report", "r", "--outline", "--quiet"});
+  const auto options = parse({"--json",
+                              "a.modar",
+                              "--input",
+                              "v.mp4",
+                              "--out=o.mp4",
+                              "--camera",
+                              "c.yml",
+                              "--method",
+                              "paper",
+                              "--parameters",
+                              "brisk-3",
+                              "--device",
+                              "mali400",
+                              "--window",
+                              "--realtime",
+                              "--report",
+                              "r",
+                              "--outline",
+                              "--no-light-estimate",
+                              "--quiet"});
   ASSERT_TRUE(options) << to_line(options.error());
   EXPECT_EQ(options->bundle, "a.modar");
   EXPECT_EQ(options->input, "v.mp4");

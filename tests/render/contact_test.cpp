@@ -5,6 +5,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "formats/colour_grid.hpp"
 #include "tests/render/scene.hpp"
 
 namespace modar {
@@ -112,6 +113,85 @@ TEST_F(ContactTest, AShadowDarkensThePictureInItsRectangle) {
   // An item of no scene has none.
   const DrawItem alone{0, from_above()};
   EXPECT_EQ(red(draw(*renderer, camera_above(), {&alone, 1}, background), 9, 9), 200);
+}
+
+TEST_F(ContactTest, AShadowGoesWithItsModelAndStaysInThePlane) {
+  SceneMaker maker;
+  maker.add_plain_model(Layout::kHalfColoured, square(0.0625, {10, 20, 30}));
+  add_pattern_and_scene(maker.content);
+  const ShadowHeader header{1, 1, {-0.25f, -0.25f}, {0.25f, 0.25f}, {}};
+  std::vector<std::byte> section(sizeof header + 1);
+  std::memcpy(section.data(), &header, sizeof header);
+  section[sizeof header] = std::byte{64};
+  maker.content.shadows.push_back(section);
+  const MappedBundle bundle(maker.content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  const std::vector<std::uint8_t> white(3 * kSide * kSide, 200);
+  const RgbImage background{white.data(), kSide, kSide, 3 * kSide};
+  // Half a unit, 8 pixels, to the right, twice as large, and lifted off the plane.
+  glm::mat4 moved = glm::translate(from_above(), glm::vec3(0.5f, 0.0f, 0.3f));
+  moved = glm::scale(moved, glm::vec3(2.0f));
+  const DrawItem item{0, moved, 0, from_above()};
+  const auto pixels = draw(*renderer, camera_above(), {&item, 1}, background);
+  // From column 16 to 32, from row 8 to 24: as large as at no height.
+  const int dark = static_cast<int>(std::lround(200 * std::sqrt(64.0 / 255)));
+  EXPECT_EQ(red(pixels, 14, 16), 200);
+  EXPECT_NEAR(red(pixels, 17, 16), dark, 2);
+  EXPECT_NEAR(red(pixels, 30, 10), dark, 2);
+  EXPECT_NEAR(red(pixels, 20, 22), dark, 2);
+  EXPECT_EQ(red(pixels, 20, 26), 200);
+}
+
+/// Mean colours of a gray pattern whose every cell is 1/2.
+void add_gray_colours(BundleContent& content) {
+  const ColourGridHeader grid{8, 8, {}};
+  ExtraSection colours;
+  colours.type = static_cast<std::uint32_t>(kPatternColours);
+  colours.owner = 0;
+  colours.bytes.resize(sizeof grid);
+  std::memcpy(colours.bytes.data(), &grid, sizeof grid);
+  for (int i = 0; i < 8 * 8 * 3; ++i) {
+    colours.bytes.push_back(std::byte{0x00});
+    colours.bytes.push_back(std::byte{0x80});
+  }
+  content.extra.push_back(colours);
+}
+
+TEST_F(ContactTest, LightFollowsWhatTheCameraShowsOfThePattern) {
+  SceneMaker maker;
+  maker.add_plain_model(Layout::kHalfLit, square(0.5, {200, 200, 200}));
+  add_pattern_and_scene(maker.content);
+  add_gray_colours(maker.content);
+  const MappedBundle bundle(maker.content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  RenderOptions options;
+  options.light = RoomLight{};
+  options.light->sky[0] = glm::vec3(0.8f);
+  const DrawItem item{0, from_above(), 0, from_above()};
+  // A half of 0.36, in sRGB: IEC 61966-2-1.
+  const double seen = 1.055 * std::pow(0.5 * 0.36, 1 / 2.4) - 0.055;
+  const std::vector<std::uint8_t> dim(3 * kSide * kSide,
+                                      static_cast<std::uint8_t>(std::lround(255 * seen)));
+  const RgbImage background{dim.data(), kSide, kSide, 3 * kSide};
+  const auto shade = [](double light) {
+    return 200 * (0.94 * std::sqrt(light) + 0.06 * std::pow(light, 0.25));
+  };
+  options.estimate_light = false;
+  renderer->set_options(options);
+  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}, background), 16, 16), shade(0.8), 2);
+  options.estimate_light = true;
+  renderer->set_options(options);
+  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}, background), 16, 16), shade(0.36), 4);
+  // Without a picture, what was seen last holds.
+  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}), 16, 16), shade(0.36), 4);
+  // Light that changes is followed within a second.
+  const std::vector<std::uint8_t> bright(3 * kSide * kSide, 188);  // sRGB of 1/2
+  const RgbImage lit{bright.data(), kSide, kSide, 3 * kSide};
+  draw(*renderer, camera_above(), {&item, 1}, lit);
+  for (int frame = 0; frame < 40; ++frame) draw(*renderer, camera_above(), {&item, 1}, lit);
+  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}, lit), 16, 16), shade(1.0), 4);
 }
 
 TEST_F(ContactTest, AnOccluderShowsThePictureAndHidesTheModel) {

@@ -12,14 +12,15 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
 
+#include "formats/colour_grid.hpp"
 #include "modar/camera.hpp"
 
 namespace modar {
 namespace {
 
-constexpr int kCells = 8;
-constexpr int kWidth = 320;
-constexpr int kHeight = 240;
+constexpr std::size_t kCells = 8;
+constexpr std::size_t kWidth = 320;
+constexpr std::size_t kHeight = 240;
 
 double stored(double linear) {
   const double c = std::clamp(linear, 0.0, 1.0);
@@ -36,10 +37,11 @@ class Shown {
     const ColourGridHeader header{kCells, kCells, {}};
     section_.resize(sizeof header + 6 * kCells * kCells);
     std::memcpy(section_.data(), &header, sizeof header);
-    for (int i = 0; i < kCells * kCells; ++i) {
+    for (std::size_t i = 0; i < kCells * kCells; ++i) {
       for (int c = 0; c < 3; ++c) {
         const auto code = static_cast<std::uint16_t>(3000 + random() % 50000);
-        std::memcpy(section_.data() + sizeof header + 6 * i + 2 * c, &code, 2);
+        std::memcpy(section_.data() + sizeof header + 6 * i + 2 * static_cast<std::size_t>(c),
+                    &code, 2);
         cells_[i][c] = code / 65535.0;
       }
     }
@@ -50,22 +52,24 @@ class Shown {
   void paint(const std::function<glm::dvec3(double, double)>& light) {
     rgb_.assign(3 * kWidth * kHeight, 128);
     const glm::dmat4 back = glm::inverse(glm::dmat4(matrix()));
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
-        const double nx = 2 * (x + 0.5) / kWidth - 1;
-        const double ny = 1 - 2 * (y + 0.5) / kHeight;
+    for (std::size_t y = 0; y < kHeight; ++y) {
+      for (std::size_t x = 0; x < kWidth; ++x) {
+        const double nx = 2 * (static_cast<double>(x) + 0.5) / kWidth - 1;
+        const double ny = 1 - 2 * (static_cast<double>(y) + 0.5) / kHeight;
         glm::dvec4 a = back * glm::dvec4(nx, ny, -1, 1);
         glm::dvec4 b = back * glm::dvec4(nx, ny, 1, 1);
         a /= a.w;
         b /= b.w;
         const glm::dvec4 p = a + (b - a) * (a.z / (a.z - b.z));
-        const int column = static_cast<int>(std::floor((p.x + 1) / 2 * kCells));
-        const int row = static_cast<int>(std::floor((0.75 - p.y) / 1.5 * kCells));
+        const double column = std::floor((p.x + 1) / 2 * kCells);
+        const double row = std::floor((0.75 - p.y) / 1.5 * kCells);
         if (column < 0 || row < 0 || column >= kCells || row >= kCells) continue;
         const glm::dvec3 given = light(p.x, p.y);
+        const glm::dvec3& cell =
+            cells_[static_cast<std::size_t>(row) * kCells + static_cast<std::size_t>(column)];
         for (int c = 0; c < 3; ++c) {
-          rgb_[3 * (y * kWidth + x) + c] = static_cast<std::uint8_t>(
-              std::lround(255 * stored(cells_[row * kCells + column][c] * given[c])));
+          rgb_[3 * (y * kWidth + x) + static_cast<std::size_t>(c)] =
+              static_cast<std::uint8_t>(std::lround(255 * stored(cell[c] * given[c])));
         }
       }
     }
@@ -92,8 +96,8 @@ class Shown {
   CameraPicture nv21() {
     luma_.assign(kWidth * kHeight, 0);
     chroma_.assign(kWidth * kHeight / 2, 0);
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
+    for (std::size_t y = 0; y < kHeight; ++y) {
+      for (std::size_t x = 0; x < kWidth; ++x) {
         const std::uint8_t* p = &rgb_[3 * (y * kWidth + x)];
         const double gray = 0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2];
         luma_[y * kWidth + x] = static_cast<std::uint8_t>(std::lround(gray));

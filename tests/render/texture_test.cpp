@@ -3,6 +3,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "formats/texture_format.hpp"
 #include "tests/render/scene.hpp"
 
 namespace modar {
@@ -268,6 +269,42 @@ TEST_F(TextureTest, AlphaTwinBlendsOverTheBackground) {
     EXPECT_NEAR(at(6, 0), 255 * a, 2);
     EXPECT_NEAR(at(6, 2), 200 * (1.0 - a) + 2 * a, 2);
   }
+}
+
+TEST_F(TextureTest, CutOutsHideWhatIsDrawnAfterThemWhereTheyAre) {
+  // Left half there, right half not. The nearer of two squares of one chunk comes first.
+  std::vector<HandMadeBlock> colour = {flat_block(15, 0, 0), flat_block(15, 0, 0),
+                                       flat_block(0, 15, 0), flat_block(0, 15, 0)};
+  std::vector<HandMadeBlock> alpha = {flat_block(15, 15, 15), flat_block(0, 0, 0),
+                                      flat_block(15, 15, 15), flat_block(15, 15, 15)};
+  SceneMaker maker;
+  MaterialRecord material = flat_material();
+  material.texture =
+      maker.add_texture(8, {pack_all(colour)}, {pack_all(alpha)}, kTextureAlpha | kTextureCutOut);
+  SceneMaker::Chunk chunk;
+  chunk.material = maker.add_material(material);
+  chunk.levels = {textured_square()};
+  for (Triangle& triangle : chunk.levels[0]) {
+    for (glm::dvec3& corner : triangle.corners) corner.z = 0.5;
+    for (glm::dvec2& uv : triangle.uvs) uv.y *= 0.25;  // the red blocks
+  }
+  for (Triangle triangle : textured_square()) {
+    for (glm::dvec2& uv : triangle.uvs) uv.y = 0.875;  // the green ones
+    chunk.levels[0].push_back(triangle);
+  }
+  maker.add_model(maker.add_layout(Layout::kHalfTextured), {chunk});
+  const MappedBundle bundle(maker.content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  const ExactView view = exact_view(8);
+  const std::vector<std::uint8_t> pixels = draw(*renderer, view.camera, {&view.item, 1});
+  const auto at = [&](int x, int c) {
+    return pixels[static_cast<std::size_t>((3 * 8 + x) * 4 + c)];
+  };
+  EXPECT_NEAR(at(1, 0), 255, 2);
+  EXPECT_NEAR(at(1, 1), 0, 4);
+  EXPECT_NEAR(at(6, 0), 0, 4);
+  EXPECT_NEAR(at(6, 1), 255, 2);
 }
 
 TEST_F(TextureTest, DrawsSortedByTextureBindEachOnce) {

@@ -132,5 +132,45 @@ TEST(Quality, HasTheValuesOfItsDefinition) {
   EXPECT_NEAR(ssim(p, q), (2 * 100 * 110 + 6.5025) / (100 * 100 + 110 * 110 + 6.5025), 1e-6);
 }
 
+/// The share of a gray image's pixels that are 128 and more.
+double covered_share(const RgbaImage& image) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4)
+    count += image.pixels[i] >= 128 ? 1U : 0U;
+  return 4.0 * static_cast<double>(count) / static_cast<double>(image.pixels.size());
+}
+
+TEST(BakeTexture, FoliageKeepsItsCoverageWithDistance) {
+  // Small leaves here and there: filtered alone, few texels of a coarse level reach 1/2.
+  RgbaImage leaves{128, 128, std::vector<std::uint8_t>(std::size_t{128} * 128 * 4, 90)};
+  for (std::size_t i = 0; i < leaves.pixels.size(); i += 4) leaves.pixels[i + 3] = 0;
+  std::uint32_t random = 12345;
+  const auto place = [&random] { return (random = random * 1664525 + 1013904223) >> 25; };
+  for (int leaf = 0; leaf < 220; ++leaf) {
+    const std::size_t x = place();
+    const std::size_t y = place();
+    for (std::size_t i = 0; i < 20; ++i) {
+      leaves.pixels[4 * ((y + i / 5) % 128 * 128 + (x + i % 5) % 128) + 3] = 255;
+    }
+  }
+  double share = 0;
+  for (std::size_t i = 3; i < leaves.pixels.size(); i += 4) share += leaves.pixels[i] / 255.0;
+  share /= 128 * 128;
+  const test::ScratchFolder folder;
+  const Texture texture = bake(write_png(folder, leaves), {});
+  ASSERT_TRUE(texture.cut_out);
+  for (std::size_t level = 0; level < 5; ++level) {
+    const TextureLevel& stored = texture.levels[level];
+    const RgbaImage alpha =
+        decode_texture(texture.format, stored.alpha, stored.width, stored.height);
+    EXPECT_NEAR(covered_share(alpha), share, 0.1) << level;
+  }
+  // A soft veil stays what it is.
+  for (std::size_t i = 0; i < leaves.pixels.size(); i += 4) {
+    leaves.pixels[i + 3] = static_cast<std::uint8_t>(i / 4 % 256);
+  }
+  EXPECT_FALSE(bake(write_png(folder, leaves), {}).cut_out);
+}
+
 }  // namespace
 }  // namespace modar

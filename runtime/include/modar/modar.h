@@ -204,6 +204,7 @@ typedef struct modar_render_options {
   float clear_colour[4];
   float lod_pixels; /* a level of detail may be off by so much on the screen */
   int exclusive;    /* 1 if nobody else draws in the context; 0: every call leaves GL's state as it found it */
+  int fixed_light;  /* 1: light does not follow what the camera's pictures show of the patterns */
 } modar_render_options;
 void modar_render_options_default(modar_render_options* options);
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options);

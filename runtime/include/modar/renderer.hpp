@@ -128,6 +128,9 @@ struct RenderOptions {
   std::optional<RoomLight> light;  ///< of all items; nothing: each scene's own
   float light_strength = 1.0f;     ///< factor on the key light
   float ambient_strength = 1.0f;   ///< factor on what comes from all around
+  /// The light of items' scenes follows what frames with planes show of their patterns, where the
+  /// bundle has the patterns' colours: brightness, colour, and how both change over the pattern.
+  bool estimate_light = true;
   bool plane_hides = false;  ///< the patterns of items' scenes hide what lies under their planes
   glm::vec4 clear_colour{0.0f, 0.0f, 0.0f, 1.0f};
   /// Nobody else draws in the context between frames: what is set then stays set. False: every call
