@@ -3,6 +3,8 @@
 # the device's player too, with Debian's cross compilers, and its size; ARM runs under qemu, wasm (SIMD of 128 bits) in
 # node. Not part of CI.
 #   scripts/foreign.sh armhf|arm64|wasm BUNDLE VIDEO   e.g. armhf build/box.modar box.mp4; 60 frames of it
+#   scripts/foreign.sh memory BUNDLE                   tracks and draws BUNDLE here within 256 MB of addresses, by the
+#                                                      device's code and a driver that draws nothing: memory a stage
 #   scripts/foreign.sh budget [MODAR [BIG_BUNDLE]]     instructions on ARMv7, beside tests/bench/arm_budget.csv; fails
 #                                                      where one is 2 % above. MODAR: program that bakes the demo scene
 #                                                      (build/release/bin/modar); BIG_BUNDLE: of about 200 MB
@@ -16,17 +18,19 @@ case $arch in
   arm64) triple=aarch64-linux-gnu run="qemu-aarch64 build/arm64/bits-there" ;;
   # Debian 12's emscripten takes the fetch() of newer nodes for a browser's.
   wasm) run="node --no-experimental-fetch build/wasm/bits-there.js" ;;
-  *) sed -n 2,10p "$0" >&2; exit 1 ;;
+  memory) triple= ;;
+  *) sed -n 2,12p "$0" >&2; exit 1 ;;
 esac
 if [ "$arch" = budget ]; then
   arch=armhf
   budget=${2:-build/release/bin/modar}
   big=${3:-}
-elif [ ! -f "$bundle" ] || [ ! -f "$video" ]; then
+elif [ ! -f "$bundle" ] || { [ "$arch" != memory ] && [ ! -f "$video" ]; }; then
   echo "foreign.sh: give a bundle and a video that shows its pattern" >&2
   exit 1
 fi
-[ -n "${budget:-}" ] || { bundle=$(realpath "$bundle") && video=$(realpath "$video"); }
+[ -z "$bundle" ] || bundle=$(realpath "$bundle")
+[ ! -f "$video" ] || video=$(realpath "$video")
 cd "$(dirname "$0")/.."
 build=$PWD/build/$arch
 mkdir -p "$build"
@@ -87,6 +91,19 @@ there_in_wasm() { # what the loop needs, without EGL
   echo "pose loop and its test as wasm: $(wc -c < "$build/bits-there.wasm") bytes"
 }
 
+# tests/track/budget_probe.cpp with a build's library and a driver that draws nothing.
+null_probe() { # PREFIX OF THE COMPILER, BUILD
+  "$1g++" -O2 -c -idirafter /usr/include tests/track/null_gl.cpp -o "$build/null_gl.o"
+  # What null_gl.cpp does not have returns 0.
+  "$1nm" "$2/runtime/libmodar_runtime.a" "$build/null_gl.o" 2> /dev/null | awk '
+    $NF ~ /^e?gl[A-Z]/ { if ($(NF - 1) == "T") has[$NF] = 1; else if ($(NF - 1) == "U") wants[$NF] = 1 }
+    END { for (name in wants) if (!has[name]) print "int " name "(void) { return 0; }" }' > "$build/null_rest.c"
+  "$1gcc" -w -O2 -c "$build/null_rest.c" -o "$build/null_rest.o"
+  "$1g++" -O2 -std=c++20 -ffp-contract=off -I. -Iruntime/include -static -idirafter /usr/include \
+    tests/track/budget_probe.cpp "$build/null_gl.o" "$2/runtime/libmodar_runtime.a" \
+    "$2/formats/libmodar_formats.a" "$build/null_rest.o" -pthread -o "$build/budget-probe"
+}
+
 # Instructions of the steps between two writes of budget_probe: the median, and the greatest.
 count() { # STEP BUNDLE FRAMES SKIP
   env -i qemu-arm -cpu cortex-a9 -plugin "$build/count.so" "$build/budget-probe" "$1" "$2" 640 480 "$3" 2>&1 > /dev/null |
@@ -105,19 +122,19 @@ measure() { # NAME STEP BUNDLE FRAMES SKIP [worst]: prints a row beside the comm
     exit before > 0 && now > 1.02 * before }' || fat=yes
 }
 
+if [ "$arch" = memory ]; then
+  cmake --preset device > /dev/null
+  cmake --build --preset device --target modar_runtime modar_formats
+  null_probe "" build/device
+  (ulimit -v 262144 && "$build/budget-probe" memory "$bundle" 640 480 10 > /dev/null)
+  exit 0
+fi
+
 if [ -n "${budget:-}" ]; then
   there_on_arm
   cmake --build "$build" --target modar_runtime modar_formats
   cc -O2 -shared -fPIC -o "$build/count.so" scripts/qemu_count.c
-  # The null driver: what null_gl.cpp does not have returns 0.
-  "$triple-g++" -O2 -c -idirafter /usr/include tests/track/null_gl.cpp -o "$build/null_gl.o"
-  "$triple-nm" "$build/runtime/libmodar_runtime.a" "$build/null_gl.o" 2> /dev/null | awk '
-    $NF ~ /^e?gl[A-Z]/ { if ($(NF - 1) == "T") has[$NF] = 1; else if ($(NF - 1) == "U") wants[$NF] = 1 }
-    END { for (name in wants) if (!has[name]) print "int " name "(void) { return 0; }" }' > "$build/null_rest.c"
-  "$triple-gcc" -w -O2 -c "$build/null_rest.c" -o "$build/null_rest.o"
-  "$triple-g++" -O2 -std=c++20 -ffp-contract=off -I. -Iruntime/include -static -idirafter /usr/include \
-    tests/track/budget_probe.cpp "$build/null_gl.o" "$build/runtime/libmodar_runtime.a" \
-    "$build/formats/libmodar_formats.a" "$build/null_rest.o" -pthread -o "$build/budget-probe"
+  null_probe "$triple-" "$build"
   "$budget" bake --quiet --model assets/models/pottery.obj --pattern assets/patterns/cover.png -o "$build/demo.modar"
   echo measure,instructions > "$build/arm_budget.csv"
   fat=no

@@ -1,9 +1,10 @@
 // What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin:
 // each measured step lies between two writes to stdout. Frames are rendered from the bundle's own
 // pattern, so that nothing but the bundle is needed.
-// Usage: budget_probe track|search|clutter|sliced|render|open BUNDLE [WIDTH HEIGHT [FRAMES
+// Usage: budget_probe track|search|clutter|sliced|render|open|memory BUNDLE [WIDTH HEIGHT [FRAMES
 // [BUDGET]]] search: frames that show the pattern; clutter: frames without it; sliced: both, within
-// a budget of so many million instructions a frame; render: by null_gl.cpp.
+// a budget of so many million instructions a frame; render: by null_gl.cpp; memory: tracks and
+// draws, and prints what memory the process holds after each stage.
 #include <unistd.h>
 
 #include <algorithm>
@@ -181,8 +182,38 @@ int run_render(const BundleView& bundle, int width, int height, int frames) {
   return 0;
 }
 
+/// What the process has mapped and what of it is resident, in MB of 10^6 bytes (proc(5)).
+void print_memory(const char* stage) {
+  std::FILE* status = std::fopen("/proc/self/status", "r");
+  if (status == nullptr) return;
+  char line[128];
+  long mapped = 0;
+  long anonymous = 0;
+  long of_files = 0;
+  while (std::fgets(line, sizeof line, status) != nullptr) {
+    std::sscanf(line, "VmSize: %ld", &mapped);
+    std::sscanf(line, "RssAnon: %ld", &anonymous);
+    std::sscanf(line, "RssFile: %ld", &of_files);
+  }
+  std::fclose(status);
+  std::fprintf(stderr, "%-12s %6.1f MB mapped, resident %6.1f own and %6.1f of files\n", stage,
+               static_cast<double>(mapped) * 1.024e-3, static_cast<double>(anonymous) * 1.024e-3,
+               static_cast<double>(of_files) * 1.024e-3);
+}
+
+int run_memory(const BundleView& bundle, int width, int height, int frames) {
+  print_memory("opened");
+  if (const int failed = run_frames("search", bundle, width, height, 2, 0)) return failed;
+  print_memory("searched");
+  if (const int failed = run_frames("track", bundle, width, height, frames, 0)) return failed;
+  print_memory("tracked");
+  if (const int failed = run_render(bundle, width, height, frames)) return failed;
+  print_memory("drawn");
+  return 0;
+}
+
 int run(int count, char** words) {
-  if (count < 3) return give_up("give track|search|clutter|sliced|render|open and a bundle");
+  if (count < 3) return give_up("give track|search|clutter|sliced|render|open|memory and a bundle");
   const std::string what = words[1];
   mark("begin\n");
   auto file = MappedFile::open(words[2]);
@@ -194,6 +225,7 @@ int run(int count, char** words) {
   const int width = count > 4 ? std::atoi(words[3]) : 640;
   const int height = count > 4 ? std::atoi(words[4]) : 480;
   const int frames = count > 5 ? std::atoi(words[5]) : 30;
+  if (what == "memory") return run_memory(*bundle, width, height, frames);
   if (what == "render") return run_render(*bundle, width, height, frames);
   return run_frames(what, *bundle, width, height, frames, count > 6 ? std::atoi(words[6]) : 12);
 }
