@@ -9,7 +9,7 @@
 
 namespace modar {
 
-/// Rendered photos that came out wrong, all but one, were below it (see find_corners.cpp).
+/// Most rendered photos that came out wrong were below it (see find_corners.cpp).
 inline constexpr double kDoubtfulSharpness = 0.92;
 
 struct FoundCorners {
