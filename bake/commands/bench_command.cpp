@@ -55,6 +55,8 @@ void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
   line.flag("--field", pose.field,
             "pose: frames as phones take them: blur, low light, JPEG, glare, rolling shutter, bent "
             "paper, mirrored prints, other editions");
+  line.flag("--lookalikes", pose.lookalikes,
+            "pose: two seconds each of other editions, mirror images and covered prints");
   line.option("--path", &pose.path,
               "pose: replay a camera path: a homography (9 numbers) or pose (12) a line");
   line.flag("--sift", pose.sift, "pose: OpenCV's SIFT with MAGSAC on the same frames");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bake/lab/bench_parts.hpp"
+#include "bake/lab/lookalike_bench.hpp"
 #include "bake/lab/many_bench.hpp"
 #include "bake/lab/pose_bench.hpp"
 #include "bake/lab/score_bench.hpp"
@@ -120,20 +121,30 @@ Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
   MODAR_ASSIGN(const auto scores, bench_scores(options, progress));
   std::vector<BenchRow> rows;
   std::vector<double> of_score[3];  // all, the half that it was tuned on, the other
+  std::vector<double> of_grade[3];
   std::vector<double> of_range[3];
   for (const ScoreBenchRow& one : scores) {
-    rows.push_back({"score " + one.name, 1.0 * one.score, one.range(), kNoFigure});
-    rows.push_back({"farthest " + one.name, one.farthest, kNoFigure, kNoFigure});
-    rows.push_back({"tilt_deg " + one.name, one.tilt_deg, kNoFigure, kNoFigure});
+    const ScoreRange& range = one.measured;
+    const double value = range_value(range);
+    rows.push_back({"score " + one.name, 1.0 * one.score, value, kNoFigure});
+    rows.push_back({"grade " + one.name, one.graded, value, one.graded / value});
+    rows.push_back({"farthest " + one.name, range.farthest, kNoFigure, kNoFigure});
+    rows.push_back({"tilt_deg " + one.name, range.tilt_deg, kNoFigure, kNoFigure});
+    rows.push_back({"covered " + one.name, range.covered_share, kNoFigure, kNoFigure});
     for (const std::size_t group : {std::size_t{0}, one.tuned ? std::size_t{1} : std::size_t{2}}) {
       of_score[group].push_back(one.score);
-      of_range[group].push_back(one.range());
+      of_grade[group].push_back(one.graded);
+      of_range[group].push_back(value);
     }
   }
   constexpr const char* kGroups[] = {"all", "tuned", "other"};
   for (std::size_t group = 0; group < 3; ++group) {
-    rows.push_back({std::string("rank_correlation ") + kGroups[group],
-                    rank_correlation(of_score[group], of_range[group]), kNoFigure, kNoFigure});
+    const auto add = [&](const char* what, const std::vector<double>& values) {
+      rows.push_back({std::string(what) + kGroups[group], rank_correlation(values, of_range[group]),
+                      kNoFigure, kNoFigure});
+    };
+    add("rank_correlation ", of_score[group]);
+    add("rank_correlation of grade ", of_grade[group]);
   }
   return rows;
 }
@@ -151,6 +162,16 @@ Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options,
   return rows;
 }
 
+Result<std::vector<BenchRow>> lookalike_rows(const PoseBenchOptions& options,
+                                             const ProgressCallback& progress) {
+  MODAR_ASSIGN(const auto measured, bench_lookalikes(options, progress));
+  std::vector<BenchRow> rows;
+  for (const LookalikeRow& row : measured) {
+    rows.push_back({row.measure + "_pct", row.percent, kNoFigure, kNoFigure});
+  }
+  return rows;
+}
+
 }  // namespace
 
 Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
@@ -161,10 +182,11 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
     measured.insert(measured.end(), rows.begin(), rows.end());
   };
   MODAR_ASSIGN(const PoseBenchOptions options, options_of(command));
-  if (command.scores || command.tables || command.many > 0) {
-    auto rows = command.many > 0 ? many_rows(options, progress)
-                : command.scores ? score_rows(options, progress)
-                                 : paper_rows(options, progress);
+  if (command.scores || command.tables || command.lookalikes || command.many > 0) {
+    auto rows = command.many > 0     ? many_rows(options, progress)
+                : command.lookalikes ? lookalike_rows(options, progress)
+                : command.scores     ? score_rows(options, progress)
+                                     : paper_rows(options, progress);
     bar.clear();
     return rows;
   }

@@ -32,15 +32,6 @@ GrayPicture picture_of(const cv::Mat& mat) {
   return picture;
 }
 
-/// The same border and layout with another photo in the middle 70 % of both sides.
-GrayPicture edition_of(const GrayImage& pattern, const GrayImage& other) {
-  cv::Mat print = mat_of(pattern).clone();
-  const cv::Rect middle(print.cols * 3 / 20, print.rows * 3 / 20, print.cols * 7 / 10,
-                        print.rows * 7 / 10);
-  cv::resize(mat_of(other), print(middle), middle.size(), 0, 0, cv::INTER_AREA);
-  return picture_of(print);
-}
-
 /// Paper bent about its vertical axis, the convex side to the camera.
 class BentPaper {
  public:
@@ -298,6 +289,48 @@ FieldFrame render_homography(const GrayImage& pattern, const std::array<double, 
     }
   }
   return out;
+}
+
+GrayPicture edition_of(const GrayImage& pattern, const GrayImage& other) {
+  cv::Mat print = mat_of(pattern).clone();
+  const cv::Rect middle(print.cols * 3 / 20, print.rows * 3 / 20, print.cols * 7 / 10,
+                        print.rows * 7 / 10);
+  cv::resize(mat_of(other), print(middle), middle.size(), 0, 0, cv::INTER_AREA);
+  return picture_of(print);
+}
+
+GrayPicture language_of(const GrayImage& pattern) {
+  cv::Mat print = mat_of(pattern).clone();
+  const int width = print.cols / 6;
+  const int height = std::max(1, print.rows / 20);
+  for (int y = print.rows * 3 / 5; y + height <= print.rows; y += height) {
+    for (int x = 0; x + width <= print.cols; x += width) {
+      cv::Mat words = print(cv::Rect(x, y, width, height));
+      const cv::Mat before = words.clone();
+      cv::flip(before, words, -1);
+    }
+  }
+  return picture_of(print);
+}
+
+HandPath::HandPath(const Pose& middle, Random& random) : middle_(middle) {
+  middle_.translation.x = middle_.translation.y = 0.0;
+  for (double& value : phase_) value = random.uniform(0.0, 6.28);
+}
+
+Pose HandPath::at(double time_s, double speed) const {
+  const auto sway = [&](std::size_t k, double hertz) {
+    return std::sin(2 * pi * hertz * speed * time_s + phase_[k]) +
+           0.3 * std::sin(2 * pi * 2.7 * hertz * speed * time_s + phase_[k + 6]);
+  };
+  Pose pose = middle_;
+  pose.rotation =
+      rotation_matrix({0.20 * sway(0, 0.31), 0.20 * sway(1, 0.23), 0.25 * sway(2, 0.17)}) *
+      middle_.rotation;
+  const double depth = middle_.translation.z;
+  pose.translation +=
+      glm::dvec3(0.10 * sway(3, 0.29), 0.07 * sway(4, 0.37), 0.15 * sway(5, 0.13)) * depth;
+  return pose;
 }
 
 }  // namespace modar

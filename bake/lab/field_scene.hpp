@@ -2,6 +2,7 @@
 // or the print itself.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -47,5 +48,24 @@ FieldFrame render_field(const GrayImage& pattern, const GrayImage& other, const 
 /// without blur, light or noise.
 FieldFrame render_homography(const GrayImage& pattern, const std::array<double, 9>& homography,
                              const GrayPicture& background);
+
+/// Another edition of a print: its border and layout around another photo in the middle 70 % of
+/// both sides.
+GrayPicture edition_of(const GrayImage& pattern, const GrayImage& other);
+/// The same print in another language: 2/5 of it are other words of the same look, which here are
+/// small blocks each turned by half a turn.
+GrayPicture language_of(const GrayImage& pattern);
+
+/// A hand-held camera's path: slow sines of all six parameters about a pose. Set by hand so that
+/// the pattern stays in the frame and moves by up to 15 pixels a frame at speed 1.
+class HandPath {
+ public:
+  HandPath(const Pose& middle, Random& random);
+  [[nodiscard]] Pose at(double time_s, double speed) const;
+
+ private:
+  Pose middle_;
+  std::array<double, 12> phase_{};
+};
 
 }  // namespace modar

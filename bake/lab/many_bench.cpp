@@ -92,9 +92,9 @@ class Frames {
       : many_(many), backgrounds_(backgrounds), options_(options) {}
 
   /// Frame i, which shows that pattern.
-  [[nodiscard]] SceneFrame at(int i, std::size_t pattern) const {
+  [[nodiscard]] SceneFrame at(int i, std::size_t pattern,
+                              const SceneBand& band = easy_band()) const {
     Random random(options_.seed + static_cast<std::uint64_t>(i));
-    const SceneBand band = easy_band();
     const GrayImage picture = many_.pictures[pattern].view();
     const Camera camera = default_camera(options_.width, options_.height);
     const Pose pose = draw_pose(band, picture, camera, random);
@@ -163,6 +163,40 @@ Result<void> measure_detection(const Many& many, const Frames& frames, const Cam
     rows.push_back({"detection cpu_ms", patterns, ms, with_one * patterns});
     rows.push_back({"detection right_pct", patterns, percent * all.right, percent * alone.right});
     rows.push_back({"detection others", patterns, 1.0 * all.others, 0});
+  }
+  return {};
+}
+
+/// Tilted views, in the greatest bundle beside searches for the shown pattern alone.
+Result<void> measure_tilts(const Many& many, const Frames& frames, const Camera& camera,
+                           const ProgressCallback& progress, std::vector<ManyBenchRow>& rows) {
+  constexpr double kTilts[] = {45, 60, 70, 75, 80};  // degrees: from one band to the next
+  const int patterns = static_cast<int>(many.size());
+  MODAR_ASSIGN(const auto bytes, many.bundle(many.size()));
+  MODAR_ASSIGN(const auto loop, searcher(bytes, camera));
+  for (std::size_t k = 0; k + 1 < std::size(kTilts); ++k) {
+    SceneBand band;
+    band.area_low = 0.5;
+    band.area_high = 3.0;
+    band.tilt_low = kTilts[k];
+    band.tilt_high = kTilts[k + 1];
+    Searched all;
+    Searched alone;
+    for (int i = 0; i < frames.count(); ++i) {
+      const std::size_t shown = static_cast<std::size_t>(i) % many.size();
+      const SceneFrame frame = frames.at(i, shown, band);
+      MODAR_TRY(all.add(*loop, frame, static_cast<std::uint32_t>(shown)));
+      MODAR_ASSIGN(const auto single,
+                   bundle_of_record(many.pictures[shown].view(), many.records[shown]));
+      MODAR_ASSIGN(const auto one, searcher(single, camera));
+      MODAR_TRY(alone.add(*one, frame, 0));
+      if (progress) progress("tilt", (1.0 * static_cast<double>(k) + 1.0 * i / frames.count()) / 4);
+    }
+    const std::string name = "detection tilt " + std::to_string(static_cast<int>(kTilts[k])) + "-" +
+                             std::to_string(static_cast<int>(kTilts[k + 1]));
+    const double percent = 100.0 / frames.count();
+    rows.push_back({name + " right_pct", patterns, percent * all.right, percent * alone.right});
+    rows.push_back({name + " others", patterns, 1.0 * all.others, 0});
   }
   return {};
 }
@@ -314,6 +348,7 @@ Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
   MODAR_ASSIGN(const auto bytes, many.bundle(many.size()));
   std::vector<ManyBenchRow> rows;
   MODAR_TRY(measure_detection(many, frames, camera, progress, rows));
+  MODAR_TRY(measure_tilts(many, frames, camera, progress, rows));
   MODAR_TRY(measure_ready(bytes, options.many, camera, frames.at(0, 0), rows));
   MODAR_TRY(measure_return(many, bytes, backgrounds, options, progress, rows));
   return rows;

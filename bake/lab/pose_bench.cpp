@@ -8,7 +8,6 @@
 #include <fstream>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <sstream>
 
 #include <glm/geometric.hpp>
@@ -149,23 +148,6 @@ int frames_of(const PoseBenchOptions& options, const SceneBand& band) {
   return (options.clutter_frames + patterns - 1) / patterns;
 }
 
-/// A hand-held camera's path: slow sines of all six parameters about a pose. Set by hand so that
-/// the pattern stays in the frame and moves by up to 15 pixels a frame at speed 1.
-Pose path_pose(const Pose& middle, double time, double speed, const std::array<double, 12>& phase) {
-  const auto sway = [&](std::size_t k, double hertz) {
-    return std::sin(2 * std::numbers::pi * hertz * speed * time + phase[k]) +
-           0.3 * std::sin(2 * std::numbers::pi * 2.7 * hertz * speed * time + phase[k + 6]);
-  };
-  Pose pose = middle;
-  pose.rotation =
-      rotation_matrix({0.20 * sway(0, 0.31), 0.20 * sway(1, 0.23), 0.25 * sway(2, 0.17)}) *
-      middle.rotation;
-  const double depth = middle.translation.z;
-  pose.translation +=
-      glm::dvec3(0.10 * sway(3, 0.29), 0.07 * sway(4, 0.37), 0.15 * sway(5, 0.13)) * depth;
-  return pose;
-}
-
 /// One path under one exposure, over one photo.
 Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const GrayPicture& background,
                       double speed, double blur, MethodTallies& tallies) {
@@ -177,15 +159,12 @@ Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const Gray
   MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, true));
   const GrayImage picture = fixture.pictures[0].view();
   Random random(options.seed + 1000003 * p + 17);
-  Pose middle = draw_pose(band, picture, camera, random);
-  middle.translation.x = middle.translation.y = 0.0;
-  std::array<double, 12> phase{};
-  for (double& value : phase) value = random.uniform(0.0, 6.28);
+  const HandPath path(draw_pose(band, picture, camera, random), random);
   const SceneLight light = draw_light(random);
   tallies.cut();
   glm::dvec2 last{0.0};
   for (int i = 0; i < options.frames; ++i) {
-    const Pose pose = path_pose(middle, i / 30.0, speed, phase);
+    const Pose pose = path.at(i / 30.0, speed);
     const glm::dvec2 centre = project(camera, pose.translation);
     const glm::dvec2 motion = i > 0 ? centre - last : glm::dvec2(0.0);
     last = centre;

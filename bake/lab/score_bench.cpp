@@ -33,6 +33,8 @@ std::vector<TrialSetting> settings_of(const GrayImage& picture) {
   for (int k = 0; k < kSizes; ++k) add(kLargest / std::pow(kStep, k), 0, 30);
   const double side = std::min(std::sqrt(own), kTiltSide);
   for (const double tilt : kTilts) add(side, tilt, tilt);
+  add(side, 0, 45);
+  settings.back().band.covered_low = settings.back().band.covered_high = 0.5;
   return settings;
 }
 
@@ -87,15 +89,20 @@ Result<std::vector<ScoreBenchRow>> bench_scores(const PoseBenchOptions& options,
     ScoreBenchRow row;
     row.name = std::filesystem::path(path).stem().string();
     row.score = score.score;
+    row.grade = score.grade;
+    row.graded = range_value(score.range);
     row.tuned = rows.size() % 2 == 0;
+    ScoreRange& range = row.measured;
     // A step counts by the share of its views that are right: the mean place of the range's end.
     double steps = 0;
     for (int k = 0; k < kSizes; ++k) steps += outcomes[static_cast<std::size_t>(k)].right_share();
-    row.farthest = setup.camera.fx / kLargest * std::pow(kStep, steps - 0.5);
-    row.tilt_deg = kTilts[0] - 0.5 * kTiltStep;
-    for (std::size_t k = kSizes; k < outcomes.size(); ++k) {
-      row.tilt_deg += kTiltStep * outcomes[k].right_share();
+    const double aspect = std::sqrt(1.0 * setup.picture.width / setup.picture.height);
+    range.farthest = setup.camera.fx / kLargest * std::pow(kStep, steps - 0.5) / aspect;
+    range.tilt_deg = kTilts[0] - 0.5 * kTiltStep;
+    for (std::size_t k = 0; k < std::size(kTilts); ++k) {
+      range.tilt_deg += kTiltStep * outcomes[kSizes + k].right_share();
     }
+    range.covered_share = outcomes.back().right_share();
     rows.push_back(row);
     if (progress) {
       progress("scores",

@@ -5,18 +5,19 @@
 #include <vector>
 
 #include "bake/lab/pose_bench.hpp"
+#include "bake/pattern/pattern.hpp"
 
 namespace modar {
 
-/// A pattern's score beside its working range, measured on smaller and smaller and steeper and
-/// steeper views.
+/// A pattern's score beside its working range, measured on smaller and smaller, steeper and
+/// steeper, and half-covered views before photos, through a lens with perspective.
 struct ScoreBenchRow {
   std::string name;
   int score = 0;
-  double farthest = 0;  ///< distance in roots of the pattern's area, for a focal length of 1280
-  double tilt_deg = 0;
-  bool tuned = false;  ///< in the half that the score was tuned on: every second by name
-  [[nodiscard]] double range() const { return farthest * tilt_deg / 90; }
+  char grade = 'E';
+  double graded = 0;    ///< range_value() of the range that the grade follows from
+  ScoreRange measured;  ///< here; `nearest` is not measured
+  bool tuned = false;   ///< in the half that the score was tuned on: every second by name
 };
 
 /// options.frames: views of each size and tilt. Errors: those of the benches and of

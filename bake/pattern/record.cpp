@@ -127,8 +127,11 @@ std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels, uns
 void expose_trial(Random& random, GrayPicture& picture) {
   const double gain = random.uniform(0.6, 1.25);
   const double bias = random.uniform(-20.0, 20.0);
+  std::array<double, 256> exposed;
+  for (int gray = 0; gray < 256; ++gray)
+    exposed[static_cast<std::size_t>(gray)] = gain * gray + bias;
   for (std::uint8_t& gray : picture.pixels) {
-    const double seen = gain * gray + bias + 3.0 * random.normal();
+    const double seen = exposed[gray] + 3.0 * random.normal();
     gray = static_cast<std::uint8_t>(std::clamp(seen + 0.5, 0.0, 255.0));
   }
 }

@@ -571,11 +571,14 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
   return out;
 }
 
+double range_value(const ScoreRange& range) {
+  // Root-area distance would favour no shape; widths are what a curator plans with.
+  return range.farthest * range.tilt_deg / 70 * (0.5 + 0.5 * range.covered_share);
+}
+
 char grade_of(const ScoreRange& range) {
-  // Root-area distance would favour no shape; widths are what a curator plans with. A factor each
-  // for distance, tilt and cover, the last at half weight. The limits are set by hand on the twelve
-  // pictures of the score.
-  const double value = range.farthest * range.tilt_deg / 70 * (0.5 + 0.5 * range.covered_share);
+  const double value = range_value(range);
+  // The limits are set by hand on the twelve pictures of the score.
   constexpr double kLimits[] = {14, 11, 8, 5};
   char grade = 'A';
   for (const double limit : kLimits) {

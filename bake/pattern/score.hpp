@@ -60,7 +60,10 @@ struct PatternScore {
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
                                    unsigned jobs, bool with_range = true);
 
-/// 'A' (the best) to 'E', from the range alone: distance, tilt and half-covered views as factors.
+/// What the grade follows from: farthest distance, tilt (over 70 degrees) and half-covered views
+/// (at half weight) as factors.
+double range_value(const ScoreRange& range);
+/// 'A' (the best) to 'E', from range_value() alone.
 char grade_of(const ScoreRange& range);
 
 /// "recognised from 13 cm to 1.3 m, to 70 degrees, 90 % right when half covered". width_mm: printed

@@ -154,26 +154,6 @@ std::vector<std::uint32_t> quads_of(const GrayPicture& level) {
 
 }  // namespace
 
-std::uint64_t Random::next() {
-  state_ += 0x9E3779B97F4A7C15ull;
-  std::uint64_t z = state_;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-  return z ^ (z >> 31);
-}
-
-double Random::uniform(double low, double high) {
-  return low + (high - low) * (static_cast<double>(next() >> 11) * 0x1.0p-53);
-}
-
-double Random::normal() {
-  // Three uniforms of 16 bits, whose sum has the variance 1/4.
-  const std::uint64_t bits = next();
-  const auto sum =
-      static_cast<double>((bits & 0xFFFF) + ((bits >> 16) & 0xFFFF) + ((bits >> 32) & 0xFFFF));
-  return 2.0 * (sum / 65536.0 - 1.5);
-}
-
 Turn turn_of(double radians) {
   constexpr double kQuarter = 1.57079632679489661923;
   const double quarters = std::floor(radians / kQuarter + 0.5);

@@ -15,10 +15,25 @@ namespace modar {
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next();
-  double uniform(double low, double high);
-  /// Mean 0, standard deviation 1, within +-3: the sum of three uniforms.
-  double normal();
+  // Here, since exposures draw one for each pixel.
+  std::uint64_t next() {
+    state_ += 0x9E3779B97F4A7C15ull;
+    std::uint64_t z = state_;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+    return z ^ (z >> 31);
+  }
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(next() >> 11) * 0x1.0p-53);
+  }
+  /// Mean 0, standard deviation 1, within +-3: the sum of three uniforms of 16 bits, whose variance
+  /// is 1/4.
+  double normal() {
+    const std::uint64_t bits = next();
+    const auto sum =
+        static_cast<int>((bits & 0xFFFF) + ((bits >> 16) & 0xFFFF) + ((bits >> 32) & 0xFFFF));
+    return 0x1.0p-15 * (sum - 98304);
+  }
 
  private:
   std::uint64_t state_;

@@ -103,6 +103,8 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
     pose.visible = 0;
     pose.inliers = 0;
     pose.fit = 0;
+    pose.agreeing = 0;
+    pose.likeness = 0;
     if (states[i].shown) set_pose(states[i].pose, pose);
   }
   for (const modar::Detection& seen : tracker->result.visible) {
@@ -114,6 +116,8 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
         seen.matches > 0
             ? std::min(1.0f, static_cast<float>(seen.inliers) / static_cast<float>(seen.matches))
             : 0;
+    pose.agreeing = static_cast<float>(seen.agreeing);
+    pose.likeness = static_cast<float>(seen.likeness);
     for (std::size_t i = 0; i < seen.corners.size(); ++i) {
       pose.corners[2 * i] = static_cast<float>(seen.corners[i].x);
       pose.corners[2 * i + 1] = static_cast<float>(seen.corners[i].y);

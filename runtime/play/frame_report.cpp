@@ -16,6 +16,8 @@
 #include <malloc.h>
 #endif
 
+#include "modar/pose.hpp"
+
 namespace modar {
 
 void RunStats::add(const FrameReport& report) {
@@ -68,7 +70,24 @@ void rounded(Writer& writer, double value) {
   number(writer, std::round(value * 1000.0) / 1000.0);
 }
 
-void detection(Writer& writer, const Detection& seen, std::span<const std::string> names) {
+/// Of the unit square to the corners.
+void homography(Writer& writer, const std::array<glm::dvec2, 4>& corners) {
+  constexpr std::array<glm::dvec2, 4> kSquare = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+  writer.Key("homography");
+  const auto map = homography_from_points(kSquare, corners);
+  if (!map) {
+    writer.Null();
+    return;
+  }
+  writer.StartArray();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) number(writer, (*map)[column][row]);
+  }
+  writer.EndArray();
+}
+
+void detection(Writer& writer, const Detection& seen, std::span<const std::string> names,
+               bool homographies) {
   writer.StartObject();
   writer.Key("pattern");
   text(writer, seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
@@ -96,6 +115,13 @@ void detection(Writer& writer, const Detection& seen, std::span<const std::strin
   writer.Int(seen.inliers);
   writer.Key("matches");
   writer.Int(seen.matches);
+  writer.Key("fit");
+  rounded(writer, seen.matches > 0 ? std::min(1.0, 1.0 * seen.inliers / seen.matches) : 0.0);
+  writer.Key("agreeing");
+  rounded(writer, seen.agreeing);
+  writer.Key("likeness");
+  rounded(writer, seen.likeness);
+  if (homographies) homography(writer, seen.corners);
   writer.EndObject();
 }
 
@@ -123,7 +149,8 @@ const char* to_string(Shown state) {
   return "hidden";
 }
 
-std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names) {
+std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
+                       bool homographies) {
   rapidjson::StringBuffer buffer;
   Writer writer(buffer);
   writer.StartObject();
@@ -133,7 +160,9 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
   number(writer, report.time_s);
   writer.Key("visible");
   writer.StartArray();
-  for (const Detection& seen : report.visible) detection(writer, seen, pattern_names);
+  for (const Detection& seen : report.visible) {
+    detection(writer, seen, pattern_names, homographies);
+  }
   writer.EndArray();
   writer.Key("reason");
   writer.String(to_string(report.reason));

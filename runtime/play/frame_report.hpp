@@ -51,10 +51,10 @@ struct FrameReport {
   [[nodiscard]] double at(Stage stage) const { return ms[static_cast<std::size_t>(stage)]; }
 };
 
-inline constexpr std::array<Reason, 7> kReasons = {
+inline constexpr std::array<Reason, 9> kReasons = {
     Reason::kVisible,    Reason::kNoFeatures,         Reason::kFewMatches,
     Reason::kNoGeometry, Reason::kFailedVerification, Reason::kLostByBlur,
-    Reason::kOutOfView};
+    Reason::kOutOfView,  Reason::kOtherPrint,         Reason::kCurved};
 
 /// A frame whose picture comes later than this after the frame itself is late (30 frames a second).
 inline constexpr double kFrameBudgetMs = 1000.0 / 30.0;
@@ -90,10 +90,14 @@ class RunStats {
   std::uint64_t dropped_ = 0;
 };
 
-/// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches}],reason,state,ms}.
+/// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches,fit,agreeing,
+/// likeness}],reason,state,ms}.
 /// Rotation row by row; numbers that are not finite become null. No newline at the end.
-/// pattern_names: by the bundle's pattern index.
-std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names);
+/// pattern_names: by the bundle's pattern index. homographies: adds each pattern's `homography`,
+/// row by row, from its unit square (0, 0 its top left corner, 1, 1 its bottom right one) to the
+/// frame's pixels; null where its corners have none.
+std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
+                       bool homographies = false);
 
 /// {"summary":{frames,dropped,visible,recognised_percent,states,reasons,late,ms}}; ms: medians.
 std::string summary_line(const RunStats& stats);

@@ -73,8 +73,9 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 13> kSwitches = {
+constexpr std::array<SwitchOption, 14> kSwitches = {
     {{"json", &PlayOptions::json},
+     {"homography", &PlayOptions::homography},
      {"force", &PlayOptions::force},
      {"window", &PlayOptions::window},
      {"realtime", &PlayOptions::realtime},
@@ -198,6 +199,8 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
   --no-light-estimate models keep their light, whatever the camera shows of the patterns
   --osd               paints state, reason and inliers on the pictures
   --json              one JSON line a frame and a summary, to standard output
+  --homography        in these lines, the map of each pattern's unit square to the frame: all that
+                      a camera of unknown focal length tells
   --camera FILE.yml   camera matrix and distortion as OpenCV writes them
                       (default: focal length = width of the frame)
   --find-focal        instead (off by default): measures the focal length on tilted views of the

@@ -32,7 +32,8 @@ struct PlayOptions {
   int width = 640;               ///< of turntable pictures
   int height = 480;
   bool json = false;
-  bool force = false;  ///< into folders that hold other files
+  bool homography = false;  ///< each pattern's in the JSON lines
+  bool force = false;       ///< into folders that hold other files
   bool window = false;
   bool find_focal = false;
   bool realtime = false;

@@ -299,7 +299,7 @@ Result<void> Player::write_line(const FrameReport& report, const Frame& frame) {
     MODAR_TRY(write_qos(report));
   }
   if (!options_.json && options_.report.empty() && !recorder_) return {};
-  const std::string line = frame_line(report, names_);
+  const std::string line = frame_line(report, names_, options_.homography);
   for (const auto& sink : sinks_) {
     MODAR_TRY(sink->line(report, line));
   }

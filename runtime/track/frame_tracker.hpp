@@ -26,6 +26,9 @@ struct Track {
   double surprise = 1e9;    ///< pixels by which the last prediction missed the pattern's centre
   int frames_since_lost = kRecentFrames;
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
+  Reason shown_reason = Reason::kVisible;    ///< why it is tracked and not shown, if it is not
+  bool judged = false;                       ///< by the PrintJudge
+  bool again = false;                        ///< it was lost a moment before it was found
 };
 
 /// The present frame, and the steps that bring tracks to it.

@@ -154,14 +154,15 @@ bool PlaneMatcher::unambiguous(const TrackedPattern& pattern, std::size_t first,
 }
 
 bool PlaneMatcher::match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
-                         std::size_t& next, std::int64_t& work) {
+                         std::size_t end, std::size_t& next, std::int64_t& work) {
   constexpr std::int64_t kCodeCost = 10;  // instructions, as scripts/foreign.sh counts them
   constexpr std::int64_t kFeatureCost = 1000;
   if (next == 0) matches_.clear();
   const Camera* lens = camera_.distortion == std::array<double, 5>{} ? nullptr : &camera_;
-  for (; next < features.size(); ++next) {
+  const std::size_t half = (features.size() + 1) / 2;
+  for (; next < end; ++next) {
     if (work <= 0) return false;
-    const TrackerFeature& feature = features[next];
+    const TrackerFeature& feature = features[next < half ? 2 * next : 2 * (next - half) + 1];
     const std::size_t first = feature.dark != 0 ? pattern.bright_count : 0;
     const std::size_t last = feature.dark != 0 ? pattern.features.size() : pattern.bright_count;
     if (first == last) continue;
@@ -346,7 +347,7 @@ std::span<const HomographyHypothesis> PlaneMatcher::find(const TrackedPattern& p
                                                          std::span<const TrackerFeature> features) {
   std::size_t next = 0;
   std::int64_t work = std::numeric_limits<std::int64_t>::max();
-  match(pattern, features, next, work);
+  match(pattern, features, features.size(), next, work);
   return hypotheses();
 }
 
@@ -404,8 +405,11 @@ void PlaneMatcher::select(const TrackedPattern& pattern, const HomographyHypothe
 namespace {
 
 // Codes of a pattern and polarity in the index, the most repeatable: trades memory and time for
-// patterns seen from views whose codes come later. With 128, half a megabyte for 50 patterns.
-constexpr std::size_t kIndexed = 128;
+// patterns seen from views whose codes come later, steep ones say. 128 or more, and so many for all
+// patterns together where that is more: half a megabyte.
+constexpr std::size_t kLeastIndexed = 128;
+constexpr std::size_t kIndexedInAll = 7168;
+constexpr std::size_t kMostIndexed = 1536;
 // Bits: a code further away casts no vote. Tighter than a match, since it is held against all
 // patterns' codes. By hand.
 constexpr int kMaxVoteDistance = 60;
@@ -451,7 +455,9 @@ CodeIndex::CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& ke
       kernels_(kernels),
       votes_(max_features),
       last_(patterns.size()),
-      support_(patterns.size()) {
+      support_(patterns.size()),
+      indexed_(std::clamp(kIndexedInAll / std::max<std::size_t>(patterns.size(), 1), kLeastIndexed,
+                          kMostIndexed)) {
   build(groups_[0], false);
   build(groups_[1], true);
 }
@@ -461,9 +467,9 @@ void CodeIndex::build(Group& group, bool dark) {
   std::vector<std::uint32_t> owners;
   for (std::uint32_t p = 0; p < patterns_.size(); ++p) {
     const auto [first, last] = range_of(patterns_[p], dark);
-    for (std::size_t i = first; i < std::min(last, first + kIndexed); ++i) {
+    for (std::size_t i = first; i < std::min(last, first + indexed_); ++i) {
       codes.push_back(code_at(patterns_[p].codes, i));
-      owners.push_back(p * static_cast<std::uint32_t>(kIndexed) +
+      owners.push_back(p * static_cast<std::uint32_t>(indexed_) +
                        static_cast<std::uint32_t>(i - first));
     }
   }
@@ -560,8 +566,8 @@ std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const TrackerFeatu
     if (group.starts.empty()) continue;
     const std::uint32_t owner = nearest_owner(group, feature.code);
     if (owner == kNone) continue;
-    const std::uint32_t p = owner / kIndexed;
-    const std::size_t at = range_of(patterns_[p], dark)[0] + owner % kIndexed;
+    const std::uint32_t p = owner / static_cast<std::uint32_t>(indexed_);
+    const std::size_t at = range_of(patterns_[p], dark)[0] + owner % indexed_;
     votes_[count] = {last_[p], match_of(patterns_[p].features[at], feature)};
     last_[p] = count++;
     ++support_[p].votes;

@@ -54,9 +54,11 @@ class PlaneMatcher {
   std::span<const HomographyHypothesis> find(const TrackedPattern& pattern,
                                              std::span<const TrackerFeature> features);
   /// The same in slices: match() with `next` 0 at first until it returns true, then hypotheses().
-  /// work: about how many ARMv7 instructions match() may take; it subtracts what it took.
+  /// Every second feature comes first, and `end` counts in that order; after hypotheses() match()
+  /// may go on to a greater one. work: about how many ARMv7 instructions match() may take; it
+  /// subtracts what it took.
   bool match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
-             std::size_t& next, std::int64_t& work);
+             std::size_t end, std::size_t& next, std::int64_t& work);
   std::span<const HomographyHypothesis> hypotheses();
   [[nodiscard]] std::size_t max_features() const { return matches_.capacity(); }
   /// Matches of the last find().
@@ -101,7 +103,7 @@ class CodeIndex {
  public:
   using Code = std::array<std::uint8_t, kCodeBytes>;
 
-  /// Indexes the most repeatable codes of each pattern, about 9 KB a pattern. Allocates nothing
+  /// Indexes the most repeatable codes of each pattern, 9 KB a pattern or more. Allocates nothing
   /// later. The patterns must outlive it.
   CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
             std::size_t max_features);
@@ -141,6 +143,7 @@ class CodeIndex {
   std::vector<Vote> votes_;
   std::vector<std::uint32_t> last_;  ///< by pattern: its last vote
   std::vector<Support> support_;
+  std::size_t indexed_;  ///< codes of a pattern and polarity, at most
 };
 
 }  // namespace modar::tracker

@@ -146,6 +146,7 @@ void PatternSearch::begin(FeatureExtractor& extractor, std::span<const SearchPri
   at_ = 0;
   found_ = false;
   next_feature_ = 0;
+  all_features_ = false;
   extractor.begin();
 }
 
@@ -213,7 +214,11 @@ bool PatternSearch::step(std::int64_t& work) {
   const FrameView frame{camera_, extractor_->pyramid(), kernels_, patches_};
   switch (stage_) {
     case Stage::kMatch:
-      if (matcher_.match(pattern, features, next_feature_, work)) stage_ = Stage::kHypotheses;
+      if (matcher_.match(pattern, features,
+                         all_features_ ? features.size() : (features.size() + 1) / 2, next_feature_,
+                         work)) {
+        stage_ = Stage::kHypotheses;
+      }
       times.match += clock.lap();
       return true;
     case Stage::kHypotheses:
@@ -239,6 +244,15 @@ bool PatternSearch::step(std::int64_t& work) {
       ++start_;
       break;
     default: {
+      // Half of the features place a pattern that nothing hides as well as all of them, in 36
+      // instead of 49 million instructions (scripts/foreign.sh budget); else what they found counts
+      // for nothing.
+      if (!all_features_ && !best_.unoccluded) {
+        all_features_ = true;
+        stage_ = Stage::kMatch;
+        times.homography += clock.lap();
+        return true;
+      }
       // Where a pose shows a part of the pattern only, a plane map may show all of it.
       if (candidate.reason == Reason::kFailedVerification ||
           (candidate.reason == Reason::kVisible && !best_.unoccluded)) {
@@ -247,6 +261,7 @@ bool PatternSearch::step(std::int64_t& work) {
       found_ = found_ || candidate.reason == Reason::kVisible;
       ++at_;
       next_feature_ = 0;
+      all_features_ = false;
       stage_ = Stage::kMatch;
       times.homography += clock.lap();
       return true;
@@ -255,7 +270,10 @@ bool PatternSearch::step(std::int64_t& work) {
   times.homography += clock.lap();
   while (start_ < start_count_ && !likely(start_)) ++start_;
   stage_ = Stage::kRefine;
-  if (start_ >= start_count_ || (best_.unoccluded && decided_)) {
+  if (!all_features_ && !(best_.unoccluded && decided_)) {
+    best_ = {};
+    stage_ = Stage::kMap;
+  } else if (start_ >= start_count_ || (best_.unoccluded && decided_)) {
     ++hypothesis_;
     next_hypothesis();
   }

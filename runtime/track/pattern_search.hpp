@@ -116,6 +116,7 @@ class PatternSearch {
   std::size_t at_ = 0;            ///< of selected_
   bool found_ = false;            ///< one of them
   std::size_t next_feature_ = 0;  ///< to match
+  bool all_features_ = false;     ///< else every second
   std::span<const HomographyHypothesis> hypotheses_;
   std::size_t hypothesis_ = 0;
   std::array<Pose, 2> starts_;  ///< of the hypothesis

@@ -6,6 +6,7 @@
 
 #include "frame_tracker.hpp"
 #include "pattern_search.hpp"
+#include "print_judge.hpp"
 #include "runtime/platform/lap_clock.hpp"
 
 namespace modar {
@@ -13,9 +14,13 @@ namespace {
 
 using tracker::DetectionCandidate;
 using tracker::PatchFit;
+using tracker::PrintJudge;
 using tracker::SearchPriority;
 using tracker::Track;
 using tracker::TrackedPattern;
+
+// Millions of instructions a frame from which a pattern can be brought to it and judged.
+constexpr int kJudgingBudget = 20;
 
 }  // namespace
 
@@ -27,6 +32,7 @@ struct PoseLoop::State {
   PoseLoopOptions options;
   std::vector<TrackedPattern> patterns;
   std::vector<Track> tracks;  ///< one a pattern
+  std::unique_ptr<PrintJudge> print_judge;
   tracker::FrameTracker frame_tracker;
   std::unique_ptr<tracker::PatternSearch> search;   ///< on the caller's thread, or
   std::unique_ptr<tracker::AsyncDetector> async;    ///< on its own
@@ -44,6 +50,9 @@ struct PoseLoop::State {
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
                    Detection& detection) const;
   bool resolve_overlap(std::size_t i, const Detection& detection, TrackResult& result);
+  bool show(std::size_t i, const PrintJudge::Verdict& verdict, Detection& detection,
+            TrackResult& result);
+  bool rename(std::size_t from, std::size_t to, Detection& detection);
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -69,6 +78,7 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
                 "bake it with a pattern");
   }
   state->tracks.resize(state->patterns.size());
+  state->print_judge = std::make_unique<PrintJudge>(state->patterns);
   state->priorities.resize(state->patterns.size());
   state->candidates.patterns.resize(state->patterns.size());
   if (options.async_search) {
@@ -148,7 +158,9 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   }
   if (sliced != nullptr) advance_search(result);
   result.times.pose = clock.lap();
-  if (search_due(!result.visible.empty())) {
+  const bool any_tracked =
+      std::any_of(tracks.begin(), tracks.end(), [](const Track& track) { return track.tracked; });
+  if (search_due(any_tracked)) {
     if (async != nullptr) {
       async->start(frame, priorities);
     } else if (sliced != nullptr) {
@@ -159,7 +171,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
     }
   }
   for (const Track& track : tracks) {
-    const Reason reason = track.tracked ? Reason::kVisible : track.last_reason;
+    const Reason reason = track.tracked ? track.shown_reason : track.last_reason;
     if (progress(reason) > progress(result.reason)) result.reason = reason;
   }
   std::sort(result.visible.begin(), result.visible.end(),
@@ -168,7 +180,8 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
 
 /// Goes on with the search by what tracking left of the frame's budget.
 void PoseLoop::State::advance_search(TrackResult& result) {
-  constexpr std::int64_t kFrameCost = 1'000'000;  // pyramid, and a copy of the frame
+  // Pyramid, a copy of the frame, and by what a step may exceed its cost.
+  constexpr std::int64_t kFrameCost = 2'000'000;
   constexpr std::int64_t kTrackCost = 3'000'000;  // of a pattern; as much to bring a find here
   const auto tracked =
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.tracked; });
@@ -187,11 +200,59 @@ void PoseLoop::State::track_all(TrackResult& result) {
     }
     track.tracked = options.track && frame_tracker.update(patterns[i], track, detection);
     if (track.tracked) {
-      result.visible.push_back(detection);
+      const auto frame = frame_tracker.frame();
+      show(i,
+           track.judged ? print_judge->follow(i, frame, track)
+                        : print_judge->meet(i, frame, track, track.again),
+           detection, result);
+      track.judged = true;
     } else {
       track.frames_since_lost = options.track ? 0 : tracker::kRecentFrames;
     }
   }
+}
+
+/// Adds what is tracked to the result, by the name that the judge gives it, unless it is not to be
+/// shown. Returns whether it was added.
+bool PoseLoop::State::show(std::size_t i, const PrintJudge::Verdict& verdict, Detection& detection,
+                           TrackResult& result) {
+  tracks[i].shown_reason = verdict.reason;
+  detection.agreeing = verdict.agreeing;
+  detection.likeness = verdict.likeness;
+  if (verdict.rival >= 0 && rename(i, static_cast<std::size_t>(verdict.rival), detection)) {
+    result.visible.push_back(detection);
+    return true;
+  }
+  if (verdict.reason != Reason::kVisible) return false;
+  result.visible.push_back(detection);
+  return true;
+}
+
+/// The frame shows another pattern in the place of a tracked one: goes on with that one.
+bool PoseLoop::State::rename(std::size_t from, std::size_t to, Detection& detection) {
+  if (tracks[to].tracked || tracks[from].homography_only) return false;
+  const TrackedPattern& pattern = patterns[to];
+  Track next;
+  next.pose = tracks[from].pose;
+  PatchFit fit;
+  Detection renamed = detection;
+  if (!tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kClose, next.pose,
+                       fit) ||
+      !frame_tracker.locate(pattern, next, renamed)) {
+    return false;
+  }
+  const PrintJudge::Verdict verdict = print_judge->meet(to, frame_tracker.frame(), next, false);
+  if (verdict.reason != Reason::kVisible || verdict.rival >= 0) return false;
+  renamed.agreeing = verdict.agreeing;
+  renamed.likeness = verdict.likeness;
+  renamed.matches = fit.visible;
+  renamed.inliers = fit.inliers;
+  next.tracked = next.judged = true;
+  tracks[to] = next;
+  tracks[from] = {};
+  tracks[from].last_reason = Reason::kOtherPrint;
+  detection = renamed;
+  return true;
 }
 
 /// Starts a track; false if the candidate is not visible in the present frame.
@@ -227,6 +288,7 @@ bool PoseLoop::State::resolve_overlap(std::size_t i, const Detection& detection,
                                       TrackResult& result) {
   const auto percent_of = [this](std::size_t which) {
     const Track& track = tracks[which];
+    if (track.shown_reason != Reason::kVisible) return 0;
     return track.homography_only
                ? tracker::map_photometric_percent(patterns[which], frame_tracker.frame(), track.map)
                : tracker::photometric_percent(patterns[which], frame_tracker.frame(), track.pose);
@@ -264,13 +326,23 @@ void PoseLoop::State::accept(TrackResult& result) {
     Detection detection;
     const bool here = candidate.reason == Reason::kVisible &&
                       start_track(patterns[i], track, candidate, detection);
-    if (here && resolve_overlap(i, detection, result)) {
-      result.visible.push_back(detection);
-      continue;
-    }
-    if (here) track = before;  // a recently lost one keeps its priority
-    const Reason reason =
+    Reason reason =
         candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
+    if (here) {
+      track.again = before.frames_since_lost < tracker::kRecentFrames;
+      PrintJudge::Verdict verdict;
+      // Within a small budget, bringing it here takes what a frame has: the next one judges.
+      track.judged = sliced == nullptr || options.budget >= kJudgingBudget;
+      if (track.judged) verdict = print_judge->meet(i, frame_tracker.frame(), track, track.again);
+      track.shown_reason = verdict.reason;
+      if (resolve_overlap(i, detection, result)) {
+        if (!track.judged) verdict.reason = before.last_reason;
+        show(i, verdict, detection, result);
+        continue;
+      }
+      reason = Reason::kOtherPrint;
+      track = before;  // a recently lost one keeps its priority
+    }
     // In the frame that lost it, the reason of the loss says more.
     if (track.frames_since_lost > 0 || progress(reason) > progress(track.last_reason))
       track.last_reason = reason;

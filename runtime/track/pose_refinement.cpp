@@ -13,83 +13,6 @@ namespace modar::tracker {
 
 // ---- The photometric check ----
 
-namespace {
-
-float correlation(std::span<const float> a, std::span<const float> b, float& contrast) {
-  float sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    sa += a[i];
-    sb += b[i];
-    saa += a[i] * a[i];
-    sbb += b[i] * b[i];
-    sab += a[i] * b[i];
-  }
-  const float n = static_cast<float>(a.size());
-  const float va = saa / n - sa / n * sa / n;
-  const float vb = sbb / n - sb / n * sb / n;
-  contrast = va;
-  if (!(va > 0.0f) || !(vb > 0.25f)) return 0.0f;
-  return (sab / n - sa / n * sb / n) / std::sqrt(va * vb);
-}
-
-}  // namespace
-
-PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap& map,
-                                  std::span<const GrayImage> pyramid) {
-  // 8x8 cells of 6x6 samples: smaller cells agree by chance, larger ones are hidden in part too
-  // often. Contrast is a variance: below it a cell of the pattern shows nothing. All set by hand;
-  // kMatching with kMinPercent.
-  constexpr int kCells = 8;
-  constexpr int kSamples = 6;
-  constexpr float kMinContrast = 16.0f;
-  constexpr float kMatching = 0.5f;
-  const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
-  const double step =
-      std::max(pattern.width(), pattern.height()) / static_cast<double>(kCells * kSamples);
-  const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
-  const auto level_of = [](double pixels, int count) {
-    return std::clamp(nearest_octave(std::max(pixels, 1.0)), 0, count - 1);
-  };
-  const auto pattern_level = static_cast<std::size_t>(level_of(step, pattern.level_count));
-  const auto frame_level =
-      static_cast<std::size_t>(level_of(step * scale, static_cast<int>(pyramid.size())));
-  const GrayImage& templates = pattern.levels[pattern_level];
-  const GrayImage& image = pyramid[frame_level];
-  const double template_shrink = 1.0 / static_cast<double>(1u << pattern_level);
-  const double shrink = 1.0 / static_cast<double>(1u << frame_level);
-  PhotometricCheck check;
-  std::array<float, kSamples * kSamples> expected{};
-  std::array<float, kSamples * kSamples> seen{};
-  for (int cell = 0; cell < kCells * kCells; ++cell) {
-    bool complete = true;
-    for (int k = 0; k < kSamples * kSamples && complete; ++k) {
-      const double u =
-          ((cell % kCells) * kSamples + k % kSamples + 0.5) / (kCells * kSamples) * pattern.width();
-      const double v =
-          (static_cast<int>(cell / kCells) * kSamples + static_cast<int>(k / kSamples) + 0.5) /
-          (kCells * kSamples) * pattern.height();
-      bool in_front = false;
-      const glm::dvec2 p = map.at({u - 0.5, v - 0.5}, in_front);
-      const double x = (p.x + 0.5) * shrink - 0.5;
-      const double y = (p.y + 0.5) * shrink - 0.5;
-      complete = in_front && x >= 0.0 && y >= 0.0 && x < image.width - 1 && y < image.height - 1;
-      if (!complete) break;
-      const auto at = static_cast<std::size_t>(k);
-      seen[at] = sample(image, static_cast<float>(x), static_cast<float>(y));
-      const double tx = std::clamp(u * template_shrink - 0.5, 0.0, templates.width - 1.001);
-      const double ty = std::clamp(v * template_shrink - 0.5, 0.0, templates.height - 1.001);
-      expected[at] = sample(templates, static_cast<float>(tx), static_cast<float>(ty));
-    }
-    if (!complete) continue;
-    float contrast = 0;
-    const float fit = correlation(expected, seen, contrast);
-    if (contrast < kMinContrast) continue;
-    ++check.cells;
-    if (fit >= kMatching) ++check.matching;
-  }
-  return check;
-}
-
 int photometric_percent(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
                         int min_cells) {
   const PhotometricCheck check =
@@ -348,6 +271,138 @@ void refine_from_inliers(const TrackedPattern& pattern, const FrameView& frame,
     }
   }
   pose = now;
+}
+
+// ---- Bent prints ----
+
+namespace {
+
+using Vector8 = Eigen::Matrix<double, 8, 1>;
+using Matrix8 = Eigen::Matrix<double, 8, 8>;
+using BendJacobian = Eigen::Matrix<double, 2, 8>;
+
+/// A print that bulges by `across` x^2 + `along` y^2 over the plane of its pose.
+struct BentPose {
+  Pose pose;
+  double across = 0;
+  double along = 0;
+
+  [[nodiscard]] glm::dvec3 at(glm::dvec2 world) const {
+    const double height = across * world.x * world.x + along * world.y * world.y;
+    return pose.rotation * glm::dvec3(world, height) + pose.translation;
+  }
+};
+
+/// The level on which the print's longer side has at most so many pixels: there patches catch what
+/// lies several frame pixels beside.
+int bend_level(const TrackedPattern& pattern, const Resolution& best, int levels, double most) {
+  int level = best.frame_level;
+  double side =
+      std::max(pattern.width(), pattern.height()) / static_cast<double>(1 << best.pattern_level);
+  while (side > most && level + 1 < levels &&
+         best.pattern_level + level + 1 - best.frame_level < pattern.level_count) {
+    ++level;
+    side *= 0.5;
+  }
+  return level;
+}
+
+/// Of a world point's pixel by a step of the pose and by the two bulges.
+BendJacobian bend_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 world, double scale) {
+  BendJacobian out;
+  out.leftCols<6>() = jacobian_of(camera, pose, world, scale);
+  const Eigen::Vector3d normal(pose.rotation[2].x, pose.rotation[2].y, pose.rotation[2].z);
+  const Eigen::Vector2d by_height = out.middleCols<3>(3) * normal;
+  out.col(6) = by_height * (world.x * world.x);
+  out.col(7) = by_height * (world.y * world.y);
+  return out;
+}
+
+/// One Gauss-Newton step over the patches of a level; false if they determine none.
+bool step_bent(const TrackedPattern& pattern, const FrameView& frame, int level, BentPose& bent) {
+  constexpr std::size_t kCount = 96;   // patches
+  constexpr int kLeast = 16;           // of those, with
+  constexpr float kCorrelated = 0.5f;  // correlation
+  const PlaneMap map = map_of_pose(pattern, frame.camera, bent.pose);
+  const PatchView view = view_of(pattern, frame, level, map, kCount);
+  const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
+  Matrix8 matrix = Matrix8::Zero();
+  Vector8 vector = Vector8::Zero();
+  int count = 0;
+  for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
+    const Patch& patch = view.patches[i];
+    const glm::dvec2 world = pattern.to_world(patch.centre);
+    const glm::dvec3 flat = BentPose{bent.pose}.at(world);
+    const glm::dvec3 there = bent.at(world);
+    if (!(flat.z > 0.0) || !(there.z > 0.0)) continue;
+    // The plane's map, moved to where the bent print has the patch.
+    PlaneMap moved = map;
+    const glm::dvec2 by{frame.camera.fx * (there.x / there.z - flat.x / flat.z),
+                        frame.camera.fy * (there.y / there.z - flat.y / flat.z)};
+    for (int column = 0; column < 3; ++column) {
+      moved.homography[column].x += by.x * moved.homography[column].z;
+      moved.homography[column].y += by.y * moved.homography[column].z;
+    }
+    PatchObservation seen;
+    if (!observe_patch(view, moved, patch, 1.0f, seen)) continue;
+    const PatchNormalEquations& one = seen.equations;
+    if (one.correlation < kCorrelated) continue;
+    const glm::dmat2 to_template = glm::inverse(seen.jacobian);
+    Eigen::Matrix2d back;
+    back << to_template[0].x, to_template[1].x, to_template[0].y, to_template[1].y;
+    const BendJacobian jacobian = back * bend_jacobian(frame.camera, bent.pose, world, shrink);
+    Eigen::Matrix2d g;
+    g << static_cast<double>(one.xx), static_cast<double>(one.xy), static_cast<double>(one.xy),
+        static_cast<double>(one.yy);
+    matrix += jacobian.transpose() * g * jacobian;
+    vector += jacobian.transpose() *
+              Eigen::Vector2d(static_cast<double>(one.ex), static_cast<double>(one.ey));
+    ++count;
+  }
+  if (count < kLeast) return false;
+  matrix.diagonal().array() += 1e-9 * matrix.trace();
+  const Vector8 change = solve_symmetric(matrix, vector);
+  if (!change.allFinite() || change.head<3>().norm() > kMaxRotation) return false;
+  std::array<double, 6> by{};
+  std::copy_n(change.data(), by.size(), by.begin());
+  bent.across += change(6);
+  bent.along += change(7);
+  return move_pose(pattern, frame.camera, 1.0, by, bent.pose) >= 0.0;
+}
+
+/// Mean distance of the four corners, frame pixels; the lens left aside.
+double corners_apart(const TrackedPattern& pattern, const Camera& camera, const BentPose& a,
+                     const BentPose& b) {
+  const double right = pattern.width() - 0.5;
+  const double bottom = pattern.height() - 0.5;
+  double sum = 0.0;
+  for (const glm::dvec2 corner :
+       {glm::dvec2{-0.5, -0.5}, {right, -0.5}, {-0.5, bottom}, {right, bottom}}) {
+    const glm::dvec2 world = pattern.to_world(corner);
+    const glm::dvec3 p = a.at(world);
+    const glm::dvec3 q = b.at(world);
+    if (!(p.z > 0.0) || !(q.z > 0.0)) return 0.0;
+    sum += 0.25 * glm::length(glm::dvec2(camera.fx * (p.x / p.z - q.x / q.z),
+                                         camera.fy * (p.y / p.z - q.y / q.z)));
+  }
+  return sum;
+}
+
+}  // namespace
+
+double bend_of(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose) {
+  constexpr double kFlat = 0.8;  // pixels of the first step: flat prints had at most 0.53
+  constexpr std::array<double, 4> kSides = {160.0, 160.0, 320.0, 320.0};
+  const int levels = static_cast<int>(frame.pyramid.size());
+  const Resolution best = finest(pattern, map_of_pose(pattern, frame.camera, pose), levels);
+  BentPose bent{pose};
+  double apart = 0.0;
+  for (std::size_t i = 0; i < kSides.size(); ++i) {
+    if (!step_bent(pattern, frame, bend_level(pattern, best, levels, kSides[i]), bent)) break;
+    apart = corners_apart(pattern, frame.camera, BentPose{pose}, bent);
+    if (i == 0 && apart < kFlat) break;
+  }
+  return apart;
 }
 
 }  // namespace modar::tracker

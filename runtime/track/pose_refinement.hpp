@@ -7,6 +7,7 @@
 #include <span>
 
 #include "patch_alignment.hpp"
+#include "photometry.hpp"
 
 namespace modar::tracker {
 
@@ -16,14 +17,6 @@ namespace modar::tracker {
 inline constexpr int kMinPercent = 30;
 /// And in how many cells at least: a few smooth ones look alike anywhere. Set by hand.
 inline constexpr int kMinCells = 8;
-
-/// Textured cells of the pattern, of 8x8, that lie in the frame, and how many of them correlate.
-struct PhotometricCheck {
-  int cells = 0;
-  int matching = 0;
-};
-PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap& map,
-                                  std::span<const GrayImage> pyramid);
 
 /// Percentage of the textured cells in view that correlate; 0 if fewer do than `min_cells`.
 int photometric_percent(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
@@ -54,5 +47,10 @@ double reprojection_rms(const Camera& camera, const Pose& pose, const PlanePoint
 /// patches beyond it lie: a pose spreads from where its features are over all that is visible.
 void refine_from_inliers(const TrackedPattern& pattern, const FrameView& frame,
                          const PlanePoints& points, Pose& pose);
+
+/// Frame pixels by which the corners of a bent print, mean of the four, lie beside those of the
+/// plane that its pose says: a few steps over the patches that show, with two bulges beside the
+/// pose's parameters. 0 where few patches show.
+double bend_of(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose);
 
 }  // namespace modar::tracker

@@ -20,6 +20,10 @@ const char* to_string(Reason reason) {
       return "lost by blur";
     case Reason::kOutOfView:
       return "out of view";
+    case Reason::kOtherPrint:
+      return "another print";
+    case Reason::kCurved:
+      return "curved";
   }
   return "unknown";
 }
@@ -27,6 +31,9 @@ const char* to_string(Reason reason) {
 int progress(Reason reason) {
   switch (reason) {
     case Reason::kVisible:
+      return 7;
+    case Reason::kOtherPrint:
+    case Reason::kCurved:
       return 6;
     case Reason::kLostByBlur:
     case Reason::kOutOfView:

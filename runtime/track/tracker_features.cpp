@@ -29,7 +29,7 @@ class CornerFinder {
   /// Appends the corners of rows of a level, from `row` (0 at first) on, which it moves to the
   /// next; false once there are no more. Corners are ordered by rows of cells, never beyond the
   /// reserved capacity.
-  bool find(const GrayImage& image, std::uint8_t level, int rows, int& row,
+  bool find(const GrayImage& image, std::uint8_t level, int threshold, int rows, int& row,
             std::vector<Corner>& corners);
 
  private:
@@ -84,8 +84,8 @@ void CornerFinder::flush(std::vector<Corner>& corners) {
   }
 }
 
-bool CornerFinder::find(const GrayImage& image, std::uint8_t level, int rows, int& row,
-                        std::vector<Corner>& corners) {
+bool CornerFinder::find(const GrayImage& image, std::uint8_t level, int threshold, int rows,
+                        int& row, std::vector<Corner>& corners) {
   const int count = image.width - 2 * kTrackerBorder;
   if (count <= 0 || image.height <= 2 * kTrackerBorder) return false;
   const Kernels& run = kernels(options_.simd);
@@ -105,8 +105,8 @@ bool CornerFinder::find(const GrayImage& image, std::uint8_t level, int rows, in
     std::uint8_t* score = row_at(y % 3);
     std::uint8_t* bright = row_at(3 + y % 3);
     if (y < last) {
-      run.corner_scores(image.pixels + y * image.stride + kTrackerBorder, image.stride,
-                        options_.threshold, count, bright, score);
+      run.corner_scores(image.pixels + y * image.stride + kTrackerBorder, image.stride, threshold,
+                        count, bright, score);
       // Kernels write past the range; that is no neighbour.
       std::memset(score + count, 0, kSlack);
     } else {
@@ -155,6 +155,12 @@ constexpr int kMinSide = 16;
 // Score from which a corner's rank in its cell decides instead of its contrast. Without it a page
 // of print took all 1,250 features of a frame, and no pattern on it was found; with it 95 to 100 %.
 constexpr int kSureScore = 40;
+// A frame with fewer corners for each megapixel is dim or flat: it is searched again, with each
+// level's threshold at so many standard deviations of its noise. Every frame that way would lose
+// true corners of bright frames to coarse levels' weak ones.
+constexpr std::int64_t kFewCorners = 400;
+constexpr int kNoiseSigmas = 4;
+constexpr int kLeastThreshold = 3;
 
 struct Point {
   int x = 0;
@@ -197,13 +203,16 @@ std::vector<std::int32_t> test_offsets(int stride) {
   constexpr double kSin = 0.09801714032956060199;
   double c = 1.0;
   double s = 0.0;
+  // Truncated above 0, since a processor without SSE 4.1 calls floor().
+  const auto nearest = [](double value) {
+    constexpr int kAbove = 4 * kTestRadius;
+    return static_cast<int>(value + (kAbove + 0.5)) - kAbove;
+  };
   std::vector<std::int32_t> offsets;
   offsets.reserve(static_cast<std::size_t>(kAngles) * points.size());
   for (int angle = 0; angle < kAngles; ++angle) {
     for (const Point& p : points) {
-      const int x = static_cast<int>(std::floor(c * p.x - s * p.y + 0.5));
-      const int y = static_cast<int>(std::floor(s * p.x + c * p.y + 0.5));
-      offsets.push_back(y * stride + x);
+      offsets.push_back(nearest(s * p.x + c * p.y) * stride + nearest(c * p.x - s * p.y));
     }
     const double next = c * kCos - s * kSin;
     s = c * kSin + s * kCos;
@@ -244,6 +253,8 @@ struct FeatureExtractor::State {
   std::vector<Corner> corners;
   std::vector<std::uint8_t> weights;  ///< of the corners, where there are too many
   std::vector<TrackerFeature> features;
+  std::array<int, kTrackerLevels> thresholds{};  ///< of corners, by level
+  bool dim = false;             ///< the frame is searched for the second time, with lower ones
   std::size_t slice_level = 0;  ///< of begin() and extend(): where the next slice starts
   int row = 0;
   std::size_t next = 0;  ///< corner
@@ -254,6 +265,8 @@ struct FeatureExtractor::State {
   bool extend_codes(std::int64_t& work);
   State(int width, const DetectOptions& with) : options(with), finder(width, with) {}
   void smooth_level(std::size_t level);
+  [[nodiscard]] int noise_threshold(const GrayImage& image) const;
+  bool search_dimmer();
   void weigh();
   void strongest();
   void describe(const Corner& corner);
@@ -419,6 +432,8 @@ void FeatureExtractor::begin() {
   state.next = 0;
   state.described = false;
   state.smoothed = false;
+  state.dim = false;
+  state.thresholds.fill(state.options.threshold);
 }
 
 /// False while corners are left to find.
@@ -429,11 +444,48 @@ bool FeatureExtractor::State::extend_corners(std::int64_t& work) {
   while (slice_level < count) {
     if (work <= 0) return false;
     work -= kPixelCost * kRows * levels[slice_level].width;
-    if (finder.find(levels[slice_level], static_cast<std::uint8_t>(slice_level), kRows, row,
-                    corners))
+    if (finder.find(levels[slice_level], static_cast<std::uint8_t>(slice_level),
+                    thresholds[slice_level], kRows, row, corners))
       continue;
     row = 0;
-    ++slice_level;
+    if (++slice_level == count && search_dimmer()) slice_level = 0;
+  }
+  return true;
+}
+
+/// The threshold that stays above a level's noise, as the median of the second differences along
+/// some of its rows tells it: edges are few among them.
+int FeatureExtractor::State::noise_threshold(const GrayImage& image) const {
+  std::array<int, 256> histogram{};
+  int count = 0;
+  for (int y = 4; y < image.height - 4; y += 8) {
+    const std::uint8_t* gray = image.pixels + y * image.stride;
+    for (int x = 4; x < image.width - 4; x += 3, ++count) {
+      const int bend = std::abs(gray[x - 2] - 2 * gray[x] + gray[x + 2]);
+      ++histogram[static_cast<std::size_t>(std::min(bend, 255))];
+    }
+  }
+  int median = 0;
+  for (int below = histogram[0]; 2 * below < count;
+       below += histogram[static_cast<std::size_t>(median)]) {
+    ++median;
+  }
+  // Of a normal distribution the median of |a - 2b + c| is 1.65 sigma.
+  const int threshold = (kNoiseSigmas * 100 * median + 82) / 165;
+  return std::clamp(threshold, kLeastThreshold, options.threshold);
+}
+
+/// Whether a frame with few corners is to be searched again; sets the thresholds for that.
+bool FeatureExtractor::State::search_dimmer() {
+  const std::int64_t area = std::int64_t{levels[0].width} * levels[0].height;
+  if (dim || static_cast<std::int64_t>(corners.size()) * 1'000'000 >= kFewCorners * area) {
+    return false;
+  }
+  dim = true;
+  corners.clear();
+  for (std::size_t level = 0; level < std::min<std::size_t>(levels.size(), kTrackerLevels);
+       ++level) {
+    thresholds[level] = noise_threshold(levels[level]);
   }
   return true;
 }

@@ -69,8 +69,8 @@ class Play(ProgramTest):
 
     def test_a_run_with_every_output_and_its_replay(self):
         bundle, clip = self.bake_demo(), self.clip()
-        done = self.play(bundle, "--input", clip, "--json", "--outline", "--osd", "--out", "pictures", "--report",
-                         "report", "--record", "kept", "--qos", "trial.jsonl")
+        done = self.play(bundle, "--input", clip, "--json", "--homography", "--outline", "--osd", "--out", "pictures",
+                         "--report", "report", "--record", "kept", "--qos", "trial.jsonl")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(done.stderr, "", "no progress bar without a terminal")
         *frames, summary = lines_of(done)
@@ -79,7 +79,8 @@ class Play(ProgramTest):
         self.assertGreater(summary["summary"]["visible"], 8, "our own cover is found")
         seen = next(frame["visible"][0] for frame in frames if frame["visible"])
         self.assertEqual(seen["pattern"], "cover")
-        self.assertEqual([len(seen["rotation"]), len(seen["translation"])], [9, 3])
+        self.assertEqual([len(seen["rotation"]), len(seen["translation"]), len(seen["homography"])], [9, 3, 9])
+        self.assertTrue(0.5 < seen["agreeing"] <= 1 and 0.5 < seen["likeness"] <= 1 and 0 < seen["fit"] <= 1, seen)
         self.assertEqual(len(list((self.folder / "pictures").glob("frame_*.png"))), 12)
         self.assertEqual({path.name for path in (self.folder / "report").iterdir()},
                          {"overlay.mp4", "contact_sheet.png", "frames.jsonl", "index.html"})

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bake/pattern/trial.hpp"
+#include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/camera_file.hpp"
 #include "modar/focal_finder.hpp"
@@ -101,12 +102,26 @@ TEST_F(Calibrate, FromAChessboardThroughABentLens) {
   expect_camera(*calibration, bent_camera());
 }
 
+const cv::Mat& filmed_picture() {
+  static const cv::Mat kPicture = test::textured_picture(320, 260, 12);
+  return kPicture;
+}
+
+/// A bundle of it.
+const std::vector<std::byte>& filmed_bundle() {
+  static const std::vector<std::byte> kBundle = [] {
+    TrackerRecordOptions options;
+    options.trial_views = 12;
+    return bundle_of_pattern(test::gray(filmed_picture()), options).value();
+  }();
+  return kBundle;
+}
+
 TEST_F(Calibrate, FromAnyPatternThroughABentLens) {
-  const cv::Mat picture = test::textured_picture(320, 260, 12);
-  ASSERT_TRUE(cv::imwrite(path("pattern.png"), picture));
+  ASSERT_TRUE(write_file(path("pattern.modar"), filmed_bundle()));
   CalibrateOptions options;
-  options.inputs = film(picture, bent_camera(), 9, 38);
-  options.pattern = path("pattern.png");
+  options.inputs = film(filmed_picture(), bent_camera(), 9, 38);
+  options.pattern = path("pattern.modar");
   const auto calibration = calibrate(options, {});
   ASSERT_TRUE(calibration) << to_line(calibration.error());
   EXPECT_GE(calibration->views, 7);
@@ -164,12 +179,8 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
 }
 
 TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
-  const cv::Mat image = test::textured_picture(320, 260, 12);
-  TrackerRecordOptions bake;
-  bake.trial_views = 12;
-  const auto bytes = bundle_of_pattern(test::gray(image), bake);
-  ASSERT_TRUE(bytes) << to_line(bytes.error());
-  const auto bundle = BundleView::open(*bytes);
+  const GrayImage image = test::gray(filmed_picture());
+  const auto bundle = BundleView::open(filmed_bundle());
   ASSERT_TRUE(bundle);
   for (const double truth : {520.0, 840.0}) {
     auto finder = FocalFinder::create(*bundle, 640, 480);
@@ -184,9 +195,8 @@ TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
     band.tilt_low = 20;
     band.tilt_high = 50;
     for (int i = 0; i < 60 && !(*finder)->focal(); ++i) {
-      const Pose pose = draw_pose(band, test::gray(image), camera, random);
-      const SceneFrame scene =
-          render_scene(test::gray(image), camera, pose, background, band, random);
+      const Pose pose = draw_pose(band, image, camera, random);
+      const SceneFrame scene = render_scene(image, camera, pose, background, band, random);
       (*finder)->add_frame(scene.picture.view());
     }
     ASSERT_TRUE((*finder)->focal())
@@ -196,12 +206,8 @@ TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
 }
 
 TEST(FocalFinder, FrontalViewsTellNothing) {
-  const cv::Mat image = test::textured_picture(320, 260, 12);
-  TrackerRecordOptions bake;
-  bake.trial_views = 8;
-  const auto bytes = bundle_of_pattern(test::gray(image), bake);
-  ASSERT_TRUE(bytes);
-  auto finder = FocalFinder::create(BundleView::open(*bytes).value(), 640, 480);
+  const GrayImage image = test::gray(filmed_picture());
+  auto finder = FocalFinder::create(BundleView::open(filmed_bundle()).value(), 640, 480);
   ASSERT_TRUE(finder);
   const Camera camera = default_camera(640, 480);
   Random random(9);
@@ -209,9 +215,9 @@ TEST(FocalFinder, FrontalViewsTellNothing) {
   SceneBand band;
   band.tilt_high = 1;
   for (int i = 0; i < 10; ++i) {
-    const Pose pose = draw_pose(band, test::gray(image), camera, random);
+    const Pose pose = draw_pose(band, image, camera, random);
     (*finder)->add_frame(
-        render_scene(test::gray(image), camera, pose, background, band, random).picture.view());
+        render_scene(image, camera, pose, background, band, random).picture.view());
   }
   EXPECT_FALSE((*finder)->focal());
   const FocalProgress progress = (*finder)->progress();

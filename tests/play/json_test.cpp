@@ -53,6 +53,24 @@ TEST(JsonLines, AFrameHoldsWhatTheContractNames) {
   EXPECT_TRUE(frame["ms"].contains("render"));
 }
 
+TEST(JsonLines, TheHomographyTakesTheUnitSquareToTheCorners) {
+  EXPECT_FALSE(json::parse(frame_line(seen_frame(), {}))["visible"][0].contains("homography"));
+  FrameReport report = seen_frame();
+  const json h = json::parse(frame_line(report, {}, true))["visible"][0]["homography"];
+  ASSERT_EQ(h.size(), 9u);
+  const auto row = [&](std::size_t i, double x, double y) {
+    return h[i].get<double>() * x + h[i + 1].get<double>() * y + h[i + 2].get<double>();
+  };
+  const glm::dvec2 square[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto [x, y] = std::pair(square[i].x, square[i].y);
+    EXPECT_NEAR(row(0, x, y) / row(6, x, y), report.visible[0].corners[i].x, 1e-9) << i;
+    EXPECT_NEAR(row(3, x, y) / row(6, x, y), report.visible[0].corners[i].y, 1e-9) << i;
+  }
+  report.visible[0].corners[2] = report.visible[0].corners[0];
+  EXPECT_TRUE(json::parse(frame_line(report, {}, true))["visible"][0]["homography"].is_null());
+}
+
 TEST(JsonLines, AFrameWithoutPatternSaysWhyAndStaysJson) {
   FrameReport report;
   report.time_s = std::numeric_limits<double>::quiet_NaN();

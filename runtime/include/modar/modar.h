@@ -103,6 +103,8 @@ typedef struct modar_pose {
   int inliers;          /* 0 where it is not visible */
   float fit;            /* share of the features looked at that agree with the pose, 0 to 1 */
   float corners[8];     /* x, y in pixels: top left, top right, bottom right, bottom left */
+  float agreeing;       /* share of the pattern's textured cells in view that look like it, 0 to 1 */
+  float likeness;       /* mean correlation of these cells, 0 to 1 */
 } modar_pose;
 
 /* NULL where no pattern of the bundle can be tracked. */

@@ -22,10 +22,12 @@ enum class Reason : std::uint8_t {
   kFailedVerification,  ///< the homography is impossible, or the frame does not look like it
   kLostByBlur,          ///< it was tracked, should be in view, and does not fit
   kOutOfView,           ///< it was tracked and left the frame
+  kOtherPrint,          ///< it is there in part: another print of its series, or its mirror image
+  kCurved,              ///< it is there, on paper too bent for a plane's pose
 };
 /// "visible", "no features", "few matches", ...
 const char* to_string(Reason reason);
-/// How far a pattern came, 1 to 6: a frame reports the reason of the one that came furthest.
+/// How far a pattern came, 1 to 7: a frame reports the reason of the one that came furthest.
 int progress(Reason reason);
 
 /// A pattern measured in this frame.
@@ -36,6 +38,10 @@ struct Detection {
   Pose pose;
   int matches = 0;  ///< features that match, or patches in view if tracked
   int inliers = 0;  ///< of those, the ones that agree with the pose
+  /// Share of the pattern's textured cells (of 8x8) in view that look like it, and their mean
+  /// correlation, each 0 to 1; of a tracked pattern as the last 16 frames saw them.
+  double agreeing = 0;
+  double likeness = 0;
 };
 
 /// Milliseconds of the stages of one frame (wall clock of the calling thread).

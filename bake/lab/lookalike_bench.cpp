@@ -1,0 +1,156 @@
+// Runs the device's tracker over sequences of lookalikes.
+#include "bake/lab/lookalike_bench.hpp"
+
+#include <algorithm>
+#include <functional>
+
+#include "bake/lab/field_scene.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/pose_loop.hpp"
+
+namespace modar {
+namespace {
+
+constexpr int kFrames = 60;  // two seconds
+constexpr int kDecided = 5;  // frames until the name must be right
+
+GrayPicture mirror_of(const GrayImage& pattern) {
+  GrayPicture out{pattern.width, pattern.height, {}};
+  for (int y = 0; y < pattern.height; ++y) {
+    const std::uint8_t* row = pattern.pixels + y * pattern.stride;
+    out.pixels.insert(out.pixels.end(), row, row + pattern.width);
+    std::reverse(out.pixels.end() - pattern.width, out.pixels.end());
+  }
+  return out;
+}
+
+/// Called with each frame's result.
+using Judge = std::function<void(int frame, const TrackResult& seen, const FrameTruth& truth)>;
+
+/// A print on a moving hand's path before a tracker. covered: share that the background hides.
+Result<void> run_sequence(const GrayImage& print, std::span<const std::byte> bundle,
+                          const GrayPicture& background, double covered, std::uint64_t seed,
+                          const Judge& judge) {
+  const Camera camera = default_camera(background.width, background.height);
+  MODAR_ASSIGN(const auto view, BundleView::open(bundle));
+  MODAR_ASSIGN(const auto loop, PoseLoop::create(view, camera));
+  SceneBand band;
+  band.area_low = 0.8;
+  band.area_high = 2.0;
+  band.tilt_high = 35;
+  band.covered_low = band.covered_high = covered;
+  Random random(seed);
+  const HandPath path(draw_pose(band, print, camera, random), random);
+  const SceneLight light = draw_light(random);
+  const std::uint64_t side = random.next();
+  GrayPicture frame;
+  for (int i = 0; i < kFrames; ++i) {
+    Random same_side(side);
+    const SceneFrame scene = render_still(print, camera, path.at(i / 30.0, 1.0), background, band,
+                                          same_side, light.focus, {});
+    expose(scene.picture, light, random, frame);
+    MODAR_ASSIGN(const TrackResult seen, loop->step(frame.view()));
+    judge(i, seen, {true, scene.corners});
+  }
+  return {};
+}
+
+/// Sums of a measure.
+struct Tally {
+  LookalikeRow row;
+  void add(bool one) {
+    ++row.sequences;
+    row.percent += one ? 1 : 0;
+  }
+  LookalikeRow finish() {
+    row.percent *= 100.0 / std::max(row.sequences, 1);
+    return row;
+  }
+};
+
+/// Whether the last frame of a print's sequence shows anything; or the pattern, in the right place.
+Result<bool> ends_shown(const GrayImage& print, std::span<const std::byte> bundle,
+                        const GrayPicture& background, double covered, std::uint64_t seed,
+                        bool right) {
+  bool shown = false;
+  MODAR_TRY(run_sequence(print, bundle, background, covered, seed,
+                         [&](int frame, const TrackResult& seen, const FrameTruth& truth) {
+                           if (frame != kFrames - 1 || seen.visible.empty()) return;
+                           shown = !right || is_right(seen.visible[0], truth);
+                         }));
+  return shown;
+}
+
+/// Whether the wrong name is reported once it must be decided. truth: index of the print.
+Result<bool> misnamed(const GrayImage& print, std::span<const std::byte> both, std::uint32_t truth,
+                      const GrayPicture& background, std::uint64_t seed) {
+  bool wrong = false;
+  int since = -1;
+  MODAR_TRY(run_sequence(print, both, background, 0, seed,
+                         [&](int frame, const TrackResult& seen, const FrameTruth&) {
+                           if (since < 0 && !seen.visible.empty()) since = frame;
+                           for (const Detection& one : seen.visible) {
+                             const bool late = since >= 0 && frame - since >= kDecided;
+                             wrong = wrong || (late && one.pattern != truth);
+                           }
+                         }));
+  return wrong;
+}
+
+}  // namespace
+
+Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& options,
+                                                   const ProgressCallback& progress) {
+  MODAR_ASSIGN(const auto backgrounds,
+               load_backgrounds(options.backgrounds, options.width, options.height));
+  Tally edition{{"lookalike shown other photo"}};
+  Tally language{{"lookalike shown other language"}};
+  Tally mirror{{"lookalike shown mirrored"}};
+  Tally named{{"lookalike misnamed"}};
+  Tally covered{{"lookalike covered right"}};
+  Tally plain{{"lookalike plain right"}};
+  std::vector<GrayPicture> pictures;
+  for (const std::string& path : options.patterns) {
+    bool shrunk = false;
+    MODAR_ASSIGN(auto picture, load_pattern(path, shrunk));
+    pictures.push_back(std::move(picture));
+  }
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    const GrayImage own = pictures[p].view();
+    const GrayPicture photo = edition_of(own, pictures[(p + 1) % pictures.size()].view());
+    const GrayPicture words = language_of(own);
+    const GrayPicture turned = mirror_of(own);
+    MODAR_ASSIGN(const auto record, bake_tracker_record(own, {}));
+    MODAR_ASSIGN(const auto other_record, bake_tracker_record(photo.view(), {}));
+    MODAR_ASSIGN(const auto alone, bundle_of_record(own, record));
+    const std::vector<GrayPicture> prints = {pictures[p], photo};
+    const std::vector<std::vector<std::byte>> records = {record, other_record};
+    MODAR_ASSIGN(const auto both, bundle_of_records(prints, records));
+    for (int i = 0; i < options.frames; ++i) {
+      const std::uint64_t seed = options.seed + 1000003 * p + 7919 * static_cast<std::uint64_t>(i);
+      const GrayPicture& behind = backgrounds[seed % backgrounds.size()];
+      const auto take = [&](Tally& tally, const GrayImage& print, double hidden, bool right) {
+        return ends_shown(print, alone, behind, hidden, seed, right).map([&](bool one) {
+          tally.add(one);
+        });
+      };
+      MODAR_TRY(take(edition, photo.view(), 0, false));
+      MODAR_TRY(take(language, words.view(), 0, false));
+      MODAR_TRY(take(mirror, turned.view(), 0, false));
+      MODAR_TRY(take(covered, own, 0.5, true));
+      MODAR_TRY(take(plain, own, 0, true));
+      for (const std::uint32_t k : {0u, 1u}) {
+        MODAR_ASSIGN(const bool wrong, misnamed(prints[k].view(), both, k, behind, seed));
+        named.add(wrong);
+      }
+      if (progress) {
+        progress("lookalikes", (static_cast<double>(p) + (i + 1.0) / options.frames) /
+                                   static_cast<double>(pictures.size()));
+      }
+    }
+  }
+  return std::vector<LookalikeRow>{edition.finish(), language.finish(), mirror.finish(),
+                                   named.finish(),   covered.finish(),  plain.finish()};
+}
+
+}  // namespace modar

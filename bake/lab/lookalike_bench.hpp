@@ -1,0 +1,28 @@
+// What tells a print from its lookalikes while it moves: other editions of a series, covered
+// prints.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bake/lab/pose_bench.hpp"
+
+namespace modar {
+
+/// Percentage of the sequences of a kind.
+struct LookalikeRow {
+  std::string measure;
+  double percent = 0;
+  int sequences = 0;
+};
+
+/// Sequences of 60 frames of a moving hand, options.frames of each kind and pattern:
+/// "lookalike shown": another photo in the same layout, another language, the mirror image, with
+/// the pattern alone in the bundle, in the last of these frames; "lookalike misnamed": pattern and
+/// edition in the bundle, one of them shown, the other one reported in the fifth frame or later;
+/// "covered right": half of the pattern behind something that stands still, right in the last
+/// frame, and "plain right". Errors: as of bench_detection().
+Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& options,
+                                                   const ProgressCallback& progress);
+
+}  // namespace modar

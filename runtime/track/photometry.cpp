@@ -1,0 +1,222 @@
+// Samples cells of prints and of frames and correlates them.
+#include "photometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace modar::tracker {
+namespace {
+
+/// The level of a pyramid whose pixels are about that wide.
+std::size_t level_of_step(double pixels, std::size_t count) {
+  return static_cast<std::size_t>(
+      std::clamp(nearest_octave(std::max(pixels, 1.0)), 0, static_cast<int>(count) - 1));
+}
+
+/// Pattern pixels between samples.
+double step_of(const TrackedPattern& pattern) {
+  return std::max(pattern.width(), pattern.height()) /
+         static_cast<double>(kCellSide * kCellSamples);
+}
+
+/// Share of the width (or height) at which a sample of a column (or row) of cells lies.
+double share_at(int cell, int k) {
+  return (cell * kCellSamples + k + 0.5) / (kCellSide * kCellSamples);
+}
+
+/// Where a sample of a cell lies, in shares of width and height.
+glm::dvec2 place_of(int cell, int k, const Mirror* mirror) {
+  glm::dvec2 place(share_at(cell % kCellSide, k % kCellSamples),
+                   share_at(cell / kCellSide, k / kCellSamples));
+  if (mirror != nullptr) {
+    double& share = mirror->upright ? place.x : place.y;
+    share = 2.0 * mirror->at - share;
+  }
+  return place;
+}
+
+}  // namespace
+
+bool Mirror::keeps(int cell) const {
+  const int along = upright ? cell % kCellSide : cell / kCellSide;
+  const double share = 2.0 * at - (along + 0.5) / kCellSide;
+  return share >= 0.0 && share <= 1.0;
+}
+
+CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
+                   std::span<const GrayImage> pyramid)
+    : pattern_(pattern), map_(map) {
+  const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
+  const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
+  const std::size_t level = level_of_step(step_of(pattern) * scale, pyramid.size());
+  image_ = &pyramid[level];
+  shrink_ = 1.0 / static_cast<double>(1u << level);
+}
+
+bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror) const {
+  for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
+    const glm::dvec2 share = place_of(cell, k, mirror);
+    bool in_front = false;
+    const glm::dvec2 p =
+        map_.at({share.x * pattern_.width() - 0.5, share.y * pattern_.height() - 0.5}, in_front);
+    const double x = (p.x + 0.5) * shrink_ - 0.5;
+    const double y = (p.y + 0.5) * shrink_ - 0.5;
+    if (!in_front || !(x >= 0.0 && y >= 0.0 && x < image_->width - 1 && y < image_->height - 1)) {
+      return false;
+    }
+    seen[static_cast<std::size_t>(k)] =
+        sample(*image_, static_cast<float>(x), static_cast<float>(y));
+  }
+  return true;
+}
+
+void CellGrid::expect(const TrackedPattern& print, int cell, CellSamples& expected,
+                      const Mirror* mirror) {
+  const std::size_t level =
+      level_of_step(step_of(print), static_cast<std::size_t>(print.level_count));
+  const GrayImage& image = print.levels[level];
+  const double shrink = 1.0 / static_cast<double>(1u << level);
+  for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
+    const glm::dvec2 share = place_of(cell, k, mirror);
+    const double x = std::clamp(share.x * print.width() * shrink - 0.5, 0.0, image.width - 1.001);
+    const double y = std::clamp(share.y * print.height() * shrink - 0.5, 0.0, image.height - 1.001);
+    expected[static_cast<std::size_t>(k)] =
+        sample(image, static_cast<float>(x), static_cast<float>(y));
+  }
+}
+
+CellMatch compare(const CellSamples& expected, const CellSamples& seen) {
+  float sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    sa += expected[i];
+    sb += seen[i];
+    saa += expected[i] * expected[i];
+    sbb += seen[i] * seen[i];
+    sab += expected[i] * seen[i];
+  }
+  const float n = static_cast<float>(expected.size());
+  CellMatch match;
+  match.expected_contrast = saa / n - sa / n * sa / n;
+  match.seen_contrast = sbb / n - sb / n * sb / n;
+  if (!(match.expected_contrast > 0.0f) || !(match.seen_contrast > 0.25f)) return match;
+  match.correlation =
+      (sab / n - sa / n * sb / n) / std::sqrt(match.expected_contrast * match.seen_contrast);
+  return match;
+}
+
+PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap& map,
+                                  std::span<const GrayImage> pyramid) {
+  const CellGrid grid(pattern, map, pyramid);
+  PhotometricCheck check;
+  CellSamples expected{};
+  CellSamples seen{};
+  for (int cell = 0; cell < kCells; ++cell) {
+    if (!grid.see(cell, seen)) continue;
+    CellGrid::expect(pattern, cell, expected);
+    const CellMatch match = compare(expected, seen);
+    if (!match.textured()) continue;
+    ++check.cells;
+    check.correlation += static_cast<double>(std::max(0.0f, match.correlation));
+    if (match.agrees()) ++check.matching;
+  }
+  if (check.cells > 0) check.correlation /= check.cells;
+  return check;
+}
+
+PrintDifference compare_prints(const TrackedPattern& first, const TrackedPattern& second,
+                               const PlaneMap& map, std::span<const GrayImage> pyramid) {
+  const CellGrid grid(first, map, pyramid);
+  PrintDifference difference;
+  CellSamples expected{};
+  CellSamples seen{};
+  for (int cell = 0; cell < kCells; ++cell) {
+    if (!grid.see(cell, seen)) continue;
+    CellGrid::expect(first, cell, expected);
+    const CellMatch one = compare(expected, seen);
+    CellGrid::expect(second, cell, expected);
+    const CellMatch other = compare(expected, seen);
+    difference.first += one.agrees() && other.disagrees() ? 1 : 0;
+    difference.second += other.agrees() && one.disagrees() ? 1 : 0;
+  }
+  return difference;
+}
+
+namespace {
+
+/// Whether the cell whose rows of samples begin at `rows`, `left` behind, agrees with itself
+/// mirrored: x to sum - 1 - x.
+bool swapped_alike(const float* rows, int pitch, int left, int sum) {
+  CellSamples own{};
+  CellSamples swapped{};
+  for (int y = 0; y < kCellSamples; ++y, rows += pitch) {
+    for (int x = left; x < left + kCellSamples; ++x) {
+      const auto k = static_cast<std::size_t>(y * kCellSamples + x - left);
+      own[k] = rows[x];
+      swapped[k] = rows[sum - 1 - x];
+    }
+  }
+  return compare(own, swapped).agrees();
+}
+
+}  // namespace
+
+Mirror most_alike_mirror(const TrackedPattern& pattern, bool upright,
+                         const std::array<bool, kCells>& those) {
+  constexpr int kSide = kCellSide * kCellSamples;
+  // The pattern's samples, turned so that the mirror swaps what lies along a row.
+  std::array<float, kSide * kSide> rows;
+  CellSamples samples{};
+  for (int cell = 0; cell < kCells; ++cell) {
+    CellGrid::expect(pattern, cell, samples);
+    for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
+      const int x = cell % kCellSide * kCellSamples + k % kCellSamples;
+      const int y = cell / kCellSide * kCellSamples + k / kCellSamples;
+      rows[static_cast<std::size_t>(upright ? y * kSide + x : x * kSide + y)] =
+          samples[static_cast<std::size_t>(k)];
+    }
+  }
+  // Mirrors at the samples and half-way between, from the middle outwards: of equally good ones the
+  // first. Cells behind the mirror are compared with what lies before it.
+  int best = kSide;
+  int most = 0;
+  for (int i = 0; i < 2 * (kSide - kCellSamples); ++i) {
+    const int sum = kSide + (i % 2 == 0 ? -i / 2 : (i + 1) / 2);
+    int alike = 0;
+    for (int left = 0; left < kSide; left += kCellSamples) {
+      const int low = sum - left - kCellSamples;
+      if (low < 0 || low > left) continue;
+      for (int top = 0; top < kSide; top += kCellSamples) {
+        const int across = left / kCellSamples;
+        const int down = top / kCellSamples;
+        const int cell = upright ? down * kCellSide + across : across * kCellSide + down;
+        if (!those[static_cast<std::size_t>(cell)]) continue;
+        alike += swapped_alike(rows.data() + top * kSide, kSide, left, sum) ? 1 : 0;
+      }
+    }
+    if (alike > most) {
+      most = alike;
+      best = sum;
+    }
+  }
+  return {upright, 0.5 * best / kSide};
+}
+
+bool related(const TrackedPattern& a, const TrackedPattern& b) {
+  constexpr double kSameShape = 0.03;  // share by which the ratio of the sides may differ
+  const double ratio = 1.0 * a.width() * b.height() / (1.0 * a.height() * b.width());
+  if (std::abs(ratio - 1.0) > kSameShape) return false;
+  int textured = 0;
+  int alike = 0;
+  CellSamples one{};
+  CellSamples other{};
+  for (int cell = 0; cell < kCells; ++cell) {
+    CellGrid::expect(a, cell, one);
+    CellGrid::expect(b, cell, other);
+    const CellMatch match = compare(one, other);
+    textured += match.textured() ? 1 : 0;
+    alike += match.agrees() ? 1 : 0;
+  }
+  return 4 * alike >= textured && alike > 0;
+}
+
+}  // namespace modar::tracker

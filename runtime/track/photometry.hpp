@@ -1,0 +1,93 @@
+// How a frame looks where a pattern should be, cell by cell: the photometric check of a pose, and
+// what tells a print from another one. Internal to runtime/track.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "modar/image.hpp"
+#include "plane_geometry.hpp"
+#include "tracked_pattern.hpp"
+
+namespace modar::tracker {
+
+/// 8x8 cells of 6x6 samples: smaller cells agree by chance, larger ones are hidden in part too
+/// often. By hand.
+inline constexpr int kCellSide = 8;
+inline constexpr int kCells = kCellSide * kCellSide;
+inline constexpr int kCellSamples = 6;
+using CellSamples = std::array<float, kCellSamples * kCellSamples>;
+
+/// Contrast is a variance: below it a cell of the pattern shows nothing. And the correlation from
+/// which a cell agrees, and below which it disagrees; what lies between says nothing. By hand.
+inline constexpr float kTexturedCell = 16.0f;
+inline constexpr float kAgreeingCell = 0.5f;
+inline constexpr float kDisagreeingCell = 0.3f;
+
+/// A line in which a print's mirror image swaps its sides: u becomes 2 at - u, of the share u of
+/// the width, or of the height if `upright` is false.
+struct Mirror {
+  bool upright = true;
+  double at = 0.5;
+  /// Whether the mirror image of a cell lies in the outline, as its centre tells.
+  [[nodiscard]] bool keeps(int cell) const;
+};
+
+/// The outline of a pattern in a frame, divided into cells.
+class CellGrid {
+ public:
+  /// The arguments must outlive it.
+  CellGrid(const TrackedPattern& pattern, const PlaneMap& map, std::span<const GrayImage> pyramid);
+  /// What the frame shows of a cell, of its mirror image if there is one, which may lie beside the
+  /// outline; false if that does not lie in the frame.
+  bool see(int cell, CellSamples& seen, const Mirror* mirror = nullptr) const;
+  /// What a print, or its mirror image, of any size shows there that fills the outline.
+  static void expect(const TrackedPattern& print, int cell, CellSamples& expected,
+                     const Mirror* mirror = nullptr);
+
+ private:
+  const TrackedPattern& pattern_;
+  const PlaneMap& map_;
+  const GrayImage* image_;
+  double shrink_;
+};
+
+/// Two cells compared: correlation, 0 where one of them is flat, and the variance of each.
+struct CellMatch {
+  float correlation = 0;
+  float expected_contrast = 0;
+  float seen_contrast = 0;
+  [[nodiscard]] bool textured() const { return expected_contrast >= kTexturedCell; }
+  [[nodiscard]] bool agrees() const { return textured() && correlation >= kAgreeingCell; }
+  [[nodiscard]] bool disagrees() const { return correlation < kDisagreeingCell; }
+};
+CellMatch compare(const CellSamples& expected, const CellSamples& seen);
+
+/// Textured cells of the pattern that lie in the frame, and how many of them correlate.
+struct PhotometricCheck {
+  int cells = 0;
+  int matching = 0;
+  double correlation = 0;  ///< mean of the cells, negative ones counted as 0
+};
+PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap& map,
+                                  std::span<const GrayImage> pyramid);
+
+/// Cells that agree with one of two prints in the same outline and disagree with the other.
+struct PrintDifference {
+  int first = 0;
+  int second = 0;
+};
+/// map: of the pattern `first`.
+PrintDifference compare_prints(const TrackedPattern& first, const TrackedPattern& second,
+                               const PlaneMap& map, std::span<const GrayImage> pyramid);
+
+/// The mirror in which most of those cells of the pattern agree with others.
+Mirror most_alike_mirror(const TrackedPattern& pattern, bool upright,
+                         const std::array<bool, kCells>& those);
+
+/// Whether two patterns have one shape and much of their picture in common, as a series' prints do:
+/// a quarter of the textured cells.
+bool related(const TrackedPattern& a, const TrackedPattern& b);
+
+}  // namespace modar::tracker

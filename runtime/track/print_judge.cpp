@@ -1,0 +1,279 @@
+// Cells seen again, mirror images, rivals in one place, and bent paper.
+#include "print_judge.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace modar::tracker {
+namespace {
+
+// Cells that a frame looks at; after 16 frames it was all.
+constexpr int kCellsOfFrame = 4;
+constexpr std::uint32_t kCellStride = 23;  // spreads them; coprime to their number
+constexpr std::uint32_t kBendEvery = 16;   // frames between measurements of a bend
+// Variance from which what the frame shows in a cell is a picture.
+constexpr float kShownContrast = 9.0f;
+// Correlation of what a cell showed before with what it shows: from the first on it is the same,
+// below the second another.
+constexpr float kSamePrint = 0.7f;
+constexpr float kChanged = 0.5f;
+// Cosine of the angle between two directions, six degrees, from which something above the paper
+// would show another place: half a cell beside, at the height of half the print's longer side.
+constexpr float kElsewhere = 0.9945f;
+// Printed cells from which it is another print: a number, and a share of the textured cells in
+// view; and below which it is the pattern again.
+constexpr int kOtherCells = 6;
+constexpr int kOtherShare = 6;
+constexpr int kAgainShare = 10;
+// Cells by which a mirror image, or another pattern, must agree with more.
+constexpr int kFlippedCells = 4;
+constexpr double kSureShare = 0.6;  // of the textured cells agree: it is no mirror image after all
+constexpr double kItselfShare = 0.94;  // of them agree: fewer than kFlippedCells do not
+constexpr int kRivalCells = 3;
+// A bend moves the corners by so many frame pixels: in a frame 1280 wide it catches the eye. More
+// where so much of the print is hidden, since the bend then reaches into what is not seen (half
+// covered, flat prints had up to 6.2); and where the pose is but the nearest to a map, since a
+// wrong focal length bends, too, unless that map shows nearly all. Shares of the textured cells.
+constexpr double kBentPixels = 5.0;
+constexpr double kHiddenBentPixels = 8.0;
+constexpr double kMapBentPixels = 10.0;
+constexpr double kSeenShare = 0.65;
+constexpr double kFlatMapShare = 0.9;
+
+constexpr std::uint8_t kForFlip[2] = {1, 2};
+constexpr std::uint8_t kAgainstFlip[2] = {4, 8};
+
+PlaneMap map_of_track(const TrackedPattern& pattern, const FrameView& frame, const Track& track) {
+  return track.homography_only ? track.map : map_of_pose(pattern, frame.camera, track.pose);
+}
+
+/// From the pattern's centre to the camera, in the pattern's axes.
+glm::vec3 direction_of(const Pose& pose) {
+  return glm::vec3(glm::normalize(-(glm::transpose(pose.rotation) * pose.translation)));
+}
+
+}  // namespace
+
+PrintJudge::PrintJudge(std::span<const TrackedPattern> patterns)
+    : patterns_(patterns),
+      evidence_(patterns.size()),
+      relations_(patterns.size() * patterns.size()),
+      mirrors_(patterns.size(), {Mirror{true}, Mirror{false}}) {}
+
+/// kFlip bits of a cell. Where the mirror image of the cell lies in the outline, pattern and mirror
+/// image are compared with what is seen of the cell; else each shows nothing where the other is.
+std::uint8_t PrintJudge::flips_of(std::size_t pattern, const CellGrid& grid, int at) const {
+  const TrackedPattern& print = patterns_[pattern];
+  CellSamples seen{};
+  CellSamples expected{};
+  CellGrid::expect(print, at, expected);
+  const bool there = grid.see(at, seen);
+  const CellMatch match = there ? compare(expected, seen) : CellMatch{};
+  std::uint8_t flips = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Mirror& mirror = mirrors_[pattern][k];
+    CellMatch other;
+    if (mirror.keeps(at)) {
+      if (!there) continue;
+      CellSamples swapped{};
+      CellGrid::expect(print, at, swapped, &mirror);
+      other = compare(swapped, seen);
+      if (other.agrees() && match.disagrees()) flips |= kForFlip[k];
+    } else {
+      CellSamples beside{};
+      if (grid.see(at, beside, &mirror) && compare(expected, beside).agrees()) {
+        flips |= kForFlip[k];
+      }
+    }
+    if (match.agrees() && other.disagrees()) flips |= kAgainstFlip[k];
+  }
+  return flips;
+}
+
+void PrintJudge::update(std::size_t pattern, const CellGrid& grid, const glm::vec3& from, int at,
+                        Cell& cell) const {
+  CellSamples expected{};
+  CellSamples seen{};
+  CellGrid::expect(patterns_[pattern], at, expected);
+  if (!grid.see(at, seen)) {
+    cell = {};
+    return;
+  }
+  const CellMatch match = compare(expected, seen);
+  if (!match.textured()) {
+    cell.state = CellState::kUnseen;
+    return;
+  }
+  cell.likeness = static_cast<std::uint8_t>(100.0f * std::max(0.0f, match.correlation));
+  if (!match.disagrees() || match.seen_contrast < kShownContrast) {
+    cell.state = match.agrees() ? CellState::kAgrees : CellState::kDoubtful;
+    return;
+  }
+  const bool before = cell.state == CellState::kDiffers || cell.state == CellState::kPrinted;
+  CellSamples shown{};
+  std::copy(cell.shown.begin(), cell.shown.end(), shown.begin());
+  const float alike = before ? compare(shown, seen).correlation : 0.0f;
+  if (alike < kChanged) {
+    cell.state = CellState::kDiffers;
+    cell.from = from;
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      cell.shown[k] = static_cast<std::uint8_t>(seen[k] + 0.5f);
+    }
+  } else if (alike >= kSamePrint && glm::dot(cell.from, from) < kElsewhere) {
+    cell.state = CellState::kPrinted;
+  }
+}
+
+void PrintJudge::look(std::size_t pattern, const FrameView& frame, const Track& track, int count) {
+  const TrackedPattern& print = patterns_[pattern];
+  Evidence& seen = evidence_[pattern];
+  const PlaneMap map = map_of_track(print, frame, track);
+  const CellGrid grid(print, map, frame.pyramid);
+  const glm::vec3 from = direction_of(track.pose);
+  for (int k = 0; k < count; ++k, ++seen.next_cell) {
+    const std::uint32_t at = seen.next_cell * kCellStride % kCells;
+    update(pattern, grid, from, static_cast<int>(at), seen.cells[at]);
+  }
+}
+
+/// The same of mirror images, of the cells that were looked at last.
+void PrintJudge::look_for_mirrors(std::size_t pattern, const FrameView& frame, const Track& track,
+                                  int count) {
+  Evidence& seen = evidence_[pattern];
+  const PlaneMap map = map_of_track(patterns_[pattern], frame, track);
+  const CellGrid grid(patterns_[pattern], map, frame.pyramid);
+  for (int k = 1; k <= count; ++k) {
+    const std::uint32_t at =
+        (seen.next_cell + kCells - static_cast<std::uint32_t>(k)) * kCellStride % kCells;
+    seen.cells[at].flips = flips_of(pattern, grid, static_cast<int>(at));
+  }
+}
+
+/// A search finds a mirror image where a part of the pattern is its own one: the mirror lies where
+/// most of the cells that agree are alike.
+void PrintJudge::place_mirrors(std::size_t pattern) {
+  std::array<bool, kCells> agreeing{};
+  for (std::size_t at = 0; at < agreeing.size(); ++at) {
+    agreeing[at] = evidence_[pattern].cells[at].state == CellState::kAgrees;
+  }
+  mirrors_[pattern] = {most_alike_mirror(patterns_[pattern], true, agreeing),
+                       most_alike_mirror(patterns_[pattern], false, agreeing)};
+}
+
+double PrintJudge::agreeing_share(const Evidence& seen) {
+  int textured = 0;
+  int agreeing = 0;
+  for (const Cell& cell : seen.cells) {
+    textured += cell.state != CellState::kUnseen ? 1 : 0;
+    agreeing += cell.state == CellState::kAgrees ? 1 : 0;
+  }
+  return textured > 0 ? 1.0 * agreeing / textured : 0.0;
+}
+
+/// at_once: one measurement decides; else two do, one after the other.
+void PrintJudge::measure(const TrackedPattern& print, const FrameView& frame, const Track& track,
+                         bool at_once, Evidence& seen) const {
+  const double share = agreeing_share(seen);
+  const double limit = track.homography_only ? kMapBentPixels
+                       : share < kSeenShare  ? kHiddenBentPixels
+                                             : kBentPixels;
+  const bool flat = track.homography_only && share >= kFlatMapShare;
+  const bool bent = !flat && bend_of(print, frame, track.pose) >= limit;
+  if (at_once || bent == seen.was_bent) seen.curved = bent;
+  seen.was_bent = bent;
+}
+
+PrintJudge::Verdict PrintJudge::judge(Evidence& seen) {
+  int textured = 0;
+  int printed = 0;
+  int likeness = 0;
+  int for_flip[2] = {0, 0};
+  for (const Cell& cell : seen.cells) {
+    for (int k = 0; k < 2; ++k) {
+      for_flip[k] += (cell.flips & kForFlip[k]) != 0 ? 1 : 0;
+      for_flip[k] -= (cell.flips & kAgainstFlip[k]) != 0 ? 1 : 0;
+    }
+    if (cell.state == CellState::kUnseen) continue;
+    ++textured;
+    likeness += cell.likeness;
+    printed += cell.state == CellState::kPrinted ? 1 : 0;
+  }
+  if (printed >= kOtherCells && printed * kOtherShare >= textured) seen.other_print = true;
+  if (printed * kAgainShare < textured) seen.other_print = false;
+  const double agreeing = agreeing_share(seen);
+  const int most = std::max(for_flip[0], for_flip[1]);
+  if (most >= kFlippedCells) seen.flipped = true;
+  if (most <= -kFlippedCells && agreeing >= kSureShare) seen.flipped = false;
+  Verdict verdict;
+  if (seen.curved) verdict.reason = Reason::kCurved;
+  if (seen.other_print || seen.flipped) verdict.reason = Reason::kOtherPrint;
+  if (textured > 0) {
+    verdict.agreeing = agreeing;
+    verdict.likeness = 0.01 * likeness / textured;
+  }
+  return verdict;
+}
+
+bool PrintJudge::related_to(std::size_t a, std::size_t b, int& work) {
+  std::uint8_t& known = relations_[a * patterns_.size() + b];
+  if (known == 0) {
+    known = related(patterns_[a], patterns_[b]) ? 2 : 1;
+    --work;
+  }
+  return known == 2;
+}
+
+/// A pattern that the frame shows rather than this one. work: patterns that are looked at.
+std::int32_t PrintJudge::rival_of(std::size_t pattern, const FrameView& frame, const Track& track,
+                                  int work) {
+  Evidence& seen = evidence_[pattern];
+  const PlaneMap map = map_of_track(patterns_[pattern], frame, track);
+  std::int32_t rival = -1;
+  int most = kRivalCells - 1;
+  for (std::size_t tried = 1; tried < patterns_.size() && work > 0; ++tried) {
+    const std::size_t other = seen.next_rival++ % patterns_.size();
+    if (other == pattern || !related_to(pattern, other, work)) continue;
+    --work;
+    const PrintDifference difference =
+        compare_prints(patterns_[pattern], patterns_[other], map, frame.pyramid);
+    if (difference.second - difference.first <= most) continue;
+    most = difference.second - difference.first;
+    rival = static_cast<std::int32_t>(other);
+  }
+  return rival;
+}
+
+PrintJudge::Verdict PrintJudge::meet(std::size_t pattern, const FrameView& frame,
+                                     const Track& track, bool again) {
+  Evidence& seen = evidence_[pattern];
+  if (!again) seen = {};
+  look(pattern, frame, track, kCells);
+  if (agreeing_share(seen) < kItselfShare) {
+    place_mirrors(pattern);
+    look_for_mirrors(pattern, frame, track, kCells);
+  } else {
+    seen.flipped = false;
+  }
+  measure(patterns_[pattern], frame, track, true, seen);
+  Verdict verdict = judge(seen);
+  verdict.rival = rival_of(pattern, frame, track, 8);
+  return verdict;
+}
+
+PrintJudge::Verdict PrintJudge::follow(std::size_t pattern, const FrameView& frame,
+                                       const Track& track) {
+  Evidence& seen = evidence_[pattern];
+  look(pattern, frame, track, kCellsOfFrame);
+  look_for_mirrors(pattern, frame, track, kCellsOfFrame);
+  if (seen.next_cell / kCellsOfFrame % kBendEvery == 0) {
+    measure(patterns_[pattern], frame, track, false, seen);
+  }
+  Verdict verdict = judge(seen);
+  verdict.rival = rival_of(pattern, frame, track, 1);
+  return verdict;
+}
+
+}  // namespace modar::tracker

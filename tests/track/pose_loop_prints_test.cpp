@@ -1,0 +1,171 @@
+// What is not the pattern, or not flat, is not shown: mirror images, other editions of a series,
+// bent paper; and what is covered still is. What the loop says of how sure it is.
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "bake/lab/field_scene.hpp"
+#include "modar/pose_loop.hpp"
+#include "tests/track/pose_loop_samples.hpp"
+
+namespace modar {
+namespace {
+
+using namespace test;  // the samples
+
+constexpr int kTwoSeconds = 60;
+
+/// picture()'s layout around another photo.
+const GrayPicture& other_edition() {
+  static const GrayPicture kEdition =
+      edition_of(gray(picture()), gray(textured_picture(300, 240, 902)));
+  return kEdition;
+}
+
+const std::vector<std::byte>& alone() {
+  static const std::vector<std::byte> kBundle = bundle_with({record()});
+  return kBundle;
+}
+
+std::unique_ptr<PoseLoop> loop_on(const std::vector<std::byte>& bundle) {
+  auto loop = PoseLoop::create(BundleView::open(bundle).value(), default_camera(kWidth, kHeight));
+  EXPECT_TRUE(loop) << to_line(loop.error());
+  return std::move(*loop);
+}
+
+/// Frames of a moving hand before clutter; covered: share of the print that the clutter hides.
+class Sequence {
+ public:
+  explicit Sequence(const GrayImage& print, double covered = 0)
+      : print_(print), path_(middle(), random_) {
+    band_.covered_low = band_.covered_high = covered;
+  }
+  SceneFrame at(int i) {
+    Random same_side(5);
+    SceneFrame scene = render_still(print_, default_camera(kWidth, kHeight), path_.at(i / 30.0, 1),
+                                    background_, band_, same_side, 0.65, {});
+    expose(scene.picture, {}, random_, scene.picture);
+    return scene;
+  }
+
+ private:
+  static Pose middle() { return pose_of(look_at(2.8, 10, 20, 10)); }
+  Random random_{4};
+  GrayImage print_;
+  SceneBand band_;
+  HandPath path_;
+  GrayPicture background_ = clutter(kWidth, kHeight, 77);
+};
+
+TEST(Prints, AnotherEditionIsTakenBackWithinTwoSeconds) {
+  const auto loop = loop_on(alone());
+  Sequence frames(other_edition().view());
+  TrackResult seen;
+  int shown = 0;
+  for (int i = 0; i < kTwoSeconds; ++i) {
+    ASSERT_TRUE(loop->step(frames.at(i).picture.view(), seen));
+    shown += seen.visible.empty() ? 0 : 1;
+  }
+  EXPECT_TRUE(seen.visible.empty());
+  EXPECT_EQ(seen.reason, Reason::kOtherPrint);
+  EXPECT_GT(shown, 0) << "one frame does not tell it from a covered print";
+}
+
+TEST(Prints, ACoveredOneStaysAndIsSeenAsCovered) {
+  const auto loop = loop_on(alone());
+  Sequence frames(gray(picture()), 0.5);
+  TrackResult seen;
+  for (int i = 0; i < kTwoSeconds / 2; ++i) {
+    ASSERT_TRUE(loop->step(frames.at(i).picture.view(), seen));
+    ASSERT_EQ(seen.visible.size(), 1u) << i;
+  }
+  EXPECT_NEAR(seen.visible[0].agreeing, 0.5, 0.15);
+  EXPECT_GT(seen.visible[0].likeness, 0.4);
+  EXPECT_LT(seen.visible[0].likeness, 0.7);
+}
+
+TEST(Prints, OfTwoEditionsInTheBundleTheShownOneIsNamed) {
+  const cv::Mat edition(240, 300, CV_8UC1,
+                        const_cast<std::uint8_t*>(other_edition().pixels.data()));
+  const auto both = bundle_with({record(), record_of(edition)});
+  for (const std::uint32_t truth : {0u, 1u}) {
+    const auto loop = loop_on(both);
+    Sequence frames(truth == 0 ? gray(picture()) : other_edition().view());
+    TrackResult seen;
+    for (int i = 0; i < 15; ++i) {
+      ASSERT_TRUE(loop->step(frames.at(i).picture.view(), seen));
+      for (const Detection& one : seen.visible) {
+        EXPECT_TRUE(i < 5 || one.pattern == truth) << i;
+      }
+    }
+    ASSERT_EQ(seen.visible.size(), 1u) << truth;
+    EXPECT_GT(seen.visible[0].agreeing, 0.85);
+    EXPECT_GT(seen.visible[0].likeness, 0.8);
+    EXPECT_LE(seen.visible[0].likeness, 1.0);
+  }
+}
+
+TEST(Prints, AMirrorImageIsNotShown) {
+  // A part of it is its own mirror image, beside the middle: there a search finds both.
+  cv::Mat motif = picture().clone();
+  cv::Mat right;
+  cv::flip(motif(cv::Rect(0, 0, 90, 240)), right, 1);
+  right.copyTo(motif(cv::Rect(90, 0, 90, 240)));
+  const auto bundle = bundle_with({record_of(motif)});
+  cv::Mat turned;
+  cv::flip(motif, turned, 1);
+  for (const bool mirrored : {false, true}) {
+    const auto loop = loop_on(bundle);
+    Sequence frames(gray(mirrored ? turned : motif));
+    TrackResult seen;
+    for (int i = 0; i < 8; ++i) {
+      ASSERT_TRUE(loop->step(frames.at(i).picture.view(), seen));
+      EXPECT_EQ(seen.visible.empty(), mirrored) << i;
+    }
+    EXPECT_EQ(seen.reason, mirrored ? Reason::kOtherPrint : Reason::kVisible);
+  }
+}
+
+TEST(Prints, BentPaperIsShownInItsPlaceOrNotAtAll) {
+  FieldCondition bent;
+  int curved = 0;
+  int flat = 0;
+  for (const double radius : {0.0, 0.8}) {
+    bent.bend_radius = radius;
+    Random random(8);
+    for (int i = 0; i < 8; ++i) {
+      const auto loop = loop_on(alone());
+      const FieldFrame frame =
+          render_field(gray(picture()), gray(picture()), default_camera(kWidth, kHeight),
+                       clutter(kWidth, kHeight, 77), bent, random);
+      TrackResult seen;
+      ASSERT_TRUE(loop->step(frame.picture.view(), seen));
+      for (const Detection& one : seen.visible) {
+        EXPECT_LT(corner_error(one, frame.truth), 10.0) << radius << " " << i;
+      }
+      curved += seen.reason == Reason::kCurved ? 1 : 0;
+      flat += radius == 0.0 && seen.reason == Reason::kVisible ? 1 : 0;
+    }
+  }
+  EXPECT_GT(curved, 3);
+  EXPECT_EQ(flat, 8);
+}
+
+TEST(Prints, AFlatExposureIsSearchedWithThresholdsOfItsNoise) {
+  const GrayPicture behind = clutter(kWidth, kHeight, 77);
+  const SceneFrame scene = frame_of(look_at(2.4, 15, 20, 10), behind);
+  GrayPicture dim = scene.picture;
+  // A tenth of the contrast; noise as that of a camera in good light after its denoiser.
+  Random random(9);
+  for (std::uint8_t& value : dim.pixels) {
+    value = static_cast<std::uint8_t>(128.5 + 0.1 * (value - 128.0) + 0.7 * random.normal());
+  }
+  const auto loop = loop_on(alone());
+  TrackResult seen;
+  ASSERT_TRUE(loop->step(dim.view(), seen));
+  ASSERT_EQ(seen.visible.size(), 1u);
+  EXPECT_LT(worst_corner(seen.visible[0], scene), 3.0);
+}
+
+}  // namespace
+}  // namespace modar
