@@ -57,7 +57,7 @@ timed "the same by pkg-config" 'cd app; c++ -x c overlay.c -x none $(pkg-config 
 # --- A collection, from what Debian packages hold; unpacked, not installed ---
 timed "60 models that bake, and 20 pictures" '
   rm -rf museum source; mkdir -p source museum/models museum/pictures; cd source
-  apt-get download -qq assimp-testmodels stellarium-data mate-backgrounds
+  apt-get download -qq assimp-testmodels stellarium-data mate-backgrounds plasma-workspace-wallpapers
   for package in *.deb; do dpkg -x "$package" .; done; rm ./*.deb
   count=0
   while read -r model; do
@@ -77,7 +77,11 @@ timed "60 models that bake, and 20 pictures" '
   done < <(find usr/share/assimp usr/share/stellarium -iname "*.obj" -o -iname "*.gltf" -o -iname "*.glb" | sort)
   [ $count = 60 ]
   mkdir /root/source/pool
-  find usr/share/backgrounds \( -name "*.jpg" -o -name "*.png" \) -size +40k -exec cp -n {} pool/ \;
+  find usr/share/backgrounds -name "*.jpg" -size +40k -exec cp -n {} pool/ \;
+  for folder in usr/share/wallpapers/*/contents/images; do
+    picture=$(ls "$folder"/* | sort -V | head -n 1)
+    cp "$picture" "pool/$(basename "${folder%/contents/images}").${picture##*.}"
+  done
   ls pool | sort | head -n 20 | while read -r picture; do mv "pool/$picture" /root/museum/pictures/; done
   [ "$(ls /root/museum/pictures | wc -l)" = 20 ]; rm -rf usr'
 timed "modar init museum" 'modar init museum'
@@ -87,7 +91,7 @@ timed "modar bake" 'cd museum
     grep -q "pattern.no-features" bake.log || { cat bake.log; exit 3; }
     for picture in $(grep -o "pictures/[^:]*" bake.log | sort -u); do
       echo "too plain: $picture"; rm "$picture"
-      next=$(ls ../source/pool | sort | head -n 1); mv "../source/pool/$next" pictures/
+      next=$(ls ../source/pool | sort | head -n 1); [ -n "$next" ]; mv "../source/pool/$next" pictures/
     done
     modar init --force .
   done'
