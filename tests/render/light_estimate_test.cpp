@@ -19,8 +19,8 @@ namespace modar {
 namespace {
 
 constexpr std::size_t kCells = 8;
-constexpr std::size_t kWidth = 320;
-constexpr std::size_t kHeight = 240;
+constexpr std::size_t kFrameWidth = 320;
+constexpr std::size_t kFrameHeight = 240;
 
 double stored(double linear) {
   const double c = std::clamp(linear, 0.0, 1.0);
@@ -50,12 +50,12 @@ class Shown {
 
   /// light(x, y): what a white surface gets at a place of the pattern, linear.
   void paint(const std::function<glm::dvec3(double, double)>& light) {
-    rgb_.assign(3 * kWidth * kHeight, 128);
+    rgb_.assign(3 * kFrameWidth * kFrameHeight, 128);
     const glm::dmat4 back = glm::inverse(glm::dmat4(matrix()));
-    for (std::size_t y = 0; y < kHeight; ++y) {
-      for (std::size_t x = 0; x < kWidth; ++x) {
-        const double nx = 2 * (static_cast<double>(x) + 0.5) / kWidth - 1;
-        const double ny = 1 - 2 * (static_cast<double>(y) + 0.5) / kHeight;
+    for (std::size_t y = 0; y < kFrameHeight; ++y) {
+      for (std::size_t x = 0; x < kFrameWidth; ++x) {
+        const double nx = 2 * (static_cast<double>(x) + 0.5) / kFrameWidth - 1;
+        const double ny = 1 - 2 * (static_cast<double>(y) + 0.5) / kFrameHeight;
         glm::dvec4 a = back * glm::dvec4(nx, ny, -1, 1);
         glm::dvec4 b = back * glm::dvec4(nx, ny, 1, 1);
         a /= a.w;
@@ -68,7 +68,7 @@ class Shown {
         const glm::dvec3& cell =
             cells_[static_cast<std::size_t>(row) * kCells + static_cast<std::size_t>(column)];
         for (int c = 0; c < 3; ++c) {
-          rgb_[3 * (y * kWidth + x) + static_cast<std::size_t>(c)] =
+          rgb_[3 * (y * kFrameWidth + x) + static_cast<std::size_t>(c)] =
               static_cast<std::uint8_t>(std::lround(255 * stored(cell[c] * given[c])));
         }
       }
@@ -85,42 +85,42 @@ class Shown {
 
   [[nodiscard]] CameraPicture rgb() const {
     CameraPicture frame;
-    frame.width = kWidth;
-    frame.height = kHeight;
+    frame.width = kFrameWidth;
+    frame.height = kFrameHeight;
     frame.planes[0] = rgb_.data();
-    frame.strides[0] = 3 * kWidth;
+    frame.strides[0] = 3 * kFrameWidth;
     return frame;
   }
 
   /// The same as a camera of a phone hands it out.
   CameraPicture nv21() {
-    luma_.assign(kWidth * kHeight, 0);
-    chroma_.assign(kWidth * kHeight / 2, 0);
-    for (std::size_t y = 0; y < kHeight; ++y) {
-      for (std::size_t x = 0; x < kWidth; ++x) {
-        const std::uint8_t* p = &rgb_[3 * (y * kWidth + x)];
+    luma_.assign(kFrameWidth * kFrameHeight, 0);
+    chroma_.assign(kFrameWidth * kFrameHeight / 2, 0);
+    for (std::size_t y = 0; y < kFrameHeight; ++y) {
+      for (std::size_t x = 0; x < kFrameWidth; ++x) {
+        const std::uint8_t* p = &rgb_[3 * (y * kFrameWidth + x)];
         const double gray = 0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2];
-        luma_[y * kWidth + x] = static_cast<std::uint8_t>(std::lround(gray));
+        luma_[y * kFrameWidth + x] = static_cast<std::uint8_t>(std::lround(gray));
         if (x % 2 != 0 || y % 2 != 0) continue;
         const auto chroma = [](double v) {
           return static_cast<std::uint8_t>(std::lround(std::clamp(128 + v, 0.0, 255.0)));
         };
-        std::uint8_t* pair = &chroma_[y / 2 * kWidth + x];
+        std::uint8_t* pair = &chroma_[y / 2 * kFrameWidth + x];
         pair[0] = chroma((p[0] - gray) / 1.402);
         pair[1] = chroma((p[2] - gray) / 1.772);
       }
     }
     CameraPicture frame;
     frame.format = PictureFormat::kNv21;
-    frame.width = kWidth;
-    frame.height = kHeight;
+    frame.width = kFrameWidth;
+    frame.height = kFrameHeight;
     frame.planes = {luma_.data(), chroma_.data(), nullptr};
-    frame.strides = {kWidth, kWidth, 0};
+    frame.strides = {kFrameWidth, kFrameWidth, 0};
     return frame;
   }
 
   [[nodiscard]] glm::mat4 matrix() const {
-    return gl_projection(default_camera(kWidth, kHeight), 0.1, 10.0) * world_;
+    return gl_projection(default_camera(kFrameWidth, kFrameHeight), 0.1, 10.0) * world_;
   }
   [[nodiscard]] PlaneLight look(const CameraPicture& frame) const {
     return look_at_pattern(frame, matrix(), pattern_, section_);
