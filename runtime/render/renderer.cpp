@@ -246,6 +246,7 @@ Result<void> Renderer::restore(const GlCaps& caps) {
   // The old state is dropped without a GL call: its names mean nothing in this context.
   auto state = std::make_unique<State>(state_->bundle, caps);
   state->options = state_->options;
+  state->estimator = std::move(state_->estimator);  // the room's light stays as it was
   const int width = state_->target.width();
   const int height = state_->target.height();
   state_ = std::move(state);
