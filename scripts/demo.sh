@@ -93,7 +93,8 @@ fi
 step "Play"
 # Our own loop, the default, holds this small, tilted picture throughout; --method paper finds it in few
 # frames and takes clutter for it in many.
-"$bin/modar-play" "$bundle" --input "$video" --outline --report "$out"
+# --force: the folder holds the video, too.
+"$bin/modar-play" "$bundle" --input "$video" --outline --report "$out" --force
 
 step "Done. Look at"
 for file in index.html overlay.mp4 contact_sheet.png demo.modar; do
