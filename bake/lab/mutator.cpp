@@ -324,7 +324,15 @@ Mutator::Mutator(std::span<const std::byte> bytes, std::uint64_t seed)
   const Result<BundleView> view = BundleView::open(bytes);
   section_count_ = view->sections().size();
   fields_ = mutation_fields(*view);
-  arrays_ = item_arrays(*view);
+  for (const ItemArray& array : item_arrays(*view)) {
+    const auto same = [&](const auto& kind) { return std::strcmp(kind[0].name, array.name) == 0; };
+    const auto kind = std::find_if(arrays_.begin(), arrays_.end(), same);
+    if (kind == arrays_.end()) {
+      arrays_.push_back({array});
+    } else {
+      kind->push_back(array);
+    }
+  }
   head_.assign(bytes.begin(),
                bytes.begin() + static_cast<std::ptrdiff_t>(sizeof(FileHeader) +
                                                            section_count_ * sizeof(SectionEntry)));
@@ -426,7 +434,9 @@ Mutation Mutator::edit_field(bool rehashed) {
 /// turns it, its bytes otherwise.
 Mutation Mutator::permute(bool rehashed) {
   if (arrays_.empty()) return edit_field(rehashed);
-  const ItemArray& array = arrays_[draw(arrays_.size())];
+  // The kind first: a bundle has hundreds of chunks, and few arrays of descriptors.
+  const std::vector<ItemArray>& kind = arrays_[draw(arrays_.size())];
+  const ItemArray& array = kind[draw(kind.size())];
   const bool triangle = std::strcmp(array.name, "triangles") == 0;
   const bool swap = draw(2) == 0;
   const std::uint64_t a = draw(array.count);

@@ -90,7 +90,7 @@ class Mutator {
   std::vector<std::byte> saved_;
   std::uint64_t saved_at_ = 0;
   std::vector<MutationField> fields_;
-  std::vector<ItemArray> arrays_;
+  std::vector<std::vector<ItemArray>> arrays_;  ///< a list a kind
   std::mt19937_64 random_;
 };
 

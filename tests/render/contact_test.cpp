@@ -87,17 +87,21 @@ TEST_F(ContactTest, OcclusionDimsTheLightFromAllAround) {
   }
 }
 
+std::vector<std::byte> shadow_section(const ShadowHeader& header,
+                                      const std::vector<std::uint8_t>& texels) {
+  std::vector<std::byte> section(sizeof header + texels.size());
+  std::memcpy(section.data(), &header, sizeof header);
+  std::memcpy(section.data() + sizeof header, texels.data(), texels.size());
+  return section;
+}
+
 TEST_F(ContactTest, AShadowDarkensThePictureInItsRectangle) {
   SceneMaker maker;
   maker.add_plain_model(Layout::kHalfColoured, square(0.125, {10, 20, 30}));
   add_pattern_and_scene(maker.content);
   // Left half: a quarter of the light is left; right half: all.
-  const ShadowHeader header{2, 1, {-0.5f, -0.5f}, {0.5f, 0.5f}, {}};
-  std::vector<std::byte> section(sizeof header + 2);
-  std::memcpy(section.data(), &header, sizeof header);
-  section[sizeof header] = std::byte{64};
-  section[sizeof header + 1] = std::byte{255};
-  maker.content.shadows.push_back(section);
+  maker.content.shadows.push_back(
+      shadow_section({2, 1, {-0.5f, -0.5f}, {0.5f, 0.5f}, {}}, {64, 255}));
   const MappedBundle bundle(maker.content);
   const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
   ASSERT_TRUE(renderer);
@@ -119,11 +123,8 @@ TEST_F(ContactTest, AShadowGoesWithItsModelAndStaysInThePlane) {
   SceneMaker maker;
   maker.add_plain_model(Layout::kHalfColoured, square(0.0625, {10, 20, 30}));
   add_pattern_and_scene(maker.content);
-  const ShadowHeader header{1, 1, {-0.25f, -0.25f}, {0.25f, 0.25f}, {}};
-  std::vector<std::byte> section(sizeof header + 1);
-  std::memcpy(section.data(), &header, sizeof header);
-  section[sizeof header] = std::byte{64};
-  maker.content.shadows.push_back(section);
+  maker.content.shadows.push_back(
+      shadow_section({1, 1, {-0.25f, -0.25f}, {0.25f, 0.25f}, {}}, {64}));
   const MappedBundle bundle(maker.content);
   const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
   ASSERT_TRUE(renderer);
