@@ -10,6 +10,7 @@
 
 #include "formats/atomic_file.hpp"
 #include "formats/colour_grid.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
 
@@ -263,20 +264,22 @@ bool stream(const SectionList& list, std::uint16_t minor, const ByteSink& sink) 
 }  // namespace
 
 std::uint16_t minor_version_of(const BundleContent& content) {
+  const auto any = [&content](SectionType type) {
+    return std::any_of(content.extra.begin(), content.extra.end(),
+                       [type](const ExtraSection& section) {
+                         return section.type == static_cast<std::uint32_t>(type);
+                       });
+  };
   const bool shadowed = std::any_of(content.shadows.begin(), content.shadows.end(),
                                     [](const auto& shadow) { return !shadow.empty(); });
   const bool hiding =
       std::any_of(content.materials.begin(), content.materials.end(),
                   [](const MaterialRecord& m) { return (m.flags & kMaterialOccluder) != 0; });
-  const bool coloured =
-      std::any_of(content.extra.begin(), content.extra.end(), [](const ExtraSection& section) {
-        return section.type == static_cast<std::uint32_t>(kPatternColours);
-      });
   const bool cut_out =
       std::any_of(content.textures.begin(), content.textures.end(),
                   [](const TextureRecord& t) { return (t.flags & kTextureCutOut) != 0; });
-  if (shadowed || hiding || coloured || cut_out || !content.lights.empty() ||
-      !content.occlusion.empty())
+  if (shadowed || hiding || any(kPatternColours) || any(kPatternShape) || cut_out ||
+      !content.lights.empty() || !content.occlusion.empty())
     return 2;
   return 1;
 }

@@ -1,6 +1,7 @@
 // Names, places and types of all fields, taken from the structs by the compiler.
 #include "formats/field_table.hpp"
 #include "formats/colour_grid.hpp"
+#include "formats/pattern_shape.hpp"
 
 #include <cstring>
 #include <type_traits>
@@ -133,6 +134,14 @@ constexpr FieldInfo kOcclusionRecord[] = {MODAR_FIELD(OcclusionRecord, layout),
 constexpr FieldInfo kColourGridHeader[] = {MODAR_FIELD(ColourGridHeader, columns),
                                            MODAR_FIELD(ColourGridHeader, rows),
                                            MODAR_FIELD(ColourGridHeader, reserved)};
+constexpr FieldInfo kPatternShapeHeader[] = {
+    MODAR_FIELD(PatternShapeHeader, kind), MODAR_FIELD(PatternShapeHeader, face_count),
+    MODAR_FIELD(PatternShapeHeader, half_arc), MODAR_FIELD(PatternShapeHeader, slope),
+    MODAR_FIELD(PatternShapeHeader, reserved)};
+constexpr FieldInfo kShapeFaceRecord[] = {
+    MODAR_FIELD(ShapeFaceRecord, place), MODAR_FIELD(ShapeFaceRecord, corner),
+    MODAR_FIELD(ShapeFaceRecord, right), MODAR_FIELD(ShapeFaceRecord, down),
+    MODAR_FIELD(ShapeFaceRecord, reserved)};
 constexpr FieldInfo kShadowHeader[] = {
     MODAR_FIELD(ShadowHeader, width), MODAR_FIELD(ShadowHeader, height),
     MODAR_FIELD(ShadowHeader, low), MODAR_FIELD(ShadowHeader, high),
@@ -191,6 +200,9 @@ constexpr RecordInfo kRecords[] = {
     {"FeatureHeader", nullptr, SectionType::kNames, sizeof(FeatureHeader), kFeatureHeader},
     {"KeypointRecord", nullptr, SectionType::kNames, sizeof(KeypointRecord), kKeypointRecord},
     {"ColourGridHeader", nullptr, SectionType::kNames, sizeof(ColourGridHeader), kColourGridHeader},
+    {"PatternShapeHeader", nullptr, SectionType::kNames, sizeof(PatternShapeHeader),
+     kPatternShapeHeader},
+    {"ShapeFaceRecord", nullptr, SectionType::kNames, sizeof(ShapeFaceRecord), kShapeFaceRecord},
     {"ShadowHeader", nullptr, SectionType::kNames, sizeof(ShadowHeader), kShadowHeader},
 };
 

@@ -10,6 +10,7 @@
 #include "formats/bits.hpp"
 #include "formats/check.hpp"
 #include "formats/colour_grid.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
 
@@ -48,6 +49,7 @@ constexpr KnownType kKnownTypes[] = {
     {SectionType::kTrackerRecord, 0, true},
     {kPatternColours, 0, true},
     {SectionType::kShadow, 0, true},
+    {kPatternShape, 0, true},
     {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
     {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
     {SectionType::kTextureData, kSectionRequired | kSectionGpu, true},
@@ -764,6 +766,26 @@ void check_colours(const RecordCheck& check, const BundleParts& parts, const Sec
   }
 }
 
+void check_shape(const RecordCheck& check, const BundleParts& parts, const SectionEntry& entry) {
+  if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
+    return check.fault(Rule::kSectionOwner, &entry.owner,
+                       "pattern " + std::to_string(entry.owner) + " is not there");
+  }
+  const PatternRecord& pattern = parts.patterns[entry.owner];
+  PatternSurface surface;
+  const char* fault =
+      view_pattern_shape(section_bytes(parts, entry), pattern.width, pattern.height, surface);
+  if (fault != nullptr) {
+    return check.fault(Rule::kPattern, &entry.size, std::string("the pattern's shape: ") + fault);
+  }
+  const auto& header =
+      *reinterpret_cast<const PatternShapeHeader*>(section_bytes(parts, entry).data());
+  check.reserved(header.reserved, sizeof(header.reserved));
+  for (const ShapeFaceRecord& face : surface.faces()) {
+    check.reserved(&face.reserved, sizeof(face.reserved));
+  }
+}
+
 /// Sections that belong to a record: the record is there, and so is the parameter set.
 void check_owned_sections(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.sections.size() && !log.stop(); ++i) {
@@ -786,6 +808,8 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
       }
     } else if (type == kPatternColours) {
       check_colours(check, parts, entry);
+    } else if (type == kPatternShape) {
+      check_shape(check, parts, entry);
     } else if (type == SectionType::kShadow) {
       check_shadow(check, parts, entry);
     } else if (type == SectionType::kTrackerRecord) {

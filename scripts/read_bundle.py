@@ -11,7 +11,7 @@ import math
 import struct
 import sys
 
-from bundle_bytes import (COLOURS, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, Bundle, Fault, at_least, digest, flags_known, follow,
+from bundle_bytes import (COLOURS, FACE, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, SHAPE, Bundle, Fault, at_least, digest, flags_known, follow,
                           need)
 from bundle_models import check_models, check_tight, decode_level
 from bundle_summary import check_summary
@@ -122,6 +122,33 @@ def read_colours(bundle, owner, variant, data):
          "colours")
 
 
+def read_shape(bundle, owner, variant, data):
+    """The shape of a pattern: an arc about an axis, or rectangles of the picture in space."""
+    need(owner < len(bundle.tables["patterns"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+    pattern = bundle.tables["patterns"][owner]
+    need(len(data) >= 32, "BUNDLE_PATTERN", 0, "a shape is too small")
+    head = SHAPE.decode(data, 0)
+    bundle.clean(head)
+    need(len(data) == 32 + 48 * head["face_count"], "BUNDLE_PATTERN", 0, "faces of a shape")
+    if head["kind"] == 1:
+        arc, slope = head["half_arc"], head["slope"]
+        need(head["face_count"] == 0 and 0 < arc <= math.pi and abs(slope) < 1 and
+             abs(slope) * pattern["height"] < pattern["width"] / arc, "BUNDLE_PATTERN", 0, "a round shape")
+        return
+    need(head["kind"] == 2 and 1 <= head["face_count"] <= 16 and not head["half_arc"] and not head["slope"],
+         "BUNDLE_PATTERN", 0, "a shape's kind")
+    for i in range(head["face_count"]):
+        face = FACE.decode(data, 32 + 48 * i)
+        bundle.clean(face)
+        left, top, width, height = face["place"]
+        right, down = face["right"], face["down"]
+        need(all(map(math.isfinite, [*face["corner"], *right, *down])) and width and height and
+             left + width <= pattern["width"] and top + height <= pattern["height"], "BUNDLE_PATTERN", 0, "a face")
+        both = sum(a * b for a, b in zip(right, down))
+        squares = sum(a * a for a in right) * sum(b * b for b in down)
+        need(squares > 0 and both * both <= 1e-6 * squares, "BUNDLE_PATTERN", 0, "a face's edges")
+
+
 def read_features(bundle):
     tables, out = bundle.tables, []
     sets = {row["id"]: row for row in tables["parameter_sets"]}
@@ -132,6 +159,8 @@ def read_features(bundle):
             read_colours(bundle, owner, variant, data)
         if kind == 260:
             read_shadow(bundle, owner, variant, data)
+        if kind == 261:
+            read_shape(bundle, owner, variant, data)
         if kind in (256, 257):
             need(owner < len(tables["patterns"]) and variant in sets, "BUNDLE_SECTION_OWNER", 0)
         if kind == 258:

@@ -12,6 +12,7 @@
 
 #include "formats/colour_grid.hpp"
 #include "formats/component.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 
 #define XXH_INLINE_ALL
@@ -144,6 +145,14 @@ void add_colours(Collector& out, const SectionEntry& entry) {
       {entry.offset + sizeof(ColourGridHeader), 2, (entry.size - sizeof(ColourGridHeader)) / 2});
 }
 
+void add_shape(Collector& out, const BundleView& bundle, const SectionEntry& entry) {
+  const auto& header =
+      *reinterpret_cast<const PatternShapeHeader*>(bundle.bytes().data() + entry.offset);
+  out.add_records(record_info("PatternShapeHeader"), entry.offset, sizeof header, 1);
+  out.add_records(record_info("ShapeFaceRecord"), entry.offset + sizeof header,
+                  sizeof(ShapeFaceRecord), header.face_count);
+}
+
 void add_shadow(Collector& out, const SectionEntry& entry) {
   out.add_records(record_info("ShadowHeader"), entry.offset, sizeof(ShadowHeader), 1);
   out.add("shadow texel", FieldType::kU8,
@@ -160,6 +169,7 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
     out.add_records(record, entry.offset + sizeof(TableHeader), header.stride, header.count);
   }
   if (static_cast<SectionType>(entry.type) == kPatternColours) return add_colours(out, entry);
+  if (static_cast<SectionType>(entry.type) == kPatternShape) return add_shape(out, bundle, entry);
   const PlaceRange all{entry.offset, 1, entry.size};
   switch (static_cast<SectionType>(entry.type)) {
     case SectionType::kNames:

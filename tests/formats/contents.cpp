@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/colour_grid.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/quantise.hpp"
 
 namespace modar::test {
@@ -361,6 +362,29 @@ BundleContent golden_content() {
   return content;
 }
 
+namespace {
+
+/// The first pattern on a cone, the second on two faces of a box.
+void add_shapes(BundleContent& content) {
+  const auto section = [&content](std::uint32_t pattern, const PatternShapeHeader& header) {
+    ExtraSection out;
+    out.type = static_cast<std::uint32_t>(kPatternShape);
+    out.owner = pattern;
+    const auto bytes = std::as_bytes(std::span(&header, 1));
+    out.bytes.assign(bytes.begin(), bytes.end());
+    content.extra.push_back(std::move(out));
+  };
+  section(0, {static_cast<std::uint32_t>(ShapeKind::kRound), 0, 1.25, -0.125, {}});
+  section(1, {static_cast<std::uint32_t>(ShapeKind::kFaces), 2, 0, 0, {}});
+  const ShapeFaceRecord faces[] = {
+      {{0, 0, 30, 20}, {-0.75f, 0.5f, 0.25f}, {1.5f, 0, 0}, {0, -1.0f, 0}, 0},
+      {{2, 20, 20, 20}, {0.75f, 0.5f, 0.25f}, {0, 0, -1.0f}, {0, -1.0f, 0}, 0}};
+  const auto bytes = std::as_bytes(std::span(faces));
+  content.extra.back().bytes.insert(content.extra.back().bytes.end(), bytes.begin(), bytes.end());
+}
+
+}  // namespace
+
 void add_looks(BundleContent& content) {
   LightRecord light{};
   light.scene = 1;
@@ -389,6 +413,7 @@ void add_looks(BundleContent& content) {
   colours.bytes.assign(grid_bytes.begin(), grid_bytes.end());
   for (int i = 0; i < 6; ++i) put(colours.bytes, static_cast<std::uint16_t>(9000 * i + 77));
   content.extra.push_back(colours);
+  add_shapes(content);
 }
 
 }  // namespace modar::test

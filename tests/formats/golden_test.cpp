@@ -43,7 +43,7 @@ std::string quoted(const std::string& path) {
 }
 
 /// A released file never changes. Version 1.1 is 1.0 and a content summary, 1.2 that with light,
-/// occlusion and a shadow, so its writer makes all.
+/// occlusion, a shadow and shapes of patterns, so its writer makes all.
 TEST(GoldenFiles, WriterMakesTheReleasedBytes) {
   BundleContent content = golden_content();
   EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_0.modar")));

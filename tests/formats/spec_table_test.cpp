@@ -15,6 +15,7 @@
 #include "formats/colour_grid.hpp"
 #include "formats/field_table.hpp"
 #include "formats/layout.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 
 namespace {
@@ -135,6 +136,8 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(LightRecord, F(scene), F(reserved0), F(sky), F(direction), F(key), F(reserved1))
   MODAR_STRUCT(OcclusionRecord, F(layout), F(offset))
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
+  MODAR_STRUCT(PatternShapeHeader, F(kind), F(face_count), F(half_arc), F(slope), F(reserved))
+  MODAR_STRUCT(ShapeFaceRecord, F(place), F(corner), F(right), F(down), F(reserved))
   MODAR_STRUCT(ShadowHeader, F(width), F(height), F(low), F(high), F(reserved))
   MODAR_STRUCT(FeatureHeader, F(count), F(descriptor_bytes), F(keypoints_offset),
                F(descriptors_offset), F(reserved))
@@ -227,6 +230,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
       {SectionType::kTrackerRecord, "tracker record"},
       {modar::kPatternColours, "pattern colours"},
       {SectionType::kShadow, "shadow"},
+      {modar::kPatternShape, "pattern shape"},
       {SectionType::kVertices, "vertices"},
       {SectionType::kIndices, "indices"},
       {SectionType::kTextureData, "texture data"}};

@@ -28,7 +28,7 @@ BundleContent texture_content();
 BundleContent golden_content();
 
 /// Adds what version 1.2 added to a golden_content(): lights, occlusion, a shadow, a material that
-/// hides.
+/// hides, its first pattern on a cone and its second on two faces of a box.
 void add_looks(BundleContent& content);
 
 /// Encodes or ends the program: test contents are never wrong.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "formats/bundle_writer.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/pose_loop.hpp"
 
@@ -43,6 +44,31 @@ void run(const std::vector<std::byte>& bundle, std::span<const std::uint8_t> dat
   }
 }
 
+/// A shape by the last bytes of the input: none, round, or two faces.
+std::vector<std::byte> shape_of(std::span<const std::uint8_t> last) {
+  PatternShapeHeader header{};
+  header.kind = last[0] % 3;
+  std::vector<std::byte> bytes(sizeof header);
+  if (header.kind == 1) {
+    header.half_arc = 0.01 + 0.012 * last[1];
+    header.slope = (last[2] - 128) / 140.0;
+  } else if (header.kind == 2) {
+    header.face_count = 2;
+    ShapeFaceRecord faces[2] = {{{0, 0, 64, 30}, {}, {1, 0, 0}, {0, -1, 0}, 0},
+                                {{1, 30, 63, 34}, {}, {0, 0, -1}, {0, 1e-9f, 0}, 0}};
+    for (std::size_t i = 0; i < 3; ++i) {
+      faces[0].corner[i] = static_cast<float>(last[3 + i]) - 128.0f;
+      faces[1].corner[i] = static_cast<float>(last[4 + i]) * 1e30f;
+    }
+    const auto all = std::as_bytes(std::span(faces));
+    bytes.insert(bytes.end(), all.begin(), all.end());
+  }
+  std::memcpy(bytes.data(), &header, sizeof header);
+  PatternSurface surface;
+  if (view_pattern_shape(bytes, 64, 64, surface) != nullptr) bytes.clear();
+  return bytes;
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -62,6 +88,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // The seeds are loop records: the frame is drawn from the same bytes.
   section.bytes.assign(std::as_bytes(all).begin(), std::as_bytes(all).end());
   content.extra.push_back(std::move(section));
+  ExtraSection shape;
+  shape.type = static_cast<std::uint32_t>(kPatternShape);
+  shape.owner = 0;
+  shape.bytes = shape_of(all.last(8));
+  if (!shape.bytes.empty()) content.extra.push_back(std::move(shape));
   std::vector<std::byte> bytes;
   const auto written = write_bundle(content, [&bytes](std::span<const std::byte> part) {
     bytes.insert(bytes.end(), part.begin(), part.end());
