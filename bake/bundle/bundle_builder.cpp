@@ -24,6 +24,7 @@
 #include "bake/texture/texture_stage.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
+#include "formats/pattern_shape.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/features.hpp"
 
@@ -310,8 +311,11 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   if (is_target_file(request.path)) {
     MODAR_ASSIGN(trace.files.emplace_back(), target_picture(request.path));
   }
-  Result<PatternFeatures> baked =
-      bake_pattern(request.path, request.width_mm, content.parameter_sets, loop, report);
+  for (std::string& file : files_of(request.path, request.shape)) {
+    trace.files.push_back(std::move(file));
+  }
+  Result<PatternFeatures> baked = bake_pattern(request.path, request.width_mm,
+                                               content.parameter_sets, loop, report, request.shape);
   if (!baked) return tl::unexpected(baked.error());
   PatternRecord record = baked->record;
   record.name = content.intern(baked->name);
@@ -320,8 +324,15 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   section.owner = static_cast<std::uint32_t>(content.patterns.size());
   section.bytes = std::move(baked->loop_record);
   content.extra.push_back(std::move(section));
-  if (!is_target_file(request.path)) {
-    // A target file names a part of a picture: its light is not estimated.
+  if (!baked->shape.empty()) {
+    ExtraSection shape;
+    shape.type = static_cast<std::uint32_t>(kPatternShape);
+    shape.owner = static_cast<std::uint32_t>(content.patterns.size());
+    shape.bytes = std::move(baked->shape);
+    content.extra.push_back(std::move(shape));
+  } else if (!is_target_file(request.path)) {
+    // A target file names a part of a picture, and on what is curved light changes from cell to
+    // cell: their light is not estimated.
     ExtraSection colours;
     colours.type = static_cast<std::uint32_t>(kPatternColours);
     colours.owner = static_cast<std::uint32_t>(content.patterns.size());
@@ -549,6 +560,12 @@ Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeReq
   }
   content.shadows.resize(request.shadows ? scenes.size() : 0);
   for (std::uint32_t s = 0; s < content.shadows.size(); ++s) {
+    const auto shaped = [&](const ExtraSection& section) {
+      return section.type == static_cast<std::uint32_t>(kPatternShape) &&
+             section.owner == content.scenes[s].pattern;
+    };
+    // A shadow lies in a plane.
+    if (std::any_of(content.extra.begin(), content.extra.end(), shaped)) continue;
     content.shadows[s] = scene_shadow(content, s, request.jobs);
   }
   timer.done(content.lights.size(), content.shadows.size());

@@ -33,7 +33,8 @@ struct SceneRequest {
 
 struct PatternRequest {
   std::string path;
-  double width_mm = 0.0;  ///< 0: what the file states, or unknown
+  double width_mm = 0.0;  ///< 0: what the file or the shape states, or unknown
+  ShapeRequest shape{};   ///< what it is printed on; flat where nothing is told
 };
 
 /// How far packed positions may lie from the source's, as the user says it.

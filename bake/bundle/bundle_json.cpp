@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <numbers>
+
+#include "formats/pattern_shape.hpp"
 
 namespace modar {
 namespace {
@@ -159,6 +162,23 @@ Json texture_json(const BundleView& bundle, std::uint32_t index) {
           {"repeat", (texture.flags & kTextureRepeat) != 0}};
 }
 
+/// What the pattern is printed on; null: it is flat.
+Json shape_json(const BundleView& bundle, std::uint32_t index) {
+  const PatternRecord& pattern = bundle.patterns()[index];
+  const auto bytes = bundle.section(kPatternShape, index);
+  PatternSurface surface;
+  if (bytes.empty() || view_pattern_shape(bytes, pattern.width, pattern.height, surface)) return {};
+  if (!surface.faces().empty()) return {{"kind", "faces"}, {"faces", surface.faces().size()}};
+  // Pattern units: half of the longer side.
+  const double mm =
+      pattern.width_mm / (2.0 * pattern.width / std::max(pattern.width, pattern.height));
+  const double grown = surface.slope() * pattern.height / std::max(pattern.width, pattern.height);
+  return {{"kind", "round"},
+          {"arc_deg", 360 / std::numbers::pi * surface.half_arc()},
+          {"top_mm", 2 * mm * (surface.radius() + grown)},
+          {"bottom_mm", 2 * mm * (surface.radius() - grown)}};
+}
+
 Json pattern_json(const BundleView& bundle, std::uint32_t index) {
   const PatternRecord& pattern = bundle.patterns()[index];
   Json keypoints = Json::object();
@@ -172,6 +192,7 @@ Json pattern_json(const BundleView& bundle, std::uint32_t index) {
           {"height", pattern.height},
           {"width_mm", pattern.width_mm},
           {"score", pattern.score < 0 ? Json() : Json(pattern.score)},
+          {"shape", shape_json(bundle, index)},
           {"keypoints", keypoints}};
 }
 
@@ -194,7 +215,9 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
   }
   Json patterns = Json::array();
   for (const PatternRequest& pattern : request.patterns) {
-    patterns.push_back({{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}});
+    Json stated = {{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}};
+    if (!pattern.shape.flat()) stated.set("shape", pattern.shape.text);
+    patterns.push_back(std::move(stated));
   }
   Json scenes = Json::array();
   for (const SceneRequest& scene : request.scenes) {

@@ -6,6 +6,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
+#include "formats/pattern_shape.hpp"
 
 namespace modar {
 namespace {
@@ -157,19 +158,14 @@ class Linker {
     const BundleView& part = linked.bundle;
     PatternRecord record = part.patterns()[0];
     record.name = content_.intern(linked.name);
-    ExtraSection section;
-    section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
-    section.owner = static_cast<std::uint32_t>(content_.patterns.size());
-    const auto tracker = part.section(SectionType::kTrackerRecord, 0);
-    section.bytes.assign(tracker.begin(), tracker.end());
-    content_.extra.push_back(std::move(section));
-    const auto colours = part.section(kPatternColours, 0);
-    if (!colours.empty()) {
-      ExtraSection grid;
-      grid.type = static_cast<std::uint32_t>(kPatternColours);
-      grid.owner = static_cast<std::uint32_t>(content_.patterns.size());
-      grid.bytes.assign(colours.begin(), colours.end());
-      content_.extra.push_back(std::move(grid));
+    for (const SectionType type : {SectionType::kTrackerRecord, kPatternColours, kPatternShape}) {
+      const auto bytes = part.section(type, 0);
+      if (bytes.empty()) continue;
+      ExtraSection section;
+      section.type = static_cast<std::uint32_t>(type);
+      section.owner = static_cast<std::uint32_t>(content_.patterns.size());
+      section.bytes.assign(bytes.begin(), bytes.end());
+      content_.extra.push_back(std::move(section));
     }
     std::vector<FeatureContent> features;
     for (std::uint32_t s = 0; s < part.parameter_sets().size(); ++s) {

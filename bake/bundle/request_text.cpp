@@ -1,5 +1,6 @@
 #include "bake/bundle/request_text.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -110,7 +111,90 @@ Result<double> parse_unit(const std::string& text) {
               "name one of mm, cm, m, km, in, ft");
 }
 
+namespace {
+
+/// A number and a unit of length, in millimetres.
+bool parse_length(std::string_view text, double& mm) {
+  const std::size_t digits = text.find_last_of("0123456789.") + 1;  // 0 where there is none
+  const Result<double> unit = parse_unit(std::string(text.substr(digits)));
+  if (!unit || !parse_number(text.substr(0, digits), mm) || !(mm > 0)) return false;
+  if (!text.ends_with("mm")) mm *= *unit * 1000;
+  return true;
+}
+
+/// "120x180x40mm".
+bool parse_box(std::string_view text, std::array<double, 3>& mm) {
+  const std::size_t digits = text.find_last_of("0123456789.") + 1;
+  const std::vector<std::string_view> parts = split(text.substr(0, digits), 'x');
+  if (parts.size() != mm.size()) return false;
+  for (std::size_t i = 0; i < mm.size(); ++i) {
+    if (!parse_length(std::string(parts[i]) + std::string(text.substr(digits)), mm[i]))
+      return false;
+  }
+  return true;
+}
+
+tl::unexpected<Error> shape_error(const std::string& text, const std::string& cause) {
+  return fail(ExitCode::kUsage, "cli.shape", "shape=" + text, cause,
+              "write cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or "
+              "box,size=120x180x40mm,right=FILE,back=FILE,left=FILE,top=FILE,bottom=FILE");
+}
+
+}  // namespace
+
+Result<ShapeRequest> parse_shape(const std::string& text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  ShapeRequest shape;
+  shape.text = text;
+  if (parts[0] == "cylinder") {
+    shape.kind = ShapeRequest::Kind::kCylinder;
+  } else if (parts[0] == "cone") {
+    shape.kind = ShapeRequest::Kind::kCone;
+  } else if (parts[0] == "box") {
+    shape.kind = ShapeRequest::Kind::kBox;
+  } else {
+    return shape_error(text, "there is no shape '" + std::string(parts[0]) + "'");
+  }
+  constexpr std::string_view kSides[] = {"right", "back", "left", "top", "bottom"};
+  const bool cone = shape.kind == ShapeRequest::Kind::kCone;
+  const bool box = shape.kind == ShapeRequest::Kind::kBox;
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const std::string_view part = parts[i];
+    const std::string_view value = part.substr(part.find('=') + 1);
+    bool good = false;
+    if (box && part.starts_with("size=")) {
+      good = parse_box(value, shape.box_mm);
+    } else if (box) {
+      const auto* side =
+          std::find(std::begin(kSides), std::end(kSides), part.substr(0, part.find('=')));
+      good = side != std::end(kSides) && !value.empty();
+      if (good) shape.sides[static_cast<std::size_t>(side - std::begin(kSides))] = value;
+    } else if (!cone && part.starts_with("diameter=")) {
+      good = parse_length(value, shape.top_mm);
+      shape.bottom_mm = shape.top_mm;
+    } else if (cone && part.starts_with("top=")) {
+      good = parse_length(value, shape.top_mm);
+    } else if (cone && part.starts_with("bottom=")) {
+      good = parse_length(value, shape.bottom_mm);
+    } else if (part.starts_with("arc=")) {
+      good = parse_number(value, shape.arc_deg) && shape.arc_deg > 0 && shape.arc_deg <= 360;
+    }
+    if (!good) return shape_error(text, "'" + std::string(part) + "' is not understood");
+  }
+  if (cone && (shape.top_mm <= 0 || shape.bottom_mm <= 0)) {
+    return shape_error(text, "a cone needs its diameters at the top and at the bottom");
+  }
+  if (box && shape.box_mm[0] <= 0) return shape_error(text, "a box needs its size");
+  return shape;
+}
+
 Result<PatternRequest> parse_pattern(const std::string& text) {
+  constexpr std::string_view kShape = ":shape=";
+  if (const std::size_t at = text.rfind(kShape); at != std::string::npos) {
+    MODAR_ASSIGN(PatternRequest request, parse_pattern(text.substr(0, at)));
+    MODAR_ASSIGN(request.shape, parse_shape(text.substr(at + kShape.size())));
+    return request;
+  }
   PatternRequest request;
   request.path = text;
   const std::size_t colon = text.rfind(':');

@@ -29,9 +29,14 @@ Result<SceneRequest> parse_scene(const std::string& text);
 /// Errors: kUsage "cli.corners".
 Result<std::array<PixelPoint, 4>> parse_corners(const std::string& text);
 
-/// "FILE" or "FILE:WIDTH", a physical width with a unit of parse_unit(): 210mm, 21cm. Errors:
-/// kUsage "cli.pattern".
+/// "FILE", "FILE:WIDTH", a physical width with a unit of parse_unit(): 210mm, 21cm, and behind
+/// either ":shape=..." of parse_shape(). Errors: kUsage "cli.pattern", "cli.shape".
 Result<PatternRequest> parse_pattern(const std::string& text);
+
+/// "cylinder,diameter=66mm,arc=120", "cone,top=80mm,bottom=60mm,arc=100"; arc in degrees, left out
+/// where the width tells it; "box,size=120x180x40mm,right=FILE,top=FILE": width, height and depth.
+/// Errors: kUsage "cli.shape".
+Result<ShapeRequest> parse_shape(const std::string& text);
 
 /// "mm", "cm", "m", "km", "in", "ft" to metres. Errors: kUsage "cli.unit".
 Result<double> parse_unit(const std::string& text);

@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "bake/bundle/request_text.hpp"
 #include "bake/check/source_check.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 
@@ -69,19 +70,23 @@ void read_scenes(const Json& document, BakeRequest& request) {
   }
 }
 
-/// The widths that patterns were baked with, where the user gives none.
+/// The widths and shapes that patterns were baked with, where the user gives none.
 void read_widths(const Json& document, BakeRequest& request) {
   const auto patterns = document.find("patterns");
   if (patterns == document.end() || !patterns->is_array()) return;
   for (const Json& stated : *patterns) {
     if (!stated.is_object()) continue;
     std::string file;
+    std::string shape;
     double width = 0;
     take(stated, "file", file);
     take(stated, "width_mm", width);
+    take(stated, "shape", shape);
     for (PatternRequest& pattern : request.patterns) {
       const bool same = std::filesystem::path(pattern.path).filename().string() == file;
       if (same && pattern.width_mm == 0 && width > 0) pattern.width_mm = width;
+      const auto known = parse_shape(shape);
+      if (same && pattern.shape.flat() && known) pattern.shape = *known;
     }
   }
 }

@@ -12,6 +12,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/pattern/pattern.hpp"
+#include "formats/tracker_record.hpp"
 #include "modar/paper_tracker.hpp"
 #include "modar/pose_loop.hpp"
 
@@ -56,10 +57,11 @@ class BundleTracker {
 class PatternSweep {
  public:
   PatternSweep(BundleTracker& tracker, std::uint32_t pattern, GrayPicture picture,
-               const Camera& camera, const PoseCheckOptions& options)
+               const PatternSurface& surface, const Camera& camera, const PoseCheckOptions& options)
       : tracker_(tracker),
         pattern_(pattern),
         picture_(std::move(picture)),
+        surface_(surface),
         camera_(camera),
         options_(options),
         random_(options.seed + 7919 * pattern),
@@ -71,7 +73,12 @@ class PatternSweep {
     step.tilt_deg = tilt;
     SceneBand band;
     band.area_low = band.area_high = area;
-    band.tilt_low = band.tilt_high = tilt;
+    if (surface_.flat()) {
+      band.tilt_low = band.tilt_high = tilt;
+    } else {
+      band.surface = &surface_;
+      band.around_low = band.around_high = tilt;
+    }
     for (; step.views < options_.views; ++step.views) {
       const Pose pose = draw_pose(band, picture_.view(), camera_, random_);
       const SceneFrame scene =
@@ -110,6 +117,7 @@ class PatternSweep {
   BundleTracker& tracker_;
   std::uint32_t pattern_;
   GrayPicture picture_;
+  PatternSurface surface_;
   Camera camera_;
   const PoseCheckOptions& options_;
   Random random_;
@@ -178,6 +186,20 @@ void tell(const BundleView& bundle, const PatternRecord& record, const IssueSink
              std::move(detail), severity});
 }
 
+/// The picture of a box's sides as the bake put them together.
+GrayPicture baked_picture(const BundleView& bundle, std::uint32_t pattern) {
+  TrackerRecordView view;
+  GrayPicture picture;
+  if (view_tracker_record(bundle.section(SectionType::kTrackerRecord, pattern), view))
+    return picture;
+  picture.width = static_cast<int>(view.header.width);
+  picture.height = static_cast<int>(view.header.height);
+  const std::size_t size = std::size_t{view.header.width} * view.header.height;
+  picture.pixels.assign(view.pixels.begin(),
+                        view.pixels.begin() + static_cast<std::ptrdiff_t>(size));
+  return picture;
+}
+
 }  // namespace
 
 Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
@@ -204,7 +226,13 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
     }
     bool shrunk = false;
     MODAR_ASSIGN(GrayPicture picture, load_pattern(*path, shrunk));
-    PatternSweep sweep(tracker, p, std::move(picture), camera, options);
+    PatternSurface surface;
+    const auto shape = bundle.section(kPatternShape, p);
+    if (!shape.empty()) {
+      static_cast<void>(view_pattern_shape(shape, record.width, record.height, surface));
+      if (!surface.faces().empty()) picture = baked_picture(bundle, p);
+    }
+    PatternSweep sweep(tracker, p, std::move(picture), surface, camera, options);
     MODAR_ASSIGN(PatternRange range, sweep_pattern(sweep, stepped));
     range.name = bundle.name(record.name);
     range.method = tracker.method();

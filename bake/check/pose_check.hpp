@@ -20,7 +20,8 @@ struct PoseCheckOptions {
   std::function<void(double done)> progress;  ///< may be empty
 };
 
-/// One step: views whose pattern has about that area (of its picture's) and tilt.
+/// One step: views whose pattern has about that area (of its picture's) and tilt; a curved one is
+/// turned about its axis instead.
 struct PoseStep {
   double area = 1;
   double tilt_deg = 0;

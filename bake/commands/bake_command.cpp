@@ -309,8 +309,11 @@ void add_bake(CommandLine& program) {
   line.option("--model", &request.models, "OBJ, glTF or GLB files", {.type = "FILE"});
   line.option(
       "--pattern", &command->patterns,
-      "Images of flat things, frontal; :WIDTH tells the printed width (:210mm, :21cm, :8.3in)",
-      {.type = "FILE[:WIDTH]"});
+      "Images of flat things, frontal; :WIDTH tells the printed width (:210mm, :21cm, :8.3in); "
+      ":shape=cylinder,diameter=66mm,arc=120 a label around a bottle, "
+      ":shape=cone,top=80mm,bottom=60mm,arc=100 one around a cup, "
+      ":shape=box,size=120x180x40mm,right=FILE,back=FILE,left=FILE,top=FILE,bottom=FILE a box",
+      {.type = "FILE[:WIDTH][:shape=...]"});
   line.option(
       "--scene", &command->scenes,
       "Which model stands on which pattern; needed where there is more than one of either",

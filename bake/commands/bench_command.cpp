@@ -55,6 +55,8 @@ void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
   line.flag("--field", pose.field,
             "pose: frames as phones take them: blur, low light, JPEG, glare, rolling shutter, bent "
             "paper, mirrored prints, other editions");
+  line.flag("--shape", pose.shape,
+            "pose: labels on cylinders and cones, and boxes, from 0 to 70 degrees about the axis");
   line.flag("--lookalikes", pose.lookalikes,
             "pose: two seconds each of other editions, mirror images and covered prints");
   line.option("--path", &pose.path,

@@ -55,6 +55,7 @@ struct SimulateCommand {
   std::string camera_file;            ///< empty: the default camera
   std::string backgrounds;            ///< folder; empty: made ones
   std::string picture_folder;         ///< of contact sheets; empty: none
+  std::string shape;                  ///< of parse_shape(); empty: flat
   SimulateOptions options;
   bool quiet = false;
   bool json = false;
@@ -295,6 +296,7 @@ Json simulation_json(const Simulation& simulation) {
           {"nearest_mm", width > 0 ? Json(simulation.range.nearest * width) : Json()},
           {"farthest_mm", width > 0 ? Json(simulation.range.farthest * width) : Json()},
           {"tilt_deg", simulation.range.tilt_deg},
+          {"around_deg", simulation.curved ? Json(2 * simulation.range.around_deg) : Json()},
           {"sentence", range_sentence(simulation)},
           {"bands", bands}};
 }
@@ -319,6 +321,9 @@ Result<void> complete(SimulateCommand& command) {
     const auto camera = read_camera_file(command.camera_file);
     if (!camera) return tl::unexpected(camera.error());
     command.options.camera = *camera;
+  }
+  if (!command.shape.empty()) {
+    MODAR_ASSIGN(command.options.shape, parse_shape(command.shape));
   }
   if (!command.backgrounds.empty()) {
     auto photos = pictures_of(command.backgrounds);
@@ -381,6 +386,10 @@ void add_simulate(CommandLine& pattern) {
   line.option("--backgrounds", &command->backgrounds,
               "A folder of photos without the pattern; else made ones", {.type = "DIR"});
   line.option("--width-mm", &options.width_mm, "Printed width of the pattern", {.positive = true});
+  line.option("--shape", &command->shape,
+              "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,"
+              "arc=100, or a box as in bake --pattern",
+              {.type = "SHAPE"});
   line.option("--views", &options.views, "Views of each value of a band",
               {.shows_default = true, .least = 1, .most = 1000});
   line.option("--seed", &options.seed, "Of the views", {.shows_default = true});

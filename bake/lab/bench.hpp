@@ -24,6 +24,7 @@ struct PoseBenchRequest {
   bool tables = false;                  ///< print the ModAR paper's tables instead
   bool scores = false;                  ///< hold scores against working ranges instead
   bool field = false;                   ///< phones' conditions instead: blur, noise, glare, bend
+  bool shape = false;                   ///< labels on bottles and cups instead
   bool lookalikes = false;              ///< sequences of lookalike and covered prints instead
   std::string path;                     ///< replay this camera path instead; see bench_path()
   bool sift = false;                    ///< OpenCV's SIFT with MAGSAC beside the others

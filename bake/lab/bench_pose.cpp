@@ -10,6 +10,7 @@
 #include "bake/lab/many_bench.hpp"
 #include "bake/lab/pose_bench.hpp"
 #include "bake/lab/score_bench.hpp"
+#include "bake/lab/shape_bench.hpp"
 #include "bake/terminal.hpp"
 #include "modar/features.hpp"
 
@@ -194,7 +195,11 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
     for (PoseBenchRow& row : rows) row.detailed = true;
     take(rows);
   };
-  const bool others = command.field || !command.path.empty();
+  if (command.shape) {
+    MODAR_ASSIGN(auto rows, bench_shapes(options, command.only, progress));
+    take_detailed(std::move(rows));
+  }
+  const bool others = command.field || command.shape || !command.path.empty();
   if (command.field) {
     MODAR_ASSIGN(auto rows, bench_field(options, command.only, progress));
     take_detailed(std::move(rows));

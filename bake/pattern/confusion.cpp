@@ -24,6 +24,9 @@ std::vector<GrayPicture> easy_views(const NamedPattern& pattern, const Confusion
   band.area_low = 0.5 * side * side / own;
   band.area_high = 1.5 * side * side / own;
   band.tilt_high = 35;
+  const PatternSurface surface =
+      surface_of(pattern.shape, pattern.picture.width, pattern.picture.height);
+  if (!surface.flat()) band.surface = &surface;
   std::vector<GrayPicture> views;
   for (int i = 0; i < options.views; ++i) {
     const Pose pose = draw_pose(band, pattern.picture.view(), camera, random);
@@ -72,13 +75,15 @@ Result<std::vector<int>> count_alone(std::span<const NamedPattern> patterns,
 Result<std::vector<std::byte>> project_of(const std::vector<NamedPattern>& patterns) {
   std::vector<GrayPicture> pictures;
   std::vector<std::vector<std::byte>> records;
+  std::vector<std::vector<std::byte>> shapes;
   for (const NamedPattern& pattern : patterns) {
     MODAR_ASSIGN(const auto bundle, BundleView::open(pattern.bundle));
     const auto record = bundle.section(SectionType::kTrackerRecord, 0, 0);
     pictures.push_back(pattern.picture);
     records.emplace_back(record.begin(), record.end());
+    shapes.push_back(pattern.shape);
   }
-  return bundle_of_records(pictures, records);
+  return bundle_of_records(pictures, records, nullptr, shapes);
 }
 
 /// Recognitions of patterns other than the one shown (none: patterns.size()).
@@ -153,7 +158,7 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   }
   Random mirror_random(options.seed + 1);
   for (const NamedPattern& pattern : patterns) {
-    NamedPattern mirror{pattern.name, pattern.picture, {}};
+    NamedPattern mirror{pattern.name, pattern.picture, {}, pattern.shape};
     for (int y = 0; y < mirror.picture.height; ++y) {
       const auto row = mirror.picture.pixels.begin() + std::ptrdiff_t{y} * mirror.picture.width;
       std::reverse(row, row + mirror.picture.width);

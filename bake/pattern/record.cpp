@@ -11,7 +11,6 @@
 
 #include "bake/parallel.hpp"
 #include "bake/pattern/picture.hpp"
-#include "bake/pattern/rectify.hpp"
 #include "bake/pattern/score.hpp"
 #include "bake/pattern/view_kernel.hpp"
 #include "bake/pattern/view_render.hpp"
@@ -74,7 +73,23 @@ bool within(const GrayImage& pattern, const std::array<double, 2>& p) {
   return p[0] >= -0.5 && p[1] >= -0.5 && p[0] < pattern.width - 0.5 && p[1] < pattern.height - 0.5;
 }
 
-std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const AffineView& view) {
+/// Whether what lies so far around a place is of one side of a box: beyond its edge cameras see
+/// something else than the picture. True of all other shapes.
+bool on_one_face(const PatternSurface& surface, double x, double y, double reach) {
+  if (surface.faces().empty()) return true;
+  return std::any_of(
+      surface.faces().begin(), surface.faces().end(), [&](const ShapeFaceRecord& face) {
+        return x - reach >= face.place[0] - 0.5 && y - reach >= face.place[1] - 0.5 &&
+               x + reach <= face.place[0] + face.place[2] - 0.5 &&
+               y + reach <= face.place[1] + face.place[3] - 0.5;
+      });
+}
+
+std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const AffineView& view,
+                                     const PatternSurface& surface) {
+  constexpr double kReach = 10.0;  // view pixels around a corner that tell most of its code
+  const double scale =
+      std::sqrt(std::abs(view.linear[0] * view.linear[3] - view.linear[1] * view.linear[2]));
   std::vector<Candidate> candidates;
   const GrayPicture picture = render_view(levels, view, nullptr);
   const auto extractor =
@@ -85,7 +100,10 @@ std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const
     if (feature.level != 0) continue;
     const auto place =
         to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
-    if (!within(levels[0].view(), place)) continue;
+    if (!within(levels[0].view(), place) ||
+        !on_one_face(surface, place[0], place[1], kReach / scale)) {
+      continue;
+    }
     Candidate candidate;
     candidate.x = place[0];
     candidate.y = place[1];
@@ -101,7 +119,8 @@ std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const
   return candidates;
 }
 
-std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels, unsigned jobs) {
+std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels,
+                                       const PatternSurface& surface, unsigned jobs) {
   std::vector<AffineView> views;
   Random random(1);
   double scale = 1.0;
@@ -117,7 +136,7 @@ std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels, uns
   }
   std::vector<std::vector<Candidate>> found(views.size());
   parallel_rows(static_cast<std::uint32_t>(views.size()), jobs,
-                [&](std::uint32_t i) { found[i] = candidates_of(levels, views[i]); });
+                [&](std::uint32_t i) { found[i] = candidates_of(levels, views[i], surface); });
   std::vector<Candidate> candidates;
   for (const auto& some : found) candidates.insert(candidates.end(), some.begin(), some.end());
   return candidates;
@@ -193,6 +212,30 @@ struct TrialView {
   std::vector<std::pair<std::uint32_t, Hit>> hits;
 };
 
+/// Adds a view's feature, seen at a place of the picture, and the candidates that it repeats.
+class TrialTally {
+ public:
+  TrialTally(const Grid& grid, double mean_scale) : grid_(grid), mean_scale_(mean_scale) {}
+  void add(const TrackerFeature& feature, double x, double y) {
+    const std::uint32_t id = trial_.features++;
+    const double radius = std::min(kNear * (1 << feature.level) / mean_scale_, 16.0);
+    grid_.near(x, y, radius, feature, which_, bits_);
+    for (std::size_t i = 0; i < which_.size(); ++i) {
+      if (bits_[i] > kRepeats) continue;
+      trial_.hits.push_back(
+          {which_[i], {id, static_cast<float>(kRepeats + 8 - bits_[i]) / (kRepeats + 8)}});
+    }
+  }
+  TrialView take() { return std::move(trial_); }
+
+ private:
+  const Grid& grid_;
+  double mean_scale_;
+  TrialView trial_;
+  std::vector<std::uint32_t> which_;
+  std::vector<int> bits_;
+};
+
 TrialView run_trial(const std::vector<ViewLevel>& levels, std::uint64_t seed, const Grid& grid) {
   Random random(seed);
   const double scale = exp_of(random.uniform(kLogSmallest, kLogLargest));
@@ -206,32 +249,69 @@ TrialView run_trial(const std::vector<ViewLevel>& levels, std::uint64_t seed, co
   expose_trial(random, picture);
   const auto extractor = FeatureExtractor::create(picture.width, picture.height, DetectOptions{});
   extractor->set_frame(picture.view());
-  const double mean_scale = scale / std::sqrt(tilt);
-  TrialView trial;
-  std::vector<std::uint32_t> which;
-  std::vector<int> bits;
+  TrialTally tally(grid, scale / std::sqrt(tilt));
   for (const TrackerFeature& feature : extractor->features()) {
     const auto place =
         to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
-    if (!within(levels[0].view(), place)) continue;
-    const std::uint32_t id = trial.features++;
-    const double radius = std::min(kNear * (1 << feature.level) / mean_scale, 16.0);
-    grid.near(place[0], place[1], radius, feature, which, bits);
-    for (std::size_t i = 0; i < which.size(); ++i) {
-      if (bits[i] > kRepeats) continue;
-      trial.hits.push_back(
-          {which[i], {id, static_cast<float>(kRepeats + 8 - bits[i]) / (kRepeats + 8)}});
-    }
+    if (within(levels[0].view(), place)) tally.add(feature, place[0], place[1]);
   }
-  return trial;
+  return tally.take();
 }
 
-Trials run_trials(const std::vector<ViewLevel>& levels, const std::vector<Candidate>& candidates,
-                  std::uint32_t count, unsigned jobs) {
+/// Axes of a camera that looks at a thing from `around` radians about its axis and `above` radians
+/// above, rolled.
+ViewAxes axes_of(double around, double above, double roll) {
+  const Turn a = turn_of(around);
+  const Turn b = turn_of(above);
+  const Turn c = turn_of(roll);
+  // Of the pattern's x and z after the turn about y, then up against down.
+  const std::array<double, 3> right = {a.cosine, 0, -a.sine};
+  const std::array<double, 3> down = {-b.sine * -a.sine, -b.cosine, b.sine * a.cosine};
+  ViewAxes axes{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    axes[0][i] = c.cosine * right[i] - c.sine * down[i];
+    axes[1][i] = c.sine * right[i] + c.cosine * down[i];
+  }
+  return axes;
+}
+
+/// The same on a pattern's surface, from all sides of it.
+TrialView run_surface_trial(const std::vector<ViewLevel>& levels, const PatternSurface& surface,
+                            std::uint64_t seed, const Grid& grid) {
+  constexpr double kAround = 85.0;  // degrees to either side; a box is seen from all sides
+  constexpr double kAbove = 40.0;
+  Random random(seed);
+  const double scale = exp_of(random.uniform(kLogSmallest, kLogLargest));
+  const double reach = surface.faces().empty() ? kAround : 180.0;
+  const double around = random.uniform(-reach, reach) * pi / 180.0;
+  const double above = random.uniform(-kAbove, kAbove) * pi / 180.0;
+  const ViewAxes axes = axes_of(around, above, random.uniform(0.0, 2 * pi));
+  CurvedView view = render_surface_view(
+      levels, surface, axes, scale, kMargin + 8,
+      [&random](int width, int height) { return made_clutter(random, width, height); });
+  expose_trial(random, view.picture);
+  const GrayPicture& picture = view.picture;
+  const auto extractor = FeatureExtractor::create(picture.width, picture.height, DetectOptions{});
+  extractor->set_frame(picture.view());
+  TrialTally tally(grid, scale);
+  for (const TrackerFeature& feature : extractor->features()) {
+    const auto x = static_cast<std::size_t>(static_cast<double>(feature.x) + 0.5);
+    const auto y = static_cast<std::size_t>(static_cast<double>(feature.y) + 0.5);
+    const auto& place = view.places[y * static_cast<std::size_t>(picture.width) + x];
+    if (place[0] == CurvedView::kNoPlace) continue;
+    tally.add(feature, place[0] / 64.0 - 0.5, place[1] / 64.0 - 0.5);
+  }
+  return tally.take();
+}
+
+Trials run_trials(const std::vector<ViewLevel>& levels, const PatternSurface& surface,
+                  const std::vector<Candidate>& candidates, std::uint32_t count, unsigned jobs) {
   const Grid grid(levels[0].view(), candidates);
   std::vector<TrialView> views(count);
-  parallel_rows(count, jobs,
-                [&](std::uint32_t i) { views[i] = run_trial(levels, 1000 + i, grid); });
+  parallel_rows(count, jobs, [&](std::uint32_t i) {
+    views[i] = surface.flat() ? run_trial(levels, 1000 + i, grid)
+                              : run_surface_trial(levels, surface, 1000 + i, grid);
+  });
   Trials trials;
   trials.hits.resize(candidates.size());
   for (const TrialView& view : views) {
@@ -387,10 +467,15 @@ double patch_score(const GrayPicture& picture, int x, int y) {
   return std::sqrt(std::max(0.0, least) / ((2 * kPatchHalf + 1) * (2 * kPatchHalf + 1)));
 }
 
-std::vector<PatchPlace> patch_places(const GrayPicture& picture) {
+std::vector<PatchPlace> patch_places(const GrayPicture& picture, const PatternSurface& surface,
+                                     double scale) {
   std::vector<PatchPlace> places;
   for (int y = kPatchBorder; y < picture.height - kPatchBorder; y += 2) {
     for (int x = kPatchBorder; x < picture.width - kPatchBorder; x += 2) {
+      if (!on_one_face(surface, (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5,
+                       (kPatchBorder + 0.5) * scale)) {
+        continue;
+      }
       const double score = patch_score(picture, x, y);
       if (score >= kWeakestPatch) places.push_back({x, y, score});
     }
@@ -422,13 +507,13 @@ std::vector<PatchPlace> spread_patches(const std::vector<PatchPlace>& places, st
 
 /// At most `count` patches a level, spread over the picture, by level and then by score.
 std::vector<TrackerPatchRecord> choose_patches(const std::vector<ViewLevel>& levels,
-                                               std::uint32_t count) {
+                                               const PatternSurface& surface, std::uint32_t count) {
   std::vector<TrackerPatchRecord> patches;
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const GrayPicture& picture = levels[level];
     const double scale = static_cast<double>(1u << level);
-    for (const PatchPlace& place :
-         spread_patches(patch_places(picture), count, std::max(picture.width, picture.height))) {
+    for (const PatchPlace& place : spread_patches(patch_places(picture, surface, scale), count,
+                                                  std::max(picture.width, picture.height))) {
       TrackerPatchRecord record{};
       record.x = static_cast<std::uint16_t>(std::lround((place.x + 0.5) * scale * 64));
       record.y = static_cast<std::uint16_t>(std::lround((place.y + 0.5) * scale * 64));
@@ -489,7 +574,8 @@ Result<void> TrackerRecordOptions::validate() const {
 }
 
 Result<std::vector<std::byte>> bake_tracker_record(const GrayImage& pattern,
-                                                   const TrackerRecordOptions& options) {
+                                                   const TrackerRecordOptions& options,
+                                                   const PatternSurface& surface) {
   MODAR_TRY(options.validate());
   if (pattern.width < 32 || pattern.height < 32 || pattern.width > kLargestSide ||
       pattern.height > kLargestSide) {
@@ -498,25 +584,26 @@ Result<std::vector<std::byte>> bake_tracker_record(const GrayImage& pattern,
                 "give another size");
   }
   const std::vector<ViewLevel> levels = view_levels(pattern);
-  const std::vector<Candidate> candidates = find_candidates(levels, options.jobs);
-  const Trials trials = run_trials(levels, candidates, options.trial_views, options.jobs);
+  const std::vector<Candidate> candidates = find_candidates(levels, surface, options.jobs);
+  const Trials trials = run_trials(levels, surface, candidates, options.trial_views, options.jobs);
   const std::vector<std::uint32_t> chosen = choose(trials, options.features);
   if (chosen.size() < 8) {
     return fail(ExitCode::kInvalidInput, "pattern.no-features", "",
                 "fewer than 8 features of the picture repeat from view to view",
                 "take a picture with more texture");
   }
-  return assemble(levels, candidates, chosen, choose_patches(levels, options.patches_per_level));
+  return assemble(levels, candidates, chosen,
+                  choose_patches(levels, surface, options.patches_per_level));
 }
 
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                      std::span<const ParameterSetRecord> sets,
-                                     const TrackerRecordOptions& options, Report& report) {
+                                     const TrackerRecordOptions& options, Report& report,
+                                     const ShapeRequest& shape) {
   StageTimer timer(report, "pattern");
-  bool shrunk = false;
-  MODAR_ASSIGN(const GrayPicture picture, load_pattern(path, shrunk));
-  const GrayImage gray = picture.view();
-  if (shrunk) {
+  MODAR_ASSIGN(ShapedPicture shaped, load_shaped(path, width_mm, shape));
+  const GrayImage gray = shaped.picture.view();
+  if (shaped.shrunk) {
     report.diagnostics.push_back({"pattern.resized", DiagnosticSeverity::kInfo, path, 0,
                                   "the picture was made smaller, to " + std::to_string(gray.width) +
                                       "x" + std::to_string(gray.height) + " pixels",
@@ -526,7 +613,8 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
   out.name = base_name(path);
   out.record.width = static_cast<std::uint32_t>(gray.width);
   out.record.height = static_cast<std::uint32_t>(gray.height);
-  out.record.width_mm = width_mm > 0 ? width_mm : png_width_mm(path);
+  out.record.width_mm = shaped.width_mm;
+  const PatternSurface surface = surface_of(shaped.section, gray.width, gray.height);
   const auto corners = pattern_corners(gray.width, gray.height);
   out.record.half_width = static_cast<float>(corners[1].x);
   out.record.half_height = static_cast<float>(corners[1].y);
@@ -541,14 +629,15 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                 "the picture holds " + std::to_string(found) + " features, too few to recognise it",
                 "take a larger, sharper picture with more texture");
   }
-  auto record = bake_tracker_record(gray, options);
+  auto record = bake_tracker_record(gray, options, surface);
   if (!record) {
     record.error().where = path;
     return tl::unexpected(record.error());
   }
   out.loop_record = std::move(*record);
   if (options.score) MODAR_TRY(add_score(path, gray, options.jobs, out, report));
-  timer.done(picture.pixels.size(), found);
+  timer.done(shaped.picture.pixels.size(), found);
+  out.shape = std::move(shaped.section);
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/pattern/shape.hpp"
 #include "bake/report.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/error.hpp"
@@ -33,23 +34,27 @@ struct TrackerRecordOptions {
 
 /// The bytes of a SectionType::kTrackerRecord section. pattern: 8-bit gray, at most 1023 pixels a
 /// side. The same picture gives the same bytes on every machine. Errors: kInvalidInput
-/// "pattern.loop-size"; "pattern.no-features" where nothing repeats.
+/// "pattern.loop-size"; "pattern.no-features" where nothing repeats. surface: of the pattern.
 Result<std::vector<std::byte>> bake_tracker_record(const GrayImage& pattern,
-                                                   const TrackerRecordOptions& options);
+                                                   const TrackerRecordOptions& options,
+                                                   const PatternSurface& surface = {});
 
 struct PatternFeatures {
   std::string name;
   PatternRecord record{};                ///< without its name
   std::vector<FeatureContent> features;  ///< one for each parameter set, in their order
   std::vector<std::byte> loop_record;    ///< a section of type kTrackerRecord
+  std::vector<std::byte> shape;          ///< a section of type kPatternShape; empty: flat
 };
 
 /// Describes an image file for the tracker, and under the ModAR paper's parameter sets as YML with
-/// its binary twin. width_mm: printed width, 0: what the file states. Errors: those of read_image()
+/// its binary twin. width_mm: printed width, 0: what the file states, or what the shape tells. An
+/// image target of 8th Wall brings its own shape. Errors: those of read_image(), shape_section()
 /// and bake_tracker_record(); kInvalidInput "pattern.no-features" where the first set finds fewer
 /// than its min_matches.
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                      std::span<const ParameterSetRecord> sets,
-                                     const TrackerRecordOptions& options, Report& report);
+                                     const TrackerRecordOptions& options, Report& report,
+                                     const ShapeRequest& shape = {});
 
 }  // namespace modar

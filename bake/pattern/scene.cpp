@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bake/pattern/gray_mat.hpp"
+#include "bake/pattern/surface_scene.hpp"
 
 namespace modar {
 namespace {
@@ -208,8 +209,32 @@ cv::Mat motion_kernel(double length, double angle) {
 
 }  // namespace
 
+namespace {
+
+/// A pose of a curved thing that keeps its picture's nearest place in the frame.
+Pose draw_surface_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
+                       Random& random) {
+  const double area = std::exp(random.uniform(std::log(band.area_low), std::log(band.area_high)));
+  const auto either_side = [&random](double low, double high) {
+    const double angle = random.uniform(low, high);
+    return random.next() % 2 == 0 ? angle : -angle;
+  };
+  const double above = either_side(band.tilt_low, band.tilt_high);
+  const double around = either_side(band.around_low, band.around_high);
+  const double roll = random.uniform(band.roll_low, band.roll_high);
+  const double side = std::sqrt(area * pattern.width * pattern.height);
+  const double room_x = std::max(0.05 * camera.width, 0.5 * (camera.width - 1.3 * side));
+  const double room_y = std::max(0.05 * camera.height, 0.5 * (camera.height - 1.3 * side));
+  const glm::dvec2 sight{random.uniform(-room_x, room_x) / camera.fx,
+                         random.uniform(-room_y, room_y) / camera.fy};
+  return surface_pose(pattern, *band.surface, camera, around, above, roll, std::sqrt(area), sight);
+}
+
+}  // namespace
+
 Pose draw_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
                Random& random) {
+  if (band.surface != nullptr) return draw_surface_pose(band, pattern, camera, random);
   const double area = std::exp(random.uniform(std::log(band.area_low), std::log(band.area_high)));
   const double tilt = random.uniform(band.tilt_low, band.tilt_high) * pi / 180.0;
   const double axis = random.uniform(0.0, 2 * pi);
@@ -260,7 +285,11 @@ SceneFrame render_still(const GrayImage& pattern, const Camera& camera, const Po
   scene.pose = pose;
   scene.picture = background;
   cv::Mat frame(background.height, background.width, CV_8UC1, scene.picture.pixels.data());
-  if (band.pattern) {
+  if (band.pattern && band.surface != nullptr) {
+    scene.corners = surface_corners(pattern, *band.surface, camera, pose);
+    draw_surface(pattern, *band.surface, camera, pose,
+                 random.uniform(band.covered_low, band.covered_high), scene.picture);
+  } else if (band.pattern) {
     scene.corners = corners_of(pattern, camera, pose);
     const double covered = random.uniform(band.covered_low, band.covered_high);
     const int side = static_cast<int>(random.uniform(0, 4));

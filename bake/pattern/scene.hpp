@@ -11,6 +11,7 @@
 
 #include "bake/pattern/view_render.hpp"
 #include "formats/error.hpp"
+#include "formats/pattern_shape.hpp"
 #include "modar/camera.hpp"
 #include "modar/pose.hpp"
 
@@ -28,6 +29,9 @@ struct SceneBand {
   bool pattern = true;  ///< false: the photo alone
   double roll_low = 0;  ///< degrees about the line of sight
   double roll_high = 360;
+  const PatternSurface* surface = nullptr;  ///< null: flat; else tilts are above or below, and
+  double around_low = 0;                    ///< degrees about its axis, to either side
+  double around_high = 0;
 };
 
 struct SceneFrame {

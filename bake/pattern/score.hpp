@@ -51,12 +51,12 @@ struct PatternScore {
   int views = 0;  ///< test views
 };
 
-/// Renders the picture smaller and smaller and more and more tilted, in fixed views, and runs the
-/// device's tracker on them: the score is the share of these views in which it is right. The causes
-/// come from the picture and from the features that are matched again. A count of decisions, which
-/// depends neither on the machine nor on the number of threads. record: the picture's tracker
-/// record. with_range: false spares the views that only the range, its grade and the cause "mirror"
-/// need, as a bake does. Errors: those of the tracker.
+/// Renders the picture, flat, smaller and smaller and more and more tilted, in fixed views, and
+/// runs the device's tracker on them: the score is the share of these views in which it is right.
+/// The causes come from the picture and from the features that are matched again. A count of
+/// decisions, which depends neither on the machine nor on the number of threads. record: the
+/// picture's tracker record. with_range: false spares the views that only the range, its grade and
+/// the cause "mirror" need, as a bake does. Errors: those of the tracker.
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
                                    unsigned jobs, bool with_range = true);
 

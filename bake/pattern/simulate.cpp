@@ -40,13 +40,18 @@ double easy_distance(const GrayImage& picture, const Camera& camera) {
 /// steps trade resolution for time. Set by hand.
 class Bands {
  public:
-  Bands(const GrayImage& picture, const Camera& camera)
-      : picture_(picture), camera_(camera), easy_(easy_distance(picture, camera)) {
+  Bands(const GrayImage& picture, const Camera& camera, bool curved)
+      : picture_(picture), camera_(camera), curved_(curved), easy_(easy_distance(picture, camera)) {
     for (int k = -5; k <= 11; ++k) {  // three steps an octave
       const double widths = 2 * std::exp2(k / 3.0);
       add("distance", "widths", widths, easy(widths));
     }
     for (int tilt = 0; tilt <= 80; tilt += 5) add("tilt", "degrees", tilt, tilted(tilt));
+    for (int around = 0; curved && around <= 120; around += 10) {
+      TrialSetting setting = easy(easy_);
+      setting.band.around_low = setting.band.around_high = around;
+      add("around", "degrees", around, setting);
+    }
     for (int roll = 0; roll < 360; roll += 45) {
       TrialSetting setting = easy(easy_);
       setting.band.roll_low = setting.band.roll_high = roll;
@@ -88,8 +93,9 @@ class Bands {
   }
   [[nodiscard]] TrialSetting tilted(double degrees) const {
     TrialSetting setting = easy(easy_);
-    // The distance stays, so that the area shrinks with the tilt.
-    setting.band.area_low *= std::cos(degrees * pi / 180);
+    // The distance stays, so that the area shrinks with the tilt; that of curved ones is of their
+    // nearest pixels.
+    if (!curved_) setting.band.area_low *= std::cos(degrees * pi / 180);
     setting.band.area_high = setting.band.area_low;
     setting.band.tilt_low = setting.band.tilt_high = degrees;
     return setting;
@@ -103,6 +109,7 @@ class Bands {
 
   GrayImage picture_;
   Camera camera_;
+  bool curved_;
   double easy_;
 };
 
@@ -132,6 +139,8 @@ WorkingRange range_of(const std::vector<SimulatedBand>& bands) {
       range.farthest = band.values[end - 1].value;
     } else if (band.name == "tilt" && first == 0) {
       range.tilt_deg = band.values[end - 1].value;
+    } else if (band.name == "around" && first == 0) {
+      range.around_deg = band.values[end - 1].value;
     }
   }
   return range;
@@ -197,9 +206,12 @@ Result<Simulation> simulate(const std::string& path, const SimulateOptions& opti
     return fail(ExitCode::kUsage, "simulate.camera", "", "the camera file states no image size",
                 "add image_width and image_height to it, or give a resolution");
   }
-  bool shrunk = false;
-  MODAR_ASSIGN(const GrayPicture picture, load_pattern(path, shrunk));
-  MODAR_ASSIGN(const auto bundle, bundle_of_pattern(picture.view(), {}));
+  MODAR_ASSIGN(const ShapedPicture shaped, load_shaped(path, options.width_mm, options.shape));
+  const GrayPicture& picture = shaped.picture;
+  const PatternSurface surface = surface_of(shaped.section, picture.width, picture.height);
+  MODAR_ASSIGN(auto record, bake_tracker_record(picture.view(), {}, surface));
+  MODAR_ASSIGN(const auto bundle,
+               bundle_of_record(picture.view(), std::move(record), shaped.section));
   MODAR_ASSIGN(auto backgrounds,
                load_backgrounds(options.backgrounds, camera.width, camera.height));
   Random random(options.seed);
@@ -209,12 +221,13 @@ Result<Simulation> simulate(const std::string& path, const SimulateOptions& opti
   TrialSetup setup;
   setup.picture = picture.view();
   setup.bundle = bundle;
+  if (!surface.flat()) setup.surface = &surface;
   setup.camera = camera;
   setup.backgrounds = backgrounds;
   setup.views = options.views;
   setup.seed = options.seed;
   setup.jobs = options.jobs;
-  Bands bands(setup.picture, camera);
+  Bands bands(setup.picture, camera, !surface.flat());
   std::mutex progress_mutex;
   std::size_t done = 0;
   const auto setting_done = [&] {
@@ -226,7 +239,8 @@ Result<Simulation> simulate(const std::string& path, const SimulateOptions& opti
   MODAR_ASSIGN(auto outcomes, try_views(setup, bands.settings, setting_done));
   Simulation simulation;
   simulation.name = std::filesystem::path(path).stem().string();
-  simulation.width_mm = options.width_mm > 0 ? options.width_mm : png_width_mm(path);
+  simulation.width_mm = shaped.width_mm;
+  simulation.curved = !surface.flat();
   std::size_t next = 0;
   for (SimulatedBand& band : bands.bands) {
     for (SimulatedValue& value : band.values) value.outcome = std::move(outcomes[next++]);
@@ -239,18 +253,23 @@ Result<Simulation> simulate(const std::string& path, const SimulateOptions& opti
 std::string range_sentence(const Simulation& simulation) {
   const WorkingRange& range = simulation.range;
   if (range.farthest <= 0) return "this camera does not recognise it at any distance";
+  char reach[64];
+  if (simulation.curved) {
+    std::snprintf(reach, sizeof reach, "over %.0f degrees around it", 2 * range.around_deg);
+  } else {
+    std::snprintf(reach, sizeof reach, "up to %.0f degrees", range.tilt_deg);
+  }
   char text[160];
   if (simulation.width_mm > 0) {
     const double width = simulation.width_mm;
     std::snprintf(text, sizeof text,
-                  "printed %s wide, this camera recognises it from %s to %s and up to %.0f degrees",
+                  "printed %s wide, this camera recognises it from %s to %s and %s",
                   length_text(width).c_str(), length_text(range.nearest * width).c_str(),
-                  length_text(range.farthest * width).c_str(), range.tilt_deg);
+                  length_text(range.farthest * width).c_str(), reach);
   } else {
     std::snprintf(text, sizeof text,
-                  "this camera recognises it from %.2g to %.2g times its width and up to %.0f "
-                  "degrees",
-                  range.nearest, range.farthest, range.tilt_deg);
+                  "this camera recognises it from %.2g to %.2g times its width and %s",
+                  range.nearest, range.farthest, reach);
   }
   return text;
 }

@@ -18,7 +18,8 @@ struct SimulateOptions {
   Camera camera = default_camera(1280, 720);  ///< frames have its size
   std::vector<std::string> backgrounds;       ///< image files; empty: generated ones
   int views = 10;                             ///< of each value of a band
-  double width_mm = 0;                        ///< printed; 0: what the file states
+  double width_mm = 0;                        ///< printed; 0: what the file or the shape states
+  ShapeRequest shape;                         ///< what it is printed on; flat where nothing is told
   std::uint64_t seed = 1;
   unsigned jobs = 1;  ///< threads; the outcome does not depend on it
 };
@@ -31,7 +32,9 @@ struct SimulatedValue {
 
 /// One condition that varies while the others stay easy.
 struct SimulatedBand {
-  std::string name;  ///< "distance", "tilt", "rotation", "blur", "light", "noise", "occlusion"
+  /// "distance", "tilt", "around" (of curved ones), "rotation", "blur", "light", "noise",
+  /// "occlusion"
+  std::string name;
   std::string unit;  ///< "widths" (of the pattern), "degrees", "pixels", ...
   std::vector<SimulatedValue> values;
 };
@@ -41,11 +44,13 @@ struct WorkingRange {
   double nearest = 0;   ///< widths of the pattern
   double farthest = 0;  ///< the same
   double tilt_deg = 0;
+  double around_deg = 0;  ///< of curved patterns, to either side
 };
 
 struct Simulation {
   std::string name;     ///< the file's
   double width_mm = 0;  ///< 0: unknown
+  bool curved = false;
   std::vector<SimulatedBand> bands;
   WorkingRange range;
 };

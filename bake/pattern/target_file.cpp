@@ -1,7 +1,11 @@
 // Keys of the JSON files are those of the tools that 8th Wall published for projects of one's own.
 #include "bake/pattern/target_file.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <numbers>
+#include <optional>
 
 #include "bake/json.hpp"
 #include "modar/mapped_file.hpp"
@@ -22,12 +26,99 @@ Result<Json> read_target(const std::string& path) {
       Json::parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
   const auto type = json.find("type");
   if (!type || !type->text()) return no_target(path, "it is no image target of 8th Wall");
-  if (*type->text() != "PLANAR") {
-    return fail(ExitCode::kUnsupported, "target.curved", path,
-                "its picture is on a curved thing (" + *type->text() + ")",
-                "only flat pictures are tracked: choose another for this place");
+  for (const char* known : {"PLANAR", "CYLINDER", "CONICAL"}) {
+    if (*type->text() == known) return json;
   }
-  return json;
+  return fail(ExitCode::kUnsupported, "target.type", path,
+              "its picture is on a thing of a kind that we do not know (" + *type->text() + ")",
+              "PLANAR, CYLINDER and CONICAL are known: choose another for this place");
+}
+
+/// A member of the target's geometry, which newer files call properties.
+std::optional<Json> member(const Json& json, const std::string& key) {
+  const auto newer = json.find("properties/" + key);
+  return newer ? newer : json.find("xrMetadata/" + key);
+}
+
+/// Where a target's picture lies, in millimetres.
+struct CurvedTarget {
+  ShapeRequest shape;
+  double side_mm = 0;   ///< of the picture, along the axis' direction
+  double width_mm = 0;  ///< in the middle of its height
+};
+
+Result<CurvedTarget> read_curved(const Json& json, const std::string& path) {
+  double numbers[9] = {};
+  constexpr const char* kKeys[] = {"cylinderCircumferenceTop",
+                                   "cylinderCircumferenceBottom",
+                                   "cylinderSideLength",
+                                   "arcAngle",
+                                   "left",
+                                   "top",
+                                   "width",
+                                   "height",
+                                   "originalWidth"};
+  for (std::size_t i = 0; i < std::size(kKeys); ++i) {
+    const auto value = member(json, kKeys[i]);
+    if (!value || !value->number()) {
+      return no_target(path, std::string("it is on a curved thing and has no ") + kKeys[i]);
+    }
+    numbers[i] = *value->number();
+  }
+  const auto& [top_around, bottom_around, side, arc, left, top, width, height, whole_width] =
+      numbers;
+  const auto whole_height = member(json, "originalHeight");
+  const double whole = whole_height ? whole_height->number().value_or(0) : 0;
+  const bool sane = top_around > 0 && bottom_around > 0 && side > 0 && arc > 0 && arc <= 360 &&
+                    width > 0 && height > 0 && width <= whole_width && height <= whole;
+  if (!sane) return no_target(path, "its geometry has numbers that no thing has");
+  // A target on its side has its crop measured after the turn, by a quarter with the clock.
+  const auto turned = member(json, "isRotated");
+  const bool on_side = turned && turned->dump().starts_with("true");
+  const double across = on_side ? height / whole : width / whole_width;
+  const double down = on_side ? width / whole_width : height / whole;
+  const double above = on_side ? (whole_width - left - width) / whole_width : top / whole;
+  const auto unit = member(json, "unit");
+  const double mm = unit && unit->text() == "in" ? 25.4 : 1;
+  const auto around_at = [&](double share) {
+    return mm * (top_around + (bottom_around - top_around) * share);
+  };
+  CurvedTarget out;
+  const auto type = json.find("type");
+  const bool cone = type && type->text() == "CONICAL";
+  out.shape.kind = cone ? ShapeRequest::Kind::kCone : ShapeRequest::Kind::kCylinder;
+  out.shape.top_mm = around_at(above) / std::numbers::pi;
+  out.shape.bottom_mm = around_at(above + down) / std::numbers::pi;
+  out.shape.arc_deg = arc * across;
+  out.shape.text = fs::path(path).filename().string();
+  out.side_mm = mm * side * down;
+  out.width_mm = around_at(above + 0.5 * down) * out.shape.arc_deg / 360;
+  return out;
+}
+
+/// The picture with the proportions that it has on the thing: a cone's is stored as wide as its
+/// wider end.
+GrayPicture in_proportion(const GrayPicture& picture, const CurvedTarget& target) {
+  GrayPicture out{picture.width, 0, {}};
+  out.height =
+      std::max(1, static_cast<int>(std::lround(picture.width * target.side_mm / target.width_mm)));
+  if (out.height == picture.height) return picture;
+  out.pixels.reserve(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+  for (int y = 0; y < out.height; ++y) {
+    const double at =
+        std::clamp((y + 0.5) * picture.height / out.height - 0.5, 0.0, picture.height - 1.0);
+    const int row = std::min(static_cast<int>(at), std::max(0, picture.height - 2));
+    const int next = std::min(row + 1, picture.height - 1);
+    const double part = at - row;
+    for (int x = 0; x < out.width; ++x) {
+      const auto gray = [&](int line) {
+        return picture.pixels[static_cast<std::size_t>(line * picture.width + x)];
+      };
+      out.pixels.push_back(
+          static_cast<std::uint8_t>(gray(row) * (1 - part) + gray(next) * part + 0.5));
+    }
+  }
+  return out;
 }
 
 /// A turn by 90 degrees against the clock, which takes back that of 8th Wall's tools.
@@ -72,11 +163,18 @@ Result<GrayPicture> load_target(const std::string& path) {
   MODAR_ASSIGN(const std::string file, target_picture(path));
   MODAR_ASSIGN(GrayPicture picture, load_gray(file));
   MODAR_ASSIGN(const Json json, read_target(path));
-  for (const char* key : {"properties/isRotated", "xrMetadata/isRotated"}) {
-    const auto turned = json.find(key);
-    if (turned && turned->dump().starts_with("true")) return turned_back(picture);
-  }
-  return picture;
+  const auto turned = member(json, "isRotated");
+  if (turned && turned->dump().starts_with("true")) picture = turned_back(picture);
+  if (json.find("type")->text() == "PLANAR") return picture;
+  MODAR_ASSIGN(const CurvedTarget curved, read_curved(json, path));
+  return in_proportion(picture, curved);
+}
+
+Result<ShapeRequest> target_shape(const std::string& path) {
+  MODAR_ASSIGN(const Json json, read_target(path));
+  if (json.find("type")->text() == "PLANAR") return ShapeRequest{};
+  MODAR_ASSIGN(CurvedTarget curved, read_curved(json, path));
+  return std::move(curved.shape);
 }
 
 }  // namespace modar

@@ -13,6 +13,7 @@
 #include "bake/pattern/view_render.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/features.hpp"
 #include "modar/mapped_file.hpp"
@@ -48,6 +49,16 @@ void add_record(const GrayImage& pattern, std::vector<std::byte> record, BundleC
 }
 
 /// Of the pattern that was added last.
+void add_shape(const std::vector<std::byte>& shape, BundleContent& content) {
+  if (shape.empty()) return;
+  ExtraSection section;
+  section.type = static_cast<std::uint32_t>(kPatternShape);
+  section.owner = static_cast<std::uint32_t>(content.patterns.size() - 1);
+  section.bytes = shape;
+  content.extra.push_back(std::move(section));
+}
+
+/// Of the pattern that was added last.
 Result<void> add_features(const GrayImage& pattern, const ParameterSetRecord& set,
                           BundleContent& content) {
   MODAR_ASSIGN(auto features, describe_image(pattern, set));
@@ -78,7 +89,7 @@ Result<void> read_picture(const std::string& path, unsigned jobs, std::vector<Na
     return tl::unexpected(bundle.error());
   }
   out.push_back(
-      {std::filesystem::path(path).stem().string(), std::move(picture), std::move(*bundle)});
+      {std::filesystem::path(path).stem().string(), std::move(picture), std::move(*bundle), {}});
   return {};
 }
 
@@ -99,8 +110,10 @@ Result<void> read_bundle(const std::string& path, std::vector<NamedPattern>& out
     const std::size_t size = std::size_t{view.header.width} * view.header.height;
     pattern.picture.pixels.assign(view.pixels.begin(),
                                   view.pixels.begin() + static_cast<std::ptrdiff_t>(size));
-    MODAR_ASSIGN(pattern.bundle,
-                 bundle_of_record(pattern.picture.view(), {bytes.begin(), bytes.end()}));
+    const auto shape = bundle.section(kPatternShape, i);
+    pattern.shape.assign(shape.begin(), shape.end());
+    MODAR_ASSIGN(pattern.bundle, bundle_of_record(pattern.picture.view(),
+                                                  {bytes.begin(), bytes.end()}, pattern.shape));
     out.push_back(std::move(pattern));
   }
   return {};
@@ -130,13 +143,15 @@ Result<TrialOutcome> try_setting(const TrialSetup& setup, const TrialSetting& se
   TrialOutcome outcome;
   TrackResult result;
   GrayPicture frame;
+  SceneBand band = setting.band;
+  band.surface = setup.surface;
   for (int view = 0; view < setup.views; ++view) {
     const GrayPicture& background = setup.backgrounds[random.next() % setup.backgrounds.size()];
-    const Pose pose = draw_pose(setting.band, setup.picture, setup.camera, random);
+    const Pose pose = draw_pose(band, setup.picture, setup.camera, random);
     const SceneLight light = setting.light ? *setting.light : draw_light(random);
     const SceneFrame scene =
-        render_still(setup.picture, setup.camera, pose, background, setting.band, random,
-                     light.focus, {setting.motion_px, random.uniform(0, pi)});
+        render_still(setup.picture, setup.camera, pose, background, band, random, light.focus,
+                     {setting.motion_px, random.uniform(0, pi)});
     loop->reset();
     tally.cut();
     for (int i = 0; i < kExposures; ++i) {
@@ -159,15 +174,18 @@ Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
 }
 
 Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
-                                                std::vector<std::byte> record) {
+                                                std::vector<std::byte> record,
+                                                const std::vector<std::byte>& shape) {
   BundleContent content;
   add_record(pattern, std::move(record), content);
+  add_shape(shape, content);
   return bytes_of(content);
 }
 
 Result<std::vector<std::byte>> bundle_of_records(std::span<const GrayPicture> patterns,
                                                  std::span<const std::vector<std::byte>> records,
-                                                 const ParameterSetRecord* set) {
+                                                 const ParameterSetRecord* set,
+                                                 std::span<const std::vector<std::byte>> shapes) {
   BundleContent content;
   if (set != nullptr) {
     content.parameter_sets.push_back(*set);
@@ -175,6 +193,7 @@ Result<std::vector<std::byte>> bundle_of_records(std::span<const GrayPicture> pa
   }
   for (std::size_t i = 0; i < patterns.size(); ++i) {
     add_record(patterns[i].view(), records[i], content);
+    if (i < shapes.size()) add_shape(shapes[i], content);
     if (set != nullptr) MODAR_TRY(add_features(patterns[i].view(), *set, content));
   }
   return bytes_of(content);

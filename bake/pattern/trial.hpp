@@ -23,20 +23,23 @@ namespace modar {
 /// A bundle that holds that pattern's tracker record alone. Errors: those of bake_tracker_record().
 Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
                                                  const TrackerRecordOptions& options);
-/// The same with a record that is baked already.
+/// The same with a record that is baked already. shape: its kPatternShape section; empty: flat.
 Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
-                                                std::vector<std::byte> record);
+                                                std::vector<std::byte> record,
+                                                const std::vector<std::byte>& shape = {});
 /// A bundle of patterns with a record each. A set other than null adds each pattern's features
-/// under that parameter set of the ModAR paper; a record that is empty is left out.
-Result<std::vector<std::byte>> bundle_of_records(std::span<const GrayPicture> patterns,
-                                                 std::span<const std::vector<std::byte>> records,
-                                                 const ParameterSetRecord* set = nullptr);
+/// under that parameter set of the ModAR paper; a record that is empty is left out. shapes: the
+/// patterns' kPatternShape sections, or none where all are flat.
+Result<std::vector<std::byte>> bundle_of_records(
+    std::span<const GrayPicture> patterns, std::span<const std::vector<std::byte>> records,
+    const ParameterSetRecord* set = nullptr, std::span<const std::vector<std::byte>> shapes = {});
 
 /// A pattern as the device has it.
 struct NamedPattern {
   std::string name;
   GrayPicture picture;
-  std::vector<std::byte> bundle;  ///< holds its tracker record alone
+  std::vector<std::byte> bundle;   ///< holds its tracker record and shape alone
+  std::vector<std::byte> shape{};  ///< its kPatternShape section; empty: flat
 };
 
 /// The patterns of bundles (*.modar, from their tracker records) and of pictures, in the order of
@@ -96,6 +99,7 @@ struct TrialSetting {
 struct TrialSetup {
   GrayImage picture;                         ///< the pattern's
   std::span<const std::byte> bundle;         ///< holds that pattern alone, with its tracker record
+  const PatternSurface* surface = nullptr;   ///< and of this shape; null: flat
   Camera camera;                             ///< frames have its size
   std::span<const GrayPicture> backgrounds;  ///< of that size, at least one
   int views = 10;                            ///< of each setting

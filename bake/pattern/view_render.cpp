@@ -312,6 +312,150 @@ GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& 
   return out;
 }
 
+namespace {
+
+constexpr int kTile = 12;  // pixels of the picture: a bottle bends away by a hundredth of it
+
+/// A tile's middle in the picture, there in the view, and the affine map between their pixels.
+struct Tile {
+  double x = 0;
+  double y = 0;
+  double u = 0;
+  double v = 0;
+  std::array<double, 4> linear{};
+  std::array<double, 4> edges{};  ///< left, top, right and bottom of its part of the picture
+  bool visible = false;
+};
+
+Tile tile_at(const PatternSurface& surface, const ViewAxes& axes, double scale, double x,
+             double y) {
+  const SurfacePoint point = surface.at(x, y);
+  const auto along = [&](std::size_t row, const std::array<double, 3>& vector) {
+    return axes[row][0] * vector[0] + axes[row][1] * vector[1] + axes[row][2] * vector[2];
+  };
+  // A pixel of the picture is `scale` pixels of the view wide where it faces the camera.
+  const double unit = scale * 0.5 * std::max(surface.width(), surface.height());
+  Tile tile;
+  tile.x = x;
+  tile.y = y;
+  tile.u = unit * along(0, point.at);
+  tile.v = unit * along(1, point.at);
+  tile.linear = {unit * along(0, point.right), unit * along(0, point.down),
+                 unit * along(1, point.right), unit * along(1, point.down)};
+  // Turned to the camera by more than 78 degrees from its edge: a determinant of a fifth.
+  const auto& a = tile.linear;
+  tile.visible = a[0] * a[3] - a[1] * a[2] > 0.2 * scale * scale;
+  return tile;
+}
+
+/// The tiles of the picture, or of each of its faces.
+std::vector<Tile> tiles_of(const PatternSurface& surface, const ViewAxes& axes, double scale) {
+  std::vector<Tile> tiles;
+  // A little more than the tile, so that neighbours leave no gap, but nothing of the next face.
+  constexpr double kMore = 0.25;
+  const auto add = [&](int left, int top, int width, int height) {
+    for (int y = 0; y < height; y += kTile) {
+      for (int x = 0; x < width; x += kTile) {
+        const int wide = std::min(kTile, width - x);
+        const int high = std::min(kTile, height - y);
+        Tile tile =
+            tile_at(surface, axes, scale, left + x + 0.5 * wide - 0.5, top + y + 0.5 * high - 0.5);
+        tile.edges = {std::max(left + x - kMore, 1.0 * left) - 0.5,
+                      std::max(top + y - kMore, 1.0 * top) - 0.5,
+                      std::min(left + x + wide + kMore, 1.0 * left + width) - 0.5,
+                      std::min(top + y + high + kMore, 1.0 * top + height) - 0.5};
+        tiles.push_back(tile);
+      }
+    }
+  };
+  if (surface.faces().empty()) {
+    add(0, 0, static_cast<int>(surface.width()), static_cast<int>(surface.height()));
+  }
+  for (const ShapeFaceRecord& face : surface.faces()) {
+    add(face.place[0], face.place[1], face.place[2], face.place[3]);
+  }
+  return tiles;
+}
+
+/// The pixels of the view whose places lie in the tile, row by row, from one level.
+void draw_tile(const std::vector<ViewLevel>& levels, const Tile& tile, double offset_u,
+               double offset_v, double scale, CurvedView& view) {
+  const auto& a = tile.linear;
+  const double determinant = a[0] * a[3] - a[1] * a[2];
+  const std::array<double, 4> inverse = {a[3] / determinant, -a[1] / determinant,
+                                         -a[2] / determinant, a[0] / determinant};
+  std::size_t level = 0;
+  double factor = 1.0;
+  while (level + 1 < levels.size() && scale * factor * 2 <= 1.0) {
+    ++level;
+    factor *= 2;
+  }
+  const Footprint footprint = footprint_of(inverse, factor);
+  const ViewSamples samples{levels[level].quads.data(), levels[level].width, levels[level].height,
+                            footprint.offsets};
+  constexpr double kReach = 0.5 * kTile + 1.0;
+  const double reach_u = kReach * (std::abs(a[0]) + std::abs(a[1]));
+  const double reach_v = kReach * (std::abs(a[2]) + std::abs(a[3]));
+  const double u = tile.u + offset_u;
+  const double v = tile.v + offset_v;
+  const int left = std::max(0, static_cast<int>(std::ceil(u - reach_u)));
+  const int right = std::min(view.picture.width - 1, static_cast<int>(std::floor(u + reach_u)));
+  const int bottom = std::min(view.picture.height - 1, static_cast<int>(std::floor(v + reach_v)));
+  std::vector<std::int32_t> xs;
+  std::vector<std::int32_t> ys;
+  for (int y = std::max(0, static_cast<int>(std::ceil(v - reach_v))); y <= bottom; ++y) {
+    xs.clear();
+    ys.clear();
+    std::size_t first = 0;
+    for (int x = left; x <= right; ++x) {
+      const double px = tile.x + inverse[0] * (x - u) + inverse[1] * (y - v);
+      const double py = tile.y + inverse[2] * (x - u) + inverse[3] * (y - v);
+      if (px < tile.edges[0] || py < tile.edges[1] || px > tile.edges[2] || py > tile.edges[3]) {
+        continue;
+      }
+      const std::size_t at =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(view.picture.width) +
+          static_cast<std::size_t>(x);
+      // What lies in a parallelogram is one run of a row.
+      if (xs.empty()) first = at;
+      xs.push_back(fixed((px + 0.5) / factor - 0.5));
+      ys.push_back(fixed((py + 0.5) / factor - 0.5));
+      view.places[at] = {static_cast<std::uint16_t>(std::lround((px + 0.5) * 64)),
+                         static_cast<std::uint16_t>(std::lround((py + 0.5) * 64))};
+    }
+    if (!xs.empty()) {
+      sample_pixels(samples, xs.data(), ys.data(), xs.size(), &view.picture.pixels[first]);
+    }
+  }
+}
+
+}  // namespace
+
+CurvedView render_surface_view(
+    const std::vector<ViewLevel>& levels, const PatternSurface& surface, const ViewAxes& axes,
+    double scale, int margin, const std::function<GrayPicture(int width, int height)>& background) {
+  const std::vector<Tile> tiles = tiles_of(surface, axes, scale);
+  double low_u = 1e9, high_u = -1e9, low_v = 1e9, high_v = -1e9;
+  for (const Tile& tile : tiles) {
+    if (!tile.visible) continue;
+    low_u = std::min(low_u, tile.u);
+    high_u = std::max(high_u, tile.u);
+    low_v = std::min(low_v, tile.v);
+    high_v = std::max(high_v, tile.v);
+  }
+  if (low_u > high_u) low_u = high_u = low_v = high_v = 0;
+  const double offset_u = margin - low_u;
+  const double offset_v = margin - low_v;
+  CurvedView view;
+  view.picture = background(static_cast<int>(std::ceil(high_u - low_u)) + 2 * margin,
+                            static_cast<int>(std::ceil(high_v - low_v)) + 2 * margin);
+  view.places.assign(view.picture.pixels.size(), {CurvedView::kNoPlace, CurvedView::kNoPlace});
+  for (const Tile& tile : tiles) {
+    if (tile.visible) draw_tile(levels, tile, offset_u, offset_v, scale, view);
+  }
+  return view;
+}
+
 std::array<double, 2> to_picture(const AffineView& view, double x, double y) {
   const auto& a = view.linear;
   const double determinant = a[0] * a[3] - a[1] * a[2];

@@ -4,9 +4,11 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "bake/pattern/picture.hpp"
+#include "formats/pattern_shape.hpp"
 #include "modar/tracker_features.hpp"
 
 namespace modar {
@@ -80,6 +82,24 @@ GrayPicture made_clutter(Random& random, int width, int height);
 /// background, which has the view's size.
 GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& view,
                         const GrayPicture* background);
+
+/// What a camera far away sees of a curved pattern, and which place of the picture each pixel
+/// shows.
+struct CurvedView {
+  GrayPicture picture;
+  /// By pixel: x and y of the picture, in 64ths from its top left corner; kNoPlace: the background.
+  std::vector<std::array<std::uint16_t, 2>> places;
+  static constexpr std::uint16_t kNoPlace = 0xFFFF;
+};
+
+/// Axes of the frame (x right, y down, z away) of a pattern's own: three rows of a rotation.
+using ViewAxes = std::array<std::array<double, 3>, 3>;
+
+/// Renders the picture on its surface, turned by the axes and scaled: small tiles of it, each by
+/// the affine view of its middle. background: of the view's size, made for it.
+CurvedView render_surface_view(const std::vector<ViewLevel>& levels, const PatternSurface& surface,
+                               const ViewAxes& axes, double scale, int margin,
+                               const std::function<GrayPicture(int width, int height)>& background);
 
 using TrackerCode = std::array<std::uint8_t, 32>;
 

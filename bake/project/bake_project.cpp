@@ -159,7 +159,13 @@ class ProjectBake {
 
   /// Pictures stand alone; models and image targets name other files.
   [[nodiscard]] static bool names_files(const ProjectAsset& asset) {
-    return !asset.pattern || is_target_file(asset.file);
+    return !asset.pattern || is_target_file(asset.file) ||
+           !files_of(asset.file, asset.shape).empty();
+  }
+
+  /// The width and the shape of a pattern.
+  [[nodiscard]] static std::string size_of(const ProjectAsset& asset) {
+    return std::to_string(asset.width_mm) + (asset.shape.flat() ? "" : " " + asset.shape.text);
   }
 
   [[nodiscard]] std::string key_of(const Task& task) const {
@@ -173,10 +179,9 @@ class ProjectBake {
   void plan(Task& task) {
     const std::string file = project_.path(task.asset->file);
     task.inputs = {{fs::path(task.asset->file).filename().string(), digests_.of(file)}};
-    task.action =
-        digest_of(std::string(task.asset->pattern ? "pattern" : "model") + "\n" + program_ + "\n" +
-                  task.inputs[0].path + "\n" + task.inputs[0].digest + "\n" +
-                  std::to_string(task.asset->width_mm) + "\n" + joined(task.settings));
+    task.action = digest_of(std::string(task.asset->pattern ? "pattern" : "model") + "\n" +
+                            program_ + "\n" + task.inputs[0].path + "\n" + task.inputs[0].digest +
+                            "\n" + size_of(*task.asset) + "\n" + joined(task.settings));
     const auto files =
         names_files(*task.asset) ? cache_.files_of(task.action) : std::vector<std::string>();
     if (files) take_inputs(task, *files);
@@ -201,8 +206,7 @@ class ProjectBake {
       return before->find(key).value_or("").text().value_or("");
     };
     if (text("program") != program_) return "modar itself changed";
-    if (text("settings") != joined(task.settings) ||
-        text("width") != std::to_string(task.asset->width_mm)) {
+    if (text("settings") != joined(task.settings) || text("width") != size_of(*task.asset)) {
       return "its settings in " + fs::path(project_.file).filename().string() + " changed";
     }
     const Json files = before->find("files").value_or(Json());
@@ -389,7 +393,7 @@ class ProjectBake {
     request.tool_version = options_.tool_version;
     request.jobs = jobs;
     if (task.asset->pattern) {
-      request.patterns = {{file, task.asset->width_mm}};
+      request.patterns = {{file, task.asset->width_mm, task.asset->shape}};
     } else {
       request.models = {file};
     }
@@ -573,7 +577,7 @@ class ProjectBake {
           {{"id", task.asset->name + (task.asset->pattern ? "\np" : "\nm") + task.tier},
            {"program", program_},
            {"settings", joined(task.settings)},
-           {"width", std::to_string(task.asset->width_mm)},
+           {"width", size_of(*task.asset)},
            {"files", std::move(files)}});
     }
     Json bundles = Json::array();

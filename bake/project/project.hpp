@@ -25,7 +25,8 @@ struct ProjectAsset {
   std::string name;       ///< what scenes and bundles call it
   std::string file;       ///< relative to the project's folder
   bool pattern = false;   ///< else a model
-  double width_mm = 0.0;  ///< of a pattern; 0: what the file states, or unknown
+  double width_mm = 0.0;  ///< of a pattern; 0: what the file or its shape states, or unknown
+  ShapeRequest shape;     ///< of a pattern
   Settings settings;      ///< of its own, above those of [bake] and of the tier
 };
 

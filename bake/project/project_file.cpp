@@ -295,7 +295,7 @@ class ProjectReader {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, kind));
     Keys keys = keys_with_settings({"file", "name"},
                                    pattern ? Setting::Part::kPattern : Setting::Part::kModel);
-    if (pattern) keys.push_back("width-mm");
+    if (pattern) keys.insert(keys.end(), {"width-mm", "shape"});
     std::set<std::string> seen;
     for (const TableReader& reader : readers) {
       MODAR_TRY(reader.allow(keys));
@@ -314,6 +314,13 @@ class ProjectReader {
     asset.pattern = pattern;
     MODAR_TRY(reader.take("name", asset.name));
     MODAR_TRY(reader.take("width-mm", asset.width_mm, 0));
+    std::string shape;
+    MODAR_TRY(reader.take("shape", shape));
+    if (!shape.empty()) {
+      auto parsed = parse_shape(shape);
+      if (!parsed) return reader.wrong("shape", "shape = \"cylinder,diameter=66mm,arc=120\"");
+      asset.shape = std::move(*parsed);
+    }
     MODAR_TRY(reader.take_settings(asset.settings));
     const std::string name = asset.name;
     std::set<std::string> left_out;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 namespace modar {
@@ -93,6 +94,57 @@ void draw_outline(const Canvas& canvas, const std::array<glm::dvec2, 4>& corners
   for (const auto& [width, ink] : {std::pair{3.5, kRim}, std::pair{1.5, colour}}) {
     for (std::size_t i = 0; i < corners.size(); ++i) {
       draw_line(canvas, corners[i], corners[(i + 1) % corners.size()], width, ink);
+    }
+  }
+}
+
+namespace {
+
+/// A place of the picture in the frame; false where it is turned away or behind the camera.
+bool shows(const PatternSurface& surface, const Camera& camera, const Pose& pose, glm::dvec2 pixel,
+           glm::dvec2& at) {
+  const auto vector_of = [](const std::array<double, 3>& v) {
+    return glm::dvec3(v[0], v[1], v[2]);
+  };
+  const SurfacePoint point = surface.at(pixel.x, pixel.y);
+  const glm::dvec3 seen = pose.rotation * vector_of(point.at) + pose.translation;
+  const glm::dvec3 normal =
+      pose.rotation * glm::cross(vector_of(point.down), vector_of(point.right));
+  if (!(seen.z > 0) || !(glm::dot(normal, seen) < 0)) return false;
+  at = project(camera, seen);
+  return true;
+}
+
+}  // namespace
+
+void draw_outline(const Canvas& canvas, const PatternSurface& surface, const Camera& camera,
+                  const Pose& pose, Colour colour) {
+  constexpr Colour kRim{16, 16, 16};
+  constexpr int kSteps = 24;  // of a side: a chord leaves a half turn by a hundredth of its radius
+  const auto draw_rectangle = [&](glm::dvec2 low, glm::dvec2 size, double width, Colour ink) {
+    const std::array<glm::dvec2, 4> corners = {low, low + glm::dvec2(size.x, 0), low + size,
+                                               low + glm::dvec2(0, size.y)};
+    glm::dvec2 last{};
+    bool visible = false;
+    for (int i = 0; i <= 4 * kSteps; ++i) {
+      const auto side = static_cast<std::size_t>(i / kSteps % 4);
+      const double share = 1.0 * (i % kSteps) / kSteps;
+      const glm::dvec2 pixel = glm::mix(corners[side], corners[(side + 1) % 4], share);
+      glm::dvec2 now{};
+      const bool here = shows(surface, camera, pose, pixel, now);
+      if (here && visible) draw_line(canvas, last, now, width, ink);
+      visible = here;
+      last = now;
+    }
+  };
+  for (const auto& [width, ink] : {std::pair{3.5, kRim}, std::pair{1.5, colour}}) {
+    if (surface.faces().empty()) {
+      draw_rectangle(glm::dvec2(-0.5), {surface.width(), surface.height()}, width, ink);
+    }
+    for (const ShapeFaceRecord& face : surface.faces()) {
+      // Just inside of the face, or a neighbour of it in the picture takes the place.
+      draw_rectangle({face.place[0] - 0.49, face.place[1] - 0.49},
+                     {face.place[2] - 0.02, face.place[3] - 0.02}, width, ink);
     }
   }
 }

@@ -10,7 +10,10 @@
 #include <glm/vec2.hpp>
 
 #include "formats/error.hpp"
+#include "formats/pattern_shape.hpp"
 #include "frame_report.hpp"
+#include "modar/camera.hpp"
+#include "modar/pose.hpp"
 
 namespace modar {
 
@@ -34,6 +37,11 @@ void draw_line(const Canvas& canvas, glm::dvec2 from, glm::dvec2 to, double line
 
 /// The closed outline of four corners: a coloured line on a dark rim, seen on any ground.
 void draw_outline(const Canvas& canvas, const std::array<glm::dvec2, 4>& corners, Colour colour);
+
+/// The same of a pattern that is not flat: the border of its picture, or of its faces, where that
+/// is turned to the camera.
+void draw_outline(const Canvas& canvas, const PatternSurface& surface, const Camera& camera,
+                  const Pose& pose, Colour colour);
 
 /// Pictures a second over the last second or so.
 class RateMeter {

@@ -263,6 +263,19 @@ FrameReport Player::begin_report(const Job& job) {
   return report;
 }
 
+/// A flat pattern's four corners, or the border of what is curved.
+void Player::outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
+                     Colour colour) const {
+  PatternSurface surface;
+  const auto shape =
+      spot_ ? std::span<const std::byte>() : bundle_.section(kPatternShape, seen.pattern);
+  const bool flat = shape.empty() ||
+                    view_pattern_shape(shape, bundle_.patterns()[seen.pattern].width,
+                                       bundle_.patterns()[seen.pattern].height, surface) != nullptr;
+  if (flat) return draw_outline(canvas, seen.corners, colour);
+  draw_outline(canvas, surface, camera, seen.pose, colour);
+}
+
 /// Outlines lie on the camera's picture, behind the models.
 void Player::draw(const Job& job, const FrameReport& report) {
   constexpr Colour kOutline{64, 255, 96};
@@ -272,7 +285,7 @@ void Player::draw(const Job& job, const FrameReport& report) {
   screen_->draw(job.frame.picture(), job.camera, {});
   screen_->picture();
   const Canvas canvas = screen_->canvas();
-  for (const Detection& seen : report.visible) draw_outline(canvas, seen.corners, kOutline);
+  for (const Detection& seen : report.visible) outline(canvas, job.camera, seen, kOutline);
   screen_->draw_on_canvas(job.camera, items_);
 }
 

@@ -68,6 +68,8 @@ class Player {
   Result<void> open_logs();
   FrameReport begin_report(const Job& job);
   void follow_spot(const Job& job);
+  void outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
+               Colour colour) const;
   void draw(const Job& job, const FrameReport& report);
   Result<void> follow_live(const Job& job);
   Result<void> paint(const FrameReport& report);

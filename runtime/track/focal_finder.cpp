@@ -134,14 +134,18 @@ Result<std::unique_ptr<FocalFinder>> FocalFinder::create(const BundleView& bundl
   state->unit = width;
   state->camera = default_camera(width, height);
   std::size_t max_codes = 0;
+  bool any = false;
   for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
     const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
     if (bytes.empty()) continue;
     MODAR_ASSIGN(const TrackedPattern pattern, tracker::view_tracked_pattern(bytes, i));
+    any = true;
+    // A homography shows no curved pattern.
+    if (!bundle.section(kPatternShape, i).empty()) continue;
     max_codes = std::max(max_codes, pattern.features.size());
     state->patterns.push_back(pattern);
   }
-  if (state->patterns.empty()) {
+  if (!any) {
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
                 "the bundle holds no pattern with a record for this loop",
                 "bake it with a pattern");

@@ -41,7 +41,13 @@ bool FrameTracker::locate(const TrackedPattern& pattern, const Track& track,
   detection.pose = track.pose;
   const PlaneMap map =
       track.homography_only ? track.map : map_of_pose(pattern, camera_, track.pose);
-  return map_corners(pattern, map, detection.corners) && plausible(detection.corners);
+  return locate_corners(pattern, map, detection.corners);
+}
+
+std::array<glm::dvec2, 4> FrameTracker::place(const TrackedPattern& pattern, const Track& track,
+                                              const Detection& detection) const {
+  if (pattern.surface.flat()) return detection.corners;
+  return claimed_place(pattern, map_of_pose(pattern, camera_, track.pose), detection.corners);
 }
 
 /// Pixels between the pattern's centre at two poses.
@@ -49,7 +55,7 @@ double FrameTracker::distance(const TrackedPattern& pattern, const Pose& a, cons
   const auto centre = [&](const Pose& at) {
     bool in_front = false;
     return map_of_pose(pattern, camera_, at)
-        .at({0.5 * pattern.width(), 0.5 * pattern.height()}, in_front);
+        .anywhere({0.5 * pattern.width(), 0.5 * pattern.height()}, in_front);
   };
   return glm::length(centre(a) - centre(b));
 }

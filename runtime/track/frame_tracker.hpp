@@ -45,6 +45,9 @@ class FrameTracker {
   bool update(const TrackedPattern& pattern, Track& track, Detection& detection);
   /// Fills in pattern, pose and corners; false if no camera could see the pattern there.
   bool locate(const TrackedPattern& pattern, const Track& track, Detection& detection) const;
+  /// The place that it takes in the frame, for same_place().
+  [[nodiscard]] std::array<glm::dvec2, 4> place(const TrackedPattern& pattern, const Track& track,
+                                                const Detection& detection) const;
 
  private:
   bool update_pose(const TrackedPattern& pattern, Track& track, PatchFit& fit);

@@ -231,7 +231,9 @@ bool observe_patch(const PatchView& view, const PlaneMap& map, const Patch& patc
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
   const double grow = static_cast<double>(1 << view.at.pattern_level);
   bool in_front = false;
-  out.pixel = map.at(patch.centre, in_front);
+  // Of the offsets -4 to 4 of a patch's columns.
+  constexpr double kMeanSquare = kPatchHalf * (kPatchHalf + 1) / 3.0;
+  out.pixel = map.at(patch.centre, in_front, kMeanSquare * grow * grow);
   if (!in_front) return false;
   const glm::dmat2 d = map.derivative(patch.centre) * (grow * shrink);
   out.jacobian = d;
@@ -248,8 +250,9 @@ bool observe_patch(const PatchView& view, const PlaneMap& map, const Patch& patc
   return true;
 }
 
-PoseJacobian pose_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 world, double scale) {
-  const glm::dvec3 turned = pose.rotation * glm::dvec3(world, 0.0);
+PoseJacobian pose_jacobian(const Camera& camera, const Pose& pose, const glm::dvec3& world,
+                           double scale) {
+  const glm::dvec3 turned = pose.rotation * world;
   const glm::dvec3 p = turned + pose.translation;
   const double fx = scale * camera.fx / p.z;
   const double fy = scale * camera.fy / p.z;
@@ -267,7 +270,7 @@ double move_pose(const TrackedPattern& pattern, const Camera& camera, double sca
   const double bottom = pattern.height();
   double most = 0.0;
   for (const glm::dvec2 corner : {glm::dvec2{0, 0}, {right, 0}, {0, bottom}, {right, bottom}}) {
-    const PoseJacobian j = pose_jacobian(camera, pose, pattern.to_world(corner), scale);
+    const PoseJacobian j = pose_jacobian(camera, pose, pattern.on_surface(corner), scale);
     const glm::dvec2 moved{std::inner_product(j.x.begin(), j.x.end(), change.begin(), 0.0),
                            std::inner_product(j.y.begin(), j.y.end(), change.begin(), 0.0)};
     most = std::max(most, glm::length(moved));
@@ -278,10 +281,7 @@ double move_pose(const TrackedPattern& pattern, const Camera& camera, double sca
 }
 
 Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_levels) {
-  const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
-  // Frame pixels per pattern pixel.
-  const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
-  const int octaves = nearest_octave(std::clamp(scale, 1e-3, 1e3));
+  const int octaves = nearest_octave(std::clamp(scale_of(pattern, map), 1e-3, 1e3));
   Resolution out;
   out.frame_level = std::clamp(octaves, 0, frame_levels - 1);
   out.pattern_level = std::clamp(out.frame_level - octaves, 0, pattern.level_count - 1);
@@ -452,7 +452,7 @@ PatchFit linearise(const TrackedPattern& pattern, const FrameView& frame, const 
     fit.correlation += static_cast<double>(std::max(0.0f, one.correlation));
     if (one.xx == 0.0f && one.yy == 0.0f) continue;
     const PoseJacobian rows =
-        pose_jacobian(frame.camera, pose, pattern.to_world(patch.centre), shrink);
+        pose_jacobian(frame.camera, pose, pattern.on_surface(patch.centre), shrink);
     const glm::dmat2& d = seen.jacobian;
     const double inverse = 1.0 / (d[0].x * d[1].y - d[0].y * d[1].x);
     PatchLinearisation& kept = out.emplace_back();

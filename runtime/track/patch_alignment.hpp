@@ -177,7 +177,8 @@ struct PoseJacobian {
   std::array<double, 6> y{};
 };
 /// scale: pixels of the level per frame pixel.
-PoseJacobian pose_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 world, double scale);
+PoseJacobian pose_jacobian(const Camera& camera, const Pose& pose, const glm::dvec3& world,
+                           double scale);
 /// Applies such a rotation and translation. Returns the largest displacement of the pattern's four
 /// corners, pixels of the level: corners, since a visible part alone moves little where the rest
 /// hangs on it like on a lever. Negative, and no change, if the pose would lie behind the camera.

@@ -394,7 +394,7 @@ void PlaneMatcher::select(const TrackedPattern& pattern, const HomographyHypothe
   inlier_sigma_.clear();
   for (std::size_t i = 0; i < hypothesis.mask.size(); ++i) {
     if (hypothesis.mask[i] == 0) continue;
-    inlier_world_.push_back(pattern.to_world(matches_[i].pattern));
+    inlier_world_.push_back(pattern.on_surface(matches_[i].pattern));
     inlier_ideal_.push_back(matches_[i].ideal);
     inlier_sigma_.push_back(matches_[i].sigma);
   }

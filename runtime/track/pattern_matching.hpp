@@ -10,6 +10,7 @@
 #include <glm/mat2x2.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 #include "kernels.hpp"
 #include "modar/camera.hpp"
@@ -63,6 +64,10 @@ class PlaneMatcher {
   [[nodiscard]] std::size_t max_features() const { return matches_.capacity(); }
   /// Matches of the last find().
   [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
+  /// Of a pattern that is not flat: goes on from the part of it that a hypothesis took for flat
+  /// over all that is turned to the camera, and makes the matches found there the hypothesis'
+  /// inliers. Returns how many poses explain them, the better one first.
+  int spread(const TrackedPattern& pattern, std::size_t hypothesis, std::array<Pose, 2>& poses);
   /// Makes inliers() those of a hypothesis of the last find().
   void select(const TrackedPattern& pattern, const HomographyHypothesis& hypothesis);
   [[nodiscard]] PlanePoints inliers() const {
@@ -79,6 +84,9 @@ class PlaneMatcher {
   std::size_t collect(const glm::dmat3& homography, double pixels,
                       std::vector<std::uint8_t>& mask) const;
   void rank_votes();
+  std::size_t collect_on_surface(const TrackedPattern& pattern, const Pose& pose, double pixels,
+                                 std::vector<std::uint8_t>& mask) const;
+  std::size_t spread_pose(const TrackedPattern& pattern, Pose& pose);
 
   Camera camera_;
   const Kernels& kernels_;
@@ -89,7 +97,7 @@ class PlaneMatcher {
   std::vector<std::uint8_t> explained_;
   std::vector<std::uint8_t> supporters_;
   std::vector<std::uint32_t> order_;
-  std::vector<glm::dvec2> inlier_world_;
+  std::vector<glm::dvec3> inlier_world_;
   std::vector<glm::dvec2> inlier_ideal_;
   std::vector<double> inlier_sigma_;
 };

@@ -349,8 +349,7 @@ void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& fra
                              const PoseCandidate& one) {
   std::array<glm::dvec2, 4> corners;
   if (one.score <= best_.score || !convinces(pattern, frame, one) ||
-      !map_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners) ||
-      !plausible(corners)) {
+      !locate_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners)) {
     return;
   }
   best_ = one;
@@ -369,10 +368,13 @@ bool PatternSearch::likely(std::size_t start) const {
 /// The poses of a hypothesis, and where the first leads to by patches alone.
 void PatternSearch::fit_starts(const TrackedPattern& pattern, const FrameView& frame) {
   const HomographyHypothesis& hypothesis = hypotheses_[hypothesis_];
+  const int spread = pattern.surface.flat() ? 0 : matcher_.spread(pattern, hypothesis_, starts_);
   matcher_.select(pattern, hypothesis);
   start_ = 0;
   start_count_ = static_cast<std::size_t>(
-      fit_poses(pattern, camera_, hypothesis.homography, matcher_.inliers(), starts_));
+      pattern.surface.flat()
+          ? fit_poses(pattern, camera_, hypothesis.homography, matcher_.inliers(), starts_)
+          : spread);
   if (start_count_ == 0) return;
   least_rms_ = reprojection_rms(camera_, starts_[0], matcher_.inliers());
   consider(pattern, frame, evaluate_start(pattern, frame, SearchRadius::kNear, starts_[0]));
@@ -383,7 +385,7 @@ void PatternSearch::fit_starts(const TrackedPattern& pattern, const FrameView& f
 void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& frame,
                              const HomographyHypothesis& hypothesis, int min_percent,
                              DetectionCandidate& candidate) const {
-  if (hypothesis.inliers < kMapInliers) return;
+  if (hypothesis.inliers < kMapInliers || !pattern.surface.flat()) return;
   PlaneMap map{hypothesis.homography, distorting_lens(camera_)};
   if (map_photometric_percent(pattern, frame, map) < min_percent) return;
   PatchFit fit;

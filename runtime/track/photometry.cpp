@@ -46,9 +46,8 @@ bool Mirror::keeps(int cell) const {
 CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
                    std::span<const GrayImage> pyramid)
     : pattern_(pattern), map_(map) {
-  const glm::dmat2 d = map.derivative({0.5 * pattern.width(), 0.5 * pattern.height()});
-  const double scale = std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
-  const std::size_t level = level_of_step(step_of(pattern) * scale, pyramid.size());
+  const std::size_t level =
+      level_of_step(step_of(pattern) * scale_of(pattern, map), pyramid.size());
   image_ = &pyramid[level];
   shrink_ = 1.0 / static_cast<double>(1u << level);
 }

@@ -1,10 +1,12 @@
 // Plane maps, poses from points, the motion model and the solver of normal equations.
 #include "plane_geometry.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -16,8 +18,208 @@ namespace {
 // imitate.
 constexpr double kMinArea = 300.0;
 
-/// The second solution of the planar pose problem: the plane reflected about the line of sight to
-/// the pattern's centre.
+/// Square pixels; positive for corners in clockwise order on the screen.
+double area_of(const std::array<glm::dvec2, 4>& corners) {
+  double area = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 a = corners[i];
+    const glm::dvec2 b = corners[(i + 1) % 4];
+    area += 0.5 * (a.x * b.y - b.x * a.y);
+  }
+  return area;
+}
+
+// Cosine between the sight and the normal of a curved pattern below which it shows nothing of use:
+// within 11 degrees of the outline a patch reaches over it.
+constexpr double kTurnedAway = 0.2;
+constexpr double kInside = 1e-6;  // pixels
+constexpr int kGrid = 8;          // places across and down at which a curved pattern is looked at
+
+bool faces(const SurfacePoint& point, const glm::dvec3& eye) {
+  const glm::dvec3 normal = glm::cross(vector_of(point.down), vector_of(point.right));
+  const glm::dvec3 sight = eye - vector_of(point.at);
+  const double along = glm::dot(normal, sight);
+  return along > 0.0 && along * along > kTurnedAway * kTurnedAway * glm::dot(normal, normal) *
+                                            glm::dot(sight, sight);
+}
+
+glm::dvec2 pixel_of(const glm::dvec3& p, const Camera* lens, bool& in_front) {
+  in_front = p.z > 1e-12;
+  if (!in_front) return {0.0, 0.0};
+  const glm::dvec2 ideal = glm::dvec2(p) / p.z;
+  if (lens == nullptr) return ideal;
+  return project(*lens, {(ideal.x - lens->cx) / lens->fx, (ideal.y - lens->cy) / lens->fy, 1.0});
+}
+
+/// Frame pixels of a pattern's pixel there, by area.
+double scale_at(const PlaneMap& map, glm::dvec2 pixel) {
+  const glm::dmat2 d = map.derivative(pixel);
+  return std::sqrt(std::abs(d[0].x * d[1].y - d[0].y * d[1].x));
+}
+
+/// Calls `take(pixel, frame pixel)` for the places of a curved pattern's grid that show.
+template <class Take>
+void visit_visible(const TrackedPattern& pattern, const PlaneMap& map, Take&& take) {
+  for (int i = 0; i < kGrid * kGrid; ++i) {
+    const glm::dvec2 pixel{(i % kGrid + 0.5) / kGrid * pattern.width() - 0.5,
+                           (static_cast<int>(i / kGrid) + 0.5) / kGrid * pattern.height() - 0.5};
+    bool in_front = false;
+    const glm::dvec2 at = map.at(pixel, in_front);
+    if (in_front) take(pixel, at);
+  }
+}
+
+}  // namespace
+
+int nearest_octave(double scale) {
+  int exponent = 0;
+  const double part = std::frexp(scale, &exponent);  // 0.5 to 1
+  return part * part < 0.5 ? exponent - 1 : exponent;
+}
+
+glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& in_front, double mean_square) const {
+  if (surface == nullptr) return pixel_of(homography * glm::dvec3(pixel, 1.0), lens, in_front);
+  const SurfacePoint point = surface->at(pixel.x, pixel.y);
+  in_front = false;
+  if (!faces(point, eye)) return {0.0, 0.0};
+  const glm::dvec3 middle = vector_of(point.at) + 0.5 * mean_square * vector_of(point.bend);
+  return pixel_of(homography * middle + shift, lens, in_front);
+}
+
+glm::dvec2 PlaneMap::anywhere(glm::dvec2 pixel, bool& in_front) const {
+  if (surface == nullptr) return at(pixel, in_front);
+  const SurfacePoint point = surface->at(pixel.x, pixel.y);
+  return pixel_of(homography * vector_of(point.at) + shift, lens, in_front);
+}
+
+glm::dmat2 PlaneMap::derivative(glm::dvec2 pixel) const {
+  glm::dvec3 right = homography[0];
+  glm::dvec3 down = homography[1];
+  glm::dvec3 p{};
+  if (surface == nullptr) {
+    p = homography * glm::dvec3(pixel, 1.0);
+  } else {
+    const SurfacePoint point = surface->at(pixel.x, pixel.y);
+    p = homography * vector_of(point.at) + shift;
+    right = homography * vector_of(point.right);
+    down = homography * vector_of(point.down);
+  }
+  const double inverse = 1.0 / p.z;
+  const glm::dvec2 at = glm::dvec2(p) * inverse;
+  glm::dmat2 d;
+  d[0] = (glm::dvec2(right) - at * right.z) * inverse;
+  d[1] = (glm::dvec2(down) - at * down.z) * inverse;
+  return d;
+}
+
+const Camera* distorting_lens(const Camera& camera) {
+  for (const double k : camera.distortion) {
+    if (k != 0.0) return &camera;
+  }
+  return nullptr;
+}
+
+PlaneMap map_of_pose(const TrackedPattern& pattern, const Camera& camera, const Pose& pose) {
+  glm::dmat3 k(1.0);
+  k[0][0] = camera.fx;
+  k[1][1] = camera.fy;
+  k[2] = {camera.cx, camera.cy, 1.0};
+  if (!pattern.surface.flat()) {
+    return {k * pose.rotation, distorting_lens(camera), &pattern.surface, k * pose.translation,
+            -(glm::transpose(pose.rotation) * pose.translation)};
+  }
+  glm::dmat3 plane = pose.rotation;
+  plane[2] = pose.translation;
+  return {k * plane * pattern.world_from_pixels(), distorting_lens(camera)};
+}
+
+double scale_of(const TrackedPattern& pattern, const PlaneMap& map) {
+  if (map.surface == nullptr) {
+    return scale_at(map, {0.5 * pattern.width(), 0.5 * pattern.height()});
+  }
+  double most = 0.0;
+  visit_visible(pattern, map,
+                [&](glm::dvec2 pixel, glm::dvec2) { most = std::max(most, scale_at(map, pixel)); });
+  return most > 0.0 ? most : 1.0;
+}
+
+bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
+                 std::array<glm::dvec2, 4>& corners) {
+  const double right = pattern.width() - 0.5;
+  const double bottom = pattern.height() - 0.5;
+  std::array<glm::dvec2, 4> image = {glm::dvec2{-0.5, -0.5}, glm::dvec2{right, -0.5},
+                                     glm::dvec2{right, bottom}, glm::dvec2{-0.5, bottom}};
+  if (map.surface != nullptr && !map.surface->faces().empty()) {
+    // A little inside of it: its border is the next face's, too.
+    const auto& place = map.surface->faces()[0].place;
+    const glm::dvec2 low{place[0] - 0.5, place[1] - 0.5};
+    const glm::dvec2 high = low + glm::dvec2(place[2] - kInside, place[3] - kInside);
+    image = {low, glm::dvec2{high.x, low.y}, high, glm::dvec2{low.x, high.y}};
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    bool in_front = false;
+    corners[i] = map.anywhere(image[i], in_front);
+    if (!in_front || !std::isfinite(corners[i].x) || !std::isfinite(corners[i].y)) return false;
+  }
+  return true;
+}
+
+bool plausible(const std::array<glm::dvec2, 4>& corners) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 a = corners[i];
+    const glm::dvec2 b = corners[(i + 1) % 4];
+    const glm::dvec2 c = corners[(i + 2) % 4];
+    // y points down: the corners go clockwise on the screen.
+    if (!((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) > 0.0)) return false;
+  }
+  return area_of(corners) > kMinArea;
+}
+
+bool locate_corners(const TrackedPattern& pattern, const PlaneMap& map,
+                    std::array<glm::dvec2, 4>& corners) {
+  if (!map_corners(pattern, map, corners)) return false;
+  if (map.surface == nullptr) return plausible(corners);
+  constexpr int kLeast = 6;  // of the grid's places
+  const double cell = 1.0 * pattern.width() * pattern.height() / (kGrid * kGrid);
+  int count = 0;
+  double area = 0.0;
+  visit_visible(pattern, map, [&](glm::dvec2 pixel, glm::dvec2) {
+    const double scale = scale_at(map, pixel);
+    area += cell * scale * scale;
+    ++count;
+  });
+  return count >= kLeast && area > kMinArea;
+}
+
+std::array<glm::dvec2, 4> claimed_place(const TrackedPattern& pattern, const PlaneMap& map,
+                                        const std::array<glm::dvec2, 4>& corners) {
+  if (map.surface == nullptr) return corners;
+  glm::dvec2 low(1e9);
+  glm::dvec2 high(-1e9);
+  visit_visible(pattern, map, [&](glm::dvec2, glm::dvec2 at) {
+    low = glm::min(low, at);
+    high = glm::max(high, at);
+  });
+  return {low, {high.x, low.y}, high, {low.x, high.y}};
+}
+
+bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
+  const auto contains_centre = [](const std::array<glm::dvec2, 4>& outline,
+                                  const std::array<glm::dvec2, 4>& other) {
+    const glm::dvec2 centre = 0.25 * (other[0] + other[1] + other[2] + other[3]);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const glm::dvec2 from = outline[i];
+      const glm::dvec2 side = outline[(i + 1) % 4] - from;
+      if (side.x * (centre.y - from.y) - side.y * (centre.x - from.x) < 0.0) return false;
+    }
+    return true;
+  };
+  const double ratio = area_of(a) / area_of(b);
+  return ratio > 0.5 && ratio < 2.0 && contains_centre(a, b) && contains_centre(b, a);
+}
+
+// The second solution of the planar pose problem: the plane reflected about the line of sight to
+// the pattern's centre.
 Pose mirrored(const Pose& pose) {
   const glm::dvec3 sight = glm::normalize(pose.translation);
   const glm::dvec3 normal = pose.rotation[2];
@@ -37,101 +239,6 @@ Pose mirrored(const Pose& pose) {
   Pose other = pose;
   other.rotation = turn * pose.rotation;
   return other;
-}
-
-/// Square pixels; positive for corners in clockwise order on the screen.
-double area_of(const std::array<glm::dvec2, 4>& corners) {
-  double area = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const glm::dvec2 a = corners[i];
-    const glm::dvec2 b = corners[(i + 1) % 4];
-    area += 0.5 * (a.x * b.y - b.x * a.y);
-  }
-  return area;
-}
-
-}  // namespace
-
-int nearest_octave(double scale) {
-  int exponent = 0;
-  const double part = std::frexp(scale, &exponent);  // 0.5 to 1
-  return part * part < 0.5 ? exponent - 1 : exponent;
-}
-
-glm::dvec2 PlaneMap::at(glm::dvec2 pixel, bool& in_front) const {
-  const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);
-  in_front = p.z > 1e-12;
-  if (!in_front) return {0.0, 0.0};
-  const glm::dvec2 ideal = glm::dvec2(p) / p.z;
-  if (lens == nullptr) return ideal;
-  return project(*lens, {(ideal.x - lens->cx) / lens->fx, (ideal.y - lens->cy) / lens->fy, 1.0});
-}
-
-glm::dmat2 PlaneMap::derivative(glm::dvec2 pixel) const {
-  const glm::dvec3 p = homography * glm::dvec3(pixel, 1.0);
-  const double inverse = 1.0 / p.z;
-  const glm::dvec2 at = glm::dvec2(p) * inverse;
-  glm::dmat2 d;
-  d[0] = (glm::dvec2(homography[0]) - at * homography[0].z) * inverse;
-  d[1] = (glm::dvec2(homography[1]) - at * homography[1].z) * inverse;
-  return d;
-}
-
-const Camera* distorting_lens(const Camera& camera) {
-  for (const double k : camera.distortion) {
-    if (k != 0.0) return &camera;
-  }
-  return nullptr;
-}
-
-PlaneMap map_of_pose(const TrackedPattern& pattern, const Camera& camera, const Pose& pose) {
-  glm::dmat3 k(1.0);
-  k[0][0] = camera.fx;
-  k[1][1] = camera.fy;
-  k[2] = {camera.cx, camera.cy, 1.0};
-  glm::dmat3 plane = pose.rotation;
-  plane[2] = pose.translation;
-  return {k * plane * pattern.world_from_pixels(), distorting_lens(camera)};
-}
-
-bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
-                 std::array<glm::dvec2, 4>& corners) {
-  const double right = pattern.width() - 0.5;
-  const double bottom = pattern.height() - 0.5;
-  const std::array<glm::dvec2, 4> image = {glm::dvec2{-0.5, -0.5}, glm::dvec2{right, -0.5},
-                                           glm::dvec2{right, bottom}, glm::dvec2{-0.5, bottom}};
-  for (std::size_t i = 0; i < 4; ++i) {
-    bool in_front = false;
-    corners[i] = map.at(image[i], in_front);
-    if (!in_front || !std::isfinite(corners[i].x) || !std::isfinite(corners[i].y)) return false;
-  }
-  return true;
-}
-
-bool plausible(const std::array<glm::dvec2, 4>& corners) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    const glm::dvec2 a = corners[i];
-    const glm::dvec2 b = corners[(i + 1) % 4];
-    const glm::dvec2 c = corners[(i + 2) % 4];
-    // y points down: the corners go clockwise on the screen.
-    if (!((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) > 0.0)) return false;
-  }
-  return area_of(corners) > kMinArea;
-}
-
-bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
-  const auto contains_centre = [](const std::array<glm::dvec2, 4>& outline,
-                                  const std::array<glm::dvec2, 4>& other) {
-    const glm::dvec2 centre = 0.25 * (other[0] + other[1] + other[2] + other[3]);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const glm::dvec2 from = outline[i];
-      const glm::dvec2 side = outline[(i + 1) % 4] - from;
-      if (side.x * (centre.y - from.y) - side.y * (centre.x - from.x) < 0.0) return false;
-    }
-    return true;
-  };
-  const double ratio = area_of(a) / area_of(b);
-  return ratio > 0.5 && ratio < 2.0 && contains_centre(a, b) && contains_centre(b, a);
 }
 
 std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,

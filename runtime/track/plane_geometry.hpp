@@ -22,20 +22,32 @@ namespace modar::tracker {
 /// another.
 int nearest_octave(double scale);
 
-/// Point correspondences of a pattern: on its plane (ModAR Eq. 1) and in the frame.
+inline glm::dvec3 vector_of(const std::array<double, 3>& v) {
+  return {v[0], v[1], v[2]};
+}
+
+/// Point correspondences of a pattern: on its plane (ModAR Eq. 1) or surface, and in the frame.
 struct PlanePoints {
-  std::span<const glm::dvec2> world;
+  std::span<const glm::dvec3> world;
   std::span<const glm::dvec2> ideal;  ///< undistorted frame pixels
   std::span<const double> sigma;      ///< standard deviation of `ideal`, pixels
 };
 
-/// Pattern pixels to frame pixels: a homography, then the lens distortion.
+/// Pattern pixels to frame pixels: a homography, then the lens distortion. Of a curved pattern, a
+/// point of its surface takes the homography's place: each pixel has the map of its tangent plane.
 struct PlaneMap {
-  glm::dmat3 homography{1.0};    ///< to the pixels of a pinhole without distortion
-  const Camera* lens = nullptr;  ///< null: no distortion
+  glm::dmat3 homography{1.0};               ///< to the pixels of a pinhole without distortion
+  const Camera* lens = nullptr;             ///< null: no distortion
+  const PatternSurface* surface = nullptr;  ///< null: flat; else `homography` takes its points, and
+  glm::dvec3 shift{};                       ///< this is added
+  glm::dvec3 eye{};                         ///< the camera, pattern axes
 
-  /// Frame pixel of a pattern pixel; `in_front` is false where the point lies behind the camera.
-  [[nodiscard]] glm::dvec2 at(glm::dvec2 pixel, bool& in_front) const;
+  /// Frame pixel of a pattern pixel; `in_front` is false where the point lies behind the camera, or
+  /// where a curved pattern turns away from it. mean_square: of the distances of what lies around
+  /// the pixel; a curved pattern bends away by half of it, as the best plane through them does.
+  [[nodiscard]] glm::dvec2 at(glm::dvec2 pixel, bool& in_front, double mean_square = 0) const;
+  /// The same of places that are turned away, too.
+  [[nodiscard]] glm::dvec2 anywhere(glm::dvec2 pixel, bool& in_front) const;
   /// Jacobian by the pattern pixel (columns). Ignores the distortion, which is nearly constant over
   /// a patch.
   [[nodiscard]] glm::dmat2 derivative(glm::dvec2 pixel) const;
@@ -46,6 +58,9 @@ const Camera* distorting_lens(const Camera& camera);
 
 PlaneMap map_of_pose(const TrackedPattern& pattern, const Camera& camera, const Pose& pose);
 
+/// Frame pixels of a pattern's pixel, in the middle of what shows.
+double scale_of(const TrackedPattern& pattern, const PlaneMap& map);
+
 /// The pattern's corners in the order of Detection; false if one lies behind the camera.
 bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
                  std::array<glm::dvec2, 4>& corners);
@@ -53,6 +68,15 @@ bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
 /// False if no camera in front of the plane can see this outline: mirrored, not convex, or smaller
 /// than 300 square pixels.
 bool plausible(const std::array<glm::dvec2, 4>& corners);
+
+/// Finds the corners; false if no camera can see the pattern like that: flat ones are plausible(),
+/// of others enough is turned towards the camera.
+bool locate_corners(const TrackedPattern& pattern, const PlaneMap& map,
+                    std::array<glm::dvec2, 4>& corners);
+/// The place that a pattern takes in the frame: its outline, of curved ones a box around what
+/// shows.
+std::array<glm::dvec2, 4> claimed_place(const TrackedPattern& pattern, const PlaneMap& map,
+                                        const std::array<glm::dvec2, 4>& corners);
 
 /// Whether two plausible outlines claim the same object: each contains the other's centre, and
 /// their areas differ by less than a factor of two. A card on top of a poster is another object.
@@ -64,6 +88,9 @@ bool same_place(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2,
 /// out. Returns how many.
 int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dmat3& homography,
               const PlanePoints& points, std::array<Pose, 2>& poses);
+
+/// The other pose that few points of a plane do not tell from this one.
+Pose mirrored(const Pose& pose);
 
 /// The camera pose closest to a map; none if the plane does not lie in front of the camera.
 std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,

@@ -83,9 +83,17 @@ struct NormalEquations {
   double cost = 0.0;
 };
 
+double depth_of(const glm::dvec2&) {
+  return 0.0;
+}
+double depth_of(const glm::dvec3& point) {
+  return point.z;
+}
+
 /// Written out, not as products of Eigen's: in builds for size those take five times the
 /// instructions.
-NormalEquations normal_equations(const Camera& camera, std::span<const glm::dvec2> world,
+template <class Point>
+NormalEquations normal_equations(const Camera& camera, std::span<const Point> world,
                                  std::span<const glm::dvec2> pixels,
                                  const Eigen::Matrix3d& rotation,
                                  const Eigen::Vector3d& translation) {
@@ -94,7 +102,8 @@ NormalEquations normal_equations(const Camera& camera, std::span<const glm::dvec
   double jtr[6] = {};
   for (std::size_t i = 0; i < world.size(); ++i) {
     const auto turned = [&](int row) {
-      return rotation(row, 0) * world[i].x + rotation(row, 1) * world[i].y;
+      return rotation(row, 0) * world[i].x + rotation(row, 1) * world[i].y +
+             rotation(row, 2) * depth_of(world[i]);
     };
     const double tx = turned(0);
     const double ty = turned(1);
@@ -168,6 +177,43 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
   return u * svd.matrixV().transpose();
 }
 
+template <class Point>
+Pose refine_over(const Camera& camera, std::span<const Point> world,
+                 std::span<const glm::dvec2> pixels, const Pose& start) {
+  Eigen::Matrix3d rotation = to_eigen(start.rotation);
+  Eigen::Vector3d translation(start.translation.x, start.translation.y, start.translation.z);
+  NormalEquations now = normal_equations(camera, world, pixels, rotation, translation);
+  if (!std::isfinite(now.cost)) return start;
+  const double start_cost = now.cost;
+  double damping = 1e-4;
+  for (int step = 0; step < kRefineSteps; ++step) {
+    Matrix6 damped = now.jtj;
+    damped.diagonal() *= 1.0 + damping;
+    const Vector6 change = solve_symmetric(damped, Vector6(-now.jtr));
+    if (!change.allFinite()) break;
+    const Eigen::Matrix3d next_rotation = exponential(change.head<3>()) * rotation;
+    const Eigen::Vector3d next_translation = translation + change.tail<3>();
+    const NormalEquations next =
+        normal_equations(camera, world, pixels, next_rotation, next_translation);
+    const bool settled = std::abs(now.cost - next.cost) <= 1e-12 * now.cost;
+    if (!(next.cost < now.cost)) {
+      if (settled || damping > 1e8) break;
+      damping *= 10.0;
+      continue;
+    }
+    rotation = next_rotation;
+    translation = next_translation;
+    now = next;
+    damping = std::max(damping * 0.1, 1e-12);
+    if (settled) break;
+  }
+  if (!(now.cost < start_cost)) return start;
+  Pose pose;
+  pose.rotation = to_glm(nearest_rotation(rotation));
+  pose.translation = {translation.x(), translation.y(), translation.z()};
+  return pose;
+}
+
 }  // namespace
 
 std::array<glm::dvec2, 4> pattern_corners(int width, int height) {
@@ -227,38 +273,12 @@ Result<Pose> pose_from_homography(const Camera& camera, const glm::dmat3& homogr
 
 Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
                  std::span<const glm::dvec2> pixels, const Pose& start) {
-  Eigen::Matrix3d rotation = to_eigen(start.rotation);
-  Eigen::Vector3d translation(start.translation.x, start.translation.y, start.translation.z);
-  NormalEquations now = normal_equations(camera, world, pixels, rotation, translation);
-  if (!std::isfinite(now.cost)) return start;
-  const double start_cost = now.cost;
-  double damping = 1e-4;
-  for (int step = 0; step < kRefineSteps; ++step) {
-    Matrix6 damped = now.jtj;
-    damped.diagonal() *= 1.0 + damping;
-    const Vector6 change = solve_symmetric(damped, Vector6(-now.jtr));
-    if (!change.allFinite()) break;
-    const Eigen::Matrix3d next_rotation = exponential(change.head<3>()) * rotation;
-    const Eigen::Vector3d next_translation = translation + change.tail<3>();
-    const NormalEquations next =
-        normal_equations(camera, world, pixels, next_rotation, next_translation);
-    const bool settled = std::abs(now.cost - next.cost) <= 1e-12 * now.cost;
-    if (!(next.cost < now.cost)) {
-      if (settled || damping > 1e8) break;
-      damping *= 10.0;
-      continue;
-    }
-    rotation = next_rotation;
-    translation = next_translation;
-    now = next;
-    damping = std::max(damping * 0.1, 1e-12);
-    if (settled) break;
-  }
-  if (!(now.cost < start_cost)) return start;
-  Pose pose;
-  pose.rotation = to_glm(nearest_rotation(rotation));
-  pose.translation = {translation.x(), translation.y(), translation.z()};
-  return pose;
+  return refine_over(camera, world, pixels, start);
+}
+
+Pose refine_pose(const Camera& camera, std::span<const glm::dvec3> world,
+                 std::span<const glm::dvec2> pixels, const Pose& start) {
+  return refine_over(camera, world, pixels, start);
 }
 
 glm::dvec3 rotation_vector(const glm::dmat3& rotation) {

@@ -69,7 +69,8 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
     if (bytes.empty()) continue;
-    MODAR_ASSIGN(const TrackedPattern pattern, tracker::view_tracked_pattern(bytes, i));
+    MODAR_ASSIGN(const TrackedPattern pattern,
+                 tracker::view_tracked_pattern(bytes, i, bundle.section(kPatternShape, i)));
     state->patterns.push_back(pattern);
   }
   if (state->patterns.empty()) {
@@ -299,7 +300,10 @@ bool PoseLoop::State::resolve_overlap(std::size_t i, const Detection& detection,
       Detection rival;
       const bool other =
           k != i && tracks[k].tracked && frame_tracker.locate(patterns[k], tracks[k], rival);
-      if (!other || !tracker::same_place(rival.corners, detection.corners)) continue;
+      if (!other || !tracker::same_place(frame_tracker.place(patterns[k], tracks[k], rival),
+                                         frame_tracker.place(patterns[i], tracks[i], detection))) {
+        continue;
+      }
       if (!drop) {
         if (percent_of(i) <= percent_of(k)) return false;
         continue;

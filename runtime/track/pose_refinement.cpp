@@ -142,7 +142,8 @@ struct PoseInformation {
   int patches = 0;
 };
 
-Jacobian jacobian_of(const Camera& camera, const Pose& pose, glm::dvec2 world, double scale) {
+Jacobian jacobian_of(const Camera& camera, const Pose& pose, const glm::dvec3& world,
+                     double scale) {
   const PoseJacobian rows = pose_jacobian(camera, pose, world, scale);
   Jacobian jacobian;
   jacobian.row(0) = Eigen::Map<const Eigen::Matrix<double, 1, 6>>(rows.x.data());
@@ -152,7 +153,7 @@ Jacobian jacobian_of(const Camera& camera, const Pose& pose, glm::dvec2 world, d
 
 glm::dvec2 residual(const Camera& camera, const Pose& pose, const PlanePoints& points,
                     std::size_t i) {
-  const glm::dvec3 p = pose.rotation * glm::dvec3(points.world[i], 0.0) + pose.translation;
+  const glm::dvec3 p = pose.rotation * points.world[i] + pose.translation;
   return points.ideal[i] -
          glm::dvec2{camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
 }
@@ -190,7 +191,7 @@ void add_patches(const TrackedPattern& pattern, const FrameView& frame, const Pa
     Eigen::Matrix2d to_template;
     to_template << back[0].x, back[1].x, back[0].y, back[1].y;
     const Jacobian jacobian =
-        to_template * jacobian_of(frame.camera, pose, pattern.to_world(patch.centre), shrink);
+        to_template * jacobian_of(frame.camera, pose, pattern.on_surface(patch.centre), shrink);
     const double variance = (jacobian * covariance * jacobian.transpose()).trace();
     if (!(variance < kMaxUncertainty * kMaxUncertainty)) continue;
     PatchObservation seen;
@@ -310,7 +311,7 @@ int bend_level(const TrackedPattern& pattern, const Resolution& best, int levels
 /// Of a world point's pixel by a step of the pose and by the two bulges.
 BendJacobian bend_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 world, double scale) {
   BendJacobian out;
-  out.leftCols<6>() = jacobian_of(camera, pose, world, scale);
+  out.leftCols<6>() = jacobian_of(camera, pose, {world, 0.0}, scale);
   const Eigen::Vector3d normal(pose.rotation[2].x, pose.rotation[2].y, pose.rotation[2].z);
   const Eigen::Vector2d by_height = out.middleCols<3>(3) * normal;
   out.col(6) = by_height * (world.x * world.x);

@@ -176,6 +176,7 @@ double PrintJudge::agreeing_share(const Evidence& seen) {
 /// at_once: one measurement decides; else two do, one after the other.
 void PrintJudge::measure(const TrackedPattern& print, const FrameView& frame, const Track& track,
                          bool at_once, Evidence& seen) const {
+  if (!print.surface.flat()) return;
   const double share = agreeing_share(seen);
   const double limit = track.homography_only ? kMapBentPixels
                        : share < kSeenShare  ? kHiddenBentPixels

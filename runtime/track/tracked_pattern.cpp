@@ -51,7 +51,14 @@ glm::dmat3 TrackedPattern::world_from_pixels() const {
   return m;
 }
 
-Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index) {
+glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
+  if (surface.flat()) return {to_world(pixel), 0.0};
+  const auto at = surface.at(pixel.x, pixel.y).at;
+  return {at[0], at[1], at[2]};
+}
+
+Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index,
+                                            std::span<const std::byte> shape) {
   std::uint32_t version = 0;
   if (bytes.size() >= sizeof version) std::memcpy(&version, bytes.data(), sizeof version);
   if (bytes.size() >= sizeof(TrackerRecordHeader) && version != kFeatureExtractorVersion) {
@@ -71,6 +78,12 @@ Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, st
   out.codes = view.codes.data();
   view_levels(view, out);
   view_patches(view, out);
+  if (shape.empty()) return out;
+  if (const char* cause =
+          view_pattern_shape(shape, view.header.width, view.header.height, out.surface)) {
+    return fail(ExitCode::kInvalidInput, "tracker.record", "a pattern's shape", cause,
+                "bake the pattern again");
+  }
   return out;
 }
 

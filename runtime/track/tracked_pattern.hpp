@@ -6,7 +6,8 @@
 //   plane_geometry.hpp    maps between pattern and frame, poses from points, motion model
 //   patch_alignment.hpp   Gauss-Newton over small patches
 //   pose_refinement.hpp   coarse to fine, from features to a pose, photometric check
-//   pattern_matching.hpp  features to homographies of one pattern; an index over all patterns
+//   pattern_matching.hpp  features to homographies of one pattern, from there over a curved one; an
+//                         index over all patterns
 //   pattern_search.hpp    finds patterns in a frame, also on a thread of its own
 //   frame_tracker.hpp     tracks patterns from frame to frame
 // Others include the public headers only: modar/pose_loop.hpp drives all of it;
@@ -20,8 +21,10 @@
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 #include "formats/error.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/image.hpp"
 
@@ -35,17 +38,22 @@ struct TrackedPattern {
   std::array<std::span<const TrackerPatchRecord>, kMaxTrackerImageLevels> patches;  ///< by level
   std::array<GrayImage, kMaxTrackerImageLevels> levels;
   int level_count = 0;
+  PatternSurface surface;
 
   [[nodiscard]] int width() const { return levels[0].width; }
   [[nodiscard]] int height() const { return levels[0].height; }
   /// Image pixels (centres at integers) to the pattern plane (ModAR Eq. 1), and back.
   [[nodiscard]] glm::dvec2 to_world(glm::dvec2 pixel) const;
   [[nodiscard]] glm::dmat3 world_from_pixels() const;
+  /// Image pixels to where the pattern's surface has them: (to_world(), 0) of a flat one.
+  [[nodiscard]] glm::dvec3 on_surface(glm::dvec2 pixel) const;
 };
 
 /// Views a section's bytes, which must outlive the pattern. Every count and offset is validated,
 /// and every feature and patch lies within the image: nothing later checks again. Errors:
-/// kInvalidInput "tracker.record"; kUnsupported "tracker.record-version".
-Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index);
+/// kInvalidInput "tracker.record"; kUnsupported "tracker.record-version". shape: of a
+/// kPatternShape section; none: flat.
+Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index,
+                                            std::span<const std::byte> shape = {});
 
 }  // namespace modar::tracker

@@ -1,5 +1,6 @@
 """`modar pattern score|simulate|confusion` and `modar calibrate`: what they print, write and refuse."""
 import json
+import math
 import shutil
 import subprocess
 import unittest
@@ -97,13 +98,56 @@ class Pattern(ProgramTest):
         self.assertEqual(self.modar_json("pattern", "score", poster)[0]["score"], self.modar_json("pattern", "score", self.part)[0]["score"])
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
+    def test_targets_of_8th_wall_on_cylinders_and_cones(self):
+        # The picture, 160 x 130 upright, is the middle half of the width and the lower 130 of 200 rows of the whole.
+        curved = {"left": 0, "top": 80, "width": 130, "height": 160, "isRotated": True, "originalWidth": 200, "originalHeight": 320,
+                  "cylinderSideLength": 100, "cylinderCircumferenceTop": 300, "cylinderCircumferenceBottom": 300, "arcAngle": 240,
+                  "targetCircumferenceTop": 200, "coniness": 0, "inputMode": "ADVANCED", "unit": "mm"}
+        shape_of = lambda file: self.modar_json("inspect", self.baked(file))["patterns"][0]
+        can = shape_of(self.target("can", type="CYLINDER", properties=curved))
+        self.assertEqual(can["shape"]["kind"], "round")
+        self.assertAlmostEqual(can["shape"]["arc_deg"], 120)
+        self.assertAlmostEqual(can["shape"]["top_mm"], 300 / math.pi, 3)
+        self.assertAlmostEqual(can["width_mm"], 100)
+        self.assertEqual((can["width"], can["height"]), (160, 104))  # 65 of 100 mm high
+        cup = shape_of(self.target("cup", type="CONICAL",
+                                   properties=curved | {"cylinderCircumferenceBottom": 8, "cylinderCircumferenceTop": 12, "unit": "in",
+                                                        "cylinderSideLength": 4}))
+        # Rows 70 to 200: circumferences of 10.6 and 8 inches.
+        self.assertAlmostEqual(cup["shape"]["top_mm"], 10.6 * 25.4 / math.pi, 0)
+        self.assertAlmostEqual(cup["shape"]["bottom_mm"], 8 * 25.4 / math.pi, 0)
+        self.assertAlmostEqual(cup["height"] / cup["width"], 0.65 * 4 / (9.3 / 3), 1)
+
+    def baked(self, pattern, *options):
+        done = self.modar("bake", "--pattern", pattern, "-o", "shape.modar", "--quiet", *QUICK, *options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return "shape.modar"
+
+    def test_shapes_are_stored_and_contradictions_refused(self):
+        one = self.modar_json("inspect", self.baked(f"{self.part}:shape=cylinder,diameter=66mm,arc=120"))["patterns"][0]
+        self.assertAlmostEqual(one["width_mm"], 66 * math.pi / 3)
+        self.assertAlmostEqual(one["shape"]["top_mm"], 66)
+        self.assertAlmostEqual(one["shape"]["bottom_mm"], 66)
+        self.assertEqual(self.modar("check", "shape.modar").returncode, 0)
+        self.assertEqual(self.modar("check", "shape.modar", "--source", self.part).returncode, 0)
+        refuse = lambda shape, *words: self.assert_fails(
+            self.modar("bake", "--pattern", f"{self.part}:{shape}", "-o", "b.modar", "--quiet", *QUICK), 1, *words)
+        refuse("shape=bottle", "no shape 'bottle'")
+        refuse("shape=cylinder,diameter=66mm", "arc=DEGREES")
+        refuse("100mm:shape=cylinder,diameter=66mm,arc=90", "173.6 degrees, not 90.0")
+        refuse("300mm:shape=cylinder,diameter=66mm", "correct the width or the diameter")
+        refuse("shape=cone,top=200mm,bottom=20mm,arc=60", "too little for these diameters")
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
     def test_what_of_other_projects_is_refused(self):
         refuse = lambda file, code, *words: self.assert_fails(
             self.modar("bake", "--pattern", file, "-o", "b.modar", "--quiet", *QUICK), code, *words)
-        refuse(self.target("can", type="CYLINDER"), 5, "curved")
+        refuse(self.target("ball", type="SPHERE"), 5, "SPHERE")
+        refuse(self.target("can", type="CYLINDER"), 3, "cylinderCircumferenceTop")
         gone = self.target("gone")
         (gone.parent / "gone_cropped.png").unlink()
         refuse(gone, 2, "gone_cropped.png, gone_luminance.png")
+        self.assert_fails(self.modar("pattern", "simulate", self.part, "--shape", "ball"), 1, "no shape 'ball'")
         mind = self.folder / "targets.mind"
         mind.write_bytes(b"\x82")
         refuse(mind, 5, "compiled from")

@@ -66,6 +66,37 @@ TEST(Pattern, WidthIsOptional) {
   EXPECT_FALSE(parse_pattern("cover.png:mm"));
 }
 
+TEST(Pattern, ShapeStandsBehindTheWidth) {
+  const auto can = parse_pattern("label.png:shape=cylinder,diameter=66mm,arc=120");
+  ASSERT_TRUE(can) << to_line(can.error());
+  EXPECT_EQ(can->path, "label.png");
+  EXPECT_EQ(can->shape.kind, ShapeRequest::Kind::kCylinder);
+  EXPECT_EQ(can->shape.top_mm, 66);
+  EXPECT_EQ(can->shape.bottom_mm, 66);
+  EXPECT_EQ(can->shape.arc_deg, 120);
+  const auto cup = parse_pattern("c:cup.png:7cm:shape=cone,top=8cm,bottom=60mm");
+  ASSERT_TRUE(cup) << to_line(cup.error());
+  EXPECT_EQ(cup->path, "c:cup.png");
+  EXPECT_EQ(cup->width_mm, 70);
+  EXPECT_EQ(cup->shape.kind, ShapeRequest::Kind::kCone);
+  EXPECT_DOUBLE_EQ(cup->shape.top_mm, 80);
+  EXPECT_EQ(cup->shape.bottom_mm, 60);
+  EXPECT_EQ(cup->shape.text, "cone,top=8cm,bottom=60mm");
+  EXPECT_TRUE(parse_pattern("p.png")->shape.flat());
+  const auto box = parse_pattern("a/front.png:shape=box,size=12x18x4cm,top=t.png,right=r.png");
+  ASSERT_TRUE(box) << to_line(box.error());
+  EXPECT_EQ(box->shape.box_mm, (std::array<double, 3>{120, 180, 40}));
+  EXPECT_EQ(box->shape.sides, (std::array<std::string, 5>{"r.png", "", "", "t.png", ""}));
+  EXPECT_EQ(files_of(box->path, box->shape), (std::vector<std::string>{"a/r.png", "a/t.png"}));
+  for (const char* bad :
+       {"", "ball", "cylinder,diameter=66", "cylinder,arc=0", "cylinder,arc=361",
+        "cylinder,top=66mm", "cone,top=66mm", "cone,top=66mm,bottom=-1mm",
+        "cylinder,diameter=66mm,arc=120,", "cylinder,diameter=nanmm", "box", "box,size=120x180mm",
+        "box,size=120x180x40", "box,size=1x2x3mm,front=f.png", "box,size=1x2x3mm,right="}) {
+    EXPECT_FALSE(parse_shape(bad)) << bad;
+  }
+}
+
 TEST(Unit, Metres) {
   EXPECT_EQ(parse_unit("mm").value(), 0.001);
   EXPECT_EQ(parse_unit("ft").value(), 0.3048);

@@ -127,12 +127,12 @@ TEST(PoseLoop, GrowsAPoseFromTheFeaturesOfOneCorner) {
         render_scene(test::gray(picture()), camera, pose,
                      clutter(640, 480, static_cast<std::uint32_t>(300 + i)), band, random);
     extractor->set_frame(scene.picture.view());
-    std::vector<glm::dvec2> world, seen;
+    std::vector<glm::dvec3> world;
+    std::vector<glm::dvec2> seen;
     for (int k = 0; k < 12; ++k) {
-      world.emplace_back(random.uniform(-0.8, 0.0), random.uniform(-0.6, 0.0));
-      seen.push_back(
-          project(camera, pose.rotation * glm::dvec3(world.back(), 0.0) + pose.translation) +
-          1.5 * glm::dvec2(random.normal(), random.normal()));
+      world.emplace_back(random.uniform(-0.8, 0.0), random.uniform(-0.6, 0.0), 0.0);
+      seen.push_back(project(camera, pose.rotation * world.back() + pose.translation) +
+                     1.5 * glm::dvec2(random.normal(), random.normal()));
     }
     const std::vector<double> sigma(world.size(), 1.5);
     const Pose start = refine_pose(camera, world, seen, pose);

@@ -43,6 +43,10 @@ Result<Pose> pose_from_homography(const Camera& camera, const glm::dmat3& homogr
 Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
                  std::span<const glm::dvec2> pixels, const Pose& start);
 
+/// The same of points in space.
+Pose refine_pose(const Camera& camera, std::span<const glm::dvec3> world,
+                 std::span<const glm::dvec2> pixels, const Pose& start);
+
 /// Rotation matrix to rotation vector (axis times angle, radians) and back (Rodrigues).
 glm::dvec3 rotation_vector(const glm::dmat3& rotation);
 glm::dmat3 rotation_matrix(const glm::dvec3& vector);

@@ -33,8 +33,8 @@ struct PoseLoopOptions {
   int budget = 0;
 };
 
-/// Reads the patterns' tracker records (section type 258) from the bundle's mapped bytes, which
-/// must outlive it. Allocates nothing per frame once a TrackResult has grown.
+/// Reads the patterns' tracker records and shapes (section types 258 and 261) from the bundle's
+/// mapped bytes, which must outlive it. Allocates nothing per frame once a TrackResult has grown.
 class PoseLoop {
  public:
   /// Errors: kInvalidInput "tracker.no-patterns" if no pattern has a tracker record,

@@ -34,7 +34,8 @@ int progress(Reason reason);
 struct Detection {
   std::uint32_t pattern = 0;
   std::array<glm::dvec2, 4>
-      corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left
+      corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left; of a curved
+                  ///< pattern hidden ones, too; of a box those of its first face
   Pose pose;
   int matches = 0;  ///< features that match, or patches in view if tracked
   int inliers = 0;  ///< of those, the ones that agree with the pose

@@ -1,0 +1,244 @@
+// Rendered frames of curved patterns.
+#include "bake/lab/shape_bench.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "bake/thread_clock.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/pose_loop.hpp"
+
+namespace modar {
+namespace {
+
+using std::numbers::pi;
+
+struct BenchShape {
+  const char* name;
+  ShapeRequest request;
+};
+
+std::vector<BenchShape> bench_shapes_of() {
+  ShapeRequest cylinder{ShapeRequest::Kind::kCylinder, 66, 66, 120, {}, {}, "cylinder"};
+  // Of a picture as high as it is wide, the side leans by 8 degrees.
+  ShapeRequest cone{ShapeRequest::Kind::kCone, 76, 56, 120, {}, {}, "cone"};
+  ShapeRequest box;
+  box.kind = ShapeRequest::Kind::kBox;
+  box.box_mm = {120, 150, 80};
+  return {{"cylinder", cylinder}, {"cone", cone}, {"box", box}};
+}
+
+/// A pattern on a shape, as a device has it.
+struct ShapedPattern {
+  GrayPicture picture;
+  std::vector<std::byte> section;
+  PatternSurface surface;
+  std::vector<std::byte> bytes;
+  std::unique_ptr<PoseLoop> loop;
+
+  [[nodiscard]] Result<void> open(const Camera& camera, bool track) {
+    MODAR_ASSIGN(const auto bundle, BundleView::open(bytes));
+    PoseLoopOptions how;
+    how.track = track;
+    MODAR_ASSIGN(loop, PoseLoop::create(bundle, camera, how));
+    return {};
+  }
+};
+
+/// The middle of a picture with the proportions of a side of a box.
+GrayPicture cut_to(const GrayPicture& picture, double width, double height) {
+  GrayPicture out;
+  out.width = std::min(picture.width, static_cast<int>(picture.height * width / height));
+  out.height = std::min(picture.height, static_cast<int>(picture.width * height / width));
+  const int left = (picture.width - out.width) / 2;
+  const int top = (picture.height - out.height) / 2;
+  for (int y = top; y < top + out.height; ++y) {
+    const auto row = picture.pixels.begin() + std::ptrdiff_t{y} * picture.width + left;
+    out.pixels.insert(out.pixels.end(), row, row + out.width);
+  }
+  return out;
+}
+
+/// The pattern of that number on a shape; a box has the next five around.
+Result<ShapedPattern> bake_on(const ShapeRequest& shape, const PoseBenchOptions& options,
+                              std::size_t number) {
+  ShapedPattern pattern;
+  bool shrunk = false;
+  double width_mm = 0;
+  if (shape.kind == ShapeRequest::Kind::kBox) {
+    const auto [w, h, d] = shape.box_mm;
+    const double widths[] = {w, d, w, d, w, w};
+    const double heights[] = {h, h, h, h, d, d};
+    std::array<GrayPicture, 6> sides;
+    for (std::size_t i = 0; i < sides.size(); ++i) {
+      const auto& path = options.patterns[(number + i) % options.patterns.size()];
+      MODAR_ASSIGN(const GrayPicture whole, load_pattern(path, shrunk));
+      sides[i] = cut_to(whole, widths[i], heights[i]);
+    }
+    ShapedPicture box = assemble_box(sides, shape.box_mm);
+    pattern.picture = std::move(box.picture);
+    pattern.section = std::move(box.section);
+  } else {
+    MODAR_ASSIGN(pattern.picture, load_pattern(options.patterns[number], shrunk));
+    MODAR_ASSIGN(pattern.section,
+                 shape_section(shape, pattern.picture.width, pattern.picture.height, width_mm));
+  }
+  pattern.surface = surface_of(pattern.section, pattern.picture.width, pattern.picture.height);
+  MODAR_ASSIGN(auto record, bake_tracker_record(pattern.picture.view(), {}, pattern.surface));
+  MODAR_ASSIGN(pattern.bytes,
+               bundle_of_record(pattern.picture.view(), std::move(record), pattern.section));
+  return pattern;
+}
+
+class Row {
+ public:
+  Row(const std::string& band, bool sequence) {
+    row_.band = band;
+    row_.method = "ours";
+    row_.sequence = sequence;
+  }
+  void cut() { poses_.cut(); }
+  Result<void> run(PoseLoop& loop, const GrayImage& frame, const FrameTruth& truth) {
+    const double start = thread_seconds();
+    MODAR_ASSIGN(const TrackResult result, loop.step(frame));
+    row_.ms += 1e3 * (thread_seconds() - start);
+    poses_.add(result, truth);
+    return {};
+  }
+  PoseBenchRow finish() {
+    static_cast<PoseFigures&>(row_) = poses_.figures();
+    row_.ms /= std::max(row_.frames, 1);
+    return row_;
+  }
+
+ private:
+  PoseBenchRow row_;
+  PoseTally poses_;
+};
+
+/// A camera's way around a thing: 70 degrees to either side, nearer and farther, in eight seconds.
+Pose pose_on_way(const ShapedPattern& pattern, const Camera& camera, double time_s, double phase) {
+  const auto sway = [&](double seconds, double shift) {
+    return std::sin(2 * pi * time_s / seconds + phase + shift);
+  };
+  return surface_pose(pattern.picture.view(), pattern.surface, camera, 70 * sway(8, 0),
+                      10 + 10 * sway(5, 1), 15 * sway(7, 2), 1.0 + 0.25 * sway(6, 3),
+                      {0.06 * sway(4, 4), 0.05 * sway(3, 5)});
+}
+
+class ShapeBench {
+ public:
+  ShapeBench(const PoseBenchOptions& options, const std::vector<GrayPicture>& backgrounds)
+      : options_(options),
+        backgrounds_(backgrounds),
+        camera_(default_camera(options.width, options.height)) {}
+
+  Result<void> detect(ShapedPattern& pattern, double low, double high, std::uint64_t seed,
+                      Row& row) {
+    MODAR_TRY(pattern.open(camera_, false));
+    Random random(seed);
+    SceneBand band;
+    band.surface = &pattern.surface;
+    band.area_low = 0.4;
+    band.area_high = 2.0;
+    band.tilt_high = 25;
+    band.around_low = low;
+    band.around_high = high;
+    for (int i = 0; i < options_.frames; ++i) {
+      const auto& photo =
+          backgrounds_[static_cast<std::size_t>(random.next() % backgrounds_.size())];
+      const Pose pose = draw_pose(band, pattern.picture.view(), camera_, random);
+      const SceneFrame scene =
+          render_scene(pattern.picture.view(), camera_, pose, photo, band, random);
+      MODAR_TRY(row.run(*pattern.loop, scene.picture.view(), {true, scene.corners}));
+    }
+    return {};
+  }
+
+  Result<void> track(ShapedPattern& pattern, std::uint64_t seed, Row& row) {
+    MODAR_TRY(pattern.open(camera_, true));
+    Random random(seed);
+    const auto& photo = backgrounds_[static_cast<std::size_t>(random.next() % backgrounds_.size())];
+    const SceneLight light = draw_light(random);
+    const double phase = random.uniform(0, 2 * pi);
+    SceneBand band;
+    band.surface = &pattern.surface;
+    row.cut();
+    for (int i = 0; i < options_.frames; ++i) {
+      const Pose pose = pose_on_way(pattern, camera_, i / 30.0, phase);
+      const SceneFrame scene =
+          render_scene(pattern.picture.view(), camera_, pose, photo, band, random, &light);
+      MODAR_TRY(row.run(*pattern.loop, scene.picture.view(), {true, scene.corners}));
+    }
+    return {};
+  }
+
+  Result<void> clutter(ShapedPattern& pattern, int frames, std::uint64_t seed, Row& row) {
+    MODAR_TRY(pattern.open(camera_, false));
+    Random random(seed);
+    SceneBand band;
+    band.pattern = false;
+    for (int i = 0; i < frames; ++i) {
+      const auto& photo =
+          backgrounds_[static_cast<std::size_t>(random.next() % backgrounds_.size())];
+      const SceneFrame scene = render_scene(pattern.picture.view(), camera_, {},
+                                            another_view(photo, random), band, random);
+      MODAR_TRY(row.run(*pattern.loop, scene.picture.view(), {}));
+    }
+    return {};
+  }
+
+ private:
+  const PoseBenchOptions& options_;
+  const std::vector<GrayPicture>& backgrounds_;
+  Camera camera_;
+};
+
+}  // namespace
+
+Result<std::vector<PoseBenchRow>> bench_shapes(const PoseBenchOptions& options,
+                                               const std::string& only,
+                                               const ProgressCallback& progress) {
+  MODAR_ASSIGN(const auto backgrounds,
+               load_backgrounds(options.backgrounds, options.width, options.height));
+  if (backgrounds.empty() || options.patterns.empty()) {
+    return fail(ExitCode::kUsage, "bench.input", "", "the bench needs patterns and backgrounds",
+                "give folders with pictures");
+  }
+  ShapeBench bench(options, backgrounds);
+  const int clutter = options.clutter_frames > 0 ? options.clutter_frames : options.frames;
+  const auto patterns = static_cast<int>(options.patterns.size());
+  std::vector<PoseBenchRow> rows;
+  double done = 0;
+  for (const BenchShape& shape : bench_shapes_of()) {
+    const std::string name = shape.name;
+    const auto wanted = [&](const std::string& row) { return row.find(only) != std::string::npos; };
+    std::vector<Row> found = {Row(name + " around 0-35", false), Row(name + " around 35-70", false),
+                              Row("tracking " + name, true), Row("none " + name, false)};
+    std::array<bool, 4> wants{};
+    const std::array<std::string, 4> names = {name + " around 0-35", name + " around 35-70",
+                                              "tracking " + name, "none " + name};
+    for (std::size_t i = 0; i < 4; ++i) wants[i] = wanted(names[i]);
+    for (int p = 0; p < patterns; ++p) {
+      if (progress) progress(name, done++ / (3.0 * patterns));
+      if (!wants[0] && !wants[1] && !wants[2] && !wants[3]) continue;
+      MODAR_ASSIGN(ShapedPattern pattern,
+                   bake_on(shape.request, options, static_cast<std::size_t>(p)));
+      const std::uint64_t seed = options.seed + 1000003 * static_cast<std::uint64_t>(p);
+      if (wants[0]) MODAR_TRY(bench.detect(pattern, 0, 35, seed, found[0]));
+      if (wants[1]) MODAR_TRY(bench.detect(pattern, 35, 70, seed + 1, found[1]));
+      if (wants[2]) MODAR_TRY(bench.track(pattern, seed + 2, found[2]));
+      if (wants[3]) {
+        MODAR_TRY(bench.clutter(pattern, (clutter + patterns - 1) / patterns, seed + 3, found[3]));
+      }
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (wants[i]) rows.push_back(found[i].finish());
+    }
+  }
+  return rows;
+}
+
+}  // namespace modar

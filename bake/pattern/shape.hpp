@@ -1,0 +1,64 @@
+// What is printed on bottles, cups and boxes: the shape that the user tells, and the section that
+// holds it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bake/pattern/picture.hpp"
+#include "formats/error.hpp"
+#include "formats/pattern_shape.hpp"
+
+namespace modar {
+
+/// The shape of a pattern as the user says it. Lengths in millimetres, 0: not told.
+struct ShapeRequest {
+  enum class Kind : std::uint8_t { kFlat, kCylinder, kCone, kBox };
+  Kind kind = Kind::kFlat;
+  double top_mm = 0;               ///< diameter at the picture's upper edge
+  double bottom_mm = 0;            ///< and at its lower edge; a cylinder's are the same
+  double arc_deg = 0;              ///< that the picture's width covers, up to 360
+  std::array<double, 3> box_mm{};  ///< width, height, depth
+  /// Of a box: right, back, left, top and bottom, relative to the folder of the pattern's picture,
+  /// which is its front; empty: plain.
+  std::array<std::string, 5> sides;
+  std::string text;  ///< as it was written: "cylinder,diameter=66mm,arc=120"
+  [[nodiscard]] bool flat() const { return kind == Kind::kFlat; }
+};
+
+/// The kPatternShape section of a picture of that size; empty where the request is flat. Not of
+/// boxes. width_mm: of the picture, along the surface; 0: filled in where the diameters tell it.
+/// Errors: kUsage "pattern.shape" where the parts contradict each other or are too few.
+Result<std::vector<std::byte>> shape_section(const ShapeRequest& request, int width, int height,
+                                             double& width_mm);
+
+/// A pattern's picture as it is tracked, and its shape.
+struct ShapedPicture {
+  GrayPicture picture;
+  bool shrunk = false;             ///< see load_pattern()
+  std::vector<std::byte> section;  ///< see shape_section()
+  double width_mm = 0;
+};
+
+/// Reads a pattern's picture, or the pictures of a box side by side in one. width_mm: 0: what the
+/// file states. Errors: those of load_pattern(), shape_section() and target_shape(); kUsage
+/// "pattern.shape" where a picture has not the proportions of its side of the box.
+Result<ShapedPicture> load_shaped(const std::string& path, double width_mm,
+                                  const ShapeRequest& request);
+
+/// The pictures of a box in one: front, right, back, left, top, bottom; empty: plain. Each is
+/// resized to its side. box_mm: width, height and depth.
+ShapedPicture assemble_box(const std::array<GrayPicture, 6>& pictures,
+                           const std::array<double, 3>& box_mm);
+
+/// The files that the request names beside the pattern's own, as paths.
+std::vector<std::string> files_of(const std::string& path, const ShapeRequest& request);
+
+/// The surface of a section that shape_section() made, whose bytes outlive it; flat of an empty
+/// one.
+PatternSurface surface_of(const std::vector<std::byte>& section, int width, int height);
+
+}  // namespace modar
