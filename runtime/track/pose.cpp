@@ -83,27 +83,39 @@ struct NormalEquations {
   double cost = 0.0;
 };
 
-double depth_of(const glm::dvec2&) {
-  return 0.0;
-}
-double depth_of(const glm::dvec3& point) {
-  return point.z;
-}
+/// Points of a plane (z = 0) or of space: one function for both, since two of it are 2 KB.
+struct PointList {
+  const double* numbers;
+  std::size_t dimensions;
+  std::size_t count;
+
+  explicit PointList(std::span<const glm::dvec2> points)
+      : numbers(reinterpret_cast<const double*>(points.data())),
+        dimensions(2),
+        count(points.size()) {}
+  explicit PointList(std::span<const glm::dvec3> points)
+      : numbers(reinterpret_cast<const double*>(points.data())),
+        dimensions(3),
+        count(points.size()) {}
+  [[nodiscard]] glm::dvec3 operator[](std::size_t i) const {
+    const double* p = numbers + i * dimensions;
+    return {p[0], p[1], dimensions == 3 ? p[2] : 0.0};
+  }
+};
 
 /// Written out, not as products of Eigen's: in builds for size those take five times the
 /// instructions.
-template <class Point>
-NormalEquations normal_equations(const Camera& camera, std::span<const Point> world,
+NormalEquations normal_equations(const Camera& camera, const PointList& world,
                                  std::span<const glm::dvec2> pixels,
                                  const Eigen::Matrix3d& rotation,
                                  const Eigen::Vector3d& translation) {
   NormalEquations out;
   double jtj[6][6] = {};
   double jtr[6] = {};
-  for (std::size_t i = 0; i < world.size(); ++i) {
+  for (std::size_t i = 0; i < world.count; ++i) {
+    const glm::dvec3 point = world[i];
     const auto turned = [&](int row) {
-      return rotation(row, 0) * world[i].x + rotation(row, 1) * world[i].y +
-             rotation(row, 2) * depth_of(world[i]);
+      return rotation(row, 0) * point.x + rotation(row, 1) * point.y + rotation(row, 2) * point.z;
     };
     const double tx = turned(0);
     const double ty = turned(1);
@@ -177,9 +189,8 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
   return u * svd.matrixV().transpose();
 }
 
-template <class Point>
-Pose refine_over(const Camera& camera, std::span<const Point> world,
-                 std::span<const glm::dvec2> pixels, const Pose& start) {
+Pose refine_over(const Camera& camera, const PointList& world, std::span<const glm::dvec2> pixels,
+                 const Pose& start) {
   Eigen::Matrix3d rotation = to_eigen(start.rotation);
   Eigen::Vector3d translation(start.translation.x, start.translation.y, start.translation.z);
   NormalEquations now = normal_equations(camera, world, pixels, rotation, translation);
@@ -273,12 +284,12 @@ Result<Pose> pose_from_homography(const Camera& camera, const glm::dmat3& homogr
 
 Pose refine_pose(const Camera& camera, std::span<const glm::dvec2> world,
                  std::span<const glm::dvec2> pixels, const Pose& start) {
-  return refine_over(camera, world, pixels, start);
+  return refine_over(camera, PointList(world), pixels, start);
 }
 
 Pose refine_pose(const Camera& camera, std::span<const glm::dvec3> world,
                  std::span<const glm::dvec2> pixels, const Pose& start) {
-  return refine_over(camera, world, pixels, start);
+  return refine_over(camera, PointList(world), pixels, start);
 }
 
 glm::dvec3 rotation_vector(const glm::dmat3& rotation) {
