@@ -144,6 +144,8 @@ if [ -n "${budget:-}" ]; then
   measure clutter_640x480 clutter "$build/demo.modar" 7 3
   # Searched and found in slices, then tracked, within PoseLoopOptions::budget of 12 million a frame.
   measure sliced_640x480 sliced "$build/demo.modar" 30 2 worst
+  # The pattern is covered, and its surroundings are followed.
+  measure extended_640x480 extended "$build/demo.modar" 60 46
   measure render_demo render "$build/demo.modar" 8 4
   [ -z "$big" ] || measure open_200mb open "$big" 1 1
   [ $fat = no ] || { echo "foreign.sh: above the budget by more than 2 %" >&2; exit 3; }

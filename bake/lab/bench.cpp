@@ -11,6 +11,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/etc1_bench.hpp"
+#include "bake/lab/extended_bench.hpp"
 #include "bake/lab/light_bench.hpp"
 #include "bake/lab/lod_bench.hpp"
 #include "bake/lab/ship_bench.hpp"
@@ -127,6 +128,39 @@ BenchResult bench_light_rows(const BenchOptions& command) {
   return bench_light(options);
 }
 
+/// Poses that follow from the surroundings beside the goals for them.
+BenchResult bench_extended_rows(const BenchOptions& command) {
+  ProgressBar bar(command.pose.quiet || command.json);
+  PoseBenchOptions options;
+  options.width = 640;
+  options.height = 480;
+  options.seed = command.pose.seed;
+  MODAR_ASSIGN(options.patterns, pictures_of(command.pose.patterns));
+  MODAR_ASSIGN(options.backgrounds, pictures_of(command.pose.backgrounds));
+  const auto measured =
+      bench_extended(options, command.pose.only,
+                     [&bar](const std::string& what, double done) { bar.show(what, done); });
+  bar.clear();
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<BenchRow> rows;
+  for (const ExtendedRow& row : *measured) {
+    const double half = row.gyroscope ? 0.5 : 1.0;
+    const auto add = [&](const char* what, double value, double goal) {
+      rows.push_back({what + (" " + row.scene), value, goal, ratio(value, goal)});
+    };
+    add("followed_pct", ratio(100.0 * row.followed, row.unseen), kNoFigure);
+    if (row.followed == 0) continue;
+    add("position_pct", row.position_pct, 3 * half);
+    add("rotation_deg", row.rotation_deg, half);
+    add("worst_position_pct", row.worst_position_pct, kNoFigure);
+    add("worst_rotation_deg", row.worst_rotation_deg, kNoFigure);
+    add("honest_pct", row.honest_pct, 95);
+    add("jump_px", row.jump_px, 5);
+    add("cpu_ms", row.ms, 3);
+  }
+  return rows;
+}
+
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
       {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
@@ -154,6 +188,9 @@ const std::vector<Bench>& benches() {
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
        "our pose loop against the ModAR paper's method, on the same frames",
        [](const BenchOptions& command) { return bench_pose_rows(command.pose); }},
+      {"extended", false, "--patterns DIR --backgrounds DIR",
+       "the pose of a pattern out of sight, in rendered rooms, against the goals",
+       bench_extended_rows},
   };
   return all;
 }

@@ -33,7 +33,7 @@ void set_pose(const modar::Pose& from, modar_pose& to) {
 
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     modar_error* error) {
-  const modar_tracker_options options = {sizeof options, 0, 0, 0.0, 0};
+  const modar_tracker_options options = {sizeof options, 0, 0, 0.0, 0, 0};
   return modar_tracker_create_with(bundle, camera, &options, error);
 }
 
@@ -54,6 +54,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
   how.async_search = asked.async_search != 0;
   if (asked.search_every > 0) how.search_every = asked.search_every;
   how.budget = asked.budget;
+  how.extended = asked.extended != 0;
   auto loop = modar::PoseLoop::create(bundle->view, ours, how);
   if (!loop) {
     modar::hand_over(loop.error(), error);
@@ -105,6 +106,9 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
     pose.fit = 0;
     pose.agreeing = 0;
     pose.likeness = 0;
+    pose.extended = 0;
+    pose.position_sigma = 0;
+    pose.rotation_sigma = 0;
     if (states[i].shown) set_pose(states[i].pose, pose);
   }
   for (const modar::Detection& seen : tracker->result.visible) {
@@ -118,12 +122,19 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
             : 0;
     pose.agreeing = static_cast<float>(seen.agreeing);
     pose.likeness = static_cast<float>(seen.likeness);
+    pose.extended = seen.extended ? 1 : 0;
+    pose.position_sigma = static_cast<float>(seen.position_sigma);
+    pose.rotation_sigma = static_cast<float>(seen.rotation_sigma);
     for (std::size_t i = 0; i < seen.corners.size(); ++i) {
       pose.corners[2 * i] = static_cast<float>(seen.corners[i].x);
       pose.corners[2 * i + 1] = static_cast<float>(seen.corners[i].y);
     }
   }
   return 0;
+}
+
+void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]) {
+  tracker->loop->set_turn({rotation[0], rotation[1], rotation[2]});
 }
 
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose) {

@@ -121,6 +121,14 @@ void detection(Writer& writer, const Detection& seen, std::span<const std::strin
   rounded(writer, seen.agreeing);
   writer.Key("likeness");
   rounded(writer, seen.likeness);
+  if (seen.extended) {
+    writer.Key("extended");
+    writer.Bool(true);
+    writer.Key("position_sigma");
+    number(writer, seen.position_sigma);
+    writer.Key("rotation_sigma");
+    number(writer, seen.rotation_sigma);
+  }
   if (homographies) homography(writer, seen.corners);
   writer.EndObject();
 }

@@ -91,7 +91,7 @@ class RunStats {
 };
 
 /// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches,fit,agreeing,
-/// likeness}],reason,state,ms}.
+/// likeness}],reason,state,ms}; of an extended pose also extended, position_sigma, rotation_sigma.
 /// Rotation row by row; numbers that are not finite become null. No newline at the end.
 /// pattern_names: by the bundle's pattern index. homographies: adds each pattern's `homography`,
 /// row by row, from its unit square (0, 0 its top left corner, 1, 1 its bottom right one) to the

@@ -6,6 +6,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "frame_sink.hpp"
+#include "gyroscope.hpp"
 #include "modar/camera_file.hpp"
 #include "modar/mapped_file.hpp"
 #include "options.hpp"
@@ -79,6 +80,15 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
                 "it looks with our loop's records, not with the paper's method",
                 "leave --method and --parameters out, and bake the pattern with this modar");
   }
+  if (options.extended && options.method != "ours") {
+    return fail(ExitCode::kUsage, "usage.conflict", "--extended",
+                "the ModAR paper's method knows the pattern alone",
+                "leave --method and --parameters out, and bake the pattern with this modar");
+  }
+  std::vector<glm::dvec3> turns;
+  if (!options.gyro.empty()) {
+    MODAR_ASSIGN(turns, read_gyroscope(options.gyro));
+  }
   MODAR_ASSIGN(auto source, open_frame_source(plan.input));
   const SourceInfo info = source->info();
   // Only where frames may be dropped may a result depend on time.
@@ -87,7 +97,8 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   LiveSlot live;
   MODAR_ASSIGN(TrackStep track,
                open_vision(bundle, {options.method == "ours", set, plan.camera, &spot,
-                                    options.live ? &live : nullptr, newest, options.find_focal}));
+                                    options.live ? &live : nullptr, newest, options.find_focal,
+                                    options.extended, std::move(turns)}));
 
   Player player(options, bundle);
   const std::string name(bundle.name(parameter_set(bundle, set).name));

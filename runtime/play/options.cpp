@@ -45,13 +45,14 @@ struct TextOption {
   const char* name;
   std::string PlayOptions::*text;
 };
-constexpr std::array<TextOption, 10> kTexts = {{{"input", &PlayOptions::input},
+constexpr std::array<TextOption, 11> kTexts = {{{"input", &PlayOptions::input},
                                                 {"out", &PlayOptions::out},
                                                 {"report", &PlayOptions::report},
                                                 {"record", &PlayOptions::record},
                                                 {"golden", &PlayOptions::golden},
                                                 {"qos", &PlayOptions::qos},
                                                 {"camera", &PlayOptions::camera_file},
+                                                {"gyro", &PlayOptions::gyro},
                                                 {"method", &PlayOptions::method},
                                                 {"parameters", &PlayOptions::parameters},
                                                 {"device", &PlayOptions::device}}};
@@ -73,8 +74,9 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 14> kSwitches = {
+constexpr std::array<SwitchOption, 15> kSwitches = {
     {{"json", &PlayOptions::json},
+     {"extended", &PlayOptions::extended},
      {"homography", &PlayOptions::homography},
      {"force", &PlayOptions::force},
      {"window", &PlayOptions::window},
@@ -138,6 +140,9 @@ Result<void> validate(const PlayOptions& options) {
   if (options.find_focal && !options.camera_file.empty()) {
     return usage("usage.conflict", "--find-focal", "--camera gives the focal length already");
   }
+  if (!options.gyro.empty() && !options.extended) {
+    return usage("usage.conflict", "--gyro", "it helps --extended, which is not given");
+  }
   if (!options.method.empty() && options.method != "ours" && options.method != "paper") {
     return usage("usage.method", "--method",
                  "'" + options.method + "' is no method; there are 'ours' and 'paper'");
@@ -195,7 +200,11 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
                       D the display; F holds the picture, and four clicks on the corners of
                       something flat make it the pattern
   --live              goes on with the new bundle when its file is replaced (see modar bake --watch)
-  --outline           draws the outline of each pattern that is seen
+  --extended          learns what stands still around a pattern, and goes on from it while the
+                      pattern is hidden or out of the frame
+  --gyro FILE         of --extended: how the camera turned, a line a frame of three numbers, the
+                      rotation vector from the frame before in radians (x right, y down, z forward)
+  --outline           draws the outline of each pattern that is seen; amber where it is extended
   --no-light-estimate models keep their light, whatever the camera shows of the patterns
   --osd               paints state, reason and inliers on the pictures
   --json              one JSON line a frame and a summary, to standard output

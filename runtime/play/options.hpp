@@ -22,6 +22,7 @@ struct PlayOptions {
   std::string golden;  ///< folder of a recording to replay; empty: none
   std::string qos;     ///< file; empty: none
   std::string camera_file;
+  std::string gyro;              ///< file of a gyroscope's turns; empty: none
   std::string method;            ///< "ours", "paper"; empty: see choose_method()
   std::string parameters;        ///< empty: orb-2000 where the bundle has it, else its first
   std::string device;            ///< empty: the context as it is
@@ -32,6 +33,7 @@ struct PlayOptions {
   int width = 640;               ///< of turntable pictures
   int height = 480;
   bool json = false;
+  bool extended = false;    ///< go on from the surroundings of a pattern that is not seen
   bool homography = false;  ///< each pattern's in the JSON lines
   bool force = false;       ///< into folders that hold other files
   bool window = false;

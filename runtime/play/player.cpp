@@ -279,13 +279,16 @@ void Player::outline(const Canvas& canvas, const Camera& camera, const Detection
 /// Outlines lie on the camera's picture, behind the models.
 void Player::draw(const Job& job, const FrameReport& report) {
   constexpr Colour kOutline{64, 255, 96};
+  constexpr Colour kExtended{255, 176, 32};
   if (!controls_.outline() || report.visible.empty()) {
     return screen_->draw(job.frame.picture(), job.camera, items_);
   }
   screen_->draw(job.frame.picture(), job.camera, {});
   screen_->picture();
   const Canvas canvas = screen_->canvas();
-  for (const Detection& seen : report.visible) outline(canvas, job.camera, seen, kOutline);
+  for (const Detection& seen : report.visible) {
+    outline(canvas, job.camera, seen, seen.extended ? kExtended : kOutline);
+  }
   screen_->draw_on_canvas(job.camera, items_);
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "modar/focal_finder.hpp"
+#include "modar/pose.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {
@@ -24,6 +25,26 @@ struct OurVision {
   std::unique_ptr<FocalFinder> finder;
   int frames_to_look = 0;
   FocalProgress focal;
+  std::uint64_t last_frame = 0;
+
+  [[nodiscard]] PoseLoopOptions loop_options() const {
+    PoseLoopOptions how;
+    how.async_search = options.apart;
+    how.extended = options.extended;
+    return how;
+  }
+
+  /// Tells the loop how the camera turned since the last frame that it saw.
+  void turn_to(std::uint64_t frame) {
+    if (frame > last_frame && frame < options.turns.size()) {
+      glm::dmat3 turned(1.0);
+      for (std::uint64_t i = last_frame + 1; i <= frame; ++i) {
+        turned = rotation_matrix(-options.turns[i]) * turned;
+      }
+      loop->set_turn(-rotation_vector(turned));
+    }
+    last_frame = frame;
+  }
 
   /// Once the focal length is known, it is the camera's, and the next loop starts with it.
   Result<void> look(const Frame& frame) {
@@ -49,9 +70,7 @@ struct OurVision {
   Result<void> follow_live(Job& job) {
     constexpr int kMostFrames = 60;  // two seconds: then the new one has no such pattern
     if (auto newer = options.live == nullptr ? nullptr : options.live->take()) {
-      PoseLoopOptions how;
-      how.async_search = options.apart;
-      MODAR_ASSIGN(next_loop, PoseLoop::create(newer->view, camera, how));
+      MODAR_ASSIGN(next_loop, PoseLoop::create(newer->view, camera, loop_options()));
       next = std::move(newer);
       frames_beside = 0;
     }
@@ -77,14 +96,13 @@ struct OurVision {
     }
     if (!loop || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
-      PoseLoopOptions how;
-      how.async_search = options.apart;
-      MODAR_ASSIGN(auto created, PoseLoop::create(bundle, camera, how));
+      MODAR_ASSIGN(auto created, PoseLoop::create(bundle, camera, loop_options()));
       loop = std::move(created);
       if (next) {
-        MODAR_ASSIGN(next_loop, PoseLoop::create(next->view, camera, how));
+        MODAR_ASSIGN(next_loop, PoseLoop::create(next->view, camera, loop_options()));
       }
     }
+    turn_to(frame.index);
     MODAR_TRY(loop->step(frame.gray_image(), job.track));
     MODAR_TRY(follow_live(job));
     job.track_ms = ms_since(before);
@@ -100,7 +118,7 @@ struct OurVision {
 
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options) {
   const auto state =
-      std::make_shared<OurVision>(OurVision{bundle, options, {}, {}, {}, {}, {}, 0, {}, 0, {}});
+      std::make_shared<OurVision>(OurVision{bundle, options, {}, {}, {}, {}, {}, 0, {}, 0, {}, 0});
   return [state](Job& job) { return state->step(job); };
 }
 

@@ -3,6 +3,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
 
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
@@ -20,6 +23,8 @@ struct VisionOptions {
   LiveSlot* live = nullptr;         ///< newer versions of the bundle come here; may be null
   bool apart = false;               ///< our loop searches on a thread of its own (PoseLoopOptions)
   bool find_focal = false;          ///< without a camera, ours measures the focal length it has
+  bool extended = false;            ///< ours goes on from the surroundings (PoseLoopOptions)
+  std::vector<glm::dvec3> turns;    ///< of a gyroscope, by frame; see read_gyroscope()
 };
 
 /// The method that is meant: the named one; "paper" where parameters of it are named or no pattern
@@ -46,9 +51,9 @@ Camera camera_for(const std::optional<Camera>& calibrated, int width, int height
 /// "method.unsupported" for the paper's method in a build without OpenCV.
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
 
-/// Our loop alone, of `options` camera, apart and find_focal: a FocalFinder takes every fifth
-/// frame until it knows the focal length; from then on that is the jobs' camera. Errors: those of
-/// PoseLoop.
+/// Our loop alone, of `options` camera, apart, find_focal, extended and turns: a FocalFinder takes
+/// every fifth frame until it knows the focal length; from then on that is the jobs' camera.
+/// Errors: those of PoseLoop.
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options);
 
 }  // namespace modar

@@ -19,7 +19,7 @@ constexpr float kPixels = kSide * kSide;
 
 constexpr int kRing = 2;  // pixels around a patch: one for the smoothing, one for the differences
 constexpr int kWide = kSide + 2 * kRing;
-using Surroundings = std::array<float, kWide * kWide>;
+using WidePatch = std::array<float, kWide * kWide>;
 
 void add_sums(Patch& patch) {
   for (int k = 0; k < kPatchPixels; ++k) {
@@ -48,10 +48,10 @@ void smooth(const float* from, int step, int first, int last, float* to) {
 /// Smooths about as much as a lens does, then differentiates. A template sharper than the frame is
 /// drawn aside by what lies on the patch's edge, each patch in its own direction: a constant error
 /// of the pose. Smoothing brought tracked corners from 0.057 to 0.016 px of the truth.
-void fill(const Surroundings& gray, Patch& patch) {
+void fill(const WidePatch& gray, Patch& patch) {
   constexpr int kAll = kWide * kWide;
-  Surroundings rows{};
-  Surroundings both{};
+  WidePatch rows{};
+  WidePatch both{};
   smooth(gray.data(), 1, 1, kAll - 1, rows.data());
   smooth(rows.data(), kWide, kWide, kAll - kWide, both.data());
   for (int v = 0; v < kSide; ++v) {
@@ -66,24 +66,13 @@ void fill(const Surroundings& gray, Patch& patch) {
   add_sums(patch);
 }
 
-/// False if the patch or its ring crosses the image border.
+/// The patch of a record in its level of the pattern's image.
 bool cut(const GrayImage& image, const TrackerPatchRecord& record, int level, Patch& patch) {
-  constexpr int kReach = kPatchHalf + kRing;
   const double grow = static_cast<double>(1 << level);
   const int column = static_cast<int>(record.x / (64.0 * grow));
   const int row = static_cast<int>(record.y / (64.0 * grow));
-  if (column < kReach || row < kReach || column >= image.width - kReach ||
-      row >= image.height - kReach) {
-    return false;
-  }
-  patch = {};
+  if (!cut_patch(image, column, row, patch)) return false;
   patch.centre = {(column + 0.5) * grow - 0.5, (row + 0.5) * grow - 0.5};
-  Surroundings gray;
-  for (int v = 0; v < kWide; ++v) {
-    std::copy_n(image.pixels + (row + v - kReach) * image.stride + column - kReach, kWide,
-                gray.begin() + v * kWide);
-  }
-  fill(gray, patch);
   return true;
 }
 
@@ -94,6 +83,23 @@ float sample_clamped(const GrayImage& image, float x, float y) {
 }
 
 }  // namespace
+
+bool cut_patch(const GrayImage& image, int column, int row, Patch& patch) {
+  constexpr int kReach = kPatchHalf + kRing;
+  if (column < kReach || row < kReach || column >= image.width - kReach ||
+      row >= image.height - kReach) {
+    return false;
+  }
+  patch = {};
+  patch.centre = {column, row};
+  WidePatch gray;
+  for (int v = 0; v < kWide; ++v) {
+    std::copy_n(image.pixels + (row + v - kReach) * image.stride + column - kReach, kWide,
+                gray.begin() + v * kWide);
+  }
+  fill(gray, patch);
+  return true;
+}
 
 PatchCache::PatchCache() {
   scratch_.reserve(kMaxPatches);
@@ -120,7 +126,7 @@ void PatchCache::motion_blur(const TrackedPattern& pattern, int level, const Pat
   const auto x0 = static_cast<float>((patch.centre.x + 0.5) / grow - 0.5) - kPatchHalf - kRing;
   const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - kRing;
   const int samples = std::clamp(static_cast<int>(std::ceil(glm::length(motion))), 2, kMaxSamples);
-  Surroundings gray{};
+  WidePatch gray{};
   for (int i = 0; i < samples; ++i) {
     const double time = (i + 0.5) / samples - 0.5;
     const float left = x0 + static_cast<float>(time * motion.x);
@@ -201,6 +207,14 @@ PatchNormalEquations equations_of(const Patch& p, const PatchSums& s, float tuke
 
 }  // namespace
 
+bool observe_patch_at(const Patch& patch, const PatchPlace& place, const GrayImage& image,
+                      const Kernels& kernels, float tukey, PatchNormalEquations& out) {
+  if (!inside(place, image)) return false;
+  out = equations_of(patch, kernels.patch_sums(patch.pixels, place, image.pixels, image.stride),
+                     tukey);
+  return true;
+}
+
 glm::vec2 displacement(const PatchNormalEquations& equations) {
   // A tenth of the trace: along an edge the displacement shrinks, across it by a tenth. By hand.
   const float damping = 0.1f * (equations.xx + equations.yy);
@@ -243,11 +257,7 @@ bool observe_patch(const PatchView& view, const PlaneMap& map, const Patch& patc
                          static_cast<float>(d[0].y),
                          static_cast<float>(d[1].x),
                          static_cast<float>(d[1].y)};
-  if (!inside(place, *view.image)) return false;
-  const PatchSums sums =
-      view.kernels->patch_sums(patch.pixels, place, view.image->pixels, view.image->stride);
-  out.equations = equations_of(patch, sums, tukey);
-  return true;
+  return observe_patch_at(patch, place, *view.image, *view.kernels, tukey, out.equations);
 }
 
 PoseJacobian pose_jacobian(const Camera& camera, const Pose& pose, const glm::dvec3& world,

@@ -141,6 +141,14 @@ PatchFit align_map(const TrackedPattern& pattern, const FrameView& frame, int fr
 
 // The parts, for refinement from features (pose_refinement.cpp).
 
+/// The patch around a pixel of any picture; false if it or its ring crosses the border.
+bool cut_patch(const GrayImage& image, int column, int row, Patch& patch);
+
+/// What a patch says of its displacement at a place of a picture; false if it does not lie inside.
+/// tukey: 1 minus the correlation at which its weight reaches zero.
+bool observe_patch_at(const Patch& patch, const PatchPlace& place, const GrayImage& image,
+                      const Kernels& kernels, float tukey, PatchNormalEquations& out);
+
 /// The displacement that the equations ask for, in template pixels; zero without weight. A trace of
 /// damping keeps it short along an edge, where a patch of a single edge knows nothing.
 glm::vec2 displacement(const PatchNormalEquations& equations);

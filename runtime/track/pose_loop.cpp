@@ -2,12 +2,17 @@
 #include "modar/pose_loop.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include "frame_tracker.hpp"
 #include "pattern_search.hpp"
 #include "print_judge.hpp"
 #include "runtime/platform/lap_clock.hpp"
+#include "surroundings.hpp"
 
 namespace modar {
 namespace {
@@ -21,6 +26,20 @@ using tracker::TrackedPattern;
 
 // Millions of instructions a frame from which a pattern can be brought to it and judged.
 constexpr int kJudgingBudget = 20;
+
+// Frames of a pattern that is not seen between looks where it should be: trades the time of a look,
+// as much as following takes, for how soon it is measured again.
+constexpr int kLookEvery = 4;
+
+/// A pose that followed from the surroundings, brought to the measured one over some frames.
+struct Return {
+  double share = 0;  ///< of the difference, that is left
+  double step = 0;   ///< of it, that goes in a frame
+  glm::dvec3 turn{};
+  glm::dvec3 way{};
+  double position_sigma = 0;
+  double rotation_sigma = 0;
+};
 
 }  // namespace
 
@@ -41,6 +60,12 @@ struct PoseLoop::State {
   tracker::DetectionCandidates candidates;
   int frames_to_search = 0;
   bool discard_found = false;  ///< what the running search finds is of before a reset
+  std::unique_ptr<tracker::Surroundings> surroundings;  ///< of the pattern `home`
+  std::size_t home = 0;
+  int frames_unseen = 0;
+  bool follows = false;  ///< the last frame's pose of it was of the surroundings
+  Return back;
+  std::optional<glm::dvec3> turn;  ///< of what the camera sees, since the last frame
 
   void step(const GrayImage& frame, TrackResult& result);
   void track_all(TrackResult& result);
@@ -53,6 +78,13 @@ struct PoseLoop::State {
   bool show(std::size_t i, const PrintJudge::Verdict& verdict, Detection& detection,
             TrackResult& result);
   bool rename(std::size_t from, std::size_t to, Detection& detection);
+  void extend(TrackResult& result);
+  Detection* choose_home(TrackResult& result);
+  [[nodiscard]] bool doubts(const Detection& seen) const;
+  bool follow(Detection& detection);
+  void see_again(const Pose& followed);
+  void start_return(const Detection& seen, const Detection& followed);
+  void go_on_returning(Detection& detection);
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -92,7 +124,12 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
     state->search =
         std::make_unique<tracker::PatternSearch>(camera, state->patterns, options.detect);
   }
+  if (options.extended) state->surroundings = std::make_unique<tracker::Surroundings>(camera);
   return std::unique_ptr<PoseLoop>(new PoseLoop(std::move(state)));
+}
+
+void PoseLoop::set_turn(const glm::dvec3& rotation) {
+  state_->turn = -rotation;
 }
 
 void PoseLoop::reset() {
@@ -100,6 +137,9 @@ void PoseLoop::reset() {
   state_->frames_to_search = 0;
   if (state_->sliced != nullptr) state_->sliced->cancel();
   state_->discard_found = state_->async != nullptr && !state_->async->idle();
+  if (state_->surroundings != nullptr) state_->surroundings->clear();
+  state_->follows = false;
+  state_->back = {};
 }
 
 Result<TrackResult> PoseLoop::step(const GrayImage& frame) {
@@ -136,8 +176,10 @@ bool PoseLoop::State::search_due(bool any_tracked) {
     recently = recently || (!track.tracked && lost);
   }
   --frames_to_search;
-  // While one is tracked, only patterns lost a moment ago are worth a search in every frame.
-  if (!missing || (any_tracked && !recently && frames_to_search > 0)) return false;
+  // While one is tracked, only patterns lost a moment ago are worth a search in every frame; while
+  // the surroundings say where one is, it is looked for there.
+  const bool waits = follows || (any_tracked && !recently);
+  if (!missing || (waits && frames_to_search > 0)) return false;
   if (async != nullptr && !async->idle()) return false;
   if (sliced != nullptr && !sliced->idle()) return false;
   frames_to_search = options.search_every;
@@ -171,6 +213,8 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
       accept(result);
     }
   }
+  if (surroundings != nullptr) extend(result);
+  turn.reset();
   for (const Track& track : tracks) {
     const Reason reason = track.tracked ? track.shown_reason : track.last_reason;
     if (progress(reason) > progress(result.reason)) result.reason = reason;
@@ -186,8 +230,9 @@ void PoseLoop::State::advance_search(TrackResult& result) {
   constexpr std::int64_t kTrackCost = 3'000'000;  // of a pattern; as much to bring a find here
   const auto tracked =
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.tracked; });
+  const std::int64_t extended = surroundings != nullptr ? 1 : 0;  // costs no more than a pattern
   const std::int64_t work =
-      std::int64_t{1'000'000} * options.budget - kFrameCost - kTrackCost * (tracked + 1);
+      std::int64_t{1'000'000} * options.budget - kFrameCost - kTrackCost * (tracked + extended + 1);
   if (sliced->advance(work, candidates, priorities)) accept(result);
 }
 
@@ -351,6 +396,143 @@ void PoseLoop::State::accept(TrackResult& result) {
     if (track.frames_since_lost > 0 || progress(reason) > progress(track.last_reason))
       track.last_reason = reason;
   }
+}
+
+/// Learns from a frame that shows the home pattern, or follows its pose in one that does not.
+void PoseLoop::State::extend(TrackResult& result) {
+  Detection* shown = choose_home(result);
+  Track& track = tracks[home];
+  // What covers a pattern draws the pose of the last patches aside: degrees, before it is lost.
+  // What the first features of one that comes back say of it is no better.
+  const bool was = follows;
+  const bool doubtful = shown != nullptr && (track.has_motion || was) && doubts(*shown);
+  Detection followed;
+  follows = (shown == nullptr || doubtful || was) && !track.homography_only && follow(followed);
+  if (shown != nullptr && !doubtful) {
+    if (follows) start_return(*shown, followed);
+    follows = false;
+    surroundings->learn(frame_tracker.frame(), shown->pose, shown->corners);
+    go_on_returning(*shown);
+    return;
+  }
+  back = {};
+  if (!follows) return;
+  if (doubtful) {
+    *shown = followed;
+    if (track.has_motion) track.pose = followed.pose;
+    track.has_motion = false;
+    return;
+  }
+  if (track.tracked && track.shown_reason == Reason::kOtherPrint) return;
+  if (!track.tracked && ++frames_unseen % kLookEvery == 0) see_again(followed.pose);
+  result.visible.push_back(followed);
+}
+
+/// The home pattern's detection in this frame, null if it is not shown. Another becomes home where
+/// it has none to lose.
+Detection* PoseLoop::State::choose_home(TrackResult& result) {
+  Detection* largest = nullptr;
+  double most = 0;
+  for (Detection& one : result.visible) {
+    if (patterns[home].index == one.pattern) return &one;
+    const glm::dvec2 a = one.corners[2] - one.corners[0];
+    const glm::dvec2 b = one.corners[3] - one.corners[1];
+    const double area = std::abs(a.x * b.y - a.y * b.x);
+    if (area <= most) continue;
+    most = area;
+    largest = &one;
+  }
+  if (largest == nullptr || follows || surroundings->ready()) return nullptr;
+  for (std::size_t i = 0; i < patterns.size(); ++i) {
+    if (patterns[i].index == largest->pattern) home = i;
+  }
+  surroundings->clear();
+  return largest;
+}
+
+/// Whether so little of the home pattern fits, or is in view, that its surroundings know better.
+bool PoseLoop::State::doubts(const Detection& seen) const {
+  // Shares of the patches in view that fit: what covers a pattern, or the little that the frame's
+  // edge leaves of it, gives poses that are off by degrees. Between the two, most of the
+  // surroundings have to contradict. Set by hand on `modar bench extended`.
+  constexpr double kFew = 0.5;
+  constexpr double kFewer = 0.8;
+  constexpr int kFewPatches = 80;
+  constexpr double kContradicted = 0.6;
+  const double share = 1.0 * seen.inliers / std::max(seen.matches, 1);
+  if (share < kFew) return true;
+  if (share >= kFewer && seen.inliers >= kFewPatches) return false;
+  return surroundings->agreement(frame_tracker.frame(), seen.pose) < kContradicted;
+}
+
+/// The home pattern's pose as its surroundings tell it.
+bool PoseLoop::State::follow(Detection& detection) {
+  if (!follows && !surroundings->ready()) return false;
+  tracker::ExtendedPose extended;
+  if (!surroundings->follow(frame_tracker.frame(), turn.has_value() ? &*turn : nullptr, extended)) {
+    return false;
+  }
+  detection.pattern = patterns[home].index;
+  detection.pose = extended.pose;
+  detection.extended = true;
+  detection.position_sigma = extended.position_sigma;
+  detection.rotation_sigma = extended.rotation_sigma;
+  const tracker::PlaneMap map = tracker::map_of_pose(patterns[home], camera, extended.pose);
+  return tracker::map_corners(patterns[home], map, detection.corners);
+}
+
+/// Looks where the surroundings say that the home pattern is, and tracks it if it is there.
+void PoseLoop::State::see_again(const Pose& followed) {
+  const TrackedPattern& pattern = patterns[home];
+  const tracker::PlaneMap map = tracker::map_of_pose(pattern, camera, followed);
+  if (!tracker::in_view(pattern, map, camera)) return;
+  Track next;
+  next.pose = followed;
+  PatchFit fit;
+  Detection detection;
+  if (!tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kFrame, next.pose,
+                       fit) ||
+      tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) <
+          tracker::kMinPercent ||
+      !frame_tracker.locate(pattern, next, detection)) {
+    return;
+  }
+  next.tracked = true;
+  next.again = true;
+  tracks[home] = next;
+}
+
+/// Largest way of a corner, pixels.
+static double way_of(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
+  double most = 0;
+  for (std::size_t i = 0; i < 4; ++i) most = std::max(most, glm::length(a[i] - b[i]));
+  return most;
+}
+
+void PoseLoop::State::start_return(const Detection& seen, const Detection& followed) {
+  constexpr double kFrames = 10;  // that a return takes at least
+  constexpr double kMostFrames = 40;
+  constexpr double kStep = 3.0;  // pixels by which it moves the corners in a frame
+  surroundings->correct(followed.pose, seen.pose);
+  back.turn = rotation_vector(followed.pose.rotation * glm::transpose(seen.pose.rotation));
+  back.way = followed.pose.translation - seen.pose.translation;
+  back.position_sigma = followed.position_sigma;
+  back.rotation_sigma = followed.rotation_sigma;
+  back.share = 1;
+  back.step = 1 / std::clamp(way_of(seen.corners, followed.corners) / kStep, kFrames, kMostFrames);
+}
+
+void PoseLoop::State::go_on_returning(Detection& detection) {
+  if (back.share <= 0) return;
+  Track shown;
+  shown.pose.rotation = rotation_matrix(back.share * back.turn) * detection.pose.rotation;
+  shown.pose.translation = detection.pose.translation + back.share * back.way;
+  if (frame_tracker.locate(patterns[home], shown, detection)) {
+    detection.extended = true;
+    detection.position_sigma = back.share * back.position_sigma;
+    detection.rotation_sigma = back.share * back.rotation_sigma;
+  }
+  back.share -= back.step;
 }
 
 }  // namespace modar

@@ -10,6 +10,7 @@
 //                         index over all patterns
 //   pattern_search.hpp    finds patterns in a frame, also on a thread of its own
 //   frame_tracker.hpp     tracks patterns from frame to frame
+//   surroundings.hpp      the pose from what stands around a pattern that is not seen
 // Others include the public headers only: modar/pose_loop.hpp drives all of it;
 // modar/tracker_features.hpp, pose.hpp, camera.hpp, pose_smoother.hpp and focal_finder.hpp offer
 // parts.

@@ -1,9 +1,10 @@
 // What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin:
 // each measured step lies between two writes to stdout. Frames are rendered from the bundle's own
 // pattern, so that nothing but the bundle is needed.
-// Usage: budget_probe track|search|clutter|sliced|render|open|memory BUNDLE [WIDTH HEIGHT [FRAMES
-// [BUDGET]]] search: frames that show the pattern; clutter: frames without it; sliced: both, within
-// a budget of so many million instructions a frame; render: by null_gl.cpp; memory: tracks and
+// Usage: budget_probe track|search|clutter|sliced|extended|render|open|memory BUNDLE [WIDTH HEIGHT
+// [FRAMES [BUDGET]]] search: frames that show the pattern; clutter: frames without it; sliced:
+// both, within a budget of so many million instructions a frame; extended: before a wall, which
+// alone the last quarter of the frames shows; render: by null_gl.cpp; memory: tracks and
 // draws, and prints what memory the process holds after each stage.
 #include <unistd.h>
 
@@ -116,6 +117,13 @@ Pose pose_at(double time) {
   return pose;
 }
 
+/// The pose of a picture eight times as large as the pattern, on a wall behind it.
+Pose behind(const Pose& pose) {
+  constexpr double kSize = 8;
+  constexpr double kDistance = 0.6;
+  return {pose.rotation, (pose.translation - kDistance * pose.rotation[2]) / kSize};
+}
+
 int run_frames(const std::string& what, const BundleView& bundle, int width, int height, int frames,
                int budget) {
   TrackerRecordView record;
@@ -126,7 +134,8 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
                           static_cast<std::ptrdiff_t>(record.header.width)};
   const Camera camera = default_camera(width, height);
   PoseLoopOptions options;
-  options.track = what == "track" || what == "sliced";
+  options.extended = what == "extended";
+  options.track = what == "track" || what == "sliced" || options.extended;
   if (what == "sliced") options.budget = budget;
   const auto loop = PoseLoop::create(bundle, camera, options);
   if (!loop) return give_up(to_line(loop.error()));
@@ -136,7 +145,10 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   TrackResult result;
   for (int i = 0; i < frames; ++i) {
     frame = options.track ? background : clutter(width, height, static_cast<std::uint32_t>(50 + i));
-    if (what != "clutter") draw(pattern, camera, pose_at(i / 30.0), numbers, frame);
+    const Pose pose = pose_at(i / 30.0);
+    if (options.extended) draw(background.view(), camera, behind(pose), numbers, frame);
+    const bool covered = options.extended && 4 * i >= 3 * frames;
+    if (what != "clutter" && !covered) draw(pattern, camera, pose, numbers, frame);
     mark("begin\n");
     const auto done = (*loop)->step(frame.view(), result);
     mark("end\n");

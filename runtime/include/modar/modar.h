@@ -105,6 +105,9 @@ typedef struct modar_pose {
   float corners[8];     /* x, y in pixels: top left, top right, bottom right, bottom left */
   float agreeing;       /* share of the pattern's textured cells in view that look like it, 0 to 1 */
   float likeness;       /* mean correlation of these cells, 0 to 1 */
+  int extended;         /* 1: it is hidden or out of the frame, and the pose follows from its surroundings, with these */
+  float position_sigma; /* standard deviations, half largest sides of the pattern, */
+  float rotation_sigma; /* and radians */
 } modar_pose;
 
 /* NULL where no pattern of the bundle can be tracked. */
@@ -118,6 +121,8 @@ typedef struct modar_tracker_options {
   double smooth_ms; /* takes the trembling out of resting poses, which may lag by so much; 0: off */
   int budget;       /* without async_search: ARMv7 instructions a frame may take, in millions, 12 or more: a search goes
                      * on over several frames, with the same results on every phone; 0: no limit */
+  int extended;     /* 1: learns what stands still around the largest pattern, and goes on from it while the pattern is
+                     * hidden or out of the frame; the camera has to move before */
 } modar_tracker_options;
 modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar_camera* camera,
                                          const modar_tracker_options* options, modar_error* error);
@@ -131,6 +136,9 @@ int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t strid
 /* The same with the frame's time, rising, which smoothing goes by; modar_tracker_step() counts 30 frames a second. */
 int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
                           modar_error* error);
+/* How the camera turned from the last frame to the next one, as a gyroscope says: a rotation vector, radians, in the
+ * camera's axes (x right, y down, z forward; a phone's sensors have others). Helps `extended`. */
+void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]);
 /* The pose of a pattern in the newest frame; answers its flag `visible`. */
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose);
 /* Why nothing is visible: "few matches", "lost by blur"...; "visible" where something is. */

@@ -7,6 +7,8 @@
 
 #include <memory>
 
+#include <glm/vec3.hpp>
+
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
 #include "modar/camera.hpp"
@@ -31,6 +33,10 @@ struct PoseLoopOptions {
   /// Smaller budgets find later, and lose fast motion while they search. Counted, not clocked: the
   /// same frames give the same results. 12 or more: the longest step takes 5, tracking a pattern 3.
   int budget = 0;
+  /// Learns what stands still around the pattern that shows largest, and goes on from it when the
+  /// pattern is hidden or leaves the frame: Detection::extended. Costs some 0.4 MB. The camera has
+  /// to move before: depth comes from motion.
+  bool extended = false;
 };
 
 /// Reads the patterns' tracker records and shapes (section types 258 and 261) from the bundle's
@@ -50,7 +56,11 @@ class PoseLoop {
   Result<TrackResult> step(const GrayImage& frame);
   /// The same into a result of the caller's, whose memory is reused.
   Result<void> step(const GrayImage& frame, TrackResult& result);
-  /// Forgets all tracks.
+  /// How the camera turned from the last frame to the next one, as a gyroscope says: a rotation
+  /// vector, radians, in the camera's axes (x right, y down, z forward; the axes of a phone's
+  /// sensors are others). Helps `extended`; not given, it is estimated.
+  void set_turn(const glm::dvec3& rotation);
+  /// Forgets all tracks, and the surroundings.
   void reset();
 
  private:

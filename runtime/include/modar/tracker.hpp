@@ -43,6 +43,12 @@ struct Detection {
   /// correlation, each 0 to 1; of a tracked pattern as the last 16 frames saw them.
   double agreeing = 0;
   double likeness = 0;
+  /// It is hidden or out of the frame: the pose follows from its surroundings, with these standard
+  /// deviations of its position (pattern units) and rotation (radians). Also while the pose is
+  /// brought back to a pattern that is seen again.
+  bool extended = false;
+  double position_sigma = 0;
+  double rotation_sigma = 0;
 };
 
 /// Milliseconds of the stages of one frame (wall clock of the calling thread).
