@@ -31,6 +31,12 @@ constexpr int kMissesOfSteady = 90;
 // Hits, and inverse depths over their standard deviation, from which a point is steady.
 constexpr int kSteadyHits = 8;
 constexpr double kSteadyDepth = 5.0;
+// Pixels of the level that it must have gone, and been seen where the pattern's motion has it: well
+// beyond kMaxOffset, so that what stays while the pattern trembles in a hand is not taken for it.
+constexpr double kSteadyTravel = 5.0;
+// Hits from which a point is used that was learned without the pattern: a turning camera shows no
+// depths, and soon none of the older points.
+constexpr int kUsableHits = 3;
 // Steady points that must be seen, to begin and to go on.
 constexpr int kLeastPoints = 8;
 constexpr int kBridged = 10;
@@ -208,7 +214,7 @@ MapFit linearise(const Camera& camera, const FrameView& frame, std::span<const M
   for (const MapPoint& point : points) {
     Projection at;
     MapPointEquations one;
-    if (!place(camera, point, pose, level, at) ||
+    if (!point.usable() || !place(camera, point, pose, level, at) ||
         !observe(frame, point, at, level, glm::dvec2(0.0), tukey, one.patch)) {
       continue;
     }
@@ -317,8 +323,12 @@ void refine_depth(const Projection& at, const PatchNormalEquations& equations, M
 }  // namespace
 
 bool MapPoint::steady() const {
-  return hits >= kSteadyHits &&
+  return hits >= kSteadyHits && travel >= kSteadyTravel &&
          inverse_depth * inverse_depth * information >= kSteadyDepth * kSteadyDepth;
+}
+
+bool MapPoint::usable() const {
+  return steady() || (!of_pattern && hits >= kUsableHits && travel >= kSteadyTravel);
 }
 
 Surroundings::Surroundings(const Camera& camera) : camera_(camera) {
@@ -379,7 +389,10 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
   for (const MapPoint& point : points_) {
     Projection at;
     if (coarse_points_.size() == coarse_points_.capacity()) break;
-    if (!point.in_view || point.misses > 0 || !place(camera_, point, now_, coarse_, at)) continue;
+    if (!point.usable() || !point.in_view || point.misses > 0 ||
+        !place(camera_, point, now_, coarse_, at)) {
+      continue;
+    }
     const glm::dvec2 pixel = glm::floor(at.pixel + 0.5);
     MapPoint& seen = coarse_points_.emplace_back();
     if (!cut_patch(before_image_, static_cast<int>(pixel.x), static_cast<int>(pixel.y),
@@ -392,6 +405,9 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
     seen.ray = {(ideal.x - camera_.cx) / camera_.fx, (ideal.y - camera_.cy) / camera_.fy};
     seen.inverse_depth = point.inverse_depth / at.direction.z;
     seen.information = point.information * at.direction.z * at.direction.z;
+    seen.of_pattern = false;
+    seen.hits = kUsableHits;
+    seen.travel = kSteadyTravel;
   }
   const glm::dmat3 expected = pose.rotation;
   const Pose start = pose;
@@ -473,6 +489,7 @@ void Surroundings::measure(const FrameView& frame, const Pose& pose) {
       point.offset = glm::dvec2(0.0);
     }
     point.place = at.pixel + point.offset;
+    if (hit) point.travel = std::max(point.travel, glm::length(point.place - point.origin));
     point.hits += hit ? 1 : 0;
     point.misses = hit ? 0 : point.misses + 1;
     if (point.misses > (point.steady() ? kMissesOfSteady : kMissesOfNew)) {
@@ -575,7 +592,7 @@ bool Surroundings::add_point(const FrameView& frame, const Pose& pose, int colum
     point.anchor_position = position_variance_;
     point.anchor_rotation = rotation_variance_;
   }
-  point.place = pixel;
+  point.place = point.origin = pixel;
   point.in_view = true;
   MapPoint* slot = free_slot();
   if (slot == nullptr) return false;

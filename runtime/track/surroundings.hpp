@@ -33,12 +33,17 @@ struct MapPoint {
   double anchor_rotation = 0;
   glm::dvec2 place{};   ///< pixel of the level where it was seen last, or should be
   glm::dvec2 offset{};  ///< of where it was seen from where it should be
+  double travel = 0;    ///< most pixels of the level that it was seen away from where it began
   int hits = 0;         ///< frames that showed it where it should be
   int misses = 0;       ///< frames in a row that did not
   bool in_view = false;
   bool of_pattern = true;  ///< learned while the pattern was seen
-  /// Motion has shown its depth, and that it keeps its place.
+  glm::dvec2 origin{};     ///< pixel of the level where it began
+  /// Motion has shown its depth, and that it goes with the pattern.
   [[nodiscard]] bool steady() const;
+  /// Whether poses may follow from it: steady, or learned since the pattern was seen and gone
+  /// along.
+  [[nodiscard]] bool usable() const;
 };
 
 /// What a point says of the pose: its patch's normal equations, and the Jacobians of its
