@@ -1,6 +1,7 @@
 // Reads the record line by line.
 #include "gyroscope.hpp"
 
+#include <algorithm>
 #include <string_view>
 
 #include "decimal.hpp"

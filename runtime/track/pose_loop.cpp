@@ -230,7 +230,7 @@ void PoseLoop::State::advance_search(TrackResult& result) {
   constexpr std::int64_t kTrackCost = 3'000'000;  // of a pattern; as much to bring a find here
   const auto tracked =
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.tracked; });
-  const std::int64_t extended = surroundings != nullptr ? 1 : 0;  // costs no more than a pattern
+  const std::int64_t extended = follows ? 1 : 0;  // costs no more than a pattern
   const std::int64_t work =
       std::int64_t{1'000'000} * options.budget - kFrameCost - kTrackCost * (tracked + extended + 1);
   if (sliced->advance(work, candidates, priorities)) accept(result);

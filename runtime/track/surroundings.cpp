@@ -284,11 +284,11 @@ double step_pose(const std::vector<MapPointEquations>& equations, const glm::dma
 /// Follows the patch to where the frame shows it, from where it was seen beside its place before.
 bool find_offset(const FrameView& frame, const Projection& at, int level, MapPoint& point,
                  PatchNormalEquations& equations) {
-  constexpr int kSteps = 3;
+  constexpr int kFindSteps = 3;
   constexpr double kSettled = 0.3;  // pixels
   constexpr double kLost = 3.0;     // a patch reaches no further
   glm::dvec2 offset = point.offset;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kFindSteps; ++step) {
     if (!observe(frame, point, at, level, offset, 1.0f, equations)) return false;
     const glm::dvec2 way = at.warp * glm::dvec2(displacement(equations));
     offset += way;
@@ -380,7 +380,7 @@ Pose Surroundings::predict(const glm::dvec3* turn) const {
 }
 
 void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, Pose& pose) {
-  constexpr int kSteps = 5;
+  constexpr int kCoarseSteps = 5;
   constexpr double kConverged = 0.1;
   constexpr int kLeast = 6;
   if (static_cast<std::size_t>(coarse_) >= frame.pyramid.size() || known_ == 0) return;
@@ -412,7 +412,7 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
   const glm::dmat3 expected = pose.rotation;
   const Pose start = pose;
   PoseSystem system;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kCoarseSteps; ++step) {
     const MapFit fit = linearise(camera_, frame, coarse_points_, coarse_, step == 0 ? 1.0f : 0.7f,
                                  pose, equations_);
     if (fit.visible < kLeast) {
@@ -431,7 +431,7 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
 
 bool Surroundings::align_fine(const FrameView& frame, const glm::dvec3* turn, Pose& pose,
                               ExtendedPose& out) {
-  constexpr int kSteps = 8;
+  constexpr int kFineSteps = 8;
   constexpr double kConverged = 0.03;
   constexpr double kLeastShare = 0.35;
   constexpr double kPlaced = 0.8;  // pixels of the level
@@ -439,7 +439,7 @@ bool Surroundings::align_fine(const FrameView& frame, const glm::dvec3* turn, Po
   PoseSystem system;
   MapFit fit;
   double moved = 0;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kFineSteps; ++step) {
     fit = linearise(camera_, frame, points_, level_, step == 0 ? 1.0f : 0.7f, pose, equations_);
     if (fit.inliers < kLeastPoints && step > 1) return false;
     moved = step_pose(equations_, turn != nullptr ? &expected : nullptr, step > 0, pose, system);

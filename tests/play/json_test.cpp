@@ -71,6 +71,18 @@ TEST(JsonLines, TheHomographyTakesTheUnitSquareToTheCorners) {
   EXPECT_TRUE(json::parse(frame_line(report, {}, true))["visible"][0]["homography"].is_null());
 }
 
+TEST(JsonLines, AnExtendedPoseSaysSo) {
+  FrameReport report = seen_frame();
+  EXPECT_FALSE(json::parse(frame_line(report, {}))["visible"][0].contains("extended"));
+  report.visible[0].extended = true;
+  report.visible[0].position_sigma = 0.25;
+  report.visible[0].rotation_sigma = 0.125;
+  const json seen = json::parse(frame_line(report, {}))["visible"][0];
+  EXPECT_EQ(seen["extended"], true);
+  EXPECT_EQ(seen["position_sigma"], 0.25);
+  EXPECT_EQ(seen["rotation_sigma"], 0.125);
+}
+
 TEST(JsonLines, AFrameWithoutPatternSaysWhyAndStaysJson) {
   FrameReport report;
   report.time_s = std::numeric_limits<double>::quiet_NaN();

@@ -65,6 +65,14 @@ TEST(Options, TheFocalLengthIsMeasuredOnlyWhereNobodyStatesIt) {
   EXPECT_EQ(code_of({"a.modar", "--golden", "r", "--find-focal"}), "usage.conflict");
 }
 
+TEST(Options, AGyroscopeHelpsExtendedPosesOnly) {
+  const auto options = parse({"a.modar", "--input", "v", "--extended", "--gyro", "turns.txt"});
+  ASSERT_TRUE(options);
+  EXPECT_TRUE(options->extended);
+  EXPECT_EQ(options->gyro, "turns.txt");
+  EXPECT_EQ(code_of({"a.modar", "--input", "v", "--gyro", "turns.txt"}), "usage.conflict");
+}
+
 TEST(Options, TurntableNeedsAPlaceAndNoInput) {
   const auto options = parse({"a.modar", "--turntable", "12", "--out", "d", "--size", "320x200"});
   ASSERT_TRUE(options);

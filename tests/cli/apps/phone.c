@@ -49,9 +49,10 @@ static int check_search_apart(const modar_bundle* bundle, const modar_camera* ca
   while (!pose.visible && ++frames < 4000) {
     NEED(modar_tracker_step(tracker, frame, (size_t)camera->width, &error) == 0);
     modar_tracker_pose(tracker, 0, &pose);
+    if (options.extended) modar_tracker_turn(tracker, (const double[3]){0.0, 0.0, 0.0});
     if (options.async_search) nanosleep(&pause, NULL);
   }
-  NEED(pose.visible);
+  NEED(pose.visible && !pose.extended && pose.position_sigma == 0.0f);
   modar_tracker_reset(tracker);
   NEED(!modar_tracker_pose(tracker, 0, &pose) && !pose.shown);
   modar_tracker_destroy(tracker);
@@ -96,7 +97,7 @@ int main(int argc, char** argv) {
   printf("pick %g %g %g %g\n", hit.distance, hit.point[0], hit.point[1], hit.point[2]);
   modar_tracker_options apart = {.size = sizeof apart, .async_search = 1};
   check_search_apart(bundle, &camera, frame, apart);
-  modar_tracker_options bounded = {.size = sizeof bounded, .budget = 12};
+  modar_tracker_options bounded = {.size = sizeof bounded, .budget = 12, .extended = 1};
   const int frames = check_search_apart(bundle, &camera, frame, bounded);
   bounded.budget = 0;
   NEED(frames > check_search_apart(bundle, &camera, frame, bounded) && frames < 30);
