@@ -26,7 +26,7 @@ TEST(Gyroscope, NamesTheLineThatItCannotRead) {
     EXPECT_EQ(turns.error().code, "gyro.line");
     EXPECT_EQ(turns.error().where, (folder / "turns.txt") + ":2");
   }
-  EXPECT_EQ(read_gyroscope(folder / "none.txt").error().exit_code, ExitCode::kIo);
+  EXPECT_EQ(read_gyroscope(folder / "none.txt").error().exit, ExitCode::kIo);
 }
 
 }  // namespace
