@@ -143,11 +143,13 @@ Result<ShapedPicture> load_shaped(const std::string& path, double width_mm,
   if (request.kind == ShapeRequest::Kind::kBox) return load_box(path, request);
   ShapedPicture out;
   MODAR_ASSIGN(out.picture, load_pattern(path, out.shrunk));
-  out.width_mm = width_mm > 0 ? width_mm : png_width_mm(path);
   ShapeRequest told = request;
   if (request.flat() && is_target_file(path)) {
     MODAR_ASSIGN(told, target_shape(path));
   }
+  // Diameter and arc tell the width: what the file states may be a program's default.
+  const bool told_width = told.top_mm > 0 && told.arc_deg > 0;
+  out.width_mm = width_mm > 0 ? width_mm : told_width ? 0 : png_width_mm(path);
   MODAR_ASSIGN(out.section,
                shape_section(told, out.picture.width, out.picture.height, out.width_mm));
   return out;

@@ -44,8 +44,9 @@ struct ShapedPicture {
 };
 
 /// Reads a pattern's picture, or the pictures of a box side by side in one. width_mm: 0: what the
-/// file states. Errors: those of load_pattern(), shape_section() and target_shape(); kUsage
-/// "pattern.shape" where a picture has not the proportions of its side of the box.
+/// shape tells, else what the file states. Errors: those of load_pattern(), shape_section() and
+/// target_shape(); kUsage "pattern.shape" where a picture has not the proportions of its side of
+/// the box.
 Result<ShapedPicture> load_shaped(const std::string& path, double width_mm,
                                   const ShapeRequest& request);
 
