@@ -11,6 +11,7 @@
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/report.hpp"
+#include "bake/texture/atlas.hpp"
 #include "bake/texture/texture.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/error.hpp"
@@ -58,7 +59,8 @@ struct BakeRequest {
   std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
   /// Of detail a chunk at most, the finest counted: halving ends before for all but huge chunks.
   std::uint32_t levels = kMaxLevels;
-  bool occlusion = true;           ///< measure and store it; not beside int16 positions
+  bool occlusion = true;  ///< measure and store it; not beside int16 positions
+  AtlasMode atlas = AtlasMode::kWhereItPays;
   bool topology = false;           ///< measure and state each model's
   std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
   std::string device;              ///< profile that it is planned for; empty: none

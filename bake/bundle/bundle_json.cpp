@@ -62,6 +62,18 @@ const char* max_error_unit(const MaxError& error) {
   return "metres";
 }
 
+const char* atlas_name(AtlasMode mode) {
+  switch (mode) {
+    case AtlasMode::kAlways:
+      return "always";
+    case AtlasMode::kNever:
+      return "never";
+    case AtlasMode::kWhereItPays:
+      break;
+  }
+  return "where it pays";
+}
+
 const char* positions_name(const BakeRequest& request) {
   if (!request.positions) return "auto";
   return *request.positions == PositionKind::kHalf ? "half" : "int16";
@@ -236,6 +248,7 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
                         {"occlusion", request.occlusion},
                         {"shadows", request.shadows},
                         {"topology", request.topology},
+                        {"atlas", atlas_name(request.atlas)},
                         {"effort", static_cast<int>(request.textures.effort)},
                         {"perceptual", request.textures.perceptual},
                         {"max_texture", request.textures.max_side},

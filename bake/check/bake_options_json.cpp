@@ -125,6 +125,7 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   if (loop.validate()) request.loop = loop;
   // Of bundles that were baked before there was any.
   request.occlusion = request.shadows = false;
+  request.atlas = AtlasMode::kNever;
   take(options, "occlusion", request.occlusion);
   take(options, "shadows", request.shadows);
   take(options, "topology", request.topology);
@@ -142,6 +143,10 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   take(options, "positions", word);
   if (word == "half") request.positions = PositionKind::kHalf;
   if (word == "int16") request.positions = PositionKind::kInt16;
+  word.clear();
+  take(options, "atlas", word);
+  if (word == "always") request.atlas = AtlasMode::kAlways;
+  if (word == "where it pays") request.atlas = AtlasMode::kWhereItPays;
 }
 
 }  // namespace modar

@@ -32,6 +32,9 @@ struct TriMesh {
   Array<std::uint32_t> source_positions;
   Array<glm::vec3> normals;  ///< unit length
   Array<glm::dvec2> uvs;
+  /// Where make_atlases() moved uvs: those on the pictures before, in the same unit (times the
+  /// longer side of the texture: texels), so that neighbours on one picture are still neighbours.
+  Array<glm::dvec2> picture_uvs;
   Array<glm::u8vec4> colours;
   Array<std::uint8_t> occlusion;  ///< see measure_occlusion(); only where it was measured
   Array<std::array<std::uint32_t, 3>> triangles;

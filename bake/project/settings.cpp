@@ -108,6 +108,11 @@ constexpr Setting kSettings[] = {
        request.topology = value == "true";
        return Result<void>();
      }},
+    {"atlas", Kind::kTruth, Part::kModel,
+     [](const std::string& value, BakeRequest& request) {
+       request.atlas = value == "true" ? AtlasMode::kAlways : AtlasMode::kNever;
+       return Result<void>();
+     }},
     {"occlusion", Kind::kTruth, Part::kModel,
      [](const std::string& value, BakeRequest& request) {
        request.occlusion = value == "true";

@@ -180,16 +180,20 @@ TextureSize texture_size(TextureSize source, const TextureOptions& options) {
 
 Result<Texture> bake_texture(const std::string& path, const TextureOptions& options,
                              Report& report) {
+  StageTimer timer(report, "texture.read");
+  MODAR_ASSIGN(const RgbaImage source, read_image(path));
+  timer.done(1, pixel_count(source));
+  return bake_texture(source, path, options, report);
+}
+
+Result<Texture> bake_texture(const RgbaImage& source, const std::string& path,
+                             const TextureOptions& options, Report& report) {
   if (options.max_side == 0 || options.max_side > kMaxTextureSide) {
     return fail(
         ExitCode::kUsage, "texture.max-side", std::to_string(options.max_side),
         "a texture's greatest side must lie between 1 and " + std::to_string(kMaxTextureSide),
         "choose another");
   }
-  StageTimer read_timer(report, "texture.read");
-  MODAR_ASSIGN(const RgbaImage source, read_image(path));
-  read_timer.done(1, pixel_count(source));
-
   StageTimer mip_timer(report, "texture.mips");
   Texture texture;
   texture.name = file_name(path);

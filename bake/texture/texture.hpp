@@ -73,5 +73,8 @@ TextureSize texture_size(TextureSize source, const TextureOptions& options);
 /// read_image() and write_png(); kUsage "texture.max-side".
 Result<Texture> bake_texture(const std::string& path, const TextureOptions& options,
                              Report& report);
+/// The same from an image; `path` is what it is called.
+Result<Texture> bake_texture(const RgbaImage& source, const std::string& path,
+                             const TextureOptions& options, Report& report);
 
 }  // namespace modar

@@ -19,7 +19,12 @@ constexpr std::uint32_t kCoverageSide = 1024;
 std::uint32_t use_of(const std::string& path, bool repeat, TextureUses& textures) {
   const auto next = static_cast<std::uint32_t>(textures.uses.size());
   const auto [place, added] = textures.index.try_emplace({path, repeat}, next);
-  if (added) textures.uses.push_back({path, repeat, make_coverage(kCoverageSide, kCoverageSide)});
+  if (added) {
+    TextureUse& use = textures.uses.emplace_back();
+    use.path = path;
+    use.repeat = repeat;
+    use.coverage = make_coverage(kCoverageSide, kCoverageSide);
+  }
   return place->second;
 }
 
@@ -84,6 +89,9 @@ std::vector<std::uint32_t> collect_textures(const TriMesh& mesh, TextureUses& te
     const std::string& map = mesh.materials[m].diffuse_map;
     if (shown[m] && !map.empty()) uses[m] = use_of(map, repeats[m], textures);
   }
+  for (std::uint32_t u = 0; u < textures.uses.size(); ++u) {
+    if (std::find(uses.begin(), uses.end(), u) != uses.end()) ++textures.uses[u].meshes;
+  }
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const std::uint32_t use = uses[mesh.triangle_material[t]];
     if (use == kNone) continue;
@@ -130,34 +138,53 @@ std::uint32_t plan_max_side(std::span<const TexturePlan> textures, const Texture
   return smaller.max_side;
 }
 
+Result<std::uint32_t> affordable_side(const TextureUses& textures, const TextureOptions& options,
+                                      std::uint64_t budget) {
+  if (budget == 0) return options.max_side;
+  std::vector<TexturePlan> files;
+  std::vector<TexturePlan> pages;
+  for (const TextureUse& use : textures.uses) {
+    if (use.replaced) continue;
+    if (use.image) {
+      pages.push_back({use.image->width, use.image->height, !is_opaque(*use.image)});
+    } else {
+      MODAR_ASSIGN(const RgbaImage image, read_image(use.path));
+      files.push_back({image.width, image.height, !is_opaque(image)});
+    }
+  }
+  const std::uint64_t taken = planned_bytes(pages, options);
+  return plan_max_side(files, options, budget > taken ? budget - taken : 0);
+}
+
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,
                                                   BundleContent& content, Report& report) {
-  if (budget != 0) {
-    std::vector<TexturePlan> plans;
-    for (const TextureUse& use : textures.uses) {
-      MODAR_ASSIGN(const RgbaImage image, read_image(use.path));
-      plans.push_back({image.width, image.height, !is_opaque(image)});
-    }
-    options.max_side = plan_max_side(plans, options, budget);
-  }
+  const std::uint32_t page_side = options.max_side;
+  MODAR_ASSIGN(const std::uint32_t file_side, affordable_side(textures, options, budget));
   std::vector<Texture> baked;
-  for (const TextureUse& use : textures.uses) {
+  std::vector<std::size_t> numbers;  // of their uses
+  for (std::size_t i = 0; i < textures.uses.size(); ++i) {
+    const TextureUse& use = textures.uses[i];
+    if (use.replaced) continue;
     options.repeat = use.repeat;
     options.coverage = use.coverage.full ? nullptr : &use.coverage;
-    MODAR_ASSIGN(Texture texture, bake_texture(use.path, options, report));
+    options.max_side = use.image ? page_side : file_side;
+    MODAR_ASSIGN(Texture texture, use.image ? bake_texture(*use.image, use.path, options, report)
+                                            : bake_texture(use.path, options, report));
     baked.push_back(std::move(texture));
+    numbers.push_back(i);
   }
   const std::vector<std::size_t> first = first_identical(baked);
-  std::vector<TextureOutcome> outcomes(baked.size());
+  std::vector<TextureOutcome> outcomes(textures.uses.size());
   for (std::size_t i = 0; i < baked.size(); ++i) {
+    TextureOutcome& outcome = outcomes[numbers[i]];
     if (first[i] != i) {
-      outcomes[i] = outcomes[first[i]];
+      outcome = outcomes[numbers[first[i]]];
     } else if (baked[i].constant) {
-      outcomes[i].constant = true;
-      outcomes[i].rgba = baked[i].constant_rgba;
+      outcome.constant = true;
+      outcome.rgba = baked[i].constant_rgba;
     } else {
-      outcomes[i] = append_texture(baked[i], content);
+      outcome = append_texture(baked[i], content);
     }
   }
   return outcomes;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -25,6 +26,9 @@ struct TextureUse {
   std::string path;
   bool repeat = false;
   CoverageMask coverage;
+  std::uint32_t meshes = 0;                ///< that show it
+  std::shared_ptr<const RgbaImage> image;  ///< a page that make_atlases() drew; null: the file
+  bool replaced = false;                   ///< by such pages: not baked
 };
 
 /// All uses of a bundle, in the order in which the models name them. An image that is used twice in
@@ -56,6 +60,12 @@ std::uint64_t planned_bytes(std::span<const TexturePlan> textures, const Texture
 std::uint32_t plan_max_side(std::span<const TexturePlan> textures, const TextureOptions& options,
                             std::uint64_t budget);
 
+/// The greatest side under which all files of the uses fit into `budget` bytes beside the pages of
+/// atlases, which keep their sides; options.max_side where the budget is 0. Errors: those of
+/// read_image().
+Result<std::uint32_t> affordable_side(const TextureUses& textures, const TextureOptions& options,
+                                      std::uint64_t budget);
+
 /// What became of a use: a texture of the bundle, or one colour that stands for it.
 struct TextureOutcome {
   std::uint32_t texture = kNone;
@@ -66,7 +76,7 @@ struct TextureOutcome {
 
 /// Bakes each use once, keeps identical results once, folds constant ones to their colour. budget:
 /// bytes that all of them together may take on the GPU, 0: any; the greatest side is lowered for
-/// it. Errors: those of bake_texture().
+/// it, but for pages of an atlas, which keep theirs. Errors: those of bake_texture().
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,
                                                   BundleContent& content, Report& report);

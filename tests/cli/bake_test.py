@@ -1,4 +1,5 @@
 """`modar bake` and `modar check`: the same bytes always, errors that help, nothing half-written."""
+import json
 import os
 import shutil
 import unittest
@@ -192,6 +193,50 @@ class Bake(ProgramTest):
         shutil.copy(POTTERY.parent / "pottery.png", self.folder)
         report = self.modar_json("bake", "--model", "a.obj", "b.obj", "--no-ao", "--max-texture", 64, "-o", "ab.modar")
         self.assertEqual(len(report["bundle"]["textures"]), 1)
+
+    def test_partly_shown_pictures_share_a_page(self):
+        # A bent sheet in two materials, each of which shows a quarter of its picture.
+        side = 9
+        lines = ["mtllib two.mtl"]
+        for y in range(side):
+            for x in range(side):
+                lines += [f"v {x} {y} {abs(x - 4) * 0.5}", f"vt {0.1 + x / 16} {0.2 + y / 16}"]
+        for m in range(2):
+            lines.append(f"usemtl m{m}")
+            for y in range(4 * m, 4 * m + 4):
+                for x in range(side - 1):
+                    a, b = y * side + x + 1, (y + 1) * side + x + 1
+                    lines.append(f"f {a}/{a} {a + 1}/{a + 1} {b + 1}/{b + 1} {b}/{b}")
+        sheets = self.folder / "two.obj"
+        sheets.write_text("\n".join(lines) + "\n")
+        (self.folder / "two.mtl").write_text("newmtl m0\nKd 1 1 1\nmap_Kd cover.png\nnewmtl m1\nKd 1 1 1\nmap_Kd game.png\n")
+        for name in ("cover.png", "game.png"):
+            shutil.copy(COVER.parent / name, self.folder)
+
+        def bake(*options):
+            out = self.folder / f"two{len(options)}.modar"
+            report = self.modar_json("bake", "--model", sheets, "--no-ao", "--max-texture", 512, *options, "-o", out)
+            return out, report["bundle"], [f for f in report["findings"] if f["id"] == "texture.atlas"]
+
+        out, together, said = bake()
+        out_apart, apart, nothing = bake("--no-atlas")
+        self.assertEqual([t["name"] for t in together["textures"]], ["two-atlas"])
+        self.assertEqual(len(apart["textures"]), 2)
+        self.assertEqual([m["chunks"] for m in together["models"] + apart["models"]], [1, 2])
+        self.assertLess(3 * together["textures"][0]["bytes"], 2 * sum(t["bytes"] for t in apart["textures"]))
+        self.assertEqual([f["severity"] for f in said], ["info"])
+        self.assertEqual(nothing, [])
+        # Beside a renderer of the source's own pictures, and baked again as the bundle states it.
+        looks = []
+        for bundle in (out, out_apart):
+            done = self.modar("check", bundle, "--source", sheets, "--visual", self.folder / "looks", "--json")
+            checked = json.loads(done.stdout)
+            self.assertTrue(checked["source"]["models"][0]["same_bytes"])
+            self.assertEqual(checked["source"]["different"], [])
+            looks.append(checked["looks"][0])
+        self.assertGreater(looks[0]["ssim_worst"], looks[1]["ssim_worst"] - 0.01)
+        self.assertLess(looks[0]["delta_e_worst"], looks[1]["delta_e_worst"] + 0.5)
+        self.assert_fails(self.modar("bake", "--model", sheets, "--atlas", "--no-atlas", "-o", out), 1, "atlas")
 
     def test_a_progress_bar_stays_out_of_pipes(self):
         done = self.modar("bake", "--model", POTTERY, "--no-lods", "--no-ao", "-o", self.folder / "a.modar")
