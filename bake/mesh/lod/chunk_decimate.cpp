@@ -97,6 +97,14 @@ class RemovedVertexMap {
 
   /// Greatest of uv_shift_of() of the vertices on the triangle.
   [[nodiscard]] double uv_shift(std::uint32_t face) const { return uv_shifts_[face]; }
+  /// The same, if they were mapped to the nearest of some other triangles (at least one).
+  [[nodiscard]] double uv_shift_on(std::uint32_t face, std::span<const KeptTriangle> faces) const {
+    double greatest = 0;
+    for (std::uint32_t v = first_[face]; v != kNoIndex; v = next_[v]) {
+      greatest = std::max(greatest, uv_shift_of(vertices_, static_cast<std::uint16_t>(v), faces));
+    }
+    return greatest;
+  }
 
  private:
   ChunkVertices vertices_;
@@ -114,9 +122,6 @@ constexpr double kShiftWeight = 0.25;
 /// Weight of the squared length of a rim's edge in the quadrics, beside the areas of triangles:
 /// keeps the outline. Set by hand.
 constexpr double kRimWeight = 1.0;
-/// Factor on the prices of collapses that shift textures far: the least of them (a slide of a
-/// hundredth of a chunk) is 1e-10, the greatest of the others 10.
-constexpr double kLatePrice = 1e12;
 
 /// Sum of the squared distances from planes, each weighted by its triangle's area (Garland and
 /// Heckbert): p^T A p + 2 b p + c.
@@ -407,7 +412,7 @@ class Decimator {
     if (shift > limits_.max_uv_shift) return std::nullopt;
     const double slide = shift * limits_.length_of_uv;
     price += kShiftWeight * quadrics_[v].area * slide * slide / root;
-    return shift > limits_.early_uv_shift ? price * kLatePrice : price;
+    return price;
   }
 
   /// Have v and u other common neighbours than those of the triangles between them, or no triangle
@@ -457,14 +462,20 @@ class Decimator {
     });
   }
 
-  /// The shift that the collapse may lead to: that of v, beside what its triangles are off by.
+  /// The shift that the collapse leads to at v and the vertices that its triangles stand for; a
+  /// bound on it where that is allowed: that of v, beside what its triangles are off by.
   double shift_after(std::uint16_t v, std::uint16_t u) {
     double before = 0;
     around(v, [&](std::uint32_t t, std::uint16_t, std::uint16_t) {
       before = std::max(before, removed_.uv_shift(t));
     });
     collect(v, u);
-    return before + uv_shift_of(vertices_, v, kept_);
+    double shift = uv_shift_of(vertices_, v, kept_);
+    if (before + shift <= limits_.max_uv_shift) return before + shift;
+    around(v, [&](std::uint32_t t, std::uint16_t, std::uint16_t) {
+      shift = std::max(shift, removed_.uv_shift_on(t, kept_));
+    });
+    return shift;
   }
 
   /// paired: the twin's collapse follows.

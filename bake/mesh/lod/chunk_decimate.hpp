@@ -25,10 +25,8 @@ struct DecimateLimits {
   /// No collapse whose vertex lies farther from the planes that it stands for (root mean square,
   /// weighted by area).
   double max_error = 0;
-  /// No collapse that may shift the uv of a removed vertex by more.
+  /// No collapse that shifts the uv of a removed vertex by more.
   double max_uv_shift = 0;
-  /// Those that may shift it by more than this come after all others.
-  double early_uv_shift = 0;
   /// Length on the surface that a unit of uv covers: the price of a collapse counts both.
   double length_of_uv = 0;
   /// Stops at so few triangles.
