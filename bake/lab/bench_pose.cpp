@@ -55,6 +55,9 @@ void add_band(const PoseBenchRow& own, const PoseBenchRow* reference, const std:
       add("worst_px", [](const PoseBenchRow& row) { return row.worst_px; });
     }
     add("error_px", [](const PoseBenchRow& row) { return row.error_px; });
+    if (own.shown_px > 0) {
+      add("shown_error_px", [](const PoseBenchRow& row) { return row.shown_px; });
+    }
   }
   if (own.sequence) add("jitter_px", [](const PoseBenchRow& row) { return row.jitter_px; });
   add("cpu_ms", [](const PoseBenchRow& row) { return row.ms; });

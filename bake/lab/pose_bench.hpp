@@ -36,6 +36,7 @@ struct PoseBenchRow : PoseFigures {
   std::string method;                  ///< "paper", "ours" or "sift"
   bool sequence = false;               ///< frames followed each other and were tracked
   bool detailed = false;               ///< P@5, P@15 and the greatest error are printed, too
+  double shown_px = 0;                 ///< of curved patterns: see bench_shapes(); 0: not measured
   double ms = 0;                       ///< thread-CPU milliseconds of a frame, mean
   double stages_ms[4] = {0, 0, 0, 0};  ///< wall time: detect, describe, match, homography
 };

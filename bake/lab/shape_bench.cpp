@@ -6,6 +6,8 @@
 #include <memory>
 #include <numbers>
 
+#include <glm/geometric.hpp>
+
 #include "bake/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
@@ -92,6 +94,30 @@ Result<ShapedPattern> bake_on(const ShapeRequest& shape, const PoseBenchOptions&
   return pattern;
 }
 
+/// Mean distance in the frame of the picture's places that face the camera, between two poses.
+double shown_error(const ShapedPattern& pattern, const Camera& camera, const Pose& truth,
+                   const Pose& seen) {
+  constexpr int kSide = 16;  // places across and down
+  const auto vector_of = [](const std::array<double, 3>& v) {
+    return glm::dvec3(v[0], v[1], v[2]);
+  };
+  double sum = 0;
+  int count = 0;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const SurfacePoint point = pattern.surface.at(
+        (i % kSide + 0.5) / kSide * pattern.picture.width - 0.5,
+        (static_cast<int>(i / kSide) + 0.5) / kSide * pattern.picture.height - 0.5);
+    const glm::dvec3 at = truth.rotation * vector_of(point.at) + truth.translation;
+    const glm::dvec3 normal =
+        truth.rotation * glm::cross(vector_of(point.down), vector_of(point.right));
+    if (!(glm::dot(normal, at) < 0)) continue;
+    const glm::dvec3 there = seen.rotation * vector_of(point.at) + seen.translation;
+    sum += glm::length(project(camera, at) - project(camera, there));
+    ++count;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
 class Row {
  public:
   Row(const std::string& band, bool sequence) {
@@ -100,14 +126,24 @@ class Row {
     row_.sequence = sequence;
   }
   void cut() { poses_.cut(); }
-  Result<void> run(PoseLoop& loop, const GrayImage& frame, const FrameTruth& truth) {
+  Result<void> run(const ShapedPattern& pattern, const Camera& camera, const SceneFrame& scene,
+                   bool shown) {
     const double start = thread_seconds();
-    MODAR_ASSIGN(const TrackResult result, loop.step(frame));
+    MODAR_ASSIGN(const TrackResult result, pattern.loop->step(scene.picture.view()));
     row_.ms += 1e3 * (thread_seconds() - start);
+    const FrameTruth truth{shown, scene.corners};
     poses_.add(result, truth);
+    if (shown && !result.visible.empty() && is_right(result.visible[0], truth)) {
+      errors_.push_back(shown_error(pattern, camera, scene.pose, result.visible[0].pose));
+    }
     return {};
   }
   PoseBenchRow finish() {
+    if (!errors_.empty()) {
+      const auto middle = errors_.begin() + static_cast<std::ptrdiff_t>(errors_.size() / 2);
+      std::nth_element(errors_.begin(), middle, errors_.end());
+      row_.shown_px = *middle;
+    }
     static_cast<PoseFigures&>(row_) = poses_.figures();
     row_.ms /= std::max(row_.frames, 1);
     return row_;
@@ -116,6 +152,7 @@ class Row {
  private:
   PoseBenchRow row_;
   PoseTally poses_;
+  std::vector<double> errors_;
 };
 
 /// A camera's way around a thing: 70 degrees to either side, nearer and farther, in eight seconds.
@@ -152,7 +189,7 @@ class ShapeBench {
       const Pose pose = draw_pose(band, pattern.picture.view(), camera_, random);
       const SceneFrame scene =
           render_scene(pattern.picture.view(), camera_, pose, photo, band, random);
-      MODAR_TRY(row.run(*pattern.loop, scene.picture.view(), {true, scene.corners}));
+      MODAR_TRY(row.run(pattern, camera_, scene, true));
     }
     return {};
   }
@@ -170,7 +207,7 @@ class ShapeBench {
       const Pose pose = pose_on_way(pattern, camera_, i / 30.0, phase);
       const SceneFrame scene =
           render_scene(pattern.picture.view(), camera_, pose, photo, band, random, &light);
-      MODAR_TRY(row.run(*pattern.loop, scene.picture.view(), {true, scene.corners}));
+      MODAR_TRY(row.run(pattern, camera_, scene, true));
     }
     return {};
   }
@@ -185,7 +222,7 @@ class ShapeBench {
           backgrounds_[static_cast<std::size_t>(random.next() % backgrounds_.size())];
       const SceneFrame scene = render_scene(pattern.picture.view(), camera_, {},
                                             another_view(photo, random), band, random);
-      MODAR_TRY(row.run(*pattern.loop, scene.picture.view(), {}));
+      MODAR_TRY(row.run(pattern, camera_, scene, false));
     }
     return {};
   }

@@ -14,8 +14,6 @@
 namespace modar {
 namespace {
 
-constexpr int kLongestAtlas = 720;  // pixels, as of other patterns
-
 /// A side of a box: its place in the common picture, and where it lies in space.
 struct BoxSide {
   const GrayPicture* picture = nullptr;
@@ -96,10 +94,10 @@ Result<ShapedPicture> load_box(const std::string& path, const ShapeRequest& requ
 }  // namespace
 
 ShapedPicture assemble_box(const std::array<GrayPicture, 6>& pictures,
-                           const std::array<double, 3>& box_mm) {
+                           const std::array<double, 3>& box_mm, int longest) {
   std::vector<BoxSide> sides = sides_of(pictures, box_mm);
   const cv::Size whole = lay_out(1000, sides);
-  const double pixels = 1000.0 * kLongestAtlas / std::max(whole.width, whole.height);
+  const double pixels = 1000.0 * longest / std::max(whole.width, whole.height);
   const cv::Size size = lay_out(pixels, sides);
   ShapedPicture out;
   out.picture = {size.width, size.height,

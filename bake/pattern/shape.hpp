@@ -51,9 +51,10 @@ Result<ShapedPicture> load_shaped(const std::string& path, double width_mm,
                                   const ShapeRequest& request);
 
 /// The pictures of a box in one: front, right, back, left, top, bottom; empty: plain. Each is
-/// resized to its side. box_mm: width, height and depth.
+/// resized to its side. box_mm: width, height and depth. longest: pixels of the longer side of the
+/// whole, by default as many as other patterns have.
 ShapedPicture assemble_box(const std::array<GrayPicture, 6>& pictures,
-                           const std::array<double, 3>& box_mm);
+                           const std::array<double, 3>& box_mm, int longest = 720);
 
 /// The files that the request names beside the pattern's own, as paths.
 std::vector<std::string> files_of(const std::string& path, const ShapeRequest& request);

@@ -267,6 +267,12 @@ TEST(Simulation, TellsItsRangeInAPersonsWords) {
   simulation.width_mm = 0;
   EXPECT_EQ(range_sentence(simulation),
             "this camera recognises it from 0.75 to 8 times its width and up to 62 degrees");
+  simulation.width_mm = 100;
+  simulation.curved = true;
+  simulation.range = {1.5, 11.0, 40.0, 70.0};
+  EXPECT_EQ(range_sentence(simulation),
+            "printed 10 cm wide, this camera recognises it from 15 cm to 1.1 m and over 140 "
+            "degrees around it");
   simulation.range = {};
   EXPECT_EQ(range_sentence(simulation), "this camera does not recognise it at any distance");
 }
