@@ -1,8 +1,10 @@
-// Any vertex layout of a bundle, one variant a layout. A slot is three rows of the affine matrix
-// from attribute space to eye space, and the scale and offset of uv.
+// Any vertex layout of a bundle, one variant a layout. One item has one matrix to clip space, and its
+// light comes in its model's space, so that normals are taken as they are. Where a call draws several
+// items, a slot is three rows of the affine matrix from attribute space to eye space, and the scale
+// and offset of uv; light comes in eye space.
 // Defines: NORMAL_XYZ or NORMAL_OCT; TEXTURED; COLOURED; SHINY (adds a highlight or emission);
 // SLOT_STREAM with SLOT_COUNT (a vertex chooses its slot), or SLOT_ATTRIBUTES (rows step once an
-// instance), or neither: one slot.
+// instance), or neither: one item, whose matrix keeps angles.
 //
 // Light is summed here in linear light. A fragment multiplies colours as they are stored (sRGB):
 // that equals a product in linear light where the transfer function is a power, so the sum is
@@ -25,16 +27,22 @@ uniform vec4 u_slots[4];
 attribute float a_slot;
 uniform vec4 u_slots[4 * SLOT_COUNT];
 #else
-uniform vec4 u_slots[4];
+uniform mat4 u_to_clip;
+uniform vec4 u_uv_map;
+// The camera in attribute space, which is model space but for its origin and scale.
+uniform vec4 u_eye;
 #endif
 #endif
+#if defined(SLOT_ATTRIBUTES) || defined(SLOT_STREAM)
+#define SLOTS
 uniform mat4 u_projection;
-// What reaches a white surface from all around, as polynomials of its normal in eye space: the
+#endif
+// What reaches a white surface from all around, as polynomials of its normal in light's space: the
 // linear parts of red, green and blue (constant in w), the quadratic ones in xy, yz, z^2, zx, and
 // all three in x^2 - y^2. Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance
 // Environment Maps", 2001.
 uniform vec4 u_sky[7];
-// The key light: its direction in eye space; its colour, and in w what surfaces without normals get.
+// The key light: its direction in that space; its colour, and in w what surfaces without normals get.
 uniform vec4 u_key;
 uniform vec4 u_key_colour;
 // As stored (sRGB); w: 1 for a material that is lit on both sides.
@@ -70,13 +78,10 @@ vec3 model_normal() {
 vec3 model_normal() { return a_normal.xyz; }
 #endif
 
-// Linear light to sRGB, as a factor on a colour in sRGB: 0.94 x^(1/2) + 0.06 x^(1/4). Colour times
-// factor is off by 7.3 of 255 at most and by 1.6 in the mean, over all colours and light of 0.02 to
-// 1.5 (0.94 and 0.06 have the least greatest error; the root alone: 9.5 and 2.1).
-vec3 encode(vec3 light) {
-  vec3 root = sqrt(light);
-  return 0.94 * root + 0.06 * sqrt(root);
-}
+// Linear light to sRGB, as a factor on a colour in sRGB: 1.05 x^(1/2) - 0.05 x. Colour times factor
+// is off by 6.6 of 255 at most and by 1.5 in the mean, over all colours and light of 0.02 to 1.5
+// (1.05 and -0.05 have the least greatest error; the root alone: 9.5 and 2.1).
+vec3 encode(vec3 light) { return 1.05 * sqrt(light) - 0.05 * light; }
 
 void main() {
 #ifdef SLOT_ATTRIBUTES
@@ -84,22 +89,27 @@ void main() {
   vec4 row1 = a_row1;
   vec4 row2 = a_row2;
   vec4 uv_map = u_slots[3];
-#else
+#endif
 #ifdef SLOT_STREAM
   int base = 4 * int(a_slot + 0.5);
-#else
-  const int base = 0;
-#endif
   vec4 row0 = u_slots[base];
   vec4 row1 = u_slots[base + 1];
   vec4 row2 = u_slots[base + 2];
   vec4 uv_map = u_slots[base + 3];
 #endif
+  // From the camera to the vertex.
+#ifdef SLOTS
   vec4 point = vec4(a_position, 1.0);
-  vec3 eye = vec3(dot(row0, point), dot(row1, point), dot(row2, point));
-  gl_Position = u_projection * vec4(eye, 1.0);
+  vec3 ray = vec3(dot(row0, point), dot(row1, point), dot(row2, point));
+  gl_Position = u_projection * vec4(ray, 1.0);
+#else
+  vec4 uv_map = u_uv_map;
+  vec3 ray = a_position - u_eye.xyz;
+  gl_Position = u_to_clip * vec4(a_position, 1.0);
+#endif
 
 #if defined(NORMAL_XYZ) || defined(NORMAL_OCT)
+#ifdef SLOTS
   // Normals go by the cofactors of the matrix; a mirror turns their sign with the determinant.
   vec3 cofactor0 = cross(row1.xyz, row2.xyz);
   vec3 cofactor1 = cross(row2.xyz, row0.xyz);
@@ -107,7 +117,10 @@ void main() {
   vec3 n = model_normal();
   n = vec3(dot(cofactor0, n), dot(cofactor1, n), dot(cofactor2, n));
   n = normalize(n) * sign(dot(row0.xyz, cofactor0));
-  if (u_diffuse.w > 0.5) n = faceforward(n, eye, n);
+#else
+  vec3 n = normalize(model_normal());
+#endif
+  if (u_diffuse.w > 0.5) n = faceforward(n, ray, n);
   vec4 line = vec4(n, 1.0);
   vec4 square = n.xyzz * n.yzzx;
   vec3 sky = vec3(dot(u_sky[0], line), dot(u_sky[1], line), dot(u_sky[2], line)) +
@@ -125,7 +138,7 @@ void main() {
 #ifdef SHINY
   vec3 added = u_emission.rgb;
 #if defined(NORMAL_XYZ) || defined(NORMAL_OCT)
-  vec3 halfway = normalize(u_key.xyz - normalize(eye));
+  vec3 halfway = normalize(u_key.xyz - normalize(ray));
   added += u_specular.rgb * pow(max(dot(n, halfway), 0.0001), u_specular.w);
 #endif
   vec3 lit = u_albedo.rgb * light;

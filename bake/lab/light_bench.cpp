@@ -150,7 +150,11 @@ class LightStage {
     MODAR_ASSIGN(follows_, Renderer::create(bundle_, probe_gl_caps()));
     RenderOptions fixed;
     fixed.estimate_light = false;
+    fixed.samples = 4;
     ours_->set_options(fixed);
+    RenderOptions follows;
+    follows.samples = fixed.samples;
+    follows_->set_options(follows);
     plain_->set_options(fixed);
     MODAR_TRY(ours_->resize(options_.width, options_.height));
     MODAR_TRY(follows_->resize(options_.width, options_.height));

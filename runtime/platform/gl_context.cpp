@@ -169,6 +169,9 @@ GlCaps probe_gl_caps() {
   caps.instanced_arrays = es3 || has("GL_EXT_instanced_arrays") || has("GL_ANGLE_instanced_arrays");
   caps.vertex_arrays = es3 || has("GL_OES_vertex_array_object");
   caps.es3 = es3;
+  caps.multisampled_textures = has("GL_EXT_multisampled_render_to_texture");
+  // GL_MAX_SAMPLES of ES 3 and of the extension.
+  if (es3 || caps.multisampled_textures) caps.max_samples = gl_integer(0x8D57, 1);
   caps.max_texture_size = gl_integer(GL_MAX_TEXTURE_SIZE, 64);
   caps.max_vertex_uniform_vectors = gl_integer(GL_MAX_VERTEX_UNIFORM_VECTORS, 128);
   caps.max_vertex_attributes = gl_integer(GL_MAX_VERTEX_ATTRIBS, 8);
@@ -190,6 +193,7 @@ Result<GlCaps> mask_gl_caps(const GlCaps& caps, const std::string& device) {
   for (const TextureFormatInfo& format : kTextureFormats) {
     if (!profile->has_extension(format.gl_extension)) masked.texture_formats &= ~bit_of(format);
   }
+  mask(masked.multisampled_textures, "GL_EXT_multisampled_render_to_texture");
   mask(masked.etc1_sub_texture, "GL_EXT_compressed_ETC1_RGB8_sub_texture");
   masked.debug_groups = masked.debug_groups && (profile->has_extension("GL_KHR_debug") ||
                                                 profile->has_extension("GL_EXT_debug_marker"));
@@ -201,6 +205,7 @@ Result<GlCaps> mask_gl_caps(const GlCaps& caps, const std::string& device) {
                                     profile->has_extension("GL_ANGLE_instanced_arrays"));
     mask(masked.vertex_arrays, "GL_OES_vertex_array_object");
     masked.es3 = false;
+    if (!masked.multisampled_textures) masked.max_samples = 1;
   }
   masked.max_texture_size = std::min(caps.max_texture_size, profile->max_texture_size);
   masked.max_vertex_uniform_vectors =

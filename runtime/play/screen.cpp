@@ -7,6 +7,10 @@ namespace {
 /// Light enough for a shadow to be seen, and no colour that the model could be thought to have.
 constexpr glm::vec4 kTurntableGround{0.86f, 0.86f, 0.85f, 1.0f};
 
+/// A pixel, where the driver has so many. What GPUs of phones average on the way to memory, nearly
+/// for nothing; eight are seldom there.
+constexpr int kSamples = 4;
+
 }  // namespace
 
 Result<std::unique_ptr<Screen>> Screen::open(const BundleView& bundle, const PlayOptions& options) {
@@ -27,6 +31,7 @@ Result<void> Screen::load(const BundleView& bundle) {
   MODAR_ASSIGN(auto renderer, Renderer::create(bundle, caps_));
   RenderOptions drawing;
   drawing.exclusive_context = true;
+  drawing.samples = kSamples;
   drawing.estimate_light = !options_.no_light_estimate;
   if (options_.turntable > 0) drawing.clear_colour = kTurntableGround;
   renderer->set_options(drawing);

@@ -17,6 +17,9 @@ namespace {
 /// Slack for rounding, relative to the size of what is compared: about 80 roundings of a float
 /// (2^-23 each). Larger would only draw what lies that close outside.
 constexpr float kRoundingSlack = 1e-5f;
+/// Squares of lengths and products of sides that differ by less, relative to a length's square,
+/// turn a normal by less than a thousandth of a radian.
+constexpr double kSameShape = 1e-3;
 
 glm::vec3 corner(const ChunkRecord& chunk, unsigned which) {
   return {(which & 1) != 0 ? chunk.bounds_max[0] : chunk.bounds_min[0],
@@ -45,6 +48,13 @@ ModelView model_view(const glm::mat4& projection, const glm::mat4& to_eye, int h
   view.scale = static_cast<float>(
       std::sqrt(std::max({glm::dot(linear[0], linear[0]), glm::dot(linear[1], linear[1]),
                           glm::dot(linear[2], linear[2])})));
+  const double least = std::min({glm::dot(linear[0], linear[0]), glm::dot(linear[1], linear[1]),
+                                 glm::dot(linear[2], linear[2])});
+  const double greatest = static_cast<double>(view.scale) * static_cast<double>(view.scale);
+  const double skew =
+      std::max({std::abs(glm::dot(linear[0], linear[1])), std::abs(glm::dot(linear[1], linear[2])),
+                std::abs(glm::dot(linear[2], linear[0]))});
+  view.keeps_angles = greatest - least <= kSameShape * greatest && skew <= kSameShape * greatest;
   // The row's length: a picture that is turned by 90 degrees has its scale in the other column.
   view.pixels = 0.5f * static_cast<float>(height) * std::hypot(p[0][1], p[1][1]);
   return view;

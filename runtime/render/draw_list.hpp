@@ -22,10 +22,11 @@ namespace modar {
 struct ModelView {
   std::array<glm::vec4, 6> planes;  ///< a point is inside where dot(plane, (p, 1)) >= 0
   glm::vec3 eye{0.0f};
-  bool perspective = true;  ///< false: parallel rays, `eye` means nothing
-  bool mirrored = false;    ///< the matrix turns the winding of triangles
-  float scale = 1.0f;       ///< greatest stretch of a length on its way to eye space
-  float pixels = 0.0f;      ///< size in pixels of one eye-space unit at distance 1
+  bool perspective = true;   ///< false: parallel rays, `eye` means nothing
+  bool mirrored = false;     ///< the matrix turns the winding of triangles
+  bool keeps_angles = true;  ///< the matrix turns, mirrors, scales and moves, no more
+  float scale = 1.0f;        ///< greatest stretch of a length on its way to eye space
+  float pixels = 0.0f;       ///< size in pixels of one eye-space unit at distance 1
 };
 
 /// projection: of GL. to_eye: an affine matrix that can be inverted. height: of the viewport,

@@ -177,8 +177,14 @@ GlExtensions load_gl_extensions(const GlCaps& caps) {
   if (caps.es3) {
     look_up(found.bind_vertex_array, "glBindVertexArray");
     look_up(found.bind_sampler, "glBindSampler");
+    look_up(found.renderbuffer_storage_multisample, "glRenderbufferStorageMultisample");
+    look_up(found.blit_framebuffer, "glBlitFramebuffer");
   } else if (caps.vertex_arrays && lists_extension(list, "GL_OES_vertex_array_object")) {
     look_up(found.bind_vertex_array, "glBindVertexArrayOES");
+  }
+  if (caps.multisampled_textures) {
+    look_up(found.renderbuffer_storage_multisample, "glRenderbufferStorageMultisampleEXT");
+    look_up(found.framebuffer_texture_multisample, "glFramebufferTexture2DMultisampleEXT");
   }
   if (caps.debug_groups && lists_extension(list, "GL_KHR_debug")) {
     look_up(found.push_debug_group, "glPushDebugGroupKHR");
@@ -195,8 +201,6 @@ namespace {
 // Of ES 3, which gl2.h does not name.
 constexpr std::array<GLenum, 2> kPixelBuffers = {0x88EB, 0x88EC};  // pack, unpack
 constexpr std::array<GLenum, 2> kPixelBufferBindings = {0x88ED, 0x88EF};
-constexpr GLenum kReadFramebuffer = 0x8CA8;
-constexpr GLenum kDrawFramebuffer = 0x8CA9;
 constexpr GLenum kReadFramebufferBinding = 0x8CAA;
 constexpr GLenum kVertexArrayBinding = 0x85B5;
 constexpr GLenum kSamplerBinding = 0x8919;

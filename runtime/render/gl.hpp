@@ -32,6 +32,10 @@ struct GlExtensions {
   PFNGLPOPGROUPMARKEREXTPROC pop_group_marker = nullptr;
   PFNGLBINDVERTEXARRAYOESPROC bind_vertex_array = nullptr;  ///< of ES 3, or of the extension
   void(GL_APIENTRYP bind_sampler)(GLuint unit, GLuint sampler) = nullptr;  ///< of ES 3
+  /// Of ES 3, or of GL_EXT_multisampled_render_to_texture.
+  PFNGLRENDERBUFFERSTORAGEMULTISAMPLEEXTPROC renderbuffer_storage_multisample = nullptr;
+  PFNGLFRAMEBUFFERTEXTURE2DMULTISAMPLEEXTPROC framebuffer_texture_multisample = nullptr;
+  PFNGLBLITFRAMEBUFFERNVPROC blit_framebuffer = nullptr;  ///< of ES 3
 
   [[nodiscard]] bool instancing() const {
     return draw_elements_instanced != nullptr && vertex_attrib_divisor != nullptr;
@@ -40,6 +44,10 @@ struct GlExtensions {
 
 /// caps: masked ones; what they lack is not looked up.
 GlExtensions load_gl_extensions(const GlCaps& caps);
+
+/// Of ES 3, which gl2.h does not name: it has a framebuffer to read from besides.
+constexpr GLenum kReadFramebuffer = 0x8CA8;
+constexpr GLenum kDrawFramebuffer = 0x8CA9;
 
 /// What GL calls of ours change, as the app had it, brought back when this ends: framebuffers,
 /// viewport, vertex array object, program, buffers, the textures and samplers of units 0 to 2, the

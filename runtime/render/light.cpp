@@ -10,7 +10,6 @@
 #include <glm/matrix.hpp>
 
 namespace modar {
-namespace {
 
 glm::mat3 rotation_of(const glm::mat4& matrix) {
   glm::mat3 turn;
@@ -21,6 +20,8 @@ glm::mat3 rotation_of(const glm::mat4& matrix) {
   }
   return turn;
 }
+
+namespace {
 
 bool same_light(const DrawItem& a, const DrawItem& b) {
   return a.scene == b.scene &&
@@ -71,11 +72,10 @@ RoomLight scaled_light(const RoomLight& light, const glm::vec3& gain) {
   return scaled;
 }
 
-EyeLight turn_light(const RoomLight& light, const glm::mat4& world_to_eye, float ambient_strength,
-                    float light_strength) {
-  const glm::mat3 turn = rotation_of(world_to_eye);
+TurnedLight turn_light(const RoomLight& light, const glm::mat3& turn, float ambient_strength,
+                       float light_strength) {
   const glm::mat3 back = glm::transpose(turn);
-  EyeLight eye;
+  TurnedLight turned;
   for (int c = 0; c < 3; ++c) {
     const auto at = [&](std::size_t i) { return light.sky[i][c] * ambient_strength; };
     // The quadratic part as a symmetric matrix without trace: p = n^T q n.
@@ -87,18 +87,20 @@ EyeLight turn_light(const RoomLight& light, const glm::mat4& world_to_eye, float
     // With x^2 + y^2 + z^2 = 1: the diagonal is (e00 - e11) / 2 (x^2 - y^2) + 3/2 e22 z^2 - e22
     // / 2.
     const std::size_t channel = static_cast<std::size_t>(c);
-    eye.sky[channel] = glm::vec4(linear, at(0) - 0.5f * e[2][2]);
-    eye.sky[3 + channel] = {2.0f * e[1][0], 2.0f * e[2][1], 1.5f * e[2][2], 2.0f * e[2][0]};
-    eye.sky[6][c] = 0.5f * (e[0][0] - e[1][1]);
+    turned.sky[channel] = glm::vec4(linear, at(0) - 0.5f * e[2][2]);
+    turned.sky[3 + channel] = {2.0f * e[1][0], 2.0f * e[2][1], 1.5f * e[2][2], 2.0f * e[2][0]};
+    turned.sky[6][c] = 0.5f * (e[0][0] - e[1][1]);
   }
   const float length = glm::length(light.direction);
-  eye.key = glm::vec4(length > 0.0f ? turn * light.direction / length : glm::vec3(0.0f), 0.0f);
-  eye.key_colour = glm::vec4(light.key * light_strength, 1.0f);
-  return eye;
+  turned.key = glm::vec4(length > 0.0f ? turn * light.direction / length : glm::vec3(0.0f), 0.0f);
+  turned.key_colour = glm::vec4(light.key * light_strength, 1.0f);
+  return turned;
 }
 
 void LightList::build(const BundleView& bundle, std::span<const DrawItem> items,
                       const RenderOptions& options, const LightEstimator* estimator) {
+  ambient_strength_ = options.ambient_strength;
+  light_strength_ = options.light_strength;
   lights_.clear();
   first_item_.clear();
   of_item_.clear();
@@ -113,9 +115,21 @@ void LightList::build(const BundleView& bundle, std::span<const DrawItem> items,
     if (estimator != nullptr) {
       if (const auto gain = estimator->at_model(items[i].scene)) light = scaled_light(light, *gain);
     }
-    lights_.push_back(
-        turn_light(light, items[i].world_to_eye, options.ambient_strength, options.light_strength));
+    lights_.push_back({light, rotation_of(items[i].world_to_eye)});
   }
+}
+
+TurnedLight LightList::in_eye_space(std::uint32_t light) const {
+  return turn_light(lights_[light].room, lights_[light].to_eye, ambient_strength_, light_strength_);
+}
+
+TurnedLight LightList::in_model_space(const DrawItem& item, std::uint32_t light) const {
+  const glm::mat3 to_model = glm::transpose(rotation_of(item.to_eye)) * lights_[light].to_eye;
+  return turn_light(lights_[light].room, to_model, ambient_strength_, light_strength_);
+}
+
+glm::vec4 LightList::key_colour(std::uint32_t light) const {
+  return glm::vec4(lights_[light].room.key * light_strength_, 1.0f);
 }
 
 }  // namespace modar

@@ -1,5 +1,5 @@
-// The light of a frame's items, turned from the pattern's world to the eye's. Internal to
-// runtime/render.
+// The light of a frame's items, turned from the pattern's world to the eye's or a model's. Internal
+// to runtime/render.
 #pragma once
 
 #include <array>
@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -16,18 +17,20 @@
 namespace modar {
 
 /// What shaders/model.vert takes: u_sky, u_key, u_key_colour.
-struct EyeLight {
+struct TurnedLight {
   std::array<glm::vec4, 7> sky{};
   glm::vec4 key{0.0f};
   glm::vec4 key_colour{0.0f};
 };
 
-/// world_to_eye: its first three columns turn; their lengths do not matter.
+/// The turn of a matrix that keeps angles; it may mirror.
+glm::mat3 rotation_of(const glm::mat4& matrix);
+
 /// gain: what a white surface that looks up gets then, in parts of 1 (see LightEstimator).
 RoomLight scaled_light(const RoomLight& light, const glm::vec3& gain);
 
-EyeLight turn_light(const RoomLight& light, const glm::mat4& world_to_eye, float ambient_strength,
-                    float light_strength);
+TurnedLight turn_light(const RoomLight& light, const glm::mat3& turn, float ambient_strength,
+                       float light_strength);
 
 /// One light for all items that share one, so that they can share draw calls.
 class LightList {
@@ -36,12 +39,22 @@ class LightList {
   void build(const BundleView& bundle, std::span<const DrawItem> items,
              const RenderOptions& options, const LightEstimator* estimator);
   [[nodiscard]] std::uint32_t of_item(std::uint32_t item) const { return of_item_[item]; }
-  [[nodiscard]] const EyeLight& light(std::uint32_t index) const { return lights_[index]; }
+  [[nodiscard]] TurnedLight in_eye_space(std::uint32_t light) const;
+  /// The item's matrix keeps angles.
+  [[nodiscard]] TurnedLight in_model_space(const DrawItem& item, std::uint32_t light) const;
+  /// The key light's colour as the shader has it.
+  [[nodiscard]] glm::vec4 key_colour(std::uint32_t light) const;
 
  private:
-  std::vector<EyeLight> lights_;
+  struct Light {
+    RoomLight room;
+    glm::mat3 to_eye{1.0f};
+  };
+  std::vector<Light> lights_;
   std::vector<std::uint32_t> first_item_;  ///< of each light
   std::vector<std::uint32_t> of_item_;
+  float ambient_strength_ = 1.0f;
+  float light_strength_ = 1.0f;
 };
 
 }  // namespace modar

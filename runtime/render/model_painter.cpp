@@ -192,8 +192,8 @@ void ModelPainter::set_surface(const PaintJob& job, ProgramState& state, const P
   const MaterialRecord& material = bundle_.materials()[piece.material];
   job.gl.use_program(state.program.id);
   set_frame(job, state);
-  set_light(job, state, piece.light);
-  set_material(job, state, piece.material);
+  set_light(job, state, piece);
+  set_material(job, state, piece);
   if (state.program.key.textured) job.gl.bind_texture(0, job.textures.colour(material.texture));
   if (state.program.key.alpha_twin) job.gl.bind_texture(1, job.textures.alpha(material.texture));
   job.gl.set_culling((material.flags & kMaterialTwoSided) == 0);
@@ -210,22 +210,28 @@ void ModelPainter::set_frame(const PaintJob& job, ProgramState& state) {
   state.light = kNone;
   state.material = kNone;
   state.item = kNone;
+  if (state.program.projection < 0) return;
   glUniformMatrix4fv(state.program.projection, 1, GL_FALSE, glm::value_ptr(job.projection));
   job.stats.bytes_uploaded += sizeof job.projection;
 }
 
-void ModelPainter::set_light(const PaintJob& job, ProgramState& state, std::uint32_t light) {
-  if (state.light == light) return;
-  state.light = light;
+void ModelPainter::set_light(const PaintJob& job, ProgramState& state, const Piece& piece) {
+  const bool own = state.program.to_clip >= 0;
+  const std::uint32_t whose = own ? piece.item : piece.light;
+  if (state.light == whose) return;
+  state.light = whose;
   state.material = kNone;  // a highlight has the light's colour
-  const EyeLight& eye = lights_.light(light);
-  glUniform4fv(state.program.sky, static_cast<GLsizei>(eye.sky.size()), glm::value_ptr(eye.sky[0]));
-  job.stats.bytes_uploaded += sizeof eye.sky;
-  set_vector(state.program.to_key, eye.key, job.stats);
-  set_vector(state.program.key_colour, eye.key_colour, job.stats);
+  const TurnedLight light = own ? lights_.in_model_space(job.items[piece.item], piece.light)
+                                : lights_.in_eye_space(piece.light);
+  glUniform4fv(state.program.sky, static_cast<GLsizei>(light.sky.size()),
+               glm::value_ptr(light.sky[0]));
+  job.stats.bytes_uploaded += sizeof light.sky;
+  set_vector(state.program.to_key, light.key, job.stats);
+  set_vector(state.program.key_colour, light.key_colour, job.stats);
 }
 
-void ModelPainter::set_material(const PaintJob& job, ProgramState& state, std::uint32_t material) {
+void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const Piece& piece) {
+  const std::uint32_t material = piece.material;
   if (state.material == material) return;
   state.material = material;
   const MaterialRecord& record = bundle_.materials()[material];
@@ -234,7 +240,7 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, std::u
   set_vector(program.diffuse, stored_colour(record.diffuse, two_sided ? 1.0f : 0.0f), job.stats);
   if (program.key.shiny) {
     const bool shining = shines(record);
-    const glm::vec4 key = lights_.light(state.light).key_colour;
+    const glm::vec4 key = lights_.key_colour(piece.light);
     glm::vec4 specular = linear_colour(record.specular, shining ? 1.0f : 0.0f, 0.0f) * key;
     specular.w = shining ? std::min(record.shininess, kMostShininess) : 1.0f;
     set_vector(program.specular, specular, job.stats);
@@ -255,9 +261,25 @@ void ModelPainter::set_slot(const PaintJob& job, ProgramState& state, const Piec
   if (state.item == piece.item && same_decoding(state.chunk, piece.chunk)) return;
   state.item = piece.item;
   state.chunk = piece.chunk;
-  const Slot slot = make_slot(matrix(job, piece), bundle_.chunks()[piece.chunk]);
-  glUniform4fv(state.program.slots, 4, glm::value_ptr(slot[0]));
-  job.stats.bytes_uploaded += sizeof slot;
+  const ChunkRecord& chunk = bundle_.chunks()[piece.chunk];
+  if (state.program.to_clip < 0) {
+    const Slot slot = make_slot(matrix(job, piece), chunk);
+    glUniform4fv(state.program.slots, 4, glm::value_ptr(slot[0]));
+    job.stats.bytes_uploaded += sizeof slot;
+    return;
+  }
+  const glm::vec3 offset(chunk.position_offset[0], chunk.position_offset[1],
+                         chunk.position_offset[2]);
+  glm::mat4 to_clip = job.projection * matrix(job, piece);
+  to_clip[3] = to_clip * glm::vec4(offset, 1.0f);
+  for (int axis = 0; axis < 3; ++axis) to_clip[axis] *= chunk.position_step;
+  glUniformMatrix4fv(state.program.to_clip, 1, GL_FALSE, glm::value_ptr(to_clip));
+  job.stats.bytes_uploaded += sizeof to_clip;
+  const glm::vec3 eye = (job.list.view(piece.item).eye - offset) / chunk.position_step;
+  set_vector(state.program.eye, glm::vec4(eye, 1.0f), job.stats);
+  const glm::vec4 uv_map(chunk.uv_scale[0], chunk.uv_scale[1], chunk.uv_offset[0],
+                         chunk.uv_offset[1]);
+  set_vector(state.program.uv_map, uv_map, job.stats);
 }
 
 void ModelPainter::set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,
@@ -374,7 +396,7 @@ void ModelPainter::draw_group(const PaintJob& job, std::span<Piece> group) {
 void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
   LevelPlace place;
   if (!job.geometry.use(piece.mesh.level, job.gl, place)) return;
-  ProgramState& state = programs_[piece.program].by_slots[0];
+  ProgramState& state = single_state(job, piece);
   set_surface(job, state, piece);
   set_slot(job, state, piece);
   set_attributes(piece.layout, place.vertex_buffer, place.vertex_offset, 0, job.gl);
@@ -389,6 +411,17 @@ void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
   ++job.stats.draw_calls;
   job.stats.triangles += piece.mesh.index_count / 3;
   job.stats.chunks_drawn += piece.chunks;
+}
+
+/// One item whose matrix turns normals otherwise than a rotation is drawn as a batch of one, whose
+/// slot's number is the attribute's value where no array gives it.
+ModelPainter::ProgramState& ModelPainter::single_state(const PaintJob& job, const Piece& piece) {
+  ProgramState& single = programs_[piece.program].by_slots[0];
+  if (job.list.view(piece.item).keeps_angles) return single;
+  ProgramState* general = program(piece.program, SlotKind::kStream, job.gl);
+  if (general == nullptr) return single;
+  glVertexAttrib1f(kAttributeSlot, 0.0f);
+  return *general;
 }
 
 bool ModelPainter::draw_instances(const PaintJob& job, std::span<const Piece> pieces) {
@@ -477,6 +510,7 @@ bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
     ++find_mesh(parts_, piece.mesh)->copies;
   }
   set_surface(job, state, pieces[0]);
+  state.item = kNone;  // slot 0 is no single item's any more
   glUniform4fv(state.program.slots, static_cast<GLsizei>(slots_.size() * 4),
                glm::value_ptr(slots_[0][0]));
   job.stats.bytes_uploaded += slots_.size() * sizeof(Slot);

@@ -61,8 +61,8 @@ class ModelPainter {
   /// What a program's uniforms were last set to.
   struct ProgramState {
     ModelProgram program;
-    std::uint64_t frame = 0;  ///< projection is of this frame
-    std::uint32_t light = kNone;
+    std::uint64_t frame = 0;      ///< projection is of this frame
+    std::uint32_t light = kNone;  ///< or the item whose light it is: see set_light()
     std::uint32_t material = kNone;
     std::uint32_t item = kNone;
     std::uint32_t chunk = kNone;  ///< the one whose decoding is set
@@ -96,6 +96,7 @@ class ModelPainter {
   [[nodiscard]] bool continues(const Piece& piece, const DrawCommand& next) const;
   void draw_group(const PaintJob& job, std::span<Piece> group);
   void draw_piece(const PaintJob& job, const Piece& piece);
+  ProgramState& single_state(const PaintJob& job, const Piece& piece);
   bool draw_instances(const PaintJob& job, std::span<const Piece> pieces);
   bool draw_batches(const PaintJob& job, std::span<const Piece> pieces);
   bool draw_batch(const PaintJob& job, ProgramState& state, std::span<const Piece> pieces);
@@ -103,8 +104,8 @@ class ModelPainter {
 
   void set_surface(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_frame(const PaintJob& job, ProgramState& state);
-  void set_light(const PaintJob& job, ProgramState& state, std::uint32_t light);
-  void set_material(const PaintJob& job, ProgramState& state, std::uint32_t material);
+  void set_light(const PaintJob& job, ProgramState& state, const Piece& piece);
+  void set_material(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_slot(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,
                       std::uint32_t more, GlState& gl) const;

@@ -7,9 +7,15 @@
 #include "runtime/render/program.hpp"
 
 namespace modar {
+namespace {
 
-Result<void> Target::resize(int width, int height, const GlCaps& caps, GlState& gl) {
-  if (width == width_ && height == height_ && framebuffer_ != 0) return {};
+constexpr GLenum kRgba8 = 0x8058;  // GL_RGBA8 of ES 3
+
+}  // namespace
+
+Result<void> Target::resize(int width, int height, int samples, const GlCaps& caps,
+                            const GlExtensions& extensions, GlState& gl) {
+  if (width == width_ && height == height_ && samples == asked_ && framebuffer_ != 0) return {};
   gl.reset();
   release(gl);
   if (width < 1 || height < 1 || width > caps.max_texture_size || height > caps.max_texture_size) {
@@ -25,30 +31,77 @@ Result<void> Target::resize(int width, int height, const GlCaps& caps, GlState& 
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  glGenRenderbuffers(1, &depth_);
-  glBindRenderbuffer(GL_RENDERBUFFER, depth_);
-  const GLenum depth_format =
-      caps.depth24 ? GLenum{GL_DEPTH_COMPONENT24_OES} : GLenum{GL_DEPTH_COMPONENT16};
-  glRenderbufferStorage(GL_RENDERBUFFER, depth_format, width, height);
-  glGenFramebuffers(1, &framebuffer_);
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture_, 0);
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth_);
   // The texture must not be read while it is drawn to.
   gl.bind_texture(0, 0);
-  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+  glGenRenderbuffers(1, &depth_);
+  glGenFramebuffers(1, &framebuffer_);
+  const GLenum depth_format =
+      caps.depth24 ? GLenum{GL_DEPTH_COMPONENT24_OES} : GLenum{GL_DEPTH_COMPONENT16};
+  const int most = std::min(samples, caps.max_samples);
+  if (!(most > 1 && attach(width, height, most, depth_format, extensions)) &&
+      !attach(width, height, 1, depth_format, extensions)) {
     release(gl);
     return fail(ExitCode::kUnsupported, "gl.framebuffer", "renderer",
                 "the driver refuses a framebuffer of this size", "ask for a smaller picture");
   }
   width_ = width;
   height_ = height;
+  asked_ = samples;
   return {};
+}
+
+/// Several samples go into the texture by themselves where the extension is, else into
+/// renderbuffers that finish() averages. False where the driver refuses.
+bool Target::attach(int width, int height, int samples, GLenum depth_format,
+                    const GlExtensions& extensions) {
+  const bool several = samples > 1;
+  const bool by_itself = several && extensions.framebuffer_texture_multisample != nullptr;
+  const auto store = [&](GLuint buffer, GLenum format) {
+    glBindRenderbuffer(GL_RENDERBUFFER, buffer);
+    if (several) {
+      extensions.renderbuffer_storage_multisample(GL_RENDERBUFFER, samples, format, width, height);
+    } else {
+      glRenderbufferStorage(GL_RENDERBUFFER, format, width, height);
+    }
+  };
+  if (several && extensions.renderbuffer_storage_multisample == nullptr) return false;
+  if (several && !by_itself && extensions.blit_framebuffer == nullptr) return false;
+  glDeleteFramebuffers(1, &drawn_);
+  glDeleteRenderbuffers(1, &colour_);
+  drawn_ = colour_ = 0;
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
+  if (by_itself) {
+    extensions.framebuffer_texture_multisample(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D,
+                                               texture_, 0, samples);
+  } else {
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture_, 0);
+  }
+  if (several && !by_itself) {
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, 0);
+    glGenRenderbuffers(1, &colour_);
+    store(colour_, kRgba8);
+    glGenFramebuffers(1, &drawn_);
+    begin();
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour_);
+  }
+  store(depth_, depth_format);
+  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth_);
+  return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+}
+
+void Target::finish(const GlExtensions& extensions) const {
+  if (drawn_ == 0) return;
+  glBindFramebuffer(kReadFramebuffer, drawn_);
+  glBindFramebuffer(kDrawFramebuffer, framebuffer_);
+  extensions.blit_framebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT,
+                              GL_NEAREST);
 }
 
 void Target::release(GlState& gl) {
   gl.forget_texture(texture_);
   glDeleteFramebuffers(1, &framebuffer_);
+  glDeleteFramebuffers(1, &drawn_);
+  glDeleteRenderbuffers(1, &colour_);
   glDeleteRenderbuffers(1, &depth_);
   glDeleteTextures(1, &texture_);
   *this = Target();

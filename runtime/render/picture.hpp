@@ -15,22 +15,34 @@ namespace modar {
 
 class Target {
  public:
-  /// Makes the framebuffer anew at that size. Errors: kUnsupported "gl.framebuffer".
-  Result<void> resize(int width, int height, const GlCaps& caps, GlState& gl);
+  /// Makes the framebuffer anew at that size, with so many samples a pixel at most. Errors:
+  /// kUnsupported "gl.framebuffer".
+  Result<void> resize(int width, int height, int samples, const GlCaps& caps,
+                      const GlExtensions& extensions, GlState& gl);
   void release(GlState& gl);
 
   /// Draw calls go here from now on.
+  void begin() const { glBindFramebuffer(GL_FRAMEBUFFER, drawn_ != 0 ? drawn_ : framebuffer_); }
+  /// What was drawn is in the texture from now on.
+  void finish(const GlExtensions& extensions) const;
+  /// What was finished is read from here.
   void bind() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_); }
   [[nodiscard]] GLuint texture() const { return texture_; }
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
 
  private:
-  GLuint framebuffer_ = 0;
+  bool attach(int width, int height, int samples, GLenum depth_format,
+              const GlExtensions& extensions);
+
+  GLuint framebuffer_ = 0;  ///< with the texture
+  GLuint drawn_ = 0;        ///< with renderbuffers of several samples; 0: the other is drawn into
   GLuint texture_ = 0;
+  GLuint colour_ = 0;  ///< of drawn_
   GLuint depth_ = 0;
   int width_ = 0;
   int height_ = 0;
+  int asked_ = 1;  ///< samples
 };
 
 /// Corners of a viewport (0 or 1, y up) to texture coordinates: start + x * across + y * up.

@@ -120,6 +120,9 @@ Result<ModelProgram> make_model_program(const ProgramKey& key) {
   const auto place = [&](const char* name) { return glGetUniformLocation(program.id, name); };
   program.slots = place("u_slots");
   program.projection = place("u_projection");
+  program.to_clip = place("u_to_clip");
+  program.uv_map = place("u_uv_map");
+  program.eye = place("u_eye");
   program.sky = place("u_sky");
   program.to_key = place("u_key");
   program.key_colour = place("u_key_colour");

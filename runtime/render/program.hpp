@@ -32,6 +32,9 @@ struct ModelProgram {
   GLuint id = 0;
   GLint slots = -1;
   GLint projection = -1;
+  GLint to_clip = -1;  ///< of kSingle, and the next two
+  GLint uv_map = -1;
+  GLint eye = -1;
   GLint sky = -1;
   GLint to_key = -1;  ///< direction of the key light
   GLint key_colour = -1;

@@ -239,7 +239,8 @@ Renderer::~Renderer() {
 
 Result<void> Renderer::resize(int width, int height) {
   const SavedGlState saved(state_->extensions, !state_->options.exclusive_context);
-  return state_->target.resize(width, height, state_->caps, state_->gl);
+  return state_->target.resize(width, height, state_->options.samples, state_->caps,
+                               state_->extensions, state_->gl);
 }
 
 Result<void> Renderer::restore(const GlCaps& caps) {
@@ -275,7 +276,7 @@ void Renderer::render(const CameraPicture& background, const glm::mat4& projecti
       background.planes[0] != nullptr && background.width > 0 && background.height > 0;
   const Viewport view =
       fit(background.width, background.height, s.target.width(), s.target.height());
-  s.target.bind();
+  s.target.begin();
   glViewport(view.x, view.y, view.width, view.height);
   const glm::vec4& clear = s.options.clear_colour;
   glClearColor(clear.r, clear.g, clear.b, clear.a);
@@ -291,6 +292,7 @@ void Renderer::render(const CameraPicture& background, const glm::mat4& projecti
     const DebugGroup group(s.extensions, "models");
     s.draw_models(projection, view.height, items);
   }
+  s.target.finish(s.extensions);
   s.end_frame();
 }
 

@@ -8,6 +8,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "runtime/render/picture.hpp"
 #include "tests/render/reference.hpp"
 #include "tests/render/scene.hpp"
 
@@ -448,6 +449,100 @@ TEST_F(SurfaceTest, AContextOfItsOwnFromNowOnShowsTheSame) {
   renderer_->set_options(options);
   draw(surface, true);
   expect_surface(surface, true);
+}
+
+/// Mean difference of the picture from one of eight times its sides, each of whose blocks is
+/// averaged.
+double difference_from_fine(Renderer& renderer, int samples) {
+  constexpr int kFiner = 8;
+  const DrawItem items[] = {{0, glm::mat4(tilted_view())}};
+  RenderOptions options = flat_light();
+  const auto picture = [&](int factor, int asked) {
+    options.samples = asked;
+    renderer.set_options(options);
+    Camera camera = frame_camera();
+    camera.width *= factor;
+    camera.height *= factor;
+    camera.fx *= factor;
+    camera.fy *= factor;
+    camera.cx = (camera.cx + 0.5) * factor - 0.5;
+    camera.cy = (camera.cy + 0.5) * factor - 0.5;
+    return draw(renderer, camera, items);
+  };
+  const auto fine = picture(kFiner, 1);
+  const auto pixels = picture(1, samples);
+  double sum = 0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      double mean = 0;
+      for (int j = 0; j < kFiner; ++j) {
+        for (int i = 0; i < kFiner; ++i) {
+          const int at = 4 * ((y * kFiner + j) * kWidth * kFiner + x * kFiner + i);
+          mean += fine[static_cast<std::size_t>(at)] / double{kFiner * kFiner};
+        }
+      }
+      sum += std::fabs(pixels[static_cast<std::size_t>(4 * (y * kWidth + x))] - mean);
+    }
+  }
+  return sum / (kWidth * kHeight);
+}
+
+TEST_F(SurfaceTest, SamplesSmoothEdges) {
+  if (probe_gl_caps().max_samples < 4) GTEST_SKIP() << "a driver of one sample";
+  const double stairs = difference_from_fine(*renderer_, 1);
+  const double smooth = difference_from_fine(*renderer_, 4);
+  EXPECT_GT(stairs, 1.0);
+  EXPECT_LT(smooth, 0.5 * stairs);
+  // Back to one sample at the same size.
+  EXPECT_EQ(difference_from_fine(*renderer_, 1), stairs);
+  GlCaps lower = probe_gl_caps();
+  lower.max_samples = 1;
+  const auto other = make_renderer(*bundle_->view, lower);
+  ASSERT_TRUE(other);
+  EXPECT_EQ(difference_from_fine(*other, 4), stairs);
+}
+
+/// Mesa's software driver has no GL_EXT_multisampled_render_to_texture: what such a driver is
+/// asked, over calls of one sample.
+int asked_of_texture = 0;
+int asked_of_depth = 0;
+
+TEST_F(SurfaceTest, SamplesThatATextureTakesByItself) {
+  GlCaps caps = probe_gl_caps();
+  caps.max_samples = 4;
+  GlExtensions extensions;
+  extensions.framebuffer_texture_multisample = [](GLenum target, GLenum place, GLenum kind,
+                                                  GLuint texture, GLint level, GLsizei samples) {
+    asked_of_texture = samples;
+    glFramebufferTexture2D(target, place, kind, texture, level);
+  };
+  extensions.renderbuffer_storage_multisample = [](GLenum target, GLsizei samples, GLenum format,
+                                                   GLsizei width, GLsizei height) {
+    asked_of_depth = samples;
+    glRenderbufferStorage(target, format, width, height);
+  };
+  GlState gl;
+  Target target;
+  while (glGetError() != GL_NO_ERROR) {
+  }
+  ASSERT_TRUE(target.resize(kWidth, kHeight, 8, caps, extensions, gl));
+  EXPECT_EQ(asked_of_texture, 4);
+  EXPECT_EQ(asked_of_depth, 4);
+  target.begin();
+  glClearColor(0.2f, 0.4f, 0.6f, 1.0f);
+  glClear(GL_COLOR_BUFFER_BIT);
+  target.finish(extensions);
+  target.bind();
+  std::array<std::uint8_t, 4> pixel{};
+  glReadPixels(3, 5, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, pixel.data());
+  EXPECT_EQ(pixel, (std::array<std::uint8_t, 4>{51, 102, 153, 255}));
+  target.release(gl);
+  // A driver that refuses what it offers: one sample is drawn with.
+  extensions.framebuffer_texture_multisample = [](GLenum, GLenum, GLenum, GLuint, GLint, GLsizei) {
+  };
+  EXPECT_TRUE(target.resize(kWidth, kHeight, 4, caps, extensions, gl));
+  EXPECT_EQ(glGetError(), GLenum{GL_NO_ERROR});
+  target.release(gl);
 }
 
 TEST_F(SurfaceTest, NoPictureNeverStretches) {

@@ -20,13 +20,15 @@ struct GlCaps {
   std::uint32_t texture_formats = 0;       ///< bit n: reads the blocks of the TextureFormat n
   std::uint32_t etc1_format =
       0x8D64;  ///< GL_ETC1_RGB8_OES; 0x9274 (ETC2, which reads ETC1's blocks) in some WebGL
-  bool etc1_sub_texture = false;  ///< GL_EXT_compressed_ETC1_RGB8_sub_texture
-  bool npot_mipmaps = false;      ///< GL_OES_texture_npot
-  bool depth24 = false;           ///< GL_OES_depth24
-  bool debug_groups = false;      ///< GL_KHR_debug or GL_EXT_debug_marker
-  bool instanced_arrays = false;  ///< GL_EXT/ANGLE_instanced_arrays, or the core of ES 3
-  bool vertex_arrays = false;     ///< GL_OES_vertex_array_object, or the core of ES 3
-  bool es3 = false;               ///< has the state of ES 3 besides
+  bool etc1_sub_texture = false;       ///< GL_EXT_compressed_ETC1_RGB8_sub_texture
+  bool npot_mipmaps = false;           ///< GL_OES_texture_npot
+  bool depth24 = false;                ///< GL_OES_depth24
+  bool debug_groups = false;           ///< GL_KHR_debug or GL_EXT_debug_marker
+  bool instanced_arrays = false;       ///< GL_EXT/ANGLE_instanced_arrays, or the core of ES 3
+  bool vertex_arrays = false;          ///< GL_OES_vertex_array_object, or the core of ES 3
+  bool es3 = false;                    ///< has the state of ES 3 besides
+  bool multisampled_textures = false;  ///< GL_EXT_multisampled_render_to_texture
+  int max_samples = 1;                 ///< of a framebuffer of ours; 1: no antialiasing
   int max_texture_size = 64;
   int max_vertex_uniform_vectors = 128;
   int max_vertex_attributes = 8;

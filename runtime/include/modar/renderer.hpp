@@ -143,6 +143,9 @@ struct RenderOptions {
   /// buffers: what benchmarks compare with. Only where the layouts need no rewriting and all
   /// geometry fits.
   bool client_arrays = false;
+  /// Samples a pixel of what render() draws, so that edges are smooth; fewer where the driver has
+  /// fewer. Holds from the next resize() on. draw() has those of the app's surface.
+  int samples = 1;
   bool instancing = true;   ///< items of one mesh or material share draw calls
   float lod_pixels = 1.0f;  ///< a level of detail may be off by so much on the screen
 };

@@ -80,7 +80,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
         showIf(findViewById(R.id.update), Fetch.AVAILABLE);
         stage = new Stage(view, this, diagnostics);
         view.setEGLContextClientVersion(2);
-        view.setEGLConfigChooser(8, 8, 8, 0, 16, 0);
+        view.setEGLConfigChooser(new Samples());
         view.setPreserveEGLContextOnPause(true);
         view.setRenderer(stage);
         view.setRenderMode(GLSurfaceView.RENDERMODE_WHEN_DIRTY);

@@ -198,7 +198,10 @@ public final class AppRun {
         app.onPause();
         Camera.busy = false;
         app.onResume();
+        check(GLSurfaceView.samples == 4, "smooth edges");
+        GLSurfaceView.most = 0;
         view.surface(Camera.width, Camera.height, true); // the context was lost meanwhile
+        check(GLSurfaceView.samples == 0, "a surface of one sample");
         check(Camera.opened == 1 && deliver(0) && deliver(1), "goes on");
         byte[] upright = picture();
         Activity.rotation = 1;
