@@ -10,6 +10,7 @@
 
 #include "formats/atomic_file.hpp"
 #include "formats/colour_grid.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
@@ -278,8 +279,8 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   const bool cut_out =
       std::any_of(content.textures.begin(), content.textures.end(),
                   [](const TextureRecord& t) { return (t.flags & kTextureCutOut) != 0; });
-  if (shadowed || hiding || any(kPatternColours) || any(kPatternShape) || cut_out ||
-      !content.lights.empty() || !content.occlusion.empty())
+  if (shadowed || hiding || any(kPatternColours) || any(kPatternShape) || any(kDrawOrder) ||
+      cut_out || !content.lights.empty() || !content.occlusion.empty())
     return 2;
   return 1;
 }

@@ -10,6 +10,7 @@
 
 #include "formats/bits.hpp"
 #include "formats/check_rules.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/tracker_record.hpp"
 #include "formats/utf8.hpp"
 #include "formats/validate.hpp"
@@ -576,6 +577,34 @@ void check_patterns(FaultLog& log, const BundleParts& parts) {
   }
 }
 
+/// Subtrees end inside of those that they belong to, and each triangle is in one node.
+bool is_tree(std::span<const DrawOrderRecord> nodes, std::size_t triangles) {
+  std::vector<bool> seen(triangles);
+  std::vector<std::size_t> ends = {nodes.size()};  // of the subtrees around the node
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const DrawOrderRecord& node = nodes[i];
+    while (ends.back() == i) ends.pop_back();
+    if (node.behind > ends.back() - i - 1) return false;
+    if (node.behind > 0) ends.push_back(i + 1 + node.behind);
+    if (node.triangle == kNone) continue;
+    if (node.triangle >= triangles || seen[node.triangle]) return false;
+    seen[node.triangle] = true;
+  }
+  return std::find(seen.begin(), seen.end(), false) == seen.end();
+}
+
+void check_draw_orders(FaultLog& log, const BundleParts& parts) {
+  for (const SectionEntry& entry : parts.sections) {
+    if (static_cast<SectionType>(entry.type) != kDrawOrder) continue;
+    const std::span<const std::byte> bytes = section_bytes(parts, entry);
+    const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
+    const LevelRecord& level = parts.levels[parts.chunks[entry.owner].first_level];
+    if (is_tree({first, bytes.size() / sizeof *first}, level.index_count / 3)) continue;
+    log.add(Rule::kChunkRange, entry.offset, "chunk " + std::to_string(entry.owner),
+            "its draw order is no tree that holds each triangle once");
+  }
+}
+
 /// Everything but sections as bytes.
 void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes) {
   const std::uint64_t damaged = log.errors();
@@ -589,6 +618,7 @@ void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes) {
   check_geometry(log, parts, hashes);
   check_texture_blocks(log, parts);
   check_patterns(log, parts);
+  check_draw_orders(log, parts);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Names, places and types of all fields, taken from the structs by the compiler.
 #include "formats/field_table.hpp"
 #include "formats/colour_grid.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 
 #include <cstring>
@@ -142,6 +143,9 @@ constexpr FieldInfo kShapeFaceRecord[] = {
     MODAR_FIELD(ShapeFaceRecord, place), MODAR_FIELD(ShapeFaceRecord, corner),
     MODAR_FIELD(ShapeFaceRecord, right), MODAR_FIELD(ShapeFaceRecord, down),
     MODAR_FIELD(ShapeFaceRecord, reserved)};
+constexpr FieldInfo kDrawOrderRecord[] = {MODAR_FIELD(DrawOrderRecord, plane),
+                                          MODAR_FIELD(DrawOrderRecord, behind),
+                                          MODAR_FIELD(DrawOrderRecord, triangle)};
 constexpr FieldInfo kShadowHeader[] = {
     MODAR_FIELD(ShadowHeader, width), MODAR_FIELD(ShadowHeader, height),
     MODAR_FIELD(ShadowHeader, low), MODAR_FIELD(ShadowHeader, high),
@@ -203,6 +207,7 @@ constexpr RecordInfo kRecords[] = {
     {"PatternShapeHeader", nullptr, SectionType::kNames, sizeof(PatternShapeHeader),
      kPatternShapeHeader},
     {"ShapeFaceRecord", nullptr, SectionType::kNames, sizeof(ShapeFaceRecord), kShapeFaceRecord},
+    {"DrawOrderRecord", nullptr, SectionType::kNames, sizeof(DrawOrderRecord), kDrawOrderRecord},
     {"ShadowHeader", nullptr, SectionType::kNames, sizeof(ShadowHeader), kShadowHeader},
 };
 

@@ -10,6 +10,7 @@
 #include "formats/bits.hpp"
 #include "formats/check.hpp"
 #include "formats/colour_grid.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/texture_format.hpp"
 #include "formats/utf8.hpp"
@@ -50,6 +51,7 @@ constexpr KnownType kKnownTypes[] = {
     {kPatternColours, 0, true},
     {SectionType::kShadow, 0, true},
     {kPatternShape, 0, true},
+    {kDrawOrder, 0, true},
     {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
     {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
     {SectionType::kTextureData, kSectionRequired | kSectionGpu, true},
@@ -786,6 +788,34 @@ void check_shape(const RecordCheck& check, const BundleParts& parts, const Secti
   }
 }
 
+/// What a walk needs to stay in its bytes: check_bundle() sees whether it is a tree.
+void check_draw_order(const RecordCheck& check, const BundleParts& parts,
+                      const SectionEntry& entry) {
+  if (entry.owner >= parts.chunks.size() || entry.variant != 0) {
+    return check.fault(Rule::kSectionOwner, &entry.owner,
+                       "chunk " + std::to_string(entry.owner) + " is not there");
+  }
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
+  const std::span nodes(first, bytes.size() / sizeof(DrawOrderRecord));
+  const std::uint32_t level = parts.chunks[entry.owner].first_level;
+  const std::size_t triangles =
+      level < parts.levels.size() ? parts.levels[level].index_count / 3 : 0;
+  std::size_t found = 0;
+  bool good = bytes.size() % sizeof(DrawOrderRecord) == 0;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    check.numbers(nodes[i].plane, "plane");
+    const bool has = nodes[i].triangle != kNone;
+    found += has;
+    good = good && nodes[i].behind < nodes.size() - i && (!has || nodes[i].triangle < triangles);
+  }
+  if (!good || found != triangles) {
+    check.fault(Rule::kChunkRange, &entry.size,
+                "its draw order does not hold the " + std::to_string(triangles) +
+                    " triangles of chunk " + std::to_string(entry.owner));
+  }
+}
+
 /// Sections that belong to a record: the record is there, and so is the parameter set.
 void check_owned_sections(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.sections.size() && !log.stop(); ++i) {
@@ -812,6 +842,8 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
       check_shape(check, parts, entry);
     } else if (type == SectionType::kShadow) {
       check_shadow(check, parts, entry);
+    } else if (type == kDrawOrder) {
+      check_draw_order(check, parts, entry);
     } else if (type == SectionType::kTrackerRecord) {
       if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
         check.fault(Rule::kSectionOwner, &entry.owner,

@@ -11,8 +11,8 @@ import math
 import struct
 import sys
 
-from bundle_bytes import (COLOURS, FACE, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, SHAPE, Bundle, Fault, at_least, digest, flags_known, follow,
-                          need)
+from bundle_bytes import (COLOURS, DRAW_ORDER, FACE, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, SHAPE, Bundle, Fault, at_least,
+                          digest, flags_known, follow, need)
 from bundle_models import check_models, check_tight, decode_level
 from bundle_summary import check_summary
 
@@ -111,6 +111,27 @@ def read_shadow(bundle, owner, variant, data):
          all(low < high for low, high in zip(head["low"], head["high"])), "BUNDLE_SCENE", 0, "a shadow")
 
 
+def read_draw_order(bundle, owner, variant, data):
+    """The planes between a chunk's triangles: a tree in pre-order that holds each triangle once."""
+    need(owner < len(bundle.tables["chunks"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+    need(len(data) % 24 == 0, "BUNDLE_CHUNK_RANGE", 0, "a draw order")
+    nodes = list(DRAW_ORDER.iter_unpack(data))
+    for node in nodes:
+        need(all(map(math.isfinite, node[:4])), "BUNDLE_NUMBER", 0, "a plane")
+    level = bundle.tables["chunks"][owner]["first_level"]
+    levels = bundle.tables["levels"]
+    triangles = levels[level]["index_count"] // 3 if level < len(levels) else 0
+    waiting, at = [len(nodes)] if nodes else [], 0  # ends of subtrees
+    while waiting:
+        end = waiting.pop()
+        behind = nodes[at][4]
+        need(behind < end - at, "BUNDLE_CHUNK_RANGE", 0, "a draw order")
+        waiting += [end] * (at + 1 + behind < end) + [at + 1 + behind] * (behind > 0)
+        at += 1
+    need(sorted(node[5] for node in nodes if node[5] != NONE) == list(range(triangles)), "BUNDLE_CHUNK_RANGE", 0,
+         "a draw order")
+
+
 def read_colours(bundle, owner, variant, data):
     """The colours of a pattern: three 16-bit numbers a cell."""
     need(owner < len(bundle.tables["patterns"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
@@ -161,6 +182,8 @@ def read_features(bundle):
             read_shadow(bundle, owner, variant, data)
         if kind == 261:
             read_shape(bundle, owner, variant, data)
+        if kind == 262:
+            read_draw_order(bundle, owner, variant, data)
         if kind in (256, 257):
             need(owner < len(tables["patterns"]) and variant in sets, "BUNDLE_SECTION_OWNER", 0)
         if kind == 258:

@@ -14,6 +14,7 @@
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/scene_shadow.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/mesh/draw_order.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/lod/reduce.hpp"
 #include "bake/mesh/occlusion.hpp"
@@ -108,6 +109,41 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
   // Keeps the next model's vertices on a 4-byte boundary.
   content.indices.resize((content.indices.size() + 3) / 4 * 4);
   content.models.push_back(record);
+}
+
+bool blended(const MaterialRecord& material, const BundleContent& content) {
+  if ((material.flags & kMaterialOccluder) != 0) return false;
+  if (material.opacity < 1.0f || material.texture == kNone) return material.opacity < 1.0f;
+  const std::uint32_t flags = content.textures[material.texture].flags;
+  return (flags & kTextureAlpha) != 0 && (flags & kTextureCutOut) == 0;
+}
+
+/// The order of the last model's triangles that are seen through.
+void add_draw_orders(BundleContent& content) {
+  const ModelRecord& model = content.models.back();
+  const VertexDecoder decoder(content.layouts[model.layout]);
+  for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
+    const ChunkRecord& chunk = content.chunks[c];
+    const LevelRecord& level = content.levels[chunk.first_level];
+    const std::size_t count = level.index_count / 3;
+    if (!blended(content.materials[chunk.material], content)) continue;
+    if (count < 2 || count > kMostOrderedTriangles) continue;
+    std::vector<std::array<glm::dvec3, 3>> triangles(count);
+    for (std::size_t i = 0; i < 3 * count; ++i) {
+      std::uint16_t index = 0;
+      std::memcpy(&index, content.indices.data() + level.index_offset + 2 * i, sizeof index);
+      const std::byte* vertex =
+          content.vertices.data() + level.vertex_offset + std::size_t{index} * decoder.stride();
+      triangles[i / 3][i % 3] = decoder.position(vertex, chunk);
+    }
+    const std::vector<DrawOrderRecord> nodes = draw_order(triangles);
+    const auto bytes = std::as_bytes(std::span(nodes));
+    ExtraSection section;
+    section.type = static_cast<std::uint32_t>(kDrawOrder);
+    section.owner = c;
+    section.bytes.assign(bytes.begin(), bytes.end());
+    content.extra.push_back(std::move(section));
+  }
 }
 
 /// A model that is welded and waits for its textures, which other models may share.
@@ -264,9 +300,18 @@ Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& ou
         textures[m].texture != kNone &&
         (content.textures[textures[m].texture].flags & kTextureAlpha) != 0;
   }
+  std::vector<bool> seen_through;
+  for (std::size_t m = 0; m < textures.size(); ++m) {
+    MaterialRecord material = material_record(welded.mesh.materials[m]);
+    material.texture = textures[m].texture;
+    if (textures[m].constant) fold_constant(textures[m].rgba, material);
+    seen_through.push_back(blended(material, content));
+  }
+  cut_crossing(welded.mesh, seen_through);
   Result<PackedMesh> packed = shape_model(std::move(welded.mesh), sides, request, report);
   if (!packed) return tl::unexpected(packed.error());
   merge_model(std::move(*packed), textures, content);
+  add_draw_orders(content);
   return {};
 }
 

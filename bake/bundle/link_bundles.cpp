@@ -6,6 +6,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 
 namespace modar {
@@ -106,8 +107,21 @@ class Linker {
     content_.textures.push_back(record);
   }
 
+  /// A section of the part, where it has one.
+  void add_extra(const BundleView& part, SectionType type, std::uint32_t owner,
+                 std::uint32_t new_owner) {
+    const auto bytes = part.section(type, owner);
+    if (bytes.empty()) return;
+    ExtraSection section;
+    section.type = static_cast<std::uint32_t>(type);
+    section.owner = new_owner;
+    section.bytes.assign(bytes.begin(), bytes.end());
+    content_.extra.push_back(std::move(section));
+  }
+
   void add_chunks(const BundleView& part, const ModelRecord& model, std::uint32_t first_material) {
     for (std::uint32_t c = 0; c < part.chunks().size(); ++c) {
+      add_extra(part, kDrawOrder, c, static_cast<std::uint32_t>(content_.chunks.size()));
       ChunkRecord chunk = part.chunks()[c];
       chunk.material = chunk.material - model.first_material + first_material;
       chunk.first_level += static_cast<std::uint32_t>(content_.levels.size());
@@ -159,13 +173,7 @@ class Linker {
     PatternRecord record = part.patterns()[0];
     record.name = content_.intern(linked.name);
     for (const SectionType type : {SectionType::kTrackerRecord, kPatternColours, kPatternShape}) {
-      const auto bytes = part.section(type, 0);
-      if (bytes.empty()) continue;
-      ExtraSection section;
-      section.type = static_cast<std::uint32_t>(type);
-      section.owner = static_cast<std::uint32_t>(content_.patterns.size());
-      section.bytes.assign(bytes.begin(), bytes.end());
-      content_.extra.push_back(std::move(section));
+      add_extra(part, type, 0, static_cast<std::uint32_t>(content_.patterns.size()));
     }
     std::vector<FeatureContent> features;
     for (std::uint32_t s = 0; s < part.parameter_sets().size(); ++s) {

@@ -12,6 +12,7 @@
 
 #include "formats/colour_grid.hpp"
 #include "formats/component.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 
@@ -170,6 +171,10 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
   }
   if (static_cast<SectionType>(entry.type) == kPatternColours) return add_colours(out, entry);
   if (static_cast<SectionType>(entry.type) == kPatternShape) return add_shape(out, bundle, entry);
+  if (static_cast<SectionType>(entry.type) == kDrawOrder) {
+    return out.add_records(record_info("DrawOrderRecord"), entry.offset, sizeof(DrawOrderRecord),
+                           entry.size / sizeof(DrawOrderRecord));
+  }
   const PlaceRange all{entry.offset, 1, entry.size};
   switch (static_cast<SectionType>(entry.type)) {
     case SectionType::kNames:

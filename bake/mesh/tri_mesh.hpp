@@ -42,6 +42,7 @@ struct TriMesh {
   std::vector<SourceMaterial> materials;
   std::uint64_t source_vertex_count = 0;
   std::uint64_t source_face_count = 0;
+  std::uint64_t cut_vertices = 0;  ///< of positions that the source does not have, the last ones
 
   [[nodiscard]] std::uint32_t source_position(std::uint32_t vertex) const {
     return source_positions.empty() ? vertex : source_positions[vertex];

@@ -93,6 +93,7 @@ ModelPainter::ModelPainter(const BundleView& bundle, std::span<const VertexForma
   setups_.resize(bundle.chunks().size());
   chunk_layouts_.assign(bundle.chunks().size(), kNone);
   find_equals();
+  find_orders();
 }
 
 /// Items of different models can share a draw call where their materials and layouts are equal.
@@ -107,6 +108,21 @@ void ModelPainter::find_equals() {
     while (!equal_layout(bundle_.layouts()[first], bundle_.layouts()[i])) ++first;
     equal_layout_.push_back(first);
   }
+}
+
+/// Makes room for the largest order: nothing is allocated in a frame.
+void ModelPainter::find_orders() {
+  std::size_t most = 0;
+  for (const SectionEntry& section : bundle_.sections()) {
+    if (section.type != static_cast<std::uint32_t>(kDrawOrder)) continue;
+    const auto bytes = bundle_.section(kDrawOrder, section.owner);
+    const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
+    orders_.resize(bundle_.chunks().size());
+    orders_[section.owner] = {first, bytes.size() / sizeof *first};
+    most = std::max(most, orders_[section.owner].size());
+  }
+  waiting_.reserve(draw_order_depth(most));
+  sorted_.reserve(3 * most);
 }
 
 Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensions& extensions,
@@ -136,6 +152,7 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
     }
   }
   if (extensions_.instancing()) glGenBuffers(1, &row_buffer_);
+  if (!orders_.empty()) glGenBuffers(1, &sorted_buffer_);
   return {};
 }
 
@@ -174,6 +191,8 @@ void ModelPainter::release(GlState& gl) {
   }
   gl.forget_buffer(row_buffer_);
   glDeleteBuffers(1, &row_buffer_);
+  gl.forget_buffer(sorted_buffer_);
+  glDeleteBuffers(1, &sorted_buffer_);
   batches_.release(gl);
 }
 
@@ -355,6 +374,8 @@ void ModelPainter::make_pieces(const PaintJob& job) {
 bool ModelPainter::continues(const Piece& piece, const DrawCommand& next) const {
   const LevelRecord& before = bundle_.levels()[piece.mesh.level];
   const LevelRecord& after = bundle_.levels()[next.level];
+  if (!order_of(piece.chunk, piece.mesh.level).empty()) return false;
+  if (!order_of(next.chunk, next.level).empty()) return false;
   return piece.item == next.item && piece.material == next.material &&
          piece.program == next.program && before.vertex_offset == after.vertex_offset &&
          before.index_offset + std::uint64_t{piece.mesh.index_count} * 2 == after.index_offset &&
@@ -400,9 +421,15 @@ void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
   set_surface(job, state, piece);
   set_slot(job, state, piece);
   set_attributes(piece.layout, place.vertex_buffer, place.vertex_offset, 0, job.gl);
-  job.gl.bind_index_buffer(place.index_buffer);
+  const auto order = order_of(piece.chunk, piece.mesh.level);
+  const bool ordered = !order.empty() && job.list.view(piece.item).perspective;
+  if (ordered) {
+    send_in_order(job, piece, order);
+  } else {
+    job.gl.bind_index_buffer(place.index_buffer);
+  }
   glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(piece.mesh.index_count), GL_UNSIGNED_SHORT,
-                 index_pointer(place.index_offset));
+                 index_pointer(ordered ? 0 : place.index_offset));
   if (job.geometry.client_arrays()) {
     job.stats.bytes_uploaded +=
         std::uint64_t{piece.mesh.index_count} * 2 +
@@ -411,6 +438,29 @@ void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
   ++job.stats.draw_calls;
   job.stats.triangles += piece.mesh.index_count / 3;
   job.stats.chunks_drawn += piece.chunks;
+}
+
+std::span<const DrawOrderRecord> ModelPainter::order_of(std::uint32_t chunk,
+                                                        std::uint32_t level) const {
+  if (orders_.empty() || bundle_.chunks()[chunk].first_level != level) return {};
+  return orders_[chunk];
+}
+
+void ModelPainter::send_in_order(const PaintJob& job, const Piece& piece,
+                                 std::span<const DrawOrderRecord> order) {
+  const std::byte* indices =
+      bundle_.indices().data() + bundle_.levels()[piece.mesh.level].index_offset;
+  const glm::vec3& eye = job.list.view(piece.item).eye;
+  sorted_.clear();
+  walk_draw_order(order, {eye.x, eye.y, eye.z}, waiting_, [&](std::uint32_t triangle) {
+    sorted_.resize(sorted_.size() + 3);
+    std::memcpy(&sorted_[sorted_.size() - 3], indices + 6 * std::size_t{triangle}, 6);
+  });
+  job.gl.bind_index_buffer(sorted_buffer_);
+  const std::size_t bytes = sorted_.size() * sizeof sorted_[0];
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(bytes), sorted_.data(),
+               GL_STREAM_DRAW);
+  job.stats.bytes_uploaded += bytes;
 }
 
 /// One item whose matrix turns normals otherwise than a rotation is drawn as a batch of one, whose

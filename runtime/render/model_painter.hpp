@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/bundle_view.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/error.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/render/batch_store.hpp"
@@ -53,8 +54,9 @@ class ModelPainter {
   [[nodiscard]] std::span<const ChunkSetup> setups() const { return setups_; }
   [[nodiscard]] std::uint64_t batch_bytes() const { return batches_.bytes(); }
 
-  /// Draws in the list's order. What follows on in the index buffer with the same state is one
-  /// piece; pieces of several items with the same state are drawn together.
+  /// Draws in the list's order, and triangles of chunks with a draw order from far to near. What
+  /// follows on in the index buffer with the same state is one piece; pieces of several items with
+  /// the same state are drawn together.
   void draw(const PaintJob& job);
 
  private:
@@ -88,6 +90,7 @@ class ModelPainter {
   };
 
   void find_equals();
+  void find_orders();
   Result<std::uint32_t> program_of(const ProgramKey& key);
   ProgramState* program(std::uint32_t index, SlotKind slots, GlState& gl);
   [[nodiscard]] bool same_decoding(std::uint32_t a, std::uint32_t b) const;
@@ -97,6 +100,10 @@ class ModelPainter {
   void draw_group(const PaintJob& job, std::span<Piece> group);
   void draw_piece(const PaintJob& job, const Piece& piece);
   ProgramState& single_state(const PaintJob& job, const Piece& piece);
+  [[nodiscard]] std::span<const DrawOrderRecord> order_of(std::uint32_t chunk,
+                                                          std::uint32_t level) const;
+  void send_in_order(const PaintJob& job, const Piece& piece,
+                     std::span<const DrawOrderRecord> order);
   bool draw_instances(const PaintJob& job, std::span<const Piece> pieces);
   bool draw_batches(const PaintJob& job, std::span<const Piece> pieces);
   bool draw_batch(const PaintJob& job, ProgramState& state, std::span<const Piece> pieces);
@@ -122,6 +129,10 @@ class ModelPainter {
   std::vector<std::uint32_t> chunk_layouts_;
   std::vector<std::uint32_t> equal_material_;  ///< the first material with the same values
   std::vector<std::uint32_t> equal_layout_;    ///< the first layout with the same values
+  std::vector<std::span<const DrawOrderRecord>> orders_;  ///< one a chunk, or none at all
+  std::vector<DrawOrderRange> waiting_;
+  std::vector<std::uint16_t> sorted_;  ///< indices of one piece
+  GLuint sorted_buffer_ = 0;
   LightList lights_;
   std::vector<Piece> pieces_;
   std::vector<BatchPart> parts_;

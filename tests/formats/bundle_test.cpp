@@ -3,10 +3,13 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 
 #include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
+#include "formats/draw_order.hpp"
 #include "tests/formats/allocation_counter.hpp"
 #include "tests/formats/support.hpp"
 
@@ -93,6 +96,53 @@ TEST(Bundle, TheSameContentGivesTheSameBytes) {
   EXPECT_EQ(read_file(path), encode(golden_content()));
   EXPECT_EQ(std::remove(path.c_str()), 0);
   EXPECT_EQ(std::remove(folder.c_str()), 0);
+}
+
+using Nodes = std::span<DrawOrderRecord>;
+
+/// Opens, and is passed by the checker, after `damage` to the draw order.
+std::pair<bool, bool> opens_and_passes(void (*damage)(Nodes)) {
+  BundleContent content = golden_content();
+  add_looks(content);
+  ExtraSection& order = content.extra.back();
+  damage({reinterpret_cast<DrawOrderRecord*>(order.bytes.data()),
+          order.bytes.size() / sizeof(DrawOrderRecord)});
+  const Bytes bytes = encode(content);
+  return {BundleView::open(bytes).has_value(), check_bundle(bytes, [](const Issue&) {})};
+}
+
+TEST(DrawOrder, OnlyATreeOfAllTrianglesPasses) {
+  using Answer = std::pair<bool, bool>;
+  EXPECT_EQ(opens_and_passes([](Nodes) {}), Answer(true, true));
+  EXPECT_EQ(opens_and_passes([](Nodes n) { n[0].behind = 99; }), Answer(false, false));
+  EXPECT_EQ(opens_and_passes([](Nodes n) { n[2].triangle = 99; }), Answer(false, false));
+  EXPECT_EQ(opens_and_passes([](Nodes n) { n[2].triangle = kNone; }), Answer(false, false));
+  EXPECT_EQ(
+      opens_and_passes([](Nodes n) { n[3].plane[1] = std::numeric_limits<float>::infinity(); }),
+      Answer(false, false));
+  // What does no harm to a reader.
+  EXPECT_EQ(opens_and_passes([](Nodes n) { n[3].triangle = n[2].triangle; }), Answer(true, false));
+  EXPECT_EQ(opens_and_passes([](Nodes n) {
+              n[0].behind = 2;
+              n[1].behind = static_cast<std::uint32_t>(n.size() - 2);
+            }),
+            Answer(true, false));
+}
+
+TEST(DrawOrder, AWalkEndsOnAnyNodes) {
+  // Each node says that all others lie behind it.
+  std::vector<DrawOrderRecord> nodes(9);
+  for (std::uint32_t i = 0; i < nodes.size(); ++i) nodes[i] = {{0, 0, 1, 0}, 99, i};
+  std::vector<DrawOrderRange> waiting;
+  waiting.reserve(draw_order_depth(nodes.size()));
+  const auto* before = waiting.data();
+  std::vector<std::uint32_t> seen;
+  walk_draw_order(nodes, {0, 0, 1}, waiting, [&](std::uint32_t t) { seen.push_back(t); });
+  EXPECT_EQ(seen, (std::vector<std::uint32_t>{8, 7, 6, 5, 4, 3, 2, 1, 0}));
+  EXPECT_EQ(waiting.data(), before);
+  walk_draw_order(nodes, {0, 0, -1}, waiting, [&](std::uint32_t t) { seen.push_back(t); });
+  EXPECT_EQ(seen.size(), 18u);
+  EXPECT_EQ(seen.back(), 8u);
 }
 
 TEST(Bundle, EmptyTablesHaveNoSection) {

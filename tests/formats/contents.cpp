@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/colour_grid.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/quantise.hpp"
 
@@ -414,6 +415,19 @@ void add_looks(BundleContent& content) {
   for (int i = 0; i < 6; ++i) put(colours.bytes, static_cast<std::uint16_t>(9000 * i + 77));
   content.extra.push_back(colours);
   add_shapes(content);
+  const std::uint32_t triangles = content.levels[content.chunks[1].first_level].index_count / 3;
+  ExtraSection order;
+  order.type = static_cast<std::uint32_t>(kDrawOrder);
+  order.owner = 1;
+  for (std::uint32_t i = 0; i <= triangles; ++i) {
+    // Turned by turns; the second node has a plane alone.
+    const DrawOrderRecord node{{i % 2 == 0 ? 1.0f : 0.0f, i % 2 == 0 ? 0.0f : -1.0f, 0.0f, 0.25f},
+                               i % 3 == 0 ? triangles - i : 0,
+                               i == 1 ? kNone : (i == 0 ? 0 : i - 1)};
+    const auto bytes = std::as_bytes(std::span(&node, 1));
+    order.bytes.insert(order.bytes.end(), bytes.begin(), bytes.end());
+  }
+  content.extra.push_back(order);
 }
 
 }  // namespace modar::test

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "formats/colour_grid.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/field_table.hpp"
 #include "formats/layout.hpp"
 #include "formats/pattern_shape.hpp"
@@ -138,6 +139,7 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
   MODAR_STRUCT(PatternShapeHeader, F(kind), F(face_count), F(half_arc), F(slope), F(reserved))
   MODAR_STRUCT(ShapeFaceRecord, F(place), F(corner), F(right), F(down), F(reserved))
+  MODAR_STRUCT(DrawOrderRecord, F(plane), F(behind), F(triangle))
   MODAR_STRUCT(ShadowHeader, F(width), F(height), F(low), F(high), F(reserved))
   MODAR_STRUCT(FeatureHeader, F(count), F(descriptor_bytes), F(keypoints_offset),
                F(descriptors_offset), F(reserved))
@@ -231,6 +233,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
       {modar::kPatternColours, "pattern colours"},
       {SectionType::kShadow, "shadow"},
       {modar::kPatternShape, "pattern shape"},
+      {modar::kDrawOrder, "draw order"},
       {SectionType::kVertices, "vertices"},
       {SectionType::kIndices, "indices"},
       {SectionType::kTextureData, "texture data"}};

@@ -9,6 +9,9 @@
 
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
+#include "formats/colour_grid.hpp"
+#include "formats/draw_order.hpp"
+#include "runtime/render/light_estimate.hpp"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -53,6 +56,45 @@ unsigned touch(std::string_view text) {
   return touch(std::span(text));
 }
 
+/// Walks over a chunk's draw order as the renderer does: each triangle once.
+unsigned walk_order(const BundleView& view, std::uint32_t chunk) {
+  const auto bytes = view.section(kDrawOrder, chunk);
+  if (bytes.empty()) return 0;
+  const LevelRecord& level = view.levels()[view.chunks()[chunk].first_level];
+  const auto indices = view.indices().subspan(level.index_offset, level.index_count * 2);
+  const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
+  std::vector<DrawOrderRange> waiting;
+  std::size_t count = 0;
+  unsigned sum = 0;
+  walk_draw_order({first, bytes.size() / sizeof *first}, {0.5f, -2.0f, 1.0f}, waiting,
+                  [&](std::uint32_t triangle) {
+                    sum += touch(indices.subspan(std::size_t{triangle} * 6, 6));
+                    ++count;
+                  });
+  if (3 * count != level.index_count) std::abort();
+  return sum;
+}
+
+/// Looks for the light of a frame that shows the whole pattern.
+unsigned look(const BundleView& view, std::uint32_t pattern) {
+  const auto colours = view.section(kPatternColours, pattern);
+  if (colours.empty()) return 0;
+  std::vector<std::uint8_t> pixels(3 * 16 * 16);
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    pixels[i] = static_cast<std::uint8_t>(60 + i % 90);
+  CameraPicture frame;
+  frame.width = frame.height = 16;
+  frame.planes[0] = pixels.data();
+  frame.strides[0] = 3 * 16;
+  const PlaneLight light =
+      look_at_pattern(frame, glm::mat4(1.0f), view.patterns()[pattern], colours);
+  for (int c = 0; c < 3; ++c) {
+    // Also true for NaN.
+    if (light.known && !(light.middle[c] > 0.0f && light.middle[c] < 1e6f)) std::abort();
+  }
+  return touch(colours) + (light.known ? 1u : 0u);
+}
+
 /// Uses every accessor of an opened bundle as a renderer or tracker would.
 unsigned walk(const BundleView& view) {
   unsigned sum = touch(view.meta());
@@ -62,6 +104,7 @@ unsigned walk(const BundleView& view) {
     const std::uint32_t stride = view.layouts()[model.layout].stride;
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const ChunkRecord& chunk = view.chunks()[model.first_chunk + c];
+      sum += walk_order(view, model.first_chunk + c);
       sum += touch(view.name(view.materials()[chunk.material].name));
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         const LevelRecord& level = view.levels()[chunk.first_level + l];
@@ -83,10 +126,11 @@ unsigned walk(const BundleView& view) {
   }
   for (std::uint32_t s = 0; s < view.scenes().size(); ++s) {
     const SceneRecord& scene = view.scenes()[s];
+    sum += touch(view.section(SectionType::kShadow, s));
     sum += view.patterns()[scene.pattern].width + view.models()[scene.model].layout;
   }
   for (std::uint32_t p = 0; p < view.patterns().size(); ++p) {
-    sum += touch(view.name(view.patterns()[p].name));
+    sum += touch(view.name(view.patterns()[p].name)) + look(view, p);
     for (std::uint32_t s = 0; s < view.parameter_sets().size(); ++s) {
       const FeatureView features = view.features(p, view.parameter_sets()[s].id);
       sum += touch(features.keypoints) + touch(features.descriptors);

@@ -153,7 +153,7 @@ std::vector<SharedVertices> find_shared(const ChunkedMesh& mesh,
                                         const std::vector<MergedVertices>& merged) {
   // By the file's numbers, and for files that write a position twice, by place where edges are
   // open.
-  Array<std::uint8_t> uses(mesh.mesh.source_vertex_count, 0);
+  Array<std::uint8_t> uses(mesh.mesh.source_vertex_count + mesh.mesh.cut_vertices, 0);
   std::vector<OpenVertex> open;
   for (std::uint32_t c = 0; c < mesh.chunks.size(); ++c) {
     for (std::size_t i = 0; i < mesh.chunks[c].vertices.size(); ++i) {

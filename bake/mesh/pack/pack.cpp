@@ -15,10 +15,6 @@
 #include "formats/transport/chunk_order.hpp"
 
 namespace modar {
-namespace {
-
-/// Chunks per thread between two joins: more balance load better and hold more memory. Set by hand.
-constexpr unsigned kWave = 4;
 
 MaterialRecord material_record(const SourceMaterial& source) {
   MaterialRecord m{};
@@ -35,6 +31,11 @@ MaterialRecord material_record(const SourceMaterial& source) {
       (source.two_sided ? kMaterialTwoSided : 0u) | (source.occluder() ? kMaterialOccluder : 0u);
   return m;
 }
+
+namespace {
+
+/// Chunks per thread between two joins: more balance load better and hold more memory. Set by hand.
+constexpr unsigned kWave = 4;
 
 /// Coarse triangles in packed vertex numbers. Those with two vertices merged into one are left out:
 /// they have no area.

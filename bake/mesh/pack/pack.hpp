@@ -33,6 +33,9 @@ struct PackOptions {
   unsigned jobs = 1;  ///< threads; the bytes do not depend on it
 };
 
+/// As the bundle has it, without a name and a texture.
+MaterialRecord material_record(const SourceMaterial& source);
+
 /// Quantises (positions as asked, 8-bit normals, 16-bit uv, 8-bit colours), decodes its own bytes
 /// and measures their greatest and rms error; computes conservative boxes and normal cones; puts
 /// each chunk in the order of formats/chunk_order.hpp, where vertices of equal bytes become one.
