@@ -96,8 +96,20 @@ step "Play"
 # --force: the folder holds the video, too.
 "$bin/modar-play" "$bundle" --input "$video" --outline --report "$out" --force
 
+step "Before and after: plain shading, ours, ours in the light that the camera shows"
+mkdir "$out/frames"
+if [ $own = yes ]; then
+  for frame in 05 30 55; do cp "$video/frame_000$frame.png" "$out/frames"; done
+else
+  ffmpeg -v fatal -nostdin -y -i "$video" -vf 'select=eq(n\,40)+eq(n\,200)+eq(n\,400)' -vsync vfr "$out/frames/%d.png"
+fi
+"$bin/modar" bench light "$bundle" "$out"/frames/*.png -o "$out"
+rm -r "$out/frames"
+figure='<h2>Before and after</h2>\n<a href=before_after.png><img src=before_after.png alt="plain shading, ours, ours in the light that the camera shows"></a>'
+sed -i "s|<h2>Contact sheet</h2>|$figure\n&|" "$out/index.html"
+
 step "Done. Look at"
-for file in index.html overlay.mp4 contact_sheet.png demo.modar; do
+for file in index.html overlay.mp4 contact_sheet.png before_after.png demo.modar; do
   [ -s "$out/$file" ] || { echo "demo.sh: $out/$file was not made" >&2; exit 4; }
   echo "$root/$out/$file"
 done

@@ -114,6 +114,9 @@ BenchResult bench_render_rows(const BenchOptions& command) {
 
 /// Shading beside plain shading, both as they differ from a path tracer.
 BenchResult bench_light_rows(const BenchOptions& command) {
+  if (!command.inputs.empty() && command.inputs[0].ends_with(".modar")) {
+    return bench_before_after(command.inputs, command.output);
+  }
   if (command.pose.patterns.empty()) {
     return fail(ExitCode::kUsage, "bench.inputs", command.name, "models need something to stand on",
                 "modar bench light MODEL[,up=y]... --patterns PICTURE [-o FOLDER]");
@@ -175,9 +178,9 @@ const std::vector<Bench>& benches() {
        "or "
        "the player on a video, against the ModAR paper's Table 9",
        bench_render_rows},
-      {"light", false, "MODEL[,up=y]... --patterns PICTURE [-o FOLDER]",
+      {"light", false, "MODEL[,up=y]... --patterns PICTURE | BUNDLE PHOTO... [-o FOLDER]",
        "models on a pattern, a plant and a glass besides: colour error (CIEDE2000) beside a path "
-       "tracer, against plain shading",
+       "tracer, against plain shading; or a bundle's models on photos, before and after",
        bench_light_rows},
       {"model", false, "SCAN [--big] | --obj FILE",
        "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "

@@ -84,29 +84,6 @@ RgbaImage stored_picture(const TracedPicture& traced) {
   return image;
 }
 
-/// Pictures of one height, side by side or one below the other.
-RgbaImage joined(const std::vector<RgbaImage>& images, bool across) {
-  RgbaImage all;
-  if (images.empty()) return all;
-  for (const RgbaImage& image : images) {
-    all.width = across ? all.width + image.width : image.width;
-    all.height = across ? image.height : all.height + image.height;
-  }
-  if (!across) {
-    for (const RgbaImage& image : images) {
-      all.pixels.insert(all.pixels.end(), image.pixels.begin(), image.pixels.end());
-    }
-    return all;
-  }
-  for (std::uint32_t y = 0; y < all.height; ++y) {
-    for (const RgbaImage& image : images) {
-      const auto row = image.pixels.begin() + static_cast<std::ptrdiff_t>(4 * y * image.width);
-      all.pixels.insert(all.pixels.end(), row, row + static_cast<std::ptrdiff_t>(4 * image.width));
-    }
-  }
-  return all;
-}
-
 /// The pixels that count, and their mean difference.
 struct Region {
   std::vector<std::size_t> pixels;
@@ -334,6 +311,28 @@ class Rows {
 };
 
 }  // namespace
+
+RgbaImage joined(const std::vector<RgbaImage>& images, bool across) {
+  RgbaImage all;
+  if (images.empty()) return all;
+  for (const RgbaImage& image : images) {
+    all.width = across ? all.width + image.width : image.width;
+    all.height = across ? image.height : all.height + image.height;
+  }
+  if (!across) {
+    for (const RgbaImage& image : images) {
+      all.pixels.insert(all.pixels.end(), image.pixels.begin(), image.pixels.end());
+    }
+    return all;
+  }
+  for (std::uint32_t y = 0; y < all.height; ++y) {
+    for (const RgbaImage& image : images) {
+      const auto row = image.pixels.begin() + static_cast<std::ptrdiff_t>(4 * y * image.width);
+      all.pixels.insert(all.pixels.end(), row, row + static_cast<std::ptrdiff_t>(4 * image.width));
+    }
+  }
+  return all;
+}
 
 double ciede2000(const glm::dvec3& a, const glm::dvec3& b) {
   constexpr double kDegree = 0.017453292519943295;

@@ -8,6 +8,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "bake/image/image.hpp"
 #include "bake/lab/bench.hpp"
 #include "formats/error.hpp"
 
@@ -36,6 +37,17 @@ struct LightBenchOptions {
 /// reference) and FOLDER/light.png (all of them). Errors: those of baking and of GL; kIo where a
 /// picture cannot be written.
 Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options);
+
+/// The first input is a bundle, the others are pictures of its patterns. A row a picture, in
+/// CIEDE2000, the mean over the models' pixels: how far light that follows the picture (ours), and
+/// plain shading (reference), are from the scenes' own light. Writes FOLDER/before_after.png:
+/// plain, in the scenes' light, in the picture's; a row a picture. Errors: those of reading and of
+/// GL; kIo.
+Result<std::vector<BenchRow>> bench_before_after(const std::vector<std::string>& inputs,
+                                                 const std::string& folder);
+
+/// Pictures of one height, side by side, or of one width, one below the other.
+RgbaImage joined(const std::vector<RgbaImage>& images, bool across);
 
 /// CIEDE2000 of two colours in CIELAB. Sharma, Wu, Dalal, "The CIEDE2000 Color-Difference Formula",
 /// 2005.

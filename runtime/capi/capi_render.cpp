@@ -175,6 +175,13 @@ void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
                            projection_of(*renderer, camera, projection), renderer->items);
 }
 
+void modar_renderer_observe(modar_renderer* renderer, const modar_picture* picture,
+                            const modar_camera* camera, const modar_item* items, size_t count) {
+  take_items(*renderer, items, count);
+  renderer->renderer->observe(picture_of(*picture), projection_of(*renderer, camera, nullptr),
+                              renderer->items);
+}
+
 void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
                             double y, double* frame_x, double* frame_y) {
   const glm::dvec2 pixel =
@@ -203,7 +210,8 @@ void modar_render_options_default(modar_render_options* options) {
               {ours.clear_colour.r, ours.clear_colour.g, ours.clear_colour.b, ours.clear_colour.a},
               ours.lod_pixels,
               ours.exclusive_context ? 1 : 0,
-              ours.estimate_light ? 0 : 1};
+              ours.estimate_light ? 0 : 1,
+              ours.samples};
 }
 
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options) {
@@ -216,6 +224,7 @@ void modar_renderer_set_options(modar_renderer* renderer, const modar_render_opt
   ours.lod_pixels = asked.lod_pixels;
   ours.exclusive_context = asked.exclusive != 0;
   ours.estimate_light = asked.fixed_light == 0;
+  ours.samples = asked.samples;
   renderer->renderer->set_options(ours);
 }
 

@@ -17,8 +17,6 @@ namespace {
 /// Samples of a cell across and down: fewer miss its mean, more take time (16 of 64 cells: some
 /// 30 us on a desk). Set by hand.
 constexpr int kSamples = 4;
-/// Frames between two looks: light changes slowly, and a look costs as much as some draw calls.
-constexpr std::uint64_t kPause = 4;
 /// The share of a new look: the light follows in about a third of a second at 30 frames a second.
 constexpr float kFollow = 0.3f;
 /// After so many frames without a look, the first one counts alone.
@@ -248,13 +246,13 @@ void LightEstimator::create(const BundleView& bundle) {
 }
 
 void LightEstimator::observe(const CameraPicture& frame, const glm::mat4& projection,
-                             std::span<const DrawItem> items) {
-  ++frame_;
+                             std::span<const DrawItem> items, std::uint64_t passed) {
+  frame_ += passed;
   for (const DrawItem& item : items) {
     if (item.scene >= bundle_.scenes().size()) continue;
     const std::uint32_t pattern = bundle_.scenes()[item.scene].pattern;
     Watched& watched = patterns_[pattern];
-    if (watched.light.known && frame_ < watched.looked + kPause) continue;
+    if (watched.light.known && frame_ < watched.looked + kLookPause) continue;
     const auto colours = bundle_.section(kPatternColours, pattern);
     if (colours.empty()) continue;
     const PlaneLight light = look_at_pattern(frame, projection * item.world_to_eye,

@@ -24,16 +24,20 @@ struct PlaneLight {
   bool known = false;
 };
 
+/// Frames between two looks: light changes slowly, and a look costs as much as some draw calls.
+inline constexpr std::uint64_t kLookPause = 4;
+
 /// Follows the light of each pattern from frame to frame.
 class LightEstimator {
  public:
   /// Forgets everything. The bundle's bytes outlive the estimator.
   void create(const BundleView& bundle);
 
-  /// Looks at the patterns of the items' scenes in a frame with planes, every fourth time. Patterns
-  /// without stored colours are left out. Allocates nothing.
+  /// Looks at the patterns of the items' scenes in a frame with planes, kLookPause frames after the
+  /// last look. passed: frames since the last call. Patterns without stored colours are left out.
+  /// Allocates nothing.
   void observe(const CameraPicture& frame, const glm::mat4& projection,
-               std::span<const DrawItem> items);
+               std::span<const DrawItem> items, std::uint64_t passed = 1);
 
   /// What a white surface in the plane gets at the place of the scene's model; nothing where nobody
   /// has seen it. scene: any number.

@@ -328,6 +328,14 @@ void Renderer::draw(const SurfaceView& surface, const CameraPicture& frame,
   s.end_frame();
 }
 
+void Renderer::observe(const CameraPicture& frame, const glm::mat4& projection,
+                       std::span<const DrawItem> items) {
+  if (frame.planes[0] == nullptr || frame.width < 1 || frame.height < 1) return;
+  if (state_->options.estimate_light) {
+    state_->estimator.observe(frame, projection, items, kLookPause);
+  }
+}
+
 void Renderer::read_pixels(std::span<std::uint8_t> rgba) {
   if (state_->target.width() == 0) return;
   const SavedGlState saved(state_->extensions, !state_->options.exclusive_context);

@@ -232,7 +232,8 @@ EMSCRIPTEN_KEEPALIVE double web_brightness(const uint8_t* gray, size_t stride) {
 }
 
 /// Uploads the models into the current context. lost: 1 where that context is new after a loss.
-EMSCRIPTEN_KEEPALIVE int web_upload(int lost) {
+/// fixed: 1 where light does not follow web_look().
+EMSCRIPTEN_KEEPALIVE int web_upload(int lost, int fixed) {
   if (lost != 0 && engine.renderer != nullptr)
     return modar_renderer_restore(engine.renderer, &engine.error);
   engine.renderer = modar_renderer_create(engine.bundle, nullptr, 0, &engine.error);
@@ -240,6 +241,7 @@ EMSCRIPTEN_KEEPALIVE int web_upload(int lost) {
   modar_render_options options;
   modar_render_options_default(&options);
   options.exclusive = 1;
+  options.fixed_light = fixed;
   modar_renderer_set_options(engine.renderer, &options);
   return 0;
 }
@@ -259,6 +261,20 @@ EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn
   surface.cover = 1;
   modar_renderer_draw(engine.renderer, &surface, nullptr, &engine.camera, nullptr, engine.items,
                       count);
+}
+/// The light on the patterns of web_poses(), as a copy of their frame shows it: RGBA, which is not
+/// kept.
+EMSCRIPTEN_KEEPALIVE void web_look(uint8_t* pixels, int width, int height) {
+  const int count = width * height;
+  for (int i = 0; i < count; ++i) std::memmove(pixels + 3 * i, pixels + 4 * i, 3);
+  modar_picture picture{};
+  picture.format = MODAR_RGB;
+  picture.width = width;
+  picture.height = height;
+  picture.planes[0] = pixels;
+  picture.strides[0] = 3 * static_cast<ptrdiff_t>(width);
+  modar_renderer_observe(engine.renderer, &picture, &engine.camera, engine.items,
+                         collect_items(0.0f, 1.0f));
 }
 EMSCRIPTEN_KEEPALIVE double web_gpu_bytes() {
   return static_cast<double>(modar_renderer_gpu_bytes(engine.renderer));

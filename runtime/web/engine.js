@@ -155,8 +155,15 @@ export class Engine {
     GL.makeContextCurrent(GL.registerContext(context, { majorVersion: version, enableExtensionsByDefault: true }));
   }
 
-  upload(afterLoss) {
-    this.#check(this.#module._web_upload(afterLoss ? 1 : 0));
+  /** fixedLight: the models' light does not follow look(). */
+  upload(afterLoss, fixedLight = false) {
+    this.#check(this.#module._web_upload(afterLoss ? 1 : 0, fixedLight ? 1 : 0));
+  }
+
+  /** The light in a small copy of the poses' frame. @param {ImageData} image */
+  look({ data, width, height }) {
+    this.frameBuffer(data.length).set(data);
+    this.#module._web_look(this.frameAt, width, height);
   }
 
   draw(width, height, { mirror = false, turn = 0, size = 1 } = {}) {

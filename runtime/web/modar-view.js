@@ -4,6 +4,9 @@ import { Engine, ModarError } from './engine.js';
 
 /** Screens of phones have more pixels than a camera's picture or a scan's texture fills. */
 const MOST_PIXELS_A_CSS_PIXEL = 2;
+/** Frames between looks at the room's light, and how wide the copy is that is looked at: reading a picture back is slow. */
+const LIGHT_EVERY = 4;
+const LIGHT_WIDTH = 160;
 
 function openContext(canvas, webgl1) {
   const attributes = { alpha: true, premultipliedAlpha: true, depth: true, stencil: false, antialias: true };
@@ -24,20 +27,25 @@ export class View {
   #models;
   #gl;
   #lost = false;
+  #fixedLight = false;
+  #small = null;
+  #frames = 0;
 
   /**
    * @param {Uint8Array | Promise<Uint8Array>} bytes the bundle, which may still be on its way
-   * @param canvases {picture, models}: laid over each other by the page
+   * @param canvases {picture, models}: laid over each other by the page; fixedLight: the models' light does not follow the
+   * camera's picture
    */
-  static async create(bytes, { picture, models, simd = true, webgl1 = false }) {
+  static async create(bytes, { picture, models, simd = true, webgl1 = false, fixedLight = false }) {
     const view = new View();
+    view.#fixedLight = fixedLight;
     view.#picture = picture;
     view.#models = models;
     view.#gl = openContext(models, webgl1);
     view.#engine = await Engine.create({ simd });
     view.#engine.open(await bytes);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
-    view.#engine.upload(false);
+    view.#engine.upload(false, fixedLight);
     models.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();  // without this it is never restored
       view.#lost = true;
@@ -85,7 +93,16 @@ export class View {
     if (this.#lost) return;
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
     this.#engine.poses().set(poses);
+    if (!this.#fixedLight && this.#frames++ % LIGHT_EVERY === 0) this.#look(source, camera);
     this.#engine.draw(width, height, gesture);
+  }
+
+  #look(source, camera) {
+    const [width, height] = [LIGHT_WIDTH, Math.max(1, Math.round((LIGHT_WIDTH * camera.height) / camera.width))];
+    this.#small ??= document.createElement('canvas').getContext('2d', { willReadFrequently: true, alpha: false });
+    if (this.#small.canvas.height !== height) Object.assign(this.#small.canvas, { width, height });
+    this.#small.drawImage(source, 0, 0, width, height);
+    this.#engine.look(this.#small.getImageData(0, 0, width, height));
   }
 
   /** Both canvases in one picture. */

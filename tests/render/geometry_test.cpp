@@ -183,8 +183,37 @@ double light_on(const RoomLight& light, const glm::dvec3& n, std::size_t c) {
 
 /// What model.vert says of its approximation: colour times factor.
 std::uint8_t lit_channel(std::uint8_t colour, double light) {
-  const double factor = 0.94 * std::sqrt(light) + 0.06 * std::sqrt(std::sqrt(light));
+  const double factor = 1.05 * std::sqrt(light) - 0.05 * light;
   return static_cast<std::uint8_t>(std::lround(std::min(255.0, colour * factor)));
+}
+
+/// Draws triangles of normals of their own in a turned, stretched view and a turned world.
+void expect_lit(Renderer& renderer, const std::vector<Triangle>& triangles, const RoomLight& light,
+                const glm::dvec3& stretch, int most) {
+  glm::dmat4 view = glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -2.5));
+  view = glm::rotate(view, 0.4, glm::dvec3(1.0, 0.0, 0.0));
+  view = glm::scale(view, stretch);
+  // Light stays where the world is, whichever way the camera looks.
+  const glm::dmat4 world = glm::rotate(glm::dmat4(1.0), 1.1, glm::dvec3(0.3, -0.5, 0.8));
+  const DrawItem item{0, glm::mat4(view), kNone, glm::mat4(world)};
+  const Camera camera = small_camera();
+  const std::vector<std::uint8_t> pixels = draw(renderer, camera, {&item, 1});
+  const glm::dmat3 normals = glm::transpose(glm::inverse(glm::dmat3(view)));
+  const glm::dmat3 to_world = glm::transpose(glm::dmat3(world));
+  std::vector<Triangle> expected = triangles;
+  for (Triangle& triangle : expected) {
+    // A two-sided surface looks at the camera.
+    glm::dvec3 n = glm::normalize(normals * triangle.normal);
+    const glm::dvec3 middle =
+        (triangle.corners[0] + triangle.corners[1] + triangle.corners[2]) / 3.0;
+    if (glm::dot(n, glm::dvec3(view * glm::dvec4(middle, 1.0))) > 0) n = -n;
+    for (std::size_t c = 0; c < 3; ++c) {
+      triangle.colour[c] = lit_channel(triangle.colour[c], light_on(light, to_world * n, c));
+    }
+  }
+  const auto eye = to_eye_space(triangles, view, true);
+  // Octahedral 8-bit normals are off by up to 1.2 degrees.
+  expect_picture(pixels, cast_rays(camera, eye), expected, most);
 }
 
 TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
@@ -219,32 +248,12 @@ TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
     options.light->direction = {0.3f, 0.2f, 0.9f};
     options.light->sky = room_of_all_terms();
     renderer->set_options(options);
-    // A stretched matrix: normals must not follow the stretch of positions.
-    glm::dmat4 view = glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -2.5));
-    view = glm::rotate(view, 0.4, glm::dvec3(1.0, 0.0, 0.0));
-    view = glm::scale(view, glm::dvec3(1.0, 1.0, 2.5));
-    // Light stays where the world is, whichever way the camera looks.
-    const glm::dmat4 world = glm::rotate(glm::dmat4(1.0), 1.1, glm::dvec3(0.3, -0.5, 0.8));
-    const DrawItem item{0, glm::mat4(view), kNone, glm::mat4(world)};
-    const Camera camera = small_camera();
-    const std::vector<std::uint8_t> pixels = draw(*renderer, camera, {&item, 1});
-    const glm::dmat3 normals = glm::transpose(glm::inverse(glm::dmat3(view)));
-    const glm::dmat3 to_world = glm::transpose(glm::dmat3(world));
-    std::vector<Triangle> expected = triangles;
-    for (Triangle& triangle : expected) {
-      // A two-sided surface looks at the camera.
-      glm::dvec3 n = glm::normalize(normals * triangle.normal);
-      const glm::dvec3 middle =
-          (triangle.corners[0] + triangle.corners[1] + triangle.corners[2]) / 3.0;
-      if (glm::dot(n, glm::dvec3(view * glm::dvec4(middle, 1.0))) > 0) n = -n;
-      for (std::size_t c = 0; c < 3; ++c) {
-        triangle.colour[c] =
-            lit_channel(triangle.colour[c], light_on(*options.light, to_world * n, c));
-      }
+    // Normals must not follow the stretch of positions; light comes another way where there is
+    // none.
+    for (const glm::dvec3& stretch :
+         {glm::dvec3(1, 1, 2.5), glm::dvec3(0.9), glm::dvec3(-1, 1, 1)}) {
+      expect_lit(*renderer, triangles, *options.light, stretch, layout == Layout::kHalfLit ? 3 : 5);
     }
-    const auto eye = to_eye_space(triangles, view, true);
-    // Octahedral 8-bit normals are off by up to 1.2 degrees.
-    expect_picture(pixels, cast_rays(camera, eye), expected, layout == Layout::kHalfLit ? 3 : 5);
   }
 }
 

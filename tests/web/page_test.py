@@ -91,9 +91,7 @@ class Page(ProgramTest):
         subprocess.run([*convert, "-pix_fmt", "gray", "-f", "rawvideo", site / "frames.gray"], check=True)
         (site / "played").mkdir()
         shutil.copytree(clip, site / "clip")
-        # The page's renderer does not see the camera's picture: its light stays as the bundle has it.
-        plain = [word for word in ["--no-light-estimate"] if word in test.run_program("modar-play", "--help").stdout]
-        test.run_program("modar-play", bundle, "--input", clip, "--out", site / "played", *plain)
+        test.run_program("modar-play", bundle, "--input", clip, "--out", site / "played")
         cls.server = Server(site)
         cls.site = site
         cls.bundle = bundle

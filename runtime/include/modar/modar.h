@@ -215,6 +215,8 @@ typedef struct modar_render_options {
   float lod_pixels; /* a level of detail may be off by so much on the screen */
   int exclusive;    /* 1 if nobody else draws in the context; 0: every call leaves GL's state as it found it */
   int fixed_light;  /* 1: light does not follow what the camera's pictures show of the patterns */
+  int samples;      /* a pixel of what modar_renderer_render() draws, from the next resize on (4: smooth edges); the app's
+                     * own surface has those that it was made with */
 } modar_render_options;
 void modar_render_options_default(modar_render_options* options);
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options);
@@ -238,6 +240,10 @@ typedef struct modar_surface {
 void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
                          const modar_picture* picture, const modar_camera* camera,
                          const float projection[16], const modar_item* items, size_t count);
+/* The light of a frame that the app draws by itself (picture NULL above): later draws follow it. Every fourth frame is
+ * enough, and a smaller copy of the whole frame. camera: the frame's; items: as they are drawn on it. No GL call. */
+void modar_renderer_observe(modar_renderer* renderer, const modar_picture* picture,
+                            const modar_camera* camera, const modar_item* items, size_t count);
 /* The frame's pixel under a touch: pixels from the viewport's top left, y down. */
 void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
                             double y, double* frame_x, double* frame_y);

@@ -213,6 +213,12 @@ class Renderer {
   void draw(const SurfaceView& surface, const CameraPicture& frame, const glm::mat4& projection,
             std::span<const DrawItem> items);
 
+  /// The light of a frame that the app draws by itself: later draws without planes follow it, as
+  /// render() and draw() do for frames that they are given. Every fourth frame is enough, and a
+  /// smaller copy of the whole frame. projection, items: of that frame. No GL call.
+  void observe(const CameraPicture& frame, const glm::mat4& projection,
+               std::span<const DrawItem> items);
+
   /// The context was lost, and another one is current: makes everything anew in it from the
   /// bundle's bytes, at the same size and with the same options. Nothing of the lost context is
   /// touched. Errors: as create() and resize().
