@@ -1,6 +1,6 @@
 // Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. Both change in the same
 // task, so picture and models never part.
-import { Engine, ModarError } from './engine.js';
+import { Engine, ModarError, POSE, POSE_FLOATS } from './engine.js';
 
 /** Screens of phones have more pixels than a camera's picture or a scan's texture fills. */
 const MOST_PIXELS_A_CSS_PIXEL = 2;
@@ -29,7 +29,7 @@ export class View {
   #lost = false;
   #fixedLight = false;
   #small = null;
-  #frames = 0;
+  #framesSinceLook = LIGHT_EVERY;
 
   /**
    * @param {Uint8Array | Promise<Uint8Array>} bytes the bundle, which may still be on its way
@@ -93,11 +93,16 @@ export class View {
     if (this.#lost) return;
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
     this.#engine.poses().set(poses);
-    if (!this.#fixedLight && this.#frames++ % LIGHT_EVERY === 0) this.#look(source, camera);
+    if (!this.#fixedLight) this.#look(source, camera, poses);
     this.#engine.draw(width, height, gesture);
   }
 
-  #look(source, camera) {
+  /** As often as the player does, so that both show the same. */
+  #look(source, camera, poses) {
+    ++this.#framesSinceLook;
+    const shown = poses.some((value, i) => i % POSE_FLOATS === POSE.shown && value !== 0);
+    if (!shown || this.#framesSinceLook < LIGHT_EVERY) return;
+    this.#framesSinceLook = 0;
     const [width, height] = [LIGHT_WIDTH, Math.max(1, Math.round((LIGHT_WIDTH * camera.height) / camera.width))];
     this.#small ??= document.createElement('canvas').getContext('2d', { willReadFrequently: true, alpha: false });
     if (this.#small.canvas.height !== height) Object.assign(this.#small.canvas, { width, height });
