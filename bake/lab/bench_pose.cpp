@@ -17,14 +17,12 @@
 namespace modar {
 namespace {
 
-/// Bands of the tracking part: name, speed of the hand, motion blur for each pixel of motion.
-struct Path {
-  const char* name;
-  double speed;
-  double blur;
-};
-constexpr Path kPaths[] = {
-    {"tracking", 1.0, 0.0}, {"tracking fast", 3.0, 0.5}, {"tracking x10", 10.0, 0.0}};
+/// Bands of the tracking part.
+constexpr BenchPath kPaths[] = {{"tracking", 1.0, 0.0, 0.0},
+                                {"tracking fast", 3.0, 0.5, 0.0},
+                                {"tracking x10", 10.0, 0.0, 0.0},
+                                {"tracking hand x4", 4.0, 0.5, 0.0},
+                                {"tracking shake", 1.0, 0.5, 1.0}};
 
 double percent(int part, int whole) {
   return whole > 0 ? 100.0 * part / whole : 0.0;
@@ -52,6 +50,8 @@ void add_band(const PoseBenchRow& own, const PoseBenchRow* reference, const std:
       // all frames.
       add("P@5", [&](const PoseBenchRow& row) { return percent(row.right, with(row)); });
       add("P@15", [&](const PoseBenchRow& row) { return percent(row.within_15, with(row)); });
+    }
+    if (own.detailed || own.sequence) {
       add("worst_px", [](const PoseBenchRow& row) { return row.worst_px; });
     }
     add("error_px", [](const PoseBenchRow& row) { return row.error_px; });
@@ -153,9 +153,9 @@ Result<std::vector<BenchRow>> score_rows(const PoseBenchOptions& options,
   return rows;
 }
 
-Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options,
+Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options, const std::string& only,
                                         const ProgressCallback& progress) {
-  MODAR_ASSIGN(const auto measured, bench_many(options, progress));
+  MODAR_ASSIGN(const auto measured, bench_many(options, only, progress));
   std::vector<BenchRow> rows;
   for (const ManyBenchRow& row : measured) {
     const bool held = row.reference > 0;
@@ -187,7 +187,7 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
   };
   MODAR_ASSIGN(const PoseBenchOptions options, options_of(command));
   if (command.scores || command.tables || command.lookalikes || command.many > 0) {
-    auto rows = command.many > 0     ? many_rows(options, progress)
+    auto rows = command.many > 0     ? many_rows(options, command.only, progress)
                 : command.lookalikes ? lookalike_rows(options, progress)
                 : command.scores     ? score_rows(options, progress)
                                      : paper_rows(options, progress);
@@ -215,10 +215,9 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
     MODAR_ASSIGN(const auto rows, bench_detection(options, progress));
     take(rows);
   }
-  for (const Path& path : kPaths) {
+  for (const BenchPath& path : kPaths) {
     if (others || std::string(path.name).find(command.only) == std::string::npos) continue;
-    MODAR_ASSIGN(const auto rows,
-                 bench_tracking(options, path.name, path.speed, path.blur, progress));
+    MODAR_ASSIGN(const auto rows, bench_tracking(options, path, progress));
     take(rows);
   }
   if (!command.video.empty()) {

@@ -318,7 +318,7 @@ HandPath::HandPath(const Pose& middle, Random& random) : middle_(middle) {
   for (double& value : phase_) value = random.uniform(0.0, 6.28);
 }
 
-Pose HandPath::at(double time_s, double speed) const {
+Pose HandPath::at(double time_s, double speed, double tremor) const {
   const auto sway = [&](std::size_t k, double hertz) {
     return std::sin(2 * pi * hertz * speed * time_s + phase_[k]) +
            0.3 * std::sin(2 * pi * 2.7 * hertz * speed * time_s + phase_[k + 6]);
@@ -330,6 +330,12 @@ Pose HandPath::at(double time_s, double speed) const {
   const double depth = middle_.translation.z;
   pose.translation +=
       glm::dvec3(0.10 * sway(3, 0.29), 0.07 * sway(4, 0.37), 0.15 * sway(5, 0.13)) * depth;
+  const auto shake = [&](std::size_t k, double hertz) {
+    return tremor * std::sin(2 * pi * hertz * time_s + phase_[k]);
+  };
+  pose.translation += glm::dvec3(0.012 * shake(6, 7.3) + 0.006 * shake(7, 11.9),
+                                 0.012 * shake(8, 6.1) + 0.006 * shake(9, 12.7), 0.0) *
+                      depth;
   return pose;
 }
 

@@ -61,7 +61,8 @@ GrayPicture language_of(const GrayImage& pattern);
 class HandPath {
  public:
   HandPath(const Pose& middle, Random& random);
-  [[nodiscard]] Pose at(double time_s, double speed) const;
+  /// tremor: 1 adds one of 6 to 13 Hz, of 23 pixels at most in a frame 1280 wide.
+  [[nodiscard]] Pose at(double time_s, double speed, double tremor = 0) const;
 
  private:
   Pose middle_;

@@ -1,8 +1,9 @@
-// Runs the device's tracker on bundles of many patterns: quarters of pictures.
+// Runs the device's tracker on bundles of many patterns: pictures, or quarters of a few.
 #include "bake/lab/many_bench.hpp"
 
 #include <algorithm>
 #include <chrono>
+#include <string_view>
 #include <thread>
 
 #include <malloc.h>
@@ -61,7 +62,7 @@ Result<Many> make_many(const PoseBenchOptions& options, const ProgressCallback& 
   }
   Many many;
   for (std::size_t i = 0; i < most; ++i) {
-    many.pictures.push_back(quarter_of(whole[i % files], i / files));
+    many.pictures.push_back(files < most ? quarter_of(whole[i % files], i / files) : whole[i]);
   }
   std::vector<Result<std::vector<std::byte>>> baked(most);
   if (progress) progress("baking", 0.0);
@@ -339,6 +340,7 @@ Result<void> measure_return(const Many& many, std::span<const std::byte> bytes,
 }  // namespace
 
 Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
+                                             const std::string& only,
                                              const ProgressCallback& progress) {
   MODAR_ASSIGN(const Many many, make_many(options, progress));
   MODAR_ASSIGN(const auto backgrounds,
@@ -347,10 +349,17 @@ Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
   const Frames frames(many, backgrounds, options);
   MODAR_ASSIGN(const auto bytes, many.bundle(many.size()));
   std::vector<ManyBenchRow> rows;
-  MODAR_TRY(measure_detection(many, frames, camera, progress, rows));
-  MODAR_TRY(measure_tilts(many, frames, camera, progress, rows));
-  MODAR_TRY(measure_ready(bytes, options.many, camera, frames.at(0, 0), rows));
-  MODAR_TRY(measure_return(many, bytes, backgrounds, options, progress, rows));
+  const auto wanted = [&only](const char* part) {
+    return std::string_view(part).find(only) != std::string_view::npos;
+  };
+  if (wanted("detection")) MODAR_TRY(measure_detection(many, frames, camera, progress, rows));
+  if (wanted("tilt")) MODAR_TRY(measure_tilts(many, frames, camera, progress, rows));
+  if (wanted("ready")) {
+    MODAR_TRY(measure_ready(bytes, options.many, camera, frames.at(0, 0), rows));
+  }
+  if (wanted("return")) {
+    MODAR_TRY(measure_return(many, bytes, backgrounds, options, progress, rows));
+  }
   return rows;
 }
 

@@ -150,7 +150,7 @@ int frames_of(const PoseBenchOptions& options, const SceneBand& band) {
 
 /// One path under one exposure, over one photo.
 Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const GrayPicture& background,
-                      double speed, double blur, MethodTallies& tallies) {
+                      const BenchPath& how, MethodTallies& tallies) {
   const Camera camera = default_camera(options.width, options.height);
   SceneBand band;
   band.area_low = 0.8;
@@ -164,13 +164,13 @@ Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const Gray
   tallies.cut();
   glm::dvec2 last{0.0};
   for (int i = 0; i < options.frames; ++i) {
-    const Pose pose = path.at(i / 30.0, speed);
+    const Pose pose = path.at(i / 30.0, how.speed, how.tremor);
     const glm::dvec2 centre = project(camera, pose.translation);
     const glm::dvec2 motion = i > 0 ? centre - last : glm::dvec2(0.0);
     last = centre;
     const SceneFrame scene =
         render_scene(picture, camera, pose, background, band, random, &light,
-                     {blur * glm::length(motion), std::atan2(motion.y, motion.x)});
+                     {how.blur * glm::length(motion), std::atan2(motion.y, motion.x)});
     MODAR_TRY(tallies.run(fixture, scene.picture.view(), {true, scene.corners}));
   }
   return {};
@@ -267,7 +267,8 @@ std::vector<SceneBand> pose_bands() {
           {"tilt 60-70", 0.5, 3.0, 60, 70, 0, 0, true},
           {"half covered", 0.5, 3.0, 0, 45, 0.5, 0.5, true},
           {"mixed", 0.25, 5.0, 0, 65, 0, 0.5, true},
-          {"none", 0.4, 4.0, 0, 45, 0, 0, false}};
+          {"none", 0.4, 4.0, 0, 45, 0, 0, false},
+          {"70 % covered", 0.5, 3.0, 0, 45, 0.7, 0.7, true}};
 }
 
 Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& options,
@@ -305,16 +306,17 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
 }
 
 Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options,
-                                                 const std::string& name, double speed, double blur,
+                                                 const BenchPath& path,
                                                  const ProgressCallback& progress) {
   cv::setNumThreads(1);
   MODAR_ASSIGN(const auto backgrounds, backgrounds_of(options));
-  MethodTallies tallies(name, true);
+  MethodTallies tallies(path.name, true);
   for (std::size_t p = 0; p < options.patterns.size(); ++p) {
     const GrayPicture& background = backgrounds[(options.seed + p) % backgrounds.size()];
-    MODAR_TRY(run_path(options, p, background, speed, blur, tallies));
+    MODAR_TRY(run_path(options, p, background, path, tallies));
     if (progress) {
-      progress(name, static_cast<double>(p + 1) / static_cast<double>(options.patterns.size()));
+      progress(path.name,
+               static_cast<double>(p + 1) / static_cast<double>(options.patterns.size()));
     }
   }
   std::vector<PoseBenchRow> rows;

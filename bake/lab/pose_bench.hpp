@@ -35,7 +35,7 @@ struct PoseBenchRow : PoseFigures {
   std::string band;
   std::string method;                  ///< "paper", "ours" or "sift"
   bool sequence = false;               ///< frames followed each other and were tracked
-  bool detailed = false;               ///< P@5, P@15 and the greatest error are printed, too
+  bool detailed = false;               ///< P@5 and P@15 are printed, too
   double shown_px = 0;                 ///< of curved patterns: see bench_shapes(); 0: not measured
   double ms = 0;                       ///< thread-CPU milliseconds of a frame, mean
   double stages_ms[4] = {0, 0, 0, 0};  ///< wall time: detect, describe, match, homography
@@ -45,10 +45,16 @@ struct PoseBenchRow : PoseFigures {
 Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& options,
                                                   const ProgressCallback& progress);
 
-/// Tracking: sequences of `frames` frames of a hand-held path. speed: 1 is a calm hand; blur:
-/// pixels of motion blur for each pixel of motion.
+/// A hand-held path.
+struct BenchPath {
+  const char* name;
+  double speed;   ///< 1: a calm hand
+  double blur;    ///< pixels of motion blur for each pixel of motion
+  double tremor;  ///< see HandPath
+};
+/// Tracking: sequences of `frames` frames of a path.
 Result<std::vector<PoseBenchRow>> bench_tracking(const PoseBenchOptions& options,
-                                                 const std::string& name, double speed, double blur,
+                                                 const BenchPath& path,
                                                  const ProgressCallback& progress);
 
 /// Detection under each of field_conditions() whose name, after "field ", holds `only`.

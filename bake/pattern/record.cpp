@@ -31,10 +31,11 @@ constexpr int kLargestSide = 1023;  // of TrackerFeatureRecord's 16-bit position
 // and at 60 to 70 degrees from 6 to 48 %.
 constexpr double kScaleStep = 1.2599210498948732;
 constexpr int kScales = 7;
-// Natural logarithms of the smallest and largest scale of the trial views, 0.3 and 2: the areas 0.1
-// to 4 that the tracker is asked for.
+// Natural logarithms of the smallest and largest scale of the trial views, 0.3 and the root of 2:
+// areas from 0.1. Of larger ones, to 4, a frame's coarser levels show what smaller views do, and
+// views up to 2 took two fifths of the trials' time.
 constexpr double kLogSmallest = -1.2039728043259361;
-constexpr double kLogLargest = 0.69314718055994531;
+constexpr double kLogLargest = 0.34657359027997265;
 // Degrees of the steepest trial view: a tilt of 4.4, just beyond the steepest baked one of 4.1.
 constexpr double kSteepest = 77.0;
 // Pixels around a rendered pattern: half a descriptor's patch and the detector's border.
@@ -92,12 +93,11 @@ std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const
       std::sqrt(std::abs(view.linear[0] * view.linear[3] - view.linear[1] * view.linear[2]));
   std::vector<Candidate> candidates;
   const GrayPicture picture = render_view(levels, view, nullptr);
-  const auto extractor =
-      FeatureExtractor::create(picture.width, picture.height, generous_detection());
+  DetectOptions detection = generous_detection();
+  detection.levels = 1;  // coarser ones repeat what views of a smaller scale show
+  const auto extractor = FeatureExtractor::create(picture.width, picture.height, detection);
   extractor->set_frame(picture.view());
   for (const TrackerFeature& feature : extractor->features()) {
-    // Coarser levels repeat what views of a smaller scale show.
-    if (feature.level != 0) continue;
     const auto place =
         to_picture(view, static_cast<double>(feature.x), static_cast<double>(feature.y));
     if (!within(levels[0].view(), place) ||
@@ -142,16 +142,22 @@ std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels,
   return candidates;
 }
 
-/// Applies a random exposure and sensor noise.
+/// Applies a random exposure and sensor noise, of 256 values drawn for the view.
 void expose_trial(Random& random, GrayPicture& picture) {
+  constexpr double kOne = 256.0;  // fixed point: the pixels are a tenth of the bake's time
   const double gain = random.uniform(0.6, 1.25);
   const double bias = random.uniform(-20.0, 20.0);
-  std::array<double, 256> exposed;
-  for (int gray = 0; gray < 256; ++gray)
-    exposed[static_cast<std::size_t>(gray)] = gain * gray + bias;
-  for (std::uint8_t& gray : picture.pixels) {
-    const double seen = exposed[gray] + 3.0 * random.normal();
-    gray = static_cast<std::uint8_t>(std::clamp(seen + 0.5, 0.0, 255.0));
+  std::array<int, 256> exposed;
+  std::array<int, 256> noise;
+  for (std::size_t i = 0; i < exposed.size(); ++i) {
+    exposed[i] = static_cast<int>(kOne * (gain * static_cast<double>(i) + bias + 0.5));
+    noise[i] = static_cast<int>(kOne * 3.0 * random.normal());
+  }
+  std::uint64_t bits = 0;
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i, bits >>= 8) {
+    if (i % sizeof bits == 0) bits = random.next();
+    std::uint8_t& gray = picture.pixels[i];
+    gray = static_cast<std::uint8_t>(std::clamp((exposed[gray] + noise[bits & 255]) >> 8, 0, 255));
   }
 }
 
@@ -165,22 +171,25 @@ class Grid {
     for (std::uint32_t i = 0; i < candidates.size(); ++i) {
       const Candidate& candidate = candidates[i];
       cells_[index(square(candidate.x), square(candidate.y), candidate.dark)].push_back(
-          {candidate.x, candidate.y, i});
+          {static_cast<float>(candidate.x), static_cast<float>(candidate.y), i});
       codes_.push_back(candidate.code);
     }
   }
   /// The candidates of the feature's polarity within the radius, and their codes' distances to its.
   void near(double x, double y, double radius, const TrackerFeature& feature,
             std::vector<std::uint32_t>& which, std::vector<int>& bits) const {
+    const auto at_x = static_cast<float>(x);
+    const auto at_y = static_cast<float>(y);
+    const auto reach = static_cast<float>(radius * radius);
     which.clear();
     for (int row = std::max(0, square(y - radius)); row <= std::min(rows_ - 1, square(y + radius));
          ++row) {
       for (int column = std::max(0, square(x - radius));
            column <= std::min(columns_ - 1, square(x + radius)); ++column) {
         for (const Entry& entry : cells_[index(column, row, feature.dark)]) {
-          const double dx = entry.x - x;
-          const double dy = entry.y - y;
-          if (dx * dx + dy * dy <= radius * radius) which.push_back(entry.candidate);
+          const float dx = entry.x - at_x;
+          const float dy = entry.y - at_y;
+          if (dx * dx + dy * dy <= reach) which.push_back(entry.candidate);
         }
       }
     }
@@ -192,8 +201,8 @@ class Grid {
   static constexpr int kSquare = 4;  // pixels: about the radius of a query
   /// Positions beside the index, since most candidates of a square are too far away.
   struct Entry {
-    double x;
-    double y;
+    float x;
+    float y;
     std::uint32_t candidate;
   };
   static int square(double value) { return static_cast<int>(std::floor((value + 0.5) / kSquare)); }

@@ -11,6 +11,11 @@ namespace {
 // Share of the inlier ratio of the frames before under which a fit may be a neighbouring place:
 // other starts are tried. Higher costs time under every passing hand; by hand.
 constexpr double kSuspicious = 0.75;
+// And under which the pose is not shown: blur and a jerk had put it 37 to 74 pixels beside, at 0.34
+// to 0.48 of that ratio. After so many such frames it is lost: a search tells whether something
+// covers the pattern, or the pose is wrong.
+constexpr double kDoubtful = 0.5;
+constexpr int kMaxDoubts = 3;
 // Pixels by which the last prediction missed: up to them, refinement starts on the finest level or
 // one above, whose patches reach that far, and starts anew two above where that does not fit.
 // Smaller values cost time, larger ones a lost start more often.
@@ -151,7 +156,11 @@ bool FrameTracker::update_pose(const TrackedPattern& pattern, Track& track, Patc
     if (!found) fit = seen;
   }
   if (!found) return false;
-  track.inlier_ratio = 0.8 * track.inlier_ratio + 0.2 * fit.inlier_ratio();
+  const double ratio = fit.inlier_ratio();
+  if (!track.has_motion) track.inlier_ratio = ratio;
+  track.doubts = ratio < kDoubtful * track.inlier_ratio ? track.doubts + 1 : 0;
+  if (track.doubts > kMaxDoubts) return false;
+  if (track.doubts == 0) track.inlier_ratio = 0.8 * track.inlier_ratio + 0.2 * ratio;
   track.surprise = distance(pattern, predicted, pose);
   track.previous = track.pose;
   track.pose = pose;

@@ -111,10 +111,13 @@ class CodeIndex {
  public:
   using Code = std::array<std::uint8_t, kCodeBytes>;
 
-  /// Indexes the most repeatable codes of each pattern, 9 KB a pattern or more. Allocates nothing
-  /// later. The patterns must outlive it.
+  /// The patterns must outlive it.
   CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
             std::size_t max_features);
+  /// Goes on indexing the most repeatable codes of each pattern, 9 KB a pattern or more, until it
+  /// returns true; then vote() may be called, which allocates nothing. work: about how many ARMv7
+  /// instructions it may take; it subtracts what it took.
+  bool build(std::int64_t& work);
   /// The evidence for a pattern.
   struct Support {
     std::uint16_t votes = 0;  ///< features that agree on one place,
@@ -139,7 +142,8 @@ class CodeIndex {
     std::uint32_t previous = 0;  ///< the same pattern's vote before this one
     FeatureMatch match;
   };
-  void build(Group& group, bool dark);
+  void collect(Group& group, bool dark);
+  void sort_into_words(Group& group);
   std::array<std::uint32_t, kProbes> nearest_words(const Group& group, const Code& code);
   std::uint32_t nearest_owner(const Group& group, const Code& code);
   [[nodiscard]] Support largest_agreement(std::uint32_t last, std::size_t count) const;
@@ -152,6 +156,12 @@ class CodeIndex {
   std::vector<std::uint32_t> last_;  ///< by pattern: its last vote
   std::vector<Support> support_;
   std::size_t indexed_;  ///< codes of a pattern and polarity, at most
+
+  // Of the group that build() is at, by code:
+  std::size_t group_ = 0;
+  std::vector<Code> codes_;
+  std::vector<std::uint32_t> owners_;
+  std::vector<std::uint32_t> nearest_;  ///< word; of the codes that were compared
 };
 
 }  // namespace modar::tracker

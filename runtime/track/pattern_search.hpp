@@ -44,16 +44,19 @@ struct DetectionCandidates {
 /// selects the few to match in full; if none of those is found, one of the others has its turn.
 class PatternSearch {
  public:
-  /// The patterns must outlive it. With more than a few of them, the first run() builds the index.
+  /// The patterns must outlive it. With more than a few of them, prepare() or the first run()
+  /// builds the index.
   PatternSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
                 const DetectOptions& options);
   /// extractor: holds the frame. priorities: one per pattern. Allocates nothing after the first
   /// call.
   void run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
            DetectionCandidates& candidates);
-  /// The same in slices: begin(), then advance() until it returns true. The arguments must stay
-  /// until then. work: about how many ARMv7 instructions advance() may take; the first step of a
-  /// call is always taken, and none is interrupted: the longest takes some 5 million.
+  /// The same in slices: prepare() and advance() until they return true, begin() between them. The
+  /// arguments must stay until then. work: about how many ARMv7 instructions advance() may take;
+  /// the first step of a call is always taken, and none is interrupted: the longest takes some 5
+  /// million.
+  bool prepare(std::int64_t work);
   void begin(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
              DetectionCandidates& candidates);
   bool advance(std::int64_t work);
@@ -103,6 +106,7 @@ class PatternSearch {
   PatchCache patches_;
   PlaneMatcher matcher_;
   std::unique_ptr<CodeIndex> index_;
+  bool ready_ = false;  ///< the index, if there is one
   std::vector<std::uint32_t> selected_;
   std::vector<std::uint8_t> has_votes_;  ///< by pattern
   std::size_t likely_ = 0;               ///< the first of selected_, which are always matched
@@ -148,11 +152,12 @@ class SlicedDetector {
   SlicedDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
                  const DetectOptions& options)
       : job_(camera, patterns, options) {}
-  [[nodiscard]] bool idle() const { return !busy_; }
+  /// False while it searches, and before the first search.
+  [[nodiscard]] bool idle() const { return prepared_ && !busy_; }
   /// Starts a search; only if idle().
   void start(const GrayImage& frame, std::span<const SearchPriority> priorities);
-  /// Goes on with it (PatternSearch::advance). In the call after the one that finished it, swaps
-  /// out candidates and priorities, and returns true.
+  /// Goes on with it (PatternSearch::advance), or prepares for the first. In the call after the one
+  /// that finished it, swaps out candidates and priorities, and returns true.
   bool advance(std::int64_t work, DetectionCandidates& candidates,
                std::vector<SearchPriority>& priorities);
   /// Forgets the search under way.
@@ -160,6 +165,7 @@ class SlicedDetector {
 
  private:
   FrameSearch job_;
+  bool prepared_ = false;
   bool busy_ = false;
   bool finished_ = false;
 };

@@ -43,6 +43,14 @@ bool Mirror::keeps(int cell) const {
   return share >= 0.0 && share <= 1.0;
 }
 
+glm::dmat3 Mirror::pixels_of(const TrackedPattern& pattern) const {
+  const int axis = upright ? 0 : 1;
+  glm::dmat3 swapped(1.0);
+  swapped[axis][axis] = -1.0;
+  swapped[2][axis] = 2.0 * at * (upright ? pattern.width() : pattern.height()) - 1.0;
+  return swapped;
+}
+
 CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
                    std::span<const GrayImage> pyramid)
     : pattern_(pattern), map_(map) {

@@ -32,6 +32,8 @@ struct Mirror {
   double at = 0.5;
   /// Whether the mirror image of a cell lies in the outline, as its centre tells.
   [[nodiscard]] bool keeps(int cell) const;
+  /// Pixels of the pattern's image to those of its mirror image.
+  [[nodiscard]] glm::dmat3 pixels_of(const TrackedPattern& pattern) const;
 };
 
 /// The outline of a pattern in a frame, divided into cells.

@@ -24,7 +24,8 @@ using tracker::SearchPriority;
 using tracker::Track;
 using tracker::TrackedPattern;
 
-// Millions of instructions a frame from which a pattern can be brought to it and judged.
+// Millions of instructions a frame from which a pattern can be brought to it, precisely, and
+// judged. Within less the next frame does both, and this one does not show it.
 constexpr int kJudgingBudget = 20;
 
 // Frames of a pattern that is not seen between looks where it should be: trades the time of a look,
@@ -72,6 +73,10 @@ struct PoseLoop::State {
   void advance_search(TrackResult& result);
   bool search_due(bool any_tracked);
   void accept(TrackResult& result);
+  /// A find is brought to the frame precisely, judged and shown.
+  [[nodiscard]] bool judges_finds() const {
+    return sliced == nullptr || options.budget >= kJudgingBudget;
+  }
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
                    Detection& detection) const;
   bool resolve_overlap(std::size_t i, const Detection& detection, TrackResult& result);
@@ -245,7 +250,9 @@ void PoseLoop::State::track_all(TrackResult& result) {
       continue;
     }
     track.tracked = options.track && frame_tracker.update(patterns[i], track, detection);
-    if (track.tracked) {
+    if (track.tracked && track.doubts > 0) {
+      track.shown_reason = Reason::kLostByBlur;
+    } else if (track.tracked) {
       const auto frame = frame_tracker.frame();
       show(i,
            track.judged ? print_judge->follow(i, frame, track)
@@ -313,12 +320,13 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
   if (async != nullptr || sliced != nullptr) {
     // It was found in an earlier frame.
     PatchFit fit;
-    const bool here = next.homography_only
-                          ? tracker::refine_map(pattern, frame_tracker.frame(), next.map, fit)
-                          : tracker::refine(pattern, frame_tracker.frame(),
-                                            tracker::SearchRadius::kFar, next.pose, fit) &&
-                                tracker::photometric_percent(pattern, frame_tracker.frame(),
-                                                             next.pose) >= tracker::kMinPercent;
+    const bool here =
+        next.homography_only
+            ? tracker::refine_map(pattern, frame_tracker.frame(), next.map, fit)
+            : tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kFar,
+                              next.pose, fit, judges_finds()) &&
+                  tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) >=
+                      tracker::kMinPercent;
     if (!here) return false;
   }
   if (!frame_tracker.locate(pattern, next, detection)) return false;
@@ -380,8 +388,7 @@ void PoseLoop::State::accept(TrackResult& result) {
     if (here) {
       track.again = before.frames_since_lost < tracker::kRecentFrames;
       PrintJudge::Verdict verdict;
-      // Within a small budget, bringing it here takes what a frame has: the next one judges.
-      track.judged = sliced == nullptr || options.budget >= kJudgingBudget;
+      track.judged = judges_finds();
       if (track.judged) verdict = print_judge->meet(i, frame_tracker.frame(), track, track.again);
       track.shown_reason = verdict.reason;
       if (resolve_overlap(i, detection, result)) {

@@ -28,14 +28,15 @@ int photometric_percent(const TrackedPattern& pattern, const FrameView& frame, c
 enum class SearchRadius : std::uint8_t { kNear, kClose, kFrame, kFar };
 
 /// Aligns patches from the coarsest level of the radius to the finest. True if the finest level
-/// fits, or under blur a coarser one that the photometric check confirms.
+/// fits, or under blur a coarser one that the photometric check confirms. precise: the finest level
+/// ends with steps over all patches.
 bool refine(const TrackedPattern& pattern, const FrameView& frame, SearchRadius radius, Pose& pose,
-            PatchFit& fit);
+            PatchFit& fit, bool precise = true);
 
 /// The same for a plane map, where a wrong focal length leaves no pose that fits. A map has to
 /// convince by itself: its percentage is 0 below 50 % or 16 cells.
-bool refine_map(const TrackedPattern& pattern, const FrameView& frame, PlaneMap& map,
-                PatchFit& fit);
+bool refine_map(const TrackedPattern& pattern, const FrameView& frame, PlaneMap& map, PatchFit& fit,
+                SearchRadius radius = SearchRadius::kFrame);
 int map_photometric_percent(const TrackedPattern& pattern, const FrameView& frame,
                             const PlaneMap& map);
 
@@ -50,7 +51,9 @@ void refine_from_inliers(const TrackedPattern& pattern, const FrameView& frame,
 
 /// Frame pixels by which the corners of a bent print, mean of the four, lie beside those of the
 /// plane that its pose says: a few steps over the patches that show, with two bulges beside the
-/// pose's parameters. 0 where few patches show.
-double bend_of(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose);
+/// pose's parameters. 0 where it is less than `least`, where few patches show, or where the bulges
+/// do not make the frame more alike.
+double bend_of(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
+               double least);
 
 }  // namespace modar::tracker

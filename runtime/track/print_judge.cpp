@@ -31,16 +31,14 @@ constexpr int kAgainShare = 10;
 // Cells by which a mirror image, or another pattern, must agree with more.
 constexpr int kFlippedCells = 4;
 constexpr double kSureShare = 0.6;  // of the textured cells agree: it is no mirror image after all
-constexpr double kItselfShare = 0.94;  // of them agree: fewer than kFlippedCells do not
+constexpr double kItselfShare = 0.94;       // of them agree: fewer than kFlippedCells do not
+constexpr double kTriedMirrorShare = 0.75;  // more of them did not agree in any mirror image
 constexpr int kRivalCells = 3;
 // A bend moves the corners by so many frame pixels: in a frame 1280 wide it catches the eye. More
-// where so much of the print is hidden, since the bend then reaches into what is not seen (half
-// covered, flat prints had up to 6.2); and where the pose is but the nearest to a map, since a
-// wrong focal length bends, too, unless that map shows nearly all. Shares of the textured cells.
+// where the pose is but the nearest to a map, since a wrong focal length bends, too, unless that
+// map shows nearly all: share of the textured cells.
 constexpr double kBentPixels = 5.0;
-constexpr double kHiddenBentPixels = 8.0;
 constexpr double kMapBentPixels = 10.0;
-constexpr double kSeenShare = 0.65;
 constexpr double kFlatMapShare = 0.9;
 
 constexpr std::uint8_t kForFlip[2] = {1, 2};
@@ -152,6 +150,25 @@ void PrintJudge::look_for_mirrors(std::size_t pattern, const FrameView& frame, c
   }
 }
 
+/// Whether a mirror image, fitted as the pattern was, agrees with more of the frame.
+bool PrintJudge::fits_mirrored(std::size_t pattern, const FrameView& frame,
+                               const Track& track) const {
+  const TrackedPattern& print = patterns_[pattern];
+  if (!print.surface.flat()) return false;
+  const PlaneMap map = map_of_track(print, frame, track);
+  const int own = check_photometry(print, map, frame.pyramid).matching;
+  for (const Mirror& mirror : mirrors_[pattern]) {
+    PlaneMap mirrored = map;
+    mirrored.homography *= mirror.pixels_of(print);
+    PatchFit fit;
+    if (!refine_map(print, frame, mirrored, fit, SearchRadius::kFar)) continue;
+    if (check_photometry(print, mirrored, frame.pyramid).matching >= own + kFlippedCells) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// A search finds a mirror image where a part of the pattern is its own one: the mirror lies where
 /// most of the cells that agree are alike.
 void PrintJudge::place_mirrors(std::size_t pattern) {
@@ -177,12 +194,9 @@ double PrintJudge::agreeing_share(const Evidence& seen) {
 void PrintJudge::measure(const TrackedPattern& print, const FrameView& frame, const Track& track,
                          bool at_once, Evidence& seen) const {
   if (!print.surface.flat()) return;
-  const double share = agreeing_share(seen);
-  const double limit = track.homography_only ? kMapBentPixels
-                       : share < kSeenShare  ? kHiddenBentPixels
-                                             : kBentPixels;
-  const bool flat = track.homography_only && share >= kFlatMapShare;
-  const bool bent = !flat && bend_of(print, frame, track.pose) >= limit;
+  const bool flat = track.homography_only && agreeing_share(seen) >= kFlatMapShare;
+  const double least = track.homography_only ? kMapBentPixels : kBentPixels;
+  const bool bent = !flat && bend_of(print, frame, track.pose, least) > 0.0;
   if (at_once || bent == seen.was_bent) seen.curved = bent;
   seen.was_bent = bent;
 }
@@ -255,6 +269,9 @@ PrintJudge::Verdict PrintJudge::meet(std::size_t pattern, const FrameView& frame
   if (agreeing_share(seen) < kItselfShare) {
     place_mirrors(pattern);
     look_for_mirrors(pattern, frame, track, kCells);
+    if (agreeing_share(seen) < kTriedMirrorShare && fits_mirrored(pattern, frame, track)) {
+      seen.flipped = true;
+    }
   } else {
     seen.flipped = false;
   }

@@ -72,6 +72,8 @@ class PrintJudge {
   [[nodiscard]] std::uint8_t flips_of(std::size_t pattern, const CellGrid& grid, int at) const;
   void look_for_mirrors(std::size_t pattern, const FrameView& frame, const Track& track, int count);
   void place_mirrors(std::size_t pattern);
+  [[nodiscard]] bool fits_mirrored(std::size_t pattern, const FrameView& frame,
+                                   const Track& track) const;
   void update(std::size_t pattern, const CellGrid& grid, const glm::vec3& from, int at,
               Cell& cell) const;
   void measure(const TrackedPattern& print, const FrameView& frame, const Track& track,

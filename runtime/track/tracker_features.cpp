@@ -287,7 +287,7 @@ std::unique_ptr<FeatureExtractor> FeatureExtractor::create(int width, int height
       state->halves.emplace_back(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) +
                                  kSlack);
     }
-    if (level >= kTrackerLevels) continue;
+    if (level >= std::min(kTrackerLevels, options.levels)) continue;
     state->smooth.emplace_back(
         static_cast<std::size_t>(state->pitch) * static_cast<std::size_t>(h) + kSlack);
     cells += static_cast<std::size_t>((w / options.cell + 1) * (h / options.cell + 1));
@@ -440,7 +440,7 @@ void FeatureExtractor::begin() {
 bool FeatureExtractor::State::extend_corners(std::int64_t& work) {
   constexpr int kRows = 16;
   constexpr std::int64_t kPixelCost = 22;  // instructions, as scripts/foreign.sh counts them
-  const std::size_t count = std::min<std::size_t>(levels.size(), kTrackerLevels);
+  const std::size_t count = smooth.size();
   while (slice_level < count) {
     if (work <= 0) return false;
     work -= kPixelCost * kRows * levels[slice_level].width;
@@ -483,8 +483,7 @@ bool FeatureExtractor::State::search_dimmer() {
   }
   dim = true;
   corners.clear();
-  for (std::size_t level = 0; level < std::min<std::size_t>(levels.size(), kTrackerLevels);
-       ++level) {
+  for (std::size_t level = 0; level < smooth.size(); ++level) {
     thresholds[level] = noise_threshold(levels[level]);
   }
   return true;

@@ -84,6 +84,38 @@ TEST(Prints, ACoveredOneStaysAndIsSeenAsCovered) {
   EXPECT_LT(seen.visible[0].likeness, 0.7);
 }
 
+TEST(Prints, WhereMostIsCoveredTheRestIsFoundAndFlat) {
+  Sequence frames(gray(picture()), 0.6);
+  int right = 0;
+  for (int i = 0; i < 8; ++i) {
+    const SceneFrame scene = frames.at(9 * i);
+    TrackResult seen;
+    ASSERT_TRUE(loop_on(alone())->step(scene.picture.view(), seen));
+    EXPECT_NE(seen.reason, Reason::kCurved) << i;
+    right += !seen.visible.empty() && worst_corner(seen.visible[0], scene) < 10.0 ? 1 : 0;
+  }
+  EXPECT_GE(right, 7);
+}
+
+TEST(Prints, APoseThatItsPatchesContradictIsNotShown) {
+  const auto loop = loop_on(alone());
+  Sequence before(gray(picture()));
+  Sequence after(gray(picture()), 0.6);
+  TrackResult seen;
+  int hidden = 0;
+  for (int i = 0; i < 15; ++i) {
+    const SceneFrame scene = (i < 5 ? before : after).at(i);
+    ASSERT_TRUE(loop->step(scene.picture.view(), seen));
+    hidden += seen.visible.empty() ? 1 : 0;
+    if (i == 5) {
+      EXPECT_TRUE(seen.visible.empty());
+      EXPECT_EQ(seen.reason, Reason::kLostByBlur);
+    }
+    for (const Detection& one : seen.visible) EXPECT_LT(worst_corner(one, scene), 15.0) << i;
+  }
+  EXPECT_LE(hidden, 5) << "what covers it for good is found out";
+}
+
 TEST(Prints, OfTwoEditionsInTheBundleTheShownOneIsNamed) {
   const cv::Mat edition(240, 300, CV_8UC1,
                         const_cast<std::uint8_t*>(other_edition().pixels.data()));

@@ -32,6 +32,8 @@ struct DetectOptions {
   /// matching grows with it. 1,000 / 1,250 / 1,500: half-covered patterns were 95.0 % right with
   /// the first and 98.8 % with the second; small ones gained 2 % more with the third.
   int max_features = 1500;
+  /// Levels of the pyramid that are searched for features, at most.
+  int levels = 8;
   /// SIMD level, 0: the least that this program was built for; -1: the best that the processor has.
   /// All give the same bits.
   int simd = -1;
