@@ -185,6 +185,7 @@ void add_points(const Camera& camera, const Pose& pose, const PlanePoints& point
 /// Adds the patches of a view that the pose predicts well enough and that are found there.
 void add_patches(const TrackedPattern& pattern, const FrameView& frame, const PatchView& view,
                  const Pose& pose, const Matrix6& covariance, PoseInformation& sum) {
+  if (view.patches.empty()) return;  // the pattern's image has no such level
   const PlaneMap map = map_of_pose(pattern, frame.camera, pose);
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
   const double grown = static_cast<double>(1 << view.at.pattern_level) * shrink;
