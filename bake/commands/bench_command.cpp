@@ -37,7 +37,8 @@ void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
   line.option("--patterns", &pose.patterns,
               "pose: folder of pattern pictures, or one picture; light: one");
   line.option("--backgrounds", &pose.backgrounds, "pose: folder of photos without a pattern");
-  line.option("--video", &pose.video, "pose: a video as well; render: the player on it instead");
+  line.option("--video", &pose.video,
+              "pose: a video as well; extended: one to blank; render: the player on it");
   line.option("--truth", &pose.truth, "pose: corners of the video's pattern (CSV)");
   line.option("--video-pattern", &pose.video_pattern,
               "pose: picture of the video's pattern (default: pattern.png beside the video)");

@@ -138,15 +138,22 @@ BenchResult bench_extended_rows(const BenchOptions& command) {
   options.width = 640;
   options.height = 480;
   options.seed = command.pose.seed;
-  MODAR_ASSIGN(options.patterns, pictures_of(command.pose.patterns));
-  MODAR_ASSIGN(options.backgrounds, pictures_of(command.pose.backgrounds));
-  const auto measured =
-      bench_extended(options, command.pose.only,
-                     [&bar](const std::string& what, double done) { bar.show(what, done); });
+  std::vector<ExtendedRow> measured;
+  if (!command.pose.patterns.empty() || command.pose.video.empty()) {
+    MODAR_ASSIGN(options.patterns, pictures_of(command.pose.patterns));
+    MODAR_ASSIGN(options.backgrounds, pictures_of(command.pose.backgrounds));
+    MODAR_ASSIGN(measured, bench_extended(options, command.pose.only,
+                                          [&bar](const std::string& what, double done) {
+                                            bar.show(what, done);
+                                          }));
+  }
+  if (!command.pose.video.empty()) {
+    MODAR_ASSIGN(measured.emplace_back(),
+                 bench_extended_video({command.pose.video, "", command.pose.video_pattern}));
+  }
   bar.clear();
-  if (!measured) return tl::unexpected(measured.error());
   std::vector<BenchRow> rows;
-  for (const ExtendedRow& row : *measured) {
+  for (const ExtendedRow& row : measured) {
     const double half = row.gyroscope ? 0.5 : 1.0;
     const auto add = [&](const char* what, double value, double goal) {
       rows.push_back({what + (" " + row.scene), value, goal, ratio(value, goal)});
@@ -191,8 +198,9 @@ const std::vector<Bench>& benches() {
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
        "our pose loop against the ModAR paper's method, on the same frames",
        [](const BenchOptions& command) { return bench_pose_rows(command.pose); }},
-      {"extended", false, "--patterns DIR --backgrounds DIR",
-       "the pose of a pattern out of sight, in rendered rooms, against the goals",
+      {"extended", false, "--patterns DIR --backgrounds DIR | --video FILE",
+       "the pose of a pattern out of sight, in rendered rooms, or blanked in a video, against the "
+       "goals",
        bench_extended_rows},
   };
   return all;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 #include <optional>
 
@@ -12,6 +13,7 @@
 
 #include "bake/lab/room_scene.hpp"
 #include "bake/thread_clock.hpp"
+#include "bake/video/video.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
 
@@ -220,7 +222,87 @@ ExtendedRow finish(Sums& sums) {
   return row;
 }
 
+/// Gray over the outline, a sixth larger than that, so that nothing of the pattern shows.
+void blank(const std::array<glm::dvec2, 4>& corners, GrayPicture& frame) {
+  constexpr double kLarger = 7.0 / 6;
+  const glm::dvec2 middle = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
+  for (int y = 0; y < frame.height; ++y) {
+    for (int x = 0; x < frame.width; ++x) {
+      const glm::dvec2 at = middle + (glm::dvec2(x, y) - middle) / kLarger;
+      bool inside = true;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const glm::dvec2 side = corners[(i + 1) % 4] - corners[i];
+        const glm::dvec2 way = at - corners[i];
+        inside = inside && side.x * way.y - side.y * way.x > 0;
+      }
+      if (inside) frame.pixels[static_cast<std::size_t>(y * frame.width + x)] = 128;
+    }
+  }
+}
+
+/// What the loop says of each frame, and the time that it took.
+Result<std::vector<std::optional<Detection>>> play(std::span<const GrayPicture> frames,
+                                                   std::span<const std::byte> bundle, bool extended,
+                                                   std::vector<double>& seconds) {
+  PoseLoopOptions how;
+  how.extended = extended;
+  MODAR_ASSIGN(const auto loop,
+               PoseLoop::create(BundleView::open(bundle).value(),
+                                default_camera(frames[0].width, frames[0].height), how));
+  std::vector<std::optional<Detection>> all;
+  TrackResult result;
+  for (const GrayPicture& frame : frames) {
+    const double start = thread_seconds();
+    MODAR_TRY(loop->step(frame.view(), result));
+    seconds.push_back(thread_seconds() - start);
+    all.emplace_back();
+    if (!result.visible.empty()) all.back() = result.visible[0];
+  }
+  return all;
+}
+
 }  // namespace
+
+Result<ExtendedRow> bench_extended_video(const VideoBench& video) {
+  MODAR_ASSIGN(Video played, Video::open(video.video));
+  std::vector<GrayPicture> frames;
+  while (const auto picture = played.next()) {
+    frames.push_back({picture->width, picture->height, {}});
+    for (int y = 0; y < picture->height; ++y) {
+      const std::uint8_t* row = picture->pixels + y * picture->stride;
+      frames.back().pixels.insert(frames.back().pixels.end(), row, row + picture->width);
+    }
+  }
+  if (frames.empty()) {
+    return fail(ExitCode::kIo, "bench.video", video.video, "the video cannot be read",
+                "give a video that other players show");
+  }
+  const auto beside = std::filesystem::path(video.video).parent_path() / "pattern.png";
+  bool shrunk = false;
+  MODAR_ASSIGN(const auto picture,
+               load_pattern(video.pattern.empty() ? beside.string() : video.pattern, shrunk));
+  MODAR_ASSIGN(const auto bundle, bundle_of_pattern(picture.view(), {}));
+  std::vector<double> seconds;
+  MODAR_ASSIGN(const auto truth, play(frames, bundle, false, seconds));
+  const std::size_t third = frames.size() / 3;
+  for (std::size_t i = third; i < 2 * third; ++i) {
+    if (truth[i].has_value()) blank(truth[i]->corners, frames[i]);
+  }
+  seconds.clear();
+  MODAR_ASSIGN(const auto seen, play(frames, bundle, true, seconds));
+  Sums sums;
+  sums.row.scene = std::filesystem::path(video.video).filename().string();
+  for (std::size_t i = third; i < 2 * third; ++i) {
+    if (!truth[i].has_value()) continue;
+    ++sums.row.unseen;
+    if (!seen[i].has_value() || !seen[i]->extended) continue;
+    ++sums.row.followed;
+    judge(*seen[i], truth[i]->pose, sums);
+    sums.seconds += seconds[i];
+    ++sums.timed;
+  }
+  return finish(sums);
+}
 
 Result<std::vector<ExtendedRow>> bench_extended(const PoseBenchOptions& options,
                                                 const std::string& only,

@@ -34,4 +34,9 @@ Result<std::vector<ExtendedRow>> bench_extended(const PoseBenchOptions& options,
                                                 const std::string& only,
                                                 const ProgressCallback& progress);
 
+/// A real video whose pattern is blanked in its second third, against the poses with it seen (which
+/// are no truth); of the pattern VideoBench::pattern, or pattern.png beside it. Errors: kIo
+/// "bench.video"; those of reading pictures, baking and the tracker.
+Result<ExtendedRow> bench_extended_video(const VideoBench& video);
+
 }  // namespace modar
