@@ -318,7 +318,7 @@ void add_bake(CommandLine& program) {
       "Images of flat things, frontal; :WIDTH tells the printed width (:210mm, :21cm, :8.3in); "
       ":shape=cylinder,diameter=66mm,arc=120 a label around a bottle, "
       ":shape=cone,top=80mm,bottom=60mm,arc=100 one around a cup, "
-      ":shape=box,size=120x180x40mm,right=FILE,back=FILE,left=FILE,top=FILE,bottom=FILE a box",
+      ":shape=box,size=120x180x40mm,right=FILE a box (as well back, left, top and bottom)",
       {.type = "FILE[:WIDTH][:shape=...]"});
   line.option(
       "--scene", &command->scenes,
