@@ -115,11 +115,10 @@ struct PatchFit {
   [[nodiscard]] double inlier_ratio() const { return visible > 0 ? 1.0 * inliers / visible : 0.0; }
   /// Six inliers determine a pose with a margin of two; a ratio of 0.3 keeps chance agreement out,
   /// while thirty inliers may be a fifth: half-covered patterns went from 95 to 98.8 % right by
-  /// that; and 36 a seventh, where 70 % is covered (places by chance had at most 32 of 256).
+  /// that, with no false recognition in 20,000 cluttered frames; a seventh of 36 gave one.
   [[nodiscard]] bool good() const {
     return inliers >= 6 &&
-           (inliers * 10 >= visible * 3 || (inliers >= 30 && inliers * 5 >= visible) ||
-            (inliers >= 36 && inliers * 7 >= visible));
+           (inliers * 10 >= visible * 3 || (inliers >= 30 && inliers * 5 >= visible));
   }
 };
 
