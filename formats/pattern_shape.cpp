@@ -6,33 +6,12 @@
 #include <cmath>
 #include <cstring>
 
+#include "formats/turn.hpp"
+
 namespace modar {
 namespace {
 
 constexpr double kHalfTurn = 3.14159265358979323846;
-
-struct Direction {
-  double cosine = 1;
-  double sine = 0;
-};
-
-/// Of an angle within +-pi: Taylor's series of an eighth of it, to 1e-17, then doubled. Without a
-/// libm, whose last bits differ between processors.
-Direction direction_of(double angle) {
-  const double x = 0.125 * angle;
-  const double xx = x * x;
-  double cosine = 1;
-  double sine = 1;
-  for (int k = 12; k > 0; k -= 2) {
-    cosine = 1 - cosine * xx / (k * (k - 1));
-    sine = 1 - sine * xx / (k * (k + 1));
-  }
-  Direction out{cosine, sine * x};
-  for (int i = 0; i < 3; ++i) {
-    out = {out.cosine * out.cosine - out.sine * out.sine, 2 * out.cosine * out.sine};
-  }
-  return out;
-}
 
 double dot(const float (&a)[3], const float (&b)[3]) {
   double sum = 0;
@@ -115,7 +94,7 @@ SurfacePoint PatternSurface::at(double x, double y) const {
   const double up = (0.5 * height_ - y - 0.5) * step;
   if (kind_ == 0) return {{along, up, 0}, {step, 0, 0}, {0, -step, 0}, {}};
   if (!faces_.empty()) return on_face(x, y);
-  const auto [cosine, sine] = direction_of(along / radius_);
+  const auto [cosine, sine] = turn_of(along / radius_);
   const double radius = radius_ + slope_ * up;
   const double stretch = step * radius / radius_;
   return {{radius * sine, rise_ * up, radius * cosine - radius_},

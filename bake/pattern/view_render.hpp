@@ -9,6 +9,7 @@
 
 #include "bake/pattern/picture.hpp"
 #include "formats/pattern_shape.hpp"
+#include "formats/turn.hpp"
 #include "modar/tracker_features.hpp"
 
 namespace modar {
@@ -49,15 +50,8 @@ struct AffineView {
   int height = 0;
 };
 
-/// Cosine and sine of an angle.
-struct Turn {
-  double cosine = 1;
-  double sine = 0;
-};
-/// Computed from sums and products only, like exp_of(): the last bit of a library's sine differs
-/// between machines, and baked bytes must not. Accurate to about 1e-15. radians: within +-1000.
-Turn turn_of(double radians);
-/// e to the power x, with a relative error of about 1e-15. x: within +-4.
+/// e to the power x, with a relative error of about 1e-15, like turn_of() from sums and products
+/// only. x: within +-4.
 double exp_of(double x);
 
 /// A view scaled by `scale`, compressed by `tilt` (>= 1) along `direction`, then rotated. It shows

@@ -313,10 +313,6 @@ constexpr std::size_t kCoarsePatches = 40;
 // Steps over all patches; a converged pose ends earlier. Bounds the time of one that does not; set
 // by hand.
 constexpr int kPreciseSteps = 10;
-// 1 minus the correlation at which a patch loses its weight. In the first step the pose is still
-// off, and even patches that hardly correlate point in the right direction.
-constexpr float kTukeyFirst = 1.0f;
-constexpr float kTukey = 0.7f;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 

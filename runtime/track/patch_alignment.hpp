@@ -26,6 +26,10 @@ inline constexpr std::size_t kMaxPatches = 256;
 /// Correlation from which a patch counts as an inlier. Blur and noise lower it for every patch,
 /// chance agreement of edges reaches 0.5; set by hand between the two.
 inline constexpr float kInlierCorrelation = 0.7f;
+/// 1 minus the correlation at which a patch loses its weight. In the first step the pose is still
+/// off, and even patches that hardly correlate point in the right direction.
+inline constexpr float kTukeyFirst = 1.0f;
+inline constexpr float kTukey = 0.7f;
 /// Radians, and the same of a homography's parameters: larger steps are not Gauss-Newton's to take.
 inline constexpr double kMaxRotation = 0.5;
 

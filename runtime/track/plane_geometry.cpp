@@ -264,15 +264,18 @@ int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dm
   return count;
 }
 
+glm::dmat3 orthonormal(const glm::dmat3& rotation) {
+  glm::dmat3 out;
+  out[0] = glm::normalize(rotation[0]);
+  out[1] = glm::normalize(rotation[1] - out[0] * glm::dot(out[0], rotation[1]));
+  out[2] = glm::cross(out[0], out[1]);
+  return out;
+}
+
 Pose extrapolate(const Pose& previous, const Pose& now) {
   const glm::dmat3 turn = now.rotation * glm::transpose(previous.rotation);
   Pose next;
-  // Orthonormalised: otherwise the rounding error of a pose fed back every frame doubles each time.
-  const glm::dmat3 turned = turn * now.rotation;
-  next.rotation[0] = glm::normalize(turned[0]);
-  next.rotation[1] =
-      glm::normalize(turned[1] - next.rotation[0] * glm::dot(next.rotation[0], turned[1]));
-  next.rotation[2] = glm::cross(next.rotation[0], next.rotation[1]);
+  next.rotation = orthonormal(turn * now.rotation);
   next.translation = now.translation + (now.translation - previous.translation);
   if (!(next.translation.z > 0.0)) return now;
   return next;

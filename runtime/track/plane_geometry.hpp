@@ -96,6 +96,10 @@ Pose mirrored(const Pose& pose);
 std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,
                                  const PlaneMap& map);
 
+/// The rotation that a nearly orthonormal matrix stands for: the rounding error of a pose that is
+/// fed back every frame doubles each time otherwise.
+glm::dmat3 orthonormal(const glm::dmat3& rotation);
+
 /// Constant-velocity prediction: the pose that repeats the motion from `previous` to `now`.
 Pose extrapolate(const Pose& previous, const Pose& now);
 

@@ -42,6 +42,13 @@ struct Return {
   double rotation_sigma = 0;
 };
 
+/// Largest way of a corner, pixels.
+double way_of(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
+  double most = 0;
+  for (std::size_t i = 0; i < 4; ++i) most = std::max(most, glm::length(a[i] - b[i]));
+  return most;
+}
+
 }  // namespace
 
 struct PoseLoop::State {
@@ -509,17 +516,12 @@ void PoseLoop::State::see_again(const Pose& followed) {
   tracks[home] = next;
 }
 
-/// Largest way of a corner, pixels.
-static double way_of(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
-  double most = 0;
-  for (std::size_t i = 0; i < 4; ++i) most = std::max(most, glm::length(a[i] - b[i]));
-  return most;
-}
-
 void PoseLoop::State::start_return(const Detection& seen, const Detection& followed) {
-  constexpr double kFrames = 10;  // that a return takes at least
+  // Frames that a return takes, at least and at most, and pixels by which it moves the corners in
+  // one: a slower return shows the wrong place longer. By hand.
+  constexpr double kFrames = 10;
   constexpr double kMostFrames = 40;
-  constexpr double kStep = 3.0;  // pixels by which it moves the corners in a frame
+  constexpr double kStep = 3.0;
   surroundings->correct(followed.pose, seen.pose);
   back.turn = rotation_vector(followed.pose.rotation * glm::transpose(seen.pose.rotation));
   back.way = followed.pose.translation - seen.pose.translation;

@@ -18,17 +18,20 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 // Frames are read on the level that is at most this wide: a patch of 9 pixels sees a corner of a
 // room there, and its place is known to a tenth of a pixel, a sixtieth of a degree.
 constexpr int kMaxWidth = 400;
-// And first two levels coarser against the frame before: its patches reach 12 pixels of that level.
+// And first so many levels coarser against the frame before: patches find their place from some 3
+// pixels away, which are 12 there.
 constexpr int kCoarser = 2;
-// Cells of a frame, each with one point at most; of them some are looked at in each frame.
+// Cells of a frame, each with one point at most: more points cost time, fewer are lost behind a
+// hand. Of the cells some are looked at in each frame, all in half a second. By hand.
 constexpr int kColumns = 10;
 constexpr int kRows = 8;
 constexpr int kCellsAFrame = 6;
 // A point is dropped after so many misses in a row: soon while it is new, late once it is steady,
-// since a passer-by may hide it for seconds.
+// since a passer-by may hide it for seconds. By hand.
 constexpr int kMissesOfNew = 8;
 constexpr int kMissesOfSteady = 90;
-// Hits, and inverse depths over their standard deviation, from which a point is steady.
+// Hits, and inverse depths over their standard deviation, from which a point is steady. By hand:
+// without the second, a still camera's surroundings are followed.
 constexpr int kSteadyHits = 8;
 constexpr double kSteadyDepth = 5.0;
 // Pixels of the level that it must have gone, and been seen where the pattern's motion has it: well
@@ -37,21 +40,23 @@ constexpr double kSteadyTravel = 5.0;
 // Hits from which a point is used that was learned without the pattern: a turning camera shows no
 // depths, and soon none of the older points.
 constexpr int kUsableHits = 3;
-// Steady points that must be seen, to begin and to go on.
+// Steady points that must be seen, to begin and to go on: three determine a pose. And the frames
+// without that are bridged by the last motion. By hand.
 constexpr int kLeastPoints = 8;
 constexpr int kBridged = 10;
-// A patch's equations as information, a square pixel: calibrated so that errors are honest.
+// Information of a patch's equations as they stand, 1 / square pixels. By hand; see kHonest.
 constexpr double kInformation = 1.0;
 // What one frame adds to a depth, of that: frames in a row see the same template with the same
-// error. And the accuracy in pixels that no baseline exceeds.
+// error. And the accuracy in pixels that no baseline exceeds. By hand.
 constexpr double kDepthGain = 0.125;
 constexpr double kDepthAccuracy = 0.15;
-// Pixels of the level by which a point may be seen beside its place.
+// Pixels of the level by which a point may be seen beside its place: the pattern's own pose is off
+// by half of it at the frame's far side. By hand.
 constexpr double kMaxOffset = 1.5;
 // Standard deviations are stated so many times larger than the equations say, which take errors of
 // depths and anchors for independent: of `modar bench extended` 95 % lie within two of these then.
 constexpr double kHonest = 4.0;
-// Of a gyroscope's turn between two frames, radians.
+// Of a gyroscope's turn between two frames, radians: three times the bench's noise. By hand.
 constexpr double kTurnSigma = 0.001;
 
 Pose compose(const Pose& a, const Pose& b) {
@@ -61,16 +66,6 @@ Pose compose(const Pose& a, const Pose& b) {
 Pose inverse(const Pose& pose) {
   const glm::dmat3 back = glm::transpose(pose.rotation);
   return {back, -(back * pose.translation)};
-}
-
-/// Orthonormalised: the rounding of a pose that is fed back every frame would grow.
-Pose normalised(const Pose& pose) {
-  Pose out = pose;
-  out.rotation[0] = glm::normalize(pose.rotation[0]);
-  out.rotation[1] = glm::normalize(pose.rotation[1] -
-                                   out.rotation[0] * glm::dot(out.rotation[0], pose.rotation[1]));
-  out.rotation[2] = glm::cross(out.rotation[0], out.rotation[1]);
-  return out;
 }
 
 /// Where a point lies in a frame.
@@ -89,7 +84,7 @@ bool place(const Camera& camera, const MapPoint& point, const Pose& pose, int le
   const Pose relative = compose(pose, inverse(point.anchor));
   const glm::dvec3 q =
       relative.rotation * glm::dvec3(point.ray, 1.0) + point.inverse_depth * relative.translation;
-  constexpr double kLeastDepth = 0.1;  // of the depth that it had
+  constexpr double kLeastDepth = 0.1;  // of the depth that it had; nearer, it looks different
   if (!(q.z > kLeastDepth)) return false;
   out.direction = q;
   out.pixel = (project(camera, q) + 0.5) * shrink - 0.5;
@@ -194,7 +189,7 @@ glm::dvec2 rest_of(const MapPointEquations& one, const Vector6& change) {
 
 /// Tukey's weight by that rest: a point that moved by itself asks for another place.
 double robust_weight(const MapPointEquations& one, const Vector6& change) {
-  constexpr double kFar = 1.5;
+  constexpr double kFar = 1.5;  // template pixels, beyond what noise does; by hand
   const glm::dvec2 rest = rest_of(one, change);
   const double far = std::min(1.0, glm::dot(rest, rest) / (kFar * kFar));
   return (1.0 - far) * (1.0 - far);
@@ -289,7 +284,7 @@ bool find_offset(const FrameView& frame, const Projection& at, int level, MapPoi
   constexpr double kLost = 3.0;     // a patch reaches no further
   glm::dvec2 offset = point.offset;
   for (int step = 0; step < kFindSteps; ++step) {
-    if (!observe(frame, point, at, level, offset, 1.0f, equations)) return false;
+    if (!observe(frame, point, at, level, offset, kTukeyFirst, equations)) return false;
     const glm::dvec2 way = at.warp * glm::dvec2(displacement(equations));
     offset += way;
     const double length = glm::length(way);
@@ -354,7 +349,7 @@ void Surroundings::clear() {
 
 void Surroundings::remember(const FrameView& frame, const Pose& pose) {
   before_ = now_;
-  now_ = normalised(pose);
+  now_ = {orthonormal(pose.rotation), pose.translation};
   known_ = std::min(known_ + 1, 2);
   if (static_cast<std::size_t>(coarse_) >= frame.pyramid.size()) return;
   const GrayImage& image = frame.pyramid[static_cast<std::size_t>(coarse_)];
@@ -375,8 +370,9 @@ Pose Surroundings::predict(const glm::dvec3* turn) const {
   Pose next;
   next.rotation = turn != nullptr ? rotation_matrix(*turn) * now_.rotation
                                   : now_.rotation * glm::transpose(from.rotation) * now_.rotation;
+  next.rotation = orthonormal(next.rotation);
   next.translation = -(next.rotation * (centre + way));
-  return normalised(next);
+  return next;
 }
 
 void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, Pose& pose) {
@@ -413,8 +409,8 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
   const Pose start = pose;
   PoseSystem system;
   for (int step = 0; step < kCoarseSteps; ++step) {
-    const MapFit fit = linearise(camera_, frame, coarse_points_, coarse_, step == 0 ? 1.0f : 0.7f,
-                                 pose, equations_);
+    const MapFit fit = linearise(camera_, frame, coarse_points_, coarse_,
+                                 step == 0 ? kTukeyFirst : kTukey, pose, equations_);
     if (fit.visible < kLeast) {
       pose = start;
       return;
@@ -433,14 +429,15 @@ bool Surroundings::align_fine(const FrameView& frame, const glm::dvec3* turn, Po
                               ExtendedPose& out) {
   constexpr int kFineSteps = 8;
   constexpr double kConverged = 0.03;
-  constexpr double kLeastShare = 0.35;
-  constexpr double kPlaced = 0.8;  // pixels of the level
+  constexpr double kLeastShare = 0.35;  // of the points in view, of which others hide some; by hand
+  constexpr double kPlaced = 0.8;       // template pixels that a point in its place still asks for
   const glm::dmat3 expected = pose.rotation;
   PoseSystem system;
   MapFit fit;
   double moved = 0;
   for (int step = 0; step < kFineSteps; ++step) {
-    fit = linearise(camera_, frame, points_, level_, step == 0 ? 1.0f : 0.7f, pose, equations_);
+    fit = linearise(camera_, frame, points_, level_, step == 0 ? kTukeyFirst : kTukey, pose,
+                    equations_);
     if (fit.inliers < kLeastPoints && step > 1) return false;
     moved = step_pose(equations_, turn != nullptr ? &expected : nullptr, step > 0, pose, system);
     if (moved < 0.0) return false;
@@ -475,7 +472,7 @@ void Surroundings::measure(const FrameView& frame, const Pose& pose) {
     Projection at;
     PatchNormalEquations equations;
     point.in_view = place(camera_, point, pose, level_, at) &&
-                    observe(frame, point, at, level_, glm::dvec2(0.0), 1.0f, equations);
+                    observe(frame, point, at, level_, glm::dvec2(0.0), kTukeyFirst, equations);
     if (!point.in_view) {
       point.offset = glm::dvec2(0.0);
       ++i;
@@ -669,7 +666,7 @@ double Surroundings::agreement(const FrameView& frame, const Pose& pose) const {
     Projection at;
     PatchNormalEquations equations;
     if (!place(camera_, point, pose, level_, at) ||
-        !observe(frame, point, at, level_, glm::dvec2(0.0), 1.0f, equations)) {
+        !observe(frame, point, at, level_, glm::dvec2(0.0), kTukeyFirst, equations)) {
       continue;
     }
     const bool near = glm::length(displacement(equations)) <= static_cast<float>(kMaxOffset);
