@@ -37,6 +37,7 @@ struct ShapedPattern {
   GrayPicture picture;
   std::vector<std::byte> section;
   PatternSurface surface;
+  std::vector<std::byte> record;
   std::vector<std::byte> bytes;
   std::unique_ptr<PoseLoop> loop;
 
@@ -88,9 +89,9 @@ Result<ShapedPattern> bake_on(const ShapeRequest& shape, const PoseBenchOptions&
                  shape_section(shape, pattern.picture.width, pattern.picture.height, width_mm));
   }
   pattern.surface = surface_of(pattern.section, pattern.picture.width, pattern.picture.height);
-  MODAR_ASSIGN(auto record, bake_tracker_record(pattern.picture.view(), {}, pattern.surface));
+  MODAR_ASSIGN(pattern.record, bake_tracker_record(pattern.picture.view(), {}, pattern.surface));
   MODAR_ASSIGN(pattern.bytes,
-               bundle_of_record(pattern.picture.view(), std::move(record), pattern.section));
+               bundle_of_record(pattern.picture.view(), pattern.record, pattern.section));
   return pattern;
 }
 
@@ -212,17 +213,28 @@ class ShapeBench {
     return {};
   }
 
-  Result<void> clutter(ShapedPattern& pattern, int frames, std::uint64_t seed, Row& row) {
-    MODAR_TRY(pattern.open(camera_, false));
-    Random random(seed);
+  /// Photos with nothing to be found, looked through for all of the patterns at once.
+  Result<void> clutter(const std::vector<ShapedPattern>& patterns, int frames, Row& row) {
+    std::vector<GrayPicture> pictures;
+    std::vector<std::vector<std::byte>> records;
+    std::vector<std::vector<std::byte>> shapes;
+    for (const ShapedPattern& one : patterns) {
+      pictures.push_back(one.picture);
+      records.push_back(one.record);
+      shapes.push_back(one.section);
+    }
+    ShapedPattern all;
+    MODAR_ASSIGN(all.bytes, bundle_of_records(pictures, records, nullptr, shapes));
+    MODAR_TRY(all.open(camera_, false));
+    Random random(options_.seed);
     SceneBand band;
     band.pattern = false;
     for (int i = 0; i < frames; ++i) {
       const auto& photo =
           backgrounds_[static_cast<std::size_t>(random.next() % backgrounds_.size())];
-      const SceneFrame scene = render_scene(pattern.picture.view(), camera_, {},
+      const SceneFrame scene = render_scene(pictures.front().view(), camera_, {},
                                             another_view(photo, random), band, random);
-      MODAR_TRY(row.run(pattern, camera_, scene, false));
+      MODAR_TRY(row.run(all, camera_, scene, false));
     }
     return {};
   }
@@ -245,35 +257,39 @@ Result<std::vector<PoseBenchRow>> bench_shapes(const PoseBenchOptions& options,
                 "give folders with pictures");
   }
   ShapeBench bench(options, backgrounds);
-  const int clutter = options.clutter_frames > 0 ? options.clutter_frames : options.frames;
-  const auto patterns = static_cast<int>(options.patterns.size());
+  const auto wanted = [&](const std::string& row) { return row.find(only) != std::string::npos; };
+  const std::string none = "none of all shapes";
+  const double bakes = static_cast<double>(bench_shapes_of().size() * options.patterns.size());
+  std::vector<ShapedPattern> baked;
   std::vector<PoseBenchRow> rows;
   double done = 0;
   for (const BenchShape& shape : bench_shapes_of()) {
     const std::string name = shape.name;
-    const auto wanted = [&](const std::string& row) { return row.find(only) != std::string::npos; };
-    std::vector<Row> found = {Row(name + " around 0-35", false), Row(name + " around 35-70", false),
-                              Row("tracking " + name, true), Row("none " + name, false)};
-    std::array<bool, 4> wants{};
-    const std::array<std::string, 4> names = {name + " around 0-35", name + " around 35-70",
-                                              "tracking " + name, "none " + name};
-    for (std::size_t i = 0; i < 4; ++i) wants[i] = wanted(names[i]);
-    for (int p = 0; p < patterns; ++p) {
-      if (progress) progress(name, done++ / (3.0 * patterns));
-      if (!wants[0] && !wants[1] && !wants[2] && !wants[3]) continue;
-      MODAR_ASSIGN(ShapedPattern pattern,
-                   bake_on(shape.request, options, static_cast<std::size_t>(p)));
-      const std::uint64_t seed = options.seed + 1000003 * static_cast<std::uint64_t>(p);
+    const std::array<std::string, 3> names = {name + " around 0-35", name + " around 35-70",
+                                              "tracking " + name};
+    std::array<bool, 3> wants{};
+    for (std::size_t i = 0; i < 3; ++i) wants[i] = wanted(names[i]);
+    if (!wants[0] && !wants[1] && !wants[2] && !wanted(none)) continue;
+    std::array<Row, 3> found = {Row(names[0], false), Row(names[1], false), Row(names[2], true)};
+    for (std::size_t p = 0; p < options.patterns.size(); ++p) {
+      if (progress) progress(name, done++ / bakes);
+      MODAR_ASSIGN(ShapedPattern pattern, bake_on(shape.request, options, p));
+      const std::uint64_t seed = options.seed + 1000003 * p;
       if (wants[0]) MODAR_TRY(bench.detect(pattern, 0, 35, seed, found[0]));
       if (wants[1]) MODAR_TRY(bench.detect(pattern, 35, 70, seed + 1, found[1]));
       if (wants[2]) MODAR_TRY(bench.track(pattern, seed + 2, found[2]));
-      if (wants[3]) {
-        MODAR_TRY(bench.clutter(pattern, (clutter + patterns - 1) / patterns, seed + 3, found[3]));
-      }
+      if (wanted(none)) baked.push_back(std::move(pattern));
     }
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < 3; ++i) {
       if (wants[i]) rows.push_back(found[i].finish());
     }
+  }
+  if (wanted(none)) {
+    Row row(none, false);
+    const int frames = options.frames * static_cast<int>(options.patterns.size());
+    MODAR_TRY(
+        bench.clutter(baked, options.clutter_frames > 0 ? options.clutter_frames : frames, row));
+    rows.push_back(row.finish());
   }
   return rows;
 }

@@ -123,8 +123,9 @@ void PatchCache::motion_blur(const TrackedPattern& pattern, int level, const Pat
       16;  // of the exposure, one a pixel: longer motions are sampled coarser
   const GrayImage& image = pattern.levels[static_cast<std::size_t>(level)];
   const double grow = static_cast<double>(1 << level);
-  const auto x0 = static_cast<float>((patch.centre.x + 0.5) / grow - 0.5) - kPatchHalf - kRing;
-  const auto y0 = static_cast<float>((patch.centre.y + 0.5) / grow - 0.5) - kPatchHalf - kRing;
+  const glm::dvec2 centre = patch.centre;
+  const auto x0 = static_cast<float>((centre.x + 0.5) / grow - 0.5) - kPatchHalf - kRing;
+  const auto y0 = static_cast<float>((centre.y + 0.5) / grow - 0.5) - kPatchHalf - kRing;
   const int samples = std::clamp(static_cast<int>(std::ceil(glm::length(motion))), 2, kMaxSamples);
   WidePatch gray{};
   for (int i = 0; i < samples; ++i) {
@@ -139,12 +140,12 @@ void PatchCache::motion_blur(const TrackedPattern& pattern, int level, const Pat
     }
   }
   blurred = {};
-  blurred.centre = patch.centre;
+  blurred.centre = centre;
   for (float& sum : gray) sum /= static_cast<float>(samples);
   fill(gray, blurred);
 }
 
-std::span<const Patch> PatchCache::of(const TrackedPattern& pattern, int level) {
+std::span<Patch> PatchCache::of(const TrackedPattern& pattern, int level) {
   ++uses_;
   Slot* oldest = slots_.data();
   for (Slot& slot : slots_) {
@@ -227,6 +228,71 @@ glm::vec2 displacement(const PatchNormalEquations& equations) {
          determinant;
 }
 
+namespace {
+
+// Variance of a frame's blur, pixels of a level: of a lens in focus on the finest, of a pixel's area
+// and of the interpolation on all; and what fill() smooths, template pixels. Estimates.
+constexpr double kLensVariance = 0.42;
+constexpr double kSampleVariance = 0.25;
+constexpr double kTemplateVariance = 0.5;
+
+/// The variance of a frame's blur, template pixels: of its square in x and y, and of their product.
+struct BlurVariance {
+  double xx = 0;
+  double yy = 0;
+  double xy = 0;
+};
+/// derivative: template pixels to pixels of the frame's level.
+BlurVariance blur_variance(const glm::dmat2& derivative, int frame_level) {
+  const double frame = kSampleVariance + kLensVariance / static_cast<double>(1 << 2 * frame_level);
+  const double a = glm::dot(derivative[0], derivative[0]);
+  const double b = glm::dot(derivative[0], derivative[1]);
+  const double c = glm::dot(derivative[1], derivative[1]);
+  const double scale = frame / std::max(a * c - b * b, 1e-6);
+  return {c * scale, a * scale, -b * scale};
+}
+
+/// The way, in template pixels, along which a template is averaged to be as blurred as the frame is
+/// where it blurs most, which is the direction in which a surface turns away. Whole pixels: a
+/// template that is kept from frame to frame depends on the pose alone.
+glm::dvec2 blur_way(const BlurVariance& blur) {
+  const double mean = 0.5 * (blur.xx + blur.yy);
+  const double half = 0.5 * (blur.xx - blur.yy);
+  const double apart = std::sqrt(half * half + blur.xy * blur.xy);
+  const glm::dvec2 along =
+      half > 0.0 ? glm::dvec2(half + apart, blur.xy) : glm::dvec2(blur.xy, apart - half);
+  const double length = glm::length(along);
+  // A way of length L has the variance L^2 / 12.
+  const double way = std::sqrt(12.0 * std::max(0.0, mean + apart - kTemplateVariance));
+  const glm::dvec2 exact = length > 0.0 ? along * (way / length) : glm::dvec2(way, 0.0);
+  return {std::floor(exact.x + 0.5), std::floor(exact.y + 0.5)};
+}
+
+/// Makes those templates of a view anew whose part of a curved surface is seen from another side
+/// than when they were made: as sharp as the picture they put rendered labels 0.033 px beside their
+/// place, blurred like this 0.019.
+void foreshorten(const TrackedPattern& pattern, const FrameView& frame, const PlaneMap& map,
+                 const PatchView& view) {
+  if (map.surface == nullptr) return;
+  const int level = view.at.pattern_level;
+  const double scale =
+      static_cast<double>(1 << level) / static_cast<double>(1 << view.at.frame_level);
+  const std::span<Patch> patches = frame.patches.of(pattern, level);
+  for (std::size_t i = 0; i < patches.size(); i += view.stride) {
+    Patch& patch = patches[i];
+    bool shows = false;
+    static_cast<void>(map.at(patch.centre, shows));
+    if (!shows) continue;
+    const glm::dvec2 way =
+        blur_way(blur_variance(map.derivative(patch.centre) * scale, view.at.frame_level));
+    if (way == patch.blur) continue;
+    PatchCache::motion_blur(pattern, level, patch, way, patch);
+    patch.blur = way;
+  }
+}
+
+}  // namespace
+
 PatchView view_of(const TrackedPattern& pattern, const FrameView& frame, int frame_level,
                   const PlaneMap& map, std::size_t count) {
   const Resolution best = finest(pattern, map, static_cast<int>(frame.pyramid.size()));
@@ -237,6 +303,7 @@ PatchView view_of(const TrackedPattern& pattern, const FrameView& frame, int fra
   if (view.at.pattern_level < 0 || view.at.pattern_level >= pattern.level_count) return view;
   view.patches = frame.patches.of(pattern, view.at.pattern_level);
   view.stride = std::max<std::size_t>(1, view.patches.size() / count);
+  foreshorten(pattern, frame, map, view);
   return view;
 }
 
@@ -245,11 +312,12 @@ bool observe_patch(const PatchView& view, const PlaneMap& map, const Patch& patc
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
   const double grow = static_cast<double>(1 << view.at.pattern_level);
   bool in_front = false;
-  // Of the offsets -4 to 4 of a patch's columns.
-  constexpr double kMeanSquare = kPatchHalf * (kPatchHalf + 1) / 3.0;
-  out.pixel = map.at(patch.centre, in_front, kMeanSquare * grow * grow);
-  if (!in_front) return false;
   const glm::dmat2 d = map.derivative(patch.centre) * (grow * shrink);
+  // Of the offsets -4 to 4 of a patch's columns; what blurs a pixel lies around it likewise.
+  double mean_square = kPatchHalf * (kPatchHalf + 1) / 3.0;
+  if (map.surface != nullptr) mean_square += blur_variance(d, view.at.frame_level).xx;
+  out.pixel = map.at(patch.centre, in_front, mean_square * grow * grow);
+  if (!in_front) return false;
   out.jacobian = d;
   const PatchPlace place{static_cast<float>((out.pixel.x + 0.5) * shrink - 0.5),
                          static_cast<float>((out.pixel.y + 0.5) * shrink - 0.5),
@@ -491,6 +559,17 @@ double robust_weight(const PatchLinearisation& patch, const Vector6& change) {
   return static_cast<double>((1.0f - far) * (1.0f - far));
 }
 
+/// Weight of a curved pattern's patch by the share of what the frame shows there that its template
+/// does not explain, which is greatest where the surface turns away. It brought the corners of
+/// rendered labels from 0.042 to 0.025 px of the truth; kLeast of 0.003 to 0.03 does alike. Flat
+/// patterns show all their patches alike.
+double trust(const TrackedPattern& pattern, const PatchLinearisation& patch) {
+  constexpr double kLeast = 0.01;  // noise that every patch has
+  if (pattern.surface.flat()) return 1.0;
+  const double correlation = static_cast<double>(patch.equations.correlation);
+  return kLeast / (kLeast + 1.0 - correlation * correlation);
+}
+
 /// One step on the pose. Returns the displacement of its corners, pixels of the level; negative if
 /// there is no step. robust: a step that converges is solved again with the weights that it leaves,
 /// from the same observations: to sample all patches once more gained nothing.
@@ -500,7 +579,9 @@ double step_pose(const TrackedPattern& pattern, const FrameView& frame, const Pa
   std::vector<PatchLinearisation>& patches = frame.patches.linearisations();
   fit = linearise(pattern, frame, view, tukey, pose, patches);
   PoseEquations equations;
-  for (const PatchLinearisation& patch : patches) equations.add(patch, 1.0);
+  for (const PatchLinearisation& patch : patches) {
+    equations.add(patch, robust ? trust(pattern, patch) : 1.0);
+  }
   Vector6 change;
   if (!solve(equations, fit, change)) return -1.0;
   std::array<double, 6> by{};
@@ -510,7 +591,7 @@ double step_pose(const TrackedPattern& pattern, const FrameView& frame, const Pa
   if (!robust || moved < 0.0 || moved >= kPreciselyConverged) return moved;
   PoseEquations weighted;
   for (const PatchLinearisation& patch : patches) {
-    weighted.add(patch, robust_weight(patch, change));
+    weighted.add(patch, robust_weight(patch, change) * trust(pattern, patch));
   }
   if (!solve(weighted, fit, change)) return moved;
   Eigen::Map<Vector6>(by.data()) = change;
@@ -539,6 +620,9 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
     view = sharp;
     // Blurred patches are made anew in each frame: half of them will do.
     view.stride = frame.blur != nullptr ? 2 : 1;
+    if (frame.blur == nullptr) {
+      foreshorten(pattern, frame, map_of_pose(pattern, frame.camera, pose), view);
+    }
     apply_motion_blur(pattern, frame, pose, view);
   }
   for (int step = 0; step < (precise ? kPreciseSteps : 1) && moved >= 0.0; ++step) {

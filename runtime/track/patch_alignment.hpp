@@ -37,6 +37,7 @@ inline constexpr double kMaxRotation = 0.5;
 /// their gradient, and of the products of the two.
 struct Patch {
   glm::dvec2 centre{};  ///< pixels of the pattern's image
+  glm::dvec2 blur{};    ///< of a curved pattern: the way that it is averaged along, pixels
   float t = 0, tt = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, tx = 0, ty = 0;
   PatchTemplate pixels{};
 };
@@ -61,9 +62,9 @@ class PatchCache {
  public:
   PatchCache();
   /// The patches of a level. Valid until the next call.
-  std::span<const Patch> of(const TrackedPattern& pattern, int level);
-  /// Makes `blurred` from a patch whose image moves by `motion` pixels of the level during the
-  /// exposure.
+  std::span<Patch> of(const TrackedPattern& pattern, int level);
+  /// Makes `blurred`, which may be the patch, from a patch whose image moves by `motion` pixels of
+  /// the level during the exposure.
   static void motion_blur(const TrackedPattern& pattern, int level, const Patch& patch,
                           glm::dvec2 motion, Patch& blurred);
   /// Empty buffers of kMaxPatches, for blurred patches and for linearisations; valid until the next

@@ -179,7 +179,7 @@ TEST(Shapes, TrackedAroundTheAxis) {
               0.02 * glm::length(scene.pose.translation));
   }
   std::nth_element(errors.begin(), errors.begin() + 7, errors.end());
-  EXPECT_LT(errors[7], 0.5);
+  EXPECT_LT(errors[7], 0.05);  // 0.064 with templates as sharp as the picture
 }
 
 /// Two sides of a box show: its pose is one, whichever of them is found first.
