@@ -32,6 +32,7 @@ struct RectifyCommand {
 struct ScoreCommand {
   std::vector<std::string> patterns;  ///< image files
   std::string overlay_folder;         ///< empty: none
+  std::string shape;                  ///< of parse_shape(); empty: flat
   unsigned jobs = 1;                  ///< threads; the scores do not depend on it
   bool json = false;
 };
@@ -184,6 +185,7 @@ Json score_json(const NamedScore& one) {
            {{"nearest_widths", range.nearest},
             {"farthest_widths", range.farthest},
             {"tilt_deg", range.tilt_deg},
+            {"around_deg", range.curved ? Json(2 * range.tilt_deg) : Json()},
             {"half_covered_right_pct", 100 * range.covered_share},
             {"sentence", range_sentence(range, one.width_mm)}}},
           {"causes", causes}};
@@ -204,12 +206,17 @@ void print_failure(const Error& error, ExitCode& answer) {
 }
 
 Result<NamedScore> score_file(const ScoreCommand& command, const std::string& path) {
-  bool shrunk = false;
-  MODAR_ASSIGN(const auto picture, load_pattern(path, shrunk));
+  ShapeRequest told;
+  if (!command.shape.empty()) {
+    MODAR_ASSIGN(told, parse_shape(command.shape));
+  }
+  MODAR_ASSIGN(const ShapedPicture shaped, load_shaped(path, 0, told));
+  const GrayImage picture = shaped.picture.view();
   TrackerRecordOptions loop;
   loop.jobs = command.jobs;
-  auto score = bake_tracker_record(picture.view(), loop).and_then([&](const auto& record) {
-    return score_pattern(picture.view(), record, command.jobs);
+  const PatternSurface surface = surface_of(shaped.section, picture.width, picture.height);
+  auto score = bake_tracker_record(picture, loop, surface).and_then([&](const auto& record) {
+    return score_pattern(picture, record, command.jobs, true, shaped.section);
   });
   if (!score) {
     score.error().where = path;
@@ -217,9 +224,9 @@ Result<NamedScore> score_file(const ScoreCommand& command, const std::string& pa
   }
   if (!command.overlay_folder.empty()) {
     MODAR_ASSIGN(const std::string out, picture_of(path, command.overlay_folder));
-    MODAR_TRY(write_png(score_overlay(picture.view(), *score), out));
+    MODAR_TRY(write_png(score_overlay(picture, *score), out));
   }
-  return NamedScore{file_stem(path), std::move(*score), png_width_mm(path)};
+  return NamedScore{file_stem(path), std::move(*score), shaped.width_mm};
 }
 
 Result<ExitCode> run_score(ScoreCommand& command) {
@@ -264,6 +271,8 @@ void add_score(CommandLine& pattern) {
               "Write NAME.png of each: features that hold (green), that hold at times (orange), "
               "places without any (dark)",
               {.type = "DIR"});
+  line.option("--shape", &command->shape,
+              "What it is printed on, as `modar pattern simulate` takes it", {.type = "SHAPE"});
   line.option("--jobs", &command->jobs, "Threads; the scores do not depend on it",
               {.least = 1, .most = 256});
   line.flag("--json", command->json, "Print as JSON");

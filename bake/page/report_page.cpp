@@ -398,9 +398,10 @@ class Page {
     for (std::size_t i = 0; i < image.pixels.size(); i += 4) gray.push_back(image.pixels[i]);
     const GrayImage view{gray.data(), static_cast<int>(image.width), static_cast<int>(image.height),
                          static_cast<std::ptrdiff_t>(image.width)};
-    MODAR_ASSIGN(
-        const PatternScore score,
-        score_pattern(view, bundle_.section(SectionType::kTrackerRecord, index), options_.jobs));
+    const auto shape = bundle_.section(kPatternShape, index);
+    MODAR_ASSIGN(const PatternScore score,
+                 score_pattern(view, bundle_.section(SectionType::kTrackerRecord, index),
+                               options_.jobs, true, {shape.begin(), shape.end()}));
     const auto stored = static_cast<double>(record.score);
     html_ += row("Score", print("%.0f of 100", stored)) + row("Grade, A to E", {score.grade}) +
              "</dl>" +

@@ -557,7 +557,8 @@ Result<FeatureContent> paper_features(const GrayImage& image,
 
 Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned jobs,
                        PatternFeatures& out, Report& report) {
-  MODAR_ASSIGN(const PatternScore score, score_pattern(gray, out.loop_record, jobs, false));
+  MODAR_ASSIGN(const PatternScore score,
+               score_pattern(gray, out.loop_record, jobs, false, out.shape));
   out.record.score = static_cast<float>(score.score);
   out.record.score_version = kScoreVersion;
   const auto worst =
@@ -644,9 +645,9 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
     return tl::unexpected(record.error());
   }
   out.loop_record = std::move(*record);
+  out.shape = std::move(shaped.section);
   if (options.score) MODAR_TRY(add_score(path, gray, options.jobs, out, report));
   timer.done(shaped.picture.pixels.size(), found);
-  out.shape = std::move(shaped.section);
   return out;
 }
 

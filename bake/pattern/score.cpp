@@ -10,6 +10,8 @@
 
 #include "bake/parallel.hpp"
 #include "bake/pattern/gray_mat.hpp"
+#include "bake/pattern/shape.hpp"
+#include "bake/pattern/surface_scene.hpp"
 #include "bake/pattern/trial.hpp"
 #include "bake/pattern/view_kernel.hpp"
 #include "bake/pattern/view_render.hpp"
@@ -343,9 +345,38 @@ AffineView view_of(const GrayPicture& picture, const Step& step, int i) {
                  frame_side(step));
 }
 
+/// Root of the area that a step's size is of: the picture's, or that of a box's front.
+double own_side(const GrayImage& picture, const PatternSurface& surface) {
+  if (surface.faces().empty()) return std::sqrt(1.0 * picture.width * picture.height);
+  const auto& front = surface.faces()[0].place;
+  return std::sqrt(1.0 * front[2] * front[3]);
+}
+
+/// Degrees.
+double angle_of(const Step& step) {
+  return std::acos(1 / step.tilt) * 57.29577951308232;
+}
+
+/// The same view of a picture on a shape, from as far around it as others are tilted; truth: filled
+/// in.
+GrayPicture shape_frame(const GrayPicture& picture, const PatternSurface& surface,
+                        const Camera& camera, const Step& step, int i, std::uint64_t seed,
+                        FrameTruth& truth) {
+  const double scale = step.side / own_side(picture.view(), surface);
+  const double side = i % 2 == 0 ? 1 : -1;
+  const Pose pose = surface_pose(picture.view(), surface, camera, side * angle_of(step), 5.0 * side,
+                                 60.0 * i, scale, {0, 0});
+  Random random(seed);
+  GrayPicture frame = made_clutter(random, camera.width, camera.height);
+  draw_surface(picture.view(), surface, camera, pose, step.vary == Vary::kCover ? 0.5 : 0, frame);
+  blur_and_noise(seed, frame);
+  truth = {true, surface_corners(picture.view(), surface, camera, pose)};
+  return frame;
+}
+
 /// How many views of a step are right; of the mirror image, in how many anything is recognised.
-Result<int> count_right(const std::vector<ViewLevel>& levels, const BundleView& bundle,
-                        const Step& step, std::uint64_t seed) {
+Result<int> count_right(const std::vector<ViewLevel>& levels, const PatternSurface& surface,
+                        const BundleView& bundle, const Step& step, std::uint64_t seed) {
   // From so far away that a view is affine.
   const int side = frame_side(step);
   Camera camera = default_camera(side, side);
@@ -355,15 +386,19 @@ Result<int> count_right(const std::vector<ViewLevel>& levels, const BundleView& 
   MODAR_ASSIGN(const auto loop, PoseLoop::create(bundle, camera, options));
   int right = 0;
   for (int i = 0; i < kViewsOfStep; ++i) {
+    const std::uint64_t seed_of_view = seed + static_cast<std::uint64_t>(i);
     const AffineView view = view_of(levels[0], step, i);
-    GrayPicture frame = step_frame(levels, view, seed + static_cast<std::uint64_t>(i));
-    if (step.vary == Vary::kCover) {
+    FrameTruth truth = truth_of(levels[0], view);
+    GrayPicture frame = surface.flat()
+                            ? step_frame(levels, view, seed_of_view)
+                            : shape_frame(levels[0], surface, camera, step, i, seed_of_view, truth);
+    if (surface.flat() && step.vary == Vary::kCover) {
       Random random(seed + 500 + static_cast<std::uint64_t>(i));
       cover_half(levels[0], view, i % 4, made_clutter(random, side, side), frame);
     }
     MODAR_ASSIGN(const TrackResult seen, loop->step(frame.view()));
     if (seen.visible.empty()) continue;
-    right += step.vary == Vary::kMirror || is_right(seen.visible[0], truth_of(levels[0], view));
+    right += step.vary == Vary::kMirror || is_right(seen.visible[0], truth);
   }
   return right;
 }
@@ -384,9 +419,11 @@ struct StepShares {
 };
 
 Result<StepShares> run_steps(const std::vector<ViewLevel>& levels,
-                             std::span<const std::byte> record, unsigned jobs, bool with_range) {
+                             std::span<const std::byte> record, unsigned jobs, bool with_range,
+                             const std::vector<std::byte>& shape) {
   MODAR_ASSIGN(const auto bytes,
-               bundle_of_record(levels[0].view(), {record.begin(), record.end()}));
+               bundle_of_record(levels[0].view(), {record.begin(), record.end()}, shape));
+  const PatternSurface surface = surface_of(shape, levels[0].width, levels[0].height);
   MODAR_ASSIGN(const auto bundle, BundleView::open(bytes));
   const GrayPicture turned_over = mirrored(levels[0]);
   const std::vector<ViewLevel> mirror_levels = view_levels(turned_over.view());
@@ -395,8 +432,8 @@ Result<StepShares> run_steps(const std::vector<ViewLevel>& levels,
   std::vector<Result<int>> right(out.steps.size(), 0);
   parallel_rows(static_cast<std::uint32_t>(right.size()), jobs, [&](std::uint32_t i) {
     const bool mirror = out.steps[i].vary == Vary::kMirror;
-    right[i] =
-        count_right(mirror ? mirror_levels : levels, bundle, out.steps[i], 1000 * std::uint64_t{i});
+    right[i] = count_right(mirror ? mirror_levels : levels, surface, bundle, out.steps[i],
+                           1000 * std::uint64_t{i});
   });
   for (const auto& one : right) {
     MODAR_ASSIGN(const int count, one);
@@ -435,9 +472,9 @@ double range_end(const StepShares& all, Vary vary, double (*value)(const Step&))
 }
 
 /// The range of a camera 1280 pixels wide: distances in widths are focal length over frame pixels.
-ScoreRange range_of_steps(const StepShares& all, const GrayImage& pattern) {
+/// aspect: the pattern's width by the size that its steps are of.
+ScoreRange range_of_steps(const StepShares& all, double aspect) {
   constexpr double kFocal = 1280;
-  const double aspect = std::sqrt(1.0 * pattern.width / pattern.height);
   ScoreRange range;
   if (mean_share(all, Vary::kSize) <= 0) return range;
   // Logarithms, since the sizes are a geometric sequence.
@@ -451,9 +488,7 @@ ScoreRange range_of_steps(const StepShares& all, const GrayImage& pattern) {
     if (near) near_side = std::max(near_side, 2 * all.steps[i].side);
   }
   range.nearest = std::min(range.farthest, kFocal / (near_side * aspect));
-  range.tilt_deg = range_end(all, Vary::kTilt, [](const Step& step) {
-    return std::acos(1 / step.tilt) * 57.29577951308232;
-  });
+  range.tilt_deg = range_end(all, Vary::kTilt, angle_of);
   range.covered_share = mean_share(all, Vary::kCover);
   return range;
 }
@@ -526,9 +561,10 @@ void darken_empty_cells(cv::Mat& picture, const std::vector<ScorePlace>& places)
 }  // namespace
 
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
-                                   unsigned jobs, bool with_range) {
+                                   unsigned jobs, bool with_range,
+                                   const std::vector<std::byte>& shape) {
   const std::vector<ViewLevel> levels = view_levels(pattern);
-  MODAR_ASSIGN(const StepShares steps, run_steps(levels, record, jobs, with_range));
+  MODAR_ASSIGN(const StepShares steps, run_steps(levels, record, jobs, with_range, shape));
   FeatureTrial trial = try_features(levels, jobs);
   PatternScore out;
   double share = 0;
@@ -538,7 +574,9 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
     counted += steps.steps[i].counts ? 1 : 0;
   }
   out.score = share_of(share / counted, kBest);
-  if (with_range) out.range = range_of_steps(steps, pattern);
+  const PatternSurface surface = surface_of(shape, pattern.width, pattern.height);
+  if (with_range) out.range = range_of_steps(steps, pattern.width / own_side(pattern, surface));
+  out.range.curved = !shape.empty();
   out.grade = grade_of(out.range);
   out.views = trial.views;
   out.places = std::move(trial.places);
@@ -590,19 +628,19 @@ char grade_of(const ScoreRange& range) {
 
 std::string range_sentence(const ScoreRange& range, double width_mm) {
   if (range.farthest <= 0) return "recognised at no distance";
+  char reach[80];
+  std::snprintf(reach, sizeof reach,
+                range.curved ? "over %.0f degrees around it, %.0f %% right when half covered"
+                             : "to %.0f degrees, %.0f %% right when half covered",
+                (range.curved ? 2 : 1) * range.tilt_deg, 100 * range.covered_share);
   char text[160];
   if (width_mm > 0) {
-    std::snprintf(text, sizeof text,
-                  "recognised from %s to %s, to %.0f degrees, %.0f %% right when half covered",
+    std::snprintf(text, sizeof text, "recognised from %s to %s, %s",
                   distance_text(range.nearest * width_mm).c_str(),
-                  distance_text(range.farthest * width_mm).c_str(), range.tilt_deg,
-                  100 * range.covered_share);
+                  distance_text(range.farthest * width_mm).c_str(), reach);
   } else {
-    std::snprintf(
-        text, sizeof text,
-        "recognised from %.2g to %.2g times its width, to %.0f degrees, %.0f %% right when "
-        "half covered",
-        range.nearest, range.farthest, range.tilt_deg, 100 * range.covered_share);
+    std::snprintf(text, sizeof text, "recognised from %.2g to %.2g times its width, %s",
+                  range.nearest, range.farthest, reach);
   }
   return text;
 }

@@ -230,8 +230,8 @@ glm::vec2 displacement(const PatchNormalEquations& equations) {
 
 namespace {
 
-// Variance of a frame's blur, pixels of a level: of a lens in focus on the finest, of a pixel's area
-// and of the interpolation on all; and what fill() smooths, template pixels. Estimates.
+// Variance of a frame's blur, pixels of a level: of a lens in focus on the finest, of a pixel's
+// area and of the interpolation on all; and what fill() smooths, template pixels. Estimates.
 constexpr double kLensVariance = 0.42;
 constexpr double kSampleVariance = 0.25;
 constexpr double kTemplateVariance = 0.5;

@@ -13,21 +13,46 @@ std::size_t level_of_step(double pixels, std::size_t count) {
       std::clamp(nearest_octave(std::max(pixels, 1.0)), 0, static_cast<int>(count) - 1));
 }
 
+// Cells along a side of a box's face. With cells over the whole picture, most of them lay on two
+// faces or on hidden ones: a face seen alone had five, and was never believed.
+constexpr int kFaceCellSide = 4;
+
+int cells_of(const TrackedPattern& pattern) {
+  const auto faces = static_cast<int>(pattern.surface.faces().size());
+  return faces > 0 ? kFaceCellSide * kFaceCellSide * faces : kCells;
+}
+
 /// Pattern pixels between samples.
 double step_of(const TrackedPattern& pattern) {
+  if (!pattern.surface.faces().empty()) {
+    const auto& place = pattern.surface.faces()[0].place;
+    return std::max(place[2], place[3]) / static_cast<double>(kFaceCellSide * kCellSamples);
+  }
   return std::max(pattern.width(), pattern.height()) /
          static_cast<double>(kCellSide * kCellSamples);
 }
 
-/// Share of the width (or height) at which a sample of a column (or row) of cells lies.
-double share_at(int cell, int k) {
-  return (cell * kCellSamples + k + 0.5) / (kCellSide * kCellSamples);
+/// Where a sample of a cell lies, in shares of width and height, of `side` by `side` cells.
+glm::dvec2 share_at(int cell, int k, int side) {
+  return {
+      (cell % side * kCellSamples + k % kCellSamples + 0.5) / (side * kCellSamples),
+      (static_cast<int>(cell / side) * kCellSamples + static_cast<int>(k / kCellSamples) + 0.5) /
+          (side * kCellSamples)};
 }
 
-/// Where a sample of a cell lies, in shares of width and height.
-glm::dvec2 place_of(int cell, int k, const Mirror* mirror) {
-  glm::dvec2 place(share_at(cell % kCellSide, k % kCellSamples),
-                   share_at(cell / kCellSide, k / kCellSamples));
+/// The same of a pattern's cell. Those of a box lie face by face and are not mirrored: what lies
+/// beside a face in the picture is another one.
+glm::dvec2 place_of(const TrackedPattern& pattern, int cell, int k, const Mirror* mirror) {
+  constexpr int kFaceCells = kFaceCellSide * kFaceCellSide;
+  if (!pattern.surface.faces().empty()) {
+    const auto faces = pattern.surface.faces();
+    const auto& face =
+        faces[std::min(static_cast<std::size_t>(cell / kFaceCells), faces.size() - 1)].place;
+    const glm::dvec2 share = share_at(cell % kFaceCells, k, kFaceCellSide);
+    return {(face[0] + share.x * face[2]) / pattern.width(),
+            (face[1] + share.y * face[3]) / pattern.height()};
+  }
+  glm::dvec2 place = share_at(cell, k, kCellSide);
   if (mirror != nullptr) {
     double& share = mirror->upright ? place.x : place.y;
     share = 2.0 * mirror->at - share;
@@ -62,7 +87,7 @@ CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
 
 bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror) const {
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
-    const glm::dvec2 share = place_of(cell, k, mirror);
+    const glm::dvec2 share = place_of(pattern_, cell, k, mirror);
     bool in_front = false;
     const glm::dvec2 p =
         map_.at({share.x * pattern_.width() - 0.5, share.y * pattern_.height() - 0.5}, in_front);
@@ -84,7 +109,7 @@ void CellGrid::expect(const TrackedPattern& print, int cell, CellSamples& expect
   const GrayImage& image = print.levels[level];
   const double shrink = 1.0 / static_cast<double>(1u << level);
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
-    const glm::dvec2 share = place_of(cell, k, mirror);
+    const glm::dvec2 share = place_of(print, cell, k, mirror);
     const double x = std::clamp(share.x * print.width() * shrink - 0.5, 0.0, image.width - 1.001);
     const double y = std::clamp(share.y * print.height() * shrink - 0.5, 0.0, image.height - 1.001);
     expected[static_cast<std::size_t>(k)] =
@@ -117,7 +142,7 @@ PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap&
   PhotometricCheck check;
   CellSamples expected{};
   CellSamples seen{};
-  for (int cell = 0; cell < kCells; ++cell) {
+  for (int cell = 0; cell < cells_of(pattern); ++cell) {
     if (!grid.see(cell, seen)) continue;
     CellGrid::expect(pattern, cell, expected);
     const CellMatch match = compare(expected, seen);

@@ -1,6 +1,7 @@
 // From the part of a curved or boxed pattern that a homography explains to the pose of all of it.
 #include <algorithm>
 #include <optional>
+#include <span>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -59,6 +60,31 @@ Pose mirrored_about(const TrackedPattern& pattern, glm::dvec2 place, const Pose&
   return out;
 }
 
+/// Leaves of the matches in a mask those on one face of a box, on which most of them lie: that is
+/// all that a homography explains, and a match by chance on another face turned the pose by 30
+/// degrees.
+void keep_one_face(const PatternSurface& surface, std::span<const FeatureMatch> matches,
+                   std::span<std::uint8_t> mask) {
+  const auto faces = surface.faces();
+  if (faces.empty()) return;
+  const auto lies_on = [&](std::size_t i, const ShapeFaceRecord& face) {
+    const glm::dvec2 at = matches[i].pattern + 0.5 - glm::dvec2(face.place[0], face.place[1]);
+    return at.x >= 0.0 && at.y >= 0.0 && at.x < face.place[2] && at.y < face.place[3];
+  };
+  const ShapeFaceRecord* fullest = nullptr;
+  int most = -1;
+  for (const ShapeFaceRecord& face : faces) {
+    int count = 0;
+    for (std::size_t i = 0; i < mask.size(); ++i) count += mask[i] != 0 && lies_on(i, face) ? 1 : 0;
+    if (count <= most) continue;
+    most = count;
+    fullest = &face;
+  }
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (!lies_on(i, *fullest)) mask[i] = 0;
+  }
+}
+
 }  // namespace
 
 /// The matches that a pose explains, where the surface faces the camera.
@@ -99,6 +125,7 @@ std::size_t PlaneMatcher::spread_pose(const TrackedPattern& pattern, Pose& pose)
 int PlaneMatcher::spread(const TrackedPattern& pattern, std::size_t hypothesis,
                          std::array<Pose, 2>& poses) {
   HomographyHypothesis& one = hypotheses_[hypothesis];
+  keep_one_face(pattern.surface, matches_, one.mask);
   glm::dvec2 middle(0.0);
   double matched = 0.0;
   for (std::size_t i = 0; i < one.mask.size(); ++i) {

@@ -147,7 +147,8 @@ class Pattern(ProgramTest):
         gone = self.target("gone")
         (gone.parent / "gone_cropped.png").unlink()
         refuse(gone, 2, "gone_cropped.png, gone_luminance.png")
-        self.assert_fails(self.modar("pattern", "simulate", self.part, "--shape", "ball"), 1, "no shape 'ball'")
+        for command in ("simulate", "score"):
+            self.assert_fails(self.modar("pattern", command, self.part, "--shape", "ball"), 1, "no shape 'ball'")
         mind = self.folder / "targets.mind"
         mind.write_bytes(b"\x82")
         refuse(mind, 5, "compiled from")

@@ -201,6 +201,9 @@ TEST(Score, SaysWhereAPatternWorksAndHowGoodThatIs) {
       range_sentence(range, 0),
       "recognised from 0.65 to 6.5 times its width, to 70 degrees, 90 % right when half covered");
   EXPECT_EQ(range_sentence({}, 200), "recognised at no distance");
+  EXPECT_EQ(
+      range_sentence({0.65, 6.5, 70.4, 0.9, true}, 66),
+      "recognised from 4 cm to 43 cm, over 141 degrees around it, 90 % right when half covered");
   // A farther, steeper or better covered range is never graded worse.
   for (const double far : {1.0, 5.0, 9.0, 14.0, 20.0}) {
     EXPECT_LE(grade_of({0.5, far + 2, 70, 0.5}), grade_of({0.5, far, 70, 0.5}));
