@@ -388,6 +388,57 @@ TEST(Levels, TheStatedErrorBoundsTheDistance) {
   }
 }
 
+/// Greatest distance of some points of one surface from all triangles of another.
+double sampled_distance(const std::vector<std::array<glm::dvec3, 3>>& from,
+                        const std::vector<std::array<glm::dvec3, 3>>& to) {
+  double greatest = 0;
+  for (const auto& [a, b, c] : from) {
+    for (const auto& [u, v] :
+         {std::pair(0.0, 0.0), std::pair(1.0 / 3, 1.0 / 3), std::pair(0.5, 0.0),
+          std::pair(0.5, 0.5), std::pair(0.0, 0.5), std::pair(0.2, 0.2)}) {
+      const glm::dvec3 p = a + u * (b - a) + v * (c - a);
+      double least = 1e9;
+      for (const auto& t : to) least = std::min(least, distance_square(p, t, least));
+      greatest = std::max(greatest, std::sqrt(least));
+    }
+  }
+  return greatest;
+}
+
+TEST(Levels, RoughSurfacesStayWithinTheStatedErrors) {
+  // Noise as steep as its triangles are wide: seen along their normals, surfaces fold.
+  constexpr int kSide = 20;
+  std::mt19937 random(8);
+  std::string text;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    text += "v " + std::to_string(i % kSide) + " " + std::to_string(i / kSide) + " " +
+            std::to_string(double(random() % 1000) / 600) + "\n";
+  }
+  for (int i = 0; i + kSide < kSide * kSide; ++i) {
+    if (i % kSide == kSide - 1) continue;
+    const auto corner = [&](int v) { return " " + std::to_string(v + 1); };
+    text += "f" + corner(i) + corner(i + 1) + corner(i + kSide + 1) + "\nf" + corner(i) +
+            corner(i + kSide + 1) + corner(i + kSide) + "\n";
+  }
+  const PackedMesh mesh = testing::packed(levelled(welded(parse(text)), 65535));
+  const ChunkRecord& chunk = mesh.chunks[0];
+  ASSERT_GE(chunk.level_count, 4u);
+  std::vector<std::vector<std::array<glm::dvec3, 3>>> surfaces;
+  for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+    auto& surface = surfaces.emplace_back();
+    for (const auto& t : triangles_of(mesh, mesh.levels[chunk.first_level + l])) {
+      auto& out = surface.emplace_back();
+      for (std::size_t i = 0; i < 3; ++i) out[i] = glm::dvec3(t[i][0], t[i][1], t[i][2]);
+    }
+    if (l == 0) continue;
+    const auto stated = static_cast<double>(mesh.levels[chunk.first_level + l].error);
+    const double greatest =
+        std::max(sampled_distance(surfaces[0], surface), sampled_distance(surface, surfaces[0]));
+    EXPECT_LE(greatest, stated) << "level " << l;
+    EXPECT_GT(greatest, stated * 0.4) << "level " << l;
+  }
+}
+
 TEST(Levels, GoOnUntilTheModelIsAFewPixelsWide) {
   // A ball of 12,800 triangles, in one chunk and in some, whose borders stay.
   for (const auto& [max_vertices, share] : {std::pair(65535u, 64u), std::pair(2500u, 12u)}) {
@@ -434,6 +485,30 @@ TEST(Levels, DistancesOfKnownSurfaces) {
     // What is below the least that a caller asks for is not told apart.
     EXPECT_EQ(surface_distance(low, high, nearby, 2.0), 2.0);
   }
+}
+
+TEST(Levels, DistancesWhereCornersDoNotTell) {
+  // All corners of a square lie on another one, which has a slit.
+  const std::vector<glm::dvec3> p = {{0, 0, 0},   {1, 0, 0},   {1, 1, 0},   {0, 1, 0},
+                                     {0.8, 0, 0}, {0.8, 1, 0}, {0.9, 0, 0}, {0.9, 1, 0}};
+  const std::vector<std::uint16_t> square = {0, 1, 2, 0, 2, 3};
+  const std::vector<std::uint16_t> slit = {0, 4, 5, 0, 5, 3, 6, 1, 2, 6, 2, 7};
+  LevelSurface with_slit(p, slit);
+  const std::vector<std::uint32_t> near = {0, 2, 3, 1, 0, 0, 2, 3};
+  const double gap = surface_distance(LevelSurface(p, square), with_slit, near, 0);
+  EXPECT_GE(gap, 0.05 - 1e-9);
+  EXPECT_LE(gap, 0.075);
+  // The middle of a square lies under a roof, farther off than a triangle elsewhere is.
+  const std::vector<glm::dvec3> q = {{0, 0, 0},       {1, 0, 0},    {1, 1, 0},   {0, 1, 0},
+                                     {0.5, 0.5, 0.3}, {3, 0, 0},    {4, 0, 0},   {3, 1, 0},
+                                     {3, 0, 0.22},    {4, 0, 0.22}, {3, 1, 0.22}};
+  const std::vector<std::uint16_t> flat = {0, 1, 2, 0, 2, 3, 5, 6, 7};
+  const std::vector<std::uint16_t> roof = {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4, 8, 9, 10};
+  LevelSurface high(q, roof);
+  const std::vector<std::uint32_t> under = {0, 0, 1, 2, 0, 4, 4, 4, 4, 4, 4};
+  const double middle = surface_distance(LevelSurface(q, flat), high, under, 0);
+  EXPECT_GE(middle, 0.3 / std::sqrt(1.36) - 1e-9);  // from a roof that rises 0.3 over 0.5
+  EXPECT_LE(middle, 0.45 / std::sqrt(1.36));
 }
 
 TEST(Levels, DistancesOfTrianglesWithoutArea) {

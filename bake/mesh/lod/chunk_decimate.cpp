@@ -189,7 +189,7 @@ class Decimator {
   using Triangle = std::array<std::uint16_t, 3>;
   /// Inside the surface, on a rim of it, or to be kept.
   enum class Kind : std::uint8_t { kInside, kRim, kLocked };
-  /// Of a vertex: the collapse to try next.
+  /// Of a vertex: the collapse to try next; to itself where none is legal.
   struct Best {
     float price = 0;
     std::uint32_t stamp = 0;
@@ -396,7 +396,11 @@ class Decimator {
       best.price = *price;
     }
     ++best_[v].stamp;
-    if (best.to == v) return false;
+    if (best.to == v) {
+      best_[v].to = v;
+      best_[v].across = kNoTwin;
+      return false;
+    }
     best_[v] = {static_cast<float>(best.price), best_[v].stamp, best.to, best.across, true};
     return true;
   }
@@ -510,25 +514,37 @@ class Decimator {
     sequence_.prices.push_back(std::max(before, price));
     sequence_.paired.push_back(paired ? 1 : 0);
     sequence_.triangles.push_back(static_cast<std::uint32_t>(alive_count_));
-    update(u);
+    update(v, u);
   }
 
-  /// Prices again what a collapse to u has changed: u, the vertices around the removed one (ring_),
-  /// and those that would collapse to u.
-  void update(std::uint16_t u) {
-    const auto aims_at_u = [&](std::uint16_t a) {
-      const Best& best = best_[first_of(a)];
-      return best.to == u || best.across == u;
-    };
+  /// Prices again what a collapse of v to u has changed: u, those that would have gone to either,
+  /// and the vertices around the removed one (ring_), to which u is near now.
+  void update(std::uint16_t v, std::uint16_t u) {
     around(u, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) {
-      if (aims_at_u(a)) ring_.push_back(a);
-      if (aims_at_u(b)) ring_.push_back(b);
+      if (aims_at(a, u)) ring_.push_back(a);
+      if (aims_at(b, u)) ring_.push_back(b);
     });
     ring_.push_back(u);
     for (std::uint16_t& w : ring_) w = first_of(w);
     std::sort(ring_.begin(), ring_.end());
     ring_.erase(std::unique(ring_.begin(), ring_.end()), ring_.end());
-    for (const std::uint16_t w : ring_) estimate(w);
+    for (const std::uint16_t w : ring_) {
+      Best& best = best_[w];
+      const bool known = w != first_of(u) && best.to != w && !aims_at(w, u) && !aims_at(w, v);
+      if (kinds_[w] != Kind::kInside || !known) {
+        estimate(w);
+      } else if (const auto price = static_cast<float>(price_of(w, u)); price < best.price) {
+        best = {price, best.stamp + 1, u, kNoTwin, false};
+        queue_.emplace(best.price, w, best.stamp);
+      } else {
+        best.exact = false;
+      }
+    }
+  }
+
+  [[nodiscard]] bool aims_at(std::uint16_t a, std::uint16_t u) const {
+    const Best& best = best_[first_of(a)];
+    return best.to == u || best.across == u;
   }
 
   ChunkVertices vertices_;

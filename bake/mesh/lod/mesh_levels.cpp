@@ -400,6 +400,10 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
 /// level 0, and its error added. Greater ones spare time (a quarter of the triangles is a quarter
 /// of it) and loosen the bound by as much. Set by hand.
 constexpr double kStandIn = 0.25;
+/// A level is measured against one of so many times its triangles at most, whatever that is off by:
+/// on rough surfaces no level is a stand-in for level 0 by its error, and each would be measured
+/// against all of its triangles. Set by hand.
+constexpr std::size_t kStandInTriangles = 8;
 
 /// A level as later ones are measured against it.
 struct MeasuredLevel {
@@ -441,7 +445,9 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
     const std::vector<std::uint16_t> become =
         collapsed_vertices(sequence, collapses, positions.size());
     double error = levels.back().error;
-    while (stand_in + 1 < levels.size() && levels[stand_in + 1].error <= kStandIn * error) {
+    while (stand_in + 1 < levels.size() &&
+           (levels[stand_in + 1].error <= kStandIn * error ||
+            levels[stand_in].indices.size() / 3 > kStandInTriangles * count)) {
       ++stand_in;
     }
     MeasuredLevel& near = levels[stand_in];

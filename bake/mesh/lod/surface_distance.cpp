@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -24,22 +25,33 @@ constexpr std::size_t next_corner(std::size_t corner) {
 
 LevelSurface::LevelSurface(std::span<const glm::dvec3> positions,
                            std::span<const std::uint16_t> indices)
-    : positions_(positions), indices_(indices), neighbours_(indices.size(), kNoIndex) {
+    : positions_(positions),
+      indices_(indices),
+      begins_(positions.size() + 2, 0),
+      corners_(indices.size()),
+      neighbours_(indices.size(), kNoIndex) {
   // Corners by vertex: each stands for the edge that begins there.
-  std::vector<std::uint32_t> begins(positions.size() + 1, 0);
-  for (const std::uint16_t v : indices) ++begins[v + std::size_t{1}];
-  std::partial_sum(begins.begin(), begins.end(), begins.begin());
-  std::vector<std::uint32_t> corners(indices.size());
-  std::vector<std::uint32_t> free(begins.begin(), begins.end() - 1);
-  for (std::uint32_t c = 0; c < indices.size(); ++c) corners[free[indices[c]]++] = c;
+  for (const std::uint16_t v : indices) ++begins_[v + std::size_t{2}];
+  std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
+  for (std::uint32_t c = 0; c < indices.size(); ++c) {
+    corners_[begins_[indices[c] + std::size_t{1}]++] = c;
+  }
   for (std::size_t c = 0; c < indices.size(); ++c) {
     const std::uint16_t to = indices[next_corner(c)];
-    for (std::uint32_t i = begins[to]; i < begins[to + std::size_t{1}]; ++i) {
-      if (indices[next_corner(corners[i])] != indices[c]) continue;
-      neighbours_[c] = corners[i] / 3;
+    for (std::uint32_t i = begins_[to]; i < begins_[to + std::size_t{1}]; ++i) {
+      if (indices[next_corner(corners_[i])] != indices[c]) continue;
+      neighbours_[c] = corners_[i] / 3;
       break;
     }
   }
+}
+
+bool LevelSurface::has(const std::uint16_t* corners) const {
+  for (std::uint32_t i = begins_[corners[0]]; i < begins_[corners[0] + std::size_t{1}]; ++i) {
+    const std::size_t second = next_corner(corners_[i]);
+    if (indices_[second] == corners[1] && indices_[next_corner(second)] == corners[2]) return true;
+  }
+  return false;
 }
 
 std::vector<std::uint32_t> LevelSurface::triangles_of_vertices() const {
@@ -77,6 +89,14 @@ namespace {
 /// The bound may exceed a distance that was found by this factor: 1.5 keeps coarse levels usable at
 /// their distance, and tighter bounds take more subdivisions.
 constexpr double kSlack = 1.5;
+
+/// A triangle whose corners alone prove that it is off by no more than this factor of a distance
+/// that was found needs no look at what lies between them. Set by hand: more loosens the bound.
+constexpr double kQuick = 1.15;
+
+/// Points whose nearest triangle is found among all: most surfaces need a few, for which a tree
+/// would take longer to build.
+constexpr int kScans = 4;
 
 /// Model space: narrower parts are not cut off. Far above double rounding, far below half floats.
 constexpr double kSliver = 1e-9;
@@ -154,84 +174,140 @@ void cut(const Piece& piece, const glm::dvec3& point, const glm::dvec3& normal, 
   if (high < kSliver) before.count = 0;
 }
 
-/// Sees points along the normal of a triangle: x and y in its plane, z the height over it.
-class PlaneFrame {
+/// A point as seen along the normal of a triangle.
+struct SeenPoint {
+  std::array<double, 3> beyond;  ///< how far it lies outside of each edge
+  double height;                 ///< over the plane
+  unsigned outside;              ///< bit i: it does not lie inside of edge i, or by a sliver only
+};
+
+/// The corners of a triangle, as seen.
+using SeenTriangle = std::array<const SeenPoint*, 3>;
+
+/// Sees points along the normal of a triangle.
+class TriangleView {
  public:
-  /// normal: of unit length.
-  PlaneFrame(const std::array<glm::dvec3, 3>& t, const glm::dvec3& normal)
-      : origin_(t[0]), x_(glm::normalize(t[1] - t[0])), y_(glm::cross(normal, x_)), z_(normal) {
-    for (std::size_t i = 0; i < 3; ++i) corners_[i] = seen(t[i]);
-    low_ = glm::min(glm::min(corners_[0], corners_[1]), corners_[2]);
-    high_ = glm::max(glm::max(corners_[0], corners_[1]), corners_[2]);
-  }
-
-  [[nodiscard]] glm::dvec3 seen(const glm::dvec3& p) const {
-    const glm::dvec3 d = p - origin_;
-    return {glm::dot(d, x_), glm::dot(d, y_), glm::dot(d, z_)};
-  }
-
-  /// Does a triangle, as seen, meet the inside of this one? Touching it by less than a sliver is no
-  /// meeting (separating axes).
-  [[nodiscard]] bool meets(const std::array<glm::dvec3, 3>& t) const {
-    for (int i = 0; i < 2; ++i) {
-      if (std::max({t[0][i], t[1][i], t[2][i]}) <= low_[i]) return false;
-      if (std::min({t[0][i], t[1][i], t[2][i]}) >= high_[i]) return false;
+  /// False where the triangle has no area.
+  bool look_at(const std::array<glm::dvec3, 3>& t) {
+    const glm::dvec3 across = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const double square = glm::dot(across, across);
+    if (!(square > 0)) return false;
+    normal_ = across / std::sqrt(square);
+    for (std::size_t i = 0; i < 3; ++i) {
+      outwards_[i] = glm::normalize(glm::cross(t[(i + 1) % 3] - t[i], normal_));
+      edges_[i] = glm::dot(t[i], outwards_[i]);
     }
-    return !parted(corners_, t) && !parted(t, corners_);
+    plane_ = glm::dot(t[0], normal_);
+    return true;
   }
-
-  /// Does the line between two points, as seen, meet the inside?
-  [[nodiscard]] bool crosses(const glm::dvec3& a, const glm::dvec3& b) const {
-    return !parted(corners_, std::array<glm::dvec3, 3>{a, b, b}) && !beside(a, b, corners_) &&
-           !beside(b, a, corners_);
+  [[nodiscard]] SeenPoint seen(const glm::dvec3& p) const {
+    SeenPoint point;
+    point.outside = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      point.beyond[i] = glm::dot(p, outwards_[i]) - edges_[i];
+      if (point.beyond[i] > -kSliver) point.outside |= 1u << i;
+    }
+    point.height = glm::dot(p, normal_) - plane_;
+    return point;
+  }
+  /// The part of the triangle that is looked at which another one covers, as seen.
+  [[nodiscard]] Piece covered(const SeenTriangle& seen,
+                              const std::array<glm::dvec3, 3>& corners) const {
+    struct Corner {
+      std::array<double, 3> beyond;
+      glm::dvec3 p;
+    };
+    std::array<Corner, 6> part;  // each of three edges adds one corner
+    for (std::size_t i = 0; i < 3; ++i) part[i] = {seen[i]->beyond, corners[i]};
+    std::size_t count = 3;
+    for (std::size_t edge = 0; edge < 3; ++edge) {
+      std::array<Corner, 6> inside;
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        const Corner& a = part[i];
+        const Corner& b = part[i + 1 == count ? 0 : i + 1];
+        if (a.beyond[edge] <= 0 && kept < inside.size()) inside[kept++] = a;
+        if (!(a.beyond[edge] * b.beyond[edge] < 0) || kept == inside.size()) continue;
+        const double at = a.beyond[edge] / (a.beyond[edge] - b.beyond[edge]);
+        Corner& between = inside[kept++];
+        for (std::size_t k = 0; k < 3; ++k) {
+          between.beyond[k] = a.beyond[k] + at * (b.beyond[k] - a.beyond[k]);
+        }
+        between.p = a.p + at * (b.p - a.p);
+      }
+      std::copy_n(inside.begin(), kept, part.begin());
+      count = kept;
+    }
+    Piece piece;
+    for (std::size_t i = 0; i < count; ++i) {
+      const glm::dvec3& p = part[i].p;
+      piece.add(p - normal_ * (glm::dot(p, normal_) - plane_));
+    }
+    return piece;
   }
 
  private:
-  /// Are all points right of the line from a to b, but for slivers?
-  static bool beside(const glm::dvec3& a, const glm::dvec3& b,
-                     const std::array<glm::dvec3, 3>& points) {
-    const double dx = b.x - a.x;
-    const double dy = b.y - a.y;
-    const double slack = kSliver * (std::abs(dx) + std::abs(dy));
-    for (const glm::dvec3& p : points) {
-      if (dx * (p.y - a.y) - dy * (p.x - a.x) > slack) return false;
-    }
-    return true;
-  }
-  /// Is there an edge of `from`, which turns left or right, with all of `from` on one side and all
-  /// points on the other?
-  static bool parted(const std::array<glm::dvec3, 3>& from,
-                     const std::array<glm::dvec3, 3>& points) {
-    const double area = (from[1].x - from[0].x) * (from[2].y - from[0].y) -
-                        (from[1].y - from[0].y) * (from[2].x - from[0].x);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const glm::dvec3& a = from[i];
-      const glm::dvec3& b = from[(i + 1) % 3];
-      if (area >= 0 ? beside(a, b, points) : beside(b, a, points)) return true;
-    }
-    return false;
-  }
-
-  glm::dvec3 origin_;
-  glm::dvec3 x_;
-  glm::dvec3 y_;
-  glm::dvec3 z_;
-  std::array<glm::dvec3, 3> corners_{};
-  glm::dvec3 low_;
-  glm::dvec3 high_;
+  glm::dvec3 normal_{0.0};
+  std::array<glm::dvec3, 3> outwards_{};
+  std::array<double, 3> edges_{};
+  double plane_ = 0;
 };
+
+/// Does the line from a to b meet the inside of the triangle that it is seen from?
+bool meets_inside(const SeenPoint& a, const SeenPoint& b) {
+  double from = 0;
+  double to = 1;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double off = a.beyond[i] + kSliver;
+    const double change = b.beyond[i] - a.beyond[i];
+    if (change > 0) to = std::min(to, -off / change);
+    if (change < 0) from = std::max(from, -off / change);
+  }
+  return from < to;
+}
+
+/// Some corner of a triangle is as near to each of its points: the radius of its circle, or half of
+/// its longest side where it has no acute angle opposite.
+double corner_reach(const std::array<glm::dvec3, 3>& t) {
+  const glm::dvec3 ab = t[1] - t[0];
+  const glm::dvec3 ac = t[2] - t[0];
+  const glm::dvec3 bc = t[2] - t[1];
+  std::array<double, 3> squares = {glm::dot(ab, ab), glm::dot(ac, ac), glm::dot(bc, bc)};
+  std::sort(squares.begin(), squares.end());
+  if (squares[0] + squares[1] <= squares[2]) return 0.5 * std::sqrt(squares[2]);
+  const glm::dvec3 across = glm::cross(ab, ac);
+  return 0.5 * std::sqrt(squares[0] * squares[1] * squares[2] / glm::dot(across, across));
+}
+
+/// How often the edge from a to b goes upwards through a ray from a point, by the first two of
+/// their distances: summed up round triangles, how many of them lie over the point, those that face
+/// away counted negative. Both triangles of an edge count it alike.
+int crossings(const SeenPoint& a, const SeenPoint& b, const SeenPoint& point) {
+  const bool upwards = b.beyond[1] > point.beyond[1];
+  if ((a.beyond[1] > point.beyond[1]) == upwards) return 0;
+  const SeenPoint& low = upwards ? a : b;
+  const SeenPoint& high = upwards ? b : a;
+  const double at = (point.beyond[1] - low.beyond[1]) / (high.beyond[1] - low.beyond[1]);
+  if (low.beyond[0] + at * (high.beyond[0] - low.beyond[0]) <= point.beyond[0]) return 0;
+  return upwards ? 1 : -1;
+}
 
 class Bounder {
  public:
   Bounder(LevelSurface& to, double least)
-      : to_(to), limit_(std::max(kDistanceFloor, least)), bound_(least) {}
+      : to_(to),
+        limit_(std::max(kDistanceFloor, least)),
+        bound_(least),
+        visited_(to.indices().size() / 3, 0),
+        places_(to.vertices()) {
+    points_.reserve(to.vertices());  // references to them last
+  }
 
   /// Finds the distance of the farthest of some points, whose squared distances are at most these.
   void probe(std::vector<std::pair<double, std::uint16_t>> points) {
     std::make_heap(points.begin(), points.end());
     while (!points.empty() && points.front().first > std::max(lower_ * lower_, limit_square())) {
-      const glm::dvec3& point = to_.position(points.front().second);
-      raise_lower(std::sqrt(to_.tree().nearest(point, lower_ * lower_)));
+      raise_lower(std::sqrt(nearest(to_.position(points.front().second), lower_ * lower_)));
       std::pop_heap(points.begin(), points.end());
       points.pop_back();
     }
@@ -243,6 +319,98 @@ class Bounder {
       if (whole.target == kNoIndex) whole.target = near;
     }
     pieces_.assign(1, whole);
+    settle();
+  }
+
+  /// Raises the bound to hold for a triangle, where its corners tell enough. squares: of their
+  /// distances from the triangles in `nearby` (kNoIndex: unknown).
+  bool cover_by_corners(const std::array<glm::dvec3, 3>& t,
+                        const std::array<std::uint32_t, 3>& nearby,
+                        const std::array<double, 3>& squares) {
+    if (std::find(nearby.begin(), nearby.end(), kNoIndex) != nearby.end()) return false;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < 3; ++i) {
+      // The distance from one triangle is convex.
+      if (i > 0 && nearby[i] == nearby[i - 1]) continue;
+      double greatest = squares[i];
+      for (const std::size_t k : {(i + 1) % 3, (i + 2) % 3}) {
+        if (greatest >= least) break;
+        greatest = std::max(greatest, nearby[k] == nearby[i]
+                                          ? squares[k]
+                                          : distance_square(t[k], to_.triangle(nearby[i])));
+      }
+      least = std::min(least, greatest);
+      if (least <= bound_ * bound_) return true;
+    }
+    double distance = std::sqrt(least);
+    if (distance > quick_limit()) {
+      distance = std::sqrt(std::max({squares[0], squares[1], squares[2]})) + corner_reach(t);
+    }
+    if (distance > quick_limit()) return false;
+    bound_ = std::max(bound_, distance);
+    return true;
+  }
+
+  /// Raises the bound to hold for the triangle, where the other surface covers it: seen along the
+  /// triangle's normal, the connected triangles of the other one that meet it end outside of it,
+  /// and those over its middle do not cancel. Then (by the degree of the projection) they cover all
+  /// of it, and no point of it lies farther from them than they do; parts that seem too far off
+  /// are looked at closely. start: a triangle of the other surface that probably shares a vertex
+  /// with this one, `shared`. False where it is not so.
+  bool cover_by_view(const std::array<glm::dvec3, 3>& t, std::uint32_t start,
+                     std::uint16_t shared) {
+    if (start == kNoIndex || !view_.look_at(t)) return false;
+    const SeenPoint middle = view_.seen((t[0] + t[1] + t[2]) / 3.0);
+    if (middle.outside != 0) return false;
+    ++stamp_;
+    waiting_.assign(1, start);
+    visited_[start] = stamp_;
+    pieces_.clear();
+    points_.clear();
+    double greatest = 0;
+    int layers = 0;
+    while (!waiting_.empty()) {
+      const std::uint32_t at = waiting_.back();
+      waiting_.pop_back();
+      const std::uint16_t* v = &to_.indices()[3 * std::size_t{at}];
+      const SeenTriangle p = {&seen(v[0]), &seen(v[1]), &seen(v[2])};
+      const bool meets = (p[0]->outside & p[1]->outside & p[2]->outside) == 0;
+      if (meets) {
+        double height = 0;
+        for (const SeenPoint* corner : p) height = std::max(height, std::abs(corner->height));
+        if (height <= limit()) {
+          greatest = std::max(greatest, height);
+        } else if (Piece part = view_.covered(p, to_.triangle(at));
+                   !accept_by(part, to_.triangle(at))) {
+          part.target = at;
+          if (part.count >= 3) pieces_.push_back(part);
+        }
+      }
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::size_t j = (i + 1) % 3;
+        if (meets) layers += crossings(*p[i], *p[j], middle);
+        const bool on = meets && (p[i]->outside & p[j]->outside) == 0;
+        if (!on && at != start && v[i] != shared && v[j] != shared) continue;
+        const std::uint32_t next = to_.neighbour(at, i);
+        if (next == kNoIndex) {
+          if (on && meets_inside(*p[i], *p[j])) return false;
+        } else if (visited_[next] != stamp_) {
+          visited_[next] = stamp_;
+          waiting_.push_back(next);
+        }
+      }
+    }
+    if (layers == 0) return false;
+    bound_ = std::max(bound_, greatest);
+    settle();
+    return true;
+  }
+
+  [[nodiscard]] double bound() const { return bound_; }
+
+ private:
+  /// Raises the bound to hold for all pieces that wait.
+  void settle() {
     std::size_t pieces = 0;
     while (!pieces_.empty()) {
       const Piece piece = pieces_.back();
@@ -256,59 +424,6 @@ class Bounder {
     }
   }
 
-  /// Raises the bound to hold for the triangle, where the other surface is a graph over it: seen
-  /// along the triangle's normal, those of its triangles that meet this one all look the same way
-  /// and end outside of it. Then (by the degree of the projection) they cover it, and no point of
-  /// it lies farther from them than they do. start: a triangle of the other surface that shares a
-  /// vertex with this one, `shared`. False, with nothing done, where it is no such graph or too far
-  /// off.
-  bool cover_by_graph(const std::array<glm::dvec3, 3>& t, std::uint32_t start,
-                      std::uint16_t shared) {
-    const glm::dvec3 across = glm::cross(t[1] - t[0], t[2] - t[0]);
-    const double square = glm::dot(across, across);
-    if (start == kNoIndex || !(square > 0)) return false;
-    const PlaneFrame frame(t, across / std::sqrt(square));
-    seen_.resize(to_.indices().size() / 3, 0);
-    ++stamp_;
-    waiting_.assign(1, start);
-    seen_[start] = stamp_;
-    double greatest = 0;
-    bool met = false;
-    while (!waiting_.empty()) {
-      const std::uint32_t at = waiting_.back();
-      waiting_.pop_back();
-      std::array<glm::dvec3, 3> seen;
-      for (std::size_t i = 0; i < 3; ++i) seen[i] = frame.seen(to_.triangle(at)[i]);
-      const bool meets = frame.meets(seen);
-      if (meets) {
-        met = true;
-        const double area = (seen[1].x - seen[0].x) * (seen[2].y - seen[0].y) -
-                            (seen[1].y - seen[0].y) * (seen[2].x - seen[0].x);
-        if (!(area > 0)) return false;
-        for (const glm::dvec3& corner : seen) greatest = std::max(greatest, std::abs(corner.z));
-        if (greatest > limit()) return false;
-      }
-      const std::uint16_t* v = &to_.indices()[3 * std::size_t{at}];
-      for (std::size_t i = 0; i < 3; ++i) {
-        const bool at_shared = v[i] == shared || v[(i + 1) % 3] == shared;
-        if (!meets && !at_shared) continue;
-        const std::uint32_t next = to_.neighbour(at, i);
-        if (next == kNoIndex) {
-          if (meets && frame.crosses(seen[i], seen[(i + 1) % 3])) return false;
-        } else if (seen_[next] != stamp_) {
-          seen_[next] = stamp_;
-          waiting_.push_back(next);
-        }
-      }
-    }
-    if (!met) return false;
-    bound_ = std::max(bound_, greatest);
-    return true;
-  }
-
-  [[nodiscard]] double bound() const { return bound_; }
-
- private:
   /// Is the piece near enough to one triangle? The distance from it is convex, so its corners bound
   /// the piece.
   bool accept_by(const Piece& piece, const std::array<glm::dvec3, 3>& t) {
@@ -364,19 +479,21 @@ class Bounder {
     piece.target = to_.neighbour(from, i);
     // Over an edge between two triangles, a piece may lie outside of both: it is nearest to the
     // edge.
-    if (piece.target == came_from) piece.target = kNoIndex;
+    if (piece.target == came_from) {
+      if (came_from != kNoIndex && accept_by(piece, to_.triangle(came_from))) return;
+      piece.target = kNoIndex;
+    }
     if (piece.target != kNoIndex || !accept_by(piece, to_.triangle(from))) pieces_.push_back(piece);
   }
 
   bool accept(const Piece& piece, bool at_once) {
-    TriangleTree& tree = to_.tree();
     const glm::dvec3 middle = piece.middle();
     double radius = 0;
     for (const glm::dvec3& corner : piece.all()) {
       radius = std::max(radius, glm::length(corner - middle));
     }
     const double margin = std::max(0.0, limit() - radius);
-    const double distance = std::sqrt(tree.nearest(middle, margin * margin));
+    const double distance = std::sqrt(nearest(middle, margin * margin));
     // A triangle found within the margin need not be the nearest: it proves no distance.
     if (distance > margin) raise_lower(distance);
     // Within the radius no point is farther off than so.
@@ -389,7 +506,7 @@ class Bounder {
   [[nodiscard]] double corner_bound(const Piece& piece) {
     double greatest = 0;
     for (const glm::dvec3& corner : piece.all()) {
-      greatest = std::max(greatest, distance_square(corner, to_.tree().last()));
+      greatest = std::max(greatest, distance_square(corner, nearest_));
     }
     return std::sqrt(greatest);
   }
@@ -397,7 +514,7 @@ class Bounder {
   /// Separates the part over the nearest triangle, which is mostly settled then, from the parts
   /// beside it.
   void divide(Piece piece) {
-    const std::array<glm::dvec3, 3> t = to_.tree().last();
+    const std::array<glm::dvec3, 3> t = nearest_;
     const glm::dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
     if (!(glm::dot(normal, normal) > 0)) return halve(piece);
     Piece outside;
@@ -447,11 +564,43 @@ class Bounder {
     }
   }
 
+  /// As TriangleTree::nearest(); the first few times by looking at all triangles.
+  double nearest(const glm::dvec3& point, double enough) {
+    if (scans_ == kScans) {
+      const double square = to_.tree().nearest(point, enough);
+      nearest_ = to_.tree().last();
+      return square;
+    }
+    ++scans_;
+    double best = std::numeric_limits<double>::infinity();
+    std::uint32_t found = 0;
+    for (std::uint32_t t = 0; t < to_.indices().size() / 3 && best > enough; ++t) {
+      const double square = distance_square(point, to_.triangle(t), best);
+      if (square >= best) continue;
+      best = square;
+      found = t;
+    }
+    nearest_ = to_.triangle(found);
+    return best;
+  }
+
+  const SeenPoint& seen(std::uint16_t vertex) {
+    PointPlace& place = places_[vertex];
+    if (place.view != stamp_) {
+      place = {stamp_, static_cast<std::uint32_t>(points_.size())};
+      points_.push_back(view_.seen(to_.position(vertex)));
+    }
+    return points_[place.number];
+  }
+
   void raise_lower(double distance) {
     lower_ = std::max(lower_, distance);
     limit_ = std::max(limit_, kSlack * lower_);
   }
   [[nodiscard]] double limit() const { return limit_; }
+  [[nodiscard]] double quick_limit() const {
+    return std::max({kDistanceFloor, bound_, kQuick * lower_});
+  }
   [[nodiscard]] double limit_square() const { return limit_ * limit_; }
 
   LevelSurface& to_;
@@ -459,31 +608,20 @@ class Bounder {
   double limit_;      ///< pieces within it need no closer look
   double bound_;
   std::vector<Piece> pieces_;
-  std::vector<std::uint32_t> seen_;  ///< stamp_ where a triangle was, in cover_by_graph()
-  std::uint32_t stamp_ = 0;
+  int scans_ = 0;
+  std::array<glm::dvec3, 3> nearest_{};  ///< the triangle that nearest() found last
+  // Of cover_by_view().
+  TriangleView view_;
+  std::uint32_t stamp_ = 0;             ///< of the view at hand
+  std::vector<std::uint32_t> visited_;  ///< of each triangle: the view that it was visited in
+  struct PointPlace {
+    std::uint32_t view = 0;
+    std::uint32_t number = 0;
+  };
+  std::vector<PointPlace> places_;  ///< of each vertex: where its point is, and in which view
+  std::vector<SeenPoint> points_;   ///< of the view at hand
   std::vector<std::uint32_t> waiting_;
 };
-
-/// A triangle from its lowest corner on, as one number.
-std::uint64_t key_of(const std::uint16_t* t) {
-  std::array<std::uint64_t, 3> v = {t[0], t[1], t[2]};
-  std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
-  return v[0] << 32 | v[1] << 16 | v[2];
-}
-
-/// Triangles of `from` that `to` does not have.
-std::vector<std::size_t> changed(std::span<const std::uint16_t> from,
-                                 std::span<const std::uint16_t> to) {
-  std::vector<std::uint64_t> kept;
-  kept.reserve(to.size() / 3);
-  for (std::size_t i = 0; i < to.size(); i += 3) kept.push_back(key_of(&to[i]));
-  std::sort(kept.begin(), kept.end());
-  std::vector<std::size_t> result;
-  for (std::size_t i = 0; i < from.size(); i += 3) {
-    if (!std::binary_search(kept.begin(), kept.end(), key_of(&from[i]))) result.push_back(i);
-  }
-  return result;
-}
 
 }  // namespace
 
@@ -491,23 +629,28 @@ double surface_distance(const LevelSurface& from, LevelSurface& to,
                         std::span<const std::uint32_t> nearby, double least) {
   Bounder bounder(to, least);
   const std::span<const std::uint16_t> corners = from.indices();
-  const std::vector<std::size_t> triangles = changed(corners, to.indices());
+  std::vector<std::size_t> changed;  // triangles that `to` does not have
   std::vector<std::pair<double, std::uint16_t>> probes;
-  std::vector<bool> probed(nearby.size(), false);
-  for (const std::size_t i : triangles) {
+  std::vector<double> squares(nearby.size(), -1.0);
+  for (std::size_t i = 0; i < corners.size(); i += 3) {
+    if (to.has(&corners[i])) continue;
+    changed.push_back(i);
     for (std::size_t k = i; k < i + 3; ++k) {
       const std::uint16_t v = corners[k];
-      if (nearby[v] == kNoIndex || probed[v]) continue;
-      probed[v] = true;
-      probes.emplace_back(distance_square(from.position(v), to.triangle(nearby[v])), v);
+      if (nearby[v] == kNoIndex || squares[v] >= 0) continue;
+      squares[v] = distance_square(from.position(v), to.triangle(nearby[v]));
+      probes.emplace_back(squares[v], v);
     }
   }
   bounder.probe(std::move(probes));
-  for (const std::size_t i : triangles) {
+  for (const std::size_t i : changed) {
+    const std::uint16_t* v = &corners[i];
     const std::array<glm::dvec3, 3> corner = from.triangle(static_cast<std::uint32_t>(i / 3));
-    const std::array<std::uint32_t, 3> near = {nearby[corners[i]], nearby[corners[i + 1]],
-                                               nearby[corners[i + 2]]};
-    if (bounder.cover_by_graph(corner, near[0], corners[i])) continue;
+    const std::array<std::uint32_t, 3> near = {nearby[v[0]], nearby[v[1]], nearby[v[2]]};
+    if (bounder.cover_by_corners(corner, near, {squares[v[0]], squares[v[1]], squares[v[2]]})) {
+      continue;
+    }
+    if (bounder.cover_by_view(corner, near[0], v[0])) continue;
     Piece whole;
     for (const glm::dvec3& c : corner) whole.add(c);
     bounder.cover(whole, near);

@@ -28,6 +28,7 @@ class LevelSurface {
   LevelSurface(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
 
   [[nodiscard]] std::span<const std::uint16_t> indices() const { return indices_; }
+  [[nodiscard]] std::size_t vertices() const { return positions_.size(); }
   [[nodiscard]] const glm::dvec3& position(std::uint16_t vertex) const {
     return positions_[vertex];
   }
@@ -41,6 +42,8 @@ class LevelSurface {
   }
   /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
   [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
+  /// Is there a triangle of these corners, in this order, from whichever it begins?
+  [[nodiscard]] bool has(const std::uint16_t* corners) const;
   /// Built on first use.
   TriangleTree& tree();
   /// Computed on first use.
@@ -49,6 +52,8 @@ class LevelSurface {
  private:
   std::span<const glm::dvec3> positions_;
   std::span<const std::uint16_t> indices_;
+  std::vector<std::uint32_t> begins_;   ///< of each vertex: where its corners begin in corners_
+  std::vector<std::uint32_t> corners_;  ///< by vertex
   std::vector<std::uint32_t> neighbours_;
   std::unique_ptr<TriangleTree> tree_;
   std::vector<EdgePlanes> planes_;
