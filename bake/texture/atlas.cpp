@@ -40,7 +40,8 @@ constexpr double kCutGutter = 2;
 constexpr int kScaleSteps = 8;
 /// What is done unasked saves so much, and costs no more decibels beside pictures apart: some have
 /// more texels apart than pixels (a side of 728 becomes 1024), which an atlas does not keep. Set by
-/// hand; the scan of five photos loses 1.2.
+/// hand; the scan of five photos loses 1.2, of which 0.01 beside pictures apart of its own density
+/// (36.34 dB and 36.35).
 constexpr double kWorthBytes = 2.0 / 3;
 constexpr double kWorthDraws = 0.5;
 constexpr double kMostLoss = 1.5;
