@@ -114,12 +114,12 @@ GrayPicture render_room(std::span<const Board> boards, const Camera& camera, con
   GrayPicture frame{camera.width, camera.height, {}};
   frame.pixels.resize(static_cast<std::size_t>(camera.width) *
                       static_cast<std::size_t>(camera.height));
-  constexpr double kSamples[] = {-0.25, 0.25};
+  constexpr double kSubpixels[] = {-0.25, 0.25};
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       double sum = 0;
-      for (const double dy : kSamples) {
-        for (const double dx : kSamples) {
+      for (const double dy : kSubpixels) {
+        for (const double dx : kSubpixels) {
           const glm::dvec3 ray((x + dx - camera.cx) / camera.fx, (y + dy - camera.cy) / camera.fy,
                                1);
           double nearest = 1e-6;

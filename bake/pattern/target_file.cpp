@@ -80,7 +80,7 @@ Result<CurvedTarget> read_curved(const Json& json, const std::string& path) {
   const double above = on_side ? (whole_width - left - width) / whole_width : top / whole;
   const auto unit = member(json, "unit");
   const double mm = unit && unit->text() == "in" ? 25.4 : 1;
-  const auto around_at = [&](double share) {
+  const auto around_at = [&, top_around = top_around, bottom_around = bottom_around](double share) {
     return mm * (top_around + (bottom_around - top_around) * share);
   };
   CurvedTarget out;

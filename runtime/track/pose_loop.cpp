@@ -32,14 +32,12 @@ constexpr int kJudgingBudget = 20;
 // as much as following takes, for how soon it is measured again.
 constexpr int kLookEvery = 4;
 
-/// A pose that followed from the surroundings, brought to the measured one over some frames.
+/// What was shown, brought to what is known better now, over some frames.
 struct Return {
   double share = 0;  ///< of the difference, that is left
   double step = 0;   ///< of it, that goes in a frame
   glm::dvec3 turn{};
   glm::dvec3 way{};
-  double position_sigma = 0;
-  double rotation_sigma = 0;
 };
 
 /// Largest way of a corner, pixels.
@@ -73,7 +71,10 @@ struct PoseLoop::State {
   int frames_unseen = 0;
   bool follows = false;  ///< the last frame's pose of it was of the surroundings
   Return back;
+  std::optional<std::array<glm::dvec2, 4>> aside;  ///< by which the last frame saw its corners
+                                                   ///< beside where the surroundings had them
   std::optional<glm::dvec3> turn;  ///< of what the camera sees, since the last frame
+  [[nodiscard]] const glm::dvec3* turn_seen() const { return turn.has_value() ? &*turn : nullptr; }
 
   void step(const GrayImage& frame, TrackResult& result);
   void track_all(TrackResult& result);
@@ -95,7 +96,12 @@ struct PoseLoop::State {
   [[nodiscard]] bool doubts(const Detection& seen) const;
   bool follow(Detection& detection);
   void see_again(const Pose& followed);
-  void start_return(const Detection& seen, const Detection& followed);
+  bool corners_of(const Pose& pose, std::array<glm::dvec2, 4>& corners) const;
+  bool seen_twice(const Detection& seen, const Detection& followed);
+  void smooth_correction(const tracker::ExtendedPose& extended,
+                         const std::array<glm::dvec2, 4>& corners);
+  [[nodiscard]] Pose returning(const Pose& pose) const;
+  void start_return(const Pose& from, const Pose& to);
   void go_on_returning(Detection& detection);
 };
 
@@ -152,6 +158,7 @@ void PoseLoop::reset() {
   if (state_->surroundings != nullptr) state_->surroundings->clear();
   state_->follows = false;
   state_->back = {};
+  state_->aside.reset();
 }
 
 Result<TrackResult> PoseLoop::step(const GrayImage& frame) {
@@ -422,23 +429,35 @@ void PoseLoop::State::extend(TrackResult& result) {
   const bool doubtful = shown != nullptr && (track.has_motion || was) && doubts(*shown);
   Detection followed;
   follows = (shown == nullptr || doubtful || was) && !track.homography_only && follow(followed);
-  if (shown != nullptr && !doubtful) {
-    if (follows) start_return(*shown, followed);
+  const bool seen = shown != nullptr && !doubtful;
+  if (seen && (!follows || seen_twice(*shown, followed))) {
+    if (follows) {
+      surroundings->correct(followed.pose, shown->pose);
+      start_return(followed.pose, shown->pose);
+    }
     follows = false;
-    surroundings->learn(frame_tracker.frame(), shown->pose, shown->corners);
+    surroundings->learn(frame_tracker.frame(), shown->pose, shown->corners, shown->inliers,
+                        turn_seen());
     go_on_returning(*shown);
     return;
   }
-  back = {};
-  if (!follows) return;
+  if (!seen) aside.reset();
+  if (!follows) {
+    back = {};
+    return;
+  }
   if (doubtful) {
-    *shown = followed;
     if (track.has_motion) track.pose = followed.pose;
     track.has_motion = false;
+  }
+  const Pose known = followed.pose;
+  go_on_returning(followed);
+  if (shown != nullptr) {
+    *shown = followed;
     return;
   }
   if (track.tracked && track.shown_reason == Reason::kOtherPrint) return;
-  if (!track.tracked && ++frames_unseen % kLookEvery == 0) see_again(followed.pose);
+  if (!track.tracked && ++frames_unseen % kLookEvery == 0) see_again(known);
   result.visible.push_back(followed);
 }
 
@@ -483,7 +502,7 @@ bool PoseLoop::State::doubts(const Detection& seen) const {
 bool PoseLoop::State::follow(Detection& detection) {
   if (!follows && !surroundings->ready()) return false;
   tracker::ExtendedPose extended;
-  if (!surroundings->follow(frame_tracker.frame(), turn.has_value() ? &*turn : nullptr, extended)) {
+  if (!surroundings->follow(frame_tracker.frame(), turn_seen(), extended)) {
     return false;
   }
   detection.pattern = patterns[home].index;
@@ -491,8 +510,48 @@ bool PoseLoop::State::follow(Detection& detection) {
   detection.extended = true;
   detection.position_sigma = extended.position_sigma;
   detection.rotation_sigma = extended.rotation_sigma;
+  if (!corners_of(extended.pose, detection.corners)) return false;
+  smooth_correction(extended, detection.corners);
+  return true;
+}
+
+/// Points that come into view again may correct the pose from one frame to the next: not what is
+/// shown.
+void PoseLoop::State::smooth_correction(const tracker::ExtendedPose& extended,
+                                        const std::array<glm::dvec2, 4>& corners) {
+  constexpr double kCorrected = 4.0;  // pixels; the camera's motion is expected to less. By hand
   const tracker::PlaneMap map = tracker::map_of_pose(patterns[home], camera, extended.pose);
-  return tracker::map_corners(patterns[home], map, detection.corners);
+  if (!tracker::in_view(patterns[home], map, camera)) return;
+  const Pose* nearest = nullptr;
+  double least = 0;
+  for (const Pose& expected : extended.expected) {
+    std::array<glm::dvec2, 4> there;
+    if (!corners_of(expected, there)) continue;
+    const double way = way_of(there, corners);
+    if (nearest == nullptr || way < least) {
+      nearest = &expected;
+      least = way;
+    }
+  }
+  if (nearest != nullptr && least > kCorrected) start_return(*nearest, extended.pose);
+}
+
+bool PoseLoop::State::corners_of(const Pose& pose, std::array<glm::dvec2, 4>& corners) const {
+  return tracker::map_corners(patterns[home], tracker::map_of_pose(patterns[home], camera, pose),
+                              corners);
+}
+
+/// Whether two frames in a row see the home pattern equally far from where the surroundings have
+/// it: the first features of one that comes back can give any pose.
+bool PoseLoop::State::seen_twice(const Detection& seen, const Detection& followed) {
+  constexpr double kSame = 0.02;  // of the outline's diagonal. By hand
+  std::array<glm::dvec2, 4> now;
+  for (std::size_t i = 0; i < 4; ++i) now[i] = seen.corners[i] - followed.corners[i];
+  const double diagonal = std::max(glm::length(followed.corners[2] - followed.corners[0]),
+                                   glm::length(followed.corners[3] - followed.corners[1]));
+  const bool twice = aside.has_value() && way_of(now, *aside) < kSame * diagonal;
+  aside = now;
+  return twice;
 }
 
 /// Looks where the surroundings say that the home pattern is, and tracks it if it is there.
@@ -516,30 +575,38 @@ void PoseLoop::State::see_again(const Pose& followed) {
   tracks[home] = next;
 }
 
-void PoseLoop::State::start_return(const Detection& seen, const Detection& followed) {
+/// `pose`, as much beside its place as is still to be shown.
+Pose PoseLoop::State::returning(const Pose& pose) const {
+  return {rotation_matrix(back.share * back.turn) * pose.rotation,
+          pose.translation + back.share * back.way};
+}
+
+/// Shows what was taken for `from` and is known to be `to` now, at first as if it were not known.
+void PoseLoop::State::start_return(const Pose& from, const Pose& to) {
   // Frames that a return takes, at least and at most, and pixels by which it moves the corners in
   // one: a slower return shows the wrong place longer. By hand.
   constexpr double kFrames = 10;
   constexpr double kMostFrames = 40;
   constexpr double kStep = 3.0;
-  surroundings->correct(followed.pose, seen.pose);
-  back.turn = rotation_vector(followed.pose.rotation * glm::transpose(seen.pose.rotation));
-  back.way = followed.pose.translation - seen.pose.translation;
-  back.position_sigma = followed.position_sigma;
-  back.rotation_sigma = followed.rotation_sigma;
+  const Pose shown = returning(from);
+  std::array<glm::dvec2, 4> shown_corners;
+  std::array<glm::dvec2, 4> corners;
+  const bool known = corners_of(shown, shown_corners) && corners_of(to, corners);
+  const double way = known ? way_of(shown_corners, corners) : 0;
+  back.turn = rotation_vector(shown.rotation * glm::transpose(to.rotation));
+  back.way = shown.translation - to.translation;
   back.share = 1;
-  back.step = 1 / std::clamp(way_of(seen.corners, followed.corners) / kStep, kFrames, kMostFrames);
+  back.step = 1 / std::clamp(way / kStep, kFrames, kMostFrames);
 }
 
 void PoseLoop::State::go_on_returning(Detection& detection) {
   if (back.share <= 0) return;
   Track shown;
-  shown.pose.rotation = rotation_matrix(back.share * back.turn) * detection.pose.rotation;
-  shown.pose.translation = detection.pose.translation + back.share * back.way;
+  shown.pose = returning(detection.pose);
   if (frame_tracker.locate(patterns[home], shown, detection)) {
     detection.extended = true;
-    detection.position_sigma = back.share * back.position_sigma;
-    detection.rotation_sigma = back.share * back.rotation_sigma;
+    detection.position_sigma += back.share * glm::length(back.way);
+    detection.rotation_sigma += back.share * glm::length(back.turn);
   }
   back.share -= back.step;
 }

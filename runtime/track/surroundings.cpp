@@ -44,6 +44,12 @@ constexpr int kUsableHits = 3;
 // without that are bridged by the last motion. By hand.
 constexpr int kLeastPoints = 8;
 constexpr int kBridged = 10;
+// What covers the pattern and stands still for a while has points as well, and goes away with
+// them: the weight of points learned without the pattern (of 0.03 to 1, the best on two rooms), and
+// the others that must be seen in each half of the frame, left, right, upper and lower, for that:
+// those of one side alone tell a pose badly. By hand.
+constexpr double kNewWeight = 0.3;
+constexpr int kEnoughSteady = 5;
 // Information of a patch's equations as they stand, 1 / square pixels. By hand; see kHonest.
 constexpr double kInformation = 1.0;
 // What one frame adds to a depth, of that: frames in a row see the same template with the same
@@ -56,8 +62,14 @@ constexpr double kMaxOffset = 1.5;
 // Standard deviations are stated so many times larger than the equations say, which take errors of
 // depths and anchors for independent: of `modar bench extended` 95 % lie within two of these then.
 constexpr double kHonest = 4.0;
-// Of a gyroscope's turn between two frames, radians: three times the bench's noise. By hand.
-constexpr double kTurnSigma = 0.001;
+// Standard deviations of a gyroscope's turn: radians a frame, somewhat more than `modar bench
+// extended` adds, and the share of the whole turn by which its scale is off, as data sheets of
+// phones' sensors allow.
+constexpr double kTurnSigma = 0.0005;
+constexpr double kTurnScale = 0.01;
+// And of a pattern's rotation, radians times its patches in place: 0.15 degrees with all in view,
+// 0.6 with a quarter, as `modar bench extended` has it.
+constexpr double kSeenSigma = 0.5;
 
 Pose compose(const Pose& a, const Pose& b) {
   return {a.rotation * b.rotation, a.rotation * b.translation + a.translation};
@@ -148,11 +160,10 @@ struct PoseSystem {
     }
   }
 
-  void expect_turn(const glm::dvec3& rest) {
-    constexpr double kWeight = 1.0 / (kTurnSigma * kTurnSigma);
+  void expect_rotation(const glm::dvec3& rest, double weight) {
     for (int row = 0; row < 3; ++row) {
-      jtj[row][row] += kWeight;
-      jtr[row] += kWeight * rest[row];
+      jtj[row][row] += weight;
+      jtr[row] += weight * rest[row];
     }
   }
 
@@ -198,11 +209,13 @@ double robust_weight(const MapPointEquations& one, const Vector6& change) {
 struct MapFit {
   int visible = 0;
   int inliers = 0;
+  double weight = 0;  ///< of the visible
 };
 
 /// Observes the points at a pose.
 MapFit linearise(const Camera& camera, const FrameView& frame, std::span<const MapPoint> points,
-                 int level, float tukey, const Pose& pose, std::vector<MapPointEquations>& out) {
+                 double new_weight, int level, float tukey, const Pose& pose,
+                 std::vector<MapPointEquations>& out) {
   const double shrink = 1.0 / static_cast<double>(1 << level);
   MapFit fit;
   out.clear();
@@ -213,6 +226,8 @@ MapFit linearise(const Camera& camera, const FrameView& frame, std::span<const M
         !observe(frame, point, at, level, glm::dvec2(0.0), tukey, one.patch)) {
       continue;
     }
+    one.weight = point.of_pattern ? 1.0 : new_weight;
+    fit.weight += one.weight;
     ++fit.visible;
     if (one.patch.correlation >= kInlierCorrelation) ++fit.inliers;
     if (one.patch.xx == 0.0f && one.patch.yy == 0.0f) continue;
@@ -246,16 +261,17 @@ MapFit linearise(const Camera& camera, const FrameView& frame, std::span<const M
 
 /// One Gauss-Newton step. Returns the way of the patch that moves furthest, template pixels;
 /// negative if there is none.
-double step_pose(const std::vector<MapPointEquations>& equations, const glm::dmat3* expected,
+double step_pose(const std::vector<MapPointEquations>& equations, const ExpectedRotation& expected,
                  bool robust, Pose& pose, PoseSystem& system) {
   Vector6 change = Vector6::Zero();
   for (int pass = 0; pass < (robust ? 2 : 1); ++pass) {
     system = {};
     for (const MapPointEquations& one : equations) {
-      system.add(one, pass == 0 ? 1.0 : robust_weight(one, change));
+      system.add(one, pass == 0 ? one.weight : one.weight * robust_weight(one, change));
     }
-    if (expected != nullptr) {
-      system.expect_turn(rotation_vector(*expected * glm::transpose(pose.rotation)));
+    if (expected.weight > 0) {
+      system.expect_rotation(rotation_vector(expected.rotation * glm::transpose(pose.rotation)),
+                             expected.weight);
     }
     change = solve_symmetric(system.matrix(), Vector6(Eigen::Map<Vector6>(system.jtr)));
     if (!change.allFinite() || change.head<3>().norm() > kMaxRotation) return -1.0;
@@ -342,6 +358,7 @@ Surroundings::Surroundings(const Camera& camera) : camera_(camera) {
 
 void Surroundings::clear() {
   points_.clear();
+  turned_known_ = false;
   known_ = 0;
   unknown_ = 0;
   position_variance_ = rotation_variance_ = 0;
@@ -381,12 +398,13 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
   constexpr int kLeast = 6;
   if (static_cast<std::size_t>(coarse_) >= frame.pyramid.size() || known_ == 0) return;
   coarse_points_.clear();
+  const bool of_pattern = enough_of_pattern();
   const double grow = static_cast<double>(1 << coarse_);
   for (const MapPoint& point : points_) {
     Projection at;
     if (coarse_points_.size() == coarse_points_.capacity()) break;
-    if (!point.usable() || !point.in_view || point.misses > 0 ||
-        !place(camera_, point, now_, coarse_, at)) {
+    const bool used = of_pattern ? point.of_pattern && point.steady() : point.usable();
+    if (!used || !point.in_view || point.misses > 0 || !place(camera_, point, now_, coarse_, at)) {
       continue;
     }
     const glm::dvec2 pixel = glm::floor(at.pixel + 0.5);
@@ -405,18 +423,15 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
     seen.hits = kUsableHits;
     seen.travel = kSteadyTravel;
   }
-  const glm::dmat3 expected = pose.rotation;
+  const ExpectedRotation expected{pose.rotation,
+                                  turn != nullptr ? 1 / (kTurnSigma * kTurnSigma) : 0.0};
   const Pose start = pose;
   PoseSystem system;
   for (int step = 0; step < kCoarseSteps; ++step) {
-    const MapFit fit = linearise(camera_, frame, coarse_points_, coarse_,
+    const MapFit fit = linearise(camera_, frame, coarse_points_, 1.0, coarse_,
                                  step == 0 ? kTukeyFirst : kTukey, pose, equations_);
-    if (fit.visible < kLeast) {
-      pose = start;
-      return;
-    }
     const double moved =
-        step_pose(equations_, turn != nullptr ? &expected : nullptr, step > 1, pose, system);
+        fit.visible < kLeast ? -1.0 : step_pose(equations_, expected, step > 1, pose, system);
     if (moved < 0.0) {
       pose = start;
       return;
@@ -425,41 +440,57 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
   }
 }
 
-bool Surroundings::align_fine(const FrameView& frame, const glm::dvec3* turn, Pose& pose,
-                              ExtendedPose& out) {
+/// What the gyroscope's turns since the pattern was seen add up to, weighed against what the points
+/// are known to.
+ExpectedRotation Surroundings::expected_rotation() const {
+  if (!turned_known_) return {};
+  const double scale =
+      kTurnScale * glm::length(rotation_vector(turned_ * glm::transpose(turned_from_)));
+  return {turned_, doubt_ * 1.0 * 1.0 / (turned_variance_ + scale * scale)};
+}
+
+bool Surroundings::align_fine(const FrameView& frame, Pose& pose, ExtendedPose& out) {
   constexpr int kFineSteps = 8;
   constexpr double kConverged = 0.03;
   constexpr double kLeastShare = 0.35;  // of the points in view, of which others hide some; by hand
   constexpr double kPlaced = 0.8;       // template pixels that a point in its place still asks for
-  const glm::dmat3 expected = pose.rotation;
+  const ExpectedRotation expected = expected_rotation();
+  const double new_weight = enough_of_pattern() ? kNewWeight : 1.0;
   PoseSystem system;
   MapFit fit;
   double moved = 0;
   for (int step = 0; step < kFineSteps; ++step) {
-    fit = linearise(camera_, frame, points_, level_, step == 0 ? kTukeyFirst : kTukey, pose,
-                    equations_);
+    fit = linearise(camera_, frame, points_, new_weight, level_, step == 0 ? kTukeyFirst : kTukey,
+                    pose, equations_);
     if (fit.inliers < kLeastPoints && step > 1) return false;
-    moved = step_pose(equations_, turn != nullptr ? &expected : nullptr, step > 0, pose, system);
+    moved = step_pose(equations_, expected, step > 0, pose, system);
     if (moved < 0.0) return false;
     if (moved < kConverged && step > 0) break;
   }
   int placed = 0;
+  double placed_weight = 0;
   double anchor_position = 0;
   double anchor_rotation = 0;
   for (const MapPointEquations& one : equations_) {
     if (one.patch.correlation < kInlierCorrelation) continue;
     if (glm::length(rest_of(one, Vector6::Zero())) > kPlaced) continue;
     ++placed;
+    placed_weight += one.weight;
     anchor_position += one.point->anchor_position;
     anchor_rotation += one.point->anchor_rotation;
   }
-  if (placed < kLeastPoints || placed < kLeastShare * fit.visible) {
+  if (placed < kLeastPoints || placed_weight < kLeastShare * fit.weight) {
     return false;
   }
-  const Matrix6 covariance = solve_symmetric(system.matrix(), Matrix6(Matrix6::Identity()));
+  const Matrix6 fused = solve_symmetric(system.matrix(), Matrix6(Matrix6::Identity()));
+  system.expect_rotation(glm::dvec3(0.0), -expected.weight);
+  const Matrix6 seen = solve_symmetric(system.matrix(), Matrix6(Matrix6::Identity()));
+  // The errors that the points of one time share count once; of the equations, which take them for
+  // exact, less is known by as much.
+  doubt_ = 1 + anchor_rotation / placed / seen.diagonal().head<3>().sum();
   out.pose = pose;
-  rotation_variance_ = covariance.diagonal().head<3>().sum() + anchor_rotation / placed;
-  position_variance_ = covariance.diagonal().tail<3>().sum() + anchor_position / placed;
+  rotation_variance_ = doubt_ * fused.diagonal().head<3>().sum();
+  position_variance_ = fused.diagonal().tail<3>().sum() + anchor_position / placed;
   out.rotation_sigma = kHonest * std::sqrt(rotation_variance_);
   out.position_sigma = kHonest * std::sqrt(position_variance_);
   return true;
@@ -636,14 +667,54 @@ void Surroundings::add_points(const FrameView& frame, const Pose& pose,
   }
 }
 
+/// Adds a turn to those since the pattern was seen.
+void Surroundings::add_turn(const glm::dvec3* turn) {
+  turned_known_ = turned_known_ && turn != nullptr;
+  if (!turned_known_) return;
+  turned_ = orthonormal(rotation_matrix(*turn) * turned_);
+  turned_variance_ += kTurnSigma * kTurnSigma;
+}
+
+/// The pattern says the rotation as well, in each frame with an error of its own.
+void Surroundings::level_turns(const Pose& pose, int patches) {
+  const double sigma = kSeenSigma / std::max(patches, 1);
+  if (!turned_known_) {
+    turned_ = pose.rotation;
+    turned_variance_ = sigma * sigma;
+    turned_known_ = true;
+  }
+  const double gain = turned_variance_ / (turned_variance_ + sigma * sigma);
+  const glm::dvec3 rest = rotation_vector(pose.rotation * glm::transpose(turned_));
+  turned_ = turned_from_ = orthonormal(rotation_matrix(gain * rest) * turned_);
+  turned_variance_ *= 1 - gain;
+}
+
 void Surroundings::learn(const FrameView& frame, const Pose& pose,
-                         const std::array<glm::dvec2, 4>& corners) {
+                         const std::array<glm::dvec2, 4>& corners, int patches,
+                         const glm::dvec3* turn) {
   if (static_cast<std::size_t>(level_) >= frame.pyramid.size()) return;
   position_variance_ = rotation_variance_ = 0;
   unknown_ = 0;
+  doubt_ = 1;
+  add_turn(turn);
+  level_turns(pose, patches);
   measure(frame, pose);
   add_points(frame, pose, &corners);
   remember(frame, pose);
+}
+
+bool Surroundings::enough_of_pattern() const {
+  const glm::dvec2 middle = 0.5 * glm::dvec2(camera_.width >> level_, camera_.height >> level_);
+  int left = 0;
+  int right = 0;
+  int upper = 0;
+  int lower = 0;
+  for (const MapPoint& point : points_) {
+    if (!point.in_view || point.misses > 0 || !point.of_pattern || !point.steady()) continue;
+    ++(point.place.x < middle.x ? left : right);
+    ++(point.place.y < middle.y ? upper : lower);
+  }
+  return std::min({left, right, upper, lower}) >= kEnoughSteady;
 }
 
 bool Surroundings::ready() const {
@@ -677,10 +748,12 @@ double Surroundings::agreement(const FrameView& frame, const Pose& pose) const {
 
 bool Surroundings::follow(const FrameView& frame, const glm::dvec3* turn, ExtendedPose& out) {
   if (known_ == 0 || static_cast<std::size_t>(level_) >= frame.pyramid.size()) return false;
+  add_turn(turn);
   Pose pose = predict(turn);
   const Pose predicted = pose;
   align_coarse(frame, turn, pose);
-  if (!align_fine(frame, turn, pose, out)) {
+  out.expected = {predicted, pose};
+  if (!align_fine(frame, pose, out)) {
     remember(frame, predicted);
     if (++unknown_ > kBridged) clear();
     return false;

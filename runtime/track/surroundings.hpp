@@ -19,6 +19,8 @@ struct ExtendedPose {
   Pose pose;
   double position_sigma = 0;  ///< of the translation, pattern units
   double rotation_sigma = 0;  ///< radians
+  /// What the last motion, and what changed in the coarse picture, made of the frame before.
+  std::array<Pose, 2> expected;
 };
 
 /// A patch of the frame that it was first seen in, and its inverse depth there.
@@ -53,6 +55,14 @@ struct MapPointEquations {
   std::array<double, 12> by_pose{};  ///< two rows of six
   glm::dvec2 by_depth{};
   const MapPoint* point = nullptr;
+  double weight = 1;
+};
+
+/// What a gyroscope says of a frame's rotation, and how much that weighs in the pose's equations;
+/// 0: nothing.
+struct ExpectedRotation {
+  glm::dmat3 rotation{1.0};
+  double weight = 0;
 };
 
 /// A map of at most kMaxPoints points in the coordinates of one pattern. Allocates nothing after
@@ -71,8 +81,10 @@ class Surroundings {
   /// Forgets everything.
   void clear();
   /// The frame shows the pattern at that pose, with its corners there: measures the points against
-  /// it, drops those that do not keep their place, adds new ones beside the pattern.
-  void learn(const FrameView& frame, const Pose& pose, const std::array<glm::dvec2, 4>& corners);
+  /// it, drops those that do not keep their place, adds new ones beside the pattern. patches: of
+  /// the pattern, that are in their place. turn: as of follow().
+  void learn(const FrameView& frame, const Pose& pose, const std::array<glm::dvec2, 4>& corners,
+             int patches, const glm::dvec3* turn);
   /// Whether a pose can be followed: of the steady points in view most were seen, and enough. What
   /// moves with the camera, or stays while the pattern is moved, has no depth by motion, so it is
   /// not steady.
@@ -97,8 +109,12 @@ class Surroundings {
   [[nodiscard]] double expected_inverse_depth(const Pose& pose, glm::dvec2 place) const;
   [[nodiscard]] MapPoint* free_slot();
   [[nodiscard]] Pose predict(const glm::dvec3* turn) const;
+  [[nodiscard]] bool enough_of_pattern() const;
   void align_coarse(const FrameView& frame, const glm::dvec3* turn, Pose& pose);
-  bool align_fine(const FrameView& frame, const glm::dvec3* turn, Pose& pose, ExtendedPose& out);
+  void add_turn(const glm::dvec3* turn);
+  void level_turns(const Pose& pose, int patches);
+  [[nodiscard]] ExpectedRotation expected_rotation() const;
+  bool align_fine(const FrameView& frame, Pose& pose, ExtendedPose& out);
   void remember(const FrameView& frame, const Pose& pose);
 
   Camera camera_;
@@ -117,6 +133,11 @@ class Surroundings {
   int next_cell_ = 0;
   double position_variance_ = 0;  ///< of now_
   double rotation_variance_ = 0;
+  double doubt_ = 1;             ///< by how much less is known of a rotation than equations say
+  glm::dmat3 turned_from_{1.0};  ///< where the pattern was seen last
+  glm::dmat3 turned_{1.0};       ///< that, turned as the gyroscope said since
+  double turned_variance_ = 0;
+  bool turned_known_ = false;  ///< a turn is known of every frame since
 };
 
 }  // namespace modar::tracker

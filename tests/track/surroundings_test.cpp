@@ -184,6 +184,48 @@ TEST_F(SurroundingsTest, FollowsWhileThePatternIsCovered) {
   EXPECT_EQ(step(frame), nullptr) << "forgotten by a reset";
 }
 
+// What covers the pattern for a while has points of its own, and goes away with them.
+TEST_F(SurroundingsTest, DoesNotGoWithWhatCoveredThePattern) {
+  learn(40);
+  Poster hand = pattern_at({0, 0, 0.3});
+  hand.picture = textured_picture(300, 220, 9);
+  hand.half_width = 1.1;
+  hand.half_height = 0.8;
+  for (int i = 0; i < 45; ++i) {
+    const View view = eye_at(time_ += 1.0 / 30, 0);
+    const int gone = std::max(0, i - 37);
+    hand.middle[0] = 0.02 * gone * gone;
+    std::vector<Poster> posters = with_pattern();
+    posters.push_back(hand);
+    const Detection* seen = step(frame_at(view, posters));
+    ASSERT_NE(seen, nullptr) << i;
+    EXPECT_LT(rotation_error(*seen, view), 1.2) << i;
+    EXPECT_LT(position_error(*seen, view), 0.01) << i;
+  }
+}
+
+// A jerk moves the frame further than patches are looked for; a gyroscope tells it.
+TEST_F(SurroundingsTest, FollowsAJerkByAGyroscope) {
+  for (const bool gyroscope : {false, true}) {
+    loop_->reset();
+    time_ = 0;
+    learn(30);
+    double before = 0;
+    int followed = 0;
+    for (const double yaw : {0.0, 0.0, 11.0, 11.0, 11.0}) {
+      const View view = eye_at(time_ += 1.0 / 30, yaw);
+      cv::Mat frame = frame_at(view, with_pattern());
+      cover(frame, view);
+      // The camera turns to the right: about its axis that points down.
+      if (gyroscope) loop_->set_turn({0, (yaw - before) * CV_PI / 180, 0});
+      before = yaw;
+      const Detection* seen = step(frame);
+      followed += seen != nullptr && rotation_error(*seen, view) < 1.0 ? 1 : 0;
+    }
+    EXPECT_EQ(followed, gyroscope ? 5 : 2);
+  }
+}
+
 // A still camera sees the pattern carried about: its surroundings say nothing of it.
 TEST_F(SurroundingsTest, SaysNothingOfAPatternThatIsCarried) {
   const View view = eye_at(0, 0);
