@@ -142,12 +142,15 @@ void judge(const Detection& seen, const Pose& truth, Sums& sums) {
   sums.honest += position <= 2 * seen.position_sigma && rotation <= 2 * seen.rotation_sigma ? 1 : 0;
 }
 
-/// Greatest difference of the ways of the corners, seen and true, between two frames.
+/// Greatest difference of the ways of the corners, seen and true, between two frames, of those that
+/// the frame shows.
 double jump_of(const std::array<glm::dvec2, 4>& seen, const std::array<glm::dvec2, 4>& seen_before,
                const std::array<glm::dvec2, 4>& truth,
-               const std::array<glm::dvec2, 4>& truth_before) {
+               const std::array<glm::dvec2, 4>& truth_before, const Camera& camera) {
   double most = 0;
   for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 p = truth[i];
+    if (p.x < 0 || p.y < 0 || p.x > camera.width || p.y > camera.height) continue;
     most = std::max(most, glm::length((seen[i] - seen_before[i]) - (truth[i] - truth_before[i])));
   }
   return most;
@@ -192,8 +195,8 @@ Result<void> run(const Sequence& sequence, std::span<const std::byte> bundle, bo
       }
     }
     if (seen != nullptr && seen_before.has_value() && time > kSeen + kUnseen - 1.0) {
-      sums.row.jump_px =
-          std::max(sums.row.jump_px, jump_of(seen->corners, *seen_before, corners, truth_before));
+      sums.row.jump_px = std::max(sums.row.jump_px, jump_of(seen->corners, *seen_before, corners,
+                                                            truth_before, sequence.camera));
     }
     if (seen != nullptr) {
       seen_before = seen->corners;

@@ -68,6 +68,7 @@ struct PoseLoop::State {
   bool discard_found = false;  ///< what the running search finds is of before a reset
   std::unique_ptr<tracker::Surroundings> surroundings;  ///< of the pattern `home`
   std::size_t home = 0;
+  double usual_patches = 0;  ///< of it, that fitted in the last second
   int frames_unseen = 0;
   bool follows = false;  ///< the last frame's pose of it was of the surroundings
   Return back;
@@ -430,7 +431,10 @@ void PoseLoop::State::extend(TrackResult& result) {
   Detection followed;
   follows = (shown == nullptr || doubtful || was) && !track.homography_only && follow(followed);
   const bool seen = shown != nullptr && !doubtful;
+  constexpr double kForgotten = 0.98;  // of the usual patches, a frame: half in a second
+  usual_patches *= kForgotten;
   if (seen && (!follows || seen_twice(*shown, followed))) {
+    usual_patches = std::max(usual_patches, 1.0 * shown->inliers);
     if (follows) {
       surroundings->correct(followed.pose, shown->pose);
       start_return(followed.pose, shown->pose);
@@ -480,20 +484,25 @@ Detection* PoseLoop::State::choose_home(TrackResult& result) {
     if (patterns[i].index == largest->pattern) home = i;
   }
   surroundings->clear();
+  usual_patches = 0;
   return largest;
 }
 
 /// Whether so little of the home pattern fits, or is in view, that its surroundings know better.
 bool PoseLoop::State::doubts(const Detection& seen) const {
-  // Shares of the patches in view that fit: what covers a pattern, or the little that the frame's
-  // edge leaves of it, gives poses that are off by degrees. Between the two, most of the
-  // surroundings have to contradict. Set by hand on `modar bench extended`.
+  // Shares of the patches in view that fit, and of those that fitted a moment ago: what covers a
+  // pattern, or the little that the frame's edge leaves of it, gives poses that are off by degrees,
+  // where steady surroundings are off by tenths. Of few patches, which a small pattern has as well,
+  // most of the surroundings have to contradict. Set by hand on `modar bench extended`.
   constexpr double kFew = 0.5;
   constexpr double kFewer = 0.8;
+  constexpr double kOfUsual = 0.5;
   constexpr int kFewPatches = 80;
   constexpr double kContradicted = 0.6;
   const double share = 1.0 * seen.inliers / std::max(seen.matches, 1);
   if (share < kFew) return true;
+  if ((share < kFewer || seen.inliers < kOfUsual * usual_patches) && surroundings->ready())
+    return true;
   if (share >= kFewer && seen.inliers >= kFewPatches) return false;
   return surroundings->agreement(frame_tracker.frame(), seen.pose) < kContradicted;
 }
@@ -520,8 +529,11 @@ bool PoseLoop::State::follow(Detection& detection) {
 void PoseLoop::State::smooth_correction(const tracker::ExtendedPose& extended,
                                         const std::array<glm::dvec2, 4>& corners) {
   constexpr double kCorrected = 4.0;  // pixels; the camera's motion is expected to less. By hand
-  const tracker::PlaneMap map = tracker::map_of_pose(patterns[home], camera, extended.pose);
-  if (!tracker::in_view(patterns[home], map, camera)) return;
+  const auto in_frame = [&](glm::dvec2 p) {
+    return p.x >= 0 && p.y >= 0 && p.x < camera.width && p.y < camera.height;
+  };
+  if (std::none_of(corners.begin(), corners.end(), in_frame))
+    return;  // far out, pixels mean little
   const Pose* nearest = nullptr;
   double least = 0;
   for (const Pose& expected : extended.expected) {
