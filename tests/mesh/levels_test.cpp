@@ -16,7 +16,6 @@
 #include "bake/mesh/lod/chunk_decimate.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/lod/surface_distance.hpp"
-#include "tests/compiler_half.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/stages.hpp"
 
@@ -84,7 +83,7 @@ std::vector<std::array<Point, 3>> triangles_of(const PackedMesh& mesh, const Lev
     EXPECT_LT(index, level.vertex_count);
     const std::byte* at = mesh.vertices.data() + level.vertex_offset + index * mesh.layout.stride;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      testing::CompilerHalf value;
+      _Float16 value;
       std::memcpy(&value, at + 2 * axis, 2);
       triangles[i / 3][i % 3][axis] = static_cast<float>(value);
     }

@@ -12,7 +12,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "tests/compiler_half.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/stages.hpp"
 
@@ -27,7 +26,7 @@ using testing::welded;
 
 /// Reads a half the way the compiler's own type does.
 float half_at(const std::byte* at) {
-  testing::CompilerHalf value;
+  _Float16 value;
   std::memcpy(&value, at, 2);
   return static_cast<float>(value);
 }
@@ -79,9 +78,9 @@ TEST(Pack, LayoutsTakeWhatTheModelHas) {
 
 /// The half nearest to a position, by the compiler.
 glm::vec3 nearest_halves(const glm::dvec3& p) {
-  return {static_cast<float>(static_cast<testing::CompilerHalf>(static_cast<float>(p.x))),
-          static_cast<float>(static_cast<testing::CompilerHalf>(static_cast<float>(p.y))),
-          static_cast<float>(static_cast<testing::CompilerHalf>(static_cast<float>(p.z)))};
+  return {static_cast<float>(static_cast<_Float16>(static_cast<float>(p.x))),
+          static_cast<float>(static_cast<_Float16>(static_cast<float>(p.y))),
+          static_cast<float>(static_cast<_Float16>(static_cast<float>(p.z)))};
 }
 
 /// Measures what the record states, with the compiler's halves and the mesh's own doubles. Packing

@@ -12,7 +12,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "tests/compiler_half.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/stages.hpp"
 
@@ -45,7 +44,7 @@ glm::dvec3 decoded(const PackedMesh& mesh, const ChunkRecord& chunk, std::size_t
       std::memcpy(&value, at + 4 * i, 4);
       a = static_cast<double>(value);
     } else if (mesh.layout.attributes[0].type == static_cast<std::uint8_t>(ComponentType::kHalf)) {
-      testing::CompilerHalf value;
+      _Float16 value;
       std::memcpy(&value, at + 2 * i, 2);
       a = static_cast<double>(value);
     } else {

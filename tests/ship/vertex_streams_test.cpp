@@ -8,7 +8,6 @@
 #include <random>
 
 #include "formats/quantise.hpp"
-#include "tests/compiler_half.hpp"
 
 namespace modar {
 namespace {
@@ -17,7 +16,7 @@ TEST(VertexStreams, EveryHalfComesBack) {
   int valid = 0;
   for (std::uint32_t bits = 0; bits < 65536; ++bits) {
     const auto half = static_cast<std::uint16_t>(bits);
-    testing::CompilerHalf value;
+    _Float16 value;
     std::memcpy(&value, &half, 2);
     const auto x = static_cast<double>(value);
     const auto parts = split_half(half);
