@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <numeric>
 #include <queue>
 #include <string_view>
 
@@ -167,11 +168,18 @@ class Grid {
   Grid(const GrayImage& pattern, const std::vector<Candidate>& candidates)
       : columns_(pattern.width / kSquare + 1),
         rows_(pattern.height / kSquare + 1),
-        cells_(static_cast<std::size_t>(2 * columns_ * rows_)) {
+        starts_(static_cast<std::size_t>(2 * columns_ * rows_) + 1),
+        entries_(candidates.size()) {
+    const auto cell = [this](const Candidate& candidate) {
+      return index(square(candidate.x), square(candidate.y), candidate.dark);
+    };
+    for (const Candidate& candidate : candidates) ++starts_[cell(candidate) + 1];
+    std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+    std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
     for (std::uint32_t i = 0; i < candidates.size(); ++i) {
       const Candidate& candidate = candidates[i];
-      cells_[index(square(candidate.x), square(candidate.y), candidate.dark)].push_back(
-          {static_cast<float>(candidate.x), static_cast<float>(candidate.y), i});
+      entries_[next[cell(candidate)]++] = {static_cast<float>(candidate.x),
+                                           static_cast<float>(candidate.y), i};
       codes_.push_back(candidate.code);
     }
   }
@@ -184,13 +192,15 @@ class Grid {
     which.clear();
     for (int row = std::max(0, square(y - radius)); row <= std::min(rows_ - 1, square(y + radius));
          ++row) {
-      for (int column = std::max(0, square(x - radius));
-           column <= std::min(columns_ - 1, square(x + radius)); ++column) {
-        for (const Entry& entry : cells_[index(column, row, feature.dark)]) {
-          const float dx = entry.x - at_x;
-          const float dy = entry.y - at_y;
-          if (dx * dx + dy * dy <= reach) which.push_back(entry.candidate);
-        }
+      const int first = std::max(0, square(x - radius));
+      const int last = std::min(columns_ - 1, square(x + radius));
+      if (first > last) continue;
+      const std::uint32_t end = starts_[index(last, row, feature.dark) + 1];
+      for (std::uint32_t i = starts_[index(first, row, feature.dark)]; i < end; ++i) {
+        const Entry& entry = entries_[i];
+        const float dx = entry.x - at_x;
+        const float dy = entry.y - at_y;
+        if (dx * dx + dy * dy <= reach) which.push_back(entry.candidate);
       }
     }
     bits.resize(which.size());
@@ -211,7 +221,8 @@ class Grid {
   }
   int columns_;
   int rows_;
-  std::vector<std::vector<Entry>> cells_;
+  std::vector<std::uint32_t> starts_;  ///< of each square, then their number
+  std::vector<Entry> entries_;         ///< a row's squares one after the other
   std::vector<TrackerCode> codes_;
 };
 

@@ -522,7 +522,10 @@ PatchFit linearise(const TrackedPattern& pattern, const FrameView& frame, const 
     if (!observe_patch(view, map, patch, tukey, seen)) continue;
     ++fit.visible;
     const PatchNormalEquations& one = seen.equations;
-    if (one.correlation >= kInlierCorrelation) ++fit.inliers;
+    if (one.correlation >= kInlierCorrelation) {
+      ++fit.inliers;
+      fit.inlier_correlation += static_cast<double>(one.correlation);
+    }
     fit.correlation += static_cast<double>(std::max(0.0f, one.correlation));
     if (one.xx == 0.0f && one.yy == 0.0f) continue;
     const PoseJacobian rows =
@@ -537,6 +540,7 @@ PatchFit linearise(const TrackedPattern& pattern, const FrameView& frame, const 
     }
   }
   if (fit.visible > 0) fit.correlation /= fit.visible;
+  if (fit.inliers > 0) fit.inlier_correlation /= fit.inliers;
   return fit;
 }
 
@@ -625,9 +629,10 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
     }
     apply_motion_blur(pattern, frame, pose, view);
   }
+  const float tukey = precise && fit.covered() ? kTukeyCovered : kTukey;
   for (int step = 0; step < (precise ? kPreciseSteps : 1) && moved >= 0.0; ++step) {
     // The fit is that of the pose before the step, which lies near enough to be judged by it.
-    moved = step_pose(pattern, frame, view, kTukey, precise, pose, fit);
+    moved = step_pose(pattern, frame, view, tukey, precise, pose, fit);
     if (moved < (precise ? kPreciselyConverged : kConverged)) break;
   }
   return fit;

@@ -90,6 +90,17 @@ FeatureMatch match_of(const TrackerFeatureRecord& record, const TrackerFeature& 
   return match;
 }
 
+namespace {
+
+/// Whether two maps differ by less than 0.6 of the first one's norm.
+bool alike(const glm::dmat2& a, const glm::dmat2& b) {
+  const glm::dmat2 gap = b - a;
+  const double size = glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]);
+  return glm::dot(gap[0], gap[0]) + glm::dot(gap[1], gap[1]) < 0.36 * size;
+}
+
+}  // namespace
+
 bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other) {
   const glm::dmat2& a = hypothesis.affine;
   const glm::dvec2 away = a * (other.pattern - hypothesis.pattern);
@@ -104,9 +115,7 @@ bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other) {
   if (!(missed < 2.0 * near * near + 0.125 * way)) return false;
   const double limit = near + 0.25 * std::sqrt(way);
   if (!(missed < limit * limit)) return false;
-  const glm::dmat2 gap = other.affine - a;
-  const double size = glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]);
-  return glm::dot(gap[0], gap[0]) + glm::dot(gap[1], gap[1]) < 0.36 * size;
+  return alike(a, other.affine);
 }
 
 PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t max_features,
@@ -386,6 +395,19 @@ std::span<const HomographyHypothesis> PlaneMatcher::hypotheses() {
     }
   }
   return std::span(hypotheses_).first(count);
+}
+
+int PlaneMatcher::beside(const HomographyHypothesis& one, double near, double far) const {
+  const PlaneMap map{one.homography};
+  int count = 0;
+  for (std::size_t i = 0; i < one.mask.size(); ++i) {
+    const FeatureMatch& match = matches_[i];
+    bool in_front = false;
+    const double miss = glm::length(map.at(match.pattern, in_front) - match.ideal);
+    if (one.mask[i] != 0 || !in_front || !(miss >= near && miss < far)) continue;
+    count += alike(map.derivative(match.pattern), match.affine) ? 1 : 0;
+  }
+  return count;
 }
 
 void PlaneMatcher::select(const TrackedPattern& pattern, const HomographyHypothesis& hypothesis) {

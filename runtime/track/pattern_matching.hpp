@@ -68,6 +68,9 @@ class PlaneMatcher {
   /// over all that is turned to the camera, and makes the matches found there the hypothesis'
   /// inliers. Returns how many poses explain them, the better one first.
   int spread(const TrackedPattern& pattern, std::size_t hypothesis, std::array<Pose, 2>& poses);
+  /// Matches that a hypothesis of the last find() misses by `near` to `far` frame pixels, but whose
+  /// scale and direction it has right.
+  [[nodiscard]] int beside(const HomographyHypothesis& one, double near, double far) const;
   /// Makes inliers() those of a hypothesis of the last find().
   void select(const TrackedPattern& pattern, const HomographyHypothesis& hypothesis);
   [[nodiscard]] PlanePoints inliers() const {

@@ -91,6 +91,9 @@ class PatternSearch {
                                              SearchRadius radius, const Pose& start) const;
   [[nodiscard]] PoseCandidate refine_start(const TrackedPattern& pattern, const FrameView& frame,
                                            Pose start) const;
+  /// Whether the features of the hypothesis speak for it by themselves.
+  [[nodiscard]] bool vouched() const;
+  [[nodiscard]] bool bent(const TrackedPattern& pattern) const;
   bool convinces(const TrackedPattern& pattern, const FrameView& frame,
                  const PoseCandidate& one) const;
   void consider(const TrackedPattern& pattern, const FrameView& frame, const PoseCandidate& one);
@@ -123,7 +126,8 @@ class PatternSearch {
   bool all_features_ = false;     ///< else every second
   std::span<const HomographyHypothesis> hypotheses_;
   std::size_t hypothesis_ = 0;
-  std::array<Pose, 2> starts_;  ///< of the hypothesis
+  std::size_t best_hypothesis_ = 0;  ///< whose pose is best_
+  std::array<Pose, 2> starts_;       ///< of the hypothesis
   std::size_t start_ = 0;
   std::size_t start_count_ = 0;
   double least_rms_ = 0;  ///< of starts_[0]

@@ -28,6 +28,15 @@ using tracker::TrackedPattern;
 // judged. Within less the next frame does both, and this one does not show it.
 constexpr int kJudgingBudget = 20;
 
+// Pixels by which a prediction missed from which a pose may have slipped, unless so many patches
+// and so much of them fit; and frames for which what was seen before a loss tells of a find. By
+// hand: they trade the time of a look at all cells, and finds in a picture that has become less
+// sharp, for poses that are wrong.
+constexpr double kSlippingSurprise = 2.5;
+constexpr int kSurePatches = 30;
+constexpr int kSurePercent = 95;
+constexpr int kRemembered = 10;
+
 // Frames of a pattern that is not seen between looks where it should be: trades the time of a look,
 // as much as following takes, for how soon it is measured again.
 constexpr int kLookEvery = 4;
@@ -88,6 +97,7 @@ struct PoseLoop::State {
   }
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
                    Detection& detection) const;
+  [[nodiscard]] bool slipped(std::size_t i, const Track& track) const;
   bool resolve_overlap(std::size_t i, const Detection& detection, TrackResult& result);
   bool show(std::size_t i, const PrintJudge::Verdict& verdict, Detection& detection,
             TrackResult& result);
@@ -265,6 +275,12 @@ void PoseLoop::State::track_all(TrackResult& result) {
       continue;
     }
     track.tracked = options.track && frame_tracker.update(patterns[i], track, detection);
+    const bool sure = detection.inliers >= kSurePatches &&
+                      detection.inliers * 100 >= detection.matches * kSurePercent;
+    if (track.tracked && !sure && track.surprise >= kSlippingSurprise && slipped(i, track)) {
+      track.tracked = track.has_motion = false;
+      track.last_reason = Reason::kLostByBlur;
+    }
     if (track.tracked && track.doubts > 0) {
       track.shown_reason = Reason::kLostByBlur;
     } else if (track.tracked) {
@@ -278,6 +294,11 @@ void PoseLoop::State::track_all(TrackResult& result) {
       track.frames_since_lost = options.track ? 0 : tracker::kRecentFrames;
     }
   }
+}
+
+bool PoseLoop::State::slipped(std::size_t i, const Track& track) const {
+  return track.judged && !track.homography_only &&
+         print_judge->slipped(i, frame_tracker.frame(), track);
 }
 
 /// Adds what is tracked to the result, by the name that the judge gives it, unless it is not to be
@@ -330,6 +351,7 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
   next.pose = candidate.pose;
   next.homography_only = candidate.homography_only;
   next.map = candidate.map;
+  next.vouched = candidate.inliers >= tracker::kVouching;
   detection.matches = candidate.matches;
   detection.inliers = candidate.inliers;
   if (async != nullptr || sliced != nullptr) {
@@ -339,9 +361,9 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
         next.homography_only
             ? tracker::refine_map(pattern, frame_tracker.frame(), next.map, fit)
             : tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kFar,
-                              next.pose, fit, judges_finds()) &&
+                              next.pose, fit, judges_finds(), next.vouched) &&
                   tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) >=
-                      tracker::kMinPercent;
+                      (next.vouched ? tracker::kVouchedPercent : tracker::kMinPercent);
     if (!here) return false;
   }
   if (!frame_tracker.locate(pattern, next, detection)) return false;
@@ -396,8 +418,13 @@ void PoseLoop::State::accept(TrackResult& result) {
     const DetectionCandidate& candidate = candidates.patterns[i];
     const Track before = track;
     Detection detection;
-    const bool here = candidate.reason == Reason::kVisible &&
-                      start_track(patterns[i], track, candidate, detection);
+    bool here = candidate.reason == Reason::kVisible &&
+                start_track(patterns[i], track, candidate, detection);
+    if (here && before.judged && before.frames_since_lost < kRemembered &&
+        print_judge->slipped(i, frame_tracker.frame(), track)) {
+      here = false;
+      track = before;
+    }
     Reason reason =
         candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
     if (here) {

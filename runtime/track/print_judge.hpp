@@ -40,6 +40,10 @@ class PrintJudge {
   /// A pattern that a search found in this frame. again: it was lost a moment ago, and what was
   /// seen then counts.
   Verdict meet(std::size_t pattern, const FrameView& frame, const Track& track, bool again);
+  /// Whether a pose has slipped from the pattern that frames before saw there: many cells that
+  /// agree do so less than they did. What covers a pattern takes cells away, and leaves the others
+  /// alone.
+  [[nodiscard]] bool slipped(std::size_t pattern, const FrameView& frame, const Track& track) const;
   /// A pattern tracked to this frame.
   Verdict follow(std::size_t pattern, const FrameView& frame, const Track& track);
 

@@ -6,6 +6,7 @@
 
 #include "bake/lab/field_scene.hpp"
 #include "modar/pose_loop.hpp"
+#include "runtime/track/print_judge.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 
 namespace modar {
@@ -71,6 +72,19 @@ TEST(Prints, AnotherEditionIsTakenBackWithinTwoSeconds) {
   EXPECT_GT(shown, 0) << "one frame does not tell it from a covered print";
 }
 
+TEST(Prints, AnEditionOfWhichASeventhDiffersIsTakenBackForGood) {
+  // Nine of 64 cells, each of other texture.
+  cv::Mat edition = picture().clone();
+  textured_picture(300, 240, 903)(cv::Rect(0, 0, 112, 90))
+      .copyTo(edition(cv::Rect(113, 90, 112, 90)));
+  const auto loop = loop_on(alone());
+  Sequence frames(gray(edition));
+  TrackResult seen;
+  for (int i = 0; i < kTwoSeconds; ++i) ASSERT_TRUE(loop->step(frames.at(i).picture.view(), seen));
+  EXPECT_EQ(seen.reason, Reason::kOtherPrint);
+  EXPECT_TRUE(seen.visible.empty());
+}
+
 TEST(Prints, ACoveredOneStaysAndIsSeenAsCovered) {
   const auto loop = loop_on(alone());
   Sequence frames(gray(picture()), 0.5);
@@ -95,6 +109,31 @@ TEST(Prints, WhereMostIsCoveredTheRestIsFoundAndFlat) {
     right += !seen.visible.empty() && worst_corner(seen.visible[0], scene) < 10.0 ? 1 : 0;
   }
   EXPECT_GE(right, 7);
+}
+
+TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
+  const auto pattern = tracker::view_tracked_pattern(record(), 0);
+  ASSERT_TRUE(pattern) << to_line(pattern.error());
+  const Camera camera = default_camera(kWidth, kHeight);
+  const auto extractor = FeatureExtractor::create(kWidth, kHeight, {});
+  tracker::PatchCache patches;
+  tracker::PrintJudge judge(std::span(&*pattern, 1));
+  const auto see = [&](const SceneFrame& scene) {
+    extractor->set_frame(scene.picture.view());
+    return tracker::FrameView{camera, extractor->pyramid(), tracker::kernels(), patches};
+  };
+  tracker::Track track;
+  track.pose = pose_of(look_at(2.8, 10, 20, 10));
+  const SceneFrame plain = frame_of(look_at(2.8, 10, 20, 10), clutter(kWidth, kHeight, 77));
+  judge.meet(0, see(plain), track, false);
+  EXPECT_FALSE(judge.slipped(0, see(plain), track));
+  SceneFrame covered = plain;
+  for (int y = 0; y < kHeight; ++y) {
+    std::fill_n(covered.picture.pixels.begin() + y * kWidth, kWidth / 2, std::uint8_t{90});
+  }
+  EXPECT_FALSE(judge.slipped(0, see(covered), track));
+  track.pose.translation.x += 0.04;  // of half the longer side: 9 pixels
+  EXPECT_TRUE(judge.slipped(0, see(plain), track));
 }
 
 TEST(Prints, APoseThatItsPatchesContradictIsNotShown) {
