@@ -324,6 +324,7 @@ PatternSearch::PoseCandidate PatternSearch::evaluate_start(const TrackedPattern&
   out.finest = fit.level == best.frame_level;
   out.unoccluded = out.finest && fit.inlier_ratio() >= kUnoccluded;
   out.complete = out.finest && fit.inlier_ratio() >= kComplete;
+  out.vouched = !fit.good();
   // Of two places that show as many cells, the finest level's patches tell the better one.
   out.score = static_cast<int>(out.finest ? 0.5 * out.percent +
                                                 100.0 * (fit.inlier_ratio() + fit.correlation)
@@ -384,6 +385,7 @@ void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& fra
   DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   candidate.reason = Reason::kVisible;
   candidate.pose = one.pose;
+  candidate.vouched = one.vouched;
   candidate.inliers = hypotheses_[hypothesis_].inliers;
 }
 
@@ -422,7 +424,7 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
   std::array<glm::dvec2, 4> corners;
   const auto pose = nearest_pose(pattern, camera_, map);
   if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) return;
-  candidate = {Reason::kVisible, *pose, true, map, candidate.matches, hypothesis.inliers};
+  candidate = {Reason::kVisible, *pose, true, map, false, candidate.matches, hypothesis.inliers};
 }
 
 // ---- Of a copy of the frame, in slices or on a thread of its own ----

@@ -30,6 +30,7 @@ struct DetectionCandidate {
   Pose pose;                     ///< if kVisible
   bool homography_only = false;  ///< no pose explains the frame, but `map` does; `pose` is nearest
   PlaneMap map;                  ///< if homography_only
+  bool vouched = false;          ///< patches alone would not do: see PatchFit::good()
   int matches = 0;
   int inliers = 0;
 };
@@ -86,6 +87,7 @@ class PatternSearch {
     bool finest = false;      ///< on the finest level,
     bool unoccluded = false;  ///< most of them,
     bool complete = false;    ///< nearly all
+    bool vouched = false;     ///< see DetectionCandidate
   };
   [[nodiscard]] PoseCandidate evaluate_start(const TrackedPattern& pattern, const FrameView& frame,
                                              SearchRadius radius, const Pose& start) const;

@@ -351,7 +351,7 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
   next.pose = candidate.pose;
   next.homography_only = candidate.homography_only;
   next.map = candidate.map;
-  next.vouched = candidate.inliers >= tracker::kVouching;
+  next.vouched = candidate.vouched;
   detection.matches = candidate.matches;
   detection.inliers = candidate.inliers;
   if (async != nullptr || sliced != nullptr) {
