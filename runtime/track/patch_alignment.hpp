@@ -115,7 +115,7 @@ Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_
 
 /// Features that by themselves speak for a place, so that less of the pattern need show there:
 /// chance brought at most 10 in 1,500 cluttered frames.
-inline constexpr int kVouching = 12;
+inline constexpr int kVouching = 16;
 
 /// How a pattern's patches fit the frame.
 struct PatchFit {

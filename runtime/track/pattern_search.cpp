@@ -358,6 +358,7 @@ bool PatternSearch::vouched() const {
 
 bool PatternSearch::convinces(const TrackedPattern& pattern, const FrameView& frame,
                               const PoseCandidate& one) const {
+  if (one.finest && one.vouched) return one.percent >= kFewPatchesPercent;
   if (one.finest) return one.percent >= (vouched() ? kVouchedPercent : kMinPercent);
   return one.percent >= (vouched() ? kMinPercent : kVaguePercent) &&
          reprojection_rms(camera_, one.pose, matcher_.inliers()) <= kVagueRms &&

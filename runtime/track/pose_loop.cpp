@@ -363,7 +363,7 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
             : tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kFar,
                               next.pose, fit, judges_finds(), next.vouched) &&
                   tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) >=
-                      (next.vouched ? tracker::kVouchedPercent : tracker::kMinPercent);
+                      (next.vouched ? tracker::kFewPatchesPercent : tracker::kMinPercent);
     if (!here) return false;
   }
   if (!frame_tracker.locate(pattern, next, detection)) return false;

@@ -73,7 +73,7 @@ TEST(TrackerReason, FailedVerification) {
   GrayPicture part = scene.picture;
   const double left = scene.corners[0].x;
   const double right = scene.corners[1].x;
-  const auto cut = static_cast<int>(left + 0.11 * (right - left));
+  const auto cut = static_cast<int>(left + 0.12 * (right - left));
   for (int y = 0; y < kHeight; ++y) {
     for (int x = cut; x < kWidth; ++x) {
       part.pixels[static_cast<std::size_t>(y * kWidth + x)] =
