@@ -25,10 +25,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What is copied as it is; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 14> kPageFiles = {
-    "app.js",           "engine.js",       "engine-plain.js", "engine-plain.wasm", "engine-simd.js",
-    "engine-simd.wasm", "icon-180.png",    "icon-512.png",    "icon.svg",          "installed.js",
-    "modar-view.js",    "modar-worker.js", "modar.js",        "style.css"};
+constexpr std::array<std::string_view, 15> kPageFiles = {
+    "app.js",           "engine.js",     "engine-plain.js", "engine-plain.wasm", "engine-simd.js",
+    "engine-simd.wasm", "gyroscope.js",  "icon-180.png",    "icon-512.png",      "icon.svg",
+    "installed.js",     "modar-view.js", "modar-worker.js", "modar.js",          "style.css"};
 /// Beside them where the page updates itself.
 constexpr std::array<std::string_view, 3> kUpdateFiles = {"engine-update.js", "engine-update.wasm",
                                                           "update-worker.js"};

@@ -37,11 +37,11 @@ struct OurVision {
   /// Tells the loop how the camera turned since the last frame that it saw.
   void turn_to(std::uint64_t frame) {
     if (frame > last_frame && frame < options.turns.size()) {
-      glm::dmat3 turned(1.0);
-      for (std::uint64_t i = last_frame + 1; i <= frame; ++i) {
-        turned = rotation_matrix(-options.turns[i]) * turned;
+      glm::dvec3 turn = options.turns[last_frame + 1];
+      for (std::uint64_t i = last_frame + 2; i <= frame; ++i) {
+        turn = -rotation_vector(rotation_matrix(-options.turns[i]) * rotation_matrix(-turn));
       }
-      loop->set_turn(-rotation_vector(turned));
+      loop->set_turn(turn);
     }
     last_frame = frame;
   }

@@ -1,5 +1,5 @@
 // The page: a cover with a start button, then the camera with models, label and tools.
-import { load, ModarError } from './modar.js';
+import { allowMotion, load, ModarError } from './modar.js';
 import { POSE, POSE_FLOATS } from './engine.js';
 import { View } from './modar-view.js';
 import { forgetInstalled, installedBundles, installedFile } from './installed.js';
@@ -206,7 +206,7 @@ async function openStream() {
 /** Tracks in what the camera brings, with the tools that it has. */
 async function follow() {
   const [track] = stream.getVideoTracks();
-  await modar.start($('video'), rememberedFocal(track));
+  await modar.start($('video'), { ...rememberedFocal(track), extended: true });
   const devices = (await navigator.mediaDevices.enumerateDevices()).filter(({ kind }) => kind === 'videoinput');
   $('flip').hidden = devices.length < 2;
   $('torch').hidden = !track.getCapabilities?.().torch;
@@ -298,6 +298,7 @@ async function start() {
   try {
     const loaded = loadBundle();
     loaded.catch(() => {});  // told below, after the camera's own troubles
+    await allowMotion();  // first: iOS asks for it within the click only
     await openStream();
     await loaded;
     await follow();

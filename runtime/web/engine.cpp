@@ -25,8 +25,9 @@ struct WebPose {
   float translation[3];
   float corners[8];
   float view[16];
+  float extended;
 };
-static_assert(sizeof(WebPose) == 40 * sizeof(float));
+static_assert(sizeof(WebPose) == 41 * sizeof(float));
 
 struct Engine {
   modar_error error;
@@ -151,14 +152,16 @@ EMSCRIPTEN_KEEPALIVE double web_focal() {
 }
 
 /// A tracker for web_camera(), in place of the one before. find_focal: 1 to measure the focal
-/// length on the way. budget: millions of ARM instructions a frame, 0: no limit.
-EMSCRIPTEN_KEEPALIVE int web_track(int find_focal, int budget) {
+/// length on the way. budget: millions of ARM instructions a frame, 0: no limit. extended: 1 to go
+/// on from a pattern's surroundings.
+EMSCRIPTEN_KEEPALIVE int web_track(int find_focal, int budget, int extended) {
   modar_tracker_destroy(engine.tracker);
   modar_focal_finder_destroy(engine.finder);
   engine.finder = nullptr;
   modar_tracker_options options{};
   options.size = sizeof options;
   options.budget = budget;
+  options.extended = extended;
   engine.tracker =
       modar_tracker_create_with(engine.bundle, &engine.camera, &options, &engine.error);
   if (engine.tracker == nullptr) return engine.error.exit_code;
@@ -169,6 +172,12 @@ EMSCRIPTEN_KEEPALIVE int web_track(int find_focal, int budget) {
 }
 EMSCRIPTEN_KEEPALIVE void web_reset() {
   modar_tracker_reset(engine.tracker);
+}
+
+/// How the camera turned up to the next frame, radians, in its own axes.
+EMSCRIPTEN_KEEPALIVE void web_turn(double x, double y, double z) {
+  const double rotation[] = {x, y, z};
+  modar_tracker_turn(engine.tracker, rotation);
 }
 
 /// The poses of a frame's patterns, then in web_poses(). gray: of web_camera()'s size.
@@ -187,6 +196,7 @@ EMSCRIPTEN_KEEPALIVE int web_step(const uint8_t* gray, size_t stride, double tim
     std::memcpy(to.translation, pose.translation, sizeof to.translation);
     std::memcpy(to.corners, pose.corners, sizeof to.corners);
     modar_view(&pose, to.view);
+    to.extended = static_cast<float>(pose.extended);
   }
   return 0;
 }

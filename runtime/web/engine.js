@@ -6,9 +6,9 @@ const NEEDS_SIMD = Uint8Array.of(
   0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11);
 
 /** Numbers in a pose of Engine.poses(), and where its parts begin; see WebPose in engine.cpp. */
-export const POSE_FLOATS = 40;
+export const POSE_FLOATS = 41;
 export const POSE = {
-  visible: 0, shown: 1, inliers: 2, fit: 3, rotation: 4, translation: 13, corners: 16, view: 24,
+  visible: 0, shown: 1, inliers: 2, fit: 3, rotation: 4, translation: 13, corners: 16, view: 24, extended: 40,
 };
 
 /** What went wrong: `code` is stable, `cure` says what to do. */
@@ -93,12 +93,17 @@ export class Engine {
   }
 
   /** Starts tracking anew for the camera. */
-  track(findFocal, budget = 0) {
-    this.#check(this.#module._web_track(findFocal ? 1 : 0, budget));
+  track(findFocal, budget = 0, extended = false) {
+    this.#check(this.#module._web_track(findFocal ? 1 : 0, budget, extended ? 1 : 0));
   }
 
   reset() {
     this.#module._web_reset();
+  }
+
+  /** How the camera turned up to the next frame: three numbers, see modar.d.ts. */
+  turn([x, y, z]) {
+    this.#module._web_turn(x, y, z);
   }
 
   /** Room for a frame in the heap, the same until a larger one is asked for. */

@@ -13,7 +13,7 @@ function useSize(width, height) {
   // A phone that was turned has another camera: what was measured for its other size holds scaled by the long side.
   const scale = camera.side ? Math.max(width, height) / camera.side : 1;
   engine.setCamera(width, height, camera.focal * scale);
-  engine.track(camera.findFocal && camera.focal === 0, camera.budget);
+  engine.track(camera.findFocal && camera.focal === 0, camera.budget, camera.extended);
 }
 
 /** The frame's luma into the engine's buffer; its stride, or 0 where this frame cannot be read so. */
@@ -46,6 +46,7 @@ async function track(message) {
   }
   if (stride === 0) return { type: 'unreadable', id: message.id };
   const copied = performance.now();
+  if (message.turn) engine.turn(message.turn);
   const poses = engine.step(stride, message.time).slice();
   const stepped = performance.now();
   const answer = {
@@ -73,7 +74,7 @@ function lookForFocal(stride, answer) {
   camera = { ...camera, focal, side: Math.max(engine.width, engine.height) };
   answer.foundFocal = focal;
   engine.setCamera(engine.width, engine.height, focal);
-  engine.track(false, camera.budget);
+  engine.track(false, camera.budget, camera.extended);
 }
 
 const answers = {

@@ -40,6 +40,8 @@ export interface Sighting {
   camera: Camera;
   /** Measured in this frame; else kept from the last frame but one. */
   visible: boolean;
+  /** The pattern is hidden or out of the frame: the pose follows from what stands still around it, and inliers is 0. */
+  extended: boolean;
   inliers: number;
   /** Share of the features looked at that agree, 0 to 1. */
   fit: number;
@@ -59,7 +61,7 @@ export interface Frame {
   source: VideoFrame | HTMLCanvasElement;
   time: number;
   camera: Camera;
-  /** 40 numbers a pattern, for View.draw(). */
+  /** 41 numbers a pattern, for View.draw(). */
   poses: Float32Array;
   /** Why nothing is visible: "few matches", "lost by blur"...; "visible" where something is. */
   reason: string;
@@ -100,12 +102,21 @@ export class Modar extends EventTarget {
     focal?: number; focalSide?: number; findFocal?: boolean; keepLuma?: boolean;
     /** Millions of ARM instructions that a frame may take, 12 or more: searches go on over several frames. 0: no limit. */
     budget?: number;
+    /**
+     * Learns what stands still around the largest pattern, and goes on from it while the pattern is hidden or out of the
+     * frame; the camera has to move before. A phone's gyroscope helps, where the browser gives it and says when its frames
+     * were taken; see allowMotion().
+     */
+    extended?: boolean;
   }): Promise<void>;
   stop(): void;
   /** Ends the worker. */
   close(): void;
-  /** Tracks one gray frame, a byte a pixel, that comes from elsewhere. */
-  step(gray: Uint8Array, width: number, height: number, time: number): Promise<Frame>;
+  /**
+   * Tracks one gray frame, a byte a pixel, that comes from elsewhere. turn: for `extended`, how the camera turned since the
+   * last frame, as a gyroscope says: a rotation vector, radians, in camera space.
+   */
+  step(gray: Uint8Array, width: number, height: number, time: number, turn?: [number, number, number]): Promise<Frame>;
   addEventListener<K extends keyof ModarEvents>(type: K, listener: (event: ModarEvents[K]) => void): void;
 }
 
@@ -115,6 +126,12 @@ export function load(bundle: string | URL | ArrayBuffer, options?: {
   simd?: boolean;
   onProgress?: (got: number, total: number) => void;
 }): Promise<Modar>;
+
+/**
+ * Whether the page may read the gyroscope, for `extended`. Safari on iOS asks the visitor, in a click's handler only: call it
+ * there, before start(). A visitor who refuses loses nothing else.
+ */
+export function allowMotion(): Promise<boolean>;
 
 /** GL's projection for a viewport that shows the whole frame. */
 export function projectionOf(camera: Camera, near?: number, far?: number): Float32Array;

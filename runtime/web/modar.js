@@ -7,8 +7,9 @@
 //
 // Types and words: modar.d.ts. The drawing of a bundle's own models is in modar-view.js.
 import { ModarError, POSE, POSE_FLOATS } from './engine.js';
+import { allowMotion, Gyroscope } from './gyroscope.js';
 
-export { ModarError };
+export { allowMotion, ModarError };
 
 async function fetchBundle(address, onProgress) {
   const failed = (cause) => new ModarError({
@@ -113,7 +114,10 @@ function release(grabbed) {
   if (typeof VideoFrame === 'function' && grabbed?.source instanceof VideoFrame) grabbed.source.close();
 }
 
-/** Calls back for each new frame of the video; answers a function that ends it. */
+/**
+ * Calls back for each new frame of the video, with its time in seconds, and when it was taken in milliseconds, where the browser
+ * says so; answers a function that ends it.
+ */
 function onFrames(video, callback) {
   let handle = 0;
   const byFrame = 'requestVideoFrameCallback' in video;
@@ -122,7 +126,7 @@ function onFrames(video, callback) {
     // Without that callback, the screen's pace: a frame counts when the video's time has moved on.
     if (byFrame || video.currentTime !== seen) {
       seen = video.currentTime;
-      if (video.videoWidth > 0) callback((metadata?.captureTime ?? now) / 1000);
+      if (video.videoWidth > 0) callback((metadata?.captureTime ?? now) / 1000, metadata?.captureTime);
     }
     handle = byFrame ? video.requestVideoFrameCallback(next) : requestAnimationFrame(next);
   };
@@ -147,6 +151,9 @@ export class Modar extends EventTarget {
   #known = [];
   #grabber = null;
   #runs = 0;
+  #gyroscope = null;
+  /** When the last frame was taken that was tracked; undefined: unknown. */
+  #trackedAt;
 
   /** @see load */
   static async open(bundle, { simd = true, onProgress } = {}) {
@@ -169,19 +176,23 @@ export class Modar extends EventTarget {
   }
 
   /** Tracks in the video, which is to play, until stop(). focal: in pixels of its width; 0: unknown. */
-  async start(video, { focal = 0, focalSide = 0, findFocal = true, keepLuma = false, budget = 0 } = {}) {
+  async start(video, { focal = 0, focalSide = 0, findFocal = true, keepLuma = false, budget = 0, extended = false } = {}) {
     this.stop();
-    await this.#tracker.ask({ type: 'camera', focal, side: focalSide, findFocal, budget });
+    await this.#tracker.ask({ type: 'camera', focal, side: focalSide, findFocal, budget, extended });
     this.#known = this.patterns.map(() => false);
     this.#grabber = new FrameGrabber(video);
     this.keepLuma = keepLuma;
     const run = ++this.#runs;
-    this.#stopFrames = onFrames(video, (time) => this.#take(time, run));
+    if (extended) this.#gyroscope = Gyroscope.of(video);
+    this.#stopFrames = onFrames(video, (time, captured) => this.#take(time, captured, run));
   }
 
   stop() {
     this.#stopFrames?.();
     this.#stopFrames = null;
+    this.#gyroscope?.close();
+    this.#gyroscope = null;
+    this.#trackedAt = undefined;
     ++this.#runs;
     release(this.#waiting);
     this.#waiting = null;
@@ -192,17 +203,17 @@ export class Modar extends EventTarget {
     this.#tracker.close();
   }
 
-  /** Tracks one gray frame (width * height bytes): for pictures that come from elsewhere. */
-  async step(gray, width, height, time) {
+  /** Tracks one gray frame (width * height bytes): for pictures that come from elsewhere. turn: see modar.d.ts. */
+  async step(gray, width, height, time, turn) {
     const pixels = gray.slice().buffer;
-    return this.#tracker.ask({ type: 'frame', kind: 'gray', time, width, height, pixels }, [pixels]);
+    return this.#tracker.ask({ type: 'frame', kind: 'gray', time, width, height, pixels, turn }, [pixels]);
   }
 
   /** The newest frame waits while one is tracked; older ones are dropped. */
-  #take(time, run) {
+  #take(time, captured, run) {
     let grabbed;
     try {
-      grabbed = this.#grabber.grab(time);
+      grabbed = { ...this.#grabber.grab(time), captured };
     } catch (error) {
       this.#grabber.useCanvas = true;
       return;
@@ -223,9 +234,14 @@ export class Modar extends EventTarget {
       const grabbed = this.#waiting;
       this.#waiting = null;
       try {
-        const answer = await this.#tracker.ask({ ...grabbed.message, keepLuma: this.keepLuma }, grabbed.transfer);
-        if (answer.type === 'unreadable') this.#grabber.useCanvas = true;
-        else if (run === this.#runs) this.#tell(answer, grabbed);
+        const turn = this.#gyroscope?.turn(this.#trackedAt, grabbed.captured);
+        const answer = await this.#tracker.ask({ ...grabbed.message, turn, keepLuma: this.keepLuma }, grabbed.transfer);
+        if (answer.type === 'unreadable') {
+          this.#grabber.useCanvas = true;
+        } else if (run === this.#runs) {
+          this.#trackedAt = grabbed.captured;
+          this.#tell(answer, grabbed);
+        }
       } catch (error) {
         if (run === this.#runs) this.dispatchEvent(new CustomEvent('error', { detail: error }));
       }
@@ -251,6 +267,7 @@ export class Modar extends EventTarget {
           pattern, name, time, camera, projection, visible: pose[POSE.visible] !== 0,
           inliers: pose[POSE.inliers], fit: pose[POSE.fit], rotation: part(POSE.rotation, 9),
           translation: part(POSE.translation, 3), corners: part(POSE.corners, 8), view: part(POSE.view, 16),
+          extended: pose[POSE.extended] !== 0,
         };
         if (!this.#known[pattern]) this.dispatchEvent(new CustomEvent('found', { detail }));
         this.dispatchEvent(new CustomEvent('updated', { detail }));

@@ -19,6 +19,15 @@ COVER = ROOT / "assets" / "patterns" / "cover.png"
 
 # Few views of a pattern: enough for tests.
 QUICK = ["--loop-views", "8", "--no-score"]
+# Frames of covered_clip(), and how the camera might have turned before each: radians, exact in few decimals.
+SEEN, COVERED = 18, 8
+TURNS = [[Random(3 * i + axis).randrange(-8, 9) / 4096 for axis in range(3)] for i in range(SEEN + COVERED)]
+
+# A gyroscope's readings, [milliseconds, degrees a second]: rising by one a millisecond; half a second later two more. By how many
+# degrees it turned in some spans, by hand: the area under straight lines, the last reading for at most 100 ms more.
+READINGS = [[10 * i, 10 * i] for i in range(1, 11)] + [[600, 50], [610, 50]]
+TURNED = {(15, 95): 4.4, (25, 35): 0.3, (105, 150): 4.5, (605, 655): 2.5, (5, 50): None, (50, 400): None, (300, 609): None,
+          (605, 711): None}
 
 
 def picture(path, width=200, height=150):
@@ -33,6 +42,23 @@ def picture(path, width=200, height=150):
               (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b"")]
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
+
+
+def covered_clip(path, width=640, height=480):
+    """Gray frames of our cover on a wall that the camera goes along; in the last COVERED of them something lies over the cover."""
+    wall = path.with_suffix(".wall")
+    columns, rows = width * 3 // 16, height * 5 // 32
+    wall.write_bytes(Random(7).randbytes(columns * rows))
+    graph = (f"[0]scale={8 * columns}:{8 * rows}:flags=bilinear,format=gray,loop=-1:1[wall];[1]scale={width * 2 // 5}:-2:flags=area,"
+             "format=gray[cover];[wall][cover]overlay=(W-w)/2:(H-h)/2:format=auto,format=gray,drawbox=x=iw*0.3:y=ih*0.2:w=iw*0.4:"
+             f"h=ih*0.6:color=gray:t=fill:enable='gte(n,{SEEN})',crop={width}:{height}:x='n*8':y='(in_h-out_h)/2+n'")
+    subprocess.run(["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "gray", "-s", f"{columns}x{rows}", "-i", wall, "-i", COVER,
+                    "-filter_complex", graph, "-frames:v", str(SEEN + COVERED), "-pix_fmt", "gray", "-f", "rawvideo", path], check=True)
+
+
+def write_turns(path, turns):
+    """For `modar-play --gyro`."""
+    path.write_text("".join("{:.12f} {:.12f} {:.12f}\n".format(*turn) for turn in turns))
 
 
 class ProgramTest(unittest.TestCase):

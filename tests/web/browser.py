@@ -102,8 +102,8 @@ class Browser:
         self.call("Page.navigate", url=url)
         self.wait(f"location.href.startsWith({url!r}) && document.readyState === 'complete'", f"loading {url}")
 
-    def resize(self, width, height, scale=1, mobile=False):
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=mobile)
+    def resize(self, width, height, scale=1, mobile=False, **more):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=mobile, **more)
 
     def camera(self, setting):
         """"granted" or "denied"."""

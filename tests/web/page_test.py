@@ -2,6 +2,7 @@
 import base64
 import hashlib
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -13,7 +14,8 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Server  # noqa: E402
-from programs import COVER, POTTERY, QUICK, ROOT, ProgramTest  # noqa: E402
+from programs import (COVER, COVERED, POTTERY, QUICK, READINGS, ROOT, TURNED, TURNS, ProgramTest, covered_clip,  # noqa: E402
+                      write_turns)
 
 PAGE = ROOT / "build" / "web" / "web"
 WIDTH, HEIGHT, FRAMES = 640, 480, 6
@@ -23,12 +25,13 @@ KEEP = os.environ.get("MODAR_WEB_PICTURES")
 FEED = """(async () => {
   const { load } = await import('/modar.js');
   const modar = await load('/bundles/demo.modar', { simd: %s });
-  await modar.start(document.createElement('video'), { findFocal: false });
+  const turns = %s;
+  await modar.start(document.createElement('video'), { findFocal: false, extended: turns.length > 0 });
   modar.stop();
-  const frames = new Uint8Array(await (await fetch('/frames.gray')).arrayBuffer());
+  const frames = new Uint8Array(await (await fetch('/%s')).arrayBuffer());
   const size = %d * %d, seen = [];
   for (let i = 0; i * size < frames.length; ++i) {
-    const { poses, reason, heapBytes } = await modar.step(frames.subarray(i * size, (i + 1) * size), %d, %d, i / 30);
+    const { poses, reason, heapBytes } = await modar.step(frames.subarray(i * size, (i + 1) * size), %d, %d, i / 30, turns[i]);
     seen.push({ reason, heapBytes, pose: Array.from(poses) });
   }
   modar.close();
@@ -61,6 +64,42 @@ RECORD = """(async () => {
 })()"""
 
 
+# Synthetic events at a gyroscope's clock: reading i of [time, rate...] as the browser would bring it.
+READ = """(async () => {
+  const { allowMotion, Gyroscope } = await import('/gyroscope.js');
+  const gyroscope = new Gyroscope(%s);
+  await allowMotion();  // which it asks for first
+  await new Promise((resolve) => { setTimeout(resolve); });
+  for (const [timeStamp, alpha, beta, gamma] of %s) {
+    const event = new DeviceMotionEvent('devicemotion', { interval: 10, rotationRate: { alpha, beta, gamma } });
+    dispatchEvent(Object.defineProperty(event, 'timeStamp', { value: timeStamp }));
+  }
+  gyroscope.close();
+  return %s.map(([from, to]) => gyroscope.turn(from ?? undefined, to) ?? null);
+})()"""
+
+# A phone that turns by one radian a second about its x axis, and what the page tells its worker.
+PHONE = """(() => {
+  globalThis.told = [];
+  globalThis.allowed = 'granted';
+  const post = Worker.prototype.postMessage;
+  Worker.prototype.postMessage = function (message, ...more) {
+    if (message.type === 'frame' || message.type === 'camera') told.push({ ...message, frame: null, pixels: null });
+    return post.call(this, message, ...more);
+  };
+  const settings = MediaStreamTrack.prototype.getSettings;
+  MediaStreamTrack.prototype.getSettings = function () { return { ...settings.call(this), facingMode: 'environment' }; };
+  DeviceMotionEvent.requestPermission = async () => allowed;
+  let timeStamp = performance.now();
+  setInterval(() => {
+    for (; timeStamp < performance.now(); timeStamp += 10) {
+      const event = new DeviceMotionEvent('devicemotion', { rotationRate: { alpha: 180 / Math.PI, beta: 0, gamma: 0 } });
+      dispatchEvent(Object.defineProperty(event, 'timeStamp', { value: timeStamp }));
+    }
+  }, 10);
+})()"""
+
+
 def rounded(value):
     """To a float and back, as C does."""
     return struct.unpack("f", struct.pack("f", value))[0]
@@ -89,6 +128,8 @@ class Page(ProgramTest):
         convert = ["ffmpeg", "-loglevel", "error", "-y", "-framerate", "30", "-i", clip / "frame_%05d.png"]
         subprocess.run([*convert, "-pix_fmt", "yuv420p", cls.video], check=True)
         subprocess.run([*convert, "-pix_fmt", "gray", "-f", "rawvideo", site / "frames.gray"], check=True)
+        covered_clip(site / "covered.gray", WIDTH, HEIGHT)
+        write_turns(cls.base / "turns.txt", TURNS)
         (site / "played").mkdir()
         shutil.copytree(clip, site / "clip")
         # Both in the light that the bundle has: the page looks at a smaller copy of the camera's picture.
@@ -111,14 +152,13 @@ class Page(ProgramTest):
             pathlib.Path(KEEP).mkdir(parents=True, exist_ok=True)
             self.browser.screenshot(pathlib.Path(KEEP) / name)
 
-    def played(self, frames):
+    def played(self, frames, *more):
         """What modar-play sees in gray frames: a dictionary a frame."""
-        done = self.run_program("modar-play", self.bundle, "--input", f"grey:{WIDTH}x{HEIGHT}:{frames}", "--json")
+        done = self.run_program("modar-play", self.bundle, "--input", f"grey:{WIDTH}x{HEIGHT}:{frames}", "--json", *more)
         self.assertEqual(done.returncode, 0, done.stderr)
         return [line for line in map(json.loads, done.stdout.splitlines()) if "frame" in line]
 
-    def assert_same_poses(self, seen, frames):
-        expected = self.played(frames)
+    def assert_same_poses(self, seen, expected):
         self.assertEqual(len(seen), len(expected))
         for web, play in zip(seen, expected):
             self.assertEqual(web["reason"], play["reason"])
@@ -127,15 +167,71 @@ class Page(ProgramTest):
                 numbers = [*each["rotation"], *each["translation"], *sum(each["corners"], [])]
                 self.assertEqual(web["pose"][4:24], [rounded(n) for n in numbers])
                 self.assertEqual(web["pose"][2], each["inliers"])
+                self.assertEqual(web["pose"][40] != 0, each.get("extended", False))
         return sum(len(play["visible"]) for play in expected)
 
     def test_poses_are_the_players_to_the_last_bit(self):
         self.browser.open(self.server.url)
+        played = self.played(self.site / "frames.gray")
+        covered = self.played(self.site / "covered.gray", "--extended", "--gyro", self.base / "turns.txt")
         for simd in ("true", "false"):
-            done = self.browser.run(FEED % (simd, WIDTH, HEIGHT, WIDTH, HEIGHT))
+            done = self.browser.run(FEED % (simd, [], "frames.gray", WIDTH, HEIGHT, WIDTH, HEIGHT))
             self.assertEqual(done["kind"], "simd" if simd == "true" else "plain")
-            self.assertGreater(self.assert_same_poses(done["seen"], self.site / "frames.gray"), FRAMES // 2)
+            self.assertGreater(self.assert_same_poses(done["seen"], played), FRAMES // 2)
             print(f"{done['kind']}: heap {done['seen'][-1]['heapBytes']} bytes")
+            done = self.browser.run(FEED % (simd, json.dumps(TURNS), "covered.gray", WIDTH, HEIGHT, WIDTH, HEIGHT))
+            self.assert_same_poses(done["seen"], covered)
+            self.assertGreaterEqual(sum(each["pose"][40] for each in done["seen"]), COVERED - 1)
+
+    def test_a_phones_turns_in_its_cameras_axes(self):
+        # Held upright, screen to the visitor: the device's axes that point up and right, by how far the phone was turned
+        # counterclockwise (its top is up, left, down, right).
+        held = {0: ((0, 1, 0), (1, 0, 0)), 90: ((1, 0, 0), (0, -1, 0)), 180: ((0, -1, 0), (-1, 0, 0)), 270: ((-1, 0, 0), (0, 1, 0))}
+        self.browser.open(self.server.url)
+        for angle, (up, right) in held.items():
+            kind = {0: "portraitPrimary", 90: "landscapePrimary", 180: "portraitSecondary", 270: "landscapeSecondary"}[angle]
+            self.browser.resize(640, 480, screenOrientation={"type": kind, "angle": angle})
+            # What the visitor does, about which axis by the right hand, and how each camera sees itself turn: x right, y down,
+            # z forward. The front camera's right is the visitor's left.
+            for axis, back, front in (([-c for c in up], (0, 1, 0), (0, 1, 0)),  # turns the phone to the right
+                                      (right, (1, 0, 0), (-1, 0, 0)),  # leans its top back to the visitor: the back looks up
+                                      ((0, 0, -1), (0, 0, 1), (0, 0, -1))):  # turns it clockwise
+                rates = [[time, *(math.degrees(c) for c in axis)] for time in (1000, 1010, 1020)]
+                for camera, wanted in ((back, "false"), (front, "true")):
+                    turned, = self.browser.run(READ % (wanted, rates, [[1000, 1020]]))
+                    for ours, theirs in zip(turned, camera):
+                        self.assertAlmostEqual(ours, 0.02 * theirs, 12, (angle, axis, wanted))
+
+    def test_turns_are_summed_between_frames_and_unknown_in_gaps(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        spans = {**TURNED, (50, 50): None, (None, 50): None}
+        readings = [[time, rate, 0, 0] for time, rate in READINGS]
+        found = self.browser.run(READ % ("false", readings, json.dumps(list(spans))))
+        for (span, degrees), turned in zip(spans.items(), found):
+            self.assertEqual(turned is None, degrees is None, span)
+            if degrees is not None:
+                self.assertAlmostEqual(math.degrees(turned[0]), degrees, 9, span)
+
+    def test_the_page_tells_its_tracker_the_gyroscopes_turns(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.browser.run(PHONE)
+        self.start()
+        self.browser.wait("told.filter(({ turn }) => turn).length > 4", "turns")
+        camera, *frames = self.browser.run("told")
+        self.assertTrue(camera["extended"])
+        for before, after in zip(frames, frames[1:]):
+            if "turn" in after:  # also over frames that were dropped on the way
+                self.assertAlmostEqual(after["turn"][0], after["time"] - before["time"], 6)
+        # Refused: everything else goes on.
+        self.browser.run("document.getElementById('close').click(), allowed = 'denied'")
+        self.browser.wait("!document.getElementById('video').srcObject", "the end")
+        self.browser.run("told.length = 0")
+        self.start()
+        self.browser.wait("told.length > 4", "frames")
+        self.assertNotIn("turn", {key for each in self.browser.run("told") for key in each if each[key] is not None})
+        self.assertEqual(self.browser.errors, [])
 
     def test_camera_frames_arrive_without_a_read_back_and_track_alike(self):
         self.browser.open(self.server.url)
@@ -147,7 +243,7 @@ class Page(ProgramTest):
             self.assertEqual({each["source"] for each in seen}, {"HTMLCanvasElement" if canvas else "VideoFrame"})
             frames = self.folder / "seen.gray"
             frames.write_bytes(b"".join(base64.b64decode(each["luma"]) for each in seen))
-            self.assert_same_poses(seen, frames)
+            self.assert_same_poses(seen, self.played(frames))
         self.assertEqual(self.browser.errors, [])
 
     def start(self, state="seen"):
@@ -284,8 +380,8 @@ class Page(ProgramTest):
         if installed.returncode != 0:
             self.skipTest("npm cannot fetch three.js: " + installed.stderr[-200:])
         names = {file.name for file in (project / "node_modules" / "modar").iterdir()}
-        self.assertEqual(names, {"package.json", "modar.js", "modar.d.ts", "modar-view.js", "modar-worker.js", "engine.js",
-                                 *(f"engine-{kind}.{end}" for kind in ("simd", "plain") for end in ("js", "wasm"))})
+        self.assertEqual(names, {"package.json", "modar.js", "modar.d.ts", "modar-view.js", "modar-worker.js", "gyroscope.js",
+                                 "engine.js", *(f"engine-{kind}.{end}" for kind in ("simd", "plain") for end in ("js", "wasm"))})
         shutil.copy(ROOT / "runtime" / "web" / "example" / "three.html", project)
         shutil.copy(self.bundle, project)
         self.browser.resize(640, 480)
