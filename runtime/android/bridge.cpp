@@ -216,6 +216,26 @@ std::size_t plane_bytes(int stride, int width, int height) {
          static_cast<std::size_t>(width);
 }
 
+/// A vector in the axes of Android's sensors (x right and y up on the phone as it is held by
+/// nature, z towards the viewer) in those of a camera (x right, y down, z forward) whose frames are
+/// upright there when they are turned clockwise by `degrees`. front: on the screen's side, not
+/// mirrored.
+std::array<double, 3> frame_axes(const std::array<double, 3>& phone, int degrees, bool front) {
+  const double right = front ? -phone[0] : phone[0];
+  const double down = -phone[1];
+  const double forward = front ? phone[2] : -phone[2];
+  switch (degrees) {
+    case 90:
+      return {down, -right, forward};
+    case 180:
+      return {-right, -down, forward};
+    case 270:
+      return {-down, right, forward};
+    default:
+      return {right, down, forward};
+  }
+}
+
 /// Tracks a frame and writes the poses of all patterns; answers how many are visible.
 jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t stride,
            double time_s, float* poses) {
@@ -371,7 +391,8 @@ MODAR_NATIVE(jstring, modelName)(JNIEnv* env, jclass, jlong number, jint index) 
 }
 
 MODAR_NATIVE(void, setCamera)
-(JNIEnv* env, jclass, jlong number, jint width, jint height, jstring file, jboolean search_apart) {
+(JNIEnv* env, jclass, jlong number, jint width, jint height, jstring file, jboolean search_apart,
+ jboolean extended) {
   const std::string path = text_of(env, file);
   const Use session(env, number, &Session::tracking);
   if (!session) return;
@@ -393,11 +414,20 @@ MODAR_NATIVE(void, setCamera)
   modar_tracker_options options{};
   options.size = sizeof options;
   options.async_search = search_apart ? 1 : 0;
+  options.extended = extended ? 1 : 0;
   modar_tracker* tracker = modar_tracker_create_with(session->bundle, &camera, &options, &error);
   if (tracker == nullptr) return throw_error(env, error);
   modar_tracker_destroy(std::exchange(session->tracker, tracker));
   const std::lock_guard drawing(session->drawing);
   session->camera = camera;
+}
+
+MODAR_NATIVE(void, onTurn)
+(JNIEnv* env, jclass, jlong number, jdouble x, jdouble y, jdouble z, jint degrees, jboolean front) {
+  const Use session(env, number, &Session::tracking);
+  if (!session || !has_camera(env, *session)) return;
+  const std::array<double, 3> rotation = frame_axes({x, y, z}, degrees, front != 0);
+  modar_tracker_turn(session->tracker, rotation.data());
 }
 
 MODAR_NATIVE(jint, onCameraFrame)

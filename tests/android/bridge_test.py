@@ -9,9 +9,14 @@ import subprocess
 import tempfile
 import unittest
 
-from machine import APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest, compile_java, have, make_clip, run_java
+from machine import (APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest, compile_java, have, make_clip, make_covered_clip,
+                     run_java, write_fakes)
 
-BRIDGE = ["Native", "ModarException", "Poses"]
+from programs import COVERED, READINGS, SEEN, TURNED, TURNS, write_turns  # noqa: E402
+
+BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope"]
+SENSORS = ["hardware/Sensor", "hardware/SensorEvent", "hardware/SensorEventListener", "hardware/SensorManager", "os/Handler",
+           "os/Looper", "os/Message"]
 FLOATS = 40
 
 
@@ -21,31 +26,69 @@ class Bridge(ProgramTest):
     def setUpClass(cls):
         cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="modar-android-"))
         cls.addClassCleanup(shutil.rmtree, cls.shared, ignore_errors=True)
-        cls.classes = cls.shared / "classes"
+        cls.classes, fakes = cls.shared / "classes", write_fakes(cls.shared / "fakes")
         compile_java(cls.classes, [*(APP / "org" / "modar" / f"{name}.java" for name in BRIDGE),
+                                   *(fakes / "android" / f"{name}.java" for name in SENSORS),
                                    FAKES / "org" / "modar" / "BridgeRun.java", FAKES / "fake" / "GlContext.java"])
         cls.clip = make_clip(cls.shared / "clip")
 
-    def bridge(self, word, bundle, *more):
-        done = run_java([self.classes], "org.modar.BridgeRun", word, bundle, self.clip, WIDTH, HEIGHT, *more)
+    def bridge(self, word, bundle, *more, clip=None):
+        done = run_java([self.classes], "org.modar.BridgeRun", word, bundle, clip or self.clip, WIDTH, HEIGHT, *more)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         # -Xcheck:jni prints what it dislikes: references that stay, exceptions that nobody looked at.
         self.assertNotIn("WARNING", done.stdout + done.stderr)
         self.assertNotIn("FATAL", done.stdout + done.stderr)
         return done.stdout
 
-    def play(self, bundle, *more):
-        return self.run_program("modar-play", bundle, "--input", f"nv21:{WIDTH}x{HEIGHT}@30:{self.clip}", *more)
+    def play(self, bundle, *more, clip=None):
+        return self.run_program("modar-play", bundle, "--input", f"nv21:{WIDTH}x{HEIGHT}@30:{clip or self.clip}", *more)
 
     def test_poses_are_the_players_to_the_last_bit(self):
-        bundle = self.bake_demo()
         out = self.folder / "poses"
+        bundle = self.bake_demo()
         reasons = self.bridge("poses", bundle, out).splitlines()
-        done = self.play(bundle, "--json", "--quiet")
+        self.assertGreater(self.assert_poses(out, reasons, FRAMES, self.play(bundle, "--json", "--quiet")), FRAMES // 2)
+
+    def test_turns_of_the_phone_are_the_players_in_each_cameras_axes(self):
+        # Where the right and the lower side of a frame are after it was turned clockwise: SENSOR_ORIENTATION.
+        after = {0: ("right", "down"), 90: ("down", "left"), 180: ("left", "up"), 270: ("up", "right")}
+        # The upright picture in the axes of the sensors. A camera on the screen's side looks at the visitor, whose left is its right.
+        sides = {0: {"right": (1, 0, 0), "left": (-1, 0, 0), "up": (0, 1, 0), "down": (0, -1, 0), "forward": (0, 0, -1)},
+                 1: {"right": (-1, 0, 0), "left": (1, 0, 0), "up": (0, 1, 0), "down": (0, -1, 0), "forward": (0, 0, 1)}}
+        cameras = [(degrees, front) for degrees in after for front in sides]
+        self.assertEqual(len(cameras), COVERED)
+        lines = []
+        for i, turn in enumerate(TURNS):
+            degrees, front = cameras[(i - SEEN) % COVERED]
+            axes = [sides[front][name] for name in (*after[degrees], "forward")]
+            phone = [sum(turn[k] * axes[k][axis] for k in range(3)) for axis in range(3)]
+            lines.append(" ".join(map(str, [*phone, degrees, front])))
+        turns, out, gyro = self.folder / "phone.txt", self.folder / "poses", self.folder / "turns.txt"
+        turns.write_text("\n".join(lines))
+        write_turns(gyro, TURNS)
+        bundle, clip = self.bake_demo(), make_covered_clip(self.shared / "covered")
+        reasons = self.bridge("poses", bundle, out, turns, clip=clip).splitlines()
+        done = self.play(bundle, "--json", "--quiet", "--extended", "--gyro", gyro, clip=clip)
+        self.assertGreaterEqual(done.stdout.count('"extended":true'), COVERED - 1)
+        self.assert_poses(out, reasons, SEEN + COVERED, done)
+
+    def test_readings_are_summed_between_frames_and_unknown_in_gaps(self):
+        readings, spans = self.folder / "readings", self.folder / "spans"
+        readings.write_text("\n".join(f"{time / 1000} {rate}" for time, rate in READINGS))
+        spans.write_text("\n".join(f"{start / 1000} {end / 1000}" for start, end in TURNED))
+        told = self.bridge("gyroscope", "", readings, spans).splitlines()
+        self.assertEqual(len(told), len(TURNED))
+        for (span, degrees), word in zip(TURNED.items(), told):
+            self.assertEqual(word == "unknown", degrees is None, span)
+            if degrees is not None:
+                self.assertAlmostEqual(float(word), degrees, 9, span)  # in the readings' unit
+
+    def assert_poses(self, out, reasons, count, done):
+        """The bridge's floats are what modar-play says; answers in how many frames something is seen."""
         self.assertEqual(done.returncode, 0, done.stderr)
-        lines = [json.loads(line) for line in done.stdout.splitlines()][:FRAMES]
+        lines = [json.loads(line) for line in done.stdout.splitlines()][:count]
         floats = out.read_bytes()
-        self.assertEqual(len(floats), FRAMES * FLOATS * 4)
+        self.assertEqual(len(floats), count * FLOATS * 4)
         seen = 0
         for i, line in enumerate(lines):
             pose = struct.unpack_from(f"={FLOATS}f", floats, i * FLOATS * 4)
@@ -64,7 +107,7 @@ class Bridge(ProgramTest):
             r, t = pose[4:13], pose[13:16]
             view = [r[0], -r[3], -r[6], 0, r[1], -r[4], -r[7], 0, r[2], -r[5], -r[8], 0, t[0], -t[1], -t[2], 1]
             self.assertEqual([v + 0.0 for v in pose[24:]], [v + 0.0 for v in view], f"frame {i}")
-        self.assertGreater(seen, FRAMES // 2)
+        return seen
 
     def test_pictures_are_the_players(self):
         bundle = self.bake_demo()

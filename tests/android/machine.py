@@ -8,7 +8,7 @@ import sys
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(ROOT / "tests" / "cli"))
 
-from programs import BIN, COVER, ProgramTest  # noqa: E402, F401
+from programs import BIN, COVER, ProgramTest, covered_clip  # noqa: E402, F401
 
 JNI = os.environ.get("MODAR_JNI", str(BIN.parent / "runtime" / "android"))
 FAKE_GL = os.environ.get("MODAR_FAKE_GL", str(BIN.parent / "tests" / "android"))
@@ -48,6 +48,26 @@ def make_clip(folder, frames=FRAMES):
     subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", str(folder / "*.png"), "-vf", "scale=out_range=full",
                     "-pix_fmt", "nv21", "-f", "rawvideo", str(file)], check=True)
     return file
+
+
+def make_covered_clip(folder):
+    """covered_clip() in NV21."""
+    folder.mkdir(exist_ok=True)
+    gray, file = folder / "covered.gray", folder / "covered.nv21"
+    covered_clip(gray, WIDTH, HEIGHT)
+    size, luma = WIDTH * HEIGHT, gray.read_bytes()
+    file.write_bytes(b"".join(luma[at:at + size] + b"\x80" * (size // 2) for at in range(0, len(luma), size)))
+    return file
+
+
+def write_fakes(folder):
+    """Android's classes as the tests have them, a Java file each."""
+    for part in (FAKES.parent / "fake_android.txt").read_text().split("\n== ")[1:]:
+        name, _, text = part.partition("\n")
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    return folder
 
 
 def have(*programs):

@@ -39,8 +39,20 @@ public final class Native {
      *
      * @param file what `modar calibrate` wrote; null: focal length = width
      * @param searchApart searches for patterns on a thread of its own; then results depend on time
+     * @param extended learns what stands still around a pattern, and goes on from it while the pattern is out of sight
      */
-    public static native void setCamera(long session, int width, int height, String file, boolean searchApart)
+    public static native void setCamera(
+            long session, int width, int height, String file, boolean searchApart, boolean extended)
+            throws ModarException;
+
+    /**
+     * Before a frame, for `extended`: how the phone turned since the last one, as Sensor.TYPE_GYROSCOPE says.
+     *
+     * @param x radians, as y and z: a rotation vector in the axes of Android's sensors
+     * @param sensorDegrees the camera's SENSOR_ORIENTATION: frames turned clockwise by it are upright
+     * @param front the camera is on the screen's side
+     */
+    public static native void onTurn(long session, double x, double y, double z, int sensorDegrees, boolean front)
             throws ModarException;
 
     /**

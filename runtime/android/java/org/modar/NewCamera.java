@@ -3,6 +3,7 @@ package org.modar;
 import android.annotation.TargetApi;
 import android.content.Context;
 import android.graphics.ImageFormat;
+import android.hardware.SensorManager;
 import android.hardware.camera2.CameraAccessException;
 import android.hardware.camera2.CameraCaptureSession;
 import android.hardware.camera2.CameraCharacteristics;
@@ -19,15 +20,22 @@ import java.util.Collections;
 /** Camera2, from API 21 on: frames stay in the camera's own memory. */
 @TargetApi(21)
 final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailableListener {
+    private final Context context;
     private final CameraManager manager;
     /** As many as may be held of an ImageReader's images, less the one that it fills. */
     private final Planes[] frames = new Planes[BUFFERS - 1];
     private CameraDevice device;
     private ImageReader reader;
     private boolean halted;
+    /** Null: the phone has none, or another clock than the camera. */
+    private Gyroscope gyroscope;
+    private int sensorDegrees;
+    private boolean front;
+    private double trackedS;
 
     NewCamera(Context context, Stage stage, int patterns) {
         super(stage, patterns);
+        this.context = context;
         manager = (CameraManager) context.getSystemService(Context.CAMERA_SERVICE);
         for (int i = 0; i < frames.length; i++) frames[i] = new Planes();
     }
@@ -63,6 +71,11 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
         @Override
         int track(long session) throws ModarException {
             Image.Plane luma = planes[0];
+            if (gyroscope != null && gyroscope.turn(trackedS, timeS)) {
+                double[] turned = gyroscope.turned;
+                Native.onTurn(session, turned[0], turned[1], turned[2], sensorDegrees, front);
+            }
+            trackedS = timeS;
             return Native.onCameraPlane(session, luma.getBuffer(), luma.getRowStride(), timeS, poses.bytes);
         }
 
@@ -97,8 +110,20 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
         Integer turn = traits.get(CameraCharacteristics.SENSOR_ORIENTATION);
         reader = ImageReader.newInstance(size.getWidth(), size.getHeight(), ImageFormat.YUV_420_888, BUFFERS);
         reader.setOnImageAvailableListener(this, handler);
-        stage.cameraOpened(size.getWidth(), size.getHeight(), turn == null ? 90 : turn);
+        sensorDegrees = turn == null ? 90 : turn;
+        openGyroscope(traits);
+        stage.cameraOpened(size.getWidth(), size.getHeight(), sensorDegrees);
         manager.openCamera(id, new Opened(), handler);
+    }
+
+    /** Turns help only where frames are dated by the sensors' clock, and a camera on a cable turns by itself. */
+    private void openGyroscope(CameraCharacteristics traits) {
+        Integer clock = traits.get(CameraCharacteristics.SENSOR_INFO_TIMESTAMP_SOURCE);
+        Integer facing = traits.get(CameraCharacteristics.LENS_FACING);
+        if (clock == null || clock != CameraCharacteristics.SENSOR_INFO_TIMESTAMP_SOURCE_REALTIME) return;
+        if (facing == null || facing > CameraCharacteristics.LENS_FACING_BACK) return;
+        front = facing == CameraCharacteristics.LENS_FACING_FRONT;
+        gyroscope = Gyroscope.open((SensorManager) context.getSystemService(Context.SENSOR_SERVICE), handler);
     }
 
     private static Size sizeOf(StreamConfigurationMap map) {
@@ -178,6 +203,7 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
     @Override
     void halt() {
         halted = true;
+        if (gyroscope != null) gyroscope.close();
         if (device != null) device.close();
     }
 

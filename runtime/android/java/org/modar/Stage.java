@@ -82,7 +82,7 @@ final class Stage implements GLSurfaceView.Renderer {
         sensorDegrees = turn;
         diagnostics.camera = frameWidth + " x " + frameHeight + ", turned by " + turn;
         try {
-            Native.setCamera(session, frameWidth, frameHeight, cameraFile, searchApart);
+            Native.setCamera(session, frameWidth, frameHeight, cameraFile, searchApart, true);
         } catch (ModarException error) {
             screen.failed(error);
         }

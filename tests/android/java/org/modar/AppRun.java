@@ -5,6 +5,7 @@ import android.content.Context;
 import android.content.res.AssetManager;
 import android.graphics.Bitmap;
 import android.hardware.Camera;
+import android.hardware.SensorManager;
 import android.hardware.camera2.CameraDevice;
 import android.hardware.camera2.CameraManager;
 import android.media.ImageReader;
@@ -25,7 +26,7 @@ public final class AppRun {
     private static MainActivity app;
     private static GLSurfaceView view;
 
-    /** words: APK, clip, width, height, the app's folder, where to put the last picture, the layout; for releases, more. */
+    /** words: APK, clip, width, height, the app's folder, where to put the last picture, the layout, a second clip; for releases, a folder. */
     public static void main(String[] words) throws Exception {
         AssetManager.apk = words[0];
         clip = Files.readAllBytes(Paths.get(words[1]));
@@ -37,14 +38,15 @@ public final class AppRun {
         Activity.numbers = R.id.class;
         Stage.searchApart = false;
 
-        if (words.length > 7) {
-            network(Paths.get(words[7]));
+        if (words.length > 8) {
+            network(Paths.get(words[8]));
             System.out.println("the day is over");
             return;
         }
         permission();
         frames(words[5]);
         camera2();
+        gyroscope(words[7]);
         fingers();
         pauses();
         pictures();
@@ -117,6 +119,39 @@ public final class AppRun {
         app.onPause();
         CameraManager.full = false;
         app.onResume();
+        shown();
+    }
+
+    /**
+     * Something comes over the cover while the camera goes along: a gyroscope at rest changes nothing of where the model
+     * stays, one that turns does. The phone's other cameras have clocks of their own.
+     */
+    private static void gyroscope(String covered) throws Exception {
+        byte[] before = clip;
+        clip = Files.readAllBytes(Paths.get(covered));
+        CameraManager.full = true;
+        byte[][] last = new byte[3][];
+        for (int i = 0; i < 3; i++) {
+            SensorManager.present = i > 0;
+            SensorManager.rate = i > 1 ? 10 : 0;
+            app.onPause();
+            check(SensorManager.listener == null, "the gyroscope is let go");
+            app.onResume();
+            check((SensorManager.listener != null) == SensorManager.present, "the gyroscope is listened to");
+            for (int frame = 0; frame < 22; frame++) check(deliver(frame), "frame " + frame);
+            last[i] = picture();
+        }
+        check(changed(last[0], last[1]) < 0.03, "at rest: " + changed(last[0], last[1]));
+        check(changed(last[1], last[2]) > 0.05, "turned: " + changed(last[1], last[2]));
+        CameraManager.realtime = false;
+        app.onPause();
+        app.onResume();
+        check(SensorManager.listener == null, "another clock");
+        app.onPause();
+        CameraManager.full = false;
+        clip = before;
+        app.onResume();
+        check(SensorManager.listener == null, "the old camera does not say when");
         shown();
     }
 

@@ -1,5 +1,6 @@
 package org.modar;
 
+import android.hardware.SensorManager;
 import fake.GlContext;
 import java.io.FileInputStream;
 import java.io.FileOutputStream;
@@ -9,6 +10,8 @@ import java.nio.ByteOrder;
 import java.nio.channels.FileChannel;
 import java.nio.file.Files;
 import java.nio.file.Paths;
+import java.util.Arrays;
+import java.util.List;
 import java.util.concurrent.atomic.AtomicReference;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
@@ -27,7 +30,8 @@ public final class BridgeRun {
         frames = new byte[all.length / (width * height * 3 / 2)][width * height * 3 / 2];
         for (int i = 0; i < frames.length; i++) System.arraycopy(all, i * frames[i].length, frames[i], 0, frames[i].length);
         switch (words[0]) {
-            case "poses": poses(words[1], words[5]); break;
+            case "poses": poses(words[1], words[5], words.length > 6 ? words[6] : ""); break;
+            case "gyroscope": gyroscope(words[5], words[6]); break;
             case "pictures": pictures(words[1], words[5]); break;
             case "misuse": misuse(words[1], words[5]); break;
             case "close": closeWhileBusy(words[1]); break;
@@ -37,7 +41,7 @@ public final class BridgeRun {
 
     private static long opened(String bundle) throws Exception {
         long session = Native.openFile(bundle);
-        Native.setCamera(session, width, height, null, false);
+        Native.setCamera(session, width, height, null, false, false);
         return session;
     }
 
@@ -86,21 +90,33 @@ public final class BridgeRun {
         if (!good) throw new AssertionError(what);
     }
 
-    /** All floats of all frames; once as arrays, once as planes with padding, which must be the same. */
-    private static void poses(String bundle, String out) throws Exception {
+    /**
+     * All floats of all frames; once as arrays, once as planes with padding, which must be the same. turns: a file with
+     * a line a frame for Native.onTurn(), and `extended`; empty: without.
+     */
+    private static void poses(String bundle, String out, String turns) throws Exception {
         long arrays = opened(bundle);
+        List<String> lines = turns.isEmpty() ? null : Files.readAllLines(Paths.get(turns));
         FileInputStream file = new FileInputStream(bundle);
         java.lang.reflect.Field number = java.io.FileDescriptor.class.getDeclaredField("fd");
         number.setAccessible(true);
         long planes = Native.openFd(number.getInt(file.getFD()), 0, file.getChannel().size());
         file.close(); // the mapping outlives it
-        Native.setCamera(planes, width, height, null, false);
+        Native.setCamera(planes, width, height, null, false, false);
+        if (lines != null) {
+            Native.setCamera(arrays, width, height, null, false, true);
+            Native.setCamera(planes, width, height, null, false, true);
+        }
         Native.verify(planes);
         int patterns = Native.patternCount(arrays);
         Poses a = new Poses(patterns);
         Poses b = new Poses(patterns);
         FileChannel sink = new FileOutputStream(out).getChannel();
         for (int i = 0; i < frames.length; i++) {
+            if (lines != null) {
+                turn(arrays, lines.get(i));
+                turn(planes, lines.get(i));
+            }
             int seen = Native.onCameraFrame(arrays, frames[i], i / 30.0, a.bytes);
             check(Native.onCameraPlane(planes, luma(frames[i], 17), width + 17, i / 30.0, b.bytes) == seen, "seen");
             a.bytes.rewind();
@@ -114,6 +130,32 @@ public final class BridgeRun {
         sink.close();
         Native.close(arrays);
         Native.close(planes);
+    }
+
+    private static void turn(long session, String line) throws Exception {
+        double[] numbers = numbers(line);
+        Native.onTurn(session, numbers[0], numbers[1], numbers[2], (int) numbers[3], numbers[4] != 0);
+    }
+
+    private static double[] numbers(String line) {
+        return Arrays.stream(line.split(" ")).mapToDouble(Double::parseDouble).toArray();
+    }
+
+    /** Readings of a file through a fake phone's gyroscope: the turn about x in each span of another file, or "unknown". */
+    private static void gyroscope(String readings, String spans) throws Exception {
+        check(Gyroscope.open(new SensorManager(), null) == null, "a phone without one");
+        SensorManager.present = true;
+        Gyroscope gyroscope = Gyroscope.open(new SensorManager(), null);
+        for (String line : Files.readAllLines(Paths.get(readings))) {
+            double[] numbers = numbers(line);
+            SensorManager.read(Math.round(numbers[0] * 1e9), (float) numbers[1], 0, 0);
+        }
+        for (String line : Files.readAllLines(Paths.get(spans))) {
+            double[] numbers = numbers(line);
+            System.out.println(gyroscope.turn(numbers[0], numbers[1]) ? gyroscope.turned[0] : "unknown");
+        }
+        gyroscope.close();
+        check(SensorManager.listener == null, "let go");
     }
 
     private static final int NV21 = 0;
@@ -216,9 +258,10 @@ public final class BridgeRun {
         throwsCode("bundle.truncated", () -> Native.openFile(damaged));
         throwsCode("android.camera", () -> Native.onCameraFrame(session, frames[0], 0, poses.bytes));
         throwsCode("android.camera", () -> Native.reason(session));
-        throwsCode("camera.size", () -> Native.setCamera(session, 0, 480, null, false));
-        throwsCode("camera.open", () -> Native.setCamera(session, width, height, "none.yml", false));
-        Native.setCamera(session, width, height, null, false);
+        throwsCode("android.camera", () -> Native.onTurn(session, 0, 0, 0, 90, false));
+        throwsCode("camera.size", () -> Native.setCamera(session, 0, 480, null, false, false));
+        throwsCode("camera.open", () -> Native.setCamera(session, width, height, "none.yml", false, false));
+        Native.setCamera(session, width, height, null, false, false);
         throwsCode("android.buffer", () -> Native.onCameraFrame(session, null, 0, poses.bytes));
         throwsCode("android.buffer", () -> Native.onCameraFrame(session, new byte[9], 0, poses.bytes));
         throwsCode("android.buffer", () -> Native.onCameraFrame(session, frames[0], 0, null));
@@ -259,13 +302,14 @@ public final class BridgeRun {
             throwsCode("android.closed", () -> Native.onDrawFrame(closed, frames[0], poses.bytes));
             throwsCode("android.closed", () -> Native.onSurfaceCreated(closed, null));
             throwsCode("android.closed", () -> Native.onSurfaceChanged(closed, 1, 1, 0, false));
-            throwsCode("android.closed", () -> Native.setCamera(closed, 4, 4, null, false));
+            throwsCode("android.closed", () -> Native.setCamera(closed, 4, 4, null, false, false));
             throwsCode("android.closed", () -> Native.setGesture(closed, 1, 0, 0, 0));
             throwsCode("android.closed", () -> Native.patternCount(closed));
             throwsCode("android.closed", () -> Native.patternName(closed, 0));
             throwsCode("android.closed", () -> Native.reason(closed));
             throwsCode("android.closed", () -> Native.verify(closed));
             throwsCode("android.closed", () -> Native.reset(closed));
+            throwsCode("android.closed", () -> Native.onTurn(closed, 0, 0, 0, 0, true));
             throwsCode("android.closed", () -> Native.pick(closed, 0, 0));
             throwsCode("android.closed", () -> Native.gpuBytes(closed));
             throwsCode("android.closed", () -> Native.projection(closed, 1, 2, matrix));
