@@ -21,8 +21,9 @@ Rgb8 mean_of(const BundleView& bundle, std::uint32_t texture) {
   const TextureLevelRecord& last =
       bundle.texture_levels()[record.first_level + record.level_count - 1];
   if (last.width != 1 || last.height != 1) return mean;
-  find_texture_format(record.format)
-      ->decode(bundle.texture_data(texture).subspan(last.offset, last.size), 1, 1, 3, mean);
+  const auto bytes = bundle.texture_data(texture).subspan(static_cast<std::size_t>(last.offset),
+                                                          static_cast<std::size_t>(last.size));
+  find_texture_format(record.format)->decode(bytes, 1, 1, 3, mean);
   return mean;
 }
 
