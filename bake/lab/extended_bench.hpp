@@ -19,7 +19,7 @@ struct ExtendedRow {
   double rotation_deg = 0;  ///< error of the rotation, 95th percentile
   double worst_position_pct = 0;
   double worst_rotation_deg = 0;
-  double jump_px = 0;     ///< greatest jump of a shown corner beyond its true way on return
+  double jump_px = 0;     ///< on return: of a corner in the frame, beyond its true way
   double honest_pct = 0;  ///< followed frames whose errors lie within two stated deviations
   double ms = 0;          ///< thread-CPU milliseconds of such a frame, mean
 };

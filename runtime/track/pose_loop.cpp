@@ -555,7 +555,7 @@ bool PoseLoop::State::follow(Detection& detection) {
 /// shown.
 void PoseLoop::State::smooth_correction(const tracker::ExtendedPose& extended,
                                         const std::array<glm::dvec2, 4>& corners) {
-  constexpr double kCorrected = 4.0;  // pixels; the camera's motion is expected to less. By hand
+  constexpr double kCorrected = 4.0;  // pixels beside where motion has the corners. By hand
   const auto in_frame = [&](glm::dvec2 p) {
     return p.x >= 0 && p.y >= 0 && p.x < camera.width && p.y < camera.height;
   };

@@ -63,12 +63,12 @@ constexpr double kMaxOffset = 1.5;
 // depths and anchors for independent: of `modar bench extended` 95 % lie within two of these then.
 constexpr double kHonest = 4.0;
 // Standard deviations of a gyroscope's turn: radians a frame, somewhat more than `modar bench
-// extended` adds, and the share of the whole turn by which its scale is off, as data sheets of
-// phones' sensors allow.
+// extended` adds, and the share of the whole turn by which its scale may be off. By hand: larger
+// ones leave more to the points.
 constexpr double kTurnSigma = 0.0005;
 constexpr double kTurnScale = 0.01;
-// And of a pattern's rotation, radians times its patches in place: 0.15 degrees with all in view,
-// 0.6 with a quarter, as `modar bench extended` has it.
+// And of a pattern's rotation, radians times its patches in place: 0.14 degrees with 200, 0.3 with
+// 100, as they were off in one rendered room.
 constexpr double kSeenSigma = 0.5;
 
 Pose compose(const Pose& a, const Pose& b) {
@@ -446,7 +446,7 @@ ExpectedRotation Surroundings::expected_rotation() const {
   if (!turned_known_) return {};
   const double scale =
       kTurnScale * glm::length(rotation_vector(turned_ * glm::transpose(turned_from_)));
-  return {turned_, doubt_ * 1.0 * 1.0 / (turned_variance_ + scale * scale)};
+  return {turned_, doubt_ / (turned_variance_ + scale * scale)};
 }
 
 bool Surroundings::align_fine(const FrameView& frame, Pose& pose, ExtendedPose& out) {
@@ -679,9 +679,10 @@ void Surroundings::add_turn(const glm::dvec3* turn) {
 void Surroundings::level_turns(const Pose& pose, int patches) {
   const double sigma = kSeenSigma / std::max(patches, 1);
   if (!turned_known_) {
-    turned_ = pose.rotation;
+    turned_ = turned_from_ = pose.rotation;
     turned_variance_ = sigma * sigma;
     turned_known_ = true;
+    return;
   }
   const double gain = turned_variance_ / (turned_variance_ + sigma * sigma);
   const glm::dvec3 rest = rotation_vector(pose.rotation * glm::transpose(turned_));
