@@ -54,9 +54,8 @@ class TriangleTree {
   [[nodiscard]] std::optional<Hit> first_hit(const glm::dvec3& origin, const glm::dvec3& direction,
                                              double from, double to) const;
 
-  /// The triangle that nearest() answered last, and its corners.
+  /// The triangle that nearest() answered last.
   [[nodiscard]] const Triangle& last_triangle() const { return triangles_[last_]; }
-  [[nodiscard]] std::array<glm::dvec3, 3> last() const { return corners(last_); }
 
  private:
   struct Node {

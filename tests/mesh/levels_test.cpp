@@ -14,6 +14,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/mesh/lod/chunk_decimate.hpp"
+#include "bake/mesh/lod/level_map.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/lod/surface_distance.hpp"
 #include "tests/import/samples.hpp"
@@ -555,6 +556,94 @@ TEST(Levels, DistancesOfTrianglesWithoutArea) {
       const double bound = surface_distance(from, to, nearby, 0);
       EXPECT_GE(bound, exact - 1e-12);
       EXPECT_LE(bound, std::max(kDistanceFloor, 1.5 * 7 * 0x1p-11 * 1.8));
+    }
+  }
+}
+
+/// The greatest distance of some points of each of the first triangles from the second ones, by
+/// looking at all of them.
+double sampled_distance(const LevelSurface& from, const LevelSurface& to) {
+  double greatest = 0;
+  for (std::uint32_t t = 0; t < from.triangles(); ++t) {
+    const std::array<glm::dvec3, 3> corners = from.triangle(t);
+    for (const glm::dvec3& weights :
+         {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(0.5, 0.5, 0),
+          glm::dvec3(0.5, 0, 0.5), glm::dvec3(0, 0.5, 0.5), glm::dvec3(1.0 / 3)}) {
+      const glm::dvec3 point =
+          weights.x * corners[0] + weights.y * corners[1] + weights.z * corners[2];
+      double least = 1e9;
+      for (std::uint32_t other = 0; other < to.triangles(); ++other) {
+        least = std::min(least, distance_square(point, to.triangle(other), least));
+      }
+      greatest = std::max(greatest, std::sqrt(least));
+    }
+  }
+  return greatest;
+}
+
+TEST(Levels, DistancesBothWays) {
+  // A rough square whose rim stays or does not, a tube of it, and one with a hole.
+  constexpr std::uint16_t kSide = 12;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int round = 0; round < 8; ++round) {
+    const bool tube = round % 4 == 2;
+    const double roughness = 0.02 + 0.03 * (round % 5);
+    std::vector<glm::dvec3> p;
+    std::vector<std::uint8_t> locked;
+    for (std::uint16_t v = 0; v < kSide * kSide; ++v) {
+      const int x = v % kSide;
+      const int y = v / kSide;
+      const double r = roughness * uniform(random);
+      const double angle = 6.283185307 * x / kSide;
+      p.push_back(tube ? glm::dvec3((1 + r) * std::cos(angle), (1 + r) * std::sin(angle), 0.4 * y)
+                       : 0.1 * glm::dvec3(x, y, 10 * r));
+      const bool rim = y == 0 || y + 1 == kSide || (!tube && (x == 0 || x + 1 == kSide));
+      locked.push_back(rim && round % 4 != 1 ? 1 : 0);
+    }
+    std::vector<std::uint16_t> all;
+    for (std::uint16_t y = 0; y + 1 < kSide; ++y) {
+      for (std::uint16_t x = 0; x + (tube ? 0 : 1) < kSide; ++x) {
+        if (round % 4 == 3 && x == 5 && y == 8) continue;
+        const auto a = static_cast<std::uint16_t>(y * kSide + x);
+        const auto b = static_cast<std::uint16_t>(y * kSide + (x + 1) % kSide);
+        const auto c = static_cast<std::uint16_t>(a + kSide);
+        const auto d = static_cast<std::uint16_t>(b + kSide);
+        all.insert(all.end(), {a, b, d, a, d, c});
+      }
+    }
+    const CollapseSequence sequence = decimate_chunk({p, {}}, all, locked, {1.0, 0.0, 0.0, 40});
+    for (const double share : {0.5, 1.0}) {
+      const std::vector<std::uint16_t> become = collapsed_vertices(
+          sequence,
+          static_cast<std::size_t>(share * static_cast<double>(sequence.collapses.size())),
+          p.size());
+      std::vector<std::uint16_t> fewer;
+      for (std::size_t i = 0; i < all.size(); i += 3) {
+        const std::array<std::uint16_t, 3> t = {become[all[i]], become[all[i + 1]],
+                                                become[all[i + 2]]};
+        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+        fewer.insert(fewer.end(), t.begin(), t.end());
+      }
+      for (const bool astray : {false, true}) {
+        // A triangle that no point of the finer level is near to.
+        if (astray) {
+          fewer.insert(fewer.end(), {all[0], static_cast<std::uint16_t>(p.size() - 1), all[5]});
+        }
+        LevelSurface fine(p, all);
+        LevelSurface coarse(p, fewer);
+        std::vector<std::uint32_t> nearby = coarse.triangles_of_vertices();
+        for (std::size_t v = 0; v < p.size(); ++v) {
+          if (nearby[v] == kNoIndex) nearby[v] = coarse.walk(p[v], nearby[become[v]]);
+        }
+        const double off = std::max(sampled_distance(fine, coarse), sampled_distance(coarse, fine));
+        const double bound = level_distance(fine, coarse, nearby, fine.triangles_of_vertices(), 0);
+        EXPECT_GE(bound, off - 1e-12) << round << " " << share << " " << astray;
+        if (!astray) {
+          EXPECT_LE(bound, 1.6 * off) << round << " " << share;
+        }
+        EXPECT_EQ(level_distance(fine, coarse, nearby, fine.triangles_of_vertices(), 9.0), 9.0);
+      }
     }
   }
 }

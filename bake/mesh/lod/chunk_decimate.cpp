@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
 #include <queue>
 #include <tuple>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -162,6 +164,7 @@ class Decimator {
         first_(vertices.positions.size(), kNoIndex),
         kinds_(vertices.positions.size(), Kind::kLocked),
         quadrics_(vertices.positions.size()),
+        own_(vertices.positions.size()),
         best_(vertices.positions.size()),
         marks_(vertices.positions.size(), 0),
         removed_(vertices, indices.size() / 3) {
@@ -178,6 +181,7 @@ class Decimator {
   }
 
   CollapseSequence run() {
+    for (std::uint16_t v = 0; v < first_.size(); ++v) own_[v] = quadrics_[v].at(position(v));
     for (std::uint32_t v = 0; v < first_.size(); ++v) {
       if (const auto w = static_cast<std::uint16_t>(v); first_of(w) == w) estimate(w);
     }
@@ -192,10 +196,10 @@ class Decimator {
   /// Of a vertex: the collapse to try next; to itself where none is legal.
   struct Best {
     float price = 0;
-    std::uint32_t stamp = 0;
     std::uint16_t to = 0;
     std::uint16_t across = kNoTwin;
     bool exact = false;
+    bool least = false;  ///< no other has a lower price by the quadrics
   };
   /// A vertex' way to a neighbour, and its twin's to the same place.
   struct Move {
@@ -206,7 +210,12 @@ class Decimator {
       return std::tie(price, to) < std::tie(other.price, other.to);
     }
   };
-  using Entry = std::tuple<float, std::uint16_t, std::uint32_t>;  // price, vertex, stamp
+  /// A price, which is in the order of its bits, and a vertex. It counts while that vertex has that
+  /// price.
+  using Entry = std::uint64_t;
+  static Entry entry(float price, std::uint16_t v) {
+    return std::uint64_t{std::bit_cast<std::uint32_t>(price)} << 16 | v;
+  }
 
   [[nodiscard]] const glm::dvec3& position(std::uint16_t v) const { return vertices_.positions[v]; }
   [[nodiscard]] std::uint16_t twin(std::uint16_t v) const {
@@ -321,7 +330,7 @@ class Decimator {
   /// root has the least rms (2.21e-4 of the diagonal; sum 2.27, mean 2.26 at 0.7) and a greatest
   /// error between (1.8e-3; 2.6, 1.5).
   [[nodiscard]] double price_of(std::uint16_t v, std::uint16_t u) const {
-    const double sum = quadrics_[v].at(position(u)) + quadrics_[u].at(position(u));
+    const double sum = quadrics_[v].at(position(u)) + own_[u];
     const double area = quadrics_[v].area + quadrics_[u].area;
     return area > 0 ? std::max(0.0, sum) / std::sqrt(area) : 0.0;
   }
@@ -353,23 +362,27 @@ class Decimator {
     list_moves(v);
     const auto least = std::min_element(moves_.begin(), moves_.end());
     if (least == moves_.end()) return;
-    best_[v] = {static_cast<float>(least->price), best_[v].stamp + 1, least->to, least->across,
-                false};
-    queue_.emplace(best_[v].price, v, best_[v].stamp);
+    queue(v, {static_cast<float>(least->price), least->to, least->across, false, true});
+  }
+
+  void queue(std::uint16_t v, const Best& best) {
+    best_[v] = best;
+    queue_.push(entry(best.price, v));
   }
 
   /// Takes the front of the queue: makes its price exact, or collapses. False where it is empty.
   bool step() {
     while (!queue_.empty()) {
-      const auto [price, v, stamp] = queue_.top();
+      const Entry top = queue_.top();
+      const auto v = static_cast<std::uint16_t>(top);
       queue_.pop();
-      if (stamp != best_[v].stamp || kinds_[v] == Kind::kLocked) continue;
+      if (kinds_[v] == Kind::kLocked || top != entry(best_[v].price, v)) continue;
       if (!best_[v].exact && !find_legal(v)) continue;
-      if (!queue_.empty() && best_[v].price > std::get<0>(queue_.top())) {
-        queue_.emplace(best_[v].price, v, best_[v].stamp);
+      const Best best = best_[v];
+      if (!queue_.empty() && entry(best.price, 0) > queue_.top()) {
+        queue(v, best);
         continue;
       }
-      const Best best = best_[v];
       collapse(v, best.to, best.price, best.across != kNoTwin);
       if (best.across != kNoTwin) collapse(twin(v), best.across, best.price, false);
       return true;
@@ -379,10 +392,16 @@ class Decimator {
 
   /// Finds the cheapest legal collapse of v, exactly priced.
   bool find_legal(std::uint16_t v) {
+    // Without uvs the quadrics tell the whole price.
+    if (best_[v].least && vertices_.uvs.empty() && twin(v) == kNoTwin &&
+        legal_price(v, best_[v].to)) {
+      best_[v].exact = true;
+      return true;
+    }
     list_moves(v);
     std::sort(moves_.begin(), moves_.end());
     Move best;
-    best.price = std::numeric_limits<double>::max();
+    best.price = std::numeric_limits<double>::infinity();
     best.to = v;
     for (Move move : moves_) {
       if (move.price >= best.price) break;
@@ -395,14 +414,9 @@ class Decimator {
       best = move;
       best.price = *price;
     }
-    ++best_[v].stamp;
-    if (best.to == v) {
-      best_[v].to = v;
-      best_[v].across = kNoTwin;
-      return false;
-    }
-    best_[v] = {static_cast<float>(best.price), best_[v].stamp, best.to, best.across, true};
-    return true;
+    const bool least = !moves_.empty() && best.to == moves_[0].to;
+    best_[v] = {static_cast<float>(best.price), best.to, best.across, true, least};
+    return best.to != v;
   }
 
   /// The exact price of a collapse; nothing where it is not allowed.
@@ -509,6 +523,7 @@ class Decimator {
     kinds_[v] = Kind::kLocked;
     removed_.reattach(kept_);
     quadrics_[u] += quadrics_[v];
+    own_[u] = quadrics_[u].at(position(u));
     const float before = sequence_.prices.empty() ? 0.0f : sequence_.prices.back();
     sequence_.collapses.push_back({v, u});
     sequence_.prices.push_back(std::max(before, price));
@@ -525,17 +540,16 @@ class Decimator {
       if (aims_at(b, u)) ring_.push_back(b);
     });
     ring_.push_back(u);
-    for (std::uint16_t& w : ring_) w = first_of(w);
-    std::sort(ring_.begin(), ring_.end());
-    ring_.erase(std::unique(ring_.begin(), ring_.end()), ring_.end());
-    for (const std::uint16_t w : ring_) {
+    ++mark_;
+    for (const std::uint16_t neighbour : ring_) {
+      const std::uint16_t w = first_of(neighbour);
+      if (std::exchange(marks_[w], mark_) == mark_) continue;
       Best& best = best_[w];
       const bool known = w != first_of(u) && best.to != w && !aims_at(w, u) && !aims_at(w, v);
       if (kinds_[w] != Kind::kInside || !known) {
         estimate(w);
       } else if (const auto price = static_cast<float>(price_of(w, u)); price < best.price) {
-        best = {price, best.stamp + 1, u, kNoTwin, false};
-        queue_.emplace(best.price, w, best.stamp);
+        queue(w, {price, u, kNoTwin, false, best.least});
       } else {
         best.exact = false;
       }
@@ -556,6 +570,7 @@ class Decimator {
   std::vector<std::uint32_t> next_;   // of each corner: the vertex' next one
   std::vector<Kind> kinds_;
   std::vector<Quadric> quadrics_;
+  std::vector<double> own_;  // of each vertex: its quadric there
   std::vector<Best> best_;
   std::vector<std::uint32_t> marks_;
   std::uint32_t mark_ = 0;

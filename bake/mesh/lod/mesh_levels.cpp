@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <numeric>
 #include <span>
@@ -15,7 +14,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/mesh/lod/chunk_decimate.hpp"
-#include "bake/mesh/lod/surface_distance.hpp"
+#include "bake/mesh/lod/level_map.hpp"
 #include "bake/parallel.hpp"
 
 namespace modar {
@@ -309,38 +308,6 @@ Cut cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequen
   return cut;
 }
 
-/// A triangle near a point, by a walk over nearer and nearer neighbours; around a vertex or along
-/// an edge that is nearest, over some equally near ones.
-std::uint32_t walk_to(const LevelSurface& surface, const glm::dvec3& point, std::uint32_t start) {
-  constexpr double kEqual = 1e-9;  // relative: rounding tells equal distances apart
-  constexpr int kMostEqual = 12;   // twice the triangles of a usual fan
-  std::uint32_t best_triangle = start;
-  std::uint32_t at = start;
-  std::uint32_t before = kNoIndex;
-  double best = distance_square(point, surface.triangle(at));
-  for (int equal = 0; equal < kMostEqual && best > 0;) {
-    std::uint32_t next = kNoIndex;
-    double least = best * (1 + kEqual);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint32_t beside = surface.neighbour(at, i);
-      if (beside == kNoIndex || beside == before) continue;
-      const double distance = distance_square(point, surface.triangle(beside));
-      if (distance > least) continue;
-      least = distance;
-      next = beside;
-    }
-    if (next == kNoIndex) break;
-    before = at;
-    at = next;
-    equal = least < best * (1 - kEqual) ? 0 : equal + 1;
-    if (least < best) {
-      best = least;
-      best_triangle = at;
-    }
-  }
-  return best_triangle;
-}
-
 std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> indices,
                                                const std::vector<std::uint16_t>& become) {
   std::vector<std::uint16_t> result;
@@ -353,17 +320,14 @@ std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> in
   return result;
 }
 
-/// For each vertex a triangle of the coarser surface near it; kNoIndex for vertices of no triangle,
-/// and for those that have no triangle in `wanted`, where that is not empty.
+/// For each vertex a triangle of the coarser surface near it; kNoIndex for vertices of no triangle.
 std::vector<std::uint32_t> nearby_triangles(const LevelSurface& surface,
                                             std::span<const glm::dvec3> positions,
-                                            const std::vector<std::uint16_t>& become,
-                                            std::span<const std::uint32_t> wanted) {
+                                            const std::vector<std::uint16_t>& become) {
   std::vector<std::uint32_t> nearby = surface.triangles_of_vertices();
   for (std::size_t v = 0; v < positions.size(); ++v) {
     if (become[v] == v || nearby[become[v]] == kNoIndex) continue;
-    if (!wanted.empty() && wanted[v] == kNoIndex) continue;
-    nearby[v] = walk_to(surface, positions[v], nearby[become[v]]);
+    nearby[v] = surface.walk(positions[v], nearby[become[v]]);
   }
   return nearby;
 }
@@ -388,39 +352,13 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
     const std::uint16_t* t = &surface.indices()[3 * std::size_t{nearby[v]}];
     double shift = shift_on(v, {t[0], t[1], t[2]});
     if (shift > limit) {
-      surface.tree().nearest(vertices.positions[v]);
-      shift = std::min(shift, shift_on(v, surface.tree().last_triangle()));
+      t = surface.corners(surface.nearest(vertices.positions[v]).triangle);
+      shift = std::min(shift, shift_on(v, {t[0], t[1], t[2]}));
     }
     greatest = std::max(greatest, shift);
   }
   return greatest;
 }
-
-/// Of a level's error: a level before it that is off by no more is measured against in the place of
-/// level 0, and its error added. Greater ones spare time (a quarter of the triangles is a quarter
-/// of it) and loosen the bound by as much. Set by hand.
-constexpr double kStandIn = 0.25;
-/// A level is measured against one of so many times its triangles at most, whatever that is off by:
-/// on rough surfaces no level is a stand-in for level 0 by its error, and each would be measured
-/// against all of its triangles. Set by hand.
-constexpr std::size_t kStandInTriangles = 8;
-
-/// A level as later ones are measured against it.
-struct MeasuredLevel {
-  std::vector<std::uint16_t> indices;
-  LevelSurface surface;
-  std::vector<std::uint32_t> triangles;  ///< of its vertices
-  double error = 0;
-
-  MeasuredLevel(std::span<const glm::dvec3> positions, std::vector<std::uint16_t> all, double off)
-      : indices(std::move(all)),
-        surface(positions, indices),
-        triangles(surface.triangles_of_vertices()),
-        error(off) {}
-  // The surface refers to the indices.
-  MeasuredLevel(const MeasuredLevel&) = delete;
-  MeasuredLevel& operator=(const MeasuredLevel&) = delete;
-};
 
 /// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut.
 void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkGrid& grid,
@@ -431,9 +369,9 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
   const std::vector<glm::dvec2> texels =
       texels_of(mesh, chunk, positions, options.texture_sides, limits);
   const std::span<const std::uint16_t> finest = merged.indices_of(chunk);
-  std::deque<MeasuredLevel> levels;
-  levels.emplace_back(positions, std::vector(finest.begin(), finest.end()), 0.0);
-  std::size_t stand_in = 0;
+  LevelSurface surface(positions, finest);
+  const std::vector<std::uint32_t> of_finest = surface.triangles_of_vertices();
+  double error = 0;
   std::size_t before = chunk.indices.size() / 3;
   for (std::uint32_t step = 0; step < cuts.size(); ++step) {
     const std::size_t collapses = collapses_at(sequence, cuts[step]);
@@ -444,30 +382,15 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
     before = count;
     const std::vector<std::uint16_t> become =
         collapsed_vertices(sequence, collapses, positions.size());
-    double error = levels.back().error;
-    while (stand_in + 1 < levels.size() &&
-           (levels[stand_in + 1].error <= kStandIn * error ||
-            levels[stand_in].indices.size() / 3 > kStandInTriangles * count)) {
-      ++stand_in;
-    }
-    MeasuredLevel& near = levels[stand_in];
-    MeasuredLevel& coarser =
-        levels.emplace_back(positions, collapsed_triangles(finest, become), 0.0);
-    // The slide of a texture is measured at every vertex that is gone.
-    const std::vector<std::uint32_t> nearby =
-        nearby_triangles(coarser.surface, positions, become,
-                         texels.empty() ? std::span<const std::uint32_t>(near.triangles)
-                                        : std::span<const std::uint32_t>());
-    double off = std::max(0.0, error - near.error);
-    off = surface_distance(near.surface, coarser.surface, nearby, off);
-    off = surface_distance(coarser.surface, near.surface, near.triangles, off);
-    error = std::max(error, near.error + off);
     ChunkLevel& level = chunk.coarser.emplace_back();
+    level.indices = collapsed_triangles(finest, become);
+    LevelSurface coarser(positions, level.indices);
+    const std::vector<std::uint32_t> nearby = nearby_triangles(coarser, positions, become);
+    error = level_distance(surface, coarser, nearby, of_finest, error);
     level.halvings = step + 1;
-    level.uv_shift = greatest_uv_shift(coarser.surface, {positions, texels}, become, nearby,
-                                       limits.max_uv_shift);
-    level.error = coarser.error = error;
-    level.indices = coarser.indices;
+    level.uv_shift =
+        greatest_uv_shift(coarser, {positions, texels}, become, nearby, limits.max_uv_shift);
+    level.error = error;
     split_normals(mesh, chunk, merged, positions, level.indices);
   }
 }

@@ -28,9 +28,8 @@ inline constexpr std::uint32_t kMaxLevels = 12;
 /// their normals only are one meanwhile where most do (flat shading): corners of coarser triangles
 /// take the normal that is nearest to the triangle's. A level's error bounds the
 /// distance between it and level 0, both as the device decodes them, measured from either to the
-/// other (see surface_distance()), or to a level between them, whose error is then added. Where
-/// vertices of level 0 are gone, the texture has slid by no more than 1 % of the chunk's diagonal.
-/// Figures go to report.levels.
+/// other (see level_distance()). Where vertices of level 0 are gone, the texture has slid by no
+/// more than 1 % of the chunk's diagonal. Figures go to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
 }  // namespace modar

@@ -1,0 +1,405 @@
+// Places vertices, traces edges, fills triangles, and looks which coarse triangles are covered.
+#include "bake/mesh/lod/level_map.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <queue>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include <glm/geometric.hpp>
+
+#include "bake/mesh/lod/surface_distance.hpp"
+
+namespace modar {
+namespace {
+
+/// Coarse triangles that the line of one edge goes through. Set by hand: a sixteenth of the
+/// triangles is seldom five.
+constexpr std::uint8_t kMostSteps = 12;
+constexpr std::uint8_t kUntraced = 0xFF;
+constexpr std::uint16_t kNoVertex = 0xFFFF;
+
+/// Where a vertex comes to lie on the coarser level.
+struct Place {
+  glm::dvec3 point{0.0};
+  double square = 0;  ///< of its distance from the vertex
+  std::uint32_t triangle = kNoIndex;
+  /// What it lies on: a vertex, an edge or all corners of a triangle; the others are kNoVertex.
+  std::array<std::uint16_t, 3> on{kNoVertex, kNoVertex, kNoVertex};
+
+  [[nodiscard]] bool at_vertex() const { return on[1] == kNoVertex; }
+};
+
+/// The line that an edge becomes: from triangle to triangle, each adjacent to the one before.
+struct Path {
+  double square = 0;  ///< greatest, of the distance of its crossings from the edge
+  std::uint32_t first = 0;
+  std::uint32_t along = kNoIndex;  ///< the corner of the coarse edge that it runs along
+  std::uint8_t count = kUntraced;
+};
+
+/// The coarse triangles that the outline of a triangle goes through, in a ring.
+class Ring {
+ public:
+  void add(std::uint32_t triangle) { all_[count_++] = triangle; }
+  [[nodiscard]] bool has(std::uint32_t triangle) const {
+    return std::find(all_.begin(), all_.begin() + count_, triangle) != all_.begin() + count_;
+  }
+  [[nodiscard]] std::span<const std::uint32_t> triangles() const { return {all_.data(), count_}; }
+
+  /// Are they connected like a tree, by the edges and vertices that the outline goes over from one
+  /// to the next? Then it can be drawn together to a point without leaving them.
+  [[nodiscard]] bool is_tree() const {
+    const auto first = all_.begin();
+    if (std::all_of(first, first + count_, [&](std::uint32_t t) { return t == *first; })) {
+      return true;
+    }
+    std::array<std::uint64_t, kMost> links;
+    std::array<std::uint32_t, kMost> nodes;
+    std::size_t link_count = 0;
+    std::size_t node_count = 0;
+    const auto note = [](auto& all, std::size_t& count, auto value) {
+      if (std::find(all.begin(), all.begin() + count, value) == all.begin() + count) {
+        all[count++] = value;
+      }
+    };
+    for (std::size_t i = 0; i < count_; ++i) {
+      const std::uint32_t a = all_[i];
+      const std::uint32_t b = all_[i + 1 == count_ ? 0 : i + 1];
+      note(nodes, node_count, a);
+      if (a != b) note(links, link_count, std::uint64_t{std::min(a, b)} << 32 | std::max(a, b));
+    }
+    return link_count + 1 == node_count;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 3 * kMostSteps;
+  std::array<std::uint32_t, kMost> all_{};
+  std::size_t count_ = 0;
+};
+
+class LevelMap {
+ public:
+  LevelMap(const LevelSurface& fine, LevelSurface& coarse, std::vector<std::uint32_t>& nearby,
+           double least)
+      : fine_(fine),
+        coarse_(coarse),
+        least_(least),
+        bound_(least),
+        places_(fine.vertices()),
+        paths_(fine.indices().size()),
+        mapped_(fine.triangles(), 0),
+        settled_(fine.triangles(), 0),
+        far_(coarse.triangles(), 0),
+        torn_(coarse.triangles(), 0),
+        covered_(coarse.triangles(), 0) {
+    for (const std::uint16_t v : fine.indices()) {
+      if (places_[v].triangle == kNoIndex && nearby[v] != kNoIndex) place(v, nearby[v]);
+    }
+    find_farthest(nearby);
+    for (std::uint32_t c = 0; c < paths_.size(); ++c) {
+      if (first_of(c) == c) trace(c);
+    }
+    for (std::uint32_t t = 0; t < fine.triangles(); ++t) map(t);
+    spread();
+  }
+
+  [[nodiscard]] double bound() const { return bound_; }
+  [[nodiscard]] double found() const { return found_; }
+  /// Of each triangle of the finer and of the coarser level: does the bound hold for it?
+  [[nodiscard]] std::span<const std::uint8_t> settled() const { return settled_; }
+  [[nodiscard]] std::span<const std::uint8_t> covered() const { return covered_; }
+
+ private:
+  [[nodiscard]] double limit() const { return std::max({kDistanceFloor, least_, kSlack * found_}); }
+  /// The one of an edge's two corners that has its path.
+  [[nodiscard]] std::uint32_t first_of(std::uint32_t corner) const {
+    return std::min(corner, fine_.opposite(corner));
+  }
+  [[nodiscard]] bool has_corner(std::uint32_t triangle, std::uint16_t vertex) const {
+    const std::uint16_t* v = coarse_.corners(triangle);
+    return v[0] == vertex || v[1] == vertex || v[2] == vertex;
+  }
+  [[nodiscard]] bool is_on(const Place& place, std::uint32_t triangle) const {
+    return triangle == place.triangle ||
+           std::all_of(place.on.begin(), place.on.end(),
+                       [&](std::uint16_t v) { return v == kNoVertex || has_corner(triangle, v); });
+  }
+
+  void place(std::uint16_t vertex, std::uint32_t triangle) {
+    Place& place = places_[vertex];
+    place.triangle = triangle;
+    const std::uint16_t* v = coarse_.corners(triangle);
+    if (has_corner(triangle, vertex)) {
+      place.point = fine_.position(vertex);
+      place.square = 0;
+      place.on = {vertex, kNoVertex, kNoVertex};
+      return;
+    }
+    const std::array<glm::dvec3, 3> t = coarse_.triangle(triangle);
+    const Foot foot = nearest_foot(fine_.position(vertex), t);
+    place.point = t[0] + foot.b * (t[1] - t[0]) + foot.c * (t[2] - t[0]);
+    const glm::dvec3 off = fine_.position(vertex) - place.point;
+    place.square = glm::dot(off, off);
+    std::size_t count = 0;
+    place.on.fill(kNoVertex);
+    if (foot.b + foot.c < 1) place.on[count++] = v[0];
+    if (foot.b > 0) place.on[count++] = v[1];
+    if (foot.c > 0) place.on[count++] = v[2];
+  }
+
+  /// Finds how far the farthest vertex is off, and better places for those that seem to be farther:
+  /// near their places first, then among all triangles.
+  void find_farthest(std::vector<std::uint32_t>& nearby) {
+    struct Far {
+      double square;
+      std::uint16_t vertex;
+      bool near_known;
+      bool operator<(const Far& other) const {
+        return std::tie(square, vertex) < std::tie(other.square, other.vertex);
+      }
+    };
+    std::priority_queue<Far> far;
+    for (std::uint32_t v = 0; v < places_.size(); ++v) {
+      if (places_[v].square <= limit() * limit()) continue;
+      far.push({places_[v].square, static_cast<std::uint16_t>(v), false});
+    }
+    while (!far.empty() && far.top().square > limit() * limit()) {
+      const auto [square, v, near_known] = far.top();
+      far.pop();
+      const NearTriangle nearest = near_known
+                                       ? coarse_.nearest(fine_.position(v), found_ * found_)
+                                       : coarse_.nearest_around(fine_.position(v), nearby[v]);
+      nearby[v] = nearest.triangle;
+      place(v, nearest.triangle);
+      if (near_known) {
+        found_ = std::max(found_, std::sqrt(nearest.square));
+      } else {
+        far.push({nearest.square, v, true});
+      }
+    }
+  }
+
+  /// Finds the path of an edge.
+  void trace(std::uint32_t corner) {
+    const std::uint16_t a = fine_.indices()[corner];
+    const std::uint16_t b = fine_.indices()[next_corner(corner)];
+    const Place& from = places_[a];
+    const Place& to = places_[b];
+    if (from.triangle == kNoIndex || to.triangle == kNoIndex) return;
+    Path& path = paths_[corner];
+    path.first = static_cast<std::uint32_t>(steps_.size());
+    if (from.at_vertex() && to.at_vertex()) {
+      if (from.on[0] == to.on[0]) {
+        path.count = 0;
+        return;
+      }
+      path.along = coarse_.edge(from.on[0], to.on[0]);
+      if (path.along == kNoIndex) path.along = coarse_.edge(to.on[0], from.on[0]);
+      if (path.along != kNoIndex) {
+        path.count = 1;
+        return;
+      }
+    }
+    // From a vertex, the line could start in any triangle around it.
+    bool backwards = from.at_vertex();
+    path.square = backwards ? walk(to, from, a, b) : walk(from, to, a, b);
+    if (path.square < 0) {
+      steps_.resize(path.first);
+      backwards = !backwards;
+      path.square = backwards ? walk(to, from, a, b) : walk(from, to, a, b);
+    }
+    if (path.square < 0) {
+      steps_.resize(path.first);
+      return;
+    }
+    path.count = static_cast<std::uint8_t>(steps_.size() - path.first);
+    if (backwards) std::reverse(steps_.begin() + path.first, steps_.end());
+  }
+
+  /// Appends the triangles from one place to another, along a plane that stands on the first one.
+  /// Returns the greatest squared distance of a crossing from the edge from a to b; below zero
+  /// where it does not get there.
+  double walk(const Place& from, const Place& to, std::uint16_t a, std::uint16_t b) {
+    std::uint32_t at = from.triangle;
+    steps_.push_back(at);
+    if (is_on(to, at)) return 0;
+    const std::array<glm::dvec3, 3> t = coarse_.triangle(at);
+    const glm::dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const glm::dvec3 left = glm::cross(normal, to.point - from.point);
+    const double origin = glm::dot(left, from.point);
+    const glm::dvec3& begin = fine_.position(a);
+    const glm::dvec3 line = fine_.position(b) - begin;
+    const double length = glm::dot(line, line);
+    // It leaves over the edge that goes from its right to its left.
+    std::array<double, 3> sides;
+    for (std::size_t i = 0; i < 3; ++i) sides[i] = glm::dot(left, t[i]) - origin;
+    std::uint32_t i = 0;
+    while (i < 3 && !(sides[i] <= 0 && sides[(i + 1) % 3] > 0)) ++i;
+    if (i == 3) return -1;
+    std::uint32_t corner = 3 * at + i;
+    double right_side = sides[i];
+    double left_side = sides[(i + 1) % 3];
+    double greatest = 0;
+    for (std::uint8_t steps = 1; steps < kMostSteps; ++steps) {
+      const glm::dvec3& right_end = coarse_.position(coarse_.indices()[corner]);
+      const glm::dvec3& left_end = coarse_.position(coarse_.indices()[next_corner(corner)]);
+      const double share = right_side / (right_side - left_side);
+      const glm::dvec3 off = right_end + share * (left_end - right_end) - begin;
+      const double there = length > 0 ? std::clamp(glm::dot(off, line) / length, 0.0, 1.0) : 0.0;
+      const glm::dvec3 apart = off - there * line;
+      greatest = std::max(greatest, glm::dot(apart, apart));
+      const std::uint32_t back = coarse_.opposite(corner);
+      if (back == kNoIndex) return -1;
+      const std::uint16_t last = coarse_.indices()[next_corner(next_corner(corner))];
+      at = back / 3;
+      steps_.push_back(at);
+      if (is_on(to, at)) return greatest;
+      // Over the edge from the right end to the third vertex, or from that to the left end.
+      corner = next_corner(back);
+      const std::uint16_t third = coarse_.indices()[next_corner(corner)];
+      if (third == last) return -1;
+      const double side = glm::dot(left, coarse_.position(third)) - origin;
+      if (side > 0) {
+        left_side = side;
+      } else {
+        right_side = side;
+        corner = next_corner(corner);
+      }
+    }
+    return -1;
+  }
+
+  [[nodiscard]] const Path& path_of(std::uint32_t corner) const { return paths_[first_of(corner)]; }
+
+  /// Adds what a triangle's edge goes through.
+  void add_to(Ring& ring, std::uint32_t corner) const {
+    const Path& path = path_of(corner);
+    const bool forwards = first_of(corner) == corner;
+    if (path.along != kNoIndex) {
+      // Between two triangles, it is in both.
+      const std::uint32_t beyond = coarse_.opposite(path.along);
+      const bool other = beyond != kNoIndex && (ring.has(beyond / 3) || !forwards);
+      ring.add(other && !ring.has(path.along / 3) ? beyond / 3 : path.along / 3);
+      return;
+    }
+    for (std::uint8_t i = 0; i < path.count; ++i) {
+      ring.add(steps_[path.first + (forwards ? i : path.count - 1u - i)]);
+    }
+  }
+
+  /// Maps a triangle to what its outline encloses, if it can be.
+  void map(std::uint32_t t) {
+    // Edges along coarse ones last: they may choose.
+    Ring ring;
+    double square = 0;
+    std::uint32_t begin = 0;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const Path& path = path_of(3 * t + k);
+      if (path.count == kUntraced) return;
+      square = std::max({square, path.square, places_[fine_.corners(t)[k]].square});
+      if (path.along != kNoIndex) begin = k + 1;
+    }
+    for (std::uint32_t k = begin; k < begin + 3; ++k) add_to(ring, 3 * t + k % 3);
+    if (!ring.is_tree() && !fan(ring, t, square)) return;
+    mapped_[t] = 1;
+    if (square <= limit() * limit()) {
+      settled_[t] = 1;
+      bound_ = std::max(bound_, std::sqrt(square));
+    } else {
+      for (const std::uint32_t at : ring.triangles()) far_[at] = 1;
+    }
+  }
+
+  /// Have all triangles of the ring a common vertex? Then the triangle is mapped to its fan, and
+  /// some point of it to that vertex.
+  bool fan(const Ring& ring, std::uint32_t t, double& square) const {
+    const std::span<const std::uint32_t> all = ring.triangles();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint16_t hub = coarse_.corners(all[0])[k];
+      if (!std::all_of(all.begin(), all.end(),
+                       [&](std::uint32_t at) { return has_corner(at, hub); })) {
+        continue;
+      }
+      square = std::max(square, distance_square(coarse_.position(hub), fine_.triangle(t)));
+      return true;
+    }
+    return false;
+  }
+
+  /// Finds the coarse triangles that are covered. Where no border of what is mapped passes, a
+  /// triangle is covered like its neighbours; and once, at a border of both levels.
+  void spread() {
+    std::vector<std::int8_t> borders(coarse_.indices().size(), 0);
+    std::vector<std::uint8_t> walls(coarse_.indices().size(), 0);
+    for (std::uint32_t c = 0; c < paths_.size(); ++c) {
+      if (mapped_[c / 3] == 0) continue;
+      const std::uint32_t beyond = fine_.opposite(c);
+      if (beyond != kNoIndex && mapped_[beyond / 3] != 0) continue;
+      const Path& path = path_of(c);
+      if (path.along == kNoIndex) {
+        for (std::uint8_t i = 0; i < path.count; ++i) torn_[steps_[path.first + i]] = 1;
+        continue;
+      }
+      walls[path.along] = 1;
+      if (coarse_.opposite(path.along) != kNoIndex) walls[coarse_.opposite(path.along)] = 1;
+      const bool same = places_[fine_.indices()[c]].on[0] == coarse_.indices()[path.along];
+      borders[path.along] = static_cast<std::int8_t>(borders[path.along] + (same ? 1 : -1));
+    }
+    std::vector<std::uint32_t> waiting;
+    const auto cover = [&](std::uint32_t t) {
+      if (torn_[t] != 0 || covered_[t] != 0) return;
+      covered_[t] = 1;
+      waiting.push_back(t);
+    };
+    for (std::uint32_t c = 0; c < borders.size(); ++c) {
+      if (borders[c] != 0 && is_border(c)) cover(c / 3);
+    }
+    while (!waiting.empty()) {
+      const std::uint32_t t = waiting.back();
+      waiting.pop_back();
+      for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) {
+        const std::uint32_t beyond = coarse_.opposite(c);
+        if (beyond != kNoIndex && walls[c] == 0) cover(beyond / 3);
+      }
+    }
+    for (std::uint32_t t = 0; t < far_.size(); ++t) {
+      if (far_[t] != 0) covered_[t] = 0;
+    }
+  }
+
+  /// Has the coarse edge this triangle only?
+  [[nodiscard]] bool is_border(std::uint32_t corner) const {
+    const std::uint16_t a = coarse_.indices()[corner];
+    const std::uint16_t b = coarse_.indices()[next_corner(corner)];
+    return coarse_.edge(a, b) == corner && !coarse_.has_edge(b, a);
+  }
+
+  const LevelSurface& fine_;
+  LevelSurface& coarse_;
+  double least_;
+  double found_ = 0;  ///< a distance that a vertex has
+  double bound_;
+  std::vector<Place> places_;         // of each vertex
+  std::vector<Path> paths_;           // of each corner of the finer level, see first_of()
+  std::vector<std::uint32_t> steps_;  // of all paths
+  std::vector<std::uint8_t> mapped_;  // of each triangle of the finer level: without a tear
+  std::vector<std::uint8_t> settled_;
+  std::vector<std::uint8_t> far_;   // of each of the coarser: is one mapped there that is far off?
+  std::vector<std::uint8_t> torn_;  // does a border pass through it?
+  std::vector<std::uint8_t> covered_;
+};
+
+}  // namespace
+
+double level_distance(LevelSurface& fine, LevelSurface& coarse, std::vector<std::uint32_t> nearby,
+                      const std::vector<std::uint32_t>& of_fine, double least) {
+  const LevelMap map(fine, coarse, nearby, least);
+  const double up = surface_distance(fine, coarse, nearby, map.bound(), map.found(), map.settled());
+  return surface_distance(coarse, fine, of_fine, up, map.found(), map.covered());
+}
+
+}  // namespace modar

@@ -1,0 +1,144 @@
+// Corners sorted by vertex, and walks over the triangles.
+#include "bake/mesh/lod/level_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <glm/geometric.hpp>
+
+namespace modar {
+namespace {
+
+/// Points whose nearest triangle is found among all: most surfaces need a few, for which a tree
+/// would take longer to build.
+constexpr int kScans = 12;
+/// Steps of a walk; what needs more is answered by where it has got to. Set by hand: three levels
+/// off, a walk takes about five.
+constexpr int kMostSteps = 24;
+
+}  // namespace
+
+LevelSurface::LevelSurface(std::span<const glm::dvec3> positions,
+                           std::span<const std::uint16_t> indices)
+    : positions_(positions),
+      indices_(indices),
+      begins_(positions.size() + 2, 0),
+      corners_(indices.size()),
+      ends_(indices.size()),
+      opposites_(indices.size(), kNoIndex) {
+  for (const std::uint16_t v : indices) ++begins_[v + std::size_t{2}];
+  std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
+  for (std::uint32_t t = 0; t < indices.size(); t += 3) {
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t place = begins_[indices[t + k] + std::size_t{1}]++;
+      corners_[place] = t + k;
+      ends_[place] = indices[t + (k == 2 ? 0 : k + 1)];
+    }
+  }
+  for (std::uint32_t v = 0; v < positions.size(); ++v) {
+    for (std::uint32_t i = begins_[v]; i < begins_[v + 1]; ++i) {
+      if (ends_[i] < v) continue;
+      const std::uint32_t back = edge(ends_[i], static_cast<std::uint16_t>(v));
+      if (back == kNoIndex || edge(static_cast<std::uint16_t>(v), ends_[i]) == kNoIndex) continue;
+      opposites_[corners_[i]] = back;
+      opposites_[back] = corners_[i];
+    }
+  }
+}
+
+std::uint32_t LevelSurface::edge(std::uint16_t from, std::uint16_t to) const {
+  std::uint32_t found = kNoIndex;
+  for (std::uint32_t i = begins_[from]; i < begins_[from + std::size_t{1}]; ++i) {
+    if (ends_[i] != to) continue;
+    if (found != kNoIndex) return kNoIndex;
+    found = corners_[i];
+  }
+  return found;
+}
+
+bool LevelSurface::has_edge(std::uint16_t from, std::uint16_t to) const {
+  const auto begin = ends_.begin() + begins_[from];
+  const auto end = ends_.begin() + begins_[from + std::size_t{1}];
+  return std::find(begin, end, to) != end;
+}
+
+std::uint32_t LevelSurface::find(std::uint16_t a, std::uint16_t b, std::uint16_t c) const {
+  for (std::uint32_t i = begins_[a]; i < begins_[a + std::size_t{1}]; ++i) {
+    if (ends_[i] != b) continue;
+    if (indices_[next_corner(next_corner(corners_[i]))] == c) return corners_[i] / 3;
+  }
+  return kNoIndex;
+}
+
+std::vector<std::uint32_t> LevelSurface::triangles_of_vertices() const {
+  std::vector<std::uint32_t> result(positions_.size(), kNoIndex);
+  for (std::size_t c = 0; c < indices_.size(); ++c) {
+    result[indices_[c]] = static_cast<std::uint32_t>(c / 3);
+  }
+  return result;
+}
+
+std::uint32_t LevelSurface::walk(const glm::dvec3& point, std::uint32_t start) const {
+  std::uint32_t at = start;
+  std::uint32_t before = kNoIndex;
+  for (int steps = 0; steps < kMostSteps; ++steps) {
+    const std::array<glm::dvec3, 3> t = triangle(at);
+    const glm::dvec3 sides[3] = {t[1] - t[0], t[2] - t[1], t[0] - t[2]};
+    const glm::dvec3 normal = glm::cross(sides[0], sides[1]);
+    // Beyond which edge is it farthest?
+    std::uint32_t next = kNoIndex;
+    double farthest = 0;
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const double beyond = glm::dot(glm::cross(point - t[i], sides[i]), normal);
+      if (beyond <= 0) continue;
+      const double square = beyond * beyond / glm::dot(sides[i], sides[i]);
+      if (square <= farthest) continue;
+      farthest = square;
+      next = neighbour(at, i);
+    }
+    // Beyond the edge that it came over, too: that edge is near.
+    if (next == kNoIndex || next == before) break;
+    before = at;
+    at = next;
+  }
+  return at;
+}
+
+NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t start) const {
+  NearTriangle best{distance_square(point, triangle(start)), start};
+  for (int steps = 0; steps < kMostSteps; ++steps) {
+    const std::uint32_t at = best.triangle;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint16_t v = indices_[3 * std::size_t{at} + k];
+      for (std::uint32_t i = begins_[v]; i < begins_[v + std::size_t{1}]; ++i) {
+        const std::uint32_t beside = corners_[i] / 3;
+        const double square = distance_square(point, triangle(beside), best.square);
+        if (square < best.square) best = {square, beside};
+      }
+    }
+    if (best.triangle == at) break;
+  }
+  return best;
+}
+
+NearTriangle LevelSurface::nearest(const glm::dvec3& point, double enough) {
+  NearTriangle found{std::numeric_limits<double>::infinity(), 0};
+  if (searches_ < kScans) {
+    ++searches_;
+    for (std::uint32_t t = 0; t < triangles() && found.square > enough; ++t) {
+      const double square = distance_square(point, triangle(t), found.square);
+      if (square < found.square) found = {square, t};
+    }
+    return found;
+  }
+  if (!tree_) tree_ = std::make_unique<TriangleTree>(positions_, indices_);
+  found.square = tree_->nearest(point, enough);
+  const auto& [a, b, c] = tree_->last_triangle();
+  found.triangle = find(static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b),
+                        static_cast<std::uint16_t>(c));
+  return found;
+}
+
+}  // namespace modar

@@ -1,0 +1,85 @@
+// The triangles of one level of a chunk: which are adjacent, which is near a point. Internal to
+// lod.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "bake/import/source_model.hpp"
+#include "bake/mesh/triangle_tree.hpp"
+
+namespace modar {
+
+/// The next corner of the same triangle.
+constexpr std::uint32_t next_corner(std::uint32_t corner) {
+  return corner % 3 == 2 ? corner - 2 : corner + 1;
+}
+
+/// A triangle that is near a point, and the square of its distance.
+struct NearTriangle {
+  double square = 0;
+  std::uint32_t triangle = 0;
+};
+
+/// Triangles over some positions. A corner (3 t + i) stands for the edge from it to the next one.
+class LevelSurface {
+ public:
+  /// Of at least one triangle. Both spans are the caller's and must outlive it.
+  LevelSurface(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
+
+  [[nodiscard]] std::span<const std::uint16_t> indices() const { return indices_; }
+  [[nodiscard]] std::uint32_t triangles() const {
+    return static_cast<std::uint32_t>(indices_.size() / 3);
+  }
+  [[nodiscard]] std::size_t vertices() const { return positions_.size(); }
+  [[nodiscard]] const glm::dvec3& position(std::uint16_t vertex) const {
+    return positions_[vertex];
+  }
+  [[nodiscard]] const std::uint16_t* corners(std::uint32_t t) const {
+    return &indices_[3 * std::size_t{t}];
+  }
+  [[nodiscard]] std::array<glm::dvec3, 3> triangle(std::uint32_t t) const {
+    const std::uint16_t* at = corners(t);
+    return {positions_[at[0]], positions_[at[1]], positions_[at[2]]};
+  }
+  /// The corner of the same edge in the triangle beyond it; kNoIndex at a border, and where more
+  /// than two triangles meet or face differently.
+  [[nodiscard]] std::uint32_t opposite(std::uint32_t corner) const { return opposites_[corner]; }
+  /// The triangle beyond the edge from corner i to the next, kNoIndex as opposite().
+  [[nodiscard]] std::uint32_t neighbour(std::uint32_t t, std::uint32_t i) const {
+    const std::uint32_t corner = opposites_[3 * t + i];
+    return corner == kNoIndex ? kNoIndex : corner / 3;
+  }
+  /// The only corner whose edge goes from a vertex to another; kNoIndex where there is none or
+  /// several.
+  [[nodiscard]] std::uint32_t edge(std::uint16_t from, std::uint16_t to) const;
+  [[nodiscard]] bool has_edge(std::uint16_t from, std::uint16_t to) const;
+  /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
+  [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
+  /// A triangle of these vertices, in this order, from whichever it begins; kNoIndex: none.
+  [[nodiscard]] std::uint32_t find(std::uint16_t a, std::uint16_t b, std::uint16_t c) const;
+  /// A triangle near a point, by a walk from triangle to triangle.
+  [[nodiscard]] std::uint32_t walk(const glm::dvec3& point, std::uint32_t start) const;
+  /// The nearest one as far as those around it tell: the same walk, by distances.
+  [[nodiscard]] NearTriangle nearest_around(const glm::dvec3& point, std::uint32_t start) const;
+  /// The nearest of all; where some triangle is within `enough` (a square), any such one.
+  NearTriangle nearest(const glm::dvec3& point, double enough = 0);
+
+ private:
+  std::span<const glm::dvec3> positions_;
+  std::span<const std::uint16_t> indices_;
+  std::vector<std::uint32_t> begins_;   ///< of each vertex: where its corners begin in corners_
+  std::vector<std::uint32_t> corners_;  ///< by vertex
+  std::vector<std::uint16_t> ends_;     ///< of each of these: the vertex that its edge goes to
+  std::vector<std::uint32_t> opposites_;
+  int searches_ = 0;  ///< answered by looking at all triangles
+  std::unique_ptr<TriangleTree> tree_;
+};
+
+}  // namespace modar
