@@ -18,7 +18,7 @@ namespace {
 
 /// Coarse triangles that the line of one edge goes through. Set by hand: a sixteenth of the
 /// triangles is seldom five.
-constexpr std::uint8_t kMostSteps = 12;
+constexpr std::uint8_t kMostCrossed = 12;
 constexpr std::uint8_t kUntraced = 0xFF;
 constexpr std::uint16_t kNoVertex = 0xFFFF;
 
@@ -42,7 +42,7 @@ struct Path {
 };
 
 /// The coarse triangles that the outline of a triangle goes through, in a ring.
-class Ring {
+class Outline {
  public:
   void add(std::uint32_t triangle) { all_[count_++] = triangle; }
   [[nodiscard]] bool has(std::uint32_t triangle) const {
@@ -76,7 +76,7 @@ class Ring {
   }
 
  private:
-  static constexpr std::size_t kMost = 3 * kMostSteps;
+  static constexpr std::size_t kMost = 3 * kMostCrossed;
   std::array<std::uint32_t, kMost> all_{};
   std::size_t count_ = 0;
 };
@@ -244,7 +244,7 @@ class LevelMap {
     double right_side = sides[i];
     double left_side = sides[(i + 1) % 3];
     double greatest = 0;
-    for (std::uint8_t steps = 1; steps < kMostSteps; ++steps) {
+    for (std::uint8_t steps = 1; steps < kMostCrossed; ++steps) {
       const glm::dvec3& right_end = coarse_.position(coarse_.indices()[corner]);
       const glm::dvec3& left_end = coarse_.position(coarse_.indices()[next_corner(corner)]);
       const double share = right_side / (right_side - left_side);
@@ -276,7 +276,7 @@ class LevelMap {
   [[nodiscard]] const Path& path_of(std::uint32_t corner) const { return paths_[first_of(corner)]; }
 
   /// Adds what a triangle's edge goes through.
-  void add_to(Ring& ring, std::uint32_t corner) const {
+  void add_to(Outline& ring, std::uint32_t corner) const {
     const Path& path = path_of(corner);
     const bool forwards = first_of(corner) == corner;
     if (path.along != kNoIndex) {
@@ -294,7 +294,7 @@ class LevelMap {
   /// Maps a triangle to what its outline encloses, if it can be.
   void map(std::uint32_t t) {
     // Edges along coarse ones last: they may choose.
-    Ring ring;
+    Outline ring;
     double square = 0;
     std::uint32_t begin = 0;
     for (std::uint32_t k = 0; k < 3; ++k) {
@@ -316,7 +316,7 @@ class LevelMap {
 
   /// Have all triangles of the ring a common vertex? Then the triangle is mapped to its fan, and
   /// some point of it to that vertex.
-  bool fan(const Ring& ring, std::uint32_t t, double& square) const {
+  bool fan(const Outline& ring, std::uint32_t t, double& square) const {
     const std::span<const std::uint32_t> all = ring.triangles();
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint16_t hub = coarse_.corners(all[0])[k];

@@ -16,7 +16,7 @@ namespace {
 constexpr int kScans = 12;
 /// Steps of a walk; what needs more is answered by where it has got to. Set by hand: three levels
 /// off, a walk takes about five.
-constexpr int kMostSteps = 24;
+constexpr int kMostWalked = 24;
 
 }  // namespace
 
@@ -83,7 +83,7 @@ std::vector<std::uint32_t> LevelSurface::triangles_of_vertices() const {
 std::uint32_t LevelSurface::walk(const glm::dvec3& point, std::uint32_t start) const {
   std::uint32_t at = start;
   std::uint32_t before = kNoIndex;
-  for (int steps = 0; steps < kMostSteps; ++steps) {
+  for (int steps = 0; steps < kMostWalked; ++steps) {
     const std::array<glm::dvec3, 3> t = triangle(at);
     const glm::dvec3 sides[3] = {t[1] - t[0], t[2] - t[1], t[0] - t[2]};
     const glm::dvec3 normal = glm::cross(sides[0], sides[1]);
@@ -108,7 +108,7 @@ std::uint32_t LevelSurface::walk(const glm::dvec3& point, std::uint32_t start) c
 
 NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t start) const {
   NearTriangle best{distance_square(point, triangle(start)), start};
-  for (int steps = 0; steps < kMostSteps; ++steps) {
+  for (int steps = 0; steps < kMostWalked; ++steps) {
     const std::uint32_t at = best.triangle;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint16_t v = indices_[3 * std::size_t{at} + k];
