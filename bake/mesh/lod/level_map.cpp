@@ -44,40 +44,45 @@ struct Path {
 /// The coarse triangles that the outline of a triangle goes through, in a ring.
 class Outline {
  public:
-  void add(std::uint32_t triangle) { all_[count_++] = triangle; }
+  void add(std::uint32_t triangle) {
+    if (count_ == 0 || all_[count_ - 1] != triangle) all_[count_++] = triangle;
+  }
   [[nodiscard]] bool has(std::uint32_t triangle) const {
     return std::find(all_.begin(), all_.begin() + count_, triangle) != all_.begin() + count_;
   }
   [[nodiscard]] std::span<const std::uint32_t> triangles() const { return {all_.data(), count_}; }
 
-  /// Are they connected like a tree, by the edges and vertices that the outline goes over from one
-  /// to the next? Then it can be drawn together to a point without leaving them.
-  [[nodiscard]] bool is_tree() const {
-    const auto first = all_.begin();
-    if (std::all_of(first, first + count_, [&](std::uint32_t t) { return t == *first; })) {
-      return true;
-    }
-    std::array<std::uint64_t, kMost> links;
-    std::array<std::uint32_t, kMost> nodes;
-    std::size_t link_count = 0;
-    std::size_t node_count = 0;
-    const auto note = [](auto& all, std::size_t& count, auto value) {
-      if (std::find(all.begin(), all.begin() + count, value) == all.begin() + count) {
-        all[count++] = value;
+  /// What is left where it does not go back the way that it came: at most two where it can be drawn
+  /// together to a point. Coarse triangles meet in a vertex or an edge, so there is one way.
+  [[nodiscard]] Outline core() const {
+    Outline left;
+    for (const std::uint32_t t : triangles()) {
+      if (left.count_ > 1 && left.all_[left.count_ - 2] == t) {
+        --left.count_;
+      } else {
+        left.add(t);
       }
-    };
-    for (std::size_t i = 0; i < count_; ++i) {
-      const std::uint32_t a = all_[i];
-      const std::uint32_t b = all_[i + 1 == count_ ? 0 : i + 1];
-      note(nodes, node_count, a);
-      if (a != b) note(links, link_count, std::uint64_t{std::min(a, b)} << 32 | std::max(a, b));
     }
-    return link_count + 1 == node_count;
+    // The same where its end meets its beginning.
+    std::size_t first = 0;
+    std::size_t& end = left.count_;
+    while (end > first + 1) {
+      if (left.all_[end - 1] == left.all_[first] || left.all_[end - 2] == left.all_[first]) {
+        --end;
+      } else if (left.all_[end - 1] == left.all_[first + 1]) {
+        ++first;
+      } else {
+        break;
+      }
+    }
+    std::copy(left.all_.begin() + first, left.all_.begin() + end, left.all_.begin());
+    end -= first;
+    return left;
   }
 
  private:
   static constexpr std::size_t kMost = 3 * kMostCrossed;
-  std::array<std::uint32_t, kMost> all_{};
+  std::array<std::uint32_t, kMost> all_;  // the first count_ are set
   std::size_t count_ = 0;
 };
 
@@ -304,7 +309,7 @@ class LevelMap {
       if (path.along != kNoIndex) begin = k + 1;
     }
     for (std::uint32_t k = begin; k < begin + 3; ++k) add_to(ring, 3 * t + k % 3);
-    if (!ring.is_tree() && !fan(ring, t, square)) return;
+    if (!fan(ring.core(), t, square)) return;
     mapped_[t] = 1;
     if (square <= limit() * limit()) {
       settled_[t] = 1;
@@ -314,10 +319,11 @@ class LevelMap {
     }
   }
 
-  /// Have all triangles of the ring a common vertex? Then the triangle is mapped to its fan, and
-  /// some point of it to that vertex.
+  /// Have all triangles of a ring a common vertex, if there are more than two? Then the triangle is
+  /// mapped to its fan, and some point of it to that vertex.
   bool fan(const Outline& ring, std::uint32_t t, double& square) const {
     const std::span<const std::uint32_t> all = ring.triangles();
+    if (all.size() <= 2) return true;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint16_t hub = coarse_.corners(all[0])[k];
       if (!std::all_of(all.begin(), all.end(),

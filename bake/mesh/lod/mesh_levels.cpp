@@ -333,8 +333,8 @@ std::vector<std::uint32_t> nearby_triangles(const LevelSurface& surface,
 }
 
 /// Greatest distance of the uv of a removed vertex from that of the surface at the nearest point.
-/// limit: what collapses were held to; where the walk found more, it has missed, and the nearest of
-/// all triangles is looked at as well.
+/// limit: what collapses were held to; where the triangles around tell more, they are not the
+/// nearest, and all are looked at.
 double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
                          const std::vector<std::uint16_t>& become,
                          const std::vector<std::uint32_t>& nearby, double limit) {
@@ -351,6 +351,9 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
     if (become[v] == v || nearby[v] == kNoIndex) continue;
     const std::uint16_t* t = &surface.indices()[3 * std::size_t{nearby[v]}];
     double shift = shift_on(v, {t[0], t[1], t[2]});
+    if (shift <= greatest) continue;
+    t = surface.corners(surface.nearest_around(vertices.positions[v], nearby[v]).triangle);
+    shift = shift_on(v, {t[0], t[1], t[2]});
     if (shift > limit) {
       t = surface.corners(surface.nearest(vertices.positions[v]).triangle);
       shift = std::min(shift, shift_on(v, {t[0], t[1], t[2]}));
