@@ -72,7 +72,7 @@ bool FrameTracker::refine_predicted(const TrackedPattern& pattern, const Track& 
   if (track.has_motion && track.surprise < kCloseSurprise) {
     const SearchRadius radius =
         track.surprise < kNearSurprise ? SearchRadius::kNear : SearchRadius::kClose;
-    if (refine(pattern, frame(), radius, pose, fit, true, track.vouched) &&
+    if (refine(pattern, frame(), radius, pose, fit) &&
         fit.inlier_ratio() >= kSuspicious * track.inlier_ratio &&
         fit.correlation >= kBlurred * track.correlation) {
       return true;
@@ -80,7 +80,7 @@ bool FrameTracker::refine_predicted(const TrackedPattern& pattern, const Track& 
     pose = predicted;
     fit = {};
   }
-  return refine(pattern, frame(), SearchRadius::kFrame, pose, fit, true, track.vouched);
+  return refine(pattern, frame(), SearchRadius::kFrame, pose, fit);
 }
 
 /// From further away: the predicted pose, then the last one, whichever shows more of the pattern.

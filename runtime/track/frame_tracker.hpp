@@ -29,7 +29,6 @@ struct Track {
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
   Reason shown_reason = Reason::kVisible;    ///< why it is tracked and not shown, if it is not
   bool judged = false;                       ///< by the PrintJudge
-  bool vouched = false;                      ///< found with few patches: see PatchFit::good()
   bool again = false;                        ///< it was lost a moment before it was found
 };
 

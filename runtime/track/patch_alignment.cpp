@@ -526,6 +526,7 @@ PatchFit linearise(const TrackedPattern& pattern, const FrameView& frame, const 
       ++fit.inliers;
       fit.inlier_correlation += static_cast<double>(one.correlation);
     }
+    if (one.correlation >= kCloseCorrelation) ++fit.close;
     fit.correlation += static_cast<double>(std::max(0.0f, one.correlation));
     if (one.xx == 0.0f && one.yy == 0.0f) continue;
     const PoseJacobian rows =
@@ -563,13 +564,15 @@ double robust_weight(const PatchLinearisation& patch, const Vector6& change) {
   return static_cast<double>((1.0f - far) * (1.0f - far));
 }
 
-/// Weight of a curved pattern's patch by the share of what the frame shows there that its template
-/// does not explain, which is greatest where the surface turns away. It brought the corners of
-/// rendered labels from 0.042 to 0.025 px of the truth; kLeast of 0.003 to 0.03 does alike. Flat
-/// patterns show all their patches alike.
-double trust(const TrackedPattern& pattern, const PatchLinearisation& patch) {
-  constexpr double kLeast = 0.01;  // noise that every patch has
-  if (pattern.surface.flat()) return 1.0;
+/// Weight of a patch by the share of what the frame shows there that its template does not explain:
+/// noise, which plain patches have most of, what covers a part of it, a surface that turns away. On
+/// six patterns it brought tracked corners from 0.0165 to 0.0115 px of the truth (of a photo that
+/// is itself blurred from 0.046 to 0.027) and jitter from 0.0125 to 0.0086, and of those covered to
+/// 70 % and found all instead of 95 % lie right; rendered labels went from 0.042 to 0.025 px.
+/// Under motion blur all weigh alike: those along the motion fit best, and say least of it.
+double trust(const FrameView& frame, const PatchLinearisation& patch) {
+  constexpr double kLeast = 0.003;  // noise that every patch has; 0.001 to 0.03 do nearly alike
+  if (frame.blur != nullptr) return 1.0;
   const double correlation = static_cast<double>(patch.equations.correlation);
   return kLeast / (kLeast + 1.0 - correlation * correlation);
 }
@@ -584,7 +587,7 @@ double step_pose(const TrackedPattern& pattern, const FrameView& frame, const Pa
   fit = linearise(pattern, frame, view, tukey, pose, patches);
   PoseEquations equations;
   for (const PatchLinearisation& patch : patches) {
-    equations.add(patch, robust ? trust(pattern, patch) : 1.0);
+    equations.add(patch, robust ? trust(frame, patch) : 1.0);
   }
   Vector6 change;
   if (!solve(equations, fit, change)) return -1.0;
@@ -595,7 +598,7 @@ double step_pose(const TrackedPattern& pattern, const FrameView& frame, const Pa
   if (!robust || moved < 0.0 || moved >= kPreciselyConverged) return moved;
   PoseEquations weighted;
   for (const PatchLinearisation& patch : patches) {
-    weighted.add(patch, robust_weight(patch, change) * trust(pattern, patch));
+    weighted.add(patch, robust_weight(patch, change) * trust(frame, patch));
   }
   if (!solve(weighted, fit, change)) return moved;
   Eigen::Map<Vector6>(by.data()) = change;

@@ -315,7 +315,7 @@ PatternSearch::PoseCandidate PatternSearch::evaluate_start(const TrackedPattern&
   PoseCandidate out;
   out.pose = start;
   PatchFit fit;
-  out.refined = refine(pattern, frame, radius, out.pose, fit, true, vouched());
+  out.refined = refine(pattern, frame, radius, out.pose, fit);
   out.percent = photometric_percent(pattern, frame, out.pose);
   out.score = out.percent;
   if (!out.refined) return out;
@@ -324,7 +324,8 @@ PatternSearch::PoseCandidate PatternSearch::evaluate_start(const TrackedPattern&
   out.finest = fit.level == best.frame_level;
   out.unoccluded = out.finest && fit.inlier_ratio() >= kUnoccluded;
   out.complete = out.finest && fit.inlier_ratio() >= kComplete;
-  out.vouched = !fit.good();
+  out.few = fit.inliers * 5 < fit.visible;
+  out.close = fit.close >= kClosePatches;
   // Of two places that show as many cells, the finest level's patches tell the better one.
   out.score = static_cast<int>(out.finest ? 0.5 * out.percent +
                                                 100.0 * (fit.inlier_ratio() + fit.correlation)
@@ -358,8 +359,8 @@ bool PatternSearch::vouched() const {
 
 bool PatternSearch::convinces(const TrackedPattern& pattern, const FrameView& frame,
                               const PoseCandidate& one) const {
-  if (one.finest && one.vouched) return one.percent >= kFewPatchesPercent;
-  if (one.finest) return one.percent >= (vouched() ? kVouchedPercent : kMinPercent);
+  if (one.finest && vouched() && !one.few) return one.percent >= kVouchedPercent;
+  if (one.finest) return one.percent >= (one.close ? kClosePatchesPercent : kMinPercent);
   return one.percent >= (vouched() ? kMinPercent : kVaguePercent) &&
          reprojection_rms(camera_, one.pose, matcher_.inliers()) <= kVagueRms &&
          photometric_percent(pattern, frame, one.pose, kVagueCells) > 0;
@@ -386,7 +387,6 @@ void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& fra
   DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   candidate.reason = Reason::kVisible;
   candidate.pose = one.pose;
-  candidate.vouched = one.vouched;
   candidate.inliers = hypotheses_[hypothesis_].inliers;
 }
 
@@ -425,7 +425,7 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
   std::array<glm::dvec2, 4> corners;
   const auto pose = nearest_pose(pattern, camera_, map);
   if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) return;
-  candidate = {Reason::kVisible, *pose, true, map, false, candidate.matches, hypothesis.inliers};
+  candidate = {Reason::kVisible, *pose, true, map, candidate.matches, hypothesis.inliers};
 }
 
 // ---- Of a copy of the frame, in slices or on a thread of its own ----

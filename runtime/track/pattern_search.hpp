@@ -24,9 +24,9 @@ enum class SearchPriority : std::uint8_t {
   kFirst,  ///< it was lost a moment ago
 };
 
-/// Percentage of the cells that must correlate where fewer patches fit than a place needs that no
-/// features vouch for: with 20, strips of a seventh gave poses 200 pixels beside.
-inline constexpr int kFewPatchesPercent = 25;
+/// Percentage of the cells that must correlate where kClosePatches speak for a place: with 20,
+/// strips of a seventh gave poses 200 pixels beside.
+inline constexpr int kClosePatchesPercent = 25;
 
 /// What a search found of one pattern.
 struct DetectionCandidate {
@@ -34,7 +34,6 @@ struct DetectionCandidate {
   Pose pose;                     ///< if kVisible
   bool homography_only = false;  ///< no pose explains the frame, but `map` does; `pose` is nearest
   PlaneMap map;                  ///< if homography_only
-  bool vouched = false;          ///< patches alone would not do: see PatchFit::good()
   int matches = 0;
   int inliers = 0;
 };
@@ -91,7 +90,8 @@ class PatternSearch {
     bool finest = false;      ///< on the finest level,
     bool unoccluded = false;  ///< most of them,
     bool complete = false;    ///< nearly all
-    bool vouched = false;     ///< see DetectionCandidate
+    bool few = false;         ///< less than a fifth of them
+    bool close = false;       ///< kClosePatches closely
   };
   [[nodiscard]] PoseCandidate evaluate_start(const TrackedPattern& pattern, const FrameView& frame,
                                              SearchRadius radius, const Pose& start) const;

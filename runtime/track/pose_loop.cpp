@@ -351,7 +351,6 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
   next.pose = candidate.pose;
   next.homography_only = candidate.homography_only;
   next.map = candidate.map;
-  next.vouched = candidate.vouched;
   detection.matches = candidate.matches;
   detection.inliers = candidate.inliers;
   if (async != nullptr || sliced != nullptr) {
@@ -361,9 +360,10 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
         next.homography_only
             ? tracker::refine_map(pattern, frame_tracker.frame(), next.map, fit)
             : tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kFar,
-                              next.pose, fit, judges_finds(), next.vouched) &&
+                              next.pose, fit, judges_finds()) &&
                   tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) >=
-                      (next.vouched ? tracker::kFewPatchesPercent : tracker::kMinPercent);
+                      (fit.close >= tracker::kClosePatches ? tracker::kClosePatchesPercent
+                                                           : tracker::kMinPercent);
     if (!here) return false;
   }
   if (!frame_tracker.locate(pattern, next, detection)) return false;

@@ -70,7 +70,7 @@ int levels_of(SearchRadius radius) {
 }  // namespace
 
 bool refine(const TrackedPattern& pattern, const FrameView& frame, SearchRadius radius, Pose& pose,
-            PatchFit& fit, bool precise, bool vouched) {
+            PatchFit& fit, bool precise) {
   const int levels = static_cast<int>(frame.pyramid.size());
   const Resolution best = finest(pattern, map_of_pose(pattern, frame.camera, pose), levels);
   const double depth = pose.translation.z;
@@ -86,8 +86,7 @@ bool refine(const TrackedPattern& pattern, const FrameView& frame, SearchRadius 
     // Coarse levels have few patches, of which chance brings more.
     const bool finest_level = level == best.frame_level;
     const bool enough = finest_level || now.inliers * 5 >= now.visible;
-    if (enough && now.good(vouched && finest_level) &&
-        (!found || now.inlier_ratio() >= kMinKept * fit.inlier_ratio())) {
+    if (enough && now.good() && (!found || now.inlier_ratio() >= kMinKept * fit.inlier_ratio())) {
       accepted = pose = next;
       fit = now;
       found = true;

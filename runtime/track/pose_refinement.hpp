@@ -32,9 +32,9 @@ enum class SearchRadius : std::uint8_t { kNear, kClose, kFrame, kFar };
 
 /// Aligns patches from the coarsest level of the radius to the finest. True if the finest level
 /// fits, or under blur a coarser one that the photometric check confirms. precise: the finest level
-/// ends with steps over all patches. vouched: see PatchFit::good().
+/// ends with steps over all patches.
 bool refine(const TrackedPattern& pattern, const FrameView& frame, SearchRadius radius, Pose& pose,
-            PatchFit& fit, bool precise = true, bool vouched = false);
+            PatchFit& fit, bool precise = true);
 
 /// The same for a plane map, where a wrong focal length leaves no pose that fits. A map has to
 /// convince by itself: its percentage is 0 below 50 % or 16 cells.

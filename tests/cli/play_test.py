@@ -1,5 +1,6 @@
 """The player from the outside: what it prints, writes and answers."""
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -86,6 +87,9 @@ class Play(ProgramTest):
         seen = next(frame["visible"][0] for frame in frames if frame["visible"])
         self.assertEqual(seen["pattern"], "cover")
         self.assertEqual([len(seen["rotation"]), len(seen["translation"]), len(seen["homography"])], [9, 3, 9])
+        for (u, v), corner in zip([(0, 0), (1, 0), (1, 1), (0, 1)], seen["corners"]):
+            x, y, w = (u * a + v * b + c for a, b, c in zip(*[iter(seen["homography"])] * 3))
+            self.assertLess(math.hypot(x / w - corner[0], y / w - corner[1]), 1e-6, seen)
         self.assertTrue(0.5 < seen["agreeing"] <= 1 and 0.5 < seen["likeness"] <= 1 and 0 < seen["fit"] <= 1, seen)
         self.assertEqual(len(list((self.folder / "pictures").glob("frame_*.png"))), 12)
         self.assertEqual({path.name for path in (self.folder / "report").iterdir()},
