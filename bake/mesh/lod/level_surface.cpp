@@ -87,6 +87,8 @@ std::uint32_t LevelSurface::walk(const glm::dvec3& point, std::uint32_t start) c
     const std::array<glm::dvec3, 3> t = triangle(at);
     const glm::dvec3 sides[3] = {t[1] - t[0], t[2] - t[1], t[0] - t[2]};
     const glm::dvec3 normal = glm::cross(sides[0], sides[1]);
+    // Without area it has no edge to be beyond of.
+    if (!(glm::dot(normal, normal) > 0)) return nearest_around(point, at).triangle;
     // Beyond which edge is it farthest?
     std::uint32_t next = kNoIndex;
     double farthest = 0;
