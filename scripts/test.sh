@@ -2,25 +2,27 @@
 # Builds with ASan + UBSan and runs the tests under CTest.
 #   scripts/test.sh           installs the build's packages only; names what it skips
 #   scripts/test.sh --all     also installs every oracle and tool, and names what is still skipped (CI runs this)
-#   scripts/test.sh --soak    --all with the long tests (label soak) in full
+#   scripts/test.sh --soak    --all with the long tests (label soak) in full, and with uses of variables after their scope
+#                             found as well
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 packages=()
+scopes=OFF
 export MODAR_SOAK=0
 case ${1:-} in
   "") ;;
   --all) packages=(test) ;;
-  --soak) packages=(test); MODAR_SOAK=1 ;;
-  -h | --help) sed -n '2,5s/^# \{0,1\}//p' "$0"; exit 0 ;;
+  --soak) packages=(test); scopes=ON; MODAR_SOAK=1 ;;
+  -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "test.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
 esac
 
 scripts/setup.sh "${packages[@]}"
 jobs=$(nproc)
 
-cmake --preset dev
+cmake --preset dev "-DMODAR_SANITIZE_SCOPES=$scopes"
 cmake --build --preset dev -- -j "$jobs"
 
 # The phone's player must build without the workstation's libraries.

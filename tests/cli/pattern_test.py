@@ -84,18 +84,13 @@ class Pattern(ProgramTest):
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
     def test_targets_of_8th_wall_are_taken_as_they_are(self):
         target = self.target("part")
-        for file, out in ((target, "theirs.modar"), (self.part, "ours.modar")):
-            done = self.modar("bake", "--pattern", file, "-o", out, "--quiet", *QUICK)
-            self.assertEqual(done.returncode, 0, done.stderr)
-        theirs, ours = (self.modar_json("inspect", out) for out in ("theirs.modar", "ours.modar"))
-        self.assertEqual(theirs["patterns"], ours["patterns"])
-        # Scores tell one pixel more or less.
-        self.assertEqual(self.modar_json("pattern", "score", target)[0]["causes"],
-                         self.modar_json("pattern", "score", self.part)[0]["causes"])
         # As the documents for moving have it: one picture, no resources.
         shutil.copy(self.part, target.parent / "poster.png")
         poster = self.target("poster", imagePath="./poster.png", resources=None, properties=None, xrMetadata={"isRotated": False})
-        self.assertEqual(self.modar_json("pattern", "score", poster)[0]["score"], self.modar_json("pattern", "score", self.part)[0]["score"])
+        ours, *theirs = (self.modar_json("inspect", self.baked(file))["patterns"][0] for file in (self.part, target, poster))
+        for pattern in theirs:
+            self.assertEqual({**pattern, "name": ""}, {**ours, "name": ""})
+        self.assertEqual(self.modar_json("pattern", "score", target)[0]["name"], "part")
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
     def test_targets_of_8th_wall_on_cylinders_and_cones(self):

@@ -103,16 +103,13 @@ constexpr NoteText kNoteTexts[] = {
 };
 static_assert(std::size(kNoteTexts) == static_cast<std::size_t>(ObjNote::kCount));
 
-/// How a block's indices of one attribute relate to its position indices.
+/// How a block's indices of one attribute, at least one, relate to its position indices.
 IndexPlane::Kind kind_of(const Scratch<std::uint32_t>& positions,
                          const Scratch<std::uint32_t>& indices) {
-  bool same = true;
-  bool absent = true;
-  for (std::size_t i = 0; i < indices.size(); ++i) {
-    same = same && indices[i] == positions[i];
-    absent = absent && indices[i] == kNoIndex;
-    if (!same && !absent) return IndexPlane::Kind::kOwn;
-  }
+  const std::uint32_t* const all = indices.data();
+  const std::size_t count = indices.size();
+  const bool absent = all[0] == kNoIndex && std::equal(all + 1, all + count, all);
+  if (!absent && !std::equal(all, all + count, positions.data())) return IndexPlane::Kind::kOwn;
   return absent ? IndexPlane::Kind::kAbsent : IndexPlane::Kind::kSame;
 }
 
