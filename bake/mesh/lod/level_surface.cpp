@@ -17,6 +17,10 @@ constexpr int kScans = 12;
 /// Steps of a walk; what needs more is answered by where it has got to. Set by hand: three levels
 /// off, a walk takes about five.
 constexpr int kMostWalked = 24;
+/// Triangles around a vertex that a search looks at. Where a coarse level has few vertices between
+/// a chunk's borders, which stay, hundreds of triangles meet in one, and each vertex of the finest
+/// level would look at all of them; a tree finds the nearest then. Set by hand.
+constexpr std::uint32_t kWidestFan = 32;
 
 }  // namespace
 
@@ -110,10 +114,13 @@ std::uint32_t LevelSurface::walk(const glm::dvec3& point, std::uint32_t start) c
 
 NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t start) const {
   NearTriangle best{distance_square(point, triangle(start)), start};
+  std::span<const std::uint16_t> seen;
   for (int steps = 0; steps < kMostWalked; ++steps) {
     const std::uint32_t at = best.triangle;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint16_t v = indices_[3 * std::size_t{at} + k];
+    const std::span<const std::uint16_t> around = indices_.subspan(3 * std::size_t{at}, 3);
+    for (const std::uint16_t v : around) {
+      if (begins_[v + std::size_t{1}] - begins_[v] > kWidestFan) continue;
+      if (std::find(seen.begin(), seen.end(), v) != seen.end()) continue;
       for (std::uint32_t i = begins_[v]; i < begins_[v + std::size_t{1}]; ++i) {
         const std::uint32_t beside = corners_[i] / 3;
         const double square = distance_square(point, triangle(beside), best.square);
@@ -121,6 +128,7 @@ NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t
       }
     }
     if (best.triangle == at) break;
+    seen = around;
   }
   return best;
 }
