@@ -192,10 +192,11 @@ class PriceQueue {
   static constexpr std::uint16_t kNone = 0xFFFF;
 
  private:
-  // Floats of one sign are in the order of their bits: here 8 of the exponent and 4 more.
+  // Floats of one sign are in the order of their bits: here 8 of the exponent and 4 more. The sign,
+  // which a price that is no number may have, is left out.
   static constexpr std::size_t kBuckets = 1 << 12;
   static std::uint16_t bucket_of(float price) {
-    return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(price) >> 19);
+    return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(price) << 1 >> 20);
   }
   std::uint16_t front() {
     while (lowest_ + std::size_t{1} < kBuckets && heads_[lowest_] == kNone) ++lowest_;

@@ -19,7 +19,8 @@ constexpr int kScans = 12;
 constexpr int kMostWalked = 24;
 /// Triangles around a vertex that a search looks at. Where a coarse level has few vertices between
 /// a chunk's borders, which stay, hundreds of triangles meet in one, and each vertex of the finest
-/// level would look at all of them; a tree finds the nearest then. Set by hand.
+/// level would look at all of them; a tree finds the nearest then. Set by hand: a rough grid
+/// of 14.6 million triangles took 269 CPU-s before this and `seen`, 154 after (loaded machine).
 constexpr std::uint32_t kWidestFan = 32;
 
 }  // namespace
