@@ -1,6 +1,8 @@
 """Value noise on an integer lattice: equal on every machine, with no state."""
+import functools
 
 
+@functools.lru_cache(1 << 16)  # neighbouring pixels ask for the same points
 def lattice(x, y, seed=0):
     """A value in [0, 1] for the lattice point (x, y)."""
     h = (x * 374761393 + y * 668265263 + seed * 2246822519) & 0xFFFFFFFF

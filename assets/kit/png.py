@@ -25,21 +25,28 @@ def _chunk(kind, body):
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
+# What a filtered byte costs: its distance from zero, as a signed number.
+_COST = bytes(min(v, 256 - v) for v in range(256))
+
+
+def _minus(a, b, high):
+    """a - b, byte by byte: long integers, `high` being the highest bit of every byte."""
+    return ((a | high) - (b & ~high)) ^ ((a ^ ~b) & high)
+
+
 def _filtered(picture):
     """Each row under the filter (none, sub, up or average) whose sum of absolute values is least."""
     stride = picture.width * 3
-    above = bytes(stride)
+    high, even = (int.from_bytes(bytes([v]) * stride, "little") for v in (0x80, 0xFE))
+    all_bits = (1 << 8 * stride) - 1
+    above = 0
     out = bytearray()
     for y in range(picture.height):
-        row = bytes(picture.pixels[y * stride : (y + 1) * stride])
-        left = bytes(3) + row[:-3]
-        trials = (
-            row,
-            bytes((a - b) & 255 for a, b in zip(row, left)),
-            bytes((a - b) & 255 for a, b in zip(row, above)),
-            bytes((a - ((b + c) >> 1)) & 255 for a, b, c in zip(row, left, above)),
-        )
-        costs = [sum(v if v < 128 else 256 - v for v in t) for t in trials]
+        row = int.from_bytes(picture.pixels[y * stride : (y + 1) * stride], "little")
+        left = row << 24 & all_bits
+        mean = (left & above) + (((left ^ above) & even) >> 1)
+        trials = [v.to_bytes(stride, "little") for v in (row, *(_minus(row, v, high) for v in (left, above, mean)))]
+        costs = [sum(t.translate(_COST)) for t in trials]
         best = costs.index(min(costs))
         out.append(best)
         out += trials[best]
