@@ -21,9 +21,10 @@ class Library(unittest.TestCase):
                               env={**os.environ, "PKG_CONFIG_LIBDIR": "", "PKG_CONFIG_PATH": ""})
 
     def launcher(self):
-        """Compiles, but leaves an empty object: the code itself is made by other builds."""
+        """Reads each file with all that it includes, and leaves an empty object: the same code, with the same definitions, is
+        compiled for the page by tests/web and for phones by phone_test.py."""
         script = self.folder / "launcher.sh"
-        script.write_text('''"$@" -fsyntax-only || exit
+        script.write_text('''"$@" -E || exit
 while [ "$1" != -o ]; do compiler=${compiler:-$1}; shift; done
 exec "$compiler" -x c++ -c /dev/null -o "$2"
 ''')
