@@ -8,14 +8,14 @@ import sys
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(ROOT / "tests" / "cli"))
 
-from programs import BIN, COVER, ProgramTest, covered_clip  # noqa: E402, F401
+from programs import BIN, CLIP_HEIGHT, CLIP_WIDTH, COVER, ProgramTest, covered_clip, demo_clip  # noqa: E402, F401
 
 JNI = os.environ.get("MODAR_JNI", str(BIN.parent / "runtime" / "android"))
 FAKE_GL = os.environ.get("MODAR_FAKE_GL", str(BIN.parent / "tests" / "android"))
 APP = ROOT / "runtime" / "android" / "java"
 FAKES = pathlib.Path(__file__).resolve().parent / "java"
 SOAK = os.environ.get("MODAR_SOAK", "1") != "0"
-WIDTH, HEIGHT, FRAMES = 480, 360, 10
+WIDTH, HEIGHT, FRAMES = CLIP_WIDTH, CLIP_HEIGHT, 10
 
 
 def compile_java(out, files, classpath=(), release="11"):
@@ -42,8 +42,7 @@ def run_java(classpath, *words, timeout=1800 if SOAK else 300):
 
 def make_clip(folder, frames=FRAMES):
     """NV21 as a phone's camera gives it, one file: our cover before clutter, held in a hand."""
-    subprocess.run(["/usr/bin/python3", str(ROOT / "assets" / "make_clip.py"), "--pattern", str(COVER), "--frames", str(frames),
-                    "--size", f"{WIDTH}x{HEIGHT}", str(folder)], check=True)
+    demo_clip(folder, frames)
     file = folder / "clip.nv21"
     subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", str(folder / "*.png"), "-vf", "scale=out_range=full",
                     "-pix_fmt", "nv21", "-f", "rawvideo", str(file)], check=True)

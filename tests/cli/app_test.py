@@ -9,12 +9,12 @@ import tempfile
 import unittest
 
 from installed_headers import clang, declared_symbols, headers, program
-from programs import BIN, COVER, POTTERY, QUICK, ROOT, ProgramTest
+from programs import BIN, CLIP_HEIGHT, CLIP_WIDTH, COVER, POTTERY, QUICK, ROOT, ProgramTest, demo_clip
 
 BUILD = BIN.parent
 SANITIZE = os.environ.get("MODAR_SANITIZE", "")
 FLAGS = [f"-fsanitize={SANITIZE}"] if SANITIZE else []
-WIDTH, HEIGHT, FRAMES = 480, 360, 6
+WIDTH, HEIGHT, FRAMES = CLIP_WIDTH, CLIP_HEIGHT, 6
 # What bake_flags() models. The middle of the red one is that of the whole, (0, 0).
 FLAGS_SHOWN = {"red": ((-1, -0.75), (0.6, -0.4), (0.2, 0.7)), "green": ((0.7, -0.5), (1, 0.75), (0.4, 0.75))}
 
@@ -91,9 +91,7 @@ class App(ProgramTest):
 
     def clip(self):
         """Frames of our cover in NV21, where its corners truly are, and the frames in RGB."""
-        folder = self.folder / "clip"
-        run("/usr/bin/python3", ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", FRAMES, "--size",
-            f"{WIDTH}x{HEIGHT}", folder, check=True)
+        folder = demo_clip(self.folder / "clip", FRAMES)
         with (folder / "truth.csv").open() as file:
             truth = list(csv.DictReader(file))
         frames = {}

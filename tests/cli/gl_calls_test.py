@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import unittest
 
-from programs import BIN, COVER, ROOT, ProgramTest
+from programs import BIN, ROOT, ProgramTest, demo_clip
 
 HEADERS = pathlib.Path("/usr/include/GLES2")
 
@@ -70,11 +70,9 @@ class GlCalls(ProgramTest):
 
     def clip(self):
         """Frames with the pattern in NV21: the camera's picture goes through the two-plane shader."""
-        folder = self.folder / "clip"
-        subprocess.run(["/usr/bin/python3", ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", "4",
-                        "--size", "320x240", folder], check=True, capture_output=True)
-        done = subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", folder / "*.png", "-pix_fmt",
-                               "nv21", "-f", "rawvideo", self.folder / "clip.raw"], capture_output=True)
+        folder = demo_clip(self.folder / "clip", 4)
+        done = subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", folder / "*.png", "-vf", "scale=320:240",
+                               "-pix_fmt", "nv21", "-f", "rawvideo", self.folder / "clip.raw"], capture_output=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         return f"nv21:320x240@30:{self.folder / 'clip.raw'}"
 

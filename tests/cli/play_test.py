@@ -9,7 +9,7 @@ import threading
 import time
 import unittest
 
-from programs import BIN, COVER, QUICK, ROOT, ProgramTest
+from programs import BIN, COVER, QUICK, ROOT, ProgramTest, demo_clip
 
 BUST = ROOT / "assets" / "models" / "bust.obj"
 
@@ -28,10 +28,7 @@ class Play(ProgramTest):
 
     def clip(self, frames=12):
         """Our cover before a made-up background."""
-        folder = self.folder / "clip"
-        subprocess.run(["python3", ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", str(frames),
-                        "--size", "480x360", folder], check=True, capture_output=True)
-        return folder
+        return demo_clip(self.folder / "clip", frames)
 
     def test_help_and_version_go_to_standard_output(self):
         done = self.play("--help")
@@ -99,7 +96,7 @@ class Play(ProgramTest):
         same = self.play(bundle, "--golden", "kept", "--quiet")
         self.assertEqual(same.returncode, 0, same.stdout + same.stderr)
         self.assertEqual(json.loads(same.stdout)["golden"]["worst_px"], 0.0)
-        other = self.play(bundle, "--golden", "kept", "--quiet", "--parameters", "brisk-3", "--tolerance", "0")
+        other = self.play(bundle, "--golden", "kept", "--quiet", "--parameters", "orb-500", "--tolerance", "0")
         self.assertEqual(other.returncode, 10, other.stdout + other.stderr)
 
     def test_a_bundle_that_is_replaced_is_played_on(self):

@@ -1,10 +1,13 @@
 """Where the programs and assets under test are, and how the tests of this folder call them."""
+import atexit
+import functools
 import json
 import os
 import pathlib
 import shutil
 import struct
 import subprocess
+import sys
 import tempfile
 import unittest
 import zlib
@@ -17,6 +20,8 @@ STATUE = ROOT / "assets" / "models" / "statue.obj"
 COVER = ROOT / "assets" / "patterns" / "cover.png"
 
 
+# The clip of demo_files(); in one frame the cover is gone.
+CLIP_WIDTH, CLIP_HEIGHT, CLIP_FRAMES, CLIP_GONE = 480, 360, 12, 6
 # Few views of a pattern: enough for tests.
 QUICK = ["--loop-views", "8", "--no-score"]
 # Frames of covered_clip(), and how the camera might have turned before each: radians, exact in few decimals.
@@ -61,10 +66,41 @@ def write_turns(path, turns):
     path.write_text("".join("{:.12f} {:.12f} {:.12f}\n".format(*turn) for turn in turns))
 
 
+def make_demo_files(folder):
+    """demo.modar, pottery on the cover (levels of detail have tests of their own), and clip/, a hand that holds the cover."""
+    done = subprocess.run([BIN / "modar", "bake", "--model", POTTERY, "--pattern", COVER, "-o", folder / "demo.modar", "--quiet",
+                           "--no-lods", *QUICK], capture_output=True, text=True)
+    if (done.returncode, done.stderr) != (0, ""):
+        raise AssertionError(done.stderr)
+    subprocess.run([sys.executable, ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", str(CLIP_FRAMES), "--size",
+                    f"{CLIP_WIDTH}x{CLIP_HEIGHT}", folder / "clip"], check=True)
+
+
+@functools.cache
+def demo_files():
+    """The folder that CTest's demo_files filled for all tests; for a test that is run by hand, one of its own."""
+    if "MODAR_DEMO_FILES" in os.environ:
+        return pathlib.Path(os.environ["MODAR_DEMO_FILES"])
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="modar-demo-"))
+    atexit.register(shutil.rmtree, folder)
+    make_demo_files(folder)
+    return folder
+
+
+def demo_clip(folder, frames=CLIP_FRAMES):
+    """frame_*.png and truth.csv as make_clip.py writes them: so many frames around the one without the cover."""
+    first, clip = CLIP_GONE - frames // 2, demo_files() / "clip"
+    truth = (clip / "truth.csv").read_text().splitlines(keepends=True)
+    folder.mkdir()
+    for i in range(frames):
+        shutil.copy(clip / f"frame_{first + i:05d}.png", folder / f"frame_{i:05d}.png")
+        truth[1 + i] = f"{i},{truth[1 + first + i].partition(',')[2]}"
+    (folder / "truth.csv").write_text("".join(truth[:1 + frames]))
+    return folder
+
+
 class ProgramTest(unittest.TestCase):
     """A test with a folder of its own, removed afterwards."""
-
-    demo = []  # the bytes of bake_demo()
 
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="modar-test-"))
@@ -90,13 +126,5 @@ class ProgramTest(unittest.TestCase):
             self.assertIn(word, done.stderr)
 
     def bake_demo(self, name="demo.modar"):
-        """Pottery on the cover, baked once a program; levels of detail have tests of their own."""
-        bundle = self.folder / name
-        if not ProgramTest.demo:
-            done = self.modar("bake", "--model", POTTERY, "--pattern", COVER, "-o", bundle, "--quiet", "--no-lods",
-                              *QUICK)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertEqual(done.stderr, "")
-            ProgramTest.demo.append(bundle.read_bytes())
-        bundle.write_bytes(ProgramTest.demo[0])
-        return bundle
+        """Pottery on the cover."""
+        return pathlib.Path(shutil.copyfile(demo_files() / "demo.modar", self.folder / name))

@@ -15,7 +15,7 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Server  # noqa: E402
 from programs import (COVER, COVERED, POTTERY, QUICK, READINGS, ROOT, TURNED, TURNS, ProgramTest, covered_clip,  # noqa: E402
-                      write_turns)
+                      demo_clip, write_turns)
 
 PAGE = ROOT / "build" / "web" / "web"
 WIDTH, HEIGHT, FRAMES = 640, 480, 6
@@ -122,8 +122,9 @@ class Page(ProgramTest):
             if done.returncode != 0:
                 raise AssertionError(done.stderr)
         clip = cls.base / "clip"
-        subprocess.run([sys.executable, ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", str(FRAMES), "--size",
-                        f"{WIDTH}x{HEIGHT}", clip], check=True, capture_output=True)
+        clip.mkdir()
+        subprocess.run(["ffmpeg", "-loglevel", "error", "-i", demo_clip(cls.base / "small", FRAMES) / "frame_%05d.png", "-vf",
+                        f"scale={WIDTH}:{HEIGHT}", "-start_number", "0", clip / "frame_%05d.png"], check=True)
         cls.video = cls.base / "camera.y4m"
         convert = ["ffmpeg", "-loglevel", "error", "-y", "-framerate", "30", "-i", clip / "frame_%05d.png"]
         subprocess.run([*convert, "-pix_fmt", "yuv420p", cls.video], check=True)
