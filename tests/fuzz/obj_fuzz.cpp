@@ -2,19 +2,16 @@
 // the number of threads changes nothing.
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/weld/weld.hpp"
+#include "tests/fuzz/need.hpp"
 
 namespace {
 
 using namespace modar;
-
-void need(bool condition) {
-  if (!condition) std::abort();
-}
+using test::need;
 
 void walk(const SourceModel& model) {
   const auto inside = [](std::uint32_t index, std::size_t size) {

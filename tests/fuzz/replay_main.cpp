@@ -1,6 +1,6 @@
 // Stands in for libFuzzer where it is not linked: runs a target over files, and over copies of them
 // that are damaged in a repeatable way.
-//   NAME_replay COPIES[:SOAK] FILE|FOLDER...
+//   fuzz_replay NAME COPIES[:SOAK] FILE|FOLDER...
 // SOAK: copies of each file under `scripts/test.sh --soak`.
 #include <algorithm>
 #include <cstdint>
@@ -11,11 +11,14 @@
 #include <iterator>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tests/soak.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+using Target = int(const std::uint8_t* data, std::size_t size);
+/// The LLVMFuzzerTestOneInput() of NAME.cpp, or null; CMakeLists.txt writes it.
+Target* fuzz_target(std::string_view name);
 
 namespace {
 
@@ -27,7 +30,7 @@ constexpr std::uintmax_t kMaxBytes = 256u << 10;
 
 std::vector<fs::path> files_of(int count, char** arguments) {
   std::vector<fs::path> files;
-  for (int i = 2; i < count; ++i) {
+  for (int i = 3; i < count; ++i) {
     if (!fs::is_directory(arguments[i])) {
       files.emplace_back(arguments[i]);
       continue;
@@ -74,21 +77,22 @@ Bytes damaged(Bytes bytes, std::mt19937_64& random) {
   return bytes;
 }
 
-void run(const Bytes& bytes) {
+void run(Target& target, const Bytes& bytes) {
   // A copy of exactly that size, so that the sanitizer sees the first byte beyond.
   const Bytes exact(bytes.begin(), bytes.end());
-  LLVMFuzzerTestOneInput(exact.data(), exact.size());
+  target(exact.data(), exact.size());
 }
 
 }  // namespace
 
 int main(int count, char** arguments) {
-  if (count < 3) {
-    std::fprintf(stderr, "usage: %s COPIES[:SOAK] FILE|FOLDER...\n", arguments[0]);
+  Target* target = count < 4 ? nullptr : fuzz_target(arguments[1]);
+  if (target == nullptr) {
+    std::fprintf(stderr, "usage: %s NAME COPIES[:SOAK] FILE|FOLDER...\n", arguments[0]);
     return 1;
   }
   char* end = nullptr;
-  unsigned long copies = std::strtoul(arguments[1], &end, 10);
+  unsigned long copies = std::strtoul(arguments[2], &end, 10);
   if (*end == ':' && modar::testing::soak()) {
     copies = std::strtoul(end + 1, nullptr, 10);
   }
@@ -97,8 +101,8 @@ int main(int count, char** arguments) {
   for (const fs::path& path : files) {
     std::ifstream file(path, std::ios::binary);
     const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    run(bytes);
-    for (unsigned long i = 0; i < copies; ++i) run(damaged(bytes, random));
+    run(*target, bytes);
+    for (unsigned long i = 0; i < copies; ++i) run(*target, damaged(bytes, random));
   }
   std::printf("%zu files and %lu damaged copies of each\n", files.size(), copies);
   return files.empty() ? 2 : 0;
