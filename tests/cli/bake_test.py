@@ -4,7 +4,7 @@ import os
 import shutil
 import unittest
 
-from programs import COVER, POTTERY, QUICK, ROOT, STATUE, ProgramTest
+from programs import COVER, POTTERY, QUICK, ROOT, STATUE, ProgramTest, picture
 
 
 class Bake(ProgramTest):
@@ -39,10 +39,11 @@ class Bake(ProgramTest):
 
     def test_the_articles_sets_can_stay_at_home(self):
         whole = self.bake_demo()
+        picture(self.folder / "picture.png")
         sizes = []
         for sets, expected in (("none", []), ("orb-500,brisk-2", ["orb-500", "brisk-2"])):
             out = self.folder / f"{sets}.modar"
-            done = self.modar("bake", "--pattern", COVER, "-o", out, *QUICK, "--parameters", sets)
+            done = self.modar("bake", "--pattern", "picture.png", "-o", out, *QUICK, "--parameters", sets)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(self.modar_json("check", out)["issues"], [])
             pattern = self.modar_json("inspect", out)["patterns"][0]

@@ -168,7 +168,7 @@ class EachFile(ProgramTest):
         self.project = self.folder / "project"
         self.project.mkdir()
         (self.project / "a_bad.png").write_text("no picture")
-        picture(self.project / "game.png")
+        picture(self.project / "game.png", 144, 108)
 
     def run_json(self, *words):
         done = self.modar("pattern", *words, "--json")

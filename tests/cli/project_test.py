@@ -44,7 +44,7 @@ class ProjectTest(ProgramTest):
             (self.place / f"models/{name}.obj").write_text(text)
         (self.place / "models/cube.mtl").write_text(CUBE_MTL)
         shutil.copy(ROOT / "assets/models/bust.png", self.place / "models/wall.png")
-        picture(self.place / "pictures/a.png")
+        picture(self.place / "pictures/a.png", 144, 108)
         self.write("[bake]\n" + FAST + "[[model]]\nfile = \"models/*.obj\"\n[[pattern]]\nfile = \"pictures/*\"\n")
 
     def write(self, text):
@@ -69,21 +69,26 @@ class ProjectTest(ProgramTest):
 
 class Files(ProjectTest):
     def test_one_model_and_one_pattern_are_the_bytes_of_a_single_bake(self):
+        cover = self.folder / "cover.png"
+        picture(cover)
         self.write("[project]\nname = \"both\"\n[bake]\n" + LIT + f"[[model]]\nfile = \"{STATUE}\"\n"
-                   f"[[model]]\nfile = \"{POTTERY}\"\n[[pattern]]\nfile = \"{COVER}\"\nwidth-mm = 210\n"
+                   f"[[model]]\nfile = \"{POTTERY}\"\n[[pattern]]\nfile = \"{cover}\"\nwidth-mm = 210\n"
                    "[[scene]]\npattern = \"cover\"\nmodel = \"pottery\"\nup = \"y\"\nscale = 0.8\noffset = [0, 0.1, 0]\n"
-                   f"light = \"{COVER}\"\n"
+                   f"light = \"{cover}\"\n"
                    "[[bundle]]\nname = \"one\"\npatterns = \"cov*\"\n")
         self.bake()
         direct = self.folder / "direct.modar"
-        done = self.modar("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene",
-                          f"cover=pottery,up=y,scale=0.8,offset=0:0.1:0,light={COVER}", *LIT_DIRECT, "-o", direct)
+        done = self.modar("bake", "--model", POTTERY, "--pattern", f"{cover}:210mm", "--scene",
+                          f"cover=pottery,up=y,scale=0.8,offset=0:0.1:0,light={cover}", *LIT_DIRECT, "-o", direct)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((self.place / "out/one.modar").read_bytes(), direct.read_bytes())
 
     def test_several_assets_are_as_baked_alone(self):
+        cover, painting = self.folder / "cover.png", self.folder / "painting.png"
+        picture(cover)
+        picture(painting, 150, 160)
         self.write("[bake]\n" + FAST + f"[[model]]\nfile = [\"{STATUE}\", \"{POTTERY}\", \"models/*.obj\"]\n"
-                   f"[[pattern]]\nfile = [\"{COVER}\", \"{COVER.parent}/painting.png\"]\n")
+                   f"[[pattern]]\nfile = [\"{cover}\", \"{painting}\"]\n")
         self.bake()
         bundle = self.place / "out/museum.modar"
         self.assertEqual(self.modar_json("check", bundle)["errors"], 0)
@@ -93,7 +98,7 @@ class Files(ProjectTest):
             alone = self.folder / "alone.modar"
             self.modar("bake", "--model", path, "-o", alone, *DIRECT)
             self.assertEqual(model, self.modar_json("inspect", alone)["models"][0])
-        for pattern, path in zip(whole["patterns"], [COVER, COVER.parent / "painting.png"]):
+        for pattern, path in zip(whole["patterns"], [cover, painting]):
             self.modar("bake", "--pattern", path, "-o", alone, *DIRECT)
             self.assertEqual(pattern, self.modar_json("inspect", alone)["patterns"][0])
 

@@ -172,7 +172,7 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
   EXPECT_NE(one_side.error().cause.find("to the same side"), std::string::npos)
       << one_side.error().cause;
   cv::imwrite(path("other.png"), cv::Mat(100, 100, CV_8UC1, cv::Scalar(9)));
-  options.inputs.push_back(path("other.png"));
+  options.inputs = {options.inputs[0], path("other.png")};
   EXPECT_EQ(calibrate(options, {}).error().code, "calibrate.size");
   options.inputs = {path("nowhere.mp4")};
   EXPECT_EQ(calibrate(options, {}).error().code, "calibrate.input");
