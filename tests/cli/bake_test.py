@@ -92,7 +92,8 @@ class Bake(ProgramTest):
         self.assertIsNone(without["bundle"]["models"][0]["topology"])
 
     def test_models_only_and_patterns_only_are_legal(self):
-        for arguments in (["--model", STATUE, "--no-ao"], ["--pattern", COVER, *QUICK]):
+        picture(self.folder / "picture.png")
+        for arguments in (["--model", STATUE, "--no-ao"], ["--pattern", "picture.png", *QUICK]):
             out = self.folder / "one.modar"
             done = self.modar("bake", *arguments, "--no-lods", "-o", out)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -100,7 +101,8 @@ class Bake(ProgramTest):
 
     def test_models_are_merged_in_the_same_buffers(self):
         out = self.folder / "two.modar"
-        report = self.modar_json("bake", "--model", POTTERY, STATUE, "--pattern", COVER, "--scene",
+        picture(self.folder / "cover.png")
+        report = self.modar_json("bake", "--model", POTTERY, STATUE, "--pattern", "cover.png", "--scene",
                                  "cover=statue,scale=0.5,up=z", "cover=pottery", "--no-lods", "--no-ao", "-o", out, *QUICK)
         self.assertEqual([m["name"] for m in report["bundle"]["models"]], ["pottery", "statue"])
         self.assertEqual(report["bundle"]["scenes"][0]["scale"], 0.5)

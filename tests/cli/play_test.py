@@ -120,7 +120,8 @@ class Play(ProgramTest):
                 if play(1)[0]["visible"]:
                     break
             other = self.folder / "other.modar"
-            done = self.modar("bake", "--model", BUST, "--pattern", COVER, "-o", other, "--quiet", "--no-lods", *QUICK)
+            done = self.modar("bake", "--model", BUST, "--pattern", COVER, "-o", other, "--quiet", "--no-lods",
+                              "--parameters", "none", *QUICK)
             self.assertEqual(done.returncode, 0, done.stderr)
             other.replace(bundle)
             time.sleep(0.4)

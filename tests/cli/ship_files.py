@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import tempfile
 
-from programs import BIN, COVER, QUICK, ProgramTest
+from programs import BIN, QUICK, ProgramTest, picture
 
 
 def sheet(path, side, wave):
@@ -52,7 +52,8 @@ class Shop:
 
     @functools.cached_property
     def pattern(self):
-        return self.bake("pattern", "--pattern", COVER, *QUICK)
+        picture(self.folder / "picture.png")
+        return self.bake("pattern", "--pattern", self.folder / "picture.png", *QUICK)
 
     def bake(self, name, *arguments):
         bundle = self.folder / name / "museum.modar"
