@@ -102,49 +102,56 @@ Foot nearest_foot(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
 
 TriangleTree::TriangleTree(std::span<const glm::dvec3> positions, std::vector<Triangle> triangles)
     : positions_(positions), triangles_(std::move(triangles)) {
+  std::vector<Centre> centres;
+  centres.reserve(triangles_.size());
+  for (const Triangle& t : triangles_) {
+    centres.push_back({positions_[t[0]] + positions_[t[1]] + positions_[t[2]], t});
+  }
   nodes_.reserve(triangles_.size());
   nodes_.emplace_back();
-  build(0, 0, static_cast<std::uint32_t>(triangles_.size()));
+  build(0, 0, centres);
 }
 
 TriangleTree::TriangleTree(std::span<const glm::dvec3> positions,
                            std::span<const std::uint16_t> indices)
     : TriangleTree(positions, triples(indices)) {}
 
-void TriangleTree::set_box(Node& node, std::uint32_t first, std::uint32_t count) const {
-  node.low = node.high = positions_[triangles_[first][0]];
-  for (std::uint32_t t = first; t < first + count; ++t) {
-    for (const std::uint32_t v : triangles_[t]) {
-      node.low = glm::min(node.low, positions_[v]);
-      node.high = glm::max(node.high, positions_[v]);
-    }
-  }
-}
-
-void TriangleTree::build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
-  set_box(nodes_[node], first, count);
+void TriangleTree::build(std::uint32_t node, std::uint32_t first, std::span<Centre> centres) {
+  const std::size_t count = centres.size();
   if (count <= kLeaf) {
-    nodes_[node].first = first;
-    nodes_[node].count = count;
+    Node leaf{positions_[centres[0].triangle[0]], positions_[centres[0].triangle[0]], first,
+              static_cast<std::uint32_t>(count)};
+    for (const Centre& centre : centres) {
+      triangles_[first++] = centre.triangle;
+      for (const std::uint32_t v : centre.triangle) {
+        leaf.low = glm::min(leaf.low, positions_[v]);
+        leaf.high = glm::max(leaf.high, positions_[v]);
+      }
+    }
+    nodes_[node] = leaf;
     return;
   }
-  const glm::dvec3 side = nodes_[node].high - nodes_[node].low;
+  glm::dvec3 low = centres[0].sum;
+  glm::dvec3 high = low;
+  for (const Centre& centre : centres) {
+    low = glm::min(low, centre.sum);
+    high = glm::max(high, centre.sum);
+  }
+  const glm::dvec3 side = high - low;
   const int axis = side.x >= side.y && side.x >= side.z ? 0 : (side.y >= side.z ? 1 : 2);
-  const auto centre = [this, axis](const Triangle& t) {
-    return positions_[t[0]][axis] + positions_[t[1]][axis] + positions_[t[2]][axis];
-  };
-  const auto begin = triangles_.begin() + first;
-  std::nth_element(begin, begin + count / 2, begin + count,
-                   [&](const Triangle& a, const Triangle& b) { return centre(a) < centre(b); });
+  std::nth_element(centres.begin(), centres.begin() + static_cast<std::ptrdiff_t>(count / 2),
+                   centres.end(),
+                   [axis](const Centre& a, const Centre& b) { return a.sum[axis] < b.sum[axis]; });
   const auto left = static_cast<std::uint32_t>(nodes_.size());
-  nodes_[node].first = left;
   nodes_.resize(nodes_.size() + 2);
-  build(left, first, count / 2);
-  build(left + 1, first + count / 2, count - count / 2);
+  build(left, first, centres.first(count / 2));
+  build(left + 1, first + static_cast<std::uint32_t>(count / 2), centres.subspan(count / 2));
+  nodes_[node] = {glm::min(nodes_[left].low, nodes_[left + 1].low),
+                  glm::max(nodes_[left].high, nodes_[left + 1].high), left, 0};
 }
 
-double TriangleTree::nearest(const glm::dvec3& point, double enough) {
-  double best = distance_square(point, corners(last_));
+double TriangleTree::nearest(const glm::dvec3& point, double enough, double best) {
+  best = std::min(best, distance_square(point, corners(last_)));
   if (best <= enough) return best;
   struct Entry {
     std::uint32_t node;

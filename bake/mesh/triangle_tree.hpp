@@ -39,9 +39,10 @@ class TriangleTree {
   TriangleTree(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
 
   /// Square of the distance of the nearest triangle; where some triangle is within `enough` (a
-  /// square), that of any such triangle. Remembers the answer: neighbouring points ask for it
-  /// again.
-  double nearest(const glm::dvec3& point, double enough = 0);
+  /// square), that of any such triangle; where none is nearer than `best`, that. Remembers the
+  /// answer: neighbouring points ask for it again.
+  double nearest(const glm::dvec3& point, double enough = 0,
+                 double best = std::numeric_limits<double>::infinity());
   /// What a ray meets first.
   struct Hit {
     double distance = 0;  ///< in lengths of the direction
@@ -68,8 +69,11 @@ class TriangleTree {
     const Triangle& v = triangles_[t];
     return {positions_[v[0]], positions_[v[1]], positions_[v[2]]};
   }
-  void build(std::uint32_t node, std::uint32_t first, std::uint32_t count);
-  void set_box(Node& node, std::uint32_t first, std::uint32_t count) const;
+  struct Centre {
+    glm::dvec3 sum;  // of the corners
+    Triangle triangle;
+  };
+  void build(std::uint32_t node, std::uint32_t first, std::span<Centre> centres);
 
   std::span<const glm::dvec3> positions_;
   std::vector<Triangle> triangles_;

@@ -683,6 +683,12 @@ TEST(Levels, DistancesOfWhatTheFinerLevelDoesNotCover) {
        {0, 1, 2, 2, 0, 1, 0},
        5.0,
        1.0},
+      {"a peak on the other side of a flat pocket",
+       {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, 0.1}, {0, 0, 5}},
+       {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3},
+       {0, 2, 1, 0, 1, 4, 1, 2, 4, 2, 0, 4},
+       {0, 0, 0, 0, kNoIndex},
+       4.9},
   };
   for (const Case& c : cases) {
     LevelSurface fine(c.positions, c.fine);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <queue>
 #include <span>
 #include <tuple>
@@ -16,9 +17,11 @@
 namespace modar {
 namespace {
 
-/// Coarse triangles that the line of one edge goes through. Set by hand: a sixteenth of the
-/// triangles is seldom five.
-constexpr std::uint8_t kMostCrossed = 12;
+/// Coarse triangles that the line of one edge goes through: a few from either end, else many. A
+/// long way from one end is mostly one around something, but where hundreds of triangles meet in
+/// one vertex there is no other. Set by hand: a sixteenth of the triangles is seldom five.
+constexpr std::uint8_t kFewCrossed = 12;
+constexpr std::uint8_t kMostCrossed = 60;
 constexpr std::uint8_t kUntraced = 0xFF;
 constexpr std::uint16_t kNoVertex = 0xFFFF;
 
@@ -44,6 +47,7 @@ struct Path {
 /// The coarse triangles that the outline of a triangle goes through, in a ring.
 class Outline {
  public:
+  void clear() { count_ = 0; }
   void add(std::uint32_t triangle) {
     if (count_ == 0 || all_[count_ - 1] != triangle) all_[count_++] = triangle;
   }
@@ -52,11 +56,13 @@ class Outline {
   }
   [[nodiscard]] std::span<const std::uint32_t> triangles() const { return {all_.data(), count_}; }
 
-  /// What is left where it does not go back the way that it came: at most two where it can be drawn
-  /// together to a point. Coarse triangles meet in a vertex or an edge, so there is one way.
-  [[nodiscard]] Outline core() const {
-    Outline left;
-    for (const std::uint32_t t : triangles()) {
+  /// What is left where another one does not go back the way that it came: at most two where it can
+  /// be drawn together to a point. Coarse triangles meet in a vertex or an edge, so there is one
+  /// way.
+  void set_core_of(const Outline& whole) {
+    Outline& left = *this;
+    left.count_ = 0;
+    for (const std::uint32_t t : whole.triangles()) {
       if (left.count_ > 1 && left.all_[left.count_ - 2] == t) {
         --left.count_;
       } else {
@@ -77,7 +83,6 @@ class Outline {
     }
     std::copy(left.all_.begin() + first, left.all_.begin() + end, left.all_.begin());
     end -= first;
-    return left;
   }
 
  private:
@@ -100,6 +105,8 @@ class LevelMap {
         settled_(fine.triangles(), 0),
         far_(coarse.triangles(), 0),
         torn_(coarse.triangles(), 0),
+        touches_(coarse.triangles(), 0),
+        same_(coarse.triangles(), 0),
         covered_(coarse.triangles(), 0) {
     for (const std::uint16_t v : fine.indices()) {
       if (places_[v].triangle == kNoIndex && nearby[v] != kNoIndex) place(v, nearby[v]);
@@ -167,17 +174,18 @@ class LevelMap {
         return std::tie(square, vertex) < std::tie(other.square, other.vertex);
       }
     };
-    std::priority_queue<Far> far;
+    std::vector<Far> farther;
     for (std::uint32_t v = 0; v < places_.size(); ++v) {
       if (places_[v].square <= limit() * limit()) continue;
-      far.push({places_[v].square, static_cast<std::uint16_t>(v), false});
+      farther.push_back({places_[v].square, static_cast<std::uint16_t>(v), false});
     }
+    std::priority_queue<Far> far(std::less<Far>(), std::move(farther));
     while (!far.empty() && far.top().square > limit() * limit()) {
       const auto [square, v, near_known] = far.top();
       far.pop();
-      const NearTriangle nearest = near_known
-                                       ? coarse_.nearest(fine_.position(v), found_ * found_)
-                                       : coarse_.nearest_around(fine_.position(v), nearby[v]);
+      const NearTriangle nearest =
+          near_known ? coarse_.nearest(fine_.position(v), found_ * found_, {square, nearby[v]})
+                     : coarse_.nearest_around(fine_.position(v), nearby[v]);
       nearby[v] = nearest.triangle;
       place(v, nearest.triangle);
       if (near_known) {
@@ -209,35 +217,43 @@ class LevelMap {
         return;
       }
     }
-    // From a vertex, the line could start in any triangle around it.
-    bool backwards = from.at_vertex();
-    path.square = backwards ? walk(to, from, a, b) : walk(from, to, a, b);
-    if (path.square < 0) {
-      steps_.resize(path.first);
-      backwards = !backwards;
-      path.square = backwards ? walk(to, from, a, b) : walk(from, to, a, b);
-    }
-    if (path.square < 0) {
-      steps_.resize(path.first);
-      return;
-    }
-    path.count = static_cast<std::uint8_t>(steps_.size() - path.first);
-    if (backwards) std::reverse(steps_.begin() + path.first, steps_.end());
+    const auto walks = [&](bool backwards, std::uint8_t most) {
+      const Place& begin = backwards ? to : from;
+      const Place& end = backwards ? from : to;
+      path.square = walk(begin, end, begin.triangle, {a, b}, most);
+      // From a vertex, the line may start in any triangle around it.
+      for (std::size_t i = 0; path.square < 0 && begin.at_vertex(); ++i) {
+        const std::span<const std::uint32_t> around = coarse_.corners_at(begin.on[0]);
+        if (i == around.size()) break;
+        steps_.resize(path.first);
+        path.square = walk(begin, end, around[i] / 3, {a, b}, most);
+      }
+      if (path.square < 0) {
+        steps_.resize(path.first);
+        return false;
+      }
+      path.count = static_cast<std::uint8_t>(steps_.size() - path.first);
+      if (backwards) std::reverse(steps_.begin() + path.first, steps_.end());
+      return true;
+    };
+    const bool first = from.at_vertex();
+    walks(first, kFewCrossed) || walks(!first, kFewCrossed) || walks(first, kMostCrossed) ||
+        walks(!first, kMostCrossed);
   }
 
   /// Appends the triangles from one place to another, along a plane that stands on the first one.
-  /// Returns the greatest squared distance of a crossing from the edge from a to b; below zero
-  /// where it does not get there.
-  double walk(const Place& from, const Place& to, std::uint16_t a, std::uint16_t b) {
-    std::uint32_t at = from.triangle;
+  /// Returns the greatest squared distance of a crossing from an edge of the finer level; below
+  /// zero where it does not get there through so few triangles.
+  double walk(const Place& from, const Place& to, std::uint32_t at,
+              const std::array<std::uint16_t, 2>& edge, std::uint8_t most) {
     steps_.push_back(at);
     if (is_on(to, at)) return 0;
     const std::array<glm::dvec3, 3> t = coarse_.triangle(at);
     const glm::dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
     const glm::dvec3 left = glm::cross(normal, to.point - from.point);
     const double origin = glm::dot(left, from.point);
-    const glm::dvec3& begin = fine_.position(a);
-    const glm::dvec3 line = fine_.position(b) - begin;
+    const glm::dvec3& begin = fine_.position(edge[0]);
+    const glm::dvec3 line = fine_.position(edge[1]) - begin;
     const double length = glm::dot(line, line);
     // It leaves over the edge that goes from its right to its left.
     std::array<double, 3> sides;
@@ -249,7 +265,7 @@ class LevelMap {
     double right_side = sides[i];
     double left_side = sides[(i + 1) % 3];
     double greatest = 0;
-    for (std::uint8_t steps = 1; steps < kMostCrossed; ++steps) {
+    for (std::uint8_t steps = 1; steps < most; ++steps) {
       const glm::dvec3& right_end = coarse_.position(coarse_.indices()[corner]);
       const glm::dvec3& left_end = coarse_.position(coarse_.indices()[next_corner(corner)]);
       const double share = right_side / (right_side - left_side);
@@ -299,24 +315,39 @@ class LevelMap {
   /// Maps a triangle to what its outline encloses, if it can be.
   void map(std::uint32_t t) {
     // Edges along coarse ones last: they may choose.
-    Outline ring;
+    Outline& ring = ring_;
+    ring.clear();
     double square = 0;
     std::uint32_t begin = 0;
+    int along = 0;
+    const std::uint16_t* v = fine_.corners(t);
     for (std::uint32_t k = 0; k < 3; ++k) {
       const Path& path = path_of(3 * t + k);
       if (path.count == kUntraced) return;
-      square = std::max({square, path.square, places_[fine_.corners(t)[k]].square});
-      if (path.along != kNoIndex) begin = k + 1;
+      square = std::max({square, path.square, places_[v[k]].square});
+      if (path.along == kNoIndex) continue;
+      begin = k + 1;
+      ++along;
     }
     for (std::uint32_t k = begin; k < begin + 3; ++k) add_to(ring, 3 * t + k % 3);
-    if (!fan(ring.core(), t, square)) return;
+    if (ring.triangles().size() > 2) {
+      core_.set_core_of(ring);
+      if (!fan(core_, t, square)) return;
+    }
     mapped_[t] = 1;
+    for (const std::uint32_t at : ring.triangles()) {
+      touches_[at] = static_cast<std::uint8_t>(std::min(touches_[at] + 1, 2));
+    }
+    if (along == 3 && ring.triangles().size() == 1) {
+      const std::uint32_t at = ring.triangles()[0];
+      same_[at] = coarse_.find(v[0], v[1], v[2]) == at ? 1 : 0;
+    }
     if (square <= limit() * limit()) {
       settled_[t] = 1;
       bound_ = std::max(bound_, std::sqrt(square));
-    } else {
-      for (const std::uint32_t at : ring.triangles()) far_[at] = 1;
+      return;
     }
+    for (const std::uint32_t at : ring.triangles()) far_[at] = 1;
   }
 
   /// Have all triangles of a ring a common vertex, if there are more than two? Then the triangle is
@@ -337,7 +368,8 @@ class LevelMap {
   }
 
   /// Finds the coarse triangles that are covered. Where no border of what is mapped passes, a
-  /// triangle is covered like its neighbours; and once, at a border of both levels.
+  /// triangle is covered like its neighbours; and once, at a border of both levels, and where it is
+  /// one of the finer level and nothing else comes there.
   void spread() {
     std::vector<std::int8_t> borders(coarse_.indices().size(), 0);
     std::vector<std::uint8_t> walls(coarse_.indices().size(), 0);
@@ -363,6 +395,9 @@ class LevelMap {
     };
     for (std::uint32_t c = 0; c < borders.size(); ++c) {
       if (borders[c] != 0 && is_border(c)) cover(c / 3);
+    }
+    for (std::uint32_t t = 0; t < same_.size(); ++t) {
+      if (same_[t] != 0 && touches_[t] == 1) cover(t);
     }
     while (!waiting.empty()) {
       const std::uint32_t t = waiting.back();
@@ -392,10 +427,14 @@ class LevelMap {
   std::vector<Place> places_;         // of each vertex
   std::vector<Path> paths_;           // of each corner of the finer level, see first_of()
   std::vector<std::uint32_t> steps_;  // of all paths
+  Outline ring_;  // of the triangle that is being mapped, and what is left of it
+  Outline core_;
   std::vector<std::uint8_t> mapped_;  // of each triangle of the finer level: without a tear
   std::vector<std::uint8_t> settled_;
   std::vector<std::uint8_t> far_;   // of each of the coarser: is one mapped there that is far off?
   std::vector<std::uint8_t> torn_;  // does a border pass through it?
+  std::vector<std::uint8_t> touches_;  // how many are mapped to it or beside it: 0, 1 or more
+  std::vector<std::uint8_t> same_;     // is one mapped to it that has its corners?
   std::vector<std::uint8_t> covered_;
 };
 

@@ -134,8 +134,9 @@ NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t
   return best;
 }
 
-NearTriangle LevelSurface::nearest(const glm::dvec3& point, double enough) {
-  NearTriangle found{std::numeric_limits<double>::infinity(), 0};
+NearTriangle LevelSurface::nearest(const glm::dvec3& point, double enough,
+                                   const NearTriangle& near) {
+  NearTriangle found = near;
   if (searches_ < kScans) {
     ++searches_;
     for (std::uint32_t t = 0; t < triangles() && found.square > enough; ++t) {
@@ -145,7 +146,8 @@ NearTriangle LevelSurface::nearest(const glm::dvec3& point, double enough) {
     return found;
   }
   if (!tree_) tree_ = std::make_unique<TriangleTree>(positions_, indices_);
-  found.square = tree_->nearest(point, enough);
+  found.square = tree_->nearest(point, enough, near.square);
+  if (!(found.square < near.square)) return near;
   const auto& [a, b, c] = tree_->last_triangle();
   found.triangle = find(static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b),
                         static_cast<std::uint16_t>(c));

@@ -56,6 +56,10 @@ class LevelSurface {
     const std::uint32_t corner = opposites_[3 * t + i];
     return corner == kNoIndex ? kNoIndex : corner / 3;
   }
+  /// The corners at a vertex.
+  [[nodiscard]] std::span<const std::uint32_t> corners_at(std::uint16_t vertex) const {
+    return {corners_.data() + begins_[vertex], corners_.data() + begins_[vertex + std::size_t{1}]};
+  }
   /// The only corner whose edge goes from a vertex to another; kNoIndex where there is none or
   /// several.
   [[nodiscard]] std::uint32_t edge(std::uint16_t from, std::uint16_t to) const;
@@ -68,8 +72,9 @@ class LevelSurface {
   [[nodiscard]] std::uint32_t walk(const glm::dvec3& point, std::uint32_t start) const;
   /// The nearest one as far as those around it tell: the same walk, by distances.
   [[nodiscard]] NearTriangle nearest_around(const glm::dvec3& point, std::uint32_t start) const;
-  /// The nearest of all; where some triangle is within `enough` (a square), any such one.
-  NearTriangle nearest(const glm::dvec3& point, double enough = 0);
+  /// The nearest of all; where some triangle is within `enough` (a square), any such one. near: one
+  /// that is probably near, the nearer the faster.
+  NearTriangle nearest(const glm::dvec3& point, double enough, const NearTriangle& near);
 
  private:
   std::span<const glm::dvec3> positions_;

@@ -22,14 +22,16 @@ inline constexpr std::uint32_t kMaxLevels = 12;
 
 /// Gives chunks coarser levels over their own vertices. Level k of the model has about 1/2^k of its
 /// triangles, shared out among the chunks so that the price of the last collapse is the same in
-/// all; a chunk that would lose less than a fifth has no level of its own there. Positions shared
-/// with other chunks stay, so that chunks of any two levels meet without a crack; seams inside a
-/// chunk are simplified on both sides alike, open rims of the model too. Vertices that differ in
-/// their normals only are one meanwhile where most do (flat shading): corners of coarser triangles
-/// take the normal that is nearest to the triangle's. A level's error bounds the
-/// distance between it and level 0, both as the device decodes them, measured from either to the
-/// other (see level_distance()). Where vertices of level 0 are gone, the texture has slid by no
-/// more than 1 % of the chunk's diagonal. Figures go to report.levels.
+/// all; a chunk that would lose less than a fifth has no level of its own there. Where the model
+/// cannot be halved any more, there is a last level that is only somewhat worse than the one
+/// before. Positions shared with other chunks stay, so that chunks of any two levels meet without a
+/// crack; seams inside a chunk are simplified on both sides alike, open rims of the model too.
+/// Vertices that differ in their normals only are one meanwhile where most do (flat shading):
+/// corners of coarser triangles take the normal that is nearest to the triangle's. A level's error
+/// bounds the distance between it and level 0, both as the device decodes them, measured from
+/// either to the other (see level_distance()), for coarse levels by way of a finer one that is
+/// hardly off. Where vertices of level 0 are gone, the texture has slid by no more than 1 % of the
+/// chunk's diagonal. Figures go to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
 }  // namespace modar

@@ -115,12 +115,15 @@ class Bounder {
     raise_lower(found);
   }
 
-  /// Finds the distance of the farthest of some points, whose squared distances are at most these.
-  void probe(std::vector<std::pair<double, std::uint16_t>> points) {
+  /// Finds the distance of the farthest of some points, whose squared distances are at most these:
+  /// from the triangles in `nearby`.
+  void probe(std::vector<std::pair<double, std::uint16_t>> points,
+             std::span<const std::uint32_t> nearby) {
     std::make_heap(points.begin(), points.end());
     while (!points.empty() && points.front().first > std::max(lower_ * lower_, limit_square())) {
-      const glm::dvec3& point = to_.position(points.front().second);
-      raise_lower(std::sqrt(to_.nearest(point, lower_ * lower_).square));
+      const auto [square, v] = points.front();
+      const NearTriangle near = {square, nearby[v]};
+      raise_lower(std::sqrt(to_.nearest(to_.position(v), lower_ * lower_, near).square));
       std::pop_heap(points.begin(), points.end());
       points.pop_back();
     }
@@ -333,7 +336,7 @@ class Bounder {
     near.square = std::numeric_limits<double>::infinity();
     if (before != kNoIndex) near = to_.nearest_around(point, before);
     if (near.square > most * most) {
-      near = to_.nearest(point, margin * margin);
+      near = to_.nearest(point, margin * margin, near);
       // A triangle found within the margin need not be the nearest: it proves no distance.
       if (near.square > margin * margin) raise_lower(std::sqrt(near.square));
     }
@@ -379,7 +382,7 @@ double surface_distance(const LevelSurface& from, LevelSurface& to,
       probes.emplace_back(squares[v[k]], v[k]);
     }
   }
-  bounder.probe(std::move(probes));
+  bounder.probe(std::move(probes), nearby);
   for (const std::uint32_t t : left) {
     const std::uint16_t* v = from.corners(t);
     const std::array<glm::dvec3, 3> corners = from.triangle(t);
