@@ -80,7 +80,7 @@ def standard_header(name):
 
 
 # Rooms of the workstation from the bottom up: each includes those before it, and of its own rank itself only.
-BAKE_ROOMS = (("bake", "bake/memory"), ("bake/image", "bake/import", "bake/video"), ("bake/mesh",),
+BAKE_ROOMS = (("bake", "bake/memory"), ("bake/image",), ("bake/import", "bake/video"), ("bake/mesh",),
               ("bake/texture", "bake/pattern"), ("bake/bundle", "bake/export", "bake/ship", "bake/web"), ("bake/check",), ("bake/page", "bake/project"), ("bake/lab",), ("bake/commands",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
 # The door that the command line has to the proofs.

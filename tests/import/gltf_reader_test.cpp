@@ -20,6 +20,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/image/image.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/stages.hpp"
 
@@ -189,6 +190,66 @@ TEST_F(Gltf, ImageNamesArePercentDecodedAndMayBeWebp) {
   EXPECT_EQ(fs::path(model->materials[0].diffuse_map).filename(), "my wall.webp");
   EXPECT_EQ(fs::path(model->materials[1].diffuse_map).filename(), "100%.png");
   EXPECT_TRUE(model->diagnostics.empty());
+}
+
+TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
+  const auto picture = [&](const char* name, std::vector<std::uint8_t> pixels) {
+    const RgbaImage image = {2, 1, std::move(pixels)};
+    ASSERT_TRUE(write_png(image, (folder_ / name).string()));
+  };
+  picture("colour.png", {200, 100, 0, 255, 200, 100, 0, 100});
+  picture("solid.png", {200, 100, 0, 255, 200, 100, 0, 255});
+  picture("glow.png", {0, 0, 255, 255, 0, 0, 0, 255});
+  picture("shade.png", {255, 9, 9, 255, 0, 9, 9, 255});
+  picture("rough.png", {0, 51, 255, 255, 0, 153, 255, 255});  // means: 0.4 and 1
+  const auto model = read(
+      std::string(kOneTriangle) +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "images":[{"uri":"colour.png"},{"uri":"glow.png"},{"uri":"shade.png"},{"uri":"rough.png"},
+          {"uri":"solid.png"}],
+          "textures":[{"source":0},{"source":1},{"source":2},{"source":3},{"source":4}],
+          "materials":[
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0}},"alphaMode":"BLEND"},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0}},"alphaMode":"MASK"},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"baseColorFactor":[1,1,1,0.9]},
+           "alphaMode":"MASK","alphaCutoff":0.35},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":4}}},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":4},"baseColorFactor":[0,1,1,1]},
+           "emissiveTexture":{"index":1},"emissiveFactor":[1,1,1],"occlusionTexture":{"index":2}},
+          {"pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0,1],"roughnessFactor":1,
+           "metallicRoughnessTexture":{"index":3}},"emissiveTexture":{"index":1,"texCoord":1},
+           "emissiveFactor":[0.5,0,0]}],
+          "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  const auto pixels = [&](std::size_t material) {
+    const Result<RgbaImage> image = read_image(model->materials[material].diffuse_map);
+    return image ? image->pixels : std::vector<std::uint8_t>();
+  };
+  using Bytes = std::vector<std::uint8_t>;
+  EXPECT_EQ(pixels(0), (Bytes{200, 100, 0, 255, 200, 100, 0, 255}));
+  EXPECT_EQ(fs::path(model->materials[1].diffuse_map), folder_ / "colour.png");
+  EXPECT_EQ(pixels(2), (Bytes{200, 100, 0, 255, 200, 100, 0, 0}));
+  // 100 / 255 of 0.9 is 0.353.
+  EXPECT_EQ(pixels(3), (Bytes{200, 100, 0, 255, 200, 100, 0, 255}));
+  EXPECT_EQ(fs::path(model->materials[4].diffuse_map), folder_ / "solid.png");
+  // sRGB 100 is 0.1274 in linear light; half of that, where all is occluded, is sRGB 71.
+  EXPECT_EQ(pixels(5), (Bytes{0, 100, 255, 255, 0, 71, 0, 255}));
+  EXPECT_EQ(model->materials[5].diffuse, glm::vec3(1.0f));
+  // Another set of coordinates: the factor alone stays. Roughness 0.4 is an exponent of 76.1.
+  EXPECT_TRUE(model->materials[6].diffuse_map.empty());
+  EXPECT_GT(model->materials[6].emission.x, 0.7f);
+  EXPECT_NEAR(model->materials[6].shininess, 76.1f, 0.1f);
+  EXPECT_FLOAT_EQ(model->materials[6].specular.x, 1.0f);
+  EXPECT_FLOAT_EQ(model->materials[6].specular.z, 0.0f);
+  EXPECT_EQ(model->materials[0].shininess, 0.0f);
+  std::vector<std::string> ids;
+  for (const Diagnostic& d : model->diagnostics) ids.push_back(d.id);
+  std::sort(ids.begin(), ids.end());
+  EXPECT_EQ(ids,
+            (std::vector<std::string>{"gltf.alpha-mask", "gltf.emissive-map", "gltf.emissive-map",
+                                      "gltf.metal-map", "gltf.occlusion-map"}));
 }
 
 TEST_F(Gltf, SparseAccessorsReplaceWhatTheyList) {

@@ -7,11 +7,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <system_error>
 
+#include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "formats/atomic_file.hpp"
 
@@ -89,23 +91,159 @@ class MaterialReader {
       m.diffuse[i] = channel(pbr.baseColorFactor, i, 1.0);
       m.emission[i] = channel(source.emissiveFactor, i, 0.0);
     }
-    m.ambient = m.diffuse;
-    // The Phong exponent whose highlight is as wide as that of the roughness.
-    const double roughness = std::clamp(pbr.roughnessFactor, 0.05, 1.0);
-    m.shininess = static_cast<float>(std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0));
-    if (source.alphaMode == "BLEND" && pbr.baseColorFactor.size() > 3) {
-      m.opacity = static_cast<float>(std::clamp(pbr.baseColorFactor[3], 0.0, 1.0));
-    }
     m.two_sided = source.doubleSided;
-    m.diffuse_map = image_path(pbr.baseColorTexture.index);
+    set_highlight(pbr, m);
+    set_pictures(source, m);
+    m.ambient = m.diffuse;
     if (folder_of_images_ != nullptr) m.keeper = folder_of_images_;
     return m;
   }
 
+  /// Adds one finding for each kind of thing that was folded or left out.
+  void report() {
+    const auto add = [&](const char* id, int count, const char* what) {
+      if (count == 0) return;
+      diagnostics_.push_back({id, DiagnosticSeverity::kInfo, label_, 0,
+                              std::to_string(count) + " materials " + what, ""});
+    };
+    add("gltf.emissive-map", emissive_.folded,
+        "have an emissive map, which is added to the base colour: it is lit like that");
+    add("gltf.emissive-map", emissive_.left_out,
+        "have an emissive map on other coordinates than the base colour, which is left out");
+    add("gltf.occlusion-map", occlusion_.folded,
+        "have an occlusion map; the base colour is darkened by half of it");
+    add("gltf.occlusion-map", occlusion_.left_out,
+        "have an occlusion map on other coordinates than the base colour, which is left out");
+    add("gltf.metal-map", averaged_,
+        "have a metallic-roughness map; its means set the highlight of the whole material");
+    add("gltf.alpha-mask", cut_out_,
+        "are cut out at an alpha value: what is below it is left out, the rest is opaque");
+  }
+
  private:
+  struct Count {
+    int folded = 0;
+    int left_out = 0;
+  };
+
+  /// The highlight of Blinn and Phong that is as wide as the roughness makes it, and as bright in
+  /// its middle: (n + 2) / 8 of what is reflected straight on. Faint ones are left out: they cost a
+  /// phone as much as bright ones.
+  void set_highlight(const tinygltf::PbrMetallicRoughness& pbr, SourceMaterial& m) {
+    constexpr double kDielectric = 0.04;
+    constexpr double kFaint = 0.05;
+    double roughness = pbr.roughnessFactor;
+    double metalness = pbr.metallicFactor;
+    if (const std::string map = image_path(pbr.metallicRoughnessTexture.index); !map.empty()) {
+      if (const auto means = mean_roughness_metalness(map)) {
+        roughness *= means->roughness;
+        metalness *= means->metalness;
+        ++averaged_;
+      } else {
+        note(means.error());
+      }
+    }
+    roughness = std::clamp(roughness, 0.05, 1.0);
+    const double exponent = std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0);
+    double brightest = 0;
+    for (int i = 0; i < 3; ++i) {
+      const double base = factor(pbr.baseColorFactor, static_cast<std::size_t>(i), 1.0);
+      const double straight = kDielectric + std::clamp(metalness, 0.0, 1.0) * (base - kDielectric);
+      const double middle = std::clamp(straight * (exponent + 2) / 8, 0.0, 1.0);
+      m.specular[i] = static_cast<float>(srgb_of_linear(middle));
+      brightest = std::max(brightest, middle);
+    }
+    m.shininess = static_cast<float>(exponent);
+    if (brightest >= kFaint && exponent >= 1) return;
+    m.specular = glm::vec3(0.0f);
+    m.shininess = 0;
+  }
+
+  void set_pictures(const tinygltf::Material& source, SourceMaterial& m) {
+    const auto& pbr = source.pbrMetallicRoughness;
+    GltfPictures pictures;
+    pictures.colour = image_path(pbr.baseColorTexture.index);
+    const auto take = [&](const auto& info, std::string& path, Count& count) {
+      if (info.index < 0) return;
+      const tinygltf::TextureInfo& colour = pbr.baseColorTexture;
+      if (info.texCoord == colour.texCoord && info.extensions == colour.extensions) {
+        path = image_path(info.index);
+      }
+      ++(path.empty() ? count.left_out : count.folded);
+    };
+    take(source.emissiveTexture, pictures.emissive, emissive_);
+    take(source.occlusionTexture, pictures.occlusion, occlusion_);
+    if (!pictures.occlusion.empty()) {
+      pictures.occlusion_strength = source.occlusionTexture.strength;
+    }
+    for (std::size_t i = 0; i < 3 && !pictures.emissive.empty(); ++i) {
+      pictures.colour_factor[i] = factor(pbr.baseColorFactor, i, 1.0);
+      pictures.emissive_factor[i] = factor(source.emissiveFactor, i, 0.0);
+    }
+    const double alpha = std::clamp(factor(pbr.baseColorFactor, 3, 1.0), 0.0, 1.0);
+    pictures.alpha = GltfPictures::Alpha::kIgnored;
+    if (source.alphaMode == "BLEND") {
+      pictures.alpha = GltfPictures::Alpha::kKept;
+      m.opacity = static_cast<float>(alpha);
+    } else if (source.alphaMode == "MASK") {
+      ++cut_out_;
+      pictures.alpha = GltfPictures::Alpha::kCutOff;
+      pictures.cutoff = source.alphaCutoff;
+      pictures.colour_factor[3] = alpha;
+      if (pictures.colour.empty() && alpha < pictures.cutoff) m.opacity = 0;
+    }
+    m.diffuse_map = folded(pictures);
+    if (pictures.emissive.empty() || m.diffuse_map == pictures.colour) return;
+    m.diffuse = glm::vec3(1.0f);  // it is in the picture
+    m.emission = glm::vec3(0.0f);
+  }
+
+  /// The path of what the shader draws: the picture itself, or a new one in the temporary folder.
+  std::string folded(const GltfPictures& pictures) {
+    const auto [found, added] = folded_.try_emplace(pictures, pictures.colour);
+    if (!added) return found->second;
+    // Where it cannot be read, whoever reads it for the bundle says so.
+    const auto needed = needs_folding(pictures);
+    if (!needed || !*needed) return found->second;
+    const auto image = fold_pictures(pictures);
+    if (!image) {
+      note(image.error());
+      return found->second;
+    }
+    const std::string& first = !pictures.colour.empty()     ? pictures.colour
+                               : !pictures.emissive.empty() ? pictures.emissive
+                                                            : pictures.occlusion;
+    const std::string path = new_picture(std::filesystem::path(first).stem().string(), ".png");
+    if (const auto written = write_png(*image, path)) {
+      found->second = path;
+    } else {
+      note(written.error());
+    }
+    return found->second;
+  }
+
+  /// A path in the temporary folder that nothing has yet.
+  std::string new_picture(const std::string& name, const std::string& extension) {
+    if (folder_of_images_ == nullptr) folder_of_images_ = std::make_shared<TemporaryFolder>();
+    const std::string path = folder_of_images_->path() + "/" + name;
+    std::error_code error;
+    for (int i = 1;; ++i) {
+      const std::string with_number = i == 1 ? path : path + "-" + std::to_string(i);
+      if (!std::filesystem::exists(with_number + extension, error)) return with_number + extension;
+    }
+  }
+
+  /// A picture that cannot be read is left out.
+  void note(const Error& error) {
+    diagnostics_.push_back(
+        {error.code, DiagnosticSeverity::kWarning, error.where, 0, error.cause, error.cure});
+  }
+
+  static double factor(const std::vector<double>& factors, std::size_t i, double other) {
+    return i < factors.size() ? factors[i] : other;
+  }
   static float channel(const std::vector<double>& factors, int i, double other) {
-    const auto k = static_cast<std::size_t>(i);
-    return static_cast<float>(srgb_of_linear(k < factors.size() ? factors[k] : other));
+    return static_cast<float>(srgb_of_linear(factor(factors, static_cast<std::size_t>(i), other)));
   }
 
   std::string image_path(int texture) {
@@ -133,17 +271,15 @@ class MaterialReader {
       if (std::filesystem::is_regular_file(folder_ + name, error)) return folder_ + name;
     }
     if (!image.image.empty()) {
-      if (folder_of_images_ == nullptr) folder_of_images_ = std::make_shared<TemporaryFolder>();
-      const std::string path = folder_of_images_->path() + "/" +
-                               plain_name(image.name, "image" + std::to_string(index)) +
-                               (image.mimeType == "image/jpeg"   ? ".jpg"
-                                : image.mimeType == "image/webp" ? ".webp"
-                                                                 : ".png");
+      const std::string path = new_picture(plain_name(image.name, "image" + std::to_string(index)),
+                                           image.mimeType == "image/jpeg"   ? ".jpg"
+                                           : image.mimeType == "image/webp" ? ".webp"
+                                                                            : ".png");
       const auto bytes = std::as_bytes(std::span(image.image));
       if (!folder_of_images_->path().empty() && write_file(path, bytes)) return path;
     }
     diagnostics_.push_back({"gltf.missing-image", DiagnosticSeverity::kWarning, label_, 0,
-                            "the base colour image '" + image.uri + "' is not there",
+                            "the image '" + image.uri + "' is not there",
                             "put the image beside the file under that name"});
     return {};
   }
@@ -154,14 +290,14 @@ class MaterialReader {
   std::vector<Diagnostic>& diagnostics_;
   std::vector<std::optional<std::string>> paths_;
   std::shared_ptr<TemporaryFolder> folder_of_images_;
+  std::map<GltfPictures, std::string> folded_;
+  Count emissive_;
+  Count occlusion_;
+  int averaged_ = 0;
+  int cut_out_ = 0;
 };
 
 }  // namespace
-
-double srgb_of_linear(double linear) {
-  const double c = std::clamp(linear, 0.0, 1.0);
-  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
-}
 
 bool keep_image_bytes(tinygltf::Image* image, int, std::string*, std::string*, int, int,
                       const unsigned char* bytes, int size, void*) {
@@ -176,6 +312,7 @@ std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const st
   std::vector<SourceMaterial> materials;
   for (const tinygltf::Material& m : gltf.materials) materials.push_back(reader.read(m));
   materials.push_back(reader.read(tinygltf::Material()));
+  reader.report();
   return materials;
 }
 namespace {

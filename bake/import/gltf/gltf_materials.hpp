@@ -19,15 +19,14 @@ namespace modar {
 bool keep_image_bytes(tinygltf::Image* image, int index, std::string* error, std::string* warning,
                       int width, int height, const unsigned char* bytes, int size, void* user);
 
-/// One material for each of the file's, followed by a white one for primitives without a material.
+/// One material for each of the file's, followed by a white one for primitives without a material:
+/// emission, occlusion, roughness, metalness and the modes of alpha as far as our shader has them.
+/// Findings say what was folded into what, and what was left out.
 /// folder: where image names are looked up, with a trailing slash. label: the file's name in
 /// diagnostics.
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const std::string& folder,
                                            const std::string& label,
                                            std::vector<Diagnostic>& diagnostics);
-
-/// Linear light to sRGB (IEC 61966-2-1), both in [0,1].
-double srgb_of_linear(double linear);
 
 /// KHR_texture_transform of the base colour: uv of the file to those of the image, v down in both.
 struct GltfUv {

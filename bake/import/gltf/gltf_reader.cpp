@@ -16,6 +16,7 @@
 #include <glm/matrix.hpp>
 
 #include "bake/import/gltf/gltf_materials.hpp"
+#include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/import/read_model.hpp"
 
@@ -441,18 +442,6 @@ void report_left_out(const tinygltf::Model& gltf, const std::string& label,
       "the model stands as its nodes have it");
   add(materials([](const auto& m) { return m.normalTexture.index >= 0; }), "gltf.normal-map", info,
       "materials have a normal map, which is left out", "");
-  add(materials([](const auto& m) { return m.occlusionTexture.index >= 0; }), "gltf.occlusion-map",
-      info, "materials have an occlusion map, which is left out", "bake it into the base colour");
-  add(materials([](const auto& m) { return m.emissiveTexture.index >= 0; }), "gltf.emissive-map",
-      info, "materials have an emissive map, which is left out; the emissive factor is kept", "");
-  add(materials(
-          [](const auto& m) { return m.pbrMetallicRoughness.metallicRoughnessTexture.index >= 0; }),
-      "gltf.metal-map", info,
-      "materials have a metallic-roughness map, which is left out; the roughness factor is folded "
-      "into the highlight",
-      "");
-  add(materials([](const auto& m) { return m.alphaMode == "MASK"; }), "gltf.alpha-mask", info,
-      "materials cut their texture out at an alpha value; it is blended instead", "");
   add(gltf.cameras.size(), "gltf.camera", info, "cameras are left out", "");
   for (const std::string& extension : gltf.extensionsUsed) {
     if (is_known(extension)) continue;
@@ -490,8 +479,9 @@ Result<SourceModel> read_gltf(const std::string& path) {
   MODAR_TRY(require_support(gltf, bytes, path));
   if (!good) {
     std::replace(error.begin(), error.end(), '\n', ' ');
-    return fail(ExitCode::kInvalidInput, "gltf.read", path, "this is not glTF 2.0: " + error,
-                "check the file with the glTF validator and export it again");
+    return fail(
+        ExitCode::kInvalidInput, "gltf.read", path, "it cannot be read as glTF 2.0: " + error,
+        "put its buffers beside it, or check it with the glTF validator and export it again");
   }
   SourceModel model;
   model.name = std::filesystem::path(path).stem().string();

@@ -1,0 +1,104 @@
+// Multiplies, adds and cuts off pixel by pixel.
+#include "bake/import/gltf/gltf_pictures.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bake/image/resample.hpp"
+
+namespace modar {
+namespace {
+
+/// glTF's occlusion darkens what comes from all around and not what comes from a lamp; a colour
+/// darkens both. Half of it, set by hand: lamps and surroundings give about as much light.
+constexpr double kOccludedShare = 0.5;
+
+/// A picture at the size of another, where it has a path.
+Result<RgbaImage> read_as_large(const std::string& path, const RgbaImage& other) {
+  if (path.empty()) return RgbaImage();
+  MODAR_ASSIGN(RgbaImage image, read_image(path));
+  if (image.width == other.width && image.height == other.height) return image;
+  return resize(image, other.width, other.height, {.repeat = true});
+}
+
+/// Linear light of each value.
+std::array<double, 256> linear_of_srgb() {
+  RgbaImage ramp = {256, 1, std::vector<std::uint8_t>(std::size_t{4} * 256, 255)};
+  for (std::size_t i = 0; i < 256; ++i) ramp.pixels[4 * i] = static_cast<std::uint8_t>(i);
+  const LinearImage light = to_linear(ramp);
+  std::array<double, 256> linear{};
+  for (std::size_t i = 0; i < 256; ++i) {
+    linear[i] = static_cast<double>(light.pixels[4 * i]) / (1 + double{LinearImage::kAlphaFloor});
+  }
+  return linear;
+}
+
+std::uint8_t alpha_of(const GltfPictures& pictures, std::uint8_t alpha) {
+  switch (pictures.alpha) {
+    case GltfPictures::Alpha::kIgnored:
+      return 255;
+    case GltfPictures::Alpha::kCutOff:
+      return alpha / 255.0 * pictures.colour_factor[3] >= pictures.cutoff ? 255 : 0;
+    case GltfPictures::Alpha::kKept:
+      break;
+  }
+  return alpha;
+}
+
+}  // namespace
+
+double srgb_of_linear(double linear) {
+  const double c = std::clamp(linear, 0.0, 1.0);
+  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
+}
+
+Result<bool> needs_folding(const GltfPictures& pictures) {
+  if (!pictures.emissive.empty() || !pictures.occlusion.empty()) return true;
+  if (pictures.colour.empty() || pictures.alpha == GltfPictures::Alpha::kKept) return false;
+  MODAR_ASSIGN(const RgbaImage colour, read_image(pictures.colour));
+  return !is_opaque(colour) ||
+         (pictures.alpha == GltfPictures::Alpha::kCutOff && alpha_of(pictures, 255) == 0);
+}
+
+Result<RgbaImage> fold_pictures(const GltfPictures& pictures) {
+  const bool emits = !pictures.emissive.empty();
+  const std::string& first = !pictures.colour.empty() ? pictures.colour
+                             : emits                  ? pictures.emissive
+                                                      : pictures.occlusion;
+  MODAR_ASSIGN(RgbaImage image, read_image(first));
+  if (pictures.colour.empty()) std::fill(image.pixels.begin(), image.pixels.end(), 255);
+  MODAR_ASSIGN(const RgbaImage emissive, read_as_large(pictures.emissive, image));
+  MODAR_ASSIGN(const RgbaImage occlusion, read_as_large(pictures.occlusion, image));
+  const std::array<double, 256> linear = linear_of_srgb();
+  for (std::size_t p = 0; p < image.pixels.size(); p += 4) {
+    std::uint8_t* pixel = &image.pixels[p];
+    pixel[3] = alpha_of(pictures, pixel[3]);
+    if (!emits && occlusion.pixels.empty()) continue;
+    double seen = 1;
+    if (!occlusion.pixels.empty()) {
+      seen -= kOccludedShare * pictures.occlusion_strength * (1 - occlusion.pixels[p] / 255.0);
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      double light = linear[pixel[i]] * seen;
+      if (emits) {
+        light = light * pictures.colour_factor[i] +
+                linear[emissive.pixels[p + i]] * pictures.emissive_factor[i];
+      }
+      pixel[i] = static_cast<std::uint8_t>(std::lround(255 * srgb_of_linear(light)));
+    }
+  }
+  return image;
+}
+
+Result<RoughnessMetalness> mean_roughness_metalness(const std::string& path) {
+  MODAR_ASSIGN(const RgbaImage image, read_image(path));
+  std::array<std::uint64_t, 2> sums{};
+  for (std::size_t p = 0; p < image.pixels.size(); p += 4) {
+    sums[0] += image.pixels[p + 1];
+    sums[1] += image.pixels[p + 2];
+  }
+  const double all = 255.0 * static_cast<double>(image.pixels.size()) / 4;
+  return RoughnessMetalness{static_cast<double>(sums[0]) / all, static_cast<double>(sums[1]) / all};
+}
+
+}  // namespace modar

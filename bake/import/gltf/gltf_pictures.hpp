@@ -1,0 +1,51 @@
+// The pictures of a glTF material as the one that our shader draws. Internal to the glTF reader.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "bake/image/image.hpp"
+
+namespace modar {
+
+/// Pictures of one material, all on the same coordinates, and what the file multiplies them by.
+struct GltfPictures {
+  enum class Alpha : std::uint8_t {
+    kIgnored,  ///< OPAQUE
+    kCutOff,   ///< MASK: drawn in full where alpha times its factor is at least `cutoff`
+    kKept,     ///< BLEND
+  };
+  std::string colour;  ///< paths; empty: white
+  std::string emissive;
+  std::string occlusion;  ///< in red
+  std::array<double, 4> colour_factor{1, 1, 1, 1};
+  std::array<double, 3> emissive_factor{0, 0, 0};
+  double occlusion_strength = 1;
+  Alpha alpha = Alpha::kKept;
+  double cutoff = 0.5;
+
+  auto operator<=>(const GltfPictures&) const = default;
+};
+
+/// Whether the colour picture cannot be drawn as it is: another one is to go into it, or its alpha
+/// means something else. Reads it where only that can tell. Errors: as read_image().
+Result<bool> needs_folding(const GltfPictures& pictures);
+
+/// One picture, of the size of the colour's (else the first of the others), of what is drawn: the
+/// colour, darkened by the occlusion, plus what is emitted, in linear light, with the factors of
+/// both where anything is emitted; alpha as asked. Errors: as read_image().
+Result<RgbaImage> fold_pictures(const GltfPictures& pictures);
+
+/// Means over a picture of green and blue, as they are stored: roughness and metalness, in [0,1].
+/// Errors: as read_image().
+struct RoughnessMetalness {
+  double roughness = 1;
+  double metalness = 1;
+};
+Result<RoughnessMetalness> mean_roughness_metalness(const std::string& path);
+
+/// Linear light to sRGB (IEC 61966-2-1), both in [0,1].
+double srgb_of_linear(double linear);
+
+}  // namespace modar
