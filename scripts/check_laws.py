@@ -38,7 +38,7 @@ THIRD_PARTIES = {
     "zstd.h": (r"runtime/fetch/piece\.cpp",
                r"bake/ship/(mesh_encoder|recipe_maker)\.cpp", r"bake/lab/ship_bench\.cpp", r"tests/.*"),
     "meshoptimizer": (r"runtime/fetch/piece\.cpp",
-                      r"bake/mesh/lod/reduce\.cpp", r"bake/ship/mesh_encoder\.cpp",
+                      r"bake/import/gltf/gltf_meshopt\.cpp", r"bake/mesh/lod/reduce\.cpp", r"bake/ship/mesh_encoder\.cpp",
                       r"bake/lab/(lod_bench|meshopt_peer|ship_bench)\.cpp", r"tests/.*"),
     "assimp/": (r"bake/lab/assimp_peer\.cpp", r"tests/mesh/assimp_oracle\.cpp"),
     "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),

@@ -17,6 +17,7 @@
 
 #include <draco/compression/encode.h>
 #include <draco/mesh/triangle_soup_mesh_builder.h>
+#include <meshoptimizer.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -140,12 +141,11 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
                 one_triangle());
   };
   EXPECT_TRUE(requires_these(R"("KHR_mesh_quantization","KHR_texture_transform")"));
-  const auto refused = requires_these(R"("EXT_meshopt_compression","KHR_texture_basisu")");
+  const auto refused = requires_these(R"("KHR_texture_basisu","MODAR_none")");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().exit, ExitCode::kUnsupported);
   EXPECT_EQ(refused.error().code, "gltf.extension");
-  EXPECT_NE(refused.error().cause.find("EXT_meshopt_compression, KHR_texture_basisu"),
-            std::string::npos);
+  EXPECT_NE(refused.error().cause.find("KHR_texture_basisu, MODAR_none"), std::string::npos);
   // Only used: read without, and said.
   const auto used =
       read(kOneTriangle + scene + R"(,"extensionsUsed":["KHR_materials_clearcoat"],)" +
@@ -352,6 +352,109 @@ TEST_F(Gltf, DracoPrimitivesAreWhatTheEncoderWasGiven) {
     found += glm::length(glm::cross(at(1) - at(0), at(2) - at(0))) / 2;
   }
   EXPECT_NEAR(found, area, 1e-3 * area);
+}
+
+/// A view as meshoptimizer packs it, and the JSON of its extension.
+struct PackedView {
+  std::string bytes;
+  std::string json;
+};
+PackedView packed(const std::string& bytes, std::size_t offset, std::size_t count,
+                  std::size_t stride, const std::string& kind) {
+  return {bytes, R"("extensions":{"EXT_meshopt_compression":{"buffer":0,"byteOffset":)" +
+                     std::to_string(offset) + R"(,"byteLength":)" + std::to_string(bytes.size()) +
+                     R"(,"count":)" + std::to_string(count) + R"(,"byteStride":)" +
+                     std::to_string(stride) + R"(,"mode":)" + kind + "}}"};
+}
+
+TEST_F(Gltf, ViewsThatMeshoptimizerPackedAreWhatItWasGiven) {
+  const std::vector<float> positions = {0, 0, 0.1f, 1, 0, 0.2f, 1, 1, 0.3f, 0, 1, 0.4f};
+  const std::vector<float> normals = {0, 0, 1, 0, 0.6f, 0, 0.8f, 0, 0, 0.6f, 0.8f, 0, 0, 0, -1, 0};
+  const std::vector<unsigned> corners = {0, 1, 2, 0, 2, 3};
+  std::vector<unsigned char> vertex_bytes(meshopt_encodeVertexBufferBound(4, 12));
+  vertex_bytes.resize(meshopt_encodeVertexBuffer(vertex_bytes.data(), vertex_bytes.size(),
+                                                 positions.data(), 4, 12));
+  std::vector<std::int8_t> eighths(16);
+  meshopt_encodeFilterOct(eighths.data(), 4, 4, 8, normals.data());
+  std::vector<unsigned char> normal_bytes(meshopt_encodeVertexBufferBound(4, 4));
+  normal_bytes.resize(
+      meshopt_encodeVertexBuffer(normal_bytes.data(), normal_bytes.size(), eighths.data(), 4, 4));
+  std::vector<unsigned char> triangles(meshopt_encodeIndexBufferBound(6, 4));
+  triangles.resize(
+      meshopt_encodeIndexBuffer(triangles.data(), triangles.size(), corners.data(), 6));
+  std::vector<unsigned char> sequence(meshopt_encodeIndexSequenceBound(6, 4));
+  sequence.resize(meshopt_encodeIndexSequence(sequence.data(), sequence.size(), corners.data(), 6));
+  const auto write = [&](bool glb, const std::string& damage) {
+    std::string all = "front";  // nothing is at the beginning
+    const auto add = [&](const std::vector<unsigned char>& bytes, std::size_t count,
+                         std::size_t stride, const std::string& kind) {
+      PackedView view = packed(raw(bytes), all.size(), count, stride, kind);
+      all += view.bytes;
+      return view.json;
+    };
+    const std::string p = add(vertex_bytes, 4, 12, R"("ATTRIBUTES")");
+    const std::string n = add(normal_bytes, 4, 4, R"("ATTRIBUTES","filter":"OCTAHEDRAL")");
+    const std::string i =
+        glb ? add(sequence, 6, 4, R"("INDICES")") : add(triangles, 6, 2, R"("TRIANGLES")");
+    if (damage == "bytes") all[5] = 'x';
+    std::string json =
+        R"({"asset":{"version":"2.0"},"extensionsUsed":["EXT_meshopt_compression"],
+        "extensionsRequired":["EXT_meshopt_compression"],"buffers":[{)" +
+        std::string(glb ? "" : R"("uri":"packed%20views.bin",)") + R"("byteLength":)" +
+        std::to_string(all.size()) +
+        R"(},{"byteLength":999,"extensions":{"EXT_meshopt_compression":{"fallback":true}}}],
+        "bufferViews":[{"buffer":1,"byteLength":48,"byteStride":12,)" +
+        p + R"(},{"buffer":1,"byteOffset":48,"byteLength":16,"byteStride":4,)" + n +
+        R"(},{"buffer":1,"byteOffset":64,"byteLength":12,)" + i + R"(}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},
+        {"bufferView":1,"componentType":5120,"normalized":true,"count":4,"type":"VEC3"},
+        {"bufferView":2,"componentType":)" +
+        (glb ? "5125" : "5123") +
+        R"(,"count":6,"type":"SCALAR"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1},"indices":2}]}],
+        "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]})";
+    if (damage == "count") json.replace(json.find("\"count\":4"), 9, "\"count\":4000000000");
+    const fs::path path = folder_ / (glb ? "packed.glb" : "packed.gltf");
+    if (!glb) {
+      std::ofstream(folder_ / "packed views.bin", std::ios::binary) << all;
+      std::ofstream(path, std::ios::binary) << json;
+      return read_gltf(path.string());
+    }
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    all.resize((all.size() + 3) / 4 * 4);
+    const auto number = [](std::size_t size) { return static_cast<std::uint32_t>(size); };
+    std::ofstream(path, std::ios::binary)
+        << "glTF"
+        << raw<std::uint32_t>(
+               {2, number(28 + json.size() + all.size()), number(json.size()), 0x4E4F534A})
+        << json << raw<std::uint32_t>({number(all.size()), 0x004E4942}) << all;
+    return read_gltf(path.string());
+  };
+  for (const bool glb : {false, true}) {
+    const auto model = write(glb, "");
+    ASSERT_TRUE(model) << to_line(model.error());
+    ASSERT_EQ(model->face_count(), 2u);
+    for (std::size_t c = 0; c < 6; ++c) {
+      // Triangles keep their order, and may begin at another corner.
+      const std::size_t first = c / 3 * 3;
+      const auto begin = corners.begin() + static_cast<std::ptrdiff_t>(first);
+      const auto& p = model->positions[model->corner_positions[c]];
+      const auto v = static_cast<std::size_t>(std::lround(10 * p.z) - 1);
+      EXPECT_NE(std::find(begin, begin + 3, v), begin + 3) << glb << " " << c;
+      EXPECT_EQ(
+          p, glm::dvec3(glm::vec3(positions[3 * v], positions[3 * v + 1], positions[3 * v + 2])));
+      EXPECT_TRUE(!glb || v == corners[c]);
+      const std::uint32_t n = model->corner_normals.at(c, model->corner_positions[c]);
+      const glm::dvec3 expected(normals[4 * v], normals[4 * v + 1], normals[4 * v + 2]);
+      EXPECT_LT(glm::length(glm::dvec3(model->normals[n]) - expected), 0.02) << glb << " " << c;
+    }
+    for (const char* damage : {"bytes", "count"}) {
+      const auto refused = write(glb, damage);
+      ASSERT_FALSE(refused) << damage;
+      EXPECT_EQ(refused.error().code, "gltf.meshopt");
+      EXPECT_NE(refused.error().cause.find("buffer view 0"), std::string::npos);
+    }
+  }
 }
 
 TEST_F(Gltf, SampleModelsAreReadOrRefused) {

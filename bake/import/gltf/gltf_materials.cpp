@@ -52,27 +52,6 @@ std::string plain_name(const std::string& name, const std::string& other) {
   return plain.empty() ? other : plain;
 }
 
-/// A URI with %XX as the byte that it stands for (RFC 3986, 2.1); what is no such pair stays.
-std::string percent_decoded(const std::string& uri) {
-  const auto digit = [](char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-  };
-  std::string decoded;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    const int high = uri[i] == '%' && i + 2 < uri.size() ? digit(uri[i + 1]) : -1;
-    const int low = high >= 0 ? digit(uri[i + 2]) : -1;
-    if (low < 0) {
-      decoded += uri[i];
-      continue;
-    }
-    decoded += static_cast<char>(16 * high + low);
-    i += 2;
-  }
-  return decoded;
-}
-
 class MaterialReader {
  public:
   MaterialReader(const tinygltf::Model& gltf, std::string folder, std::string label,
@@ -298,6 +277,26 @@ class MaterialReader {
 };
 
 }  // namespace
+
+std::string percent_decoded(const std::string& uri) {
+  const auto digit = [](char c) {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+  };
+  std::string decoded;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    const int high = uri[i] == '%' && i + 2 < uri.size() ? digit(uri[i + 1]) : -1;
+    const int low = high >= 0 ? digit(uri[i + 2]) : -1;
+    if (low < 0) {
+      decoded += uri[i];
+      continue;
+    }
+    decoded += static_cast<char>(16 * high + low);
+    i += 2;
+  }
+  return decoded;
+}
 
 bool keep_image_bytes(tinygltf::Image* image, int, std::string*, std::string*, int, int,
                       const unsigned char* bytes, int size, void*) {

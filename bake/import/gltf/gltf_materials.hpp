@@ -15,6 +15,9 @@ class Model;
 
 namespace modar {
 
+/// A URI with %XX as the byte that it stands for (RFC 3986, 2.1); what is no such pair stays.
+std::string percent_decoded(const std::string& uri);
+
 /// Keeps an image's encoded bytes as they are: for tinygltf::TinyGLTF::SetImageLoader().
 bool keep_image_bytes(tinygltf::Image* image, int index, std::string* error, std::string* warning,
                       int width, int height, const unsigned char* bytes, int size, void* user);

@@ -16,6 +16,7 @@
 #include <glm/matrix.hpp>
 
 #include "bake/import/gltf/gltf_materials.hpp"
+#include "bake/import/gltf/gltf_meshopt.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/import/read_model.hpp"
@@ -396,9 +397,9 @@ bool read_bytes(const std::string& path, std::string& bytes) {
 }
 
 /// Extensions that are read in full; a file that requires others cannot be shown as it is meant.
-constexpr const char* kKnownExtensions[] = {"EXT_texture_webp", "KHR_draco_mesh_compression",
-                                            "KHR_materials_unlit", "KHR_mesh_quantization",
-                                            "KHR_texture_transform"};
+constexpr const char* kKnownExtensions[] = {"EXT_meshopt_compression",    "EXT_texture_webp",
+                                            "KHR_draco_mesh_compression", "KHR_materials_unlit",
+                                            "KHR_mesh_quantization",      "KHR_texture_transform"};
 
 bool is_known(const std::string& extension) {
   return std::find(std::begin(kKnownExtensions), std::end(kKnownExtensions), extension) !=
@@ -460,6 +461,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   }
   const std::string parent = std::filesystem::path(path).parent_path().string();
   const std::string folder = (parent.empty() ? "." : parent) + "/";
+  MODAR_ASSIGN(bytes, decode_meshopt_views(std::move(bytes), folder, path));
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_image_bytes, nullptr);
   tinygltf::Model gltf;

@@ -1,0 +1,18 @@
+// EXT_meshopt_compression: glTF files with buffer views that meshoptimizer has encoded. Internal to
+// the glTF reader.
+#pragma once
+
+#include <string>
+
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// The file with these views decoded, as a GLB; `file` itself where it has none. folder: where the
+/// names of buffers are looked up, with a trailing slash. label: the file's name in errors.
+/// Errors: kInvalidInput "gltf.meshopt", which names the buffer view; kUnsupported where the result
+/// is larger than a GLB can be.
+Result<std::string> decode_meshopt_views(std::string file, const std::string& folder,
+                                         const std::string& label);
+
+}  // namespace modar
