@@ -231,6 +231,7 @@ TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
   EXPECT_EQ(pixels(0), (Bytes{200, 100, 0, 255, 200, 100, 0, 255}));
   EXPECT_EQ(fs::path(model->materials[1].diffuse_map), folder_ / "colour.png");
   EXPECT_EQ(pixels(2), (Bytes{200, 100, 0, 255, 200, 100, 0, 0}));
+  EXPECT_EQ(fs::path(model->materials[2].diffuse_map).filename(), "colour.png");
   // 100 / 255 of 0.9 is 0.353.
   EXPECT_EQ(pixels(3), (Bytes{200, 100, 0, 255, 200, 100, 0, 255}));
   EXPECT_EQ(fs::path(model->materials[4].diffuse_map), folder_ / "solid.png");

@@ -192,7 +192,7 @@ class MaterialReader {
     const std::string& first = !pictures.colour.empty()     ? pictures.colour
                                : !pictures.emissive.empty() ? pictures.emissive
                                                             : pictures.occlusion;
-    const std::string path = new_picture(std::filesystem::path(first).stem().string(), ".png");
+    const std::string path = new_picture(std::filesystem::path(first).stem().string() + ".png");
     if (const auto written = write_png(*image, path)) {
       found->second = path;
     } else {
@@ -201,15 +201,17 @@ class MaterialReader {
     return found->second;
   }
 
-  /// A path in the temporary folder that nothing has yet.
-  std::string new_picture(const std::string& name, const std::string& extension) {
+  /// A path of this name that nothing has yet: in a folder of its own below the temporary one where
+  /// the name is taken there, as textures are called by it.
+  std::string new_picture(const std::string& name) {
     if (folder_of_images_ == nullptr) folder_of_images_ = std::make_shared<TemporaryFolder>();
-    const std::string path = folder_of_images_->path() + "/" + name;
     std::error_code error;
-    for (int i = 1;; ++i) {
-      const std::string with_number = i == 1 ? path : path + "-" + std::to_string(i);
-      if (!std::filesystem::exists(with_number + extension, error)) return with_number + extension;
+    std::string folder = folder_of_images_->path();
+    for (int i = 2; std::filesystem::exists(folder + "/" + name, error); ++i) {
+      folder = folder_of_images_->path() + "/" + std::to_string(i);
+      std::filesystem::create_directory(folder, error);
     }
+    return folder + "/" + name;
   }
 
   /// A picture that cannot be read is left out.
@@ -250,10 +252,10 @@ class MaterialReader {
       if (std::filesystem::is_regular_file(folder_ + name, error)) return folder_ + name;
     }
     if (!image.image.empty()) {
-      const std::string path = new_picture(plain_name(image.name, "image" + std::to_string(index)),
-                                           image.mimeType == "image/jpeg"   ? ".jpg"
-                                           : image.mimeType == "image/webp" ? ".webp"
-                                                                            : ".png");
+      const std::string path = new_picture(plain_name(image.name, "image" + std::to_string(index)) +
+                                           (image.mimeType == "image/jpeg"   ? ".jpg"
+                                            : image.mimeType == "image/webp" ? ".webp"
+                                                                             : ".png"));
       const auto bytes = std::as_bytes(std::span(image.image));
       if (!folder_of_images_->path().empty() && write_file(path, bytes)) return path;
     }
