@@ -109,18 +109,22 @@ class MaterialReader {
   /// its middle: (n + 2) / 8 of what is reflected straight on. Faint ones are left out: they cost a
   /// phone as much as bright ones.
   void set_highlight(const tinygltf::PbrMetallicRoughness& pbr, SourceMaterial& m) {
-    constexpr double kDielectric = 0.04;
-    constexpr double kFaint = 0.05;
+    constexpr double kDielectric = 0.04;  // of all that is no metal: glTF 2.0, appendix B
+    constexpr double kFaint = 0.05;       // of white; set by hand: duller ones are hardly seen
     double roughness = pbr.roughnessFactor;
     double metalness = pbr.metallicFactor;
     if (const std::string map = image_path(pbr.metallicRoughnessTexture.index); !map.empty()) {
-      if (const auto means = mean_roughness_metalness(map)) {
-        roughness *= means->roughness;
-        metalness *= means->metalness;
-        ++averaged_;
-      } else {
-        note(means.error());
+      const auto [found, added] = means_.try_emplace(map);
+      if (added) {
+        if (const auto means = mean_roughness_metalness(map)) {
+          found->second = *means;
+        } else {
+          note(means.error());
+        }
       }
+      roughness *= found->second.roughness;
+      metalness *= found->second.metalness;
+      ++averaged_;
     }
     roughness = std::clamp(roughness, 0.05, 1.0);
     const double exponent = std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0);
@@ -181,19 +185,16 @@ class MaterialReader {
   std::string folded(const GltfPictures& pictures) {
     const auto [found, added] = folded_.try_emplace(pictures, pictures.colour);
     if (!added) return found->second;
-    // Where it cannot be read, whoever reads it for the bundle says so.
-    const auto needed = needs_folding(pictures);
-    if (!needed || !*needed) return found->second;
     const auto image = fold_pictures(pictures);
     if (!image) {
-      note(image.error());
+      // Where it is the colour, whoever reads it for the bundle says so.
+      if (image.error().where != pictures.colour) note(image.error());
       return found->second;
     }
-    const std::string& first = !pictures.colour.empty()     ? pictures.colour
-                               : !pictures.emissive.empty() ? pictures.emissive
-                                                            : pictures.occlusion;
-    const std::string path = new_picture(std::filesystem::path(first).stem().string() + ".png");
-    if (const auto written = write_png(*image, path)) {
+    if (!*image) return found->second;
+    const std::filesystem::path first = pictures.first();
+    const std::string path = new_picture(first.stem().string() + ".png");
+    if (const auto written = write_png(**image, path)) {
       found->second = path;
     } else {
       note(written.error());
@@ -272,6 +273,7 @@ class MaterialReader {
   std::vector<std::optional<std::string>> paths_;
   std::shared_ptr<TemporaryFolder> folder_of_images_;
   std::map<GltfPictures, std::string> folded_;
+  std::map<std::string, RoughnessMetalness> means_;  ///< by path: 1 where it cannot be read
   Count emissive_;
   Count occlusion_;
   int averaged_ = 0;

@@ -52,20 +52,14 @@ double srgb_of_linear(double linear) {
   return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
 }
 
-Result<bool> needs_folding(const GltfPictures& pictures) {
-  if (!pictures.emissive.empty() || !pictures.occlusion.empty()) return true;
-  if (pictures.colour.empty() || pictures.alpha == GltfPictures::Alpha::kKept) return false;
-  MODAR_ASSIGN(const RgbaImage colour, read_image(pictures.colour));
-  return !is_opaque(colour) ||
-         (pictures.alpha == GltfPictures::Alpha::kCutOff && alpha_of(pictures, 255) == 0);
-}
-
-Result<RgbaImage> fold_pictures(const GltfPictures& pictures) {
+Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures) {
   const bool emits = !pictures.emissive.empty();
-  const std::string& first = !pictures.colour.empty() ? pictures.colour
-                             : emits                  ? pictures.emissive
-                                                      : pictures.occlusion;
-  MODAR_ASSIGN(RgbaImage image, read_image(first));
+  const bool alone = !emits && pictures.occlusion.empty();
+  if (alone && (pictures.colour.empty() || pictures.alpha == GltfPictures::Alpha::kKept)) {
+    return std::nullopt;
+  }
+  MODAR_ASSIGN(RgbaImage image, read_image(pictures.first()));
+  if (alone && is_opaque(image) && alpha_of(pictures, 255) == 255) return std::nullopt;
   if (pictures.colour.empty()) std::fill(image.pixels.begin(), image.pixels.end(), 255);
   MODAR_ASSIGN(const RgbaImage emissive, read_as_large(pictures.emissive, image));
   MODAR_ASSIGN(const RgbaImage occlusion, read_as_large(pictures.occlusion, image));
@@ -73,7 +67,7 @@ Result<RgbaImage> fold_pictures(const GltfPictures& pictures) {
   for (std::size_t p = 0; p < image.pixels.size(); p += 4) {
     std::uint8_t* pixel = &image.pixels[p];
     pixel[3] = alpha_of(pictures, pixel[3]);
-    if (!emits && occlusion.pixels.empty()) continue;
+    if (alone) continue;
     double seen = 1;
     if (!occlusion.pixels.empty()) {
       seen -= kOccludedShare * pictures.occlusion_strength * (1 - occlusion.pixels[p] / 255.0);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "bake/image/image.hpp"
@@ -26,16 +27,16 @@ struct GltfPictures {
   double cutoff = 0.5;
 
   auto operator<=>(const GltfPictures&) const = default;
+  /// The one whose size and name the result has: the colour, or the first that there is.
+  [[nodiscard]] const std::string& first() const {
+    return !colour.empty() ? colour : !emissive.empty() ? emissive : occlusion;
+  }
 };
 
-/// Whether the colour picture cannot be drawn as it is: another one is to go into it, or its alpha
-/// means something else. Reads it where only that can tell. Errors: as read_image().
-Result<bool> needs_folding(const GltfPictures& pictures);
-
-/// One picture, of the size of the colour's (else the first of the others), of what is drawn: the
-/// colour, darkened by the occlusion, plus what is emitted, in linear light, with the factors of
-/// both where anything is emitted; alpha as asked. Errors: as read_image().
-Result<RgbaImage> fold_pictures(const GltfPictures& pictures);
+/// One picture of what is drawn, of the size of first(): the colour, darkened by the occlusion,
+/// plus what is emitted, in linear light, with the factors of both where anything is emitted; alpha
+/// as asked. Nothing where the colour can be drawn as it is. Errors: as read_image().
+Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures);
 
 /// Means over a picture of green and blue, as they are stored: roughness and metalness, in [0,1].
 /// Errors: as read_image().

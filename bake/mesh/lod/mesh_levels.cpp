@@ -45,7 +45,9 @@ constexpr float kSteepest = 8;
 /// A price (see CollapseSequence) below what half floats tell apart.
 constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor);
 /// Of the error of the level before: a level that is off by no more may stand for the finest where
-/// coarser ones are measured.
+/// coarser ones are measured, which adds its error to theirs. At 0.15 and 0.25, levels of nefertiti
+/// (70,000 triangles) are measured in 0.5 and 0.3 of the time and state 3 and 4 % more on average,
+/// those of a scan of 1.1 million in 0.9 and 0.85, 0.2 and 1 %; at 0.4 both state 10 and 5 % more.
 constexpr double kNegligible = 0.2;
 /// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
 /// a flat chunk may lose more than its share. Set by hand.
