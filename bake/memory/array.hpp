@@ -109,6 +109,18 @@ class Array {
     small.size_ = small.capacity_ = 0;
     return result;
   }
+  /// The same memory as more, smaller elements, whose values the caller has put there.
+  template <class U>
+  static Array split(Array<U>&& large) {
+    static_assert(sizeof(U) % sizeof(T) == 0 && alignof(T) <= alignof(U));
+    constexpr std::size_t kEach = sizeof(U) / sizeof(T);
+    Array result;
+    result.size_ = large.size_ * kEach;
+    result.capacity_ = large.capacity_ * kEach;
+    result.data_ = reinterpret_cast<T*>(std::exchange(large.data_, nullptr));
+    large.size_ = large.capacity_ = 0;
+    return result;
+  }
   void swap(Array& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
