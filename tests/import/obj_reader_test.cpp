@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
+#include <random>
 #include <set>
+#include <sstream>
 
 #include "tests/import/samples.hpp"
 #include "tests/import/tiny_obj.hpp"
@@ -302,6 +306,134 @@ TEST(ObjReader, BlocksJoinWithoutASeam) {
   EXPECT_EQ(m.diagnostics[0].message.substr(0, 2), "2 ");
   // 2 lines a step but for the first two, the statements at 20000 (with its own face) and up.
   EXPECT_EQ(m.diagnostics[0].line, 2u + 2u * 19999u + 2u);
+}
+
+/// Random plain lines, as exporters write them.
+class PlainLines {
+ public:
+  explicit PlainLines(std::uint64_t seed) : random_(seed) {}
+
+  /// Positions with or without colours, uvs, normals, faces of each kind.
+  std::string text() {
+    const std::size_t vertices = 4 + below(30);
+    const std::size_t triple = below(2) == 0 ? 3 : 6;
+    const unsigned wide = below(2) == 0 ? 7 : 4;
+    std::string text;
+    for (std::size_t i = 0; i < vertices; ++i) text += "v" + decimals(triple, wide);
+    for (std::size_t i = 0; i < vertices; ++i) text += "vt" + decimals(2, wide);
+    for (std::size_t i = 0; i < vertices; ++i) text += "vn" + decimals(3, wide);
+    for (std::size_t kind = below(4), i = 0; i < 2 * vertices; ++i) {
+      if (below(8) == 0) kind = below(4);
+      text += face(kind, below(6) == 0 ? 4 : 3, vertices);
+    }
+    return text;
+  }
+
+  /// The text with a few bytes changed to others that numbers and faces might hold.
+  std::string damaged(std::string text) {
+    static const std::string kBytes = "0019.-+/ eE#x\t\r\n\\";
+    for (std::size_t i = below(6); i > 0; --i) {
+      text[below(text.size())] = kBytes[below(kBytes.size())];
+    }
+    return text;
+  }
+
+ private:
+  std::size_t below(std::size_t bound) { return random_() % bound; }
+
+  std::string digits(std::size_t count) {
+    std::string text;
+    for (; count > 0; --count) text += static_cast<char>('0' + below(10));
+    return text;
+  }
+
+  std::string decimals(std::size_t count, unsigned wide) {
+    std::string text;
+    for (; count > 0; --count) {
+      text += below(2) == 0 ? " " : " -";
+      text += digits(1 + below(wide)) + "." + digits(1 + below(wide));
+    }
+    return text + "\n";
+  }
+
+  std::string face(std::size_t kind, std::size_t corners, std::size_t vertices) {
+    const auto index = [&] { return std::to_string(1 + below(vertices)); };
+    std::string text = "f";
+    for (; corners > 0; --corners) {
+      text += " " + index();
+      if (kind == 1) text += "/" + index();
+      if (kind == 2) text += "//" + index();
+      if (kind == 3) text += "/" + index() + "/" + index();
+    }
+    return text + "\n";
+  }
+
+  std::mt19937_64 random_;
+};
+
+/// What of a model can differ, as bytes where numbers are not compared by value.
+std::string content_of(const std::string& text) {
+  const auto model = parse_obj(text, "", "test.obj");
+  if (!model) return to_line(model.error());
+  std::ostringstream out;
+  out << std::hexfloat;
+  for (const glm::dvec3& p : model->positions) out << p.x << ' ' << p.y << ' ' << p.z << '\n';
+  for (const glm::vec3& c : model->colours) out << c.x << ' ' << c.y << ' ' << c.z << '\n';
+  for (const glm::dvec2& uv : model->uvs) out << uv.x << ' ' << uv.y << '\n';
+  for (const glm::vec3& n : model->normals) out << n.x << ' ' << n.y << ' ' << n.z << '\n';
+  for (std::size_t f = 0; f < model->face_count(); ++f) out << model->face_size(f) << ' ';
+  for (std::size_t i = 0; i < model->corner_count(); ++i) {
+    const Corner c = model->corner(i);
+    out << c.position << '/' << c.uv << '/' << c.normal << ' ';
+  }
+  for (const Diagnostic& d : model->diagnostics) out << d.id << d.line << d.message << '\n';
+  return out.str();
+}
+
+/// The same statements in a spelling that exporters do not use.
+std::string indented(const std::string& text) {
+  std::string wider = " ";
+  for (const char c : text) {
+    wider += c;
+    if (c == '\n') wider += ' ';
+  }
+  return wider;
+}
+
+TEST(ObjReader, PlainLinesReadAsIndentedOnesDo) {
+  PlainLines lines(5);
+  for (int i = 0; i < 3000; ++i) {
+    const std::string text = lines.damaged(lines.text());
+    // A backslash in front of a line end would continue the blank, too: the same statement.
+    ASSERT_EQ(content_of(text), content_of(indented(text))) << text;
+  }
+}
+
+TEST(ObjReader, PlainNumbersAreCorrectlyRounded) {
+  PlainLines lines(6);
+  for (int i = 0; i < 300; ++i) {
+    std::istringstream text(lines.text());
+    const SourceModel model = parse(text.str());
+    std::size_t position = 0;
+    std::size_t uv = 0;
+    for (std::string line; std::getline(text, line);) {
+      char* next = line.data() + 2;
+      if (line.starts_with("v ")) {
+        for (int k = 0; k < 3; ++k) {
+          const double value = std::strtod(next, &next);
+          const double ours = model.positions[position][k];
+          ASSERT_EQ(std::bit_cast<std::uint64_t>(ours), std::bit_cast<std::uint64_t>(value))
+              << line;
+        }
+        ++position;
+      } else if (line.starts_with("vt")) {
+        for (int k = 0; k < 2; ++k) ASSERT_EQ(model.uvs[uv][k], std::strtod(next, &next)) << line;
+        ++uv;
+      }
+    }
+    ASSERT_EQ(position, model.positions.size());
+    ASSERT_EQ(uv, model.uvs.size());
+  }
 }
 
 TEST(ObjReader, TruncatedAnywhereItAnswers) {

@@ -1,11 +1,14 @@
 // Parses OBJ statements in a single pass over the bytes, without searching for line ends first.
 #include "bake/import/obj/obj_block.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 
+#include "bake/import/obj/line_window.hpp"
 #include "bake/import/obj/number_parser.hpp"
 
 namespace modar {
@@ -25,20 +28,39 @@ void fill_colours(ObjBlock& block) {
   }
 }
 
+/// Says of all corners so far that they have no such index, where none had one.
+void fill_plane(const ObjBlock& block, Scratch<std::uint32_t>& plane) {
+  while (plane.size() < block.corner_positions.size()) plane.push(kNoIndex);
+}
+
+/// has_uv, has_normal: the file has one, and be it one that is left out.
+void push_corner(ObjBlock& block, const Corner& corner, bool has_uv, bool has_normal) {
+  if (has_uv || block.corner_uvs.size() != 0) {
+    fill_plane(block, block.corner_uvs);
+    block.corner_uvs.push(corner.uv);
+  }
+  if (has_normal || block.corner_normals.size() != 0) {
+    fill_plane(block, block.corner_normals);
+    block.corner_normals.push(corner.normal);
+  }
+  block.corner_positions.push(corner.position);
+}
+
 void pop_corners(ObjBlock& block, std::uint32_t count) {
   block.corner_positions.pop(count);
-  block.corner_uvs.pop(count);
-  block.corner_normals.pop(count);
+  if (block.corner_uvs.size() != 0) block.corner_uvs.pop(count);
+  if (block.corner_normals.size() != 0) block.corner_normals.pop(count);
 }
 
 /// One past the line end at p; nullptr where the line continues.
 const char* take_line_end(const char* p) {
-  p += static_cast<int>(*p == '\r');
-  return *p == '\n' ? p + 1 : nullptr;
+  // Branches, which a file's lines all take alike: the next line need not wait for this byte.
+  if (*p == '\n') return p + 1;
+  return *p == '\r' && p[1] == '\n' ? p + 2 : nullptr;
 }
 
-/// Plain numbers, each after one blank, up to the line end. Returns the byte after it and their
-/// count; nullptr for anything else, or for more than kMost.
+/// Plain numbers, each after one blank, up to the end of the line. Returns the byte after them and
+/// their count; nullptr for anything else, or for more than kMost.
 template <unsigned kMost>
 const char* take_plain_reals(const char* p, double (&values)[kMost], unsigned& count) {
   count = 0;
@@ -48,7 +70,29 @@ const char* take_plain_reals(const char* p, double (&values)[kMost], unsigned& c
     if (p == nullptr) return nullptr;
     ++count;
   }
-  return take_line_end(p);
+  return p;
+}
+
+/// As take_plain_reals(): the three numbers of a position or a normal, or six with a colour.
+const char* take_triples(const char* p, double (&values)[6], unsigned& count) {
+#ifdef __SSE2__
+  if (*p == ' ') {
+    if (const char* const end = detail::take_three_or_six(p + 1, values, count)) return end;
+  }
+#endif
+  return take_plain_reals(p, values, count);
+}
+
+/// As take_plain_reals(): the two or three numbers of a uv.
+const char* take_pair(const char* p, double (&values)[3], unsigned& count) {
+#ifdef __SSE2__
+  if (*p == ' ') {
+    count = 2;
+    const char* const end = detail::take_two(p + 1, values);
+    if (end != nullptr && *end != ' ') return end;
+  }
+#endif
+  return take_plain_reals(p, values, count);
 }
 
 /// An index of 1 to 8 digits, not 0; nullptr where there is none.
@@ -62,9 +106,10 @@ const char* take_plain_index(const char* p, std::uint32_t& value) {
 }
 
 const char* take_plain_position(const char* p, ObjBlock& block) {
-  double v[6] = {};
+  double v[6];
   unsigned n = 0;
-  p = take_plain_reals(p, v, n);
+  p = take_triples(p, v, n);
+  if (p != nullptr) p = take_line_end(p);
   if (p == nullptr || (n == 3 && block.colours.size() != 0) || (n != 3 && n != 6)) return nullptr;
   block.positions.push({v[0], v[1], v[2]});
   if (n == 6) {
@@ -75,18 +120,20 @@ const char* take_plain_position(const char* p, ObjBlock& block) {
 }
 
 const char* take_plain_uv(const char* p, ObjBlock& block) {
-  double v[3] = {};
+  double v[3];
   unsigned n = 0;
-  p = take_plain_reals(p, v, n);
+  p = take_pair(p, v, n);
+  if (p != nullptr) p = take_line_end(p);
   if (p == nullptr || n < 2) return nullptr;
   block.uvs.push({v[0], v[1]});
   return p;
 }
 
 const char* take_plain_normal(const char* p, ObjBlock& block) {
-  double v[3] = {};
+  double v[6];
   unsigned n = 0;
-  p = take_plain_reals(p, v, n);
+  p = take_triples(p, v, n);
+  if (p != nullptr) p = take_line_end(p);
   if (p == nullptr || n != 3) return nullptr;
   block.normals.push(glm::vec3(glm::dvec3(v[0], v[1], v[2])));
   return p;
@@ -137,9 +184,7 @@ const char* take_plain_corner(const char* p, ObjBlock& block) {
   const std::uint32_t v = first.value;
   // No index is 0, which wraps to kNoIndex where there is none.
   static_assert(kNoIndex == static_cast<std::uint32_t>(-1));
-  block.corner_positions.push(v - 1);
-  block.corner_uvs.push(t - 1);
-  block.corner_normals.push(n - 1);
+  push_corner(block, {v - 1, t - 1, n - 1}, t != 0, n != 0);
   ObjCounts& highest = block.highest;
   highest.positions = v > highest.positions ? v : highest.positions;
   highest.uvs = t > highest.uvs ? t : highest.uvs;
@@ -147,7 +192,59 @@ const char* take_plain_corner(const char* p, ObjBlock& block) {
   return p;
 }
 
+#ifdef __SSE2__
+void push_three(Scratch<std::uint32_t>& plane, std::uint64_t& highest,
+                const detail::TriangleIndices& indices) {
+  const std::uint32_t greatest = std::max({indices[0], indices[1], indices[2]});
+  highest = std::max<std::uint64_t>(highest, greatest);
+  for (unsigned i = 0; i < 3; ++i) plane.push(indices[i] - 1);
+}
+
+/// A triangle in less than 64 bytes, of kEach indices a corner; nullptr for anything else.
+template <std::size_t kEach>
+const char* take_short_triangle(const char* p, ObjBlock& block) {
+  std::array<detail::TriangleIndices, kEach> indices;
+  p = detail::take_triangle(p, indices);
+  if (p != nullptr) p = take_line_end(p);
+  if (p == nullptr) return nullptr;
+  if constexpr (kEach > 1) {
+    fill_plane(block, block.corner_uvs);
+    push_three(block.corner_uvs, block.highest.uvs, indices[1]);
+  }
+  if constexpr (kEach > 2) {
+    fill_plane(block, block.corner_normals);
+    push_three(block.corner_normals, block.highest.normals, indices[2]);
+  }
+  push_three(block.corner_positions, block.highest.positions, indices[0]);
+  if (kEach < 2 && block.corner_uvs.size() != 0) fill_plane(block, block.corner_uvs);
+  if (kEach < 3 && block.corner_normals.size() != 0) fill_plane(block, block.corner_normals);
+  block.face_corners.push(3);
+  return p;
+}
+
+/// How many indices the corner at p seems to have.
+unsigned indices_of_corner(const char* p) {
+  unsigned count = 1;
+  for (; is_digit(*p) || *p == '/'; ++p) count += *p == '/' ? 1 : 0;
+  return count;
+}
+
+/// As take_short_triangle(), of as many indices a corner as the face before had; after another face
+/// the next one is taken to be like it.
+const char* take_likely_triangle(const char* p, ObjBlock& block) {
+  const char* next = nullptr;
+  if (block.likely_indices == 1) next = take_short_triangle<1>(p, block);
+  if (block.likely_indices == 2) next = take_short_triangle<2>(p, block);
+  if (block.likely_indices == 3) next = take_short_triangle<3>(p, block);
+  if (next == nullptr) block.likely_indices = indices_of_corner(p);
+  return next;
+}
+#endif
+
 const char* take_plain_face(const char* p, ObjBlock& block) {
+#ifdef __SSE2__
+  if (const char* const next = take_likely_triangle(p + 1, block)) return next;
+#endif
   std::uint32_t count = 0;
   while (*p == ' ') {
     p = take_plain_corner(p + 1, block);
@@ -186,7 +283,10 @@ class BlockParser {
       : p_(text), end_(text + size), limits_(limits), block_(block) {}
 
   void run() {
-    while (p_ < end_) statement();
+    while (p_ < end_) {
+      if (limits_ == nullptr) plain_statements();
+      if (p_ < end_) statement();
+    }
     block_.lines = line_ - 1;
   }
 
@@ -269,14 +369,21 @@ class BlockParser {
     return true;
   }
 
-  void statement() {
-    if (limits_ == nullptr) {
-      if (const char* const next = take_plain_statement(p_, block_)) {
-        p_ = next;
-        ++line_;
-        return;
-      }
+  /// As many as there are before one that is not plain.
+  void plain_statements() {
+    const char* p = p_;
+    std::uint64_t lines = 0;
+    while (p < end_) {
+      const char* const next = take_plain_statement(p, block_);
+      if (next == nullptr) break;
+      p = next;
+      ++lines;
     }
+    p_ = p;
+    line_ += lines;
+  }
+
+  void statement() {
     skip_blanks();
     const char c = *p_;
     const char next = p_[1];
@@ -405,9 +512,7 @@ class BlockParser {
       note(ObjNote::kAttributeRange);
       result.normal = kNoIndex;
     }
-    block_.corner_positions.push(result.position);
-    block_.corner_uvs.push(result.uv);
-    block_.corner_normals.push(result.normal);
+    push_corner(block_, result, has_t, has_n);
     return true;
   }
 
@@ -548,6 +653,7 @@ void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits
   block.statements.clear();
   block.notes = {};
   block.highest = {};
+  block.likely_indices = 1;
   BlockParser(text, size, limits, block).run();
 }
 

@@ -90,15 +90,16 @@ struct ObjBlock {
   Scratch<glm::dvec2> uvs;
   Scratch<glm::vec3> normals;
   Scratch<std::uint32_t> corner_positions;  ///< these three: see relative
-  Scratch<std::uint32_t> corner_uvs;
-  Scratch<std::uint32_t> corner_normals;
-  Scratch<std::uint32_t> face_corners;  ///< number of corners of each face
+  Scratch<std::uint32_t> corner_uvs;        ///< empty where no corner has one
+  Scratch<std::uint32_t> corner_normals;    ///< empty where no corner has one
+  Scratch<std::uint32_t> face_corners;      ///< number of corners of each face
   /// Entries (3 * corner + component) whose index counts from the start of the block (modulo 2^32).
   std::vector<std::uint32_t> relative;
   std::vector<ObjStatement> statements;
   NoteTallies notes{};
   ObjCounts highest;  ///< greatest absolute index of a corner, plus one
   std::uint64_t lines = 0;
+  unsigned likely_indices = 1;  ///< a corner, of the next face: tells what to try first
 };
 
 /// Set for the second, checked pass over a file with bad indices: every corner is checked against
@@ -108,8 +109,8 @@ struct ObjLimits {
   ObjCounts total;   ///< elements of the whole file
 };
 
-/// Parses whole statements; the last byte is a '\n', followed by kTextPadding readable bytes.
-/// limits: nullptr in the fast pass, where indices are resolved later.
+/// Parses whole statements; the last byte is a '\n'. kTextPadding bytes ahead of and behind the
+/// text can be read. limits: nullptr in the fast pass, where indices are resolved later.
 void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block);
 
 /// The first statement end whose last byte lies in [from, size): one past a '\n' that is not

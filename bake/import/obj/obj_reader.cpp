@@ -103,9 +103,11 @@ constexpr NoteText kNoteTexts[] = {
 };
 static_assert(std::size(kNoteTexts) == static_cast<std::size_t>(ObjNote::kCount));
 
-/// How a block's indices of one attribute, at least one, relate to its position indices.
+/// How a block's indices of one attribute relate to its position indices, of which there is one at
+/// least.
 IndexPlane::Kind kind_of(const Scratch<std::uint32_t>& positions,
                          const Scratch<std::uint32_t>& indices) {
+  if (indices.size() == 0) return IndexPlane::Kind::kAbsent;
   const std::uint32_t* const all = indices.data();
   const std::size_t count = indices.size();
   const bool absent = all[0] == kNoIndex && std::equal(all + 1, all + count, all);
@@ -177,7 +179,7 @@ void ObjAssembler::add_colours(const ObjBlock& block) {
 
 void ObjAssembler::add_plane(const ObjBlock& block, const Scratch<std::uint32_t>& indices,
                              IndexPlane& plane) {
-  if (indices.size() == 0) return;
+  if (block.corner_positions.size() == 0) return;
   if (plane.kind != IndexPlane::Kind::kOwn) {
     const IndexPlane::Kind kind = kind_of(block.corner_positions, indices);
     if (model_.corner_count() == 0 && kind != IndexPlane::Kind::kOwn) plane.kind = kind;
@@ -191,6 +193,7 @@ void ObjAssembler::add_plane(const ObjBlock& block, const Scratch<std::uint32_t>
     plane.kind = IndexPlane::Kind::kOwn;
   }
   append(plane.own, indices);
+  plane.own.append(block.corner_positions.size() - indices.size(), kNoIndex);
 }
 
 void ObjAssembler::add_faces(const ObjBlock& block) {

@@ -1,0 +1,245 @@
+// The numbers of a plain OBJ line out of one look at the 64 bytes behind its keyword: all their
+// ends are known at once, and two numbers are computed in one register. Internal to the OBJ reader.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "bake/import/obj/number_parser.hpp"
+
+#ifdef __SSE2__
+namespace modar::detail {
+
+/// Bytes that a window looks at.
+inline constexpr std::size_t kWindow = 64;
+static_assert(kWindow <= kTextPadding);
+
+/// Digits of a number at most: what a lane of eight bytes holds.
+inline constexpr unsigned kMostDigits = 8;
+
+/// A bit for each of the bytes at p from `kFrom` to `kTo`, multiples of 16. test: sets the highest
+/// bit of some of 16 bytes.
+template <unsigned kFrom, unsigned kTo, class Test>
+std::uint64_t window_bits(const char* p, const Test& test) {
+  static_assert(kTo <= kWindow);
+  std::uint64_t bits = 0;
+  for (unsigned i = kFrom; i < kTo; i += 16) {
+    const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p + i));
+    const auto mask = static_cast<std::uint32_t>(_mm_movemask_epi8(test(bytes)));
+    bits |= std::uint64_t{mask} << i;
+  }
+  return bits;
+}
+
+/// The bytes that do not lie in [kLow, '9'].
+template <char kLow, unsigned kFrom, unsigned kTo>
+std::uint64_t bytes_outside(const char* p) {
+  const __m128i low = _mm_set1_epi8(kLow);
+  const __m128i rest = _mm_set1_epi8(127 - ('9' - kLow));
+  return window_bits<kFrom, kTo>(
+      p, [&](__m128i bytes) { return _mm_adds_epu8(_mm_sub_epi8(bytes, low), rest); });
+}
+
+template <unsigned kFrom, unsigned kTo>
+std::uint64_t points_in(const char* p) {
+  const __m128i point = _mm_set1_epi8('.');
+  return window_bits<kFrom, kTo>(p, [&](__m128i bytes) { return _mm_cmpeq_epi8(bytes, point); });
+}
+
+/// The places of the lowest kCount bits, which are taken; false where there are fewer.
+template <std::size_t kCount>
+bool take_bits(std::uint64_t& bits, std::array<unsigned, kCount>& places) {
+  std::array<std::uint64_t, kCount> left;
+  for (std::uint64_t& each : left) {
+    each = bits;
+    bits &= bits - 1;
+  }
+  if (left[kCount - 1] == 0) return false;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    places[i] = static_cast<unsigned>(__builtin_ctzll(left[i]));
+  }
+  return true;
+}
+
+/// The last n of the eight bytes of a lane, for n from 0 to 8.
+inline constexpr std::array<std::uint64_t, kMostDigits + 1> kLastBytes = {0,
+                                                                          0xFF00000000000000u,
+                                                                          0xFFFF000000000000u,
+                                                                          0xFFFFFF0000000000u,
+                                                                          0xFFFFFFFF00000000u,
+                                                                          0xFFFFFFFFFF000000u,
+                                                                          0xFFFFFFFFFFFF0000u,
+                                                                          0xFFFFFFFFFFFFFF00u,
+                                                                          0xFFFFFFFFFFFFFFFFu};
+
+/// Two times eight bytes, wherever they lie.
+inline __m128i load_lanes(const void* low, const void* high) {
+  const auto halves = [](const void* p) { return static_cast<const double*>(p); };
+  return _mm_castpd_si128(_mm_loadh_pd(_mm_load_sd(halves(low)), halves(high)));
+}
+
+/// A number of a line: where it ends, and its digits, up to 8.
+struct Digits {
+  const char* end;
+  unsigned count;
+};
+
+/// Two times eight digits, 0 to 9 a byte, to two times two numbers of four digits.
+inline __m128i join_fours(__m128i digits) {
+  const __m128i tens =
+      _mm_mullo_epi16(_mm_and_si128(digits, _mm_set1_epi16(0xFF)), _mm_set1_epi16(10));
+  const __m128i pairs = _mm_add_epi16(tens, _mm_srli_epi16(digits, 8));
+  return _mm_madd_epi16(pairs, _mm_set1_epi32(0x00010064));  // 100 times the first, and the second
+}
+
+/// What join_fours() made of four numbers, to those numbers.
+inline __m128i join_eights(__m128i first, __m128i second) {
+  const __m128i fours = _mm_packs_epi32(first, second);
+  return _mm_madd_epi16(fours, _mm_set1_epi32(0x00012710));  // 10,000 times the first
+}
+
+inline __m128i digit_lanes(const Digits& low, const Digits& high) {
+  const __m128i bytes = load_lanes(low.end - kMostDigits, high.end - kMostDigits);
+  const __m128i mask = load_lanes(&kLastBytes[low.count], &kLastBytes[high.count]);
+  return _mm_and_si128(_mm_sub_epi8(bytes, _mm_set1_epi8('0')), mask);
+}
+
+/// The values of four numbers, which consist of digits.
+inline __m128i four_values(const Digits& a, const Digits& b, const Digits& c, const Digits& d) {
+  return join_eights(join_fours(digit_lanes(a, b)), join_fours(digit_lanes(c, d)));
+}
+
+/// A decimal of a line: "-12.345678", with 1 to 7 digits on either side of the point, 8 in all.
+struct Decimal {
+  const char* end;
+  unsigned digits;   ///< in all
+  unsigned after;    ///< behind the point
+  unsigned divisor;  ///< of kDivisors
+};
+
+/// 10 to the power of n at 2 n, its negative at 2 n + 1: dividing by it gives the sign, of 0 too.
+inline constexpr std::array<double, 16> kDivisors = {1e0, -1e0, 1e1, -1e1, 1e2, -1e2, 1e3, -1e3,
+                                                     1e4, -1e4, 1e5, -1e5, 1e6, -1e6, 1e7, -1e7};
+
+/// The digits of two decimals without the points; sets bytes of `bad` where they are none.
+inline __m128i decimal_lanes(const Decimal& low, const Decimal& high, __m128i& bad) {
+  // Those before the point lie one byte farther from the end.
+  const __m128i behind = load_lanes(low.end - kMostDigits, high.end - kMostDigits);
+  const __m128i before = load_lanes(low.end - kMostDigits - 1, high.end - kMostDigits - 1);
+  const __m128i split = load_lanes(&kLastBytes[low.after], &kLastBytes[high.after]);
+  const __m128i mask = load_lanes(&kLastBytes[low.digits], &kLastBytes[high.digits]);
+  const __m128i bytes = _mm_or_si128(_mm_and_si128(behind, split), _mm_andnot_si128(split, before));
+  const __m128i digits = _mm_and_si128(_mm_sub_epi8(bytes, _mm_set1_epi8('0')), mask);
+  bad = _mm_or_si128(bad, _mm_subs_epu8(digits, _mm_set1_epi8(9)));
+  return digits;
+}
+
+/// The values of two decimals, whose digits the low half of `numbers` has. Both operands of the
+/// division are exact, so the single rounding is correct (see take_plain_real()).
+inline __m128d decimal_pair(__m128i numbers, const Decimal& low, const Decimal& high) {
+  const __m128i divisors = load_lanes(&kDivisors[low.divisor], &kDivisors[high.divisor]);
+  return _mm_div_pd(_mm_cvtepi32_pd(numbers), _mm_castsi128_pd(divisors));
+}
+
+/// Computes two or three decimals; false where one of them is no number.
+template <std::size_t kCount>
+bool decimal_values(const std::array<Decimal, kCount>& decimals, double* values) {
+  static_assert(kCount == 2 || kCount == 3);
+  const Decimal& last = decimals[kCount - 1];
+  __m128i bad = _mm_setzero_si128();
+  const __m128i first = join_fours(decimal_lanes(decimals[0], decimals[1], bad));
+  const __m128i second = kCount == 3 ? join_fours(decimal_lanes(last, last, bad)) : first;
+  const __m128i numbers = join_eights(first, second);
+  _mm_storeu_pd(values, decimal_pair(numbers, decimals[0], decimals[1]));
+  if (kCount == 3) {
+    _mm_store_sd(values + 2, decimal_pair(_mm_unpackhi_epi64(numbers, numbers), last, last));
+  }
+  return _mm_movemask_epi8(_mm_cmpeq_epi8(bad, _mm_setzero_si128())) == 0xFFFF;
+}
+
+/// Which bytes of a line end numbers, and which are points.
+struct DecimalMarks {
+  std::uint64_t ends;
+  std::uint64_t points;
+};
+
+/// kCount decimals at p + begin, each after one blank but the first. Returns the place of the first
+/// byte after them, 0 for anything else. Reads from kTextPadding bytes ahead of p.
+template <std::size_t kCount>
+unsigned take_decimals(const char* p, unsigned begin, DecimalMarks& marks, double* values) {
+  std::array<unsigned, kCount> ends;
+  std::array<unsigned, kCount> points;
+  if (!take_bits(marks.ends, ends) || !take_bits(marks.points, points)) return 0;
+  std::array<Decimal, kCount> decimals;
+  unsigned excess = 0;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (i > 0 && p[ends[i - 1]] != ' ') return 0;
+    const unsigned negative = p[begin] == '-' ? 1 : 0;
+    const unsigned before = points[i] - begin - negative;
+    const unsigned after = ends[i] - points[i] - 1;
+    excess |= (before - 1) | (after - 1) | (kMostDigits - before - after);
+    decimals[i] = {p + ends[i], before + after, after, 2 * after + negative};
+    begin = ends[i] + 1;
+  }
+  if (excess >= kMostDigits || !decimal_values(decimals, values)) return 0;
+  return ends[kCount - 1];
+}
+
+/// Three or six decimals at p, each after one blank but the first. Returns the first byte after
+/// them and their count; nullptr for anything else.
+inline const char* take_three_or_six(const char* p, double* values, unsigned& count) {
+  // Three end within 48 bytes.
+  DecimalMarks marks = {bytes_outside<'-', 0, 48>(p), points_in<0, 48>(p)};
+  unsigned end = take_decimals<3>(p, 0, marks, values);
+  count = 3;
+  if (end == 0 || p[end] != ' ') return end == 0 ? nullptr : p + end;
+  marks.ends |= bytes_outside<'-', 48, 64>(p);
+  marks.points |= points_in<48, 64>(p);
+  end = take_decimals<3>(p, end + 1, marks, values + 3);
+  count = 6;
+  return end == 0 ? nullptr : p + end;
+}
+
+/// Two decimals at p, with one blank between them.
+inline const char* take_two(const char* p, double* values) {
+  DecimalMarks marks = {bytes_outside<'-', 0, 32>(p), points_in<0, 32>(p)};
+  const unsigned end = take_decimals<2>(p, 0, marks, values);
+  return end == 0 ? nullptr : p + end;
+}
+
+/// Indices of three corners: values as the file has them, none of them 0; the fourth repeats the
+/// third.
+using TriangleIndices = std::array<std::uint32_t, 4>;
+
+/// Three corners of kEach indices, "v", "v/t" or "v/t/n", at p and each after one blank but the
+/// first. Returns the first byte after them; nullptr for anything else. Reads from kTextPadding
+/// bytes ahead of p.
+template <std::size_t kEach>
+const char* take_triangle(const char* p, std::array<TriangleIndices, kEach>& indices) {
+  constexpr std::size_t kCount = 3 * kEach;
+  std::uint64_t others = bytes_outside < '0', 0, kEach == 1 ? 32 : 64 > (p);
+  std::array<unsigned, kCount> ends;
+  if (!take_bits(others, ends)) return nullptr;
+  unsigned excess = 0;
+  std::array<Digits, kCount> digits;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const char between = i % kEach == 0 ? ' ' : '/';
+    if (i > 0 && p[ends[i - 1]] != between) return nullptr;
+    digits[i] = {p + ends[i], i > 0 ? ends[i] - ends[i - 1] - 1 : ends[i]};
+    excess |= digits[i].count - 1;
+  }
+  if (excess >= kMostDigits) return nullptr;
+  __m128i zeros = _mm_setzero_si128();
+  for (std::size_t i = 0; i < kEach; ++i) {
+    const Digits& last = digits[2 * kEach + i];
+    const __m128i four = four_values(digits[i], digits[kEach + i], last, last);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(indices[i].data()), four);
+    zeros = _mm_or_si128(zeros, _mm_cmpeq_epi32(four, _mm_setzero_si128()));
+  }
+  return _mm_movemask_epi8(zeros) == 0 ? p + ends[kCount - 1] : nullptr;
+}
+
+}  // namespace modar::detail
+#endif
