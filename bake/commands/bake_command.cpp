@@ -266,7 +266,8 @@ void add_geometry_options(CommandLine& line, BakeCommand& command) {
       "Store them as half or int16 (else: int16 or float where --max-error needs it)",
       {.type = "LAYOUT"});
   line.option("--lods", &request.levels,
-              "Levels of detail at most, the finest counted, each of half the triangles before it",
+              "Levels of detail at most, the finest counted, each of half the triangles before it "
+              "(above a million: a quarter)",
               {.shows_default = true, .least = 1, .most = kMaxLevels});
   line.flag("--no-lods", [&request] { request.levels = 1; }, "The finest level only",
             {.excludes = "--lods"});

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <limits>
 #include <random>
+#include <set>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -166,7 +167,11 @@ Result<void> bench_one(const std::string& path, unsigned jobs, std::vector<Bench
   MODAR_TRY(make_levels(chunked, options, report));
   const double cpu = cpu_seconds() - begin;
   WholeMesh whole(positions, finest);
-  for (std::uint32_t halvings = 1; halvings < options.levels; ++halvings) {
+  std::set<std::uint32_t> made;
+  for (const Chunk& chunk : chunked.chunks) {
+    for (const ChunkLevel& level : chunk.coarser) made.insert(level.halvings);
+  }
+  for (const std::uint32_t halvings : made) {
     const std::string level = "1/" + std::to_string(1u << halvings) + " ";
     double stated = 0;
     double slide = 0;

@@ -81,15 +81,6 @@ inline Foot foot_of(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, dou
   return {plane, of_b / area, of_c / area};
 }
 
-std::vector<TriangleTree::Triangle> triples(std::span<const std::uint16_t> indices) {
-  std::vector<TriangleTree::Triangle> triangles;
-  triangles.reserve(indices.size() / 3);
-  for (std::size_t i = 0; i < indices.size(); i += 3) {
-    triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
-  }
-  return triangles;
-}
-
 }  // namespace
 
 double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
@@ -111,10 +102,6 @@ TriangleTree::TriangleTree(std::span<const glm::dvec3> positions, std::vector<Tr
   nodes_.emplace_back();
   build(0, 0, centres);
 }
-
-TriangleTree::TriangleTree(std::span<const glm::dvec3> positions,
-                           std::span<const std::uint16_t> indices)
-    : TriangleTree(positions, triples(indices)) {}
 
 void TriangleTree::build(std::uint32_t node, std::uint32_t first, std::span<Centre> centres) {
   const std::size_t count = centres.size();

@@ -36,7 +36,6 @@ class TriangleTree {
   /// At least one triangle, every index below positions.size(). The positions are the caller's and
   /// must outlive the tree.
   TriangleTree(std::span<const glm::dvec3> positions, std::vector<Triangle> triangles);
-  TriangleTree(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
 
   /// Square of the distance of the nearest triangle; where some triangle is within `enough` (a
   /// square), that of any such triangle; where none is nearer than `best`, that. Remembers the

@@ -280,22 +280,45 @@ TEST(Levels, PositionsWrittenTwiceStayTogether) {
   expect_closed_seam(levelled(cut, 65535), twice);
 }
 
-TEST(Levels, CountsAreThoseAsked) {
-  const ChunkedMesh split = levelled(welded(parse(ball(40))), 3000);
-  ASSERT_GT(split.chunks.size(), 1u);
-  std::size_t all = 0;
-  for (const Chunk& chunk : split.chunks) all += chunk.indices.size() / 3;
-  for (std::uint32_t halvings = 1; halvings < 4; ++halvings) {
-    std::size_t count = 0;
-    for (const Chunk& chunk : split.chunks) {
+/// Triangles of the model's levels by how often they are halved; nothing where a level is not made.
+std::map<std::uint32_t, std::size_t> triangles_of_levels(const ChunkedMesh& mesh) {
+  std::map<std::uint32_t, std::size_t> counts;
+  for (const Chunk& chunk : mesh.chunks) {
+    for (const ChunkLevel& level : chunk.coarser) counts[level.halvings] = 0;
+  }
+  for (auto& [halvings, count] : counts) {
+    for (const Chunk& chunk : mesh.chunks) {
       std::size_t size = chunk.indices.size() / 3;
       for (const ChunkLevel& level : chunk.coarser) {
         if (level.halvings <= halvings) size = level.indices.size() / 3;
       }
       count += size;
     }
-    const auto wanted = static_cast<double>(all >> halvings);
-    EXPECT_NEAR(static_cast<double>(count), wanted, 0.03 * wanted) << halvings;
+  }
+  return counts;
+}
+
+TEST(Levels, CountsAreThoseAsked) {
+  const TriMesh mesh = welded(parse(ball(40)));
+  const std::size_t all = mesh.triangles.size();
+  ChunkedMesh split = chunked(mesh, 3000);
+  ASSERT_GT(split.chunks.size(), 1u);
+  // Where a half would be many, levels are a quarter of those before.
+  for (const std::size_t many : {all, all / 3}) {
+    ChunkedMesh levels = split;
+    LevelOptions options;
+    options.many_triangles = many;
+    Report report;
+    ASSERT_TRUE(make_levels(levels, options, report));
+    const std::vector<std::uint32_t> expected =
+        many == all ? std::vector<std::uint32_t>{1, 2, 3} : std::vector<std::uint32_t>{2, 3, 4};
+    std::vector<std::uint32_t> made;
+    for (const auto& [halvings, count] : triangles_of_levels(levels)) {
+      made.push_back(halvings);
+      const auto wanted = static_cast<double>(all >> halvings);
+      EXPECT_NEAR(static_cast<double>(count), wanted, 0.03 * wanted) << many << " " << halvings;
+    }
+    EXPECT_EQ(made, expected) << many;
   }
 }
 
@@ -637,6 +660,42 @@ TEST(Levels, DistancesBothWays) {
       EXPECT_GE(bound, off - 1e-12) << round << " " << share;
       EXPECT_LE(bound, 1.6 * off) << round << " " << share;
       EXPECT_EQ(level_distance(fine, coarse, nearby, of_fine, 9.0), 9.0);
+    }
+  }
+}
+
+TEST(Levels, NearestTriangleIsTheNearestOfAll) {
+  // Scattered, in one plane, and all in one place.
+  for (const glm::dvec3& size : {glm::dvec3(1, 1, 1), glm::dvec3(3, 0, 1), glm::dvec3(0, 0, 0)}) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> one(-1, 1);
+    const auto any = [&](double scale) {
+      const double x = one(random);
+      const double y = one(random);
+      return scale * glm::dvec3(x, y, one(random));
+    };
+    std::vector<glm::dvec3> positions;
+    std::vector<std::uint16_t> indices;
+    for (std::uint16_t t = 0; t < 900; ++t) {
+      const glm::dvec3 middle = any(1) * size;
+      for (int k = 0; k < 3; ++k) {
+        indices.push_back(static_cast<std::uint16_t>(positions.size()));
+        positions.push_back(middle + any(0.05) * size);
+      }
+    }
+    LevelSurface surface(positions, indices);
+    for (int i = 0; i < 300; ++i) {
+      const glm::dvec3 point = any(i % 3 == 0 ? 4 : 1);
+      double least = std::numeric_limits<double>::infinity();
+      for (std::uint32_t t = 0; t < surface.triangles(); ++t) {
+        least = std::min(least, distance_square(point, surface.triangle(t)));
+      }
+      const NearTriangle start{distance_square(point, surface.triangle(7)), 7};
+      const NearTriangle found = surface.nearest(point, 0, start);
+      EXPECT_EQ(found.square, least);
+      EXPECT_EQ(distance_square(point, surface.triangle(found.triangle)), least);
+      const NearTriangle enough = surface.nearest(point, 4 * least, start);
+      EXPECT_LE(enough.square, std::max(4 * least, 1e-30));
     }
   }
 }

@@ -6,14 +6,17 @@
 #include <limits>
 #include <numeric>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 namespace modar {
 namespace {
 
-/// Points whose nearest triangle is found among all: most surfaces need a few, for which a tree
-/// would take longer to build.
-constexpr int kScans = 12;
+/// Triangles of a box where they are searched for the nearest, on average, and boxes along the
+/// longest side. Set by hand: a search looks at all boxes, and at the triangles of a few.
+constexpr double kBoxed = 16;
+constexpr double kMostCells = 48;
 /// Steps of a walk; what needs more is answered by where it has got to. Set by hand: three levels
 /// off, a walk takes about five.
 constexpr int kMostWalked = 24;
@@ -136,22 +139,60 @@ NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t
 
 NearTriangle LevelSurface::nearest(const glm::dvec3& point, double enough,
                                    const NearTriangle& near) {
+  if (boxes_.empty()) make_boxes();
   NearTriangle found = near;
-  if (searches_ < kScans) {
-    ++searches_;
-    for (std::uint32_t t = 0; t < triangles() && found.square > enough; ++t) {
-      const double square = distance_square(point, triangle(t), found.square);
-      if (square < found.square) found = {square, t};
+  for (const Box& box : boxes_) {
+    if (found.square <= enough) break;
+    const glm::dvec3 off = glm::max(glm::max(box.low - point, point - box.high), glm::dvec3(0.0));
+    if (glm::dot(off, off) >= found.square) continue;
+    for (std::uint32_t i = box.first; i < box.end; ++i) {
+      const double square = distance_square(point, triangle(boxed_[i]), found.square);
+      if (square < found.square) found = {square, boxed_[i]};
     }
-    return found;
   }
-  if (!tree_) tree_ = std::make_unique<TriangleTree>(positions_, indices_);
-  found.square = tree_->nearest(point, enough, near.square);
-  if (!(found.square < near.square)) return near;
-  const auto& [a, b, c] = tree_->last_triangle();
-  found.triangle = find(static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b),
-                        static_cast<std::uint16_t>(c));
   return found;
+}
+
+void LevelSurface::make_boxes() {
+  std::vector<glm::dvec3> centres;
+  centres.reserve(triangles());
+  glm::dvec3 low(std::numeric_limits<double>::infinity());
+  glm::dvec3 high = -low;
+  for (std::uint32_t t = 0; t < triangles(); ++t) {
+    const std::array<glm::dvec3, 3> corners = triangle(t);
+    centres.push_back((corners[0] + corners[1] + corners[2]) / 3.0);
+    low = glm::min(low, centres[t]);
+    high = glm::max(high, centres[t]);
+  }
+  // A surface goes through about the square of the cells along a side.
+  const double cells = std::clamp(std::sqrt(triangles() / kBoxed), 1.0, kMostCells);
+  const glm::dvec3 size = high - low;
+  const double side = std::max({size.x, size.y, size.z}) / cells;
+  const double per_length = side > 0 ? 1 / side : 0.0;
+  const glm::uvec3 counts = glm::uvec3(size * per_length) + 1u;
+  const auto cell_of = [&](std::uint32_t t) {
+    const glm::uvec3 at((centres[t] - low) * per_length);
+    return (std::size_t{at.z} * counts.y + at.y) * counts.x + at.x;
+  };
+  std::vector<std::uint32_t> ends(std::size_t{counts.x} * counts.y * counts.z + 1, 0);
+  for (std::uint32_t t = 0; t < triangles(); ++t) ++ends[cell_of(t) + 1];
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  boxed_.resize(triangles());
+  for (std::uint32_t t = 0; t < triangles(); ++t) boxed_[ends[cell_of(t)]++] = t;
+  std::uint32_t first = 0;
+  for (const std::uint32_t end : ends) {
+    if (end == first) continue;
+    Box& box = boxes_.emplace_back();
+    box.first = first;
+    box.end = end;
+    box.low = box.high = centres[boxed_[first]];
+    for (; first < end; ++first) {
+      for (const glm::dvec3& corner : triangle(boxed_[first])) {
+        box.low = glm::min(box.low, corner);
+        box.high = glm::max(box.high, corner);
+      }
+    }
+  }
 }
 
 }  // namespace modar

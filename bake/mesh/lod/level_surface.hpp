@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -83,8 +82,16 @@ class LevelSurface {
   std::vector<std::uint32_t> corners_;  ///< by vertex
   std::vector<std::uint16_t> ends_;     ///< of each of these: the vertex that its edge goes to
   std::vector<std::uint32_t> opposites_;
-  int searches_ = 0;  ///< answered by looking at all triangles
-  std::unique_ptr<TriangleTree> tree_;
+  /// A box of space: the triangles whose centres are in a cell of a grid.
+  struct Box {
+    glm::dvec3 low;
+    glm::dvec3 high;
+    std::uint32_t first = 0;  ///< in boxed_
+    std::uint32_t end = 0;
+  };
+  void make_boxes();
+  std::vector<Box> boxes_;  ///< those with triangles, made for the first search
+  std::vector<std::uint32_t> boxed_;
 };
 
 }  // namespace modar

@@ -45,13 +45,13 @@ constexpr float kSteepest = 8;
 /// A price (see CollapseSequence) below what half floats tell apart.
 constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor);
 /// Of the error of the level before: a level that is off by no more may stand for the finest where
-/// coarser ones are measured, which adds its error to theirs. At 0.15 and 0.25, levels of nefertiti
-/// (70,000 triangles) are measured in 0.5 and 0.3 of the time and state 3 and 4 % more on average,
-/// those of a scan of 1.1 million in 0.9 and 0.85, 0.2 and 1 %; at 0.4 both state 10 and 5 % more.
-constexpr double kNegligible = 0.2;
+/// coarser ones are measured, which adds its error to theirs. At 0.3 and 0.4, levels of a scan of
+/// 1.1 million triangles are made in 0.96 and 0.91 of the time and state 2 and 5 % more on average;
+/// at 0.2, in 1.03 of it and 1 % less.
+constexpr double kNegligible = 0.25;
 /// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
 /// a flat chunk may lose more than its share. Set by hand.
-constexpr std::uint32_t kFurther = 1;
+constexpr std::uint32_t kFurther = 2;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
 /// Vertices that differ in their normals only, as one: flat-shaded models have one for every corner
@@ -254,16 +254,15 @@ std::vector<glm::dvec3> decoded_positions(const TriMesh& mesh, const Chunk& chun
 }
 
 CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
-                          const ChunkGrid& grid, const SharedVertices& shared,
-                          const LevelOptions& options) {
+                          const ChunkGrid& grid, const SharedVertices& shared, PositionKind kind,
+                          std::span<const std::uint32_t> sides, std::uint32_t halvings) {
   const std::size_t triangles = chunk.indices.size() / 3;
   if (triangles < 2 * kFewTriangles) return {};
-  const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);
+  const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, kind, grid);
   DecimateLimits limits;
   limits.max_error = kMaxCollapse * diagonal_of(positions);
-  limits.least_triangles = std::max(kFewTriangles, triangles >> (options.levels + kFurther));
-  const std::vector<glm::dvec2> texels =
-      texels_of(mesh, chunk, positions, options.texture_sides, limits);
+  limits.least_triangles = std::max(kFewTriangles, triangles >> (halvings + kFurther));
+  const std::vector<glm::dvec2> texels = texels_of(mesh, chunk, positions, sides, limits);
   return decimate_chunk({positions, texels, shared.twins}, merged.indices_of(chunk), shared.locked,
                         limits);
 }
@@ -273,6 +272,7 @@ CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const MergedV
 struct Cut {
   float price = 0;
   double share = 0;
+  std::uint32_t halvings = 0;  ///< of the model's triangles, at the level that this makes
 };
 
 /// Collapses of one chunk ahead of the cut.
@@ -290,6 +290,12 @@ std::size_t collapses_at(const CollapseSequence& sequence, const Cut& cut) {
 std::size_t triangles_after(const CollapseSequence& sequence, std::size_t all,
                             std::size_t collapses) {
   return collapses == 0 ? all : sequence.triangles[collapses - 1];
+}
+
+std::size_t triangles_in(const ChunkedMesh& mesh) {
+  std::size_t count = 0;
+  for (const Chunk& chunk : mesh.chunks) count += chunk.indices.size() / 3;
+  return count;
 }
 
 /// The cut that leaves the model `target` triangles or a few less: one for all chunks, so that
@@ -324,6 +330,32 @@ std::optional<Cut> cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSe
     (fits({cut.price, middle}) ? cut.share : less) = middle;
   }
   return cut;
+}
+
+/// How often the model's triangles are halved at each coarser level.
+std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions& options) {
+  std::vector<std::uint32_t> halvings;
+  for (std::uint32_t at = 0; halvings.size() + 1 < options.levels;) {
+    at += triangles >> (at + 1) > options.many_triangles ? 2u : 1u;
+    halvings.push_back(at);
+  }
+  return halvings;
+}
+
+/// The cuts of all levels up to the last that can be reached, and one that is not much worse.
+std::vector<Cut> cuts_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequences,
+                          const std::vector<std::uint32_t>& halvings) {
+  std::vector<Cut> cuts;
+  for (const std::uint32_t level : halvings) {
+    std::optional<Cut> cut = cut_for(mesh, sequences, triangles_in(mesh) >> level);
+    const bool reached = cut.has_value();
+    const float before = cuts.empty() ? 0.0f : cuts.back().price;
+    if (!reached) cut = {std::max(before, kLeastPrice) * kSteepest * kSteepest, 1.0};
+    cut->halvings = level;
+    cuts.push_back(*cut);
+    if (!reached) break;
+  }
+  return cuts;
 }
 
 std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> indices,
@@ -415,8 +447,8 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
   const std::span<const std::uint16_t> finest = merged.indices_of(chunk);
   std::vector<MeasuredLevel> levels;
   levels.emplace_back(positions, std::vector<std::uint16_t>(finest.begin(), finest.end()));
-  for (std::uint32_t step = 0; step < cuts.size(); ++step) {
-    const std::size_t collapses = collapses_at(sequence, cuts[step]);
+  for (const Cut& cut : cuts) {
+    const std::size_t collapses = collapses_at(sequence, cut);
     const std::size_t count = triangles_after(sequence, chunk.indices.size() / 3, collapses);
     const auto before = static_cast<double>(levels.back().surface.triangles());
     if (count == 0 || static_cast<double>(count) > kWorthwhile * before) continue;
@@ -425,7 +457,7 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
     MeasuredLevel coarser(positions, collapsed_triangles(finest, become));
     const std::vector<std::uint32_t> nearby = measure(coarser, levels, positions, become, texels);
     ChunkLevel& level = chunk.coarser.emplace_back();
-    level.halvings = step + 1;
+    level.halvings = cut.halvings;
     level.uv_shift = greatest_uv_shift(coarser.surface, {positions, texels}, become, nearby,
                                        limits.max_uv_shift);
     level.error = coarser.error;
@@ -461,19 +493,13 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
       if (report.progress) report.progress("levels", begin + 0.5 * done);
     }
   };
+  const std::vector<std::uint32_t> halvings = halvings_of(triangles_in(mesh), options);
   std::vector<CollapseSequence> sequences(chunks);
   each_chunk(0.0, [&](std::size_t c) {
-    sequences[c] = decimate(mesh.mesh, mesh.chunks[c], merged[c], grids[c], shared[c], options);
+    sequences[c] = decimate(mesh.mesh, mesh.chunks[c], merged[c], grids[c], shared[c],
+                            options.positions, options.texture_sides, halvings.back());
   });
-  std::size_t triangles_in_all = 0;
-  for (const Chunk& chunk : mesh.chunks) triangles_in_all += chunk.indices.size() / 3;
-  std::vector<Cut> cuts;
-  for (std::uint32_t level = 1; level < options.levels; ++level) {
-    const std::optional<Cut> cut = cut_for(mesh, sequences, triangles_in_all >> level);
-    const float before = cuts.empty() ? 0.0f : cuts.back().price;
-    cuts.push_back(cut ? *cut : Cut{std::max(before, kLeastPrice) * kSteepest * kSteepest, 1.0});
-    if (!cut) break;
-  }
+  const std::vector<Cut> cuts = cuts_for(mesh, sequences, halvings);
   each_chunk(0.5, [&](std::size_t c) {
     level_chunk(mesh.mesh, merged[c], grids[c], options, sequences[c], cuts, mesh.chunks[c]);
     sequences[c] = {};
