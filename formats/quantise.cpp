@@ -9,17 +9,12 @@ namespace {
 /// From one signed 8-bit code to the next, in the mean of both decodings.
 constexpr double kSnorm8Step = (2.0 / 255.0 + 1.0 / 127.0) / 2.0;
 
-/// What ES 2.0 and ES 3 make of c, in the middle.
-double snorm8_mean(int c) {
-  const double es2 = decode_normalised(static_cast<std::int8_t>(c));
-  const double es3 = c == -128 ? -1.0 : c / 127.0;
-  return (es2 + es3) / 2.0;
-}
-
-/// What signed codes decode to under ES 2.0 and under ES 3, by code + 128.
+/// What signed codes decode to under ES 2.0 and under ES 3, and the middle of the two, by code +
+/// 128.
 struct SnormTables {
   std::array<double, 256> es2{};
   std::array<double, 256> es3{};
+  std::array<double, 257> mean{};  ///< the last one is no code: nothing is near it
 };
 
 constexpr SnormTables make_snorm_tables() {
@@ -28,7 +23,9 @@ constexpr SnormTables make_snorm_tables() {
     const auto at = static_cast<std::size_t>(c + 128);
     tables.es2[at] = decode_normalised(static_cast<std::int8_t>(c));
     tables.es3[at] = c < -127 ? -1.0 : c / 127.0;
+    tables.mean[at] = (tables.es2[at] + tables.es3[at]) / 2.0;
   }
+  tables.mean[256] = 4.0;
   return tables;
 }
 constexpr SnormTables kSnorm = make_snorm_tables();
@@ -81,14 +78,15 @@ std::uint16_t float_to_half(float value) {
 
 std::int8_t float_to_snorm8(float value) {
   const double wanted = clamped(value, -1.0, 1.0);
-  int best = static_cast<int>(std::floor((wanted - 0.5 / 255.0) / kSnorm8Step));
-  best = best < -128 ? -128 : (best > 127 ? 127 : best);
+  // Without branches, which normals in no order would mispredict.
+  const double steps = (wanted - 0.5 / 255.0) / kSnorm8Step;
+  auto below = static_cast<int>(steps);
+  below -= static_cast<int>(steps < below);
+  below = below < -128 ? -128 : (below > 127 ? 127 : below);
   // The mean of both decodings bends at -127, so the neighbour above decides by distance.
-  if (best < 127 &&
-      std::fabs(snorm8_mean(best + 1) - wanted) < std::fabs(snorm8_mean(best) - wanted)) {
-    ++best;
-  }
-  return static_cast<std::int8_t>(best);
+  const auto at = static_cast<std::size_t>(below + 128);
+  const bool above = std::fabs(kSnorm.mean[at + 1] - wanted) < std::fabs(kSnorm.mean[at] - wanted);
+  return static_cast<std::int8_t>(below + static_cast<int>(above));
 }
 
 std::array<std::int8_t, 2> normal_to_oct8(const std::array<double, 3>& normal) {

@@ -12,19 +12,34 @@ namespace {
 
 /// Entries of the cache that is planned for: the smallest that phones of the class have.
 constexpr std::uint32_t kCacheSize = 16;
-/// Vertices go through a counting sort on their first bits, then are compared within a bucket.
-constexpr unsigned kBucketShift = 64 - 12;
-constexpr std::size_t kBuckets = std::size_t{1} << (64 - kBucketShift);
+/// Vertices are sorted by their first bits, three digits of so many, then compared where these are
+/// the same: 33 bits hold two of a position's 16-bit coordinates.
+constexpr unsigned kDigitBits = 11;
+constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
 constexpr std::uint64_t kOut = ~std::uint64_t{0};  ///< no corners: they have 48 bits
 constexpr std::uint32_t kNoVertex = 0xFFFFFFFFu;
 
 }  // namespace
 
+/// Sorts keys_ by their first bits, the last digit first; those with the same stay in order.
+void ChunkOrderer::sort_by_digits() {
+  for (unsigned shift = 64 - 3 * kDigitBits; shift < 64; shift += kDigitBits) {
+    const auto digit = [&](const Key& key) {
+      return static_cast<std::size_t>(key.head >> shift) & (kDigits - 1);
+    };
+    places_of_digits_.assign(kDigits + 1, 0);
+    for (const Key& key : keys_) ++places_of_digits_[digit(key) + 1];
+    for (std::size_t d = 0; d < kDigits; ++d) places_of_digits_[d + 1] += places_of_digits_[d];
+    unsorted_.swap(keys_);
+    keys_.resize(unsorted_.size());
+    for (const Key& key : unsorted_) keys_[places_of_digits_[digit(key)]++] = key;
+  }
+}
+
 void ChunkOrderer::rank_vertices(std::span<const std::byte> vertices, std::uint32_t stride) {
   const std::size_t count = vertices.size() / stride;
   const std::size_t head_bytes = std::min<std::size_t>(stride, 8);
-  unsorted_.resize(count);
-  buckets_.assign(kBuckets + 1, 0);
+  keys_.resize(count);
   for (std::size_t v = 0; v < count; ++v) {
     std::uint64_t head = 0;
     for (std::size_t i = 0; i < head_bytes; ++i) {
@@ -32,12 +47,9 @@ void ChunkOrderer::rank_vertices(std::span<const std::byte> vertices, std::uint3
     }
     // A stride below 8 bytes fills only the high bytes of the head.
     head <<= 8 * (8 - head_bytes);
-    unsorted_[v] = {head, static_cast<std::uint32_t>(v)};
-    ++buckets_[(head >> kBucketShift) + 1];
+    keys_[v] = {head, static_cast<std::uint32_t>(v)};
   }
-  for (std::size_t b = 0; b < kBuckets; ++b) buckets_[b + 1] += buckets_[b];
-  keys_.resize(count);
-  for (const Key& key : unsorted_) keys_[buckets_[key.head >> kBucketShift]++] = key;
+  sort_by_digits();
   const auto compare = [&](const Key& a, const Key& b) {
     return std::memcmp(vertices.data() + std::size_t{a.vertex} * stride,
                        vertices.data() + std::size_t{b.vertex} * stride, stride);
@@ -47,12 +59,14 @@ void ChunkOrderer::rank_vertices(std::span<const std::byte> vertices, std::uint3
     const int bytes = compare(a, b);
     return bytes != 0 ? bytes < 0 : a.vertex < b.vertex;
   };
-  // Each bucket now says where the next one begins.
-  std::size_t begin = 0;
-  for (std::size_t b = 0; b < kBuckets; ++b) {
+  const auto same_digits = [](const Key& a, const Key& b) {
+    return (a.head ^ b.head) >> (64 - 3 * kDigitBits) == 0;
+  };
+  for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
+    for (end = begin + 1; end < count && same_digits(keys_[begin], keys_[end]);) ++end;
+    if (end - begin == 1) continue;
     std::sort(keys_.begin() + static_cast<std::ptrdiff_t>(begin),
-              keys_.begin() + static_cast<std::ptrdiff_t>(buckets_[b]), before);
-    begin = buckets_[b];
+              keys_.begin() + static_cast<std::ptrdiff_t>(end), before);
   }
   rank_.resize(count);
   vertex_of_rank_.clear();

@@ -29,6 +29,7 @@ class ChunkOrderer {
   }
 
  private:
+  void sort_by_digits();
   void rank_vertices(std::span<const std::byte> vertices, std::uint32_t stride);
   void sort_triangles(std::span<std::uint16_t> indices);
   void link_triangles(std::span<const std::uint16_t> indices);
@@ -46,7 +47,7 @@ class ChunkOrderer {
   };
   std::vector<Key> unsorted_;
   std::vector<Key> keys_;
-  std::vector<std::uint32_t> buckets_;
+  std::vector<std::uint32_t> places_of_digits_;
   std::vector<std::uint16_t> rank_;            // of each old vertex: its place among distinct bytes
   std::vector<std::uint16_t> vertex_of_rank_;  // the lowest old number with those bytes
   std::vector<std::uint64_t> triangles_;       // canonical: lowest rank first, then sorted

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <map>
 #include <numeric>
 #include <random>
 #include <set>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "formats/transport/chunk_order.hpp"
@@ -111,6 +114,26 @@ std::vector<std::uint32_t> stored(const std::vector<std::uint32_t>& vertices,
   return bytes;
 }
 
+TEST(ChunkOrder, VerticesAreInTheOrderOfTheirBytes) {
+  // Of few different bytes, so that many agree in all but their last. No triangle uses any.
+  std::mt19937 random(8);
+  for (std::uint32_t stride = 2; stride <= 16; ++stride) {
+    std::vector<std::string> vertices(1 + random() % 3000);
+    for (std::string& v : vertices) {
+      for (std::uint32_t i = 0; i < stride; ++i) v += "\0\1\x7f\xff"[random() % 4];
+    }
+    std::string bytes;
+    for (const std::string& v : vertices) bytes += v;
+    ChunkOrderer orderer;
+    std::vector<std::string> ours;
+    for (const std::uint16_t old : orderer.order(std::as_bytes(std::span(bytes)), stride, {})) {
+      ours.push_back(vertices[old]);
+    }
+    const std::set<std::string> sorted(vertices.begin(), vertices.end());
+    ASSERT_EQ(ours, std::vector<std::string>(sorted.begin(), sorted.end())) << stride;
+  }
+}
+
 TEST(ChunkOrder, HangsOnTheContentAlone) {
   // Triangles at random, degenerate and doubled ones among them.
   std::mt19937 random(3);
@@ -165,6 +188,74 @@ TEST(Chunk, EveryTriangleOnceWithItsMaterial) {
     EXPECT_EQ(expected, found) << most;
   }
   EXPECT_EQ(chunked(mesh, 65535).chunks.size(), 3u);
+}
+
+/// A triangle's number in the file, and its centre in 65,536ths of [-1,1].
+struct Centre {
+  std::uint32_t triangle = 0;
+  std::array<int, 3> at{};
+};
+
+/// Are all of `front` lower than all of `behind` along one axis? What is level goes by the file.
+bool divided(std::span<const std::vector<Centre>> front,
+             std::span<const std::vector<Centre>> behind, std::size_t axis) {
+  using Place = std::pair<int, std::uint32_t>;
+  Place highest = {-1, 0};
+  Place lowest = {65536, 0};
+  for (const auto& chunk : front) {
+    for (const Centre& c : chunk) highest = std::max(highest, Place(c.at[axis], c.triangle));
+  }
+  for (const auto& chunk : behind) {
+    for (const Centre& c : chunk) lowest = std::min(lowest, Place(c.at[axis], c.triangle));
+  }
+  return highest < lowest;
+}
+
+bool is_kd_tree(std::span<const std::vector<Centre>> chunks) {
+  if (chunks.size() < 2) return true;
+  for (std::size_t k = 1; k < chunks.size(); ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (divided(chunks.first(k), chunks.subspan(k), axis)) {
+        return is_kd_tree(chunks.first(k)) && is_kd_tree(chunks.subspan(k));
+      }
+    }
+  }
+  return false;
+}
+
+TEST(Chunk, ChunksAreTheLeavesOfAKdTree) {
+  // In no order, and many centres at one height.
+  TriMesh mesh = welded(parse(grid(40, 1)));
+  std::mt19937 random(4);
+  std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
+  for (glm::dvec3& p : mesh.positions) p = glm::dvec3(glm::ivec3(p * 8.0)) / 8.0;
+  std::map<Triangle, Centre> centres;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    Centre& centre = centres[mesh.triangles[t]];
+    centre.triangle = t;
+    const auto& [a, b, c] = mesh.triangles[t];
+    const glm::dvec3 sum = mesh.positions[a] + mesh.positions[b] + mesh.positions[c];
+    for (int i = 0; i < 3; ++i) {
+      const double at = (sum[i] / 3.0 + 1.0) * 32768.0;
+      centre.at[static_cast<std::size_t>(i)] = std::clamp(static_cast<int>(at), 0, 65535);
+    }
+  }
+  const ChunkedMesh cut = chunked(mesh, 100);
+  std::vector<std::vector<Centre>> chunks;
+  for (const Chunk& chunk : cut.chunks) {
+    std::vector<Centre>& all = chunks.emplace_back();
+    for (std::size_t i = 0; i < chunk.indices.size(); i += 3) {
+      const auto vertex = [&](std::size_t k) { return chunk.vertices[chunk.indices[i + k]]; };
+      const auto found = centres.find({vertex(0), vertex(1), vertex(2)});
+      ASSERT_NE(found, centres.end());
+      ASSERT_TRUE(all.empty() || all.back().triangle < found->second.triangle);
+      all.push_back(found->second);
+      centres.erase(found);
+    }
+  }
+  EXPECT_TRUE(centres.empty());
+  EXPECT_GT(chunks.size(), 16u);
+  EXPECT_TRUE(is_kd_tree(chunks));
 }
 
 TEST(Chunk, OptionsAreHeldToTheirRange) {

@@ -7,6 +7,8 @@
 #include <map>
 #include <random>
 #include <span>
+#include <string>
+#include <vector>
 
 #include <glm/geometric.hpp>
 
@@ -133,6 +135,47 @@ TEST(Weld, MakesNormalsWithinSmoothingGroups) {
     const TriMesh hard = welded(parse(walls + groups + a + (groups[2] == '1' ? "s 2\n" : "") + b));
     EXPECT_EQ(hard.positions.size(), 8u);
     for (const glm::vec3& n : hard.normals) EXPECT_NEAR(std::max({-n.x, -n.y, -n.z}), 1.0f, 1e-6f);
+  }
+}
+
+TEST(Weld, NormalsAreWeighedByAreaAndAngle) {
+  std::mt19937 random(12);
+  const auto number = [&] { return static_cast<double>(random() % 20001) / 1e4 - 1.0; };
+  std::vector<glm::dvec3> points(300);
+  std::string vertices;
+  for (glm::dvec3& p : points) {
+    p = {number(), number(), 0.2 * number()};
+    vertices +=
+        "v " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
+  }
+  std::vector<glm::dvec3> sums(points.size(), glm::dvec3(0.0));
+  std::string faces;
+  std::string faces_with_uv;  // whose indices differ: welded the other way
+  for (int f = 0; f < 1501; ++f) {
+    std::array<std::size_t, 3> t{};
+    for (std::size_t& v : t) v = random() % points.size();
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    const glm::dvec3 area = glm::cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]);
+    faces += "f";
+    faces_with_uv += "f";
+    for (std::size_t i = 0; i < 3; ++i) {
+      const glm::dvec3& a = points[t[i]];
+      const glm::dvec3 b = points[t[(i + 1) % 3]] - a;
+      const glm::dvec3 c = points[t[(i + 2) % 3]] - a;
+      sums[t[i]] += area * std::atan2(glm::length(glm::cross(b, c)), glm::dot(b, c));
+      faces += " " + std::to_string(t[i] + 1);
+      faces_with_uv += " " + std::to_string(t[i] + 1) + "/1";
+    }
+    faces += "\n";
+    faces_with_uv += "\n";
+  }
+  for (const std::string& text : {vertices + faces, "vt 0 0\n" + vertices + faces_with_uv}) {
+    const TriMesh mesh = welded(parse(text));
+    for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
+      const std::size_t source = mesh.source_positions.empty() ? v : mesh.source_positions[v];
+      const glm::dvec3 wanted = glm::normalize(sums[source]);
+      EXPECT_LT(glm::length(glm::dvec3(mesh.normals[v]) - wanted), 1e-5) << v;
+    }
   }
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <numeric>
 #include <span>
 
@@ -16,25 +18,36 @@
 namespace modar {
 namespace {
 
-/// A triangle and its centre, counted along each axis in 65,536ths of [-1,1]: finer than the
-/// triangles of any model that has to be split.
-struct Item {
-  std::array<std::uint16_t, 3> centre;
-  std::uint16_t unused = 0;
-  std::uint32_t triangle = 0;
+/// Triangles and their centres, counted along each axis in 65,536ths of [-1,1] from its middle:
+/// finer than the triangles of any model that has to be split. An array for each, as a pass needs
+/// few of them.
+struct Items {
+  std::array<Array<std::int16_t>, 3> centres;
+  Array<std::uint32_t> triangles;
+
+  [[nodiscard]] std::size_t size() const { return triangles.size(); }
+  void resize(std::size_t size) {
+    for (Array<std::int16_t>& each : centres) each.resize(size);
+    triangles.resize(size);
+  }
+  void set(std::size_t i, const TriMesh& mesh, std::uint32_t triangle) {
+    const auto& t = mesh.triangles[triangle];
+    const glm::dvec3 sum = mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = std::clamp((sum[axis] / 3.0 + 1.0) * 32768.0, 0.0, 65535.0);
+      centres[static_cast<std::size_t>(axis)][i] =
+          static_cast<std::int16_t>(static_cast<int>(at) - 32768);
+    }
+    triangles[i] = triangle;
+  }
 };
 
-Item make_item(const TriMesh& mesh, std::uint32_t triangle) {
-  const auto& t = mesh.triangles[triangle];
-  const glm::dvec3 sum = mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]];
-  Item item;
-  item.triangle = triangle;
-  for (int i = 0; i < 3; ++i) {
-    const double at = std::clamp((sum[i] / 3.0 + 1.0) * 32768.0, 0.0, 65535.0);
-    item.centre[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(at);
-  }
-  return item;
-}
+/// Some of them, one behind the other.
+struct Stretch {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  [[nodiscard]] std::size_t size() const { return end - begin; }
+};
 
 /// A piece estimated to exceed the limit by this factor is split without counting its vertices: a
 /// wrong estimate would make chunks small. Set by hand.
@@ -42,10 +55,16 @@ constexpr double kSurely = 1.25;
 /// What borders add to the vertices of a piece, and a margin for uneven halves. Set by hand.
 constexpr double kMargin = 1.055;
 
+/// Marks that are looked at together, and what they are where all are set.
+constexpr std::size_t kTogether = 8;
+constexpr std::uint64_t kAllMarks = 0x0101010101010101u;
+
 class ChunkBuilder {
  public:
-  ChunkBuilder(const TriMesh& mesh, const ChunkOptions& options, std::vector<Chunk>& chunks)
+  ChunkBuilder(const TriMesh& mesh, Items& items, const ChunkOptions& options,
+               std::vector<Chunk>& chunks)
       : mesh_(mesh),
+        items_(items),
         max_vertices_(options.max_vertices),
         max_side_(options.max_side),
         chunks_(chunks),
@@ -55,7 +74,7 @@ class ChunkBuilder {
 
   /// Triangles of one material in the order of the file. Returns false where one of them is longer
   /// than a chunk may be.
-  bool split(std::span<Item> items, std::uint32_t material) {
+  bool split(const Stretch& items, std::uint32_t material) {
     double vertices = static_cast<double>(items.size()) * vertices_per_triangle_;
     if (vertices < kSurely * max_vertices_) {
       const std::uint32_t count = number_vertices(items);
@@ -72,54 +91,100 @@ class ChunkBuilder {
     auto middle = static_cast<std::size_t>(static_cast<double>(items.size()) * share);
     middle = std::clamp<std::size_t>(middle, 1, items.size() - 1);
     partition(items, middle);
-    return split(items.first(middle), material) && split(items.subspan(middle), material);
+    const std::size_t border = items.begin + middle;
+    return split({items.begin, border}, material) && split({border, items.end}, material);
   }
 
  private:
   /// The axis along which the centres spread most.
-  static std::size_t longest_axis(std::span<const Item> items) {
-    std::array<std::uint16_t, 3> low = items[0].centre;
-    std::array<std::uint16_t, 3> high = low;
-    for (const Item& item : items) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        low[i] = std::min(low[i], item.centre[i]);
-        high[i] = std::max(high[i], item.centre[i]);
+  [[nodiscard]] std::size_t longest_axis(const Stretch& items) const {
+    std::array<int, 3> sides{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::int16_t* const at = items_.centres[axis].data();
+      std::int16_t low = at[items.begin];
+      std::int16_t high = low;
+      for (std::size_t i = items.begin; i < items.end; ++i) {
+        low = at[i] < low ? at[i] : low;
+        high = at[i] > high ? at[i] : high;
       }
+      sides[axis] = high - low;
     }
-    const auto side = [&](std::size_t i) { return high[i] - low[i]; };
-    return side(0) >= side(1) && side(0) >= side(2) ? 0 : (side(1) >= side(2) ? 1 : 2);
+    return sides[0] >= sides[1] && sides[0] >= sides[2] ? 0 : (sides[1] >= sides[2] ? 1 : 2);
   }
 
   /// Moves the `middle` triangles that lie lowest along the longest side of their box to the front;
   /// both parts keep file order, and ties go to the first in the file.
-  void partition(std::span<Item> items, std::size_t middle) {
-    const std::size_t axis = longest_axis(items);
+  void partition(const Stretch& items, std::size_t middle) {
+    const std::int16_t* const centres = items_.centres[longest_axis(items)].data() + items.begin;
     histogram_.assign(65536, 0);
-    for (const Item& item : items) ++histogram_[item.centre[axis]];
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      ++histogram_[static_cast<std::size_t>(centres[i] + 32768)];
+    }
     std::size_t left = middle;
-    std::uint32_t border = 0;
+    std::size_t border = 0;
     while (histogram_[border] <= left) left -= histogram_[border++];
-    behind_.resize(0);
-    behind_.reserve(items.size() - middle);
-    std::size_t kept = 0;
-    for (const Item& item : items) {
-      const std::uint16_t at = item.centre[axis];
-      const bool front = at < border || (at == border && left > 0);
-      if (front && at == border) --left;
-      if (front) {
-        items[kept++] = item;
-      } else {
-        behind_.push_back(item);
+    mark_front(centres, items.size(), static_cast<int>(border) - 32768, left);
+    for (Array<std::int16_t>& each : items_.centres) move_front(each, items, middle, behind_);
+    move_front(items_.triangles, items, middle, behind_triangles_);
+  }
+
+  /// Marks what lies below `border`, and the first `ties` at it.
+  void mark_front(const std::int16_t* centres, std::size_t count, int border, std::size_t ties) {
+    in_front_.resize((count + kTogether - 1) / kTogether * kTogether);
+    for (std::size_t i = 0; i < count; ++i) {
+      in_front_[i] = static_cast<std::uint8_t>(centres[i] < border);
+    }
+    for (std::size_t i = 0; ties > 0; ++i) {
+      if (centres[i] != border) continue;
+      in_front_[i] = 1;
+      --ties;
+    }
+  }
+
+  /// Moves those of `values` that are marked to the front. Neighbours mostly go the same way, so
+  /// eight are looked at together; where they do not, each is written to both parts and one of them
+  /// goes on, without branches, which would be mispredicted.
+  template <class T>
+  void move_front(Array<T>& values, const Stretch& items, std::size_t middle, Array<T>& behind) {
+    const std::size_t behind_size = items.size() - middle + 1;  // one more may be written
+    // Memory of the first pieces is not held while the last are cut.
+    if (behind.size() < behind_size || behind.size() / 4 > behind_size) {
+      behind.release();
+      behind.resize(behind_size);
+    }
+    T* to = values.data() + items.begin;
+    T* to_behind = behind.data();
+    const T* const from = to;
+    std::size_t i = 0;
+    while (i < items.size()) {
+      std::uint64_t marks = 0;
+      std::memcpy(&marks, in_front_.data() + i, kTogether);
+      const bool whole = i + kTogether <= items.size();
+      if (whole && (marks == 0 || marks == kAllMarks)) {
+        std::array<T, kTogether> some;
+        std::memcpy(some.data(), from + i, sizeof some);
+        T*& end = marks == 0 ? to_behind : to;
+        std::memcpy(end, some.data(), sizeof some);
+        end += kTogether;
+        i += kTogether;
+        continue;
+      }
+      for (const std::size_t stop = std::min(i + kTogether, items.size()); i < stop; ++i) {
+        const T value = from[i];
+        *to = value;
+        *to_behind = value;
+        to += in_front_[i];
+        to_behind += 1 - in_front_[i];
       }
     }
-    std::copy(behind_.begin(), behind_.end(), items.begin() + static_cast<std::ptrdiff_t>(kept));
+    std::copy(behind.data(), to_behind, to);
   }
 
   /// Numbers the vertices of these triangles by first use; stops one past the limit.
-  std::uint32_t number_vertices(std::span<const Item> items) {
+  std::uint32_t number_vertices(const Stretch& items) {
     used_.clear();
-    for (const Item& item : items) {
-      for (const std::uint32_t v : mesh_.triangles[item.triangle]) {
+    for (const std::uint32_t triangle : triangles(items)) {
+      for (const std::uint32_t v : mesh_.triangles[triangle]) {
         if (local_[v] != kNoIndex) continue;
         local_[v] = static_cast<std::uint32_t>(used_.size());
         used_.push_back(v);
@@ -146,12 +211,12 @@ class ChunkBuilder {
     used_.clear();
   }
 
-  void emit(std::span<const Item> items, std::uint32_t material) {
+  void emit(const Stretch& items, std::uint32_t material) {
     Chunk& chunk = chunks_.emplace_back();
     chunk.material = material;
     chunk.indices.reserve(3 * items.size());
-    for (const Item& item : items) {
-      for (const std::uint32_t v : mesh_.triangles[item.triangle]) {
+    for (const std::uint32_t triangle : triangles(items)) {
+      for (const std::uint32_t v : mesh_.triangles[triangle]) {
         chunk.indices.push_back(static_cast<std::uint16_t>(local_[v]));
       }
     }
@@ -159,7 +224,12 @@ class ChunkBuilder {
     forget_vertices();
   }
 
+  [[nodiscard]] std::span<const std::uint32_t> triangles(const Stretch& items) const {
+    return {items_.triangles.data() + items.begin, items.size()};
+  }
+
   const TriMesh& mesh_;
+  Items& items_;
   std::uint32_t max_vertices_;
   double max_side_;
   std::vector<Chunk>& chunks_;
@@ -167,7 +237,9 @@ class ChunkBuilder {
   std::vector<std::uint32_t> used_;
   double vertices_per_triangle_;
   std::vector<std::uint32_t> histogram_;
-  Array<Item> behind_;
+  Array<std::uint8_t> in_front_;
+  Array<std::int16_t> behind_;
+  Array<std::uint32_t> behind_triangles_;
 };
 
 }  // namespace
@@ -195,17 +267,17 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
   std::vector<std::uint32_t> begins(result.mesh.materials.size() + 1, 0);
   for (const std::uint32_t m : result.mesh.triangle_material) ++begins[m + 1];
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
-  Array<Item> items(result.mesh.triangles.size());
+  Items items;
+  items.resize(result.mesh.triangles.size());
   std::vector<std::uint32_t> next(begins.begin(), begins.end() - 1);
   for (std::uint32_t t = 0; t < items.size(); ++t) {
-    items[next[result.mesh.triangle_material[t]]++] = make_item(result.mesh, t);
+    items.set(next[result.mesh.triangle_material[t]]++, result.mesh, t);
   }
   result.mesh.triangle_material.release();  // chunks hold it from here on
-  ChunkBuilder builder(result.mesh, options, result.chunks);
+  ChunkBuilder builder(result.mesh, items, options, result.chunks);
   for (std::uint32_t m = 0; m + 1 < begins.size(); ++m) {
-    const auto part =
-        std::span(items.data(), items.size()).subspan(begins[m], begins[m + 1] - begins[m]);
-    if (!part.empty() && !builder.split(part, m)) {
+    const Stretch part = {begins[m], begins[m + 1]};
+    if (part.size() != 0 && !builder.split(part, m)) {
       return fail(ExitCode::kUnsupported, "model.max-error", result.mesh.name,
                   "a triangle is too long for the grid that the requested error needs",
                   "allow a greater --max-error, or divide the model's longest triangles");
