@@ -409,6 +409,36 @@ TEST(ObjReader, PlainLinesReadAsIndentedOnesDo) {
   }
 }
 
+TEST(ObjReader, CornersOfManyDigitsAreReadAsTheyStand) {
+  // Lines of 9 to 80 bytes: leading zeros are as good as large models.
+  std::string text = kTriangle + "vt 0.5 0.5\nvt 0.25 0.5\nvn 0.0 0.0 1.0\n";
+  std::vector<Corner> wanted;
+  std::mt19937 random(9);
+  for (int f = 0; f < 2000; ++f) {
+    const std::size_t kind = random() % 3;
+    text += "f";
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      Corner corner;
+      const auto index = [&](std::uint32_t count, std::uint32_t& to) {
+        to = static_cast<std::uint32_t>(random() % count);
+        return std::string(random() % 8, '0') + std::to_string(to + 1);
+      };
+      text += " " + index(3, corner.position);
+      if (kind > 0) text += "/" + index(2, corner.uv);
+      if (kind > 1) text += "/" + index(1, corner.normal);
+      wanted.push_back(corner);
+    }
+    text += "\n";
+  }
+  const SourceModel model = parse(text);
+  ASSERT_EQ(model.corner_count(), wanted.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    ASSERT_EQ(model.corner(i).position, wanted[i].position) << i;
+    ASSERT_EQ(model.corner(i).uv, wanted[i].uv) << i;
+    ASSERT_EQ(model.corner(i).normal, wanted[i].normal) << i;
+  }
+}
+
 TEST(ObjReader, PlainNumbersAreCorrectlyRounded) {
   PlainLines lines(6);
   for (int i = 0; i < 300; ++i) {

@@ -2,10 +2,11 @@
 // ends are known at once, and two numbers are computed in one register. Internal to the OBJ reader.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "bake/import/obj/number_parser.hpp"
 
@@ -14,7 +15,7 @@ namespace modar::detail {
 
 /// Bytes that a window looks at.
 inline constexpr std::size_t kWindow = 64;
-static_assert(kWindow <= kTextPadding);
+static_assert(kWindow + 32 <= kTextPadding);  // see index_ends()
 
 /// Digits of a number at most: what a lane of eight bytes holds.
 inline constexpr unsigned kMostDigits = 8;
@@ -76,8 +77,11 @@ inline constexpr std::array<std::uint64_t, kMostDigits + 1> kLastBytes = {0,
 
 /// Two times eight bytes, wherever they lie.
 inline __m128i load_lanes(const void* low, const void* high) {
-  const auto halves = [](const void* p) { return static_cast<const double*>(p); };
-  return _mm_castpd_si128(_mm_loadh_pd(_mm_load_sd(halves(low)), halves(high)));
+  double first = 0;
+  double second = 0;
+  std::memcpy(&first, low, sizeof first);
+  std::memcpy(&second, high, sizeof second);
+  return _mm_castpd_si128(_mm_set_pd(second, first));
 }
 
 /// A number of a line: where it ends, and its digits, up to 8.
@@ -213,15 +217,35 @@ inline const char* take_two(const char* p, double* values) {
 /// third.
 using TriangleIndices = std::array<std::uint32_t, 4>;
 
+/// Where three corners' kEach indices end. Three indices a corner may take more bytes than a window
+/// has: then the last corner gets one of its own.
+template <std::size_t kEach>
+bool index_ends(const char* p, std::array<unsigned, 3 * kEach>& ends) {
+  constexpr unsigned kBytes = kEach == 1 ? 32 : 64;
+  std::uint64_t others = bytes_outside<'0', 0, kBytes>(p);
+  if constexpr (kEach < 3) {
+    return take_bits(others, ends);
+  } else {
+    std::array<unsigned, 6> two_corners;
+    std::array<unsigned, 3> one_corner;
+    if (!take_bits(others, two_corners)) return false;
+    const unsigned last = two_corners[5] + 1;
+    others = bytes_outside<'0', 0, 32>(p + last);
+    if (!take_bits(others, one_corner)) return false;
+    std::copy(two_corners.begin(), two_corners.end(), ends.begin());
+    for (std::size_t i = 0; i < 3; ++i) ends[6 + i] = last + one_corner[i];
+    return true;
+  }
+}
+
 /// Three corners of kEach indices, "v", "v/t" or "v/t/n", at p and each after one blank but the
 /// first. Returns the first byte after them; nullptr for anything else. Reads from kTextPadding
 /// bytes ahead of p.
 template <std::size_t kEach>
 const char* take_triangle(const char* p, std::array<TriangleIndices, kEach>& indices) {
   constexpr std::size_t kCount = 3 * kEach;
-  std::uint64_t others = bytes_outside < '0', 0, kEach == 1 ? 32 : 64 > (p);
   std::array<unsigned, kCount> ends;
-  if (!take_bits(others, ends)) return nullptr;
+  if (!index_ends<kEach>(p, ends)) return nullptr;
   unsigned excess = 0;
   std::array<Digits, kCount> digits;
   for (std::size_t i = 0; i < kCount; ++i) {

@@ -13,9 +13,10 @@
 namespace modar {
 namespace {
 
-/// Small enough for the text and what it parses to to stay in a core's second-level cache; set by
-/// hand.
-constexpr std::uint64_t kBlockBytes = std::uint64_t{1} << 18;
+/// Small enough for the text and what it parses to to stay in a core's second-level cache, and for
+/// little memory to be touched for small files: of 2^16 to 2^18 the fastest, by a tenth on scans of
+/// 10 MB.
+constexpr std::uint64_t kBlockBytes = std::uint64_t{1} << 17;
 constexpr std::uint64_t kMaxStatement = std::uint64_t{1} << 30;  ///< bytes; the format has no limit
 /// Bytes looked at ahead of a block to see whether its first line continues another: "\\\r\n".
 constexpr std::uint64_t kContext = 3;
