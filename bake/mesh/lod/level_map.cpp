@@ -146,6 +146,11 @@ class LevelMap {
                        [&](std::uint16_t v) { return v == kNoVertex || has_corner(triangle, v); });
   }
 
+  /// Is the line between two places inside one triangle, and no edge of it?
+  [[nodiscard]] static bool within(const Place& a, const Place& b) {
+    return a.triangle == b.triangle && !(a.at_vertex() && b.at_vertex());
+  }
+
   void place(std::uint16_t vertex, std::uint32_t triangle) {
     Place& place = places_[vertex];
     place.triangle = triangle;
@@ -209,6 +214,12 @@ class LevelMap {
     const Place& to = places_[b];
     if (from.triangle == kNoIndex || to.triangle == kNoIndex) return;
     Path& path = paths_[corner];
+    path.first = static_cast<std::uint32_t>(steps_.size());
+    if (within(from, to)) {
+      steps_.push_back(from.triangle);
+      path.count = 1;
+      return;
+    }
     if (from.at_vertex() && to.at_vertex()) {
       if (from.on[0] == to.on[0]) {
         path.count = 0;
@@ -389,34 +400,51 @@ class LevelMap {
     }
   }
 
-  /// Maps a triangle to what its outline encloses, if it can be.
-  void map(std::uint32_t t) {
-    // Edges along coarse ones last: they may choose.
-    Outline& ring = ring_;
-    ring.clear();
-    double square = 0;
-    std::uint32_t begin = 0;
-    int along = 0;
+  /// Fills ring_ with the triangles that the outline of one goes through; along: how many of its
+  /// edges run along coarse ones. Returns the greatest square of its corners and edges, below zero
+  /// where some edge has no path.
+  double outline(std::uint32_t t, int& along) {
     const std::uint16_t* v = fine_.corners(t);
+    const Place& a = places_[v[0]];
+    const Place& b = places_[v[1]];
+    const Place& c = places_[v[2]];
+    double square = std::max({a.square, b.square, c.square});
+    ring_.clear();
+    if (within(a, b) && within(b, c) && within(c, a)) {
+      if (a.triangle == kNoIndex) return -1;
+      ring_.add(a.triangle);
+      return square;
+    }
+    // Edges along coarse ones last: they may choose.
+    std::uint32_t begin = 0;
     for (std::uint32_t k = 0; k < 3; ++k) {
       const Path& path = path_of(3 * t + k);
-      if (path.count == kUntraced) return;
-      square = std::max({square, path.square, places_[v[k]].square});
+      if (path.count == kUntraced) return -1;
+      square = std::max(square, path.square);
       if (path.along == kNoIndex) continue;
       begin = k + 1;
       ++along;
     }
-    for (std::uint32_t k = begin; k < begin + 3; ++k) add_to(ring, 3 * t + k % 3);
-    if (ring.triangles().size() > 2) {
-      core_.set_core_of(ring);
+    for (std::uint32_t k = begin; k < begin + 3; ++k) add_to(ring_, 3 * t + k % 3);
+    return square;
+  }
+
+  /// Maps a triangle to what its outline encloses, if it can be.
+  void map(std::uint32_t t) {
+    int along = 0;
+    double square = outline(t, along);
+    if (square < 0) return;
+    if (ring_.triangles().size() > 2) {
+      core_.set_core_of(ring_);
       if (!fan(core_, t, square)) return;
     }
     mapped_[t] = 1;
-    for (const std::uint32_t at : ring.triangles()) {
+    for (const std::uint32_t at : ring_.triangles()) {
       touches_[at] = static_cast<std::uint8_t>(std::min(touches_[at] + 1, 2));
     }
-    if (along == 3 && ring.triangles().size() == 1) {
-      const std::uint32_t at = ring.triangles()[0];
+    if (along == 3 && ring_.triangles().size() == 1) {
+      const std::uint32_t at = ring_.triangles()[0];
+      const std::uint16_t* v = fine_.corners(t);
       same_[at] = coarse_.find(v[0], v[1], v[2]) == at ? 1 : 0;
     }
     if (square <= limit() * limit()) {
@@ -424,7 +452,7 @@ class LevelMap {
       bound_ = std::max(bound_, std::sqrt(square));
       return;
     }
-    for (const std::uint32_t at : ring.triangles()) far_[at] = 1;
+    for (const std::uint32_t at : ring_.triangles()) far_[at] = 1;
   }
 
   /// Have all triangles of a ring a common vertex, if there are more than two? Then the triangle is
