@@ -157,7 +157,7 @@ struct LevelRecord {
   std::uint64_t index_offset;   ///< bytes into kIndices
   std::uint32_t vertex_count;   ///< every index is below it; at most kMaxChunkVertices
   std::uint32_t index_count;    ///< a multiple of 3
-  float error;                  ///< model space: greatest distance from level 0; 0 for level 0
+  float error;                  ///< model space: at least the greatest distance from level 0
   std::uint32_t reserved;
 };
 static_assert(sizeof(LevelRecord) == 32);

@@ -126,6 +126,7 @@ class Looker {
     look.ssim_worst = 2;
     look.ssim_mean = look.delta_e_mean = 0;
     const auto views = view_directions();
+    double shown_views = 0;
     for (std::size_t view = 0; view < kViews; ++view) {
       const glm::dmat4 to_eye =
           glm::lookAt(kDistance * glm::normalize(views[view]), glm::dvec3(0.0),
@@ -136,8 +137,9 @@ class Looker {
       if (crop.right <= crop.left) continue;
       const double similar = ssim(cut(wanted, crop), cut(shown, crop));
       const double off = mean_delta_e(wanted, shown, clear_);
-      look.ssim_mean += similar / kViews;
-      look.delta_e_mean += off / kViews;
+      look.ssim_mean += similar;
+      look.delta_e_mean += off;
+      ++shown_views;
       look.delta_e_worst = std::max(look.delta_e_worst, off);
       if (similar < look.ssim_worst) {
         look.ssim_worst = similar;
@@ -149,6 +151,10 @@ class Looker {
                           bundle_.models().size());
       }
     }
+    // A sheet shows nothing from behind.
+    if (shown_views == 0) return;
+    look.ssim_mean /= shown_views;
+    look.delta_e_mean /= shown_views;
   }
 
   RgbaImage draw(std::uint32_t index, const glm::dmat4& to_eye) {

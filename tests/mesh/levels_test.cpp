@@ -759,6 +759,36 @@ TEST(Levels, DistancesOfWhatTheFinerLevelDoesNotCover) {
   }
 }
 
+TEST(Levels, WhatShadesABendWiderIsNoCloseLevel) {
+  // A sheet, flat and with a bend in its middle: levels of both are exact in place.
+  for (const double rise : {0.0, 0.5}) {
+    std::string text;
+    constexpr int kSide = 41;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      text += "v " + std::to_string(i % kSide) + " " + std::to_string(i / kSide) + " " +
+              std::to_string(rise * std::abs(i % kSide - kSide / 2)) + "\n";
+    }
+    for (int y = 1; y < kSide; ++y) {
+      for (int x = 1; x < kSide; ++x) {
+        const int a = (y - 1) * kSide + x;
+        text += "f " + std::to_string(a) + " " + std::to_string(a + 1) + " " +
+                std::to_string(a + kSide + 1) + " " + std::to_string(a + kSide) + "\n";
+      }
+    }
+    const ChunkedMesh split = levelled(welded(parse(text)), 65535);
+    ASSERT_EQ(split.chunks.size(), 1u);
+    ASSERT_EQ(split.chunks[0].coarser.size(), 3u);
+    for (const ChunkLevel& level : split.chunks[0].coarser) {
+      EXPECT_LE(level.error, 2 * kDistanceFloor);
+      EXPECT_EQ(level.shading > 0, rise > 0);
+    }
+    const PackedMesh packed = testing::packed(split);
+    const float stated = packed.levels.back().error;
+    EXPECT_EQ(stated > 0.004f, rise > 0) << stated;
+    EXPECT_GE(stated, static_cast<float>(split.chunks[0].coarser.back().shading));
+  }
+}
+
 TEST(Levels, ThreeTrianglesAtAnEdgeAreKept) {
   // A fan of many triangles round a common edge, none of which may go.
   const std::vector<glm::dvec3> p = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}};

@@ -34,8 +34,9 @@ inline constexpr std::uint32_t kMaxLevels = 12;
 /// most do (flat shading): corners of coarser triangles take the normal that is nearest to the
 /// triangle's. A level's error bounds the distance between it and level 0, both as the device
 /// decodes them, measured from either to the other (see level_distance()), for coarse levels by way
-/// of a finer one that is hardly off. Where vertices of level 0 are gone, the texture has slid by
-/// no more than 1 % of the chunk's diagonal. Figures go to report.levels.
+/// of a finer one that is hardly off; beside it stands what its shading shows. Where vertices of
+/// level 0 are gone, the texture has slid by no more than 1 % of the chunk's diagonal. Figures go
+/// to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
 }  // namespace modar

@@ -116,7 +116,7 @@ class ChunkPacker {
       if (coarse.empty()) break;
       level_orderer_.order(coarse, static_cast<std::uint32_t>(order.size()));
       out.levels.push_back(std::move(coarse));
-      out.level_errors.push_back(level.error);
+      out.level_errors.push_back(std::max({out.level_errors.back(), level.error, level.shading}));
     }
     out.record.level_count = static_cast<std::uint32_t>(out.levels.size());
   }
