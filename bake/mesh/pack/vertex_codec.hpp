@@ -132,8 +132,9 @@ class VertexPacker {
   static glm::vec3 put_float(const glm::dvec3& p, std::byte* bytes);
   glm::vec3 put_half(const glm::dvec3& p, std::byte* bytes);
   glm::vec3 put_int16(const glm::dvec3& p, const ChunkGrid& grid, std::byte* bytes);
-  void put_normal(const glm::dvec3& n, std::byte* bytes);
-  void put_oct(const glm::dvec3& n, std::byte* bytes);
+  /// These two return what the bytes decode to, not normalised.
+  static glm::dvec3 put_normal(const glm::dvec3& n, std::byte* bytes);
+  static glm::dvec3 put_oct(const glm::dvec3& n, std::byte* bytes);
   void add_normal_error(const glm::dvec3& decoded, const glm::dvec3& n);
   void put_uv(const glm::dvec2& uv, const UvRange& range, std::uint32_t texture_side,
               std::byte* bytes);
