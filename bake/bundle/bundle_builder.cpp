@@ -277,6 +277,7 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   if (auto made = make_levels(*chunked, level_options, report); !made) {
     return tl::unexpected(made.error());
   }
+  drop_alike_levels(*chunked);
   if (request.occlusion && plan->kind != PositionKind::kInt16) {
     chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
   }

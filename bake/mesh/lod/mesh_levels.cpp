@@ -61,6 +61,10 @@ constexpr double kShading = 0.25;
 /// About so many vertices of a chunk are looked at for it. All of them would make levels of a scan
 /// of 1.1 million triangles 1.06 times as dear, these cost nothing that can be measured.
 constexpr std::size_t kShaded = 2000;
+/// Of the error of the next coarser level: a level that is off by more is hardly ever drawn, as
+/// that one may be from nearly the same distance on. Bundles of five scans are smaller by 1 to 11 %
+/// without such levels, that of a rough grid by 17 %.
+constexpr double kAlike = 0.9;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
 /// Vertices that differ in their normals only, as one: flat-shaded models have one for every corner
@@ -563,6 +567,17 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
   timer.done(fine, triangles, figures.position_error_max);
   report.levels.push_back(figures);
   return {};
+}
+
+void drop_alike_levels(ChunkedMesh& mesh) {
+  const auto shown = [](const ChunkLevel& level) { return std::max(level.error, level.shading); };
+  for (Chunk& chunk : mesh.chunks) {
+    std::vector<ChunkLevel>& levels = chunk.coarser;
+    for (std::size_t i = levels.size(); i-- > 1;) {
+      if (shown(levels[i - 1]) <= kAlike * shown(levels[i])) continue;
+      levels.erase(levels.begin() + static_cast<std::ptrdiff_t>(i) - 1);
+    }
+  }
 }
 
 }  // namespace modar

@@ -39,4 +39,7 @@ inline constexpr std::uint32_t kMaxLevels = 12;
 /// to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
+/// Takes out the levels that are hardly nearer to the finest than the next coarser one is.
+void drop_alike_levels(ChunkedMesh& mesh);
+
 }  // namespace modar
