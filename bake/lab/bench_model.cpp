@@ -10,6 +10,7 @@
 
 #include "bake/json.hpp"
 #include "bake/lab/bench_parts.hpp"
+#include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/process.hpp"
 
 namespace modar {
@@ -45,7 +46,6 @@ class ModelBench {
   Result<void> prepare(const std::vector<std::string>& scans) {
     obj_ = command_.obj;
     if (!obj_.empty()) return measure_size();
-    scan_ = scans[0];
     obj_ = folder_ + "/big.obj";
     const std::uint64_t triangles = command_.big ? kChurchTriangles : kUsualTriangles;
     if (probe({"make", scans[0], std::to_string(triangles), obj_}).empty()) {
@@ -117,11 +117,13 @@ class ModelBench {
     add("read_wall_s/one_thread", ours["wall_s"], best_probe("read", 1)["wall_s"]);
   }
 
-  /// One whole bake in a process of its own, and what it says of itself under "bytes".
-  ProcessOutcome bake(const std::string& positions, unsigned jobs, double& bytes) const {
+  /// One whole bake in a process of its own, and what it says of itself under "bytes". lods: how
+  /// many levels of detail, at most.
+  ProcessOutcome bake(const std::string& positions, unsigned jobs, double& bytes,
+                      const std::string& lods = "1") const {
     const std::string report = folder_ + "/report.json";
     const ProcessOutcome outcome =
-        run_measured({{program_folder() + "/modar", "bake", "--model", obj_, "--no-lods",
+        run_measured({{program_folder() + "/modar", "bake", "--model", obj_, "--lods", lods,
                        "--positions", positions, "--jobs", std::to_string(jobs), "--quiet",
                        "--json", "-o", folder_ + "/ours.modar"},
                       {},
@@ -154,12 +156,28 @@ class ModelBench {
       add("bake_bytes_per_triangle/goal " + kind, bytes, kGoalBytes);
       Figures pages = probe({"pages", "-", std::to_string(ours.peak_rss_bytes)});
       add("bake_cpu_s/first_touch_of_its_memory " + kind, ours.cpu_seconds, pages["cpu_s"]);
+      bench_levels(kind, ours);
       if (kind == "half") continue;
       bench_bake_peers(ours);
       if (command_.jobs == 1) continue;
       double ignored = 0;
       add("bake_wall_s/one_thread", ours.wall_seconds, bake(kind, 1, ignored).wall_seconds);
     }
+  }
+
+  /// A bake with the default levels of detail, beside one without, and beside gltfpack, which makes
+  /// one of half the triangles and does not measure it.
+  void bench_levels(const std::string& kind, const ProcessOutcome& without) {
+    double ignored = 0;
+    const ProcessOutcome with = bake(kind, command_.jobs, ignored, std::to_string(kMaxLevels));
+    add("levels_bake_cpu_s/without " + kind, with.cpu_seconds, without.cpu_seconds);
+    if (kind == "half") return;  // which measures occlusion as well
+    const ProcessOutcome theirs = run_measured(
+        {{"gltfpack", "-si", "0.5", "-i", obj_, "-o", folder_ + "/theirs.glb"}, {}, ""});
+    const bool ran = theirs.exit == 0;
+    add("levels_bake_cpu_s/gltfpack_half", with.cpu_seconds, ran ? theirs.cpu_seconds : kNoFigure);
+    add("levels_bake_peak_bytes/gltfpack_half", static_cast<double>(with.peak_rss_bytes),
+        ran ? static_cast<double>(theirs.peak_rss_bytes) : kNoFigure);
   }
 
   void bench_bake_peers(const ProcessOutcome& ours) {
@@ -176,16 +194,10 @@ class ModelBench {
     }
   }
 
-  /// What a default bake does beyond, beside reading the same file; levels of detail on a file of
-  /// the usual size, for they take minutes on a large one.
+  /// What a bake does beyond, beside reading the same file.
   void bench_stages() {
-    add_stage("topology", obj_);
-    std::string usual = obj_;
-    if (command_.big && command_.obj.empty()) {
-      usual = folder_ + "/usual.obj";
-      probe({"make", scan_, std::to_string(kUsualTriangles), usual});
-    }
-    add_stage("levels", usual);
+    add_stage("topology");
+    add_stage("levels");
     Figures ours = probe({"order", obj_, "1"});
     Figures theirs = probe({"meshopt", obj_, "1"});
     add("order_cpu_s/meshoptimizer", ours["cpu_s"], theirs["cpu_s"]);
@@ -193,14 +205,13 @@ class ModelBench {
         theirs["misses_per_triangle"]);
   }
 
-  void add_stage(const std::string& stage, const std::string& obj) {
-    Figures figures = probe({stage, obj, std::to_string(command_.jobs)});
-    Figures read = probe({"read", obj, "1"});
+  void add_stage(const std::string& stage) {
+    Figures figures = probe({stage, obj_, std::to_string(command_.jobs)});
+    Figures read = probe({"read", obj_, "1"});
     add(stage + "_cpu_s/read", figures.empty() ? kNoFigure : figures["cpu_s"], read["cpu_s"]);
   }
 
   std::string folder_;
-  std::string scan_;
   const ModelBenchRequest& command_;
   std::string obj_;
   double megabytes_ = 0;
