@@ -14,12 +14,10 @@ for extra in "$@"; do
 done
 
 wanted=$(sed -E 's/#.*//; s/^[[:space:]]*([^[:space:]]+).*/\1/' "${lists[@]}" | grep -v '^[[:space:]]*$' | sort -u)
-missing=()
-for package in $wanted; do
-  if [ "$(dpkg-query -W -f '${db:Status-Abbrev}' "$package" 2>/dev/null || true)" != "ii " ]; then
-    missing+=("$package")
-  fi
-done
+# What is there, by its own name or as what another package provides.
+there=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}, ${Provides}\n' 2>/dev/null |
+  sed -n -E 's/^ii //; T; s/ \([^)]*\)//g; s/, */\n/g; p' | sort -u || true)
+mapfile -t missing < <(comm -23 <(echo "$wanted") <(echo "$there"))
 if [ ${#missing[@]} -eq 0 ]; then exit 0; fi
 
 command -v apt-get >/dev/null || {
