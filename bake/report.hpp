@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "bake/up_axis.hpp"
+
 namespace modar {
 
 /// Told when a stage begins or moves on: its name and how much of it is done (0 to 1).
@@ -78,6 +80,7 @@ struct Report {
   std::vector<Diagnostic> diagnostics;
   std::vector<MeshTopology> topologies;  ///< one a model, where they were asked for
   std::vector<LevelFigures> levels;      ///< one a model, where levels were asked for
+  std::vector<Upright> uprights;         ///< one a model
   ProgressCallback progress;             ///< may be empty
 };
 

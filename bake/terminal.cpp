@@ -4,15 +4,21 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <set>
+#include <tuple>
+#include <vector>
 
 namespace modar {
 
 namespace {
 
-constexpr double kEstimateAfter = 5.0;  // seconds: shorter stages end before one has read it
+constexpr double kEstimateAfter = 5.0;     // seconds: shorter stages end before one has read it
+constexpr std::size_t kWarningsShown = 3;  // of one kind
+constexpr std::size_t kNotesShown = 4;     // kinds
 
 }  // namespace
 
@@ -47,7 +53,6 @@ void ProgressBar::show(const std::string& stage, double done) {
   const std::string left = time_left(done, elapsed);
   const int percent = static_cast<int>(done * 100 + 0.5);
   if (!terminal_) {
-    if (begins) std::fprintf(stderr, "%s\n", stage.c_str());
     if (left.empty() || elapsed < next_words_s_) return;
     std::fprintf(stderr, "%s: %d %%%s\n", stage.c_str(), percent, left.c_str());
     next_words_s_ = 2 * elapsed;
@@ -87,11 +92,73 @@ int guarded(const std::function<int()>& work) {
   }
 }
 
+namespace {
+
+/// The colour of warnings and errors on a terminal, and its end.
+const char* colour_of(DiagnosticSeverity severity) {
+  if (isatty(STDERR_FILENO) != 1) return "";
+  return severity == DiagnosticSeverity::kInfo      ? ""
+         : severity == DiagnosticSeverity::kWarning ? "\x1b[1;33m"
+                                                    : "\x1b[1;31m";
+}
+
+const char* severity_word(DiagnosticSeverity severity) {
+  return severity == DiagnosticSeverity::kInfo      ? "note"
+         : severity == DiagnosticSeverity::kWarning ? "warning"
+                                                    : "error";
+}
+
+/// Findings of one kind: printed whole up to `whole` of them, then counted.
+void print_group(const std::vector<const Diagnostic*>& group, std::size_t whole) {
+  const std::size_t shown = group.size() > whole ? std::max<std::size_t>(whole, 1) : group.size();
+  for (std::size_t i = 0; i < shown; ++i) {
+    Diagnostic one = *group[i];
+    if (i + 1 == shown && shown < group.size()) {
+      one.cure += (one.cure.empty() ? "" : "; ") + std::to_string(group.size() - shown) +
+                  " more like it: --notes shows them";
+    }
+    print_diagnostic(one);
+  }
+}
+
+}  // namespace
+
+void print_findings(const std::vector<Diagnostic>& findings, bool all) {
+  // A warning is the same one however often it is found in a file.
+  std::vector<const Diagnostic*> once;
+  std::set<std::tuple<std::string, std::string, std::uint64_t, std::string>> seen;
+  for (const Diagnostic& one : findings) {
+    if (seen.insert({one.id, one.file, one.line, one.message}).second) once.push_back(&one);
+  }
+  for (const auto severity :
+       {DiagnosticSeverity::kInfo, DiagnosticSeverity::kWarning, DiagnosticSeverity::kError}) {
+    std::vector<std::vector<const Diagnostic*>> groups;  // by id, in the order of the first
+    for (const Diagnostic* one : once) {
+      if (one->severity != severity) continue;
+      auto group = std::find_if(groups.begin(), groups.end(),
+                                [&](const auto& known) { return known[0]->id == one->id; });
+      if (group == groups.end()) group = groups.emplace(group);
+      group->push_back(one);
+    }
+    const bool notes = severity == DiagnosticSeverity::kInfo;
+    const std::size_t whole = all ? findings.size() : notes ? 1 : kWarningsShown;
+    std::size_t left_out = 0;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (notes && !all && g >= kNotesShown) {
+        left_out += groups[g].size();
+      } else {
+        print_group(groups[g], whole);
+      }
+    }
+    if (left_out != 0) std::fprintf(stderr, "note: %zu more notes: --notes shows them\n", left_out);
+  }
+}
+
 void print_diagnostic(const Diagnostic& diagnostic) {
-  const char* severity = diagnostic.severity == DiagnosticSeverity::kInfo      ? "note"
-                         : diagnostic.severity == DiagnosticSeverity::kWarning ? "warning"
-                                                                               : "error";
-  std::string line = std::string(severity) + ": " + diagnostic.file;
+  const char* colour = colour_of(diagnostic.severity);
+  const std::string severity =
+      colour + std::string(severity_word(diagnostic.severity)) + (*colour == '\0' ? "" : "\x1b[0m");
+  std::string line = severity + ": " + diagnostic.file;
   if (diagnostic.line != 0) line += ":" + std::to_string(diagnostic.line);
   line += ": " + diagnostic.message;
   if (!diagnostic.cure.empty()) line += "; " + diagnostic.cure;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "bake/report.hpp"
 #include "formats/error.hpp"
@@ -44,6 +45,9 @@ int print_error(const Error& error);
 /// What a program does between its first and last line. An exception that nobody caught is told as
 /// a bug of ours.
 int guarded(const std::function<int()>& work);
+/// All findings of a bake on stderr, each once: notes first, warnings after them, errors last. Of
+/// many of one kind the first are shown and the others counted, unless `all` are wanted.
+void print_findings(const std::vector<Diagnostic>& findings, bool all);
 /// "warning: file:line: message; cure [id]" on stderr.
 void print_diagnostic(const Diagnostic& diagnostic);
 

@@ -12,6 +12,7 @@
 
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/bundle/light_image.hpp"
+#include "bake/bundle/request_check.hpp"
 #include "bake/bundle/scene_shadow.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/draw_order.hpp"
@@ -20,6 +21,7 @@
 #include "bake/mesh/occlusion.hpp"
 #include "bake/mesh/pack/pack.hpp"
 #include "bake/mesh/topology/mesh_topology.hpp"
+#include "bake/mesh/upright.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/texture/texture_stage.hpp"
@@ -163,17 +165,19 @@ void note_files(const SourceModel& source, std::vector<std::string>& files) {
   }
 }
 
-Result<WeldedModel> read_and_weld(const std::string& path, const BakeRequest& request,
+Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& request,
                                   TextureUses& textures, Report& report, BakeTrace& trace) {
   StageTimer reading(report, "read");
-  Result<SourceModel> source = read_model(path, request.jobs);
+  Result<SourceModel> source = read_model(model.path, request.jobs);
   if (!source) return tl::unexpected(source.error());
+  source->name = model.name;
   report.diagnostics.insert(report.diagnostics.end(), source->diagnostics.begin(),
                             source->diagnostics.end());
   note_files(*source, trace.files);
   reading.done(source->positions.size(), source->face_count());
   Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
   if (!mesh) return tl::unexpected(mesh.error());
+  report.uprights.push_back(request.up ? Upright{*request.up, UpReason::kAsked} : find_up(*mesh));
   if (request.topology) {
     TopologyOptions options;
     options.jobs = request.jobs;
@@ -320,8 +324,8 @@ Result<void> add_models(const BakeRequest& request, BundleContent& content, Repo
                         BakeTrace& trace) {
   TextureUses textures;
   std::vector<WeldedModel> models;
-  for (const std::string& path : request.models) {
-    Result<WeldedModel> welded = read_and_weld(path, request, textures, report, trace);
+  for (const ModelRequest& model : request.models) {
+    Result<WeldedModel> welded = read_and_weld(model, request, textures, report, trace);
     if (!welded) return tl::unexpected(welded.error());
     const glm::dvec3 box = welded->mesh.source_max - welded->mesh.source_min;
     trace.model_sides.push_back({box.x, box.y, box.z});
@@ -372,7 +376,7 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
                                                content.parameter_sets, loop, report, request.shape);
   if (!baked) return tl::unexpected(baked.error());
   PatternRecord record = baked->record;
-  record.name = content.intern(baked->name);
+  record.name = content.intern(request.name);
   ExtraSection section;
   section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
   section.owner = static_cast<std::uint32_t>(content.patterns.size());
@@ -398,84 +402,6 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   return {};
 }
 
-Result<void> require_unique(const std::vector<std::string>& paths, const char* what) {
-  std::set<std::string> seen;
-  for (const std::string& path : paths) {
-    if (!seen.insert(file_stem(path)).second) {
-      return fail(ExitCode::kUsage, "bake.same-name", path,
-                  std::string("two ") + what + "s are named '" + file_stem(path) + "'",
-                  "rename one of the files: scenes refer to them by name");
-    }
-  }
-  return {};
-}
-
-Result<std::uint32_t> find_by_name(const std::vector<std::string>& paths, const std::string& name,
-                                   const char* what) {
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    if (file_stem(paths[i]) == name) return static_cast<std::uint32_t>(i);
-  }
-  std::string known;
-  for (const std::string& path : paths) known += (known.empty() ? "" : ", ") + file_stem(path);
-  return fail(ExitCode::kUsage, "bake.scene-unknown", name,
-              std::string("the scene names a ") + what + " that is not baked",
-              std::string("name one of: ") + (known.empty() ? "(none)" : known));
-}
-
-/// A scene with the indices of what it names.
-struct KnownScene {
-  SceneRequest scene;
-  std::uint32_t pattern = 0;
-  std::uint32_t model = 0;
-};
-
-/// Before anything is baked: a name that is written wrong costs no minutes.
-Result<std::vector<KnownScene>> find_scenes(const BakeRequest& request,
-                                            const std::vector<std::string>& pattern_paths) {
-  std::vector<SceneRequest> scenes = request.scenes;
-  if (scenes.empty() && request.models.size() == 1 && pattern_paths.size() == 1) {
-    SceneRequest scene;
-    scene.pattern = file_stem(pattern_paths[0]);
-    scene.model = file_stem(request.models[0]);
-    scene.light = request.light;
-    scenes.push_back(scene);
-  }
-  std::vector<KnownScene> known;
-  for (const SceneRequest& scene : scenes) {
-    const Result<std::uint32_t> pattern = find_by_name(pattern_paths, scene.pattern, "pattern");
-    if (!pattern) return tl::unexpected(pattern.error());
-    const Result<std::uint32_t> model = find_by_name(request.models, scene.model, "model");
-    if (!model) return tl::unexpected(model.error());
-    known.push_back({scene, *pattern, *model});
-  }
-  return known;
-}
-
-/// Rotation (unit quaternion x, y, z, w) that takes the axis to +z, and the index of the axis.
-struct AxisTurn {
-  std::array<double, 4> quaternion;
-  std::size_t axis;
-};
-
-AxisTurn turn_to_z(UpAxis up) {
-  const double h = std::sqrt(0.5);
-  switch (up) {
-    case UpAxis::kX:
-      return {{0, -h, 0, h}, 0};
-    case UpAxis::kMinusX:
-      return {{0, h, 0, h}, 0};
-    case UpAxis::kY:
-      return {{h, 0, 0, h}, 1};
-    case UpAxis::kMinusY:
-      return {{-h, 0, 0, h}, 1};
-    case UpAxis::kMinusZ:
-      return {{1, 0, 0, 0}, 2};
-    case UpAxis::kZ:
-      break;
-  }
-  return {{0, 0, 0, 1}, 2};
-}
-
 /// Sizes that collections publish their scans in.
 struct Tier {
   std::string_view name;
@@ -490,10 +416,6 @@ void lower_budget(std::uint64_t bytes, BakeRequest& request) {
 }
 
 }  // namespace
-
-std::string file_stem(const std::string& path) {
-  return std::filesystem::path(path).stem().string();
-}
 
 Result<void> plan_for_device(const std::string& device, BakeRequest& request) {
   const DeviceProfile* profile = find_device_profile(device);
@@ -524,79 +446,36 @@ Result<void> plan_for_tier(const std::string& tier, BakeRequest& request) {
               "name one of: " + names);
 }
 
-Result<void> require_shown(const BakeRequest& request) {
-  const bool whole = !request.models.empty() && !request.patterns.empty();
-  const bool one_scene =
-      request.scenes.empty() && request.models.size() == 1 && request.patterns.size() == 1;
-  std::vector<std::string> pattern_paths;
-  for (const PatternRequest& pattern : request.patterns) pattern_paths.push_back(pattern.path);
-  if (!whole || one_scene || !find_scenes(request, pattern_paths)) return {};
-  const auto shown = [&](const std::string& name, std::string SceneRequest::*side) {
-    return std::any_of(request.scenes.begin(), request.scenes.end(),
-                       [&](const SceneRequest& scene) { return scene.*side == name; });
-  };
-  std::vector<std::string> idle;  // patterns without a model
-  for (const std::string& path : pattern_paths) {
-    const std::string name = file_stem(path);
-    if (!shown(name, &SceneRequest::pattern)) idle.push_back(name);
-  }
-  std::string lines;
-  std::string what;
-  std::size_t next = 0;
-  for (const std::string& path : request.models) {
-    const std::string name = file_stem(path);
-    if (shown(name, &SceneRequest::model)) continue;
-    const std::string on =
-        next < idle.size() ? idle[next++] : file_stem(request.patterns.front().path);
-    lines += " --scene " + on + "=" + name;
-    if (what.empty()) what = "the model '" + name + "' stands on no pattern";
-  }
-  for (; next < idle.size(); ++next) {
-    lines += " --scene " + idle[next] + "=" + file_stem(request.models.front());
-    if (what.empty()) what = "no model stands on the pattern '" + idle[next] + "'";
-  }
-  if (lines.empty()) return {};
-  return fail(ExitCode::kUsage, "bake.never-shown", "", what + ", so it would never be shown",
-              "add" + lines);
-}
-
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, BakeTrace* trace) {
   if (request.models.empty() && request.patterns.empty()) {
     return fail(ExitCode::kUsage, "bake.nothing", "", "there is neither a model nor a pattern",
                 "name files with --model and --pattern");
   }
-  std::vector<std::string> pattern_paths;
-  for (const PatternRequest& pattern : request.patterns) pattern_paths.push_back(pattern.path);
-  if (auto unique = require_unique(request.models, "model"); !unique) {
-    return tl::unexpected(unique.error());
-  }
-  if (auto unique = require_unique(pattern_paths, "pattern"); !unique) {
-    return tl::unexpected(unique.error());
-  }
-
-  const Result<std::vector<KnownScene>> scenes = find_scenes(request, pattern_paths);
-  if (!scenes) return tl::unexpected(scenes.error());
+  BakeRequest named = request;
+  MODAR_TRY(name_assets(named));
+  MODAR_TRY(check_inputs(named));
+  MODAR_ASSIGN(const std::vector<KnownScene> scenes, find_scenes(named));
 
   BundleContent content;
   BakeTrace traced;
-  MODAR_TRY(add_models(request, content, report, traced));
-  if (!request.patterns.empty()) add_parameter_sets(request, content);
-  TrackerRecordOptions loop = request.loop;
-  loop.jobs = request.jobs;
-  for (const PatternRequest& pattern : request.patterns) {
-    if (auto added = add_pattern(pattern, loop, content, report, traced); !added) {
-      return tl::unexpected(added.error());
-    }
+  const std::size_t first_up = report.uprights.size();
+  MODAR_TRY(add_models(named, content, report, traced));
+  if (!named.patterns.empty()) add_parameter_sets(named, content);
+  TrackerRecordOptions loop = named.loop;
+  loop.jobs = named.jobs;
+  for (const PatternRequest& pattern : named.patterns) {
+    MODAR_TRY(add_pattern(pattern, loop, content, report, traced));
   }
-  for (const KnownScene& known : *scenes) {
-    content.scenes.push_back(
-        place_scene(known.scene, known.pattern, known.model, traced.model_sides[known.model]));
+  named.scenes.clear();
+  for (const KnownScene& known : scenes) {
+    const PlacedModel model = {known.model, traced.model_sides[known.model],
+                               report.uprights[first_up + known.model].axis};
+    MODAR_ASSIGN(SceneRequest resolved, resolve_scene(known.scene, content, known.pattern, model));
+    content.scenes.push_back(place_scene(resolved, content, known.pattern, model));
+    named.scenes.push_back(std::move(resolved));
   }
-  BakeRequest stated = request;
-  stated.scenes.clear();
-  for (const KnownScene& known : *scenes) stated.scenes.push_back(known.scene);
-  MODAR_TRY(light_scenes(stated.scenes, request, content, report));
-  content.meta = bundle_meta(stated, report);
+  MODAR_TRY(light_scenes(named.scenes, named, content, report));
+  content.meta = bundle_meta(named, report);
   content.summary = content_summary_of(content);
   if (trace != nullptr) *trace = std::move(traced);
   return content;
@@ -624,25 +503,6 @@ Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeReq
   }
   timer.done(content.lights.size(), content.shadows.size());
   return {};
-}
-
-SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,
-                        const std::array<double, 3>& model_sides) {
-  const AxisTurn turn = turn_to_z(request.up);
-  const double largest = *std::max_element(model_sides.begin(), model_sides.end());
-  const double half_height = largest > 0 ? model_sides[turn.axis] / largest : 0.0;
-  SceneRecord scene{};
-  scene.pattern = pattern;
-  scene.model = model;
-  scene.scale = static_cast<float>(request.scale);
-  for (std::size_t i = 0; i < 3; ++i) scene.offset[i] = static_cast<float>(request.offset[i]);
-  if (!request.centred) {
-    scene.offset[2] = static_cast<float>(request.offset[2] + request.scale * half_height);
-  }
-  for (std::size_t i = 0; i < 4; ++i) {
-    scene.rotation[i] = static_cast<float>(turn.quaternion[i]);
-  }
-  return scene;
 }
 
 }  // namespace modar

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/bundle/scene_placement.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/pattern/pattern.hpp"
@@ -18,24 +19,21 @@
 
 namespace modar {
 
-/// Which axis of the model points out of the pattern, towards the camera.
-enum class UpAxis : std::uint8_t { kX, kY, kZ, kMinusX, kMinusY, kMinusZ };
+/// A model file and what scenes call it.
+struct ModelRequest {
+  ModelRequest() = default;
+  ModelRequest(std::string file, std::string called = {})  // NOLINT: a path is a request
+      : path(std::move(file)), name(std::move(called)) {}
 
-/// A scene as the user asks for it. Names are those of files without folder and extension.
-struct SceneRequest {
-  std::string pattern;
-  std::string model;
-  double scale = 1.0;  ///< factor on: largest side of the model = largest side of the pattern
-  UpAxis up = UpAxis::kZ;
-  bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
-  std::array<double, 3> offset{};  ///< pattern units (half of its largest side), added at last
-  std::string light;               ///< picture of its room, see read_light(); empty: a neutral room
+  std::string path;
+  std::string name;  ///< empty: as name_assets() says
 };
 
 struct PatternRequest {
   std::string path;
   double width_mm = 0.0;  ///< 0: what the file or the shape states, or unknown
   ShapeRequest shape{};   ///< what it is printed on; flat where nothing is told
+  std::string name = {};  ///< empty: as name_assets() says
 };
 
 /// How far packed positions may lie from the source's, as the user says it.
@@ -46,10 +44,11 @@ struct MaxError {
 };
 
 struct BakeRequest {
-  std::vector<std::string> models;
+  std::vector<ModelRequest> models;
   std::vector<PatternRequest> patterns;
   std::vector<SceneRequest> scenes;
-  std::string light;  ///< of the scene that one model and one pattern make by themselves
+  std::optional<UpAxis> up;  ///< of all models, for scenes that name none; nothing: see find_up()
+  std::string light;         ///< of the scene that one model and one pattern make by themselves
   TextureOptions textures;
   std::uint64_t texture_budget = 0;  ///< GPU bytes that all textures may take; 0: any
   std::size_t most_triangles = 0;    ///< of each model, before its levels of detail; 0: any
@@ -95,10 +94,15 @@ struct BakeTrace {
   std::vector<std::array<double, 3>> model_sides;  ///< of each model's box, source units
 };
 
-/// Runs all stages. One model and one pattern without a scene make one by themselves. trace:
-/// filled where given.
-/// Errors: those of the stages; kUsage "bake.nothing", "bake.same-name", "bake.scene-unknown",
-/// "bake.max-error-unit".
+/// Reads what is cheap to read of each input, so that a wrong one costs no bake: models can be
+/// opened and have a format that is read, pictures and lights can be decoded, scenes name what
+/// there is and give lengths only where their pattern's width is known. Names must be set.
+/// Errors: those of the readers; kUsage "bake.scene-unknown", "scene.no-width".
+Result<void> check_inputs(const BakeRequest& request);
+
+/// Runs all stages, after name_assets() and check_inputs(). One model and one pattern without a
+/// scene make one by themselves. trace: filled where given.
+/// Errors: those of the stages; kUsage "bake.nothing", "bake.max-error-unit".
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report,
                                    BakeTrace* trace = nullptr);
 
@@ -107,9 +111,10 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report,
 Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeRequest& request,
                           BundleContent& content, Report& report);
 
-/// The scene's record for a model whose source box has these side lengths (source units).
-SceneRecord place_scene(const SceneRequest& request, std::uint32_t pattern, std::uint32_t model,
-                        const std::array<double, 3>& model_sides);
+/// Gives each model and pattern that has no name one: the file's stem, or, where several files have
+/// the same (as scene.gltf), the name of its folder. Errors: kUsage "bake.same-name", where two
+/// still have one name.
+Result<void> name_assets(BakeRequest& request);
 
 /// "dir/spider.obj" -> "spider".
 std::string file_stem(const std::string& path);

@@ -48,6 +48,14 @@ std::optional<Json> stated(const BundleView& bundle, std::uint32_t model, const 
   return one ? one->find(key) : std::nullopt;
 }
 
+constexpr const char* kReasonNames[] = {"asked",  "standard", "header",    "georeferenced",
+                                        "ground", "base",     "convention"};
+
+Json upright_json(const Upright& upright) {
+  return {{"axis", up_axis_name(upright.axis)},
+          {"reason", kReasonNames[static_cast<std::size_t>(upright.reason)]}};
+}
+
 const char* max_error_unit(const MaxError& error) {
   switch (error.unit) {
     case MaxError::Unit::kAny:
@@ -127,6 +135,7 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
   }
   const std::optional<MeshTopology> topology = stated_topology(bundle, index);
   const std::optional<LevelFigures> levels = stated_levels(bundle, index);
+  const std::optional<Upright> upright = stated_upright(bundle, index);
   return {{"name", bundle.name(model.name)},
           {"vertices", model.vertex_count},
           {"triangles", model.triangle_count},
@@ -149,6 +158,7 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
           {"normal_error_rms_deg", model.normal_error_rms_deg},
           {"uv_error_max_texels", model.uv_error_max_texels},
           {"uv_error_rms_texels", model.uv_error_rms_texels},
+          {"up", upright ? upright_json(*upright) : Json()},
           {"topology", topology ? topology_json(*topology) : Json()},
           {"levels", levels ? level_json(*levels) : Json()}};
 }
@@ -215,8 +225,12 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
     return std::filesystem::path(path).filename().string();
   };
   Json models = Json::array();
-  for (const std::string& path : request.models) {
-    Json model = {{"file", name(path)}};
+  for (const ModelRequest& asked : request.models) {
+    Json model = {{"file", name(asked.path)}};
+    if (asked.name != file_stem(asked.path)) model.set("name", asked.name);
+    if (models.size() < report.uprights.size()) {
+      model.set("up", upright_json(report.uprights[models.size()]));
+    }
     if (models.size() < report.topologies.size()) {
       model.set("topology", topology_json(report.topologies[models.size()]));
     }
@@ -229,13 +243,18 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
   for (const PatternRequest& pattern : request.patterns) {
     Json stated = {{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}};
     if (!pattern.shape.flat()) stated.set("shape", pattern.shape.text);
+    if (pattern.name != file_stem(pattern.path)) stated.set("name", pattern.name);
     patterns.push_back(std::move(stated));
   }
   Json scenes = Json::array();
   for (const SceneRequest& scene : request.scenes) {
-    Json stated = {{"pattern", scene.pattern}, {"model", scene.model},
-                   {"scale", scene.scale},     {"up", static_cast<int>(scene.up)},
-                   {"centred", scene.centred}, {"offset", Json::list(scene.offset)}};
+    Json stated = {{"pattern", scene.pattern},
+                   {"model", scene.model},
+                   {"scale", scene.size.value},
+                   {"up", up_axis_name(scene.up.value_or(UpAxis::kZ))},
+                   {"turn", Json::list(scene.turn)},
+                   {"centred", scene.centred},
+                   {"offset_sides", Json::list(scene.offset.value)}};
     if (!scene.light.empty()) stated.set("light", name(scene.light));
     scenes.push_back(std::move(stated));
   }
@@ -255,7 +274,8 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
                         {"mipmaps", request.textures.mipmaps},
                         {"loop_views", request.loop.trial_views},
                         {"score", request.loop.score},
-                        {"unit_metres", request.unit_metres}};
+                        {"unit_metres", request.unit_metres},
+                        {"up", request.up ? up_axis_name(*request.up) : ""}};
   const Json meta = {{"tool", "modar " + request.tool_version},
                      {"models", models},
                      {"patterns", patterns},
@@ -285,6 +305,16 @@ std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_
   return LevelFigures{*error->number(), *shift->number()};
 }
 
+std::optional<Upright> stated_upright(const BundleView& bundle, std::uint32_t model) {
+  const std::optional<Json> found = stated(bundle, model, "up");
+  if (!found) return std::nullopt;
+  const auto axis = up_axis_of(found->find("axis").value_or("").text().value_or(""));
+  const std::string reason = found->find("reason").value_or("").text().value_or("");
+  const auto* known = std::find(std::begin(kReasonNames), std::end(kReasonNames), reason);
+  if (!axis || known == std::end(kReasonNames)) return std::nullopt;
+  return Upright{*axis, static_cast<UpReason>(known - std::begin(kReasonNames))};
+}
+
 std::string topology_words(const MeshTopology& t) {
   return std::to_string(t.components) + " components, " + std::to_string(t.boundary_loops) +
          " boundary loops, Euler number " + std::to_string(t.euler()) +
@@ -292,12 +322,47 @@ std::string topology_words(const MeshTopology& t) {
          std::to_string(t.non_manifold_vertices) + " vertices";
 }
 
-std::string level_words(const LevelFigures& levels) {
-  char text[128];
-  std::snprintf(text, sizeof text,
-                "levels of detail: off by at most %.3g, texture shifted by at most %.1f texels",
-                levels.position_error_max, levels.uv_shift_max_texels);
+std::string length_words(double source_units, const ModelRecord& model) {
+  char text[96];
+  const double share = model.diagonal > 0 ? 100 * source_units / model.diagonal : 0;
+  if (model.unit_metres > 0) {
+    std::snprintf(text, sizeof text, "%.3g mm (%.2g %% of its diagonal)",
+                  source_units * model.unit_metres * 1000, share);
+  } else {
+    std::snprintf(text, sizeof text, "%.3g of the file's units (%.2g %% of its diagonal)",
+                  source_units, share);
+  }
   return text;
+}
+
+std::string level_words(const LevelFigures& levels, const ModelRecord& model) {
+  char text[96];
+  std::snprintf(text, sizeof text, ", texture shifted by at most %.1f texels",
+                levels.uv_shift_max_texels);
+  return std::to_string(model.level_count) + " levels of detail, the coarsest off by at most " +
+         length_words(levels.position_error_max, model) +
+         (levels.uv_shift_max_texels > 0 ? text : "");
+}
+
+std::string scene_words(const BundleView& bundle, std::uint32_t index) {
+  const SceneRecord& scene = bundle.scenes()[index];
+  const auto placement = stated_placement(bundle, index);
+  const auto upright = stated_upright(bundle, scene.model);
+  std::string words;
+  if (placement) {
+    std::string axis(up_axis_name(placement->up));
+    for (char& c : axis) c = c == '-' ? c : static_cast<char>(c - 'a' + 'A');
+    words = axis + " up";
+    const bool guessed = upright && upright->axis == placement->up;
+    if (guessed) words += " (" + std::string(up_reason_words(upright->reason)) + ")";
+  }
+  char text[48];
+  if (const double height = scene_height_mm(bundle, scene); height > 0) {
+    std::snprintf(text, sizeof text, "%.4g mm high", height);
+  } else {
+    std::snprintf(text, sizeof text, "scale %.4g", static_cast<double>(scene.scale));
+  }
+  return words + (words.empty() ? "" : ", ") + text;
 }
 
 Json diagnostics_json(const std::vector<Diagnostic>& diagnostics) {
@@ -312,6 +377,36 @@ Json diagnostics_json(const std::vector<Diagnostic>& diagnostics) {
   }
   return list;
 }
+
+std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::uint32_t scene) {
+  const std::optional<Json> scenes = Json::parse(bundle.meta()).find("scenes");
+  const std::optional<Json> one = scenes ? scenes->at(scene) : std::nullopt;
+  if (!one) return std::nullopt;
+  const auto up = up_axis_of(one->find("up").value_or("").text().value_or(""));
+  const Json turn = one->find("turn").value_or(Json());
+  if (!up || turn.size() != 3) return std::nullopt;
+  StatedPlacement placement{*up, {}};
+  for (std::size_t i = 0; i < 3; ++i) placement.turn[i] = turn.at(i)->number().value_or(0);
+  return placement;
+}
+
+namespace {
+
+Json scene_json(const BundleView& bundle, std::uint32_t index) {
+  const SceneRecord& scene = bundle.scenes()[index];
+  const std::optional<StatedPlacement> placement = stated_placement(bundle, index);
+  const double height = scene_height_mm(bundle, scene);
+  return {{"pattern", bundle.name(bundle.patterns()[scene.pattern].name)},
+          {"model", bundle.name(bundle.models()[scene.model].name)},
+          {"scale", scene.scale},
+          {"offset", Json::list(scene.offset)},
+          {"rotation", Json::list(scene.rotation)},
+          {"up", placement ? Json(up_axis_name(placement->up)) : Json()},
+          {"turn", placement ? Json::list(placement->turn) : Json()},
+          {"height_mm", height > 0 ? Json(height) : Json()}};
+}
+
+}  // namespace
 
 Json bundle_json(const BundleView& bundle) {
   Json models = Json::array();
@@ -328,11 +423,7 @@ Json bundle_json(const BundleView& bundle) {
   }
   Json scenes = Json::array();
   for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
-    const SceneRecord& scene = bundle.scenes()[s];
-    scenes.push_back({{"pattern", bundle.name(bundle.patterns()[scene.pattern].name)},
-                      {"model", bundle.name(bundle.models()[scene.model].name)},
-                      {"scale", scene.scale},
-                      {"offset", Json::list(scene.offset)}});
+    scenes.push_back(scene_json(bundle, s));
   }
   return {{"format", {{"major", bundle.header().major}, {"minor", bundle.header().minor}}},
           {"bytes", bundle.bytes().size()},

@@ -2,6 +2,7 @@
 // bundle. Keys are a contract (bake/commands/json.md).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -23,9 +24,23 @@ std::string bundle_meta(const BakeRequest& request, const Report& report);
 std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint32_t model);
 std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_t model);
 
+/// Which axis of the model is up, and how that is known. Nothing of bundles that do not state it.
+std::optional<Upright> stated_upright(const BundleView& bundle, std::uint32_t model);
+
+/// How a scene's model was turned.
+struct StatedPlacement {
+  UpAxis up = UpAxis::kY;
+  std::array<double, 3> turn{};  ///< SceneRequest::turn
+};
+std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::uint32_t scene);
+
 /// "3 components, 1 boundary loop, ...", "levels of detail: off by at most ...": for people.
 std::string topology_words(const MeshTopology& topology);
-std::string level_words(const LevelFigures& levels);
+std::string level_words(const LevelFigures& levels, const ModelRecord& model);
+/// "0.42 mm (0.01 % of its diagonal)".
+std::string length_words(double source_units, const ModelRecord& model);
+/// "Y up (the glTF standard), 120 mm high".
+std::string scene_words(const BundleView& bundle, std::uint32_t scene);
 
 /// "findings" of the documents.
 Json diagnostics_json(const std::vector<Diagnostic>& diagnostics);

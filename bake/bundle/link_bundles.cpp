@@ -46,16 +46,21 @@ class Linker {
       if (part.bundle.patterns().size() != 1) return no_part(part, "pattern");
       add_pattern(part);
     }
-    for (const SceneRequest& scene : described.scenes) {
+    BakeRequest resolved = described;
+    for (SceneRequest& scene : resolved.scenes) {
       MODAR_ASSIGN(const std::uint32_t pattern, find(patterns, scene.pattern, "pattern"));
-      MODAR_ASSIGN(const std::uint32_t model, find(models, scene.model, "model"));
-      content_.scenes.push_back(place_scene(scene, pattern, model, models[model].model_sides));
+      MODAR_ASSIGN(const std::uint32_t index, find(models, scene.model, "model"));
+      const auto upright = stated_upright(models[index].bundle, 0);
+      const PlacedModel model = {index, models[index].model_sides,
+                                 upright ? upright->axis : UpAxis::kY};
+      MODAR_ASSIGN(scene, resolve_scene(scene, content_, pattern, model));
+      content_.scenes.push_back(place_scene(scene, content_, pattern, model));
     }
     std::sort(content_.occlusion.begin(), content_.occlusion.end(),
               [](const auto& a, const auto& b) { return a.layout < b.layout; });
     Report quiet;
-    MODAR_TRY(light_scenes(described.scenes, described, content_, quiet));
-    Json meta = Json::parse(bundle_meta(described, {}));
+    MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
+    Json meta = Json::parse(bundle_meta(resolved, {}));
     meta.set("models", std::move(models_));
     meta.set("patterns", std::move(patterns_));
     content_.meta = meta.dump();

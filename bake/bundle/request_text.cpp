@@ -4,7 +4,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
+#include <filesystem>
 #include <string_view>
+#include <system_error>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 namespace modar {
@@ -28,27 +33,199 @@ bool parse_number(std::string_view text, double& value) {
 
 namespace {
 
-tl::unexpected<Error> scene_error(const std::string& text, const std::string& cause) {
-  return fail(ExitCode::kUsage, "cli.scene", "--scene " + text, cause,
-              "write PATTERN=MODEL, then any of ,scale=S ,up=x|y|z|-x|-y|-z ,offset=X:Y:Z ,centred "
-              ",light=FILE");
+constexpr double kMostScale = 1e6;   // beyond, floats of the record lose the offset
+constexpr double kMostOffset = 1e6;  // millimetres or sides, the same
+constexpr double kMostTurn = 360;
+
+/// Where the unit of a number begins.
+std::size_t unit_start(std::string_view text) {
+  return text.find_last_of("0123456789.") + 1;  // 0 where there is no digit
 }
 
-bool parse_offset(std::string_view text, std::array<double, 3>& offset) {
-  const std::vector<std::string_view> parts = split(text, ':');
-  return parts.size() == 3 && parse_number(parts[0], offset[0]) &&
-         parse_number(parts[1], offset[1]) && parse_number(parts[2], offset[2]);
+tl::unexpected<Error> scene_error(const std::string& text, const std::string& cause,
+                                  const std::string& cure =
+                                      "write PATTERN=MODEL, then any of ,height=120mm ,width=80mm "
+                                      ",scale=0.8 ,up=y ,turn=90 ,offset=X:Y:Z ,centred "
+                                      ",light=FILE") {
+  return fail(ExitCode::kUsage, "cli.scene", "--scene " + text, cause, cure);
+}
+
+std::string number_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+/// "0.8". Errors: what is wrong with it, for a message.
+tl::expected<double, WrongValue> parse_scale(std::string_view text) {
+  double value = 0;
+  const bool percent = text.ends_with('%');
+  const std::string_view digits = percent ? text.substr(0, text.size() - 1) : text;
+  if (!parse_number(digits, value)) {
+    return tl::unexpected(WrongValue{"it is no number", "write a factor, as in scale=0.8"});
+  }
+  if (percent) {
+    return tl::unexpected(
+        WrongValue{"it is a factor, not a percentage", "write scale=" + number_text(value / 100)});
+  }
+  if (!(value > 0)) {
+    return tl::unexpected(WrongValue{"a model of that size would not be seen",
+                                     "write a factor above 0, as in scale=0.8"});
+  }
+  if (value > kMostScale) {
+    return tl::unexpected(WrongValue{"that is more than " + number_text(kMostScale),
+                                     "write a factor on the pattern's largest side"});
+  }
+  return value;
+}
+
+bool is_file(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error);
+}
+
+/// "NAME=FILE" to both; a file whose own path has an equals sign has no name.
+std::pair<std::string, std::string> split_name(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const bool named = equals != std::string::npos && equals > 0 && equals + 1 < text.size() &&
+                     text.find('/') > equals && !is_file(text);
+  if (!named) return {"", text};
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+/// The unit that a word stands for which is none: "inch", "MM".
+std::string_view meant_unit(const std::string& word) {
+  constexpr std::pair<std::string_view, std::string_view> kWords[] = {
+      {"inch", "in"},  {"inches", "in"}, {"\"", "in"},   {"zoll", "in"},
+      {"MM", "mm"},    {"Mm", "mm"},     {"CM", "cm"},   {"Cm", "cm"},
+      {"M", "m"},      {"meter", "m"},   {"metre", "m"}, {"metres", "m"},
+      {"meters", "m"}, {"feet", "ft"},   {"foot", "ft"}, {"'", "ft"}};
+  for (const auto& [said, meant] : kWords) {
+    if (word == said) return meant;
+  }
+  return {};
 }
 
 }  // namespace
 
-Result<UpAxis> parse_up(const std::string& text) {
-  constexpr std::string_view kNames[] = {"x", "y", "z", "-x", "-y", "-z"};
-  for (std::size_t i = 0; i < std::size(kNames); ++i) {
-    if (text == kNames[i]) return static_cast<UpAxis>(i);
+ModelRequest parse_model(const std::string& text) {
+  auto [name, path] = split_name(text);
+  return {std::move(path), std::move(name)};
+}
+
+tl::expected<double, WrongValue> parse_millimetres(std::string_view text) {
+  const std::size_t digits = unit_start(text);
+  const std::string number(text.substr(0, digits));
+  const std::string unit(text.substr(digits));
+  double value = 0;
+  if (const std::size_t comma = number.find(','); comma != std::string::npos) {
+    std::string point = number;
+    point[comma] = '.';
+    return tl::unexpected(
+        WrongValue{"a comma stands in the number", "write " + point + unit + ", with a point"});
   }
+  if (!parse_number(number, value)) {
+    return tl::unexpected(WrongValue{"it is no length", "write a number and a unit, as in 210mm"});
+  }
+  if (unit.empty()) {
+    return tl::unexpected(WrongValue{
+        "its unit is missing", "write " + number + "mm, " + number + "cm or " + number + "in"});
+  }
+  const Result<double> metres = parse_unit(unit);
+  if (!metres) {
+    const std::string_view meant = meant_unit(unit);
+    return tl::unexpected(WrongValue{"there is no unit '" + unit + "'",
+                                     meant.empty() ? "name one of mm, cm, m, km, in, ft"
+                                                   : "write " + number + std::string(meant)});
+  }
+  if (!(value > 0)) {
+    return tl::unexpected(WrongValue{"a length has to be above 0", "write one, as in 210mm"});
+  }
+  return unit == "mm" ? value : value * *metres * 1000;
+}
+
+tl::expected<std::array<double, 3>, WrongValue> parse_turn(std::string_view text) {
+  const std::vector<std::string_view> parts = split(text, ':');
+  std::array<double, 3> turn{};
+  bool good = parts.size() == 1 || parts.size() == 3;
+  for (std::size_t i = 0; good && i < parts.size(); ++i) {
+    good = parse_number(parts[i], turn[parts.size() == 1 ? 2 : i]) &&
+           std::fabs(turn[parts.size() == 1 ? 2 : i]) <= kMostTurn;
+  }
+  if (good) return turn;
+  return tl::unexpected(WrongValue{
+      "it is neither an angle nor three of them",
+      "write degrees: turn=90 about the axis out of the pattern, or turn=X:Y:Z about each axis"});
+}
+
+tl::expected<SceneOffset, WrongValue> parse_offset(std::string_view text) {
+  const std::size_t digits = unit_start(text);
+  const std::string unit(text.substr(digits));
+  const std::vector<std::string_view> parts = split(text.substr(0, digits), ':');
+  SceneOffset offset;
+  bool good = parts.size() == offset.value.size();
+  for (std::size_t i = 0; good && i < parts.size(); ++i) {
+    good = parse_number(parts[i], offset.value[i]) && std::fabs(offset.value[i]) <= kMostOffset;
+  }
+  const Result<double> metres = unit.empty() ? 1.0 : parse_unit(unit);
+  if (!good || !metres) {
+    return tl::unexpected(WrongValue{"it is not three numbers",
+                                     "write X:Y:Z, as in offset=0:0:20mm; without a unit they are "
+                                     "millimetres where the pattern's width is known, else its "
+                                     "largest side"});
+  }
+  if (!unit.empty()) {
+    offset.unit = SceneOffset::Unit::kMillimetres;
+    for (double& value : offset.value) value = unit == "mm" ? value : value * *metres * 1000;
+  }
+  return offset;
+}
+
+Result<UpAxis> parse_up(const std::string& text) {
+  if (const auto up = up_axis_of(text)) return *up;
   return fail(ExitCode::kUsage, "cli.up", text, "there is no such axis",
               "name one of x, y, z, -x, -y, -z");
+}
+
+tl::expected<bool, WrongValue> take_scene_part(std::string_view key, std::string_view value,
+                                               SceneRequest& scene) {
+  const auto lengths = [&](SceneSize::Kind kind) -> tl::expected<bool, WrongValue> {
+    scene.size.kind = kind;
+    auto mm = parse_millimetres(value);
+    if (!mm) return tl::unexpected(std::move(mm.error()));
+    scene.size.value = *mm;
+    return true;
+  };
+  if (key == "height") return lengths(SceneSize::Kind::kHeight);
+  if (key == "width") return lengths(SceneSize::Kind::kWidth);
+  if (key == "scale") {
+    auto scale = parse_scale(value);
+    if (!scale) return tl::unexpected(std::move(scale.error()));
+    scene.size = {SceneSize::Kind::kScale, *scale};
+    return true;
+  }
+  if (key == "up") {
+    scene.up = up_axis_of(value);
+    if (scene.up) return true;
+    return tl::unexpected(WrongValue{"there is no such axis", "name one of x, y, z, -x, -y, -z"});
+  }
+  if (key == "turn") {
+    auto turn = parse_turn(value);
+    if (!turn) return tl::unexpected(std::move(turn.error()));
+    scene.turn = *turn;
+    return true;
+  }
+  if (key == "offset") {
+    auto offset = parse_offset(value);
+    if (!offset) return tl::unexpected(std::move(offset.error()));
+    scene.offset = *offset;
+    return true;
+  }
+  if (key == "light" && !value.empty()) {
+    scene.light = std::string(value);
+    return true;
+  }
+  return false;
 }
 
 Result<SceneRequest> parse_scene(const std::string& text) {
@@ -60,24 +237,24 @@ Result<SceneRequest> parse_scene(const std::string& text) {
   SceneRequest scene;
   scene.pattern = std::string(parts[0].substr(0, equals));
   scene.model = std::string(parts[0].substr(equals + 1));
+  std::string_view sized;
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::string_view part = parts[i];
-    bool good = false;
-    if (part.starts_with("scale=")) {
-      good = parse_number(part.substr(6), scene.scale) && scene.scale > 0;
-    } else if (part.starts_with("up=")) {
-      const Result<UpAxis> up = parse_up(std::string(part.substr(3)));
-      if (up) scene.up = *up;
-      good = up.has_value();
-    } else if (part.starts_with("offset=")) {
-      good = parse_offset(part.substr(7), scene.offset);
-    } else if (part.starts_with("light=")) {
-      scene.light = std::string(part.substr(6));
-      good = !scene.light.empty();
-    } else if (part == "centred") {
-      good = scene.centred = true;
+    const std::string_view key = part.substr(0, part.find('='));
+    if (part == "centred") {
+      scene.centred = true;
+      continue;
     }
-    if (!good) return scene_error(text, "'" + std::string(part) + "' is not understood");
+    const bool valued = key.size() < part.size();
+    auto taken = take_scene_part(key, valued ? part.substr(key.size() + 1) : "", scene);
+    const std::string quoted = "'" + std::string(part) + "'";
+    if (!taken) return scene_error(text, quoted + ": " + taken.error().cause, taken.error().cure);
+    if (!*taken || !valued) return scene_error(text, quoted + " is not understood");
+    if (key != "scale" && key != "height" && key != "width") continue;
+    if (!sized.empty()) {
+      return scene_error(text, "it gives its size twice", "leave " + quoted + " out");
+    }
+    sized = key;
   }
   return scene;
 }
@@ -113,13 +290,10 @@ Result<double> parse_unit(const std::string& text) {
 
 namespace {
 
-/// A number and a unit of length, in millimetres.
 bool parse_length(std::string_view text, double& mm) {
-  const std::size_t digits = text.find_last_of("0123456789.") + 1;  // 0 where there is none
-  const Result<double> unit = parse_unit(std::string(text.substr(digits)));
-  if (!unit || !parse_number(text.substr(0, digits), mm) || !(mm > 0)) return false;
-  if (!text.ends_with("mm")) mm *= *unit * 1000;
-  return true;
+  const auto parsed = parse_millimetres(text);
+  if (parsed) mm = *parsed;
+  return parsed.has_value();
 }
 
 /// "120x180x40mm".
@@ -132,6 +306,14 @@ bool parse_box(std::string_view text, std::array<double, 3>& mm) {
       return false;
   }
   return true;
+}
+
+/// What follows a picture's last colon: a length that is written wrong, or part of a name?
+bool looks_like_length(std::string_view tail) {
+  constexpr std::string_view kStarts = "0123456789.,-+";
+  return (!tail.empty() && kStarts.find(tail[0]) != std::string_view::npos) ||
+         tail.starts_with("nan") || tail.starts_with("inf") ||
+         parse_unit(std::string(tail)).has_value();
 }
 
 tl::unexpected<Error> shape_error(const std::string& text, const std::string& cause) {
@@ -196,23 +378,19 @@ Result<PatternRequest> parse_pattern(const std::string& text) {
     return request;
   }
   PatternRequest request;
-  request.path = text;
+  std::tie(request.name, request.path) = split_name(text);
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos) return request;
   const std::string_view tail = std::string_view(text).substr(colon + 1);
-  const std::size_t digits = tail.find_last_of("0123456789.") + 1;  // 0 where there is none
-  const Result<double> unit = parse_unit(std::string(tail.substr(digits)));
-  double width = 0;
-  const bool number = parse_number(tail.substr(0, digits), width);
-  if (!unit || (!number && !tail.ends_with("mm"))) return request;  // a file with a colon
-  if (!number || width <= 0) {
+  const auto width = parse_millimetres(tail);
+  if (!width) {
+    if (!looks_like_length(tail) || is_file(text)) return request;
     return fail(ExitCode::kUsage, "cli.pattern", "--pattern " + text,
-                "'" + std::string(tail) + "' is no width",
-                "write FILE:WIDTH, as in cover.png:148mm");
+                "'" + std::string(tail) + "' is no width: " + width.error().cause,
+                width.error().cure);
   }
-  request.width_mm = width * *unit * 1000;
-  if (tail.ends_with("mm")) request.width_mm = width;
-  request.path = text.substr(0, colon);
+  request.width_mm = *width;
+  std::tie(request.name, request.path) = split_name(text.substr(0, colon));
   return request;
 }
 

@@ -18,12 +18,35 @@ std::vector<std::string_view> split(std::string_view text, char separator);
 /// The whole text as a finite number; false where it is none.
 bool parse_number(std::string_view text, double& value);
 
-/// "x", "-y". Errors: kUsage "cli.up".
+/// "x", "-y", "Z". Errors: kUsage "cli.up".
 Result<UpAxis> parse_up(const std::string& text);
 
-/// "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred]".
-/// Errors: kUsage "cli.scene".
+/// What is wrong with a part of a text, and how to write it.
+struct WrongValue {
+  std::string cause;
+  std::string cure;
+};
+
+/// "210mm", "21cm", "8.3in": a length above 0, in millimetres.
+tl::expected<double, WrongValue> parse_millimetres(std::string_view text);
+
+/// "90" (degrees about the pattern's z axis) or "0:45:90" (about x, y and z).
+tl::expected<std::array<double, 3>, WrongValue> parse_turn(std::string_view text);
+
+/// "0:0:20mm", "0.1:0:0".
+tl::expected<SceneOffset, WrongValue> parse_offset(std::string_view text);
+
+/// One key of a scene (scale, height, width, up, turn, offset, light) with its value. False: there
+/// is no such key.
+tl::expected<bool, WrongValue> take_scene_part(std::string_view key, std::string_view value,
+                                               SceneRequest& scene);
+
+/// "PATTERN=MODEL[,scale=S|,height=120mm|,width=80mm][,up=y][,turn=90][,offset=X:Y:Z][,centred]
+/// [,light=FILE]". Errors: kUsage "cli.scene".
 Result<SceneRequest> parse_scene(const std::string& text);
+
+/// "FILE" or "NAME=FILE".
+ModelRequest parse_model(const std::string& text);
 
 /// "x,y,x,y,x,y,x,y" in pixels: top-left, top-right, bottom-right, bottom-left.
 /// Errors: kUsage "cli.corners".

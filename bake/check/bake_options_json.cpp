@@ -1,5 +1,6 @@
 // Reads the options of a bake back from the meta text that bundle_meta() wrote.
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -36,10 +37,38 @@ void take(const Json& options, const char* key, T& value) {
 }
 
 /// A name of a scene or a pattern that is among the sources: others cannot be baked.
-template <class Range, class PathOf>
-bool is_given(const Range& sources, PathOf path_of, const std::string& stem) {
+template <class Range>
+bool is_given(const Range& sources, const std::string& name) {
   return std::any_of(sources.begin(), sources.end(),
-                     [&](const auto& source) { return file_stem(path_of(source)) == stem; });
+                     [&](const auto& source) { return source.name == name; });
+}
+
+void take_three(const Json& stated, const char* key, std::array<double, 3>& values) {
+  const auto found = stated.find(key);
+  if (found == stated.end() || !found->is_array() || found->size() != values.size()) return;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if ((*found)[i].is_number()) values[i] = (*found)[i].get<double>();
+  }
+}
+
+/// What the bundle calls the sources, where it is not the stem of their file's name: the user's own
+/// names come first, and two files of one name are told apart by the user alone.
+template <class Asset>
+void read_names(const Json& document, const char* kind, std::vector<Asset>& assets) {
+  const auto entries = document.find(kind);
+  if (entries == document.end() || !entries->is_array()) return;
+  for (const Json& stated : *entries) {
+    std::string file;
+    std::string name;
+    if (!stated.is_object()) continue;
+    take(stated, "file", file);
+    take(stated, "name", name);
+    const auto same = [&](const Asset& asset) {
+      return asset.name.empty() && std::filesystem::path(asset.path).filename().string() == file;
+    };
+    if (name.empty() || std::count_if(assets.begin(), assets.end(), same) != 1) continue;
+    std::find_if(assets.begin(), assets.end(), same)->name = name;
+  }
 }
 
 void read_scenes(const Json& document, BakeRequest& request) {
@@ -50,21 +79,15 @@ void read_scenes(const Json& document, BakeRequest& request) {
     SceneRequest scene;
     take(stated, "pattern", scene.pattern);
     take(stated, "model", scene.model);
-    take(stated, "scale", scene.scale);
-    int up = 0;
+    take(stated, "scale", scene.size.value);
+    std::string up;
     take(stated, "up", up);
-    if (up <= static_cast<int>(UpAxis::kMinusZ)) scene.up = static_cast<UpAxis>(up);
+    scene.up = up_axis_of(up);
     take(stated, "centred", scene.centred);
-    const auto offset = stated.find("offset");
-    for (std::size_t i = 0; offset != stated.end() && offset->is_array() && i < 3; ++i) {
-      if (i < offset->size() && (*offset)[i].is_number()) {
-        scene.offset[i] = (*offset)[i].get<double>();
-      }
-    }
-    if (is_given(
-            request.models, [](const std::string& path) { return path; }, scene.model) &&
-        is_given(
-            request.patterns, [](const PatternRequest& p) { return p.path; }, scene.pattern)) {
+    take_three(stated, "turn", scene.turn);
+    scene.offset.unit = SceneOffset::Unit::kSide;
+    take_three(stated, "offset_sides", scene.offset.value);
+    if (is_given(request.models, scene.model) && is_given(request.patterns, scene.pattern)) {
       request.scenes.push_back(scene);
     }
   }
@@ -96,6 +119,9 @@ void read_widths(const Json& document, BakeRequest& request) {
 void read_bake_options(std::string_view meta, BakeRequest& request) {
   const Json document = Json::parse(meta, nullptr, false);
   if (!document.is_object()) return;
+  read_names(document, "models", request.models);
+  read_names(document, "patterns", request.patterns);
+  if (!name_assets(request)) return;
   read_scenes(document, request);
   read_widths(document, request);
   if (!document.contains("options")) return;
@@ -143,6 +169,9 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   take(options, "positions", word);
   if (word == "half") request.positions = PositionKind::kHalf;
   if (word == "int16") request.positions = PositionKind::kInt16;
+  word.clear();
+  take(options, "up", word);
+  request.up = up_axis_of(word);
   word.clear();
   take(options, "atlas", word);
   if (word == "always") request.atlas = AtlasMode::kAlways;

@@ -218,14 +218,14 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
     const PatternRecord& record = bundle.patterns()[p];
     const auto path = std::find_if(
         options.pictures.begin(), options.pictures.end(),
-        [&](const std::string& file) { return file_stem(file) == bundle.name(record.name); });
+        [&](const PatternRequest& source) { return source.name == bundle.name(record.name); });
     if (path == options.pictures.end()) {
       tell(bundle, record, sink, WorkstationRule::kSourceMissing,
            "its picture is needed to render views of it");
       continue;
     }
     bool shrunk = false;
-    MODAR_ASSIGN(GrayPicture picture, load_pattern(*path, shrunk));
+    MODAR_ASSIGN(GrayPicture picture, load_pattern(path->path, shrunk));
     PatternSurface surface;
     const auto shape = bundle.section(kPatternShape, p);
     if (!shape.empty()) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/bundle/bundle_builder.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/error.hpp"
@@ -12,9 +13,9 @@
 namespace modar {
 
 struct PoseCheckOptions {
-  std::vector<std::string> pictures;  ///< image files of the patterns, by their stems
-  int views = 8;                      ///< of each step of size and tilt
-  int width = 1280;                   ///< of the frames, pixels
+  std::vector<PatternRequest> pictures;  ///< with their names
+  int views = 8;                         ///< of each step of size and tilt
+  int width = 1280;                      ///< of the frames, pixels
   int height = 720;
   std::uint64_t seed = 1;
   std::function<void(double done)> progress;  ///< may be empty

@@ -53,6 +53,9 @@ class OtherPaths {
     for (const auto& [path, other] : paths_) {
       if (word == path) return other;
       if (word.starts_with(path + ":")) return other + word.substr(path.size());
+      if (const std::size_t at = word.find("=" + path); at != std::string::npos) {
+        return word.substr(0, at + 1) + other + word.substr(at + 1 + path.size());
+      }
     }
     return word;
   }
@@ -100,7 +103,7 @@ Result<void> prove_reproducible(const BakeRequest& request, const std::vector<st
   if (folder.path().empty()) return trouble("there is no room for temporary files");
   OtherPaths paths(folder.path());
   bool linked = true;
-  for (const std::string& model : request.models) linked = paths.add(model) && linked;
+  for (const ModelRequest& model : request.models) linked = paths.add(model.path) && linked;
   for (const PatternRequest& pattern : request.patterns) linked = paths.add(pattern.path) && linked;
   if (!linked) return trouble("the input's folders cannot be linked to");
 

@@ -133,19 +133,20 @@ class SourceCheck {
  public:
   SourceCheck(const BundleView& bundle, const IssueSink& sink) : bundle_(bundle), sink_(sink) {}
 
-  Result<SourceFit> run(const BakeRequest& request, Report& report) {
+  Result<SourceFit> run(BakeRequest request, Report& report) {
+    MODAR_TRY(name_assets(request));
     MODAR_ASSIGN(const BundleContent content, build_bundle(request, report));
     again_ = &content;
     for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
       const ModelRecord& model = bundle_.models()[m];
       const auto path = std::find_if(
           request.models.begin(), request.models.end(),
-          [&](const std::string& p) { return file_stem(p) == bundle_.name(model.name); });
+          [&](const ModelRequest& source) { return source.name == bundle_.name(model.name); });
       if (path == request.models.end()) {
         missing("model", model.name, &model);
         continue;
       }
-      MODAR_TRY(check_model(model, *path, request, report));
+      MODAR_TRY(check_model(model, path->path, request, report));
     }
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
     for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) check_pattern(p);

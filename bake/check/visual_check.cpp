@@ -236,9 +236,9 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
     const ModelRecord& model = bundle.models()[m];
     const auto path = std::find_if(
         options.models.begin(), options.models.end(),
-        [&](const std::string& file) { return file_stem(file) == bundle.name(model.name); });
+        [&](const ModelRequest& source) { return source.name == bundle.name(model.name); });
     if (path == options.models.end()) continue;  // SOURCE_MISSING reports it
-    MODAR_ASSIGN(ModelLook look, looker.look(m, *path));
+    MODAR_ASSIGN(ModelLook look, looker.look(m, path->path));
     looks.push_back(std::move(look));
   }
   return looks;

@@ -9,6 +9,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "bake/bundle/bundle_builder.hpp"
 #include "bake/image/image.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
@@ -17,10 +18,10 @@
 namespace modar {
 
 struct VisualOptions {
-  std::vector<std::string> models;  ///< source files, by their stems
-  std::string picture_folder;       ///< the worst view of each model goes there; empty: nowhere
-  int side = 512;                   ///< of a view, pixels
-  double least_ssim = 0.9;          ///< gates, over what shows the model
+  std::vector<ModelRequest> models;  ///< with their names
+  std::string picture_folder;        ///< the worst view of each model goes there; empty: nowhere
+  int side = 512;                    ///< of a view, pixels
+  double least_ssim = 0.9;           ///< gates, over what shows the model
   double greatest_delta_e = 4.0;
   unsigned jobs = 1;
   std::function<void(double done)> progress;  ///< may be empty

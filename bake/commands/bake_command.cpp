@@ -32,8 +32,10 @@ struct BakeCommand {
   std::string output;
   bool prove_reproducible = false;
   bool quiet = false;
+  bool notes = false;
   bool json = false;
   // Options as text, before they are parsed into the request.
+  std::vector<std::string> models;
   std::vector<std::string> patterns;
   std::vector<std::string> scenes;
   std::string unit;
@@ -62,6 +64,7 @@ Result<void> refuse_project_options(const BakeCommand& command) {
 /// Reads what the options say as text into the request.
 Result<void> complete(BakeCommand& command) {
   BakeRequest& request = command.request;
+  for (const std::string& text : command.models) request.models.push_back(parse_model(text));
   for (const std::string& text : command.patterns) {
     MODAR_ASSIGN(PatternRequest pattern, parse_pattern(text));
     request.patterns.push_back(std::move(pattern));
@@ -81,24 +84,39 @@ Result<void> complete(BakeCommand& command) {
   if (!command.tier.empty()) MODAR_TRY(plan_for_tier(command.tier, request));
   if (!command.device.empty()) MODAR_TRY(plan_for_device(command.device, request));
   request.tool_version = MODAR_VERSION;
-  return {};
+  return name_assets(request);
+}
+
+/// How each scene's model stands: whoever set nothing sees here what was chosen.
+void print_scenes(const BundleView& bundle) {
+  constexpr std::uint32_t kMostLines = 12;
+  const std::uint32_t count = bundle.scenes().size();
+  for (std::uint32_t s = 0; s < std::min(count, kMostLines); ++s) {
+    const SceneRecord& scene = bundle.scenes()[s];
+    const std::string name = std::string(bundle.name(bundle.patterns()[scene.pattern].name)) + "=" +
+                             std::string(bundle.name(bundle.models()[scene.model].name));
+    std::fprintf(stderr, "scene   %-16s %s%s\n", name.c_str(), scene_words(bundle, s).c_str(),
+                 s == 0 ? "; up=, turn= and height= in --scene change it" : "");
+  }
+  if (count > kMostLines) {
+    std::fprintf(stderr, "scene   and %u more: `modar inspect` lists them\n", count - kMostLines);
+  }
 }
 
 void print_summary(const BundleView& bundle, const Report& report, const std::string& path) {
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
     std::fprintf(stderr,
-                 "model   %-16s %llu triangles, %llu vertices, %u chunks, error at most %.3g of a "
-                 "diagonal of %.4g\n",
+                 "model   %-16s %llu triangles, %llu vertices, %u chunks, off by at most %s\n",
                  std::string(bundle.name(model.name)).c_str(),
                  static_cast<unsigned long long>(model.triangle_count),
                  static_cast<unsigned long long>(model.vertex_count), model.chunk_count,
-                 model.position_error_max, model.diagonal);
+                 length_words(model.position_error_max, model).c_str());
     if (const auto topology = stated_topology(bundle, m)) {
       std::fprintf(stderr, "        %s\n", topology_words(*topology).c_str());
     }
     if (const auto levels = stated_levels(bundle, m)) {
-      std::fprintf(stderr, "        %s\n", level_words(*levels).c_str());
+      std::fprintf(stderr, "        %s\n", level_words(*levels, model).c_str());
     }
   }
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
@@ -119,6 +137,7 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
                  std::string(bundle.name(pattern.name)).c_str(), pattern.width, pattern.height,
                  counts.empty() ? "" : ", keypoints", counts.c_str());
   }
+  print_scenes(bundle);
   double ms = 0;
   for (const StageReport& stage : report.stages) ms += stage.ms;
   std::fprintf(stderr, "%s: %s, baked in %.1f s\n", path.c_str(),
@@ -178,21 +197,23 @@ Result<void> keep_other_files(const std::string& output) {
 
 /// Tries what will be written, before the work.
 Result<void> try_outputs(const BakeCommand& command) {
-  std::vector<std::string> inputs = command.request.models;
+  std::vector<std::string> models;
+  for (const ModelRequest& model : command.request.models) models.push_back(model.path);
+  std::vector<std::string> inputs = models;
   for (const PatternRequest& pattern : command.request.patterns) inputs.push_back(pattern.path);
   MODAR_TRY(keep_inputs(command.output, inputs));
   MODAR_TRY(keep_other_files(command.output));
-  MODAR_TRY(
-      try_output(command.output, file_bytes(command.request.models) / kSourceBytesPerBundleByte));
+  MODAR_TRY(try_output(command.output, file_bytes(models) / kSourceBytesPerBundleByte));
   const std::string& folder = command.request.textures.picture_folder;
   return folder.empty() ? Result<void>() : make_output_folder(folder);
 }
 
 Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& words) {
-  if (command.request.models.empty() && command.patterns.empty()) {
-    return run_project(
-        command.project,
-        {command.request.jobs, command.request.memory_bytes, command.quiet, command.json}, words);
+  if (command.models.empty() && command.patterns.empty()) {
+    return run_project(command.project,
+                       {command.request.jobs, command.request.memory_bytes, command.quiet,
+                        command.json, command.notes},
+                       words);
   }
   MODAR_TRY(refuse_project_options(command));
   MODAR_TRY(complete(command));
@@ -212,7 +233,7 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
   bar.clear();
   report_memory(command.request, report);
   if (!command.quiet) {
-    for (const Diagnostic& diagnostic : report.diagnostics) print_diagnostic(diagnostic);
+    print_findings(report.diagnostics, command.notes);
   }
   if (!content) return tl::unexpected(content.error());
   StageTimer writing(report, "write");
@@ -313,7 +334,9 @@ void add_bake(CommandLine& program) {
   const auto command = std::make_shared<BakeCommand>();
   BakeRequest& request = command->request;
   request.jobs = std::max(1u, std::thread::hardware_concurrency());
-  line.option("--model", &request.models, "OBJ, glTF or GLB files", {.type = "FILE"});
+  line.option("--model", &command->models,
+              "OBJ, glTF, GLB, PLY or STL files; NAME=FILE names one that shares its file's name",
+              {.type = "[NAME=]FILE"});
   line.option(
       "--pattern", &command->patterns,
       "Images of flat things, frontal; :WIDTH tells the printed width (:210mm, :21cm, :8.3in); "
@@ -323,9 +346,12 @@ void add_bake(CommandLine& program) {
       {.type = "FILE[:WIDTH][:shape=...]"});
   line.option(
       "--scene", &command->scenes,
-      "Which model stands on which pattern; needed where there is more than one of either",
-      {.type =
-           "PATTERN=MODEL[,scale=S][,up=x|y|z|-x|-y|-z][,offset=X:Y:Z][,centred][,light=FILE]"});
+      "Which model stands on which pattern, needed where there is more than one of either, and "
+      "how: "
+      "height=120mm or width=80mm or scale=0.8 (of the pattern's largest side), up=x|y|z|-x|-y|-z, "
+      "turn=DEGREES or turn=X:Y:Z, offset=X:Y:Z (mm where the pattern's width is known, else its "
+      "largest side), centred, light=FILE",
+      {.type = "PATTERN=MODEL[,KEY=VALUE...]"});
   line.option("-o,--output", &command->output, "The bundle to write", {.type = "OUT.modar"});
   add_project_options(line, command->project);
   line.flag("--prove-reproducible", command->prove_reproducible,
@@ -346,6 +372,7 @@ void add_bake(CommandLine& program) {
             "Hold the process there (1G, 800M): large arrays live in files beside the bundle",
             {.type = "SIZE"});
   line.flag("--quiet", command->quiet, "No progress, no summary, no diagnostics on stderr");
+  line.flag("--notes", command->notes, "Show every note, not the first of each kind");
   line.flag("--json", command->json, "Print what was baked, stages and diagnostics as JSON");
   line.footer(
       example("  modar bake --model spider.obj --pattern box.png:210mm"

@@ -5,23 +5,19 @@
 
 #include "bake/bundle/request_text.hpp"
 #include "bake/commands/check_command.hpp"
+#include "bake/import/read_model.hpp"
 #include "bake/output.hpp"
 #include "bake/terminal.hpp"
 
 namespace modar {
 namespace {
 
-bool is_model(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  return extension == ".obj" || extension == ".OBJ" || extension == ".glb" || extension == ".gltf";
-}
-
-Result<SourceFit> bake_and_compare(const BundleView& bundle, const CheckCommand& command,
-                                   const IssueSink& sink) {
+/// What the sources would be baked as again.
+Result<BakeRequest> source_request(const BundleView& bundle, const CheckCommand& command) {
   BakeRequest request;
   for (const std::string& path : command.sources) {
-    if (is_model(path)) {
-      request.models.push_back(path);
+    if (is_model_file(parse_model(path).path)) {
+      request.models.push_back(parse_model(path));
     } else {
       MODAR_ASSIGN(PatternRequest pattern, parse_pattern(path));
       request.patterns.push_back(std::move(pattern));
@@ -32,7 +28,13 @@ Result<SourceFit> bake_and_compare(const BundleView& bundle, const CheckCommand&
   }
   if (request.parameters.empty()) request.parameters = {"none"};
   read_bake_options(bundle.meta(), request);
+  MODAR_TRY(name_assets(request));
   request.jobs = command.jobs;
+  return request;
+}
+
+Result<SourceFit> bake_and_compare(const BundleView& bundle, const CheckCommand& command,
+                                   const BakeRequest& request, const IssueSink& sink) {
   ProgressBar bar(command.json || command.sarif);
   Report report;
   report.progress = [&bar](const std::string& stage, double done) { bar.show(stage, done); };
@@ -41,13 +43,10 @@ Result<SourceFit> bake_and_compare(const BundleView& bundle, const CheckCommand&
 
 Result<std::vector<PatternRange>> track_patterns(const BundleView& bundle,
                                                  const CheckCommand& command,
+                                                 const BakeRequest& request,
                                                  const IssueSink& sink) {
   PoseCheckOptions options;
-  for (const std::string& path : command.sources) {
-    if (is_model(path)) continue;
-    MODAR_ASSIGN(const PatternRequest pattern, parse_pattern(path));
-    options.pictures.push_back(pattern.path);
-  }
+  options.pictures = request.patterns;
   ProgressBar bar(command.json || command.sarif);
   options.views = command.pose_views;
   options.progress = [&bar](double done) { bar.show("pose", done); };
@@ -55,12 +54,10 @@ Result<std::vector<PatternRange>> track_patterns(const BundleView& bundle,
 }
 
 Result<std::vector<ModelLook>> compare_looks(const BundleView& bundle, const CheckCommand& command,
-                                             const IssueSink& sink) {
+                                             const BakeRequest& request, const IssueSink& sink) {
   MODAR_TRY(make_output_folder(command.visual));
   VisualOptions options;
-  for (const std::string& path : command.sources) {
-    if (is_model(path)) options.models.push_back(path);
-  }
+  options.models = request.models;
   options.picture_folder = command.visual;
   options.jobs = command.jobs;
   ProgressBar bar(command.json || command.sarif);
@@ -82,12 +79,13 @@ Result<void> keep_sources(const BundleView& bundle, const CheckCommand& command)
 Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
                                    const IssueSink& sink, CheckExtras& extras) {
   if (!command.visual.empty()) MODAR_TRY(keep_sources(bundle, command));
-  MODAR_ASSIGN(extras.source, bake_and_compare(bundle, command, sink));
+  MODAR_ASSIGN(const BakeRequest request, source_request(bundle, command));
+  MODAR_ASSIGN(extras.source, bake_and_compare(bundle, command, request, sink));
   if (!command.visual.empty()) {
-    MODAR_ASSIGN(extras.looks, compare_looks(bundle, command, sink));
+    MODAR_ASSIGN(extras.looks, compare_looks(bundle, command, request, sink));
   }
   if (command.pose) {
-    MODAR_ASSIGN(extras.poses, track_patterns(bundle, command, sink));
+    MODAR_ASSIGN(extras.poses, track_patterns(bundle, command, request, sink));
   }
   return {};
 }

@@ -35,7 +35,7 @@ void print_models(const BundleView& bundle) {
       std::printf("  %s\n", topology_words(*topology).c_str());
     }
     if (const auto levels = stated_levels(bundle, m)) {
-      std::printf("  %s\n", level_words(*levels).c_str());
+      std::printf("  %s\n", level_words(*levels, model).c_str());
     }
   }
 }
@@ -87,10 +87,10 @@ void print_table(const BundleView& bundle, const std::string& path) {
   std::printf("\nscenes\n");
   for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
     const SceneRecord& scene = bundle.scenes()[s];
-    std::printf("  on %s stands %s, scale %g\n",
+    std::printf("  on %s stands %s, %s\n",
                 std::string(bundle.name(bundle.patterns()[scene.pattern].name)).c_str(),
                 std::string(bundle.name(bundle.models()[scene.model].name)).c_str(),
-                static_cast<double>(scene.scale));
+                scene_words(bundle, s).c_str());
   }
 }
 

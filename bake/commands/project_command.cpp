@@ -28,7 +28,7 @@ using State = AssetOutcome::State;
 
 constexpr const char* kProjectWords[] = {"--project", "--cache",   "--asset", "--depfile",
                                          "--dry-run", "--explain", "--jobs",  "--memory",
-                                         "--quiet",   "--json",    "--watch"};
+                                         "--quiet",   "--json",    "--watch", "--notes"};
 
 /// What of the bake stands on the command line would be ignored beside a project file.
 Result<void> refuse_other_options(const std::vector<std::string>& words) {
@@ -131,13 +131,13 @@ std::string counts_of(const ProjectOutcome& outcome) {
   return text;
 }
 
-void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run) {
+void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run, bool notes) {
   for (const AssetOutcome& asset : outcome.assets) {
     if (!explain || asset.reason.empty()) continue;
     std::fprintf(stderr, "%-7s %s%s%s: %s\n", state_name(asset.state), asset.name.c_str(),
                  asset.tier.empty() ? "" : " for ", asset.tier.c_str(), asset.reason.c_str());
   }
-  for (const Diagnostic& diagnostic : outcome.diagnostics) print_diagnostic(diagnostic);
+  print_findings(outcome.diagnostics, notes);
   for (const BundleOutcome& bundle : outcome.bundles) {
     const char* what = bundle.fresh     ? "up to date"
                        : bundle.written ? "written"
@@ -223,7 +223,9 @@ Result<ProjectOutcome> bake_once(const ProjectCommand& command, const std::strin
   MODAR_ASSIGN(ProjectOutcome outcome, std::move(baked));
   if (!command.depfile.empty() && !command.dry_run)
     MODAR_TRY(write_depfile(command.depfile, outcome));
-  if (!common.quiet) print_outcome(outcome, command.explain || command.dry_run, command.dry_run);
+  if (!common.quiet) {
+    print_outcome(outcome, command.explain || command.dry_run, command.dry_run, common.notes);
+  }
   if (common.json) std::fputs(project_json(outcome).dump().c_str(), stdout);
   for (const Error& error : outcome.errors) print_error(error);
   return outcome;

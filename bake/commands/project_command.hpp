@@ -29,6 +29,7 @@ struct CommonOptions {
   std::uint64_t memory_bytes = 0;
   bool quiet = false;
   bool json = false;
+  bool notes = false;
 };
 
 /// words: of the command line, to refuse options that belong in the file.

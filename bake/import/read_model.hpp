@@ -14,6 +14,13 @@ namespace modar {
 /// Errors: those of the reader; kUnsupported "model.format" that lists what can be read.
 Result<SourceModel> read_model(const std::string& path, unsigned jobs);
 
+/// Is it a file that read_model() has a reader for, by its extension?
+bool is_model_file(const std::string& path);
+
+/// The same as an error. Errors: kUnsupported
+/// "model.format", whose cure converts what it is.
+Result<void> require_model_format(const std::string& path);
+
 struct ReadOptions {
   unsigned jobs = 1;  ///< threads; the result does not depend on it
 };
@@ -35,6 +42,19 @@ std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& 
                                       const std::string& label,
                                       std::vector<Diagnostic>& diagnostics,
                                       std::vector<std::string>* missing = nullptr);
+
+/// Reads a binary or ASCII STL: triangles, in the colours of the usual extensions of the format
+/// where it has them. Corners of equal coordinates become one position. Errors: kIo "io.open";
+/// kInvalidInput "stl.short" (fewer bytes than its triangles need), "stl.text" (a line that is none
+/// of the format), "stl.no-faces".
+Result<SourceModel> read_stl(const std::string& path);
+Result<SourceModel> parse_stl(std::string_view bytes, const std::string& label);
+
+/// Reads a binary or ASCII PLY: positions, normals, uvs and colours of vertices, uvs of corners,
+/// polygons and triangle strips. Errors: kIo "io.open"; kInvalidInput "ply.header", "ply.short"
+/// (the file ends within an element), "ply.number", "ply.no-faces" (a point cloud).
+Result<SourceModel> read_ply(const std::string& path);
+Result<SourceModel> parse_ply(std::string_view bytes, const std::string& label);
 
 /// Reads a .gltf with its buffers, or a .glb, through tinygltf: the triangles of the default
 /// scene's meshes (of all root nodes where there is none), transformed by their nodes; normals, the

@@ -11,6 +11,7 @@
 
 #include "bake/memory/array.hpp"
 #include "bake/report.hpp"
+#include "bake/up_axis.hpp"
 
 namespace modar {
 
@@ -68,6 +69,7 @@ struct FaceRun {
 /// face 0.
 struct SourceModel {
   std::string name;  ///< the file's stem
+  Upright up;        ///< as the format or a comment says it, else what is usual for the format
   Array<glm::dvec3> positions;
   Array<glm::vec3> colours;  ///< empty, or one a position, RGB in [0,1]
   Array<glm::dvec2> uvs;     ///< v up, as OBJ has it

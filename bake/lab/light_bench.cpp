@@ -60,7 +60,7 @@ Result<std::vector<std::byte>> bake_scenes(const std::vector<Subject>& subjects,
     SceneRequest scene;
     scene.pattern = file_stem(options.pattern);
     scene.model = file_stem(subject.path);
-    scene.scale = kScale;
+    scene.size.value = kScale;
     scene.up = subject.up;
     request.scenes.push_back(scene);
   }

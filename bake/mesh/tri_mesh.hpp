@@ -24,6 +24,7 @@ struct Placement {
 /// textures.
 struct TriMesh {
   std::string name;
+  Upright up;  ///< as the source says it; see find_up()
   Placement placement;
   glm::dvec3 source_min{0.0};  ///< of the vertices that triangles use
   glm::dvec3 source_max{0.0};

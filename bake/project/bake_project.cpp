@@ -265,14 +265,18 @@ class ProjectBake {
   [[nodiscard]] std::string scene_text(const ProjectScene& scene) const {
     const SceneRequest& request = scene.request;
     std::string text = request.pattern + "\n" + request.model + "\n" +
-                       std::to_string(static_cast<int>(request.up)) +
-                       (request.centred ? " c" : " s");
-    for (const double number :
-         {request.scale, request.offset[0], request.offset[1], request.offset[2]}) {
+                       std::string(request.up ? up_axis_name(*request.up) : "") +
+                       (request.centred ? " c" : " s") +
+                       std::to_string(static_cast<int>(request.size.kind)) +
+                       std::to_string(static_cast<int>(request.offset.unit));
+    const auto add = [&text](double number) {
       char digits[32];
       std::snprintf(digits, sizeof digits, " %.17g", number);
       text += digits;
-    }
+    };
+    add(request.size.value);
+    for (const double number : request.turn) add(number);
+    for (const double number : request.offset.value) add(number);
     if (!request.light.empty()) {
       text += "\n" + request.light + " " + digests_.of(project_.path(request.light));
     }

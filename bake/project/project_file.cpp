@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -80,17 +81,26 @@ class TableReader {
     for (const auto& element : *list) values.push_back(element.as_string()->get());
     return {};
   }
-  Result<void> take(std::string_view key, std::array<double, 3>& values) const {
+  /// A text, a number, or a list of numbers, as --scene has them: "y", "0.8", "0:0:20".
+  Result<void> take_scene_value(std::string_view key, std::string& text) const {
     const toml::node* node = table_.get(key);
     if (node == nullptr) return {};
-    const auto* list = node->as_array();
-    if (list == nullptr || list->size() != values.size()) return wrong(key, "three numbers");
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const auto number = list->get(i)->value<double>();
-      if (!number) return wrong(key, "three numbers");
-      values[i] = *number;
+    if (const auto* plain = node->as_string()) {
+      text = plain->get();
+      return {};
     }
-    return {};
+    const auto add = [&text](const toml::node& part) {
+      const auto number = part.value<double>();
+      char digits[32];
+      std::snprintf(digits, sizeof digits, "%.17g", number.value_or(0));
+      text += (text.empty() ? "" : ":") + std::string(digits);
+      return number.has_value();
+    };
+    const auto* list = node->as_array();
+    bool good = list != nullptr || add(*node);
+    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) good &= add(*list->get(i));
+    if (good) return {};
+    return wrong(key, "a number, a text, or a list of numbers");
   }
   /// Every key of a table within: {"en", "A vase."}.
   Result<void> take(std::string_view key, std::map<std::string, std::string>& texts) const {
@@ -354,21 +364,14 @@ class ProjectReader {
   Result<void> read_scenes() {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
     for (const TableReader& reader : readers) {
-      MODAR_TRY(
-          reader.allow({"pattern", "model", "scale", "up", "offset", "centred", "light", "text"}));
+      MODAR_TRY(reader.allow({"pattern", "model", "scale", "height", "width", "up", "turn",
+                              "offset", "centred", "light", "text"}));
       ProjectScene scene;
       MODAR_TRY(reader.take("pattern", scene.request.pattern));
       MODAR_TRY(reader.take("model", scene.request.model));
       MODAR_TRY(known(reader, "pattern", scene.request.pattern, project_.patterns));
       MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
-      MODAR_TRY(reader.take("scale", scene.request.scale, 0));
-      if (!(scene.request.scale > 0)) return reader.wrong("scale", "a factor above 0");
-      std::string up = "z";
-      MODAR_TRY(reader.take("up", up));
-      const Result<UpAxis> axis = parse_up(up);
-      if (!axis) return reader.wrong("up", "x, y, z, -x, -y or -z in quotes");
-      scene.request.up = *axis;
-      MODAR_TRY(reader.take("offset", scene.request.offset));
+      MODAR_TRY(read_placement(reader, scene.request));
       MODAR_TRY(reader.take("centred", scene.request.centred));
       scene.request.light = light_;
       MODAR_TRY(take_light(reader, scene.request.light));
@@ -376,6 +379,27 @@ class ProjectReader {
       project_.scenes.push_back(std::move(scene));
     }
     if (readers.empty()) make_scenes();
+    return {};
+  }
+
+  /// A key whose value is written as in --scene, where lists of numbers may stand for "X:Y:Z".
+  static Result<void> read_part(const TableReader& reader, const char* key, SceneRequest& scene) {
+    if (!reader.has(key)) return {};
+    std::string text;
+    MODAR_TRY(reader.take_scene_value(key, text));
+    const auto taken = take_scene_part(key, text, scene);
+    if (taken) return {};
+    return fail(ExitCode::kInvalidInput, "project.value", reader.at(key),
+                std::string(key) + " = " + text + ": " + taken.error().cause, taken.error().cure);
+  }
+
+  static Result<void> read_placement(const TableReader& reader, SceneRequest& scene) {
+    int sizes = 0;
+    for (const char* key : {"scale", "height", "width"}) sizes += reader.has(key) ? 1 : 0;
+    if (sizes > 1) return reader.wrong("scale", "one of scale, height and width, not several");
+    for (const char* key : {"scale", "height", "width", "up", "turn", "offset"}) {
+      MODAR_TRY(read_part(reader, key, scene));
+    }
     return {};
   }
 

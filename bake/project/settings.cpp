@@ -118,6 +118,11 @@ constexpr Setting kSettings[] = {
        request.occlusion = value == "true";
        return Result<void>();
      }},
+    {"up", Kind::kText, Part::kModel,
+     [](const std::string& value, BakeRequest& request) -> Result<void> {
+       MODAR_ASSIGN(request.up, parse_up(value));
+       return {};
+     }},
     {"shadows", Kind::kTruth, Part::kScene,
      [](const std::string& value, BakeRequest& request) {
        request.shadows = value == "true";

@@ -76,7 +76,13 @@ class SourceTest : public ::testing::Test {
     request.parameters = {"none"};
     request.loop.trial_views = 8;
     request.loop.score = false;
-    request.scenes = {{"card", "two", 0.5, UpAxis::kY, false, {0.1, 0, 0}, ""}};
+    SceneRequest scene;
+    scene.pattern = "card";
+    scene.model = "two";
+    scene.size.value = 0.5;
+    scene.up = UpAxis::kY;
+    scene.offset = {SceneOffset::Unit::kSide, {0.05, 0, 0}};
+    request.scenes = {scene};
     Report report;
     auto built = build_bundle(request, report);
     ASSERT_TRUE(built) << to_line(built.error());

@@ -110,6 +110,21 @@ class Bake(ProgramTest):
         self.assertGreater(report["peak_rss_bytes"], 1e6)
         self.assertTrue(all({"name", "ms", "in", "out", "max_error"} <= set(s) for s in report["stages"]))
 
+    def test_a_scene_is_as_high_as_was_asked(self):
+        picture(self.folder / "cover.png")
+        report = self.modar_json("bake", "--model", STATUE, "--pattern", "cover.png:200mm", "--scene",
+                                 "cover=statue,height=12cm,turn=0:0:30,offset=5:0:0", "--no-lods", "--no-ao", "-o", "out.modar",
+                                 *QUICK)
+        scene = report["bundle"]["scenes"][0]
+        self.assertAlmostEqual(scene["height_mm"], 120, delta=0.1)
+        self.assertEqual((scene["up"], scene["turn"]), ("z", [0, 0, 30]))
+        self.assertAlmostEqual(scene["offset"][0], 5 / 100, places=6)  # half of 200 mm is a unit of the plane
+        heights = [float(line.split()[3]) for line in STATUE.read_text().splitlines() if line.startswith("v ")]
+        self.assertEqual(report["bundle"]["models"][0]["up"], {"axis": "z", "reason": "header"})
+        sides = report["bundle"]["models"][0]["scale"] * 2  # the statue's height is its largest side
+        self.assertAlmostEqual(max(heights) - min(heights), sides, delta=1e-3 * sides)
+        self.assertAlmostEqual(scene["scale"], 120 / 200, places=6)
+
     def test_the_asked_error_is_kept_and_picks_the_layout(self):
         out = self.folder / "fine.modar"
 
@@ -270,7 +285,9 @@ class BadInput(ProgramTest):
         (self.folder / "empty.obj").write_text("# nothing\n")
         self.assert_fails(self.bake("--model", "empty.obj"), 3, "empty.obj")
         (self.folder / "m.stl").write_text("solid\n")
-        self.assert_fails(self.bake("--model", "m.stl"), 5, ".stl", ".obj")
+        self.assert_fails(self.bake("--model", "m.stl"), 3, "m.stl", "no triangle")
+        (self.folder / "m.fbx").write_text("Kaydara FBX Binary")
+        self.assert_fails(self.bake("--model", "m.fbx"), 5, ".fbx", "assimp export 'm.fbx' 'm.glb'")
         self.assert_nothing_written()
 
     def test_a_scene_of_unknown_names(self):
@@ -282,7 +299,25 @@ class BadInput(ProgramTest):
     def test_two_of_one_name(self):
         (self.folder / "sub").mkdir()
         shutil.copy(POTTERY, self.folder / "sub")
-        self.assert_fails(self.bake("--model", POTTERY, self.folder / "sub" / "pottery.obj"), 1, "pottery", "rename")
+        shutil.copytree(self.folder / "sub", self.folder / "other" / "sub")
+        again = self.folder / "sub" / "pottery.obj"
+        third = self.folder / "other" / "sub" / "pottery.obj"
+        self.assert_fails(self.bake("--model", again, third), 1, "two models are named 'sub'", "--model NAME=")
+        self.assert_nothing_written()
+        done = self.modar_json("bake", "--model", POTTERY, again, f"third={third}", "--no-lods", "--no-ao", "-o", "all.modar")
+        self.assertEqual([model["name"] for model in done["bundle"]["models"]], ["models", "sub", "third"])
+
+    def test_inputs_are_looked_at_before_the_bake(self):
+        (self.folder / "text.png").write_text("no image")
+        for words in (["--pattern", "text.png"], ["--model", "none.glb"],
+                      ["--pattern", COVER, "--scene", "cover=pottery,light=none.hdr"]):
+            done = self.bake("--model", POTTERY, *words, "--json")
+            self.assertIn(done.returncode, (2, 3), done.stderr)
+            self.assertNotIn("texture", done.stderr)
+        picture(self.folder / "plain.png")
+        self.assert_fails(self.bake("--model", POTTERY, "--pattern", "plain.png", "--scene", "plain=pottery,height=12cm"), 1,
+                          "width of 'plain' is unknown", "210mm")
+        self.assert_nothing_written()
 
     def test_an_output_that_cannot_be_written(self):
         done = self.modar("bake", "--model", POTTERY, "-o", self.folder / "no" / "such" / "out.modar")

@@ -11,29 +11,95 @@ TEST(Scene, DefaultsAndOptions) {
   ASSERT_TRUE(plain);
   EXPECT_EQ(plain->pattern, "cover");
   EXPECT_EQ(plain->model, "vase");
-  EXPECT_EQ(plain->scale, 1.0);
-  EXPECT_EQ(plain->up, UpAxis::kZ);
+  EXPECT_EQ(plain->size.kind, SceneSize::Kind::kScale);
+  EXPECT_EQ(plain->size.value, 1.0);
+  EXPECT_FALSE(plain->up);
   EXPECT_FALSE(plain->centred);
 
-  const auto full = parse_scene("a b=c.d,scale=2.5,up=-y,offset=0.5:-1:1e-1,centred");
-  ASSERT_TRUE(full);
+  const auto full = parse_scene("a b=c.d,scale=2.5,up=-Y,turn=90,offset=0.5:-1:1e-1,centred");
+  ASSERT_TRUE(full) << to_line(full.error());
   EXPECT_EQ(full->pattern, "a b");
   EXPECT_EQ(full->model, "c.d");
-  EXPECT_EQ(full->scale, 2.5);
+  EXPECT_EQ(full->size.value, 2.5);
   EXPECT_EQ(full->up, UpAxis::kMinusY);
-  EXPECT_EQ(full->offset, (std::array<double, 3>{0.5, -1.0, 0.1}));
+  EXPECT_EQ(full->turn, (std::array<double, 3>{0, 0, 90}));
+  EXPECT_EQ(full->offset.value, (std::array<double, 3>{0.5, -1.0, 0.1}));
+  EXPECT_EQ(full->offset.unit, SceneOffset::Unit::kUsual);
   EXPECT_TRUE(full->centred);
+
+  const auto sized = parse_scene("a=b,height=12cm,turn=10:20:-30,offset=0:0:1in");
+  ASSERT_TRUE(sized) << to_line(sized.error());
+  EXPECT_EQ(sized->size.kind, SceneSize::Kind::kHeight);
+  EXPECT_DOUBLE_EQ(sized->size.value, 120);
+  EXPECT_EQ(sized->turn, (std::array<double, 3>{10, 20, -30}));
+  EXPECT_EQ(sized->offset.unit, SceneOffset::Unit::kMillimetres);
+  EXPECT_DOUBLE_EQ(sized->offset.value[2], 25.4);
 }
 
 TEST(Scene, Refused) {
-  for (const char* text :
-       {"", "cover", "=vase", "cover=", "a=b,scale=0", "a=b,scale=-1", "a=b,scale=nan",
-        "a=b,scale=1x", "a=b,up=w", "a=b,offset=1:2", "a=b,offset=1:2:3:4", "a=b,", "a=b,fast"}) {
+  for (const char* text : {"",
+                           "cover",
+                           "=vase",
+                           "cover=",
+                           "a=b,scale=0",
+                           "a=b,scale=-1",
+                           "a=b,scale=nan",
+                           "a=b,scale=1x",
+                           "a=b,up=w",
+                           "a=b,offset=1:2",
+                           "a=b,offset=1:2:3:4",
+                           "a=b,",
+                           "a=b,fast",
+                           "a=b,scale=1e39",
+                           "a=b,height=120",
+                           "a=b,height=nanmm",
+                           "a=b,turn=1:2",
+                           "a=b,turn=361",
+                           "a=b,scale=1,height=5mm",
+                           "a=b,offset=1:2:3furlong",
+                           "a=b,centred=no"}) {
     const auto scene = parse_scene(text);
     ASSERT_FALSE(scene) << text;
     EXPECT_EQ(scene.error().exit, ExitCode::kUsage);
     EXPECT_EQ(scene.error().code, "cli.scene");
   }
+}
+
+TEST(Scene, CuresSayWhatToWrite) {
+  const auto cure = [](const char* text) { return parse_scene(text).error().cure; };
+  EXPECT_EQ(cure("a=b,scale=80%"), "write scale=0.8");
+  EXPECT_EQ(cure("a=b,scale=0"), "write a factor above 0, as in scale=0.8");
+  EXPECT_EQ(cure("a=b,height=20"), "write 20mm, 20cm or 20in");
+  EXPECT_EQ(cure("a=b,height=20inch"), "write 20in");
+  EXPECT_EQ(cure("a=b,up=w"), "name one of x, y, z, -x, -y, -z");
+}
+
+TEST(Name, StandsBeforeAFile) {
+  EXPECT_EQ(parse_model("bear=a/scene.gltf").name, "bear");
+  EXPECT_EQ(parse_model("bear=a/scene.gltf").path, "a/scene.gltf");
+  EXPECT_EQ(parse_model("a/b=c.obj").path, "a/b=c.obj");
+  EXPECT_EQ(parse_model("scene.gltf").name, "");
+  const auto pattern = parse_pattern("front=a/1.png:210mm");
+  ASSERT_TRUE(pattern);
+  EXPECT_EQ(pattern->name, "front");
+  EXPECT_EQ(pattern->path, "a/1.png");
+  EXPECT_EQ(pattern->width_mm, 210);
+}
+
+TEST(Name, TheFoldersWhereFilesAreCalledAlike) {
+  BakeRequest request;
+  request.models = {ModelRequest("bear/scene.gltf"), ModelRequest("fox/scene.gltf"),
+                    ModelRequest("owl.glb"), ModelRequest("a/b.obj", "cat")};
+  ASSERT_TRUE(name_assets(request));
+  EXPECT_EQ(request.models[0].name, "bear");
+  EXPECT_EQ(request.models[1].name, "fox");
+  EXPECT_EQ(request.models[2].name, "owl");
+  EXPECT_EQ(request.models[3].name, "cat");
+  request.models = {ModelRequest("a/x/scene.gltf"), ModelRequest("b/x/scene.gltf")};
+  const auto refused = name_assets(request);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "bake.same-name");
+  EXPECT_EQ(refused.error().cure, "give one of them a name: --model NAME=b/x/scene.gltf");
 }
 
 TEST(Corners, EightNumbersAndNothingElse) {
@@ -64,6 +130,11 @@ TEST(Pattern, WidthIsOptional) {
   EXPECT_FALSE(parse_pattern("cover.png:-3cm"));
   EXPECT_FALSE(parse_pattern("cover.png:-3mm"));
   EXPECT_FALSE(parse_pattern("cover.png:mm"));
+  const auto cure = [](const char* text) { return parse_pattern(text).error().cure; };
+  EXPECT_EQ(cure("cover.png:20"), "write 20mm, 20cm or 20in");
+  EXPECT_EQ(cure("cover.png:20inch"), "write 20in");
+  EXPECT_EQ(cure("cover.png:21,0cm"), "write 21.0cm, with a point");
+  EXPECT_FALSE(parse_pattern("cover.png:nanmm"));
 }
 
 TEST(Pattern, ShapeStandsBehindTheWidth) {

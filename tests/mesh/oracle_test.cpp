@@ -63,7 +63,7 @@ const std::map<std::string, std::string>& known_differences() {
 
 /// Answers whether both read it.
 bool expect_same_as_assimp(const std::string& path) {
-  const auto ours = read_obj(path);
+  const auto ours = read_model(path, 1);
   if (!ours || known_differences().contains(fs::path(path).filename().string())) return false;
   const SurfaceFigures theirs = testing::load_with_assimp(path);
   if (!theirs.loaded || theirs.faces == 0) return false;
@@ -109,6 +109,21 @@ TEST(Eyes, AssimpReadsTheSame) {
   EXPECT_GE(compared, own_models().size());
   RecordProperty("compared", static_cast<int>(compared));
   std::printf("%zu of %zu files compared\n", compared, files.size());
+}
+
+TEST(Eyes, AssimpReadsTheSameOfScans) {
+  const fs::path folder = "/usr/share/assimp/models";
+  std::size_t compared = 0;
+  for (const char* kind : {"PLY", "STL"}) {
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder / kind, error)) {
+      if (is_model_file(entry.path().string()) && expect_same_as_assimp(entry.path().string())) {
+        ++compared;
+      }
+    }
+  }
+  std::printf("%zu PLY and STL files compared\n", compared);
+  EXPECT_GE(compared, fs::exists(folder / "PLY") ? 8u : 0u);
 }
 
 using Corners = std::array<glm::dvec3, 3>;

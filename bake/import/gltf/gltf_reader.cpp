@@ -487,6 +487,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   }
   SourceModel model;
   model.name = std::filesystem::path(path).stem().string();
+  model.up = {UpAxis::kY, UpReason::kStandard};
   const auto note_file = [&](const std::string& uri) {
     if (!uri.empty() && !tinygltf::IsDataURI(uri)) model.files.push_back(folder + uri);
   };

@@ -26,6 +26,7 @@
 #include "bake/import/obj/obj_text.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/import/source_model.hpp"
+#include "bake/import/up_comment.hpp"
 
 namespace modar {
 namespace {
@@ -404,9 +405,10 @@ Result<std::optional<ObjCounts>> parse_once(const ByteSource& source, const std:
 Result<SourceModel> parse_source(const ByteSource& source, const std::string& folder,
                                  const std::string& stem, const std::string& label,
                                  const ReadOptions& options) {
-  char head[4];
-  const std::int64_t got = source.read(0, sizeof head, head);
-  if (got > 0 && is_utf16({head, static_cast<std::size_t>(got)})) {
+  char bytes[4096];
+  const std::int64_t got = source.read(0, sizeof bytes, bytes);
+  const std::string_view head(bytes, got > 0 ? static_cast<std::size_t>(got) : 0);
+  if (is_utf16(head.substr(0, 4))) {
     return fail(ExitCode::kInvalidInput, "obj.utf16", label, "the file is UTF-16 text",
                 "save it as UTF-8 (or plain ASCII) and bake again");
   }
@@ -425,6 +427,7 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
                     " vertices and no face that can be kept",
                 "export the model as polygons (point clouds must be meshed first)");
   }
+  if (const auto up = up_in_comments(head)) model.up = {*up, UpReason::kHeader};
   shrink_arrays(model);
   return model;
 }

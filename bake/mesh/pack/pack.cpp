@@ -57,7 +57,8 @@ struct PackedChunk {
   std::vector<std::byte> vertices;                 ///< in their final order
   std::vector<std::vector<std::uint16_t>> levels;  ///< indices, the finest first
   std::vector<double> level_errors;
-  ChunkRecord record{};  ///< lacks first_level
+  std::size_t collapsed = 0;  ///< triangles that rounding left without area, and that are left out
+  ChunkRecord record{};       ///< lacks first_level
   PackErrors errors;
 };
 
@@ -104,7 +105,8 @@ class ChunkPacker {
     packer_.pack(chunk, grid, uv, texture_side, bytes_.data(), decoded_);
     out.errors = packer_.errors();
     out.record = chunk_record(chunk, grid, uv, decoded_);
-    std::vector<std::uint16_t>& finest = out.levels.emplace_back(chunk.indices);
+    std::vector<std::uint16_t>& finest = out.levels.emplace_back(lasting_triangles(chunk.indices));
+    out.collapsed = (chunk.indices.size() - finest.size()) / 3;
     out.level_errors.push_back(0.0);
     const auto order = orderer_.order(bytes_, stride_, finest);
     out.vertices.resize(order.size() * stride_);
@@ -122,6 +124,23 @@ class ChunkPacker {
   }
 
  private:
+  /// Without those of which two corners have become the same vertex: they have no area.
+  [[nodiscard]] std::vector<std::uint16_t> lasting_triangles(
+      const std::vector<std::uint16_t>& indices) const {
+    const auto same = [this](std::uint16_t a, std::uint16_t b) {
+      return std::memcmp(bytes_.data() + std::size_t{a} * stride_,
+                         bytes_.data() + std::size_t{b} * stride_, stride_) == 0;
+    };
+    std::vector<std::uint16_t> lasting;
+    lasting.reserve(indices.size());
+    for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
+      const std::uint16_t* const t = &indices[i];
+      if (same(t[0], t[1]) || same(t[1], t[2]) || same(t[2], t[0])) continue;
+      lasting.insert(lasting.end(), t, t + 3);
+    }
+    return lasting;
+  }
+
   VertexPacker packer_;
   std::uint16_t stride_;
   ChunkOrderer orderer_;
@@ -215,8 +234,16 @@ void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
   record.unit_metres = options.unit_metres;
   record.source_vertex_count = mesh.source_vertex_count;
   record.source_face_count = mesh.source_face_count;
-  record.chunk_count = static_cast<std::uint32_t>(chunked.chunks.size());
   record.material_count = static_cast<std::uint32_t>(mesh.materials.size());
+}
+
+void tell_collapsed(const std::string& name, std::size_t count, Report& report) {
+  if (count == 0) return;
+  report.diagnostics.push_back({"model.collapsed", DiagnosticSeverity::kInfo, name, 0,
+                                std::to_string(count) +
+                                    " triangles are smaller than stored positions tell apart and "
+                                    "are left out",
+                                "--positions int16 or --max-error keeps more of them"});
 }
 
 std::size_t index_count(const ChunkedMesh& chunked) {
@@ -249,6 +276,7 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   const std::vector<ChunkGrid> grids = make_grids(chunked, options.positions);
   ChunkAppender appender(out);
   PackErrors errors;
+  std::size_t collapsed = 0;
   const unsigned jobs = std::max(1u, options.jobs);
   std::vector<ChunkPacker> packers(jobs, ChunkPacker(mesh, offsets, options.positions));
   // A wave of chunks at a time, a few for each thread; they are joined in order.
@@ -266,7 +294,8 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
     });
     for (PackedChunk& chunk : packed) {
       errors.add(chunk.errors);
-      appender.append(chunk);
+      collapsed += chunk.collapsed;
+      if (!chunk.levels[0].empty()) appender.append(chunk);
     }
     if (report.progress) {
       report.progress(
@@ -274,6 +303,13 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
     }
   }
   appender.finish();
+  out.record.chunk_count = static_cast<std::uint32_t>(out.chunks.size());
+  if (out.chunks.empty()) {
+    return fail(ExitCode::kInvalidInput, "model.no-area", mesh.name,
+                "all its triangles are smaller than positions can tell apart",
+                "bake it with --positions int16 or a --max-error");
+  }
+  tell_collapsed(mesh.name, collapsed, report);
   errors.write(mesh.placement.scale, out.record);
   timer.done(out.record.triangle_count, out.vertices.size() + out.indices.size(),
              out.record.position_error_max);

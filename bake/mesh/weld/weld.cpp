@@ -642,6 +642,7 @@ Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& op
   StageTimer timer(report, "weld");
   TriMesh mesh;
   mesh.name = source.name;
+  mesh.up = source.up;
   mesh.source_vertex_count = source.positions.size();
   mesh.source_face_count = source.face_count();
   WeldCounts counts;

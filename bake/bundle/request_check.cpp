@@ -1,0 +1,161 @@
+#include "bake/bundle/request_check.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "bake/bundle/light_image.hpp"
+#include "bake/import/read_model.hpp"
+#include "formats/nearest.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <class Asset>
+std::vector<std::string> names_of(const std::vector<Asset>& assets) {
+  std::vector<std::string> names;
+  for (const Asset& asset : assets) names.push_back(asset.name);
+  return names;
+}
+
+/// The name of the folder that a file is in.
+std::string folder_name(const std::string& path) {
+  std::error_code error;
+  return fs::absolute(path, error).lexically_normal().parent_path().filename().string();
+}
+
+template <class Asset>
+Result<void> name_files(std::vector<Asset>& assets, const char* what) {
+  std::map<std::string, int> stems;
+  for (const Asset& asset : assets) {
+    if (asset.name.empty()) ++stems[file_stem(asset.path)];
+  }
+  std::set<std::string> taken;
+  for (Asset& asset : assets) {
+    const std::string stem = file_stem(asset.path);
+    if (asset.name.empty()) asset.name = stems[stem] > 1 ? folder_name(asset.path) : stem;
+    if (asset.name.empty()) asset.name = stem;
+    if (taken.insert(asset.name).second) continue;
+    return fail(ExitCode::kUsage, "bake.same-name", asset.path,
+                std::string("two ") + what + "s are named '" + asset.name + "'",
+                std::string("give one of them a name: --") + what + " NAME=" + asset.path);
+  }
+  return {};
+}
+
+Result<std::uint32_t> find_by_name(const std::vector<std::string>& names, const std::string& name,
+                                   const char* what) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<std::uint32_t>(found - names.begin());
+  std::string known;
+  for (const std::string& one : names) known += (known.empty() ? "" : ", ") + one;
+  const std::string_view nearest = nearest_name(name, names);
+  return fail(ExitCode::kUsage, "bake.scene-unknown", name,
+              std::string("the scene names a ") + what + " that is not baked",
+              nearest.empty() ? "name one of: " + (known.empty() ? "(none)" : known)
+                              : "did you mean '" + std::string(nearest) + "'?");
+}
+
+Result<void> check_model(const std::string& path) {
+  MODAR_TRY(require_model_format(path));
+  std::error_code error;
+  const char* cause = nullptr;
+  if (::access(path.c_str(), R_OK) != 0) {
+    cause = std::strerror(errno);
+  } else if (!fs::is_regular_file(path, error)) {
+    cause = "this is not a regular file";
+  }
+  if (cause == nullptr) return {};
+  return fail(ExitCode::kIo, "io.open", path, cause, "check the path and its permissions");
+}
+
+}  // namespace
+
+std::string file_stem(const std::string& path) {
+  return fs::path(path).stem().string();
+}
+
+Result<void> name_assets(BakeRequest& request) {
+  MODAR_TRY(name_files(request.models, "model"));
+  return name_files(request.patterns, "pattern");
+}
+
+Result<std::vector<KnownScene>> find_scenes(const BakeRequest& request) {
+  std::vector<SceneRequest> scenes = request.scenes;
+  if (scenes.empty() && request.models.size() == 1 && request.patterns.size() == 1) {
+    SceneRequest scene;
+    scene.pattern = request.patterns[0].name;
+    scene.model = request.models[0].name;
+    scene.light = request.light;
+    scenes.push_back(scene);
+  }
+  std::vector<KnownScene> known;
+  for (const SceneRequest& scene : scenes) {
+    MODAR_ASSIGN(const std::uint32_t pattern,
+                 find_by_name(names_of(request.patterns), scene.pattern, "pattern"));
+    MODAR_ASSIGN(const std::uint32_t model,
+                 find_by_name(names_of(request.models), scene.model, "model"));
+    known.push_back({scene, pattern, model});
+  }
+  return known;
+}
+
+Result<void> check_inputs(const BakeRequest& request) {
+  for (const ModelRequest& model : request.models) MODAR_TRY(check_model(model.path));
+  std::vector<double> widths;
+  for (const PatternRequest& pattern : request.patterns) {
+    MODAR_ASSIGN(const ShapedPicture shaped,
+                 load_shaped(pattern.path, pattern.width_mm, pattern.shape));
+    widths.push_back(shaped.width_mm);
+  }
+  MODAR_ASSIGN(const std::vector<KnownScene> scenes, find_scenes(request));
+  std::set<std::string> lights;
+  for (const KnownScene& known : scenes) {
+    if (needs_width(known.scene) && !(widths[known.pattern] > 0)) {
+      return no_width(known.scene);
+    }
+    const std::string& light = known.scene.light;
+    if (!light.empty() && lights.insert(light).second) MODAR_TRY(read_light(light));
+  }
+  return {};
+}
+
+Result<void> require_shown(const BakeRequest& request) {
+  const bool whole = !request.models.empty() && !request.patterns.empty();
+  const bool one_scene =
+      request.scenes.empty() && request.models.size() == 1 && request.patterns.size() == 1;
+  if (!whole || one_scene || !find_scenes(request)) return {};
+  const auto shown = [&](const std::string& name, std::string SceneRequest::*side) {
+    return std::any_of(request.scenes.begin(), request.scenes.end(),
+                       [&](const SceneRequest& scene) { return scene.*side == name; });
+  };
+  std::vector<std::string> idle;  // patterns without a model
+  for (const PatternRequest& pattern : request.patterns) {
+    if (!shown(pattern.name, &SceneRequest::pattern)) idle.push_back(pattern.name);
+  }
+  std::string lines;
+  std::string what;
+  std::size_t next = 0;
+  for (const ModelRequest& model : request.models) {
+    if (shown(model.name, &SceneRequest::model)) continue;
+    const std::string on = next < idle.size() ? idle[next++] : request.patterns.front().name;
+    lines += " --scene " + on + "=" + model.name;
+    if (what.empty()) what = "the model '" + model.name + "' stands on no pattern";
+  }
+  for (; next < idle.size(); ++next) {
+    lines += " --scene " + idle[next] + "=" + request.models.front().name;
+    if (what.empty()) what = "no model stands on the pattern '" + idle[next] + "'";
+  }
+  if (lines.empty()) return {};
+  return fail(ExitCode::kUsage, "bake.never-shown", "", what + ", so it would never be shown",
+              "add" + lines);
+}
+
+}  // namespace modar

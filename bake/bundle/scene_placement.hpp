@@ -1,0 +1,78 @@
+// Where a scene's model stands on its pattern: from what the user said to the scene's record.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "bake/up_axis.hpp"
+#include "formats/bundle_view.hpp"
+#include "formats/bundle_writer.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// How large the model is on its pattern.
+struct SceneSize {
+  enum class Kind : std::uint8_t {
+    kScale,   ///< the value is a factor on: largest side of the model = that of the pattern
+    kHeight,  ///< millimetres above the pattern, from the lowest to the highest point
+    kWidth    ///< millimetres along the pattern's x axis
+  };
+  Kind kind = Kind::kScale;
+  double value = 1.0;
+};
+
+/// A shift along the pattern's axes, after everything else.
+struct SceneOffset {
+  enum class Unit : std::uint8_t {
+    kUsual,  ///< millimetres where the pattern's width is known, else the pattern's side
+    kSide,   ///< the pattern's largest side
+    kMillimetres
+  };
+  Unit unit = Unit::kUsual;
+  std::array<double, 3> value{};
+};
+
+/// A scene as the user asks for it.
+struct SceneRequest {
+  std::string pattern;  ///< names, see name_assets()
+  std::string model;
+  SceneSize size;
+  std::optional<UpAxis> up;      ///< points out of the pattern; nothing: as find_up() says
+  std::array<double, 3> turn{};  ///< degrees about the pattern's x, y and z, in this order
+  bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
+  SceneOffset offset;
+  std::string light;  ///< picture of its room, see read_light(); empty: a neutral room
+};
+
+/// True where a length in millimetres is asked for, which needs the pattern's width.
+bool needs_width(const SceneRequest& request);
+
+/// The error of such a scene where the width is unknown. kUsage "scene.no-width".
+tl::unexpected<Error> no_width(const SceneRequest& request);
+
+/// The model that a scene places, in content.models.
+struct PlacedModel {
+  std::uint32_t index = 0;
+  std::array<double, 3> sides{};  ///< of its box, source units
+  UpAxis up = UpAxis::kY;         ///< for scenes that name none
+};
+
+/// The request with `up` set, its size as a factor and its offset in sides: as modar states it in
+/// the bundle's meta text. content: has the model and the pattern.
+/// Errors: kUsage "scene.no-width", where millimetres are asked for and the width is unknown;
+/// "scene.flat", where a height is asked for and the model has none.
+Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleContent& content,
+                                   std::uint32_t pattern, const PlacedModel& model);
+
+/// The record of a resolved scene.
+SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& content,
+                        std::uint32_t pattern, const PlacedModel& model);
+
+/// Millimetres from the lowest to the highest point of a scene's model; 0 where the pattern's width
+/// is unknown. Of the vertices of its finest level.
+double scene_height_mm(const BundleView& bundle, const SceneRecord& scene);
+
+}  // namespace modar

@@ -1,0 +1,397 @@
+// Reads PLY: the header says what follows, so values are read one after the other and given to
+// what they mean.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bake/import/obj/mtl_reader.hpp"
+#include "bake/import/ply/ply_header.hpp"
+#include "bake/import/read_model.hpp"
+#include "bake/import/up_comment.hpp"
+#include "modar/mapped_file.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::uint64_t kMostElements = 0x3FFFFFFFu;  ///< vertices and corners, as of an OBJ
+
+/// Values in file order, text or binary.
+class PlyValues {
+ public:
+  PlyValues(std::string_view bytes, const PlyHeader& header)
+      : bytes_(bytes), at_(header.bytes), encoding_(header.encoding) {}
+
+  [[nodiscard]] std::size_t offset() const { return at_; }
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+  [[nodiscard]] bool text() const { return encoding_ == PlyHeader::Encoding::kText; }
+
+  /// Least bytes that an element takes, so that no count is believed beyond the file.
+  [[nodiscard]] std::size_t least_bytes(const PlyElement& element) const {
+    std::size_t bytes = 0;
+    for (const PlyProperty& property : element.properties) {
+      bytes += text() ? 2 : ply_bytes(property.list ? property.count_type : property.type);
+    }
+    return bytes == 0 || !text() ? bytes : bytes - 1;  // the last line may have no end
+  }
+
+  /// False at the end of the file or where the text is no number.
+  bool take(PlyType type, double& value) {
+    return text() ? take_text(value) : take_binary(type, value);
+  }
+
+ private:
+  template <class T>
+  double value_of(const char* from) const {
+    std::array<char, sizeof(T)> raw{};
+    std::memcpy(raw.data(), from, sizeof(T));
+    if (encoding_ == PlyHeader::Encoding::kBig) std::reverse(raw.begin(), raw.end());
+    return static_cast<double>(std::bit_cast<T>(raw));
+  }
+
+  bool take_binary(PlyType type, double& value) {
+    const std::size_t size = ply_bytes(type);
+    if (left() < size) return false;
+    const char* const from = bytes_.data() + at_;
+    at_ += size;
+    switch (type) {
+      case PlyType::kI8:
+        value = value_of<std::int8_t>(from);
+        break;
+      case PlyType::kU8:
+        value = value_of<std::uint8_t>(from);
+        break;
+      case PlyType::kI16:
+        value = value_of<std::int16_t>(from);
+        break;
+      case PlyType::kU16:
+        value = value_of<std::uint16_t>(from);
+        break;
+      case PlyType::kI32:
+        value = value_of<std::int32_t>(from);
+        break;
+      case PlyType::kU32:
+        value = value_of<std::uint32_t>(from);
+        break;
+      case PlyType::kF32:
+        value = value_of<float>(from);
+        break;
+      case PlyType::kF64:
+        value = value_of<double>(from);
+        break;
+    }
+    return true;
+  }
+
+  bool take_text(double& value) {
+    const auto space = [](char c) {
+      return c == ' ' || c == '\n' || c == '\r' || c == '\t' || c == '\v' || c == '\f';
+    };
+    while (at_ < bytes_.size() && space(bytes_[at_])) ++at_;
+    std::size_t end = at_;
+    while (end < bytes_.size() && !space(bytes_[end])) ++end;
+    const std::size_t start = at_ < end && bytes_[at_] == '+' ? at_ + 1 : at_;
+    const auto [stop, error] = std::from_chars(bytes_.data() + start, bytes_.data() + end, value);
+    if (start == end || stop != bytes_.data() + end || error == std::errc::invalid_argument) {
+      return false;
+    }
+    if (error == std::errc::result_out_of_range) value = std::numeric_limits<double>::infinity();
+    at_ = end;
+    return true;
+  }
+
+  std::string_view bytes_;
+  std::size_t at_;
+  PlyHeader::Encoding encoding_;
+};
+
+/// What a vertex's property is.
+enum class Role : std::uint8_t { kNone, kX, kY, kZ, kNx, kNy, kNz, kU, kV, kRed, kGreen, kBlue };
+constexpr std::size_t kRoles = 12;
+
+Role role_of(std::string_view name) {
+  constexpr std::pair<std::string_view, Role> kNames[] = {{"x", Role::kX},
+                                                          {"y", Role::kY},
+                                                          {"z", Role::kZ},
+                                                          {"nx", Role::kNx},
+                                                          {"ny", Role::kNy},
+                                                          {"nz", Role::kNz},
+                                                          {"u", Role::kU},
+                                                          {"v", Role::kV},
+                                                          {"s", Role::kU},
+                                                          {"t", Role::kV},
+                                                          {"texture_u", Role::kU},
+                                                          {"texture_v", Role::kV},
+                                                          {"red", Role::kRed},
+                                                          {"green", Role::kGreen},
+                                                          {"blue", Role::kBlue},
+                                                          {"r", Role::kRed},
+                                                          {"g", Role::kGreen},
+                                                          {"b", Role::kBlue},
+                                                          {"diffuse_red", Role::kRed},
+                                                          {"diffuse_green", Role::kGreen},
+                                                          {"diffuse_blue", Role::kBlue}};
+  for (const auto& [known, role] : kNames) {
+    if (name == known) return role;
+  }
+  return Role::kNone;
+}
+
+/// What full intensity of a colour is.
+double full_of(PlyType type) {
+  if (type == PlyType::kU8 || type == PlyType::kI8) return 255;
+  if (type == PlyType::kU16 || type == PlyType::kI16) return 65535;
+  return 1;
+}
+
+class PlyReader {
+ public:
+  PlyReader(std::string_view bytes, const PlyHeader& header, const std::string& label)
+      : header_(header), values_(bytes, header), label_(label) {}
+
+  Result<SourceModel> run() {
+    for (const PlyElement& element : header_.elements) {
+      const std::size_t least = values_.least_bytes(element);
+      if (element.count > kMostElements || (least > 0 && element.count > values_.left() / least)) {
+        return cut_short(element, 0);
+      }
+      if (least == 0) continue;
+      if (element.name == "vertex") {
+        MODAR_TRY(read_vertices(element));
+      } else {
+        MODAR_TRY(read_faces(element));
+      }
+    }
+    return finish();
+  }
+
+ private:
+  [[nodiscard]] tl::unexpected<Error> cut_short(const PlyElement& element,
+                                                std::uint64_t index) const {
+    return fail(ExitCode::kInvalidInput, values_.left() == 0 ? "ply.short" : "ply.number",
+                label_ + ": byte " + std::to_string(values_.offset()),
+                "the file ends, or holds no number, at " + element.name + " " +
+                    std::to_string(index) + " of " + std::to_string(element.count),
+                "the file is cut short or damaged; copy or export it again");
+  }
+
+  /// Reads a list into list_. False at the end.
+  bool take_list(const PlyProperty& property) {
+    double count = 0;
+    if (!values_.take(property.count_type, count) || !(count >= 0)) return false;
+    const std::size_t least = values_.text() ? 1 : ply_bytes(property.type);
+    if (count > static_cast<double>(values_.left() / least)) return false;
+    list_.resize(static_cast<std::size_t>(count));
+    for (double& value : list_) {
+      if (!values_.take(property.type, value)) return false;
+    }
+    return true;
+  }
+
+  Result<void> read_vertices(const PlyElement& element) {
+    std::vector<Role> roles;
+    bool has[kRoles] = {};
+    double full = 1;
+    for (const PlyProperty& property : element.properties) {
+      roles.push_back(property.list ? Role::kNone : role_of(property.name));
+      has[static_cast<std::size_t>(roles.back())] = true;
+      if (roles.back() == Role::kRed) full = full_of(property.type);
+    }
+    const auto all = [&](Role first, std::size_t count) {
+      const auto start = static_cast<std::size_t>(first);
+      return std::all_of(has + start, has + start + count, [](bool one) { return one; });
+    };
+    const bool normals = all(Role::kNx, 3);
+    const bool uvs = all(Role::kU, 2);
+    const bool colours = all(Role::kRed, 3);
+    model_.positions.reserve(element.count);
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      std::array<double, kRoles> value{};
+      for (std::size_t p = 0; p < roles.size(); ++p) {
+        const PlyProperty& property = element.properties[p];
+        const bool good =
+            property.list ? take_list(property)
+                          : values_.take(property.type, value[static_cast<std::size_t>(roles[p])]);
+        if (!good) return cut_short(element, i);
+      }
+      model_.positions.push_back({value[1], value[2], value[3]});
+      if (normals) {
+        model_.normals.push_back(glm::vec3(glm::dvec3(value[4], value[5], value[6])));
+      }
+      if (uvs) model_.uvs.push_back({value[7], value[8]});
+      if (colours) {
+        model_.colours.push_back(
+            glm::clamp(glm::vec3(glm::dvec3(value[9], value[10], value[11]) / full), 0.0f, 1.0f));
+      }
+    }
+    return {};
+  }
+
+  /// Faces, and what no reader needs, which is passed over.
+  Result<void> read_faces(const PlyElement& element) {
+    const bool strips = element.name == "tristrips";
+    const bool faces = element.name == "face" || strips;
+    std::vector<double> corners;
+    std::vector<double> uvs;
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      corners.clear();
+      uvs.clear();
+      double texture = 0;
+      for (const PlyProperty& property : element.properties) {
+        double value = 0;
+        if (!(property.list ? take_list(property) : values_.take(property.type, value))) {
+          return cut_short(element, i);
+        }
+        if (property.list &&
+            (property.name == "vertex_indices" || property.name == "vertex_index")) {
+          corners.swap(list_);
+        } else if (property.list && property.name == "texcoord") {
+          uvs.swap(list_);
+        } else if (property.name == "texnumber") {
+          texture = value;
+        }
+      }
+      if (!faces) continue;
+      if (strips) {
+        add_strip(corners);
+      } else {
+        add_face(corners, uvs, texture);
+      }
+      if (model_.corner_count() > kMostElements) return cut_short(element, i);
+    }
+    return {};
+  }
+
+  void add_face(const std::vector<double>& corners, const std::vector<double>& uvs,
+                double texture) {
+    const auto vertices = static_cast<double>(model_.positions.size());
+    const auto inside = [&](double index) { return index >= 0 && index < vertices; };
+    if (corners.size() < 3 || !std::all_of(corners.begin(), corners.end(), inside)) {
+      ++left_out_;
+      return;
+    }
+    const auto material = static_cast<std::uint32_t>(std::clamp(
+        texture, 0.0, static_cast<double>(std::max<std::size_t>(header_.textures.size(), 1) - 1)));
+    if (model_.material_runs.empty() || model_.material_runs.back().value != material) {
+      model_.material_runs.push_back({faces_, material});
+    }
+    const bool own_uvs = uvs.size() == 2 * corners.size();
+    if (own_uvs && corner_uvs_.size() < model_.corner_count()) {
+      corner_uvs_.resize(model_.corner_count(), kNoIndex);
+    }
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      model_.corner_positions.push_back(static_cast<std::uint32_t>(corners[k]));
+      if (!own_uvs) continue;
+      corner_uvs_.push_back(static_cast<std::uint32_t>(face_uvs_.size()));
+      face_uvs_.push_back({uvs[2 * k], uvs[2 * k + 1]});
+    }
+    first_corner_.push_back(static_cast<std::uint32_t>(model_.corner_count()));
+    ++faces_;
+  }
+
+  void add_strip(const std::vector<double>& corners) {
+    std::size_t start = 0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      if (corners[i] < 0) {
+        start = i + 1;
+      } else if (i >= start + 2) {
+        const bool odd = (i - start) % 2 != 0;
+        add_face({corners[i - 2], corners[odd ? i : i - 1], corners[odd ? i - 1 : i]}, {}, 0);
+      }
+    }
+  }
+
+  Result<SourceModel> finish() {
+    if (faces_ == 0) {
+      return fail(ExitCode::kInvalidInput, "ply.no-faces", label_,
+                  "the file has " + std::to_string(model_.positions.size()) +
+                      " vertices and no face that can be kept",
+                  "mesh the point cloud first, in MeshLab or CloudCompare");
+    }
+    if (left_out_ != 0) {
+      model_.diagnostics.push_back({"ply.left-out", DiagnosticSeverity::kWarning, label_, 0,
+                                    std::to_string(left_out_) +
+                                        " faces have fewer than three corners or name vertices "
+                                        "that do not exist",
+                                    "they are left out; export the model again"});
+    }
+    if (model_.corner_count() != 3 * faces_) {
+      model_.first_corner.push_back(0);
+      for (const std::uint32_t corner : first_corner_) model_.first_corner.push_back(corner);
+    }
+    if (!face_uvs_.empty()) {
+      corner_uvs_.resize(model_.corner_count(), kNoIndex);
+      model_.uvs = Array<glm::dvec2>();
+      model_.uvs.append(face_uvs_.data(), face_uvs_.size());
+      model_.corner_uvs.kind = IndexPlane::Kind::kOwn;
+      model_.corner_uvs.own.append(corner_uvs_.data(), corner_uvs_.size());
+    } else if (!model_.uvs.empty()) {
+      model_.corner_uvs.kind = IndexPlane::Kind::kSame;
+    }
+    if (!model_.normals.empty()) model_.corner_normals.kind = IndexPlane::Kind::kSame;
+    model_.smoothing_runs = {{0, kUnstatedSmoothing}};
+    return std::move(model_);
+  }
+
+  const PlyHeader& header_;
+  PlyValues values_;
+  const std::string& label_;
+  SourceModel model_;
+  std::vector<double> list_;
+  std::vector<std::uint32_t> first_corner_;  // of the face after each
+  std::vector<std::uint32_t> corner_uvs_;    // of faces with uvs of their own
+  std::vector<glm::dvec2> face_uvs_;
+  std::uint64_t faces_ = 0;
+  std::uint64_t left_out_ = 0;
+};
+
+/// One material a picture that the header names, or one without.
+void add_materials(const PlyHeader& header, const std::string& folder, const std::string& label,
+                   SourceModel& model) {
+  for (const std::string& statement : header.textures) {
+    SourceMaterial& material = model.materials.emplace_back();
+    bool transformed = false;
+    material.diffuse = glm::vec3(1.0f);
+    material.diffuse_map = find_map_file(statement, folder, material.name, transformed);
+    if (!material.diffuse_map.empty()) continue;
+    model.files.push_back(folder + material.name);
+    model.diagnostics.push_back({"ply.missing-texture", DiagnosticSeverity::kWarning, label, 0,
+                                 "the picture '" + statement + "' is not there",
+                                 "put it into the model's folder"});
+  }
+  if (model.materials.empty()) model.materials.emplace_back();
+}
+
+Result<SourceModel> parse(std::string_view bytes, const std::string& folder,
+                          const std::string& label) {
+  MODAR_ASSIGN(const PlyHeader header, parse_ply_header(bytes, label));
+  MODAR_ASSIGN(SourceModel model, PlyReader(bytes, header, label).run());
+  model.name = std::filesystem::path(label).stem().string();
+  if (const auto up = up_in_comments(bytes.substr(0, header.bytes))) {
+    model.up = {*up, UpReason::kHeader};
+  }
+  add_materials(header, folder, label, model);
+  return model;
+}
+
+}  // namespace
+
+Result<SourceModel> parse_ply(std::string_view bytes, const std::string& label) {
+  return parse(bytes, "", label);
+}
+
+Result<SourceModel> read_ply(const std::string& path) {
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+  const std::size_t slash = path.rfind('/');
+  return parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()},
+               slash == std::string::npos ? "./" : path.substr(0, slash + 1), path);
+}
+
+}  // namespace modar

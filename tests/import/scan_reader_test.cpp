@@ -1,0 +1,235 @@
+// PLY and STL in: hand-made files with known answers. tests/mesh/oracle_test.cpp holds Debian's
+// sample files against assimp.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "bake/import/read_model.hpp"
+
+namespace modar {
+namespace {
+
+template <class T>
+void put(std::string& to, T value, bool big = false) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof value);
+  for (std::size_t i = 0; i < sizeof(T); ++i) to += raw[big ? sizeof(T) - 1 - i : i];
+}
+
+/// A binary STL of these corners, three a triangle.
+std::string binary_stl(const std::vector<glm::vec3>& corners, std::string header = "",
+                       std::uint16_t bits = 0) {
+  header.resize(80, ' ');
+  put(header, static_cast<std::uint32_t>(corners.size() / 3));
+  for (std::size_t i = 0; i < corners.size(); i += 3) {
+    for (int k = 0; k < 3; ++k) put(header, 0.0f);  // the normal, which many leave at zero
+    for (std::size_t c = i; c < i + 3; ++c) {
+      for (int k = 0; k < 3; ++k) put(header, corners[c][k]);
+    }
+    put(header, bits);
+  }
+  return header;
+}
+
+/// Both sides of a roof whose slopes meet at that angle, along y.
+std::vector<glm::vec3> roof(float degrees) {
+  const float half = degrees / 2 * 3.14159265f / 180;
+  const glm::vec3 left(-std::sin(half), 0, -std::cos(half));
+  const glm::vec3 right(std::sin(half), 0, -std::cos(half));
+  const glm::vec3 top(0, 0, 0);
+  const glm::vec3 along(0, 1, 0);
+  return {top, top + along, left, top, right, top + along};
+}
+
+TEST(Stl, BinaryAndTextAreTheSame) {
+  const std::vector<glm::vec3> corners = roof(60);
+  // A header that begins as text does.
+  const auto binary = parse_stl(binary_stl(corners, "solid of revolution"), "a.stl");
+  ASSERT_TRUE(binary) << to_line(binary.error());
+  std::string text = "solid roof\n";
+  for (std::size_t i = 0; i < corners.size(); i += 3) {
+    text += " facet normal 0 0 0\r\n  OUTER LOOP\n";
+    for (std::size_t c = i; c < i + 3; ++c) {
+      char line[128];
+      std::snprintf(line, sizeof line, "   vertex %.9g %.9g %+.9g\n",
+                    static_cast<double>(corners[c].x), static_cast<double>(corners[c].y),
+                    static_cast<double>(corners[c].z));
+      text += line;
+    }
+    text += "  endloop\n endfacet\n";
+  }
+  const auto read = parse_stl(text + "endsolid roof\n", "a.stl");
+  ASSERT_TRUE(read) << to_line(read.error());
+  for (const SourceModel* model : {&*binary, &*read}) {
+    EXPECT_EQ(model->face_count(), 2u);
+    ASSERT_EQ(model->positions.size(), 4u) << "corners of one place are one position";
+    for (std::size_t c = 0; c < corners.size(); ++c) {
+      EXPECT_EQ(glm::vec3(model->positions[model->corner_positions[c]]), corners[c]);
+    }
+    EXPECT_EQ(model->up.axis, UpAxis::kZ);
+  }
+}
+
+TEST(Stl, SharpEdgesStaySharpAndRoundOnesAreSmooth) {
+  const auto sharp = parse_stl(binary_stl(roof(90)), "a.stl");
+  const auto round = parse_stl(binary_stl(roof(150)), "a.stl");
+  ASSERT_TRUE(sharp && round);
+  const auto normal = [](const SourceModel& model, std::size_t corner) {
+    return model.normals[model.corner_normals.own[corner]];
+  };
+  EXPECT_LT(normal(*sharp, 0).x, -0.7f);  // the left slope looks left
+  EXPECT_GT(normal(*sharp, 3).x, 0.7f);
+  EXPECT_NEAR(normal(*round, 0).x, 0, 1e-6);  // the ridge looks up
+  EXPECT_NEAR(normal(*round, 0).z, 1, 1e-6);
+  EXPECT_LT(normal(*round, 2).x, -0.2f);  // the eaves are the slope's
+}
+
+TEST(Stl, ColoursOfFacets) {
+  // Blue in the low bits, bit 15 set: pure red.
+  const auto red = parse_stl(binary_stl(roof(90), "", 0xFC00), "a.stl");
+  ASSERT_TRUE(red);
+  ASSERT_EQ(red->colours.size(), red->positions.size());
+  EXPECT_EQ(red->colours[0], glm::vec3(1, 0, 0));
+  // Magics: red in the low bits, bit 15 unset; where it is set, the header's colour.
+  const std::string header = std::string("COLOR=") + '\x00' + '\xFF' + '\x00' + '\xFF';
+  const auto blue = parse_stl(binary_stl(roof(90), header, 0x7C00), "a.stl");
+  ASSERT_TRUE(blue);
+  EXPECT_EQ(blue->colours[0], glm::vec3(0, 0, 1));
+  const auto green = parse_stl(binary_stl(roof(90), header, 0x8000), "a.stl");
+  ASSERT_TRUE(green);
+  EXPECT_EQ(green->colours[0], glm::vec3(0, 1, 0));
+  EXPECT_TRUE(parse_stl(binary_stl(roof(90)), "a.stl")->colours.empty());
+}
+
+TEST(Stl, RefusesWhatIsNone) {
+  std::string cut = binary_stl(roof(90));
+  cut.pop_back();
+  const auto short_file = parse_stl(cut, "dir/a.stl");
+  ASSERT_FALSE(short_file);
+  EXPECT_EQ(short_file.error().code, "stl.short");
+  EXPECT_EQ(short_file.error().where, "dir/a.stl: byte 80");
+  std::string many = binary_stl(roof(90));
+  many[83] = '\xFF';  // four thousand million triangles
+  EXPECT_EQ(parse_stl(many, "a.stl").error().code, "stl.short");
+  const auto words = parse_stl("solid x\nfacet normal 0 0 1\nvertex 1 2\n", "a.stl");
+  ASSERT_FALSE(words);
+  EXPECT_EQ(words.error().code, "stl.text");
+  EXPECT_EQ(words.error().where, "a.stl:3");
+  EXPECT_EQ(parse_stl("", "a.stl").error().code, "stl.no-faces");
+  std::vector<glm::vec3> bad = roof(90);
+  bad[0].x = NAN;
+  const auto half = parse_stl(binary_stl(bad), "a.stl");
+  ASSERT_TRUE(half);
+  EXPECT_EQ(half->face_count(), 1u);
+  ASSERT_EQ(half->diagnostics.size(), 1u);
+  EXPECT_EQ(half->diagnostics[0].id, "stl.not-finite");
+}
+
+constexpr const char* kQuadHeader =
+    "element vertex 4\n"
+    "property float x\nproperty float y\nproperty double z\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n"
+    "element face 2\n"
+    "property list uchar int vertex_indices\n"
+    "end_header\n";
+
+TEST(Ply, TextAndBothByteOrdersAreTheSame) {
+  const std::string start = "ply\nformat ";
+  const std::string quad = std::string(" 1.0\ncomment Z up\n") + kQuadHeader;
+  const std::string text = start + "ascii" + quad +
+                           "0 0 0.5 255 0 0 255\n1 0 0.5 0 255 0 255\n1 1 0.5 0 0 255 255\n"
+                           "0 1 0.5 51 51 51 255\n4 0 1 2 3\n3 0 2 3\n";
+  std::string files[3] = {text, start + "binary_little_endian" + quad,
+                          start + "binary_big_endian" + quad};
+  const float xy[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  const unsigned char rgb[4][3] = {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {51, 51, 51}};
+  for (int f = 1; f < 3; ++f) {
+    const bool big = f == 2;
+    for (int v = 0; v < 4; ++v) {
+      put(files[f], xy[v][0], big);
+      put(files[f], xy[v][1], big);
+      put(files[f], 0.5, big);
+      for (const unsigned char c : rgb[v]) put(files[f], c);
+      put(files[f], '\xFF');
+    }
+    for (const auto& face : {std::vector<int>{0, 1, 2, 3}, std::vector<int>{0, 2, 3}}) {
+      put(files[f], static_cast<unsigned char>(face.size()));
+      for (const int index : face) put(files[f], index, big);
+    }
+  }
+  for (const std::string& file : files) {
+    const auto model = parse_ply(file, "a.ply");
+    ASSERT_TRUE(model) << to_line(model.error());
+    ASSERT_EQ(model->face_count(), 2u);
+    EXPECT_EQ(model->face_size(0), 4u);
+    EXPECT_EQ(model->face_size(1), 3u);
+    EXPECT_EQ(model->corner_positions[5], 2u);
+    EXPECT_EQ(model->positions[2], glm::dvec3(1, 1, 0.5));
+    EXPECT_EQ(model->colours[1], glm::vec3(0, 1, 0));
+    EXPECT_FLOAT_EQ(model->colours[3].r, 0.2f);
+    EXPECT_EQ(model->up.axis, UpAxis::kZ);
+    EXPECT_EQ(model->up.reason, UpReason::kHeader);
+  }
+}
+
+TEST(Ply, CornersWithUvsOfTheirOwnAndStrips) {
+  const auto corners = parse_ply(
+      "ply\nformat ascii 1.0\ncomment TextureFile stone wall.png\nelement vertex 3\n"
+      "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+      "property list uchar int vertex_index\nproperty list uchar float texcoord\nend_header\n"
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 0 .5\n",
+      "a.ply");
+  ASSERT_TRUE(corners) << to_line(corners.error());
+  ASSERT_EQ(corners->uvs.size(), 3u);
+  EXPECT_EQ(corners->uvs[corners->corner(2).uv], glm::dvec2(0, 0.5));
+  ASSERT_EQ(corners->diagnostics.size(), 1u);
+  EXPECT_EQ(corners->diagnostics[0].id, "ply.missing-texture");
+  const auto strip = parse_ply(
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+      "0 0 0 1 0 0 0 1 0 1 1 0\n8 0 1 2 3 -1 0 1 3\n",
+      "a.ply");
+  ASSERT_TRUE(strip) << to_line(strip.error());
+  ASSERT_EQ(strip->face_count(), 3u);
+  for (std::size_t f = 0; f < 2; ++f) {  // every second one of a strip winds the other way
+    const glm::dvec3 a = strip->positions[strip->corner_positions[3 * f]];
+    const glm::dvec3 b = strip->positions[strip->corner_positions[3 * f + 1]];
+    const glm::dvec3 c = strip->positions[strip->corner_positions[3 * f + 2]];
+    EXPECT_GT(glm::cross(b - a, c - a).z, 0) << f;
+  }
+}
+
+TEST(Ply, RefusesWhatIsNone) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const auto code = [](const std::string& text) {
+    const auto read = parse_ply(text, "a.ply");
+    return read ? std::string() : read.error().code;
+  };
+  EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n3 0 1 2\n"), "");
+  EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n3 0 1"), "ply.short");
+  EXPECT_EQ(code(header + "0 0 0 1 0 zero 0 1 0\n3 0 1 2\n"), "ply.number");
+  EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n3 0 1 3\n"), "ply.no-faces");
+  EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n255 0 1 3\n"), "ply.number");
+  EXPECT_EQ(code("solid"), "ply.header");
+  EXPECT_EQ(code("ply\nformat ascii 1.0\nelement vertex -1\nend_header\n"), "ply.header");
+  EXPECT_EQ(code("ply\nformat ascii 1.0\nproperty float x\nend_header\n"), "ply.header");
+  EXPECT_EQ(
+      code("ply\nformat ascii 1.0\nelement vertex 9999999999\nproperty float x\nend_header\n"),
+      "ply.short");
+  const auto points = parse_ply(
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "a.ply");
+  ASSERT_FALSE(points);
+  EXPECT_EQ(points.error().code, "ply.no-faces");
+}
+
+}  // namespace
+}  // namespace modar
