@@ -10,6 +10,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "bake/bundle/alike_patterns.hpp"
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/request_check.hpp"
@@ -377,6 +378,7 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   if (!baked) return tl::unexpected(baked.error());
   PatternRecord record = baked->record;
   record.name = content.intern(request.name);
+  trace.ranges.push_back(baked->range);
   ExtraSection section;
   section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
   section.owner = static_cast<std::uint32_t>(content.patterns.size());
@@ -466,6 +468,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
   for (const PatternRequest& pattern : named.patterns) {
     MODAR_TRY(add_pattern(pattern, loop, content, report, traced));
   }
+  for (Diagnostic& alike : alike_patterns(content)) report.diagnostics.push_back(std::move(alike));
   named.scenes.clear();
   for (const KnownScene& known : scenes) {
     const PlacedModel model = {known.model, traced.model_sides[known.model],
@@ -475,7 +478,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
     named.scenes.push_back(std::move(resolved));
   }
   MODAR_TRY(light_scenes(named.scenes, named, content, report));
-  content.meta = bundle_meta(named, report);
+  content.meta = bundle_meta(named, report, traced);
   content.summary = content_summary_of(content);
   if (trace != nullptr) *trace = std::move(traced);
   return content;

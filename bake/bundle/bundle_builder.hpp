@@ -91,6 +91,7 @@ struct BakeTrace {
   /// Files that models and image targets name, as paths; those that are missing too. Their own and
   /// pictures that are patterns are not among them.
   std::vector<std::string> files;
+  std::vector<std::optional<ScoreRange>> ranges;   ///< one a pattern
   std::vector<std::array<double, 3>> model_sides;  ///< of each model's box, source units
 };
 

@@ -184,6 +184,33 @@ Json texture_json(const BundleView& bundle, std::uint32_t index) {
           {"repeat", (texture.flags & kTextureRepeat) != 0}};
 }
 
+}  // namespace
+
+Json range_json(const ScoreRange& range, double width_mm) {
+  return {{"nearest_widths", range.nearest},
+          {"farthest_widths", range.farthest},
+          {"tilt_deg", range.tilt_deg},
+          {"around_deg", range.curved ? Json(2 * range.tilt_deg) : Json()},
+          {"half_covered_right_pct", 100 * range.covered_share},
+          {"sentence", range_sentence(range, width_mm)}};
+}
+
+std::optional<ScoreRange> stated_range(const BundleView& bundle, std::uint32_t pattern) {
+  const std::optional<Json> patterns = Json::parse(bundle.meta()).find("patterns");
+  const std::optional<Json> one = patterns ? patterns->at(pattern) : std::nullopt;
+  const Json values = one ? one->find("range").value_or(Json()) : Json();
+  if (values.size() != 5) return std::nullopt;
+  std::array<double, 5> numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const std::optional<double> number = values.at(i)->number();
+    if (!number || !(*number >= 0 && *number < 1e6)) return std::nullopt;
+    numbers[i] = *number;
+  }
+  return ScoreRange{numbers[0], numbers[1], numbers[2], numbers[3], numbers[4] > 0};
+}
+
+namespace {
+
 /// What the pattern is printed on; null: it is flat.
 Json shape_json(const BundleView& bundle, std::uint32_t index) {
   const PatternRecord& pattern = bundle.patterns()[index];
@@ -209,18 +236,21 @@ Json pattern_json(const BundleView& bundle, std::uint32_t index) {
     if (bundle.section(SectionType::kMappedFeatures, index, set.id).empty()) continue;
     keypoints.set(bundle.name(set.name), bundle.features(index, set.id).keypoints.size());
   }
+  const std::optional<ScoreRange> range = stated_range(bundle, index);
   return {{"name", bundle.name(pattern.name)},
           {"width", pattern.width},
           {"height", pattern.height},
           {"width_mm", pattern.width_mm},
           {"score", pattern.score < 0 ? Json() : Json(pattern.score)},
+          {"grade", range ? Json(std::string(1, grade_of(*range))) : Json()},
+          {"range", range ? range_json(*range, pattern.width_mm) : Json()},
           {"shape", shape_json(bundle, index)},
           {"keypoints", keypoints}};
 }
 
 }  // namespace
 
-std::string bundle_meta(const BakeRequest& request, const Report& report) {
+std::string bundle_meta(const BakeRequest& request, const Report& report, const BakeTrace& trace) {
   const auto name = [](const std::string& path) {
     return std::filesystem::path(path).filename().string();
   };
@@ -244,6 +274,12 @@ std::string bundle_meta(const BakeRequest& request, const Report& report) {
     Json stated = {{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}};
     if (!pattern.shape.flat()) stated.set("shape", pattern.shape.text);
     if (pattern.name != file_stem(pattern.path)) stated.set("name", pattern.name);
+    if (patterns.size() < trace.ranges.size() && trace.ranges[patterns.size()]) {
+      const ScoreRange& range = *trace.ranges[patterns.size()];
+      stated.set("range",
+                 Json::list(std::array<double, 5>{range.nearest, range.farthest, range.tilt_deg,
+                                                  range.covered_share, range.curved ? 1.0 : 0.0}));
+    }
     patterns.push_back(std::move(stated));
   }
   Json scenes = Json::array();

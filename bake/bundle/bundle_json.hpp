@@ -16,8 +16,8 @@
 namespace modar {
 
 /// JSON of the kMeta section: tool, options and source file names, without folders or times.
-/// What the report says of the models stands beside each.
-std::string bundle_meta(const BakeRequest& request, const Report& report);
+/// What the report says of the models and the trace of the patterns stands beside each.
+std::string bundle_meta(const BakeRequest& request, const Report& report, const BakeTrace& trace);
 
 /// What the bundle states of a model's topology and of its levels of detail. Nothing where it was
 /// baked without them, or by others.
@@ -26,6 +26,11 @@ std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_
 
 /// Which axis of the model is up, and how that is known. Nothing of bundles that do not state it.
 std::optional<Upright> stated_upright(const BundleView& bundle, std::uint32_t model);
+
+/// Where a pattern is recognised, as the bake measured it. Nothing: it was not scored.
+std::optional<ScoreRange> stated_range(const BundleView& bundle, std::uint32_t pattern);
+/// "range" of the documents.
+Json range_json(const ScoreRange& range, double width_mm);
 
 /// How a scene's model was turned.
 struct StatedPlacement {

@@ -60,7 +60,7 @@ class Linker {
               [](const auto& a, const auto& b) { return a.layout < b.layout; });
     Report quiet;
     MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
-    Json meta = Json::parse(bundle_meta(resolved, {}));
+    Json meta = Json::parse(bundle_meta(resolved, {}, {}));
     meta.set("models", std::move(models_));
     meta.set("patterns", std::move(patterns_));
     content_.meta = meta.dump();

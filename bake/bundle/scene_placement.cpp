@@ -34,7 +34,8 @@ glm::dquat turn_to_z(UpAxis up) {
   return {1, 0, 0, 0};
 }
 
-/// Model axes to pattern axes.
+}  // namespace
+
 glm::dquat rotation_of(UpAxis up, const std::array<double, 3>& turn) {
   glm::dquat rotation = turn_to_z(up);
   for (int axis = 0; axis < 3; ++axis) {
@@ -46,6 +47,8 @@ glm::dquat rotation_of(UpAxis up, const std::array<double, 3>& turn) {
   }
   return rotation;
 }
+
+namespace {
 
 /// Of a model after its rotation, in the unit of [-1,1].
 struct TurnedBox {

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include <glm/gtc/quaternion.hpp>
+
 #include "bake/up_axis.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
@@ -46,6 +48,9 @@ struct SceneRequest {
   SceneOffset offset;
   std::string light;  ///< picture of its room, see read_light(); empty: a neutral room
 };
+
+/// Model axes to pattern axes: `up` to +z, then degrees about the pattern's x, y and z.
+glm::dquat rotation_of(UpAxis up, const std::array<double, 3>& turn);
 
 /// True where a length in millimetres is asked for, which needs the pattern's width.
 bool needs_width(const SceneRequest& request);

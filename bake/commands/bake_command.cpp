@@ -133,9 +133,11 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
       counts += " " + std::string(bundle.name(set.name)) + "=" +
                 std::to_string(bundle.features(p, set.id).keypoints.size());
     }
-    std::fprintf(stderr, "pattern %-16s %u x %u%s%s\n",
+    const auto range = stated_range(bundle, p);
+    const std::string graded = range ? std::string(", grade ") + grade_of(*range) : "";
+    std::fprintf(stderr, "pattern %-16s %u x %u%s%s%s\n",
                  std::string(bundle.name(pattern.name)).c_str(), pattern.width, pattern.height,
-                 counts.empty() ? "" : ", keypoints", counts.c_str());
+                 graded.c_str(), counts.empty() ? "" : ", keypoints", counts.c_str());
   }
   print_scenes(bundle);
   double ms = 0;

@@ -176,18 +176,11 @@ Json score_json(const NamedScore& one) {
   for (const ScoreCause& cause : one.score.causes) {
     causes.push_back({{"id", cause.id}, {"value", cause.value}, {"advice", cause.advice}});
   }
-  const ScoreRange& range = one.score.range;
   return {{"name", one.name},
           {"score", one.score.score},
           {"version", kScoreVersion},
           {"grade", std::string(1, one.score.grade)},
-          {"range",
-           {{"nearest_widths", range.nearest},
-            {"farthest_widths", range.farthest},
-            {"tilt_deg", range.tilt_deg},
-            {"around_deg", range.curved ? Json(2 * range.tilt_deg) : Json()},
-            {"half_covered_right_pct", 100 * range.covered_share},
-            {"sentence", range_sentence(range, one.width_mm)}}},
+          {"range", range_json(one.score.range, one.width_mm)},
           {"causes", causes}};
 }
 
@@ -216,7 +209,7 @@ Result<NamedScore> score_file(const ScoreCommand& command, const std::string& pa
   loop.jobs = command.jobs;
   const PatternSurface surface = surface_of(shaped.section, picture.width, picture.height);
   auto score = bake_tracker_record(picture, loop, surface).and_then([&](const auto& record) {
-    return score_pattern(picture, record, command.jobs, true, shaped.section);
+    return score_pattern(picture, record, command.jobs, shaped.section);
   });
   if (!score) {
     score.error().where = path;
@@ -261,8 +254,8 @@ Result<ExitCode> run_score(ScoreCommand& command) {
 }
 
 void add_score(CommandLine& pattern) {
-  CommandLine& line =
-      pattern.command("score", "0 to 100: how well pictures serve as patterns, and what to do");
+  CommandLine& line = pattern.command(
+      "score", "A to E: from where pictures are recognised as patterns, and what to do");
   const auto command = std::make_shared<ScoreCommand>();
   command->jobs = cores();
   line.option("patterns", &command->patterns, "Pattern pictures, or folders of them",

@@ -292,10 +292,10 @@ Result<ExitCode> run_init(const InitCommand& command) {
     return fail(ExitCode::kUsage, "init.exists", path, "there is a project file already",
                 "edit it, or write a new one with --force");
   }
-  MODAR_ASSIGN(const std::string text, initial_project(command.folder));
-  MODAR_TRY(write_file(path, std::string_view(text)));
-  std::fprintf(stderr, "%s: written; look through it, then `modar bake` in its folder\n",
-               path.c_str());
+  MODAR_ASSIGN(const InitialProject initial, initial_project(command.folder));
+  MODAR_TRY(write_file(path, std::string_view(initial.text)));
+  std::fprintf(stderr, "%s: written; look through it, then `modar bake` in its folder%s\n",
+               path.c_str(), initial.left_out.c_str());
   return ExitCode::kOk;
 }
 

@@ -12,6 +12,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "bake/bundle/bundle_json.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/camera.hpp"
@@ -24,15 +25,17 @@ namespace {
 constexpr std::array<std::uint8_t, 3> kBackdrop = {233, 236, 240};
 constexpr double kDistance = 4.0;  // of the eye from the middle of a model in [-1,1]
 
-/// Turns a model as its first scene does, so that z is up; z is where it stands in none.
-glm::dmat4 upright(const BundleView& bundle, std::uint32_t model) {
+/// Turns a model as its first scene does, so that z is up; one that stands in none as the bundle
+/// states its upright, else as it is.
+glm::dquat upright(const BundleView& bundle, std::uint32_t model) {
   for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
     const SceneRecord& scene = bundle.scenes()[s];
     if (scene.model != model) continue;
     const float* r = scene.rotation;
-    return glm::mat4_cast(glm::dquat(r[3], r[0], r[1], r[2]));
+    return {r[3], r[0], r[1], r[2]};
   }
-  return glm::dmat4(1.0);
+  const auto stated = stated_upright(bundle, model);
+  return rotation_of(stated ? stated->axis : UpAxis::kZ, {});
 }
 
 glm::dmat4 table_view() {
@@ -40,8 +43,8 @@ glm::dmat4 table_view() {
                      glm::dvec3(0, 0, 1));
 }
 
-glm::dmat4 model_view(const BundleView& bundle, std::uint32_t model) {
-  return table_view() * upright(bundle, model);
+glm::dmat4 model_view(const glm::dquat& rotation) {
+  return table_view() * glm::mat4_cast(rotation);
 }
 
 /// Calls body(eye, chunk) for each vertex of the coarsest levels, in eye space.
@@ -69,9 +72,10 @@ double fitting_focal(const std::vector<glm::dvec3>& eyes, double width, double h
   return 0.46 * height / reach;
 }
 
-double model_focal(const BundleView& bundle, std::uint32_t index, double width, double height) {
+double model_focal(const BundleView& bundle, std::uint32_t index, const glm::dquat& rotation,
+                   double width, double height) {
   std::vector<glm::dvec3> eyes;
-  for_coarse_vertices(bundle, bundle.models()[index], model_view(bundle, index),
+  for_coarse_vertices(bundle, bundle.models()[index], model_view(rotation),
                       [&](const glm::dvec3& eye) { eyes.push_back(eye); });
   return fitting_focal(eyes, width, height);
 }
@@ -131,10 +135,14 @@ Result<std::unique_ptr<ModelCamera>> ModelCamera::create(const BundleView& bundl
 }
 
 RgbaImage ModelCamera::model(std::uint32_t index) {
+  return standing(index, upright(state_->bundle, index));
+}
+
+RgbaImage ModelCamera::standing(std::uint32_t index, const glm::dquat& rotation) {
   Camera& camera = state_->camera;
-  camera.fx = camera.fy = model_focal(state_->bundle, index, camera.width, camera.height);
-  return state_->shoot(RgbImage{}, {index, glm::mat4(model_view(state_->bundle, index)), kNone,
-                                    glm::mat4(table_view())});
+  camera.fx = camera.fy = model_focal(state_->bundle, index, rotation, camera.width, camera.height);
+  return state_->shoot(RgbImage{},
+                       {index, glm::mat4(model_view(rotation)), kNone, glm::mat4(table_view())});
 }
 
 RgbaImage ModelCamera::scene(std::uint32_t index) {
@@ -251,9 +259,10 @@ std::string wireframe_svg(const BundleView& bundle, std::uint32_t model_index, s
   std::uint32_t level = 0;
   while (level + 1 < model.level_count && triangles_of(bundle, model, level) > most) ++level;
   std::vector<DrawnTriangle> triangles;
-  const double focal = model_focal(bundle, model_index, 400, 300);
+  const glm::dquat rotation = upright(bundle, model_index);
+  const double focal = model_focal(bundle, model_index, rotation, 400, 300);
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-    add_chunk(bundle, model, c, level, focal, model_view(bundle, model_index), triangles);
+    add_chunk(bundle, model, c, level, focal, model_view(rotation), triangles);
   }
   std::sort(triangles.begin(), triangles.end(),
             [](const DrawnTriangle& a, const DrawnTriangle& b) { return a.depth < b.depth; });

@@ -5,6 +5,8 @@
 #include <memory>
 #include <string>
 
+#include <glm/gtc/quaternion.hpp>
+
 #include "bake/image/image.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/error.hpp"
@@ -22,8 +24,10 @@ class ModelCamera {
                                                      int height);
   ~ModelCamera();
 
-  /// A model alone, turned as in its first scene (z up where it has none).
+  /// A model alone, turned as in its first scene, or as the bundle states that it stands.
   RgbaImage model(std::uint32_t index);
+  /// A model alone, with its axes turned so.
+  RgbaImage standing(std::uint32_t index, const glm::dquat& rotation);
   /// A scene's model on its pattern, seen as somebody at a table sees it.
   RgbaImage scene(std::uint32_t index);
 

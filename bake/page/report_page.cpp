@@ -87,6 +87,21 @@ Result<std::string> data_uri(const RgbaImage& image) {
          to_base64({reinterpret_cast<const std::uint8_t*>(png.data()), png.size()});
 }
 
+/// A quarter of the width and height, by means of 4x4 pixels.
+RgbaImage quartered(const RgbaImage& image) {
+  RgbaImage small{image.width / 4, image.height / 4, {}};
+  for (std::size_t y = 0; y < small.height; ++y) {
+    for (std::size_t x = 0; x < 4 * std::size_t{small.width}; ++x) {
+      unsigned sum = 0;
+      for (std::size_t k = 0; k < 16; ++k) {
+        sum += image.pixels[4 * ((4 * y + k / 4) * image.width + 4 * (x / 4) + k % 4) + x % 4];
+      }
+      small.pixels.push_back(static_cast<std::uint8_t>((sum + 8) / 16));
+    }
+  }
+  return small;
+}
+
 Result<std::string> picture(const RgbaImage& image, const std::string& alt) {
   MODAR_ASSIGN(const std::string uri, data_uri(image));
   return print("<img width=\"%u\" height=\"%u\" loading=\"lazy\" alt=\"", image.width,
@@ -101,8 +116,8 @@ class Page {
 
   Result<std::string> run() {
     check_bundle(bundle_.bytes(), [&](const Issue& issue) { verdict_.add(issue); });
-    const bool many = bundle_.models().size() + bundle_.scenes().size() > kManyModels;
-    auto camera = ModelCamera::create(bundle_, many ? 320 : 640, many ? 240 : 480);
+    many_ = bundle_.models().size() + bundle_.scenes().size() > kManyModels;
+    auto camera = ModelCamera::create(bundle_, many_ ? 320 : 640, many_ ? 240 : 480);
     if (camera) camera_ = std::move(*camera);
     if (!camera) no_pictures_ = camera.error().cause;
     head();
@@ -184,10 +199,30 @@ class Page {
         html_ += image;
       }
       html_ += "<div><h3>" + escape_html(model) + " on " + escape_html(pattern) + "</h3><dl>" +
-               row("Scale", print("%.3g", static_cast<double>(scene.scale))) +
-               "</dl></div></article>\n";
+               row("Stands", scene_words(bundle_, s)) +
+               row("Scale", print("%.3g", static_cast<double>(scene.scale))) + "</dl>";
+      MODAR_TRY(other_turns(s));
+      html_ += "</div></article>\n";
     }
     html_ += "</div>\n</section>\n";
+    return {};
+  }
+
+  /// The other ways in which a scene's model could stand, small: one of them is right where this
+  /// one is wrong.
+  Result<void> other_turns(std::uint32_t index) {
+    const auto placement = stated_placement(bundle_, index);
+    if (camera_ == nullptr || !placement || many_) return {};
+    html_ += "<p class=\"note\">Were another axis up:</p><div class=\"turns\">";
+    for (const UpAxis up : {UpAxis::kY, UpAxis::kZ, UpAxis::kMinusY, UpAxis::kMinusZ, UpAxis::kX}) {
+      if (up == placement->up) continue;
+      const std::string word = "up=" + std::string(up_axis_name(up));
+      const RgbaImage image =
+          camera_->standing(bundle_.scenes()[index].model, rotation_of(up, placement->turn));
+      MODAR_ASSIGN(const std::string shown, picture(quartered(image), "with " + word));
+      html_ += "<figure>" + shown + "<figcaption>" + word + "</figcaption></figure>";
+    }
+    html_ += "</div>";
     return {};
   }
 
@@ -401,12 +436,12 @@ class Page {
     const auto shape = bundle_.section(kPatternShape, index);
     MODAR_ASSIGN(const PatternScore score,
                  score_pattern(view, bundle_.section(SectionType::kTrackerRecord, index),
-                               options_.jobs, true, {shape.begin(), shape.end()}));
+                               options_.jobs, {shape.begin(), shape.end()}));
     const auto stored = static_cast<double>(record.score);
-    html_ += row("Score", print("%.0f of 100", stored)) + row("Grade, A to E", {score.grade}) +
+    html_ += row("Grade, A to E", {score.grade}) + row("Score", print("%.0f of 100", stored)) +
              "</dl>" +
              print(
-                 "<meter min=\"0\" max=\"100\" low=\"30\" high=\"60\" optimum=\"100\" "
+                 "<meter min=\"0\" max=\"100\" low=\"44\" high=\"72\" optimum=\"100\" "
                  "value=\"%.0f\" aria-label=\"Score of ",
                  stored) +
              escape_html(title) + "\"></meter><p class=\"note\">" +
@@ -558,6 +593,7 @@ class Page {
   const ReportOptions& options_;
   const ProgressCallback& progress_;
   Verdict verdict_;
+  bool many_ = false;  ///< models and scenes: pictures are small
   std::unique_ptr<ModelCamera> camera_;
   std::string no_pictures_;
   std::string html_;

@@ -566,20 +566,25 @@ Result<FeatureContent> paper_features(const GrayImage& image,
   return content;
 }
 
+/// "A: recognised from 34 cm to 3.8 m, ...", and what the causes advise.
 Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned jobs,
                        PatternFeatures& out, Report& report) {
-  MODAR_ASSIGN(const PatternScore score,
-               score_pattern(gray, out.loop_record, jobs, false, out.shape));
+  MODAR_ASSIGN(const PatternScore score, score_pattern(gray, out.loop_record, jobs, out.shape));
   out.record.score = static_cast<float>(score.score);
   out.record.score_version = kScoreVersion;
-  const auto worst =
-      std::min_element(score.causes.begin(), score.causes.end(),
-                       [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
-  const bool weak = score.score < kWeakScore;
-  report.diagnostics.push_back(
-      {weak ? "pattern.weak" : "pattern.score",
-       weak ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, path, 0,
-       "the pattern scores " + std::to_string(score.score) + " of 100", weak ? worst->advice : ""});
+  out.range = score.range;
+  std::string advice;
+  for (const ScoreCause& cause : score.causes) {
+    if (*cause.advice == 0) continue;
+    advice += (advice.empty() ? "" : "; ") + std::string(cause.id) + ": " + cause.advice;
+  }
+  const bool weak = score.grade >= kWeakGrade;
+  report.diagnostics.push_back({weak ? "pattern.weak" : "pattern.score",
+                                weak ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo,
+                                path, 0,
+                                std::string("grade ") + score.grade + ", " +
+                                    range_sentence(score.range, out.record.width_mm),
+                                advice});
   return {};
 }
 

@@ -16,6 +16,16 @@
 
 namespace modar {
 
+/// Where the device's tracker was right in rendered views, by a camera 1280 pixels wide whose focal
+/// length is its width.
+struct ScoreRange {
+  double nearest = 0;        ///< pattern widths; 0 with farthest 0: nowhere
+  double farthest = 0;       ///< the same
+  double tilt_deg = 0;       ///< from the front to there; of curved ones about the axis
+  double covered_share = 0;  ///< of views with half of the pattern covered
+  bool curved = false;       ///< on a shape: tilt_deg is to either side of it
+};
+
 struct TrackerRecordOptions {
   /// Descriptors kept, at most. More of them are right in harder views and cost matching time and
   /// 44 bytes each. The study in which this loop was designed: 1,000 features a frame on 3,000
@@ -44,6 +54,7 @@ struct PatternFeatures {
   PatternRecord record{};                ///< without its name
   std::vector<FeatureContent> features;  ///< one for each parameter set, in their order
   std::vector<std::byte> loop_record;    ///< a section of type kTrackerRecord
+  std::optional<ScoreRange> range;       ///< where it is recognised; nothing: it was not scored
   std::vector<std::byte> shape;          ///< a section of type kPatternShape; empty: flat
 };
 

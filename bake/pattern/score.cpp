@@ -33,12 +33,16 @@ constexpr int kSpreadGrid = 6;
 // limit them.
 constexpr double kEasySide = 240;
 
-// Views of each step. More make the score finer and slower; a score of 18 steps took 0.5 to 0.7
-// CPU-s (three patterns, one run each).
+// Views of each step: more make the range finer and slower.
 constexpr int kViewsOfStep = 6;
-// Share of the steps' views that the best patterns reach, which scores 100. Tuned on twelve
-// pictures.
-constexpr double kBest = 0.75;
+// Of sharpness_of(): from where on print is fine, and where it is nothing else. Photos have 0.4 to
+// 1.2, a circuit board 1.2, pages of text with letters of 4 pixels 1.5 and more.
+constexpr double kFine = 1.3;
+constexpr double kFinest = 1.9;
+// range_value() at which a score reaches 63 of 100: the grades' limits are 80, 72, 60 and 44 then.
+constexpr double kScoreScale = 8.7;
+// Least range_value() of the grades A to D. Set by hand on the twelve pictures of the score.
+constexpr double kGradeLimits[] = {14, 11, 8, 5};
 
 /// A feature that the bake could keep.
 struct Describable {
@@ -259,26 +263,25 @@ struct Step {
   Vary vary;
   double side;  ///< frame pixels: root of the area, were it not tilted
   double tilt;
-  bool counts = false;  ///< for the score; the other steps complete the range
+  bool easier = false;  ///< than the first of its kind: tried where that one is not always right
 };
 
 /// Sizes from one that nearly every pattern is recognised at down by 7 % each, then tilts from 65
-/// to 79 degrees: tuned so that good and poor patterns spread over the score. Then what the working
-/// range needs beside them: larger and less tilted views for poor patterns, views that overflow the
-/// frame, half-covered ones, and the mirror image.
+/// to 79 degrees; views that overflow the frame, half-covered ones, the mirror image; and for poor
+/// patterns larger and less tilted views.
 std::vector<Step> test_steps() {
   std::vector<Step> steps;
   for (const double side : {104, 97, 91, 85, 79, 74, 69, 64, 60, 56}) {
-    steps.push_back({Vary::kSize, side, 1.1, true});
+    steps.push_back({Vary::kSize, side, 1.1});
   }
   for (const double tilt : {2.4, 2.7, 3.0, 3.3, 3.7, 4.1, 4.6, 5.2}) {
-    steps.push_back({Vary::kTilt, kEasySide, tilt, true});
+    steps.push_back({Vary::kTilt, kEasySide, tilt});
   }
-  for (const double side : {120, 140, 170, 200}) steps.push_back({Vary::kSize, side, 1.1});
-  for (const double tilt : {2.0, 1.7, 1.4}) steps.push_back({Vary::kTilt, kEasySide, tilt});
   for (const double side : {400, 560, 800}) steps.push_back({Vary::kClose, side, 1.1});
   for (const double tilt : {1.05, 1.15, 1.25, 1.4}) steps.push_back({Vary::kCover, 200, tilt});
   steps.push_back({Vary::kMirror, kEasySide, 1.1});
+  for (const double side : {120, 140, 170, 200}) steps.push_back({Vary::kSize, side, 1.1, true});
+  for (const double tilt : {2.0, 1.7, 1.4}) steps.push_back({Vary::kTilt, kEasySide, tilt, true});
   return steps;
 }
 
@@ -418,28 +421,74 @@ struct StepShares {
   std::vector<double> shares;
 };
 
+/// The steps of a picture, in two rounds: the easier ones are right wherever the first of their
+/// kind always was.
+class StepTrial {
+ public:
+  StepTrial(const std::vector<ViewLevel>& levels, const PatternSurface& surface,
+            const BundleView& bundle, unsigned jobs)
+      : levels_(levels),
+        turned_over_(mirrored(levels[0])),
+        mirror_levels_(view_levels(turned_over_.view())),
+        surface_(surface),
+        bundle_(bundle),
+        jobs_(jobs),
+        shares_{test_steps(), {}} {
+    shares_.shares.assign(shares_.steps.size(), 1.0);
+  }
+
+  Result<StepShares> run() {
+    std::vector<std::uint32_t> round;
+    for (std::uint32_t i = 0; i < shares_.steps.size(); ++i) {
+      if (!shares_.steps[i].easier) round.push_back(i);
+    }
+    MODAR_TRY(try_steps(round));
+    round.clear();
+    for (std::uint32_t i = 0; i < shares_.steps.size(); ++i) {
+      if (shares_.steps[i].easier && first_share(shares_.steps[i].vary) < 1) round.push_back(i);
+    }
+    MODAR_TRY(try_steps(round));
+    return std::move(shares_);
+  }
+
+ private:
+  [[nodiscard]] double first_share(Vary vary) const {
+    std::size_t i = 0;
+    while (shares_.steps[i].vary != vary) ++i;
+    return shares_.shares[i];
+  }
+
+  Result<void> try_steps(const std::vector<std::uint32_t>& round) {
+    std::vector<Result<int>> right(round.size(), 0);
+    parallel_rows(static_cast<std::uint32_t>(round.size()), jobs_, [&](std::uint32_t k) {
+      const Step& step = shares_.steps[round[k]];
+      right[k] = count_right(step.vary == Vary::kMirror ? mirror_levels_ : levels_, surface_,
+                             bundle_, step, 1000 * std::uint64_t{round[k]});
+    });
+    for (std::size_t k = 0; k < round.size(); ++k) {
+      MODAR_ASSIGN(const int count, right[k]);
+      shares_.shares[round[k]] = 1.0 * count / kViewsOfStep;
+    }
+    return {};
+  }
+
+  const std::vector<ViewLevel>& levels_;
+  GrayPicture turned_over_;
+  std::vector<ViewLevel> mirror_levels_;
+  const PatternSurface& surface_;
+  const BundleView& bundle_;
+  unsigned jobs_;
+  StepShares shares_;
+};
+
 Result<StepShares> run_steps(const std::vector<ViewLevel>& levels,
-                             std::span<const std::byte> record, unsigned jobs, bool with_range,
+                             std::span<const std::byte> record, unsigned jobs,
                              const std::vector<std::byte>& shape) {
   MODAR_ASSIGN(const auto bytes,
                bundle_of_record(levels[0].view(), {record.begin(), record.end()}, shape));
   const PatternSurface surface = surface_of(shape, levels[0].width, levels[0].height);
   MODAR_ASSIGN(const auto bundle, BundleView::open(bytes));
-  const GrayPicture turned_over = mirrored(levels[0]);
-  const std::vector<ViewLevel> mirror_levels = view_levels(turned_over.view());
-  StepShares out{test_steps(), {}};
-  if (!with_range) std::erase_if(out.steps, [](const Step& step) { return !step.counts; });
-  std::vector<Result<int>> right(out.steps.size(), 0);
-  parallel_rows(static_cast<std::uint32_t>(right.size()), jobs, [&](std::uint32_t i) {
-    const bool mirror = out.steps[i].vary == Vary::kMirror;
-    right[i] = count_right(mirror ? mirror_levels : levels, surface, bundle, out.steps[i],
-                           1000 * std::uint64_t{i});
-  });
-  for (const auto& one : right) {
-    MODAR_ASSIGN(const int count, one);
-    out.shares.push_back(1.0 * count / kViewsOfStep);
-  }
-  return out;
+  return StepTrial(levels, surface, bundle, jobs).run();
 }
 
 /// Mean share of the steps that vary the same.
@@ -530,7 +579,7 @@ ScoreCause cause(const char* id, int value, const char* advice) {
 }
 
 /// The advice of the worst cause, where none is bad.
-void advise(const char* const (&advices)[8], PatternScore& score) {
+void advise(const char* const (&advices)[9], PatternScore& score) {
   const bool advised = std::any_of(score.causes.begin(), score.causes.end(),
                                    [](const ScoreCause& one) { return *one.advice != 0; });
   if (advised) return;
@@ -561,29 +610,22 @@ void darken_empty_cells(cv::Mat& picture, const std::vector<ScorePlace>& places)
 }  // namespace
 
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
-                                   unsigned jobs, bool with_range,
-                                   const std::vector<std::byte>& shape) {
+                                   unsigned jobs, const std::vector<std::byte>& shape) {
   const std::vector<ViewLevel> levels = view_levels(pattern);
-  MODAR_ASSIGN(const StepShares steps, run_steps(levels, record, jobs, with_range, shape));
+  MODAR_ASSIGN(const StepShares steps, run_steps(levels, record, jobs, shape));
   FeatureTrial trial = try_features(levels, jobs);
   PatternScore out;
-  double share = 0;
-  int counted = 0;
-  for (std::size_t i = 0; i < steps.steps.size(); ++i) {
-    share += steps.steps[i].counts ? steps.shares[i] : 0;
-    counted += steps.steps[i].counts ? 1 : 0;
-  }
-  out.score = share_of(share / counted, kBest);
   const PatternSurface surface = surface_of(shape, pattern.width, pattern.height);
-  if (with_range) out.range = range_of_steps(steps, pattern.width / own_side(pattern, surface));
+  out.range = range_of_steps(steps, pattern.width / own_side(pattern, surface));
   out.range.curved = !shape.empty();
   out.grade = grade_of(out.range);
+  out.score = score_of(out.range);
   out.views = trial.views;
   out.places = std::move(trial.places);
   const double side = std::sqrt(1.0 * pattern.width * pattern.height);
   const double aspect =
       1.0 * std::min(pattern.width, pattern.height) / std::max(pattern.width, pattern.height);
-  const char* const advices[8] = {
+  const char* const advices[9] = {
       "choose or add detail with corners: print, ornaments, photos of rough things",
       "crop away empty margins, or put detail into the empty parts",
       "photograph it in even, brighter light, or print it with more contrast",
@@ -591,21 +633,23 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
       "crop it closer to a square: long strips hold a pose badly",
       "give a larger picture: 300 pixels or more on each side",
       "take a sharper picture: hold still, focus, do not enlarge a small one",
-      "make the two sides differ: its mirror image is taken for it"};
+      "make the two sides differ: its mirror image is taken for it",
+      "choose larger print: lines this fine blur into gray from arm's length on"};
   // Each cause's scale runs to what good patterns have: set by hand on twelve pictures and on those
   // with one known fault that the tests make.
-  const int values[8] = {share_of(trial.held, 60),
+  const int values[9] = {share_of(trial.held, 60),
                          share_of(spread_of(levels[0], out.places), 1.0),
                          share_of(contrast_of(levels[0]), 30),
                          share_of(trial.held / std::max(1.0, trial.held + trial.ambiguous), 0.5),
                          share_of(aspect, 0.6),
                          share_of(side, 300),
                          share_of(sharpness_of(levels) - 0.15, 0.35),
-                         mean_share(steps, Vary::kMirror) > 0 ? 0 : 100};
-  constexpr const char* kIds[8] = {"texture", "spread", "contrast", "repetition",
-                                   "aspect",  "size",   "blur",     "mirror"};
-  for (std::size_t i = 0; i < 8; ++i) out.causes.push_back(cause(kIds[i], values[i], advices[i]));
-  if (with_range ? out.grade != 'A' : out.score < kWeakScore) advise(advices, out);
+                         mean_share(steps, Vary::kMirror) > 0 ? 0 : 100,
+                         share_of(kFinest - sharpness_of(levels), kFinest - kFine)};
+  constexpr const char* kIds[9] = {"texture", "spread", "contrast", "repetition", "aspect",
+                                   "size",    "blur",   "mirror",   "fine"};
+  for (std::size_t i = 0; i < 9; ++i) out.causes.push_back(cause(kIds[i], values[i], advices[i]));
+  if (out.grade != 'A') advise(advices, out);
   return out;
 }
 
@@ -614,12 +658,26 @@ double range_value(const ScoreRange& range) {
   return range.farthest * range.tilt_deg / 70 * (0.5 + 0.5 * range.covered_share);
 }
 
+namespace {
+
+int score_of_value(double value) {
+  return static_cast<int>(std::lround(100 * (1 - std::exp(-value / kScoreScale))));
+}
+
+}  // namespace
+
+int score_of(const ScoreRange& range) {
+  return score_of_value(range_value(range));
+}
+
+int least_score(char grade) {
+  return grade >= 'E' ? 0 : score_of_value(kGradeLimits[grade - 'A']);
+}
+
 char grade_of(const ScoreRange& range) {
   const double value = range_value(range);
-  // The limits are set by hand on the twelve pictures of the score.
-  constexpr double kLimits[] = {14, 11, 8, 5};
   char grade = 'A';
-  for (const double limit : kLimits) {
+  for (const double limit : kGradeLimits) {
     if (value >= limit) return grade;
     ++grade;
   }

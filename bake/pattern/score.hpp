@@ -8,32 +8,22 @@
 #include <vector>
 
 #include "bake/image/image.hpp"
+#include "bake/pattern/record.hpp"
 #include "formats/error.hpp"
 #include "modar/image.hpp"
 
 namespace modar {
 
 /// Version of the score's rules; scores of different versions cannot be compared.
-inline constexpr std::uint32_t kScoreVersion = 1;
-/// Scores below this cause a warning: such patterns are recognised from close by only. Set by hand
-/// on the twelve pictures that the score was tuned on.
-inline constexpr int kWeakScore = 30;
+inline constexpr std::uint32_t kScoreVersion = 2;
+/// Patterns of this grade cause a warning: they are recognised from close by only.
+inline constexpr char kWeakGrade = 'E';
 
 struct ScoreCause {
-  /// "texture", "spread", "contrast", "repetition", "aspect", "size", "blur", "mirror"
+  /// "texture", "spread", "contrast", "repetition", "aspect", "size", "blur", "mirror", "fine"
   const char* id;
   int value = 0;       ///< 0 to 100, the best
   const char* advice;  ///< what a person can do; empty where the value is good
-};
-
-/// Where the device's tracker was right in rendered views, by a camera 1280 pixels wide whose focal
-/// length is its width.
-struct ScoreRange {
-  double nearest = 0;        ///< pattern widths; 0 with farthest 0: nowhere
-  double farthest = 0;       ///< the same
-  double tilt_deg = 0;       ///< from the front to there; of curved ones about the axis
-  double covered_share = 0;  ///< of views with half of the pattern covered
-  bool curved = false;       ///< on a shape: tilt_deg is to either side of it
 };
 
 /// A corner of the picture, and in how many of the test views it was matched unambiguously.
@@ -44,7 +34,7 @@ struct ScorePlace {
 };
 
 struct PatternScore {
-  int score = 0;  ///< 0 to 100
+  int score = 0;  ///< 0 to 100, see score_of()
   ScoreRange range;
   char grade = 'E';  ///< 'A' to 'E', see grade_of()
   std::vector<ScoreCause> causes;
@@ -53,19 +43,21 @@ struct PatternScore {
 };
 
 /// Renders the picture, flat, smaller and smaller and more and more tilted, in fixed views, and
-/// runs the device's tracker on them: the score is the share of these views in which it is right.
-/// The causes come from the picture and from the features that are matched again. A count of
-/// decisions, which depends neither on the machine nor on the number of threads. record: the
-/// picture's tracker record. shape: its kPatternShape section, empty: flat; views of others go
-/// around the shape. with_range: false spares the views that only the range, its grade and
-/// the cause "mirror" need, as a bake does. Errors: those of the tracker.
+/// runs the device's tracker on them: the range is where it is right, and the grade and the score
+/// follow from the range alone. The causes come from the picture and from the features that are
+/// matched again. A count of decisions, which depends neither on the machine nor on the number of
+/// threads. record: the picture's tracker record. shape: its kPatternShape section, empty: flat;
+/// views of others go around the shape. Errors: those of the tracker.
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
-                                   unsigned jobs, bool with_range = true,
-                                   const std::vector<std::byte>& shape = {});
+                                   unsigned jobs, const std::vector<std::byte>& shape = {});
 
 /// What the grade follows from: farthest distance, tilt (over 70 degrees) and half-covered views
 /// (at half weight) as factors.
 double range_value(const ScoreRange& range);
+/// 0 to 100, rising with range_value(): A from 80 on, B from 72, C from 60, D from 44.
+int score_of(const ScoreRange& range);
+/// The least score of a grade.
+int least_score(char grade);
 /// 'A' (the best) to 'E', from range_value() alone.
 char grade_of(const ScoreRange& range);
 

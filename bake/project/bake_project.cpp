@@ -13,6 +13,7 @@
 #include <optional>
 #include <set>
 
+#include "bake/bundle/alike_patterns.hpp"
 #include "bake/bundle/link_bundles.hpp"
 #include "bake/json.hpp"
 #include "bake/parallel.hpp"
@@ -259,7 +260,8 @@ class ProjectBake {
   [[nodiscard]] std::string gates_text() const {
     const ProjectGates& gates = project_.gates;
     return std::to_string(gates.min_psnr_db) + " " + std::to_string(gates.min_ssim) + " " +
-           std::to_string(gates.min_score) + " " + std::to_string(gates.max_bytes) + "\n";
+           std::to_string(gates.min_score) + gates.min_grade + " " +
+           std::to_string(gates.max_bytes) + "\n";
   }
 
   [[nodiscard]] std::string scene_text(const ProjectScene& scene) const {
@@ -465,6 +467,7 @@ class ProjectBake {
     add_texts(target, content);
     MODAR_TRY(hold_gates(target, content));
     note_budget(target, described, content);
+    for (Diagnostic& alike : alike_patterns(content)) notes_.push_back(std::move(alike));
     return write(target, content);
   }
 
@@ -504,6 +507,13 @@ class ProjectBake {
       const double score = static_cast<double>(pattern.score);
       if (gates.min_score > 0 && score < gates.min_score)
         return failed(pattern.name, "score", score, gates.min_score);
+      if (gates.min_grade != 0 && score < least_score(gates.min_grade)) {
+        return fail(ExitCode::kInvalidInput, "project.gate", target.path,
+                    content.names.substr(pattern.name.offset, pattern.name.length) +
+                        ": its grade is below " + gates.min_grade + ", which [gates] asks for",
+                    "take a better picture (`modar pattern score` says what is wrong with it), or "
+                    "lower the gate; the bundle is not written");
+      }
     }
     return {};
   }

@@ -4,8 +4,12 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 
+#include "bake/import/read_model.hpp"
+#include "bake/mesh/upright.hpp"
+#include "bake/mesh/weld/weld.hpp"
 #include "bake/process.hpp"
 #include "bake/project/project.hpp"
 
@@ -24,6 +28,8 @@ bool one_of(const std::string& extension, std::initializer_list<const char*> lis
 }
 
 struct Found {
+  std::string folder;
+  std::vector<fs::path> left_out;  ///< what looks like a model or a picture and is not read
   std::vector<fs::path> models;    ///< relative to the folder, in byte order
   std::vector<fs::path> pictures;  ///< the same
   std::string material_text;       ///< of all MTL and glTF files, in lower case
@@ -41,6 +47,7 @@ std::string text_of(const fs::path& path) {
 
 Result<Found> look_through(const std::string& folder) {
   Found found;
+  found.folder = folder;
   std::error_code error;
   fs::recursive_directory_iterator it(folder, error);
   if (error) {
@@ -56,7 +63,12 @@ Result<Found> look_through(const std::string& folder) {
     if (!it->is_regular_file(error)) continue;
     const fs::path relative = it->path().lexically_relative(folder);
     const std::string extension = lower(relative.extension().string());
-    if (one_of(extension, {".obj", ".gltf", ".glb"})) found.models.push_back(relative);
+    if (is_model_file(relative.string())) found.models.push_back(relative);
+    if (one_of(extension, {".fbx",  ".dae",  ".blend", ".3ds", ".usdz", ".usd", ".max", ".c4d",
+                           ".ma",   ".mb",   ".skp",   ".stp", ".step", ".las", ".e57", ".gif",
+                           ".heic", ".avif", ".bmp",   ".psd", ".svg",  ".pdf"})) {
+      found.left_out.push_back(relative);
+    }
     if (one_of(extension, {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"})) {
       found.pictures.push_back(relative);
     }
@@ -64,11 +76,26 @@ Result<Found> look_through(const std::string& folder) {
   }
   std::sort(found.models.begin(), found.models.end());
   std::sort(found.pictures.begin(), found.pictures.end());
+  std::sort(found.left_out.begin(), found.left_out.end());
   // What a material names is a texture.
   std::erase_if(found.pictures, [&](const fs::path& picture) {
     return found.material_text.find(lower(picture.filename().string())) != std::string::npos;
   });
   return found;
+}
+
+/// "; left out: a.fbx, b.pdf", or nothing.
+std::string left_out_words(const Found& found) {
+  constexpr std::size_t kMostNames = 6;
+  std::string words;
+  for (std::size_t i = 0; i < std::min(kMostNames, found.left_out.size()); ++i) {
+    words += (i == 0 ? "; left out, since such files are not read: " : ", ") +
+             found.left_out[i].string();
+  }
+  if (found.left_out.size() > kMostNames) {
+    words += " and " + std::to_string(found.left_out.size() - kMostNames) + " more";
+  }
+  return words;
 }
 
 /// A TOML text in quotes, of a file name that a glob matches as it is.
@@ -126,8 +153,42 @@ std::string tables(const std::string& kind, const std::vector<fs::path>& files,
   return text;
 }
 
+constexpr const char* kSceneHints =
+    "#turn = 90       # degrees about the axis out of the pattern\n"
+    "#scale = 0.8     # of the pattern's largest side, or height = \"120mm\" where its width is "
+    "known\n"
+    "#text.en = \"A vase.\"\n";
+
+/// How a model would stand: "y", and how that is known. Large files are not read for it.
+std::optional<Upright> upright_of(const fs::path& path) {
+  constexpr std::uintmax_t kMostBytes = 100'000'000;  // a second of reading
+  std::error_code error;
+  if (fs::file_size(path, error) > kMostBytes || error) return std::nullopt;
+  auto source = read_model(path.string(), 1);
+  if (!source) return std::nullopt;
+  if (source->up.reason != UpReason::kConvention) return source->up;
+  Report report;
+  const auto mesh = weld(std::move(*source), report);
+  return mesh ? std::optional(find_up(*mesh)) : std::nullopt;
+}
+
+/// "up = "y"   # the glTF standard", so that one sees what to change.
+std::string up_line(const Found& found, const std::string& model) {
+  const auto file =
+      std::find_if(found.models.begin(), found.models.end(), [&](const fs::path& one) {
+        std::string name = one.string();
+        std::replace(name.begin(), name.end(), '/', '-');
+        return one.stem() == model || name == model;
+      });
+  const auto up =
+      file == found.models.end() ? std::nullopt : upright_of(fs::path(found.folder) / *file);
+  if (!up) return "#up = \"y\"\n";
+  return "up = \"" + std::string(up_axis_name(up->axis)) +
+         "\"        # axis that points up: " + std::string(up_reason_words(up->reason)) + "\n";
+}
+
 /// Pairs in order, where names do not say what belongs together.
-std::string scenes(const std::vector<std::string>& models,
+std::string scenes(const Found& found, const std::vector<std::string>& models,
                    const std::vector<std::string>& patterns) {
   if (models.empty() || patterns.empty()) return "";
   const bool by_name = std::any_of(models.begin(), models.end(), [&](const std::string& name) {
@@ -139,27 +200,25 @@ std::string scenes(const std::vector<std::string>& models,
       "# own name, and a single one on a single one.\n";
   if (by_name || (models.size() == 1 && patterns.size() == 1)) {
     return text + "#[[scene]]\n#pattern = " + quoted(patterns[0], false) +
-           "\n#model = " + quoted(models[0], false) + "\n#up = \"y\"\n#scale = 0.8\n\n";
+           "\n#model = " + quoted(models[0], false) + "\n#" + up_line(found, models[0]) +
+           kSceneHints + "\n";
   }
   for (std::size_t i = 0; i < std::min(models.size(), patterns.size()); ++i) {
     text += "[[scene]]\npattern = " + quoted(patterns[i], false) +
-            "\nmodel = " + quoted(models[i], false) + "\n" +
-            (i == 0 ? "#up = \"y\"      # the axis of the model that points out of the pattern\n"
-                      "#scale = 0.8   # of the pattern's largest side\n"
-                      "#text.en = \"A vase.\"\n"
-                    : "") +
-            "\n";
+            "\nmodel = " + quoted(models[i], false) + "\n" + up_line(found, models[i]) +
+            (i == 0 ? kSceneHints : "") + "\n";
   }
   return text;
 }
 
 }  // namespace
 
-Result<std::string> initial_project(const std::string& folder) {
+Result<InitialProject> initial_project(const std::string& folder) {
   MODAR_ASSIGN(const Found found, look_through(folder));
   if (found.models.empty() && found.pictures.empty()) {
     return fail(ExitCode::kInvalidInput, "project.nothing", folder,
-                "there is neither a model (OBJ, glTF, GLB) nor a picture in it",
+                "there is neither a model (OBJ, glTF, GLB, PLY, STL) nor a picture in it" +
+                    left_out_words(found),
                 "put some there, or name another folder");
   }
   std::error_code error;
@@ -183,23 +242,24 @@ Result<std::string> initial_project(const std::string& folder) {
       "#device = \"ace2\"          # plan textures for a device\n"
       "#effort = \"best\"          # of textures: fast, good, best\n"
       "#unit = \"mm\"              # of the models' coordinates\n"
-      "#max-error = \"0.01%\"      # of positions\n\n"
+      "#max-error = \"0.01%\"      # of positions\n"
+      "#up = \"z\"                 # axis of all models that points up; else as each file says\n\n"
       "#[[tier]]                 # the same bundles once more, for other devices\n"
       "#name = \"low\"\n"
       "#device = \"mali400\"\n"
       "#max-texture = 512\n\n"
       "#[gates]                  # a bundle that does not reach them is not written\n"
       "#min-psnr = 30\n"
-      "#min-score = 40\n\n";
+      "#min-grade = \"C\"\n\n";
   std::vector<std::string> models;
   std::vector<std::string> patterns;
   text += tables("model", found.models, "", models);
   text +=
       tables("pattern", found.pictures,
              "\n#width-mm = 210          # as printed, where the file does not state it", patterns);
-  text += scenes(models, patterns);
+  text += scenes(found, models, patterns);
   while (text.ends_with("\n\n")) text.pop_back();
-  return text;
+  return InitialProject{text, left_out_words(found)};
 }
 
 }  // namespace modar

@@ -53,6 +53,7 @@ struct ProjectGates {
   double min_psnr_db = 0;       ///< of each texture
   double min_ssim = 0;          ///< the same
   double min_score = 0;         ///< of each pattern, 0 to 100
+  char min_grade = 0;           ///< of each pattern, 'A' to 'E'; 0: any
   std::uint64_t max_bytes = 0;  ///< of the file; 0: any
 };
 
@@ -81,10 +82,15 @@ struct Project {
 /// glob that matches nothing), "project.same-name", "project.scene-unknown".
 Result<Project> read_project(const std::string& path);
 
+struct InitialProject {
+  std::string text;
+  std::string left_out;  ///< "; left out, ...: a.fbx", for a message; empty: nothing
+};
+
 /// The text of a project file, with comments, for the models and pictures in a folder and below it
 /// (hidden ones and `out` left out). A picture that a model uses as a texture is no pattern.
 /// Errors: kIo "io.folder"; kInvalidInput "project.nothing" where there are none.
-Result<std::string> initial_project(const std::string& folder);
+Result<InitialProject> initial_project(const std::string& folder);
 
 struct ProjectOptions {
   std::string cache;            ///< folder; empty: the project's

@@ -459,10 +459,18 @@ class ProjectReader {
   Result<void> read_gates() {
     MODAR_ASSIGN(const auto reader, table(project_.file, root_, "gates"));
     if (!reader) return {};
-    MODAR_TRY(reader->allow({"min-psnr", "min-ssim", "min-score", "max-bytes"}));
+    MODAR_TRY(reader->allow({"min-psnr", "min-ssim", "min-score", "min-grade", "max-bytes"}));
     MODAR_TRY(reader->take("min-psnr", project_.gates.min_psnr_db, 0));
     MODAR_TRY(reader->take("min-ssim", project_.gates.min_ssim, 0));
     MODAR_TRY(reader->take("min-score", project_.gates.min_score, 0));
+    std::string grade;
+    MODAR_TRY(reader->take("min-grade", grade));
+    if (!grade.empty()) {
+      if (grade.size() != 1 || grade[0] < 'A' || grade[0] > 'E') {
+        return reader->wrong("min-grade", "\"A\" (the best) to \"E\"");
+      }
+      project_.gates.min_grade = grade[0];
+    }
     double bytes = 0;
     MODAR_TRY(reader->take("max-bytes", bytes, 0));
     project_.gates.max_bytes = static_cast<std::uint64_t>(bytes);

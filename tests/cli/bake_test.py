@@ -110,6 +110,15 @@ class Bake(ProgramTest):
         self.assertGreater(report["peak_rss_bytes"], 1e6)
         self.assertTrue(all({"name", "ms", "in", "out", "max_error"} <= set(s) for s in report["stages"]))
 
+    def test_patterns_that_nobody_can_tell_apart_are_named(self):
+        picture(self.folder / "a.png")
+        picture(self.folder / "b.png", mirrored=True)
+        report = self.modar_json("bake", "--pattern", "a.png", "b.png", "again=a.png", "-o", "out.modar", *QUICK)
+        told = [(one["file"], one["id"]) for one in report["findings"] if one["id"] in ("pattern.same", "pattern.mirrored")]
+        self.assertEqual(told, [("b", "pattern.mirrored"), ("again", "pattern.same"), ("again", "pattern.mirrored")])
+        self.assertIn("take either for the other", self.modar("bake", "--pattern", "a.png", "again=a.png", "-o", "out.modar",
+                                                              *QUICK).stderr)
+
     def test_a_scene_is_as_high_as_was_asked(self):
         picture(self.folder / "cover.png")
         report = self.modar_json("bake", "--model", STATUE, "--pattern", "cover.png:200mm", "--scene",

@@ -29,7 +29,7 @@ class Document(ProgramTest):
             page = (self.share / f"man/man1/modar-{name}.1").read_text().replace("\\-", "-")
             for option in re.findall(r"^  .*?(--[a-z-]+)", self.modar(name, "--help").stdout, re.MULTILINE):
                 self.assertIn(option, page)
-        self.assertIn("0 to 100", (self.share / "man/man1/modar-pattern-score.1").read_text())
+        self.assertIn("A to E", (self.share / "man/man1/modar-pattern-score.1").read_text())
 
     def test_pages_are_clean_roff(self):
         if shutil.which("groff") is None:

@@ -23,7 +23,7 @@ distortion_coefficients: !!opencv-matrix
    data: [ -0.1, 0., 0., 0., 0. ]
 """
 GAME = ROOT / "assets" / "patterns" / "game.png"
-CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur", "mirror"]
+CAUSES = ["texture", "spread", "contrast", "repetition", "aspect", "size", "blur", "mirror", "fine"]
 
 
 class Pattern(ProgramTest):
@@ -41,17 +41,20 @@ class Pattern(ProgramTest):
         shutil.copy(self.part, project)
         (project / "notes.txt").write_text("no picture")
         one, = self.modar_json("pattern", "score", project, "--overlay", "overlays", "--jobs", "2")
-        self.assertEqual((one["name"], one["version"]), ("part", 1))
+        self.assertEqual((one["name"], one["version"]), ("part", 2))
         self.assertTrue(0 <= one["score"] <= 100)
         self.assertEqual([cause["id"] for cause in one["causes"]], CAUSES)
         self.assertIn(one["grade"], "ABCDE")
         self.assertLess(one["range"]["nearest_widths"], one["range"]["farthest_widths"])
         self.assertIn("times its width, to", one["range"]["sentence"])
         self.assertTrue((self.folder / "overlays/part.png").read_bytes().startswith(b"\x89PNG"))
-        baked = self.modar("bake", "--pattern", self.part, "-o", "b.modar", "--jobs", "1", "--quiet",
+        baked = self.modar("bake", "--pattern", f"{self.part}:20cm", "-o", "b.modar", "--jobs", "1", "--quiet",
                            "--parameters", "none")
         self.assertEqual(baked.returncode, 0, baked.stderr)
-        self.assertEqual(self.modar_json("inspect", "b.modar")["patterns"][0]["score"], one["score"])
+        stored = self.modar_json("inspect", "b.modar")["patterns"][0]
+        self.assertEqual((stored["score"], stored["grade"]), (one["score"], one["grade"]))
+        self.assertEqual(stored["range"]["tilt_deg"], one["range"]["tilt_deg"])
+        self.assertIn(" cm to ", stored["range"]["sentence"])
 
     def test_simulate_tells_bands_and_a_range(self):
         (self.folder / "camera.yml").write_text(CAMERA)

@@ -35,14 +35,16 @@ TURNED = {(15, 95): 4.4, (25, 35): 0.3, (105, 150): 4.5, (605, 655): 2.5, (5, 50
           (605, 711): None}
 
 
-def picture(path, width=200, height=150):
-    """A PNG of gray rectangles, small enough to be a pattern in no time."""
+def picture(path, width=200, height=150, mirrored=False):
+    """A PNG of gray rectangles, small enough to be a pattern in no time; or its mirror image."""
     random = Random(7)
     rows = [bytearray([128] * width) for _ in range(height)]
     for _ in range(150):
         x, y, shade = random.randrange(width), random.randrange(height), random.randrange(256)
         for row in rows[y:y + random.randrange(4, 20)]:
             row[x:x + 16] = bytes([shade] * len(row[x:x + 16]))
+    if mirrored:
+        rows = [row[::-1] for row in rows]
     chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
               (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b"")]
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(

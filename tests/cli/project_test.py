@@ -121,7 +121,7 @@ class Files(ProjectTest):
         words = (self.place / "out/museum-low.modar").read_bytes()
         self.assertIn("Ein Haus.".encode(), words)
         self.assertEqual(self.modar("check", self.place / "out/museum-low.modar").returncode, 0)
-        for gate, value in (("min-psnr", 98), ("max-bytes", 1000)):
+        for gate, value in (("min-psnr", 98), ("max-bytes", 1000), ("min-grade", '"A"')):
             shutil.rmtree(self.place / "out", ignore_errors=True)
             self.write(text + f"[gates]\n{gate} = {value}\n")
             self.assert_fails(self.modar("bake", cwd=self.place), 3, "project.gate")
