@@ -244,6 +244,10 @@ jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t 
     throw_error(env, error);
     return 0;
   }
+  {
+    const std::lock_guard drawing(session.drawing);
+    modar_tracker_camera(session.tracker, &session.camera);
+  }
   jint visible = 0;
   const std::uint32_t patterns = modar_pattern_count(session.bundle);
   for (std::uint32_t i = 0; i < patterns; ++i, poses += kPoseFloats) {
@@ -415,6 +419,7 @@ MODAR_NATIVE(void, setCamera)
   options.size = sizeof options;
   options.async_search = search_apart ? 1 : 0;
   options.extended = extended ? 1 : 0;
+  options.estimate_camera = path.empty() ? 1 : 0;
   modar_tracker* tracker = modar_tracker_create_with(session->bundle, &camera, &options, &error);
   if (tracker == nullptr) return throw_error(env, error);
   modar_tracker_destroy(std::exchange(session->tracker, tracker));

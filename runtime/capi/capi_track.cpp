@@ -2,7 +2,6 @@
 #include <memory>
 #include <vector>
 
-#include "modar/focal_finder.hpp"
 #include "modar/pose_loop.hpp"
 #include "modar/pose_smoother.hpp"
 #include "runtime/capi/handles.hpp"
@@ -33,7 +32,7 @@ void set_pose(const modar::Pose& from, modar_pose& to) {
 
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     modar_error* error) {
-  const modar_tracker_options options = {sizeof options, 0, 0, 0.0, 0, 0};
+  const modar_tracker_options options = {sizeof options, 0, 0, 0.0, 0, 0, 0};
   return modar_tracker_create_with(bundle, camera, &options, error);
 }
 
@@ -55,6 +54,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
   if (asked.search_every > 0) how.search_every = asked.search_every;
   how.budget = asked.budget;
   how.extended = asked.extended != 0;
+  how.estimate_camera = asked.estimate_camera != 0;
   auto loop = modar::PoseLoop::create(bundle->view, ours, how);
   if (!loop) {
     modar::hand_over(loop.error(), error);
@@ -143,6 +143,16 @@ int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pos
   return pose->visible;
 }
 
+double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera) {
+  const modar::Camera& ours = tracker->camera;
+  *camera = {ours.width, ours.height, ours.fx, ours.fy, ours.cx, ours.cy, {}};
+  std::copy(ours.distortion.begin(), ours.distortion.end(), camera->distortion);
+  const modar::CameraEstimate& now = tracker->result.camera;
+  if (!now.estimated) return 0.0;
+  camera->fx = camera->fy = now.focal;
+  return now.sigma;
+}
+
 const char* modar_tracker_reason(const modar_tracker* tracker) {
   return modar::to_string(tracker->result.reason);
 }
@@ -165,34 +175,4 @@ void modar_item_place(modar_item* item, const modar_scene* scene, const modar_po
   modar::copy_matrix(glm::make_mat4(view) * glm::make_mat4(scene->place), item->to_eye);
   item->scene = scene->number;
   std::memcpy(item->world_to_eye, view, sizeof view);
-}
-
-struct modar_focal_finder {
-  std::unique_ptr<modar::FocalFinder> finder;
-  int width = 0;
-  int height = 0;
-};
-
-modar_focal_finder* modar_focal_finder_create(const modar_bundle* bundle, int width, int height,
-                                              modar_error* error) {
-  if (bundle == nullptr) {
-    modar::hand_over(modar::missing("bundle"), error);
-    return nullptr;
-  }
-  auto finder = modar::FocalFinder::create(bundle->view, width, height);
-  if (!finder) {
-    modar::hand_over(finder.error(), error);
-    return nullptr;
-  }
-  return new modar_focal_finder{std::move(*finder), width, height};
-}
-
-void modar_focal_finder_destroy(modar_focal_finder* finder) {
-  delete finder;
-}
-
-double modar_focal_finder_look(modar_focal_finder* finder, const uint8_t* gray, size_t stride) {
-  finder->finder->add_frame(
-      {gray, finder->width, finder->height, static_cast<std::ptrdiff_t>(stride)});
-  return finder->finder->focal().value_or(0.0);
 }

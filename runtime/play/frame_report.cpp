@@ -27,6 +27,7 @@ void RunStats::add(const FrameReport& report) {
   ++states_[static_cast<std::size_t>(report.state)];
   ++reasons_[static_cast<std::size_t>(report.reason)];
   if (!report.visible.empty()) ++visible_;
+  camera_ = report.camera;
   if (report.at(Stage::kLatency) > kFrameBudgetMs) ++late_;
 }
 
@@ -133,6 +134,20 @@ void detection(Writer& writer, const Detection& seen, std::span<const std::strin
   writer.EndObject();
 }
 
+void camera(Writer& writer, const CameraReport& camera) {
+  writer.Key("camera");
+  writer.StartObject();
+  writer.Key("focal_px");
+  rounded(writer, camera.focal.focal);
+  if (camera.focal.estimated) {
+    writer.Key("sigma_px");
+    rounded(writer, camera.focal.sigma);
+  }
+  writer.Key("source");
+  writer.String(camera.given ? "given" : camera.focal.estimated ? "estimated" : "assumed");
+  writer.EndObject();
+}
+
 void times(Writer& writer, const StageTimes& ms) {
   writer.Key("ms");
   writer.StartObject();
@@ -176,6 +191,7 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
   writer.String(to_string(report.reason));
   writer.Key("state");
   writer.String(to_string(report.state));
+  camera(writer, report.camera);
   times(writer, report.ms);
   writer.EndObject();
   return {buffer.GetString(), buffer.GetSize()};
@@ -212,6 +228,7 @@ std::string summary_line(const RunStats& stats) {
   writer.EndObject();
   writer.Key("late");
   writer.Uint64(stats.late());
+  if (stats.camera()) camera(writer, *stats.camera());
   times(writer, stats.median_ms());
   writer.EndObject();
   writer.EndObject();

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -39,12 +40,19 @@ enum class Shown : std::uint8_t {
 };
 const char* to_string(Shown state);
 
+/// The camera by which a frame was measured.
+struct CameraReport {
+  CameraEstimate focal;
+  bool given = false;  ///< by somebody; else estimated or, by the ModAR paper's method, assumed
+};
+
 struct FrameReport {
   std::uint64_t frame = 0;
   double time_s = 0;
   std::vector<Detection> visible;  ///< measured in this frame, whether shown or not
   Reason reason = Reason::kNoFeatures;
   Shown state = Shown::kHidden;
+  CameraReport camera;
   StageTimes ms{};
 
   double& at(Stage stage) { return ms[static_cast<std::size_t>(stage)]; }
@@ -75,6 +83,8 @@ class RunStats {
     return reasons_[static_cast<std::size_t>(reason)];
   }
   [[nodiscard]] double recognised_percent() const;
+  /// Of the last frame; none without frames.
+  [[nodiscard]] const std::optional<CameraReport>& camera() const { return camera_; }
   /// Lower median of each stage; 0 without frames.
   [[nodiscard]] StageTimes median_ms() const { return quantile_ms(0.5); }
   /// The value that so large a share of the frames does not exceed, rounded down to a frame's own.
@@ -88,18 +98,21 @@ class RunStats {
   std::uint64_t visible_ = 0;
   std::uint64_t late_ = 0;
   std::uint64_t dropped_ = 0;
+  std::optional<CameraReport> camera_;
 };
 
 /// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches,fit,agreeing,
-/// likeness}],reason,state,ms}; of an extended pose also extended, position_sigma, rotation_sigma.
-/// Rotation row by row; numbers that are not finite become null. No newline at the end.
-/// pattern_names: by the bundle's pattern index. homographies: adds each pattern's `homography`,
-/// row by row, from its unit square (0, 0 its top left corner, 1, 1 its bottom right one) to the
-/// frame's pixels; null where its corners have none.
+/// likeness}],reason,state,camera:{focal_px,sigma_px,source},ms}; sigma_px of an estimated camera;
+/// of an extended pose also extended, position_sigma, rotation_sigma. Rotation row by row; numbers
+/// that are not finite become null. No newline at the end. pattern_names: by the bundle's pattern
+/// index. homographies: adds each pattern's `homography`, row by row, from its unit square (0, 0
+/// its top left corner, 1, 1 its bottom right one) to the frame's pixels; null where its corners
+/// have none.
 std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
                        bool homographies = false);
 
-/// {"summary":{frames,dropped,visible,recognised_percent,states,reasons,late,ms}}; ms: medians.
+/// {"summary":{frames,dropped,visible,recognised_percent,states,reasons,late,camera,ms}}; ms:
+/// medians, camera: of the last frame.
 std::string summary_line(const RunStats& stats);
 
 /// {frame,model,angle_deg,triangles,draw_calls,ms:{render}}: a picture of the turntable.

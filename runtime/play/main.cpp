@@ -75,11 +75,6 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   options.method = choose_method(bundle, plan.method, plan.parameters);
   MODAR_ASSIGN(const std::uint32_t set,
                choose_parameter_set(bundle, options.method, plan.parameters));
-  if (options.find_focal && options.method != "ours") {
-    return fail(ExitCode::kUsage, "usage.conflict", "--find-focal",
-                "it looks with our loop's records, not with the paper's method",
-                "leave --method and --parameters out, and bake the pattern with this modar");
-  }
   if (options.extended && options.method != "ours") {
     return fail(ExitCode::kUsage, "usage.conflict", "--extended",
                 "the ModAR paper's method knows the pattern alone",
@@ -95,10 +90,9 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   const bool newest = info.live || options.realtime;
   SpotSlot spot;
   LiveSlot live;
-  MODAR_ASSIGN(TrackStep track,
-               open_vision(bundle, {options.method == "ours", set, plan.camera, &spot,
-                                    options.live ? &live : nullptr, newest, options.find_focal,
-                                    options.extended, std::move(turns)}));
+  MODAR_ASSIGN(TrackStep track, open_vision(bundle, {options.method == "ours", set, plan.camera,
+                                                     &spot, options.live ? &live : nullptr, newest,
+                                                     options.extended, std::move(turns)}));
 
   Player player(options, bundle);
   const std::string name(bundle.name(parameter_set(bundle, set).name));

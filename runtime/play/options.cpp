@@ -74,7 +74,7 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 15> kSwitches = {
+constexpr std::array<SwitchOption, 14> kSwitches = {
     {{"json", &PlayOptions::json},
      {"extended", &PlayOptions::extended},
      {"homography", &PlayOptions::homography},
@@ -82,7 +82,6 @@ constexpr std::array<SwitchOption, 15> kSwitches = {
      {"window", &PlayOptions::window},
      {"realtime", &PlayOptions::realtime},
      {"live", &PlayOptions::live},
-     {"find-focal", &PlayOptions::find_focal},
      {"outline", &PlayOptions::outline},
      {"osd", &PlayOptions::osd},
      {"no-light-estimate", &PlayOptions::no_light_estimate},
@@ -132,13 +131,6 @@ Result<void> validate(const PlayOptions& options) {
   if (options.live &&
       !(options.golden.empty() && options.record.empty() && options.turntable == 0)) {
     return usage("usage.conflict", "--live", "recordings and turntables are of one bundle");
-  }
-  if (options.find_focal && !(options.golden.empty() && options.record.empty())) {
-    return usage("usage.conflict", "--find-focal",
-                 "a recording has one camera from its first frame on; give --camera FILE.yml");
-  }
-  if (options.find_focal && !options.camera_file.empty()) {
-    return usage("usage.conflict", "--find-focal", "--camera gives the focal length already");
   }
   if (!options.gyro.empty() && !options.extended) {
     return usage("usage.conflict", "--gyro", "it helps --extended, which is not given");
@@ -211,9 +203,8 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
   --homography        in these lines, the map of each pattern's unit square to the frame: all that
                       a camera of unknown focal length tells
   --camera FILE.yml   camera matrix and distortion as OpenCV writes them
-                      (default: focal length = width of the frame)
-  --find-focal        instead (off by default): measures the focal length on tilted views of the
-                      patterns while playing, and goes on with it; see also modar calibrate
+                      (default: the focal length starts at the frame's longer side and is
+                      estimated from what is seen, as --json reports; see also modar calibrate)
   --method METHOD     how patterns are found: ours (default where the bundle has records for it),
                       or paper, the ModAR paper's
   --parameters SET    of --method paper, which it implies: orb-2000 (default), orb-500, brisk-3 or

@@ -37,7 +37,6 @@ struct PlayOptions {
   bool homography = false;  ///< each pattern's in the JSON lines
   bool force = false;       ///< into folders that hold other files
   bool window = false;
-  bool find_focal = false;
   bool realtime = false;
   bool live = false;  ///< play newer versions of the bundle as they come
   bool outline = false;

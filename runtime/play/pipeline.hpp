@@ -13,7 +13,6 @@
 #include "formats/error.hpp"
 #include "frame_source.hpp"
 #include "modar/camera.hpp"
-#include "modar/focal_finder.hpp"
 #include "modar/tracker.hpp"
 #include "runtime/platform/semaphore.hpp"
 
@@ -146,7 +145,6 @@ struct Job {
   Camera camera;  ///< of this frame's size
   TrackResult track;
   double track_ms = 0;
-  FocalProgress focal;                      ///< of the search for it, while it goes on
   std::shared_ptr<const SpotPattern> spot;  ///< what `track` is about; null: the bundle's patterns
   std::shared_ptr<const LiveBundle> live;   ///< that bundle; null: the one that was opened first
 };

@@ -130,7 +130,6 @@ Result<bool> Player::show(const Job& job) {
   MODAR_TRY(screen_->resize(job.frame.width, job.frame.height));
   MODAR_TRY(follow_live(job));
   follow_spot(job);
-  if (options_.find_focal && !options_.quiet) report_focal(job);
   FrameReport report = begin_report(job);
   const std::int64_t before = now_ns();
   draw(job, report);
@@ -192,44 +191,6 @@ Result<void> Player::follow_live(const Job& job) {
   return {};
 }
 
-/// The vision thread has measured the focal length of frames of this size: says so once.
-void Player::report_focal(const Job& job) {
-  const Camera& camera = job.camera;
-  focal_ = job.focal;
-  if (camera.fx == reported_focal_ || camera.fx == default_camera(camera.width, camera.height).fx) {
-    return;
-  }
-  reported_focal_ = camera.fx;
-  progress_.end();
-  std::fprintf(stderr, "modar-play: the focal length is %.1f pixels, from frame %llu on\n",
-               camera.fx, static_cast<unsigned long long>(stats_.frames()));
-}
-
-/// The run is over, and --find-focal has found nothing: what it would have needed.
-void Player::report_focal_unknown() const {
-  char seen[120];
-  if (focal_.deviation > 0 && focal_.scatter_deg < FocalProgress::kMinScatterDeg) {
-    std::snprintf(
-        seen, sizeof seen,
-        "all %d views are tilted to the same side: they scatter by %.1f degrees, %.0f are needed",
-        focal_.views, focal_.scatter_deg, FocalProgress::kMinScatterDeg);
-  } else if (focal_.deviation > 0) {
-    std::snprintf(seen, sizeof seen, "%d views tell it to %.1f %%, 1 %% is needed", focal_.views,
-                  100 * focal_.deviation);
-  } else if (focal_.views + focal_.frontal > 0) {
-    std::snprintf(seen, sizeof seen,
-                  "%d views tell something and %d are too frontal or too far, %d are needed",
-                  focal_.views, focal_.frontal, FocalProgress::kMinViews);
-  } else {
-    std::snprintf(seen, sizeof seen, "no pattern was seen well enough");
-  }
-  std::fprintf(
-      stderr,
-      "modar-play: the focal length stays unknown: %s (in %d looks); tilt a pattern by 30 to 50 "
-      "degrees, to every side, large in the frame, or use `modar calibrate`\n",
-      seen, focal_.frames);
-}
-
 /// Hysteresis, what to draw, and all of the report that stands before drawing.
 FrameReport Player::begin_report(const Job& job) {
   FrameReport report;
@@ -239,6 +200,8 @@ FrameReport Player::begin_report(const Job& job) {
     if (spot_ || controls_.wants(seen.pattern)) report.visible.push_back(seen);
   }
   report.reason = job.track.reason;
+  report.camera = {job.track.camera, setup_.camera.fx > 0};
+  report.camera.focal.focal = job.camera.fx;
   report.at(Stage::kRead) = job.frame.read_ms;
   report.at(Stage::kDetect) = job.track.times.detect;
   report.at(Stage::kDescribe) = job.track.times.describe;
@@ -402,7 +365,6 @@ Result<int> Player::finish(const PipelineCounts& counts) {
                 "nothing half-made was left; start it again");
   }
   stats_.set_dropped(counts.dropped);
-  if (options_.find_focal && !options_.quiet && reported_focal_ == 0) report_focal_unknown();
   const std::string summary = summary_line(stats_);
   for (const auto& sink : sinks_) {
     MODAR_TRY(sink->finish(summary));

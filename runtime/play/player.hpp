@@ -81,8 +81,6 @@ class Player {
   Result<void> show_frozen(const Job& job);
   void make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corners);
   [[nodiscard]] std::string summary_text() const;
-  void report_focal(const Job& job);
-  void report_focal_unknown() const;
 
   const PlayOptions& options_;
   BundleView bundle_;
@@ -96,8 +94,6 @@ class Player {
   Controls controls_;
   Progress progress_;
   RateMeter rate_;
-  double reported_focal_ = 0;  ///< pixels, of --find-focal; 0: none yet
-  FocalProgress focal_;
   RunStats stats_;
   std::unique_ptr<Screen> screen_;
   std::vector<std::unique_ptr<FrameSink>> sinks_;

@@ -3,15 +3,11 @@
 
 #include <memory>
 
-#include "modar/focal_finder.hpp"
 #include "modar/pose.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {
 namespace {
-
-/// Frames between looks for the focal length: neighbours show the same view. Set by hand.
-constexpr int kLookEvery = 5;
 
 struct OurVision {
   BundleView bundle;
@@ -22,15 +18,13 @@ struct OurVision {
   std::shared_ptr<const LiveBundle> next;  ///< with next_loop: to come
   std::unique_ptr<PoseLoop> next_loop;
   int frames_beside = 0;
-  std::unique_ptr<FocalFinder> finder;
-  int frames_to_look = 0;
-  FocalProgress focal;
   std::uint64_t last_frame = 0;
 
   [[nodiscard]] PoseLoopOptions loop_options() const {
     PoseLoopOptions how;
     how.async_search = options.apart;
     how.extended = options.extended;
+    how.estimate_camera = !options.camera;
     return how;
   }
 
@@ -44,25 +38,6 @@ struct OurVision {
       loop->set_turn(turn);
     }
     last_frame = frame;
-  }
-
-  /// Once the focal length is known, it is the camera's, and the next loop starts with it.
-  Result<void> look(const Frame& frame) {
-    if (--frames_to_look > 0) return {};
-    frames_to_look = kLookEvery;
-    if (!finder) {
-      MODAR_ASSIGN(auto created, FocalFinder::create(bundle, frame.width, frame.height));
-      finder = std::move(created);
-    }
-    const bool added = finder->add_frame(frame.gray_image());
-    focal = finder->progress();
-    const std::optional<double> found = added ? finder->focal() : std::nullopt;
-    if (!found) return {};
-    options.camera = default_camera(frame.width, frame.height);
-    options.camera->fx = options.camera->fy = *found;
-    finder.reset();
-    loop.reset();
-    return {};
   }
 
   /// A newer bundle's loop works beside the one before it until it sees something too, or that sees
@@ -81,7 +56,6 @@ struct OurVision {
     if (lost && ++frames_beside < kMostFrames) return {};
     job.track = std::move(seen);
     loop = std::move(next_loop);
-    finder.reset();
     live = std::move(next);
     bundle = live->view;
     return {};
@@ -90,10 +64,6 @@ struct OurVision {
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
     const std::int64_t before = now_ns();
-    if (camera.width != frame.width || camera.height != frame.height) finder.reset();
-    if (options.find_focal && !options.camera) {
-      MODAR_TRY(look(frame));
-    }
     if (!loop || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
       MODAR_ASSIGN(auto created, PoseLoop::create(bundle, camera, loop_options()));
@@ -106,8 +76,8 @@ struct OurVision {
     MODAR_TRY(loop->step(frame.gray_image(), job.track));
     MODAR_TRY(follow_live(job));
     job.track_ms = ms_since(before);
+    if (job.track.camera.estimated) camera.fx = camera.fy = job.track.camera.focal;
     job.camera = camera;
-    job.focal = focal;
     job.spot = nullptr;
     job.live = live;
     return {};
@@ -118,7 +88,7 @@ struct OurVision {
 
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options) {
   const auto state =
-      std::make_shared<OurVision>(OurVision{bundle, options, {}, {}, {}, {}, {}, 0, {}, 0, {}, 0});
+      std::make_shared<OurVision>(OurVision{bundle, options, {}, {}, {}, {}, {}, 0, 0});
   return [state](Job& job) { return state->step(job); };
 }
 

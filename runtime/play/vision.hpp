@@ -18,11 +18,10 @@ namespace modar {
 struct VisionOptions {
   bool ours = true;                 ///< our pose loop; false: the ModAR paper's method
   std::uint32_t parameter_set = 0;  ///< id, see choose_parameter_set()
-  std::optional<Camera> camera;     ///< calibrated; else the default for the frame's size
+  std::optional<Camera> camera;     ///< calibrated; else ours estimates it from the default
   SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
   LiveSlot* live = nullptr;         ///< newer versions of the bundle come here; may be null
   bool apart = false;               ///< our loop searches on a thread of its own (PoseLoopOptions)
-  bool find_focal = false;          ///< without a camera, ours measures the focal length it has
   bool extended = false;            ///< ours goes on from the surroundings (PoseLoopOptions)
   std::vector<glm::dvec3> turns;    ///< of a gyroscope, by frame; see read_gyroscope()
 };
@@ -51,9 +50,8 @@ Camera camera_for(const std::optional<Camera>& calibrated, int width, int height
 /// "method.unsupported" for the paper's method in a build without OpenCV.
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options);
 
-/// Our loop alone, of `options` camera, apart, find_focal, extended and turns: a FocalFinder takes
-/// every fifth frame until it knows the focal length; from then on that is the jobs' camera.
-/// Errors: those of PoseLoop.
+/// Our loop alone, of `options` camera, apart, extended and turns. The jobs' camera is that by
+/// which their frame was measured. Errors: those of PoseLoop.
 TrackStep our_vision(const BundleView& bundle, const VisionOptions& options);
 
 }  // namespace modar

@@ -34,7 +34,7 @@ Camera default_camera(int width, int height) {
   Camera camera;
   camera.width = width;
   camera.height = height;
-  camera.fx = camera.fy = width;
+  camera.fx = camera.fy = std::max(width, height);
   camera.cx = 0.5 * (width - 1);
   camera.cy = 0.5 * (height - 1);
   return camera;

@@ -29,6 +29,8 @@ struct Track {
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
   Reason shown_reason = Reason::kVisible;    ///< why it is tracked and not shown, if it is not
   bool judged = false;                       ///< by the PrintJudge
+  bool measured = false;                     ///< by a free homography, while it is tracked
+  int frames_to_measure = 0;                 ///< so again
   bool again = false;                        ///< it was lost a moment before it was found
 };
 
@@ -60,7 +62,7 @@ class FrameTracker {
   bool refine_blurred(const TrackedPattern& pattern, const Track& track, const Pose& predicted,
                       Pose& pose, PatchFit& fit);
 
-  Camera camera_;
+  const Camera& camera_;
   const Kernels& kernels_;
   std::unique_ptr<FeatureExtractor> extractor_;
   std::unique_ptr<PatchCache> patches_ = std::make_unique<PatchCache>();

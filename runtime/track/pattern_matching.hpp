@@ -91,7 +91,7 @@ class PlaneMatcher {
                                  std::vector<std::uint8_t>& mask) const;
   std::size_t spread_pose(const TrackedPattern& pattern, Pose& pose);
 
-  Camera camera_;
+  const Camera& camera_;
   const Kernels& kernels_;
   std::array<HomographyHypothesis, 4> hypotheses_;
   std::vector<FeatureMatch> matches_;

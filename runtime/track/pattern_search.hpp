@@ -109,7 +109,7 @@ class PatternSearch {
                 const HomographyHypothesis& hypothesis, int min_percent,
                 DetectionCandidate& candidate) const;
 
-  Camera camera_;
+  const Camera& camera_;
   const Kernels& kernels_;
   std::span<const TrackedPattern> patterns_;
   PatchCache patches_;

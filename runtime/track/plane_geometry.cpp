@@ -248,6 +248,45 @@ std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& ca
   return pose ? std::optional(*pose) : std::nullopt;
 }
 
+std::optional<PlaneSplit> split_map(const TrackedPattern& pattern, const Camera& camera,
+                                    const PlaneMap& map, double aspect) {
+  constexpr double kMost = 0.25;
+  glm::dmat3 k(1.0);
+  k[0][0] = camera.fx;
+  k[1][1] = camera.fy;
+  k[2] = {camera.cx, camera.cy, 1.0};
+  // Of the picture at its aspect: what remains is near a rotation.
+  glm::dmat3 picture = pattern.world_from_pixels();
+  glm::dmat3 unshaped(glm::inverse(pattern.shape));
+  unshaped[2][2] = 1.0;
+  picture = unshaped * picture;
+  glm::dmat3 m = glm::inverse(k) * map.homography * glm::inverse(picture);
+  m[1] /= aspect;
+  if (m[2].z < 0.0) m *= -1.0;
+  const double xx = glm::dot(m[0], m[0]);
+  const double xy = glm::dot(m[0], m[1]);
+  const double yy = glm::dot(m[1], m[1]);
+  const double area = std::sqrt(std::max(0.0, xx * yy - xy * xy));
+  const double trace = std::sqrt(xx + yy + 2.0 * area);
+  if (!(area > 0.0) || !std::isfinite(trace)) return std::nullopt;
+  // The square root of a symmetric 2 x 2 matrix, scaled to the area 1.
+  const double root = std::sqrt(area);
+  const glm::dmat2 stretch = glm::dmat2(xx + area, xy, xy, yy + area) / (trace * root);
+  if (!(std::abs(stretch[0][0] - 1.0) < kMost && std::abs(stretch[1][1] - 1.0) < kMost &&
+        std::abs(stretch[0][1]) < kMost)) {
+    return std::nullopt;
+  }
+  const glm::dmat2 back = glm::inverse(stretch);
+  PlaneSplit split;
+  split.pose.rotation[0] = (m[0] * back[0][0] + m[1] * back[0][1]) / root;
+  split.pose.rotation[1] = (m[0] * back[1][0] + m[1] * back[1][1]) / root;
+  split.pose.rotation[2] = glm::cross(split.pose.rotation[0], split.pose.rotation[1]);
+  split.pose.translation = m[2] / root;
+  split.shape = stretch * glm::dmat2(1.0, 0.0, 0.0, aspect);
+  if (!(split.pose.translation.z > 0.0)) return std::nullopt;
+  return split;
+}
+
 int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dmat3& homography,
               const PlanePoints& points, std::array<Pose, 2>& poses) {
   const auto start = nearest_pose(pattern, camera, {homography, nullptr});

@@ -96,6 +96,17 @@ Pose mirrored(const Pose& pose);
 std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,
                                  const PlaneMap& map);
 
+/// A map of a flat pattern as a pose and what the pattern's plane is beside its picture
+/// (TrackedPattern::shape): exactly the map, by the rotation that needs the least of a shape (polar
+/// decomposition). aspect: the area that the shape gives the picture. None if no camera could see
+/// it, or the shape would be off by more than a quarter.
+struct PlaneSplit {
+  Pose pose;
+  glm::dmat2 shape{1.0};
+};
+std::optional<PlaneSplit> split_map(const TrackedPattern& pattern, const Camera& camera,
+                                    const PlaneMap& map, double aspect);
+
 /// The rotation that a nearly orthonormal matrix stands for: the rounding error of a pose that is
 /// fed back every frame doubles each time otherwise.
 glm::dmat3 orthonormal(const glm::dmat3& rotation);

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "camera_estimator.hpp"
 #include "frame_tracker.hpp"
 #include "pattern_search.hpp"
 #include "print_judge.hpp"
@@ -41,6 +42,19 @@ constexpr int kRemembered = 10;
 // as much as following takes, for how soon it is measured again.
 constexpr int kLookEvery = 4;
 
+// Frames between views that are measured for the camera: trades their time, that of tracking again,
+// for how soon it is known. And the patches that must fit, and their share, for paper to be taken
+// as flat and uncovered.
+constexpr int kMeasureEvery = 3;
+constexpr int kFlatPatches = 24;
+constexpr double kFlatRatio = 0.6;
+// Steps of a homography from where a pose has the pattern, and the share that a measurement has in
+// the shape: less lags, more trembles.
+constexpr int kMeasuringSteps = 2;
+constexpr double kNewShape = 0.5;
+// Share by which a focal length may change until what was learned around a pattern is wrong.
+constexpr double kLearnedAnew = 0.01;
+
 /// What was shown, brought to what is known better now, over some frames.
 struct Return {
   double share = 0;  ///< of the difference, that is left
@@ -56,21 +70,64 @@ double way_of(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4
   return most;
 }
 
+/// Four places of a pattern, the corners of as much of it as the frame shows, and where the map has
+/// them; false if that is too little.
+bool places_in_view(const TrackedPattern& pattern, const tracker::PlaneMap& map,
+                    const Camera& camera, tracker::CameraEstimator::View& view) {
+  constexpr double kLeast = 0.4;  // of each side
+  constexpr double kStep = 0.1;
+  const double longest = std::max(pattern.width(), pattern.height());
+  glm::dvec2 low{0.05, 0.05};  // shares of width and height
+  glm::dvec2 high{0.95, 0.95};
+  for (;;) {
+    const std::array<glm::dvec2, 4> shares = {low, glm::dvec2{high.x, low.y}, high,
+                                              glm::dvec2{low.x, high.y}};
+    std::array<bool, 4> inside{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const glm::dvec2 pixel{shares[i].x * pattern.width() - 0.5,
+                             shares[i].y * pattern.height() - 0.5};
+      const glm::dvec2 seen = map.at(pixel, inside[i]);
+      inside[i] = inside[i] && seen.x >= 0 && seen.y >= 0 && seen.x < camera.width &&
+                  seen.y < camera.height;
+      view.world[i] = {(2.0 * shares[i].x - 1.0) * pattern.width() / longest,
+                       (1.0 - 2.0 * shares[i].y) * pattern.height() / longest};
+      view.pixels[i] = undistort(camera, seen);
+    }
+    // The side whose places are out goes inwards; of a single corner, both of its sides.
+    const bool left = !(inside[0] && inside[3]);
+    const bool right = !(inside[1] && inside[2]);
+    const bool top = !(inside[0] && inside[1]);
+    const bool bottom = !(inside[2] && inside[3]);
+    if (!left && !right) return true;
+    if (left != right) (left ? low.x : high.x) += left ? kStep : -kStep;
+    if (top != bottom) (top ? low.y : high.y) += top ? kStep : -kStep;
+    if (left == right && top == bottom) {
+      low += kStep;
+      high -= kStep;
+    }
+    if (high.x - low.x < kLeast || high.y - low.y < kLeast) return false;
+  }
+}
+
 }  // namespace
 
 struct PoseLoop::State {
   State(const Camera& seen_by, const PoseLoopOptions& how)
-      : camera(seen_by), options(how), frame_tracker(seen_by, how.detect) {}
+      : camera(seen_by), search_camera(seen_by), options(how), frame_tracker(camera, how.detect) {}
 
   Camera camera;
+  Camera search_camera;
   PoseLoopOptions options;
   std::vector<TrackedPattern> patterns;
-  std::vector<Track> tracks;  ///< one a pattern
+  std::vector<TrackedPattern> searched;  ///< a search's own
+  std::vector<Track> tracks;             ///< one a pattern
   std::unique_ptr<PrintJudge> print_judge;
   tracker::FrameTracker frame_tracker;
-  std::unique_ptr<tracker::PatternSearch> search;   ///< on the caller's thread, or
-  std::unique_ptr<tracker::AsyncDetector> async;    ///< on its own
-  std::unique_ptr<tracker::SlicedDetector> sliced;  ///< there, within the budget of a frame
+  std::unique_ptr<tracker::CameraEstimator> estimator;  ///< where the camera is a guess
+  double learned_focal = 0;                             ///< by which the surroundings are known
+  std::unique_ptr<tracker::PatternSearch> search;       ///< on the caller's thread, or
+  std::unique_ptr<tracker::AsyncDetector> async;        ///< on its own
+  std::unique_ptr<tracker::SlicedDetector> sliced;      ///< there, within the budget of a frame
   std::vector<SearchPriority> priorities;
   tracker::DetectionCandidates candidates;
   int frames_to_search = 0;
@@ -88,6 +145,9 @@ struct PoseLoop::State {
 
   void step(const GrayImage& frame, TrackResult& result);
   void track_all(TrackResult& result);
+  void measure_camera(TrackResult& result);
+  bool measure_view(std::size_t i);
+  void apply_estimate();
   void advance_search(TrackResult& result);
   bool search_due(bool any_tracked);
   void accept(TrackResult& result);
@@ -139,21 +199,27 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
                 "the bundle holds no pattern with a record for this loop",
                 "bake it with a pattern");
   }
+  state->searched = state->patterns;
   state->tracks.resize(state->patterns.size());
-  state->print_judge = std::make_unique<PrintJudge>(state->patterns);
+  state->print_judge = std::make_unique<PrintJudge>(state->patterns, !options.estimate_camera);
   state->priorities.resize(state->patterns.size());
   state->candidates.patterns.resize(state->patterns.size());
   if (options.async_search) {
-    state->async =
-        std::make_unique<tracker::AsyncDetector>(camera, state->patterns, options.detect);
+    state->async = std::make_unique<tracker::AsyncDetector>(state->search_camera, state->searched,
+                                                            options.detect);
   } else if (options.budget > 0) {
-    state->sliced =
-        std::make_unique<tracker::SlicedDetector>(camera, state->patterns, options.detect);
+    state->sliced = std::make_unique<tracker::SlicedDetector>(state->search_camera, state->searched,
+                                                              options.detect);
   } else {
-    state->search =
-        std::make_unique<tracker::PatternSearch>(camera, state->patterns, options.detect);
+    state->search = std::make_unique<tracker::PatternSearch>(state->search_camera, state->searched,
+                                                             options.detect);
   }
-  if (options.extended) state->surroundings = std::make_unique<tracker::Surroundings>(camera);
+  if (options.extended) {
+    state->surroundings = std::make_unique<tracker::Surroundings>(state->camera);
+  }
+  if (options.estimate_camera) {
+    state->estimator = std::make_unique<tracker::CameraEstimator>(camera, state->patterns.size());
+  }
   return std::unique_ptr<PoseLoop>(new PoseLoop(std::move(state)));
 }
 
@@ -223,6 +289,9 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   result.features = 0;
   result.times = {};
   LapClock clock;
+  if (estimator != nullptr) apply_estimate();
+  result.camera = estimator != nullptr ? estimator->estimate() : CameraEstimate{camera.fx};
+  result.camera.focal = camera.fx;
   frame_tracker.set_frame(frame);
   track_all(result);
   if (async != nullptr && async->take(candidates, priorities)) {
@@ -243,6 +312,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
       accept(result);
     }
   }
+  if (estimator != nullptr) measure_camera(result);
   if (surroundings != nullptr) extend(result);
   turn.reset();
   for (const Track& track : tracks) {
@@ -293,6 +363,95 @@ void PoseLoop::State::track_all(TrackResult& result) {
     } else {
       track.frames_since_lost = options.track ? 0 : tracker::kRecentFrames;
     }
+  }
+}
+
+/// Measures tracked flat patterns by free homographies: what these say of the camera, and what a
+/// pose leaves of them, since no camera explains the pictures of a stabilised or distorting one.
+void PoseLoop::State::measure_camera(TrackResult& result) {
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    Track& track = tracks[i];
+    if (!track.tracked || track.doubts > 0 || !patterns[i].surface.flat()) continue;
+    if (--track.frames_to_measure > 0) continue;
+    track.frames_to_measure = kMeasureEvery;
+    const bool first = !track.measured;
+    track.measured = measure_view(i) || track.measured;
+    if (!first || !track.measured) continue;
+    for (Detection& seen : result.visible) {
+      if (seen.pattern == patterns[i].index) frame_tracker.locate(patterns[i], track, seen);
+    }
+  }
+}
+
+/// Measures a tracked pattern's plane; false if the frame shows too little of it.
+bool PoseLoop::State::measure_view(std::size_t i) {
+  TrackedPattern& pattern = patterns[i];
+  Track& track = tracks[i];
+  const auto frame = frame_tracker.frame();
+  tracker::CameraEstimator::View view{i, {}, {}, track.pose};
+  tracker::PlaneMap map =
+      track.homography_only ? track.map : tracker::map_of_pose(pattern, camera, track.pose);
+  if (!places_in_view(pattern, map, camera, view)) return false;
+  PatchFit fit;
+  if (track.measured) {
+    const auto levels = static_cast<int>(frame.pyramid.size());
+    fit = tracker::align_map(pattern, frame, tracker::finest(pattern, map, levels).frame_level,
+                             kMeasuringSteps, map);
+  } else if (!tracker::refine_map(pattern, frame, map, fit, tracker::SearchRadius::kFrame)) {
+    return false;
+  }
+  if (fit.inlier_ratio() < kFlatRatio || fit.inliers < kFlatPatches ||
+      !places_in_view(pattern, map, camera, view)) {
+    return false;
+  }
+  const auto plane = tracker::split_map(pattern, camera, map, estimator->aspect(i));
+  if (!plane) return false;
+  if (estimator->is_new(i, view.pixels)) {
+    view.pose = plane->pose;
+    estimator->add(view);
+  }
+  const double share = track.measured ? kNewShape : 1.0;
+  pattern.shape = (1.0 - share) * pattern.shape + share * plane->shape;
+  track.pose = plane->pose;
+  track.homography_only = false;
+  return true;
+}
+
+/// Goes on with the focal length and the aspects that the views so far say.
+void PoseLoop::State::apply_estimate() {
+  const double focal = estimator->estimate().focal;
+  const Camera before = camera;
+  camera.fx = camera.fy = focal;
+  for (std::size_t i = 0; i < patterns.size(); ++i) {
+    TrackedPattern& pattern = patterns[i];
+    if (!pattern.surface.flat()) continue;
+    const glm::dmat2 alone(1.0, 0.0, 0.0, estimator->aspect(i));
+    Track& track = tracks[i];
+    const auto plane = tracker::split_map(
+        pattern, camera, tracker::map_of_pose(pattern, before, track.pose), alone[1][1]);
+    if (!track.tracked || track.homography_only || !plane) {
+      pattern.shape = alone;
+      track.measured = false;
+      continue;
+    }
+    if (track.has_motion) {
+      const auto previous = tracker::split_map(
+          pattern, camera, tracker::map_of_pose(pattern, before, track.previous), alone[1][1]);
+      track.has_motion = previous.has_value();
+      if (previous) track.previous = previous->pose;
+    }
+    track.pose = plane->pose;
+    pattern.shape = plane->shape;
+  }
+  // The thread of a search reads its own copies.
+  const bool idle = async != nullptr ? async->idle() : sliced == nullptr || sliced->idle();
+  for (std::size_t i = 0; idle && i < patterns.size(); ++i) {
+    searched[i].shape[1][1] = searched[i].surface.flat() ? estimator->aspect(i) : 1.0;
+  }
+  if (idle) search_camera = camera;
+  if (surroundings != nullptr && std::abs(focal - learned_focal) > kLearnedAnew * learned_focal) {
+    surroundings->clear();
+    learned_focal = focal;
   }
 }
 

@@ -55,7 +55,7 @@ void refine_from_inliers(const TrackedPattern& pattern, const FrameView& frame,
 /// Frame pixels by which the corners of a bent print, mean of the four, lie beside those of the
 /// plane that its pose says: a few steps over the patches that show, with two bulges beside the
 /// pose's parameters. 0 where it is less than `least`, where few patches show, or where the bulges
-/// do not make the frame more alike.
+/// do not make the frame more alike than a free homography does.
 double bend_of(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
                double least);
 

@@ -61,8 +61,9 @@ glm::vec3 direction_of(const Pose& pose) {
 
 }  // namespace
 
-PrintJudge::PrintJudge(std::span<const TrackedPattern> patterns)
+PrintJudge::PrintJudge(std::span<const TrackedPattern> patterns, bool known_camera)
     : patterns_(patterns),
+      known_camera_(known_camera),
       evidence_(patterns.size()),
       relations_(patterns.size() * patterns.size()),
       mirrors_(patterns.size(), {Mirror{true}, Mirror{false}}) {}
@@ -219,7 +220,7 @@ double PrintJudge::agreeing_share(const Evidence& seen) {
 /// at_once: one measurement decides; else two do, one after the other.
 void PrintJudge::measure(const TrackedPattern& print, const FrameView& frame, const Track& track,
                          bool at_once, Evidence& seen) const {
-  if (!print.surface.flat()) return;
+  if (!known_camera_ || !print.surface.flat()) return;
   const bool flat = track.homography_only && agreeing_share(seen) >= kFlatMapShare;
   const double least = track.homography_only ? kMapBentPixels : kBentPixels;
   const bool bent = !flat && bend_of(print, frame, track.pose, least) > 0.0;

@@ -29,7 +29,8 @@ namespace modar::tracker {
 class PrintJudge {
  public:
   /// The patterns must outlive it. Allocates nothing later.
-  explicit PrintJudge(std::span<const TrackedPattern> patterns);
+  /// known_camera: else a bend hides nothing.
+  explicit PrintJudge(std::span<const TrackedPattern> patterns, bool known_camera = true);
 
   struct Verdict {
     Reason reason = Reason::kVisible;  ///< or kOtherPrint, kCurved: it is not to be shown
@@ -88,6 +89,7 @@ class PrintJudge {
   static Verdict judge(Evidence& seen);
 
   std::span<const TrackedPattern> patterns_;
+  bool known_camera_;
   std::vector<Evidence> evidence_;       ///< by pattern
   std::vector<std::uint8_t> relations_;  ///< by two patterns: 0 not known yet, 1 none, 2 related
   /// By pattern: an upright mirror and one that is not, as place_mirrors() left them.

@@ -117,7 +117,7 @@ class Surroundings {
   bool align_fine(const FrameView& frame, Pose& pose, ExtendedPose& out);
   void remember(const FrameView& frame, const Pose& pose);
 
-  Camera camera_;
+  const Camera& camera_;
   int level_ = 0;   ///< of the pyramid, on which patches are cut
   int coarse_ = 0;  ///< on which a frame is first aligned to the one before
   std::vector<MapPoint> points_;

@@ -39,15 +39,17 @@ void view_patches(const TrackerRecordView& view, TrackedPattern& out) {
 
 glm::dvec2 TrackedPattern::to_world(glm::dvec2 pixel) const {
   const double longest = std::max(width(), height());
-  return {(2.0 * pixel.x + 1.0 - width()) / longest, (height() - 2.0 * pixel.y - 1.0) / longest};
+  return shape * glm::dvec2((2.0 * pixel.x + 1.0 - width()) / longest,
+                            (height() - 2.0 * pixel.y - 1.0) / longest);
 }
 
 glm::dmat3 TrackedPattern::world_from_pixels() const {
   const double longest = std::max(width(), height());
+  const glm::dvec2 middle = to_world({0.0, 0.0});
   glm::dmat3 m(1.0);
-  m[0][0] = 2.0 / longest;
-  m[1][1] = -2.0 / longest;
-  m[2] = {(1.0 - width()) / longest, (height() - 1.0) / longest, 1.0};
+  m[0] = glm::dvec3(shape[0] * (2.0 / longest), 0.0);
+  m[1] = glm::dvec3(shape[1] * (-2.0 / longest), 0.0);
+  m[2] = {middle, 1.0};
   return m;
 }
 

@@ -9,17 +9,18 @@
 //   pattern_matching.hpp  features to homographies of one pattern, from there over a curved one; an
 //                         index over all patterns
 //   pattern_search.hpp    finds patterns in a frame, also on a thread of its own
+//   camera_estimator.hpp  the focal length and the aspects of patterns from views of them
 //   frame_tracker.hpp     tracks patterns from frame to frame
 //   surroundings.hpp      the pose from what stands around a pattern that is not seen
 // Others include the public headers only: modar/pose_loop.hpp drives all of it;
-// modar/tracker_features.hpp, pose.hpp, camera.hpp, pose_smoother.hpp and focal_finder.hpp offer
-// parts.
+// modar/tracker_features.hpp, pose.hpp, camera.hpp, and pose_smoother.hpp offer parts.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <span>
 
+#include <glm/mat2x2.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -40,6 +41,10 @@ struct TrackedPattern {
   std::array<GrayImage, kMaxTrackerImageLevels> levels;
   int level_count = 0;
   PatternSurface surface;
+  /// Of a flat pattern: what its plane is beside its picture, by the middle (the axes of
+  /// to_world()). Not of the record: while the camera is a guess, what a pose leaves of a measured
+  /// homography.
+  glm::dmat2 shape{1.0};
 
   [[nodiscard]] int width() const { return levels[0].width; }
   [[nodiscard]] int height() const { return levels[0].height; }

@@ -33,9 +33,9 @@ struct Engine {
   modar_error error;
   modar_bundle* bundle = nullptr;
   modar_tracker* tracker = nullptr;
-  modar_focal_finder* finder = nullptr;
   modar_renderer* renderer = nullptr;
   modar_camera camera;
+  double focal_sigma = 0;    ///< 0 where it is not estimated
   WebPose* poses = nullptr;  ///< one a pattern
   modar_item* items = nullptr;
   char text[256];
@@ -142,7 +142,8 @@ EMSCRIPTEN_KEEPALIVE uint32_t web_scene(uint32_t index, int part) {
   return part == 0 ? scene.pattern : scene.model;
 }
 
-/// The camera's frames have this size. focal: pixels; 0: the width, as for every unknown camera.
+/// The camera's frames have this size. focal: pixels; 0: the longer side, as for every unknown
+/// camera.
 EMSCRIPTEN_KEEPALIVE void web_camera(int width, int height, double focal) {
   engine.camera = modar_camera_default(width, height);
   if (focal > 0) engine.camera.fx = engine.camera.fy = focal;
@@ -150,25 +151,23 @@ EMSCRIPTEN_KEEPALIVE void web_camera(int width, int height, double focal) {
 EMSCRIPTEN_KEEPALIVE double web_focal() {
   return engine.camera.fx;
 }
+EMSCRIPTEN_KEEPALIVE double web_focal_sigma() {
+  return engine.focal_sigma;
+}
 
-/// A tracker for web_camera(), in place of the one before. find_focal: 1 to measure the focal
-/// length on the way. budget: millions of ARM instructions a frame, 0: no limit. extended: 1 to go
+/// A tracker for web_camera(), in place of the one before. find_focal: 1 to estimate the focal
+/// length from there. budget: millions of ARM instructions a frame, 0: no limit. extended: 1 to go
 /// on from a pattern's surroundings.
 EMSCRIPTEN_KEEPALIVE int web_track(int find_focal, int budget, int extended) {
   modar_tracker_destroy(engine.tracker);
-  modar_focal_finder_destroy(engine.finder);
-  engine.finder = nullptr;
   modar_tracker_options options{};
   options.size = sizeof options;
   options.budget = budget;
   options.extended = extended;
+  options.estimate_camera = find_focal;
   engine.tracker =
       modar_tracker_create_with(engine.bundle, &engine.camera, &options, &engine.error);
-  if (engine.tracker == nullptr) return engine.error.exit_code;
-  if (find_focal == 0) return 0;
-  engine.finder = modar_focal_finder_create(engine.bundle, engine.camera.width,
-                                            engine.camera.height, &engine.error);
-  return engine.finder == nullptr ? engine.error.exit_code : 0;
+  return engine.tracker == nullptr ? engine.error.exit_code : 0;
 }
 EMSCRIPTEN_KEEPALIVE void web_reset() {
   modar_tracker_reset(engine.tracker);
@@ -184,6 +183,7 @@ EMSCRIPTEN_KEEPALIVE void web_turn(double x, double y, double z) {
 EMSCRIPTEN_KEEPALIVE int web_step(const uint8_t* gray, size_t stride, double time_s) {
   const int failed = modar_tracker_step_at(engine.tracker, gray, stride, time_s, &engine.error);
   if (failed != 0) return failed;
+  engine.focal_sigma = modar_tracker_camera(engine.tracker, &engine.camera);
   modar_pose pose;
   for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p) {
     modar_tracker_pose(engine.tracker, p, &pose);
@@ -205,10 +205,6 @@ EMSCRIPTEN_KEEPALIVE WebPose* web_poses() {
 }
 EMSCRIPTEN_KEEPALIVE const char* web_reason() {
   return modar_tracker_reason(engine.tracker);
-}
-/// The focal length once the finder of web_track() knows it, else 0.
-EMSCRIPTEN_KEEPALIVE double web_find_focal(const uint8_t* gray, size_t stride) {
-  return engine.finder == nullptr ? 0.0 : modar_focal_finder_look(engine.finder, gray, stride);
 }
 
 /// Gray in place of RGBA, by the weights of BT.601, which sum to 1 << 16 here.

@@ -81,7 +81,7 @@ export class Engine {
     }));
   }
 
-  /** Of the camera's frames. focal: in pixels, 0: unknown (assumed to be the width). */
+  /** Of the camera's frames. focal: in pixels, 0: unknown (the longer side, to begin with). */
   setCamera(width, height, focal) {
     this.width = width;
     this.height = height;
@@ -90,6 +90,11 @@ export class Engine {
 
   get focal() {
     return this.#module._web_focal();
+  }
+
+  /** Its standard deviation, pixels; 0 where it is not estimated. */
+  get focalSigma() {
+    return this.#module._web_focal_sigma();
   }
 
   /** Starts tracking anew for the camera. */
@@ -130,11 +135,6 @@ export class Engine {
   step(stride, time) {
     this.#check(this.#module._web_step(this.frameAt, stride, time));
     return this.poses();
-  }
-
-  /** The focal length, once frames have told it; else 0. */
-  findFocal(stride) {
-    return this.#module._web_find_focal(this.frameAt, stride);
   }
 
   brightness(stride) {

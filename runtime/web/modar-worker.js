@@ -1,19 +1,19 @@
 // The worker: one engine that tracks. modar.js sends it one frame at a time.
 import { Engine, ModarError } from './engine.js';
 
-/** Frames with a pattern between looks for the focal length: a look costs as much as a search. */
-const FOCAL_EVERY = 5;
+/** Share of the focal length below which its spread makes it worth keeping for the next start. */
+const KNOWN_FOCAL = 0.03;
 
 let engine;
 let camera = { focal: 0, findFocal: false };
-let seen = 0;
+let told = false;
 
 function useSize(width, height) {
   if (engine.width === width && engine.height === height) return;
   // A phone that was turned has another camera: what was measured for its other size holds scaled by the long side.
   const scale = camera.side ? Math.max(width, height) / camera.side : 1;
   engine.setCamera(width, height, camera.focal * scale);
-  engine.track(camera.findFocal && camera.focal === 0, camera.budget, camera.extended);
+  engine.track(camera.findFocal, camera.budget, camera.extended);
 }
 
 /** The frame's luma into the engine's buffer; its stride, or 0 where this frame cannot be read so. */
@@ -50,13 +50,16 @@ async function track(message) {
   const poses = engine.step(stride, message.time).slice();
   const stepped = performance.now();
   const answer = {
-    type: 'poses', id: message.id, width: engine.width, height: engine.height, focal: engine.focal, poses,
+    type: 'poses', id: message.id, width: engine.width, height: engine.height, focal: engine.focal,
+    focalSigma: engine.focalSigma, poses,
     reason: engine.reason, brightness: engine.brightness(stride), heapBytes: engine.heapBytes,
     copyMs: copied - began, stepMs: stepped - copied,
   };
   if (message.keepLuma) answer.luma = lumaOf(stride);
-  const unknown = camera.findFocal && camera.focal === 0;
-  if (unknown && answer.reason === 'visible' && ++seen % FOCAL_EVERY === 0) lookForFocal(stride, answer);
+  if (!told && answer.focalSigma > 0 && answer.focalSigma < KNOWN_FOCAL * answer.focal) {
+    answer.foundFocal = answer.focal;
+    told = true;
+  }
   return answer;
 }
 
@@ -66,15 +69,6 @@ function lumaOf(stride) {
   const luma = new Uint8Array(width * height);
   for (let y = 0; y < height; ++y) luma.set(from.subarray(y * stride, y * stride + width), y * width);
   return luma;
-}
-
-function lookForFocal(stride, answer) {
-  const focal = engine.findFocal(stride);
-  if (focal === 0) return;
-  camera = { ...camera, focal, side: Math.max(engine.width, engine.height) };
-  answer.foundFocal = focal;
-  engine.setCamera(engine.width, engine.height, focal);
-  engine.track(false, camera.budget, camera.extended);
 }
 
 const answers = {
@@ -88,6 +82,7 @@ const answers = {
   },
   camera(options) {
     camera = options;
+    told = false;
     if (engine.width) engine.setCamera(0, 0, 0);  // the next frame starts a new tracker
     return { type: 'ready' };
   },

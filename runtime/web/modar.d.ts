@@ -26,6 +26,8 @@ export interface Camera {
   width: number;
   height: number;
   focal: number;
+  /** Standard deviation of the focal length while it is estimated; 0: it was given. */
+  focalSigma: number;
 }
 
 /**
@@ -67,7 +69,7 @@ export interface Frame {
   reason: string;
   /** Mean of the frame's gray values, 0 to 255. */
   brightness: number;
-  /** Set once, when the focal length has been measured: keep it for start(). */
+  /** Set once, when the focal length is known to 3 %: keep it for start(). */
   foundFocal?: number;
   /** Bytes of the engine's heap in the worker. */
   heapBytes: number;
@@ -96,7 +98,8 @@ export class Modar extends EventTarget {
   readonly kind: 'simd' | 'plain';
   /**
    * Tracks in the video, which is to play, until stop(). focal: in pixels where the frame's long side
-   * has focalSide of them; 0: unknown, then the width is assumed and, with findFocal, measured.
+   * has focalSide of them; 0: unknown, that side is assumed. With findFocal
+   * that is where its estimate begins; without, it is taken as given.
    */
   start(video: HTMLVideoElement, options?: {
     focal?: number; focalSide?: number; findFocal?: boolean; keepLuma?: boolean;

@@ -175,7 +175,7 @@ export class Modar extends EventTarget {
     return modar;
   }
 
-  /** Tracks in the video, which is to play, until stop(). focal: in pixels of its width; 0: unknown. */
+  /** Tracks in the video, which is to play, until stop(). focal: in pixels of its longer side; 0: unknown. */
   async start(video, { focal = 0, focalSide = 0, findFocal = true, keepLuma = false, budget = 0, extended = false } = {}) {
     this.stop();
     await this.#tracker.ask({ type: 'camera', focal, side: focalSide, findFocal, budget, extended });
@@ -253,7 +253,7 @@ export class Modar extends EventTarget {
 
   #tell(answer, { source, time }) {
     const { poses } = answer;
-    const camera = { width: answer.width, height: answer.height, focal: answer.focal };
+    const camera = { width: answer.width, height: answer.height, focal: answer.focal, focalSigma: answer.focalSigma };
     this.dispatchEvent(new CustomEvent('frame', { detail: { ...answer, camera, source, time } }));
     let projection = null;
     for (let pattern = 0; pattern < this.patterns.length; ++pattern) {

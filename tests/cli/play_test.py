@@ -56,14 +56,19 @@ class Play(ProgramTest):
                                       stderr=subprocess.PIPE, text=True)
             self.assertEqual(done.returncode, 2, done.stderr)
 
-    def test_a_focal_length_that_stays_unknown_is_told_with_the_reason(self):
-        bundle = self.bake_demo()
-        paper = self.play(bundle, "--input", COVER, "--find-focal", "--method", "paper")
-        self.assert_fails(paper, 1, "the paper's method")
-        done = self.play(bundle, "--input", COVER, "--find-focal")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("the focal length stays unknown: 0 views tell something and 1 are too frontal", done.stderr)
-        self.assertNotIn("focal", self.play(bundle, "--input", COVER, "--find-focal", "--quiet").stderr)
+    def test_the_camera_is_reported_with_its_source(self):
+        bundle, clip = self.bake_demo(), self.clip()
+        (self.folder / "camera.yml").write_text(
+            "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n"
+            "   dt: d\n   data: [ 700., 0., 320., 0., 700., 240., 0., 0., 1. ]\n")
+        for given in ([], ["--camera", self.folder / "camera.yml"], ["--method", "paper"]):
+            done = self.play(bundle, "--input", clip, "--json", *given)
+            lines = [json.loads(line) for line in done.stdout.splitlines()]
+            for camera in (lines[0]["camera"], lines[-1]["summary"]["camera"]):
+                self.assertEqual(camera["source"], "given" if "--camera" in given else "assumed" if given else "estimated")
+                self.assertEqual("sigma_px" in camera, not given)
+                if "--camera" in given:
+                    self.assertEqual(camera["focal_px"], 525)  # of 640 pixels, in frames of 480
 
     def test_a_run_with_every_output_and_its_replay(self):
         bundle, clip = self.bake_demo(), self.clip()

@@ -13,7 +13,6 @@
 #include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/camera_file.hpp"
-#include "modar/focal_finder.hpp"
 #include "tests/track/synthetic.hpp"
 
 namespace modar {
@@ -176,55 +175,6 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
   EXPECT_EQ(calibrate(options, {}).error().code, "calibrate.size");
   options.inputs = {path("nowhere.mp4")};
   EXPECT_EQ(calibrate(options, {}).error().code, "calibrate.input");
-}
-
-TEST(FocalFinder, FindsTheFocalLengthInAHandfulOfFrames) {
-  const GrayImage image = test::gray(filmed_picture());
-  const auto bundle = BundleView::open(filmed_bundle());
-  ASSERT_TRUE(bundle);
-  for (const double truth : {520.0, 840.0}) {
-    auto finder = FocalFinder::create(*bundle, 640, 480);
-    ASSERT_TRUE(finder) << to_line(finder.error());
-    Camera camera = default_camera(640, 480);
-    camera.fx = camera.fy = truth;
-    Random random(9);
-    const GrayPicture background = made_background(640, 480, random);
-    SceneBand band;
-    band.area_low = 0.8;
-    band.area_high = 1.6;
-    band.tilt_low = 20;
-    band.tilt_high = 50;
-    for (int i = 0; i < 60 && !(*finder)->focal(); ++i) {
-      const Pose pose = draw_pose(band, image, camera, random);
-      const SceneFrame scene = render_scene(image, camera, pose, background, band, random);
-      (*finder)->add_frame(scene.picture.view());
-    }
-    ASSERT_TRUE((*finder)->focal())
-        << truth << " after " << (*finder)->progress().views << " views";
-    EXPECT_NEAR(*(*finder)->focal(), truth, 0.01 * truth);
-  }
-}
-
-TEST(FocalFinder, FrontalViewsTellNothing) {
-  const GrayImage image = test::gray(filmed_picture());
-  auto finder = FocalFinder::create(BundleView::open(filmed_bundle()).value(), 640, 480);
-  ASSERT_TRUE(finder);
-  const Camera camera = default_camera(640, 480);
-  Random random(9);
-  const GrayPicture background = made_background(640, 480, random);
-  SceneBand band;
-  band.tilt_high = 1;
-  for (int i = 0; i < 10; ++i) {
-    const Pose pose = draw_pose(band, image, camera, random);
-    (*finder)->add_frame(
-        render_scene(image, camera, pose, background, band, random).picture.view());
-  }
-  EXPECT_FALSE((*finder)->focal());
-  const FocalProgress progress = (*finder)->progress();
-  EXPECT_EQ(progress.frames, 10);
-  EXPECT_EQ(progress.frontal, 10);
-  EXPECT_EQ(progress.views, 0);
-  EXPECT_EQ(progress.deviation, 0);
 }
 
 TEST_F(Calibrate, RealPhotosAsOpenCvHasThem) {

@@ -56,15 +56,6 @@ TEST(Options, ReadsEachOption) {
               options->quiet);
 }
 
-TEST(Options, TheFocalLengthIsMeasuredOnlyWhereNobodyStatesIt) {
-  EXPECT_FALSE(parse({"a.modar", "--input", "v"})->find_focal);
-  EXPECT_TRUE(parse({"a.modar", "--input", "v", "--find-focal"})->find_focal);
-  for (const char* other : {"--camera", "--record"}) {
-    EXPECT_EQ(code_of({"a.modar", "--input", "v", "--find-focal", other, "x"}), "usage.conflict");
-  }
-  EXPECT_EQ(code_of({"a.modar", "--golden", "r", "--find-focal"}), "usage.conflict");
-}
-
 TEST(Options, AGyroscopeHelpsExtendedPosesOnly) {
   const auto options = parse({"a.modar", "--input", "v", "--extended", "--gyro", "turns.txt"});
   ASSERT_TRUE(options);

@@ -26,7 +26,7 @@ FEED = """(async () => {
   const { load } = await import('/modar.js');
   const modar = await load('/bundles/demo.modar', { simd: %s });
   const turns = %s;
-  await modar.start(document.createElement('video'), { findFocal: false, extended: turns.length > 0 });
+  await modar.start(document.createElement('video'), { extended: turns.length > 0 });
   modar.stop();
   const frames = new Uint8Array(await (await fetch('/%s')).arrayBuffer());
   const size = %d * %d, seen = [];
@@ -56,7 +56,7 @@ RECORD = """(async () => {
       seen.push({ luma: btoa(text), reason, pose: Array.from(poses), source: source.constructor.name });
       if (seen.length === 6) resolve();
     });
-    modar.start(video, { findFocal: false, keepLuma: true });
+    modar.start(video, { keepLuma: true });
   });
   modar.close();
   for (const track of stream.getTracks()) track.stop();
@@ -543,7 +543,7 @@ COMPARE = """(async () => {
   const { load } = await import('/modar.js');
   const { View } = await import('/modar-view.js');
   const modar = await load('/bundles/demo.modar');
-  await modar.start(document.createElement('video'), { findFocal: false });
+  await modar.start(document.createElement('video'));
   modar.stop();
   const canvas = () => {
     const made = document.createElement('canvas');

@@ -20,7 +20,8 @@ struct Camera {
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3
 };
 
-/// The camera that is assumed when none is given: focal length = width, principal point = centre.
+/// The camera that is assumed when none is given: focal length = longer side of
+/// the frame, principal point = centre.
 Camera default_camera(int width, int height);
 
 /// The same lens for frames of another size (same aspect: scaled; other aspect: centre crop).

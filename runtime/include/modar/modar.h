@@ -87,7 +87,7 @@ typedef struct modar_camera {
   double fx, fy, cx, cy;
   double distortion[5]; /* k1 k2 p1 p2 k3 */
 } modar_camera;
-/* What is assumed of an unknown camera: focal length = width. */
+/* What is assumed of an unknown camera, to begin with: focal length = the frame's longer side. */
 modar_camera modar_camera_default(int width, int height);
 /* Reads the file that `modar calibrate` writes. */
 int modar_camera_read(const char* path, modar_camera* camera, modar_error* error);
@@ -123,6 +123,8 @@ typedef struct modar_tracker_options {
                      * on over several frames, with the same results on every phone; 0: no limit */
   int extended;     /* 1: learns what stands still around the largest pattern, and goes on from it while the pattern is
                      * hidden or out of the frame; the camera has to move before */
+  int estimate_camera; /* 1: the camera is a guess (modar_camera_default()): its focal length, and the aspects of flat
+                        * patterns, are estimated from the frames, see modar_tracker_camera() */
 } modar_tracker_options;
 modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar_camera* camera,
                                          const modar_tracker_options* options, modar_error* error);
@@ -141,17 +143,11 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
 void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]);
 /* The pose of a pattern in the newest frame; answers its flag `visible`. */
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose);
+/* The camera by which the newest frame's poses were measured: draw with it. Answers the standard deviation of its focal
+ * length, pixels, while that is estimated; else 0. */
+double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera);
 /* Why nothing is visible: "few matches", "lost by blur"...; "visible" where something is. */
 const char* modar_tracker_reason(const modar_tracker* tracker);
-
-/* The focal length of a camera that nobody has calibrated, from views of tilted patterns. */
-typedef struct modar_focal_finder modar_focal_finder;
-modar_focal_finder* modar_focal_finder_create(const modar_bundle* bundle, int width, int height,
-                                              modar_error* error);
-void modar_focal_finder_destroy(modar_focal_finder* finder);
-/* Looks at a frame of that size, about as dear as a search; the focal length in pixels once it is known to about 1 %,
- * else 0. Give it every fifth frame or so. */
-double modar_focal_finder_look(modar_focal_finder* finder, const uint8_t* gray, size_t stride);
 
 /* GL's projection for the camera: pixels of the frame land on pixels of a viewport that shows it. */
 void modar_projection(const modar_camera* camera, double near_plane, double far_plane,

@@ -37,6 +37,10 @@ struct PoseLoopOptions {
   /// pattern is hidden or leaves the frame: Detection::extended. Costs some 0.4 MB. The camera has
   /// to move before: depth comes from motion.
   bool extended = false;
+  /// The camera is a guess. Its focal length, and the aspects of flat patterns, are estimated from
+  /// the frames (TrackResult::camera), and no print is hidden because it seems bent: a wrong camera
+  /// bends, too.
+  bool estimate_camera = false;
 };
 
 /// Reads the patterns' tracker records and shapes (section types 258 and 261) from the bundle's

@@ -60,11 +60,20 @@ struct TrackTimes {
   double pose = 0;
 };
 
+/// The focal length by which a frame's poses were measured, pixels, and while it is estimated its
+/// standard deviation.
+struct CameraEstimate {
+  double focal = 0;
+  double sigma = 0;
+  bool estimated = false;
+};
+
 struct TrackResult {
   std::vector<Detection> visible;       ///< in the order of the bundle's patterns
   Reason reason = Reason::kNoFeatures;  ///< of the pattern that came furthest
   int features = 0;                     ///< keypoints of the frame
   TrackTimes times;
+  CameraEstimate camera;
 };
 
 /// The two-frame rule of the ModAR paper: a model is shown once its pattern was seen in two

@@ -68,11 +68,10 @@ int main(int argc, char** argv) {
   modar_camera camera = modar_camera_default(atoi(argv[4]), atoi(argv[5]));
   /* A caller of an older version knows no smoothing. */
   modar_tracker_options older = {.size = offsetof(modar_tracker_options, smooth_ms), .smooth_ms = 1e300};
-  modar_tracker_options options = {.size = sizeof options, .search_every = 5, .smooth_ms = 20.0};
+  modar_tracker_options options = {.size = sizeof options, .search_every = 5, .smooth_ms = 20.0, .estimate_camera = 1};
   modar_tracker_destroy(modar_tracker_create_with(bundle, &camera, &older, &error));
   modar_tracker* tracker = modar_tracker_create_with(bundle, &camera, &options, &error);
-  modar_focal_finder* finder = modar_focal_finder_create(bundle, camera.width, camera.height, &error);
-  NEED(tracker != NULL && finder != NULL);
+  NEED(tracker != NULL);
   size_t width = (size_t)camera.width, pixels = width * (size_t)camera.height;
   uint8_t* frame = malloc(pixels * 3 / 2);
   modar_scene scene = {0};
@@ -83,7 +82,7 @@ int main(int argc, char** argv) {
     modar_tracker_pose(tracker, scene.pattern, &pose);
     printf("pose %d %g %g %g %g\n", pose.visible, pose.fit, pose.translation[0], pose.translation[1],
            pose.translation[2]);
-    NEED(modar_focal_finder_look(finder, frame, width) >= 0.0);
+    NEED(modar_tracker_camera(tracker, &camera) > 0.0 && camera.fx == camera.fy);
   }
   NEED(pose.visible);
   modar_item item;
@@ -103,7 +102,6 @@ int main(int argc, char** argv) {
   NEED(frames > check_search_apart(bundle, &camera, frame, bounded) && frames < 30);
   check_drawing(bundle);
   free(frame);
-  modar_focal_finder_destroy(finder);
   modar_tracker_destroy(tracker);
   modar_bundle_close(bundle);
   return 0;

@@ -37,7 +37,7 @@ public final class Native {
     /**
      * The size of the camera's frames, and its lens.
      *
-     * @param file what `modar calibrate` wrote; null: focal length = width
+     * @param file what `modar calibrate` wrote; null: the focal length is estimated from the frames
      * @param searchApart searches for patterns on a thread of its own; then results depend on time
      * @param extended learns what stands still around a pattern, and goes on from it while the pattern is out of sight
      */

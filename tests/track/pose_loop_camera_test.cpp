@@ -1,0 +1,119 @@
+// A camera that nobody measured: its focal length and the aspects of prints are estimated, and the
+// corners lie where the picture's corners are all the while.
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "bake/lab/field_scene.hpp"
+#include "modar/pose_loop.hpp"
+#include "tests/track/pose_loop_samples.hpp"
+
+namespace modar {
+namespace {
+
+using namespace test;  // the samples
+
+constexpr int kSecond = 30;
+
+/// What a loop makes of picture(), printed with another aspect, in a moving hand before a camera.
+GrayPicture copy_of(const cv::Mat& print) {
+  return {print.cols, print.rows, {print.datastart, print.dataend}};
+}
+
+struct Played {
+  int shown = 0;
+  double worst = 0;  ///< corner of a frame, pixels
+  CameraEstimate camera;
+  Reason last_reason = Reason::kVisible;
+};
+
+Played play(const Camera& lens, double aspect, int frames, bool estimate, double tilt = 35) {
+  PoseLoopOptions options;
+  options.estimate_camera = estimate;
+  cv::Mat print;
+  cv::resize(picture(), print, {}, 1.0, aspect, cv::INTER_AREA);
+  const GrayPicture printed = copy_of(print);
+  static const std::vector<std::byte> bundle = bundle_with({record()});
+  auto loop = PoseLoop::create(BundleView::open(bundle).value(),
+                               default_camera(lens.width, lens.height), options);
+  EXPECT_TRUE(loop) << to_line(loop.error());
+  Random random(4);
+  SceneBand band;
+  const HandPath path(pose_of(look_at(2.8 * lens.fx / 640.0, tilt, 30, 10)), random);
+  const GrayPicture background = clutter(lens.width, lens.height, 77);
+  Played out;
+  TrackResult seen;
+  for (int i = 0; i < frames; ++i) {
+    Random same_side(5);
+    SceneFrame scene = render_still(printed.view(), lens, path.at(i / 30.0, 1), background, band,
+                                    same_side, 0.65, {});
+    expose(scene.picture, {}, random, scene.picture);
+    EXPECT_TRUE((*loop)->step(scene.picture.view(), seen));
+    out.shown += seen.visible.empty() ? 0 : 1;
+    for (const Detection& one : seen.visible) {
+      out.worst = std::max(out.worst, worst_corner(one, scene));
+    }
+  }
+  out.camera = seen.camera;
+  out.last_reason = seen.reason;
+  return out;
+}
+
+Camera lens_of(int width, int height, double focal) {
+  Camera lens = default_camera(width, height);
+  lens.fx = lens.fy = focal;
+  return lens;
+}
+
+TEST(UnknownCamera, TheDefaultIsTheLongerSide) {
+  EXPECT_EQ(default_camera(480, 640).fx, 640);
+  EXPECT_EQ(default_camera(640, 480).fy, 640);
+}
+
+TEST(UnknownCamera, CornersLieRightFromTheFirstFrameOn) {
+  for (const double focal : {0.65, 0.85, 1.25}) {
+    for (const double aspect : {0.94, 1.08}) {
+      const Played one = play(lens_of(640, 480, 640 * focal), aspect, kSecond / 2, true);
+      EXPECT_EQ(one.shown, kSecond / 2)
+          << focal << " " << aspect << " " << to_string(one.last_reason);
+      EXPECT_LT(one.worst, 1.5) << focal << " " << aspect;
+    }
+  }
+}
+
+TEST(UnknownCamera, TheFocalLengthIsFoundWithItsSpread) {
+  for (const double focal : {520.0, 840.0}) {
+    const Played one = play(lens_of(640, 480, focal), 1.0, 4 * kSecond, true);
+    EXPECT_TRUE(one.camera.estimated);
+    EXPECT_NEAR(one.camera.focal, focal, 0.06 * focal);
+    EXPECT_NEAR(one.camera.focal, focal, 2.5 * one.camera.sigma);
+    EXPECT_LT(one.camera.sigma, 0.06 * focal);
+  }
+}
+
+TEST(UnknownCamera, NearlyFrontalViewsTellLittleAndSaySo) {
+  const Played one = play(lens_of(640, 480, 840), 1.0, kSecond, true, 0);
+  EXPECT_GT(one.camera.sigma, 0.03 * 840);
+  EXPECT_NEAR(one.camera.focal, 840, 2.5 * one.camera.sigma) << one.camera.sigma;
+  EXPECT_LT(one.worst, 1.5);
+}
+
+TEST(UnknownCamera, AGivenOneIsNeverTouched) {
+  const Played one = play(lens_of(640, 480, 700), 1.0, 3, false);
+  EXPECT_FALSE(one.camera.estimated);
+  EXPECT_EQ(one.camera.focal, 640);
+}
+
+TEST(UnknownCamera, AFlatPrintOfAnotherAspectIsNotBent) {
+  // The loop is given a camera, so that a bend hides: a wrong aspect is none.
+  for (const double aspect : {0.94, 0.98, 1.04, 1.06}) {
+    for (const double focal : {1.0, 1.2}) {
+      const Played one = play(lens_of(640, 480, 640 * focal), aspect, kSecond / 2, false);
+      EXPECT_EQ(one.shown, kSecond / 2)
+          << aspect << " " << focal << " " << to_string(one.last_reason);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace modar
