@@ -87,22 +87,6 @@ Result<void> complete(BakeCommand& command) {
   return name_assets(request);
 }
 
-/// How each scene's model stands: whoever set nothing sees here what was chosen.
-void print_scenes(const BundleView& bundle) {
-  constexpr std::uint32_t kMostLines = 12;
-  const std::uint32_t count = bundle.scenes().size();
-  for (std::uint32_t s = 0; s < std::min(count, kMostLines); ++s) {
-    const SceneRecord& scene = bundle.scenes()[s];
-    const std::string name = std::string(bundle.name(bundle.patterns()[scene.pattern].name)) + "=" +
-                             std::string(bundle.name(bundle.models()[scene.model].name));
-    std::fprintf(stderr, "scene   %-16s %s%s\n", name.c_str(), scene_words(bundle, s).c_str(),
-                 s == 0 ? "; up=, turn= and height= in --scene change it" : "");
-  }
-  if (count > kMostLines) {
-    std::fprintf(stderr, "scene   and %u more: `modar inspect` lists them\n", count - kMostLines);
-  }
-}
-
 void print_summary(const BundleView& bundle, const Report& report, const std::string& path) {
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <type_traits>
 
@@ -18,6 +19,7 @@ struct CommandLine::Parts {
   std::function<Result<ExitCode>()> work;
   std::vector<std::unique_ptr<CommandLine>> commands;
   std::map<const CLI::Option*, std::vector<std::string>> choices;
+  std::map<const CLI::Option*, OptionRules> rules;
 };
 
 namespace {
@@ -105,6 +107,98 @@ std::optional<Error> unknown_word(const CLI::App* app) {
                is_option ? "there is no such option" : "there is no such command", cure};
 }
 
+/// The option that CLI11's message is about: the longest name that stands in it.
+const CLI::Option* option_in(const CLI::App& app, const std::string& message) {
+  const CLI::Option* found = nullptr;
+  std::size_t longest = 0;
+  for (const CLI::Option* option : app.get_options()) {
+    std::vector<std::string> names = option->get_lnames();
+    for (const std::string& name : option->get_snames()) names.push_back(name);
+    if (option->get_positional()) names.push_back(option->get_name(true));
+    for (const std::string& name : names) {
+      if (name.size() <= longest || message.find(name) == std::string::npos) continue;
+      found = option;
+      longest = name.size();
+    }
+  }
+  return found;
+}
+
+std::string shown_name(const CLI::Option& option) {
+  if (!option.get_lnames().empty()) return "--" + option.get_lnames().front();
+  return option.get_positional() ? option.get_name(true) : "-" + option.get_snames().front();
+}
+
+std::optional<double> number_in(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  return end != text.c_str() && *end == '\0' ? std::optional(value) : std::nullopt;
+}
+
+/// "210" for "21cm" behind an option of millimetres.
+std::string in_millimetres(const std::string& text) {
+  constexpr std::pair<const char*, double> kUnits[] = {
+      {"mm", 1}, {"cm", 10}, {"in", 25.4}, {"m", 1000}};
+  for (const auto& [unit, mm] : kUnits) {
+    if (!text.ends_with(unit)) continue;
+    const auto value = number_in(text.substr(0, text.size() - std::string(unit).size()));
+    char digits[32];
+    if (value) return std::snprintf(digits, sizeof digits, "%.6g", *value * mm), digits;
+  }
+  return "";
+}
+
+/// What a value should have been, and an example.
+std::string number_cure(const OptionRules& rules, const std::string& name,
+                        const std::string& value) {
+  if (name.ends_with("-mm")) {
+    const std::string meant = in_millimetres(value);
+    return meant.empty() ? "write millimetres, as in " + name + " 210"
+                         : "write millimetres: " + name + " " + meant;
+  }
+  char text[96];
+  if (rules.positive || (rules.least == 0 && rules.most > 1e300)) {
+    return std::string("write a number ") + (rules.positive ? "above 0" : "from 0 on");
+  }
+  if (std::isinf(rules.least)) return "write a number, as in " + name + " 4";
+  std::snprintf(text, sizeof text, "write a number from %.8g to %.8g", rules.least, rules.most);
+  return text;
+}
+
+/// An error of CLI11 in the words that all others have.
+Error usage_error(const CLI::ParseError& thrown, const CLI::Option* option,
+                  const std::vector<std::string>& choices, const OptionRules& rules,
+                  const std::string& help) {
+  Error error{ExitCode::kUsage, "cli.usage", "", thrown.what(), "see `" + help + " --help`"};
+  if (option == nullptr) return error;
+  const std::string name = shown_name(*option);
+  error.where = name;
+  const std::string value = option->results().empty() ? "" : option->results().back();
+  const std::string quoted = "'" + value + "'";
+  if (dynamic_cast<const CLI::RequiredError*>(&thrown) != nullptr) {
+    error.cause = "it is missing";
+  } else if (dynamic_cast<const CLI::ExcludesError*>(&thrown) != nullptr) {
+    error.cause = "it contradicts another option: " + std::string(thrown.what());
+    error.cure = "leave one of them out";
+  } else if (dynamic_cast<const CLI::RequiresError*>(&thrown) != nullptr) {
+    error.cause = "it needs " + (rules.needs.empty() ? std::string("another option") : rules.needs);
+    error.cure = "add it";
+  } else if (value.empty()) {
+    error.cause = "its value is missing";
+    error.cure = "write " + name + " " + option->get_type_name();
+  } else if (!choices.empty()) {
+    const std::string_view meant = nearest_name(value, choices);
+    std::string list;
+    for (const std::string& choice : choices) list += (list.empty() ? "" : ", ") + choice;
+    error.cause = quoted + " is none of its values";
+    error.cure = meant.empty() ? "name one of " + list : "did you mean " + std::string(meant) + "?";
+  } else {
+    error.cause = quoted + (number_in(value) ? " is out of its range" : " is no number");
+    error.cure = number_cure(rules, name, value);
+  }
+  return error;
+}
+
 }  // namespace
 
 std::string example(const std::string& text, const std::string& codes) {
@@ -142,6 +236,7 @@ void CommandLine::option(const std::string& names, Value value, const std::strin
         limit<std::remove_pointer_t<decltype(target)>>(rules, *option);
         apply(rules, *parts_->app, *option);
         parts_->choices[option] = rules.choices;
+        parts_->rules[option] = rules;
       },
       value);
 }
@@ -207,12 +302,37 @@ CommandText CommandLine::describe() const {
   return text;
 }
 
+Error CommandLine::told(const std::exception& error) const {
+  const CommandLine* chosen = this;
+  for (bool deeper = true; deeper;) {
+    deeper = false;
+    for (const auto& command : chosen->parts_->commands) {
+      if (!command->parts_->app->parsed()) continue;
+      chosen = command.get();
+      deeper = true;
+      break;
+    }
+  }
+  const Parts& parts = *chosen->parts_;
+  const CLI::Option* option = option_in(*parts.app, error.what());
+  const auto choices = parts.choices.find(option);
+  const auto rules = parts.rules.find(option);
+  std::string help = parts.app->get_name();
+  for (const CLI::App* up = parts.app->get_parent(); up != nullptr; up = up->get_parent()) {
+    help = up->get_name() + " " + help;
+  }
+  return usage_error(dynamic_cast<const CLI::ParseError&>(error), option,
+                     choices == parts.choices.end() ? std::vector<std::string>() : choices->second,
+                     rules == parts.rules.end() ? OptionRules() : rules->second, help);
+}
+
 int CommandLine::parse_and_run(int argc, char** argv) {
   try {
     parts_->app->parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {
       if (const auto unknown = unknown_word(parts_->app)) return print_error(*unknown);
+      return print_error(told(error));
     }
     return parts_->app->exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
                                          : static_cast<int>(ExitCode::kUsage);

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <limits>
 #include <map>
@@ -113,6 +114,8 @@ class CommandLine {
  private:
   struct Parts;
   explicit CommandLine(std::unique_ptr<Parts> parts);
+  /// What the parser threw, with cause and cure.
+  [[nodiscard]] Error told(const std::exception& error) const;
   void choose(const std::string& names, std::function<void(int)> take,
               const std::map<std::string, int>& words, const std::string& help,
               const OptionRules& rules);

@@ -20,8 +20,25 @@
 #include "bake/project/project.hpp"
 #include "bake/terminal.hpp"
 #include "formats/atomic_file.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
 
 namespace modar {
+
+void print_scenes(const BundleView& bundle) {
+  constexpr std::uint32_t kMostLines = 12;
+  const std::uint32_t count = bundle.scenes().size();
+  for (std::uint32_t s = 0; s < std::min(count, kMostLines); ++s) {
+    const SceneRecord& scene = bundle.scenes()[s];
+    const std::string name = std::string(bundle.name(bundle.patterns()[scene.pattern].name)) + "=" +
+                             std::string(bundle.name(bundle.models()[scene.model].name));
+    std::fprintf(stderr, "scene   %-16s %s%s\n", name.c_str(), scene_words(bundle, s).c_str(),
+                 s == 0 ? "; up=, turn= and height= in --scene change it" : "");
+  }
+  if (count > kMostLines) {
+    std::fprintf(stderr, "scene   and %u more: `modar inspect` lists them\n", count - kMostLines);
+  }
+}
 namespace {
 
 using State = AssetOutcome::State;
@@ -145,6 +162,9 @@ void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run, bo
                                         : "not written";
     std::fprintf(stderr, "%s: %s, %s\n", bundle.path.c_str(), human_bytes(bundle.bytes).c_str(),
                  what);
+    const auto file = bundle.written ? MappedFile::open(bundle.path) : Result<MappedFile>();
+    if (!file) continue;
+    if (const auto view = BundleView::open(file->bytes())) print_scenes(*view);
   }
   std::fprintf(stderr, "%s\n", counts_of(outcome).c_str());
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bake/commands/command_line.hpp"
+#include "formats/bundle_view.hpp"
 
 namespace modar {
 
@@ -31,6 +32,9 @@ struct CommonOptions {
   bool json = false;
   bool notes = false;
 };
+
+/// How each scene's model stands, on stderr: whoever set nothing sees here what was chosen.
+void print_scenes(const BundleView& bundle);
 
 /// words: of the command line, to refuse options that belong in the file.
 Result<ExitCode> run_project(const ProjectCommand& command, const CommonOptions& common,

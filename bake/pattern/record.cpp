@@ -573,11 +573,11 @@ Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned 
   out.record.score = static_cast<float>(score.score);
   out.record.score_version = kScoreVersion;
   out.range = score.range;
-  std::string advice;
-  for (const ScoreCause& cause : score.causes) {
-    if (*cause.advice == 0) continue;
-    advice += (advice.empty() ? "" : "; ") + std::string(cause.id) + ": " + cause.advice;
-  }
+  const auto worst =
+      std::min_element(score.causes.begin(), score.causes.end(),
+                       [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
+  const std::string advice =
+      *worst->advice == 0 ? "" : std::string(worst->id) + ": " + worst->advice;
   const bool weak = score.grade >= kWeakGrade;
   report.diagnostics.push_back({weak ? "pattern.weak" : "pattern.score",
                                 weak ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo,

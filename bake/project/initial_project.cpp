@@ -112,6 +112,15 @@ std::string quoted(const std::string& text, bool as_glob) {
   return out + "\"";
 }
 
+/// The name of a file whose stem is taken: its folder's, else its whole path's.
+std::string folder_or_path(const fs::path& file, const std::set<std::string>& taken) {
+  std::string name = file.parent_path().filename().string();
+  if (!name.empty() && taken.count(name) == 0) return name;
+  name = file.string();
+  std::replace(name.begin(), name.end(), '/', '-');
+  return name;
+}
+
 /// "[[model]]" tables of the files: one glob a folder and extension where all names differ, else a
 /// table a file. names: receives what scenes call them.
 std::string tables(const std::string& kind, const std::vector<fs::path>& files,
@@ -141,8 +150,7 @@ std::string tables(const std::string& kind, const std::vector<fs::path>& files,
       std::string name = file.stem().string();
       text += "[[" + kind + "]]\nfile = " + quoted(file.string(), true) + "\n";
       if (!taken.insert(name).second) {
-        name = file.string();
-        std::replace(name.begin(), name.end(), '/', '-');
+        name = folder_or_path(file, taken);
         taken.insert(name);
         text += "name = " + quoted(name, false) + "\n";
       }
@@ -178,7 +186,7 @@ std::string up_line(const Found& found, const std::string& model) {
       std::find_if(found.models.begin(), found.models.end(), [&](const fs::path& one) {
         std::string name = one.string();
         std::replace(name.begin(), name.end(), '/', '-');
-        return one.stem() == model || name == model;
+        return one.stem() == model || one.parent_path().filename() == model || name == model;
       });
   const auto up =
       file == found.models.end() ? std::nullopt : upright_of(fs::path(found.folder) / *file);

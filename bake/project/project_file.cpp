@@ -266,6 +266,12 @@ class ProjectReader {
     MODAR_TRY(read_scenes());
     MODAR_TRY(read_bundles());
     MODAR_TRY(read_gates());
+    if (project_.models.empty() && project_.patterns.empty()) {
+      return fail(ExitCode::kInvalidInput, "project.empty", project_.file,
+                  "it lists neither a model nor a pattern",
+                  "add [[model]] file = \"vase.glb\" and [[pattern]] file = \"cover.png\", or let "
+                  "`modar init --force` write it anew");
+    }
     return std::move(project_);
   }
 

@@ -472,7 +472,7 @@ class Init(ProjectTest):
         self.modar("init", cwd=self.place)
         report = self.bake("--dry-run")
         self.assertEqual(sorted(a["name"] for a in report["assets"]),
-                         sorted(["a", "a", "b", "more-b.obj", "odd [1] \"x\""]))
+                         sorted(["a", "a", "b", "more", "odd [1] \"x\""]))
         try:
             import jsonschema
         except ImportError:

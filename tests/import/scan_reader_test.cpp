@@ -215,6 +215,9 @@ TEST(Ply, RefusesWhatIsNone) {
     return read ? std::string() : read.error().code;
   };
   EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n3 0 1 2\n"), "");
+  std::string odd = header;  // a line that an old Blender writes
+  odd.insert(odd.find("element"), "Created by Blender3D 247\n");
+  EXPECT_EQ(code(odd + "0 0 0 1 0 0 0 1 0\n3 0 1 2\n"), "");
   EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n3 0 1"), "ply.short");
   EXPECT_EQ(code(header + "0 0 0 1 0 zero 0 1 0\n3 0 1 2\n"), "ply.number");
   EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n3 0 1 3\n"), "ply.no-faces");

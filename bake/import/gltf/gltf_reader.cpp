@@ -174,10 +174,19 @@ double GltfAccessor::at(std::size_t element, std::size_t component) const {
 
 constexpr int kMaxDepth = 1000;  ///< of nodes; keeps recursion within a small stack, set by hand
 
+/// What is counted while the scene is read, and left out of the model.
+struct LeftOut {
+  std::size_t lines_and_points = 0;  ///< primitives
+  std::size_t morphs = 0;            ///< primitives with targets
+  std::size_t second_uvs = 0;        ///< primitives
+};
+
 class SceneReader {
  public:
   SceneReader(const tinygltf::Model& gltf, SourceModel& model, std::string label)
       : gltf_(gltf), model_(model), label_(std::move(label)), seen_(gltf.nodes.size()) {}
+
+  [[nodiscard]] const LeftOut& left_out() const { return left_out_; }
 
   Result<void> run() {
     for (const int node : roots()) MODAR_TRY(walk(node, glm::dmat4(1.0), 0));
@@ -259,10 +268,11 @@ class SceneReader {
   Result<void> add_primitive(const tinygltf::Primitive& primitive, const glm::dmat4& to_scene) {
     const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
     if (mode < TINYGLTF_MODE_TRIANGLES) {
-      ++lines_and_points_;
+      ++left_out_.lines_and_points;
       return {};
     }
-    if (!primitive.targets.empty()) ++morphs_;
+    if (!primitive.targets.empty()) ++left_out_.morphs;
+    if (primitive.attributes.count("TEXCOORD_1") != 0) ++left_out_.second_uvs;
     const GltfUv placing = gltf_uv(gltf_, primitive.material);
     GltfAccessor positions;
     GltfAccessor normals;
@@ -368,14 +378,10 @@ class SceneReader {
     if (!any_colours_) model_.colours.release();
     // The specification: faces without normals are flat-shaded.
     model_.smoothing_runs = {{0, 0}};
-    const auto add = [&](std::uint64_t count, const char* id, const std::string& what) {
-      if (count == 0) return;
-      model_.diagnostics.push_back(
-          {id, DiagnosticSeverity::kWarning, label_, 0, std::to_string(count) + " " + what, ""});
-    };
-    add(lines_and_points_, "gltf.lines", "primitives of lines or points are left out");
-    add(skins_, "gltf.skin", "skinned nodes are baked in the pose of their nodes");
-    add(morphs_, "gltf.morph", "primitives have morph targets, which are left out");
+    if (skins_ == 0) return;
+    model_.diagnostics.push_back(
+        {"gltf.skin", DiagnosticSeverity::kWarning, label_, 0,
+         std::to_string(skins_) + " skinned nodes are baked in the pose of their nodes", ""});
   }
 
   const tinygltf::Model& gltf_;
@@ -383,9 +389,8 @@ class SceneReader {
   std::string label_;
   std::vector<bool> seen_;  // nodes: glTF's are trees
   bool any_colours_ = false;
-  std::uint64_t lines_and_points_ = 0;
+  LeftOut left_out_;
   std::uint64_t skins_ = 0;
-  std::uint64_t morphs_ = 0;
 };
 
 /// Reads a whole file; false where it cannot be read.
@@ -425,31 +430,33 @@ Result<void> require_support(const tinygltf::Model& gltf, std::string_view bytes
               "WebP)");
 }
 
-/// One diagnostic for each kind of thing that is left out of materials and scene.
-void report_left_out(const tinygltf::Model& gltf, const std::string& label,
+/// What of the file no bundle holds, as one finding.
+void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const std::string& label,
                      std::vector<Diagnostic>& diagnostics) {
-  const auto add = [&](std::size_t count, const char* id, DiagnosticSeverity severity,
-                       const std::string& what, const char* cure) {
+  std::string words;
+  const auto add = [&words](std::size_t count, const char* one, const char* many) {
     if (count == 0) return;
-    diagnostics.push_back({id, severity, label, 0, std::to_string(count) + " " + what, cure});
+    words += (words.empty() ? "" : ", ") + std::to_string(count) + " " + (count == 1 ? one : many);
   };
-  const auto materials = [&](const auto& test) {
-    return static_cast<std::size_t>(
-        std::count_if(gltf.materials.begin(), gltf.materials.end(), test));
-  };
-  const auto warning = DiagnosticSeverity::kWarning;
-  const auto info = DiagnosticSeverity::kInfo;
-  add(gltf.animations.size(), "gltf.animation", warning, "animations are left out",
-      "the model stands as its nodes have it");
-  add(materials([](const auto& m) { return m.normalTexture.index >= 0; }), "gltf.normal-map", info,
-      "materials have a normal map, which is left out", "");
-  add(gltf.cameras.size(), "gltf.camera", info, "cameras are left out", "");
+  const auto normal_maps = static_cast<std::size_t>(
+      std::count_if(gltf.materials.begin(), gltf.materials.end(),
+                    [](const auto& material) { return material.normalTexture.index >= 0; }));
+  add(gltf.animations.size(), "animation", "animations");
+  add(counts.morphs, "set of morph targets", "sets of morph targets");
+  add(normal_maps, "normal map", "normal maps");
+  add(counts.second_uvs, "second uv set", "second uv sets");
+  add(counts.lines_and_points, "primitive of lines or points", "primitives of lines or points");
+  add(gltf.cameras.size(), "camera", "cameras");
+  std::string extensions;
   for (const std::string& extension : gltf.extensionsUsed) {
-    if (is_known(extension)) continue;
-    diagnostics.push_back({"gltf.extension-ignored", info, label, 0,
-                           "the extension " + extension + " is not read; the file does without",
-                           ""});
+    if (!is_known(extension)) extensions += (extensions.empty() ? "" : ", ") + extension;
   }
+  if (!extensions.empty()) words += (words.empty() ? "" : ", ") + ("extensions " + extensions);
+  if (words.empty()) return;
+  const bool shows = !gltf.animations.empty() || counts.morphs + counts.lines_and_points != 0;
+  diagnostics.push_back({"gltf.left-out",
+                         shows ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, label, 0,
+                         "left out: " + words, ""});
 }
 
 }  // namespace
@@ -494,8 +501,9 @@ Result<SourceModel> read_gltf(const std::string& path) {
   for (const tinygltf::Buffer& buffer : gltf.buffers) note_file(buffer.uri);
   for (const tinygltf::Image& image : gltf.images) note_file(image.uri);
   model.materials = gltf_materials(gltf, folder, path, model.diagnostics);
-  MODAR_TRY(SceneReader(gltf, model, path).run());
-  report_left_out(gltf, path, model.diagnostics);
+  SceneReader scene(gltf, model, path);
+  MODAR_TRY(scene.run());
+  report_left_out(gltf, scene.left_out(), path, model.diagnostics);
   if (model.corner_positions.empty()) {
     return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it shows no triangles",
                 "export a mesh in its default scene");

@@ -70,8 +70,7 @@ class HeaderParser {
       header_.textures.emplace_back(line);
       return {};
     }
-    if (word == "comment" || word == "obj_info" || word.empty()) return {};
-    return error("'" + std::string(word.substr(0, 32)) + "' is no word of a PLY header");
+    return {};  // comments, and lines that programs write though no PLY has them
   }
 
   Result<void> take_format(std::string_view name) {

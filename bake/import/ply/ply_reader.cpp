@@ -159,8 +159,13 @@ class PlyReader {
   Result<SourceModel> run() {
     for (const PlyElement& element : header_.elements) {
       const std::size_t least = values_.least_bytes(element);
-      if (element.count > kMostElements || (least > 0 && element.count > values_.left() / least)) {
-        return cut_short(element, 0);
+      const std::uint64_t room = least > 0 ? values_.left() / least : kMostElements;
+      if (element.count > std::min(room, kMostElements)) {
+        return fail(ExitCode::kInvalidInput, "ply.short",
+                    label_ + ": byte " + std::to_string(values_.offset()),
+                    "the header states " + std::to_string(element.count) + " elements '" +
+                        element.name + "' and the file has room for " + std::to_string(room),
+                    "the file is cut short; copy or export it again");
       }
       if (least == 0) continue;
       if (element.name == "vertex") {
