@@ -1,4 +1,4 @@
-// The report of a run: movie, contact sheet, JSON lines and the page that shows them.
+// The report of a run: movie, poster, contact sheet, JSON lines and the page that shows them.
 #include <algorithm>
 #include <vector>
 
@@ -77,6 +77,34 @@ class ContactSheet {
   std::uint64_t count_ = 0;
 };
 
+/// The picture that stands for the movie until it is played: the first one with a model at or after
+/// each power of two takes the place of the last, so that it comes from a run's second half where
+/// it can, and few are copied.
+class Poster {
+ public:
+  void add(const RgbaView& image, const FrameReport& report) {
+    const bool model = report.state == Shown::kShown;
+    if (++count_ >= next_ || (model && !has_model_)) due_ = true;
+    while (next_ <= count_) next_ *= 2;
+    if (!due_ || (has_model_ && !model)) return;
+    pixels_.assign(image.pixels.begin(), image.pixels.end());
+    width_ = image.width;
+    height_ = image.height;
+    due_ = false;
+    has_model_ = model;
+  }
+  [[nodiscard]] RgbaView picture() const { return {pixels_, width_, height_}; }
+
+ private:
+  std::vector<std::uint8_t> pixels_;
+  int width_ = 0;
+  int height_ = 0;
+  std::uint64_t count_ = 0;
+  std::uint64_t next_ = 1;
+  bool due_ = false;
+  bool has_model_ = false;
+};
+
 class Report final : public FrameSink {
  public:
   Report(std::string folder, double fps, ReportTitle title, std::span<const std::string> names,
@@ -94,6 +122,7 @@ class Report final : public FrameSink {
     } catch (const std::exception& error) {
       return failed(error.what());
     }
+    poster_.add(image, report);
     return movie_->picture(image, report);
   }
 
@@ -108,6 +137,9 @@ class Report final : public FrameSink {
     MODAR_TRY(write_line(summary));
     MODAR_TRY(lines_.commit());
     MODAR_TRY(write_sheet());
+    if (!frames_.empty()) {
+      MODAR_TRY(write_png(folder_ + "/poster.png", poster_.picture()));
+    }
     return write_file(folder_ + "/index.html", report_page(title_, fps_, frames_, stats_));
   }
 
@@ -158,6 +190,7 @@ class Report final : public FrameSink {
   std::unique_ptr<FrameSink> movie_;
   AtomicFile lines_;
   ContactSheet sheet_;
+  Poster poster_;
   std::vector<PageFrame> frames_;
   RunStats stats_;
 };

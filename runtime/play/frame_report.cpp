@@ -160,6 +160,14 @@ void times(Writer& writer, const StageTimes& ms) {
 
 }  // namespace
 
+bool draws_in_software(std::string_view gl_renderer) {
+  constexpr std::array<std::string_view, 5> kNames = {"llvmpipe", "softpipe", "swrast",
+                                                      "Software Rasterizer", "SwiftShader"};
+  return std::any_of(kNames.begin(), kNames.end(), [&](std::string_view name) {
+    return gl_renderer.find(name) != std::string_view::npos;
+  });
+}
+
 const char* to_string(Shown state) {
   switch (state) {
     case Shown::kShown:

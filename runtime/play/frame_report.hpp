@@ -101,6 +101,10 @@ class RunStats {
   std::optional<CameraReport> camera_;
 };
 
+/// True for drivers of OpenGL that draw on the processor, by the name that they give themselves:
+/// Mesa's llvmpipe, softpipe and swrast, SwiftShader.
+bool draws_in_software(std::string_view gl_renderer);
+
 /// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches,fit,agreeing,
 /// likeness}],reason,state,camera:{focal_px,sigma_px,source},ms}; sigma_px of an estimated camera;
 /// of an extended pose also extended, position_sigma, rotation_sigma. Rotation row by row; numbers

@@ -39,8 +39,8 @@ bool is_frame(std::string_view name) {
 
 /// What --out and --report write. Names with a leading dot are those of unfinished files.
 bool is_ours(std::string_view name) {
-  constexpr std::array<std::string_view, 4> kReport = {"overlay.mp4", "contact_sheet.png",
-                                                       "frames.jsonl", "index.html"};
+  constexpr std::array<std::string_view, 5> kReport = {
+      "overlay.mp4", "poster.png", "contact_sheet.png", "frames.jsonl", "index.html"};
   for (const std::string_view each : kReport) {
     if (name.starts_with(each)) return true;
   }

@@ -46,9 +46,11 @@ struct ReportTitle {
   std::string bundle;
   std::string input;
   std::string method;
+  std::string gl_renderer;  ///< the driver's own name
 };
 
-/// A folder with overlay.mp4, contact_sheet.png, frames.jsonl and index.html that shows them.
+/// A folder with overlay.mp4, poster.png, contact_sheet.png, frames.jsonl and index.html that shows
+/// them.
 /// pattern_names: by the bundle's pattern index.
 Result<std::unique_ptr<FrameSink>> open_report(const std::string& folder, double fps,
                                                const ReportTitle& title,

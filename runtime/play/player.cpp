@@ -103,7 +103,7 @@ Result<void> Player::open_sinks() {
   }
   if (options_.report.empty()) return {};
   const ReportTitle title{file_name(options_.bundle), file_name(input_of(options_)),
-                          options_.method};
+                          options_.method, screen_->caps().renderer};
   return add(open_report(options_.report, setup_.source.fps, title, names_));
 }
 
@@ -360,11 +360,23 @@ void Player::make_pattern(const Job& job, const std::array<glm::dvec2, 4>& corne
 
 Result<int> Player::finish(const PipelineCounts& counts) {
   progress_.end();
-  if (was_interrupted() && !setup_.source.live) {
-    return fail(ExitCode::kIo, "play.interrupted", "", "the run was interrupted",
-                "nothing half-made was left; start it again");
+  const bool interrupted = was_interrupted() && !setup_.source.live;
+  if (interrupted && stats_.frames() == 0) {
+    return fail(ExitCode::kIo, "play.interrupted", input_of(options_),
+                "the run was interrupted before its first frame", "start it again");
   }
   stats_.set_dropped(counts.dropped);
+  MODAR_TRY(finish_outputs(!interrupted));
+  if (interrupted) {
+    return fail(ExitCode::kIo, "play.interrupted", input_of(options_),
+                "the run was interrupted after " + std::to_string(stats_.frames()) + " frames",
+                "what was asked for is whole, of these frames; start it again for all");
+  }
+  return golden_ && !golden_->good() ? kExitDifferent : 0;
+}
+
+/// Completes every output. whole: all frames were played, so that a comparison has a verdict.
+Result<void> Player::finish_outputs(bool whole) {
   const std::string summary = summary_line(stats_);
   for (const auto& sink : sinks_) {
     MODAR_TRY(sink->finish(summary));
@@ -375,13 +387,13 @@ Result<int> Player::finish(const PipelineCounts& counts) {
   if (qos_) {
     MODAR_TRY(qos_->finish(summary));
   }
-  if (golden_) {
+  if (golden_ && whole) {
     MODAR_TRY(print_line(golden_->line()));
   }
   if (options_.json || !options_.quiet) {
     MODAR_TRY(print_line(options_.json ? summary : summary_text()));
   }
-  return golden_ && !golden_->good() ? kExitDifferent : 0;
+  return {};
 }
 
 std::string Player::summary_text() const {
@@ -389,12 +401,13 @@ std::string Player::summary_text() const {
   char text[200];
   std::snprintf(text, sizeof text,
                 "%llu frames, a pattern seen in %llu (%.1f %%), held in %llu; median ms: track "
-                "%.1f, render %.1f",
+                "%.1f, render %.1f%s",
                 static_cast<unsigned long long>(stats_.frames()),
                 static_cast<unsigned long long>(stats_.visible()), stats_.recognised_percent(),
                 static_cast<unsigned long long>(stats_.count(Shown::kHeld)),
                 ms[static_cast<std::size_t>(Stage::kTrack)],
-                ms[static_cast<std::size_t>(Stage::kRender)]);
+                ms[static_cast<std::size_t>(Stage::kRender)],
+                draws_in_software(screen_->caps().renderer) ? " (in software)" : "");
   return text;
 }
 

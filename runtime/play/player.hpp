@@ -61,9 +61,12 @@ class Player {
   /// Takes what the user did. Answers false once the user ended the run.
   bool idle();
   /// Completes every output; answers the program's exit code.
+  /// Of an interrupted run, the frames that were played. Errors: kIo "play.interrupted" (a file's
+  /// run, after its outputs are complete), those of the outputs.
   Result<int> finish(const PipelineCounts& counts);
 
  private:
+  Result<void> finish_outputs(bool whole);
   Result<void> open_sinks();
   Result<void> open_logs();
   FrameReport begin_report(const Job& job);

@@ -103,7 +103,7 @@ void add_card(std::string& page, const std::string& value, const std::string& la
   page += "<div class=card><b>" + value + "</b><span>" + escape_html(label) + "</span></div>\n";
 }
 
-void add_cards(std::string& page, const RunStats& stats) {
+void add_cards(std::string& page, const ReportTitle& title, const RunStats& stats) {
   const StageTimes ms = stats.median_ms();
   page += "<section class=cards>\n";
   add_card(page, std::to_string(stats.frames()), "frames");
@@ -112,7 +112,9 @@ void add_cards(std::string& page, const RunStats& stats) {
   add_card(page, std::to_string(stats.count(Shown::kHidden)), "frames hidden");
   add_card(page, fixed(ms[static_cast<std::size_t>(Stage::kTrack)], 1) + " ms", "vision (median)");
   add_card(page, fixed(ms[static_cast<std::size_t>(Stage::kRender)], 1) + " ms",
-           "rendering (median)");
+           draws_in_software(title.gl_renderer)
+               ? "rendering (median), in software: no graphics card"
+               : "rendering (median)");
   page += "</section>\n";
 }
 
@@ -172,8 +174,10 @@ std::string report_page(const ReportTitle& title, double fps, std::span<const Pa
           std::string(kReportStyle) + "</style></head>\n<body><main>\n";
   page += "<h1>" + escape_html(title.bundle) + " <small>on " + escape_html(title.input) +
           ", method " + escape_html(title.method) + "</small></h1>\n";
-  add_cards(page, stats);
-  page += "<video id=film src=overlay.mp4 controls loop muted playsinline preload=auto></video>\n";
+  add_cards(page, title, stats);
+  page +=
+      "<video id=film src=overlay.mp4 poster=poster.png controls loop muted playsinline "
+      "preload=auto></video>\n";
   add_strip(page, frames);
   page += "<p id=now aria-live=off>&nbsp;</p>\n";
   add_reasons(page, stats);

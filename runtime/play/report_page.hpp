@@ -21,8 +21,8 @@ struct PageFrame {
   std::string patterns;  ///< names of what was seen, with commas
 };
 
-/// Needs no file but overlay.mp4 and contact_sheet.png beside it, and no network. fps: of the
-/// movie, which shows one picture a PageFrame, in order.
+/// Needs no file but overlay.mp4, poster.png and contact_sheet.png beside it, and no network. fps:
+/// of the movie, which shows one picture a PageFrame, in order.
 std::string report_page(const ReportTitle& title, double fps, std::span<const PageFrame> frames,
                         const RunStats& stats);
 

@@ -13,7 +13,7 @@ const char* to_string(Reason reason) {
     case Reason::kFewMatches:
       return "few matches";
     case Reason::kNoGeometry:
-      return "no geometry";
+      return "not in view";
     case Reason::kFailedVerification:
       return "failed verification";
     case Reason::kLostByBlur:

@@ -336,7 +336,7 @@ function adviceFor({ reason, brightness }, unseenMs) {
   if (unseenMs < PATIENCE_MS) return $('reason').textContent;
   if (reason === 'lost by blur') return say('blurred');
   if (reason === 'out of view') return say('outside');
-  if (reason === 'no geometry' || reason === 'failed verification') return say('hold');
+  if (reason === 'failed verification') return say('hold');
   return unseenMs > FAR_MS ? `${lookWords()} ${say('far')}` : lookWords();
 }
 

@@ -91,7 +91,7 @@ class Play(ProgramTest):
         self.assertTrue(0.5 < seen["agreeing"] <= 1 and 0.5 < seen["likeness"] <= 1 and 0 < seen["fit"] <= 1, seen)
         self.assertEqual(len(list((self.folder / "pictures").glob("frame_*.png"))), 12)
         self.assertEqual({path.name for path in (self.folder / "report").iterdir()},
-                         {"overlay.mp4", "contact_sheet.png", "frames.jsonl", "index.html"})
+                         {"overlay.mp4", "poster.png", "contact_sheet.png", "frames.jsonl", "index.html"})
         self.assertIn('"event":"found"', (self.folder / "trial.jsonl").read_text())
 
         same = self.play(bundle, "--golden", "kept", "--quiet")
@@ -186,7 +186,8 @@ class Play(ProgramTest):
 
     def test_a_pipe_that_falls_silent_does_not_hang_the_end(self):
         bundle = self.bake_demo()
-        process = subprocess.Popen([BIN / "modar-play", bundle, "--input", "nv21:160x120:-", "--realtime", "--json"],
+        process = subprocess.Popen([BIN / "modar-play", bundle, "--input", "nv21:160x120:-", "--realtime", "--json", "--report",
+                                    self.folder / "kept"],
                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         watch = threading.Timer(60, process.kill)
         watch.start()
@@ -196,7 +197,10 @@ class Play(ProgramTest):
         process.terminate()
         self.assertEqual(process.wait(), 2)
         watch.cancel()
-        self.assertIn(b"interrupted", process.stderr.read())
+        self.assertIn(b"interrupted after 1 frames", process.stderr.read())
+        self.assertEqual(json.loads(process.stdout.read())["summary"]["frames"], 1)
+        self.assertEqual(len((self.folder / "kept" / "frames.jsonl").read_text().splitlines()), 2)
+        self.assertTrue((self.folder / "kept" / "index.html").exists(), "what was played is kept")
         for stream in (process.stdin, process.stdout, process.stderr):
             stream.close()
 

@@ -115,7 +115,7 @@ TEST(JsonLines, TheSummaryCountsAndTakesMedians) {
   EXPECT_EQ(summary["dropped"], 2);
   EXPECT_EQ(summary["late"], 1);
   EXPECT_EQ(summary["recognised_percent"], 75.0);
-  EXPECT_EQ(summary["reasons"], json({{"visible", 3}, {"no geometry", 1}}));
+  EXPECT_EQ(summary["reasons"], json({{"visible", 3}, {"not in view", 1}}));
   EXPECT_EQ(summary["states"], json({{"shown", 3}, {"held", 0}, {"hidden", 1}}));
   EXPECT_EQ(summary["ms"]["track"], 5.0) << "the lower median of 1 5 9 100";
 }

@@ -54,7 +54,7 @@ TEST(Reason, EveryReasonHasItsWords) {
   EXPECT_STREQ(to_string(Reason::kVisible), "visible");
   EXPECT_STREQ(to_string(Reason::kNoFeatures), "no features");
   EXPECT_STREQ(to_string(Reason::kFewMatches), "few matches");
-  EXPECT_STREQ(to_string(Reason::kNoGeometry), "no geometry");
+  EXPECT_STREQ(to_string(Reason::kNoGeometry), "not in view");
   EXPECT_STREQ(to_string(Reason::kFailedVerification), "failed verification");
   EXPECT_STREQ(to_string(Reason::kLostByBlur), "lost by blur");
   EXPECT_STREQ(to_string(Reason::kOutOfView), "out of view");

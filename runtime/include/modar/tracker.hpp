@@ -16,9 +16,9 @@ namespace modar {
 /// Why nothing is visible in a frame. A value, not an error.
 enum class Reason : std::uint8_t {
   kVisible,
-  kNoFeatures,          ///< the frame has no corners to describe
-  kFewMatches,          ///< too few features match the pattern's
-  kNoGeometry,          ///< no homography, or too few matches agree with it
+  kNoFeatures,  ///< the frame has no corners to describe
+  kFewMatches,  ///< too few features match the pattern's
+  kNoGeometry,  ///< "not in view": some features match, as in any picture, and no place agrees
   kFailedVerification,  ///< the homography is impossible, or the frame does not look like it
   kLostByBlur,          ///< it was tracked, should be in view, and does not fit
   kOutOfView,           ///< it was tracked and left the frame
