@@ -67,9 +67,34 @@ void limit(const OptionRules& rules, CLI::Option& option) {
   }
 }
 
-/// Options without their validators' notes, which apply() has put into words.
+/// Text with line breaks between words, so that no line is longer than `width`, but for longer
+/// words.
+std::string wrapped(const std::string& text, std::size_t width) {
+  std::string out;
+  std::size_t column = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    if (column > 0 && column + 1 + end - begin > width) {
+      out += '\n';
+      column = 0;
+    } else if (begin > 0) {
+      out += ' ';
+      ++column;
+    }
+    out.append(text, begin, end - begin);
+    column += end - begin;
+    begin = end + 1;
+  }
+  return out;
+}
+
+/// Options without their validators' notes, which apply() has put into words, in lines of 80
+/// columns.
 class HelpFormatter : public CLI::Formatter {
  public:
+  std::string make_option_desc(const CLI::Option* option) const override {
+    return wrapped(CLI::Formatter::make_option_desc(option), kColumns - column_width_);
+  }
   std::string make_option_name(const CLI::Option* option, bool positional) const override {
     const std::string name = CLI::Formatter::make_option_name(option, positional);
     return name.substr(0, name.find('{'));
@@ -80,6 +105,9 @@ class HelpFormatter : public CLI::Formatter {
     if (option->get_expected_max() == CLI::detail::expected_max_vector_size) words += " ...";
     return words + (option->get_required() ? " REQUIRED" : "");
   }
+
+ private:
+  static constexpr std::size_t kColumns = 80;
 };
 
 /// The first word of the command line that nothing takes, and the name that it is nearest to.

@@ -125,7 +125,7 @@ std::string bash_completion(const CommandText& program) {
     cases +=
         "    " + shell_word(command.name) + ") words=" +
         shell_word(joined(command_words(command), " ") + " " + joined(option_words(command), " ")) +
-        " ;;\n";
+        (command.commands.empty() ? "" : " files=no") + " ;;\n";
     for (const OptionText& option : command.options) {
       for (const std::string& name : option.names) {
         if (option.choices.empty()) continue;
@@ -135,14 +135,15 @@ std::string bash_completion(const CommandText& program) {
     }
   });
   return "# bash completion for modar. Made by `modar document`.\n_modar() {\n"
-         "  local command=modar word words='' i\n  COMPREPLY=()\n"
+         "  local command=modar word words='' files=yes i\n  COMPREPLY=()\n"
          "  for ((i = 1; i < COMP_CWORD; i++)); do\n"
          "    case \"$command ${COMP_WORDS[i]}\" in " +
          names +
          ") command=\"$command ${COMP_WORDS[i]}\" ;; esac\n  done\n"
          "  word=${COMP_WORDS[COMP_CWORD]}\n  case \"$command\" in\n" +
          cases + "  esac\n  case \"$command ${COMP_WORDS[COMP_CWORD - 1]}\" in\n" + values +
-         "    *) if [[ $word != -* ]]; then COMPREPLY=($(compgen -f -- \"$word\")); fi ;;\n  esac\n"
+         "    *) if [[ $files = yes && $word != -* ]]; then COMPREPLY=($(compgen -f -- "
+         "\"$word\")); fi ;;\n  esac\n"
          "  COMPREPLY+=($(compgen -W \"$words\" -- \"$word\"))\n}\n"
          "complete -o filenames -F _modar modar\n";
 }

@@ -365,6 +365,22 @@ bool runs_by_ssh(const std::string& runner) {
   return program.substr(program.rfind('/') + 1) == "ssh";
 }
 
+/// The edge by which Ninja writes the plan again, under the name build.ninja, when a file is added
+/// to a folder that a glob looks into or taken out of it, or modar.toml changes.
+std::string ninja_generator(const NinjaPlanCommand& command, const Project& project,
+                            const std::string& program) {
+  std::string words = "modar plan --ninja --project " + shell_quoted(command.file) + " --cache " +
+                      shell_quoted(command.cache);
+  if (!command.runner.empty()) words += " --run " + shell_quoted(command.runner);
+  std::string text = "rule plan\n  command = " + ninja_value(words) +
+                     " > $out.new && mv $out.new $out\n  generator = 1\n"
+                     "  description = look for assets again\n"
+                     "build build.ninja: plan " +
+                     ninja_quoted(command.file) + program;
+  for (const std::string& folder : project.folders) text += " " + ninja_quoted(folder);
+  return text + "\n\n";
+}
+
 /// An edge for each asset, which bakes it into the cache, and one for all bundles. Stamps stand for
 /// entries of the cache, whose names nobody knows before the bake.
 std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
@@ -379,7 +395,8 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
     return ssh ? std::filesystem::absolute(name, error).lexically_normal().string() : name;
   };
   std::string text =
-      "# modar plan --ninja: run by `ninja -f FILE`, as often as something changes.\n"
+      "# modar plan --ninja: save it as build.ninja, and run `ninja` as often as something "
+      "changes.\n"
       "ninja_required_version = 1.5\n"
       "rule asset\n  command = " +
       runner + "modar bake --quiet --project " + word(path(command.file)) + " --cache " +
@@ -389,6 +406,7 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
       ninja_value(shell_quoted(command.file) + " --cache " + shell_quoted(command.cache)) +
       "\n  restat = 1\n  description = link the bundles\n\n";
   const std::string program = " | " + ninja_quoted(program_folder() + "/modar");
+  text += ninja_generator(command, project, program);
   std::string stamps;
   std::set<std::string> names;
   for (const AssetOutcome& asset : planned.assets) {
@@ -406,9 +424,9 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
   for (const ProjectScene& scene : project.scenes) {
     if (!scene.request.light.empty()) lights.insert(project.path(scene.request.light));
   }
-  text += "build" + bundles + ": bundles" + stamps + " |";
+  text += "build" + bundles + ": bundles" + stamps + " | build.ninja";
   for (const std::string& light : lights) text += " " + ninja_quoted(light);
-  return text + "\n";
+  return text + "\ndefault" + bundles + "\n";
 }
 
 Result<ExitCode> write_ninja_plan(NinjaPlanCommand& command) {
@@ -426,9 +444,11 @@ Result<ExitCode> write_ninja_plan(NinjaPlanCommand& command) {
   return ExitCode::kOk;
 }
 
+constexpr std::uint64_t kNoSize = ~std::uint64_t{0};
+
 struct CacheCommand {
   std::string folder;
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = kNoSize;  ///< of `prune`: how much stays
   bool json = false;
 };
 
@@ -444,6 +464,27 @@ void print_summary(const CacheCommand& command, const CacheSummary& summary, con
     std::printf("%s: damaged, removed\n", path.c_str());
   std::printf("%s%llu entries, %s\n", verb, static_cast<unsigned long long>(summary.entries),
               human_bytes(summary.bytes).c_str());
+}
+
+/// Without a size, says what sizes would remove.
+Result<ExitCode> run_prune(const CacheCommand& command) {
+  MODAR_ASSIGN(const std::string folder, cache_folder(command.folder));
+  if (command.bytes != kNoSize) {
+    MODAR_ASSIGN(const CacheSummary removed, prune_cache(folder, command.bytes));
+    print_summary(command, removed, "removed: ");
+    return ExitCode::kOk;
+  }
+  MODAR_ASSIGN(const CacheSummary all, summarise_cache(folder));
+  print_summary(command, all, "nothing was removed of ");
+  if (command.json || all.entries == 0) return ExitCode::kOk;
+  std::printf("--size keeps what was used last:\n");
+  for (const std::uint64_t bytes : {all.bytes / 2, all.bytes / 10, std::uint64_t{0}}) {
+    MODAR_ASSIGN(const CacheSummary removed, prune_cache(folder, bytes, true));
+    std::printf(
+        "  --size %-12llu would remove %llu entries, %s\n", static_cast<unsigned long long>(bytes),
+        static_cast<unsigned long long>(removed.entries), human_bytes(removed.bytes).c_str());
+  }
+  return ExitCode::kOk;
 }
 
 void add_cache_options(CommandLine& line, CacheCommand& command) {
@@ -495,14 +536,12 @@ void add_cache(CommandLine& program) {
   });
   CommandLine& prune = cache.command("prune", "Remove the entries that were used longest ago");
   add_cache_options(prune, *command);
-  prune.size("--size", command->bytes, "Keep at most this much (1G, 800M)",
-             {.type = "SIZE", .required = true});
-  prune.run([command]() -> Result<ExitCode> {
-    MODAR_ASSIGN(const std::string folder, cache_folder(command->folder));
-    MODAR_ASSIGN(const CacheSummary removed, prune_cache(folder, command->bytes));
-    print_summary(*command, removed, "removed: ");
-    return ExitCode::kOk;
-  });
+  prune.size(
+      "--size", command->bytes,
+      "Keep at most this much (1G, 800M); without it, nothing is removed, and it is said what "
+      "would be",
+      {.type = "SIZE"});
+  prune.run([command] { return run_prune(*command); });
   CommandLine& verify = cache.command("verify", "Read every entry, remove those that are damaged");
   add_cache_options(verify, *command);
   verify.footer(example("  modar cache verify --cache /srv/modar-cache\n"));

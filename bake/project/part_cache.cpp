@@ -242,16 +242,18 @@ Result<CacheSummary> summarise_cache(const std::string& folder) {
   return summary;
 }
 
-Result<CacheSummary> prune_cache(const std::string& folder, std::uint64_t bytes) {
+Result<CacheSummary> prune_cache(const std::string& folder, std::uint64_t bytes, bool dry_run) {
   std::vector<std::string> left;
   MODAR_ASSIGN(const auto entries, entries_of(folder, left));
-  for (const std::string& path : left) ::unlink(path.c_str());
+  for (const std::string& path : left) {
+    if (!dry_run) ::unlink(path.c_str());
+  }
   std::uint64_t sum = 0;
   for (const Entry& entry : entries) sum += entry.bytes;
   CacheSummary removed;
   for (const Entry& entry : entries) {
     if (sum <= bytes) break;
-    remove_entry(entry.stem);
+    if (!dry_run) remove_entry(entry.stem);
     sum -= entry.bytes;
     removed.bytes += entry.bytes;
     ++removed.entries;

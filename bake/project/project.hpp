@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -59,10 +60,11 @@ struct ProjectGates {
 
 /// A project file as it was read, globs expanded.
 struct Project {
-  std::string file;         ///< path of the project file
-  std::string folder;       ///< its folder, with a slash at its end; empty: the current one
-  std::string out = "out";  ///< folder of the bundles, relative to the project's
-  std::string cache;        ///< folder of the cache, relative; empty: kCacheFolder
+  std::string file;               ///< path of the project file
+  std::string folder;             ///< its folder, with a slash at its end; empty: the current one
+  std::string out = "out";        ///< folder of the bundles, relative to the project's
+  std::string cache;              ///< folder of the cache, relative; empty: kCacheFolder
+  std::set<std::string> folders;  ///< that its globs look into, as the current folder sees them
   std::vector<ProjectAsset> models;
   std::vector<ProjectAsset> patterns;
   std::vector<ProjectScene> scenes;
@@ -138,8 +140,9 @@ struct CacheSummary {
 };
 Result<CacheSummary> summarise_cache(const std::string& folder);
 /// Removes those that were used longest ago until at most `bytes` are left, and what interrupted
-/// processes left more than a day ago. Answers what was removed.
-Result<CacheSummary> prune_cache(const std::string& folder, std::uint64_t bytes);
+/// processes left more than a day ago. Answers what was removed. dry_run: what would be.
+Result<CacheSummary> prune_cache(const std::string& folder, std::uint64_t bytes,
+                                 bool dry_run = false);
 /// Reads every entry and removes those that are damaged: they are baked again when needed.
 Result<CacheSummary> verify_cache(const std::string& folder);
 

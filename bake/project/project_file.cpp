@@ -180,22 +180,46 @@ class TableReader {
   std::string name_;
 };
 
-/// Files that a glob matches, relative to the folder, in byte order. "**/" stands for any number of
-/// folders.
-std::vector<std::string> expand(const std::string& folder, const std::string& pattern) {
-  std::vector<std::string> globs = {folder + pattern};
-  if (const std::size_t deep = pattern.find("**/"); deep != std::string::npos) {
-    const std::string base = folder + pattern.substr(0, deep);
-    const std::string rest = pattern.substr(deep + 3);
-    globs = {base + rest};
-    std::error_code error;
-    fs::recursive_directory_iterator it(base.empty() ? "." : base, error);
-    for (; !error && it != fs::recursive_directory_iterator(); it.increment(error)) {
-      if (it->is_directory()) globs.push_back((it->path() / rest).string());
+/// The globs for glob() of one in which "**/" stands for any number of folders.
+std::vector<std::string> plain_globs(const std::string& folder, const std::string& pattern) {
+  const std::size_t deep = pattern.find("**/");
+  if (deep == std::string::npos) return {folder + pattern};
+  const std::string base = folder + pattern.substr(0, deep);
+  const std::string rest = pattern.substr(deep + 3);
+  std::vector<std::string> globs = {base + rest};
+  std::error_code error;
+  fs::recursive_directory_iterator it(base.empty() ? "." : base, error);
+  for (; !error && it != fs::recursive_directory_iterator(); it.increment(error)) {
+    if (it->is_directory()) globs.push_back((it->path() / rest).string());
+  }
+  return globs;
+}
+
+/// The folders in which a new file or folder could match a glob, but for hidden ones.
+void add_folders(const std::string& folder, const std::string& pattern,
+                 std::set<std::string>& folders) {
+  const bool deep = pattern.find("**/") != std::string::npos;
+  for (const std::string& one : plain_globs(folder, pattern)) {
+    if (deep && one.find("/.") != std::string::npos) continue;
+    for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+      end = one.find('/', begin);
+      const std::string part = one.substr(begin, end - begin);
+      const bool last_of_deep = deep && end == std::string::npos;
+      if (!last_of_deep && part.find_first_of("*?[") == std::string::npos) continue;
+      glob_t found{};
+      const std::string above = begin == 0 ? "." : one.substr(0, begin - 1);
+      if (::glob(above.c_str(), GLOB_NOSORT, nullptr, &found) == 0) {
+        for (std::size_t i = 0; i < found.gl_pathc; ++i) folders.insert(found.gl_pathv[i]);
+      }
+      ::globfree(&found);
     }
   }
+}
+
+/// Files that a glob matches, relative to the folder, in byte order.
+std::vector<std::string> expand(const std::string& folder, const std::string& pattern) {
   std::vector<std::string> files;
-  for (const std::string& one : globs) {
+  for (const std::string& one : plain_globs(folder, pattern)) {
     glob_t found{};
     if (::glob(one.c_str(), GLOB_NOSORT, nullptr, &found) == 0) {
       for (std::size_t i = 0; i < found.gl_pathc; ++i) {
@@ -347,6 +371,7 @@ class ProjectReader {
     }
     for (const std::string& glob : globs) {
       if (glob.starts_with('!')) continue;
+      add_folders(project_.folder, glob, project_.folders);
       const std::vector<std::string> files = expand(project_.folder, glob);
       if (files.empty()) {
         return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("file"),

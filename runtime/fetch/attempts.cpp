@@ -140,6 +140,10 @@ Outcome Attempts::again(Transfer& transfer, const std::string& cause) {
   transfer.not_before =
       Transfer::Clock::now() +
       std::chrono::duration_cast<Transfer::Clock::duration>(std::chrono::duration<double>(wait));
+  if (options_.waiting) {
+    options_.waiting(
+        {address_of(transfer), cause, transfer.fruitless + 1, options_.attempts, wait});
+  }
   return Outcome::kAgain;
 }
 

@@ -132,6 +132,7 @@ TransferOptions transfer_options(const FetchOptions& options, const std::string&
   transfer.stall_s = options.stall_s;
   transfer.authorities = options.authorities;
   transfer.source = options.source;
+  transfer.waiting = options.waiting;
   transfer.user_agent = "modar-fetch/" MODAR_VERSION " (" + installed + ")";
   return transfer;
 }

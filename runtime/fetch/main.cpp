@@ -44,7 +44,7 @@ links (FAT, /sdcard), the bundles are DIR/slots/*/NAME.modar: the paths that are
   --status FILE     write what happened as JSON, also where it fails, for whoever looks after devices
   --verify          check what is installed; go back to the release before if it is damaged
   --json            print what was done as JSON
-  --quiet           no progress, no summary
+  --quiet           no progress, no word of waits, no summary
   --help, --version
 
 Example:
@@ -179,6 +179,25 @@ void show_progress(const FetchProgress& progress) {
   std::fflush(stderr);
 }
 
+/// Short waits pass unsaid, and several files that wait for the same server are one line.
+class WaitPrinter {
+ public:
+  void operator()(const FetchWait& wait) {
+    constexpr double kWorthSaying = 1;  // seconds
+    if (wait.seconds < kWorthSaying || (wait.cause == cause_ && wait.attempt <= attempt_)) return;
+    cause_ = wait.cause;
+    attempt_ = wait.attempt;
+    const char* clear = ::isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "";
+    std::fprintf(stderr, "%smodar-fetch: %s: %s; attempt %u of %u in %.0f s\n", clear,
+                 wait.address.c_str(), wait.cause.c_str(), wait.attempt, wait.attempts,
+                 wait.seconds);
+  }
+
+ private:
+  std::string cause_;
+  unsigned attempt_ = 0;
+};
+
 using Writer = rapidjson::PrettyWriter<rapidjson::StringBuffer>;
 
 void write_bundles(Writer& json, const std::vector<std::string>& bundles) {
@@ -282,6 +301,7 @@ int run_fetch(CommandLine& line) {
   line.options.trusted_key = *key;
   const bool bar = !line.quiet && !line.json && ::isatty(STDERR_FILENO) != 0;
   if (bar) line.options.progress = show_progress;
+  if (!line.quiet) line.options.waiting = WaitPrinter();
   const auto report = fetch_release(line.options);
   if (bar) std::fputs("\r\033[K", stderr);
   if (!report) return fail_with_status(line, report.error());

@@ -26,6 +26,7 @@ struct TransferOptions {
   std::string authorities;  ///< PEM file; empty: of the environment, else the system's
   ByteSource source;        ///< instead of libcurl
   double stall_s = 30;      ///< a transfer without data for so long is aborted
+  std::function<void(const FetchWait&)> waiting;  ///< may be empty
 };
 
 /// One object to download.

@@ -93,15 +93,20 @@ modar plan --ninja --run 'srun -Q -n1' --cache "$work/cache" >build.ninja
 start=$(now)
 ninja -j 6 -k 0 >ninja.log 2>&1 & ninja=$!
 until [ "$(find .modar/plan -type f ! -name '*.d' 2>/dev/null | wc -l)" -ge 6 ]; do sleep 0.1; done
-# The daemon, and the bakes that it has started: theirs is an environment of this cluster that names the node.
-kill -9 "$(cat "$work/node2.pid")"
+# First the bakes of node2, as soon as it has one: theirs is an environment of this cluster that names the node. A bake that is
+# killed is an edge that fails, whatever the moment. Then its daemon.
 killed=0
-for process in /proc/[0-9]*; do
-  environment=$(tr '\0' '\n' 2>/dev/null <"$process/environ" || true)
-  if grep -qx "SLURM_CONF=$SLURM_CONF" <<<"$environment" && grep -qx SLURMD_NODENAME=node2 <<<"$environment"; then
-    kill -9 "${process#/proc/}" && killed=$((killed + 1))
-  fi
+while [ $killed = 0 ] && kill -0 "$ninja" 2>/dev/null; do
+  for process in /proc/[0-9]*; do
+    environment=$({ tr '\0' '\n' <"$process/environ"; } 2>/dev/null || true)
+    if [ "$(cat "$process/comm" 2>/dev/null || true)" = modar ] && grep -qx "SLURM_CONF=$SLURM_CONF" <<<"$environment" &&
+      grep -qx SLURMD_NODENAME=node2 <<<"$environment"; then
+      if kill -9 "${process#/proc/}" 2>/dev/null; then killed=$((killed + 1)); fi
+    fi
+  done
 done
+[ $killed -gt 0 ] || { echo "try.sh: node2 was given no bake" >&2; exit 4; }
+kill -9 "$(cat "$work/node2.pid")"
 scontrol update nodename=node2 state=down reason=killed
 wait "$ninja" && first=0 || first=$?
 failed=$(grep -c '^FAILED' ninja.log || true)

@@ -31,6 +31,12 @@ class Document(ProgramTest):
                 self.assertIn(option, page)
         self.assertIn("A to E", (self.share / "man/man1/modar-pattern-score.1").read_text())
 
+    def test_help_wraps(self):
+        for words in (["bake"], ["pattern", "simulate"], ["bench"]):
+            for line in self.modar(*words, "--help").stdout.splitlines():
+                if line.startswith(" " * 30):
+                    self.assertLessEqual(len(line), 80, line)
+
     def test_pages_are_clean_roff(self):
         if shutil.which("groff") is None:
             self.skipTest("groff is not installed")
@@ -44,6 +50,10 @@ class Document(ProgramTest):
         self.assertIn("--width-mm", self.complete("modar", "pattern", "rectify", "--wi"))
         self.assertEqual(self.complete("modar", "bake", "--effort", "b"), ["best"])
         (self.folder / "vase.obj").touch()
+        (self.folder / "patio").touch()
+        self.assertEqual(self.complete("modar", "pat"), ["pattern"], "a command, not a file")
+        self.assertIn("bake", self.complete("modar", ""))
+        self.assertNotIn("vase.obj", self.complete("modar", ""))
         self.assertEqual(self.complete("modar", "bake", "--model", "va"), ["vase.obj"])
 
     def test_zsh_and_fish_read_theirs(self):

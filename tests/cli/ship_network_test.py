@@ -97,6 +97,10 @@ class RealServer(ShipTest):
         self.nginx.stop()
         self.assert_fails(self.fetch(self.nginx.url(), "--attempts", "2"), 16, "fetch.network", "again")
         self.assertLess(time.monotonic() - begin, 60)
+        done = self.fetch(self.nginx.url(), "--attempts", "4")  # waits 0.5, 1 and 2 s
+        self.assertEqual([line.split("; ")[1] for line in done.stderr.splitlines()[:-1]],
+                         ["attempt 3 of 4 in 1 s", "attempt 4 of 4 in 2 s"], done.stderr)
+        self.assertEqual(len(self.fetch(self.nginx.url(), "--attempts", "3", "--quiet").stderr.splitlines()), 1)
 
     @unittest.skipUnless(soak(), "2G takes its time; soak runs it")
     def test_2g_with_breaks(self):

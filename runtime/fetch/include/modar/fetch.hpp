@@ -21,6 +21,15 @@ struct FetchProgress {
   double seconds_left = -1;  ///< -1: not known yet
 };
 
+/// A file that did not come, and will be asked for again.
+struct FetchWait {
+  std::string address;
+  std::string cause;
+  unsigned attempt = 0;   ///< the next one, of those in a row without data
+  unsigned attempts = 0;  ///< after which it gives up
+  double seconds = 0;     ///< until then
+};
+
 /// For an app with a network stack of its own, asked from the thread that calls fetch_release(),
 /// for one file at a time: hands the bytes of the file `path` below the release folder, from byte
 /// `from` to its end, to `take` in portions, until that returns false. Errors: kExitMixed
@@ -47,6 +56,7 @@ struct FetchOptions {
   std::int64_t now = 0;
   ByteSource source;  ///< instead of the URL; a library built without libcurl needs it
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
+  std::function<void(const FetchWait&)> waiting;       ///< may be empty
 };
 
 struct FetchReport {
