@@ -81,6 +81,8 @@ apt_settings >"$bare/etc/apt/apt.conf.d/99network"
 cp -al "$cache/archives/." "$bare/var/cache/apt/archives" 2>/dev/null ||
   cp -a "$cache/archives/." "$bare/var/cache/apt/archives"
 name=$(basename "$here")
+# The root is thrown away: dpkg need not wait for the disk.
+echo force-unsafe-io >"$bare/etc/dpkg/dpkg.cfg.d/bare"
 # The checkout may belong to somebody else, which git distrusts.
 printf '[safe]\n\tdirectory = *\n[advice]\n\tdetachedHead = false\n' >"$bare/gitconfig"
 GIT_CONFIG_GLOBAL=$bare/gitconfig git clone --quiet --no-local "$here" "$bare/root/$name"

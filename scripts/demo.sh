@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
 # First light: bakes a model and a pattern, checks the bundle, plays a video with the model on it.
-#   scripts/demo.sh          spider.obj on the box of a real hand-held video (Debian packages)
+#   scripts/demo.sh          a jar on the box of a real hand-held video (Debian's opencv-doc)
 #   scripts/demo.sh --web    the same as a page for browsers in out/web (Debian's emscripten compiles its engine)
-#   scripts/demo.sh --own    our own pottery on our own cover, on a clip that we render: needs no
-#                            package but the build's
-# Leaves everything in out/demo (out/demo-own) and prints where to look.
+#   scripts/demo.sh --own    the jar on a book's cover, in a clip that it renders: needs no package but the build's
+# Leaves everything in out/demo (out/demo-own) and says where to look; what the programs say goes to build/demo.log.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
@@ -15,11 +14,44 @@ case ${1:-} in
   "") ;;
   --own) own=yes ;;
   --web) web=yes ;;
-  -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "demo.sh: '$1' is not understood; try --help" >&2; exit 1 ;;
 esac
 
-step() { printf '\n== %s\n' "$*" >&2; }
+mkdir -p build
+log=build/demo.log
+: >"$log"
+steps=6
+at=0
+watcher=
+trap '[ -z "$watcher" ] || kill "$watcher" 2>/dev/null' EXIT
+step() {  # WHAT COMMAND...: one line with its seconds; on a terminal, also how far a build is
+  at=$((at + 1))
+  local what=$1 start=$SECONDS status=0
+  shift
+  printf '%d/%d  %-62s ' $at $steps "$what"
+  echo "== $what" >>"$log"
+  if [ -t 1 ]; then
+    (while sleep 1; do
+      printf '\r%d/%d  %-62s %4d s %-12s' $at $steps "$what" $((SECONDS - start)) \
+        "$(tail -n 1 "$log" | sed -n 's/^\(\[[0-9]*\/[0-9]*\]\).*/\1/p')"
+    done) &
+    watcher=$!
+  fi
+  "$@" >>"$log" 2>&1 || status=$?
+  if [ -n "$watcher" ]; then
+    kill "$watcher"; wait "$watcher" 2>/dev/null || true
+    watcher=
+    printf '\r%d/%d  %-62s ' $at $steps "$what"
+  fi
+  if [ $status -ne 0 ]; then
+    printf 'failed\n'
+    tail -n 25 "$log" >&2
+    echo "demo.sh: the whole log is $root/$log" >&2
+    exit $status
+  fi
+  printf '%4d s %-12s\n' $((SECONDS - start)) ""
+}
 
 # The path of a file of an installed package; where the machine installs no documentation, the package
 # is unpacked into build/packages instead.
@@ -35,81 +67,109 @@ package_file() {
   echo "$unpacked$path"
 }
 
-step "Packages"
-if [ $own = yes ]; then scripts/setup.sh; elif [ $web = yes ]; then scripts/setup.sh demo test; else scripts/setup.sh demo; fi
-
-step "Build (release)"
-cmake --preset release >build-release.log 2>&1 || { cat build-release.log >&2; exit 4; }
-rm -f build-release.log
-cmake --build --preset release
 bin=build/release/bin
-
+model=assets/models/pottery.obj
 if [ $own = yes ]; then
   out=out/demo-own
-  rm -rf "$out"; mkdir -p "$out"
-  model=assets/models/pottery.obj
   pattern=assets/patterns/cover.png
+  width=210mm
   scene="cover=pottery,scale=0.5"
-  step "Clip: our cover before a made-up background"
-  python3 assets/make_clip.py --pattern "$pattern" --frames 60 --size 480x360 "$out/clip"
   video=$out/clip
 else
   out=out/demo
-  rm -rf "$out"; mkdir -p "$out"
-  model=$(package_file assimp-testmodels /usr/share/assimp/models/OBJ/spider.obj)
-  packed=$(package_file opencv-doc /usr/share/doc/opencv-doc/opencv4/html/box.mp4.gz)
-  video=$out/box.mp4
-  gzip -dc "$packed" >"$video"
-  step "Pattern: the front of the box, from four corners in one frame of the video"
-  ffmpeg -v fatal -nostdin -y -i "$video" -vf 'select=eq(n\,264)' -frames:v 1 "$out/photo.png"
   pattern=$out/box.png
+  width=258mm
+  scene="box=pottery,scale=0.36"
+  video=$out/box.mp4
+fi
+bundle=$out/demo.modar
+
+packages() {
+  if [ $own = yes ]; then scripts/setup.sh; elif [ $web = yes ]; then scripts/setup.sh demo web; else scripts/setup.sh demo; fi
+}
+
+build() {
+  cmake --preset release
+  cmake --build --preset release --target modar modar-play
+}
+
+make_pattern() {
+  rm -rf "$out"; mkdir -p "$out"
+  if [ $own = yes ]; then
+    python3 assets/make_clip.py --pattern "$pattern" --frames 60 --size 480x360 "$video"
+    return
+  fi
+  local packed
+  packed=$(package_file opencv-doc /usr/share/doc/opencv-doc/opencv4/html/box.mp4.gz)
+  gzip -dc "$packed" >"$video"
+  ffmpeg -v fatal -nostdin -y -i "$video" -vf 'select=eq(n\,264)' -frames:v 1 "$out/photo.png"
   # The corners as read off the photo in an image viewer; the box's front is 258 x 189 mm.
   "$bin/modar" pattern rectify "$out/photo.png" \
     --corners 285.8,111.2,513.6,168.7,473.3,282.6,200.8,195.6 \
     --width-mm 258 --height-mm 189 -o "$pattern"
-  # The spider of the package is modelled with Y up.
-  scene="box=spider,up=y,scale=0.6"
+}
+
+check() {
+  "$bin/modar" check "$bundle"
+  "$bin/modar" inspect "$bundle"
+  "$bin/modar" report "$bundle" -o "$out/report.html"
+}
+
+page() {
+  cmake --preset web
+  cmake --build --preset web
+  "$bin/modar" web "$bundle" -o out/web --title "A jar on a box"
+}
+
+play() {
+  # --force: the folder holds the video, too.
+  "$bin/modar-play" "$bundle" --input "$video" --report "$out" --force
+  # Three frames with plain shading, as it is drawn, and in the light that the camera shows.
+  mkdir "$out/frames"
+  if [ $own = yes ]; then
+    for frame in 05 30 55; do cp "$video/frame_000$frame.png" "$out/frames"; done
+  else
+    ffmpeg -v fatal -nostdin -y -i "$video" -vf 'select=eq(n\,40)+eq(n\,200)+eq(n\,400)' -vsync vfr "$out/frames/%d.png"
+  fi
+  "$bin/modar" bench light "$bundle" "$out"/frames/*.png -o "$out"
+  rm -r "$out/frames"
+  local figure='<h2>Before and after</h2>\n<a href=before_after.png><img src=before_after.png alt="plain shading, ours, ours in the light that the camera shows"></a>'
+  sed -i "s|<h2>Contact sheet</h2>|$figure\n&|" "$out/index.html"
+}
+
+echo "ModAR: a jar is baked onto a picture, and played on a video. What the programs say goes to $log."
+step "packages of Debian (about 1.4 GB of disk, the first time)" packages
+step "building modar and modar-play (minutes, the first time)" build
+if [ $own = yes ]; then
+  step "the picture: a book's cover; a clip of it" make_pattern
+else
+  step "the picture: a box's front, from one frame of the video" make_pattern
 fi
-
-step "Bake"
-bundle=$out/demo.modar
-"$bin/modar" bake --model "$model" --pattern "$pattern" --scene "$scene" -o "$bundle"
-
-step "Check"
-"$bin/modar" check "$bundle"
-"$bin/modar" inspect "$bundle"
+step "modar bake: model and picture become one file" \
+  "$bin/modar" bake --model "$model" --pattern "$pattern:$width" --scene "$scene" -o "$bundle"
+step "modar check, modar report" check
+size=$(($(stat -c %s "$bundle") / 1024))
 
 if [ $web = yes ]; then
-  step "Page"
-  cmake --preset web >/dev/null
-  cmake --build --preset web
-  "$bin/modar" web "$bundle" -o out/web --title "A spider on a box"
-  step "Done. Open it"
-  echo "here:       python3 -m http.server --bind 127.0.0.1 --directory $root/out/web   (http://localhost:8000)"
-  echo "on a phone: $root/$bin/modar web $root/$bundle -o $root/out/web --title 'A spider on a box' --serve"
+  step "modar web: the page, and its engine (minutes, the first time)" page
+  cat <<END
+Made in $((SECONDS / 60)) min $((SECONDS % 60)) s: $root/out/web, a page with a bundle of $size KB. Open it
+  here:        python3 -m http.server --bind 127.0.0.1 --directory $root/out/web   (http://localhost:8000)
+  on a phone:  $root/$bin/modar web $root/$bundle -o $root/out/web --title 'A jar on a box' --serve
+END
   exit
 fi
 
-step "Play"
-# Our own loop, the default, holds this small, tilted picture throughout; --method paper finds it in few
-# frames and takes clutter for it in many.
-# --force: the folder holds the video, too.
-"$bin/modar-play" "$bundle" --input "$video" --outline --report "$out" --force
-
-step "Before and after: plain shading, ours, ours in the light that the camera shows"
-mkdir "$out/frames"
-if [ $own = yes ]; then
-  for frame in 05 30 55; do cp "$video/frame_000$frame.png" "$out/frames"; done
-else
-  ffmpeg -v fatal -nostdin -y -i "$video" -vf 'select=eq(n\,40)+eq(n\,200)+eq(n\,400)' -vsync vfr "$out/frames/%d.png"
-fi
-"$bin/modar" bench light "$bundle" "$out"/frames/*.png -o "$out"
-rm -r "$out/frames"
-figure='<h2>Before and after</h2>\n<a href=before_after.png><img src=before_after.png alt="plain shading, ours, ours in the light that the camera shows"></a>'
-sed -i "s|<h2>Contact sheet</h2>|$figure\n&|" "$out/index.html"
-
-step "Done. Look at"
-for file in index.html overlay.mp4 contact_sheet.png before_after.png demo.modar; do
+step "modar-play: finds the picture in each frame, draws the jar" play
+for file in index.html overlay.mp4 poster.png contact_sheet.png before_after.png report.html demo.modar; do
   [ -s "$out/$file" ] || { echo "demo.sh: $out/$file was not made" >&2; exit 4; }
-  echo "$root/$out/$file"
 done
+grep -E '^[0-9]+ frames' "$log" | tail -n 1
+grep -q 'in software' "$log" && echo "No graphics card was used: rendering times are those of a processor, not of a phone."
+cat <<END
+Made in $((SECONDS / 60)) min $((SECONDS % 60)) s, in $root/$out. Look at
+  index.html    the video with the jar, and what became of each frame
+  report.html   what is in the bundle of $size KB, demo.modar, and what each phone says to it
+  poster.png, overlay.mp4, contact_sheet.png, before_after.png   the pictures alone
+Next: your own model on your own picture, see README.md.
+END

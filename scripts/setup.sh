@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
 # Installs Debian packages that are named in scripts/packages*.txt and not yet there.
-#   scripts/setup.sh [test] [demo]
-# Packages of the build always; those of the tests and the demo where named. Uses sudo if not root.
+#   scripts/setup.sh [test] [demo] [web] [release]
+# Packages of the build always; those of the tests, the demo, the page's engine (web) and a release where named. Uses sudo if
+# not root.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 
 lists=("$here/packages.txt")
 for extra in "$@"; do
   case $extra in
-    test | demo) lists+=("$here/packages-$extra.txt") ;;
-    *) echo "setup.sh: '$extra' is neither test nor demo" >&2; exit 1 ;;
+    test | demo | web | release) lists+=("$here/packages-$extra.txt") ;;
+    *) echo "setup.sh: '$extra' is none of test, demo, web and release" >&2; exit 1 ;;
   esac
 done
 
@@ -24,10 +25,14 @@ command -v apt-get >/dev/null || {
   echo "setup.sh: no apt-get here; install by hand: ${missing[*]}" >&2; exit 5; }
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then as_root=(sudo); fi
-echo "Installing ${#missing[@]} Debian packages: ${missing[*]}" >&2
-export DEBIAN_FRONTEND=noninteractive
+mkdir -p "$here/../build"
+log=$here/../build/packages.log
+echo "Installing ${#missing[@]} Debian packages: ${missing[*]} (what apt says goes to build/packages.log)" >&2
 # One list that a mirror serves broken (another architecture's, say) does not stop what the other lists hold.
-"${as_root[@]}" apt-get update -qq >&2 ||
+"${as_root[@]}" apt-get update -qq >"$log" 2>&1 ||
   echo "setup.sh: some package lists could not be fetched; going on with the others" >&2
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-  "${missing[@]}" >&2
+# How much it is, in apt's own words.
+LC_ALL=C apt-get install --assume-no --no-install-recommends "${missing[@]}" 2>&1 |
+  grep -E '^([0-9]+ upgraded|Need to get|After this)' >&2 || true
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
+  "${missing[@]}" >>"$log" 2>&1 || { tail -n 25 "$log" >&2; exit 5; }

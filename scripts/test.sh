@@ -12,7 +12,7 @@ scopes=OFF
 export MODAR_SOAK=0
 case ${1:-} in
   "") ;;
-  --all) packages=(test); scopes=ON; MODAR_SOAK=1 ;;
+  --all) packages=(test web); scopes=ON; MODAR_SOAK=1 ;;
   -h | --help) sed -n '2,5s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "test.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
 esac
