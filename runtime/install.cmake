@@ -18,7 +18,7 @@ install(TARGETS ${libraries} EXPORT modar-targets
   INCLUDES DESTINATION ${include_dir})
 set_target_properties(modar_shared PROPERTIES EXPORT_NAME shared)
 install(TARGETS modar_shared EXPORT modar-targets
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
   INCLUDES DESTINATION ${include_dir})
 install(EXPORT modar-targets NAMESPACE modar:: DESTINATION ${package_dir} COMPONENT development)
 install(DIRECTORY ${include_folders} DESTINATION ${include_dir} COMPONENT development)
@@ -28,7 +28,7 @@ foreach(header error layout bundle_view transport/recipe)
   install(FILES ${CMAKE_SOURCE_DIR}/formats/${header}.hpp DESTINATION ${include_dir}/${folder} COMPONENT development)
 endforeach()
 install(FILES example/overlay.c example/CMakeLists.txt
-  DESTINATION ${CMAKE_INSTALL_DOCDIR}/example COMPONENT development)
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libmodar-dev/examples COMPONENT development)
 
 configure_package_config_file(modar-config.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/modar-config.cmake
   INSTALL_DESTINATION ${package_dir})

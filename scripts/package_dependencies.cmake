@@ -1,5 +1,13 @@
 # Read by cpack, before it makes packages: what the programs in the build folder depend on, by dpkg-shlibdeps. What
 # they load when a video is opened is recommended and not required: OpenCV's codecs alone bring 380 MB.
+# The same sources give the same bytes: files are as old as the last commit.
+if("$ENV{SOURCE_DATE_EPOCH}" STREQUAL "")
+  execute_process(COMMAND git log -1 --format=%ct WORKING_DIRECTORY ${CMAKE_CURRENT_LIST_DIR}
+    OUTPUT_VARIABLE committed OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  if(committed)
+    set(ENV{SOURCE_DATE_EPOCH} ${committed})
+  endif()
+endif()
 set(binary ${CPACK_PACKAGE_DIRECTORY}/../bin)
 set(loaded ${CPACK_PACKAGE_DIRECTORY}/../libexec/modar)
 set(work ${CPACK_PACKAGE_DIRECTORY}/shlibdeps)
@@ -23,3 +31,15 @@ read_dependencies(player -e${binary}/modar-play -e${binary}/modar-fetch
   -dRecommends -e${loaded}/libmodar_media.so -e${loaded}/libmodar_video.so)
 set(CPACK_DEBIAN_PLAYER_PACKAGE_DEPENDS "${player_Depends}")
 set(CPACK_DEBIAN_PLAYER_PACKAGE_RECOMMENDS "libgl1-mesa-dri, ${player_Recommends}")
+
+# Of the shared library: its dependencies, and by which version others depend on it, as a whole and function by function.
+set(library ${CPACK_PACKAGE_DIRECTORY}/../runtime/capi/libmodar.so.0)
+read_dependencies(library -e${library})
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS "${library_Depends}")
+set(version ${CPACK_PACKAGE_VERSION})
+file(WRITE ${work}/shlibs "libmodar 0 libmodar0 (>= ${version})\n")
+file(WRITE ${work}/triggers "activate-noawait ldconfig\n")
+execute_process(COMMAND dpkg-gensymbols -q -plibmodar0 -v${version} -e${library} -O${work}/symbols
+  WORKING_DIRECTORY ${work} COMMAND_ERROR_IS_FATAL ANY)
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${work}/shlibs ${work}/triggers ${work}/symbols)
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_STRICT_PERMISSION ON)

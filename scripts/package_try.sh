@@ -49,7 +49,7 @@ in_clean test -s /root/modar-demo/play/index.html -a -s /root/modar-demo/play/ov
 
 # --- An app of somebody else's ---
 install --no-install-recommends '/packages/libmodar-dev*.deb g++ make cmake pkg-config'
-timed "the example app with CMake and the static library" 'cp -r /usr/share/doc/modar/example app; cd app; cmake -S . -B build
+timed "the example app with CMake and the static library" 'cp -r /usr/share/doc/libmodar-dev/examples app; cd app; cmake -S . -B build
   cmake --build build; head -c 460800 /dev/zero | build/overlay ../modar-demo/demo.modar 640 480 | wc -c | grep -x 1228800'
 timed "the same by pkg-config" 'cd app; c++ -x c overlay.c -x none $(pkg-config --cflags --libs modar) -o by-pkg-config
   head -c 460800 /dev/zero | ./by-pkg-config ../modar-demo/demo.modar 640 480 | wc -c | grep -x 1228800; rm -rf ../app'

@@ -1,10 +1,11 @@
 """What `cmake --install` puts where: the parts of the Debian packages, as scripts/packages.cmake names them."""
+import re
 import subprocess
 import unittest
 
 from programs import BIN, ROOT, ProgramTest
 
-PROGRAMS = {"workstation": ["modar"], "player": ["modar-fetch", "modar-play"], "development": []}
+PROGRAMS = {"workstation": ["modar"], "player": ["modar-fetch", "modar-play"], "library": [], "development": []}
 
 
 class Package(ProgramTest):
@@ -24,6 +25,9 @@ class Package(ProgramTest):
         self.assertEqual([name for name in files["workstation"] if name.endswith((".a", ".so", ".hpp", ".h"))], [])
         self.assertEqual({name for name in files["player"] if name.startswith("libexec/")},
                          {"libexec/modar/libmodar_media.so", "libexec/modar/libmodar_video.so"})
+        # Apps that were built need the library alone; what links them needs the rest.
+        self.assertEqual({re.sub(r".*/|[.]0[.].*", "", name) for name in files["library"]}, {"libmodar.so.0", "libmodar.so"})
+        self.assertIn("libmodar.so", {re.sub(r".*/", "", name) for name in files["development"]})
         for schema in ("check", "modar"):
             self.assertIn(f"share/modar/{schema}.schema.json", files["workstation"])
         for header in ("modar.h", "pose_loop.hpp", "fetch.hpp"):

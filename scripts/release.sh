@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# Makes all that a release attaches, in a folder of its own:
+#   scripts/release.sh [--key FILE] [--twice] [--out DIR]      (default: out/release)
+#   *.deb                  the Debian packages, clean for lintian, with the page's engine
+#   modar-web-V.tar.gz     the page and its engine, for those who build in place: unpack as build/web
+#   modar-V.tgz            the engine as an npm package
+#   modar-V.apk            the app with the demo's bundle, where ANDROID_NDK is set (see scripts/apk.sh)
+#   modar-V.tar.gz         the sources
+#   SHA256SUMS             of all of these; with --key SHA256SUMS.minisig, by that secret key of minisign
+# --twice: builds the packages and the engine a second time, in another folder, and fails where a byte differs.
+# Only what is committed goes in. Takes 10 minutes on two cores, and 2 GB of disk; --twice takes 20.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root"
+key="" twice=no out=out/release
+while [ $# -gt 0 ]; do
+  case $1 in
+    --key | --out) [ $# -ge 2 ] || { echo "release.sh: $1 wants a value" >&2; exit 1; }; printf -v "${1#--}" %s "$2"; shift ;;
+    --twice) twice=yes ;;
+    -h | --help) sed -n '2,12s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    *) echo "release.sh: '$1' is not understood; try --help" >&2; exit 1 ;;
+  esac
+  shift
+done
+[ -z "$key" ] || [ -r "$key" ] || { echo "release.sh: $key cannot be read" >&2; exit 2; }
+[ -z "$(git status --porcelain --untracked-files=no)" ] || { echo "release.sh: commit your changes first" >&2; exit 1; }
+version=$(sed -n 's/^project(modar VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
+SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
+export SOURCE_DATE_EPOCH
+mkdir -p build
+log=$root/build/release.log
+: >"$log"
+step() {  # WHAT COMMAND...: one line with its seconds; what it prints goes to the log
+  local what=$1 start=$SECONDS status=0
+  shift
+  printf '%-66s ' "$what"
+  "$@" >>"$log" 2>&1 || status=$?
+  if [ $status -ne 0 ]; then
+    printf 'failed\n'
+    tail -n 25 "$log" >&2
+    echo "release.sh: the whole log is $log" >&2
+    exit $status
+  fi
+  printf '%4d s\n' $((SECONDS - start))
+}
+packed() { tar --sort=name --owner=0 --group=0 --numeric-owner --mode=go=u-w "--mtime=@$SOURCE_DATE_EPOCH" -c "$@" | gzip -9n; }
+
+build() {  # FOLDER OUT: engine and packages of the clone in FOLDER
+  local clone=$1 to=$2
+  (cd "$clone" && scripts/sources.sh --libraries)
+  for preset in web package; do
+    (cd "$clone" && cmake --preset $preset && cmake --build --preset $preset) || return
+  done
+  mkdir -p "$to"
+  cp "$clone"/build/package/packages/*.deb "$to"
+  packed -C "$clone/build/web" web >"$to/modar-web-$version.tar.gz"
+  (cd "$to" && npm pack --silent "$clone/build/web/web")
+}
+look() {  # Lintian's errors and warnings stop a release.
+  lintian --fail-on error,warning --allow-root "$out"/*.deb
+}
+clone() {  # FOLDER: what is committed, with the library sources that are there already
+  rm -rf "$1"
+  git clone --quiet --no-local "$root" "$1"
+  [ ! -d build/sources ] || { mkdir -p "$1/build"; cp -a build/sources "$1/build/"; }
+}
+app() { "$root/scripts/apk.sh" "$work/demo.modar" --title ModAR --out "$root/$out/modar-$version.apk"; }
+
+work=$(mktemp -d "${TMPDIR:-/tmp}/modar-release-XXXXXX")
+trap 'rm -rf "$work"' EXIT
+rm -rf "$out"
+mkdir -p "$out"
+echo "ModAR $version, $(git log -1 --format='%h of %cs'). What the programs say goes to build/release.log."
+step "Debian packages that building takes (1.9 GB, the first time)" scripts/setup.sh web release
+step "engine and packages" eval 'clone "$work/one" && build "$work/one" "$out"'
+step "lintian" look
+if [ $twice = yes ]; then
+  step "engine and packages once more, in another folder" eval 'clone "$work/another/two" && build "$work/another/two" "$work/again"'
+  step "the same bytes" diff -r "$out" "$work/again"
+fi
+step "sources" eval 'git archive --format=tar --prefix="modar-$version/" HEAD | gzip -9n >"$out/modar-$version.tar.gz"'
+if [ -n "${ANDROID_NDK:-}" ]; then
+  step "packages for the app" scripts/setup.sh test
+  step "a bundle for the app" "$work/one/build/package/bin/modar" bake --model assets/models/pottery.obj \
+    --pattern assets/patterns/cover.png:210mm --scene cover=pottery,scale=0.5 -o "$work/demo.modar"
+  step "app" app
+else
+  echo "No app: ANDROID_NDK is not set, and without its compilers the app has no native library."
+fi
+(cd "$out" && LC_ALL=C sha256sum -- * >"$work/sums" && mv "$work/sums" SHA256SUMS)
+if [ -n "$key" ]; then
+  minisign -S -s "$key" -m "$out/SHA256SUMS" -t "ModAR $version" >>"$log"
+else
+  echo "Not signed: --key FILE signs, with a key of \`minisign -G\`."
+fi
+ls -l "$out"
+echo "All of it is in $root/$out."
