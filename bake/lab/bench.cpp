@@ -177,8 +177,10 @@ const std::vector<Bench>& benches() {
        bench_load},
       {"etc1", true, "IMAGE... [--crop SIDE]", "our ETC1 encoder against Android's libetc1",
        bench_etc1_rows},
-      {"ship", true, "BUNDLE...",
-       "bytes and decoding of what travels, against Draco, meshopt and zstd", bench_ship_rows},
+      {"ship", true, "BUNDLE|MODEL...",
+       "bytes and decoding of what travels, against Draco, meshopt and zstd; models are baked with "
+       "the default options",
+       bench_ship_rows},
       {"render", true, "BUNDLE... [--device NAME] [--video FILE]",
        "ten copies in the ModAR paper's ways, loading, culling, against index rendering from "
        "arrays; "

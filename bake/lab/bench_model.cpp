@@ -57,6 +57,7 @@ class ModelBench {
 
   std::vector<BenchRow> run() {
     bench_read();
+    bench_default_bake();
     bench_bake();
     bench_stages();
     return std::move(rows_);
@@ -117,17 +118,15 @@ class ModelBench {
     add("read_wall_s/one_thread", ours["wall_s"], best_probe("read", 1)["wall_s"]);
   }
 
-  /// One whole bake in a process of its own, and what it says of itself under "bytes". lods: how
-  /// many levels of detail, at most.
-  ProcessOutcome bake(const std::string& positions, unsigned jobs, double& bytes,
-                      const std::string& lods = "1") const {
+  /// One whole bake in a process of its own, and what it says of itself under "bytes". positions:
+  /// without levels of detail, in this layout; empty: with the default options.
+  ProcessOutcome bake(const std::string& positions, unsigned jobs, double& bytes) const {
     const std::string report = folder_ + "/report.json";
-    const ProcessOutcome outcome =
-        run_measured({{program_folder() + "/modar", "bake", "--model", obj_, "--lods", lods,
-                       "--positions", positions, "--jobs", std::to_string(jobs), "--quiet",
-                       "--json", "-o", folder_ + "/ours.modar"},
-                      {},
-                      report});
+    std::vector<std::string> words = {
+        program_folder() + "/modar", "bake",    "--model", obj_, "--jobs",
+        std::to_string(jobs),        "--quiet", "--json",  "-o", folder_ + "/ours.modar"};
+    if (!positions.empty()) words.insert(words.end(), {"--no-lods", "--positions", positions});
+    const ProcessOutcome outcome = run_measured({std::move(words), {}, report});
     std::ifstream file(report);
     const std::string text(std::istreambuf_iterator<char>(file), {});
     const auto models = Json::parse(text).find("bundle/models");
@@ -156,7 +155,6 @@ class ModelBench {
       add("bake_bytes_per_triangle/goal " + kind, bytes, kGoalBytes);
       Figures pages = probe({"pages", "-", std::to_string(ours.peak_rss_bytes)});
       add("bake_cpu_s/first_touch_of_its_memory " + kind, ours.cpu_seconds, pages["cpu_s"]);
-      bench_levels(kind, ours);
       if (kind == "half") continue;
       bench_bake_peers(ours);
       if (command_.jobs == 1) continue;
@@ -165,19 +163,30 @@ class ModelBench {
     }
   }
 
-  /// A bake with the default levels of detail, beside one without, and beside gltfpack, which makes
-  /// one of half the triangles and does not measure it.
-  void bench_levels(const std::string& kind, const ProcessOutcome& without) {
-    double ignored = 0;
-    const ProcessOutcome with = bake(kind, command_.jobs, ignored, std::to_string(kMaxLevels));
-    add("levels_bake_cpu_s/without " + kind, with.cpu_seconds, without.cpu_seconds);
-    if (kind == "half") return;  // which measures occlusion as well
-    const ProcessOutcome theirs = run_measured(
-        {{"gltfpack", "-si", "0.5", "-i", obj_, "-o", folder_ + "/theirs.glb"}, {}, ""});
-    const bool ran = theirs.exit == 0;
-    add("levels_bake_cpu_s/gltfpack_half", with.cpu_seconds, ran ? theirs.cpu_seconds : kNoFigure);
-    add("levels_bake_peak_bytes/gltfpack_half", static_cast<double>(with.peak_rss_bytes),
-        ran ? static_cast<double>(theirs.peak_rss_bytes) : kNoFigure);
+  /// What people get who set nothing: all levels of detail, the light that reaches each vertex,
+  /// half floats. gltfpack as it is, and with a level of half the triangles, which it does not
+  /// measure.
+  void bench_default_bake() {
+    double bytes = 0;
+    const ProcessOutcome ours = best_bake("", command_.jobs, bytes);
+    const auto peak = static_cast<double>(ours.peak_rss_bytes);
+    const std::map<std::string, std::vector<std::string>> peers = {
+        {"gltfpack", {}}, {"gltfpack_half", {"-si", "0.5"}}};
+    for (const auto& [name, options] : peers) {
+      const std::string glb = folder_ + "/theirs.glb";
+      std::vector<std::string> words = {"gltfpack", "-i", obj_, "-o", glb};
+      words.insert(words.end(), options.begin(), options.end());
+      const ProcessOutcome theirs = run_measured({std::move(words), {}, ""});
+      const bool ran = theirs.exit == 0;
+      std::error_code error;
+      const auto size = static_cast<double>(fs::file_size(glb, error));
+      add("default_bake_cpu_s/" + name, ours.cpu_seconds, ran ? theirs.cpu_seconds : kNoFigure);
+      add("default_bake_peak_bytes/" + name, peak,
+          ran ? static_cast<double>(theirs.peak_rss_bytes) : kNoFigure);
+      const auto ours_size = static_cast<double>(fs::file_size(folder_ + "/ours.modar", error));
+      add("default_bake_bytes/" + name, ours_size, ran && !error ? size : kNoFigure);
+    }
+    add("default_bake_bytes_per_triangle/goal", bytes, kGoalBytes);
   }
 
   void bench_bake_peers(const ProcessOutcome& ours) {

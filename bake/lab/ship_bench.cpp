@@ -7,6 +7,7 @@
 #include <meshoptimizer.h>
 #include <zstd.h>
 
+#include "bake/process.hpp"
 #include "bake/ship/recipe_maker.hpp"
 #include "bake/thread_clock.hpp"
 #include "modar/mapped_file.hpp"
@@ -83,11 +84,24 @@ DecodeCost measure_decoding(const PublishedBundle& made, std::span<const std::by
   return cost;
 }
 
+/// A bundle as it is; anything else is a model, baked with the default options into `folder`.
+Result<std::string> default_bundle(const std::string& file, const std::string& folder) {
+  if (file.ends_with(".modar")) return file;
+  const std::string bundle = folder + "/" + std::filesystem::path(file).stem().string() + ".modar";
+  const int code = run_process(
+      {{program_folder() + "/modar", "bake", "--model", file, "--quiet", "-o", bundle}, {}, ""});
+  if (code == 0) return bundle;
+  return fail(ExitCode::kInvalidInput, "bench.bake", file,
+              "it does not bake, exit code " + std::to_string(code), "see what `modar bake` says");
+}
+
 }  // namespace
 
 Result<std::vector<ShipBenchRow>> bench_ship(const std::vector<std::string>& files, unsigned jobs) {
+  const TemporaryFolder folder;
   std::vector<ShipBenchRow> rows;
-  for (const std::string& path : files) {
+  for (const std::string& named : files) {
+    MODAR_ASSIGN(const std::string path, default_bundle(named, folder.path()));
     const auto file = MappedFile::open(path);
     if (!file) return tl::unexpected(file.error());
     const auto bundle = BundleView::open(file->bytes());

@@ -16,7 +16,8 @@ struct ShipBenchRow {
   double reference = 0;
 };
 
-/// files: bundles. Errors: those of opening them and of make_recipe().
+/// files: bundles, or models, which are baked with the default options. Errors: kInvalidInput
+/// "bench.bake"; those of opening bundles and of make_recipe().
 Result<std::vector<ShipBenchRow>> bench_ship(const std::vector<std::string>& files, unsigned jobs);
 
 /// A model as one Draco mesh, quantised by Draco itself: the reference for geometry.

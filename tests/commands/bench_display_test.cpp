@@ -38,6 +38,10 @@ TEST(BenchDisplay, TellsTheArticlesFiguresOfARun) {
   // The two frames with a pattern take 200 ms on average: 5 a second of the video's 10.
   EXPECT_DOUBLE_EQ(row(rows, "statue table9_recognition_fps_low_end").ours, 5);
   EXPECT_DOUBLE_EQ(row(rows, "statue table9_recognition_fps_low_end").reference, 28);
+  // Seen and drawn at once, in the second frame.
+  EXPECT_TRUE(std::isnan(row(rows, "statue table9_loading_fps_low_end").ours));
+  EXPECT_DOUBLE_EQ(row(rows, "statue table9_loading_s_low_end").ours, 0.25);
+  EXPECT_DOUBLE_EQ(row(rows, "statue table9_loading_s_mid_range").reference, 17);
   // Pictures of 0.1, 0.3 and 0.4 s: two steps in 0.3 s.
   EXPECT_NEAR(row(rows, "statue table9_display_fps_mid_range").ours, 2 / 0.3, 1e-9);
   EXPECT_NEAR(row(rows, "statue table9_display_fps_mid_range").ratio, 2 / 0.3 / 25, 1e-9);
@@ -47,6 +51,18 @@ TEST(BenchDisplay, TellsTheArticlesFiguresOfARun) {
   EXPECT_TRUE(std::isnan(row(rows, "statue table9_stutters_mid_range").ratio));
   EXPECT_DOUBLE_EQ(row(rows, "statue pictures").ours, 5);
   EXPECT_DOUBLE_EQ(row(rows, "statue dropped_frames").ours, 1);
+}
+
+TEST(BenchDisplay, LoadingLastsFromTheFirstSightToTheFirstModel) {
+  const auto run = read_played_run(
+      line(0, "0", "", "hidden", "1", "5") + line(1, "0.1", "{}", "hidden", "1", "5") +
+      line(2, "0.2", "{}", "hidden", "1", "5") + line(3, "0.5", "{}", "shown", "1", "40") +
+      "{\"summary\":{\"dropped\":0,\"late\":0}}\n");
+  ASSERT_TRUE(run) << to_line(run.error());
+  const auto rows = display_rows("bust", *run);
+  EXPECT_NEAR(row(rows, "bust table9_loading_fps_low_end").ours, 2 / 0.4, 1e-9);
+  EXPECT_DOUBLE_EQ(row(rows, "bust table9_loading_fps_low_end").reference, 12);
+  EXPECT_NEAR(row(rows, "bust table9_loading_s_low_end").ours, 0.44, 1e-9);
 }
 
 TEST(BenchDisplay, VisionIsNoFasterThanTheCamera) {
