@@ -73,13 +73,13 @@ if [ $own = yes ]; then
   out=out/demo-own
   pattern=assets/patterns/cover.png
   width=210mm
-  scene="cover=pottery,scale=0.5"
+  scene="cover=pottery,height=150mm"
   video=$out/clip
 else
   out=out/demo
   pattern=$out/box.png
   width=258mm
-  scene="box=pottery,scale=0.36"
+  scene="box=pottery,height=95mm"
   video=$out/box.mp4
 fi
 bundle=$out/demo.modar

@@ -55,14 +55,13 @@ struct RenderBenchRow {
 /// rasterises nothing: Mesa's no-op driver, in a child process; left out where Mesa is not the
 /// driver). "MODEL x10 WAY gain_low_end" and "gain_mid_range": how often our frame time of
 /// index_arrays holds that of the way, and the paper's; Tables 10 to 12 in their own units, with
-/// seconds of 1,800 frames: "table11_fps_low_end", "table10_speed_up_pct_low_end". "MODEL x1 shading_cpu_ms" (CPU time of a
-/// frame with a camera picture, the model on its pattern, its shadow): the reference is plain
-/// shading.
-/// Then, a bundle (by its path): open_ms; load_cpu_ms (buffers into GL) and
-/// driver_cpu_ms (glBufferData of the same bytes alone), both against memcpy; bytes in GL by kind;
-/// and, a model, triangles sent from inside it against those whose own boxes meet the frustum. Call
-/// it before anything else of this process has opened a GL context.
-/// Errors: those of MappedFile, BundleView, GlContext and Renderer; kUsage "device.unknown".
+/// seconds of 1,800 frames: "table11_fps_low_end", "table10_speed_up_pct_low_end". "MODEL x1
+/// shading_cpu_ms" (CPU time of a frame with a camera picture, the model on its pattern, its
+/// shadow): the reference is plain shading. Then, a bundle (by its path): open_ms; load_cpu_ms
+/// (buffers into GL) and driver_cpu_ms (glBufferData of the same bytes alone), both against memcpy;
+/// bytes in GL by kind; and, a model, triangles sent from inside it against those whose own boxes
+/// meet the frustum. Call it before anything else of this process has opened a GL context. Errors:
+/// those of MappedFile, BundleView, GlContext and Renderer; kUsage "device.unknown".
 Result<std::vector<RenderBenchRow>> bench_render(std::span<const std::string> bundle_paths,
                                                  const RenderBenchOptions& options);
 
