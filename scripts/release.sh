@@ -7,7 +7,8 @@
 #   modar-V.apk            the app with the demo's bundle, where ANDROID_NDK is set (see scripts/apk.sh)
 #   modar-V.tar.gz         the sources
 #   SHA256SUMS             of all of these; with --key SHA256SUMS.minisig, by that secret key of minisign
-# --twice: builds the packages and the engine a second time, in another folder, and fails where a byte differs.
+# --twice: builds the packages and the engine a second time, in another folder, and fails where a byte differs. Machines with
+# other versions of Debian's packages differ in the copyright files alone, which name these.
 # Only what is committed goes in. Takes 10 minutes on two cores, and 2 GB of disk; --twice takes 20.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -17,7 +18,7 @@ while [ $# -gt 0 ]; do
   case $1 in
     --key | --out) [ $# -ge 2 ] || { echo "release.sh: $1 wants a value" >&2; exit 1; }; printf -v "${1#--}" %s "$2"; shift ;;
     --twice) twice=yes ;;
-    -h | --help) sed -n '2,12s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,13s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "release.sh: '$1' is not understood; try --help" >&2; exit 1 ;;
   esac
   shift
@@ -44,6 +45,9 @@ step() {  # WHAT COMMAND...: one line with its seconds; what it prints goes to t
   printf '%4d s\n' $((SECONDS - start))
 }
 packed() { tar --sort=name --owner=0 --group=0 --numeric-owner --mode=go=u-w "--mtime=@$SOURCE_DATE_EPOCH" -c "$@" | gzip -9n; }
+npm_files() {  # FOLDER: what its package.json lists
+  python3 -c 'import json, sys; print("package.json", *json.load(open(sys.argv[1]))["files"], sep="\n")' "$1/package.json"
+}
 
 build() {  # FOLDER OUT: engine and packages of the clone in FOLDER
   local clone=$1 to=$2
@@ -54,7 +58,9 @@ build() {  # FOLDER OUT: engine and packages of the clone in FOLDER
   mkdir -p "$to"
   cp "$clone"/build/package/packages/*.deb "$to"
   packed -C "$clone/build/web" web >"$to/modar-web-$version.tar.gz"
-  (cd "$to" && npm pack --silent "$clone/build/web/web")
+  # As `npm pack` lays it out, whose bytes differ from version to version.
+  npm_files "$clone/build/web/web" >"$work/npm-files"
+  packed -C "$clone/build/web/web" --transform 's,^,package/,' -T "$work/npm-files" >"$to/modar-$version.tgz"
 }
 look() {  # Lintian's errors and warnings stop a release.
   lintian --fail-on error,warning --allow-root "$out"/*.deb
@@ -71,7 +77,7 @@ trap 'rm -rf "$work"' EXIT
 rm -rf "$out"
 mkdir -p "$out"
 echo "ModAR $version, $(git log -1 --format='%h of %cs'). What the programs say goes to build/release.log."
-step "Debian packages that building takes (1.9 GB, the first time)" scripts/setup.sh web release
+step "Debian packages that building takes (2 GB, the first time)" scripts/setup.sh web release
 step "engine and packages" eval 'clone "$work/one" && build "$work/one" "$out"'
 step "lintian" look
 if [ $twice = yes ]; then

@@ -82,6 +82,8 @@ class MethodTally {
     row_.ms += 1e3 * (thread_seconds() - start);
     if (!result) return tl::unexpected(result.error());
     poses_.add(*result, truth);
+    row_.features.take(result->features);
+    for (const Detection& seen : result->visible) row_.inliers.take(seen.inliers);
     row_.stages_ms[0] += result->times.detect;
     row_.stages_ms[1] += result->times.describe;
     row_.stages_ms[2] += result->times.match;

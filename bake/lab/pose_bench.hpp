@@ -2,6 +2,7 @@
 // ModAR paper's method and ours on the same frames, single-threaded.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -30,6 +31,18 @@ struct PoseBenchOptions {
   std::vector<SceneBand> bands;  ///< empty: pose_bands()
 };
 
+/// The least and the most of what was taken; equal bounds of 0 where nothing was.
+struct IntRange {
+  int least = 0;
+  int most = 0;
+  bool any = false;
+  void take(int value) {
+    least = any ? std::min(least, value) : value;
+    most = any ? std::max(most, value) : value;
+    any = true;
+  }
+};
+
 /// One method on one band, over all patterns.
 struct PoseBenchRow : PoseFigures {
   std::string band;
@@ -39,6 +52,8 @@ struct PoseBenchRow : PoseFigures {
   double shown_px = 0;                 ///< of curved patterns: see bench_shapes(); 0: not measured
   double ms = 0;                       ///< thread-CPU milliseconds of a frame, mean
   double stages_ms[4] = {0, 0, 0, 0};  ///< wall time: detect, describe, match, homography
+  IntRange features;                   ///< of a frame
+  IntRange inliers;                    ///< of a recognition
 };
 
 /// Detection: frames are independent.

@@ -182,22 +182,38 @@ class Pattern(ProgramTest):
         rows = self.modar_json("bench", "pose", "--tables", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
                                "--quiet")
         found = {row["measure"]: row for row in rows}
-        article = {"orb-2000": (1094.8, 86, 93), "orb-500": (453.7, 69, 88), "brisk-3": (485.7, 2425, 97),
-                   "brisk-2": (473.5, 2296, 95)}  # mean of Table 6, first of Table 7, accuracy from afar
+        # Of SCYTHE, whose size ours has: Table 6; first of Table 7, milliseconds and share; their sum; accuracy from afar.
+        article = {"orb-2000": (1189, 86, 12.51, 434, 93), "orb-500": (430, 69, 12.02, 309, 88),
+                   "brisk-3": (544, 2425, 49.47, 4880, 97), "brisk-2": (540, 2296, 47.73, 4614, 95)}
         bands = ("area 0.4-0.9", "area 0.9-4")
-        stages = ("detect", "describe", "match", "homography")
+        methods = (*article, "ours")
         self.assertEqual(set(found), {
-            *(f"table6_features {name}" for name in article),
-            *(f"table{table}_{stage}_ms {name}" for table in (7, 8) for stage in stages for name in (*article, "ours")),
-            *(f"{what}_pct {band} {name}" for what in ("accuracy", "right") for band in bands
-              for name in (*article, "ours")),
-            *(f"cpu_ms {name}" for name in (*article, "ours"))})
-        for name, (features, milliseconds, accuracy) in article.items():
-            self.assertAlmostEqual(found[f"table6_features {name}"]["reference"], features, delta=0.1)
+            *(f"table6_features {of} {name}" for of in ("game/scythe", "mean") for name in article),
+            *(f"table6_{what}_{end} {name}" for what in ("frame_features", "inliers") for end in ("least", "most")
+              for name in methods),
+            *(f"table{table}_{stage}_{unit} {name}" for table in (7, 8) for unit in ("ms", "cpu_pct")
+              for stage in ("detect", "describe", "match", "homography") for name in methods),
+            *(f"table{table}_four_stages_ms {name}" for table in (7, 8) for name in methods),
+            *(f"{what}_pct {band} {name}" for what in ("accuracy", "right") for band in bands for name in methods),
+            *(f"{what}_ms {name}" for what in ("read_yml", "cpu") for name in methods),
+            *(f"reduction_pct orb-2000/brisk-3 {device}" for device in ("low_end", "mid_range"))})
+        for name, (features, milliseconds, share, four, accuracy) in article.items():
+            self.assertEqual(found[f"table6_features game/scythe {name}"]["reference"], features)
             self.assertEqual(found[f"table7_detect_ms {name}"]["reference"], milliseconds)
+            self.assertEqual(found[f"table7_detect_cpu_pct {name}"]["reference"], share)
+            self.assertAlmostEqual(found[f"table7_four_stages_ms {name}"]["reference"], four, delta=0.1)
             self.assertEqual(found[f"accuracy_pct {bands[0]} {name}"]["reference"], accuracy)
-            self.assertGreater(found[f"table8_detect_ms {name}"]["ours"], 0)
-        self.assertLessEqual(found["table6_features orb-500"]["ours"], 500)
+            stages = [found[f"table8_{stage}_ms {name}"]["ours"] for stage in ("detect", "describe", "match", "homography")]
+            self.assertAlmostEqual(sum(stages), found[f"table8_four_stages_ms {name}"]["ours"], places=6)
+            self.assertGreater(min(stages), 0)
+            self.assertLessEqual(sum(found[f"table7_{stage}_cpu_pct {name}"]["ours"]
+                                     for stage in ("detect", "describe", "match", "homography")), 100)
+        # The picture is blurred until it is as rich as the article's, not richer, and hardly poorer.
+        self.assertTrue(0.8 * 544 <= found["table6_features mean brisk-3"]["ours"] <= 544, found)
+        self.assertEqual(found["table6_features mean brisk-3"]["ours"], found["table6_features game/scythe brisk-3"]["ours"])
+        self.assertAlmostEqual(found["reduction_pct orb-2000/brisk-3 low_end"]["reference"], 91.1, delta=0.05)
+        self.assertEqual(found["read_yml_ms ours"]["ours"], 0)
+        self.assertLessEqual(found["table6_features game/scythe orb-500"]["ours"], 500)
         for band in bands:
             self.assertEqual(found[f"accuracy_pct {band} ours"]["ours"], 100)
             self.assertEqual(found[f"right_pct {band} ours"]["ours"], 100)
