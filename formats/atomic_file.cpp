@@ -2,15 +2,19 @@
 #include "formats/atomic_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <climits>
 #include <cstdio>
 #include <cstring>
 #include <utility>
 
 namespace modar {
 namespace {
+
+constexpr int kMostLinks = 40;  // as Linux follows
 
 std::string reason(const char* deed, int number) {
   return std::string(deed) + ": " + std::strerror(number);
@@ -29,6 +33,21 @@ bool sync_folder_of(const std::string& path) {
   return synced;
 }
 
+/// Where a symbolic link leads to, so that the link stays; the path itself where it is none.
+std::string followed(const std::string& path) {
+  std::string target = path;
+  for (int links = 0; links < kMostLinks; ++links) {
+    std::string text(PATH_MAX, '\0');
+    const ssize_t length = ::readlink(target.c_str(), text.data(), text.size());
+    if (length < 0) return target;
+    text.resize(static_cast<std::size_t>(length));
+    const std::size_t slash = target.rfind('/');
+    const bool relative = !text.starts_with('/') && slash != std::string::npos;
+    target = relative ? target.substr(0, slash + 1) + text : text;
+  }
+  return path;  // links in a circle: opening it says so
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(int descriptor, std::string path, std::string temporary)
@@ -45,13 +64,40 @@ AtomicFile::~AtomicFile() {
 }
 
 Result<AtomicFile> AtomicFile::create(const std::string& path) {
-  std::string temporary = path + "." + std::to_string(::getpid()) + ".tmp";
-  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0) {
+  const auto refused = [&path] {
     return fail(ExitCode::kIo, "io.create", path, reason("cannot create the file", errno),
                 "check that the folder exists and may be written");
+  };
+  const std::string target = followed(path);
+  struct stat old {};
+  const bool there = ::stat(target.c_str(), &old) == 0;
+  if (!there && errno == ELOOP) return refused();
+  if (there && !S_ISREG(old.st_mode)) {
+    // A device, a pipe or a socket is written to, not replaced; a folder refuses by itself.
+    const int descriptor = ::open(target.c_str(), O_WRONLY | O_CLOEXEC);
+    return descriptor < 0 ? Result<AtomicFile>(refused()) : AtomicFile(descriptor, target, "");
   }
-  return AtomicFile(descriptor, path, std::move(temporary));
+  std::string temporary = target + "." + std::to_string(::getpid()) + ".tmp";
+  // What an interrupted process of this number left is removed, whatever it is: never written to.
+  ::unlink(temporary.c_str());
+  const int descriptor =
+      ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
+  if (descriptor < 0) return refused();
+  if (there) {
+    // As the file that is replaced. Only its owner or root may give it away; others go on as
+    // themselves, as an editor does.
+    [[maybe_unused]] const int given = ::fchown(descriptor, old.st_uid, old.st_gid);
+    const bool moded = ::fchmod(descriptor, old.st_mode & 07777) == 0;
+    // FAT and the like have no modes of their own.
+    if (!moded && errno != ENOSYS && errno != EPERM && errno != EOPNOTSUPP) {
+      const int number = errno;
+      ::close(descriptor);
+      ::unlink(temporary.c_str());
+      errno = number;
+      return refused();
+    }
+  }
+  return AtomicFile(descriptor, target, std::move(temporary));
 }
 
 Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
@@ -74,6 +120,10 @@ Result<void> AtomicFile::commit() {
   };
   if (descriptor_ < 0) {
     return fail(ExitCode::kInternal, "io.commit", path_, "the file was committed before", "");
+  }
+  if (temporary_.empty()) {  // no regular file: there is nothing to sync and to rename
+    if (::close(std::exchange(descriptor_, -1)) != 0) return failed("cannot close");
+    return {};
   }
   if (::fsync(descriptor_) != 0) return failed("cannot sync");
   // close() gives the descriptor back even where it fails, so it is never closed twice.

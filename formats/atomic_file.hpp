@@ -14,7 +14,10 @@ namespace modar {
 /// A file under construction. Destroyed before commit(), it leaves nothing behind.
 class AtomicFile {
  public:
-  /// Creates "<path>.<pid>.tmp" in the folder of `path`. Errors: kIo "io.create".
+  /// Creates "<path>.<pid>.tmp" in the folder of `path`, with the mode and, where that is allowed,
+  /// the owner of the file that it will replace. A symbolic link is followed to its target; what is
+  /// no regular file (/dev/null, a pipe) is opened and written to as it is.
+  /// Errors: kIo "io.create".
   static Result<AtomicFile> create(const std::string& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;

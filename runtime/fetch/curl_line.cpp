@@ -37,30 +37,51 @@ bool is_tls_failure(CURLcode code) {
          code == CURLE_SSL_ISSUER_ERROR;
 }
 
-void set_common(CURL* handle, const TransferOptions& options) {
-  curl_easy_setopt(handle, CURLOPT_NOSIGNAL, 1L);
-  curl_easy_setopt(handle, CURLOPT_FOLLOWLOCATION, 1L);
-  curl_easy_setopt(handle, CURLOPT_MAXREDIRS, 5L);
-  curl_easy_setopt(handle, CURLOPT_PROTOCOLS_STR, "http,https,file");
-  curl_easy_setopt(handle, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
-  curl_easy_setopt(handle, CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
+/// Options of one handle. Each is looked at: one that libcurl refuses would leave what it had.
+class Options {
+ public:
+  explicit Options(CURL* handle) : handle_(handle), good_(handle != nullptr) {}
+
+  template <class Value>
+  Options& set(CURLoption option, Value value) {
+    good_ = good_ && curl_easy_setopt(handle_, option, value) == CURLE_OK;
+    return *this;
+  }
+  [[nodiscard]] bool good() const { return good_; }
+
+ private:
+  CURL* handle_;
+  bool good_;
+};
+
+/// What all transfers of a handle share. Set once: curl_easy_reset() restores the size of the
+/// buffer but keeps the buffer.
+bool set_common(CURL* handle, const TransferOptions& options) {
   const std::uint64_t capped = options.bytes_per_second / (2 * std::max(1u, options.parallel));
-  curl_easy_setopt(handle, CURLOPT_LOW_SPEED_LIMIT,
-                   options.bytes_per_second == 0
-                       ? kLeastSpeed
-                       : std::clamp(static_cast<long>(std::min<std::uint64_t>(capped, kLeastSpeed)),
-                                    1L, kLeastSpeed));
-  curl_easy_setopt(handle, CURLOPT_USERAGENT, options.user_agent.c_str());
+  const long least =
+      options.bytes_per_second == 0
+          ? kLeastSpeed
+          : std::clamp(static_cast<long>(std::min<std::uint64_t>(capped, kLeastSpeed)), 1L,
+                       kLeastSpeed);
+  Options set(handle);
+  set.set(CURLOPT_NOSIGNAL, 1L)
+      .set(CURLOPT_FOLLOWLOCATION, 1L)
+      .set(CURLOPT_MAXREDIRS, 5L)
+      .set(CURLOPT_PROTOCOLS_STR, "http,https")
+      .set(CURLOPT_REDIR_PROTOCOLS_STR, "http,https")
+      .set(CURLOPT_CONNECTTIMEOUT, kConnectSeconds)
+      .set(CURLOPT_LOW_SPEED_LIMIT, least)
+      .set(CURLOPT_LOW_SPEED_TIME, std::max(1L, static_cast<long>(std::ceil(options.stall_s))))
+      .set(CURLOPT_USERAGENT, options.user_agent.c_str());
   if (const std::string file = authorities_of(options); !file.empty()) {
-    curl_easy_setopt(handle, CURLOPT_CAINFO, file.c_str());
+    set.set(CURLOPT_CAINFO, file.c_str());
   }
   if (const char* folder = std::getenv("SSL_CERT_DIR"); folder != nullptr && *folder != '\0') {
-    curl_easy_setopt(handle, CURLOPT_CAPATH, folder);
+    set.set(CURLOPT_CAPATH, folder);
   }
-  curl_easy_setopt(handle, CURLOPT_LOW_SPEED_TIME,
-                   std::max(1L, static_cast<long>(std::ceil(options.stall_s))));
   // Small reads keep the rate limit smooth on slow links.
-  if (options.bytes_per_second != 0) curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 2048L);
+  if (options.bytes_per_second != 0) set.set(CURLOPT_BUFFERSIZE, 2048L);
+  return set.good();
 }
 
 /// A place for one attempt at a time; its handle keeps its connections.
@@ -78,8 +99,7 @@ void judge_status(Download& download) {
   download.judged = true;
   long status = 0;
   curl_easy_getinfo(download.handle, CURLINFO_RESPONSE_CODE, &status);
-  // 0: not HTTP; file:// honours the range.
-  download.welcome = status == 0 || status == 206 || status == 200;
+  download.welcome = status == 206 || status == 200;
   // A server without range requests sends the file from its beginning.
   if (status == 200 && download.asked_from != 0) download.attempts->discard(*download.transfer);
 }
@@ -106,9 +126,7 @@ Answer answer_of(const Download& download, CURLcode code) {
              std::string("the TLS connection failed: ") + words,
              "give the authority of its certificate with --cacert, and check the clock"}};
   }
-  if (status == 404 || status == 410 || code == CURLE_FILE_COULDNT_READ_FILE) {
-    return {Answer::Kind::kMissing, {}, {}};
-  }
+  if (status == 404 || status == 410) return {Answer::Kind::kMissing, {}, {}};
   if (status == 416 || code == CURLE_RANGE_ERROR || code == CURLE_BAD_DOWNLOAD_RESUME) {
     return {Answer::Kind::kNoRange, {}, {}};
   }
@@ -127,7 +145,10 @@ class CurlLine : public Line {
         address_(std::move(address)),
         multi_(multi),
         places_(std::max(1u, options_.parallel)) {
-    for (Download& place : places_) place.handle = curl_easy_init();
+    for (Download& place : places_) {
+      place.handle = curl_easy_init();
+      ready_ = ready_ && set_common(place.handle, options_);
+    }
   }
   CurlLine(const CurlLine&) = delete;
   CurlLine& operator=(const CurlLine&) = delete;
@@ -147,6 +168,7 @@ class CurlLine : public Line {
   std::string address_;
   CURLM* multi_;
   std::vector<Download> places_;  // never grows: libcurl's callbacks point into it
+  bool ready_ = true;             // all handles have their options
   Clock::time_point begin_ = Clock::now();
 };
 
@@ -156,15 +178,14 @@ bool CurlLine::start(Transfer& transfer, Attempts& attempts) {
   Download& download = *std::ranges::find(places_, nullptr, &Download::transfer);
   CURL* handle = download.handle;
   download = {&transfer, &attempts, handle, transfer.have};
-  curl_easy_reset(handle);
-  set_common(handle, options_);
-  curl_easy_setopt(handle, CURLOPT_URL, (address_ + "/" + transfer.path).c_str());
-  curl_easy_setopt(handle, CURLOPT_RESUME_FROM_LARGE, static_cast<curl_off_t>(transfer.have));
-  curl_easy_setopt(handle, CURLOPT_WRITEFUNCTION, on_body);
-  curl_easy_setopt(handle, CURLOPT_WRITEDATA, &download);
-  curl_easy_setopt(handle, CURLOPT_ERRORBUFFER, download.reason.data());
-  curl_easy_setopt(handle, CURLOPT_PRIVATE, &download);
-  if (curl_multi_add_handle(multi_, handle) == CURLM_OK) return true;
+  Options set(handle);
+  set.set(CURLOPT_URL, (address_ + "/" + transfer.path).c_str())
+      .set(CURLOPT_RESUME_FROM_LARGE, static_cast<curl_off_t>(transfer.have))
+      .set(CURLOPT_WRITEFUNCTION, on_body)
+      .set(CURLOPT_WRITEDATA, &download)
+      .set(CURLOPT_ERRORBUFFER, download.reason.data())
+      .set(CURLOPT_PRIVATE, &download);
+  if (ready_ && set.good() && curl_multi_add_handle(multi_, handle) == CURLM_OK) return true;
   download.transfer = nullptr;
   transfer.error = {ExitCode::kInternal, "fetch.curl", address_, "libcurl refuses to start",
                     "report this as a bug"};
@@ -229,23 +250,6 @@ Result<void> CurlLine::run(std::vector<Transfer>& transfers, Attempts& attempts)
 }
 
 }  // namespace
-
-std::string curl_address(const std::string& url_or_folder) {
-  std::string base = url_or_folder;
-  while (base.size() > 1 && base.back() == '/') base.pop_back();
-  if (base.find("://") != std::string::npos) return base;
-  char* absolute = ::realpath(base.c_str(), nullptr);
-  if (absolute == nullptr) return {};
-  CURLU* parts = curl_url();
-  curl_url_set(parts, CURLUPART_SCHEME, "file", 0);
-  curl_url_set(parts, CURLUPART_PATH, absolute, CURLU_URLENCODE);
-  char* text = nullptr;
-  if (curl_url_get(parts, CURLUPART_URL, &text, 0) == CURLUE_OK) base = text;
-  curl_free(text);
-  curl_url_cleanup(parts);
-  std::free(absolute);
-  return base;
-}
 
 Result<std::unique_ptr<Line>> make_curl_line(const TransferOptions& options,
                                              const std::string& address) {

@@ -1,7 +1,9 @@
 // What carries transfers: libcurl, or an app's ByteSource. Internal to runtime/fetch.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,12 +18,16 @@ class Line {
   virtual Result<void> run(std::vector<Transfer>& transfers, Attempts& attempts) = 0;
 };
 
-/// The release folder's URL: of an address, or of a local folder; empty if there is no such folder.
-/// Without libcurl, always empty.
-std::string curl_address(const std::string& url_or_folder);
+/// The folder that a release is to be read from, as an absolute path: of a path, or of a file://
+/// address. Nothing: it is the address of a server. Empty: there is no such folder.
+std::optional<std::string> release_folder(const std::string& url_or_folder);
 
-/// Several transfers at once over HTTP, HTTPS or from a folder. Errors: kInternal "fetch.curl".
-/// In a build without libcurl: kUnsupported "fetch.curl".
+/// The files below a folder, regular ones only, at most that many bytes a second (0: any). A file
+/// that is not there answers "fetch.missing".
+ByteSource folder_source(std::string folder, std::uint64_t bytes_per_second);
+
+/// Several transfers at once over HTTP or HTTPS. Errors: kInternal "fetch.curl". In a build without
+/// libcurl: kUnsupported "fetch.curl".
 Result<std::unique_ptr<Line>> make_curl_line(const TransferOptions& options,
                                              const std::string& address);
 

@@ -3,10 +3,6 @@
 
 namespace modar::fetch {
 
-std::string curl_address(const std::string& url_or_folder) {
-  return url_or_folder;
-}
-
 Result<std::unique_ptr<Line>> make_curl_line(const TransferOptions& options, const std::string&) {
   return fail(ExitCode::kUnsupported, "fetch.curl", options.url, "this build has no libcurl",
               "set FetchOptions::source");

@@ -23,10 +23,16 @@ Result<Transfers> Transfers::create(const TransferOptions& options) {
     return Transfers(std::make_unique<State>(
         State{Attempts(options, "the release folder"), make_source_line(options.source)}));
   }
-  const std::string address = curl_address(options.url);
-  if (address.empty()) {
-    return fail(ExitCode::kUsage, "fetch.url", options.url, "there is no such folder",
-                "give http://HOST/PATH or a folder that `modar ship publish` filled");
+  std::string address = options.url;
+  while (address.size() > 1 && address.back() == '/') address.pop_back();
+  if (const auto folder = release_folder(address)) {
+    if (folder->empty()) {
+      return fail(ExitCode::kUsage, "fetch.url", options.url, "there is no such folder",
+                  "give http://HOST/PATH or a folder that `modar ship publish` filled");
+    }
+    return Transfers(std::make_unique<State>(
+        State{Attempts(options, *folder),
+              make_source_line(folder_source(*folder, options.bytes_per_second))}));
   }
   MODAR_ASSIGN(auto line, make_curl_line(options, address));
   return Transfers(std::make_unique<State>(State{Attempts(options, address), std::move(line)}));

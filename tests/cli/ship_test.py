@@ -1,5 +1,6 @@
 """`modar ship` and `modar-fetch` over folders: releases, keys, what is refused, what is reused."""
 import json
+import os
 import pathlib
 import shutil
 import stat
@@ -20,6 +21,27 @@ class Publish(ShipTest):
         self.assert_installed(self.shop.old)
         self.assertFalse(self.fetch_json()["changed"])
         self.assertEqual(fetched["bundles"], [str(self.store / "museum.modar")])
+
+    def test_an_unsigned_stick_is_read_within_its_limits(self):
+        # libcurl's file:// wrote past its buffer for a file after one that was missing, with a limit on the rate.
+        self.publish(self.shop.old)
+        stick = self.folder / "stick"
+        shutil.copytree(self.site, stick)
+        (stick / "keys").mkdir(exist_ok=True)
+        for name in ("1.json", "2.json"):
+            (stick / "keys" / name).write_bytes(b"x" * 16000)
+        for words in ([], ["--limit-rate", "200000"]):
+            done = self.fetch(stick, "--attempts", "1", *words, store=self.folder / f"store{len(words)}")
+            self.assertNotIn("Sanitizer", done.stderr)
+            self.assertIn(done.returncode, (10, 13, 16), done.stderr)
+        (stick / "latest").unlink()
+        os.mkfifo(stick / "latest")  # nobody writes to it
+        self.assertEqual(self.fetch(stick, "--attempts", "1", store=self.folder / "waiting").returncode, 16)
+        limited = self.folder / "limited"
+        begin = time.monotonic()
+        self.fetch_json(self.site, "--limit-rate", str(4 * self.shop.old.stat().st_size), store=limited)
+        self.assertGreater(time.monotonic() - begin, 0.05)
+        self.fetch_json("file://" + str(self.site), store=self.folder / "third")
 
     def test_the_document_keeps_its_schema(self):
         try:
