@@ -73,6 +73,12 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   MODAR_ASSIGN(Plan plan, make_plan(asked, bundle));
   PlayOptions options = asked;
   options.method = choose_method(bundle, plan.method, plan.parameters);
+  if (options.method == "paper" && !options.quiet) {
+    std::fprintf(
+        stderr,
+        "modar-play: the ModAR paper's method is there to compare with: it reports patterns "
+        "in frames that show none as well\n");
+  }
   MODAR_ASSIGN(const std::uint32_t set,
                choose_parameter_set(bundle, options.method, plan.parameters));
   if (options.extended && options.method != "ours") {
