@@ -162,7 +162,7 @@ class Page {
               verdict_.good() ? "Good" : "Bad") +
         "<span>" + std::to_string(verdict_.errors()) + " " + noun(verdict_.errors(), "error") +
         ", " + std::to_string(verdict_.warnings()) + " " + noun(verdict_.warnings(), "warning") +
-        "</span>" +
+        "</span>" + weakest_pattern() +
         print("<span>bundle version %u.%u</span></div>\n<ul class=\"counts\">",
               bundle_.header().major, bundle_.header().minor);
     std::uint64_t triangles = 0;
@@ -179,6 +179,25 @@ class Page {
     count(bundle_.textures().size(), "texture");
     count(bundle_.patterns().size(), "pattern");
     html_ += "</ul>\n</div></header>\n<main>\n";
+  }
+
+  /// From where visitors have a chance: the pattern that is recognised worst.
+  [[nodiscard]] std::string weakest_pattern() const {
+    std::optional<ScoreRange> worst;
+    std::uint32_t index = 0;
+    for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) {
+      const auto range = stated_range(bundle_, p);
+      if (!range || (worst && range_value(*range) >= range_value(*worst))) continue;
+      worst = range;
+      index = p;
+    }
+    if (!worst) return "";
+    const PatternRecord& record = bundle_.patterns()[index];
+    const std::string who = bundle_.patterns().size() == 1
+                                ? "pattern"
+                                : "weakest pattern " + escape_html(name(record.name));
+    return "<span>" + who + ": grade " + grade_of(*worst) + ", " +
+           range_sentence(*worst, record.width_mm) + "</span>";
   }
 
   Result<void> scenes() {
