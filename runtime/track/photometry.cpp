@@ -7,11 +7,38 @@
 namespace modar::tracker {
 namespace {
 
-/// The level of a pyramid whose pixels are about that wide.
-std::size_t level_of_step(double pixels, std::size_t count) {
-  return static_cast<std::size_t>(
-      std::clamp(nearest_octave(std::max(pixels, 1.0)), 0, static_cast<int>(count) - 1));
-}
+/// A picture as samples so many pixels apart see it: between two levels of its pyramid, as textures
+/// are filtered (Williams, "Pyramidal parametrics", 1983). The nearest level alone showed regular
+/// print that is finer than the samples differently on each side of a comparison.
+class Filtered {
+ public:
+  Filtered(std::span<const GrayImage> pyramid, double pixels) {
+    std::size_t level = 0;
+    double width = 1.0;
+    for (; level + 1 < pyramid.size() && 2.0 * width <= pixels; width *= 2.0) ++level;
+    fine_ = &pyramid[level];
+    coarse_ = &pyramid[std::min(level + 1, pyramid.size() - 1)];
+    fine_shrink_ = 1.0 / width;
+    coarse_shrink_ = coarse_ == fine_ ? fine_shrink_ : 0.5 / width;
+    share_ = static_cast<float>(std::clamp(pixels / width - 1.0, 0.0, 1.0));
+  }
+  /// At a place in pixels of the finest level, from its edge; beyond the border the border.
+  [[nodiscard]] float at(double x, double y) const {
+    const float fine = on(*fine_, fine_shrink_, x, y);
+    return fine + share_ * (on(*coarse_, coarse_shrink_, x, y) - fine);
+  }
+
+ private:
+  static float on(const GrayImage& image, double shrink, double x, double y) {
+    return sample(image, static_cast<float>(std::clamp(x * shrink - 0.5, 0.0, image.width - 1.001)),
+                  static_cast<float>(std::clamp(y * shrink - 0.5, 0.0, image.height - 1.001)));
+  }
+  const GrayImage* fine_;
+  const GrayImage* coarse_;
+  double fine_shrink_ = 1;
+  double coarse_shrink_ = 1;
+  float share_ = 0;
+};
 
 // Cells along a side of a box's face. With cells over the whole picture, most of them lay on two
 // faces or on hidden ones: a face seen alone had five, and was never believed.
@@ -78,42 +105,40 @@ glm::dmat3 Mirror::pixels_of(const TrackedPattern& pattern) const {
 
 CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
                    std::span<const GrayImage> pyramid)
-    : pattern_(pattern), map_(map) {
-  const std::size_t level =
-      level_of_step(step_of(pattern) * scale_of(pattern, map), pyramid.size());
-  image_ = &pyramid[level];
-  shrink_ = 1.0 / static_cast<double>(1u << level);
+    : pattern_(pattern), map_(map), pyramid_(pyramid) {
+  // Of a print far away the frame shows less than the samples could.
+  const double step = step_of(pattern);
+  const double scale = scale_of(pattern, map);
+  spread_ = std::max(1.0, 1.0 / (step * std::max(scale, 1e-6)));
+  pixels_ = spread_ * step * scale;
 }
 
 bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror) const {
+  const Filtered frame(pyramid_, pixels_);
+  const GrayImage& whole = pyramid_[0];
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
     const glm::dvec2 share = place_of(pattern_, cell, k, mirror);
     bool in_front = false;
     const glm::dvec2 p =
         map_.at({share.x * pattern_.width() - 0.5, share.y * pattern_.height() - 0.5}, in_front);
-    const double x = (p.x + 0.5) * shrink_ - 0.5;
-    const double y = (p.y + 0.5) * shrink_ - 0.5;
-    if (!in_front || !(x >= 0.0 && y >= 0.0 && x < image_->width - 1 && y < image_->height - 1)) {
+    const double margin = 0.5 * pixels_;
+    if (!in_front || !(p.x >= margin && p.y >= margin && p.x < whole.width - 1 - margin &&
+                       p.y < whole.height - 1 - margin)) {
       return false;
     }
-    seen[static_cast<std::size_t>(k)] =
-        sample(*image_, static_cast<float>(x), static_cast<float>(y));
+    seen[static_cast<std::size_t>(k)] = frame.at(p.x + 0.5, p.y + 0.5);
   }
   return true;
 }
 
 void CellGrid::expect(const TrackedPattern& print, int cell, CellSamples& expected,
-                      const Mirror* mirror) {
-  const std::size_t level =
-      level_of_step(step_of(print), static_cast<std::size_t>(print.level_count));
-  const GrayImage& image = print.levels[level];
-  const double shrink = 1.0 / static_cast<double>(1u << level);
+                      const Mirror* mirror, double spread) {
+  const Filtered picture(std::span(print.levels).first(static_cast<std::size_t>(print.level_count)),
+                         spread * step_of(print));
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
     const glm::dvec2 share = place_of(print, cell, k, mirror);
-    const double x = std::clamp(share.x * print.width() * shrink - 0.5, 0.0, image.width - 1.001);
-    const double y = std::clamp(share.y * print.height() * shrink - 0.5, 0.0, image.height - 1.001);
     expected[static_cast<std::size_t>(k)] =
-        sample(image, static_cast<float>(x), static_cast<float>(y));
+        picture.at(share.x * print.width(), share.y * print.height());
   }
 }
 
@@ -144,7 +169,7 @@ PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap&
   CellSamples seen{};
   for (int cell = 0; cell < cells_of(pattern); ++cell) {
     if (!grid.see(cell, seen)) continue;
-    CellGrid::expect(pattern, cell, expected);
+    CellGrid::expect(pattern, cell, expected, nullptr, grid.spread());
     const CellMatch match = compare(expected, seen);
     if (!match.textured()) continue;
     ++check.cells;
@@ -163,9 +188,9 @@ PrintDifference compare_prints(const TrackedPattern& first, const TrackedPattern
   CellSamples seen{};
   for (int cell = 0; cell < kCells; ++cell) {
     if (!grid.see(cell, seen)) continue;
-    CellGrid::expect(first, cell, expected);
+    CellGrid::expect(first, cell, expected, nullptr, grid.spread());
     const CellMatch one = compare(expected, seen);
-    CellGrid::expect(second, cell, expected);
+    CellGrid::expect(second, cell, expected, nullptr, grid.spread());
     const CellMatch other = compare(expected, seen);
     difference.first += one.agrees() && other.disagrees() ? 1 : 0;
     difference.second += other.agrees() && one.disagrees() ? 1 : 0;

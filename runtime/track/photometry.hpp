@@ -44,15 +44,19 @@ class CellGrid {
   /// What the frame shows of a cell, of its mirror image if there is one, which may lie beside the
   /// outline; false if that does not lie in the frame.
   bool see(int cell, CellSamples& seen, const Mirror* mirror = nullptr) const;
-  /// What a print, or its mirror image, of any size shows there that fills the outline.
+  /// How many times less the frame resolves than the samples of a cell could, 1 or more.
+  [[nodiscard]] double spread() const { return spread_; }
+  /// What a print, or its mirror image, of any size shows there that fills the outline, to a frame
+  /// of that spread().
   static void expect(const TrackedPattern& print, int cell, CellSamples& expected,
-                     const Mirror* mirror = nullptr);
+                     const Mirror* mirror = nullptr, double spread = 1);
 
  private:
   const TrackedPattern& pattern_;
   const PlaneMap& map_;
-  const GrayImage* image_;
-  double shrink_;
+  std::span<const GrayImage> pyramid_;
+  double spread_ = 1;
+  double pixels_ = 1;  ///< of the frame, between samples at that spread
 };
 
 /// Two cells compared: correlation, 0 where one of them is flat, and the variance of each.

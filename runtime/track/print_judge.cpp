@@ -74,7 +74,7 @@ std::uint8_t PrintJudge::flips_of(std::size_t pattern, const CellGrid& grid, int
   const TrackedPattern& print = patterns_[pattern];
   CellSamples seen{};
   CellSamples expected{};
-  CellGrid::expect(print, at, expected);
+  CellGrid::expect(print, at, expected, nullptr, grid.spread());
   const bool there = grid.see(at, seen);
   const CellMatch match = there ? compare(expected, seen) : CellMatch{};
   std::uint8_t flips = 0;
@@ -84,7 +84,7 @@ std::uint8_t PrintJudge::flips_of(std::size_t pattern, const CellGrid& grid, int
     if (mirror.keeps(at)) {
       if (!there) continue;
       CellSamples swapped{};
-      CellGrid::expect(print, at, swapped, &mirror);
+      CellGrid::expect(print, at, swapped, &mirror, grid.spread());
       other = compare(swapped, seen);
       if (other.agrees() && match.disagrees()) flips |= kForFlip[k];
     } else {
@@ -102,7 +102,7 @@ void PrintJudge::update(std::size_t pattern, const CellGrid& grid, const glm::ve
                         Cell& cell) const {
   CellSamples expected{};
   CellSamples seen{};
-  CellGrid::expect(patterns_[pattern], at, expected);
+  CellGrid::expect(patterns_[pattern], at, expected, nullptr, grid.spread());
   if (!grid.see(at, seen)) {
     cell = {};
     return;
@@ -143,7 +143,7 @@ bool PrintJudge::slipped(std::size_t pattern, const FrameView& frame, const Trac
   for (int at = 0; at < kCells; ++at) {
     const Cell& before = evidence_[pattern].cells[static_cast<std::size_t>(at)];
     if (before.state != CellState::kAgrees || !grid.see(at, seen)) continue;
-    CellGrid::expect(print, at, expected);
+    CellGrid::expect(print, at, expected, nullptr, grid.spread());
     const CellMatch match = compare(expected, seen);
     if (!match.agrees()) continue;
     ++agreeing;

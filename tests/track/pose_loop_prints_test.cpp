@@ -85,6 +85,47 @@ TEST(Prints, AnEditionOfWhichASeventhDiffersIsTakenBackForGood) {
   EXPECT_TRUE(seen.visible.empty());
 }
 
+// Rows of figures between lines, as fine as the samples of the cells that are compared.
+cv::Mat table() {
+  cv::Mat sheet(300, 400, CV_8UC1, cv::Scalar(255));
+  Random random(3);
+  for (int row = 0; row <= 20; ++row) {
+    cv::line(sheet, {10, 10 + 14 * row}, {390, 10 + 14 * row}, cv::Scalar(0));
+    for (int column = 0; column < 8 && row < 20; ++column) {
+      cv::putText(sheet, std::to_string(random.next() % 100000), {14 + 47 * column, 21 + 14 * row},
+                  cv::FONT_HERSHEY_SIMPLEX, 0.32, cv::Scalar(0), 1, cv::LINE_AA);
+    }
+  }
+  for (int column = 0; column <= 8; ++column) {
+    cv::line(sheet, {10 + 47 * column, 10}, {10 + 47 * column, 290}, cv::Scalar(0));
+  }
+  return sheet;
+}
+
+TEST(Prints, OfATableOfFiguresAsMuchAgreesFromFarAsFromNear) {
+  const cv::Mat sheet = table();
+  constexpr int kFrames = 12;
+  const auto bundle = bundle_with({record_of(sheet)});
+  for (const double distance : {2.2, 3.6, 5.0}) {
+    const auto loop = loop_on(bundle);
+    Random random(4);
+    const HandPath path(pose_of(look_at(distance, 40, 20, 10)), random);
+    const GrayPicture behind = clutter(kWidth, kHeight, 77);
+    TrackResult seen;
+    double agreeing = 0;
+    for (int i = 0; i < kFrames; ++i) {
+      Random same_side(5);
+      SceneFrame scene = render_still(gray(sheet), default_camera(kWidth, kHeight),
+                                      path.at(i / 10.0, 1), behind, {}, same_side, 0.65, {});
+      expose(scene.picture, {}, random, scene.picture);
+      ASSERT_TRUE(loop->step(scene.picture.view(), seen));
+      ASSERT_EQ(seen.visible.size(), 1u) << distance << " " << i << " " << to_string(seen.reason);
+      agreeing += seen.visible[0].agreeing / kFrames;
+    }
+    EXPECT_GT(agreeing, 0.98) << distance;
+  }
+}
+
 TEST(Prints, ACoveredOneStaysAndIsSeenAsCovered) {
   const auto loop = loop_on(alone());
   Sequence frames(gray(picture()), 0.5);
