@@ -9,11 +9,14 @@
 #include <system_error>
 
 #include "bake/terminal.hpp"
+#include "formats/atomic_file.hpp"
 
 namespace modar {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kFolderMark = ".modar-output";
 
 }  // namespace
 
@@ -25,6 +28,19 @@ Result<void> make_output_folder(const std::string& folder) {
                 "name a folder that can be made");
   }
   return {};
+}
+
+Result<void> claim_output_folder(const std::string& folder, bool force) {
+  const fs::path mark = fs::path(folder) / kFolderMark;
+  std::error_code error;
+  const bool empty = !fs::exists(folder, error) || fs::is_empty(folder, error);
+  if (!error && !empty && !force && !fs::exists(mark, error)) {
+    return fail(ExitCode::kUsage, "out.foreign-folder", folder,
+                "the folder holds files that modar has not written",
+                "name a new or an empty folder, or write into this one with --force");
+  }
+  MODAR_TRY(make_output_folder(folder));
+  return write_file(mark.string(), "Files of this folder were written by modar.\n");
 }
 
 Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs) {

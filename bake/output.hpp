@@ -13,6 +13,11 @@ namespace modar {
 /// Makes the folder and those above it where they are missing. Errors: kIo "io.folder".
 Result<void> make_output_folder(const std::string& folder);
 
+/// Makes a folder in which files are written, and replaced the next time. One that holds files and
+/// no mark of an earlier run is refused unless `force` is set: somebody may have named a web
+/// server's root. Errors: kUsage "out.foreign-folder", kIo "io.folder".
+Result<void> claim_output_folder(const std::string& folder, bool force);
+
 /// Refuses an output that is one of the inputs: by its path, a symbolic link or a hard link.
 /// Errors: kUsage "out.input".
 Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs);

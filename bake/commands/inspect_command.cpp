@@ -16,6 +16,7 @@ namespace {
 struct InspectCommand {
   std::string bundle;
   std::string extract;  ///< folder for GLB, PKM, YML; empty: none
+  bool force = false;
   bool json = false;
 };
 
@@ -103,7 +104,7 @@ Result<ExitCode> run_inspect(const InspectCommand& command) {
     return tl::unexpected(std::move(error));
   }
   if (!command.extract.empty()) {
-    MODAR_ASSIGN(const auto files, extract_bundle(*bundle, command.extract));
+    MODAR_ASSIGN(const auto files, extract_bundle(*bundle, command.extract, command.force));
     for (const std::string& name : files) std::fprintf(stderr, "wrote %s\n", name.c_str());
   }
   if (command.json) {
@@ -122,6 +123,7 @@ void add_inspect(CommandLine& program) {
   line.option("bundle", &command->bundle, "The bundle", {.type = "BUNDLE", .required = true});
   line.option("--extract", &command->extract,
               "Write models as GLB, textures as PKM and KTX, patterns as YML", {.type = "DIR"});
+  line.flag("--force", command->force, "Extract into a folder that holds other files as well");
   line.flag("--json", command->json, "Print as JSON");
   line.footer(example("  modar inspect spider.modar --extract out/\n"));
   line.run([command] { return run_inspect(*command); });

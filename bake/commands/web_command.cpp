@@ -72,6 +72,7 @@ void add_web(CommandLine& program) {
               {.type = "FILE"});
   line.option("--page", &options.page, "The page's files; else those installed or built with modar",
               {.type = "DIR"});
+  line.flag("--force", options.force, "Write into a folder that holds other files as well");
   line.flag("--serve", command->serve, "Serve it by HTTPS, with a QR code of the address");
   line.option("--port", &command->port, "Of that server; 0: any that is free",
               {.shows_default = true, .least = 0, .most = 65535});

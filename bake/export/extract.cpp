@@ -136,9 +136,9 @@ Result<void> Extraction::models() {
 
 }  // namespace
 
-Result<std::vector<std::string>> extract_bundle(const BundleView& bundle,
-                                                const std::string& folder) {
-  if (auto made = make_output_folder(folder); !made) return tl::unexpected(made.error());
+Result<std::vector<std::string>> extract_bundle(const BundleView& bundle, const std::string& folder,
+                                                bool force) {
+  MODAR_TRY(claim_output_folder(folder, force));
   Extraction extraction(bundle, folder);
   for (const auto& step : {&Extraction::models, &Extraction::textures, &Extraction::patterns}) {
     if (auto done = (extraction.*step)(); !done) return tl::unexpected(done.error());

@@ -325,6 +325,7 @@ Result<Site> write_site(const SiteOptions& options) {
   MODAR_TRY(choose_languages(draft));
   MODAR_TRY(read_texts(draft));
   MODAR_ASSIGN(const Json release, release_of(options, draft.page));
+  MODAR_TRY(claim_output_folder(options.output, options.force));
   for (const char* folder : {"/bundles", "/patterns", "/words"}) {
     MODAR_TRY(make_output_folder(options.output + folder));
   }

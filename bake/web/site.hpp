@@ -20,7 +20,8 @@ struct SiteOptions {
                         ///< no updates
   std::string trusted_key;  ///< file K.pub that its releases are verified with
   std::string page;         ///< folder that the preset `web` built; empty: find_page()
-  std::string output;       ///< folder, made if absent
+  std::string output;       ///< folder, made if absent; see claim_output_folder()
+  bool force = false;       ///< write into a folder of other files as well
 };
 
 struct Site {

@@ -44,6 +44,17 @@ class Inspect(ProgramTest):
         self.assertEqual([m["vertex_count"] for m in theirs["models"]], [m["vertices"] for m in ours["models"]])
 
 
+    def test_a_folder_of_other_files_is_left_alone(self):
+        bundle = self.bake_demo()
+        out = self.folder / "www"
+        out.mkdir()
+        (out / "pottery.glb").write_text("mine")
+        self.assert_fails(self.modar("inspect", bundle, "--extract", out), 1, "out.foreign-folder", "--force")
+        self.assertEqual([(file.name, file.read_text()) for file in out.iterdir()], [("pottery.glb", "mine")])
+        for words in (["--force"], []):  # then it is a folder of modar's
+            self.assertEqual(self.modar("inspect", bundle, "--extract", out, *words).returncode, 0)
+        self.assertTrue((out / "pottery.glb").read_bytes().startswith(b"glTF"))
+
     def test_the_second_reader_warns_of_grids(self):
         done = subprocess.run(["python3", ROOT / "scripts" / "read_bundle.py", ROOT / "tests/corrupt/CHUNK_GRID.modar"],
                               capture_output=True, text=True)
