@@ -215,6 +215,15 @@ TEST(Ply, RefusesWhatIsNone) {
     return read ? std::string() : read.error().code;
   };
   EXPECT_EQ(code(header + "0 0 0 1 0 0 0 1 0\n3 0 1 2\n"), "");
+  const auto twice = parse_ply(
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nelement vertex 1\n"
+      "property float x\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 1 2 3 1 0 4 5 6 0 1 7 8 9\n5\n3 0 1 2\n",
+      "a.ply");
+  ASSERT_TRUE(twice) << to_line(twice.error());
+  EXPECT_EQ(twice->positions.size(), 3u);
+  EXPECT_EQ(twice->colours.size(), 3u);
   std::string odd = header;  // a line that an old Blender writes
   odd.insert(odd.find("element"), "Created by Blender3D 247\n");
   EXPECT_EQ(code(odd + "0 0 0 1 0 0 0 1 0\n3 0 1 2\n"), "");

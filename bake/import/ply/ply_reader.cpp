@@ -168,7 +168,8 @@ class PlyReader {
                     "the file is cut short; copy or export it again");
       }
       if (least == 0) continue;
-      if (element.name == "vertex") {
+      // Of several elements of that name, which no program writes, the first holds the vertices.
+      if (element.name == "vertex" && model_.positions.empty()) {
         MODAR_TRY(read_vertices(element));
       } else {
         MODAR_TRY(read_faces(element));
