@@ -220,7 +220,7 @@ class App(ProgramTest):
     def bake_flags(self):
         """Two triangles in red and green, flat, on our cover: its largest side is from -1 to 1 as it stands."""
         (self.folder / "flags.mtl").write_text("newmtl red\nKa 1 0 0\nKd 1 0 0\nnewmtl green\nKa 0 1 0\nKd 0 1 0\n")
-        lines = ["mtllib flags.mtl", *(f"v {x} {y} 0" for triangle in FLAGS_SHOWN.values() for x, y in triangle),
+        lines = ["# Z up", "mtllib flags.mtl", *(f"v {x} {y} 0" for triangle in FLAGS_SHOWN.values() for x, y in triangle),
                  "usemtl red", "f 1 2 3", "usemtl green", "f 4 5 6"]
         (self.folder / "flags.obj").write_text("\n".join(lines) + "\n")
         bundle = self.folder / "flags.modar"
