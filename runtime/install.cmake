@@ -17,14 +17,8 @@ install(TARGETS ${libraries} EXPORT modar-targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
   INCLUDES DESTINATION ${include_dir})
 set_target_properties(modar_shared PROPERTIES EXPORT_NAME shared)
-# The package libmodar0 has the shared library alone; elsewhere `--component development` is all that an app links.
-if(MODAR_PACKAGES)
-  set(shared_component library)
-else()
-  set(shared_component development)
-endif()
 install(TARGETS modar_shared EXPORT modar-targets
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${shared_component} NAMELINK_COMPONENT development
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
   INCLUDES DESTINATION ${include_dir})
 install(EXPORT modar-targets NAMESPACE modar:: DESTINATION ${package_dir} COMPONENT development)
 install(DIRECTORY ${include_folders} DESTINATION ${include_dir} COMPONENT development)

@@ -74,8 +74,9 @@ class App(ProgramTest):
     def setUpClass(cls):
         cls.prefix = pathlib.Path(tempfile.mkdtemp(prefix="modar-prefix-"))
         cls.addClassCleanup(shutil.rmtree, cls.prefix, ignore_errors=True)
-        done = run("cmake", "--install", BUILD, "--prefix", cls.prefix, "--component", "development", text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
+        for component in ("development", "library"):
+            done = run("cmake", "--install", BUILD, "--prefix", cls.prefix, "--component", component, text=True)
+            assert done.returncode == 0, done.stdout + done.stderr
 
     def build_example(self):
         """A copy of runtime/example, far from our tree."""
