@@ -232,7 +232,7 @@ class Page {
   Result<void> other_turns(std::uint32_t index) {
     const auto placement = stated_placement(bundle_, index);
     if (camera_ == nullptr || !placement || many_) return {};
-    html_ += "<p class=\"note\">Were another axis up:</p><div class=\"turns\">";
+    html_ += "<p class=\"note\">With another axis up:</p><div class=\"turns\">";
     for (const UpAxis up : {UpAxis::kY, UpAxis::kZ, UpAxis::kMinusY, UpAxis::kMinusZ, UpAxis::kX}) {
       if (up == placement->up) continue;
       const std::string word = "up=" + std::string(up_axis_name(up));

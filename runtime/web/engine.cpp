@@ -155,16 +155,16 @@ EMSCRIPTEN_KEEPALIVE double web_focal_sigma() {
   return engine.focal_sigma;
 }
 
-/// A tracker for web_camera(), in place of the one before. find_focal: 1 to estimate the focal
+/// A tracker for web_camera(), in place of the one before. estimate_camera: 1 to estimate the focal
 /// length from there. budget: millions of ARM instructions a frame, 0: no limit. extended: 1 to go
 /// on from a pattern's surroundings.
-EMSCRIPTEN_KEEPALIVE int web_track(int find_focal, int budget, int extended) {
+EMSCRIPTEN_KEEPALIVE int web_track(int estimate_camera, int budget, int extended) {
   modar_tracker_destroy(engine.tracker);
   modar_tracker_options options{};
   options.size = sizeof options;
   options.budget = budget;
   options.extended = extended;
-  options.estimate_camera = find_focal;
+  options.estimate_camera = estimate_camera;
   engine.tracker =
       modar_tracker_create_with(engine.bundle, &engine.camera, &options, &engine.error);
   return engine.tracker == nullptr ? engine.error.exit_code : 0;

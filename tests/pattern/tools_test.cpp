@@ -188,7 +188,7 @@ TEST(Score, NamesWhatIsWrongWithAPicture) {
       EXPECT_LT(value_of(bad, id), value_of(good, id)) << id;
     }
     for (const ScoreCause& cause : bad.causes) {
-      EXPECT_TRUE(cause.value >= 60 || *cause.advice != 0) << ids[0] << " " << cause.id;
+      EXPECT_EQ(*cause.advice != 0, cause.value < 60) << ids[0] << " " << cause.id;
     }
   }
 }
