@@ -44,7 +44,7 @@ THIRD_PARTIES = {
     "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),
     "bake/lab/tinyobj_library": (r"bake/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),
     "curl/": (r"runtime/fetch/curl_line\.cpp",),
-    "httplib.h": (r"bake/web/serve\.cpp",),
+    "httplib.h": (r"bake/web/(http_reader|serve)\.cpp",),
     "openssl/": (r"bake/web/serve\.cpp",),
     "qrencode.h": (r"bake/web/serve\.cpp",),
     "SDL": (r"runtime/play/desk_.*\.cpp", r"tests/.*"),

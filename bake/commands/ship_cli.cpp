@@ -114,6 +114,21 @@ void add_prune(CommandLine& ship) {
   line.run([prune] { return ExitCode{run_prune(*prune)}; });
 }
 
+void add_verify(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("verify", "Read a release folder or a mirror whole: signatures, every object");
+  const auto verify = std::make_shared<VerifyCommand>();
+  line.option("place", &verify->place, "The folder, or the address that devices fetch from",
+              {.type = "DIR|URL", .required = true});
+  line.option("--trust", &verify->trust, "The public key that devices were given",
+              {.type = "K.pub", .required = true});
+  line.flag("--json", verify->json, "Print what was found as JSON");
+  line.footer(
+      example("  modar ship verify https://museum.example/ar --trust museum.key.pub\n",
+              ", 10 another key signed it, 13 files of different releases, 3 objects are damaged"));
+  line.run([verify] { return ExitCode{run_verify(*verify)}; });
+}
+
 void add_ship_plan(CommandLine& ship) {
   CommandLine& line = ship.command("plan", "Bytes and minutes of an update, before publishing");
   const auto plan = std::make_shared<PlanCommand>();
@@ -136,13 +151,14 @@ void add_ship_plan(CommandLine& ship) {
 
 void add_ship(CommandLine& program) {
   CommandLine& line = program.command(
-      "ship", "Releases for devices: keygen, publish, list, root, rotate, prune, plan");
+      "ship", "Releases for devices: keygen, publish, list, root, rotate, prune, verify, plan");
   add_keygen(line);
   add_publish(line);
   add_list(line);
   add_root(line);
   add_rotate(line);
   add_prune(line);
+  add_verify(line);
   add_ship_plan(line);
 }
 

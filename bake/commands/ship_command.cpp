@@ -18,6 +18,7 @@
 #include "bake/ship/keys.hpp"
 #include "bake/ship/release_folder.hpp"
 #include "bake/terminal.hpp"
+#include "bake/web/http_reader.hpp"
 #include "formats/atomic_file.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/release.hpp"
@@ -267,6 +268,39 @@ int run_prune(const PruneCommand& command) {
     std::fputs(prune_json(*freed, folder->versions()).c_str(), stdout);
   } else {
     std::fprintf(stderr, "%s freed\n", human_bytes(*freed).c_str());
+  }
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_verify(const VerifyCommand& command) {
+  const auto key = read_text(command.trust).and_then([](const std::string& text) {
+    return parse_public_key(text);
+  });
+  if (!key) return print_error(key.error());
+  const auto read = is_web_address(command.place)
+                        ? web_reader(command.place)
+                        : Result<ReleaseReader>(read_release_folder(command.place));
+  if (!read) return print_error(read.error());
+  ProgressBar bar(command.json);
+  const auto report = verify_release(*read, *key, [&](double done) { bar.show("verify", done); });
+  bar.clear();
+  if (!report) return print_error(report.error());
+  if (command.json) std::fputs(verify_json(*report).c_str(), stdout);
+  for (const DamagedObject& object : report->damaged) {
+    std::fprintf(stderr, "%s: %s; the bundle %s needs it\n", object.path.c_str(),
+                 object.cause.c_str(), object.bundle.c_str());
+  }
+  if (!report->damaged.empty()) {
+    return print_error({ExitCode::kInvalidInput, "ship.damaged", command.place,
+                        std::to_string(report->damaged.size()) + " of " +
+                            std::to_string(report->objects) + " objects are damaged",
+                        "remove them and publish their bundles again, or copy them again"});
+  }
+  if (!command.json) {
+    std::fprintf(stderr, "release %llu is whole: %zu bundles, %llu objects, %s; %s\n",
+                 static_cast<unsigned long long>(report->release.version),
+                 report->release.bundles.size(), static_cast<unsigned long long>(report->objects),
+                 human_bytes(report->bytes).c_str(), expiry_text(report->release.expires).c_str());
   }
   return static_cast<int>(ExitCode::kOk);
 }

@@ -45,6 +45,12 @@ struct PruneCommand {
   bool json = false;
 };
 
+struct VerifyCommand {
+  std::string place;  ///< a folder, or the address of a mirror
+  std::string trust;  ///< file of the public key that devices are given
+  bool json = false;
+};
+
 struct PlanCommand {
   std::string old_bundle;
   std::string new_bundle;
@@ -61,6 +67,8 @@ int run_rotate(const RotateCommand& command);
 int run_root(const RotateCommand& command);
 int run_list(const ListCommand& command);
 int run_prune(const PruneCommand& command);
+/// Reads a release folder or a mirror whole.
+int run_verify(const VerifyCommand& command);
 int run_plan(const PlanCommand& command);
 
 }  // namespace modar

@@ -58,6 +58,22 @@ std::string prune_json(std::uint64_t freed_bytes, const std::vector<std::uint64_
   return Json({{"freed_bytes", freed_bytes}, {"releases", Json::list(releases)}}).dump();
 }
 
+std::string verify_json(const VerifyReport& report) {
+  Json damaged = Json::array();
+  for (const DamagedObject& object : report.damaged) {
+    damaged.push_back({{"path", object.path}, {"bundle", object.bundle}, {"cause", object.cause}});
+  }
+  return Json({{"version", report.release.version},
+               {"epoch", report.release.epoch},
+               {"expires", time_text(report.release.expires)},
+               {"key", to_hex(report.key.id)},
+               {"bundles", report.release.bundles.size()},
+               {"objects", report.objects},
+               {"bytes", report.bytes},
+               {"damaged", damaged}})
+      .dump();
+}
+
 std::string plan_json(const UpdatePlan& plan, const Link& link, const std::string& device,
                       double minutes) {
   const Json json = {{"link", link.name},

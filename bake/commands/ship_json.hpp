@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bake/ship/publish.hpp"
+#include "bake/ship/verify_release.hpp"
 
 namespace modar {
 
@@ -17,6 +18,7 @@ struct ListedRelease {
 };
 std::string list_json(const std::vector<ListedRelease>& releases);
 std::string prune_json(std::uint64_t freed_bytes, const std::vector<std::uint64_t>& releases);
+std::string verify_json(const VerifyReport& report);
 std::string plan_json(const UpdatePlan& plan, const Link& link, const std::string& device,
                       double minutes);
 

@@ -110,13 +110,13 @@ std::vector<BundleChange> changes_between(const std::vector<ReleaseBundle>& befo
 
 /// Makes the pieces of the request's bundles and puts them into the release.
 Result<void> add_bundles(const PublishRequest& request, const ReleaseFolder& folder,
-                         PublishReport& done, Report& report) {
+                         ObjectLedger& ledger, PublishReport& done, Report& report) {
   for (const std::string& path : request.bundles) {
     StageTimer timer(report, "publish " + path);
     MODAR_ASSIGN(const auto bundle, open_bundle(path));
     MODAR_ASSIGN(const auto made, make_recipe(bundle.view, request.recipe));
     if (!request.dry_run) {
-      MODAR_ASSIGN(const auto added, folder.add_objects(made));
+      MODAR_ASSIGN(const auto added, folder.add_objects(made, ledger));
       done.added_bytes += added;
     }
     const std::string name = std::filesystem::path(path).stem().string();
@@ -135,6 +135,20 @@ Result<void> add_bundles(const PublishRequest& request, const ReleaseFolder& fol
     timer.done(bundle.view.bytes().size(), made.download_size);
   }
   return {};
+}
+
+/// Hashes what the release keeps of the one before: what rots on the server would fail on every
+/// device. Those that the request names were written by add_bundles().
+Result<void> check_kept(const PublishRequest& request, const ReleaseFolder& folder,
+                        const Release& release, ObjectLedger& ledger) {
+  std::set<std::string> written;
+  for (const std::string& path : request.bundles) {
+    written.insert(std::filesystem::path(path).stem().string());
+  }
+  for (const ReleaseBundle& bundle : release.bundles) {
+    if (!written.contains(bundle.name)) MODAR_TRY(folder.check_objects(bundle, ledger));
+  }
+  return ledger.save();
 }
 
 // Rates and delays that browsers' tools and WebPageTest use for these networks.
@@ -196,7 +210,8 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
   MODAR_ASSIGN(done.release.version, next_version(folder, word.epoch, request.version));
   done.release.expires = request.expires;
   MODAR_ASSIGN(done.release.bundles, kept_bundles(before, request));
-  MODAR_TRY(add_bundles(request, folder, done, report));
+  ObjectLedger ledger(request.folder);
+  MODAR_TRY(add_bundles(request, folder, ledger, done, report));
   for (const auto& [name, devices] : request.devices) {
     for (ReleaseBundle& bundle : done.release.bundles) {
       if (bundle.name == name) bundle.devices = devices;
@@ -214,7 +229,9 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
     return fail(ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
                 "name each bundle's file with letters, digits, '.', '_' and '-', no two alike");
   }
-  if (!request.dry_run) MODAR_TRY(folder.add_release(done.release, key));
+  if (request.dry_run) return done;
+  MODAR_TRY(check_kept(request, folder, done.release, ledger));
+  MODAR_TRY(folder.add_release(done.release, key));
   return done;
 }
 

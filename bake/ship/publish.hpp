@@ -43,7 +43,7 @@ struct PublishReport {
 /// Validates each bundle, writes its pieces, then the signed document, then `latest`: the release
 /// before stays valid at every moment.
 /// Errors: kInvalidInput "ship.bad-bundle", "ship.name"; kUsage "ship.version", "ship.key",
-/// "ship.drop"; kIo; kExitLocked.
+/// "ship.drop"; kIo, "ship.damaged" (an object of a kept bundle); kExitLocked.
 Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report);
 
 /// A network as planning sees it.

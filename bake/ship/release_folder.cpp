@@ -146,14 +146,41 @@ std::uint32_t ReleaseFolder::key_links() const {
   return numbers.empty() ? 0 : static_cast<std::uint32_t>(numbers.back());
 }
 
-Result<std::uint64_t> ReleaseFolder::add_objects(const PublishedBundle& bundle) const {
+Result<std::vector<std::byte>> ReleaseFolder::recipe(const ReleaseBundle& bundle) const {
+  const auto stored = read_text(path_ + "/objects/" + object_path(bundle.recipe));
+  if (!stored) {
+    return fail(ExitCode::kIo, "ship.recipe", object_path(bundle.recipe),
+                "a recipe of a kept release is missing", "publish that release again");
+  }
+  return unpack_zstd(std::as_bytes(std::span(*stored)), bundle.recipe_raw_size);
+}
+
+Result<void> ReleaseFolder::check_objects(const ReleaseBundle& bundle, ObjectLedger& ledger) const {
+  const auto check = [&](const ObjectId& id) -> Result<void> {
+    if (ledger.holds(id)) return {};
+    return fail(ExitCode::kIo, "ship.damaged", path_ + "/objects/" + object_path(id),
+                "it is missing or damaged, and the bundle " + bundle.name + " needs it",
+                "publish " + bundle.name + ".modar again, or take it out: --drop " + bundle.name);
+  };
+  MODAR_TRY(check(bundle.recipe));
+  MODAR_ASSIGN(const auto raw, recipe(bundle));
+  MODAR_ASSIGN(const auto view, open_recipe(raw));
+  for (const PieceRecord& piece : view.pieces) {
+    if (piece.stored_size != 0) MODAR_TRY(check(std::to_array(piece.id)));
+  }
+  return {};
+}
+
+Result<std::uint64_t> ReleaseFolder::add_objects(const PublishedBundle& bundle,
+                                                 ObjectLedger& ledger) const {
   std::uint64_t added = 0;
   const auto add = [&](const ObjectId& id, std::span<const std::byte> bytes) -> Result<void> {
+    if (ledger.holds(id)) return {};
     const fs::path path = path_ + "/objects/" + object_path(id);
-    // Names are hashes of the content: a file of full length is the same object.
-    std::error_code error;
-    if (fs::file_size(path, error) == bytes.size() && !error) return {};
     MODAR_TRY(make_folders(path.parent_path()));
+    // A link or a pipe in the object's place is not written through.
+    std::error_code error;
+    if (!fs::is_directory(path, error)) fs::remove(path, error);
     added += bytes.size();
     return write_file(path.string(), bytes);
   };
@@ -215,15 +242,9 @@ Result<std::uint64_t> ReleaseFolder::prune(std::size_t keep) const {
     MODAR_ASSIGN(const auto kept, release(all[i]));
     for (const ReleaseBundle& bundle : kept.bundles) {
       needed.insert(to_hex(bundle.recipe));
-      const auto stored = read_text(path_ + "/objects/" + object_path(bundle.recipe));
-      if (!stored) {
-        return fail(ExitCode::kIo, "ship.recipe", object_path(bundle.recipe),
-                    "a recipe of a kept release is missing", "publish that release again");
-      }
-      MODAR_ASSIGN(auto raw,
-                   unpack_zstd(std::as_bytes(std::span(*stored)), bundle.recipe_raw_size));
-      MODAR_ASSIGN(const auto recipe, open_recipe(raw));
-      for (const PieceRecord& piece : recipe.pieces) needed.insert(to_hex(piece.id));
+      MODAR_ASSIGN(const auto raw, recipe(bundle));
+      MODAR_ASSIGN(const auto view, open_recipe(raw));
+      for (const PieceRecord& piece : view.pieces) needed.insert(to_hex(piece.id));
     }
   }
   std::uint64_t bytes = 0;

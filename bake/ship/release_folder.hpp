@@ -5,6 +5,7 @@
 //   keys/S.json(.minisig)        the chain of keys
 //   root.json(.minisig)          the root key's word: which key signs
 //   objects/ab/abcdef...         pieces and recipes, by the BLAKE2b of their bytes
+//   .objects, .lock              the publisher's own: what was read before; who is at work
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "bake/ship/keys.hpp"
+#include "bake/ship/object_ledger.hpp"
 #include "bake/ship/recipe_maker.hpp"
 #include "formats/folder_lock.hpp"
 #include "modar/release.hpp"
@@ -40,8 +42,11 @@ class ReleaseFolder {
   /// by the newest release. Errors: kUsage "ship.key".
   [[nodiscard]] Result<void> check_signer(const PublicKey& key) const;
 
-  /// Writes the objects that are missing; returns their bytes.
-  Result<std::uint64_t> add_objects(const PublishedBundle& bundle) const;
+  /// Writes the objects that are missing or hold other bytes; returns the bytes written.
+  Result<std::uint64_t> add_objects(const PublishedBundle& bundle, ObjectLedger& ledger) const;
+  /// Refuses a bundle of which an object is missing or holds other bytes. Errors: kIo
+  /// "ship.damaged".
+  Result<void> check_objects(const ReleaseBundle& bundle, ObjectLedger& ledger) const;
   /// Writes and signs the document, then points `latest` at it.
   Result<void> add_release(const Release& release, const SecretKey& key) const;
   /// Writes the root's word: `next` signs from now on, and a new epoch begins.
@@ -55,6 +60,8 @@ class ReleaseFolder {
 
  private:
   ReleaseFolder(std::string path, FolderLock lock);
+  /// A bundle's recipe as RecipeView reads it. Errors: kIo "ship.recipe"; kInvalidInput.
+  [[nodiscard]] Result<std::vector<std::byte>> recipe(const ReleaseBundle& bundle) const;
   std::string path_;
   FolderLock lock_;
 };

@@ -85,6 +85,116 @@ class Publish(ShipTest):
         again = self.modar("ship", "prune", "--to", self.site, "--keep", "1", "--json")
         self.assertEqual(json.loads(again.stdout)["freed_bytes"], 0)
 
+    def objects(self, site=None):
+        return sorted(p for p in ((site or self.site) / "objects").rglob("*") if p.is_file())
+
+    def rot(self, path):
+        """Another byte in the middle: the same length."""
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 1
+        path.write_bytes(data)
+
+    def test_rot_on_the_server_is_written_again(self):
+        self.publish(self.shop.old)
+        before = {p: p.read_bytes() for p in self.objects()}
+        self.rot(self.objects()[0])
+        missing = self.objects()[1]
+        missing.unlink()
+        os.mkfifo(missing)  # nobody writes to it
+        linked = self.objects()[1]
+        outside = self.folder / "outside"
+        outside.write_bytes(b"mine")
+        linked.unlink()
+        linked.symlink_to(outside)
+        done = self.modar("ship", "publish", self.shop.old, "--to", self.site, "--key", self.shop.key, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual({p: p.read_bytes() for p in self.objects()}, before)
+        self.assertEqual(outside.read_bytes(), b"mine")
+        self.fetch_json()
+        self.assert_installed(self.shop.old)
+
+    def test_a_kept_bundle_that_has_rotted_is_not_signed_again(self):
+        other = self.folder / "other.modar"
+        shutil.copy(self.shop.bake("other", "--model", sheet(self.folder / "other.obj", 12, 0.9)), other)
+        self.publish(other)
+        rotten = self.objects()[0]
+        self.rot(rotten)
+        done = self.modar("ship", "publish", self.shop.old, "--to", self.site, "--key", self.shop.key)
+        self.assert_fails(done, 2, "ship.damaged", str(rotten), "publish other.modar again")
+        self.assertEqual((self.site / "latest").read_text(), "1\n")
+        both = self.modar("ship", "publish", self.shop.old, other, "--to", self.site, "--key", self.shop.key)
+        self.assertEqual(both.returncode, 0, both.stderr)
+        self.fetch_json()
+        self.assert_installed(self.shop.old, other)
+
+    def test_objects_that_were_read_are_not_read_again(self):
+        self.publish(self.shop.old)
+        rotten = self.objects()[0]
+        self.rot(rotten)
+        bytes_before, look = rotten.read_bytes(), rotten.stat()
+        noted = f"{rotten.name} {look.st_size} {max(look.st_mtime_ns, look.st_ctime_ns)} {look.st_ino}"
+        publish = ["ship", "publish", self.shop.old, "--to", self.site, "--key", self.shop.key]
+        (self.site / ".objects").write_text(f"modar objects 1\n{noted}\n")
+        self.assertEqual(self.modar(*publish).returncode, 0)
+        self.assertEqual(rotten.read_bytes(), bytes_before)  # it was believed
+        self.assertIn(noted + "\n", (self.site / ".objects").read_text())
+        os.utime(rotten)
+        self.assertEqual(self.modar(*publish).returncode, 0)
+        self.assertNotEqual(rotten.read_bytes(), bytes_before)
+
+    def verify(self, place=None, *options, trust=None, env=None):
+        return self.modar("ship", "verify", place or self.site, "--trust", trust or self.trust, *options, env=env)
+
+    def test_a_mirror_is_proved_whole(self):
+        other = self.folder / "other.modar"
+        shutil.copy(self.shop.old, other)  # the same recipe
+        self.publish(self.shop.old, other)
+        report = json.loads(self.verify(self.site, "--json").stdout)
+        self.assertEqual(report["damaged"], [])
+        self.assertEqual(report["objects"], len(self.objects()))
+        self.assertEqual(report["bytes"], sum(p.stat().st_size for p in self.objects()))
+        self.assertEqual((report["version"], report["bundles"]), (1, 2))
+        first, second = self.objects()[:2]
+        self.rot(first)
+        second.unlink()
+        done = self.verify()
+        self.assert_fails(done, 3, "ship.damaged", first.name, second.name, "it is missing", "museum")
+        damaged = json.loads(self.verify(self.site, "--json").stdout)["damaged"]
+        self.assertEqual([d["path"] for d in damaged if "/" in d["path"]][0].split("/")[0], "objects")
+        self.assertEqual(self.modar("ship", "publish", self.shop.old, "--to", self.site, "--key", self.shop.key).returncode, 0)
+        self.assertEqual(self.verify().returncode, 0)
+        thief = self.folder / "thief"
+        self.modar("ship", "keygen", "--out", thief)
+        self.assert_fails(self.verify(trust=f"{thief}.pub"), 10, "signature.key")
+        (self.site / "releases" / "2.json.minisig").unlink()
+        self.assert_fails(self.verify(), 13, "ship.absent", "2.json.minisig")
+
+    def test_a_mirror_is_verified_through_its_keys(self):
+        root, other = self.folder / "root", self.folder / "other"
+        for key in (root, other):
+            self.modar("ship", "keygen", "--out", key)
+        self.modar("ship", "root", "--to", self.site, "--key", root, "--next", self.trust)
+        self.modar("ship", "rotate", "--to", self.site, "--key", self.shop.key, "--next", f"{other}.pub")
+        self.publish(self.shop.old, key=other)
+        self.assertEqual(self.verify(trust=f"{root}.pub").returncode, 0)
+        self.assert_fails(self.verify(trust=f"{other}.pub"), 10, "signature.key")  # devices follow the root
+
+    def test_a_mirror_on_the_web_is_proved_whole(self):
+        from servers import RudeServer
+        self.publish(self.shop.old)
+        server = RudeServer(self.folder, lambda path, attempt: "garbage" if path.endswith(self.bad) else None)
+        self.addCleanup(server.stop)
+        self.bad = "nothing"
+        report = json.loads(self.verify(server.url() + "/site/", "--json").stdout)
+        self.assertEqual((report["damaged"], report["objects"]), ([], len(self.objects())))
+        self.bad = self.objects()[0].name
+        self.assert_fails(self.verify(server.url() + "/site"), 3, self.bad)
+        done = self.verify(server.url().replace("//", "//curator:secret@") + "/elsewhere")
+        self.assert_fails(done, 13, "ship.absent")
+        self.assertNotIn("secret", done.stderr)
+        for wrong in ("http://", "http://host:port/x", "http://:80/"):
+            self.assert_fails(self.verify(wrong), 1, "http.url")
+
     def test_a_bad_bundle_is_not_published(self):
         broken = self.folder / "broken.modar"
         data = bytearray(self.shop.old.read_bytes())

@@ -1,0 +1,42 @@
+// Proves a release folder, or a mirror of one, whole: every document and object as it was signed.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modar/release.hpp"
+
+namespace modar {
+
+/// A file below a release folder, which must not be longer than `limit` bytes; nothing where there
+/// is none.
+using ReleaseReader =
+    std::function<Result<std::optional<std::string>>(const std::string& path, std::size_t limit)>;
+
+/// The files of a folder; regular ones only. Errors of the reader: kIo "io.read".
+ReleaseReader read_release_folder(const std::string& folder);
+
+struct DamagedObject {
+  std::string path;    ///< below the release folder
+  std::string bundle;  ///< the first that needs it
+  std::string cause;
+};
+
+struct VerifyReport {
+  Release release;  ///< the newest
+  PublicKey key;    ///< signed it: where the root's word and the chain lead from the given one
+  std::uint64_t objects = 0;
+  std::uint64_t bytes = 0;  ///< of the objects that are whole
+  std::vector<DamagedObject> damaged;
+};
+
+/// Reads what a device without a state would read, and every object of the newest release.
+/// `progress` is told the part that is done, 0 to 1.
+/// Errors: those of the reader; kExitWrongKey; kExitMixed; kInvalidInput "release.*".
+Result<VerifyReport> verify_release(const ReleaseReader& read, const PublicKey& trusted,
+                                    const std::function<void(double)>& progress);
+
+}  // namespace modar
