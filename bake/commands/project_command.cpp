@@ -43,9 +43,9 @@ namespace {
 
 using State = AssetOutcome::State;
 
-constexpr const char* kProjectWords[] = {"--project", "--cache",   "--asset", "--depfile",
-                                         "--dry-run", "--explain", "--jobs",  "--memory",
-                                         "--quiet",   "--json",    "--watch", "--notes"};
+constexpr const char* kProjectWords[] = {
+    "--project", "--cache",  "--cache-key", "--asset", "--depfile", "--dry-run", "--explain",
+    "--jobs",    "--memory", "--quiet",     "--json",  "--watch",   "--notes"};
 
 /// What of the bake stands on the command line would be ignored beside a project file.
 Result<void> refuse_other_options(const std::vector<std::string>& words) {
@@ -178,6 +178,10 @@ void add_project_options(CommandLine& line, ProjectCommand& command) {
   line.option("--cache", &command.cache,
               "Of a project: folder of what is baked already; several machines may share it",
               {.type = "DIR"});
+  line.option(
+      "--cache-key", &command.cache_key,
+      "Of a project: sign what goes into the cache with this secret key, believe nothing else",
+      {.type = "K"});
   line.flag("--dry-run", command.dry_run, "Of a project: say what would be baked, bake nothing");
   line.flag("--explain", command.explain, "Of a project: say why each asset is baked");
   line.option("--asset", &command.asset,
@@ -224,6 +228,7 @@ Result<ProjectOutcome> bake_once(const ProjectCommand& command, const std::strin
   MODAR_ASSIGN(const Project project, read_project(file));
   ProjectOptions options;
   options.cache = command.cache;
+  options.cache_key = command.cache_key;
   options.only = command.asset;
   options.jobs = common.jobs;
   options.dry_run = command.dry_run;
@@ -331,6 +336,7 @@ Result<std::string> cache_folder(const std::string& named) {
 struct NinjaPlanCommand {
   std::string file = kProjectFile;
   std::string cache;
+  std::string cache_key;
   std::string runner;
   bool ninja = false;
 };
@@ -371,6 +377,7 @@ std::string ninja_generator(const NinjaPlanCommand& command, const Project& proj
                             const std::string& program) {
   std::string words = "modar plan --ninja --project " + shell_quoted(command.file) + " --cache " +
                       shell_quoted(command.cache);
+  if (!command.cache_key.empty()) words += " --cache-key " + shell_quoted(command.cache_key);
   if (!command.runner.empty()) words += " --run " + shell_quoted(command.runner);
   std::string text = "rule plan\n  command = " + ninja_value(words) +
                      " > $out.new && mv $out.new $out\n  generator = 1\n"
@@ -394,16 +401,20 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
     std::error_code error;
     return ssh ? std::filesystem::absolute(name, error).lexically_normal().string() : name;
   };
+  const bool keyed = !command.cache_key.empty();
   std::string text =
       "# modar plan --ninja: save it as build.ninja, and run `ninja` as often as something "
       "changes.\n"
       "ninja_required_version = 1.5\n"
       "rule asset\n  command = " +
       runner + "modar bake --quiet --project " + word(path(command.file)) + " --cache " +
-      word(path(command.cache)) + " --jobs 1 --asset $name --depfile $told && touch $out\n" +
+      word(path(command.cache)) +
+      (keyed ? " --cache-key " + word(path(command.cache_key)) : std::string()) +
+      " --jobs 1 --asset $name --depfile $told && touch $out\n" +
       "  depfile = $out.d\n  deps = gcc\n  description = bake $name\n"
       "rule bundles\n  command = modar bake --quiet --project " +
-      ninja_value(shell_quoted(command.file) + " --cache " + shell_quoted(command.cache)) +
+      ninja_value(shell_quoted(command.file) + " --cache " + shell_quoted(command.cache) +
+                  (keyed ? " --cache-key " + shell_quoted(command.cache_key) : std::string())) +
       "\n  restat = 1\n  description = link the bundles\n\n";
   const std::string program = " | " + ninja_quoted(program_folder() + "/modar");
   text += ninja_generator(command, project, program);
@@ -436,6 +447,7 @@ Result<ExitCode> write_ninja_plan(NinjaPlanCommand& command) {
   }
   ProjectOptions options;
   options.cache = command.cache;
+  options.cache_key = command.cache_key;
   options.dry_run = true;
   options.tool_version = MODAR_VERSION;
   MODAR_ASSIGN(const ProjectOutcome planned, bake_project(project, options, {}));
@@ -448,6 +460,7 @@ constexpr std::uint64_t kNoSize = ~std::uint64_t{0};
 
 struct CacheCommand {
   std::string folder;
+  std::string key;                ///< of `verify`: the file of the cache's key; empty: none
   std::uint64_t bytes = kNoSize;  ///< of `prune`: how much stays
   bool json = false;
 };
@@ -515,6 +528,8 @@ void add_plan(CommandLine& program) {
   line.option("--project", &command->file, "The project", {.type = "FILE", .shows_default = true});
   line.option("--cache", &command->cache, "Of what is baked; all machines see it under this path",
               {.type = "DIR"});
+  line.option("--cache-key", &command->cache_key,
+              "Signs what goes into the cache; nothing else is believed", {.type = "K"});
   line.option("--run", &command->runner,
               "Put before each asset's command: srun -Q -n1, or ssh HOST", {.type = "WORDS"});
   line.footer(
@@ -544,10 +559,12 @@ void add_cache(CommandLine& program) {
   prune.run([command] { return run_prune(*command); });
   CommandLine& verify = cache.command("verify", "Read every entry, remove those that are damaged");
   add_cache_options(verify, *command);
+  verify.option("--cache-key", &command->key, "Remove what this key has not signed as well",
+                {.type = "K"});
   verify.footer(example("  modar cache verify --cache /srv/modar-cache\n"));
   verify.run([command]() -> Result<ExitCode> {
     MODAR_ASSIGN(const std::string folder, cache_folder(command->folder));
-    MODAR_ASSIGN(const CacheSummary summary, verify_cache(folder));
+    MODAR_ASSIGN(const CacheSummary summary, verify_cache(folder, command->key));
     print_summary(*command, summary, "");
     return summary.damaged.empty() ? ExitCode::kOk : ExitCode::kInvalidInput;
   });

@@ -12,10 +12,11 @@ namespace modar {
 
 /// Options of `modar bake` that go with modar.toml.
 struct ProjectCommand {
-  std::string file;     ///< empty: modar.toml in the current folder
-  std::string cache;    ///< empty: as the project says
-  std::string asset;    ///< empty: all
-  std::string depfile;  ///< empty: none
+  std::string file;       ///< empty: modar.toml in the current folder
+  std::string cache;      ///< empty: as the project says
+  std::string cache_key;  ///< file; empty: entries are not signed
+  std::string asset;      ///< empty: all
+  std::string depfile;    ///< empty: none
   bool dry_run = false;
   bool explain = false;
   bool watch = false;  ///< bake again whenever something changes

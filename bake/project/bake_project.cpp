@@ -374,14 +374,15 @@ class ProjectBake {
   }
 
   Result<void> obtain(Task& task, unsigned jobs) {
-    bool damaged = false;
-    if (task.key) task.part = cache_.read(*task.key, damaged);
+    const std::string name = task.inputs[0].path;
+    std::string reason;
+    if (task.key) task.part = cache_.read(*task.key, name, reason);
     if (task.part) {
       task.state = AssetOutcome::State::kCached;
     } else {
-      if (damaged) task.reason = "its entry in the cache was damaged";
+      if (!reason.empty()) task.reason = reason;
       MODAR_TRY(bake_part(task, jobs));
-      task.part = cache_.read(*task.key, damaged);
+      task.part = cache_.read(*task.key, name, reason);
       if (!task.part) {
         return fail(ExitCode::kIo, "cache.folder", task.asset->file,
                     "what was written to the cache cannot be read back", "check the disk");
@@ -415,7 +416,7 @@ class ProjectBake {
     if (!trace.model_sides.empty()) notes.model_sides = trace.model_sides[0];
     notes.diagnostics = std::move(report.diagnostics);
     const auto lock = interrupts_->writing();
-    MODAR_TRY(cache_.write(*task.key, content, notes));
+    MODAR_TRY(cache_.write(*task.key, task.inputs[0].path, content, notes));
     if (!names_files(*task.asset)) return {};
     std::vector<std::string> files;
     for (std::size_t i = 1; i < task.inputs.size(); ++i) files.push_back(task.inputs[i].path);
@@ -665,7 +666,8 @@ class ProjectBake {
 Result<ProjectOutcome> bake_project(const Project& project, const ProjectOptions& options,
                                     const ProgressCallback& progress) {
   const std::string own = project.cache.empty() ? kCacheFolder : project.cache;
-  PartCache cache(options.cache.empty() ? project.path(own) : options.cache);
+  MODAR_ASSIGN(auto signer, read_cache_key(options.cache_key));
+  PartCache cache(options.cache.empty() ? project.path(own) : options.cache, std::move(signer));
   return ProjectBake(project, options, std::move(cache), progress).run();
 }
 

@@ -96,6 +96,7 @@ Result<InitialProject> initial_project(const std::string& folder);
 
 struct ProjectOptions {
   std::string cache;            ///< folder; empty: the project's
+  std::string cache_key;        ///< file of the key that signs the cache's entries; empty: none
   std::string only;             ///< bake this asset into the cache and link nothing; empty: all
   unsigned jobs = 1;            ///< threads, shared out over assets
   bool memory_limited = false;  ///< a MemoryLimit holds: assets are baked one after the other
@@ -143,7 +144,8 @@ Result<CacheSummary> summarise_cache(const std::string& folder);
 /// processes left more than a day ago. Answers what was removed. dry_run: what would be.
 Result<CacheSummary> prune_cache(const std::string& folder, std::uint64_t bytes,
                                  bool dry_run = false);
-/// Reads every entry and removes those that are damaged: they are baked again when needed.
-Result<CacheSummary> verify_cache(const std::string& folder);
+/// Reads every entry and removes what is damaged, not what its name says, or not signed with the
+/// key of the file `cache_key` (empty: none is asked for): it is baked again when needed.
+Result<CacheSummary> verify_cache(const std::string& folder, const std::string& cache_key);
 
 }  // namespace modar

@@ -30,7 +30,8 @@ void unmap(std::span<const std::byte> bytes) {
 }  // namespace
 
 Result<MappedFile> MappedFile::open(const std::string& path) {
-  const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+  // Opening a pipe must not wait for somebody to write to it.
+  const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   if (file.value < 0) {
     return fail(ExitCode::kIo, "io.open", path, std::strerror(errno),
                 "check the path and its permissions");

@@ -333,6 +333,99 @@ class Cache(ProjectTest):
         self.assertEqual(self.parts(cache), [])
         self.assert_fails(self.modar("cache", "show", "--cache", self.folder / "none"), 2, "cache.folder")
 
+    def states_with(self, cache, *options):
+        """Bakes again without the project's own state, but for the cache."""
+        for name in ("out", ".modar"):
+            shutil.rmtree(self.place / name, ignore_errors=True)
+        report = self.bake("--cache", cache, "--explain", *options)
+        self.assertEqual((self.place / "out/museum.modar").read_bytes(), self.good)
+        return sorted(asset["state"] for asset in report["assets"])
+
+    def test_an_entry_is_that_of_its_key_and_name(self):
+        cache = self.folder / "cache"
+        self.bake("--cache", cache)
+        self.good = (self.place / "out/museum.modar").read_bytes()
+        one, two = [p for p in self.parts(cache) if b'"name": "a.png"' not in p.with_suffix(".json").read_bytes()]
+        self.assertEqual({json.loads(p.with_suffix(".json").read_text().partition("\n")[2])["name"] for p in (one, two)},
+                         {"a.obj", "b.obj"})
+
+        def exchange(suffix):
+            first, second = one.with_suffix(suffix), two.with_suffix(suffix)
+            kept = first.read_bytes()
+            first.write_bytes(second.read_bytes())
+            second.write_bytes(kept)
+
+        for suffixes in ([".modar"], [".modar", ".json"], [".json"]):
+            for suffix in suffixes:
+                exchange(suffix)
+            self.assertEqual(self.states_with(cache), ["baked", "baked", "cached"], suffixes)
+            self.assertIn("was damaged" if suffixes == [".modar"] else "of another part", self.told)
+            for suffix in suffixes:
+                exchange(suffix)
+            damaged = self.modar("cache", "verify", "--cache", cache)
+            self.assertEqual(damaged.returncode, 3)
+            for part in (one, two):
+                self.assertIn(f"{part}: damaged, removed", damaged.stdout)
+            self.assertEqual(self.states_with(cache), ["baked", "baked", "cached"])
+        lists = sorted(cache.rglob("*.txt"))
+        lists[0].write_bytes(lists[1].read_bytes())  # the files that another model names
+        self.assertEqual(self.modar_json("cache", "show", "--cache", cache)["entries"], 3)
+        damaged = self.modar("cache", "verify", "--cache", cache)
+        self.assertEqual((damaged.returncode, lists[0].exists()), (3, False), damaged.stdout)
+
+    def test_pipes_and_folders_in_an_entrys_place(self):
+        cache = self.folder / "cache"
+        self.bake("--cache", cache)
+        self.good = (self.place / "out/museum.modar").read_bytes()
+        for make in (os.mkfifo, os.mkdir):
+            for suffix in (".modar", ".json"):
+                part = self.parts(cache)[0].with_suffix(suffix)
+                part.unlink()
+                make(part)
+                if suffix == ".modar":
+                    damaged = self.modar("cache", "verify", "--cache", cache)
+                    self.assertEqual((damaged.returncode, part.exists()), (3, False), damaged.stdout)
+                    make(part)
+                self.assertEqual(self.states_with(cache), ["baked", "cached", "cached"])
+                self.assertTrue(part.is_file())
+        for make in (os.mkfifo, os.mkdir):
+            file = sorted(cache.rglob("*.txt"))[0]
+            file.unlink()
+            make(file)
+            self.assertEqual(self.states_with(cache), ["baked", "cached", "cached"])
+            self.assertTrue(file.is_file())
+
+    def test_a_key_keeps_planted_entries_out(self):
+        cache, plant, key, other = (self.folder / name for name in ("cache", "plant", "key", "other"))
+        for name in (key, other):
+            self.modar("ship", "keygen", "--out", name)
+        self.bake("--cache", cache)
+        self.good = (self.place / "out/museum.modar").read_bytes()
+        # Who has no key writes entries that are sound but for the signature.
+        self.assertEqual(self.states_with(cache, "--cache-key", key), ["baked", "baked", "baked"])
+        self.assertIn("not signed with the cache's key", self.told)
+        self.assertEqual(self.states_with(cache, "--cache-key", key), ["cached", "cached", "cached"])
+        self.assertEqual(self.states_with(cache), ["cached", "cached", "cached"])
+        self.assertEqual(self.modar("cache", "verify", "--cache", cache, "--cache-key", key).returncode, 0)
+        # Another bundle under a signed name, with a digest that fits.
+        self.states_with(plant, "--cache-key", other)
+        for file in plant.rglob("*.*"):
+            if file.suffix in (".json", ".modar"):
+                shutil.copy(file, cache / file.relative_to(plant))
+        self.assertEqual(self.states_with(cache, "--cache-key", key), ["cached", "cached", "cached"])  # the same bytes
+        signatures = [p.with_suffix(".minisig") for p in self.parts(plant)]
+        for file in signatures:  # by another key
+            shutil.copy(file, cache / file.relative_to(plant))
+            break
+        self.assertEqual(self.states_with(cache, "--cache-key", key), ["baked", "cached", "cached"])
+        for file in signatures:
+            shutil.copy(file, cache / file.relative_to(plant))
+        checked = self.modar("cache", "verify", "--cache", cache, "--cache-key", key)
+        self.assertEqual((checked.returncode, len(self.parts(cache))), (3, 0), checked.stdout)
+        locked = self.folder / "locked"
+        locked.write_text("untrusted comment: x\n")
+        self.assert_fails(self.modar("bake", "--cache", cache, "--cache-key", locked, cwd=self.place), 3, "key.secret")
+
     def test_several_processes_share_it(self):
         copies = [self.folder / f"copy{i}" for i in range(3)]
         for copy in copies:
