@@ -48,7 +48,7 @@ timed "modar-demo" 'rm -rf modar-demo; modar-demo'
 in_clean test -s /root/modar-demo/play/index.html -a -s /root/modar-demo/play/overlay.mp4 -a -s /root/modar-demo/report.html
 
 # --- An app of somebody else's ---
-install --no-install-recommends '/packages/libmodar-dev*.deb g++ make cmake pkg-config'
+install --no-install-recommends '/packages/libmodar*.deb g++ make cmake pkg-config'
 timed "the example app with CMake and the static library" 'cp -r /usr/share/doc/libmodar-dev/examples app; cd app; cmake -S . -B build
   cmake --build build; head -c 460800 /dev/zero | build/overlay ../modar-demo/demo.modar 640 480 | wc -c | grep -x 1228800'
 timed "the same by pkg-config" 'cd app; c++ -x c overlay.c -x none $(pkg-config --cflags --libs modar) -o by-pkg-config
@@ -102,3 +102,7 @@ timed "modar ship keygen, publish" 'cd museum; modar ship keygen --out museum.ke
   modar ship publish out/museum.modar --to ar --key museum.key'
 timed "modar-fetch" 'cd museum; modar-fetch ar --store store --trust museum.key.pub; cmp store/museum.modar out/museum.modar'
 say "the fetched bundle is the published one" "$(in_clean stat -c %s /root/museum/out/museum.modar) bytes"
+
+# --- A page, with the engine that the package brings ---
+timed "modar web" 'cd museum; modar web out/museum.modar -o site --title Museum; test -s site/index.html; ls site/*.wasm'
+say "the page" "$(in_clean sh -c 'du -sk /root/museum/site | cut -f1') KB"

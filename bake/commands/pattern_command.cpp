@@ -109,6 +109,28 @@ Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   return {};
 }
 
+/// What was written, and how well its shape is known.
+void print_rectified(const RectifyCommand& command, const Rectified& done) {
+  // The player measures aspects that are off by less as soon as it sees the thing.
+  constexpr double kWellKnown = 0.02;
+  const AspectEstimate& aspect = done.aspect;
+  std::fprintf(stderr, "wrote %s, %u x %u pixels", command.output.c_str(), done.image.width,
+               done.image.height);
+  if (aspect.spread > 0) {
+    std::fprintf(stderr, "; width by height %.3f +- %.3f", aspect.aspect, aspect.spread);
+  }
+  std::fputc('\n', stderr);
+  if (aspect.spread < kWellKnown * aspect.aspect) return;
+  char cause[96];
+  std::snprintf(cause, sizeof cause, "how long the sides are follows from perspective, to %.0f %%",
+                100 * aspect.spread / aspect.aspect);
+  print_diagnostic({"rectify.aspect", DiagnosticSeverity::kWarning, command.photo, 0, cause,
+                    command.options.width_mm > 0
+                        ? "measure the height, and give --height-mm"
+                        : "measure the sides and give --width-mm and --height-mm, or take a photo "
+                          "from straight in front"});
+}
+
 Result<ExitCode> run_rectify(RectifyCommand& command) {
   if (!command.corners.empty()) MODAR_TRY(parse_corners(command.corners));
   MODAR_TRY(keep_inputs(command.output, {command.photo}));
@@ -117,22 +139,27 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
                 "the picture and its width are written as PNG", "name it FILE.png");
   }
   MODAR_TRY(try_output(command.output, 0));
-  MODAR_ASSIGN(auto photo, read_image(command.photo));
-  Result<RgbaImage> image =
-      take_corners(command, photo).and_then([&] { return rectify(photo, command.options); });
-  if (!image) {
-    Error error = image.error();
+  MODAR_ASSIGN(const Photo photo, read_photo(command.photo));
+  command.options.focal_px = photo.focal_px;
+  auto done = take_corners(command, photo.image).and_then([&] {
+    return rectify(photo.image, command.options);
+  });
+  if (!done) {
+    Error error = done.error();
     if (error.where.empty()) error.where = command.photo;
     return tl::unexpected(std::move(error));
   }
-  MODAR_TRY(write_png(*image, command.output, command.options.width_mm));
-  std::fprintf(stderr, "wrote %s, %u x %u pixels\n", command.output.c_str(), image->width,
-               image->height);
+  MODAR_TRY(write_png(done->image, command.output, command.options.width_mm));
+  print_rectified(command, *done);
   if (command.json) {
-    const Json json = {
-        {"image", command.output},      {"width", image->width},
-        {"height", image->height},      {"corners", corners_json(command.options.corners)},
-        {"doubtful", command.doubtful}, {"width_mm", command.options.width_mm}};
+    const Json json = {{"image", command.output},
+                       {"width", done->image.width},
+                       {"height", done->image.height},
+                       {"aspect", done->aspect.aspect},
+                       {"aspect_spread", done->aspect.spread},
+                       {"corners", corners_json(command.options.corners)},
+                       {"doubtful", command.doubtful},
+                       {"width_mm", command.options.width_mm}};
     std::fputs(json.dump().c_str(), stdout);
   }
   return ExitCode::kOk;
@@ -152,7 +179,8 @@ void add_rectify(CommandLine& pattern) {
   line.option("--width-mm", &command->options.width_mm, "Physical width of the thing",
               {.positive = true});
   line.option("--height-mm", &command->options.height_mm,
-              "Physical height; without it the aspect ratio comes from the perspective",
+              "Physical height; without it the aspect ratio comes from the perspective and its "
+              "spread is told",
               {.positive = true});
   line.option("--max-side", &command->options.max_side, "Longest side of the result, in pixels",
               {.shows_default = true, .least = 16, .most = kMaxTextureSide});

@@ -12,11 +12,20 @@
 
 namespace modar {
 
+/// What a camera wrote beside a picture's pixels.
+struct ExifFacts {
+  /// Which corner of the picture the first pixel is: 1-8 as EXIF and TIFF count, 1: upright.
+  unsigned orientation = 1;
+  unsigned focal_35mm = 0;  ///< focal length on a frame of 36 x 24 mm, mm; 0: not stated
+  /// Pixels when the picture was taken, as its file stores them; 0: not stated.
+  unsigned width = 0;
+  unsigned height = 0;
+};
+
 /// An image as its file stores it.
 struct StoredImage {
   RgbaImage image;
-  /// Which corner of the picture the first pixel is: 1-8 as EXIF and TIFF count, 1: upright.
-  unsigned orientation = 1;
+  ExifFacts exif;
 };
 
 /// The error "image.decode" of a file that is truncated or damaged.
@@ -29,9 +38,9 @@ inline tl::unexpected<Error> damaged_image(const std::string& name, std::string 
 /// Errors: "image.too-large", "image.decode" where a side is 0.
 Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const std::string& name);
 
-/// The orientation that an EXIF block (a TIFF header and its first directory) states; 1 where it
-/// states none. An "Exif\0\0" before it is skipped.
-unsigned exif_orientation(std::span<const std::byte> exif);
+/// Of an EXIF block (a TIFF header, its first directory and that of the exposure); an "Exif\0\0"
+/// before it is skipped. What is damaged counts as not stated.
+ExifFacts exif_facts(std::span<const std::byte> exif);
 
 /// Gives an image its pixels, uninitialised where a format's library fills all of them.
 inline void allocate_pixels(RgbaImage& image, std::uint32_t width, std::uint32_t height) {

@@ -33,6 +33,15 @@ Result<RgbaImage> read_image(const std::string& path);
 /// The same from a file's bytes; `name` is what errors call it.
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name);
 
+/// A picture that a camera took.
+struct Photo {
+  RgbaImage image;
+  double focal_px = 0;  ///< focal length in pixels by its EXIF block; 0: not stated, or cropped
+};
+
+/// As read_image(), with what the camera wrote of its lens.
+Result<Photo> read_photo(const std::string& path);
+
 /// A PNG file: 8-bit RGB, or RGBA where any pixel is not opaque. width_mm: the physical width of
 /// what the picture shows, stored as its resolution (pHYs); 0: not stored. Errors: kInternal
 /// "image.encode" where the image is empty.

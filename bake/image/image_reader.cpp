@@ -1,5 +1,6 @@
 // Which library decodes an image file, and what is done with its pixels afterwards.
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string_view>
@@ -53,7 +54,7 @@ Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::s
 
 /// Turns the picture upright.
 RgbaImage upright(StoredImage stored) {
-  const unsigned orientation = stored.orientation;
+  const unsigned orientation = stored.exif.orientation;
   if (orientation <= 1 || orientation > 8) return std::move(stored.image);
   const RgbaImage& image = stored.image;
   const bool swap = orientation >= 5;
@@ -86,6 +87,55 @@ std::uint32_t number_at(std::span<const std::byte> bytes, std::size_t at, std::s
   return value;
 }
 
+/// Reads a directory of an EXIF block, and answers where the exposure's is; 0: not stated.
+std::uint32_t read_directory(std::span<const std::byte> exif, std::size_t at, bool big,
+                             ExifFacts& facts) {
+  constexpr std::size_t kEntryBytes = 12;
+  const std::size_t count = number_at(exif, at, 2, big);
+  std::uint32_t exposure = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t entry = at + 2 + kEntryBytes * i;
+    if (entry + kEntryBytes > exif.size()) break;
+    const std::uint32_t type = number_at(exif, entry + 2, 2, big);  // 1: BYTE, 3: SHORT, 4: LONG
+    const std::size_t bytes = type == 1 ? 1 : type == 3 ? 2 : type == 4 ? 4 : 0;
+    const std::uint32_t value = number_at(exif, entry + 8, bytes, big);
+    switch (number_at(exif, entry, 2, big)) {
+      case 0x0112:
+        facts.orientation = value;
+        break;
+      case 0x8769:
+        exposure = value;
+        break;
+      case 0xA002:
+        facts.width = value;
+        break;
+      case 0xA003:
+        facts.height = value;
+        break;
+      case 0xA405:
+        facts.focal_35mm = value;
+        break;
+      default:
+        break;
+    }
+  }
+  return exposure;
+}
+
+/// The focal length in pixels of a picture that is as its camera took it, or reduced from that; 0:
+/// not known, or cropped since.
+double focal_px(const StoredImage& stored) {
+  constexpr double kFilmDiagonal = 43.266615;  // mm, of 36 x 24
+  constexpr double kSameShape = 0.01;
+  const ExifFacts& exif = stored.exif;
+  const double width = stored.image.width;
+  const double height = stored.image.height;
+  if (exif.focal_35mm == 0 || exif.width == 0 || exif.height == 0) return 0;
+  const double shape = width * exif.height / (height * exif.width);
+  if (std::fabs(shape - 1) > kSameShape) return 0;
+  return exif.focal_35mm / kFilmDiagonal * std::hypot(width, height);
+}
+
 }  // namespace
 
 Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const std::string& name) {
@@ -99,24 +149,15 @@ Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const s
   return {};
 }
 
-unsigned exif_orientation(std::span<const std::byte> exif) {
-  constexpr std::uint32_t kOrientationTag = 274;
-  constexpr std::size_t kEntryBytes = 12;
+ExifFacts exif_facts(std::span<const std::byte> exif) {
   if (starts_with(exif, "Exif\0\0"sv)) exif = exif.subspan(6);
   const bool big = starts_with(exif, "MM\0*"sv);
-  if (!big && !starts_with(exif, "II*\0"sv)) return 1;
-  const std::size_t directory = number_at(exif, 4, 4, big);
-  const std::size_t count = number_at(exif, directory, 2, big);
-  unsigned orientation = 1;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t entry = directory + 2 + kEntryBytes * i;
-    if (entry + kEntryBytes > exif.size()) return 1;
-    if (number_at(exif, entry, 2, big) != kOrientationTag) continue;
-    const std::uint32_t type = number_at(exif, entry + 2, 2, big);  // 1: BYTE, 3: SHORT, 4: LONG
-    const std::size_t bytes = type == 1 ? 1 : type == 3 ? 2 : type == 4 ? 4 : 0;
-    orientation = number_at(exif, entry + 8, bytes, big);
-  }
-  return orientation >= 1 && orientation <= 8 ? orientation : 1;
+  ExifFacts facts;
+  if (!big && !starts_with(exif, "II*\0"sv)) return facts;
+  const std::uint32_t exposure = read_directory(exif, number_at(exif, 4, 4, big), big, facts);
+  if (exposure != 0) read_directory(exif, exposure, big, facts);
+  if (facts.orientation < 1 || facts.orientation > 8) facts.orientation = 1;
+  return facts;
 }
 
 bool is_opaque(const RgbaImage& image) {
@@ -134,6 +175,13 @@ Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::stri
 Result<RgbaImage> read_image(const std::string& path) {
   MODAR_ASSIGN(const std::vector<std::byte> bytes, read_bytes(path));
   return decode_image(bytes, path);
+}
+
+Result<Photo> read_photo(const std::string& path) {
+  MODAR_ASSIGN(const std::vector<std::byte> bytes, read_bytes(path));
+  MODAR_ASSIGN(StoredImage stored, decode_stored(bytes, path));
+  const double focal = focal_px(stored);
+  return Photo{upright(std::move(stored)), focal};
 }
 
 Result<LinearImage> decode_linear_image(std::span<const std::byte> bytes, const std::string& name) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <csetjmp>
 #include <cstdio>
+#include <cstring>
 
 #include <jerror.h>
 #include <jpeglib.h>
@@ -82,14 +83,16 @@ class JpegReader {
   [[nodiscard]] bool is_cmyk() const { return info_.num_components == 4; }
 
   /// Valid after read_header().
-  [[nodiscard]] unsigned orientation() const {
+  [[nodiscard]] ExifFacts exif() const {
     for (const jpeg_marker_struct* marker = info_.marker_list; marker != nullptr;
          marker = marker->next) {
-      const unsigned found =
-          exif_orientation(std::as_bytes(std::span(marker->data, marker->data_length)));
-      if (found != 1) return found;
+      // Segments of other programs have the same marker.
+      const auto segment = std::as_bytes(std::span(marker->data, marker->data_length));
+      if (segment.size() > 4 && std::memcmp(segment.data(), "Exif", 4) == 0) {
+        return exif_facts(segment);
+      }
     }
-    return 1;
+    return {};
   }
 
  private:
@@ -119,7 +122,7 @@ Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::str
   if (!reader.read_header()) return damaged();
   MODAR_TRY(check_image_size(reader.width(), reader.height(), name));
   StoredImage stored;
-  stored.orientation = reader.orientation();
+  stored.exif = reader.exif();
   allocate_pixels(stored.image, reader.width(), reader.height());
   if (!reader.read_pixels(stored.image.pixels.data())) return damaged();
   if (reader.is_cmyk()) cmyk_to_rgba(stored.image.pixels);

@@ -100,11 +100,11 @@ class PngReader {
     return true;
   }
 
-  [[nodiscard]] unsigned orientation() const {
+  [[nodiscard]] ExifFacts exif() const {
     png_bytep exif = nullptr;
     png_uint_32 size = 0;
-    if (png_get_eXIf_1(png_, info_, &size, &exif) == 0) return 1;
-    return exif_orientation(std::as_bytes(std::span(exif, size)));
+    if (png_get_eXIf_1(png_, info_, &size, &exif) == 0) return {};
+    return exif_facts(std::as_bytes(std::span(exif, size)));
   }
   /// Of the picture's width; 0: not stated.
   [[nodiscard]] double width_mm() const {
@@ -173,7 +173,7 @@ Result<StoredImage> decode_png(std::span<const std::byte> bytes, const std::stri
     rows[y] = &stored.image.pixels[y * stored.image.width * 4];
   }
   if (!reader.read_pixels(rows)) return damaged();
-  stored.orientation = reader.orientation();
+  stored.exif = reader.exif();
   return stored;
 }
 

@@ -161,7 +161,7 @@ Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::stri
   if (quirks.no_alpha) {
     for (std::size_t i = 3; i < stored.image.pixels.size(); i += 4) stored.image.pixels[i] = 255;
   }
-  if (quirks.from_right) stored.orientation = 2;
+  if (quirks.from_right) stored.exif.orientation = 2;
   return stored;
 }
 

@@ -97,7 +97,7 @@ Result<StoredImage> decode_tiff(std::span<const std::byte> bytes, const std::str
   }
   MODAR_TRY(check_image_size(width, height, name));
   StoredImage stored;
-  stored.orientation = leave_pixels_as_stored(file.get());
+  stored.exif.orientation = leave_pixels_as_stored(file.get());
   std::vector<std::uint32_t> raster(std::size_t{width} * height);
   const bool read = TIFFReadRGBAImageOriented(file.get(), width, height, raster.data(),
                                               ORIENTATION_TOPLEFT, 1) != 0;

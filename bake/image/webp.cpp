@@ -9,15 +9,14 @@
 namespace modar {
 namespace {
 
-unsigned orientation_of(const WebPData& data) {
+ExifFacts exif_of(const WebPData& data) {
   const std::unique_ptr<WebPDemuxer, void (*)(WebPDemuxer*)> demuxer(WebPDemux(&data),
                                                                      &WebPDemuxDelete);
   WebPChunkIterator chunk{};
-  if (!demuxer || WebPDemuxGetChunk(demuxer.get(), "EXIF", 1, &chunk) == 0) return 1;
-  const unsigned orientation =
-      exif_orientation(std::as_bytes(std::span(chunk.chunk.bytes, chunk.chunk.size)));
+  if (!demuxer || WebPDemuxGetChunk(demuxer.get(), "EXIF", 1, &chunk) == 0) return {};
+  const ExifFacts facts = exif_facts(std::as_bytes(std::span(chunk.chunk.bytes, chunk.chunk.size)));
   WebPDemuxReleaseChunkIterator(&chunk);
-  return orientation;
+  return facts;
 }
 
 }  // namespace
@@ -41,7 +40,7 @@ Result<StoredImage> decode_webp(std::span<const std::byte> bytes, const std::str
                          stored.image.pixels.size(), features.width * 4) == nullptr) {
     return damaged_image(name, "the WebP data is damaged or cut short");
   }
-  stored.orientation = orientation_of(data);
+  stored.exif = exif_of(data);
   return stored;
 }
 

@@ -15,17 +15,6 @@ constexpr double kSmallestSide = 32.0;
 // Of the result: the largest texture side that the workstation handles anywhere.
 constexpr std::uint32_t kLargestResult = 8192;
 
-struct Vector {
-  double x = 0;
-  double y = 0;
-  double z = 0;
-};
-
-double triple(const Vector& a, const Vector& b, const Vector& c) {
-  return (a.y * b.z - a.z * b.y) * c.x + (a.z * b.x - a.x * b.z) * c.y +
-         (a.x * b.y - a.y * b.x) * c.z;
-}
-
 double length(const PixelPoint& a, const PixelPoint& b) {
   return std::hypot(b.x - a.x, b.y - a.y);
 }
@@ -34,46 +23,6 @@ tl::unexpected<Error> bad_corners(const char* cause) {
   return fail(ExitCode::kInvalidInput, "rectify.corners", "", cause,
               "give the corners inside of the photo as top-left, top-right, bottom-right, "
               "bottom-left of the pattern");
-}
-
-/// Width over height by the mean length of opposite sides.
-double aspect_of_sides(const std::array<PixelPoint, 4>& c) {
-  return (length(c[0], c[1]) + length(c[3], c[2])) / (length(c[0], c[3]) + length(c[1], c[2]));
-}
-
-/// Width over height from the perspective (Zhang & He, "Whiteboard scanning and image enhancement",
-/// Eq. 11, 12, 20, 21); 0 where the perspective is too weak to tell the focal length.
-double aspect_of_perspective(const std::array<PixelPoint, 4>& c, double width, double height) {
-  std::array<Vector, 4> m;  // Zhang and He's order: top-left, top-right, bottom-left, bottom-right
-  constexpr std::array<std::size_t, 4> kOrder = {0, 1, 3, 2};
-  const double unit = std::max(width, height);
-  for (std::size_t i = 0; i < 4; ++i) {
-    const PixelPoint& p = c[kOrder[i]];
-    m[i] = {(p.x - 0.5 * (width - 1)) / unit, (p.y - 0.5 * (height - 1)) / unit, 1.0};
-  }
-  const double k2 = triple(m[0], m[3], m[2]) / triple(m[1], m[3], m[2]);
-  const double k3 = triple(m[0], m[3], m[1]) / triple(m[2], m[3], m[1]);
-  const Vector n2{k2 * m[1].x - m[0].x, k2 * m[1].y - m[0].y, k2 - 1.0};
-  const Vector n3{k3 * m[2].x - m[0].x, k3 * m[2].y - m[0].y, k3 - 1.0};
-  const double focal_squared = -(n2.x * n3.x + n2.y * n3.y) / (n2.z * n3.z);
-  // Focal lengths in units of the longer side: fields of view of 10 to 110 degrees. Anything else
-  // is taken for noise in the corners. Set by hand.
-  constexpr double kShortest = 0.35;
-  constexpr double kLongest = 6.0;
-  if (!(focal_squared > kShortest * kShortest) || !(focal_squared < kLongest * kLongest))
-    return 0.0;
-  const double across = (n2.x * n2.x + n2.y * n2.y) / focal_squared + n2.z * n2.z;
-  const double down = (n3.x * n3.x + n3.y * n3.y) / focal_squared + n3.z * n3.z;
-  return std::sqrt(across / down);
-}
-
-double aspect_ratio(const RectifyOptions& options, double width, double height) {
-  if (options.width_mm > 0 && options.height_mm > 0) return options.width_mm / options.height_mm;
-  const double by_sides = aspect_of_sides(options.corners);
-  const double by_perspective = aspect_of_perspective(options.corners, width, height);
-  // Opposite sides cannot mislead by more than a view at 75 degrees does. Set by hand.
-  const bool plausible = by_perspective > 0.25 * by_sides && by_perspective < 4.0 * by_sides;
-  return plausible ? by_perspective : by_sides;
 }
 
 Result<RgbaImage> warp(const RgbaImage& photo, const std::array<PixelPoint, 4>& corners,
@@ -132,7 +81,7 @@ Result<void> RectifyOptions::validate() const {
   return {};
 }
 
-Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options) {
+Result<Rectified> rectify(const RgbaImage& photo, const RectifyOptions& options) {
   MODAR_TRY(options.validate());
   const double width = photo.width;
   const double height = photo.height;
@@ -142,7 +91,11 @@ Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options)
     }
   }
   const auto& c = options.corners;
-  const double aspect = aspect_ratio(options, width, height);
+  const bool measured = options.width_mm > 0 && options.height_mm > 0;
+  Rectified out;
+  out.aspect = measured ? AspectEstimate{options.width_mm / options.height_mm, 0}
+                        : estimate_aspect(c, photo.width, photo.height, options.focal_px);
+  const double aspect = out.aspect.aspect;
   const double photo_longest =
       std::max({length(c[0], c[1]), length(c[1], c[2]), length(c[2], c[3]), length(c[3], c[0])});
   const double longest = std::min(photo_longest, static_cast<double>(options.max_side));
@@ -151,8 +104,10 @@ Result<RgbaImage> rectify(const RgbaImage& photo, const RectifyOptions& options)
   const auto short_pixels = static_cast<std::uint32_t>(std::max(1L, std::lround(shortest)));
   // A result coarser than the photo is sampled finer and averaged, so that it does not alias.
   const int oversampling = std::clamp(static_cast<int>(std::ceil(photo_longest / longest)), 1, 8);
-  return aspect >= 1.0 ? warp(photo, c, long_pixels, short_pixels, oversampling)
-                       : warp(photo, c, short_pixels, long_pixels, oversampling);
+  const std::uint32_t wide = aspect >= 1.0 ? long_pixels : short_pixels;
+  const std::uint32_t high = aspect >= 1.0 ? short_pixels : long_pixels;
+  MODAR_ASSIGN(out.image, warp(photo, c, wide, high, oversampling));
+  return out;
 }
 
 }  // namespace modar

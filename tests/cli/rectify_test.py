@@ -22,6 +22,19 @@ class Rectify(ProgramTest):
         width, height = png_size(self.folder / "out.png")
         self.assertAlmostEqual(width / height, 2 / 3, delta=0.01)
 
+    def test_an_aspect_that_is_not_well_known_is_told(self):
+        frontal = self.rectify("40,30,300,30,300,600,40,600", "--json")
+        self.assertEqual(frontal.returncode, 0, frontal.stderr)
+        self.assertAlmostEqual(json.loads(frontal.stdout)["aspect"], 260 / 570, delta=0.01)
+        self.assertRegex(frontal.stderr, r"width by height 0\.45\d \+- 0\.0")
+        self.assertNotIn("rectify.aspect", frontal.stderr)
+        tilted = self.rectify("10,10,300,160,310,500,20,650", "--width-mm", "200")
+        self.assertEqual(tilted.returncode, 0, tilted.stderr)
+        self.assertRegex(tilted.stderr, r"rectify\.aspect")
+        self.assertIn("--height-mm", tilted.stderr)
+        measured = self.rectify("10,10,300,160,310,500,20,650", "--width-mm", "200", "--height-mm", "300")
+        self.assertNotIn("rectify.aspect", measured.stderr)
+
     def test_the_width_travels_with_the_image(self):
         self.assertEqual(self.rectify("10,10,300,40,310,600,20,650", "--width-mm", "200").returncode, 0)
         bundle = self.folder / "b.modar"

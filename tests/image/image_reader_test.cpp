@@ -1,5 +1,6 @@
 // Image files of all kinds to the right pixels, and hostile ones to errors.
 #include <gtest/gtest.h>
+#include <fstream>
 
 #include <array>
 #include <opencv2/core.hpp>
@@ -247,6 +248,39 @@ TEST(ImageReader, ExifOrientationIsApplied) {
   ASSERT_EQ(turned->height, 32U);
   EXPECT_LT(turned->pixels[0], 60);
   EXPECT_GT(turned->pixels[turned->pixels.size() - 4], 200);
+}
+
+/// A JPEG's EXIF segment of an exposure: 26 mm on film, of a picture of those sides.
+Bytes exposure_segment(unsigned width, unsigned height) {
+  return Bytes() + std::initializer_list<unsigned>{
+                       0xFF, 0xE1, 0, 76, 'E', 'x', 'i', 'f', 0, 0, 'I', 'I', 42, 0, 8, 0, 0,
+                       0,  // one entry: where the exposure's
+                           // directory is
+                       1, 0, 0x69, 0x87, 4, 0, 1, 0, 0, 0, 26, 0, 0, 0, 0, 0, 0, 0, 3,
+                       0,  // three entries
+                       0x02, 0xA0, 3, 0, 1, 0, 0, 0, width & 255, width >> 8, 0, 0, 0x03, 0xA0, 3,
+                       0, 1, 0, 0, 0, height & 255, height >> 8, 0, 0, 0x05, 0xA4, 3, 0, 1, 0, 0, 0,
+                       26, 0, 0, 0, 0, 0, 0, 0};
+}
+
+TEST(ImageReader, ExifTellsTheFocalLengthOfWhatIsNotCropped) {
+  const Bytes plain = encoded(to_mat(test::noise(64, 48, 3)), ".jpg");
+  const auto focal = [&plain](unsigned width, unsigned height) {
+    Bytes jpeg = plain;
+    const Bytes segment = exposure_segment(width, height);
+    jpeg.insert(jpeg.begin() + 2, segment.begin(), segment.end());
+    const std::string path = testing::TempDir() + "exposure.jpg";
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(jpeg.data()),
+               static_cast<std::streamsize>(jpeg.size()));
+    const auto photo = read_photo(path);
+    std::remove(path.c_str());
+    return photo ? photo->focal_px : -1;
+  };
+  // 26 mm of a film's diagonal of 43.27 mm; the picture's is 80 pixels long.
+  EXPECT_NEAR(focal(64, 48), 26 / 43.2666 * 80, 0.01);
+  EXPECT_NEAR(focal(640, 480), 26 / 43.2666 * 80, 0.01);
+  EXPECT_EQ(focal(640, 400), 0);
 }
 
 TEST(ImageReader, JpegWhoseCodedDataIsCutShortIsRefused) {

@@ -9,6 +9,8 @@
 
 #include <unistd.h>
 
+#include <random>
+
 #include <gtest/gtest.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -79,12 +81,12 @@ TEST(Rectify, AnUprightRectangleIsCutOutAsItIs) {
   options.corners = {PixelPoint{99.5, 59.5}, {399.5, 59.5}, {399.5, 259.5}, {99.5, 259.5}};
   const auto cut = rectify(photo, options);
   ASSERT_TRUE(cut) << to_line(cut.error());
-  ASSERT_EQ(cut->width, 300u);
-  ASSERT_EQ(cut->height, 200u);
+  ASSERT_EQ(cut->image.width, 300u);
+  ASSERT_EQ(cut->image.height, 200u);
   for (std::uint32_t y = 0; y < 200; y += 7) {
     for (std::uint32_t x = 0; x < 300; x += 7) {
       for (std::uint32_t c = 0; c < 4; ++c) {
-        EXPECT_NEAR(cut->pixels[4 * (y * 300 + x) + c],
+        EXPECT_NEAR(cut->image.pixels[4 * (y * 300 + x) + c],
                     photo.pixels[4 * ((y + 60) * 640 + x + 100) + c], 2);
       }
     }
@@ -110,7 +112,7 @@ TEST(Rectify, ThePerspectiveTellsTheAspectRatio) {
     options.corners = photographed(aspect, 0.5, -0.4, 900);
     const auto flat = rectify(photo, options);
     ASSERT_TRUE(flat) << to_line(flat.error());
-    EXPECT_NEAR(static_cast<double>(flat->width) / flat->height, aspect, 0.02 * aspect);
+    EXPECT_NEAR(static_cast<double>(flat->image.width) / flat->image.height, aspect, 0.02 * aspect);
   }
 }
 
@@ -121,7 +123,7 @@ TEST(Rectify, SizesInMillimetresDecideTheAspectRatio) {
   options.height_mm = 100;
   const auto flat = rectify(waves(1000, 750), options);
   ASSERT_TRUE(flat);
-  EXPECT_NEAR(static_cast<double>(flat->width) / flat->height, 2.0, 0.02);
+  EXPECT_NEAR(static_cast<double>(flat->image.width) / flat->image.height, 2.0, 0.02);
 }
 
 // The value at each place of the result is that of the photo where the pinhole model puts it.
@@ -134,24 +136,59 @@ TEST(Rectify, SamplesThePhotoWhereTheHomographySays) {
   options.max_side = 200;
   const auto flat = rectify(photo, options);
   ASSERT_TRUE(flat);
-  ASSERT_EQ(flat->width, 200u);
-  const float w = static_cast<float>(flat->width);
-  const float h = static_cast<float>(flat->height);
+  ASSERT_EQ(flat->image.width, 200u);
+  const float w = static_cast<float>(flat->image.width);
+  const float h = static_cast<float>(flat->image.height);
   std::vector<cv::Point2f> from = {{0, 0}, {w, 0}, {w, h}, {0, h}};
   std::vector<cv::Point2f> to;
   for (const PixelPoint& c : options.corners)
     to.emplace_back(static_cast<float>(c.x), static_cast<float>(c.y));
   const cv::Mat map = cv::getPerspectiveTransform(from, to);
-  for (std::uint32_t y = 5; y < flat->height; y += 20) {
-    for (std::uint32_t x = 5; x < flat->width; x += 20) {
+  for (std::uint32_t y = 5; y < flat->image.height; y += 20) {
+    for (std::uint32_t x = 5; x < flat->image.width; x += 20) {
       std::vector<cv::Point2f> at = {{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f}};
       cv::perspectiveTransform(at, at, map);
-      EXPECT_NEAR(flat->pixels[4 * (y * flat->width + x)], 127 + 120 * std::sin(at[0].x * 0.05f),
-                  5);
-      EXPECT_NEAR(flat->pixels[4 * (y * flat->width + x) + 1],
+      EXPECT_NEAR(flat->image.pixels[4 * (y * flat->image.width + x)],
+                  127 + 120 * std::sin(at[0].x * 0.05f), 5);
+      EXPECT_NEAR(flat->image.pixels[4 * (y * flat->image.width + x) + 1],
                   127 + 120 * std::sin(at[0].y * 0.04f), 5);
     }
   }
+}
+
+// Lenses of phones, tilted by up to 45 degrees, corners off by up to a pixel: the aspect is found,
+// and its error is what the estimate says of it.
+TEST(Rectify, TheSpreadOfTheAspectIsHonest) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> any(-1, 1);
+  constexpr int kViews = 400;
+  std::vector<double> errors;
+  int within = 0;
+  for (int i = 0; i < kViews; ++i) {
+    const double aspect = std::exp(0.6 * any(random));
+    auto corners =
+        photographed(aspect, 0.5 * any(random), 0.5 * any(random), 760 + 60 * any(random));
+    for (PixelPoint& corner : corners) {
+      corner.x += any(random);
+      corner.y += any(random);
+    }
+    const AspectEstimate found = estimate_aspect(corners, 1000, 750, 0);
+    errors.push_back(std::fabs(found.aspect / aspect - 1));
+    within += std::fabs(found.aspect - aspect) < 2 * found.spread ? 1 : 0;
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[kViews / 2], 0.01);
+  EXPECT_LT(errors.back(), 0.05);
+  EXPECT_GT(within, kViews * 95 / 100);
+}
+
+TEST(Rectify, TheFocalLengthOfThePhotoDecidesWhereItIsKnown) {
+  const auto corners = photographed(1.0, 0.1, -0.6, 2000);
+  const AspectEstimate usual = estimate_aspect(corners, 1000, 750, 0);
+  const AspectEstimate known = estimate_aspect(corners, 1000, 750, 2000);
+  EXPECT_GT(std::fabs(usual.aspect - 1), 0.01);
+  EXPECT_NEAR(known.aspect, 1.0, 0.005);
+  EXPECT_LT(known.spread, usual.spread);
 }
 
 TEST(Rectify, CornersThatAreNoQuadrilateralAreRefused) {
