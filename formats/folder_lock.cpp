@@ -11,7 +11,8 @@
 namespace modar {
 
 Result<FolderLock> FolderLock::take(const std::string& file, const Error& busy) {
-  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  // A link in its place is not followed: it would make a file elsewhere.
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
   if (descriptor < 0) {
     return fail(ExitCode::kIo, "io.create", file, std::strerror(errno),
                 "see that the folder can be written");

@@ -21,13 +21,14 @@ constexpr std::uint64_t kLeastProgress = 1024;
 bool Attempts::begin(Transfer& transfer) {
   transfer.too_long = false;
   if (transfer.wanted == nullptr) return true;
-  const std::uint64_t have = file_size(transfer.part_path()).value_or(0);
-  auto file = OutputFile::open(transfer.part_path());
+  const Folder& folder = *transfer.wanted->folder;
+  auto file = folder.resume(transfer.part_name());
   if (!file) {
     transfer.error = file.error();
     return false;
   }
   transfer.part.emplace(std::move(*file));
+  const std::uint64_t have = folder.size(transfer.part_name()).value_or(0);
   if (transfer.have == 0) tell(static_cast<std::int64_t>(have));
   transfer.have = have;
   // A complete part file was never verified (the run was killed): download it again.
@@ -108,15 +109,16 @@ Outcome Attempts::judge(Transfer& transfer, const Answer& answer) {
 /// Verifies a complete object; discards it and tries again if it is wrong.
 Outcome Attempts::judge_object(Transfer& transfer) {
   bool right = false;
-  if (const auto file = MappedFile::open(transfer.part_path())) {
-    right = object_id(file->bytes()) == transfer.wanted->id;
+  const Wanted& wanted = *transfer.wanted;
+  if (const auto file = wanted.folder->map(transfer.part_name())) {
+    right = object_id(file->bytes()) == wanted.id;
   }
   if (!right) {
     ++stats_.corrupt;
     discard(transfer);
     return again(transfer, "what came is not what was published");
   }
-  if (auto moved = rename_file(transfer.part_path(), transfer.wanted->file); !moved) {
+  if (auto moved = wanted.folder->rename(transfer.part_name(), to_hex(wanted.id)); !moved) {
     transfer.error = moved.error();
     return Outcome::kFailed;
   }

@@ -35,7 +35,7 @@ struct Transfer {
   Clock::time_point not_before{};  ///< of the next attempt
   Error error;                     ///< after Outcome::kFailed
 
-  [[nodiscard]] std::string part_path() const { return wanted->file + ".part"; }
+  [[nodiscard]] std::string part_name() const { return to_hex(wanted->id) + ".part"; }
 };
 
 /// How an attempt ended, as far as the network knows.

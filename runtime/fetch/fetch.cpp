@@ -197,17 +197,15 @@ Result<std::vector<ReleaseBundle>> choose_bundles(const Release& release,
 /// Whether every chosen bundle of the release in use is there and intact. Reads them all (BLAKE2b,
 /// about 1 GB/s on a desk): a fetch heals what has rotted.
 bool is_installed(const InstalledRelease& active, const std::vector<ReleaseBundle>& chosen) {
-  return std::all_of(chosen.begin(), chosen.end(), [&](const ReleaseBundle& bundle) {
-    return has_hash(active.folder + "/" + bundle.name + ".modar", bundle);
-  });
+  return std::all_of(chosen.begin(), chosen.end(),
+                     [&](const ReleaseBundle& bundle) { return has_hash(active.folder, bundle); });
 }
 
 /// The first damaged bundle of a release, or nothing.
 std::optional<Error> find_damage(const InstalledRelease& installed) {
   for (const ReleaseBundle& bundle : installed.release.bundles) {
-    const std::string file = installed.folder + "/" + bundle.name + ".modar";
-    if (!file_size(file)) continue;  // not for this device
-    if (auto good = verify_bundle(file, bundle); !good) return good.error();
+    if (!installed.folder.size(bundle.name + ".modar")) continue;  // not for this device
+    if (auto good = verify_bundle(installed.folder, bundle); !good) return good.error();
   }
   return std::nullopt;
 }
@@ -243,7 +241,7 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   report.epoch = news.release.epoch;
   report.expires = news.release.expires;
   report.blocked = store.blocked_links(news.release);
-  report.bundles = installed_paths(store.path(), news.release);
+  if (const auto now = store.active()) report.bundles = installed_paths(store.folder(), *now);
   report.downloaded_bytes = transfers.stats().bytes;
   report.retries = transfers.stats().retries;
   report.corrupt_pieces += transfers.stats().corrupt;
@@ -266,16 +264,16 @@ Result<StoreReport> verify_store(const std::string& path) {
     active = std::move(before);
   }
   report.version = active->release.version;
-  report.bundles = installed_paths(store.path(), active->release);
+  report.bundles = installed_paths(store.folder(), *active);
   return report;
 }
 
 std::optional<StoreReport> installed_release(const std::string& store) {
   using namespace fetch;
-  const std::string slot = active_slot(store);
-  const auto installed = slot.empty() ? std::nullopt : read_slot(slot);
+  const auto folder = Folder::open(store, false);
+  const auto installed = folder ? active_release(*folder) : std::nullopt;
   if (!installed) return std::nullopt;
-  return StoreReport{installed->release.version, installed_paths(store, installed->release), false};
+  return StoreReport{installed->release.version, installed_paths(*folder, *installed), false};
 }
 
 }  // namespace modar

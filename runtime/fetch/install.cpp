@@ -1,7 +1,5 @@
 #include "install.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstring>
@@ -9,7 +7,6 @@
 #include <memory>
 #include <set>
 
-#include "formats/atomic_file.hpp"
 #include "formats/check.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/piece.hpp"
@@ -62,9 +59,8 @@ class PieceSource {
 
 void PieceSource::add(const InstalledRelease& installed) {
   for (const ReleaseBundle& bundle : installed.release.bundles) {
-    const std::string path = installed.folder + "/" + bundle.name;
-    auto file = MappedFile::open(path + ".modar");
-    const auto stored = read_small_file(path + ".recipe", kMaxRecipeBytes);
+    auto file = installed.folder.map(bundle.name + ".modar");
+    const auto stored = installed.folder.read(bundle.name + ".recipe", kMaxRecipeBytes);
     if (!file || !stored || file->bytes().size() != bundle.size) continue;
     auto old = std::make_unique<OldBundle>();
     old->bundle = std::move(*file);
@@ -106,7 +102,8 @@ struct Assembly {
   std::string recipe_stored;                ///< as downloaded, kept beside the bundle
   std::vector<std::uint64_t> recipe_bytes;  ///< unpacked, aligned
   RecipeView recipe;
-  std::string file;  ///< NAME.modar in the spare slot
+  const Folder* slot;  ///< the spare one
+  std::string name;    ///< of the file in it: NAME.modar
 };
 
 struct AssemblyCounts {
@@ -127,7 +124,7 @@ Result<void> write_raw(OutputFile& file, const PieceRecord& piece, std::span<std
 
 /// Feature texts are written last, from the mapped features that are in the file by then.
 Result<void> write_texts(const Assembly& assembly, OutputFile& file) {
-  MODAR_ASSIGN(const auto mapped, MappedFile::open(assembly.file));
+  MODAR_ASSIGN(const auto mapped, assembly.slot->map(assembly.name));
   for (const PieceRecord& piece : assembly.recipe.pieces) {
     if (static_cast<PieceForm>(piece.form) != PieceForm::kFeatureText) continue;
     MODAR_ASSIGN(auto raw, decode_piece(piece, mapped.bytes().subspan(
@@ -138,21 +135,19 @@ Result<void> write_texts(const Assembly& assembly, OutputFile& file) {
   return {};
 }
 
-Result<std::vector<std::byte>> downloaded(const PieceRecord& piece, const std::string& pieces) {
-  MODAR_ASSIGN(const auto file, MappedFile::open(pieces + "/" + to_hex(piece.id)));
+Result<std::vector<std::byte>> downloaded(const PieceRecord& piece, const Folder& pieces) {
+  MODAR_ASSIGN(const auto file, pieces.map(to_hex(piece.id)));
   return decode_piece(piece, file.bytes());
 }
 
-/// Writes the file at `assembly.file`: pieces that `source` has from there, the others from
+/// Writes the file of `assembly`: pieces that `source` has from there, the others from
 /// `pieces`/ID. Pieces in `damaged` are never taken from `source`; pieces of it that turn out to be
 /// damaged are added to the set, and then the file is left unfinished. Errors: kIo; kInvalidInput.
-Result<void> assemble(const Assembly& assembly, const PieceSource& source,
-                      const std::string& pieces, AssemblyCounts& counts,
-                      std::set<ObjectId>& damaged) {
+Result<void> assemble(const Assembly& assembly, const PieceSource& source, const Folder& pieces,
+                      AssemblyCounts& counts, std::set<ObjectId>& damaged) {
   const std::size_t known_damage = damaged.size();
-  MODAR_ASSIGN(auto file, OutputFile::open(assembly.file));
-  MODAR_TRY(file.resize(0));  // bytes that no piece covers are zero
-  MODAR_TRY(file.resize(assembly.bundle.size));
+  MODAR_ASSIGN(auto file, assembly.slot->create(assembly.name));
+  MODAR_TRY(file.resize(assembly.bundle.size));  // bytes that no piece covers are zero
   for (const PieceRecord& piece : assembly.recipe.pieces) {
     if (piece.stored_size == 0) continue;
     const ObjectId id = std::to_array(piece.id);
@@ -221,7 +216,8 @@ class Installation {
         news_(job.news),
         active_(job.active),
         chosen_(job.chosen),
-        slot_(job.store.spare_folder()) {}
+        slot_(job.store.spare_folder()),
+        pieces_(job.store.pieces()) {}
 
   Result<void> run(FetchReport& report) {
     if (active_) source_.add(*active_);
@@ -241,28 +237,28 @@ class Installation {
     std::vector<Wanted> wanted;
     std::set<ObjectId> known;  // bundles of equal content share a recipe
     for (const ReleaseBundle& bundle : chosen_) {
-      const std::string file = piece_file(bundle.recipe);
-      if (!known.insert(bundle.recipe).second || file_size(file)) continue;
+      if (!known.insert(bundle.recipe).second || pieces_.size(to_hex(bundle.recipe))) continue;
       wanted.push_back(want(bundle.recipe, bundle.recipe_size));
     }
     MODAR_TRY(transfers_.objects(wanted, [](std::int64_t) {}));
     for (const ReleaseBundle& bundle : chosen_) {
       Assembly& assembly = assemblies_.emplace_back();
       assembly.bundle = bundle;
-      assembly.file = slot_ + "/" + bundle.name + ".modar";
+      assembly.slot = &slot_;
+      assembly.name = bundle.name + ".modar";
       MODAR_TRY(open_stored_recipe(assembly));
     }
     return {};
   }
 
   Result<void> open_stored_recipe(Assembly& assembly) {
-    const std::string file = piece_file(assembly.bundle.recipe);
-    const auto stored = read_small_file(file, kMaxRecipeBytes);
+    const std::string file = to_hex(assembly.bundle.recipe);
+    const auto stored = pieces_.read(file, kMaxRecipeBytes);
     if (!stored || object_id(std::as_bytes(std::span(*stored))) != assembly.bundle.recipe) {
       // It was damaged on the disk after it was verified: the next run downloads it again.
-      MODAR_TRY(remove_file(file));
-      return fail(ExitCode::kIo, "fetch.recipe", file, "it was damaged on the disk",
-                  "run modar-fetch again");
+      MODAR_TRY(pieces_.remove(file));
+      return fail(ExitCode::kIo, "fetch.recipe", pieces_.path_of(file),
+                  "it was damaged on the disk", "run modar-fetch again");
     }
     assembly.recipe_stored = *stored;
     MODAR_ASSIGN(const auto recipe,
@@ -306,7 +302,9 @@ class Installation {
     for (const Assembly& assembly : assemblies_) {
       for (const ReleaseBundle& old : before->release.bundles) {
         if (old.name != assembly.bundle.name || old.hash != assembly.bundle.hash) continue;
-        if (has_hash(assembly.file, assembly.bundle)) kept_.insert(old.name);
+        // Under another name, somebody may write to it, or the other slot.
+        if (slot_.has_other_names(assembly.name)) continue;
+        if (has_hash(slot_, assembly.bundle)) kept_.insert(old.name);
       }
     }
     return {};
@@ -321,22 +319,22 @@ class Installation {
       if (is_whole(id, size)) continue;
       wanted.push_back(want(id, size));
       total += size;
-      const auto part = file_size(wanted.back().file + ".part").value_or(0);
+      const auto part = pieces_.size(to_hex(id) + ".part").value_or(0);
       needed += size - std::min(part, size);
     }
     const std::uint64_t before_clearing = needed;
     for (const Assembly& assembly : assemblies_) {
       if (!kept_.contains(assembly.bundle.name)) needed += assembly.bundle.size;
     }
-    for (const std::string& name : list_folder(slot_)) {
+    for (const std::string& name : slot_.list()) {
       const bool kept = kept_.contains(name.substr(0, name.rfind('.')));
-      if (!kept) reclaimed += file_size(slot_ + "/" + name).value_or(0);
+      if (!kept) reclaimed += slot_.size(name).value_or(0);
     }
     needed = std::max(before_clearing, needed - std::min(needed, reclaimed));
-    MODAR_ASSIGN(const auto space, free_space(store_.path()));
+    MODAR_ASSIGN(const auto space, store_.folder().free_space());
     if (space < needed) {
       return fail(
-          kExitNoSpace, "fetch.space", store_.path(),
+          kExitNoSpace, "fetch.space", store_.folder().path(),
           std::to_string(needed) + " bytes are needed, " + std::to_string(space) + " are free",
           "make room and run modar-fetch again");
     }
@@ -346,14 +344,13 @@ class Installation {
 
   /// Whether the store has a piece with the right content; one with the wrong content is removed.
   bool is_whole(const ObjectId& id, std::uint64_t size) {
-    const std::string file = piece_file(id);
-    const auto found = file_size(file);
-    if (!found) return false;
-    if (const auto mapped = MappedFile::open(file);
-        *found == size && mapped && object_id(mapped->bytes()) == id) {
+    const std::string file = to_hex(id);
+    if (!pieces_.size(file)) return false;
+    if (const auto mapped = pieces_.map(file);
+        mapped && mapped->bytes().size() == size && object_id(mapped->bytes()) == id) {
       return true;
     }
-    ::unlink(file.c_str());
+    static_cast<void>(pieces_.remove(file));  // what stays is renamed over, or says so then
     return false;
   }
 
@@ -365,10 +362,13 @@ class Installation {
         continue;
       }
       // The recipe first: clear_slot() takes it for the sign that the bundle is ours.
-      MODAR_TRY(write_file(slot_ + "/" + assembly.bundle.name + ".recipe",
-                           std::string_view(assembly.recipe_stored)));
+      if (slot_.has(assembly.name)) {
+        return fail(ExitCode::kIo, "store.foreign", slot_.path_of(assembly.name),
+                    "modar-fetch has not written it", "move it elsewhere");
+      }
+      MODAR_TRY(slot_.replace(assembly.bundle.name + ".recipe", assembly.recipe_stored));
       MODAR_TRY(build_bundle(assembly, report));
-      MODAR_TRY(verify_bundle(assembly.file, assembly.bundle));
+      MODAR_TRY(verify_bundle(slot_, assembly.bundle));
     }
     return {};
   }
@@ -378,7 +378,7 @@ class Installation {
     while (true) {
       const std::size_t known = damaged_.size();
       counts = {};
-      MODAR_TRY(assemble(assembly, source_, store_.pieces(), counts, damaged_));
+      MODAR_TRY(assemble(assembly, source_, pieces_, counts, damaged_));
       if (damaged_.size() == known) break;
       // An installed bundle is damaged on the disk: download these pieces after all.
       report.corrupt_pieces += static_cast<std::uint32_t>(damaged_.size() - known);
@@ -392,18 +392,15 @@ class Installation {
 
   /// The documents last: a slot with a release.json is complete.
   Result<void> finish() {
-    return write_file(slot_ + "/release.json.minisig", std::string_view(news_.signature_text))
-        .and_then([&] { return write_file(slot_ + "/release.json", std::string_view(news_.text)); })
+    return slot_.replace("release.json.minisig", news_.signature_text)
+        .and_then([&] { return slot_.replace("release.json", news_.text); })
         .and_then([&] {
           return store_.activate({slot_, news_.text, news_.release});
         });
   }
 
-  [[nodiscard]] std::string piece_file(const ObjectId& id) const {
-    return store_.pieces() + "/" + to_hex(id);
-  }
   [[nodiscard]] Wanted want(const ObjectId& id, std::uint64_t size) const {
-    return {id, size, "objects/" + object_path(id), piece_file(id)};
+    return {id, size, "objects/" + object_path(id), &pieces_};
   }
 
   const FetchOptions& options_;
@@ -412,7 +409,8 @@ class Installation {
   const SignedRelease& news_;
   const std::optional<InstalledRelease>& active_;
   const std::vector<ReleaseBundle>& chosen_;
-  std::string slot_;
+  const Folder& slot_;
+  const Folder& pieces_;
   PieceSource source_;
   std::vector<Assembly> assemblies_;
   std::set<ObjectId> damaged_;
@@ -421,14 +419,15 @@ class Installation {
 
 }  // namespace
 
-bool has_hash(const std::string& file, const ReleaseBundle& bundle) {
-  const auto mapped = MappedFile::open(file);
+bool has_hash(const Folder& slot, const ReleaseBundle& bundle) {
+  const auto mapped = slot.map(bundle.name + ".modar");
   return mapped && mapped->bytes().size() == bundle.size &&
          bundle_hash(mapped->bytes()) == bundle.hash;
 }
 
-Result<void> verify_bundle(const std::string& file, const ReleaseBundle& bundle) {
-  MODAR_ASSIGN(const auto mapped, MappedFile::open(file));
+Result<void> verify_bundle(const Folder& slot, const ReleaseBundle& bundle) {
+  MODAR_ASSIGN(const auto mapped, slot.map(bundle.name + ".modar"));
+  const std::string file = slot.path_of(bundle.name + ".modar");
   if (mapped.bytes().size() != bundle.size || bundle_hash(mapped.bytes()) != bundle.hash) {
     return fail(kExitBadBundle, "store.hash", file, "it is not what was signed",
                 "run modar-fetch again");

@@ -30,11 +30,11 @@ struct InstallationJob {
 /// Builds the release in the spare slot and puts it in use. Errors: those of fetch_release().
 Result<void> install(const InstallationJob& job, FetchReport& report);
 
-/// Whether a file has a bundle's size and signed hash. Reads it once.
-bool has_hash(const std::string& file, const ReleaseBundle& bundle);
+/// Whether a bundle's file in a slot has its size and signed hash. Reads it once.
+bool has_hash(const Folder& slot, const ReleaseBundle& bundle);
 
-/// Checks a file against a bundle's signed hash and the rules of a good bundle.
+/// Checks a bundle's file in a slot against its signed hash and the rules of a good bundle.
 /// Errors: kIo; kExitBadBundle "store.hash", "store.rules".
-Result<void> verify_bundle(const std::string& file, const ReleaseBundle& bundle);
+Result<void> verify_bundle(const Folder& slot, const ReleaseBundle& bundle);
 
 }  // namespace modar::fetch

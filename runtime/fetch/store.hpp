@@ -1,5 +1,4 @@
-// The installer's folder on the device, and what the installer does with files. Internal to
-// runtime/fetch.
+// The installer's folder on the device. Internal to runtime/fetch.
 //
 //   lock                  held while a fetch is running
 //   state.json            trusted key, highest version installed; slots/state.json: a copy
@@ -9,7 +8,8 @@
 //                         symbolic links, a file that says "slots/a"
 //   NAME.modar -> current/NAME.modar (only where there are symbolic links)
 //
-// Everything else in there belongs to others and is never removed.
+// Everything else in there belongs to others and is never removed. Others may write into the
+// folder: links, pipes and hard links that they plant lead nothing outside (folder.hpp).
 #pragma once
 
 #include <cstdint>
@@ -19,59 +19,12 @@
 #include <string_view>
 #include <vector>
 
+#include "folder.hpp"
 #include "formats/error.hpp"
 #include "formats/folder_lock.hpp"
 #include "modar/release.hpp"
 
 namespace modar::fetch {
-
-/// @name Files
-/// Every error names the path.
-/// @{
-/// Creates a folder if it is missing. Errors: kIo "io.create".
-Result<void> make_folder(const std::string& path);
-/// Names in a folder without "." and "..", sorted; empty if there is no such folder.
-std::vector<std::string> list_folder(const std::string& path);
-/// Nothing if it cannot be read or is longer than `limit` bytes.
-std::optional<std::string> read_small_file(const std::string& path, std::size_t limit);
-/// Bytes; nothing if there is no such file.
-std::optional<std::uint64_t> file_size(const std::string& path);
-Result<void> remove_file(const std::string& path);
-/// Errors: kIo "io.rename".
-Result<void> rename_file(const std::string& from, const std::string& to);
-/// Syncs the names in a folder to the disk. Errors: kIo "io.sync".
-Result<void> sync_folder(const std::string& path);
-/// Points the symbolic link `path` at `target` atomically; false where the file system has no
-/// symbolic links. Errors: kIo "io.link".
-Result<bool> switch_link(const std::string& path, const std::string& target);
-/// Whether there is anything of that name, a dangling link included.
-bool path_exists(const std::string& path);
-/// Target of a symbolic link, or empty.
-std::string link_target(const std::string& path);
-/// Free bytes of the file system of `path`. Errors: kIo "io.space".
-Result<std::uint64_t> free_space(const std::string& path);
-
-/// A file open for writing at any offset; closed when destroyed.
-class OutputFile {
- public:
-  /// Creates the file, or opens it and keeps what it holds. Never follows a symbolic link.
-  /// Errors: kIo "io.create".
-  static Result<OutputFile> open(const std::string& path);
-  OutputFile(OutputFile&& other) noexcept;
-  OutputFile& operator=(OutputFile&& other) noexcept;
-  ~OutputFile();
-  /// Errors: kIo "io.write".
-  Result<void> write_at(std::uint64_t offset, const void* bytes, std::size_t size);
-  /// Cuts the file off, or makes it longer by zeros: then its last byte may be overwritten with 0.
-  Result<void> resize(std::uint64_t size);
-  Result<void> sync();
-
- private:
-  OutputFile(int descriptor, std::string path);
-  int descriptor_ = -1;
-  std::string path_;
-};
-/// @}
 
 struct StoreState {
   std::uint64_t epoch = 0;    ///< of the root's word that is believed; 0: none
@@ -87,7 +40,7 @@ std::optional<StoreState> parse_state(std::string_view json);
 
 /// A release in a slot.
 struct InstalledRelease {
-  std::string folder;
+  Folder folder;
   std::string text;  ///< of the release document
   Release release;
 };
@@ -95,11 +48,11 @@ struct InstalledRelease {
 class Store {
  public:
   /// Creates what is missing and takes the lock, which is held until the object is destroyed.
-  /// Errors: kIo; kExitLocked "store.locked".
+  /// Errors: kIo, "store.link" where a folder of the store is a link; kExitLocked "store.locked".
   static Result<Store> open(const std::string& path);
 
-  [[nodiscard]] const std::string& path() const { return path_; }
-  [[nodiscard]] std::string pieces() const { return path_ + "/pieces"; }
+  [[nodiscard]] const Folder& folder() const { return root_; }
+  [[nodiscard]] const Folder& pieces() const { return pieces_; }
   /// The newer of its two copies.
   [[nodiscard]] StoreState state() const;
   /// Writes both copies.
@@ -110,7 +63,7 @@ class Store {
   /// The release in the slot that is not in use.
   [[nodiscard]] std::optional<InstalledRelease> other() const;
   /// The folder in which the next release is built.
-  [[nodiscard]] std::string spare_folder() const;
+  [[nodiscard]] const Folder& spare_folder() const;
 
   /// Puts a complete slot in use and updates the links NAME.modar.
   Result<void> activate(const InstalledRelease& release) const;
@@ -123,20 +76,22 @@ class Store {
   /// Removes pieces and parts of pieces, but for those of the ids in `keep`.
   Result<void> remove_pieces(const std::set<std::string>& keep) const;
   /// Removes a release from a slot, but for the bundles in `keep`.
-  Result<void> clear_slot(const std::string& slot, const std::set<std::string>& keep) const;
+  Result<void> clear_slot(const Folder& slot, const std::set<std::string>& keep) const;
 
  private:
-  Store(std::string path, FolderLock lock);
-  std::string path_;
+  Store(Folder root, Folder slots, Folder a, Folder b, Folder pieces, FolderLock lock);
+  Folder root_, slots_, a_, b_, pieces_;
   FolderLock lock_;
 };
 
-/// The folder of the slot in use, from `current`; empty if there is none.
-std::string active_slot(const std::string& store);
-/// Paths of those of a release's bundles that are installed in that slot.
-std::vector<std::string> installed_paths(const std::string& store, const Release& release);
+/// The slot in use, from `current`: "slots/a", "slots/b", or empty.
+std::string active_slot(const Folder& store);
+/// The release in use; nothing if there is none.
+std::optional<InstalledRelease> active_release(const Folder& store);
+/// Paths of those of the bundles of the release in use that are installed.
+std::vector<std::string> installed_paths(const Folder& store, const InstalledRelease& release);
 
 /// Reads the release in a slot; nothing if it has none.
-std::optional<InstalledRelease> read_slot(const std::string& folder);
+std::optional<InstalledRelease> read_slot(const Folder& folder);
 
 }  // namespace modar::fetch

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "folder.hpp"
 #include "formats/error.hpp"
 #include "formats/transport/recipe.hpp"
 #include "modar/fetch.hpp"
@@ -32,9 +33,10 @@ struct TransferOptions {
 /// One object to download.
 struct Wanted {
   ObjectId id{};
-  std::uint64_t size = 0;  ///< bytes
-  std::string path;        ///< below the URL
-  std::string file;        ///< its destination; `file`.part until it is complete
+  std::uint64_t size = 0;          ///< bytes
+  std::string path;                ///< below the URL
+  const Folder* folder = nullptr;  ///< its destination, under to_hex(id), with ".part" until it is
+                                   ///< complete
 };
 
 struct TransferStats {

@@ -10,8 +10,8 @@ import unittest
 from programs import BIN
 from ship_files import ShipTest, soak
 
-CALLS = ["openat", "mkdir", "unlink", "rename", "symlink", "link", "pwrite64", "write", "ftruncate", "fsync", "close",
-         "newfstatat", "readlink", "getdents64", "statfs", "flock", "mmap", "read"]
+CALLS = ["openat", "mkdir", "mkdirat", "unlinkat", "renameat", "symlinkat", "pwrite64", "write", "ftruncate", "fsync", "close",
+         "newfstatat", "fstat", "readlinkat", "getdents64", "fstatfs", "flock", "mmap", "read"]
 
 
 def strace_works():

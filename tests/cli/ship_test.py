@@ -671,24 +671,121 @@ class Store(ShipTest):
         self.assert_installed(self.shop.old)
         self.assertFalse(self.fetch_json()["changed"])
 
-    def test_part_files_follow_no_links(self):
+    def store_with_an_update(self):
+        """A store with a release, a site with the next one, and a folder of somebody else's outside."""
         self.publish(self.shop.old)
         self.fetch_json()
         self.publish(self.shop.new)
-        victim = self.folder / "victim"
-        victim.write_text("precious")
-        for piece in (self.site / "objects").rglob("*"):
-            if piece.is_file():
-                (self.store / "pieces" / f"{piece.name}.part").symlink_to(victim)
-        self.assertEqual(self.fetch().returncode, 2)
-        self.assertEqual(victim.read_text(), "precious")
+        self.outside = self.folder / "outside"
+        self.outside.mkdir()
+        self.victim = self.outside / "victim"
+        self.victim.write_text("precious")
+
+    def assert_nothing_outside(self):
+        self.assertEqual([p.name for p in self.outside.iterdir()], ["victim"])
+        self.assertEqual(self.victim.read_text(), "precious")
+
+    def test_folders_that_are_links_are_refused(self):
+        self.store_with_an_update()
+        for name in ("slots", "slots/b", "slots/a", "pieces"):
+            with self.subTest(name):
+                folder = self.store / name
+                kept = folder.with_name(folder.name + ".kept")
+                folder.rename(kept)
+                folder.symlink_to(self.outside)
+                self.assert_fails(self.fetch(), 2, "store.link", str(folder))
+                done = self.run_program("modar-fetch", "--store", self.store, "--verify")
+                self.assert_fails(done, 2, "store.link")
+                self.assert_nothing_outside()
+                folder.unlink()
+                kept.rename(folder)
+        lock = self.store / "lock"
+        lock.unlink()
+        lock.symlink_to(self.outside / "made")
+        self.assert_fails(self.fetch(), 2, "io.create")
+        self.assert_nothing_outside()
+        lock.unlink()
+        self.fetch_json()
+        self.assert_installed(self.shop.new)
+
+    def plants(self):
+        """Ways to put something of another's into a file's place: a link, a second name, a pipe."""
+        return {"link": lambda path: path.symlink_to(self.victim), "second name": lambda path: os.link(self.victim, path),
+                "pipe": os.mkfifo}
+
+    def test_planted_pieces_lead_nothing_outside(self):
+        for way in ("link", "second name", "pipe"):
+            for suffix in (".part", ""):
+                with self.subTest(way + suffix):
+                    shutil.rmtree(self.store, ignore_errors=True)
+                    shutil.rmtree(self.folder / "outside", ignore_errors=True)
+                    shutil.rmtree(self.site, ignore_errors=True)
+                    self.store_with_an_update()
+                    for piece in (self.site / "objects").rglob("*"):
+                        if piece.is_file():
+                            self.plants()[way](self.store / "pieces" / f"{piece.name}{suffix}")
+                    self.assertIn(self.fetch().returncode, (0, 2))  # what is no recipe is thrown away first
+                    self.fetch_json()
+                    self.assert_installed(self.shop.new)
+                    self.assert_nothing_outside()
+
+    def test_planted_bundles_and_documents_lead_nothing_outside(self):
+        for way in ("link", "second name", "pipe"):
+            for name in ("slots/b/museum.modar", "slots/b/museum.recipe", "slots/b/release.json", "slots/b/release.json.minisig",
+                         "slots/state.json", "state.json", "current"):
+                with self.subTest(way + " " + name):
+                    shutil.rmtree(self.store, ignore_errors=True)
+                    shutil.rmtree(self.folder / "outside", ignore_errors=True)
+                    shutil.rmtree(self.site, ignore_errors=True)
+                    self.store_with_an_update()
+                    place = self.store / name
+                    place.unlink(missing_ok=True)
+                    self.plants()[way](place)
+                    done = self.fetch()
+                    if name == "slots/b/museum.modar":  # without a recipe beside it, it is not ours
+                        self.assert_fails(done, 2, "store.foreign", str(place))
+                        place.unlink()
+                        done = self.fetch()
+                    self.assertEqual(done.returncode, 0, done.stderr)
+                    self.assert_nothing_outside()
+                    self.assert_installed(self.shop.new)
+
+    def test_a_bundle_with_a_second_name_is_built_again(self):
+        other = self.folder / "other.modar"
+        shutil.copy(self.shop.old, other)
+        self.publish(self.shop.old, other)
+        self.fetch_json()
+        self.publish(self.shop.new)
+        self.fetch_json()
+        kept = self.store / "slots" / "a" / "other.modar"
+        second = self.folder / "second"
+        os.link(kept, second)
+        self.publish(self.shop.old)
+        self.fetch_json()
+        self.assertEqual(kept.stat().st_nlink, 1)
+        second.write_bytes(b"rot")
+        self.assert_installed(self.shop.old, other)
+
+    def test_planted_bundles_are_not_installed(self):
+        """A pipe or a link in the place of an installed bundle is no bundle: the next fetch replaces it."""
+        for plant in (os.mkfifo, lambda path: path.symlink_to(self.shop.old)):
+            shutil.rmtree(self.store, ignore_errors=True)
+            shutil.rmtree(self.site, ignore_errors=True)
+            self.publish(self.shop.old)
+            self.fetch_json()
+            installed = self.store / "slots" / "a" / "museum.modar"
+            installed.unlink()
+            plant(installed)
+            self.assertTrue(self.fetch_json()["changed"])
+            self.assert_installed(self.shop.old)
+            self.assertFalse((self.store / "museum.modar").resolve().is_fifo())
 
     def without_links(self):
         """An environment in which links fail, as on FAT and Android's shared storage."""
         source = self.folder / "nolinks.c"
-        source.write_text("#include <errno.h>\nint symlink(const char* a, const char* b) "
-                          "{ (void)a; (void)b; errno = EPERM; return -1; }\n"
-                          "int link(const char* a, const char* b) { return symlink(a, b); }\n")
+        source.write_text("#include <errno.h>\nint symlinkat(const char* a, int f, const char* b) "
+                          "{ (void)a; (void)f; (void)b; errno = EPERM; return -1; }\n"
+                          "int symlink(const char* a, const char* b) { return symlinkat(a, 0, b); }\n")
         library = self.folder / "nolinks.so"
         subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
         return {"LD_PRELOAD": str(library), "ASAN_OPTIONS": "verify_asan_link_order=0"}

@@ -16,9 +16,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string folder = path.substr(0, path.rfind('/'));
   static const auto store = modar::fetch::Store::open(folder);
   need(store.has_value());
-  const std::string slot = modar::fetch::active_slot(folder);
-  need(slot.empty() || slot == folder + "/slots/a" || slot == folder + "/slots/b");
-  need(store->spare_folder() != slot);
+  const std::string slot = modar::fetch::active_slot(store->folder());
+  need(slot.empty() || slot == "slots/a" || slot == "slots/b");
+  need(store->spare_folder().path() != folder + "/" + slot);
 
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const auto state = modar::fetch::parse_state(text);

@@ -32,6 +32,17 @@ class Documents(unittest.TestCase):
                     missing.append(f"{name}: {target}")
         self.assertEqual(missing, [])
 
+    def test_each_attack_of_the_specification_has_a_test(self):
+        table = (ROOT / "formats/shipping.md").read_text().partition("## Attacks and accidents\n")[2].partition("\n## ")[0]
+        rows = [line.split("|")[1:4] for line in table.splitlines() if line.startswith("| ")][1:]
+        self.assertGreater(len(rows), 14)
+        tests = "".join(file.read_text() for file in (ROOT / "tests/cli").glob("ship*_test.py"))
+        for happens, _, names in rows:
+            named = re.findall(r"`(\w+)`", names)
+            self.assertEqual(not named, "Stolen root key" in happens, happens)  # against which there is nothing
+            for name in named:
+                self.assertIn(f"def test_{name}(self)", tests)
+
 
 if __name__ == "__main__":
     unittest.main()
