@@ -49,6 +49,11 @@ void add_publish(CommandLine& ship) {
               {.shows_default = true, .least = 1, .most = 36500, .excludes = "--expires"});
   line.flag("--no-expiry", publish->no_expiry, "Devices believe it for ever: for USB sticks",
             {.excludes = "--expires"});
+  line.option(
+      "--fresh-days", &publish->fresh_days,
+      "Devices believe it for so many days after each `modar ship refresh`; 0: without. Stays "
+      "for later releases",
+      {.type = "N", .least = 0, .most = 36500});
   line.option("--drop", &request.drop, "This bundle leaves the release; may be given again",
               {.type = "NAME", .repeatable = true});
   line.flag("--dry-run", request.dry_run, "Print what would change and write nothing");
@@ -62,6 +67,17 @@ void add_publish(CommandLine& ship) {
   line.flag("--json", publish->json, "Print the release and what was written as JSON");
   line.footer(ship_example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));
   line.run([publish] { return ExitCode{run_publish(*publish)}; });
+}
+
+void add_refresh(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("refresh", "Sign that the newest release still is the newest: daily, by cron");
+  const auto refresh = std::make_shared<RefreshCommand>();
+  line.option("--to", &refresh->folder, "The folder that devices fetch from",
+              {.type = "DIR", .required = true});
+  add_key_options(line, refresh->key_file, refresh->pass_phrase_file);
+  line.footer(ship_example("  modar ship refresh --to /var/www/ar --key museum.key\n"));
+  line.run([refresh] { return ExitCode{run_refresh(*refresh)}; });
 }
 
 void add_rotate(CommandLine& ship) {
@@ -151,12 +167,14 @@ void add_ship_plan(CommandLine& ship) {
 
 void add_ship(CommandLine& program) {
   CommandLine& line = program.command(
-      "ship", "Releases for devices: keygen, publish, list, root, rotate, prune, verify, plan");
+      "ship",
+      "Releases for devices: keygen, publish, list, root, rotate, refresh, prune, verify, plan");
   add_keygen(line);
   add_publish(line);
   add_list(line);
   add_root(line);
   add_rotate(line);
+  add_refresh(line);
   add_prune(line);
   add_verify(line);
   add_ship_plan(line);

@@ -183,6 +183,9 @@ int run_publish(ShipPublishCommand& command) {
     }
     command.request.expires = *time;
   }
+  if (command.fresh_days >= 0) {
+    command.request.fresh_days = static_cast<std::uint64_t>(command.fresh_days);
+  }
   ProgressBar bar(command.quiet || command.json);
   Report stages;
   stages.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
@@ -228,6 +231,28 @@ int run_root(const RotateCommand& command) {
   if (!word) return print_error(word.error());
   std::fprintf(stderr, "epoch %llu: key %s signs; publish the next release with it\n",
                static_cast<unsigned long long>(word->epoch), to_hex(next.id).c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_refresh(const RefreshCommand& command) {
+  const auto key = load_key(command.key_file, command.pass_phrase_file);
+  if (!key) return print_error(key.error());
+  const auto folder = ReleaseFolder::open(command.folder);
+  if (!folder) return print_error(folder.error());
+  if (auto fine = folder->check_signer(key->public_key); !fine) return print_error(fine.error());
+  const auto newest = folder->newest();
+  if (!newest) return print_error(newest.error());
+  if (!*newest || (*newest)->fresh_days == 0) {
+    return print_error({ExitCode::kUsage, "ship.fresh", command.folder,
+                        "its newest release asks for no freshness",
+                        "publish with --fresh-days 7 first"});
+  }
+  if (auto signed_ = folder->add_freshness(**newest, std::time(nullptr), *key); !signed_) {
+    return print_error(signed_.error());
+  }
+  std::fprintf(stderr, "release %llu is the newest, for %llu days\n",
+               static_cast<unsigned long long>((*newest)->version),
+               static_cast<unsigned long long>((*newest)->fresh_days));
   return static_cast<int>(ExitCode::kOk);
 }
 

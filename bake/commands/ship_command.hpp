@@ -22,6 +22,7 @@ struct ShipPublishCommand {
   std::string expires;  ///< a time, or empty
   unsigned valid_days = 365;
   bool no_expiry = false;
+  int fresh_days = -1;               ///< -1: as the newest release has it
   std::vector<std::string> devices;  ///< NAME=PROFILE[,PROFILE]
   bool quiet = false;
   bool json = false;
@@ -32,6 +33,12 @@ struct RotateCommand {
   std::string key_file;
   std::string pass_phrase_file;
   std::string next_key;  ///< file of the public key that follows
+};
+
+struct RefreshCommand {
+  std::string folder;
+  std::string key_file;
+  std::string pass_phrase_file;
 };
 
 struct ListCommand {
@@ -65,6 +72,8 @@ int run_publish(ShipPublishCommand& command);
 int run_rotate(const RotateCommand& command);
 /// Writes the root key's word: the next key signs.
 int run_root(const RotateCommand& command);
+/// Signs that the newest release is still the newest.
+int run_refresh(const RefreshCommand& command);
 int run_list(const ListCommand& command);
 int run_prune(const PruneCommand& command);
 /// Reads a release folder or a mirror whole.

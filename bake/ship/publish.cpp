@@ -1,6 +1,7 @@
 #include "bake/ship/publish.hpp"
 
 #include <algorithm>
+#include <ctime>
 #include <filesystem>
 #include <set>
 
@@ -209,6 +210,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
   done.release.epoch = word.epoch;
   MODAR_ASSIGN(done.release.version, next_version(folder, word.epoch, request.version));
   done.release.expires = request.expires;
+  done.release.fresh_days = request.fresh_days.value_or(newest ? newest->fresh_days : 0);
   MODAR_ASSIGN(done.release.bundles, kept_bundles(before, request));
   ObjectLedger ledger(request.folder);
   MODAR_TRY(add_bundles(request, folder, ledger, done, report));
@@ -231,7 +233,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
   }
   if (request.dry_run) return done;
   MODAR_TRY(check_kept(request, folder, done.release, ledger));
-  MODAR_TRY(folder.add_release(done.release, key));
+  MODAR_TRY(folder.add_release(done.release, std::time(nullptr), key));
   return done;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,10 @@ struct PublishRequest {
   std::vector<std::string> drop;     ///< names of bundles that leave the release
   bool dry_run = false;              ///< writes nothing
   std::string folder;
-  std::uint64_t version = 0;                                ///< 0: one more than the newest
-  std::int64_t expires = 0;                                 ///< seconds since 1970, UTC; kNever
+  std::uint64_t version = 0;  ///< 0: one more than the newest
+  std::int64_t expires = 0;   ///< seconds since 1970, UTC; kNever
+  std::optional<std::uint64_t>
+      fresh_days;  ///< 0: no freshness; nothing: as the newest release has it
   std::map<std::string, std::vector<std::string>> devices;  ///< by bundle name; none: for all
   RecipeOptions recipe;
 };

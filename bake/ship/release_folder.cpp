@@ -191,13 +191,28 @@ Result<std::uint64_t> ReleaseFolder::add_objects(const PublishedBundle& bundle,
   return added;
 }
 
-Result<void> ReleaseFolder::add_release(const Release& release, const SecretKey& key) const {
+Result<void> ReleaseFolder::add_freshness(const Release& release, std::int64_t now,
+                                          const SecretKey& key) const {
+  if (release.fresh_days == 0) return {};
+  constexpr std::int64_t kDay = 86400;
+  const std::string path = path_ + "/" + freshness_path(release.version);
+  const std::string text =
+      freshness_text({release.epoch, release.version, now,
+                      now + kDay * static_cast<std::int64_t>(release.fresh_days)});
+  const std::string signature = sign(key, text, "modar fresh " + std::to_string(release.version));
+  MODAR_TRY(write_file(path + ".minisig", std::string_view(signature)));
+  return write_file(path, std::string_view(text));
+}
+
+Result<void> ReleaseFolder::add_release(const Release& release, std::int64_t now,
+                                        const SecretKey& key) const {
   const std::string number = std::to_string(release.version);
   const std::string path = path_ + "/releases/" + number + ".json";
   const std::string text = release_text(release);
   const std::string signature = sign(key, text, "modar release " + number);
   return write_file(path + ".minisig", std::string_view(signature))
       .and_then([&] { return write_file(path, std::string_view(text)); })
+      .and_then([&] { return add_freshness(release, now, key); })
       .and_then([&] { return write_file(path_ + "/latest", std::string_view(number + "\n")); });
 }
 
@@ -251,9 +266,11 @@ Result<std::uint64_t> ReleaseFolder::prune(std::size_t keep) const {
   std::error_code error;
   // Documents first: no remaining document names a removed object.
   for (std::size_t i = 0; i < gone; ++i) {
-    const std::string path = path_ + "/releases/" + std::to_string(all[i]) + ".json";
-    fs::remove(path, error);
-    fs::remove(path + ".minisig", error);
+    const std::string document = "releases/" + std::to_string(all[i]) + ".json";
+    for (const std::string& name : {document, freshness_path(all[i])}) {
+      fs::remove(fs::path(path_) / name, error);
+      fs::remove(fs::path(path_) / (name + ".minisig"), error);
+    }
   }
   for (const auto& entry : fs::recursive_directory_iterator(path_ + "/objects", error)) {
     if (!entry.is_regular_file() || needed.contains(entry.path().filename().string())) continue;

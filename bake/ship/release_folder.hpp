@@ -2,6 +2,7 @@
 //
 //   latest                       number of the newest release
 //   releases/N.json(.minisig)    release documents
+//   releases/N.fresh.json(.minisig)  that release N is still the newest, signed every few days
 //   keys/S.json(.minisig)        the chain of keys
 //   root.json(.minisig)          the root key's word: which key signs
 //   objects/ab/abcdef...         pieces and recipes, by the BLAKE2b of their bytes
@@ -47,8 +48,11 @@ class ReleaseFolder {
   /// Refuses a bundle of which an object is missing or holds other bytes. Errors: kIo
   /// "ship.damaged".
   Result<void> check_objects(const ReleaseBundle& bundle, ObjectLedger& ledger) const;
-  /// Writes and signs the document, then points `latest` at it.
-  Result<void> add_release(const Release& release, const SecretKey& key) const;
+  /// Writes and signs the document and its freshness, then points `latest` at it.
+  Result<void> add_release(const Release& release, std::int64_t now, const SecretKey& key) const;
+  /// Signs that the release is the newest at this time (seconds since 1970), and for the days that
+  /// its document says. Writes nothing where that says none.
+  Result<void> add_freshness(const Release& release, std::int64_t now, const SecretKey& key) const;
   /// Writes the root's word: `next` signs from now on, and a new epoch begins.
   /// Errors: kUsage "ship.root" (another key than that of the word before).
   Result<RootWord> add_root_word(const PublicKey& next, const SecretKey& root) const;

@@ -91,6 +91,19 @@ Result<Release> read_newest(const ReleaseReader& read, const Trust& trust) {
               "publish the release again");
 }
 
+/// A release that asks for it has a freshness, signed and of its number.
+Result<void> check_fresh(const ReleaseReader& read, const Release& release, const Trust& trust) {
+  if (release.fresh_days == 0) return {};
+  const std::string path = freshness_path(release.version);
+  MODAR_ASSIGN(const auto document, read_signed(read, path, kMostKeyBytes));
+  if (!document) return absent(path);
+  MODAR_TRY(verify_signature(document->text, document->signature, trust.key));
+  MODAR_ASSIGN(const auto fresh, parse_freshness(document->text));
+  if (fresh.version == release.version && fresh.epoch == release.epoch) return {};
+  return fail(kExitMixed, "ship.mixed", path, "it speaks of another release",
+              "sign it again: `modar ship refresh`");
+}
+
 class ObjectVerifier {
  public:
   ObjectVerifier(const ReleaseReader& read, VerifyReport& report,
@@ -173,6 +186,7 @@ Result<VerifyReport> verify_release(const ReleaseReader& read, const PublicKey& 
   MODAR_TRY(follow_links(read, trust));
   VerifyReport report;
   MODAR_ASSIGN(report.release, read_newest(read, trust));
+  MODAR_TRY(check_fresh(read, report.release, trust));
   report.key = trust.key;
   ObjectVerifier objects(read, report, progress);
   for (const ReleaseBundle& bundle : report.release.bundles) {

@@ -32,9 +32,24 @@ Result<TrustDocument> download_trust(Transfers& transfers, const std::string& pa
   return document;
 }
 
+using KeyId = std::array<std::uint8_t, 8>;
+
+/// What this device believes, and how it came to it.
+struct Belief {
+  const Store& store;
+  StoreState state;
+  /// Both copies of the state are gone though a release is installed: nothing is saved before a
+  /// document has been held against that release.
+  bool lost = false;
+  std::vector<KeyId> passed;  ///< keys that the chain led through
+
+  Result<void> save() const { return lost ? Result<void>() : store.save_state(state); }
+};
+
 /// Believes the root's word if there is a newer one than the state knows. Only the root key signs
 /// it, so no thief of a signing key can stop or forge it.
-Result<void> follow_root(Transfers& transfers, const Store& store, StoreState& state) {
+Result<void> follow_root(Transfers& transfers, Belief& belief) {
+  StoreState& state = belief.state;
   const auto document = download_trust(transfers, "root.json");
   if (!document && document.error().code == "fetch.missing") return {};
   if (!document) return tl::unexpected(document.error());
@@ -47,14 +62,14 @@ Result<void> follow_root(Transfers& transfers, const Store& store, StoreState& s
   state.epoch = word.epoch;
   state.key_serial = word.links;
   state.version = 0;
-  return store.save_state(state);
+  return belief.save();
 }
 
 /// Moves the trust along the chain of keys until `wanted` is trusted; to the chain's end where the
 /// state is fresh, so that a key that was left behind is not believed again. What verifies is saved
 /// at once.
-Result<void> follow_chain(Transfers& transfers, const Signature& wanted, const Store& store,
-                          StoreState& state) {
+Result<void> follow_chain(Transfers& transfers, const Signature& wanted, Belief& belief) {
+  StoreState& state = belief.state;
   MODAR_ASSIGN(auto trusted, parse_public_key(state.trusted_key));
   while ((state.fresh || trusted.id != wanted.key_id) && state.key_serial < kMaxLinks) {
     const std::uint32_t serial = state.key_serial + 1;
@@ -71,10 +86,12 @@ Result<void> follow_chain(Transfers& transfers, const Signature& wanted, const S
       return fail(kExitMixed, "fetch.chain", path, "it is a different link of the chain",
                   "publish the chain of keys again");
     }
+    belief.passed.push_back(trusted.id);
     MODAR_ASSIGN(trusted, parse_public_key(link.key));
     state.trusted_key = public_key_line(trusted);
-    MODAR_TRY(store.save_state(state));
+    MODAR_TRY(belief.save());
   }
+  belief.passed.push_back(trusted.id);
   return {};  // where the end of the chain is not `wanted`, the signature check reports it
 }
 
@@ -90,11 +107,36 @@ Result<void> recall_trust(const std::string& given_key, StoreState& state) {
   return {};
 }
 
+/// The Freshness of a release that has one, into `news`. Errors: kExitMixed "fetch.mixed";
+/// kExitExpired "fetch.stale"; as download_release().
+Result<void> check_freshness(Transfers& transfers, const PublicKey& trusted, std::int64_t clock,
+                             StoreState& state, SignedRelease& news) {
+  if (news.release.fresh_days == 0) return {};
+  const std::string path = freshness_path(news.release.version);
+  MODAR_ASSIGN(news.fresh_text, transfers.text(path, kMaxLinkBytes));
+  MODAR_ASSIGN(const auto signature_text, transfers.text(path + ".minisig", kMaxSignatureBytes));
+  MODAR_ASSIGN(const auto signature, parse_signature(signature_text));
+  MODAR_TRY(verify_signature(news.fresh_text, signature, trusted));
+  MODAR_ASSIGN(const auto fresh, parse_freshness(news.fresh_text));
+  if (fresh.version != news.release.version || fresh.epoch != news.release.epoch) {
+    return fail(kExitMixed, "fetch.mixed", path, "it speaks of another release",
+                "sign it again: `modar ship refresh`");
+  }
+  if (fresh.expires <= clock) {
+    return fail(
+        kExitExpired, "fetch.stale", path,
+        "nobody has said since " + time_text(fresh.time) + " that this release is the newest",
+        "sign it again: `modar ship refresh`, or set this device's clock");
+  }
+  state.time = std::max(state.time, fresh.time);
+  return {};
+}
+
 /// The server's newest release. Where another key than the trusted one has signed it, asks for the
 /// root's word and follows the chain of keys.
 /// Errors: kExitWrongKey; kExitMixed; kExitNetwork; kInvalidInput "release.*".
-Result<SignedRelease> download_release(Transfers& transfers, const Store& store,
-                                       StoreState& state) {
+Result<SignedRelease> download_release(Transfers& transfers, std::int64_t clock, Belief& belief) {
+  StoreState& state = belief.state;
   MODAR_ASSIGN(const auto latest, transfers.text("latest", kMaxLatestBytes));
   MODAR_ASSIGN(const auto version, parse_latest(latest));
   const std::string path = "releases/" + std::to_string(version) + ".json";
@@ -106,8 +148,8 @@ Result<SignedRelease> download_release(Transfers& transfers, const Store& store,
   MODAR_ASSIGN(const auto signature, parse_signature(news.signature_text));
   MODAR_ASSIGN(const auto before, parse_public_key(state.trusted_key));
   if (state.fresh || before.id != signature.key_id) {
-    MODAR_TRY(follow_root(transfers, store, state));
-    MODAR_TRY(follow_chain(transfers, signature, store, state));
+    MODAR_TRY(follow_root(transfers, belief));
+    MODAR_TRY(follow_chain(transfers, signature, belief));
   }
   MODAR_ASSIGN(const auto trusted, parse_public_key(state.trusted_key));
   MODAR_TRY(verify_signature(news.text, signature, trusted));
@@ -117,6 +159,7 @@ Result<SignedRelease> download_release(Transfers& transfers, const Store& store,
                 "publish the release again");
   }
   news.release = std::move(release);
+  MODAR_TRY(check_freshness(transfers, trusted, clock, state, news));
   return news;
 }
 
@@ -170,6 +213,41 @@ Result<void> judge_release(const SignedRelease& news, const StoreState& state,
   return {};
 }
 
+/// Where the state was lost, the installed release tells what was believed: no epoch before its
+/// own, and in its epoch no keys that do not lead past the one that signed it.
+Result<void> judge_lost_state(const SignedRelease& news, const Belief& belief,
+                              const std::optional<InstalledRelease>& installed) {
+  if (!belief.lost || !installed || news.release.epoch > installed->release.epoch) return {};
+  const std::string where = "release " + std::to_string(news.release.version);
+  if (news.release.epoch < installed->release.epoch) {
+    return fail(kExitRollBack, "fetch.epoch", where,
+                "it is of epoch " + std::to_string(news.release.epoch) + ", the installed one of " +
+                    std::to_string(installed->release.epoch),
+                "publish it again; for another publisher, name another store");
+  }
+  const auto text = installed->folder.read("release.json.minisig", kMaxSignatureBytes);
+  const auto signature = parse_signature(text.value_or(""));
+  const bool led = !signature || std::find(belief.passed.begin(), belief.passed.end(),
+                                           signature->key_id) != belief.passed.end();
+  if (led) return {};
+  return fail(kExitWrongKey, "fetch.retired", where,
+              "the server's keys do not lead to " + to_hex(signature->key_id) +
+                  ", which signed the installed release",
+              "publish the chain of keys again; for another publisher, name another store");
+}
+
+/// The time, as late as is known: clocks of devices start in 1970 without a battery.
+std::int64_t clock_of(const FetchOptions& options, const StoreState& state,
+                      const std::optional<InstalledRelease>& active) {
+  // Nothing that this program reads was signed before it was written: raised with each release.
+  constexpr std::int64_t kNotBefore = 1'795'392'000;  // 2026-11-23
+  std::int64_t clock = options.now != 0 ? options.now : std::int64_t{std::time(nullptr)};
+  clock = std::max({clock, kNotBefore, state.time});
+  const auto text = active ? active->folder.read("fresh.json", kMaxLinkBytes) : std::nullopt;
+  const auto fresh = parse_freshness(text.value_or(""));
+  return fresh ? std::max(clock, fresh->time) : clock;
+}
+
 /// The bundles that this device wants.
 Result<std::vector<ReleaseBundle>> choose_bundles(const Release& release,
                                                   const FetchOptions& options) {
@@ -220,11 +298,15 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   const std::string installed =
       active ? "release " + std::to_string(active->release.version) : "nothing installed";
   MODAR_ASSIGN(auto transfers, Transfers::create(transfer_options(options, installed)));
-  StoreState state = store.state();
+  Belief belief{store, store.state(), false, {}};
+  StoreState& state = belief.state;
+  belief.lost = state.fresh && active.has_value();
   MODAR_TRY(recall_trust(options.trusted_key, state));
-  MODAR_ASSIGN(const auto news, download_release(transfers, store, state));
-  MODAR_TRY(
-      judge_release(news, state, active, options.now != 0 ? options.now : std::time(nullptr)));
+  const std::int64_t known_time = state.time;
+  const std::int64_t clock = clock_of(options, state, active);
+  MODAR_ASSIGN(const auto news, download_release(transfers, clock, belief));
+  MODAR_TRY(judge_lost_state(news, belief, active));
+  MODAR_TRY(judge_release(news, state, active, clock));
   MODAR_ASSIGN(const auto chosen, choose_bundles(news.release, options));
 
   FetchReport report;
@@ -233,6 +315,9 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   if (report.changed) {
     MODAR_TRY(install({options, store, transfers, news, std::move(active), chosen}, report));
   } else {
+    if (!news.fresh_text.empty() && state.time > known_time) {
+      MODAR_TRY(active->folder.replace("fresh.json", news.fresh_text));
+    }
     MODAR_TRY(store.link_bundles(news.release));
   }
   state.version = news.release.version;

@@ -392,6 +392,7 @@ class Installation {
 
   /// The documents last: a slot with a release.json is complete.
   Result<void> finish() {
+    if (!news_.fresh_text.empty()) MODAR_TRY(slot_.replace("fresh.json", news_.fresh_text));
     return slot_.replace("release.json.minisig", news_.signature_text)
         .and_then([&] { return slot_.replace("release.json", news_.text); })
         .and_then([&] {

@@ -16,6 +16,7 @@ struct SignedRelease {
   std::string text;
   std::string signature_text;
   Release release;
+  std::string fresh_text;  ///< its Freshness; empty: it has none
 };
 
 struct InstallationJob {

@@ -194,6 +194,7 @@ namespace {
 
 constexpr const char* kReleaseFormat = "modar-release";
 constexpr const char* kKeyFormat = "modar-key";
+constexpr const char* kFreshFormat = "modar-fresh";
 constexpr const char* kRootFormat = "modar-root";
 constexpr std::string_view kNeverText = "never";
 constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 53;  ///< exact in JSON
@@ -345,6 +346,10 @@ Result<Release> parse_release(std::string_view json) {
     release.epoch = members.number("epoch", kMaxNumber);
     if (release.epoch == 0) return bad("epoch", "epochs begin at 1");
   }
+  if (document.HasMember("fresh_days")) {
+    release.fresh_days = members.number("fresh_days", 36500);
+    if (release.fresh_days == 0) return bad("fresh_days", "it is 1 or more");
+  }
   std::set<std::string> names;
   for (const rapidjson::Value& json_bundle : bundles->GetArray()) {
     MODAR_ASSIGN(auto bundle, read_bundle(json_bundle));
@@ -367,6 +372,7 @@ std::string release_text(const Release& release) {
   if (release.epoch != 0) put(json, "epoch", release.epoch);
   put(json, "version", release.version);
   put(json, "expires", time_text(release.expires));
+  if (release.fresh_days != 0) put(json, "fresh_days", release.fresh_days);
   json.Key("bundles");
   json.StartArray();
   for (const ReleaseBundle& bundle : release.bundles) write_bundle(json, bundle);
@@ -432,6 +438,39 @@ std::string time_text(std::int64_t seconds) {
                 static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
                 static_cast<unsigned>(date.day()), of_day / 3600, of_day / 60 % 60, of_day % 60);
   return text.data();
+}
+
+std::string freshness_path(std::uint64_t version) {
+  return "releases/" + std::to_string(version) + ".fresh.json";
+}
+
+Result<Freshness> parse_freshness(std::string_view text) {
+  MODAR_ASSIGN(const auto document, parse_document(text, kFreshFormat));
+  Members members(document);
+  Freshness freshness;
+  if (document.HasMember("epoch")) freshness.epoch = members.number("epoch", kMaxNumber);
+  freshness.version = members.number("version", kMaxNumber);
+  const std::string time = members.text("time");
+  const std::string expires = members.text("expires");
+  if (!members.missing().empty()) return bad(members.missing(), "it is missing or wrong");
+  MODAR_ASSIGN(freshness.time, parse_time(time));
+  MODAR_ASSIGN(freshness.expires, parse_time(expires));
+  return freshness;
+}
+
+std::string freshness_text(const Freshness& freshness) {
+  rapidjson::StringBuffer buffer;
+  Writer json(buffer);
+  json.SetIndent(' ', 1);
+  json.StartObject();
+  put(json, "format", kFreshFormat);
+  put(json, "format_version", std::uint64_t{1});
+  if (freshness.epoch != 0) put(json, "epoch", freshness.epoch);
+  put(json, "version", freshness.version);
+  put(json, "time", time_text(freshness.time));
+  put(json, "expires", time_text(freshness.expires));
+  json.EndObject();
+  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
 }
 
 Result<KeyLink> parse_key_link(std::string_view json) {

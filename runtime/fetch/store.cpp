@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kMaxStateBytes = 65536;
 constexpr std::size_t kMaxPointerBytes = 64;
+constexpr std::uint64_t kMaxTime = 253402300799;  // the end of 9999
 constexpr std::string_view kBundle = ".modar";
 constexpr std::string_view kRecipe = ".recipe";
 constexpr std::string_view kLinkTarget = "current/";
@@ -71,7 +72,9 @@ std::optional<StoreState> parse_state(std::string_view text) {
   StoreState state;
   state.fresh = false;
   const auto number = [&](const char* key, std::uint64_t& to) {
-    if (!json.HasMember(key)) return key == std::string_view("epoch");  // stores before epochs
+    if (!json.HasMember(key)) {
+      return key == std::string_view("epoch") || key == std::string_view("time");  // older stores
+    }
     if (!json[key].IsUint64()) return false;
     to = json[key].GetUint64();
     return true;
@@ -82,19 +85,22 @@ std::optional<StoreState> parse_state(std::string_view text) {
     return parse_public_key(to).has_value();
   };
   std::uint64_t serial = 0;
+  std::uint64_t time = 0;
   if (!number("epoch", state.epoch) || !number("version", state.version) ||
-      !number("key_serial", serial) || serial > 0xFFFFFFFFu ||
-      !key_line("root_key", state.root_key) || !key_line("trusted_key", state.trusted_key)) {
+      !number("key_serial", serial) || !number("time", time) || time > kMaxTime ||
+      serial > 0xFFFFFFFFu || !key_line("root_key", state.root_key) ||
+      !key_line("trusted_key", state.trusted_key)) {
     return std::nullopt;
   }
   state.key_serial = static_cast<std::uint32_t>(serial);
+  state.time = static_cast<std::int64_t>(time);
   return state;
 }
 
 StoreState Store::state() const {
   StoreState best;
   const auto rank = [](const StoreState& s) {
-    return std::tuple(s.epoch, s.key_serial, s.version);
+    return std::tuple(s.epoch, s.key_serial, s.version, s.time);
   };
   for (const Folder* folder : {&root_, &slots_}) {
     const auto text = folder->read("state.json", kMaxStateBytes);
@@ -119,6 +125,8 @@ Result<void> Store::save_state(const StoreState& state) const {
   json.String(state.trusted_key.c_str());
   json.Key("key_serial");
   json.Uint(state.key_serial);
+  json.Key("time");
+  json.Uint64(static_cast<std::uint64_t>(state.time));
   json.EndObject();
   const std::string_view text(buffer.GetString(), buffer.GetSize());
   MODAR_TRY(root_.replace("state.json", text));
@@ -220,7 +228,7 @@ Result<void> Store::remove_pieces(const std::set<std::string>& keep) const {
 Result<void> Store::clear_slot(const Folder& slot, const std::set<std::string>& keep) const {
   // Without its document the slot is no release. A bundle is ours if its recipe lies beside it:
   // that is written first and removed last.
-  for (const char* name : {"release.json", "release.json.minisig"}) {
+  for (const char* name : {"release.json", "release.json.minisig", "fresh.json"}) {
     MODAR_TRY(slot.remove(name));
   }
   for (const std::string& name : slot.list()) {

@@ -32,7 +32,8 @@ struct StoreState {
   std::string root_key;       ///< public_key_line() that was given with --trust
   std::string trusted_key;    ///< where the root's word and the chain of keys have led to
   std::uint32_t key_serial = 0;
-  bool fresh = true;  ///< nothing is known: a new store, or both copies are lost
+  std::int64_t time = 0;  ///< latest that a believed document was signed at, seconds since 1970
+  bool fresh = true;      ///< nothing is known: a new store, or both copies are lost
 };
 
 /// Reads state.json; nothing if it is damaged.

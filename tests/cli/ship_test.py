@@ -391,8 +391,108 @@ class Keys(ShipTest):
         # All is lost: the chain of the server is followed to its end.
         for name in ("state.json", "slots/state.json"):
             (self.store / name).unlink(missing_ok=True)
+        self.assert_fails(self.fetch(thief), 10, "fetch.retired")  # a thief leaves the chain out
         shutil.copytree(self.site / "keys", thief / "keys", dirs_exist_ok=True)
         self.assert_fails(self.fetch(thief), 10, "signature.key")
+        self.fetch_json()
+
+    def lose_state(self):
+        for name in ("state.json", "slots/state.json"):
+            (self.store / name).unlink(missing_ok=True)
+
+    def test_a_lost_state_keeps_the_installed_epoch(self):
+        root, signing, next_key = (self.folder / name for name in ("root", "signing", "next"))
+        for key in (root, signing, next_key):
+            self.modar("ship", "keygen", "--out", key)
+        trust = f"{root}.pub"
+        self.modar("ship", "root", "--to", self.site, "--key", root, "--next", f"{signing}.pub")
+        self.publish(self.shop.old, key=signing)
+        thief = shutil.copytree(self.site, self.folder / "thiefs-site")
+        self.publish(self.shop.new, key=signing, site=thief, options=["--release", "99"])
+        self.modar("ship", "root", "--to", self.site, "--key", root, "--next", f"{next_key}.pub")
+        self.publish(self.shop.old, key=next_key)
+        self.fetch_json(trust=trust)
+        for _ in range(2):  # what is refused leaves nothing behind
+            self.lose_state()
+            for _ in range(2):
+                self.assert_fails(self.fetch(thief, trust=trust), 11, "fetch.epoch")
+        self.assertEqual(self.fetch_json(trust=trust)["epoch"], 2)
+        self.assert_fails(self.fetch(thief, trust=trust), 10, "signature.key")
+        # Another publisher's root, given by whoever owns the device, counts anew.
+        mine = self.folder / "mine"
+        self.publish(self.shop.new, site=mine)
+        self.assertEqual(self.fetch_json(mine)["epoch"], 0)
+
+    def test_a_release_held_back_is_noticed_within_days(self):
+        self.publish(self.shop.old, options=["--fresh-days", "3"])
+        self.fetch_json()
+        fresh = self.site / "releases" / "1.fresh.json"
+        held_back = shutil.copytree(self.site, self.folder / "held-back")
+        self.assert_stale(held_back, 4)
+        self.assertEqual(self.fetch_at(held_back, 2).returncode, 0)
+        refresh = ["ship", "refresh", "--to", self.site, "--key", self.shop.key]
+        before = fresh.read_text()
+        time.sleep(1.1)  # its times are whole seconds
+        self.assertEqual(self.modar(*refresh).returncode, 0)
+        self.assertNotEqual(fresh.read_text(), before)
+        self.assertFalse(self.fetch_json()["changed"])
+        self.assertEqual((self.store / "current" / "fresh.json").read_text(), fresh.read_text())
+        # A later release has it as well, unless it is told not to; the freshness of one is none of another.
+        self.publish(self.shop.new)
+        self.assertTrue((self.site / "releases" / "2.fresh.json").is_file())
+        for end in ("", ".minisig"):
+            shutil.copy(f"{fresh}{end}", self.site / "releases" / f"2.fresh.json{end}")
+        self.assert_fails(self.fetch(), 13, "fetch.mixed", "2.fresh.json")
+        verify = ["ship", "verify", self.site, "--trust", self.trust]
+        self.assert_fails(self.modar(*verify), 13, "ship.mixed")
+        (self.site / "releases" / "2.fresh.json").unlink()
+        self.assert_fails(self.fetch(), 13, "fetch.missing", "2.fresh.json")
+        self.assert_fails(self.modar(*verify), 13, "ship.absent")
+        self.assertEqual(self.modar(*refresh).returncode, 0)
+        self.assertEqual(self.modar(*verify).returncode, 0)
+        self.fetch_json()
+        self.publish(self.shop.old, options=["--fresh-days", "0"])
+        self.assert_fails(self.modar(*refresh), 1, "ship.fresh")
+        self.fetch_json()
+        other = self.folder / "other"
+        self.modar("ship", "keygen", "--out", other)
+        self.assert_fails(self.modar("ship", "refresh", "--to", held_back, "--key", other), 1, "ship.key")
+        self.modar("ship", "prune", "--to", self.site, "--keep", "1")
+        self.assertEqual(sorted(p.name for p in (self.site / "releases").iterdir()), ["3.json", "3.json.minisig"])
+
+    def fetch_at(self, site, days):
+        """As on a device whose clock is so many days ahead, into a store of its own."""
+        return self.fetch(site, store=self.folder / f"at{days}", env=self.clock(time.time() + 86400 * days))
+
+    def assert_stale(self, site, days):
+        self.assert_fails(self.fetch_at(site, days), 12, "fetch.stale", "modar ship refresh")
+
+    def clock(self, seconds):
+        """An environment in which time() says so."""
+        source = self.folder / "clock.c"
+        source.write_text(f"long time(long* to) {{ if (to) *to = {int(seconds)}L; return {int(seconds)}L; }}\n")
+        library = self.folder / f"clock{int(seconds)}.so"
+        subprocess.run(["cc", "-shared", "-fPIC", "-fno-builtin", "-o", library, source], check=True)
+        return {"LD_PRELOAD": str(library), "ASAN_OPTIONS": "verify_asan_link_order=0"}
+
+    def test_a_clock_that_was_set_back_brings_nothing_back(self):
+        soon = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() + 86400))
+        self.publish(self.shop.old, options=["--expires", soon, "--fresh-days", "9"])
+        before = shutil.copytree(self.site, self.folder / "before")
+        self.assertEqual(self.fetch(before, store=self.folder / "early", env=self.clock(0)).returncode, 0)
+        self.fetch_json()
+        # A freshness of three days later was believed; that release expires before it.
+        state = json.loads((self.store / "state.json").read_text())
+        self.assertGreater(state["time"], time.time() - 3600)
+        state["time"] += 3 * 86400
+        for name in ("state.json", "slots/state.json"):
+            (self.store / name).write_text(json.dumps(state))
+        for now in (0, time.time()):
+            self.assert_fails(self.fetch(before, env=self.clock(now)), 12, "fetch.expired")
+        # With no state at all, the day of the program's release counts: what expired before it stays expired.
+        old = self.folder / "old-site"
+        self.publish(self.shop.old, site=old, options=["--expires", "2026-11-01T00:00:00Z"])
+        self.assert_fails(self.fetch(old, store=self.folder / "new", env=self.clock(0)), 12, "fetch.expired")
 
     def test_trust_is_saved_before_the_release_is(self):
         self.publish(self.shop.old)

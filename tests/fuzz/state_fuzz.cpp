@@ -27,6 +27,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const modar::fetch::StoreState again = store->state();
   need(!again.fresh && again.epoch == state->epoch && again.version == state->version &&
        again.root_key == state->root_key && again.trusted_key == state->trusted_key &&
-       again.key_serial == state->key_serial);
+       again.key_serial == state->key_serial && again.time == state->time);
   return 0;
 }

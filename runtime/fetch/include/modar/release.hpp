@@ -102,6 +102,7 @@ struct Release {
   std::uint64_t epoch = 0;             ///< of the root's word that named the signing key; 0: none
   std::uint64_t version = 0;           ///< 1 or more; only grows within an epoch
   std::int64_t expires = 0;            ///< seconds since 1970-01-01, UTC; kNever: does not
+  std::uint64_t fresh_days = 0;        ///< so often its Freshness is signed anew; 0: it has none
   std::vector<ReleaseBundle> bundles;  ///< at least one; names differ in more than case
 };
 inline constexpr std::int64_t kNever = 0;
@@ -121,6 +122,20 @@ Result<std::uint64_t> parse_latest(std::string_view text);
 /// "2027-01-31T00:00:00Z" to seconds. Errors: kInvalidInput "release.time".
 Result<std::int64_t> parse_time(std::string_view text);
 std::string time_text(std::int64_t seconds);
+
+/// Says, signed anew every few days, that a release is still the newest: who holds updates back
+/// cannot say so.
+struct Freshness {
+  std::uint64_t epoch = 0;
+  std::uint64_t version = 0;  ///< of the release
+  std::int64_t time = 0;      ///< when it was signed, seconds since 1970, UTC
+  std::int64_t expires = 0;   ///< until when it counts
+};
+/// "releases/N.fresh.json".
+std::string freshness_path(std::uint64_t version);
+/// Errors: kInvalidInput "release.*".
+Result<Freshness> parse_freshness(std::string_view json);
+std::string freshness_text(const Freshness& freshness);
 
 /// A link of the chain of keys: signed by one key, it names the key that follows.
 struct KeyLink {
