@@ -100,10 +100,14 @@ Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   std::fprintf(stderr,
                "found the corners %s, see %s; if they are wrong, give others with --corners\n",
                corners_text(found.corners).c_str(), command.picture.c_str());
-  command.doubtful = found.sharpness < kDoubtfulSharpness;
+  const char* doubt = found.sharpness < kDoubtfulSharpness ? "an edge is hidden or blurred"
+                      : found.framed ? "another edge lies around them, perhaps the sheet's"
+                      : found.fills  ? "they fill the photo, which may be the picture already"
+                                     : nullptr;
+  command.doubtful = doubt != nullptr;
   if (command.doubtful) {
     print_diagnostic({"rectify.doubtful", DiagnosticSeverity::kWarning, command.photo, 0,
-                      "an edge is hidden or blurred: the corners may be wrong",
+                      std::string("the corners may be wrong: ") + doubt,
                       "look at " + command.picture + ", and give --corners where they are"});
   }
   return {};

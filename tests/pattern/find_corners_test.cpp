@@ -89,6 +89,42 @@ TEST(FindCorners, WithinOnePercentOfTheWidth) {
   }
 }
 
+/// Darkens a table beside what lies there, as a soft shadow does.
+cv::Mat shaded(const cv::Mat& table, const Corners& corners) {
+  cv::Mat light(table.size(), CV_32F, cv::Scalar(1));
+  std::vector<cv::Point> outline;
+  for (const cv::Point2f& corner : corners) outline.emplace_back(corner + cv::Point2f(8, 8));
+  cv::fillConvexPoly(light, outline, cv::Scalar(0.5), cv::LINE_AA);
+  cv::GaussianBlur(light, light, cv::Size(), 8);
+  cv::Mat out;
+  cv::cvtColor(light, light, cv::COLOR_GRAY2BGR);
+  table.convertTo(out, CV_32FC3);
+  cv::multiply(out, light, out);
+  out.convertTo(out, CV_8UC3);
+  return out;
+}
+
+TEST(FindCorners, AShadowIsNoPartOfTheThing) {
+  const Corners corners = {
+      {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  const auto found = find_corners(
+      as_photo(photograph(asset("mural.png"), shaded(backdrop(""), corners), corners)));
+  ASSERT_TRUE(found) << found.error().cause;
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(found->corners[i].x, static_cast<double>(corners[i].x), 2) << i;
+    EXPECT_NEAR(found->corners[i].y, static_cast<double>(corners[i].y), 2) << i;
+  }
+}
+
+TEST(FindCorners, APhotoThatIsThePictureAlreadyIsDoubted) {
+  cv::Mat scan = asset("mural.png");
+  cv::resize(scan, scan, cv::Size(900, 700));
+  cv::copyMakeBorder(scan, scan, 20, 20, 20, 20, cv::BORDER_CONSTANT, cv::Scalar(235, 238, 240));
+  const auto found = find_corners(as_photo(scan));
+  ASSERT_TRUE(found) << found.error().cause;
+  EXPECT_TRUE(found->fills);
+}
+
 TEST(FindCorners, NothingThatStandsOutIsAnError) {
   const auto empty = find_corners(as_photo(backdrop("")));
   ASSERT_FALSE(empty);
