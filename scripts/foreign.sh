@@ -139,6 +139,8 @@ if [ -n "${budget:-}" ]; then
   echo measure,instructions > "$build/arm_budget.csv"
   fat=no
   # The first interval is the opening of the bundle; the first frames search, and fill caches.
+  measure track_default_camera track-default "$build/demo.modar" 30 4
+  measure search_default_camera search-default "$build/demo.modar" 7 3
   measure track_640x480 track "$build/demo.modar" 30 4
   measure search_640x480 search "$build/demo.modar" 7 3
   measure clutter_640x480 clutter "$build/demo.modar" 7 3

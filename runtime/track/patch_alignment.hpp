@@ -60,6 +60,7 @@ struct PatchNormalEquations {
 struct PatchLinearisation {
   PatchNormalEquations equations;
   std::array<double, 12> jacobian{};  ///< two rows of six
+  glm::dvec2 world{};                 ///< of its centre, in the pattern's plane
 };
 
 /// Patches of the levels used last: six, for two levels of three patterns tracked at once.
@@ -157,6 +158,21 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
 /// How the patches fit at a pose, without moving it.
 PatchFit evaluate(const TrackedPattern& pattern, const FrameView& frame, int frame_level,
                   const Pose& pose);
+
+/// How a flat pattern's pose follows a change of its shape.
+struct PlaneChange {
+  std::array<double, 2> shape{};           ///< (1 + a, b; b, 1 - a) on its left
+  std::array<double, 12> pose_by_shape{};  ///< the pose's step by a, then by b, times -1
+  /// Of this share of the change.
+  [[nodiscard]] glm::dmat2 shape_after(const glm::dmat2& before, double share) const;
+  [[nodiscard]] Pose pose_after(const Pose& before, double share) const;
+};
+/// Gauss-Newton on a flat pattern's pose together with two numbers of its shape, by which both are
+/// a free homography's eight; all patches of the level, or about `count`, weighed by their
+/// correlation alone. change: from the shape before, and how a pose that is weighed otherwise
+/// follows it.
+PatchFit align_plane(TrackedPattern& pattern, const FrameView& frame, int frame_level, int steps,
+                     std::size_t count, Pose& pose, PlaneChange& change);
 
 /// The same alignment over the eight parameters of a homography, for a plane that no pose of the
 /// given camera explains. Ignores the change of the lens distortion across the update.

@@ -42,16 +42,19 @@ constexpr int kRemembered = 10;
 // as much as following takes, for how soon it is measured again.
 constexpr int kLookEvery = 4;
 
-// Frames between views that are measured for the camera: trades their time, that of tracking again,
-// for how soon it is known. And the patches that must fit, and their share, for paper to be taken
-// as flat and uncovered.
-constexpr int kMeasureEvery = 3;
+// Frames between measurements of a plane: trades their time, half of tracking's, for how soon the
+// camera is known. Where the last one moved a corner by so many pixels the next comes sooner: with
+// a wrong focal length a shape lags behind a turn. And the patches that must fit, and their share,
+// for paper to be taken as flat and uncovered.
+constexpr int kMeasureEvery = 5;
+constexpr int kMeasureSoon = 2;
+constexpr double kMovedShape = 0.4;
 constexpr int kFlatPatches = 24;
 constexpr double kFlatRatio = 0.6;
 // Steps of a homography from where a pose has the pattern, and the share that a measurement has in
 // the shape: less lags, more trembles.
 constexpr int kMeasuringSteps = 2;
-constexpr double kNewShape = 0.5;
+constexpr double kNewShape = 0.7;
 // Share by which a focal length may change until what was learned around a pattern is wrong.
 constexpr double kLearnedAnew = 0.01;
 
@@ -62,6 +65,10 @@ struct Return {
   glm::dvec3 turn{};
   glm::dvec3 way{};
 };
+
+bool shows_flat(const PatchFit& fit) {
+  return fit.inlier_ratio() >= kFlatRatio && fit.inliers >= kFlatPatches;
+}
 
 /// Largest way of a corner, pixels.
 double way_of(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
@@ -145,8 +152,11 @@ struct PoseLoop::State {
 
   void step(const GrayImage& frame, TrackResult& result);
   void track_all(TrackResult& result);
-  void measure_camera(TrackResult& result);
-  bool measure_view(std::size_t i);
+  void measure(std::size_t i, Detection& detection);
+  bool view_plane(const TrackedPattern& plane, const Pose& pose,
+                  tracker::CameraEstimator::View& view, tracker::PlaneSplit& split) const;
+  bool measure_first(std::size_t i, tracker::CameraEstimator::View& view);
+  bool measure_again(std::size_t i, tracker::CameraEstimator::View& view);
   void apply_estimate();
   void advance_search(TrackResult& result);
   bool search_due(bool any_tracked);
@@ -312,7 +322,6 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
       accept(result);
     }
   }
-  if (estimator != nullptr) measure_camera(result);
   if (surroundings != nullptr) extend(result);
   turn.reset();
   for (const Track& track : tracks) {
@@ -354,6 +363,7 @@ void PoseLoop::State::track_all(TrackResult& result) {
     if (track.tracked && track.doubts > 0) {
       track.shown_reason = Reason::kLostByBlur;
     } else if (track.tracked) {
+      measure(i, detection);
       const auto frame = frame_tracker.frame();
       show(i,
            track.judged ? print_judge->follow(i, frame, track)
@@ -366,54 +376,84 @@ void PoseLoop::State::track_all(TrackResult& result) {
   }
 }
 
-/// Measures tracked flat patterns by free homographies: what these say of the camera, and what a
-/// pose leaves of them, since no camera explains the pictures of a stabilised or distorting one.
-void PoseLoop::State::measure_camera(TrackResult& result) {
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    Track& track = tracks[i];
-    if (!track.tracked || track.doubts > 0 || !patterns[i].surface.flat()) continue;
-    if (--track.frames_to_measure > 0) continue;
-    track.frames_to_measure = kMeasureEvery;
-    const bool first = !track.measured;
-    track.measured = measure_view(i) || track.measured;
-    if (!first || !track.measured) continue;
-    for (Detection& seen : result.visible) {
-      if (seen.pattern == patterns[i].index) frame_tracker.locate(patterns[i], track, seen);
-    }
-  }
+/// Measures a tracked flat pattern's free homography: what it says of the camera, and what a pose
+/// leaves of it, since no camera explains the pictures of a stabilised or distorting one.
+void PoseLoop::State::measure(std::size_t i, Detection& detection) {
+  Track& track = tracks[i];
+  if (estimator == nullptr || !patterns[i].surface.flat() || track.doubts > 0) return;
+  if (--track.frames_to_measure > 0 && track.measured) return;
+  track.frames_to_measure = kMeasureEvery;
+  tracker::CameraEstimator::View view{i, {}, {}, track.pose};
+  if (!(track.measured ? measure_again(i, view) : measure_first(i, view))) return;
+  if (estimator->is_new(i, view.pixels)) estimator->add(view);
+  const std::array<glm::dvec2, 4> before = detection.corners;
+  frame_tracker.locate(patterns[i], track, detection);
+  if (!track.measured || way_of(before, detection.corners) > kMovedShape)
+    track.frames_to_measure = kMeasureSoon;
+  track.measured = true;
+  track.homography_only = false;
 }
 
-/// Measures a tracked pattern's plane; false if the frame shows too little of it.
-bool PoseLoop::State::measure_view(std::size_t i) {
-  TrackedPattern& pattern = patterns[i];
+/// Goes to a pattern's plane at a pose; false if the camera could not see it there, or sees too
+/// little of it.
+bool PoseLoop::State::view_plane(const TrackedPattern& plane, const Pose& pose,
+                                 tracker::CameraEstimator::View& view,
+                                 tracker::PlaneSplit& split) const {
+  const tracker::PlaneMap map = tracker::map_of_pose(plane, camera, pose);
+  const auto known = tracker::split_map(plane, camera, map, estimator->aspect(view.pattern));
+  if (!known || !places_in_view(plane, map, camera, view)) return false;
+  split = *known;
+  view.pose = split.pose;
+  return true;
+}
+
+/// From where a pose, or a map, was found.
+bool PoseLoop::State::measure_first(std::size_t i, tracker::CameraEstimator::View& view) {
   Track& track = tracks[i];
-  const auto frame = frame_tracker.frame();
-  tracker::CameraEstimator::View view{i, {}, {}, track.pose};
-  tracker::PlaneMap map =
-      track.homography_only ? track.map : tracker::map_of_pose(pattern, camera, track.pose);
-  if (!places_in_view(pattern, map, camera, view)) return false;
+  TrackedPattern plane = patterns[i];
+  Pose pose = track.pose;
+  tracker::PlaneSplit split;
+  if (track.homography_only) {
+    const auto known = tracker::split_map(plane, camera, track.map, estimator->aspect(i));
+    if (!known) return false;
+    plane.shape = known->shape;
+    pose = known->pose;
+  }
   PatchFit fit;
-  if (track.measured) {
-    const auto levels = static_cast<int>(frame.pyramid.size());
-    fit = tracker::align_map(pattern, frame, tracker::finest(pattern, map, levels).frame_level,
-                             kMeasuringSteps, map);
-  } else if (!tracker::refine_map(pattern, frame, map, fit, tracker::SearchRadius::kFrame)) {
+  if (!tracker::refine_plane(plane, frame_tracker.frame(), pose, fit) || !shows_flat(fit) ||
+      !view_plane(plane, pose, view, split)) {
     return false;
   }
-  if (fit.inlier_ratio() < kFlatRatio || fit.inliers < kFlatPatches ||
-      !places_in_view(pattern, map, camera, view)) {
+  track.pose = split.pose;
+  patterns[i].shape = split.shape;
+  return true;
+}
+
+/// From where tracking has it.
+bool PoseLoop::State::measure_again(std::size_t i, tracker::CameraEstimator::View& view) {
+  Track& track = tracks[i];
+  TrackedPattern plane = patterns[i];
+  Pose pose = track.pose;
+  tracker::PlaneChange change;
+  tracker::PlaneSplit split;
+  const auto frame = frame_tracker.frame();
+  const tracker::PlaneMap map = tracker::map_of_pose(plane, camera, pose);
+  const int level = tracker::finest(plane, map, static_cast<int>(frame.pyramid.size())).frame_level;
+  if (!places_in_view(plane, map, camera, view) ||
+      !shows_flat(tracker::align_plane(plane, frame, level, kMeasuringSteps, tracker::kMaxPatches,
+                                       pose, change)) ||
+      !view_plane(plane, pose, view, split)) {
     return false;
   }
-  const auto plane = tracker::split_map(pattern, camera, map, estimator->aspect(i));
-  if (!plane) return false;
-  if (estimator->is_new(i, view.pixels)) {
-    view.pose = plane->pose;
-    estimator->add(view);
-  }
-  const double share = track.measured ? kNewShape : 1.0;
-  pattern.shape = (1.0 - share) * pattern.shape + share * plane->shape;
-  track.pose = plane->pose;
-  track.homography_only = false;
+  // Tracking weighs patches otherwise: it goes on from its own pose, as the shape moves that, and
+  // its motion from where that shape would have had the pattern a frame before.
+  const Pose moved = change.pose_after(track.pose, kNewShape);
+  const glm::dmat3 undo = glm::transpose(track.pose.rotation);
+  track.previous.translation +=
+      track.previous.rotation * (undo * (moved.translation - track.pose.translation));
+  track.previous.rotation = track.previous.rotation * undo * moved.rotation;
+  track.pose = moved;
+  patterns[i].shape = change.shape_after(patterns[i].shape, kNewShape);
   return true;
 }
 
@@ -590,6 +630,7 @@ void PoseLoop::State::accept(TrackResult& result) {
       track.again = before.frames_since_lost < tracker::kRecentFrames;
       PrintJudge::Verdict verdict;
       track.judged = judges_finds();
+      if (track.judged) measure(i, detection);
       if (track.judged) verdict = print_judge->meet(i, frame_tracker.frame(), track, track.again);
       track.shown_reason = verdict.reason;
       if (resolve_overlap(i, detection, result)) {

@@ -113,6 +113,26 @@ bool refine_map(const TrackedPattern& pattern, const FrameView& frame, PlaneMap&
   return fit.good() && map_photometric_percent(pattern, frame, map) > 0;
 }
 
+bool refine_plane(TrackedPattern& pattern, const FrameView& frame, Pose& pose, PatchFit& fit) {
+  // Of a level: a wrong focal length, or aspect, leaves a pose some pixels beside.
+  constexpr int kPlaneSteps = 3;
+  constexpr std::size_t kCoarse = 40;
+  constexpr std::size_t kFine = 128;
+  TrackedPattern plane = pattern;
+  Pose next = pose;
+  PlaneChange change;
+  const int levels = static_cast<int>(frame.pyramid.size());
+  const Resolution best = finest(pattern, map_of_pose(pattern, frame.camera, pose), levels);
+  for (int level = coarsest_level(pattern, best, levels, 1); level >= best.frame_level; --level) {
+    fit = align_plane(plane, frame, level, kPlaneSteps, level == best.frame_level ? kFine : kCoarse,
+                      next, change);
+  }
+  if (!fit.good()) return false;
+  pattern.shape = plane.shape;
+  pose = next;
+  return true;
+}
+
 // ---- From the features of a part of the pattern ----
 
 namespace {

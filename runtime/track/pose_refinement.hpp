@@ -43,6 +43,11 @@ bool refine_map(const TrackedPattern& pattern, const FrameView& frame, PlaneMap&
 int map_photometric_percent(const TrackedPattern& pattern, const FrameView& frame,
                             const PlaneMap& map);
 
+/// Aligns a flat pattern's pose and its shape with it, from where a pose alone has the pattern: a
+/// free homography, as far as one level above the finest brings it. False, and nothing changed, if
+/// too little of the pattern fits.
+bool refine_plane(TrackedPattern& pattern, const FrameView& frame, Pose& pose, PatchFit& fit);
+
 /// Root mean square distance of the points from their projections, in their sigmas.
 double reprojection_rms(const Camera& camera, const Pose& pose, const PlanePoints& points);
 

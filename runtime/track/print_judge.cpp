@@ -217,6 +217,11 @@ double PrintJudge::agreeing_share(const Evidence& seen) {
   return textured > 0 ? 1.0 * agreeing / textured : 0.0;
 }
 
+void PrintJudge::forget_mirrors(Evidence& seen) {
+  for (Cell& cell : seen.cells) cell.flips = 0;
+  seen.flipped = false;
+}
+
 /// at_once: one measurement decides; else two do, one after the other.
 void PrintJudge::measure(const TrackedPattern& print, const FrameView& frame, const Track& track,
                          bool at_once, Evidence& seen) const {
@@ -302,7 +307,7 @@ PrintJudge::Verdict PrintJudge::meet(std::size_t pattern, const FrameView& frame
       seen.flipped = true;
     }
   } else {
-    seen.flipped = false;
+    forget_mirrors(seen);
   }
   measure(patterns_[pattern], frame, track, true, seen);
   Verdict verdict = judge(seen);
@@ -314,7 +319,11 @@ PrintJudge::Verdict PrintJudge::follow(std::size_t pattern, const FrameView& fra
                                        const Track& track) {
   Evidence& seen = evidence_[pattern];
   look(pattern, frame, track, kCellsOfFrame);
-  look_for_mirrors(pattern, frame, track, kCellsOfFrame);
+  if (agreeing_share(seen) < kItselfShare) {
+    look_for_mirrors(pattern, frame, track, kCellsOfFrame);
+  } else {
+    forget_mirrors(seen);
+  }
   if (seen.next_cell / kCellsOfFrame % kBendEvery == 0) {
     measure(patterns_[pattern], frame, track, false, seen);
   }

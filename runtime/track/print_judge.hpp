@@ -86,6 +86,7 @@ class PrintJudge {
   std::int32_t rival_of(std::size_t pattern, const FrameView& frame, const Track& track, int work);
   bool related_to(std::size_t a, std::size_t b, int& work);
   static double agreeing_share(const Evidence& seen);
+  static void forget_mirrors(Evidence& seen);
   static Verdict judge(Evidence& seen);
 
   std::span<const TrackedPattern> patterns_;

@@ -5,7 +5,8 @@
 // [FRAMES [BUDGET]]] search: frames that show the pattern; clutter: frames without it; sliced:
 // both, within a budget of so many million instructions a frame; extended: before a wall, which
 // alone the last quarter of the frames shows; render: by null_gl.cpp; memory: tracks and
-// draws, and prints what memory the process holds after each stage.
+// draws, and prints what memory the process holds after each stage. track-default, search-default:
+// while the camera is a guess, as apps have it that give none.
 #include <unistd.h>
 
 #include <algorithm>
@@ -135,7 +136,9 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   const Camera camera = default_camera(width, height);
   PoseLoopOptions options;
   options.extended = what == "extended";
-  options.track = what == "track" || what == "sliced" || options.extended;
+  options.estimate_camera = what == "track-default" || what == "search-default";
+  options.track =
+      what == "track" || what == "track-default" || what == "sliced" || options.extended;
   if (what == "sliced") options.budget = budget;
   const auto loop = PoseLoop::create(bundle, camera, options);
   if (!loop) return give_up(to_line(loop.error()));
