@@ -65,6 +65,7 @@ for _ in $(seq 60); do
   [ "$(sinfo -h -t idle -o %D 2>/dev/null || true)" != 3 ] || break
   sleep 0.5
 done
+disown -a  # the shell does not report their end
 [ "$(sinfo -h -t idle -o %D)" = 3 ] || { echo "the nodes did not come up:" >&2; tail -n 5 "$work"/*.log >&2; exit 4; }
 
 # --- Projects ---
@@ -97,11 +98,11 @@ until [ "$(find .modar/plan -type f ! -name '*.d' 2>/dev/null | wc -l)" -ge 6 ];
 # killed is an edge that fails, whatever the moment. Then its daemon.
 killed=0
 while [ $killed = 0 ] && kill -0 "$ninja" 2>/dev/null; do
-  for process in /proc/[0-9]*; do
-    environment=$({ tr '\0' '\n' <"$process/environ"; } 2>/dev/null || true)
-    if [ "$(cat "$process/comm" 2>/dev/null || true)" = modar ] && grep -qx "SLURM_CONF=$SLURM_CONF" <<<"$environment" &&
-      grep -qx SLURMD_NODENAME=node2 <<<"$environment"; then
-      if kill -9 "${process#/proc/}" 2>/dev/null; then killed=$((killed + 1)); fi
+  for pid in $(pgrep -x modar); do
+    environment=$({ tr '\0' '\n' <"/proc/$pid/environ"; } 2>/dev/null || true)
+    if grep -qx "SLURM_CONF=$SLURM_CONF" <<<"$environment" && grep -qx SLURMD_NODENAME=node2 <<<"$environment" &&
+      kill -9 "$pid" 2>/dev/null; then
+      killed=$((killed + 1))
     fi
   done
 done
