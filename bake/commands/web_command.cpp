@@ -14,6 +14,7 @@ namespace {
 struct WebCommand {
   SiteOptions options;
   bool serve = false;
+  std::string bind = "0.0.0.0";
   int port = 8443;
   bool quiet = false;
   bool json = false;
@@ -44,7 +45,7 @@ Result<ExitCode> run_web(const WebCommand& command) {
                  human_bytes(site.page_bytes).c_str(), human_bytes(site.bundle_bytes).c_str());
   }
   if (!command.serve) return ExitCode::kOk;
-  MODAR_TRY(serve_site({command.options.output, command.port},
+  MODAR_TRY(serve_site({command.options.output, command.bind, command.port},
                        [&](const auto& urls) { print_addresses(command, urls); }));
   return ExitCode::kOk;
 }
@@ -74,6 +75,9 @@ void add_web(CommandLine& program) {
               {.type = "DIR"});
   line.flag("--force", options.force, "Write into a folder that holds other files as well");
   line.flag("--serve", command->serve, "Serve it by HTTPS, with a QR code of the address");
+  line.option("--bind", &command->bind,
+              "Of that server: this address alone, 127.0.0.1 for this machine; 0.0.0.0: all",
+              {.type = "ADDRESS", .shows_default = true});
   line.option("--port", &command->port, "Of that server; 0: any that is free",
               {.shows_default = true, .least = 0, .most = 65535});
   line.flag("--quiet", command->quiet, "Print nothing but errors and addresses");

@@ -8,15 +8,21 @@
 #include <netinet/in.h>
 
 #include <array>
+#include <filesystem>
 #include <memory>
+#include <thread>
 
 #include <httplib.h>
 #include <openssl/evp.h>
 #include <openssl/x509v3.h>
 #include <qrencode.h>
 
+#include "bake/web/relay.hpp"
+
 namespace modar {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// A certificate serves one run of the command, days at most.
 constexpr long kValidSeconds = 7L * 24 * 3600;
@@ -66,6 +72,39 @@ Certificate make_certificate(EVP_PKEY* key, const std::vector<std::string>& addr
   return certificate;
 }
 
+/// Below the page's own policy, which index.html states: both hold.
+const httplib::Headers kSafeHeaders = {{"Content-Security-Policy",
+                                        "script-src 'self' 'wasm-unsafe-eval'; base-uri 'none'; "
+                                        "object-src 'none'; form-action 'none'; "
+                                        "frame-ancestors 'self'"},
+                                       {"X-Content-Type-Options", "nosniff"},
+                                       {"Referrer-Policy", "no-referrer"}};
+
+/// Answers 404 to what is no file in the folder: links that lead out of it, hidden files.
+httplib::Server::HandlerWithResponse inside_only(const std::string& folder) {
+  std::error_code error;
+  const fs::path root = fs::canonical(folder, error);
+  return [root](const httplib::Request& request, httplib::Response& response) {
+    using Handled = httplib::Server::HandlerResponse;
+    std::error_code unknown;
+    const std::string path =
+        request.path.ends_with('/') ? request.path + "index.html" : request.path;
+    const fs::path file = fs::canonical(root / fs::path(path).relative_path(), unknown);
+    const fs::path below = file.lexically_relative(root);
+    const bool inside = !unknown && !below.empty() && !below.string().starts_with('.');
+    if (inside && fs::is_regular_file(file, unknown)) return Handled::Unhandled;
+    response.status = 404;
+    return Handled::Handled;
+  };
+}
+
+/// The addresses of the server: those of this machine's networks, or the one that it is bound to.
+std::vector<std::string> addresses_of(const ServeOptions& options) {
+  if (options.bind == "0.0.0.0") return own_addresses();
+  if (options.bind.starts_with("127.")) return {};
+  return {options.bind};
+}
+
 tl::unexpected<Error> no_server(int port, const char* cause) {
   return fail(ExitCode::kIo, "web.port", "port " + std::to_string(port), cause,
               "name another port: --port");
@@ -75,7 +114,8 @@ tl::unexpected<Error> no_server(int port, const char* cause) {
 
 Result<void> serve_site(const ServeOptions& options,
                         const std::function<void(const std::vector<std::string>&)>& ready) {
-  const std::vector<std::string> addresses = own_addresses();
+  MODAR_ASSIGN(const Listener listener, listen_on(options.bind, options.port));
+  const std::vector<std::string> addresses = addresses_of(options);
   const Key key(EVP_EC_gen("P-256"), EVP_PKEY_free);
   const Certificate certificate =
       key == nullptr ? Certificate(nullptr, X509_free) : make_certificate(key.get(), addresses);
@@ -88,19 +128,21 @@ Result<void> serve_site(const ServeOptions& options,
   server.set_file_extension_and_mimetype_mapping("wasm", "application/wasm");
   server.set_file_extension_and_mimetype_mapping("modar", "application/octet-stream");
   server.set_file_extension_and_mimetype_mapping("webmanifest", "application/manifest+json");
-  int port = options.port;
-  if (port == 0) {
-    port = server.bind_to_any_port("0.0.0.0");
-  } else if (!server.bind_to_port("0.0.0.0", port)) {
-    port = -1;
-  }
-  if (port < 0) return no_server(options.port, "another program has it, or this one may not");
+  server.set_default_headers(kSafeHeaders);
+  server.set_pre_routing_handler(inside_only(options.folder));
+  // A thread for each connection that the relay lets in.
+  server.new_task_queue = [] { return new httplib::ThreadPool(kMostConnections); };
+  server.set_payload_max_length(0);
+  const int behind = server.bind_to_any_port("127.0.0.1");
+  if (behind < 0) return no_server(options.port, "the server does not start");
+  std::thread(relay_connections, listener, behind).detach();
   std::vector<std::string> urls;
+  const std::string port = std::to_string(listener.port);
   for (const std::string& address : addresses)
-    urls.push_back("https://" + address + ":" + std::to_string(port) + "/");
-  urls.push_back("https://localhost:" + std::to_string(port) + "/");
+    urls.push_back("https://" + address + ":" + port + "/");
+  urls.push_back("https://localhost:" + port + "/");
   ready(urls);
-  if (!server.listen_after_bind()) return no_server(port, "the server stopped");
+  if (!server.listen_after_bind()) return no_server(listener.port, "the server stopped");
   return {};
 }
 

@@ -11,13 +11,16 @@ namespace modar {
 
 struct ServeOptions {
   std::string folder;
-  int port = 8443;  ///< 0: any that is free
+  std::string bind = "0.0.0.0";  ///< an IPv4 address of this machine; 0.0.0.0: all of them
+  int port = 8443;               ///< 0: any that is free
 };
 
 /// Serves the folder by HTTPS until the process is ended: browsers give the camera to nothing less.
 /// The certificate is made on the spot and signed by nobody, so that browsers ask once.
+/// Serves regular files in the folder alone, not what links lead to elsewhere; connections are
+/// bounded in number and in time (relay.hpp), and answers have security headers.
 /// ready: called with the addresses, the first for other devices, once they answer.
-/// Errors: kIo "web.port".
+/// Errors: kIo "web.port"; kUsage "web.bind".
 Result<void> serve_site(const ServeOptions& options,
                         const std::function<void(const std::vector<std::string>&)>& ready);
 

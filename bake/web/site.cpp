@@ -269,6 +269,11 @@ Result<Json> release_of(const SiteOptions& options, const std::string& page) {
   MODAR_ASSIGN(
       const PublicKey key,
       parse_public_key({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
+  if (origin_of(options.release).find('@') != std::string::npos) {
+    return fail(ExitCode::kUsage, "web.login", "--release",
+                "the address holds a name or a password, which the page would give to everybody",
+                "give the address without it");
+  }
   const bool folder = options.release.ends_with('/');
   return Json{{"url", options.release + (folder ? "" : "/")}, {"key", public_key_line(key)}};
 }

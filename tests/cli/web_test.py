@@ -1,20 +1,35 @@
 """`modar web`: the folder that it writes, what it refuses, and its server. The page itself: tests/web."""
 import html
+import http.client
 import json
 import os
 import re
 import shutil
 import signal
+import socket
 import ssl
 import struct
 import subprocess
 import unittest
+import urllib.error
 import urllib.request
 
 from programs import BIN, ROOT, ProgramTest
 
 PAGE = ROOT / "runtime" / "web"
 ENGINES = ("engine-plain.js", "engine-plain.wasm", "engine-simd.js", "engine-simd.wasm")
+
+
+class From(urllib.request.HTTPSHandler):
+    """Opens connections from another of this machine's addresses."""
+
+    def __init__(self, address, context):
+        super().__init__(context=context)
+        self.address = address
+
+    def https_open(self, request):
+        return self.do_open(lambda host, **words: http.client.HTTPSConnection(host, source_address=(self.address, 0), context=self._context,
+                                                                              **words), request)
 
 
 class Web(ProgramTest):
@@ -81,6 +96,81 @@ class Web(ProgramTest):
             self.assert_fails(self.web(bundle, "--texts", texts), 3, word)
         (self.page / "engine-simd.wasm").unlink()
         self.assert_fails(self.web(bundle), 2, "engine-simd.wasm")
+
+    def serve(self, *words):
+        """The folder's server: its process, its port, and a context that trusts its certificate."""
+        words = [str(BIN / "modar"), "web", str(self.bake_demo()), "-o", str(self.folder / "site"), "--page", str(self.page), "--serve",
+                 "--port", "0", "--quiet", *words]
+        server = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.addCleanup(server.stdout.close)
+        self.addCleanup(server.wait)
+        self.addCleanup(os.kill, server.pid, signal.SIGINT)
+        self.urls = []
+        while not self.urls or "localhost" not in self.urls[-1]:
+            self.urls.append(server.stdout.readline().strip())
+        port = int(self.urls[-1].rstrip("/").rsplit(":", 1)[1])
+        return port, ssl.create_default_context(cadata=ssl.get_server_certificate(("127.0.0.1", port)))
+
+    def get(self, port, context, path):
+        try:
+            with urllib.request.urlopen(f"https://127.0.0.1:{port}{path}", context=context, timeout=20) as answer:
+                return answer.status, answer.read(), answer.headers
+        except urllib.error.HTTPError as error:
+            with error:
+                return error.code, b"", error.headers
+
+    def test_its_server_stays_in_the_folder(self):
+        port, context = self.serve("--bind", "127.0.0.1")
+        self.assertEqual(self.urls, [f"https://localhost:{port}/"])
+        secret = self.folder / "secret.txt"
+        secret.write_text("secret")
+        site = self.folder / "site"
+        (site / "link.txt").symlink_to(secret)
+        (site / "linked").symlink_to(self.folder)
+        (site / "inner.txt").symlink_to(site / "site.json")
+        os.mkfifo(site / "pipe")
+        for path in ("/link.txt", "/linked/secret.txt", "/../secret.txt", "/%2e%2e/secret.txt", "/.modar-output", "/pipe", "/none"):
+            self.assertEqual(self.get(port, context, path)[0], 404, path)
+        self.assertEqual(self.get(port, context, "/inner.txt")[1], self.read("site.json"))
+        for path in ("/", "/index.html", "/app.js", "/none"):
+            headers = self.get(port, context, path)[2]
+            policy = headers["Content-Security-Policy"]
+            for part in ("base-uri 'none'", "object-src 'none'", "'wasm-unsafe-eval'"):
+                self.assertIn(part, policy)
+            self.assertNotIn("'unsafe-eval'", policy)
+            self.assertEqual((headers["X-Content-Type-Options"], headers["Referrer-Policy"]), ("nosniff", "no-referrer"))
+        page = self.read("index.html").decode()
+        self.assertNotIn("'unsafe-eval'", page)
+        self.assertIn("base-uri 'none'; object-src 'none'", page)
+
+    def test_slow_connections_do_not_stop_its_server(self):
+        port, context = self.serve()
+        slow = []
+        for host in ("127.0.0.1", "127.0.0.2", "127.0.0.3"):  # other addresses of this machine stand for other guests
+            for _ in range(30):
+                guest = socket.socket()
+                guest.bind((host, 0))
+                guest.connect(("127.0.0.1", port))
+                slow.append(guest)
+        for one in slow:
+            self.addCleanup(one.close)
+            try:
+                one.sendall(b"\x16")  # a handshake that begins, and then nothing
+            except OSError:
+                pass  # closed at once: one too many of that address
+        guest = urllib.request.build_opener(From("127.0.0.9", context))
+        with guest.open(f"https://127.0.0.1:{port}/", timeout=20) as answer:
+            self.assertEqual(answer.status, 200)
+        # Those that only wait are closed: the address that had too many is served again.
+        for one in slow:
+            one.settimeout(30)
+            try:
+                self.assertIn(one.recv(1), (b"", b"\x15"))
+            except ConnectionError:
+                pass
+        self.assertEqual(self.get(port, context, "/")[0], 200)
+        self.assert_fails(self.modar("web", self.bake_demo(), "-o", self.folder / "site", "--page", self.page, "--serve", "--bind", "here",
+                                     "--quiet"), 1, "web.bind")
 
     def test_it_serves_by_https_with_a_certificate_of_its_own(self):
         bundle = self.bake_demo()
