@@ -2,10 +2,13 @@
 #include "bake/terminal.hpp"
 
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <new>
 #include <set>
@@ -41,8 +44,9 @@ ProgressBar::~ProgressBar() {
   clear();
 }
 
-void ProgressBar::show(const std::string& stage, double done) {
+void ProgressBar::show(const std::string& name, double done) {
   if (!active_) return;
+  const std::string stage = printable(name);
   const bool begins = stage != stage_;
   if (begins) {
     stage_ = stage;
@@ -77,6 +81,16 @@ void ProgressBar::clear() {
 int print_error(const Error& error) {
   std::fprintf(stderr, "modar: error: %s\n", to_line(error).c_str());
   return static_cast<int>(error.exit);
+}
+
+int finish_output(int code) {
+  const bool failed = std::ferror(stdout) != 0;
+  if (std::fflush(stdout) == 0 && !failed) return code;
+  if (!failed && (errno == EPIPE || errno == EBADF)) return code;  // nobody wants it
+  const char* cause = failed ? "a part of it could not be written" : std::strerror(errno);
+  const int told = print_error(
+      {ExitCode::kIo, "io.stdout", "standard output", cause, "make room where it goes"});
+  return code == 0 ? told : code;
 }
 
 int guarded(const std::function<int()>& work) {
@@ -158,11 +172,21 @@ void print_diagnostic(const Diagnostic& diagnostic) {
   const char* colour = colour_of(diagnostic.severity);
   const std::string severity =
       colour + std::string(severity_word(diagnostic.severity)) + (*colour == '\0' ? "" : "\x1b[0m");
-  std::string line = severity + ": " + diagnostic.file;
+  std::string line = diagnostic.file;
   if (diagnostic.line != 0) line += ":" + std::to_string(diagnostic.line);
   line += ": " + diagnostic.message;
   if (!diagnostic.cure.empty()) line += "; " + diagnostic.cure;
-  std::fprintf(stderr, "%s [%s]\n", line.c_str(), diagnostic.id.c_str());
+  std::fprintf(stderr, "%s: %s [%s]\n", severity.c_str(), printable(line).c_str(),
+               diagnostic.id.c_str());
+}
+
+void warn_of_readers(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) == 0) return;
+  std::fprintf(stderr,
+               "modar: warning: %s: others may read this secret key; chmod 600 it [key.mode]\n",
+               printable(path).c_str());
 }
 
 ProcessCost process_cost() {

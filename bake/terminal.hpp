@@ -21,7 +21,7 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
   /// done: 0 to 1.
-  void show(const std::string& stage, double done);
+  void show(const std::string& name, double done);
   /// Wipes the line, before other words are printed.
   void clear();
 
@@ -45,11 +45,18 @@ int print_error(const Error& error);
 /// What a program does between its first and last line. An exception that nobody caught is told as
 /// a bug of ours.
 int guarded(const std::function<int()>& work);
+/// What is left of the output goes to stdout; `code`, or that of an error where it does not arrive
+/// there (a full disk, kIo "io.stdout"). The last thing that a program does.
+int finish_output(int code);
 /// All findings of a bake on stderr, each once: notes first, warnings after them, errors last. Of
 /// many of one kind the first are shown and the others counted, unless `all` are wanted.
 void print_findings(const std::vector<Diagnostic>& findings, bool all);
 /// "warning: file:line: message; cure [id]" on stderr.
 void print_diagnostic(const Diagnostic& diagnostic);
+
+/// A word on stderr where others than its owner may read a secret key. ssh refuses such keys; in a
+/// container they may be mounted readable to all.
+void warn_of_readers(const std::string& path);
 
 /// CPU time of the process (user and system) and its greatest resident size.
 struct ProcessCost {

@@ -7,6 +7,8 @@
 
 #include <tl/expected.hpp>
 
+#include "formats/utf8.hpp"
+
 namespace modar {
 
 /// What a program of ours returns to the shell. Commands document their own codes from 10 up.
@@ -66,7 +68,7 @@ inline std::string to_line(const Error& error) {
   std::string line = error.where.empty() ? std::string() : error.where + ": ";
   line += error.cause;
   if (!error.cure.empty()) line += "; " + error.cure;
-  return line + " [" + error.code + "]";
+  return printable(line + " [" + error.code + "]");
 }
 
 }  // namespace modar

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 namespace modar {
@@ -25,6 +26,24 @@ inline std::size_t utf8_character(std::string_view text) {
   }
   if (first < 0xF0) return 3;
   return tail(3) ? 4 : 0;
+}
+
+/// The text with its control characters as "\x1B": none of it commands the terminal that it is
+/// printed to, and none of it begins a line of its own.
+inline std::string printable(std::string_view text) {
+  constexpr const char* kDigits = "0123456789ABCDEF";
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t size = utf8_character(text);
+    const auto byte = static_cast<unsigned char>(text[0]);
+    if (size == 0 && (byte < 0x20 || (byte >= 0x7F && byte < 0xA0))) {
+      out += {'\\', 'x', kDigits[byte / 16], kDigits[byte % 16]};
+    } else {
+      out += text.substr(0, size == 0 ? 1 : size);
+    }
+    text.remove_prefix(size == 0 ? 1 : size);
+  }
+  return out;
 }
 
 /// True for a byte that no character starts with.

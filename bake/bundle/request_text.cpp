@@ -36,6 +36,9 @@ namespace {
 constexpr double kMostScale = 1e6;   // beyond, floats of the record lose the offset
 constexpr double kMostOffset = 1e6;  // millimetres or sides, the same
 constexpr double kMostTurn = 360;
+constexpr double kLeastScale = 1e-6;
+constexpr double kLeastLength = 0.01;  // millimetres: less is not printed
+constexpr double kMostLength = 1e6;    // millimetres, as offsets
 
 /// Where the unit of a number begins.
 std::size_t unit_start(std::string_view text) {
@@ -68,7 +71,7 @@ tl::expected<double, WrongValue> parse_scale(std::string_view text) {
     return tl::unexpected(
         WrongValue{"it is a factor, not a percentage", "write scale=" + number_text(value / 100)});
   }
-  if (!(value > 0)) {
+  if (!(value >= kLeastScale)) {
     return tl::unexpected(WrongValue{"a model of that size would not be seen",
                                      "write a factor above 0, as in scale=0.8"});
   }
@@ -141,7 +144,9 @@ tl::expected<double, WrongValue> parse_millimetres(std::string_view text) {
   if (!(value > 0)) {
     return tl::unexpected(WrongValue{"a length has to be above 0", "write one, as in 210mm"});
   }
-  return unit == "mm" ? value : value * *metres * 1000;
+  const double length = unit == "mm" ? value : value * *metres * 1000;
+  if (length >= kLeastLength && length <= kMostLength) return length;
+  return tl::unexpected(WrongValue{"lengths are from 0.01mm to 1000m", "write one, as in 210mm"});
 }
 
 tl::expected<std::array<double, 3>, WrongValue> parse_turn(std::string_view text) {

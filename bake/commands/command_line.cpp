@@ -24,6 +24,14 @@ struct CommandLine::Parts {
 
 namespace {
 
+/// "800M" to "800000000". CLI11 alone takes "-1" and numbers beyond 64 bits for very great ones.
+std::string size_in_bytes(std::string& text) {
+  const std::size_t digits = text.find_first_not_of("0123456789");
+  constexpr std::size_t kMostDigits = 18;
+  if (digits == 0 || std::min(digits, text.size()) > kMostDigits) return "no size";
+  return CLI::AsSizeValue(true)(text);
+}
+
 /// What --help says of an option beyond its own text: "1 to 12, default 4, not with --no-lods".
 std::string rules_in_words(const OptionRules& rules, const CLI::Option& option) {
   std::string words;
@@ -272,7 +280,7 @@ void CommandLine::option(const std::string& names, Value value, const std::strin
 void CommandLine::size(const std::string& names, std::uint64_t& bytes, const std::string& help,
                        const OptionRules& rules) {
   CLI::Option* option = parts_->app->add_option(names, bytes, help);
-  option->transform(CLI::Validator(CLI::AsSizeValue(true)).description(""));
+  option->transform(CLI::Validator(size_in_bytes, ""));
   apply(rules, *parts_->app, *option);
 }
 

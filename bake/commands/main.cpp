@@ -5,7 +5,7 @@
 #include "bake/terminal.hpp"
 
 int main(int argc, char** argv) {
-  return modar::guarded([&] {
+  const int code = modar::guarded([&] {
     modar::CommandLine program(
         "modar: bakes models and patterns for augmented reality on old phones",
         std::string("modar ") + MODAR_VERSION);
@@ -25,4 +25,5 @@ int main(int argc, char** argv) {
     program.footer("\n`modar COMMAND --help` shows the options and an example of each command.\n");
     return program.parse_and_run(argc, argv);
   });
+  return modar::finish_output(code);
 }

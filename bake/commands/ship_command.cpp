@@ -64,6 +64,7 @@ Result<std::string> ask_pass_phrase() {
 
 Result<SecretKey> load_key(const std::string& path, const std::string& pass_phrase_file) {
   MODAR_ASSIGN(const auto text, read_text(path));
+  warn_of_readers(path);
   std::string pass_phrase;
   if (!pass_phrase_file.empty()) {
     MODAR_ASSIGN(const auto file, read_text(pass_phrase_file));

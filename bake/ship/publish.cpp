@@ -227,6 +227,13 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
             [](const ReleaseBundle& a, const ReleaseBundle& b) { return a.name < b.name; });
   done.changes = changes_between(before, done.release.bundles);
   // A document that devices would refuse is not published.
+  if (const std::size_t size = release_text(done.release).size(); size > kMaxReleaseBytes) {
+    return fail(ExitCode::kUnsupported, "ship.too-many", request.folder,
+                std::to_string(done.release.bundles.size()) + " bundles make a document of " +
+                    std::to_string(size) + " bytes; devices read " +
+                    std::to_string(kMaxReleaseBytes),
+                "publish them into several folders");
+  }
   if (const auto readable = parse_release(release_text(done.release)); !readable) {
     return fail(ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
                 "name each bundle's file with letters, digits, '.', '_' and '-', no two alike");

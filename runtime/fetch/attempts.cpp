@@ -74,6 +74,12 @@ Outcome Attempts::end(Transfer& transfer, const Answer& answer) {
 }
 
 Outcome Attempts::judge(Transfer& transfer, const Answer& answer) {
+  if (transfer.too_long && transfer.wanted == nullptr) {  // no document of a release is so long
+    transfer.error = {kExitMixed, "fetch.too-long", address_of(transfer),
+                      "it is longer than " + std::to_string(transfer.limit) + " bytes",
+                      "publish the release again, or use a newer modar-fetch"};
+    return Outcome::kFailed;
+  }
   if (transfer.too_long) {
     discard(transfer);
     return again(transfer, "the server sends more than the file has");

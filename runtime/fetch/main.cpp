@@ -335,5 +335,9 @@ int main(int argc, char** argv) {
     std::fputs(line->help ? kHelp : "modar-fetch " MODAR_VERSION "\n", stdout);
     return 0;
   }
-  return line->verify ? run_verify(*line) : run_fetch(*line);
+  const int code = line->verify ? run_verify(*line) : run_fetch(*line);
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  const int told = answer({ExitCode::kIo, "io.stdout", "standard output",
+                           "what was done could not be printed", "make room where it goes"});
+  return code == 0 ? told : code;
 }

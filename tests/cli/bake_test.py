@@ -391,6 +391,20 @@ class Help(ProgramTest):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertRegex(done.stdout, r"^modar \d+\.\d+\.\d+\n$")
 
+    def test_sizes_are_no_negative_numbers(self):
+        for size in ("-1", "-1G", "99999999999999999999", "1e30G", "much", "1X", ""):
+            done = self.modar("bake", "--model", POTTERY, "-o", "x.modar", f"--memory={size}")
+            self.assert_fails(done, 1, "--memory")
+            self.assertFalse((self.folder / "x.modar").exists())
+
+    def test_lengths_and_scales_are_those_of_prints(self):
+        for width in ("nanmm", "infmm", "1e39mm", "1e-39mm", "1e300m", "0mm", "-1mm"):
+            done = self.modar("bake", "--pattern", f"{COVER}:{width}", "-o", "x.modar")
+            self.assert_fails(done, 1, "cli.pattern", width)
+        for part in ("scale=1e39", "scale=nan", "scale=1e-30", "height=1e39mm", "height=nanmm", "width=1e-39mm", "offset=1e39:0:0"):
+            done = self.modar("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene", f"cover=pottery,{part}", "-o", "x.modar")
+            self.assert_fails(done, 1, "cli.scene", part)
+
     def test_few_libraries_are_mapped(self):
         done = self.modar("--version", env={"LD_TRACE_LOADED_OBJECTS": "1"})
         libraries = done.stdout.splitlines()

@@ -249,6 +249,13 @@ class Publish(ShipTest):
         self.publish(self.shop.new, options=["--no-expiry"])
         self.assertEqual(self.fetch_json()["expires"], "never")
 
+    def test_a_document_without_end_fails_at_once(self):
+        self.publish(self.shop.old)
+        (self.site / "releases" / "1.json").write_bytes(b" " * (9 << 20))
+        done = self.fetch()
+        self.assert_fails(done, 13, "fetch.too-long", "8388608")
+        self.assertNotIn("attempt", done.stderr)
+
     def test_names_that_differ_by_case_only_are_refused(self):
         other = self.folder / "Museum.modar"
         shutil.copy(self.shop.old, other)
@@ -274,6 +281,16 @@ class Keys(ShipTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(stat.S_IMODE(key.stat().st_mode), 0o600)
         self.assert_fails(self.modar("ship", "keygen", "--out", key), 1, "key.exists")
+
+    def test_a_key_that_others_may_read_is_told_of(self):
+        key = self.folder / "k"
+        shutil.copy(self.shop.key, key)
+        publish = ["ship", "publish", self.shop.old, "--to", self.site, "--key", key]
+        for mode, told in ((0o600, False), (0o644, True), (0o640, True), (0o400, False)):
+            key.chmod(mode)
+            done = self.modar(*publish)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual("[key.mode]" in done.stderr, told, oct(mode))
 
     @unittest.skipUnless(shutil.which("minisign"), "minisign is not installed")
     def test_minisign_verifies_ours_and_we_its(self):
@@ -622,6 +639,17 @@ class Refusals(ShipTest):
         self.publish(self.shop.old, options=["--for", "museum=ace2"])
         self.assert_fails(self.fetch(self.site, "--device", "mali400"), 5, "fetch.device")
         self.fetch_json(self.site, "--device", "ace2")
+
+    @unittest.skipUnless(os.path.exists("/dev/full"), "no /dev/full here")
+    def test_output_that_does_not_arrive_is_an_error(self):
+        self.publish(self.shop.old)
+        for words in (["modar-fetch", self.site, "--store", self.store, "--trust", self.trust, "--json"],
+                      ["modar", "check", self.shop.old, "--json"], ["modar", "ship", "list", "--to", self.site],
+                      ["modar", "--help"]):
+            with open("/dev/full", "w") as full:
+                done = subprocess.run([BIN / words[0], *map(str, words[1:])], stdout=full, stderr=subprocess.PIPE, text=True)
+            self.assertEqual(done.returncode, 2, words)
+            self.assertIn("io.stdout", done.stderr)
 
     def test_usage(self):
         self.assert_fails(self.fetch(self.folder / "nowhere"), 1, "fetch.url")

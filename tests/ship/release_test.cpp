@@ -38,6 +38,20 @@ TEST(Release, ReadsWhatItWrites) {
   EXPECT_EQ(back->bundles[0].devices, (std::vector<std::string>{"ace2", "mali400"}));
 }
 
+TEST(Release, HoldsFiveThousandBundles) {
+  Release release = sample();
+  const ReleaseBundle one = release.bundles[0];
+  for (int i = 0; i < 5000; ++i) {
+    release.bundles.push_back(one);
+    release.bundles.back().name = "a-name-of-thirty-letters-" + std::to_string(10000 + i);
+  }
+  const std::string text = release_text(release);
+  EXPECT_GT(text.size(), 1u << 20);
+  const auto back = parse_release(text);
+  ASSERT_TRUE(back) << to_line(back.error());
+  EXPECT_EQ(release_text(*back), text);
+}
+
 TEST(Release, RefusesWhatLeadsElsewhere) {
   for (const char* name : {"", "../vase", "a/b", ".hidden", "a b", "caf\u00e9"}) {
     Release release = sample();

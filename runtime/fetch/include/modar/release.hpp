@@ -82,7 +82,8 @@ Result<void> verify_signature(std::string_view message, const Signature& signatu
 
 /// @name Release documents
 /// @{
-inline constexpr std::size_t kMaxReleaseBytes = 1u << 20;
+/// Of a document; some 350 a bundle.
+inline constexpr std::size_t kMaxReleaseBytes = 8u << 20;
 inline constexpr std::size_t kMaxRecipeBytes =
     sizeof(RecipeHeader) + std::size_t{kMaxPieces} * sizeof(PieceRecord);
 
