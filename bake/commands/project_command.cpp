@@ -44,8 +44,8 @@ namespace {
 using State = AssetOutcome::State;
 
 constexpr const char* kProjectWords[] = {
-    "--project", "--cache",  "--cache-key", "--asset", "--depfile", "--dry-run", "--explain",
-    "--jobs",    "--memory", "--quiet",     "--json",  "--watch",   "--notes"};
+    "--project", "--cache", "--cache-key", "--outside", "--asset", "--depfile", "--dry-run",
+    "--explain", "--jobs",  "--memory",    "--quiet",   "--json",  "--watch",   "--notes"};
 
 /// What of the bake stands on the command line would be ignored beside a project file.
 Result<void> refuse_other_options(const std::vector<std::string>& words) {
@@ -182,6 +182,8 @@ void add_project_options(CommandLine& line, ProjectCommand& command) {
       "--cache-key", &command.cache_key,
       "Of a project: sign what goes into the cache with this secret key, believe nothing else",
       {.type = "K"});
+  line.flag("--outside", command.outside,
+            "Of a project that you trust: let it use files outside its folder");
   line.flag("--dry-run", command.dry_run, "Of a project: say what would be baked, bake nothing");
   line.flag("--explain", command.explain, "Of a project: say why each asset is baked");
   line.option("--asset", &command.asset,
@@ -225,10 +227,11 @@ std::set<std::string> watched_paths(const std::string& file, const ProjectOutcom
 
 Result<ProjectOutcome> bake_once(const ProjectCommand& command, const std::string& file,
                                  const CommonOptions& common) {
-  MODAR_ASSIGN(const Project project, read_project(file));
+  MODAR_ASSIGN(const Project project, read_project(file, command.outside));
   ProjectOptions options;
   options.cache = command.cache;
   options.cache_key = command.cache_key;
+  warn_of_readers(command.cache_key);
   options.only = command.asset;
   options.jobs = common.jobs;
   options.dry_run = command.dry_run;
@@ -338,6 +341,7 @@ struct NinjaPlanCommand {
   std::string cache;
   std::string cache_key;
   std::string runner;
+  bool outside = false;
   bool ninja = false;
 };
 
@@ -377,6 +381,7 @@ std::string ninja_generator(const NinjaPlanCommand& command, const Project& proj
                             const std::string& program) {
   std::string words = "modar plan --ninja --project " + shell_quoted(command.file) + " --cache " +
                       shell_quoted(command.cache);
+  if (command.outside) words += " --outside";
   if (!command.cache_key.empty()) words += " --cache-key " + shell_quoted(command.cache_key);
   if (!command.runner.empty()) words += " --run " + shell_quoted(command.runner);
   std::string text = "rule plan\n  command = " + ninja_value(words) +
@@ -401,18 +406,20 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
     std::error_code error;
     return ssh ? std::filesystem::absolute(name, error).lexically_normal().string() : name;
   };
+  const std::string outside = command.outside ? " --outside" : "";
   const bool keyed = !command.cache_key.empty();
   std::string text =
       "# modar plan --ninja: save it as build.ninja, and run `ninja` as often as something "
       "changes.\n"
       "ninja_required_version = 1.5\n"
       "rule asset\n  command = " +
-      runner + "modar bake --quiet --project " + word(path(command.file)) + " --cache " +
-      word(path(command.cache)) +
+      runner + "modar bake --quiet" + outside + " --project " + word(path(command.file)) +
+      " --cache " + word(path(command.cache)) +
       (keyed ? " --cache-key " + word(path(command.cache_key)) : std::string()) +
       " --jobs 1 --asset $name --depfile $told && touch $out\n" +
       "  depfile = $out.d\n  deps = gcc\n  description = bake $name\n"
-      "rule bundles\n  command = modar bake --quiet --project " +
+      "rule bundles\n  command = modar bake --quiet" +
+      outside + " --project " +
       ninja_value(shell_quoted(command.file) + " --cache " + shell_quoted(command.cache) +
                   (keyed ? " --cache-key " + shell_quoted(command.cache_key) : std::string())) +
       "\n  restat = 1\n  description = link the bundles\n\n";
@@ -441,7 +448,7 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
 }
 
 Result<ExitCode> write_ninja_plan(NinjaPlanCommand& command) {
-  MODAR_ASSIGN(const Project project, read_project(command.file));
+  MODAR_ASSIGN(const Project project, read_project(command.file, command.outside));
   if (command.cache.empty()) {
     command.cache = project.path(project.cache.empty() ? kCacheFolder : project.cache);
   }
@@ -530,6 +537,7 @@ void add_plan(CommandLine& program) {
               {.type = "DIR"});
   line.option("--cache-key", &command->cache_key,
               "Signs what goes into the cache; nothing else is believed", {.type = "K"});
+  line.flag("--outside", command->outside, "Let the project use files outside its folder");
   line.option("--run", &command->runner,
               "Put before each asset's command: srun -Q -n1, or ssh HOST", {.type = "WORDS"});
   line.footer(

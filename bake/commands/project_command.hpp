@@ -19,7 +19,8 @@ struct ProjectCommand {
   std::string depfile;    ///< empty: none
   bool dry_run = false;
   bool explain = false;
-  bool watch = false;  ///< bake again whenever something changes
+  bool outside = false;  ///< the project may use files outside its folder
+  bool watch = false;    ///< bake again whenever something changes
 };
 
 /// Declares them.

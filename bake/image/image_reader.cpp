@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "bake/image/decoders.hpp"
+#include "bake/input.hpp"
 
 namespace modar {
 namespace {
@@ -16,8 +17,8 @@ using std::string_view_literals::operator""sv;
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 31;
 
 Result<std::vector<std::byte>> read_bytes(const std::string& path) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
-                                                             &std::fclose);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
+      is_regular_file(path) ? std::fopen(path.c_str(), "rb") : nullptr, &std::fclose);
   const auto error = [&path] {
     return fail(ExitCode::kIo, "io.open", path, "the image cannot be opened or read",
                 "check its name and your rights to read it");

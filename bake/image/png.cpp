@@ -8,6 +8,7 @@
 #include <png.h>
 
 #include "bake/image/decoders.hpp"
+#include "bake/input.hpp"
 #include "formats/atomic_file.hpp"
 
 namespace modar {
@@ -180,7 +181,7 @@ Result<StoredImage> decode_png(std::span<const std::byte> bytes, const std::stri
 double png_width_mm(const std::string& path) {
   constexpr std::size_t kReadLimit = 65536;  // pHYs comes before the pixels
   std::vector<std::byte> bytes(kReadLimit);
-  std::FILE* const file = std::fopen(path.c_str(), "rb");
+  std::FILE* const file = is_regular_file(path) ? std::fopen(path.c_str(), "rb") : nullptr;
   if (file == nullptr) return 0;
   bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file));
   std::fclose(file);

@@ -411,6 +411,12 @@ class ProjectBake {
       return fail(ExitCode::kIo, "project.changing", file, "it changed while it was baked",
                   "bake again");
     }
+    for (const std::string& named : trace.files) {
+      if (project_.may_use(named)) continue;
+      return fail(ExitCode::kInvalidInput, "project.outside", file,
+                  "it names " + named + ", which lies outside the project's folder",
+                  "copy it into the folder; where you trust the project, bake with --outside");
+    }
     take_inputs(task, named_files(task, trace.files));
     PartNotes notes;
     if (!trace.model_sides.empty()) notes.model_sides = trace.model_sides[0];

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "bake/import/read_model.hpp"
+#include "bake/input.hpp"
 #include "bake/mesh/upright.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/process.hpp"
@@ -41,6 +42,7 @@ bool left_out(const fs::path& name) {
 }
 
 std::string text_of(const fs::path& path) {
+  if (!is_regular_file(path.string())) return {};
   std::ifstream file(path, std::ios::binary);
   return lower(std::string(std::istreambuf_iterator<char>(file), {}));
 }

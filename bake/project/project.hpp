@@ -61,6 +61,7 @@ struct ProjectGates {
 /// A project file as it was read, globs expanded.
 struct Project {
   std::string file;               ///< path of the project file
+  bool outside = false;           ///< may use files outside its folder
   std::string folder;             ///< its folder, with a slash at its end; empty: the current one
   std::string out = "out";        ///< folder of the bundles, relative to the project's
   std::string cache;              ///< folder of the cache, relative; empty: kCacheFolder
@@ -77,12 +78,16 @@ struct Project {
   [[nodiscard]] std::string path(const std::string& relative) const {
     return relative.starts_with('/') ? relative : folder + relative;
   }
+  /// Whether the project may use a file, given as the current folder sees it: one in its folder.
+  [[nodiscard]] bool may_use(const std::string& name) const;
 };
 
 /// Errors: kIo "project.open"; kInvalidInput with file, line and column: "project.toml" (no TOML),
 /// "project.key" (unknown; names the nearest one there is), "project.value", "project.no-match" (a
-/// glob that matches nothing), "project.same-name", "project.scene-unknown".
-Result<Project> read_project(const std::string& path);
+/// glob that matches nothing), "project.same-name", "project.scene-unknown", "project.outside" (a
+/// path that leads outside the project's folder, by links too, unless `outside` allows it: whoever
+/// bakes a stranger's project gives it the files of its folder alone).
+Result<Project> read_project(const std::string& path, bool outside = false);
 
 struct InitialProject {
   std::string text;

@@ -273,8 +273,9 @@ Result<std::optional<TableReader>> table(const std::string& file, const toml::ta
 
 class ProjectReader {
  public:
-  ProjectReader(const std::string& file, const toml::table& root) : root_(root) {
+  ProjectReader(const std::string& file, const toml::table& root, bool outside) : root_(root) {
     project_.file = file;
+    project_.outside = outside;
     const fs::path folder = fs::path(file).parent_path();
     if (!folder.empty()) project_.folder = (folder / "").string();
   }
@@ -290,6 +291,10 @@ class ProjectReader {
     MODAR_TRY(read_scenes());
     MODAR_TRY(read_bundles());
     MODAR_TRY(read_gates());
+    const TableReader whole(project_.file, root_, "the file");
+    for (const std::string& path : {project_.out, std::string(kCacheFolder)}) {  // may be links
+      MODAR_TRY(keep_inside(whole, "project", path));
+    }
     if (project_.models.empty() && project_.patterns.empty()) {
       return fail(ExitCode::kInvalidInput, "project.empty", project_.file,
                   "it lists neither a model nor a pattern",
@@ -306,9 +311,32 @@ class ProjectReader {
     if (!reader) return {};
     MODAR_TRY(reader->allow({"name", "out", "cache", "light"}));
     MODAR_TRY(reader->take("name", name_));
+    if (reader->has("name") && !is_plain(name_)) return wrong_name(*reader);
     MODAR_TRY(reader->take("out", project_.out));
+    MODAR_TRY(keep_inside(*reader, "out", project_.out));
     MODAR_TRY(reader->take("cache", project_.cache));
+    MODAR_TRY(keep_inside(*reader, "cache", project_.cache));
     return take_light(*reader, light_);
+  }
+
+  /// A name that files get: none of another folder, none that a terminal takes for a command.
+  static bool is_plain(const std::string& name) {
+    return !name.empty() && !name.starts_with('.') && name.find('/') == std::string::npos &&
+           printable(name) == name;
+  }
+
+  static tl::unexpected<Error> wrong_name(const TableReader& reader) {
+    return reader.wrong("name", "a name without a slash, which the file gets");
+  }
+
+  /// `path` is relative to the project's folder.
+  [[nodiscard]] Result<void> keep_inside(const TableReader& reader, const char* key,
+                                         const std::string& path) const {
+    if (printable(path) != path) return reader.wrong(key, "a path without control characters");
+    if (path.empty() || project_.may_use(project_.path(path))) return {};
+    return fail(ExitCode::kInvalidInput, "project.outside", reader.at(key),
+                "'" + path + "' leads outside the project's folder",
+                "copy it into the folder; where you trust the project, bake with --outside");
   }
 
   Result<void> read_bake() {
@@ -322,7 +350,7 @@ class ProjectReader {
       MODAR_TRY(tier.allow(keys_with_settings({"name"}, std::nullopt)));
       ProjectTier read;
       MODAR_TRY(tier.take("name", read.name));
-      if (read.name.empty()) return tier.wrong("name", "a name, which the files get");
+      if (!is_plain(read.name)) return wrong_name(tier);
       MODAR_TRY(tier.take_settings(read.settings));
       project_.tiers.push_back(std::move(read));
     }
@@ -353,6 +381,7 @@ class ProjectReader {
     ProjectAsset asset;
     asset.pattern = pattern;
     MODAR_TRY(reader.take("name", asset.name));
+    if (printable(asset.name) != asset.name) return reader.wrong("name", "a name of letters");
     MODAR_TRY(reader.take("width-mm", asset.width_mm, 0));
     std::string shape;
     MODAR_TRY(reader.take("shape", shape));
@@ -379,6 +408,7 @@ class ProjectReader {
       }
       for (const std::string& file : files) {
         if (left_out.count(file) != 0) continue;
+        MODAR_TRY(keep_inside(reader, "file", file));
         asset.file = file;
         asset.name = name.empty() ? file_stem(file) : name;
         if (!seen.insert(asset.name).second) {
@@ -438,6 +468,7 @@ class ProjectReader {
   Result<void> take_light(const TableReader& reader, std::string& light) const {
     MODAR_TRY(reader.take("light", light));
     std::error_code error;
+    if (!light.empty()) MODAR_TRY(keep_inside(reader, "light", light));
     if (light.empty() || fs::is_regular_file(project_.path(light), error)) return {};
     return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("light"),
                 "there is no file '" + light + "'", "correct the name, or take the line out");
@@ -478,9 +509,7 @@ class ProjectReader {
       MODAR_TRY(reader.take("name", bundle.name));
       MODAR_TRY(reader.take("models", bundle.models));
       MODAR_TRY(reader.take("patterns", bundle.patterns));
-      if (bundle.name.empty() || bundle.name.find('/') != std::string::npos) {
-        return reader.wrong("name", "a name without a slash, which the file gets");
-      }
+      if (!is_plain(bundle.name)) return wrong_name(reader);
       project_.bundles.push_back(std::move(bundle));
     }
     if (project_.bundles.empty()) project_.bundles.push_back({name_, {}, {}});
@@ -516,7 +545,17 @@ class ProjectReader {
 
 }  // namespace
 
-Result<Project> read_project(const std::string& path) {
+bool Project::may_use(const std::string& name) const {
+  if (outside) return true;
+  std::error_code error;
+  const fs::path own = fs::canonical(folder.empty() ? "." : folder, error);
+  const fs::path whole = fs::weakly_canonical(fs::absolute(name, error), error);
+  // Of what cannot be looked at nothing is known.
+  const fs::path relative = whole.lexically_relative(own);
+  return !error && !relative.empty() && *relative.begin() != "..";
+}
+
+Result<Project> read_project(const std::string& path, bool outside) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
     return fail(ExitCode::kIo, "project.open", path, "there is no project file",
@@ -529,7 +568,7 @@ Result<Project> read_project(const std::string& path) {
                 std::string(parsed.error().description()),
                 "correct the line: toml.io has the rules");
   }
-  return ProjectReader(path, parsed.table()).run();
+  return ProjectReader(path, parsed.table(), outside).run();
 }
 
 }  // namespace modar

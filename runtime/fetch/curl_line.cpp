@@ -56,7 +56,7 @@ class Options {
 
 /// What all transfers of a handle share. Set once: curl_easy_reset() restores the size of the
 /// buffer but keeps the buffer.
-bool set_common(CURL* handle, const TransferOptions& options) {
+bool set_common(CURL* handle, const TransferOptions& options, const std::string& address) {
   const std::uint64_t capped = options.bytes_per_second / (2 * std::max(1u, options.parallel));
   const long least =
       options.bytes_per_second == 0
@@ -68,7 +68,7 @@ bool set_common(CURL* handle, const TransferOptions& options) {
       .set(CURLOPT_FOLLOWLOCATION, 1L)
       .set(CURLOPT_MAXREDIRS, 5L)
       .set(CURLOPT_PROTOCOLS_STR, "http,https")
-      .set(CURLOPT_REDIR_PROTOCOLS_STR, "http,https")
+      .set(CURLOPT_REDIR_PROTOCOLS_STR, address.starts_with("https:") ? "https" : "http,https")
       .set(CURLOPT_CONNECTTIMEOUT, kConnectSeconds)
       .set(CURLOPT_LOW_SPEED_LIMIT, least)
       .set(CURLOPT_LOW_SPEED_TIME, std::max(1L, static_cast<long>(std::ceil(options.stall_s))))
@@ -126,6 +126,13 @@ Answer answer_of(const Download& download, CURLcode code) {
              std::string("the TLS connection failed: ") + words,
              "give the authority of its certificate with --cacert, and check the clock"}};
   }
+  if (code == CURLE_UNSUPPORTED_PROTOCOL) {
+    return {Answer::Kind::kFatal,
+            {},
+            {kExitNetwork, "fetch.redirect", download.attempts->address_of(*download.transfer),
+             "the server redirects to an address that is not HTTPS",
+             "fetch from an address that stays with HTTPS"}};
+  }
   if (status == 404 || status == 410) return {Answer::Kind::kMissing, {}, {}};
   if (status == 416 || code == CURLE_RANGE_ERROR || code == CURLE_BAD_DOWNLOAD_RESUME) {
     return {Answer::Kind::kNoRange, {}, {}};
@@ -147,7 +154,7 @@ class CurlLine : public Line {
         places_(std::max(1u, options_.parallel)) {
     for (Download& place : places_) {
       place.handle = curl_easy_init();
-      ready_ = ready_ && set_common(place.handle, options_);
+      ready_ = ready_ && set_common(place.handle, options_, address_);
     }
   }
   CurlLine(const CurlLine&) = delete;
@@ -187,8 +194,8 @@ bool CurlLine::start(Transfer& transfer, Attempts& attempts) {
       .set(CURLOPT_PRIVATE, &download);
   if (ready_ && set.good() && curl_multi_add_handle(multi_, handle) == CURLM_OK) return true;
   download.transfer = nullptr;
-  transfer.error = {ExitCode::kInternal, "fetch.curl", address_, "libcurl refuses to start",
-                    "report this as a bug"};
+  transfer.error = {ExitCode::kInternal, "fetch.curl", without_login(address_),
+                    "libcurl refuses to start", "report this as a bug"};
   return false;
 }
 
@@ -256,7 +263,7 @@ Result<std::unique_ptr<Line>> make_curl_line(const TransferOptions& options,
   static const CURLcode global = curl_global_init(CURL_GLOBAL_DEFAULT);
   CURLM* multi = global == CURLE_OK ? curl_multi_init() : nullptr;
   if (multi == nullptr) {
-    return fail(ExitCode::kInternal, "fetch.curl", options.url, "libcurl does not start",
+    return fail(ExitCode::kInternal, "fetch.curl", without_login(address), "libcurl does not start",
                 "report this as a bug");
   }
   return std::make_unique<CurlLine>(options, address, multi);

@@ -18,6 +18,9 @@ class Line {
   virtual Result<void> run(std::vector<Transfer>& transfers, Attempts& attempts) = 0;
 };
 
+/// An address as it is printed: without a name and a password.
+std::string without_login(const std::string& url);
+
 /// The folder that a release is to be read from, as an absolute path: of a path, or of a file://
 /// address. Nothing: it is the address of a server. Empty: there is no such folder.
 std::optional<std::string> release_folder(const std::string& url_or_folder);

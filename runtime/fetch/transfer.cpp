@@ -7,6 +7,14 @@
 
 namespace modar::fetch {
 
+std::string without_login(const std::string& url) {
+  const std::size_t scheme = url.find("://");
+  if (scheme == std::string::npos) return url;
+  const std::size_t host = scheme + 3;
+  const std::size_t at = url.substr(0, url.find('/', host)).rfind('@');
+  return at == std::string::npos || at < host ? url : url.substr(0, host) + url.substr(at + 1);
+}
+
 struct Transfers::State {
   Attempts attempts;
   std::unique_ptr<Line> line;
@@ -35,7 +43,8 @@ Result<Transfers> Transfers::create(const TransferOptions& options) {
               make_source_line(folder_source(*folder, options.bytes_per_second))}));
   }
   MODAR_ASSIGN(auto line, make_curl_line(options, address));
-  return Transfers(std::make_unique<State>(State{Attempts(options, address), std::move(line)}));
+  return Transfers(
+      std::make_unique<State>(State{Attempts(options, without_login(address)), std::move(line)}));
 }
 
 Result<std::string> Transfers::text(const std::string& path, std::size_t limit, bool optional) {

@@ -76,7 +76,7 @@ class Files(ProjectTest):
                    "[[scene]]\npattern = \"cover\"\nmodel = \"pottery\"\nup = \"y\"\nscale = 0.8\noffset = [0, 0.1, 0]\n"
                    f"light = \"{cover}\"\n"
                    "[[bundle]]\nname = \"one\"\npatterns = \"cov*\"\n")
-        self.bake()
+        self.bake("--outside")
         direct = self.folder / "direct.modar"
         done = self.modar("bake", "--model", POTTERY, "--pattern", f"{cover}:210mm", "--scene",
                           f"cover=pottery,up=y,scale=0.8,offset=0:0.1:0,light={cover}", *LIT_DIRECT, "-o", direct)
@@ -89,7 +89,7 @@ class Files(ProjectTest):
         picture(painting, 150, 160)
         self.write("[bake]\n" + FAST + f"[[model]]\nfile = [\"{STATUE}\", \"{POTTERY}\", \"models/*.obj\"]\n"
                    f"[[pattern]]\nfile = [\"{cover}\", \"{painting}\"]\n")
-        self.bake()
+        self.bake("--outside")
         bundle = self.place / "out/museum.modar"
         self.assertEqual(self.modar_json("check", bundle)["errors"], 0)
         whole = self.modar_json("inspect", bundle)
@@ -280,6 +280,98 @@ class Again(ProjectTest):
         self.assertEqual(target, "out/museum.modar")
         self.assertEqual(sorted(inputs.split()), sorted(
             ["modar.toml", "models/a.obj", "models/b.obj", "models/cube.mtl", "models/wall.png", "pictures/a.png"]))
+
+
+class Strangers(ProjectTest):
+    """Projects that somebody else wrote: they get the files of their folder, and write into it."""
+
+    def refused(self, text, *words, code=3):
+        self.write(text)
+        before = sorted(p for p in self.folder.rglob("*") if ".modar" not in p.parts)
+        done = self.modar("bake", "--quiet", cwd=self.place)
+        self.assertEqual(done.returncode, code, done.stderr)
+        for word in words:
+            self.assertIn(word, done.stderr)
+        self.assertEqual(sorted(p for p in self.folder.rglob("*") if ".modar" not in p.parts), before)
+        return done.stderr
+
+    def table(self, project="", model="models/*.obj", rest=""):
+        return f"[project]\n{project}\n[bake]\n{FAST}[[model]]\nfile = \"{model}\"\n{rest}"
+
+    def test_names_lead_nowhere(self):
+        for name in ("../../evil", "/tmp/evil", "..", ".hidden", "a\\u001b[2Jb", ""):
+            self.refused(self.table(f'name = "{name}"'), "project.value", "modar.toml:2:")
+            self.refused(self.table(rest=f'[[bundle]]\nname = "{name}"\n'), "project.value")
+            self.refused(self.table(rest=f'[[tier]]\nname = "{name}"\n'), "project.value")
+
+    def test_paths_stay_in_the_folder(self):
+        shutil.copytree(self.place / "models", self.folder / "others")
+        (self.place / "models/link.obj").symlink_to(self.folder / "others/b.obj")
+        (self.place / "linked").symlink_to(self.folder / "others")
+        shutil.copy(self.place / "pictures/a.png", self.folder / "room.png")
+        for project in ('out = "../elsewhere"', 'out = "/tmp/elsewhere"', 'cache = "../cache"', 'out = "linked/out"',
+                        'light = "../room.png"'):
+            self.refused(self.table(project), "project.outside", "--outside", "modar.toml:2:")
+        for model in ("../others/b.obj", f"{self.folder}/others/b.obj", "models/link.obj", "linked/b.obj", "../o*/b.obj"):
+            self.refused(self.table(model=model), "project.outside", "--outside")
+            self.write(self.table(model=model))
+            self.bake("--outside", "--dry-run")
+        (self.place / "models/link.obj").unlink()
+        (self.place / ".modar").symlink_to(self.folder / "others")
+        self.refused(self.table(), "project.outside")
+
+    def test_textures_stay_in_the_folder(self):
+        outside = self.folder / "private.png"
+        shutil.copy(self.place / "models/wall.png", outside)
+        for name in ("../../private.png", str(outside)):
+            (self.place / "models/cube.mtl").write_text(CUBE_MTL.replace("wall.png", name))
+            told = self.refused(self.table(model="models/a.obj"), "project.outside", "private.png")
+            self.assertIn("--outside", told)
+        self.assertEqual([p for p in self.place.rglob("*.modar") if p.is_file()], [])
+        self.bake("--outside")
+
+    def test_pipes_are_no_inputs(self):
+        def piped(name):
+            path = self.place / name
+            path.unlink(missing_ok=True)
+            os.mkfifo(path)  # nobody writes to it: what opens it waits for ever
+            return path
+        for name, words in (("models/a.obj", ["--model", "models/a.obj"]), ("x.glb", ["--model", "x.glb"]), ("x.ply", ["--model", "x.ply"]),
+                            ("x.stl", ["--model", "x.stl"]), ("x.png", ["--pattern", "x.png"]), ("x.jpg", ["--pattern", "x.jpg"])):
+            piped(name)
+            done = self.modar("bake", *words, "-o", "y.modar", cwd=self.place)
+            self.assertIn(done.returncode, (2, 3), (name, done.stderr))
+        (self.place / "models/a.obj").unlink()
+        (self.place / "models/a.obj").write_text(CUBE)
+        for name in ("models/cube.mtl", "models/wall.png"):
+            piped(name)
+            done = self.modar("bake", "--model", "models/a.obj", "-o", "y.modar", *DIRECT, cwd=self.place)
+            self.assertIn(done.returncode, (0, 2, 3), (name, done.stderr))
+        gltf = {"asset": {"version": "2.0"}, "buffers": [{"uri": "x.bin", "byteLength": 12}], "images": [{"uri": "y.png"}],
+                "bufferViews": [{"buffer": 0, "byteLength": 12}], "textures": [{"source": 0}],
+                "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]}
+        (self.place / "z.gltf").write_text(json.dumps(gltf))
+        for name in ("x.bin", "y.png"):
+            piped(name)
+        done = self.modar("bake", "--model", "z.gltf", "-o", "y.modar", cwd=self.place)
+        self.assertIn(done.returncode, (2, 3), done.stderr)
+        for command in (["check", "p.modar"], ["inspect", "p.modar"], ["report", "p.modar"]):
+            piped("p.modar")
+            self.assertIn(self.modar(*command, cwd=self.place).returncode, (1, 2, 3), command)
+        self.assertEqual(self.modar("init", "--force", cwd=self.place).returncode, 0)
+
+    def test_no_name_commands_the_terminal(self):
+        escape = "\x1b]0;owned\x07\x1b[2J"
+        (self.place / "models/a.obj").write_text(CUBE.replace("usemtl wall", f"usemtl w{escape}"))
+        evil = self.place / f"models/{escape}.obj"
+        evil.write_text(CUBE.replace("f 1/1", "f 9/1"))
+        for words in (["bake", "--model", "models/a.obj", "-o", "y.modar", *DIRECT[:-1], "--notes"],
+                      ["bake", "--model", evil, "-o", "y.modar"], ["check", f"{escape}.modar"], ["inspect", f"{escape}"],
+                      ["bake", "--model", f"{escape}.xyz", "-o", "y.modar"], ["bake", f"--{escape}"], [escape]):
+            done = self.modar(*words, cwd=self.place)
+            self.assertNotIn("\x1b", done.stderr + done.stdout, words)
+            self.assertNotIn("\x07", done.stderr + done.stdout, words)
+        self.refused(self.table(model="models/*.obj"), "control characters")
 
 
 class Cache(ProjectTest):

@@ -115,7 +115,7 @@ class BreakingLine:
 
 class RudeServer:
     """Serves `root`; `rude(path, attempt)` may name a way to answer wrongly:
-    garbage, short, long, 416, 404, 500, drip (a byte a second), byte (one byte, then the end)."""
+    garbage, short, long, 416, 404, 500, redirect:URL, drip (a byte a second), byte (one byte, then the end)."""
 
     def __init__(self, root, rude, certificate=None):
         root = pathlib.Path(root)
@@ -128,6 +128,12 @@ class RudeServer:
             def do_GET(self):
                 attempts[self.path] = attempts.get(self.path, 0) + 1
                 way = rude(self.path, attempts[self.path])
+                if way and way.startswith("redirect:"):
+                    self.send_response(302)
+                    self.send_header("Location", way.removeprefix("redirect:") + self.path)
+                    self.send_header("Content-Length", "0")
+                    self.end_headers()
+                    return
                 file = root / self.path.lstrip("/")
                 if way in ("404", "416", "500") or not file.is_file():
                     self.send_response(int(way) if way else 404)

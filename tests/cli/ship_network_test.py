@@ -146,12 +146,46 @@ class RudeServers(ShipTest):
         done = self.fetch_from(lambda path, _: "drip" if "objects" in path else None, "--attempts", "1")
         self.assert_fails(done, 16, "fetch.network")
 
-    @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
-    def test_a_private_authority(self):
+    def certificate(self):
         key, certificate = self.folder / "tls.key", self.folder / "tls.pem"
         subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", certificate,
                         "-days", "2", "-subj", "/CN=museum", "-addext", "subjectAltName=IP:127.0.0.1"],
                        check=True, capture_output=True)
+        return certificate, key
+
+    @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
+    def test_https_stays_https(self):
+        self.publish(self.shop.old)
+        plain = RudeServer(self.site, lambda path, attempt: None)
+        self.addCleanup(plain.stop)
+        certificate, key = self.certificate()
+        secure = RudeServer(self.site, lambda path, attempt: None, (certificate, key))
+        self.addCleanup(secure.stop)
+        down = RudeServer(self.site, lambda path, attempt: "redirect:" + plain.url(), (certificate, key))
+        self.addCleanup(down.stop)
+        self.assert_fails(self.fetch(down.url(), "--cacert", certificate), 16, "fetch.redirect", "HTTPS")
+        up = RudeServer(self.site, lambda path, attempt: "redirect:" + secure.url())
+        self.addCleanup(up.stop)
+        self.fetch_json(up.url(), "--cacert", certificate)
+
+    def test_a_login_is_not_printed(self):
+        self.publish(self.shop.old)
+        server = RudeServer(self.site, lambda path, attempt: "500" if "objects" in path else None)
+        self.addCleanup(server.stop)
+        url = server.url().replace("//", "//curator:hunter2@")
+        status = self.folder / "status.json"
+        for attempts in ("1", "3"):
+            done = self.fetch(url, "--attempts", attempts, "--status", status)
+            self.assert_fails(done, 16, "127.0.0.1")
+            self.assertNotIn("hunter2", done.stderr + status.read_text())
+        for wrong in (url + "/nowhere", "http://curator:hunter2@127.0.0.1:1/", "https://curator:hunter2@" + server.url()[7:]):
+            done = self.fetch(wrong, "--attempts", "1")
+            self.assertNotEqual(done.returncode, 0)
+            self.assertNotIn("hunter2", done.stderr)
+
+    @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
+    def test_a_private_authority(self):
+        certificate, key = self.certificate()
         self.publish(self.shop.old)
         server = RudeServer(self.site, lambda path, attempt: None, (certificate, key))
         self.addCleanup(server.stop)

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bake/import/gltf/gltf_materials.hpp"
+#include "bake/input.hpp"
 #include "bake/json.hpp"
 
 namespace modar {
@@ -203,8 +204,9 @@ class Rewriter {
     if (bytes) return &*bytes;
     const std::string name = uri->text().value_or("");
     for (const std::string& file : {name, percent_decoded(name)}) {
+      if (bytes || !is_regular_file(folder_ + file)) continue;
       std::ifstream stream(folder_ + file, std::ios::binary);
-      if (bytes || !stream) continue;
+      if (!stream) continue;
       bytes.emplace(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
     }
     if (!bytes) return fail_at(view, "its buffer '" + name.substr(0, 80) + "' cannot be read");

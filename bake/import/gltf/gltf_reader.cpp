@@ -20,6 +20,7 @@
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/input.hpp"
 
 namespace modar {
 namespace {
@@ -395,6 +396,7 @@ class SceneReader {
 
 /// Reads a whole file; false where it cannot be read.
 bool read_bytes(const std::string& path, std::string& bytes) {
+  if (!is_regular_file(path)) return false;
   std::ifstream file(path, std::ios::binary);
   if (!file) return false;
   bytes.assign(std::istreambuf_iterator<char>(file), {});
@@ -459,6 +461,27 @@ void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const s
                          "left out: " + words, ""});
 }
 
+// How tinygltf reads the files that a model names: regular ones, under the names as they stand.
+
+bool regular_file(const std::string& path, void*) {
+  return is_regular_file(path);
+}
+
+std::string plain_path(const std::string& path, void*) {
+  return path;
+}
+
+bool read_buffer(std::vector<unsigned char>* bytes, std::string* error, const std::string& path,
+                 void*) {
+  std::string read;
+  if (!read_bytes(path, read)) {
+    *error += "cannot read " + path;
+    return false;
+  }
+  bytes->assign(read.begin(), read.end());
+  return true;
+}
+
 }  // namespace
 
 Result<SourceModel> read_gltf(const std::string& path) {
@@ -471,6 +494,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   MODAR_ASSIGN(bytes, decode_meshopt_views(std::move(bytes), folder, path));
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_image_bytes, nullptr);
+  loader.SetFsCallbacks({regular_file, plain_path, read_buffer, nullptr, nullptr});
   tinygltf::Model gltf;
   std::string error;
   std::string warning;

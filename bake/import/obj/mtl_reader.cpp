@@ -14,6 +14,7 @@
 
 #include "bake/import/obj/number_parser.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/input.hpp"
 
 namespace modar {
 namespace {
@@ -349,6 +350,7 @@ std::vector<std::string> split_names(const std::string& text) {
 }
 
 std::string read_text(const std::string& path) {
+  if (!is_regular_file(path)) return {};
   std::ifstream in(path, std::ios::binary);
   std::string text;
   char buffer[65536];

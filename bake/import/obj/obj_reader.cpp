@@ -442,7 +442,7 @@ std::string stem_of(const std::string& path) {
 }  // namespace
 
 Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   struct stat status {};
   if (descriptor < 0 || ::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     const std::string cause = descriptor < 0 ? std::strerror(errno) : "this is not a regular file";
