@@ -6,11 +6,10 @@
 #include <string_view>
 #include <thread>
 
-#include <malloc.h>
-
 #include "bake/parallel.hpp"
 #include "bake/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
+#include "modar/heap.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {
@@ -200,11 +199,6 @@ Result<void> measure_tilts(const Many& many, const Frames& frames, const Camera&
     rows.push_back({name + " others", patterns, 1.0 * all.others, 0});
   }
   return {};
-}
-
-double heap_bytes() {
-  const struct mallinfo2 now = mallinfo2();
-  return static_cast<double>(now.uordblks + now.hblkhd);
 }
 
 /// From mapped bytes to a tracker that takes frames: median time and heap; then the time of its

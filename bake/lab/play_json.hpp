@@ -23,6 +23,7 @@ struct PlayedRun {
   std::vector<PlayedFrame> frames;
   std::uint64_t dropped = 0;  ///< frames that a newer one replaced
   std::uint64_t late = 0;     ///< pictures past the budget of 33.33 ms
+  double cpu_percent = 0;     ///< processor time by wall clock; 100: one core, all the time
 };
 
 /// Reads what the player printed. Errors: kInvalidInput "bench.play" with the line's number, where

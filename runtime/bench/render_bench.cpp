@@ -24,6 +24,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/component.hpp"
 #include "modar/camera.hpp"
+#include "modar/heap.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/render/draw_list.hpp"
@@ -436,16 +437,19 @@ Result<void> add_load(const BenchStage& stage, const std::string& path, Rows& ro
   std::vector<double> copies;
   std::vector<double> uploads;
   GpuMemory memory;
+  double heap = 0;
   for (int i = 0; i < 5; ++i) {
     double start = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
     const Result<MappedFile> file = MappedFile::open(path);
     const bool opened = file && BundleView::open(file->bytes());
     if (opened) opens.push_back(clock_ms(CLOCK_PROCESS_CPUTIME_ID) - start);
+    heap = heap_bytes();
     start = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
     MODAR_ASSIGN(const std::unique_ptr<Renderer> renderer,
                  Renderer::create(stage.bundle, stage.caps));
     glFinish();
     loads.push_back(clock_ms(CLOCK_PROCESS_CPUTIME_ID) - start);
+    heap = heap_bytes() - heap;
     memory = renderer->gpu_memory();
     start = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
     std::vector<std::byte> copy;
@@ -457,6 +461,7 @@ Result<void> add_load(const BenchStage& stage, const std::string& path, Rows& ro
   if (!opens.empty()) rows.add(path + " open_ms", median(opens), 0);
   rows.add(path + " load_cpu_ms", median(loads), median(copies));
   rows.add(path + " driver_cpu_ms", median(uploads), median(copies));
+  rows.add(path + " heap_bytes Renderer and GL", heap, 0);
   rows.add(path + " gl_geometry_bytes", static_cast<double>(memory.geometry),
            static_cast<double>(stage.bundle.vertices().size() + stage.bundle.indices().size()));
   rows.add(

@@ -150,7 +150,12 @@ class Play(ProgramTest):
         for figure, values in article.items():
             for device, value in zip(("low_end", "mid_range"), values):
                 self.assertEqual(rows[f"pottery table9_{figure}_{device}"]["reference"], value)
-        self.assertEqual(rows["pottery pictures"]["ours"] + rows["pottery dropped_frames"]["ours"], 12)
+        self.assertAlmostEqual(rows["pottery pictures"]["ours"] + rows["pottery dropped_frames"]["ours"], 12)
+        self.assertGreater(rows["pottery table9_cpu_percent"]["ours"], 1)
+        heap = [rows[f"pottery heap_bytes {name}"]["ours"] for name in ("BundleView", "PoseLoop", "PoseLoop searching")]
+        if any(heap):  # the sanitizers' allocator does not count
+            self.assertLess(heap[0], 10000, "the bundle is mapped")
+            self.assertGreater(heap[2], heap[1], "a search takes an index")
         done = self.modar("bench", "render", bundle, "--video", "none.mp4")
         self.assert_fails(done, 2, "modar-play")
         self.assertIn("none.mp4", done.stderr)
