@@ -6,8 +6,10 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <system_error>
 
+#include "bake/input.hpp"
 #include "bake/terminal.hpp"
 #include "formats/atomic_file.hpp"
 
@@ -51,6 +53,18 @@ Result<void> keep_inputs(const std::string& output, const std::vector<std::strin
                 "the output would overwrite the input " + input, "name another output");
   }
   return {};
+}
+
+Result<void> keep_other_kinds(const std::string& output, const std::string& kind,
+                              const std::function<bool(std::string_view)>& is_ours) {
+  if (!is_regular_file(output)) return {};
+  std::ifstream file(output, std::ios::binary);
+  std::string start(4096, '\0');
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  start.resize(static_cast<std::size_t>(file.gcount()));
+  if (start.empty() || is_ours(start)) return {};
+  return fail(ExitCode::kUsage, "out.foreign", output,
+              "the output would overwrite a file that is no " + kind, "name another output");
 }
 
 Result<void> try_output(const std::string& path, std::uint64_t bytes) {

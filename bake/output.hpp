@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/error.hpp"
@@ -21,6 +23,12 @@ Result<void> claim_output_folder(const std::string& folder, bool force);
 /// Refuses an output that is one of the inputs: by its path, a symbolic link or a hard link.
 /// Errors: kUsage "out.input".
 Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs);
+
+/// Refuses to write over a file of another kind than the output will be. is_ours: judges the first
+/// 4 KiB of what is there; what is missing, empty or no regular file is written to.
+/// kind: "a page of modar report". Errors: kUsage "out.foreign".
+Result<void> keep_other_kinds(const std::string& output, const std::string& kind,
+                              const std::function<bool(std::string_view)>& is_ours);
 
 /// Tries the folder of a file that will be written: it can be written, and `bytes` are free there.
 /// Leaves nothing behind. Errors: kIo "io.folder", "io.space".

@@ -173,12 +173,11 @@ constexpr std::uint64_t kSourceBytesPerBundleByte = 8;
 /// which the models name, are known only later.
 Result<void> keep_other_files(const std::string& output) {
   if (output.ends_with(".modar")) return {};
-  std::ifstream file(output, std::ios::binary);
-  std::array<std::uint8_t, kMagic.size()> start{};
-  file.read(reinterpret_cast<char*>(start.data()), start.size());
-  if (file.gcount() == 0 || start == kMagic) return {};
-  return fail(ExitCode::kUsage, "out.foreign", output,
-              "the output would overwrite a file that is no bundle", "name another output");
+  return keep_other_kinds(output, "bundle", [](std::string_view start) {
+    return std::equal(kMagic.begin(), kMagic.end(), start.begin(),
+                      start.begin() + std::min(start.size(), kMagic.size()),
+                      [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); });
+  });
 }
 
 /// Tries what will be written, before the work.

@@ -61,6 +61,8 @@ Result<ExitCode> run_calibrate(CalibrateCommand& command) {
   std::vector<std::string> inputs = command.options.inputs;
   inputs.push_back(command.options.pattern);
   MODAR_TRY(keep_inputs(command.output, inputs));
+  MODAR_TRY(keep_other_kinds(command.output, "camera file",
+                             [](std::string_view start) { return start.starts_with("%YAML"); }));
   MODAR_TRY(try_output(command.output, 0));
   ProgressBar bar(command.quiet);
   const auto calibration = calibrate(

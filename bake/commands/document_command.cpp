@@ -76,10 +76,18 @@ std::string manual_page(const CommandText& command, const std::string& version) 
   return text;
 }
 
+/// Into a folder that other programs share: a page or a completion of `modar` alone is replaced.
+Result<void> write_document(const std::string& path, const std::string& text) {
+  MODAR_TRY(keep_other_kinds(path, "document of modar", [](std::string_view start) {
+    return start.find("modar") != std::string_view::npos;
+  }));
+  return write_file(path, std::string_view(text));
+}
+
 Result<void> write_pages(const CommandText& command, const std::string& folder,
                          const std::string& version) {
-  MODAR_TRY(write_file(folder + "/" + page_name(command.name) + ".1",
-                       std::string_view(manual_page(command, version))));
+  MODAR_TRY(
+      write_document(folder + "/" + page_name(command.name) + ".1", manual_page(command, version)));
   for (const CommandText& each : command.commands) MODAR_TRY(write_pages(each, folder, version));
   return {};
 }
@@ -231,7 +239,7 @@ Result<ExitCode> write_documents(const CommandLine& program, const std::string& 
   const auto write = [&](const std::string& place, const std::string& name,
                          const std::string& words) -> Result<void> {
     MODAR_TRY(make_output_folder(folder + "/" + place));
-    return write_file(folder + "/" + place + "/" + name, std::string_view(words));
+    return write_document(folder + "/" + place + "/" + name, words);
   };
   MODAR_TRY(write("bash-completion/completions", "modar", bash_completion(text)));
   MODAR_TRY(write("zsh/site-functions", "_modar", zsh_completion(text)));

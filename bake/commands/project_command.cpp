@@ -101,6 +101,14 @@ Result<void> write_depfile(const std::string& path, const ProjectOutcome& outcom
   return write_file(path, std::string_view(text + "\n"));
 }
 
+/// A depfile of ours names its targets in a line of their own; those of compilers name inputs
+/// there.
+Result<void> keep_no_depfile(const std::string& path) {
+  return keep_other_kinds(path, "depfile of modar", [](std::string_view start) {
+    return start.substr(0, start.find('\n')).ends_with(": \\") && !start.starts_with(' ');
+  });
+}
+
 Json project_json(const ProjectOutcome& outcome) {
   Json assets = Json::array();
   for (const AssetOutcome& asset : outcome.assets) {
@@ -228,6 +236,7 @@ std::set<std::string> watched_paths(const std::string& file, const ProjectOutcom
 Result<ProjectOutcome> bake_once(const ProjectCommand& command, const std::string& file,
                                  const CommonOptions& common) {
   MODAR_ASSIGN(const Project project, read_project(file, command.outside));
+  if (!command.depfile.empty()) MODAR_TRY(keep_no_depfile(command.depfile));
   ProjectOptions options;
   options.cache = command.cache;
   options.cache_key = command.cache_key;

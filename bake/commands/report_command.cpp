@@ -25,6 +25,9 @@ struct ReportCommand {
 
 Result<ExitCode> run_report(ReportCommand& command) {
   MODAR_TRY(keep_inputs(command.output, {command.bundle, command.bake_file}));
+  MODAR_TRY(keep_other_kinds(command.output, "page of modar report", [](std::string_view start) {
+    return start.find("content=\"modar report\"") != std::string_view::npos;
+  }));
   MODAR_TRY(try_output(command.output, 0));
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
   MODAR_ASSIGN(const BundleView bundle, BundleView::open(file.bytes()));

@@ -154,6 +154,7 @@ class Page {
   void head() {
     html_ =
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+        "<meta name=\"generator\" content=\"modar report\">\n"
         "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>" +
         escape_html(options_.title) + "</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>" +
         kStyle + "</style>\n</head>\n<body>\n<header><div>\n<h1>" + escape_html(options_.title) +

@@ -1,4 +1,5 @@
 // modar-fetch: installs releases on the device.
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -261,6 +262,18 @@ void write_status(const CommandLine& line, const Error* error, std::uint64_t ver
   if (auto written = write_file(line.status_file, all); !written) answer(written.error());
 }
 
+/// Only a status of an earlier run is written over.
+Result<void> keep_no_status(const std::string& path) {
+  constexpr std::size_t kMaxStatusBytes = 1u << 20;
+  struct stat info {};
+  if (path.empty() || ::stat(path.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return {};
+  const auto text = read_small_file(path, kMaxStatusBytes);
+  if (text && (text->empty() || text->starts_with("{\"program\":\"modar-fetch"))) return {};
+  return fail(ExitCode::kUsage, "out.foreign", path,
+              "the output would overwrite a file that is no status of modar-fetch",
+              "name another output");
+}
+
 int fail_with_status(const CommandLine& line, const Error& error) {
   // What is installed stays in use.
   const auto installed = installed_release(line.options.store);
@@ -335,6 +348,7 @@ int main(int argc, char** argv) {
     std::fputs(line->help ? kHelp : "modar-fetch " MODAR_VERSION "\n", stdout);
     return 0;
   }
+  if (auto kept = keep_no_status(line->status_file); !kept) return answer(kept.error());
   const int code = line->verify ? run_verify(*line) : run_fetch(*line);
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   const int told = answer({ExitCode::kIo, "io.stdout", "standard output",

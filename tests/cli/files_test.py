@@ -53,6 +53,35 @@ class Inputs(ProgramTest):
                                               "-o", output))
             self.assert_kept(path, self.modar("calibrate", path, "--board", "9x6", "-o", output))
 
+    def test_files_of_other_kinds_stay(self):
+        bundle = self.bake_demo()
+        (self.folder / "modar.toml").write_text(f"[[model]]\nfile = \"m.obj\"\n[bake]\nlods = 1\nocclusion = false\n")
+        (self.folder / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        share = self.folder / "share"
+        thesis = "My thesis.\nall: paper.pdf\n"
+        for name, words in (("page.html", ["report", bundle, "-o"]), ("deps.d", ["bake", "--depfile"]), ("camera.yml", ["calibrate", COVER, "--board", "9x6", "-o"]),
+                            ("share/man/man1/modar-bake.1", ["document", "-o"]),
+                            ("share/bash-completion/completions/modar", ["document", "-o"])):
+            with self.subTest(name):
+                path = self.folder / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(thesis)
+                output = share if words[0] == "document" else path
+                done = self.modar(*words, output)
+                self.assert_fails(done, 1, "out.foreign", str(path))
+                self.assertEqual(path.read_text(), thesis)
+                path.write_text("")  # nothing is lost
+                if words[0] != "calibrate":
+                    for _ in range(2):
+                        done = self.modar(*words, output)
+                        self.assertEqual(done.returncode, 0, done.stderr)
+                    self.assertNotEqual(path.read_text(), "")
+        status = self.folder / "status.json"
+        status.write_text(thesis)
+        done = self.run_program("modar-fetch", "--store", self.folder / "store", "--verify", "--status", status)
+        self.assert_fails(done, 1, "out.foreign", "status.json")
+        self.assertEqual(status.read_text(), thesis)
+
     def test_pictures_beside_patterns(self):
         path, _ = self.aliases(COVER)
         self.assert_kept(path, self.modar("pattern", "score", path, "--overlay", "."))
