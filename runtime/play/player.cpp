@@ -77,7 +77,7 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
       bundle_(bundle),
       watch_(options.bundle),
       names_(pattern_names(bundle)),
-      hysteresis_(names_.size()),
+      hysteresis_(names_.size(), options.method != "paper"),
       smoother_(names_.size(), options.smooth_ms),
       controls_(bundle, options.outline, options.osd || options.window),
       progress_(!options.quiet) {
@@ -164,7 +164,7 @@ void Player::follow_spot(const Job& job) {
   if (job.spot == spot_) return;
   spot_ = job.spot;
   names_ = pattern_names(spot_ ? spot_->view : bundle_);
-  hysteresis_ = Hysteresis(names_.size());
+  hysteresis_ = Hysteresis(names_.size(), options_.method != "paper");
   smoother_ = PoseSmoother(names_.size(), options_.smooth_ms);
 }
 
@@ -179,7 +179,7 @@ Result<void> Player::follow_live(const Job& job) {
   items_.reserve(std::max(bundle_.scenes().size(), bundle_.patterns().size()));
   std::vector<std::string> names = pattern_names(bundle_);
   if (!spot_ && names != names_) {
-    hysteresis_ = Hysteresis(names.size());
+    hysteresis_ = Hysteresis(names.size(), options_.method != "paper");
     smoother_ = PoseSmoother(names.size(), options_.smooth_ms);
     names_ = std::move(names);
   }

@@ -713,7 +713,7 @@ PatchFit align_plane(TrackedPattern& pattern, const FrameView& frame, int frame_
   std::array<double, 2> all{};
   for (int step = 0; step < steps; ++step) {
     std::vector<PatchLinearisation>& patches = frame.patches.linearisations();
-    fit = linearise(pattern, frame, view, kTukey, pose, patches);
+    fit = linearise(pattern, frame, view, fit.covered() ? kTukeyCovered : kTukey, pose, patches);
     const glm::dmat2 of_world = glm::dmat2(scale, 0.0, 0.0, -scale) * glm::inverse(pattern.shape);
     PlaneEquations sum;
     for (const PatchLinearisation& patch : patches) {

@@ -67,7 +67,7 @@ struct Return {
 };
 
 bool shows_flat(const PatchFit& fit) {
-  return fit.inlier_ratio() >= kFlatRatio && fit.inliers >= kFlatPatches;
+  return fit.inliers >= kFlatPatches && (fit.inlier_ratio() >= kFlatRatio || fit.covered());
 }
 
 /// Largest way of a corner, pixels.
@@ -385,7 +385,9 @@ void PoseLoop::State::measure(std::size_t i, Detection& detection) {
   track.frames_to_measure = kMeasureEvery;
   tracker::CameraEstimator::View view{i, {}, {}, track.pose};
   if (!(track.measured ? measure_again(i, view) : measure_first(i, view))) return;
-  if (estimator->is_new(i, view.pixels)) estimator->add(view);
+  // Corners beyond what covers a print would say more of the camera than they know.
+  const bool open = detection.inliers >= kFlatRatio * detection.matches;
+  if (open && estimator->is_new(i, view.pixels)) estimator->add(view);
   const std::array<glm::dvec2, 4> before = detection.corners;
   frame_tracker.locate(patterns[i], track, detection);
   if (!track.measured || way_of(before, detection.corners) > kMovedShape)

@@ -32,7 +32,8 @@ PoseSmoother::PoseSmoother(std::size_t pattern_count, double max_latency_ms)
     : states_(pattern_count), max_latency_s_(std::clamp(max_latency_ms, 0.0, 1000.0) * 1e-3) {}
 
 /// Returns the latency in seconds.
-double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
+double PoseSmoother::smooth(double time_s, State& state, Detection& detection) const {
+  Pose& pose = detection.pose;
   const double seconds = time_s - state.time_s;
   const bool fresh = !state.known || !(seconds > 0.0) || seconds > kMaxGap_s;
   const Pose raw = pose;
@@ -40,6 +41,7 @@ double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
   if (fresh) {
     state.speed = 0.0;
     state.smooth = raw;
+    state.corners = detection.corners;
   } else {
     const double depth = std::max(raw.translation.z, 1e-9);
     const double moved = glm::length(turn_between(state.raw, raw)) +
@@ -50,11 +52,15 @@ double PoseSmoother::smooth(double time_s, State& state, Pose& pose) const {
     state.smooth.rotation =
         rotation_matrix(part * turn_between(state.smooth, raw)) * state.smooth.rotation;
     state.smooth.translation += part * (raw.translation - state.smooth.translation);
+    for (std::size_t i = 0; i < state.corners.size(); ++i) {
+      state.corners[i] += part * (detection.corners[i] - state.corners[i]);
+    }
   }
   state.known = true;
   state.time_s = time_s;
   state.raw = raw;
   pose = state.smooth;
+  detection.corners = state.corners;
   return latency;
 }
 
@@ -66,7 +72,7 @@ double PoseSmoother::step(double time_s, std::span<Detection> visible) {
     if (detection.pattern >= states_.size()) continue;
     State& state = states_[detection.pattern];
     state.seen = true;
-    slowest = std::max(slowest, smooth(time_s, state, detection.pose));
+    slowest = std::max(slowest, smooth(time_s, state, detection));
   }
   for (State& state : states_) state.known = state.known && state.seen;
   return slowest * 1e3;

@@ -2,6 +2,8 @@
 // detections in sequence and outlives two misses.
 #include "modar/tracker.hpp"
 
+#include "plane_geometry.hpp"
+
 namespace modar {
 
 const char* to_string(Reason reason) {
@@ -56,8 +58,8 @@ constexpr int kFramesToKeep = 2;
 
 }  // namespace
 
-Hysteresis::Hysteresis(std::size_t pattern_count)
-    : counters_(pattern_count), states_(pattern_count) {}
+Hysteresis::Hysteresis(std::size_t pattern_count, bool predict)
+    : counters_(pattern_count), states_(pattern_count), predict_(predict) {}
 
 std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> visible) {
   for (Counter& counter : counters_) counter.state.measured = false;
@@ -65,6 +67,8 @@ std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> v
     if (detection.pattern >= counters_.size()) continue;
     Counter& counter = counters_[detection.pattern];
     counter.state.measured = true;
+    counter.moving = predict_ && counter.seen > 0;
+    counter.previous = counter.state.pose;
     counter.state.pose = detection.pose;
   }
   for (std::size_t i = 0; i < counters_.size(); ++i) {
@@ -76,7 +80,14 @@ std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> v
       if (counter.seen >= kFramesToShow) counter.state.shown = true;
     } else {
       counter.seen = 0;
-      if (counter.missed <= kFramesToKeep) ++counter.missed;
+      if (counter.missed <= kFramesToKeep) {
+        ++counter.missed;
+        if (counter.moving) {
+          const Pose next = tracker::extrapolate(counter.previous, counter.state.pose);
+          counter.previous = counter.state.pose;
+          counter.state.pose = next;
+        }
+      }
       if (counter.missed > kFramesToKeep) counter.state.shown = false;
     }
     states_[i] = counter.state;

@@ -25,8 +25,8 @@ TEST(Hysteresis, FollowsTheArticlesRule) {
   EXPECT_EQ(shown("......"), "000000");
 }
 
-TEST(Hysteresis, KeepsTheNewestMeasuredPoseAndSaysWhetherItIsOfThisFrame) {
-  Hysteresis hysteresis(2);
+TEST(Hysteresis, WithoutPredictionKeepsTheNewestPoseAndSaysWhetherItIsOfThisFrame) {
+  Hysteresis hysteresis(2, false);
   Detection detection;
   detection.pattern = 1;
   detection.pose.translation = {1, 2, 3};
@@ -40,6 +40,29 @@ TEST(Hysteresis, KeepsTheNewestMeasuredPoseAndSaysWhetherItIsOfThisFrame) {
   EXPECT_TRUE(states[1].shown);
   EXPECT_FALSE(states[1].measured);
   EXPECT_EQ(states[1].pose.translation, glm::dvec3(4, 5, 6));
+}
+
+TEST(Hysteresis, GoesOnAsThePatternMovedBeforeItsLoss) {
+  Hysteresis hysteresis(1);
+  Detection detection;
+  const auto see = [&](double x, double turn) {
+    detection.pose.translation = {x, 2, 8};
+    detection.pose.rotation = rotation_matrix({0, turn, 0});
+    return hysteresis.step({&detection, 1})[0];
+  };
+  see(1.0, 0.3);
+  see(1.5, 0.4);
+  for (const int missed : {1, 2}) {
+    const Hysteresis::State state = hysteresis.step({})[0];
+    EXPECT_TRUE(state.shown);
+    EXPECT_FALSE(state.measured);
+    EXPECT_NEAR(state.pose.translation.x, 1.5 + 0.5 * missed, 1e-12);
+    EXPECT_NEAR(rotation_vector(state.pose.rotation).y, 0.4 + 0.1 * missed, 1e-9);
+  }
+  EXPECT_FALSE(hysteresis.step({})[0].shown);
+  // One frame tells no motion.
+  see(3.0, 0);
+  EXPECT_EQ(hysteresis.step({})[0].pose.translation.x, 3.0);
 }
 
 TEST(Hysteresis, IgnoresPatternsThatItDoesNotKnow) {

@@ -61,6 +61,26 @@ TEST(PoseSmoother, ASteadyMotionIsTrailedByTheStatedLatency) {
   }
 }
 
+TEST(PoseSmoother, CornersStayWhereTheSmoothedPoseHasThem) {
+  // Of a camera of 600 pixels, 4 units away: a corner moves by 150 pixels a unit.
+  PoseSmoother smoother(1, 120.0);
+  for (int i = 0; i < 40; ++i) {
+    const double x = 0.02 * i + 0.01 * std::sin(40.0 * i);
+    auto seen = at(x);
+    for (std::size_t k = 0; k < 4; ++k) {
+      seen[0].corners[k] = {300.0 + 100.0 * static_cast<double>(k) + 150.0 * x, 200.0};
+    }
+    smoother.step(i * kFrame_s, seen);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const double there = 300.0 + 100.0 * static_cast<double>(k);
+      EXPECT_NEAR(seen[0].corners[k].x, there + 150.0 * seen[0].pose.translation.x, 1e-9) << i;
+    }
+    if (i > 0) {
+      EXPECT_GT(std::abs(seen[0].pose.translation.x - x), 1e-6);
+    }
+  }
+}
+
 TEST(PoseSmoother, TurnsAreSmoothedAndStayTurns) {
   PoseSmoother smoother(1, 200.0);
   auto seen = at(0.0, 0.0);

@@ -99,7 +99,7 @@ typedef struct modar_pose {
   float rotation[9];    /* row by row */
   float translation[3]; /* half largest sides of the pattern */
   int visible;          /* 1: measured in this frame */
-  int shown;            /* 1: draw the model (the pose may be of the last frame but one) */
+  int shown;            /* 1: draw the model (while not visible, the pose goes on as it moved) */
   int inliers;          /* 0 where it is not visible */
   float fit;            /* share of the features looked at that agree with the pose, 0 to 1 */
   float corners[8];     /* x, y in pixels: top left, top right, bottom right, bottom left */

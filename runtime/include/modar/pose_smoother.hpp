@@ -1,9 +1,12 @@
 // Removes jitter from poses, for drawing, at the price of a latency that it reports.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
+
+#include <glm/vec2.hpp>
 
 #include "modar/tracker.hpp"
 
@@ -19,7 +22,7 @@ class PoseSmoother {
   /// of sight.
   PoseSmoother(std::size_t pattern_count, double max_latency_ms);
 
-  /// time_s: of the frame, increasing. Changes poses only, not corners. A pattern that was not in
+  /// time_s: of the frame, increasing. Changes poses, and corners alike. A pattern that was not in
   /// the last frame starts anew. Returns the largest latency, milliseconds.
   double step(double time_s, std::span<Detection> visible);
 
@@ -31,8 +34,9 @@ class PoseSmoother {
     double speed = 0;
     Pose raw;
     Pose smooth;
+    std::array<glm::dvec2, 4> corners{};  ///< smooth, too
   };
-  double smooth(double time_s, State& state, Pose& pose) const;
+  double smooth(double time_s, State& state, Detection& detection) const;
 
   std::vector<State> states_;
   double max_latency_s_ = 0;

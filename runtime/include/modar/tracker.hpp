@@ -77,27 +77,33 @@ struct TrackResult {
 };
 
 /// The two-frame rule of the ModAR paper: a model is shown once its pattern was seen in two
-/// consecutive frames, and stays for two frames after its loss.
+/// consecutive frames, and stays for two frames after its loss. There it goes on as it moved
+/// between the last two frames that saw it: a print that leaves the frame fast takes its model
+/// along.
 class Hysteresis {
  public:
-  explicit Hysteresis(std::size_t pattern_count);
+  /// predict: false leaves the model of a lost pattern where it was, as the paper does.
+  explicit Hysteresis(std::size_t pattern_count, bool predict = true);
 
   struct State {
     bool shown = false;     ///< draw the model, at `pose`
-    bool measured = false;  ///< the pose is of this frame
-    Pose pose;              ///< the latest measured pose
+    bool measured = false;  ///< the pose is of this frame, not predicted from those before
+    Pose pose;
   };
   /// Takes a frame's detections; returns one state per pattern, valid until the next call.
   std::span<const State> step(std::span<const Detection> visible);
 
  private:
   struct Counter {
-    int seen = 0;    ///< consecutive frames with a detection
-    int missed = 0;  ///< consecutive frames without
+    int seen = 0;         ///< consecutive frames with a detection
+    int missed = 0;       ///< consecutive frames without
+    bool moving = false;  ///< `previous` is the pose of the frame before that of `state`
+    Pose previous;
     State state;
   };
   std::vector<Counter> counters_;
   std::vector<State> states_;
+  bool predict_ = true;
 };
 
 }  // namespace modar
