@@ -71,6 +71,24 @@ void read_names(const Json& document, const char* kind, std::vector<Asset>& asse
   }
 }
 
+/// A picture among the sources that lights a scene and is no pattern of the bundle.
+std::string take_light(const Json& document, const std::string& file, BakeRequest& request) {
+  const auto named = [&file](const PatternRequest& pattern) {
+    return std::filesystem::path(pattern.path).filename().string() == file;
+  };
+  const auto patterns = document.find("patterns");
+  if (patterns != document.end() && patterns->is_array()) {
+    for (const Json& stated : *patterns) {
+      std::string other;
+      if (stated.is_object()) take(stated, "file", other);
+      if (other == file) return "";
+    }
+  }
+  const auto found = std::find_if(request.patterns.begin(), request.patterns.end(), named);
+  if (file.empty() || found == request.patterns.end()) return "";
+  return found->path;
+}
+
 void read_scenes(const Json& document, BakeRequest& request) {
   const auto scenes = document.find("scenes");
   if (scenes == document.end() || !scenes->is_array()) return;
@@ -87,10 +105,17 @@ void read_scenes(const Json& document, BakeRequest& request) {
     take_three(stated, "turn", scene.turn);
     scene.offset.unit = SceneOffset::Unit::kSide;
     take_three(stated, "offset_sides", scene.offset.value);
+    std::string light;
+    take(stated, "light", light);
+    scene.light = take_light(document, light, request);
     if (is_given(request.models, scene.model) && is_given(request.patterns, scene.pattern)) {
       request.scenes.push_back(scene);
     }
   }
+  std::erase_if(request.patterns, [&request](const PatternRequest& pattern) {
+    return std::any_of(request.scenes.begin(), request.scenes.end(),
+                       [&](const SceneRequest& scene) { return scene.light == pattern.path; });
+  });
 }
 
 /// The widths and shapes that patterns were baked with, where the user gives none.

@@ -19,6 +19,8 @@
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_codec.hpp"
+#include "formats/draw_order.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 
 namespace modar {
@@ -35,6 +37,10 @@ constexpr double kLeastTexturePsnr = 30.0;
 
 /// Of scales and offsets, which are floats made from doubles.
 constexpr float kSceneSlack = 1e-5f;
+/// Of lights, whose parts are sums over a picture.
+constexpr float kLightSlack = 1e-3f;
+/// Of shadows (0 to 255) and occlusion (0 to 127), on average: what nobody sees.
+constexpr double kShadeSlack = 8;
 /// Of widths that were written in different units.
 constexpr double kWidthSlack = 1e-6;
 /// Codes of 256 bits that describe one corner; random ones differ in 128, rarely in less than 96.
@@ -237,8 +243,72 @@ class SourceCheck {
                std::max(fit.source_to_bundle, fit.bundle_to_source));
     judge_model(model, mesh, fit);
     check_materials(model);
+    check_occlusion(model);
+    if (fit.same_bytes) check_draw_order(model);
     fit_.models.push_back(fit);
     return {};
+  }
+
+  /// The shades of a model's corners, where it has the same vertices.
+  void check_occlusion(const ModelRecord& model) {
+    const ModelRecord* other = namesake(again_->models, model.name);
+    if (other == nullptr || other->chunk_count != model.chunk_count) return;
+    const std::uint32_t ours = occlusion_byte(bundle_.occlusion(), model.layout);
+    std::uint32_t theirs = kNone;
+    for (const OcclusionRecord& record : again_->occlusion) {
+      if (record.layout == other->layout) theirs = record.offset;
+    }
+    const std::string where = label("model", model.name);
+    if ((ours == kNone) != (theirs == kNone)) {
+      return tell(WorkstationRule::kSourceColour, where, &model,
+                  ours == kNone ? "its occlusion is missing" : "its source gives no occlusion");
+    }
+    if (ours == kNone) return;
+    const std::size_t stride = bundle_.layouts()[model.layout].stride;
+    const std::size_t other_stride = again_->layouts[other->layout].stride;
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const LevelRecord& a = bundle_.levels()[bundle_.chunks()[model.first_chunk + c].first_level];
+      const LevelRecord& b = again_->levels[again_->chunks[other->first_chunk + c].first_level];
+      if (a.vertex_count != b.vertex_count) return;
+      for (std::size_t v = 0; v < a.vertex_count; ++v) {
+        const auto mine =
+            std::to_integer<int>(bundle_.vertices()[a.vertex_offset + v * stride + ours]);
+        const auto its =
+            std::to_integer<int>(again_->vertices[b.vertex_offset + v * other_stride + theirs]);
+        sum += std::abs(mine - its);
+      }
+      count += a.vertex_count;
+    }
+    const double mean = count == 0 ? 0 : sum / static_cast<double>(count);
+    if (mean <= kShadeSlack) return;
+    tell(WorkstationRule::kSourceColour, where, &model,
+         "its occlusion is off by " + std::to_string(mean) + " of 127 on average");
+  }
+
+  [[nodiscard]] std::span<const std::byte> section_again(SectionType type,
+                                                         std::size_t owner) const {
+    for (const ExtraSection& extra : again_->extra) {
+      if (extra.type == static_cast<std::uint32_t>(type) && extra.owner == owner)
+        return extra.bytes;
+    }
+    return {};
+  }
+
+  /// Of a model that has the same bytes.
+  void check_draw_order(const ModelRecord& model) {
+    const ModelRecord* other = namesake(again_->models, model.name);
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const std::uint32_t chunk = model.first_chunk + c;
+      if (equal(bundle_.section(kDrawOrder, chunk),
+                section_again(kDrawOrder, other->first_chunk + c))) {
+        continue;
+      }
+      tell(WorkstationRule::kSourceColour,
+           label("model", model.name) + ", chunk " + std::to_string(c), &bundle_.chunks()[chunk],
+           "the order in which it is drawn is not the source's");
+    }
   }
 
   void judge_model(const ModelRecord& model, const TriMesh& mesh, const ModelFit& fit) {
@@ -332,17 +402,83 @@ class SourceCheck {
       }
       const std::string where =
           "scene " + std::to_string(s) + ", " + label("pattern", pattern.name);
-      const bool found =
-          std::any_of(again_->scenes.begin(), again_->scenes.end(), [&](const SceneRecord& other) {
+      const auto found =
+          std::find_if(again_->scenes.begin(), again_->scenes.end(), [&](const SceneRecord& other) {
             return name_again(again_->patterns[other.pattern].name) == bundle_.name(pattern.name) &&
                    name_again(again_->models[other.model].name) == bundle_.name(model.name) &&
                    same_place(scene, other);
           });
-      if (found) continue;
+      if (found != again_->scenes.end()) {
+        check_lighting(s, static_cast<std::uint32_t>(found - again_->scenes.begin()), where);
+        continue;
+      }
       tell(WorkstationRule::kSourceScene, where, &scene,
            "scale " + std::to_string(scene.scale) + ", offset " + std::to_string(scene.offset[0]) +
                " " + std::to_string(scene.offset[1]) + " " + std::to_string(scene.offset[2]));
     }
+  }
+
+  /// The light and the shadow of a scene whose model stands as in the source's.
+  void check_lighting(std::uint32_t scene, std::uint32_t other, const std::string& where) {
+    const auto light_of = [](const auto& lights, std::uint32_t index) {
+      const LightRecord* found = nullptr;
+      for (std::uint32_t i = 0; i < lights.size(); ++i) {
+        if (lights[i].scene == index) found = &lights[i];
+      }
+      return found;
+    };
+    const LightRecord* ours = light_of(bundle_.lights(), scene);
+    const LightRecord* theirs = light_of(again_->lights, other);
+    const SceneRecord* place = &bundle_.scenes()[scene];
+    if (ours != nullptr && theirs == nullptr) {  // its picture is not among the sources
+      return tell(WorkstationRule::kSourceMissing, where + ", light", ours, "");
+    }
+    if (ours == nullptr && theirs != nullptr) {
+      return tell(WorkstationRule::kSourceScene, where, place, "its light is missing");
+    }
+    if (ours != nullptr && !same_light(*ours, *theirs)) {
+      tell(WorkstationRule::kSourceScene, where, ours, "its light is not that of its picture");
+    }
+    const auto shadow = bundle_.section(SectionType::kShadow, scene);
+    const std::string fault = shadow_fault(
+        shadow, other < again_->shadows.size() ? again_->shadows[other] : std::vector<std::byte>());
+    if (!fault.empty()) tell(WorkstationRule::kSourceScene, where, place, fault);
+  }
+
+  static bool same_light(const LightRecord& a, const LightRecord& b) {
+    const auto near = [](const auto& x, const auto& y) {
+      return std::equal(std::begin(x), std::end(x), std::begin(y), [](float p, float q) {
+        return std::fabs(p - q) <= kLightSlack * std::max(1.0f, std::fabs(q));
+      });
+    };
+    return near(a.sky, b.sky) && near(a.key, b.key) && near(a.direction, b.direction);
+  }
+
+  /// How a shadow differs from the one baked again; empty where nobody sees it.
+  static std::string shadow_fault(std::span<const std::byte> ours,
+                                  std::span<const std::byte> theirs) {
+    if (ours.empty() != theirs.empty()) {
+      return ours.empty() ? "its shadow is missing" : "the source gives no shadow";
+    }
+    if (equal(ours, theirs)) return "";
+    ShadowHeader a{};
+    ShadowHeader b{};
+    std::memcpy(&a, ours.data(), sizeof a);
+    std::memcpy(&b, theirs.data(), sizeof b);
+    const auto near = [](float x, float y) {
+      return std::fabs(x - y) <= kLightSlack * std::max(1.0f, std::fabs(y));
+    };
+    const bool place = near(a.low[0], b.low[0]) && near(a.low[1], b.low[1]) &&
+                       near(a.high[0], b.high[0]) && near(a.high[1], b.high[1]);
+    if (!place || ours.size() != theirs.size())
+      return "its shadow lies elsewhere than the source's";
+    double sum = 0;
+    for (std::size_t i = sizeof a; i < ours.size(); ++i) {
+      sum += std::abs(std::to_integer<int>(ours[i]) - std::to_integer<int>(theirs[i]));
+    }
+    const double mean = sum / static_cast<double>(ours.size() - sizeof a);
+    if (mean <= kShadeSlack) return "";
+    return "its shadow is off by " + std::to_string(mean) + " of 255 on average";
   }
 
   static bool same_place(const SceneRecord& a, const SceneRecord& b) {
@@ -421,6 +557,10 @@ class SourceCheck {
     const std::string fault = same_record ? "" : record_fault(record, section->bytes);
     if (!fault.empty()) {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern, fault);
+    }
+    if (!equal(bundle_.section(kPatternShape, index), section_again(kPatternShape, which))) {
+      tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
+           "its shape is not the source's");
     }
     const double width = other->width_mm;
     if (width <= 0 || std::fabs(pattern.width_mm / width - 1) <= kWidthSlack) return;

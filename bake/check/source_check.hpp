@@ -30,8 +30,9 @@ struct SourceFit {
 /// Bakes `request` in memory and compares each asset of the bundle with its namesake: byte for
 /// byte, then the surfaces of models both ways in double precision, at their vertices and the
 /// centres of their triangles (a surface may be off by no more than the bundle states), materials
-/// and their textures, patterns' images, codes and widths, and scenes where the request has any.
-/// bundle: one that check_bundle() found good. Errors: those of the bake.
+/// and their textures, occlusion, the order of drawing, patterns' images, codes, widths and shapes,
+/// and scenes with their lights and shadows where the request has any. bundle: one that
+/// check_bundle() found good. Errors: those of the bake.
 Result<SourceFit> check_source(const BundleView& bundle, const BakeRequest& request,
                                const IssueSink& sink, Report& report);
 

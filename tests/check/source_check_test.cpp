@@ -11,8 +11,11 @@
 #include <set>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/bundle/request_text.hpp"
 #include "bake/image/image.hpp"
 #include "formats/bundle_view.hpp"
+#include "formats/draw_order.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 #include "tests/formats/support.hpp"
 #include "tests/texture/texture_samples.hpp"
@@ -71,7 +74,14 @@ class SourceTest : public ::testing::Test {
     ASSERT_TRUE(write_png(ramp(0), folder_.file("wood.png")));
     ASSERT_TRUE(write_png(ramp(5), folder_.file("stone.png")));
     ASSERT_TRUE(write_png(squares(), folder_.file("card.png")));
+    ASSERT_TRUE(write_png(ramp(60), folder_.file("room.png")));
+    bake();
+  }
+
+  void bake(const ShapeRequest& shape = {}) {
     BakeRequest request = sources();
+    request.patterns.pop_back();  // the room's picture, which lights the scene
+    request.patterns[0].shape = shape;
     request.patterns[0].width_mm = 210;
     request.parameters = {"none"};
     request.loop.trial_views = 8;
@@ -82,6 +92,7 @@ class SourceTest : public ::testing::Test {
     scene.size.value = 0.5;
     scene.up = UpAxis::kY;
     scene.offset = {SceneOffset::Unit::kSide, {0.05, 0, 0}};
+    scene.light = folder_.file("room.png");
     request.scenes = {scene};
     Report report;
     auto built = build_bundle(request, report);
@@ -93,7 +104,7 @@ class SourceTest : public ::testing::Test {
   [[nodiscard]] BakeRequest sources() const {
     BakeRequest request;
     request.models = {folder_.file("two.obj")};
-    request.patterns = {{folder_.file("card.png"), 0.0}};
+    request.patterns = {{folder_.file("card.png"), 0.0}, {folder_.file("room.png"), 0.0}};
     return request;
   }
 
@@ -106,6 +117,7 @@ class SourceTest : public ::testing::Test {
     if (!bundle) return {to_line(bundle.error())};
     BakeRequest request = sources();
     request.parameters = {"none"};
+    if (!room_given_) request.patterns.pop_back();
     read_bake_options(bundle->meta(), request);
     std::set<std::string> ids;
     Report report;
@@ -131,6 +143,7 @@ class SourceTest : public ::testing::Test {
 
   ScratchFolder folder_;
   BundleContent content_;
+  bool room_given_ = true;
 };
 
 using Ids = std::set<std::string>;
@@ -158,6 +171,69 @@ TEST_F(SourceTest, ScenesAreWhereTheyWereAskedFor) {
     EXPECT_EQ(issues([&](BundleContent& content) { change(content.scenes[0]); }),
               Ids{"SOURCE_SCENE"});
   }
+}
+
+TEST_F(SourceTest, ShadowsAndLightsAreThoseOfTheirSources) {
+  ASSERT_FALSE(content_.shadows.empty() || content_.shadows[0].empty());
+  ASSERT_EQ(content_.lights.size(), 1u);
+  const std::function<void(BundleContent&)> changes[] = {
+      [](BundleContent& content) {  // all black
+        std::fill(content.shadows[0].begin() + sizeof(ShadowHeader), content.shadows[0].end(),
+                  std::byte{0});
+      },
+      [](BundleContent& content) { content.shadows[0].clear(); },
+      [](BundleContent& content) {
+        ShadowHeader header{};
+        std::memcpy(&header, content.shadows[0].data(), sizeof header);
+        header.high[0] += 1;
+        std::memcpy(content.shadows[0].data(), &header, sizeof header);
+      },
+      [](BundleContent& content) { content.lights.clear(); },
+      [](BundleContent& content) { content.lights[0].key[0] *= 3; },
+      [](BundleContent& content) { content.lights[0].sky[1] += 0.5f; },
+      [](BundleContent& content) {
+        for (float& part : content.lights[0].direction) part = -part;
+      }};
+  for (const auto& change : changes) EXPECT_EQ(issues(change), Ids{"SOURCE_SCENE"});
+  room_given_ = false;  // then nothing is known of the light, and of the shadow that it casts
+  EXPECT_EQ(issues(), Ids{"SOURCE_MISSING"});
+}
+
+TEST_F(SourceTest, CornersHaveTheShadesOfTheirSource) {
+  ASSERT_EQ(content_.occlusion.size(), 1u);
+  const Ids found = issues([](BundleContent& content) {
+    const std::size_t stride = content.layouts[content.occlusion[0].layout].stride;
+    for (std::size_t v = content.occlusion[0].offset; v < content.vertices.size(); v += stride) {
+      content.vertices[v] = content.vertices[v] < std::byte{64} ? std::byte{127} : std::byte{0};
+    }
+  });
+  EXPECT_EQ(found, (Ids{"SOURCE_BYTES", "SOURCE_COLOUR"}));
+  EXPECT_TRUE(
+      issues([](BundleContent& content) { content.occlusion.clear(); }).count("SOURCE_COLOUR"));
+}
+
+TEST_F(SourceTest, GlassIsDrawnInTheOrderOfItsSource) {
+  const DrawOrderRecord node{{0, 0, 1, 0}, 0, 0};
+  ExtraSection order;
+  order.type = static_cast<std::uint32_t>(kDrawOrder);
+  order.owner = 0;
+  const auto bytes = std::as_bytes(std::span(&node, 1));
+  order.bytes.assign(bytes.begin(), bytes.end());
+  EXPECT_EQ(issues([&](BundleContent& content) { content.extra.push_back(order); }),
+            Ids{"SOURCE_COLOUR"});
+}
+
+TEST_F(SourceTest, PatternsHaveTheShapesOfTheirSources) {
+  const auto shape = parse_shape("cylinder,diameter=100mm");
+  ASSERT_TRUE(shape);
+  bake(*shape);
+  EXPECT_EQ(issues(), Ids());
+  const Ids found = issues([](BundleContent& content) {
+    std::erase_if(content.extra, [](const ExtraSection& extra) {
+      return extra.type == static_cast<std::uint32_t>(kPatternShape);
+    });
+  });
+  EXPECT_TRUE(found.count("SOURCE_PATTERN"));
 }
 
 TEST_F(SourceTest, PatternsHaveTheirCodesImagesAndWidths) {
