@@ -1,4 +1,4 @@
-// Makes levels in both ways and samples the distances between surfaces.
+// Bakes with default options, and samples the distances between the source and the bundle's levels.
 #include "bake/lab/lod_bench.hpp"
 
 #include <meshoptimizer.h>
@@ -10,15 +10,16 @@
 #include <filesystem>
 #include <limits>
 #include <random>
-#include <set>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "bake/import/read_model.hpp"
-#include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
+#include "bake/process.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
 
 namespace modar {
 namespace {
@@ -27,10 +28,6 @@ using Triangles = std::vector<TriangleTree::Triangle>;
 
 /// Points a surface: the 99th percentile then stands on 500 of them.
 constexpr std::size_t kSamples = 50'000;
-/// Pixels that every material's texture is taken to have, where a model has uv: what scans usually
-/// have. Slides are of that scale.
-constexpr std::uint32_t kTextureSide = 2048;
-
 double cpu_seconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
@@ -42,16 +39,22 @@ struct Distances {
   double greatest = 0;
 };
 
-/// Samples `from` evenly by area. Both index `positions`.
-Distances distances(const std::vector<glm::dvec3>& positions, const Triangles& from,
-                    const Triangles& to) {
+/// A surface in source units.
+struct LevelSurface {
+  std::vector<glm::dvec3> positions;
+  Triangles triangles;
+};
+
+/// Samples `from` evenly by area.
+Distances distances(const LevelSurface& from, const LevelSurface& to) {
   std::vector<double> areas;  // summed up
   double area = 0;
-  for (const auto& [a, b, c] : from) {
+  const std::vector<glm::dvec3>& positions = from.positions;
+  for (const auto& [a, b, c] : from.triangles) {
     area += glm::length(glm::cross(positions[b] - positions[a], positions[c] - positions[a]));
     areas.push_back(area);
   }
-  TriangleTree tree(positions, to);
+  TriangleTree tree(to.positions, to.triangles);
   std::mt19937_64 random(1);
   const auto unit = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   std::vector<double> at(kSamples);
@@ -62,7 +65,7 @@ Distances distances(const std::vector<glm::dvec3>& positions, const Triangles& f
   std::size_t t = 0;
   for (const double x : at) {
     while (t + 1 < areas.size() && areas[t] < x) ++t;
-    const auto& [a, b, c] = from[t];
+    const auto& [a, b, c] = from.triangles[t];
     const double v = std::sqrt(unit());
     const double w = unit();
     const glm::dvec3 point =
@@ -77,35 +80,59 @@ Distances distances(const std::vector<glm::dvec3>& positions, const Triangles& f
 }
 
 /// The worse of both ways.
-Distances both_ways(const std::vector<glm::dvec3>& positions, const Triangles& a,
-                    const Triangles& b) {
-  const Distances there = distances(positions, a, b);
-  const Distances back = distances(positions, b, a);
+Distances both_ways(const LevelSurface& a, const LevelSurface& b) {
+  const Distances there = distances(a, b);
+  const Distances back = distances(b, a);
   return {std::max(there.rms, back.rms), std::max(there.p99, back.p99),
           std::max(there.greatest, back.greatest)};
 }
 
-/// All chunks at the level of the model that has so many halvings; its stated error, and slide.
-Triangles level_of(const ChunkedMesh& mesh, std::uint32_t halvings, double& error, double& slide) {
-  Triangles triangles;
-  error = slide = 0;
-  for (const Chunk& chunk : mesh.chunks) {
-    const std::vector<std::uint16_t>* indices = &chunk.indices;
-    const ChunkLevel* last = nullptr;
-    for (const ChunkLevel& level : chunk.coarser) {
-      if (level.halvings <= halvings) last = &level;
+constexpr std::uint32_t kMostHalvings = 16;
+/// Triangles that a level of so many halvings may have, times those asked for: halving stops a
+/// little early where a chunk's border is in the way.
+constexpr double kNearlyHalved = 1.3;
+
+/// The model of a bundle, each chunk at its first level of at most so many halvings, or its
+/// coarsest; error: the greatest that these levels state.
+LevelSurface level_of(const BundleView& bundle, std::uint32_t halvings, double& error) {
+  LevelSurface surface;
+  const ModelRecord& model = bundle.models()[0];
+  const VertexDecoder decoder(bundle.layouts()[model.layout]);
+  const glm::dvec3 center(model.center[0], model.center[1], model.center[2]);
+  error = 0;
+  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+    const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+    const LevelRecord* level = &bundle.levels()[chunk.first_level];
+    const double most = kNearlyHalved * level->index_count / std::exp2(halvings);
+    for (std::uint32_t l = 1; l < chunk.level_count && level->index_count > most; ++l) ++level;
+    error = std::max(error, model.scale * static_cast<double>(level->error));
+    const auto base = static_cast<std::uint32_t>(surface.positions.size());
+    for (std::uint32_t v = 0; v < level->vertex_count; ++v) {
+      const std::byte* vertex =
+          bundle.vertices().data() + level->vertex_offset + std::size_t{v} * decoder.stride();
+      surface.positions.push_back(center + model.scale * decoder.position(vertex, chunk));
     }
-    if (last != nullptr) {
-      indices = &last->indices;
-      error = std::max(error, last->error);
-      slide = std::max(slide, last->uv_shift);
-    }
-    for (std::size_t i = 0; i < indices->size(); i += 3) {
-      const std::uint16_t* t = indices->data() + i;
-      triangles.push_back({chunk.vertices[t[0]], chunk.vertices[t[1]], chunk.vertices[t[2]]});
+    const auto* indices =
+        reinterpret_cast<const std::uint16_t*>(bundle.indices().data() + level->index_offset);
+    for (std::uint32_t i = 0; i < level->index_count; i += 3) {
+      surface.triangles.push_back(
+          {base + indices[i], base + indices[i + 1], base + indices[i + 2]});
     }
   }
-  return triangles;
+  return surface;
+}
+
+/// Bakes a model as people who set nothing do; answers the processor time.
+Result<double> bake_default(const std::string& path, const std::string& bundle, unsigned jobs,
+                            bool levels) {
+  std::vector<std::string> words = {
+      program_folder() + "/modar", "bake",    "--model", path,  "--jobs",
+      std::to_string(jobs),        "--quiet", "-o",      bundle};
+  if (!levels) words.emplace_back("--no-lods");
+  const ProcessOutcome outcome = run_measured({std::move(words), {}, ""});
+  if (outcome.exit == 0) return outcome.cpu_seconds;
+  return fail(ExitCode::kInvalidInput, "bench.bake", path, "it does not bake",
+              "look at what `modar bake --model` says of it");
 }
 
 /// meshopt_simplify on a whole mesh, each level from the one before, as its manual says.
@@ -140,57 +167,54 @@ class WholeMesh {
   double cpu_ = 0;
 };
 
+/// The model's surface as its file holds it.
+Result<LevelSurface> source_of(const std::string& path, unsigned jobs) {
+  Report report;
+  MODAR_ASSIGN(SourceModel source, read_model(path, jobs));
+  MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), report, {jobs}));
+  LevelSurface surface;
+  for (const glm::dvec3& p : mesh.positions) {
+    surface.positions.push_back(mesh.placement.center + mesh.placement.scale * p);
+  }
+  surface.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
+  return surface;
+}
+
 Result<void> bench_one(const std::string& path, unsigned jobs, std::vector<BenchRow>& rows) {
   const std::string name = std::filesystem::path(path).stem().string();
   const auto add = [&](const std::string& measure, double ours, double reference) {
     rows.push_back({measure + " " + name, ours, reference, ours / reference});
   };
-  Report report;
-  MODAR_ASSIGN(SourceModel source, read_model(path, jobs));
-  MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), report, {jobs}));
-  const std::vector<glm::dvec3> positions(mesh.positions.begin(), mesh.positions.end());
-  const Triangles finest(mesh.triangles.begin(), mesh.triangles.end());
-  glm::dvec3 low = positions[0];
-  glm::dvec3 high = low;
-  for (const glm::dvec3& p : positions) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  const double percent = 100 / glm::length(high - low);
-  ChunkOptions chunk_options;
-  chunk_options.max_vertices = chunk_vertices_for(positions.size());
-  LevelOptions options;
-  options.jobs = jobs;
-  if (!mesh.uvs.empty()) options.texture_sides.assign(mesh.materials.size(), kTextureSide);
-  MODAR_ASSIGN(ChunkedMesh chunked, chunk(std::move(mesh), chunk_options, report));
-  const double begin = cpu_seconds();
-  MODAR_TRY(make_levels(chunked, options, report));
-  const double cpu = cpu_seconds() - begin;
-  WholeMesh whole(positions, finest);
-  std::set<std::uint32_t> made;
-  for (const Chunk& chunk : chunked.chunks) {
-    for (const ChunkLevel& level : chunk.coarser) made.insert(level.halvings);
-  }
-  for (const std::uint32_t halvings : made) {
+  MODAR_ASSIGN(const LevelSurface finest, source_of(path, jobs));
+  const TemporaryFolder folder;
+  const std::string out = folder.path() + "/levels.modar";
+  MODAR_ASSIGN(const double without, bake_default(path, out, jobs, false));
+  MODAR_ASSIGN(const double with, bake_default(path, out, jobs, true));
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(out));
+  MODAR_ASSIGN(const BundleView bundle, BundleView::open(file.bytes()));
+  const double percent = 100 / bundle.models()[0].diagonal;
+  WholeMesh whole(finest.positions, finest.triangles);
+  std::size_t last = finest.triangles.size();
+  for (std::uint32_t halvings = 1; halvings <= kMostHalvings; ++halvings) {
     const std::string level = "1/" + std::to_string(1u << halvings) + " ";
     double stated = 0;
-    double slide = 0;
-    const Triangles ours = level_of(chunked, halvings, stated, slide);
-    const Triangles theirs = whole.simplify(ours.size());
-    const Distances our_own = both_ways(positions, finest, ours);
-    const Distances their_own = both_ways(positions, finest, theirs);
-    add(level + "triangles/asked", static_cast<double>(ours.size()),
-        static_cast<double>(finest.size() >> halvings));
-    add(level + "triangles/meshopt_simplify", static_cast<double>(ours.size()),
-        static_cast<double>(theirs.size()));
+    const LevelSurface ours = level_of(bundle, halvings, stated);
+    if (ours.triangles.size() == last) continue;  // no level of so few
+    last = ours.triangles.size();
+    const LevelSurface theirs{finest.positions, whole.simplify(ours.triangles.size())};
+    const Distances our_own = both_ways(finest, ours);
+    const Distances their_own = both_ways(finest, theirs);
+    add(level + "triangles/asked", static_cast<double>(ours.triangles.size()),
+        static_cast<double>(finest.triangles.size() >> halvings));
+    add(level + "triangles/meshopt_simplify", static_cast<double>(ours.triangles.size()),
+        static_cast<double>(theirs.triangles.size()));
     add(level + "rms_percent/meshopt_simplify", percent * our_own.rms, percent * their_own.rms);
     add(level + "p99_percent/meshopt_simplify", percent * our_own.p99, percent * their_own.p99);
     add(level + "greatest_percent/meshopt_simplify", percent * our_own.greatest,
         percent * their_own.greatest);
     add(level + "stated_percent/greatest_found", percent * stated, percent * our_own.greatest);
-    if (!options.texture_sides.empty()) add(level + "slide_texels/side", slide, kTextureSide);
   }
-  add("cpu_s/meshopt_simplify", cpu, whole.cpu());
+  add("cpu_s/meshopt_simplify", with - without, whole.cpu());
   return {};
 }
 

@@ -9,11 +9,12 @@
 
 namespace modar {
 
-/// For each model and level: triangles against the number asked for; rms, 99th percentile and
-/// greatest distance (percent of the diagonal, sampled evenly by area, the worse of both ways)
-/// against meshopt_simplify on the whole mesh at the same number of triangles; our stated bound
-/// against the distance found; how far the texture slides, where there is one; and CPU seconds of
-/// all levels against meshopt_simplify's. Errors: those of reading and of the stages.
+/// For each model, and each level of the bundle that `modar bake` makes of it by default: triangles
+/// against the number asked for; rms, 99th percentile and greatest distance from the source
+/// (percent of the diagonal, sampled evenly by area, the worse of both ways) against
+/// meshopt_simplify on the whole mesh at the same number of triangles; the bundle's stated bound
+/// against the distance found; and CPU seconds that levels add to a bake against
+/// meshopt_simplify's. Errors: those of reading and of the stages, kInvalidInput "bench.bake".
 Result<std::vector<BenchRow>> bench_lod(const std::vector<std::string>& models, unsigned jobs);
 
 }  // namespace modar

@@ -376,6 +376,16 @@ class Check(ProgramTest):
         self.assertEqual(self.modar("check", bad).returncode, 3)
         self.assertEqual(self.modar("check", self.folder / "none").returncode, 2)
 
+    def test_the_levels_of_a_default_bundle_lie_within_their_bounds(self):
+        done = self.modar("bench", "lod", ROOT / "assets" / "models" / "pottery.obj", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = {row["measure"]: row for row in json.loads(done.stdout)}
+        self.assertAlmostEqual(rows["1/2 triangles/asked pottery"]["ratio"], 1, delta=0.05)
+        bounds = [row for name, row in rows.items() if "stated_percent/greatest_found" in name]
+        self.assertGreater(len(bounds), 1)
+        for row in bounds:
+            self.assertGreaterEqual(row["ratio"], 0.99, row)  # rounding of half floats is no level's error
+
 
 class Help(ProgramTest):
     def test_help_shows_an_example(self):
