@@ -43,6 +43,20 @@ class Documents(unittest.TestCase):
             for name in named:
                 self.assertIn(f"def test_{name}(self)", tests)
 
+    def test_each_promise_of_the_threat_model_has_a_test(self):
+        text = (ROOT / "formats/threats.md").read_text()
+        rows = [line.split("|")[1:4] for line in text.splitlines() if line.startswith("| **")]
+        self.assertGreater(len(rows), 10)
+        tests = "".join(file.read_text() for folder in ("cli", "web", "check") for file in (ROOT / "tests" / folder).glob("*_test.py"))
+        for who, _, names in rows:
+            named = re.findall(r"`(\w+)`", names)
+            self.assertTrue(named, who)
+            for name in named:
+                if name.endswith("_fuzz"):
+                    self.assertTrue((ROOT / "tests/fuzz" / f"{name}.cpp").exists(), name)
+                else:
+                    self.assertIn(f"def test_{name}(self)", tests)
+
 
 if __name__ == "__main__":
     unittest.main()
