@@ -30,6 +30,7 @@ export class View {
   #fixedLight = false;
   #small = null;
   #framesSinceLook = LIGHT_EVERY;
+  #redraw = () => {};
 
   /**
    * @param {Uint8Array | Promise<Uint8Array>} bytes the bundle, which may still be on its way
@@ -94,7 +95,9 @@ export class View {
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
     this.#engine.poses().set(poses);
     if (!this.#fixedLight) this.#look(source, camera, poses);
-    this.#engine.draw(width, height, gesture);
+    const as = { ...gesture };
+    this.#redraw = () => this.#engine.draw(width, height, as);
+    this.#redraw();
   }
 
   /** As often as the player does, so that both show the same. */
@@ -110,12 +113,13 @@ export class View {
     this.#engine.look(this.#small.getImageData(0, 0, width, height));
   }
 
-  /** Both canvases in one picture. */
+  /** Both canvases in one picture. A browser empties the models' once it has shown them: they are drawn again. */
   async photograph(type = 'image/jpeg') {
     const photo = document.createElement('canvas');
     Object.assign(photo, { width: this.#picture.width, height: this.#picture.height });
     const context = photo.getContext('2d', { alpha: false });
     context.drawImage(this.#picture, 0, 0);
+    if (!this.#lost) this.#redraw();
     context.drawImage(this.#models, 0, 0);
     return new Promise((resolve) => { photo.toBlob(resolve, type, 0.92); });
   }

@@ -264,9 +264,31 @@ class Page(ProgramTest):
         print("from the camera to the first tracked frame {:.0f} ms, to the model {:.0f} ms".format(*ms))
         self.keep("stage-portrait.png")
         self.assertEqual(self.browser.run("document.getElementById('label-name').textContent"), "cover")
-        self.browser.run("document.getElementById('shoot').click()")
+        # Long after the models were drawn: browsers have emptied their canvas by then. What the picture shows alone is kept.
+        self.browser.run("""new Promise((shot) => { setTimeout(() => {
+          const picture = document.getElementById('picture');
+          window.alone = picture.getContext('2d').getImageData(0, 0, picture.width, picture.height).data;
+          document.getElementById('shoot').click();
+          shot();
+        }, 5); })""")
         self.browser.wait("document.getElementById('photo').open && document.getElementById('photo-image').naturalWidth > 0", "a photo")
         self.assertEqual(self.browser.run("document.getElementById('photo-image').naturalWidth"), 780)
+        lit, drawn = self.browser.run("""(async () => {
+          const image = document.getElementById('photo-image');
+          const copy = new OffscreenCanvas(image.naturalWidth, image.naturalHeight).getContext('2d');
+          copy.drawImage(image, 0, 0);
+          const photo = copy.getImageData(0, 0, image.naturalWidth, image.naturalHeight).data;
+          let [lit, drawn] = [0, 0];
+          for (let i = 0; i < photo.length; i += 4) {
+            const worst = Math.max(...[0, 1, 2].map((c) => Math.abs(photo[i + c] - window.alone[i + c])));
+            lit += worst > 48;
+            drawn += worst > 12;
+          }
+          return [lit, drawn];
+        })()""")
+        print(f"the photo differs from the camera's picture in {lit} pixels by more than 48 of 255, in {drawn} by more than 12")
+        self.assertGreater(lit, 5000, "the model is on the photo")
+        self.assertLess(drawn, 780 * 1688 / 3, "and the camera's picture around it")
         self.keep("photo-portrait.png")
         self.browser.run("document.getElementById('photo').close()")
         self.browser.resize(844, 390, 2, True)
