@@ -268,7 +268,11 @@ Result<void> keep_no_status(const std::string& path) {
   struct stat info {};
   if (path.empty() || ::stat(path.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return {};
   const auto text = read_small_file(path, kMaxStatusBytes);
-  if (text && (text->empty() || text->starts_with("{\"program\":\"modar-fetch"))) return {};
+  const auto first_value = [&text] { return text->substr(0, text->find(',')); };
+  if (text && (text->empty() || (text->starts_with('{') &&
+                                 first_value().find("\"modar-fetch ") != std::string::npos))) {
+    return {};
+  }
   return fail(ExitCode::kUsage, "out.foreign", path,
               "the output would overwrite a file that is no status of modar-fetch",
               "name another output");
