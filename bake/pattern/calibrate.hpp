@@ -32,8 +32,9 @@ struct Calibration {
 
 /// Finds board or pattern in each frame and calibrates from the plane's views (Zhang, "A flexible
 /// new technique for camera calibration", 2000, as OpenCV has it). From a board: fx, fy, cx, cy and
-/// k1 k2 p1 p2 k3; from a pattern: one focal length for both axes, cx, cy and k1 k2.
-/// Errors: kIo "calibrate.input"; kInvalidInput "calibrate.size" (frames of different sizes),
+/// k1 k2 p1 p2 k3; from a pattern: one focal length for both axes, cx, cy and k1 k2, and the
+/// print's aspect; its focal_spread is not below that of thirds of the views. Errors: kIo
+/// "calibrate.input"; kInvalidInput "calibrate.size" (frames of different sizes),
 /// "calibrate.few-views" (fewer than 5 views), "calibrate.weak" (views too similar to determine the
 /// focal length to 3 %, or all tilted to the same side); those of reading pictures and of the
 /// tracker.

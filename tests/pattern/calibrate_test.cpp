@@ -136,6 +136,21 @@ TEST_F(Calibrate, FromAnyPatternThroughABentLens) {
   EXPECT_NEAR(camera->distortion[0], calibration->camera.distortion[0], 1e-12);
 }
 
+TEST_F(Calibrate, FromAPrintOfAnotherAspectThanItsPicture) {
+  ASSERT_TRUE(write_file(path("pattern.modar"), filmed_bundle()));
+  cv::Mat print;
+  cv::resize(filmed_picture(), print, {}, 1.0, 1.1, cv::INTER_AREA);
+  CalibrateOptions options;
+  options.inputs = film(print, bent_camera(), 12, 38);
+  options.pattern = path("pattern.modar");
+  const auto calibration = calibrate(options, {});
+  ASSERT_TRUE(calibration) << to_line(calibration.error());
+  const Camera truth = bent_camera();
+  EXPECT_NEAR(calibration->camera.fx, truth.fx, 0.03 * truth.fx);
+  EXPECT_NEAR(calibration->camera.fx, truth.fx, 3.0 * calibration->focal_spread);
+  EXPECT_NEAR(calibration->camera.cy, truth.cy, 12);
+}
+
 TEST_F(Calibrate, TiltsAboutOneAxisTellTheFocalLengthAndNoPrincipalPoint) {
   Camera camera = bent_camera();
   camera.cx = 0.5 * (camera.width - 1);
