@@ -1,5 +1,7 @@
 // Reads modar.toml. toml++ is known to this file alone.
 #define TOML_EXCEPTIONS 0
+// "[=]" breaks what toml++ 3.0 asserts in debug builds, before it finds the error itself.
+#define TOML_ASSERT(expr) static_assert(true)
 #include <toml++/toml.h>
 
 #include <glob.h>
