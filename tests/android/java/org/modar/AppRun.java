@@ -238,6 +238,8 @@ public final class AppRun {
         view.surface(Camera.width, Camera.height, true); // the context was lost meanwhile
         check(GLSurfaceView.samples == 0, "a surface of one sample");
         check(Camera.opened == 1 && deliver(0) && deliver(1), "goes on");
+        // The new session's first frames tell how the camera sees, and the model's picture follows.
+        for (int i = 0; i < 20; i++) check(deliver(1), "settles");
         byte[] upright = picture();
         Activity.rotation = 1;
         app.onConfigurationChanged(null);
