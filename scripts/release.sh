@@ -6,7 +6,7 @@
 #   modar-V.tgz            the engine as an npm package
 #   modar-V.apk            the app with the demo's bundle, where ANDROID_NDK is set (see scripts/apk.sh)
 #   modar-V-oci.tar        modar and the player on a bare Debian 12 as a container (OCI archive):
-#                          podman run -v "$PWD:/work" oci-archive:modar-V-oci.tar bake --model vase.obj -o vase.modar
+#                          podman run -v "$PWD:/srv" oci-archive:modar-V-oci.tar bake --model vase.obj -o vase.modar
 #   modar-V.tar.gz         the sources
 #   SHA256SUMS             of all of these; with --key SHA256SUMS.minisig, by that secret key of minisign
 # --twice: builds the packages and the engine a second time, in another folder, and fails where a byte differs. Machines with
@@ -87,13 +87,13 @@ container() {
     --customize-hook='rm -r "$1/packages"' bookworm "$work/root.tar" $(apt_sources) || return
   umoci init --layout "$work/oci" && umoci new --image "$image" &&
     umoci raw add-layer --image "$image" --history.created "$stamp" "$work/root.tar" &&
-    umoci config --image "$image" --config.entrypoint modar --config.cmd=--help --config.workingdir /work \
+    umoci config --image "$image" --config.entrypoint modar --config.cmd=--help --config.workingdir /srv \
       --created "$stamp" --history.created "$stamp" && umoci gc --layout "$work/oci" || return
   tar --sort=name --owner=0 --group=0 --numeric-owner "--mtime=@$SOURCE_DATE_EPOCH" -C "$work/oci" \
     -cf "$root/$out/modar-$version-oci.tar" .
   # It runs, and bakes.
-  umoci unpack --image "$image" "$work/container" && cp -r assets "$work/container/rootfs/work" &&
-    chroot "$work/container/rootfs" modar bake --model /work/models/pottery.obj -o /tmp/pottery.modar
+  umoci unpack --image "$image" "$work/container" && cp -r assets "$work/container/rootfs/srv" &&
+    chroot "$work/container/rootfs" modar bake --model /srv/assets/models/pottery.obj -o /tmp/pottery.modar
 }
 app() { "$root/scripts/apk.sh" "$work/demo.modar" --title ModAR --out "$root/$out/modar-$version.apk"; }
 
