@@ -65,6 +65,9 @@ std::optional<std::vector<std::byte>> encode_draco(std::span<const DracoInput> a
     const auto id = static_cast<std::int32_t>(a);
     if (attributes[a].kind == DracoInput::Kind::kNormal) {
       encoder.SetAttributeQuantization(id, normal_bits);
+    } else if (normal_bits == kNoMap) {
+      // Numbers have nothing to predict; the order of the values does not depend on the predictor.
+      encoder.SetAttributePredictionScheme(id, draco::PREDICTION_DIFFERENCE);
     } else if (attributes[a].kind == DracoInput::Kind::kUv) {
       // They are integers already; the bit width enables Draco's texture coordinate predictor.
       encoder.SetAttributeQuantization(id, 16);

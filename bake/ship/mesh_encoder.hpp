@@ -23,8 +23,10 @@ struct DracoInput {
   std::vector<std::uint32_t> value_of_vertex;
 };
 
+inline constexpr int kNoMap = 0;  ///< for values that are numbers only, and that nobody predicts
+
 /// Encodes with Draco's best compression; nothing if Draco refuses. indices: triangles with 3
-/// distinct position values each. normal_bits: of the octahedral map.
+/// distinct position values each. normal_bits: of the octahedral map, or kNoMap.
 std::optional<std::vector<std::byte>> encode_draco(std::span<const DracoInput> attributes,
                                                    std::span<const std::uint16_t> indices,
                                                    std::uint32_t vertex_count, int normal_bits);

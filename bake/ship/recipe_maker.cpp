@@ -22,6 +22,9 @@ namespace {
 /// update downloads them all. Set by hand, above the four sets of 2000 keypoints.
 constexpr std::uint64_t kMaxPatternPiece = 4u << 20;
 
+/// Bytes: of smaller mesh objects and levels, zstd alone may be smaller.
+constexpr std::size_t kTinyObject = 4096;
+
 std::vector<std::byte> zstd(std::span<const std::byte> bytes) {
   std::vector<std::byte> packed(ZSTD_compressBound(bytes.size()));
   packed.resize(
@@ -54,18 +57,31 @@ struct ChunkPlace {
   std::uint64_t indices = 0;
   std::uint32_t index_bytes = 0;
   std::uint16_t index_base = 0;
-  const LayoutRecord* layout = nullptr;
+  LayoutRecord layout{};  ///< as it travels
 };
 
 std::uint64_t place_in(const BundleView& bundle, std::span<const std::byte> section) {
   return static_cast<std::uint64_t>(section.data() - bundle.bytes().data());
 }
 
+/// A model's layout, with the byte of its occlusion as one more attribute.
+LayoutRecord travelling_layout(const BundleView& bundle, const ModelRecord& model) {
+  LayoutRecord layout = bundle.layouts()[model.layout];
+  const std::uint32_t byte = occlusion_byte(bundle.occlusion(), model.layout);
+  if (byte == kNone || layout.attribute_count == std::size(layout.attributes)) return layout;
+  AttributeRecord& occlusion = layout.attributes[layout.attribute_count++];
+  occlusion.semantic = kTravellingOcclusion;
+  occlusion.type = static_cast<std::uint8_t>(ComponentType::kU8);
+  occlusion.components = 1;
+  occlusion.offset = static_cast<std::uint16_t>(byte);
+  return layout;
+}
+
 std::vector<ChunkPlace> chunk_places(const BundleView& bundle) {
   std::vector<ChunkPlace> places;
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
-    const LayoutRecord& layout = bundle.layouts()[model.layout];
+    const LayoutRecord layout = travelling_layout(bundle, model);
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
       const LevelRecord& level = bundle.levels()[chunk.first_level];
@@ -81,7 +97,7 @@ std::vector<ChunkPlace> chunk_places(const BundleView& bundle) {
       place.indices = place_in(bundle, bytes);
       place.index_bytes = static_cast<std::uint32_t>(bytes.size());
       place.index_base = *low;
-      place.layout = &layout;
+      place.layout = layout;
       places.push_back(place);
     }
   }
@@ -140,9 +156,11 @@ class RecipeMaker {
     const auto objects = run_limited(places.size(), options_.jobs, {}, [&](std::size_t i) {
       const ChunkPlace& place = places[i];
       auto object = encode_mesh_object(at(place.vertices, place.vertex_bytes),
-                                       local_indices(bundle_, place), *place.layout);
-      // zstd alone is smaller for tiny chunks.
-      if (object && zstd(mesh_raw(place)).size() <= object->size()) object.reset();
+                                       local_indices(bundle_, place), place.layout);
+      if (object && object->size() < kTinyObject &&
+          zstd(mesh_raw(place)).size() <= object->size()) {
+        object.reset();
+      }
       return object;
     });
     for (std::size_t i = 0; i < places.size(); ++i) {
@@ -192,7 +210,7 @@ class RecipeMaker {
     if (!coded || is_covered(offset, raw.size())) return;
     Draft draft;
     draft.stored = zstd(*coded);
-    if (zstd(raw).size() <= draft.stored.size()) return;
+    if (draft.stored.size() < kTinyObject && zstd(raw).size() <= draft.stored.size()) return;
     draft.record.form = static_cast<std::uint8_t>(PieceForm::kLevel);
     draft.record.offset = offset;
     draft.record.raw_size = static_cast<std::uint32_t>(raw.size());
@@ -343,13 +361,15 @@ class RecipeMaker {
       const auto stored = draft.stored.empty()
                               ? at(draft.record.second_offset, draft.record.second_size)
                               : std::span<const std::byte>(draft.stored);
-      if (!decode_piece(draft.record, stored)) {
+      const auto form = static_cast<PieceForm>(draft.record.form);
+      const bool proven = form == PieceForm::kMesh || form == PieceForm::kLevel;  // by the encoder
+      if (!proven && !decode_piece(draft.record, stored)) {
         return fail(ExitCode::kInternal, "ship.piece",
                     "byte " + std::to_string(draft.record.offset),
                     "a piece does not decode to its original bytes", "report this as a bug");
       }
       append(std::as_bytes(std::span(&draft.record, 1)));
-      FormTotals& totals = out.forms[static_cast<PieceForm>(draft.record.form)];
+      FormTotals& totals = out.forms[form];
       ++totals.pieces;
       totals.raw_bytes += draft.record.raw_size;
       totals.stored_bytes += draft.record.stored_size;

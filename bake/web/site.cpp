@@ -16,6 +16,7 @@
 #include "formats/check.hpp"
 #include "formats/html.hpp"
 #include "formats/tracker_record.hpp"
+#include "formats/trim.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/release.hpp"
 
@@ -40,6 +41,7 @@ struct Draft {
   Json texts;
   std::size_t texts_used = 0;
   std::uint64_t hash = 14695981039346656037u;
+  std::vector<std::string> kept;  ///< what sw.js keeps: addresses of the files
   Site site;
 };
 
@@ -49,12 +51,15 @@ void add_to_hash(std::uint64_t& hash, std::span<const std::byte> bytes) {
     hash = (hash ^ static_cast<std::uint64_t>(byte)) * 1099511628211u;
 }
 
-Result<void> put(Draft& draft, const std::string& name, std::span<const std::byte> bytes) {
+/// version: behind the address under which the page asks for the file, where it has one.
+Result<void> put(Draft& draft, const std::string& name, std::span<const std::byte> bytes,
+                 const std::string& version = {}) {
   const std::string path = draft.options.output + "/" + name;
   MODAR_TRY(write_file(path, bytes));
   add_to_hash(draft.hash, std::as_bytes(std::span(name)));
   add_to_hash(draft.hash, bytes);
   draft.site.files.push_back(name);
+  draft.kept.push_back(name + version);
   return {};
 }
 
@@ -210,9 +215,13 @@ Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::
                 "rename one");
   }
   names.push_back(name);
+  MODAR_ASSIGN(const std::vector<std::byte> trimmed, encode_bundle(trim(*bundle)));
+  // An address of these bytes alone: page and service worker may share what a cache holds of it.
+  const std::string version = "?v=" + to_hex(bundle_hash(trimmed)).substr(0, 16);
   const std::string to = "bundles/" + name + ".modar";
-  MODAR_TRY(put(draft, to, file.bytes()));
-  draft.site.bundle_bytes += file.bytes().size();
+  MODAR_TRY(put(draft, to, trimmed, version));
+  draft.site.bundle_bytes += trimmed.size();
+  draft.site.trimmed_bytes += file.bytes().size() - std::min(file.bytes().size(), trimmed.size());
   Json patterns = Json::array();
   for (std::uint32_t p = 0; p < bundle->patterns().size(); ++p) {
     MODAR_ASSIGN(
@@ -221,8 +230,8 @@ Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::
     patterns.push_back(pattern);
   }
   return Json{{"title", title_of(stem)},
-              {"file", to},
-              {"bytes", file.bytes().size()},
+              {"file", to + version},
+              {"bytes", trimmed.size()},
               {"hash", to_hex(bundle_hash(file.bytes()))},
               {"patterns", patterns}};
 }
@@ -305,7 +314,7 @@ Result<void> put_entry(Draft& draft, const std::string& title) {
   MODAR_TRY(put(draft, "manifest.webmanifest", manifest.dump()));
   MODAR_ASSIGN(const std::string worker, page_text(draft, "sw.js"));
   add_to_hash(draft.hash, std::as_bytes(std::span(worker)));
-  const Json kept = {{"hash", std::to_string(draft.hash)}, {"files", Json::list(draft.site.files)}};
+  const Json kept = {{"hash", std::to_string(draft.hash)}, {"files", Json::list(draft.kept)}};
   draft.site.page_bytes += html.size() + worker.size();
   return put(draft, "sw.js", "const SITE = " + kept.dump() + ";\n" + worker);
 }
@@ -323,7 +332,7 @@ Result<std::string> find_page() {
 }
 
 Result<Site> write_site(const SiteOptions& options) {
-  Draft draft{options, options.page, {}, {}, 0, 14695981039346656037u, {}};
+  Draft draft{options, options.page, {}, {}, 0, 14695981039346656037u, {}, {}};
   if (draft.page.empty()) {
     MODAR_ASSIGN(draft.page, find_page());
   }

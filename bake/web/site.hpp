@@ -25,9 +25,10 @@ struct SiteOptions {
 };
 
 struct Site {
-  std::vector<std::string> files;  ///< relative to the folder, in the order of writing
-  std::uint64_t page_bytes = 0;    ///< of page and engines: what every site has
-  std::uint64_t bundle_bytes = 0;
+  std::vector<std::string> files;   ///< relative to the folder, in the order of writing
+  std::uint64_t page_bytes = 0;     ///< of page and engines: what every site has
+  std::uint64_t bundle_bytes = 0;   ///< of the bundles, without what pages do not read
+  std::uint64_t trimmed_bytes = 0;  ///< left out of the bundles: see formats/trim.hpp
 };
 
 /// The page as it was installed with the programs, or built beside them.

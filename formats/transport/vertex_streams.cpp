@@ -71,8 +71,7 @@ std::array<std::int32_t, 3> octahedral_direction(std::int32_t s, std::int32_t t,
   return {x, y, z};
 }
 
-std::array<std::int8_t, 3> snorm8_of_octahedral(std::int32_t s, std::int32_t t, int bits) {
-  const auto direction = octahedral_direction(s, t, bits);
+std::array<std::int8_t, 3> snorm8_of_direction(const std::array<std::int32_t, 3>& direction) {
   std::uint64_t squares = 0;
   for (const std::int64_t d : direction) squares += static_cast<std::uint64_t>(d * d);
   const auto length = static_cast<std::int64_t>(square_root(squares << 16));
@@ -84,6 +83,10 @@ std::array<std::int8_t, 3> snorm8_of_octahedral(std::int32_t s, std::int32_t t, 
     bytes[c] = static_cast<std::int8_t>(std::clamp<std::int64_t>(value, -128, 127));
   }
   return bytes;
+}
+
+std::array<std::int8_t, 3> snorm8_of_octahedral(std::int32_t s, std::int32_t t, int bits) {
+  return snorm8_of_direction(octahedral_direction(s, t, bits));
 }
 
 std::array<std::int32_t, 3> octahedral_of_snorm8(std::array<std::int8_t, 3> bytes, int bits) {

@@ -26,8 +26,9 @@ std::uint16_t join_half(HalfParts parts);
 /// Bits of `fine` that are not known from `coarse`: 0 for |x| >= 1/2, one more for each halving.
 int fine_bits(std::int32_t coarse);
 
-/// A direction of the octahedral map of 2^bits - 1 values a side, as the bytes that
-/// float_to_snorm8 gives for it. s, t: 0 to 2^bits - 2.
+/// A direction of any length above 0, as the bytes that float_to_snorm8 gives for it.
+std::array<std::int8_t, 3> snorm8_of_direction(const std::array<std::int32_t, 3>& direction);
+/// The same of a point of the octahedral map of 2^bits - 1 values a side. s, t: 0 to 2^bits - 2.
 std::array<std::int8_t, 3> snorm8_of_octahedral(std::int32_t s, std::int32_t t, int bits);
 
 /// The direction at a point of the map; its absolute values add up to 2^(bits-1) - 1.
@@ -36,6 +37,10 @@ std::array<std::int32_t, 3> octahedral_direction(std::int32_t s, std::int32_t t,
 /// The direction of the map that decodes to exactly these bytes or, if there is none near the
 /// normal, to the nearest ones. bits: 2 to 16.
 std::array<std::int32_t, 3> octahedral_of_snorm8(std::array<std::int8_t, 3> bytes, int bits);
+
+/// Semantic of the byte that OcclusionRecord names, where it travels; a layout has no such
+/// attribute.
+inline constexpr std::uint8_t kTravellingOcclusion = 255;
 
 /// How one attribute of a layout travels.
 struct VertexStream {

@@ -11,8 +11,10 @@ const SIMD = WebAssembly.validate(Uint8Array.of(
 self.addEventListener('install', (event) => {
   const other = SIMD ? 'engine-plain.' : 'engine-simd.';
   const files = SITE.files.filter((file) => !file.startsWith(other));
-  // Past the browser's own cache, where files of an older site may lie.
-  const requests = ['./', ...files].map((file) => new Request(file, { cache: 'no-cache' }));
+  // Past the browser's own cache, where files of an older site may lie; but what has its hash in its address is the
+  // same wherever it lies, and the page has just loaded it.
+  const cacheOf = (file) => (file.includes('?v=') ? 'force-cache' : 'no-cache');
+  const requests = ['./', ...files].map((file) => new Request(file, { cache: cacheOf(file) }));
   event.waitUntil(caches.open(CACHE).then((cache) => cache.addAll(requests)));
 });
 

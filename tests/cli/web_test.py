@@ -56,7 +56,10 @@ class Web(ProgramTest):
         on_disk = sorted(str(p.relative_to(self.folder / "site")) for p in (self.folder / "site").rglob("*") if p.is_file())
         on_disk.remove(".modar-output")  # the mark is no part of the page
         self.assertEqual(sorted(written["files"]), on_disk)
-        self.assertEqual(self.read("bundles/red-vase.modar"), bundle.read_bytes())
+        shown = self.read("bundles/red-vase.modar")
+        self.assertEqual(len(bundle.read_bytes()) - len(shown), written["trimmed_bytes"])
+        self.assertGreater(written["trimmed_bytes"], 0)
+        self.assertEqual(self.modar("check", self.folder / "site/bundles/red-vase.modar").returncode, 0)
         self.assertEqual(self.read("app.js"), (PAGE / "app.js").read_bytes())
         site = json.loads(self.read("site.json"))
         self.assertEqual((site["title"], site["languages"]), ('A <b> & "c"', ["de", "en"]))
@@ -70,7 +73,11 @@ class Web(ProgramTest):
         self.assertEqual(json.loads(self.read("manifest.webmanifest"))["name"], 'A <b> & "c"')
         # What a visitor keeps is all that there is, but for the worker that keeps it.
         kept = re.match(r"const SITE = (\{.*?\n\})\s*;\n", self.read("sw.js").decode(), re.S)
-        self.assertEqual(sorted(json.loads(kept[1])["files"]), sorted(set(on_disk) - {"sw.js"}))
+        files = json.loads(kept[1])["files"]
+        self.assertEqual(sorted(file.split("?")[0] for file in files), sorted(set(on_disk) - {"sw.js"}))
+        # The page asks for a bundle under the address that the worker keeps it under: it travels once.
+        self.assertIn(site["bundles"][0]["file"], files)
+        self.assertIn("?v=", site["bundles"][0]["file"])
 
     def test_same_input_same_bytes_and_a_change_is_a_new_version(self):
         bundle = self.bake_demo()

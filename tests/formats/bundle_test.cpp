@@ -10,6 +10,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/draw_order.hpp"
+#include "formats/trim.hpp"
 #include "tests/formats/allocation_counter.hpp"
 #include "tests/formats/support.hpp"
 
@@ -272,6 +273,39 @@ TEST(Writer, StopsWhereTheSinkFails) {
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, "io.write");
   EXPECT_EQ(calls, 5);
+}
+
+/// Every section but those that only the paper's method reads, byte by byte.
+TEST(Bundle, TrimmedHoldsAllThatPlayersRead) {
+  BundleContent content = golden_content();
+  add_looks(content);
+  ExtraSection record;  // the first pattern's: it is found without its features
+  record.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
+  record.owner = 0;
+  record.bytes.assign(96, std::byte{1});
+  content.extra.push_back(record);
+  const Bytes whole = encode(content);
+  const auto before = BundleView::open(whole);
+  ASSERT_TRUE(before) << to_line(before.error());
+  const Bytes small = encode(trim(*before));
+  const auto after = BundleView::open(small);
+  ASSERT_TRUE(after) << to_line(after.error());
+  std::size_t dropped = 0;
+  for (const SectionEntry& entry : before->sections()) {
+    const auto type = static_cast<SectionType>(entry.type);
+    const auto got = after->section(type, entry.owner, entry.variant);
+    const bool twin = type == SectionType::kMappedFeatures || type == SectionType::kFeatureYml;
+    if (twin && !before->section(SectionType::kTrackerRecord, entry.owner).empty()) {
+      EXPECT_TRUE(got.empty()) << entry.type << " of " << entry.owner;
+      ++dropped;
+    } else if (type != SectionType::kContentSummary && type != SectionType::kParameterSets) {
+      expect_bytes(got, before->section(type, entry.owner, entry.variant),
+                   std::to_string(entry.type).c_str());
+    }
+  }
+  EXPECT_GT(dropped, 0u);
+  EXPECT_FALSE(after->features(1, content.features[1][0].set_id).keypoints.empty());
+  EXPECT_EQ(encode(trim(*after)), small) << "once more changes nothing";
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "bake/ship/mesh_encoder.hpp"
 #include "formats/quantise.hpp"
 #include "formats/transport/chunk_order.hpp"
+#include "formats/transport/vertex_streams.hpp"
 #include "modar/piece.hpp"
 
 namespace modar {
@@ -150,6 +151,21 @@ TEST(MeshObject, RestoresWhatNoEditorWouldMake) {
     }
     expect_restored(mesh);
   }
+}
+
+TEST(MeshObject, OcclusionTravelsAsAnAttribute) {
+  Mesh mesh = sheet(full_layout(), 40);
+  const std::size_t without = expect_restored(mesh).size();
+  for (std::size_t v = 0; v < mesh.vertices.size(); v += mesh.layout.stride) {
+    mesh.vertices[v + 11] = static_cast<std::byte>(100 + 20 * std::sin(0.0002 * double(v)));
+  }
+  Mesh unknown = mesh;
+  unknown.order();
+  EXPECT_FALSE(encode_mesh_object(unknown.vertices, unknown.indices, unknown.layout))
+      << "a byte of no attribute cannot travel";
+  AttributeRecord& occlusion = mesh.layout.attributes[mesh.layout.attribute_count++];
+  occlusion = {kTravellingOcclusion, static_cast<std::uint8_t>(ComponentType::kU8), 1, 0, 11, 0};
+  EXPECT_LT(expect_restored(mesh).size(), without + mesh.vertices.size() / mesh.layout.stride / 2);
 }
 
 TEST(MeshObject, LevelsComeBackInTheirOrder) {
