@@ -389,6 +389,15 @@ class Page(ProgramTest):
         finally:
             type(self).server = Server(self.site)
 
+    def test_a_first_visit_brings_the_bundle_once(self):
+        server = Server(self.site)  # another origin: nothing of it is stored yet
+        self.addCleanup(server.close)
+        self.browser.open(server.url)
+        self.browser.wait("navigator.serviceWorker.ready.then(() => true)", "the service worker")
+        brought = [path for path, _ in server.http.answered if path.startswith("/bundles/")]
+        self.assertEqual(len(brought), 1, server.http.answered)
+        kept = "caches.keys().then(async (names) => (await caches.match('bundles/demo.modar', { ignoreSearch: true }))?.ok)"
+        self.assertTrue(self.browser.run(kept))
 
     def test_the_package_installs_and_three_js_draws_on_a_picture(self):
         npm, project = shutil.which("npm"), self.site / "project"
