@@ -1,7 +1,7 @@
 #!/bin/sh
-# Builds the pose loop for another processor and proves that it sees there, to the last bit, what it sees here. For ARM,
-# the device's player too, with Debian's cross compilers, and its size; ARM runs under qemu, wasm (SIMD of 128 bits) in
-# node. Not part of CI.
+# Builds the pose loop for another processor and proves that it sees there, to the last bit, what it sees here, with an
+# estimated camera (the default) and with a given one. For ARM, the device's player too, with Debian's cross compilers, and
+# its size; ARM runs under qemu, wasm (SIMD of 128 bits) in node. Not part of CI.
 #   scripts/foreign.sh armhf|arm64|wasm BUNDLE VIDEO   e.g. armhf build/box.modar box.mp4; 60 frames of it
 #   scripts/foreign.sh memory BUNDLE                   tracks and draws BUNDLE here within 256 MB of addresses, by the
 #                                                      device's code and a driver that draws nothing: memory a stage
@@ -19,7 +19,7 @@ case $arch in
   # Debian 12's emscripten takes the fetch() of newer nodes for a browser's.
   wasm) run="node --no-experimental-fetch build/wasm/bits-there.js" ;;
   memory) triple= ;;
-  *) sed -n 2,12p "$0" >&2; exit 1 ;;
+  *) sed -n 2,13p "$0" >&2; exit 1 ;;
 esac
 if [ "$arch" = budget ]; then
   arch=armhf

@@ -34,8 +34,10 @@ Result<ExitCode> print_rows(const BenchOptions& bench) {
 }
 
 void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
-  line.option("--patterns", &pose.patterns,
-              "pose: folder of pattern pictures, or one picture; light: one");
+  line.option(
+      "--patterns", &pose.patterns,
+      "pose: folder of pattern pictures, or one picture; light: one; wild: to look for, too, "
+      "in clips that show none");
   line.option("--backgrounds", &pose.backgrounds, "pose: folder of photos without a pattern");
   line.option("--video", &pose.video,
               "pose: a video as well; extended: one to blank; render: the player on it");
@@ -63,9 +65,12 @@ void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
   line.option("--path", &pose.path,
               "pose: replay a camera path: a homography (9 numbers) or pose (12) a line");
   line.flag("--sift", pose.sift, "pose: OpenCV's SIFT with MAGSAC on the same frames");
+  line.flag("--known-camera", pose.known_camera,
+            "pose: tell the tracker lens and aspect, which are unknown to it and drawn at random "
+            "otherwise");
   line.option("--parameters", &pose.parameters,
-              "pose: set of the ModAR paper's method, none: ours alone");
-  line.option("--only", &pose.only, "pose: bands whose name holds this text");
+              "pose, wild: set of the ModAR paper's method, none: ours alone");
+  line.option("--only", &pose.only, "pose, wild: bands or clips whose name holds this text");
   line.option("--seed", &pose.seed, "pose: of the rendered frames");
   line.flag("--quiet", pose.quiet, "No progress bar");
 }

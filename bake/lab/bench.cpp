@@ -15,6 +15,7 @@
 #include "bake/lab/light_bench.hpp"
 #include "bake/lab/lod_bench.hpp"
 #include "bake/lab/ship_bench.hpp"
+#include "bake/lab/wild_bench.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
@@ -171,6 +172,23 @@ BenchResult bench_extended_rows(const BenchOptions& command) {
   return rows;
 }
 
+/// Videos of real things, beside other methods.
+BenchResult bench_wild_rows(const BenchOptions& command) {
+  WildBenchOptions options;
+  options.folder = command.inputs[0];
+  options.only = command.pose.only;
+  options.bake.jobs = command.model.jobs;
+  MODAR_ASSIGN(options.paper_set, paper_set_named(command.pose.parameters));
+  if (!command.pose.patterns.empty()) {
+    MODAR_ASSIGN(options.more_patterns, pictures_of(command.pose.patterns));
+  }
+  ProgressBar bar(command.pose.quiet || command.json);
+  auto rows =
+      bench_wild(options, [&bar](const std::string& what, double done) { bar.show(what, done); });
+  bar.clear();
+  return rows;
+}
+
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
       {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
@@ -204,6 +222,11 @@ const std::vector<Bench>& benches() {
        "the pose of a pattern out of sight, in rendered rooms, or blanked in a video, against the "
        "goals",
        bench_extended_rows},
+      {"wild", true, "CLIPS [--patterns DIR] [--only TEXT] [--parameters none]",
+       "a folder of videos of real things with their truths (ours, POT-210, PlanarTrack): the pose "
+       "loop with an unknown camera, against SIFT and ORB with a RANSAC homography and the ModAR "
+       "paper's method",
+       bench_wild_rows},
   };
   return all;
 }

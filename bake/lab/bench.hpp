@@ -28,6 +28,7 @@ struct PoseBenchRequest {
   bool lookalikes = false;              ///< sequences of lookalike and covered prints instead
   std::string path;                     ///< replay this camera path instead; see bench_path()
   bool sift = false;                    ///< OpenCV's SIFT with MAGSAC beside the others
+  bool known_camera = false;            ///< the tracker is told lens and aspect
   int many = 0;                         ///< measure bundles of 1 to so many patterns instead
   unsigned seed = 1;
   bool quiet = false;

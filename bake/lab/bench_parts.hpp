@@ -16,6 +16,9 @@ inline double ratio(double a, double b) {
   return b > 0 ? a / b : kNoFigure;
 }
 
+/// The ModAR paper's parameter set of that name, 0: "none". Errors: kUsage "parameters.unknown".
+Result<std::uint32_t> paper_set_named(const std::string& name);
+
 /// `modar bench pose`: a row a measure and band; the reference is the ModAR paper's method. Values
 /// that do not apply are not finite. Errors: kIo "pictures.folder"; those of reading pictures and
 /// videos.

@@ -102,15 +102,8 @@ Result<PoseBenchOptions> options_of(const PoseBenchRequest& command) {
   options.clutter_frames = command.clutter;
   options.many = command.many;
   options.sift = command.sift;
-  options.paper_set = 0;
-  for (const ParameterSetRecord& set : paper_parameter_sets()) {
-    if (command.parameters == parameter_set_name(set.id)) options.paper_set = set.id;
-  }
-  if (options.paper_set == 0 && command.parameters != "none") {
-    return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
-                "there is no parameter set '" + command.parameters + "'",
-                "name one of the paper's sets, or none to run ours alone");
-  }
+  options.known_camera = command.known_camera;
+  MODAR_ASSIGN(options.paper_set, paper_set_named(command.parameters));
   for (const SceneBand& band : pose_bands()) {
     if (band.name.find(command.only) != std::string::npos) options.bands.push_back(band);
   }
@@ -177,6 +170,16 @@ Result<std::vector<BenchRow>> lookalike_rows(const PoseBenchOptions& options,
 }
 
 }  // namespace
+
+Result<std::uint32_t> paper_set_named(const std::string& name) {
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    if (name == parameter_set_name(set.id)) return set.id;
+  }
+  if (name == "none") return 0;
+  return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
+              "there is no parameter set '" + name + "'",
+              "name one of the paper's sets, or none to run ours alone");
+}
 
 Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
   ProgressBar bar(command.quiet);

@@ -252,6 +252,7 @@ Result<std::vector<BenchRow>> paper_rows(const PoseBenchOptions& asked,
   const TemporaryFolder folder;
   PoseBenchOptions options = asked;
   MODAR_ASSIGN(options.patterns, paper_patterns(asked.patterns, folder.path()));
+  options.known_camera = true;  // as the paper's is calibrated
   options.bands.clear();
   for (const SceneBand& band : pose_bands()) {
     if (band.name == kFar || band.name == kNear) options.bands.push_back(band);

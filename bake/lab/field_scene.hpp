@@ -25,7 +25,7 @@ struct FieldCondition {
   bool shadow = false;         ///< a shadow's edge across the pattern, 45 % of the light behind it
   double shutter_px = 0;       ///< rolling shutter: shift of the last row against the first
   bool distorting = false;     ///< the lens distorts and the tracker is not told
-  double focal = 1;            ///< true focal length over the one that the tracker assumes
+  double focal = 1;            ///< of the focal length of the camera below
   double bend_radius = 0;      ///< of the paper about its vertical axis, pattern widths; 0: flat
   bool mirrored = false;       ///< the print is the mirror image: any recognition is false
   bool other_edition = false;  ///< the same layout around another photo: any recognition is false
@@ -38,7 +38,7 @@ struct FieldFrame {
 };
 
 /// The pattern (or what the condition makes of it) at a random pose, area 0.5 to 2 and up to 45
-/// degrees, through that condition. camera: the one the tracker assumes. other: picture whose
+/// degrees, through that condition. camera: the lens. other: picture whose
 /// middle another edition shows.
 FieldFrame render_field(const GrayImage& pattern, const GrayImage& other, const Camera& camera,
                         const GrayPicture& background, const FieldCondition& condition,

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "bake/lab/field_scene.hpp"
+#include "bake/lab/unknown_view.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
 
@@ -27,19 +28,33 @@ GrayPicture mirror_of(const GrayImage& pattern) {
 /// Called with each frame's result.
 using Judge = std::function<void(int frame, const TrackResult& seen, const FrameTruth& truth)>;
 
-/// A print on a moving hand's path before a tracker. covered: share that the background hides.
-Result<void> run_sequence(const GrayImage& print, std::span<const std::byte> bundle,
-                          const GrayPicture& background, double covered, std::uint64_t seed,
-                          const Judge& judge) {
-  const Camera camera = default_camera(background.width, background.height);
+/// How a print is shown.
+struct Showing {
+  const GrayPicture& background;
+  double covered = 0;  ///< share that the background hides
+  std::uint64_t seed = 0;
+  bool known_camera = false;  ///< see PoseBenchOptions
+};
+
+/// A print on a moving hand's path before a tracker.
+Result<void> run_sequence(const GrayImage& picture, std::span<const std::byte> bundle,
+                          const Showing& showing, const Judge& judge) {
+  const GrayPicture& background = showing.background;
+  const Camera assumed = default_camera(background.width, background.height);
   MODAR_ASSIGN(const auto view, BundleView::open(bundle));
-  MODAR_ASSIGN(const auto loop, PoseLoop::create(view, camera));
+  PoseLoopOptions how;
+  how.estimate_camera = !showing.known_camera;
+  MODAR_ASSIGN(const auto loop, PoseLoop::create(view, assumed, how));
+  Random drawn(showing.seed + 4099);
+  const UnknownView unknown = draw_unknown(picture, assumed, showing.known_camera, drawn);
+  const GrayImage print = unknown.print.view();
+  const Camera& camera = unknown.lens;
   SceneBand band;
   band.area_low = 0.8;
   band.area_high = 2.0;
   band.tilt_high = 35;
-  band.covered_low = band.covered_high = covered;
-  Random random(seed);
+  band.covered_low = band.covered_high = showing.covered;
+  Random random(showing.seed);
   const HandPath path(draw_pose(band, print, camera, random), random);
   const SceneLight light = draw_light(random);
   const std::uint64_t side = random.next();
@@ -70,10 +85,9 @@ struct Tally {
 
 /// Whether the last frame of a print's sequence shows anything; or the pattern, in the right place.
 Result<bool> ends_shown(const GrayImage& print, std::span<const std::byte> bundle,
-                        const GrayPicture& background, double covered, std::uint64_t seed,
-                        bool right) {
+                        const Showing& showing, bool right) {
   bool shown = false;
-  MODAR_TRY(run_sequence(print, bundle, background, covered, seed,
+  MODAR_TRY(run_sequence(print, bundle, showing,
                          [&](int frame, const TrackResult& seen, const FrameTruth& truth) {
                            if (frame != kFrames - 1 || seen.visible.empty()) return;
                            shown = !right || is_right(seen.visible[0], truth);
@@ -83,10 +97,10 @@ Result<bool> ends_shown(const GrayImage& print, std::span<const std::byte> bundl
 
 /// Whether the wrong name is reported once it must be decided. truth: index of the print.
 Result<bool> misnamed(const GrayImage& print, std::span<const std::byte> both, std::uint32_t truth,
-                      const GrayPicture& background, std::uint64_t seed) {
+                      const Showing& showing) {
   bool wrong = false;
   int since = -1;
-  MODAR_TRY(run_sequence(print, both, background, 0, seed,
+  MODAR_TRY(run_sequence(print, both, showing,
                          [&](int frame, const TrackResult& seen, const FrameTruth&) {
                            if (since < 0 && !seen.visible.empty()) since = frame;
                            for (const Detection& one : seen.visible) {
@@ -130,9 +144,8 @@ Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& optio
       const std::uint64_t seed = options.seed + 1000003 * p + 7919 * static_cast<std::uint64_t>(i);
       const GrayPicture& behind = backgrounds[seed % backgrounds.size()];
       const auto take = [&](Tally& tally, const GrayImage& print, double hidden, bool right) {
-        return ends_shown(print, alone, behind, hidden, seed, right).map([&](bool one) {
-          tally.add(one);
-        });
+        const Showing showing{behind, hidden, seed, options.known_camera};
+        return ends_shown(print, alone, showing, right).map([&](bool one) { tally.add(one); });
       };
       MODAR_TRY(take(edition, photo.view(), 0, false));
       MODAR_TRY(take(language, words.view(), 0, false));
@@ -140,7 +153,8 @@ Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& optio
       MODAR_TRY(take(covered, own, 0.5, true));
       MODAR_TRY(take(plain, own, 0, true));
       for (const std::uint32_t k : {0u, 1u}) {
-        MODAR_ASSIGN(const bool wrong, misnamed(prints[k].view(), both, k, behind, seed));
+        MODAR_ASSIGN(const bool wrong,
+                     misnamed(prints[k].view(), both, k, {behind, 0, seed, options.known_camera}));
         named.add(wrong);
       }
       if (progress) {

@@ -5,16 +5,16 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
-#include <sstream>
 
 #include <glm/geometric.hpp>
 #include <opencv2/core.hpp>
 
+#include "bake/lab/feature_peer.hpp"
 #include "bake/lab/field_scene.hpp"
-#include "bake/lab/sift_peer.hpp"
+#include "bake/lab/number_lines.hpp"
+#include "bake/lab/unknown_view.hpp"
 #include "bake/thread_clock.hpp"
 #include "bake/video/video.hpp"
 #include "formats/bundle_view.hpp"
@@ -31,7 +31,7 @@ struct Fixture {
   std::vector<std::byte> bytes;
   std::unique_ptr<PaperTracker> paper;  ///< null where options.paper_set is 0
   std::unique_ptr<PoseLoop> ours;
-  std::unique_ptr<SiftTracker> sift;  ///< of the first pattern; null unless options.sift
+  std::unique_ptr<FeaturePeer> sift;  ///< of the first pattern; null unless options.sift
 };
 
 /// track: whether ours tracks patterns from frame to frame. Errors: those of reading pictures,
@@ -60,9 +60,12 @@ Result<Fixture> make_fixture(const std::vector<std::string>& paths, const PoseBe
   if (options.ours) {
     PoseLoopOptions how;
     how.track = track;
+    how.estimate_camera = !options.known_camera;
     MODAR_ASSIGN(fixture.ours, PoseLoop::create(bundle, camera, how));
   }
-  if (options.sift) fixture.sift = SiftTracker::create(fixture.pictures[0].view());
+  if (options.sift) {
+    fixture.sift = FeaturePeer::create(fixture.pictures[0].view(), PeerMethod::kSiftMagsac);
+  }
   return fixture;
 }
 
@@ -150,6 +153,13 @@ int frames_of(const PoseBenchOptions& options, const SceneBand& band) {
   return (options.clutter_frames + patterns - 1) / patterns;
 }
 
+/// The lens and the print of pattern p: the same in every band.
+UnknownView unknown_of(const PoseBenchOptions& options, std::size_t p, const Fixture& fixture,
+                       const Camera& camera) {
+  Random random(options.seed + 1000003 * p + 4099);
+  return draw_unknown(fixture.pictures[0].view(), camera, options.known_camera, random);
+}
+
 /// One path under one exposure, over one photo.
 Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const GrayPicture& background,
                       const BenchPath& how, MethodTallies& tallies) {
@@ -159,19 +169,20 @@ Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const Gray
   band.area_high = 2.0;
   band.tilt_high = 35;
   MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, true));
-  const GrayImage picture = fixture.pictures[0].view();
   Random random(options.seed + 1000003 * p + 17);
-  const HandPath path(draw_pose(band, picture, camera, random), random);
+  const UnknownView unknown = unknown_of(options, p, fixture, camera);
+  const GrayImage picture = unknown.print.view();
+  const HandPath path(draw_pose(band, picture, unknown.lens, random), random);
   const SceneLight light = draw_light(random);
   tallies.cut();
   glm::dvec2 last{0.0};
   for (int i = 0; i < options.frames; ++i) {
     const Pose pose = path.at(i / 30.0, how.speed, how.tremor);
-    const glm::dvec2 centre = project(camera, pose.translation);
+    const glm::dvec2 centre = project(unknown.lens, pose.translation);
     const glm::dvec2 motion = i > 0 ? centre - last : glm::dvec2(0.0);
     last = centre;
     const SceneFrame scene =
-        render_scene(picture, camera, pose, background, band, random, &light,
+        render_scene(picture, unknown.lens, pose, background, band, random, &light,
                      {how.blur * glm::length(motion), std::atan2(motion.y, motion.x)});
     MODAR_TRY(tallies.run(fixture, scene.picture.view(), {true, scene.corners}));
   }
@@ -179,34 +190,6 @@ Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const Gray
 }
 
 using Truths = std::map<std::uint64_t, FrameTruth>;
-
-/// A line of numbers, and where it stands in the file.
-struct NumberLine {
-  std::size_t number = 0;
-  std::vector<double> values;
-};
-
-/// Lines of numbers separated by blanks or commas, without comments. code: of errors.
-Result<std::vector<NumberLine>> read_numbers(const std::string& path, const char* code) {
-  std::ifstream file(path);
-  if (!file) return fail(ExitCode::kIo, code, path, "the file cannot be read", "check its path");
-  std::vector<NumberLine> lines;
-  std::string line;
-  for (std::size_t number = 1; std::getline(file, line); ++number) {
-    if (line.empty() || line[0] == '#') continue;
-    std::replace(line.begin(), line.end(), ',', ' ');
-    std::istringstream words(line);
-    words.imbue(std::locale::classic());
-    NumberLine out{number, {}};
-    for (double value = 0; words >> value;) out.values.push_back(value);
-    if (!words.eof()) {
-      return fail(ExitCode::kInvalidInput, code, path + ":" + std::to_string(number),
-                  "this is not a number", "write numbers separated by blanks or commas");
-    }
-    lines.push_back(std::move(out));
-  }
-  return lines;
-}
 
 Result<Truths> read_truth(const std::string& path) {
   Truths truths;
@@ -283,7 +266,8 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
   for (const SceneBand& band : bands) tallies.emplace_back(band.name, false);
   for (std::size_t p = 0; p < options.patterns.size(); ++p) {
     MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, false));
-    const GrayImage picture = fixture.pictures[0].view();
+    const UnknownView unknown = unknown_of(options, p, fixture, camera);
+    const GrayImage picture = unknown.print.view();
     for (std::size_t b = 0; b < bands.size(); ++b) {
       Random random(options.seed + 1000003 * p + 7919 * b);
       const int frames = frames_of(options, bands[b]);
@@ -292,8 +276,9 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
             backgrounds[static_cast<std::size_t>(random.next() % backgrounds.size())];
         // Without a pattern only the photo makes the frames differ.
         const GrayPicture background = bands[b].pattern ? photo : another_view(photo, random);
-        const Pose pose = draw_pose(bands[b], picture, camera, random);
-        const SceneFrame scene = render_scene(picture, camera, pose, background, bands[b], random);
+        const Pose pose = draw_pose(bands[b], picture, unknown.lens, random);
+        const SceneFrame scene =
+            render_scene(picture, unknown.lens, pose, background, bands[b], random);
         MODAR_TRY(tallies[b].run(fixture, scene.picture.view(), {bands[b].pattern, scene.corners}));
       }
       if (progress) {
@@ -345,6 +330,7 @@ Result<std::vector<PoseBenchRow>> bench_field(const PoseBenchOptions& options,
     bool shrunk = false;
     MODAR_ASSIGN(const GrayPicture other,
                  load_pattern(options.patterns[(p + 1) % options.patterns.size()], shrunk));
+    const UnknownView unknown = unknown_of(options, p, fixture, camera);
     for (std::size_t c = 0; c < conditions.size(); ++c) {
       // The same poses under every condition.
       Random random(options.seed + 1000003 * p);
@@ -352,7 +338,7 @@ Result<std::vector<PoseBenchRow>> bench_field(const PoseBenchOptions& options,
         const auto& photo =
             backgrounds[static_cast<std::size_t>(random.next() % backgrounds.size())];
         Random own(random.next());
-        const FieldFrame frame = render_field(fixture.pictures[0].view(), other.view(), camera,
+        const FieldFrame frame = render_field(unknown.print.view(), other.view(), unknown.lens,
                                               photo, conditions[c], own);
         MODAR_TRY(tallies[c].run(fixture, frame.picture.view(), frame.truth));
       }
@@ -382,9 +368,10 @@ Result<std::vector<PoseBenchRow>> bench_path(const PoseBenchOptions& options,
   for (std::size_t p = 0; p < options.patterns.size(); ++p) {
     MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, true));
     Random random(options.seed + 1000003 * p);
+    const UnknownView unknown = unknown_of(options, p, fixture, camera);
     tallies.cut();
     for (const auto& [number, values] : lines) {
-      const FieldFrame frame = path_frame(values, fixture.pictures[0].view(), camera,
+      const FieldFrame frame = path_frame(values, unknown.print.view(), unknown.lens,
                                           backgrounds[p % backgrounds.size()], random);
       MODAR_TRY(tallies.run(fixture, frame.picture.view(), frame.truth));
     }

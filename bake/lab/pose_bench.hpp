@@ -26,7 +26,10 @@ struct PoseBenchOptions {
   std::uint32_t paper_set = 1;  ///< parameter set of the paper's method; 0: without that method
   bool ours = true;
   bool sift = false;  ///< beside them OpenCV's SIFT with MAGSAC
-  int many = 50;      ///< bench_many(): patterns in the greatest bundle, 2 or more
+  /// Frames are rendered through the camera that the tracker is given, and show the picture as it
+  /// is; false: as draw_unknown() has them, and the tracker estimates the camera.
+  bool known_camera = false;
+  int many = 50;  ///< bench_many(): patterns in the greatest bundle, 2 or more
   std::uint64_t seed = 1;
   std::vector<SceneBand> bands;  ///< empty: pose_bands()
 };

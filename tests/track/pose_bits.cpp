@@ -1,5 +1,6 @@
 // What the pose loop sees in raw gray frames, to the last bit: scripts/foreign.sh compares what
-// this prints on two kinds of processor. Usage: pose_bits BUNDLE WIDTH HEIGHT < FRAMES
+// this prints on two kinds of processor. First as people get it who give no camera, whose focal
+// length is estimated; then with a given one. Usage: pose_bits BUNDLE WIDTH HEIGHT < FRAMES
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -24,12 +25,14 @@ std::vector<std::byte> contents(const char* path) {
 }
 
 void print(int frame, const TrackResult& result) {
-  std::printf("%d reason %d features %d\n", frame, static_cast<int>(result.reason),
-              result.features);
+  std::printf("%d reason %d features %d focal %a %a\n", frame, static_cast<int>(result.reason),
+              result.features, result.camera.focal, result.camera.sigma);
   for (const Detection& each : result.visible) {
     std::printf(" pattern %u inliers %d matches %d", each.pattern, each.inliers, each.matches);
     for (const glm::dvec2& corner : each.corners) std::printf(" %a %a", corner.x, corner.y);
     for (int i = 0; i < 3; ++i) std::printf(" %a", each.pose.translation[i]);
+    for (int i = 0; i < 9; ++i) std::printf(" %a", each.pose.rotation[i / 3][i % 3]);
+    std::printf(" %a %a", each.agreeing, each.likeness);
     std::printf("\n");
   }
 }
@@ -43,15 +46,21 @@ int run(const char* path, int width, int height) {
   const std::vector<std::byte> bytes = contents(path);
   const auto bundle = BundleView::open(bytes);
   if (!bundle) return give_up(to_line(bundle.error()));
-  const auto loop = PoseLoop::create(*bundle, default_camera(width, height));
-  if (!loop) return give_up(to_line(loop.error()));
-  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width) *
-                                   static_cast<std::size_t>(height));
-  for (int frame = 0; std::fread(pixels.data(), 1, pixels.size(), stdin) == pixels.size();
-       ++frame) {
-    const auto result = (*loop)->step({pixels.data(), width, height, width});
-    if (!result) return give_up(to_line(result.error()));
-    print(frame, *result);
+  const std::size_t size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  std::vector<std::vector<std::uint8_t>> frames(1, std::vector<std::uint8_t>(size));
+  while (std::fread(frames.back().data(), 1, size, stdin) == size) frames.emplace_back(size);
+  frames.pop_back();
+  for (const bool estimate : {true, false}) {
+    PoseLoopOptions how;
+    how.estimate_camera = estimate;
+    const auto loop = PoseLoop::create(*bundle, default_camera(width, height), how);
+    if (!loop) return give_up(to_line(loop.error()));
+    std::printf("camera %s\n", estimate ? "estimated" : "given");
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const auto result = (*loop)->step({frames[i].data(), width, height, width});
+      if (!result) return give_up(to_line(result.error()));
+      print(static_cast<int>(i), *result);
+    }
   }
   return 0;
 }

@@ -1,5 +1,5 @@
-// Wraps cv::SIFT, a brute-force matcher and cv::findHomography.
-#include "bake/lab/sift_peer.hpp"
+// Wraps cv::SIFT and cv::ORB, a brute-force matcher and cv::findHomography.
+#include "bake/lab/feature_peer.hpp"
 
 #include <vector>
 
@@ -11,6 +11,7 @@ namespace {
 
 constexpr float kRatio = 0.8f;      // Lowe's, of the best match's distance to the second best's
 constexpr double kInlierPx = 3;     // OpenCV's default threshold
+constexpr int kOrbFeatures = 2000;  // of the ModAR paper's set orb-2000
 constexpr int kFewestInliers = 12;  // the 8 of the ModAR paper pass on clutter. Set by hand
 
 cv::Mat matrix_of(const GrayImage& image) {
@@ -20,33 +21,40 @@ cv::Mat matrix_of(const GrayImage& image) {
 
 }  // namespace
 
-struct SiftTracker::State {
-  cv::Ptr<cv::SIFT> sift = cv::SIFT::create();
-  cv::BFMatcher matcher{cv::NORM_L2};
+struct FeaturePeer::State {
+  explicit State(PeerMethod method)
+      : features(method == PeerMethod::kOrbRansac
+                     ? cv::Ptr<cv::Feature2D>(cv::ORB::create(kOrbFeatures))
+                     : cv::Ptr<cv::Feature2D>(cv::SIFT::create())),
+        matcher(method == PeerMethod::kOrbRansac ? cv::NORM_HAMMING : cv::NORM_L2),
+        sampling(method == PeerMethod::kSiftMagsac ? cv::USAC_MAGSAC : cv::RANSAC) {}
+  cv::Ptr<cv::Feature2D> features;
+  cv::BFMatcher matcher;
+  int sampling;
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
   std::vector<cv::Point2d> outline;
 };
 
-SiftTracker::SiftTracker(std::unique_ptr<State> state) : state_(std::move(state)) {}
-SiftTracker::~SiftTracker() = default;
+FeaturePeer::FeaturePeer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+FeaturePeer::~FeaturePeer() = default;
 
-std::unique_ptr<SiftTracker> SiftTracker::create(const GrayImage& pattern) {
-  auto state = std::make_unique<State>();
-  state->sift->detectAndCompute(matrix_of(pattern), cv::noArray(), state->keypoints,
-                                state->descriptors);
+std::unique_ptr<FeaturePeer> FeaturePeer::create(const GrayImage& pattern, PeerMethod method) {
+  auto state = std::make_unique<State>(method);
+  state->features->detectAndCompute(matrix_of(pattern), cv::noArray(), state->keypoints,
+                                    state->descriptors);
   const double right = pattern.width - 0.5;
   const double bottom = pattern.height - 0.5;
   state->outline = {{-0.5, -0.5}, {right, -0.5}, {right, bottom}, {-0.5, bottom}};
-  return std::unique_ptr<SiftTracker>(new SiftTracker(std::move(state)));
+  return std::unique_ptr<FeaturePeer>(new FeaturePeer(std::move(state)));
 }
 
-Result<TrackResult> SiftTracker::step(const GrayImage& frame) {
+Result<TrackResult> FeaturePeer::step(const GrayImage& frame) {
   TrackResult result;
   try {
     std::vector<cv::KeyPoint> seen;
     cv::Mat descriptors;
-    state_->sift->detectAndCompute(matrix_of(frame), cv::noArray(), seen, descriptors);
+    state_->features->detectAndCompute(matrix_of(frame), cv::noArray(), seen, descriptors);
     if (descriptors.rows < 2 || state_->descriptors.rows < 2) return result;
     std::vector<std::vector<cv::DMatch>> matches;
     state_->matcher.knnMatch(descriptors, state_->descriptors, matches, 2);
@@ -59,7 +67,7 @@ Result<TrackResult> SiftTracker::step(const GrayImage& frame) {
     }
     if (from.size() < 4) return result;
     cv::Mat inliers;
-    const cv::Mat map = cv::findHomography(from, to, cv::USAC_MAGSAC, kInlierPx, inliers);
+    const cv::Mat map = cv::findHomography(from, to, state_->sampling, kInlierPx, inliers);
     if (map.empty() || cv::countNonZero(inliers) < kFewestInliers) return result;
     std::vector<cv::Point2d> corners;
     cv::perspectiveTransform(state_->outline, corners, map);
@@ -70,7 +78,7 @@ Result<TrackResult> SiftTracker::step(const GrayImage& frame) {
     result.visible.push_back(detection);
     return result;
   } catch (const std::exception& thrown) {
-    return fail(ExitCode::kInternal, "bench.sift", "", thrown.what(), "report this as a bug");
+    return fail(ExitCode::kInternal, "bench.peer", "", thrown.what(), "report this as a bug");
   }
 }
 
