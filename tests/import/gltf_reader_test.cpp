@@ -98,6 +98,76 @@ TEST_F(Gltf, NodesMoveTheirMeshes) {
   EXPECT_NEAR(static_cast<double>(model->materials[0].diffuse.y), 0.5, 0.001);
 }
 
+/// Three vertices: one on each of two joints, one on both. The second joint is 2 along x, a quarter
+/// turn about z, and was bound where it stands without the turn.
+std::string skinned_triangle(int last_joint = 1) {
+  return one_triangle() +
+         raw<std::uint8_t>(
+             {0, 0, 0, 0, 1, 0, 0, 0, 0, static_cast<std::uint8_t>(last_joint), 0, 0}) +
+         raw<float>({1, 0, 0, 0, 2, 0, 0, 0, 0.5f, 0.5f, 0, 0}) +
+         raw<float>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0,  0, 0, 1,
+                     1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -2, 0, 0, 1});
+}
+
+constexpr const char* kSkin =
+    R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+    {"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":12},
+    {"buffer":0,"byteOffset":56,"byteLength":48},{"buffer":0,"byteOffset":104,"byteLength":128}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+    {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"},
+    {"bufferView":2,"componentType":5121,"count":3,"type":"VEC4"},
+    {"bufferView":3,"componentType":5126,"count":3,"type":"VEC4"},
+    {"bufferView":4,"componentType":5126,"count":2,"type":"MAT4"}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":0,"JOINTS_0":2,"WEIGHTS_0":3},"indices":1}]}],
+    "skins":[{"inverseBindMatrices":4,"joints":[1,2]}],
+    "nodes":[{"mesh":0,"skin":0,"translation":[100,100,100]},{"children":[2],"translation":[0,0,5]},
+    {"translation":[2,0,0],"rotation":[0,0,0.7071067811865476,0.7071067811865476]}],
+    "scenes":[{"nodes":[0,1]}])";
+
+TEST_F(Gltf, SkinnedMeshesFollowTheirJoints) {
+  const auto model = read(kSkin, skinned_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->positions.size(), 3u);
+  // The node's own place does not count. (1,0,0) lies at (-1,0,0) of the second joint, which the
+  // turn takes to (0,-1,0); its weight of 2 counts as 1.
+  EXPECT_LT(glm::length(model->positions[0] - glm::dvec3(0, 0, 5)), 1e-12);
+  EXPECT_LT(glm::length(model->positions[1] - glm::dvec3(2, -1, 5)), 1e-12);
+  // (0,1,0): half of itself, half of (-2,1,0) turned to (-1,-2,0) and moved to (1,-2,0).
+  EXPECT_LT(glm::length(model->positions[2] - glm::dvec3(0.5, -0.5, 5)), 1e-12);
+  EXPECT_TRUE(model->diagnostics.empty());
+  const auto broken = read(kSkin, skinned_triangle(2));
+  ASSERT_FALSE(broken) << "a joint that is not there";
+  EXPECT_EQ(broken.error().code, "gltf.skin");
+}
+
+TEST_F(Gltf, InstancedNodesAreCopied) {
+  const std::string instances =
+      R"("nodes":[{"mesh":0,"translation":[0,0,1],"extensions":{"EXT_mesh_gpu_instancing":
+      {"attributes":{"TRANSLATION":2,"SCALE":3}}}}],"scenes":[{"nodes":[0]}],
+      "extensionsUsed":["EXT_mesh_gpu_instancing"],"extensionsRequired":["EXT_mesh_gpu_instancing"])";
+  const auto file = [&](int scales) {
+    const std::string count = std::to_string(scales);
+    return read(R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+        {"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":48}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+        {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"},
+        {"bufferView":2,"componentType":5126,"count":2,"type":"VEC3"},
+        {"bufferView":2,"byteOffset":24,"componentType":5126,"count":)" +
+                    count + R"(,"type":"VEC3"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)" +
+                    instances,
+                one_triangle() + raw<float>({10, 0, 0, 20, 0, 0, 1, 1, 1, 2, 3, 4}));
+  };
+  const auto model = file(2);
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->positions.size(), 6u);
+  EXPECT_EQ(model->positions[1], glm::dvec3(11, 0, 1));
+  EXPECT_EQ(model->positions[4], glm::dvec3(22, 0, 1));
+  EXPECT_EQ(model->positions[5], glm::dvec3(20, 3, 1));
+  EXPECT_EQ(model->corner_positions.size(), 6u);
+  EXPECT_FALSE(file(1)) << "two places, one scale";
+}
+
 TEST_F(Gltf, BrokenFilesAreErrors) {
   const std::string scene = R"("nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])";
   const std::string mesh =
@@ -141,6 +211,8 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
                 one_triangle());
   };
   EXPECT_TRUE(requires_these(R"("KHR_mesh_quantization","KHR_texture_transform")"));
+  EXPECT_TRUE(requires_these(R"("KHR_lights_punctual","KHR_materials_clearcoat")"));
+  EXPECT_FALSE(requires_these(R"("KHR_materials_pbrSpecularGlossiness")"));
   const auto refused = requires_these(R"("KHR_texture_basisu","MODAR_none")");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().exit, ExitCode::kUnsupported);

@@ -7,17 +7,19 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 
+#include "bake/import/gltf/gltf_accessor.hpp"
 #include "bake/import/gltf/gltf_materials.hpp"
 #include "bake/import/gltf/gltf_meshopt.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
+#include "bake/import/gltf/gltf_pose.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/input.hpp"
@@ -25,154 +27,11 @@
 namespace modar {
 namespace {
 
-// Checked access to arrays: bounds first, then bytes.
-
-/// Elements of one accessor as doubles. Checks every bound: tinygltf checks none.
-class GltfAccessor {
- public:
-  /// Returns false where the accessor does not exist or exceeds its buffer. Without a buffer view
-  /// all elements are zero, as the specification has it; elements of a sparse accessor replace
-  /// them.
-  bool open(const tinygltf::Model& gltf, int index);
-
-  [[nodiscard]] std::size_t size() const { return count_; }
-  [[nodiscard]] std::size_t components() const { return components_; }
-  /// element < size(), component < components(). Normalised integers become [0,1] or [-1,1].
-  [[nodiscard]] double at(std::size_t element, std::size_t component) const;
-
- private:
-  bool replace_sparse(const tinygltf::Model& gltf, int index);
-
-  const unsigned char* bytes_ = nullptr;
-  std::size_t count_ = 0;
-  std::size_t components_ = 0;
-  std::size_t stride_ = 0;
-  std::size_t size_ = 0;  // of a component
-  int type_ = 0;
-  bool normalised_ = false;
-  std::vector<double> replaced_;  // all elements, where some are sparse
-};
-
-/// Elements without a buffer behind them: a file of a few bytes could ask for any number. Set by
-/// hand: far above real files, 384 MiB of normals at most.
-constexpr std::size_t kMostUnbacked = std::size_t{1} << 24;
-
-template <class T>
-double load(const unsigned char* at) {
-  T value;
-  std::memcpy(&value, at, sizeof value);
-  return static_cast<double>(value);
-}
-
-/// `count` elements of `element` bytes each, `stride` apart (0: the view's own, or none); nullptr
-/// where they exceed their buffer.
-const unsigned char* place(const tinygltf::Model& gltf, int index, std::size_t offset,
-                           std::size_t count, std::size_t element, std::size_t& stride) {
-  if (index < 0 || static_cast<std::size_t>(index) >= gltf.bufferViews.size()) return nullptr;
-  const tinygltf::BufferView& view = gltf.bufferViews[static_cast<std::size_t>(index)];
-  if (view.buffer < 0 || static_cast<std::size_t>(view.buffer) >= gltf.buffers.size()) {
-    return nullptr;
-  }
-  const std::vector<unsigned char>& data = gltf.buffers[static_cast<std::size_t>(view.buffer)].data;
-  if (stride == 0) stride = view.byteStride == 0 ? element : view.byteStride;
-  if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset ||
-      stride < element || stride > 65536 || offset > view.byteLength) {
-    return nullptr;
-  }
-  const std::size_t room = view.byteLength - offset;
-  if (count != 0 && (room < element || (count - 1) > (room - element) / stride)) return nullptr;
-  return data.data() + view.byteOffset + offset;
-}
-
-bool GltfAccessor::open(const tinygltf::Model& gltf, int index) {
-  if (index < 0 || static_cast<std::size_t>(index) >= gltf.accessors.size()) return false;
-  const tinygltf::Accessor& accessor = gltf.accessors[static_cast<std::size_t>(index)];
-  const int components =
-      tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type));
-  const int size =
-      tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor.componentType));
-  if (components <= 0 || size <= 0) return false;
-  count_ = accessor.count;
-  components_ = static_cast<std::size_t>(components);
-  size_ = static_cast<std::size_t>(size);
-  type_ = accessor.componentType;
-  normalised_ = accessor.normalized;
-  bytes_ = nullptr;
-  stride_ = 0;
-  replaced_.clear();
-  if (accessor.bufferView >= 0) {
-    bytes_ =
-        place(gltf, accessor.bufferView, accessor.byteOffset, count_, components_ * size_, stride_);
-    if (bytes_ == nullptr) return false;
-  }
-  if (bytes_ == nullptr && count_ > kMostUnbacked) return false;
-  return !accessor.sparse.isSparse || replace_sparse(gltf, index);
-}
-
-bool GltfAccessor::replace_sparse(const tinygltf::Model& gltf, int index) {
-  const auto& sparse = gltf.accessors[static_cast<std::size_t>(index)].sparse;
-  const int index_size =
-      tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(sparse.indices.componentType));
-  if (sparse.count < 0 || static_cast<std::size_t>(sparse.count) > count_ || index_size <= 0 ||
-      sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0 || count_ > kMostUnbacked) {
-    return false;
-  }
-  GltfAccessor indices;
-  indices.count_ = static_cast<std::size_t>(sparse.count);
-  indices.components_ = 1;
-  indices.size_ = indices.stride_ = static_cast<std::size_t>(index_size);
-  indices.type_ = sparse.indices.componentType;
-  indices.bytes_ =
-      place(gltf, sparse.indices.bufferView, static_cast<std::size_t>(sparse.indices.byteOffset),
-            indices.count_, indices.size_, indices.stride_);
-  GltfAccessor values(*this);
-  values.count_ = indices.count_;
-  values.stride_ = components_ * size_;
-  values.bytes_ =
-      place(gltf, sparse.values.bufferView, static_cast<std::size_t>(sparse.values.byteOffset),
-            values.count_, values.stride_, values.stride_);
-  if (indices.bytes_ == nullptr || values.bytes_ == nullptr) return false;
-  std::vector<double> all(count_ * components_);
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = at(i / components_, i % components_);
-  for (std::size_t i = 0; i < indices.count_; ++i) {
-    const double element = indices.at(i, 0);
-    if (!(element >= 0 && element < static_cast<double>(count_))) return false;
-    for (std::size_t c = 0; c < components_; ++c) {
-      all[static_cast<std::size_t>(element) * components_ + c] = values.at(i, c);
-    }
-  }
-  replaced_ = std::move(all);
-  return true;
-}
-
-double GltfAccessor::at(std::size_t element, std::size_t component) const {
-  if (!replaced_.empty()) return replaced_[element * components_ + component];
-  if (bytes_ == nullptr) return 0.0;
-  const unsigned char* const place = bytes_ + element * stride_ + component * size_;
-  switch (type_) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return normalised_ ? std::max(load<std::int8_t>(place) / 127.0, -1.0)
-                         : load<std::int8_t>(place);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return load<std::uint8_t>(place) / (normalised_ ? 255.0 : 1.0);
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return normalised_ ? std::max(load<std::int16_t>(place) / 32767.0, -1.0)
-                         : load<std::int16_t>(place);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return load<std::uint16_t>(place) / (normalised_ ? 65535.0 : 1.0);
-    case TINYGLTF_COMPONENT_TYPE_INT:
-      return load<std::int32_t>(place);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      return load<std::uint32_t>(place);
-    case TINYGLTF_COMPONENT_TYPE_DOUBLE:
-      return load<double>(place);
-    default:
-      return load<float>(place);
-  }
-}
-
 // The scene.
 
+/// Vertices beyond which a file may not copy nodes: some bytes could ask for any number. Set by
+/// hand, far above what a phone draws.
+constexpr std::size_t kMostCopied = std::size_t{1} << 25;
 constexpr int kMaxDepth = 1000;  ///< of nodes; keeps recursion within a small stack, set by hand
 
 /// What is counted while the scene is read, and left out of the model.
@@ -185,7 +44,11 @@ struct LeftOut {
 class SceneReader {
  public:
   SceneReader(const tinygltf::Model& gltf, SourceModel& model, std::string label)
-      : gltf_(gltf), model_(model), label_(std::move(label)), seen_(gltf.nodes.size()) {}
+      : gltf_(gltf),
+        model_(model),
+        label_(std::move(label)),
+        skins_(gltf),
+        seen_(gltf.nodes.size()) {}
 
   [[nodiscard]] const LeftOut& left_out() const { return left_out_; }
 
@@ -221,24 +84,6 @@ class SceneReader {
                 "check the file with the glTF validator and export it again");
   }
 
-  static glm::dmat4 transform_of(const tinygltf::Node& node) {
-    glm::dmat4 m(1.0);
-    if (node.matrix.size() == 16) {
-      for (int i = 0; i < 16; ++i) m[i / 4][i % 4] = node.matrix[static_cast<std::size_t>(i)];
-      return m;
-    }
-    if (node.rotation.size() == 4) {
-      m = glm::mat4_cast(
-          glm::dquat(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]));
-    }
-    for (int i = 0; i < 3; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (node.scale.size() == 3) m[i] *= node.scale[k];
-      if (node.translation.size() == 3) m[3][i] = node.translation[k];
-    }
-    return m;
-  }
-
   Result<void> walk(int index, const glm::dmat4& parent, int depth) {
     if (index < 0 || static_cast<std::size_t>(index) >= gltf_.nodes.size() || depth > kMaxDepth ||
         seen_[static_cast<std::size_t>(index)]) {
@@ -246,14 +91,26 @@ class SceneReader {
     }
     seen_[static_cast<std::size_t>(index)] = true;
     const tinygltf::Node& node = gltf_.nodes[static_cast<std::size_t>(index)];
-    const glm::dmat4 to_scene = parent * transform_of(node);
-    if (node.skin >= 0) ++skins_;
+    const glm::dmat4 to_scene = parent * node_transform(node);
     if (node.mesh >= 0 && static_cast<std::size_t>(node.mesh) < gltf_.meshes.size()) {
-      for (const auto& primitive : gltf_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
-        MODAR_TRY(add_primitive(primitive, to_scene));
-      }
+      MODAR_TRY(add_mesh(node, to_scene));
     }
     for (const int child : node.children) MODAR_TRY(walk(child, to_scene, depth + 1));
+    return {};
+  }
+
+  Result<void> add_mesh(const tinygltf::Node& node, const glm::dmat4& to_scene) {
+    const auto copies = node_copies(gltf_, node);
+    if (!copies) return wrong("gltf.accessor", "the copies of a node leave their buffer");
+    for (const glm::dmat4& copy : *copies) {
+      if (copies->size() > 1 && model_.positions.size() > kMostCopied) {
+        return wrong("gltf.copies", "its instanced nodes make more than " +
+                                        std::to_string(kMostCopied) + " vertices");
+      }
+      for (const auto& primitive : gltf_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
+        MODAR_TRY(add_primitive(primitive, node.skin, to_scene * copy));
+      }
+    }
     return {};
   }
 
@@ -266,7 +123,8 @@ class SceneReader {
                       accessor.components() >= least_components);
   }
 
-  Result<void> add_primitive(const tinygltf::Primitive& primitive, const glm::dmat4& to_scene) {
+  Result<void> add_primitive(const tinygltf::Primitive& primitive, int skin,
+                             const glm::dmat4& to_scene) {
     const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
     if (mode < TINYGLTF_MODE_TRIANGLES) {
       ++left_out_.lines_and_points;
@@ -293,25 +151,35 @@ class SceneReader {
     if (model_.positions.size() + positions.size() >= kNoIndex) {
       return wrong("gltf.read", "it has more vertices than 32 bits count");
     }
+    const auto places = skins_.bind(primitive, skin, positions.size(), to_scene);
+    if (!places) return wrong("gltf.skin", "a skin, its joints or its weights are broken");
     const auto first = static_cast<std::uint32_t>(model_.positions.size());
-    const glm::dmat3 turn = glm::transpose(glm::inverse(glm::dmat3(to_scene)));
+    std::optional<glm::dmat4> place = places->of(0);
+    glm::dmat3 turn(1.0);
+    const bool mirrored = place && glm::determinant(glm::dmat3(*place)) < 0;
     for (std::size_t v = 0; v < positions.size(); ++v) {
-      model_.positions.push_back(glm::dvec3(to_scene * glm::dvec4(vector(positions, v), 1.0)));
+      if (v == 0 || places->skinned()) {
+        place = places->of(v);
+        if (!place) return wrong("gltf.skin", "a vertex names a joint that its skin has not");
+        turn = glm::transpose(glm::inverse(glm::dmat3(*place)));
+      }
+      model_.positions.push_back(glm::dvec3(*place * glm::dvec4(vector(positions, v), 1.0)));
       model_.normals.push_back(has_normals ? glm::vec3(turn * vector(normals, v)) : glm::vec3(0));
       // SourceModel has OBJ's convention: v points up.
       const glm::dvec2 uv =
           has_uvs ? placing.apply({uvs.at(v, 0), uvs.at(v, 1)}) : glm::dvec2(0.0, 1.0);
       model_.uvs.push_back({uv.x, 1.0 - uv.y});
-      glm::vec3 colour(1.0f);
-      for (int i = 0; has_colours && i < 3; ++i) {
-        colour[i] = static_cast<float>(srgb_of_linear(colours.at(v, static_cast<std::size_t>(i))));
-      }
-      model_.colours.push_back(colour);
+      model_.colours.push_back(has_colours ? colour_of(colours, v) : glm::vec3(1.0f));
     }
     any_colours_ = any_colours_ || has_colours;
     begin_material(primitive.material);
-    return add_triangles(primitive, mode, first, positions.size(),
-                         glm::determinant(glm::dmat3(to_scene)) < 0, has_uvs, has_normals);
+    return add_triangles(primitive, mode, first, positions.size(), mirrored, has_uvs, has_normals);
+  }
+
+  static glm::vec3 colour_of(const GltfAccessor& colours, std::size_t v) {
+    const glm::dvec3 linear = vector(colours, v);
+    return glm::vec3(
+        glm::dvec3(srgb_of_linear(linear.x), srgb_of_linear(linear.y), srgb_of_linear(linear.z)));
   }
 
   static glm::dvec3 vector(const GltfAccessor& accessor, std::size_t v) {
@@ -379,19 +247,15 @@ class SceneReader {
     if (!any_colours_) model_.colours.release();
     // The specification: faces without normals are flat-shaded.
     model_.smoothing_runs = {{0, 0}};
-    if (skins_ == 0) return;
-    model_.diagnostics.push_back(
-        {"gltf.skin", DiagnosticSeverity::kWarning, label_, 0,
-         std::to_string(skins_) + " skinned nodes are baked in the pose of their nodes", ""});
   }
 
   const tinygltf::Model& gltf_;
   SourceModel& model_;
   std::string label_;
+  SkinPoses skins_;
   std::vector<bool> seen_;  // nodes: glTF's are trees
   bool any_colours_ = false;
   LeftOut left_out_;
-  std::uint64_t skins_ = 0;
 };
 
 /// Reads a whole file; false where it cannot be read.
@@ -403,14 +267,26 @@ bool read_bytes(const std::string& path, std::string& bytes) {
   return !file.bad();
 }
 
-/// Extensions that are read in full; a file that requires others cannot be shown as it is meant.
-constexpr const char* kKnownExtensions[] = {"EXT_meshopt_compression",    "EXT_texture_webp",
-                                            "KHR_draco_mesh_compression", "KHR_materials_unlit",
-                                            "KHR_mesh_quantization",      "KHR_texture_transform"};
+/// Extensions that are read in full.
+constexpr const char* kKnownExtensions[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
+                                            "EXT_texture_webp",        "KHR_draco_mesh_compression",
+                                            "KHR_materials_unlit",     "KHR_mesh_quantization",
+                                            "KHR_texture_transform"};
 
 bool is_known(const std::string& extension) {
   return std::find(std::begin(kKnownExtensions), std::end(kKnownExtensions), extension) !=
          std::end(kKnownExtensions);
+}
+
+/// Whether a file that requires an extension can be shown without it: lamps, which the scene's
+/// light stands for, notes, and refinements of the core's materials.
+bool is_dispensable(const std::string& extension) {
+  constexpr const char* kAlone[] = {
+      "KHR_lights_punctual", "EXT_lights_ies", "EXT_lights_image_based",
+      "KHR_xmp_json_ld",     "KHR_xmp",        "KHR_animation_pointer"};
+  return std::find(std::begin(kAlone), std::end(kAlone), extension) != std::end(kAlone) ||
+         (extension.starts_with("KHR_materials_") &&
+          extension != "KHR_materials_pbrSpecularGlossiness");
 }
 
 /// Refuses glTF 1.0 and required extensions that are not read. gltf: may be half read.
@@ -423,7 +299,8 @@ Result<void> require_support(const tinygltf::Model& gltf, std::string_view bytes
   }
   std::string unknown;
   for (const std::string& extension : gltf.extensionsRequired) {
-    if (!is_known(extension)) unknown += (unknown.empty() ? "" : ", ") + extension;
+    if (is_known(extension) || is_dispensable(extension)) continue;
+    unknown += (unknown.empty() ? "" : ", ") + extension;
   }
   if (unknown.empty()) return {};
   return fail(ExitCode::kUnsupported, "gltf.extension", path,
