@@ -160,6 +160,7 @@ BenchResult bench_extended_rows(const BenchOptions& command) {
       rows.push_back({what + (" " + row.scene), value, goal, ratio(value, goal)});
     };
     add("followed_pct", ratio(100.0 * row.followed, row.unseen), kNoFigure);
+    if (row.direct_px > 0) add("seen_p95_px", row.seen_px, row.direct_px);
     if (row.followed == 0) continue;
     add("position_pct", row.position_pct, 3 * half);
     add("rotation_deg", row.rotation_deg, half);

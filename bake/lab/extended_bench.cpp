@@ -27,15 +27,15 @@ constexpr double kSeen = 4.0;    // seconds in which the pattern is seen, first 
 constexpr double kUnseen = 5.0;  // seconds in between
 constexpr double kLength = 2 * kSeen + kUnseen - 2;
 
-enum class Scene : std::uint8_t { kTurned, kCovered, kPasserBy, kCarried };
+enum class Scene : std::uint8_t { kTurned, kCovered, kPasserBy, kFilled, kPartly, kCarried };
 struct SceneName {
   Scene scene;
   const char* name;
 };
-constexpr SceneName kScenes[] = {{Scene::kTurned, "turned"},
-                                 {Scene::kCovered, "covered"},
-                                 {Scene::kPasserBy, "passer-by"},
-                                 {Scene::kCarried, "carried"}};
+constexpr SceneName kScenes[] = {
+    {Scene::kTurned, "turned"},         {Scene::kCovered, "covered"},
+    {Scene::kPasserBy, "passer-by"},    {Scene::kFilled, "filled by passer-by"},
+    {Scene::kPartly, "partly covered"}, {Scene::kCarried, "carried"}};
 
 /// 0 before `from`, 1 after `to`, smooth in between.
 double ramp(double time, double from, double to) {
@@ -78,7 +78,9 @@ struct Sequence {
   std::vector<Board> room;
   std::array<double, 8> phase{};
 
-  [[nodiscard]] bool hidden(double time) const { return time > kSeen && time < kSeen + kUnseen; }
+  [[nodiscard]] bool hidden(double time) const {
+    return scene != Scene::kPartly && time > kSeen && time < kSeen + kUnseen;
+  }
 
   /// Where the pattern is in the room.
   [[nodiscard]] Pose placed(double time) const {
@@ -92,7 +94,20 @@ struct Sequence {
     const Pose pose = camera_at(scene, time, phase);
     boards.push_back(board_of(pattern, placed(time)));
     const double gone = time - kSeen;
-    if (hidden(time) && scene != Scene::kTurned) {
+    if (hidden(time) && scene == Scene::kFilled) {
+      // Someone passes so close that nothing else is seen for a second and a half.
+      const double x = -4.5 + 9 * gone / kUnseen;
+      boards.push_back(
+          {{x - 2.1, 3.0, 2.6}, {4.2, 0, 0.3}, {0, -6.0, 0}, &pictures[2 % pictures.size()], 1});
+    } else if (scene == Scene::kPartly) {
+      // Something slides to and fro over up to 65 % of it, from below right.
+      const double slide = 1.15 - 0.65 * (1 - std::cos(2 * pi * time / 3.0));
+      boards.push_back({{slide, 0.75 - 0.3 * std::sin(0.7 * time), 0.1},
+                        {2.3, 0.2, 0.1},
+                        {-0.1, -2.5, 0.1},
+                        &pictures[1 % pictures.size()],
+                        1});
+    } else if (hidden(time) && scene != Scene::kTurned) {
       // Something slides before the pattern, half way to the camera, and away again.
       const double slide =
           4.0 * (1 - ramp(gone, -0.1, 0.5) + ramp(gone, kUnseen - 0.5, kUnseen + 0.1));
@@ -117,6 +132,8 @@ struct Sums {
   ExtendedRow row;
   std::vector<double> positions;
   std::vector<double> rotations;
+  std::vector<double> seen_px;
+  std::vector<double> direct_px;
   int honest = 0;
   double seconds = 0;
   int timed = 0;
@@ -162,6 +179,8 @@ Result<void> run(const Sequence& sequence, std::span<const std::byte> bundle, bo
   how.extended = true;
   MODAR_ASSIGN(const auto loop,
                PoseLoop::create(BundleView::open(bundle).value(), sequence.camera, how));
+  MODAR_ASSIGN(const auto plain,
+               PoseLoop::create(BundleView::open(bundle).value(), sequence.camera));
   std::optional<Pose> last;
   std::optional<std::array<glm::dvec2, 4>> seen_before;
   std::array<glm::dvec2, 4> truth_before{};
@@ -185,6 +204,11 @@ Result<void> run(const Sequence& sequence, std::span<const std::byte> bundle, bo
     const double took = thread_seconds() - start;
     const Detection* seen = result.visible.empty() ? nullptr : &result.visible[0];
     const auto corners = corners_of(sequence.pattern, sequence.camera, truth);
+    MODAR_ASSIGN(const auto direct, plain->step(frame.view()));
+    if (!direct.visible.empty() && seen != nullptr) {
+      sums.seen_px.push_back(corner_error(*seen, {true, corners}));
+      sums.direct_px.push_back(corner_error(direct.visible[0], {true, corners}));
+    }
     if (sequence.hidden(time)) {
       ++sums.row.unseen;
       if (seen != nullptr && seen->extended) {
@@ -220,6 +244,8 @@ ExtendedRow finish(Sums& sums) {
   row.worst_rotation_deg = percentile(sums.rotations, 1.0);
   row.position_pct = percentile(sums.positions, 0.95);
   row.rotation_deg = percentile(sums.rotations, 0.95);
+  row.seen_px = percentile(sums.seen_px, 0.95);
+  row.direct_px = percentile(sums.direct_px, 0.95);
   if (row.followed > 0) row.honest_pct = 100.0 * sums.honest / row.followed;
   if (sums.timed > 0) row.ms = 1e3 * sums.seconds / sums.timed;
   return row;

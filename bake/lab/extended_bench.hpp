@@ -19,6 +19,8 @@ struct ExtendedRow {
   double rotation_deg = 0;  ///< error of the rotation, 95th percentile
   double worst_position_pct = 0;
   double worst_rotation_deg = 0;
+  double seen_px = 0;     ///< mean error of the corners where the loop without `extended` shows the
+  double direct_px = 0;   ///< pattern, 95th percentile; and that loop's; 0: not measured
   double jump_px = 0;     ///< on return: of a corner in the frame, beyond its true way
   double honest_pct = 0;  ///< followed frames whose errors lie within two stated deviations
   double ms = 0;          ///< thread-CPU milliseconds of such a frame, mean
@@ -26,10 +28,11 @@ struct ExtendedRow {
 
 /// For each pattern and scene a sequence of `frames` frames at most, 30 a second: the camera turns
 /// by 60 degrees and back while it moves half a pattern's width (`turned`); something covers the
-/// pattern (`covered`); the same with a passer-by (`passer-by`); the pattern is carried through the
-/// room before a still camera, then hidden, where any pose is wrong (`carried`). Turns and covers
-/// take five seconds. only: scenes whose name holds it. Errors: those of reading pictures, baking
-/// and the tracker.
+/// pattern (`covered`); the same with a passer-by (`passer-by`), who may fill the frame (`filled by
+/// passer-by`); something slides to and fro over a part of the pattern (`partly covered`); the
+/// pattern is carried through the room before a still camera, then hidden, where any pose is wrong
+/// (`carried`). Turns and covers take five seconds. only: scenes whose name holds it. Errors: those
+/// of reading pictures, baking and the tracker.
 Result<std::vector<ExtendedRow>> bench_extended(const PoseBenchOptions& options,
                                                 const std::string& only,
                                                 const ProgressCallback& progress);
