@@ -11,8 +11,9 @@
 #include "formats/bits.hpp"
 #include "formats/check_rules.hpp"
 #include "formats/draw_order.hpp"
+#include "formats/meta_text.hpp"
+#include "formats/texture_format.hpp"
 #include "formats/tracker_record.hpp"
-#include "formats/utf8.hpp"
 #include "formats/validate.hpp"
 
 #define XXH_INLINE_ALL
@@ -41,17 +42,8 @@ void check_zero(FaultLog& log, std::span<const std::byte> bytes, std::uint64_t f
 
 void check_meta(FaultLog& log, const BundleParts& parts, const SectionEntry& entry) {
   const std::span<const std::byte> bytes = section_bytes(parts, entry);
-  std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  while (!rest.empty()) {
-    const bool space = rest[0] == '\n' || rest[0] == '\r' || rest[0] == '\t';
-    const std::size_t length = space ? 1 : utf8_character(rest);
-    if (length == 0) {
-      log.add(Rule::kMetaText, entry.offset + bytes.size() - rest.size(), "meta",
-              "a byte belongs to no printable character of UTF-8");
-      return;
-    }
-    rest.remove_prefix(length);
-  }
+  const auto fault = check_meta_text({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  if (fault) log.add(Rule::kMetaText, entry.offset + fault->offset, "meta", fault->cause);
 }
 
 }  // namespace
@@ -605,14 +597,40 @@ void check_draw_orders(FaultLog& log, const BundleParts& parts) {
   }
 }
 
+/// The stated minor version has all that the bundle uses, and is one that this program knows.
+void check_minor(FaultLog& log, const BundleParts& parts, bool accept_newer) {
+  const auto& header = *reinterpret_cast<const FileHeader*>(parts.bytes.data());
+  std::uint16_t needed = 0;
+  for (const SectionEntry& entry : parts.sections) {
+    needed = std::max(needed, section_since(entry.type));
+  }
+  constexpr std::uint16_t kFlagsSince = 2;
+  for (std::uint32_t i = 0; i < parts.materials.size(); ++i) {
+    if ((parts.materials[i].flags & kMaterialOccluder) != 0) needed = kFlagsSince;
+  }
+  for (std::uint32_t i = 0; i < parts.textures.size(); ++i) {
+    if ((parts.textures[i].flags & kTextureCutOut) != 0) needed = kFlagsSince;
+  }
+  const std::string states = "it states 1." + std::to_string(header.minor) + ", ";
+  if (header.minor < needed) {
+    log.add(Rule::kMinor, offsetof(FileHeader, minor), "header",
+            states + "and uses what 1." + std::to_string(needed) + " added");
+  } else if (header.minor > kMinorVersion && !accept_newer) {
+    log.add(Rule::kMinor, offsetof(FileHeader, minor), "header",
+            states + "this program knows up to 1." + std::to_string(kMinorVersion) +
+                " and cannot judge what that added");
+  }
+}
+
 /// Everything but sections as bytes.
-void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes) {
+void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes, bool accept_newer) {
   const std::uint64_t damaged = log.errors();
   if (!validate_tables(log, parts)) return;
   validate_models(log, parts);
   validate_assets(log, parts);
   // Payloads are read through records, so these have to be clean; a wrong hash does no harm.
   if (log.errors() != damaged) return;
+  check_minor(log, parts, accept_newer);
   check_model_records(log, parts);
   check_summary(log, parts);
   check_geometry(log, parts, hashes);
@@ -634,18 +652,19 @@ bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
   };
   BufferHashes hashes{{log, parts, options, section(SectionType::kVertices)},
                       {log, parts, options, section(SectionType::kIndices)}};
-  check_contents(log, parts, hashes);
+  check_contents(log, parts, hashes, options.accept_newer);
   hashes.vertices.finish();
   hashes.indices.finish();
   return log.clean();
 }
 
-std::string first_error(std::span<const std::byte> bytes) {
+std::string first_error(std::span<const std::byte> bytes, const CheckOptions& options) {
   std::string error;
-  check_bundle(bytes, [&error](const Issue& issue) {
+  const IssueSink sink = [&error](const Issue& issue) {
     if (issue.kind->severity != Severity::kError || !error.empty()) return;
     error = std::string(issue.kind->id) + " " + issue.where;
-  });
+  };
+  check_bundle(bytes, sink, options);
   return error;
 }
 

@@ -51,6 +51,9 @@ struct CheckOptions {
   /// Told of bytes that are not read again, whole pages front to back, so that a mapping can give
   /// them back (forget_read() in modar/mapped_file.hpp). None: nobody is told.
   std::function<void(std::span<const std::byte>)> release;
+  /// A newer minor version is no error: what it adds can be skipped, as devices do, and is not
+  /// checked.
+  bool accept_newer = false;
 };
 
 /// Runs every rule over the bytes, about in file order; calls `sink` for each finding. Memory does
@@ -59,7 +62,7 @@ bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
                   const CheckOptions& options = {});
 
 /// The first error that check_bundle() finds, as "ID where"; empty for a good bundle.
-std::string first_error(std::span<const std::byte> bytes);
+std::string first_error(std::span<const std::byte> bytes, const CheckOptions& options = {});
 
 /// Checks the hash of every section, and nothing else: finds bytes that the storage has changed
 /// since the bundle was written, which BundleView::open() does not look at. Reads the whole file.

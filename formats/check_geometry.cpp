@@ -178,7 +178,7 @@ class GeometryCheck {
     if (valid_at_a_glance(layout, scan, chunk, level, range)) {
       return check_cone(layout, chunk, level, range, where);
     }
-    wrong_index_ = degenerate_ = not_finite_ = normal_ = outside_ = padding_ = Tally();
+    wrong_index_ = degenerate_ = not_finite_ = normal_ = outside_ = padding_ = occlusion_ = Tally();
     for (std::uint32_t i = 0; i < level.index_count; ++i) {
       const std::uint16_t index = indices[i];
       if (index >= level.vertex_count) {
@@ -203,6 +203,7 @@ class GeometryCheck {
     tell(Rule::kNormalLength, normal_, where, "normals are not of unit length");
     tell(Rule::kChunkBounds, outside_, where, "vertices lie outside of the chunk's box");
     tell(Rule::kVertexPadding, padding_, where, "vertices have padding that is not zero");
+    tell(Rule::kVertexOcclusion, occlusion_, where, "vertices have an occlusion above 127");
     tell(Rule::kDegenerateTriangles, degenerate_, where, "triangles use a vertex twice");
     if (wrong_index_.count + not_finite_.count > 0) {
       extent_.broken = true;
@@ -288,7 +289,11 @@ class GeometryCheck {
 
   void check_vertex(const LayoutRecord& layout, const ChunkRecord& chunk, const std::byte* vertex) {
     std::array<bool, kMaxVertexStride> owned{};
-    if (occlusion_byte_ < owned.size()) owned[occlusion_byte_] = true;
+    if (occlusion_byte_ < layout.stride) {
+      owned[occlusion_byte_] = true;
+      const std::byte* place = vertex + occlusion_byte_;
+      if (*place > std::byte{kMaxOcclusion}) occlusion_.hit(offset_of(parts_, place));
+    }
     for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
       const AttributeRecord& attribute = layout.attributes[i];
       const std::uint32_t size = component_bytes(attribute.type);
@@ -364,6 +369,7 @@ class GeometryCheck {
   Tally normal_;
   Tally outside_;
   Tally padding_;
+  Tally occlusion_;
   Extent extent_;
   ConeCheck cones_;
 };

@@ -23,6 +23,19 @@ inline constexpr std::uint32_t kMaxPatternSide = 65535;
 inline constexpr std::uint32_t kMaxShadowSide = 256;
 inline constexpr std::uint32_t kMaxVertexStride = 252;  ///< bytes
 inline constexpr std::uint32_t kMaxDescriptorBits = 4096;
+inline constexpr std::uint8_t kMaxOcclusion = 127;
+/// What a length of the real world may be: from a nanometre to a million kilometres in a source
+/// unit, a pattern from a thousandth of a millimetre to ten kilometres. A scene's numbers and a
+/// light's come from divisions of such lengths. Wide enough for every use; what lies outside was
+/// never meant.
+inline constexpr double kLeastUnitMetres = 1e-9;
+inline constexpr double kMostUnitMetres = 1e9;
+inline constexpr double kLeastPatternMm = 1e-3;
+inline constexpr double kMostPatternMm = 1e7;
+inline constexpr double kLeastSceneScale = 1e-9;
+inline constexpr double kMostSceneNumber = 1e9;
+inline constexpr double kMostLight = 1e6;
+inline constexpr double kMostShapeNumber = 1e3;  ///< pattern units
 inline constexpr std::uint64_t kSectionAlignment = 64;
 inline constexpr std::uint64_t kGpuAlignment = 4096;
 

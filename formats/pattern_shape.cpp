@@ -20,16 +20,18 @@ double dot(const float (&a)[3], const float (&b)[3]) {
 }
 
 const char* check_face(const ShapeFaceRecord& face, std::uint32_t width, std::uint32_t height) {
-  const auto finite = [](const float(&v)[3]) {
-    return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+  const auto near = [](const float(&v)[3]) {  // NaN is not
+    return std::all_of(std::begin(v), std::end(v), [](float part) {
+      return std::fabs(static_cast<double>(part)) <= kMostShapeNumber;
+    });
   };
   if (face.place[2] == 0 || face.place[3] == 0 ||
       std::uint32_t{face.place[0]} + face.place[2] > width ||
       std::uint32_t{face.place[1]} + face.place[3] > height) {
     return "a face lies outside of the picture";
   }
-  if (!finite(face.corner) || !finite(face.right) || !finite(face.down)) {
-    return "a face's place is not finite";
+  if (!near(face.corner) || !near(face.right) || !near(face.down)) {
+    return "a face's place is not within 1000 units";
   }
   const double right = dot(face.right, face.right);
   const double down = dot(face.down, face.down);

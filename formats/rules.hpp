@@ -15,6 +15,7 @@ enum class Rule : std::uint8_t {
   kTruncated,
   kMagicBytes,
   kVersion,
+  kMinor,
   kFileSize,
   kHeader,
   kHeaderHash,
@@ -42,6 +43,7 @@ enum class Rule : std::uint8_t {
   kParameterSet,
   kFeatures,
   kScene,
+  kLightValues,
   kSectionHash,
   kPadding,
   kMetaText,
@@ -70,6 +72,7 @@ enum class Rule : std::uint8_t {
   kTrackerRecord,
   kContentSummary,
   kVertexPadding,
+  kVertexOcclusion,
   kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV
   kUnreferencedVertices,
   kUnreferencedIndices,

@@ -21,18 +21,19 @@
 namespace modar {
 namespace {
 
-/// What version 1.0 says about a section type.
+/// What the specification says about a section type.
 struct KnownType {
   SectionType type;
   std::uint16_t flags;
-  bool owned;  ///< owner and variant are used
+  bool owned;               ///< owner and variant are used
+  std::uint16_t since = 0;  ///< minor version that added it
 };
 
 constexpr KnownType kKnownTypes[] = {
     {SectionType::kNames, kSectionRequired, false},
     {SectionType::kMeta, 0, false},
     {SectionType::kStatement, 0, false},
-    {SectionType::kContentSummary, 0, false},
+    {SectionType::kContentSummary, 0, false, 1},
     {SectionType::kModels, kSectionRequired, false},
     {SectionType::kChunks, kSectionRequired, false},
     {SectionType::kLevels, kSectionRequired, false},
@@ -43,15 +44,15 @@ constexpr KnownType kKnownTypes[] = {
     {SectionType::kPatterns, kSectionRequired, false},
     {SectionType::kParameterSets, kSectionRequired, false},
     {SectionType::kScenes, kSectionRequired, false},
-    {SectionType::kLights, 0, false},
-    {SectionType::kOcclusion, 0, false},
+    {SectionType::kLights, 0, false, 2},
+    {SectionType::kOcclusion, 0, false, 2},
     {SectionType::kMappedFeatures, kSectionRequired, true},
     {SectionType::kFeatureYml, 0, true},
     {SectionType::kTrackerRecord, 0, true},
-    {kPatternColours, 0, true},
-    {SectionType::kShadow, 0, true},
-    {kPatternShape, 0, true},
-    {kDrawOrder, 0, true},
+    {kPatternColours, 0, true, 2},
+    {SectionType::kShadow, 0, true, 2},
+    {kPatternShape, 0, true, 2},
+    {kDrawOrder, 0, true, 2},
     {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
     {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
     {SectionType::kTextureData, kSectionRequired | kSectionGpu, true},
@@ -231,6 +232,11 @@ void check_names(FaultLog& log, const BundleParts& parts) {
 
 bool known_section_type(std::uint32_t type) {
   return known_type(type) != nullptr;
+}
+
+std::uint16_t section_since(std::uint32_t type) {
+  const KnownType* known = known_type(type);
+  return known != nullptr ? known->since : 0;
 }
 
 const SectionEntry* find_section(std::span<const SectionEntry> sections, SectionType type,
@@ -486,7 +492,7 @@ void check_model(const RecordCheck& check, const BundleParts& parts, const Model
   check.numbers(model.center, "center");
   check.number(model.scale, "scale", std::numeric_limits<double>::denorm_min());
   check.number(model.diagonal, "diagonal", 0.0);
-  check.number(model.unit_metres, "unit_metres", 0.0);
+  check.size(model.unit_metres, "unit_metres", kLeastUnitMetres, kMostUnitMetres);
   check.number(model.position_error_max, "position_error_max", 0.0);
   check.number(model.position_error_rms, "position_error_rms", 0.0);
   check.number(model.normal_error_max_deg, "normal_error_max_deg", 0.0, 180.0);
@@ -575,6 +581,9 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
   check.number(texture.psnr_db, "psnr_db", 0.0, kMaxPsnr);
   check.number(texture.ssim, "ssim", -1.0, 1.0);
   check.flags(texture.flags, kTextureAlpha | kTextureRepeat | kTextureCutOut);
+  if ((texture.flags & (kTextureAlpha | kTextureCutOut)) == kTextureCutOut) {
+    check.fault(Rule::kTextureRange, &texture.flags, "it is cut out, and has no alpha");
+  }
   check.reserved(texture.reserved, sizeof(texture.reserved));
   if (find_texture_format(texture.format) == nullptr) {
     check.fault(Rule::kEnum, &texture.format,
@@ -650,7 +659,7 @@ void check_textures(FaultLog& log, const BundleParts& parts) {
 
 void check_pattern(const RecordCheck& check, const PatternRecord& pattern) {
   check.name(pattern.name);
-  check.number(pattern.width_mm, "width_mm", 0.0);
+  check.size(pattern.width_mm, "width_mm", kLeastPatternMm, kMostPatternMm);
   check.number(pattern.score, "score", -1.0, 100.0);
   check.reserved(pattern.reserved, sizeof(pattern.reserved));
   const std::uint32_t side = std::max(pattern.width, pattern.height);
@@ -734,8 +743,8 @@ void check_shadow(const RecordCheck& check, const BundleParts& parts, const Sect
     return check.fault(Rule::kScene, &entry.size, "its shadow is too small for its header");
   }
   const auto& header = *reinterpret_cast<const ShadowHeader*>(bytes.data());
-  check.numbers(header.low, "low");
-  check.numbers(header.high, "high");
+  check.numbers(header.low, "low", -kMostSceneNumber, kMostSceneNumber);
+  check.numbers(header.high, "high", -kMostSceneNumber, kMostSceneNumber);
   check.reserved(header.reserved, sizeof(header.reserved));
   const bool sized = std::min(header.width, header.height) >= 1 &&
                      std::max(header.width, header.height) <= kMaxShadowSide;
@@ -854,8 +863,8 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
 }
 
 void check_scene(const RecordCheck& check, const BundleParts& parts, const SceneRecord& scene) {
-  check.number(scene.scale, "scale", std::numeric_limits<float>::denorm_min());
-  check.numbers(scene.offset, "offset");
+  check.number(scene.scale, "scale", kLeastSceneScale, kMostSceneNumber);
+  check.numbers(scene.offset, "offset", -kMostSceneNumber, kMostSceneNumber);
   check.numbers(scene.rotation, "rotation");
   check.reserved(scene.reserved, sizeof(scene.reserved));
   if (scene.pattern >= parts.patterns.size() || scene.model >= parts.models.size()) {
@@ -872,10 +881,27 @@ void check_scene(const RecordCheck& check, const BundleParts& parts, const Scene
   }
 }
 
+/// Light is nowhere negative, and so has a positive mean that bounds all that varies: of any light,
+/// the coefficients behind the first are at most 2, 15/8 or 15/16 times as great as that one.
+void check_sky(const RecordCheck& check, const LightRecord& light) {
+  constexpr double kRounding = 1e-3;
+  for (std::size_t i = 0; i < std::size(light.sky); ++i) {
+    const auto mean = static_cast<double>(light.sky[i % 3]);
+    const auto value = static_cast<double>(light.sky[i]);
+    const bool good = i < 3 ? value >= 0.0 && value <= kMostLight
+                            : std::fabs(value) <= 2.0 * mean * (1.0 + kRounding) + kRounding;
+    if (good) continue;
+    return check.fault(Rule::kLightValues, &light.sky[i],
+                       "coefficient " + std::to_string(i / 3) + " is " + number_text(value) +
+                           ", the mean light " + number_text(mean));
+  }
+}
+
 void check_light(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
   const LightRecord& light = parts.lights[index];
   check.numbers(light.sky, "sky");
-  check.numbers(light.key, "key");
+  check.numbers(light.key, "key", 0.0, kMostLight);
+  check_sky(check, light);
   check.numbers(light.direction, "direction");
   check.reserved(&light.reserved0, sizeof(light.reserved0));
   check.reserved(&light.reserved1, sizeof(light.reserved1));

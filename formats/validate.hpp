@@ -27,8 +27,11 @@ void validate_models(FaultLog& log, const BundleParts& parts);
 /// Textures, patterns, parameter sets, features, scenes.
 void validate_assets(FaultLog& log, const BundleParts& parts);
 
-/// Version 1.0 gives the section type a meaning.
+/// The specification gives the section type a meaning.
 bool known_section_type(std::uint32_t type);
+
+/// The minor version that added a section type; 0 for those that it does not know.
+std::uint16_t section_since(std::uint32_t type);
 
 /// The section with that key, or nullptr.
 const SectionEntry* find_section(std::span<const SectionEntry> sections, SectionType type,
@@ -71,8 +74,13 @@ class RecordCheck {
     fault(Rule::kNumber, &field, name + (" is " + number_text(value)));
   }
   template <class T, std::size_t N>
-  void numbers(const T (&fields)[N], const char* name) const {
-    for (const T& field : fields) number(field, name);
+  void numbers(const T (&fields)[N], const char* name, double low = -std::numeric_limits<T>::max(),
+               double high = std::numeric_limits<T>::max()) const {
+    for (const T& field : fields) number(field, name, low, high);
+  }
+  /// 0, which stands for an unknown size, or within [low, high].
+  void size(const double& field, const char* name, double low, double high) const {
+    if (field != 0.0) number(field, name, low, high);
   }
 
   void reserved(const void* field, std::size_t bytes) const {

@@ -106,7 +106,7 @@ VertexScan::VertexScan(const LayoutRecord& layout, std::uint32_t used)
                 component_bytes(attribute.type) * attribute.components, std::byte{0});
     plan(attribute);
   }
-  if (used < stride_) padding[used] = std::byte{0};
+  if (used < stride_) padding[used] = std::byte{0xFF & ~kMaxOcclusion};
   std::memcpy(padding_, padding.data(), padding.size());
 }
 

@@ -23,7 +23,7 @@ IndexScan scan_indices(std::span<const std::uint16_t> indices);
 /// How vertices of one layout are scanned.
 class VertexScan {
  public:
-  /// used: a byte of a vertex that belongs to no attribute and may be anything (OcclusionRecord),
+  /// used: a byte of a vertex that belongs to no attribute and may be 0 to 127 (OcclusionRecord),
   /// or kNone.
   explicit VertexScan(const LayoutRecord& layout, std::uint32_t used = kNone);
 
@@ -34,7 +34,7 @@ class VertexScan {
   struct Extent {
     bool finite = true;         ///< no infinity, no NaN
     bool unit_normals = true;   ///< lengths certainly within the tolerance of VERTEX_NORMAL
-    bool clean_padding = true;  ///< bytes of no attribute are zero
+    bool clean_padding = true;  ///< bytes of no attribute are zero, the used one at most 127
     double low[3] = {};         ///< of the position attribute, as OpenGL ES 2.0 decodes it
     double high[3] = {};
   };

@@ -1,4 +1,5 @@
 """The bytes of a ModAR bundle as tables, written from formats/bundle.md alone (for read_bundle.py)."""
+import json
 import math
 import struct
 
@@ -128,19 +129,22 @@ DRAW_ORDER = struct.Struct("<4f2I")
 KEYPOINT = struct.Struct("<5f2i")
 SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0}  # type: flags
 OWNED = {256: 1, 257: 0, 259: 0, 260: 0, 261: 0, 262: 0, 514: 3}
+SINCE = {4: 1, 65: 2, 66: 2, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
 
 class Bundle:
     def __init__(self, data):
         self.data, self.sections, self.payload, self.tables = data, [], {}, {}
-        self.warnings = []
+        self.warnings, self.shades = [], []  # shades: digests of the levels' occlusion
         self.read_header()
         self.read_sections()
         self.names = self.payload.get((1, NONE, 0), b"")
         self.check_text(self.names, "BUNDLE_NAME")
         for kind, (name, record) in TABLES.items():
             self.tables[name] = self.read_table(kind, record)
+        self.check_minor()
+        self.check_meta(self.payload.get((2, NONE, 0)))
         self.vertices = self.payload.get((512, NONE, 0), b"")
         self.indices = self.payload.get((513, NONE, 0), b"")
 
@@ -195,6 +199,38 @@ class Bundle:
             raise Fault(rule, error.start, "no UTF-8") from None
         bad = [c for c in letters if ord(c) < 32 or 127 <= ord(c) < 160]
         need(not bad, rule, 0, "a control character")
+
+    def check_minor(self):
+        needed = max((SINCE.get(entry["type"], 0) for entry in self.sections), default=0)
+        if any(row["flags"] & 2 for row in self.tables["materials"]) or any(row["flags"] & 4 for row in self.tables["textures"]):
+            needed = 2
+        need(self.header["minor"] >= needed, "BUNDLE_MINOR", 10, f"1.{needed} is needed")
+
+    def check_meta(self, text):
+        """*Meta text*: an object whose known members have their types."""
+        if text is None:
+            return
+
+        def no_number(word):
+            raise ValueError(word)
+
+        def deep(value):
+            inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+            return 0 if inner is None else 1 + max(map(deep, inner), default=0)
+
+        try:
+            meta = json.loads(text.decode("utf-8"), parse_constant=no_number)
+            good = isinstance(meta, dict) and not text.startswith(b"\xef\xbb\xbf") and deep(meta) <= 32
+        except (ValueError, RecursionError):
+            good = False
+        need(good, "META_TEXT", 0, "no JSON object")
+        lists = [meta.get(name, []) for name in ("models", "patterns", "scenes", "texts")]
+        need(all(isinstance(part, list) and all(isinstance(item, dict) for item in part) for part in lists) and
+             isinstance(meta.get("tool", ""), str) and isinstance(meta.get("options", {}), dict), "META_TEXT", 0, "a member")
+        for item in meta.get("texts", []):
+            words = item.get("text")
+            need(isinstance(item.get("pattern"), str) and isinstance(item.get("model", ""), str) and
+                 isinstance(words, dict) and all(isinstance(word, str) for word in words.values()), "META_TEXT", 0, "texts")
 
     def read_table(self, kind, record):
         entry = next((e for e in self.sections if e["type"] == kind), None)

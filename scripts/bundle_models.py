@@ -72,7 +72,8 @@ def check_models(bundle):
 def check_model(bundle, model):
     tables, at = bundle.tables, model["at"]
     errors = [name for name in model if "_error_" in name]
-    at_least(model, 0, "diagonal", "unit_metres", *errors)
+    at_least(model, 0, "diagonal", *errors)
+    need(model["unit_metres"] == 0 or 1e-9 <= model["unit_metres"] <= 1e9, "BUNDLE_NUMBER", at, "unit_metres")
     need(model["scale"] > 0, "BUNDLE_NUMBER", at, "scale")
     need(max(model[name] for name in errors if name.endswith("_deg")) <= 180, "BUNDLE_NUMBER", at)
     for name in errors:
@@ -225,6 +226,10 @@ def decode_level(bundle, layout, chunk, level, full):
             out[SEMANTICS[part["semantic"]] + "_values"] = values
     owned = {row["offset"] for row in bundle.tables["occlusion"]
              if bundle.tables["layouts"][row["layout"]] is layout}
+    for byte in owned:
+        shades = bytes(bundle.vertices[level["vertex_offset"] + i * layout["stride"] + byte] for i in used)
+        need(max(shades, default=0) <= 127, "VERTEX_OCCLUSION", at)
+        bundle.shades.append(digest(shades))
     owned |= {part["offset"] + byte for part in layout["attributes"]
              for byte in range(struct.calcsize(f"{part['components']}{COMPONENTS[part['type']]}"))}
     stride, first = layout["stride"], level["vertex_offset"]

@@ -28,6 +28,7 @@ def check_textures(bundle):
     for number, row in enumerate(tables["textures"]):
         width, height, at = row["width"], row["height"], row["at"]
         flags_known(bundle, row, 7)
+        need(row["flags"] & 5 != 4, "BUNDLE_TEXTURE_RANGE", at, "cut out without alpha")
         need(row["format"] == 1, "BUNDLE_ENUM", at, "format")
         need(-1 <= row["ssim"] <= 1 and 0 <= row["psnr_db"] <= 140, "BUNDLE_NUMBER", at, "quality")
         need(1 <= min(width, height) and max(width, height) <= 8192 and
@@ -83,7 +84,7 @@ def check_patterns(bundle):
         need(min(row["width"], row["height"]) >= 1 and side <= 65535 and
              abs(row["half_width"] - row["width"] / side) <= 1e-6 and
              abs(row["half_height"] - row["height"] / side) <= 1e-6, "BUNDLE_PATTERN", row["at"])
-        at_least(row, 0, "width_mm")
+        need(row["width_mm"] == 0 or 1e-3 <= row["width_mm"] <= 1e7, "BUNDLE_NUMBER", row["at"], "width_mm")
         need(-1 <= row["score"] <= 100, "BUNDLE_NUMBER", row["at"], "score")
     ids = [row["id"] for row in tables["parameter_sets"]]
     need(all(a < b for a, b in zip(ids, ids[1:])), "BUNDLE_PARAMETER_SET", 0, "ids do not rise")
@@ -93,7 +94,12 @@ def check_patterns(bundle):
         need(row["pattern"] < len(tables["patterns"]) and row["model"] < len(tables["models"]) and
              abs(sum(part * part for part in row["rotation"]) - 1) <= 1e-4, "BUNDLE_SCENE",
              row["at"])
-        need(row["scale"] > 0, "BUNDLE_NUMBER", row["at"], "scale")
+        need(1e-9 <= row["scale"] <= 1e9 and max(map(abs, row["offset"])) <= 1e9, "BUNDLE_NUMBER", row["at"], "scale")
+    for row in tables["lights"]:
+        sky, mean = row["sky"], row["sky"][:3]
+        need(all(0 <= part <= 1e6 for part in [*mean, *row["key"]]) and
+             all(abs(part) <= 2.002 * mean[i % 3] + 1e-3 for i, part in enumerate(sky) if i > 2),
+             "LIGHT_VALUES", row["at"])
     lit = [row["scene"] for row in tables["lights"]]
     need(lit == sorted(set(lit)) and all(scene < len(tables["scenes"]) for scene in lit) and
          all(abs(sum(part * part for part in row["direction"]) - 1) <= 1e-4 for row in tables["lights"]),
@@ -109,6 +115,7 @@ def read_shadow(bundle, owner, variant, data):
     sides = (head["width"], head["height"])
     need(1 <= min(sides) and max(sides) <= 256 and len(data) == 32 + sides[0] * sides[1] and
          all(low < high for low, high in zip(head["low"], head["high"])), "BUNDLE_SCENE", 0, "a shadow")
+    need(max(map(abs, [*head["low"], *head["high"]])) <= 1e9, "BUNDLE_NUMBER", 0, "a shadow's place")
 
 
 def read_draw_order(bundle, owner, variant, data):
@@ -163,7 +170,7 @@ def read_shape(bundle, owner, variant, data):
         bundle.clean(face)
         left, top, width, height = face["place"]
         right, down = face["right"], face["down"]
-        need(all(map(math.isfinite, [*face["corner"], *right, *down])) and width and height and
+        need(all(abs(part) <= 1000 for part in [*face["corner"], *right, *down]) and width and height and
              left + width <= pattern["width"] and top + height <= pattern["height"], "BUNDLE_PATTERN", 0, "a face")
         both = sum(a * b for a, b in zip(right, down))
         squares = sum(a * a for a in right) * sum(b * b for b in down)
@@ -261,9 +268,11 @@ def check(bundle, full):
             "meta": meta, "sections": bundle.sections, **tables, "features": features}
 
 
-def scene_digest(decoded):
+def scene_digest(bundle, decoded):
     """Of everything that is drawn or recognised: not of where it lies in the file or how it was made."""
     scene = {key: value for key, value in decoded.items() if key not in ("bytes", "meta", "sections")}
+    looks = {f"{kind} {owner}": digest(data) for (kind, owner, _), data in bundle.payload.items() if 258 <= kind <= 262}
+    scene.update(looks=looks, shades=bundle.shades)
     return digest(json.dumps(scene, sort_keys=True).encode())
 
 
@@ -296,7 +305,7 @@ def main(arguments):
         for warning in bundle.warnings if code == 0 else []:
             print(f"{prefix}warning: {warning}", file=sys.stderr)
         if "--scenes" in options:
-            print(scene_digest(decoded) if code == 0 else words.replace("\n", " "))
+            print(scene_digest(bundle, decoded) if code == 0 else words.replace("\n", " "))
         elif code != 0:
             print(prefix + words, file=sys.stderr)
         elif "--json" in options:

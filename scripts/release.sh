@@ -28,6 +28,15 @@ done
 [ -z "$key" ] || [ -r "$key" ] || { echo "release.sh: $key cannot be read" >&2; exit 2; }
 [ -z "$(git status --porcelain --untracked-files=no)" ] || { echo "release.sh: commit your changes first" >&2; exit 1; }
 version=$(sed -n 's/^project(modar VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
+# Clocks of devices count from the day of the release on (kNotBefore): no earlier than the changelog's last change, and not later
+# than today, or expired releases would be believed and fresh ones not.
+floor=$(sed -n "s/.*kNotBefore = \([0-9']*\);.*/\1/p" runtime/fetch/fetch.cpp | tr -d "'")
+changed=$(git log -1 --format=%ct -- CHANGELOG.md)
+if [ "${floor:-0}" -lt $((changed / 86400 * 86400)) ] || [ "$floor" -gt "$(date +%s)" ]; then
+  echo "release.sh: raise kNotBefore in runtime/fetch/fetch.cpp to the day of this release:" \
+    "$(($(date +%s) / 86400 * 86400)), $(date -u +%F)" >&2
+  exit 1
+fi
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 mkdir -p build

@@ -8,10 +8,12 @@
 #include <cstring>
 #include <map>
 #include <numeric>
+#include <optional>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/check/level_difference.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/lod/reduce.hpp"
@@ -19,6 +21,7 @@
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_codec.hpp"
+#include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
@@ -32,6 +35,14 @@ constexpr std::size_t kMaxSamples = 400000;
 constexpr double kRounding = 1e-12;
 /// Vertex colours are 8 bits; nearest points may lie a little beside their vertex.
 constexpr double kColourLimit = 4.0 / 255.0;
+/// A block of two encodings that differs more shows, 16 pixels of one.
+constexpr double kBlockSlack = 24;
+/// Of measured decibels and similarity, which are rounded sums.
+constexpr float kQualitySlack = 0.01f;
+/// Of measured errors of a model that has the same levels.
+constexpr double kFigureSlack = 1e-3;
+/// A texel of a shadow that differs more shows.
+constexpr int kTexelSlack = 96;
 /// Two encodings of one texture that differ more are not of one picture.
 constexpr double kLeastTexturePsnr = 30.0;
 
@@ -41,6 +52,8 @@ constexpr float kSceneSlack = 1e-5f;
 constexpr float kLightSlack = 1e-3f;
 /// Of shadows (0 to 255) and occlusion (0 to 127), on average: what nobody sees.
 constexpr double kShadeSlack = 8;
+/// Of a cell of a pattern's colours, of 65535: a step and a half of 8 bits.
+constexpr int kCellSlack = 400;
 /// Of widths that were written in different units.
 constexpr double kWidthSlack = 1e-6;
 /// Codes of 256 bits that describe one corner; random ones differ in 128, rarely in less than 96.
@@ -143,37 +156,53 @@ class SourceCheck {
     MODAR_TRY(name_assets(request));
     MODAR_ASSIGN(const BundleContent content, build_bundle(request, report));
     again_ = &content;
+    const auto unknown = [this](const auto& sources, const auto& assets) {
+      return std::any_of(sources.begin(), sources.end(), [&](const auto& source) {
+        for (std::uint32_t i = 0; i < assets.size(); ++i) {
+          if (bundle_.name(assets[i].name) == source.name) return false;
+        }
+        return true;
+      });
+    };
+    strange_model_ = unknown(request.models, bundle_.models());
+    strange_pattern_ = unknown(request.patterns, bundle_.patterns());
     for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
       const ModelRecord& model = bundle_.models()[m];
       const auto path = std::find_if(
           request.models.begin(), request.models.end(),
           [&](const ModelRequest& source) { return source.name == bundle_.name(model.name); });
       if (path == request.models.end()) {
-        missing("model", model.name, &model);
+        missing("model", model.name, &model, strange_model_);
         continue;
       }
       MODAR_TRY(check_model(model, path->path, request, report));
     }
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
     for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) check_pattern(p);
+    check_parameter_sets();
     if (!request.scenes.empty()) check_scenes();
     return std::move(fit_);
   }
 
  private:
-  void tell(WorkstationRule rule, const std::string& where, const void* place, std::string detail) {
+  void tell(WorkstationRule rule, const std::string& where, const void* place, std::string detail,
+            std::optional<Severity> severity = {}) {
     sink_(Issue{
         &workstation_issue_kind(rule), where,
         static_cast<std::uint64_t>(static_cast<const std::byte*>(place) - bundle_.bytes().data()),
-        std::move(detail)});
+        std::move(detail), severity});
   }
 
   [[nodiscard]] std::string label(const char* what, NameRef name) const {
     return what + (" '" + std::string(bundle_.name(name)) + "'");
   }
 
-  void missing(const char* what, NameRef name, const void* place) {
-    tell(WorkstationRule::kSourceMissing, label(what, name), place, "");
+  /// renamed: of what kind of asset the sources have one that the bundle lacks.
+  void missing(const char* what, NameRef name, const void* place, bool renamed = false) {
+    if (!renamed) return tell(WorkstationRule::kSourceMissing, label(what, name), place, "");
+    tell(WorkstationRule::kSourceMissing, label(what, name), place,
+         "and no asset has the name of a source: NAME=FILE gives a file that was renamed its name",
+         Severity::kError);
   }
 
   [[nodiscard]] std::string_view name_again(NameRef name) const {
@@ -244,9 +273,74 @@ class SourceCheck {
     judge_model(model, mesh, fit);
     check_materials(model);
     check_occlusion(model);
-    if (fit.same_bytes) check_draw_order(model);
+    if (fit.same_bytes) {
+      check_draw_order(model);
+    } else {
+      check_levels(model);
+    }
     fit_.models.push_back(fit);
     return {};
+  }
+
+  /// Levels that are in the order of those baked again, byte by byte: what was changed since.
+  void check_levels(const ModelRecord& model) {
+    const ModelRecord* other = namesake(again_->models, model.name);
+    if (other == nullptr || other->chunk_count != model.chunk_count) return;
+    const double slack = 2 * model.position_error_max / model.scale + 1e-6;
+    bool same = true;
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const ChunkRecord& a = bundle_.chunks()[model.first_chunk + c];
+      const ChunkRecord& b = again_->chunks[other->first_chunk + c];
+      for (std::uint32_t l = 0; l < std::min(a.level_count, b.level_count); ++l) {
+        const LevelPart ours{&bundle_.layouts()[model.layout], &a,
+                             &bundle_.levels()[a.first_level + l], bundle_.vertices(),
+                             bundle_.indices()};
+        const LevelPart theirs{&again_->layouts[other->layout], &b,
+                               &again_->levels[b.first_level + l], again_->vertices,
+                               again_->indices};
+        const std::string fault = level_difference(ours, theirs, slack);
+        same = same && same_level(*ours.level, *theirs.level, ours.layout->stride);
+        if (fault.empty()) continue;
+        tell(WorkstationRule::kSourceSurface,
+             label("model", model.name) + ", chunk " + std::to_string(c) + ", level " +
+                 std::to_string(l),
+             ours.level, fault);
+      }
+    }
+    if (same) check_figures(model, *other);
+  }
+
+  /// What a model states of itself, where its levels are those of the source.
+  void check_figures(const ModelRecord& model, const ModelRecord& other) {
+    const auto near = [](double a, double b) { return std::fabs(a - b) <= kFigureSlack * b; };
+    const auto close = [&near](float a, float b) {
+      return near(static_cast<double>(a), static_cast<double>(b));
+    };
+    if (near(model.position_error_max, other.position_error_max) &&
+        near(model.position_error_rms, other.position_error_rms) &&
+        close(model.normal_error_max_deg, other.normal_error_max_deg) &&
+        close(model.normal_error_rms_deg, other.normal_error_rms_deg) &&
+        close(model.uv_error_max_texels, other.uv_error_max_texels) &&
+        close(model.uv_error_rms_texels, other.uv_error_rms_texels) &&
+        near(model.unit_metres, other.unit_metres) && model.vertex_count == other.vertex_count) {
+      return;
+    }
+    tell(WorkstationRule::kSourceCounts, label("model", model.name), &model.position_error_max,
+         "its levels are the source's, and the errors, the unit or the count that it states are "
+         "not");
+  }
+
+  /// The sets that detection shares with the bake: of one name, they are one.
+  void check_parameter_sets() {
+    for (std::uint32_t i = 0; i < bundle_.parameter_sets().size(); ++i) {
+      const ParameterSetRecord& set = bundle_.parameter_sets()[i];
+      const ParameterSetRecord* other = namesake(again_->parameter_sets, set.name);
+      constexpr std::size_t kSize =
+          offsetof(ParameterSetRecord, reserved) - offsetof(ParameterSetRecord, id);
+      if (other == nullptr || std::memcmp(&set.id, &other->id, kSize) == 0) continue;
+      tell(WorkstationRule::kSourcePattern, label("parameter set", set.name), &set,
+           "its values are not those of its name");
+    }
   }
 
   /// The shades of a model's corners, where it has the same vertices.
@@ -392,6 +486,11 @@ class SourceCheck {
 
   /// Scenes of assets whose sources are given, as the bundle states that they were asked for.
   void check_scenes() {
+    if (bundle_.scenes().size() < again_->scenes.size()) {
+      tell(WorkstationRule::kSourceScene, "scenes", bundle_.bytes().data(),
+           "it has " + std::to_string(bundle_.scenes().size()) + ", and was baked with " +
+               std::to_string(again_->scenes.size()));
+    }
     for (std::uint32_t s = 0; s < bundle_.scenes().size(); ++s) {
       const SceneRecord& scene = bundle_.scenes()[s];
       const PatternRecord& pattern = bundle_.patterns()[scene.pattern];
@@ -473,10 +572,16 @@ class SourceCheck {
     if (!place || ours.size() != theirs.size())
       return "its shadow lies elsewhere than the source's";
     double sum = 0;
+    int worst = 0;
     for (std::size_t i = sizeof a; i < ours.size(); ++i) {
-      sum += std::abs(std::to_integer<int>(ours[i]) - std::to_integer<int>(theirs[i]));
+      const int off = std::abs(std::to_integer<int>(ours[i]) - std::to_integer<int>(theirs[i]));
+      sum += off;
+      worst = std::max(worst, off);
     }
     const double mean = sum / static_cast<double>(ours.size() - sizeof a);
+    if (mean <= kShadeSlack && worst > kTexelSlack) {
+      return "a texel of its shadow is off by " + std::to_string(worst) + " of 255";
+    }
     if (mean <= kShadeSlack) return "";
     return "its shadow is off by " + std::to_string(mean) + " of 255 on average";
   }
@@ -506,7 +611,7 @@ class SourceCheck {
         again_->texture_data[static_cast<std::size_t>(other - again_->textures.data())];
     const bool same = equal(bundle_.texture_data(index), data);
     note(same, where, &texture);
-    if (same) return;
+    if (same) return check_texture_levels(texture, *other, where);
     const auto picture = [](const TextureRecord& t, const TextureLevelRecord& level,
                             std::span<const std::byte> bytes) {
       return decode_texture(static_cast<TextureFormat>(t.format),
@@ -527,16 +632,59 @@ class SourceCheck {
       return tell(WorkstationRule::kSourceColour, where, &texture,
                   "it is nearer to texture '" + std::string(name_again(third.name)) + "'");
     }
-    if (psnr >= kLeastTexturePsnr) return;
+    if (psnr >= kLeastTexturePsnr) {
+      const double worst = worst_block(ours, theirs);
+      if (worst <= kBlockSlack) return;
+      return tell(WorkstationRule::kSourceColour, where, &texture,
+                  "one of its blocks is off by " + std::to_string(worst) + " of 255");
+    }
     tell(WorkstationRule::kSourceColour, where, &texture,
          size ? std::to_string(psnr) + " dB from the picture, baked again"
               : "baked again it has another size");
   }
 
+  /// The greatest mean difference of a block of 4 x 4 pixels, of 255, between pictures of one size.
+  static double worst_block(const RgbaImage& a, const RgbaImage& b) {
+    constexpr std::uint32_t kSide = 4;
+    const std::uint32_t columns = (a.width + kSide - 1) / kSide;
+    std::vector<int> sums(std::size_t{columns} * ((a.height + kSide - 1) / kSide), 0);
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+      const std::size_t pixel = i / 4;
+      const std::size_t block = pixel / a.width / kSide * columns + pixel % a.width / kSide;
+      if (i % 4 != 3) sums[block] += std::abs(int{a.pixels[i]} - int{b.pixels[i]});
+    }
+    return sums.empty() ? 0.0
+                        : static_cast<double>(*std::max_element(sums.begin(), sums.end())) /
+                              (3 * kSide * kSide);
+  }
+
+  /// Of a texture that has the same blocks: they are shown as the source's are.
+  void check_texture_levels(const TextureRecord& texture, const TextureRecord& other,
+                            const std::string& where) {
+    const auto near = [](float a, float b) { return std::fabs(a - b) <= kQualitySlack; };
+    bool same = texture.width == other.width && texture.height == other.height &&
+                texture.flags == other.flags && texture.format == other.format &&
+                texture.source_width == other.source_width &&
+                texture.source_height == other.source_height &&
+                near(texture.psnr_db, other.psnr_db) && near(texture.ssim, other.ssim) &&
+                texture.level_count == other.level_count;
+    for (std::uint32_t i = 0; same && i < texture.level_count; ++i) {
+      const TextureLevelRecord& a = bundle_.texture_levels()[texture.first_level + i];
+      const TextureLevelRecord& b = again_->texture_levels[other.first_level + i];
+      same = a.offset == b.offset && a.alpha_offset == b.alpha_offset &&
+             near(a.psnr_db, b.psnr_db) && near(a.ssim, b.ssim);
+    }
+    if (same) return;
+    tell(WorkstationRule::kSourceColour, where, &texture,
+         "its blocks are the source's, and what it states of them is not");
+  }
+
   void check_pattern(std::uint32_t index) {
     const PatternRecord& pattern = bundle_.patterns()[index];
     const PatternRecord* other = namesake(again_->patterns, pattern.name);
-    if (other == nullptr) return missing("pattern", pattern.name, &pattern);
+    if (other == nullptr) {
+      return missing("pattern", pattern.name, &pattern, strange_pattern_);
+    }
     const auto which = static_cast<std::uint32_t>(other - again_->patterns.data());
     bool same = pattern.width == other->width && pattern.height == other->height;
     for (const FeatureContent& features : again_->features[which]) {
@@ -562,10 +710,31 @@ class SourceCheck {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
            "its shape is not the source's");
     }
+    if (!same_colours(bundle_.section(kPatternColours, index),
+                      section_again(kPatternColours, which))) {
+      tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
+           "its colours, by which light is measured, are not the source's");
+    }
     const double width = other->width_mm;
     if (width <= 0 || std::fabs(pattern.width_mm / width - 1) <= kWidthSlack) return;
     tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
          std::to_string(pattern.width_mm) + " mm wide, the source is " + std::to_string(width));
+  }
+
+  /// Within what another decoder of the same picture may give. A bundle that was baked before there
+  /// were any has none.
+  static bool same_colours(std::span<const std::byte> ours, std::span<const std::byte> theirs) {
+    if (ours.empty()) return true;
+    if (ours.size() != theirs.size() ||
+        !equal(ours.first(sizeof(ColourGridHeader)), theirs.first(sizeof(ColourGridHeader)))) {
+      return false;
+    }
+    for (std::size_t i = sizeof(ColourGridHeader); i + 1 < ours.size(); i += 2) {
+      const int off = load_number<std::uint16_t>(ours.data() + i) -
+                      load_number<std::uint16_t>(theirs.data() + i);
+      if (std::abs(off) > kCellSlack) return false;
+    }
+    return true;
   }
 
   /// How the image or the codes of a tracker record differ from those baked again; empty where
@@ -638,6 +807,8 @@ class SourceCheck {
   const BundleView& bundle_;
   const IssueSink& sink_;
   const BundleContent* again_ = nullptr;
+  bool strange_model_ = false;  ///< a source whose name no model of the bundle has
+  bool strange_pattern_ = false;
   SourceFit fit_;
 };
 

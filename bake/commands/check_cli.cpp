@@ -13,7 +13,8 @@ namespace {
 
 void add_source_options(CommandLine& line, CheckCommand& check) {
   line.option("--source", &check.sources,
-              "Bake these models and pattern images again and compare; measure what differs",
+              "Bake these models and pattern images again and compare; measure what differs; "
+              "modar.toml stands for all of a project's, and for its texts",
               {.type = "FILE[:WIDTHmm]"});
   line.flag("--pose", check.pose,
             "Track the patterns of --source in rendered views: errors and working range",

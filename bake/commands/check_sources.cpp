@@ -1,22 +1,82 @@
 // The part of `modar check` that bakes again, looks and tracks.
-#include <filesystem>
+#include <optional>
+#include <set>
 #include <string>
-#include <system_error>
+#include <utility>
+#include <vector>
 
 #include "bake/bundle/request_text.hpp"
+#include "bake/check/text_check.hpp"
 #include "bake/commands/check_command.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/output.hpp"
+#include "bake/project/project.hpp"
 #include "bake/terminal.hpp"
 
 namespace modar {
 namespace {
 
-/// What the sources would be baked as again.
-Result<BakeRequest> source_request(const BundleView& bundle, const CheckCommand& command) {
+struct Sources {
   BakeRequest request;
+  /// Of a project file's scenes; unset: no project file is given, and no text is known.
+  std::optional<std::vector<SceneText>> texts;
+};
+
+bool is_project(const std::string& path) {
+  return path.ends_with(".toml");
+}
+
+/// The assets of a project file that the bundle has, and what its scenes say.
+Result<void> take_project(const BundleView& bundle, const std::string& path, Sources& sources) {
+  MODAR_ASSIGN(const Project project, read_project(path, true));
+  const auto holds = [&bundle](const auto& records, const std::string& name) {
+    for (std::uint32_t i = 0; i < records.size(); ++i) {
+      if (bundle.name(records[i].name) == name) return true;
+    }
+    return false;
+  };
+  for (const ProjectAsset& asset : project.models) {
+    if (holds(bundle.models(), asset.name)) {
+      sources.request.models.push_back({project.path(asset.file), asset.name});
+    }
+  }
+  for (const ProjectAsset& asset : project.patterns) {
+    if (!holds(bundle.patterns(), asset.name)) continue;
+    PatternRequest pattern;
+    pattern.path = project.path(asset.file);
+    pattern.name = asset.name;
+    pattern.width_mm = asset.width_mm;
+    pattern.shape = asset.shape;
+    sources.request.patterns.push_back(std::move(pattern));
+  }
+  sources.texts.emplace();
+  for (const ProjectScene& scene : project.scenes) {
+    const SceneRequest& asked = scene.request;
+    if (scene.texts.empty() || !holds(bundle.patterns(), asked.pattern) ||
+        !holds(bundle.models(), asked.model)) {
+      continue;
+    }
+    sources.texts->push_back({asked.pattern, asked.model, scene.texts});
+  }
+  std::set<std::string> lights;
+  for (const ProjectScene& scene : project.scenes) {
+    const std::string& light = scene.request.light;
+    if (light.empty() || !lights.insert(light).second) continue;
+    PatternRequest picture;
+    picture.path = project.path(light);
+    sources.request.patterns.push_back(std::move(picture));
+  }
+  return {};
+}
+
+/// What the sources would be baked as again.
+Result<Sources> read_sources(const BundleView& bundle, const CheckCommand& command) {
+  Sources sources;
+  BakeRequest& request = sources.request;
   for (const std::string& path : command.sources) {
-    if (is_model_file(parse_model(path).path)) {
+    if (is_project(path)) {
+      MODAR_TRY(take_project(bundle, path, sources));
+    } else if (is_model_file(parse_model(path).path)) {
       request.models.push_back(parse_model(path));
     } else {
       MODAR_ASSIGN(PatternRequest pattern, parse_pattern(path));
@@ -30,7 +90,7 @@ Result<BakeRequest> source_request(const BundleView& bundle, const CheckCommand&
   read_bake_options(bundle.meta(), request);
   MODAR_TRY(name_assets(request));
   request.jobs = command.jobs;
-  return request;
+  return sources;
 }
 
 Result<SourceFit> bake_and_compare(const BundleView& bundle, const CheckCommand& command,
@@ -79,7 +139,9 @@ Result<void> keep_sources(const BundleView& bundle, const CheckCommand& command)
 Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
                                    const IssueSink& sink, CheckExtras& extras) {
   if (!command.visual.empty()) MODAR_TRY(keep_sources(bundle, command));
-  MODAR_ASSIGN(const BakeRequest request, source_request(bundle, command));
+  MODAR_ASSIGN(const Sources sources, read_sources(bundle, command));
+  const BakeRequest& request = sources.request;
+  if (sources.texts) check_texts(bundle, *sources.texts, sink);
   MODAR_ASSIGN(extras.source, bake_and_compare(bundle, command, request, sink));
   if (!command.visual.empty()) {
     MODAR_ASSIGN(extras.looks, compare_looks(bundle, command, request, sink));

@@ -5,6 +5,7 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/commands/ship_command.hpp"
+#include "bake/terminal.hpp"
 #include "modar/device_profile.hpp"
 
 namespace modar {
@@ -96,18 +97,76 @@ void add_rotate(CommandLine& ship) {
 void add_root(CommandLine& ship) {
   CommandLine& line =
       ship.command("root", "Name the key that signs, by the root key that devices trust");
-  const auto root = std::make_shared<RotateCommand>();
+  const auto root = std::make_shared<RootCommand>();
   line.option("--to", &root->folder, "The folder that devices fetch from",
               {.type = "DIR", .required = true});
   add_key_options(line, root->key_file, root->pass_phrase_file);
   line.option("--next", &root->next_key, "The public key that signs from now on",
-              {.type = "NEW.pub", .required = true});
+              {.type = "NEW.pub"});
+  line.option("--draft", &root->draft,
+              "Write this file and sign it, for others to sign (`modar ship sign`) and for "
+              "`modar ship accept`: where several root keys have to agree",
+              {.type = "FILE"});
+  line.option("--roots", &root->roots,
+              "Name the public root keys that follow the ones before, not a signing key",
+              {.type = "K.pub", .needs = "--draft", .excludes = "--next"});
+  line.option("--threshold", &root->threshold, "How many of --roots have to agree",
+              {.least = 1, .most = 16, .needs = "--roots"});
   line.footer(
-      ship_example("  modar ship root --to /var/www/ar --key root.key --next museum.key.pub\n") +
+      ship_example("  modar ship root --to /var/www/ar --key root.key --next museum.key.pub\n"
+                   "  modar ship root --to /var/www/ar --key a.key --next museum.key.pub --draft "
+                   "new.json\n") +
       "Keep the root key offline. Where a signing key was stolen, name a new one: devices leave "
       "the\n"
       "stolen one, whatever it has signed since, and count releases anew.\n");
-  line.run([root] { return ExitCode{run_root(*root)}; });
+  line.run([root] {
+    if (root->next_key.empty() && root->roots.empty()) {
+      return ExitCode{print_error({ExitCode::kUsage, "ship.root", "ship root", "no key is named",
+                                   "name the one that signs with --next NEW.pub"})};
+    }
+    return ExitCode{run_root(*root)};
+  });
+}
+
+void add_trust(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("trust", "Several root keys in one file for devices: K of N have to agree");
+  const auto trust = std::make_shared<TrustCommand>();
+  line.option("keys", &trust->keys, "The public keys", {.type = "K.pub...", .required = true});
+  line.option("--threshold", &trust->threshold, "How many of them have to agree",
+              {.required = true, .least = 1, .most = 16});
+  line.option("--out", &trust->out, "The file for `modar-fetch --trust`, and all that takes K.pub",
+              {.type = "FILE", .required = true});
+  line.footer(ship_example(
+      "  modar ship trust a.key.pub b.key.pub c.key.pub --threshold 2 --out museum.trust\n"));
+  line.run([trust] { return ExitCode{run_trust(*trust)}; });
+}
+
+void add_sign(CommandLine& ship) {
+  CommandLine& line = ship.command("sign", "Sign a draft of `modar ship root`, at home");
+  const auto sign = std::make_shared<SignCommand>();
+  line.option("draft", &sign->draft, "The file; what it says is printed",
+              {.type = "FILE", .required = true});
+  add_key_options(line, sign->key_file, sign->pass_phrase_file);
+  line.footer(
+      ship_example("  modar ship sign new.json --key b.key\n") +
+      "The signature goes beside it. `minisign -Sm` signs as well: move its file to that name.\n");
+  line.run([sign] { return ExitCode{run_sign(*sign)}; });
+}
+
+void add_accept(CommandLine& ship) {
+  CommandLine& line = ship.command("accept", "Publish a draft that enough root keys have signed");
+  const auto accept = std::make_shared<AcceptCommand>();
+  line.option("draft", &accept->draft, "The file, its signatures beside it",
+              {.type = "FILE", .required = true});
+  line.option("--to", &accept->folder, "The folder that devices fetch from",
+              {.type = "DIR", .required = true});
+  line.option("--trust", &accept->trust, "The root keys that devices were given",
+              {.type = "FILE", .required = true});
+  line.footer(
+      example("  modar ship accept new.json --to /var/www/ar --trust museum.trust\n",
+              ", 10 too few root keys signed it, 15 another publisher is at work on the folder"));
+  line.run([accept] { return ExitCode{run_accept(*accept)}; });
 }
 
 void add_list(CommandLine& ship) {
@@ -168,11 +227,15 @@ void add_ship_plan(CommandLine& ship) {
 void add_ship(CommandLine& program) {
   CommandLine& line = program.command(
       "ship",
-      "Releases for devices: keygen, publish, list, root, rotate, refresh, prune, verify, plan");
+      "Releases for devices: keygen, publish, list, root, trust, sign, accept, rotate, refresh, "
+      "prune, verify, plan");
   add_keygen(line);
   add_publish(line);
   add_list(line);
   add_root(line);
+  add_trust(line);
+  add_sign(line);
+  add_accept(line);
   add_rotate(line);
   add_refresh(line);
   add_prune(line);

@@ -17,6 +17,7 @@
 #include "bake/output.hpp"
 #include "bake/ship/keys.hpp"
 #include "bake/ship/release_folder.hpp"
+#include "bake/ship/root_draft.hpp"
 #include "bake/terminal.hpp"
 #include "bake/web/http_reader.hpp"
 #include "formats/atomic_file.hpp"
@@ -139,6 +140,84 @@ Result<KeyChange> open_key_change(const RotateCommand& command) {
 
 }  // namespace
 
+namespace {
+
+Result<RootSet> read_root_keys(const std::vector<std::string>& files, unsigned threshold) {
+  std::vector<PublicKey> keys;
+  for (const std::string& file : files) {
+    MODAR_ASSIGN(const auto text, read_text(file));
+    MODAR_ASSIGN(const auto key, parse_public_key(text));
+    keys.push_back(key);
+  }
+  return make_root_set(std::move(keys), threshold);
+}
+
+/// Writes what is to be signed, and the first signature.
+Result<std::string> write_draft(const RootCommand& command) {
+  MODAR_ASSIGN(const auto key, load_key(command.key_file, command.pass_phrase_file));
+  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(command.folder));
+  RootDraft draft;
+  if (!command.roots.empty()) {
+    MODAR_ASSIGN(const auto roots, read_root_keys(command.roots, command.threshold));
+    draft = draft_root_link(folder, roots);
+  } else {
+    MODAR_ASSIGN(const auto text, read_text(command.next_key));
+    MODAR_ASSIGN(const auto next, parse_public_key(text));
+    MODAR_ASSIGN(draft, draft_root_word(folder, next));
+  }
+  MODAR_TRY(write_root_draft(command.draft, draft));
+  MODAR_ASSIGN(const auto signature, sign_root_draft(command.draft, key));
+  std::fprintf(stderr, "%s\n", draft.meaning.c_str());
+  return signature;
+}
+
+int run_draft(const RootCommand& command) {
+  const auto signature = write_draft(command);
+  if (!signature) return print_error(signature.error());
+  std::printf("%s\n%s\n", command.draft.c_str(), signature->c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
+}  // namespace
+
+int run_trust(const TrustCommand& command) {
+  const auto roots = read_root_keys(command.keys, command.threshold);
+  if (!roots) return print_error(roots.error());
+  if (auto kept = keep_inputs(command.out, command.keys); !kept) return print_error(kept.error());
+  const std::string text = "untrusted comment: root keys of modar, " +
+                           std::to_string(roots->threshold) + " of " +
+                           std::to_string(roots->keys.size()) + "\n" + root_set_line(*roots) + "\n";
+  auto written = write_file(command.out, std::string_view(text));
+  if (!written) return print_error(written.error());
+  std::printf("%s\n", command.out.c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_sign(const SignCommand& command) {
+  const auto key = load_key(command.key_file, command.pass_phrase_file);
+  if (!key) return print_error(key.error());
+  const auto draft = read_root_draft(command.draft);
+  if (!draft) return print_error(draft.error());
+  const auto signature = sign_root_draft(command.draft, *key);
+  if (!signature) return print_error(signature.error());
+  std::fprintf(stderr, "%s\n", draft->meaning.c_str());
+  std::printf("%s\n", signature->c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
+int run_accept(const AcceptCommand& command) {
+  const auto trust = read_text(command.trust).and_then([](const std::string& text) {
+    return parse_root_set(text);
+  });
+  if (!trust) return print_error(trust.error());
+  const auto folder = ReleaseFolder::open(command.folder);
+  if (!folder) return print_error(folder.error());
+  const auto draft = accept_root_draft(*folder, command.draft, *trust);
+  if (!draft) return print_error(draft.error());
+  std::fprintf(stderr, "%s: %s\n", draft->path.c_str(), draft->meaning.c_str());
+  return static_cast<int>(ExitCode::kOk);
+}
+
 int run_keygen(const KeygenCommand& command) {
   const std::string public_file = command.out + ".pub";
   if (!command.force &&
@@ -224,7 +303,8 @@ int run_rotate(const RotateCommand& command) {
   return static_cast<int>(ExitCode::kOk);
 }
 
-int run_root(const RotateCommand& command) {
+int run_root(const RootCommand& command) {
+  if (!command.draft.empty()) return run_draft(command);
   const auto change = open_key_change(command);
   if (!change) return print_error(change.error());
   const auto& [key, next, folder] = *change;
@@ -300,7 +380,7 @@ int run_prune(const PruneCommand& command) {
 
 int run_verify(const VerifyCommand& command) {
   const auto key = read_text(command.trust).and_then([](const std::string& text) {
-    return parse_public_key(text);
+    return parse_root_set(text);
   });
   if (!key) return print_error(key.error());
   const auto read = is_web_address(command.place)

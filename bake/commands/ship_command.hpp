@@ -35,6 +35,31 @@ struct RotateCommand {
   std::string next_key;  ///< file of the public key that follows
 };
 
+struct RootCommand : RotateCommand {
+  std::string draft;  ///< file for several to sign; empty: signed and published at once
+  std::vector<std::string>
+      roots;               ///< public keys of the set that follows; empty: next_key is named
+  unsigned threshold = 1;  ///< of these
+};
+
+struct TrustCommand {
+  std::vector<std::string> keys;
+  unsigned threshold = 1;
+  std::string out;
+};
+
+struct SignCommand {
+  std::string draft;
+  std::string key_file;
+  std::string pass_phrase_file;
+};
+
+struct AcceptCommand {
+  std::string draft;
+  std::string folder;
+  std::string trust;  ///< file of the root keys that devices were given
+};
+
 struct RefreshCommand {
   std::string folder;
   std::string key_file;
@@ -70,8 +95,15 @@ struct PlanCommand {
 int run_keygen(const KeygenCommand& command);
 int run_publish(ShipPublishCommand& command);
 int run_rotate(const RotateCommand& command);
-/// Writes the root key's word: the next key signs.
-int run_root(const RotateCommand& command);
+/// Writes the root key's word: the next key signs; or a draft of it, or of the root keys that
+/// follow.
+int run_root(const RootCommand& command);
+/// Several public keys in one file, for devices.
+int run_trust(const TrustCommand& command);
+/// Adds a signature to a draft.
+int run_sign(const SignCommand& command);
+/// Publishes a draft that enough root keys have signed.
+int run_accept(const AcceptCommand& command);
 /// Signs that the newest release is still the newest.
 int run_refresh(const RefreshCommand& command);
 int run_list(const ListCommand& command);

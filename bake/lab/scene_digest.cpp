@@ -7,8 +7,11 @@
 #include "bake/process.hpp"
 #include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
+#include "formats/colour_grid.hpp"
 #include "formats/component.hpp"
+#include "formats/draw_order.hpp"
 #include "formats/field_table.hpp"
+#include "formats/pattern_shape.hpp"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -50,14 +53,16 @@ void add_table(Digest& digest, const BundleView& view, const char* name, const T
   }
 }
 
+/// occlusion: the byte of its vertices that holds it, or kNone.
 void add_level(Digest& digest, const BundleView& view, const LayoutRecord& layout,
-               const LevelRecord& level) {
+               const LevelRecord& level, std::uint32_t occlusion) {
   const std::byte* vertex = view.vertices().data() + level.vertex_offset;
   for (std::uint32_t i = 0; i < level.vertex_count; ++i, vertex += layout.stride) {
     for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
       const AttributeRecord& attribute = layout.attributes[a];
       digest.add(vertex + attribute.offset, attribute.components * component_bytes(attribute.type));
     }
+    if (occlusion != kNone) digest.add(vertex + occlusion, 1);
   }
   digest.add(view.indices().data() + level.index_offset, 2 * std::size_t{level.index_count});
 }
@@ -80,12 +85,15 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
   add_table(digest, view, "PatternRecord", view.patterns());
   add_table(digest, view, "ParameterSetRecord", view.parameter_sets());
   add_table(digest, view, "SceneRecord", view.scenes());
+  add_table(digest, view, "LightRecord", view.lights());
+  add_table(digest, view, "OcclusionRecord", view.occlusion());
   for (std::uint32_t m = 0; m < view.models().size(); ++m) {
     const ModelRecord& model = view.models()[m];
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const ChunkRecord& chunk = view.chunks()[model.first_chunk + c];
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
-        add_level(digest, view, view.layouts()[model.layout], view.levels()[chunk.first_level + l]);
+        add_level(digest, view, view.layouts()[model.layout], view.levels()[chunk.first_level + l],
+                  occlusion_byte(view.occlusion(), model.layout));
       }
     }
   }
@@ -93,7 +101,8 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
   for (const SectionEntry& entry : view.sections()) {
     const auto type = static_cast<SectionType>(entry.type);
     if (type != SectionType::kMappedFeatures && type != SectionType::kFeatureYml &&
-        type != SectionType::kTrackerRecord) {
+        type != SectionType::kTrackerRecord && type != SectionType::kShadow &&
+        type != kPatternColours && type != kPatternShape && type != kDrawOrder) {
       continue;
     }
     digest.add(&entry.type, sizeof entry.type);

@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "bake/ship/verify_release.hpp"
 #include "formats/atomic_file.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
@@ -216,9 +217,51 @@ Result<void> ReleaseFolder::add_release(const Release& release, std::int64_t now
       .and_then([&] { return write_file(path_ + "/latest", std::string_view(number + "\n")); });
 }
 
+std::uint32_t ReleaseFolder::root_links() const {
+  const auto numbers = numbers_in(path_ + "/roots");
+  return numbers.empty() ? 0 : static_cast<std::uint32_t>(numbers.back());
+}
+
+Result<RootSet> ReleaseFolder::roots(const RootSet& trust) const {
+  return follow_root_chain(read_release_folder(path_), trust);
+}
+
+Result<void> ReleaseFolder::add_signed(
+    const std::string& path, const std::string& text,
+    const std::vector<std::pair<PublicKey, std::string>>& signatures) const {
+  const fs::path file = fs::path(path_) / path;
+  MODAR_TRY(make_folders(file.parent_path()));
+  // Of the document before: they verify nothing any more.
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(file.parent_path(), error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(file.filename().string() + ".") && name.ends_with(".minisig")) {
+      fs::remove(entry.path(), error);
+    }
+  }
+  for (const auto& [key, signature] : signatures) {
+    MODAR_TRY(write_file(signature_path(file.string(), key), std::string_view(signature)));
+  }
+  if (path == "root.json" && !signatures.empty()) {
+    // For devices that were given this key alone.
+    const std::string& first = signatures.front().second;
+    MODAR_TRY(write_file(file.string() + ".minisig", std::string_view(first)));
+  }
+  return write_file(file.string(), std::string_view(text));
+}
+
 Result<RootWord> ReleaseFolder::add_root_word(const PublicKey& next, const SecretKey& root) const {
   const std::string path = path_ + "/root.json";
   MODAR_ASSIGN(RootWord word, root_word());
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(path_, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool several =
+        name.starts_with("root.json.") && name.ends_with(".minisig") && name != "root.json.minisig";
+    if (!several && root_links() == 0) continue;
+    return fail(ExitCode::kUsage, "ship.root", path_, "several root keys have to agree here",
+                "write a draft for all to sign: `modar ship root --draft FILE`");
+  }
   if (word.epoch != 0) {
     MODAR_ASSIGN(const Signature before,
                  parse_signature(read_text(path + ".minisig").value_or("")));

@@ -4,7 +4,9 @@
 //   releases/N.json(.minisig)    release documents
 //   releases/N.fresh.json(.minisig)  that release N is still the newest, signed every few days
 //   keys/S.json(.minisig)        the chain of keys
-//   root.json(.minisig)          the root key's word: which key signs
+//   root.json(.minisig)          the root key's word: which key signs; of several root keys,
+//                                root.json.KEY.minisig each
+//   roots/S.json, S.json.KEY.minisig  the chain of root keys
 //   objects/ab/abcdef...         pieces and recipes, by the BLAKE2b of their bytes
 //   .objects, .lock              the publisher's own: what was read before; who is at work
 #pragma once
@@ -12,6 +14,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bake/ship/keys.hpp"
@@ -54,8 +57,17 @@ class ReleaseFolder {
   /// its document says. Writes nothing where that says none.
   Result<void> add_freshness(const Release& release, std::int64_t now, const SecretKey& key) const;
   /// Writes the root's word: `next` signs from now on, and a new epoch begins.
-  /// Errors: kUsage "ship.root" (another key than that of the word before).
+  /// Errors: kUsage "ship.root" (another key than that of the word before, or several keys have to
+  /// agree).
   Result<RootWord> add_root_word(const PublicKey& next, const SecretKey& root) const;
+  /// Number of links in the chain of root keys.
+  [[nodiscard]] std::uint32_t root_links() const;
+  /// The root keys that the chain leads to from those that devices were given.
+  /// Errors: kExitWrongKey "signature.too-few"; kInvalidInput "release.*".
+  [[nodiscard]] Result<RootSet> roots(const RootSet& trust) const;
+  /// Writes a document of root keys: `path` in the folder, and a signature by each of these keys.
+  Result<void> add_signed(const std::string& path, const std::string& text,
+                          const std::vector<std::pair<PublicKey, std::string>>& signatures) const;
   /// Appends `next` to the chain, signed by `key`.
   Result<void> add_key(const PublicKey& next, const SecretKey& key) const;
   /// Removes all but the `keep` newest releases, then the objects that no release needs; returns

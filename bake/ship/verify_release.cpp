@@ -44,11 +44,20 @@ struct Trust {
   std::uint32_t links = 0;
 };
 
-Result<void> follow_root_word(const ReleaseReader& read, Trust& trust) {
-  MODAR_ASSIGN(const auto document, read_signed(read, "root.json", kMostKeyBytes));
-  if (!document) return {};
-  MODAR_TRY(verify_signature(document->text, document->signature, trust.key));
-  MODAR_ASSIGN(const auto word, parse_root_word(document->text));
+Result<void> follow_root_word(const ReleaseReader& read, const RootSet& roots, Trust& trust) {
+  const std::string path = "root.json";
+  MODAR_ASSIGN(const auto text, read(path, kMostKeyBytes));
+  if (!text && trust.key != PublicKey()) return {};
+  if (!text) return absent(path);
+  if (roots.keys.size() == 1) {
+    MODAR_ASSIGN(const auto document, read_signed(read, path, kMostKeyBytes));
+    MODAR_TRY(verify_signature(*text, document->signature, roots.keys.front()));
+  } else {
+    MODAR_TRY(verify_root_signatures(path, *text, roots, [&read](const std::string& signature) {
+      return read(signature, kMostKeyBytes);
+    }));
+  }
+  MODAR_ASSIGN(const auto word, parse_root_word(*text));
   MODAR_ASSIGN(trust.key, parse_public_key(word.key));
   trust.epoch = word.epoch;
   trust.links = word.links;
@@ -179,11 +188,49 @@ ReleaseReader read_release_folder(const std::string& folder) {
   };
 }
 
-Result<VerifyReport> verify_release(const ReleaseReader& read, const PublicKey& trusted,
-                                    const std::function<void(double)>& progress) {
-  Trust trust{trusted};
-  MODAR_TRY(follow_root_word(read, trust));
+Result<RootSet> follow_root_chain(const ReleaseReader& read, const RootSet& trusted) {
+  RootSet roots = trusted;
+  const SignatureReader signature = [&read](const std::string& path) {
+    return read(path, kMostKeyBytes);
+  };
+  for (std::uint32_t serial = 1; serial <= kMostLinks; ++serial) {
+    const std::string path = root_link_path(serial);
+    MODAR_ASSIGN(const auto text, read(path, kMostKeyBytes));
+    if (!text) break;
+    MODAR_TRY(verify_root_signatures(path, *text, roots, signature));
+    MODAR_ASSIGN(auto link, parse_root_link(*text));
+    if (link.serial != serial) {
+      return fail(kExitMixed, "ship.chain", path, "it is a different link of the chain",
+                  "publish the chain of root keys again");
+    }
+    MODAR_TRY(verify_root_signatures(path, *text, link.roots, signature));
+    roots = std::move(link.roots);
+  }
+  return roots;
+}
+
+namespace {
+
+/// The key that signs releases now.
+Result<Trust> follow_keys(const ReleaseReader& read, const RootSet& trusted) {
+  MODAR_ASSIGN(const RootSet roots, follow_root_chain(read, trusted));
+  // Several root keys sign no releases: which key does is said in root.json.
+  Trust trust{trusted.keys.size() == 1 ? trusted.keys.front() : PublicKey()};
+  MODAR_TRY(follow_root_word(read, roots, trust));
   MODAR_TRY(follow_links(read, trust));
+  return trust;
+}
+
+}  // namespace
+
+Result<Release> newest_release(const ReleaseReader& read, const RootSet& trusted) {
+  MODAR_ASSIGN(const Trust trust, follow_keys(read, trusted));
+  return read_newest(read, trust);
+}
+
+Result<VerifyReport> verify_release(const ReleaseReader& read, const RootSet& trusted,
+                                    const std::function<void(double)>& progress) {
+  MODAR_ASSIGN(const Trust trust, follow_keys(read, trusted));
   VerifyReport report;
   MODAR_ASSIGN(report.release, read_newest(read, trust));
   MODAR_TRY(check_fresh(read, report.release, trust));

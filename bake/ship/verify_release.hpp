@@ -19,6 +19,15 @@ using ReleaseReader =
 /// The files of a folder; regular ones only. Errors of the reader: kIo "io.read".
 ReleaseReader read_release_folder(const std::string& folder);
 
+/// The root keys that the chain of root keys leads to from those that devices were given.
+/// Errors: those of the reader; kExitWrongKey "signature.too-few"; kExitMixed "ship.chain";
+/// kInvalidInput "release.*".
+Result<RootSet> follow_root_chain(const ReleaseReader& read, const RootSet& trusted);
+
+/// The newest release, verified as by a device without a state; none of its objects is read.
+/// Errors: those of verify_release(); kExitMixed "ship.absent" where there is no release.
+Result<Release> newest_release(const ReleaseReader& read, const RootSet& trusted);
+
 struct DamagedObject {
   std::string path;    ///< below the release folder
   std::string bundle;  ///< the first that needs it
@@ -36,7 +45,7 @@ struct VerifyReport {
 /// Reads what a device without a state would read, and every object of the newest release.
 /// `progress` is told the part that is done, 0 to 1.
 /// Errors: those of the reader; kExitWrongKey; kExitMixed; kInvalidInput "release.*".
-Result<VerifyReport> verify_release(const ReleaseReader& read, const PublicKey& trusted,
+Result<VerifyReport> verify_release(const ReleaseReader& read, const RootSet& trusted,
                                     const std::function<void(double)>& progress);
 
 }  // namespace modar

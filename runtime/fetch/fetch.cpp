@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <ctime>
 #include <optional>
+#include <tuple>
+#include <utility>
 
 #include "install.hpp"
 
@@ -46,16 +48,65 @@ struct Belief {
   Result<void> save() const { return lost ? Result<void>() : store.save_state(state); }
 };
 
-/// Believes the root's word if there is a newer one than the state knows. Only the root key signs
+/// A text that the server need not have.
+Result<std::optional<std::string>> download_optional(Transfers& transfers, const std::string& path,
+                                                     std::size_t limit) {
+  auto text = transfers.text(path, limit, true);
+  if (text) return std::optional<std::string>(std::move(*text));
+  if (text.error().code == "fetch.missing") return std::optional<std::string>();
+  return tl::unexpected(text.error());
+}
+
+/// The root keys that count now: those of --trust, and where the chain of root keys leads from
+/// them. What verifies is saved at once: a set that was left is not believed again.
+Result<RootSet> follow_root_links(Transfers& transfers, Belief& belief) {
+  StoreState& state = belief.state;
+  MODAR_ASSIGN(auto roots, parse_root_set(state.roots.empty() ? state.root_key : state.roots));
+  const SignatureReader read = [&](const std::string& path) {
+    return download_optional(transfers, path, kMaxSignatureBytes);
+  };
+  while (state.root_serial < kMaxLinks) {
+    const std::string path = root_link_path(state.root_serial + 1);
+    MODAR_ASSIGN(const auto text, download_optional(transfers, path, kMaxLinkBytes));
+    if (!text) break;
+    MODAR_TRY(verify_root_signatures(path, *text, roots, read));
+    MODAR_ASSIGN(auto link, parse_root_link(*text));
+    if (link.serial != state.root_serial + 1) {
+      return fail(kExitMixed, "fetch.chain", path, "it is a different link of the chain",
+                  "publish the chain of root keys again");
+    }
+    MODAR_TRY(verify_root_signatures(path, *text, link.roots, read));
+    roots = std::move(link.roots);
+    state.roots = root_set_line(roots);
+    state.root_serial = link.serial;
+    MODAR_TRY(belief.save());
+  }
+  return roots;
+}
+
+/// Believes the root's word if there is a newer one than the state knows. Only the root keys sign
 /// it, so no thief of a signing key can stop or forge it.
 Result<void> follow_root(Transfers& transfers, Belief& belief) {
   StoreState& state = belief.state;
-  const auto document = download_trust(transfers, "root.json");
-  if (!document && document.error().code == "fetch.missing") return {};
-  if (!document) return tl::unexpected(document.error());
-  MODAR_ASSIGN(const auto root, parse_public_key(state.root_key));
-  MODAR_TRY(verify_signature(document->text, document->signature, root));
-  MODAR_ASSIGN(const auto word, parse_root_word(document->text));
+  MODAR_ASSIGN(const auto roots, follow_root_links(transfers, belief));
+  const std::string path = "root.json";
+  MODAR_ASSIGN(const auto text, download_optional(transfers, path, kMaxLinkBytes));
+  if (!text && !state.trusted_key.empty()) return {};
+  if (!text) {
+    return fail(kExitWrongKey, "fetch.no-root", path,
+                "the server does not say which key signs, and several root keys sign no releases",
+                "name the key that signs: `modar ship root`");
+  }
+  if (roots.keys.size() == 1) {
+    MODAR_ASSIGN(const auto signature_text, transfers.text(path + ".minisig", kMaxSignatureBytes));
+    MODAR_ASSIGN(const auto signature, parse_signature(signature_text));
+    MODAR_TRY(verify_signature(*text, signature, roots.keys.front()));
+  } else {
+    MODAR_TRY(verify_root_signatures(path, *text, roots, [&](const std::string& signature) {
+      return download_optional(transfers, signature, kMaxSignatureBytes);
+    }));
+  }
+  MODAR_ASSIGN(const auto word, parse_root_word(*text));
   if (word.epoch <= state.epoch) return {};  // known, or replayed
   MODAR_ASSIGN(const auto key, parse_public_key(word.key));
   state.trusted_key = public_key_line(key);
@@ -98,12 +149,12 @@ Result<void> follow_chain(Transfers& transfers, const Signature& wanted, Belief&
 /// Puts the key that --trust gives into the state, unless the state knows where the chain of keys
 /// has led from it. Errors: kInvalidInput "key.public".
 Result<void> recall_trust(const std::string& given_key, StoreState& state) {
-  MODAR_ASSIGN(const auto given, parse_public_key(given_key));
-  const std::string line = public_key_line(given);
-  if (line == state.root_key || line == state.trusted_key) return {};
+  MODAR_ASSIGN(const auto given, parse_root_set(given_key));
+  const std::string line = root_set_line(given);
+  if (line == state.root_key || line == state.trusted_key || line == state.roots) return {};
   state = {};
   state.root_key = line;
-  state.trusted_key = line;
+  if (given.keys.size() == 1) state.trusted_key = line;
   return {};
 }
 
@@ -146,8 +197,8 @@ Result<SignedRelease> download_release(Transfers& transfers, std::int64_t clock,
   news.text = std::move(text);
   news.signature_text = std::move(signature_text);
   MODAR_ASSIGN(const auto signature, parse_signature(news.signature_text));
-  MODAR_ASSIGN(const auto before, parse_public_key(state.trusted_key));
-  if (state.fresh || before.id != signature.key_id) {
+  const auto before = parse_public_key(state.trusted_key);  // none: no root's word is known yet
+  if (state.fresh || !before || before->id != signature.key_id) {
     MODAR_TRY(follow_root(transfers, belief));
     MODAR_TRY(follow_chain(transfers, signature, belief));
   }
@@ -175,15 +226,17 @@ TransferOptions transfer_options(const FetchOptions& options, const std::string&
   transfer.stall_s = options.stall_s;
   transfer.authorities = options.authorities;
   transfer.source = options.source;
+  transfer.needs = options.needs;
   transfer.waiting = options.waiting;
   transfer.user_agent = "modar-fetch/" MODAR_VERSION " (" + installed + ")";
   return transfer;
 }
 
-/// Refuses a release that is older than what was installed, has expired, or differs from the
-/// installed one of the same number.
+/// Refuses a release that is older than what was installed or than `least` (epoch, version), has
+/// expired, or differs from the installed one of the same number.
 Result<void> judge_release(const SignedRelease& news, const StoreState& state,
-                           const std::optional<InstalledRelease>& active, std::int64_t now) {
+                           const std::optional<InstalledRelease>& active, std::int64_t now,
+                           const std::pair<std::uint64_t, std::uint64_t>& least) {
   // The active release counts too, in case the state was lost; not one of an epoch before.
   const bool counts = active && active->release.epoch == state.epoch;
   const std::uint64_t known =
@@ -194,6 +247,11 @@ Result<void> judge_release(const SignedRelease& news, const StoreState& state,
                 "it is of epoch " + std::to_string(news.release.epoch) +
                     ", the root key's word of epoch " + std::to_string(state.epoch),
                 "publish it again");
+  }
+  if (std::tie(news.release.epoch, news.release.version) < std::tie(least.first, least.second)) {
+    return fail(kExitRollBack, "fetch.roll-back", where,
+                "release " + std::to_string(least.second) + " came with this program",
+                "publish it under a higher number");
   }
   if (news.release.version < known) {
     return fail(kExitRollBack, "fetch.roll-back", where,
@@ -306,7 +364,8 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   const std::int64_t clock = clock_of(options, state, active);
   MODAR_ASSIGN(const auto news, download_release(transfers, clock, belief));
   MODAR_TRY(judge_lost_state(news, belief, active));
-  MODAR_TRY(judge_release(news, state, active, clock));
+  MODAR_TRY(
+      judge_release(news, state, active, clock, {options.least_epoch, options.least_version}));
   MODAR_ASSIGN(const auto chosen, choose_bundles(news.release, options));
 
   FetchReport report;

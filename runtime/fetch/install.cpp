@@ -433,7 +433,7 @@ Result<void> verify_bundle(const Folder& slot, const ReleaseBundle& bundle) {
     return fail(kExitBadBundle, "store.hash", file, "it is not what was signed",
                 "run modar-fetch again");
   }
-  const std::string error = first_error(mapped.bytes());
+  const std::string error = first_error(mapped.bytes(), {.release = {}, .accept_newer = true});
   if (error.empty()) return {};
   return fail(kExitBadBundle, "store.rules", file, error,
               "tell the publisher: `modar check` finds it before publishing");

@@ -188,6 +188,93 @@ Result<void> verify_signature(std::string_view message, const Signature& signatu
   return {};
 }
 
+// --- Root keys ---
+
+namespace {
+
+tl::unexpected<Error> bad_set(ExitCode exit, std::string cause) {
+  return fail(exit, "key.set", "root keys", std::move(cause),
+              "give the file K.pub of `modar ship keygen`, or one of `modar ship trust`");
+}
+
+}  // namespace
+
+Result<RootSet> make_root_set(std::vector<PublicKey> keys, unsigned threshold) {
+  std::sort(keys.begin(), keys.end(),
+            [](const PublicKey& a, const PublicKey& b) { return a.id < b.id; });
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (keys[i].id != keys[j].id && keys[i].bytes != keys[j].bytes) continue;
+      return bad_set(ExitCode::kUsage, "key " + to_hex(keys[i].id) + " is given twice");
+    }
+  }
+  if (keys.empty() || keys.size() > kMaxRootKeys) {
+    return bad_set(ExitCode::kUsage, std::to_string(keys.size()) + " keys are not 1 to " +
+                                         std::to_string(kMaxRootKeys));
+  }
+  if (threshold < 1 || threshold > keys.size()) {
+    return bad_set(ExitCode::kUsage, std::to_string(threshold) + " of " +
+                                         std::to_string(keys.size()) + " keys cannot agree");
+  }
+  return RootSet{threshold, std::move(keys)};
+}
+
+Result<RootSet> parse_root_set(std::string_view text) {
+  std::string_view rest = text;
+  std::string_view line = take_line(rest);
+  if (line.starts_with(kUntrusted)) line = take_line(rest);
+  if (line.empty() || line.front() < '0' || line.front() > '9') {
+    MODAR_ASSIGN(const auto key, parse_public_key(text));
+    return RootSet{1, {key}};
+  }
+  unsigned threshold = 0;
+  const auto number = std::from_chars(line.data(), line.data() + line.size(), threshold);
+  if (number.ec != std::errc())
+    return bad_set(ExitCode::kInvalidInput, "its threshold is no number");
+  line.remove_prefix(static_cast<std::size_t>(number.ptr - line.data()));
+  std::vector<PublicKey> keys;
+  while (!line.empty()) {
+    if (line.front() != ' ')
+      return bad_set(ExitCode::kInvalidInput, "its keys have no blanks between them");
+    line.remove_prefix(1);
+    const std::string_view word = line.substr(0, line.find(' '));
+    MODAR_ASSIGN(const auto key, parse_public_key(word));
+    if (keys.size() == kMaxRootKeys)
+      return bad_set(ExitCode::kInvalidInput, "it has too many keys");
+    keys.push_back(key);
+    line.remove_prefix(word.size());
+  }
+  auto set = make_root_set(std::move(keys), threshold);
+  if (!set) set.error().exit = ExitCode::kInvalidInput;
+  return set;
+}
+
+std::string root_set_line(const RootSet& set) {
+  if (set.keys.size() == 1) return public_key_line(set.keys.front());
+  std::string line = std::to_string(set.threshold);
+  for (const PublicKey& key : set.keys) line += " " + public_key_line(key);
+  return line;
+}
+
+std::string signature_path(const std::string& document, const PublicKey& key) {
+  return document + "." + to_hex(key.id) + ".minisig";
+}
+
+Result<void> verify_root_signatures(const std::string& document, std::string_view text,
+                                    const RootSet& set, const SignatureReader& read) {
+  unsigned good = 0;
+  for (const PublicKey& key : set.keys) {
+    MODAR_ASSIGN(const auto found, read(signature_path(document, key)));
+    if (!found) continue;
+    const auto signature = parse_signature(*found);
+    if (signature && verify_signature(text, *signature, key) && ++good == set.threshold) return {};
+  }
+  return fail(kExitWrongKey, "signature.too-few", document,
+              std::to_string(good) + " of the root keys signed it, " +
+                  std::to_string(set.threshold) + " have to",
+              "have it signed by more: `modar ship root --sign`");
+}
+
 // --- Release documents ---
 
 namespace {
@@ -196,6 +283,7 @@ constexpr const char* kReleaseFormat = "modar-release";
 constexpr const char* kKeyFormat = "modar-key";
 constexpr const char* kFreshFormat = "modar-fresh";
 constexpr const char* kRootFormat = "modar-root";
+constexpr const char* kRootLinkFormat = "modar-roots";
 constexpr std::string_view kNeverText = "never";
 constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 53;  ///< exact in JSON
 
@@ -518,6 +606,37 @@ std::string root_word_text(const RootWord& word) {
   put(json, "epoch", word.epoch);
   put(json, "links", std::uint64_t{word.links});
   put(json, "key", word.key);
+  json.EndObject();
+  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+}
+
+std::string root_link_path(std::uint32_t serial) {
+  return "roots/" + std::to_string(serial) + ".json";
+}
+
+Result<RootLink> parse_root_link(std::string_view json) {
+  MODAR_ASSIGN(const auto document, parse_document(json, kRootLinkFormat));
+  Members members(document);
+  RootLink link;
+  link.serial = static_cast<std::uint32_t>(members.number("serial", 1000000));
+  const std::string roots = members.text("roots");
+  if (!members.missing().empty()) return bad(members.missing(), "it is missing or wrong");
+  if (link.serial == 0) return bad("serial", "links begin at 1");
+  const auto set = parse_root_set(roots);
+  if (!set) return bad("roots", set.error().cause);
+  link.roots = *set;
+  return link;
+}
+
+std::string root_link_text(const RootLink& link) {
+  rapidjson::StringBuffer buffer;
+  Writer json(buffer);
+  json.SetIndent(' ', 1);
+  json.StartObject();
+  put(json, "format", kRootLinkFormat);
+  put(json, "format_version", std::uint64_t{1});
+  put(json, "serial", std::uint64_t{link.serial});
+  put(json, "roots", root_set_line(link.roots));
   json.EndObject();
   return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
 }

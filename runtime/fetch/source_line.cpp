@@ -32,9 +32,12 @@ class SourceLine : public Line {
         });
     Answer answer;
     if (!handed) {
-      const bool missing = handed.error().code == "fetch.missing";
-      answer.kind = missing ? Answer::Kind::kMissing : Answer::Kind::kBroken;
+      const std::string& code = handed.error().code;
+      answer.kind = code == "fetch.missing" ? Answer::Kind::kMissing
+                    : code == "fetch.later" ? Answer::Kind::kFatal
+                                            : Answer::Kind::kBroken;
       answer.cause = handed.error().cause;
+      answer.error = handed.error();
     }
     return attempts.end(transfer, answer);
   }

@@ -73,25 +73,33 @@ std::optional<StoreState> parse_state(std::string_view text) {
   state.fresh = false;
   const auto number = [&](const char* key, std::uint64_t& to) {
     if (!json.HasMember(key)) {
-      return key == std::string_view("epoch") || key == std::string_view("time");  // older stores
+      const std::string_view name = key;  // older stores lack these
+      return name == "epoch" || name == "time" || name == "root_serial";
     }
     if (!json[key].IsUint64()) return false;
     to = json[key].GetUint64();
     return true;
   };
-  const auto key_line = [&](const char* key, std::string& to) {
+  const auto string = [&](const char* key, std::string& to) {
     if (!json.HasMember(key) || !json[key].IsString()) return false;
     to = json[key].GetString();
-    return parse_public_key(to).has_value();
+    return true;
   };
   std::uint64_t serial = 0;
+  std::uint64_t root_serial = 0;
   std::uint64_t time = 0;
   if (!number("epoch", state.epoch) || !number("version", state.version) ||
       !number("key_serial", serial) || !number("time", time) || time > kMaxTime ||
-      serial > 0xFFFFFFFFu || !key_line("root_key", state.root_key) ||
-      !key_line("trusted_key", state.trusted_key)) {
+      !number("root_serial", root_serial) || std::max(serial, root_serial) > 0xFFFFFFFFu ||
+      !string("root_key", state.root_key) || !parse_root_set(state.root_key) ||
+      !string("trusted_key", state.trusted_key)) {
     return std::nullopt;
   }
+  if (!state.trusted_key.empty() && !parse_public_key(state.trusted_key)) return std::nullopt;
+  if (json.HasMember("roots") && (!string("roots", state.roots) || !parse_root_set(state.roots))) {
+    return std::nullopt;
+  }
+  state.root_serial = static_cast<std::uint32_t>(root_serial);
   state.key_serial = static_cast<std::uint32_t>(serial);
   state.time = static_cast<std::int64_t>(time);
   return state;
@@ -100,7 +108,7 @@ std::optional<StoreState> parse_state(std::string_view text) {
 StoreState Store::state() const {
   StoreState best;
   const auto rank = [](const StoreState& s) {
-    return std::tuple(s.epoch, s.key_serial, s.version, s.time);
+    return std::tuple(s.root_serial, s.epoch, s.key_serial, s.version, s.time);
   };
   for (const Folder* folder : {&root_, &slots_}) {
     const auto text = folder->read("state.json", kMaxStateBytes);
@@ -121,6 +129,12 @@ Result<void> Store::save_state(const StoreState& state) const {
   json.Uint64(state.version);
   json.Key("root_key");
   json.String(state.root_key.c_str());
+  if (!state.roots.empty()) {
+    json.Key("roots");
+    json.String(state.roots.c_str());
+    json.Key("root_serial");
+    json.Uint(state.root_serial);
+  }
   json.Key("trusted_key");
   json.String(state.trusted_key.c_str());
   json.Key("key_serial");

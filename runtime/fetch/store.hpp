@@ -29,8 +29,11 @@ namespace modar::fetch {
 struct StoreState {
   std::uint64_t epoch = 0;    ///< of the root's word that is believed; 0: none
   std::uint64_t version = 0;  ///< highest that was installed in that epoch
-  std::string root_key;       ///< public_key_line() that was given with --trust
-  std::string trusted_key;    ///< where the root's word and the chain of keys have led to
+  std::string root_key;       ///< root_set_line() that was given with --trust
+  std::string roots;          ///< where the chain of root keys has led to; empty: still root_key
+  std::uint32_t root_serial = 0;  ///< of the chain's last link that was read
+  std::string trusted_key;  ///< where the root's word and the chain of keys have led to; empty:
+                            ///< nowhere yet, as several root keys never sign releases
   std::uint32_t key_serial = 0;
   std::int64_t time = 0;  ///< latest that a believed document was signed at, seconds since 1970
   bool fresh = true;      ///< nothing is known: a new store, or both copies are lost

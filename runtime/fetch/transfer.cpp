@@ -18,8 +18,26 @@ std::string without_login(const std::string& url) {
 struct Transfers::State {
   Attempts attempts;
   std::unique_ptr<Line> line;
+  std::function<void(std::span<const FileNeed>)> needs;
 
-  Result<void> run(std::vector<Transfer>& transfers) { return line->run(transfers, attempts); }
+  Result<void> run(std::vector<Transfer>& transfers) {
+    if (needs) needs(needs_of(transfers));
+    return line->run(transfers, attempts);
+  }
+
+  /// What a part that is there already has is not asked for; a complete one is, from the start.
+  static std::vector<FileNeed> needs_of(const std::vector<Transfer>& transfers) {
+    std::vector<FileNeed> list;
+    for (const Transfer& transfer : transfers) {
+      FileNeed need{transfer.path, 0, transfer.limit};
+      if (transfer.wanted != nullptr) {
+        const auto have = transfer.wanted->folder->size(transfer.part_name()).value_or(0);
+        need.from = have < transfer.limit ? have : 0;
+      }
+      list.push_back(std::move(need));
+    }
+    return list;
+  }
 };
 
 Transfers::Transfers(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -28,8 +46,8 @@ Transfers::~Transfers() = default;
 
 Result<Transfers> Transfers::create(const TransferOptions& options) {
   if (options.source) {
-    return Transfers(std::make_unique<State>(
-        State{Attempts(options, "the release folder"), make_source_line(options.source)}));
+    return Transfers(std::make_unique<State>(State{
+        Attempts(options, "the release folder"), make_source_line(options.source), options.needs}));
   }
   std::string address = options.url;
   while (address.size() > 1 && address.back() == '/') address.pop_back();
@@ -40,11 +58,12 @@ Result<Transfers> Transfers::create(const TransferOptions& options) {
     }
     return Transfers(std::make_unique<State>(
         State{Attempts(options, *folder),
-              make_source_line(folder_source(*folder, options.bytes_per_second))}));
+              make_source_line(folder_source(*folder, options.bytes_per_second)),
+              {}}));
   }
   MODAR_ASSIGN(auto line, make_curl_line(options, address));
-  return Transfers(
-      std::make_unique<State>(State{Attempts(options, without_login(address)), std::move(line)}));
+  return Transfers(std::make_unique<State>(
+      State{Attempts(options, without_login(address)), std::move(line), {}}));
 }
 
 Result<std::string> Transfers::text(const std::string& path, std::size_t limit, bool optional) {

@@ -26,7 +26,8 @@ struct TransferOptions {
   std::string user_agent;
   std::string authorities;  ///< PEM file; empty: of the environment, else the system's
   ByteSource source;        ///< instead of libcurl
-  double stall_s = 30;      ///< a transfer without data for so long is aborted
+  std::function<void(std::span<const FileNeed>)> needs;  ///< may be empty
+  double stall_s = 30;  ///< a transfer without data for so long is aborted
   std::function<void(const FetchWait&)> waiting;  ///< may be empty
 };
 

@@ -12,8 +12,10 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/request_text.hpp"
+#include "bake/check/text_check.hpp"
 #include "bake/image/image.hpp"
 #include "formats/bundle_view.hpp"
+#include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
@@ -197,6 +199,85 @@ TEST_F(SourceTest, ShadowsAndLightsAreThoseOfTheirSources) {
   for (const auto& change : changes) EXPECT_EQ(issues(change), Ids{"SOURCE_SCENE"});
   room_given_ = false;  // then nothing is known of the light, and of the shadow that it casts
   EXPECT_EQ(issues(), Ids{"SOURCE_MISSING"});
+}
+
+/// One byte or number at a time, as a foreign writer may get it wrong behind right hashes.
+TEST_F(SourceTest, EveryLevelIsThatOfItsSource) {
+  ASSERT_EQ(content_.models.size(), 1u);
+  const LayoutRecord& layout = content_.layouts[content_.models[0].layout];
+  const auto place_of = [&layout](Semantic semantic) {
+    for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
+      const AttributeRecord& attribute = layout.attributes[i];
+      if (attribute.semantic == static_cast<std::uint8_t>(semantic)) return attribute.offset;
+    }
+    return std::uint16_t{0xFFFF};
+  };
+  const std::uint16_t uv = place_of(Semantic::kUv);
+  const std::uint16_t normal = place_of(Semantic::kNormal);
+  ASSERT_NE(uv, 0xFFFF);
+  ASSERT_NE(normal, 0xFFFF);
+  const std::function<void(BundleContent&)> changes[] = {
+      [uv](BundleContent& c) { c.vertices[uv + 1] ^= std::byte{0x40}; },
+      [normal](BundleContent& c) {
+        for (std::size_t i = 0; i < 3; ++i) c.vertices[normal + i] = ~c.vertices[normal + i];
+      },
+      [](BundleContent& c) { std::swap(c.indices[0], c.indices[2]); },
+      [](BundleContent& c) { c.chunks[0].uv_offset[0] += 0.25f; },
+      [](BundleContent& c) { c.chunks[1].uv_scale[1] *= 0.5f; },
+  };
+  for (const auto& change : changes) {
+    const Ids found = issues(change);
+    EXPECT_TRUE(found.count("SOURCE_SURFACE")) << (found.empty() ? "" : *found.begin());
+  }
+}
+
+TEST_F(SourceTest, FlagsColoursAndNamesAreThoseOfTheirSources) {
+  EXPECT_TRUE(issues([](BundleContent& content) {
+                content.textures[0].flags ^= kTextureRepeat;
+              }).count("SOURCE_COLOUR"));
+  EXPECT_EQ(issues([](BundleContent& content) {
+              for (ExtraSection& extra : content.extra) {
+                if (extra.type != static_cast<std::uint32_t>(kPatternColours)) continue;
+                extra.bytes[sizeof(ColourGridHeader) + 1] ^= std::byte{0x40};
+              }
+            }),
+            Ids{"SOURCE_PATTERN"});
+  EXPECT_EQ(issues([](BundleContent& content) {
+              content.scenes.clear(), content.lights.clear(), content.shadows.clear();
+            }),
+            Ids{"SOURCE_SCENE"});
+  EXPECT_TRUE(issues([](BundleContent& content) {
+                content.patterns[0].name = content.intern("cart");
+              }).count("SOURCE_MISSING"));
+}
+
+TEST(SourceTexts, AreThoseOfTheProject) {
+  BundleContent content = pattern_content();
+  content.meta =
+      R"({"texts":[{"pattern":"p","model":"m","text":{"en":"A vase.","de":"Eine Vase."}}]})";
+  const Bytes bytes = encode(content);
+  const auto bundle = BundleView::open(bytes);
+  ASSERT_TRUE(bundle);
+  const auto said = [&](const std::vector<SceneText>& texts) {
+    std::string all;
+    check_texts(*bundle, texts, [&all](const Issue& issue) {
+      all += std::string(issue.kind->id) + " " + issue.where + ": " + issue.detail + "\n";
+    });
+    return all;
+  };
+  EXPECT_EQ(said({{"p", "m", {{"en", "A vase."}, {"de", "Eine Vase."}}}}), "");
+  EXPECT_EQ(said({{"p", "m", {{"en", "A jar."}, {"de", "Eine Vase."}}}}),
+            "SOURCE_SCENE pattern 'p', model 'm': its text in 'en' is 'A vase.', the source's is "
+            "'A jar.'\n");
+  EXPECT_EQ(said({{"p", "m", {{"en", "A vase."}, {"fr", "Un vase."}}}}),
+            "SOURCE_SCENE pattern 'p', model 'm': its text in 'fr' is missing\n");
+  EXPECT_EQ(said({{"p", "m", {{"en", "A vase."}}}}),
+            "SOURCE_SCENE pattern 'p', model 'm': it has a text in a language that the source "
+            "lacks\n");
+  EXPECT_EQ(said({}), "SOURCE_SCENE texts: it has 1, the source 0\n");
+  EXPECT_EQ(said({{"q", "m", {{"en", "A cup."}}}}),
+            "SOURCE_SCENE pattern 'q', model 'm': its text is missing\n"
+            "SOURCE_SCENE texts: it has 1, the source 1\n");
 }
 
 TEST_F(SourceTest, CornersHaveTheShadesOfTheirSource) {

@@ -187,6 +187,12 @@ constexpr CorruptCase kSectionCases[] = {
          record_of<SceneRecord>(b, SectionType::kScenes, 1).pattern = 2;
        });
      }},
+    {"LIGHT_VALUES",
+     [] {
+       return damaged(lit_content(), [](Bytes& b) {
+         record_of<LightRecord>(b, SectionType::kLights).sky[4] = -1.5f;
+       });
+     }},
 };
 
 }  // namespace

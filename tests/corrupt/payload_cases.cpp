@@ -37,6 +37,13 @@ KeypointRecord& keypoint(BundleContent& content) {
 }
 
 constexpr CorruptCase kPayloadCases[] = {
+    {"BUNDLE_MINOR",
+     [] {
+       Bytes bytes = encode(lit_content());
+       reinterpret_cast<FileHeader*>(bytes.data())->minor = 1;
+       rehash(bytes);
+       return bytes;
+     }},
     {"SECTION_HASH",
      [] {
        Bytes bytes = encode(pattern_content());
@@ -49,7 +56,12 @@ constexpr CorruptCase kPayloadCases[] = {
        bytes[entry_of(bytes, SectionType::kMeta).offset - 1] = std::byte{1};
        return bytes;
      }},
-    {"META_TEXT", [] { return changed(pattern_content(), [](auto& c) { c.meta = "{\xFF}"; }); }},
+    {"META_TEXT",
+     [] {
+       return changed(pattern_content(), [](auto& c) {
+         c.meta = R"({"texts":[{"pattern":"cover","text":{"en":1890}}]})";
+       });
+     }},
     {"MODEL_PLACEMENT",
      [] { return changed(model_content(), [](auto& c) { c.models[0].diagonal = 1; }); }},
     {"MODEL_COUNTS",
@@ -159,6 +171,8 @@ constexpr CorruptCase kPayloadCases[] = {
          c.materials[0].diffuse[1] = 0.25f;
        });
      }},
+    {"VERTEX_OCCLUSION",
+     [] { return changed(lit_content(), [](auto& c) { c.vertices[11] = std::byte{128}; }); }},
     {"VERTEX_PADDING", [] { return vertex_damage(6, std::byte{1}, std::byte{0}); }},
     {"PATTERN_YML_DIFFERS",
      [] {

@@ -4,13 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <set>
 #include <sstream>
 #include <string>
 
 #include "formats/bundle_view.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/rules.hpp"
 #include "tests/corrupt/cases.hpp"
 #include "tests/formats/support.hpp"
@@ -105,6 +109,112 @@ TEST(Check, ConesHoldTheNormalsOfTheirTriangles) {
   EXPECT_EQ(said(0.8165f, true).front(),
             "error CHUNK_CONE model 'octahedron', chunk 0, level 0 (byte 8192): 1 triangles face "
             "out of the cone");
+}
+
+/// What a writer of other bundles may get wrong though no hash tells: a change to a good bundle
+/// with all of 1.2, and what is said of it first.
+template <class Damage>
+std::string said_of(Damage damage) {
+  Bytes bytes = encode(lit_content());
+  damage(bytes);
+  rehash(bytes);
+  return report(bytes).front();
+}
+
+TEST(Check, NumbersOfTheWorldHaveBounds) {
+  EXPECT_EQ(said_of([](Bytes&) {}), "good");
+  const auto bad = [](auto damage) {
+    return said_of(damage).substr(0, 19) == "error BUNDLE_NUMBER";
+  };
+  for (const double width : {1e300, -1.0, 1e-5, 2e7}) {
+    EXPECT_TRUE(bad([width](Bytes& b) {
+      record_of<PatternRecord>(b, SectionType::kPatterns).width_mm = width;
+    })) << width;
+  }
+  for (const double unit : {1e300, 1e-10, -1.0}) {
+    EXPECT_TRUE(bad([unit](Bytes& b) {
+      record_of<ModelRecord>(b, SectionType::kModels).unit_metres = unit;
+    })) << unit;
+  }
+  for (const float scale : {1e30f, 1e-12f, 0.0f}) {
+    EXPECT_TRUE(bad([scale](Bytes& b) {
+      record_of<SceneRecord>(b, SectionType::kScenes).scale = scale;
+    })) << scale;
+  }
+  EXPECT_TRUE(
+      bad([](Bytes& b) { record_of<SceneRecord>(b, SectionType::kScenes).offset[1] = -1e30f; }));
+  EXPECT_TRUE(bad([](Bytes& b) {
+    const std::uint64_t at = entry_of(b, SectionType::kShadow).offset;
+    reinterpret_cast<ShadowHeader*>(b.data() + at)->high[0] = 1e30f;
+  }));
+}
+
+TEST(Check, CornersOfBoxesLieNearTheirPattern) {
+  for (const float place : {1e30f, -1e30f, std::numeric_limits<float>::infinity(), 1001.0f}) {
+    const std::string said = said_of([place](Bytes& b) {
+      // The second pattern's: two faces.
+      for (std::size_t i = 0; i < BundleView::open(b)->sections().size(); ++i) {
+        const SectionEntry& entry = BundleView::open(b)->sections()[i];
+        if (entry.type != static_cast<std::uint32_t>(kPatternShape) || entry.owner != 1) continue;
+        auto* face = reinterpret_cast<ShapeFaceRecord*>(b.data() + entry.offset +
+                                                        sizeof(PatternShapeHeader));
+        face->corner[2] = place;
+        return;
+      }
+    });
+    EXPECT_EQ(said.substr(0, 20), "error BUNDLE_PATTERN") << place << ": " << said;
+  }
+}
+
+/// The bounds hold for every light that can be: those of a single lamp in any direction, whose
+/// coefficients are the greatest, are good.
+TEST(Check, LightsThatCannotBeAreFound) {
+  const auto said = [](const std::array<double, 9>& sky, float key) {
+    return said_of([&](Bytes& b) {
+      auto& light = record_of<LightRecord>(b, SectionType::kLights);
+      for (std::size_t i = 0; i < 27; ++i) light.sky[i] = static_cast<float>(sky[i / 3]);
+      std::fill(std::begin(light.key), std::end(light.key), key);
+    });
+  };
+  for (int i = 0; i < 200; ++i) {
+    const double z = 1 - 2 * (i + 0.5) / 200;
+    const double x = std::sqrt(1 - z * z) * std::cos(2.4 * i);
+    const double y = std::sqrt(1 - z * z) * std::sin(2.4 * i);
+    // Of a lamp in (x, y, z), by the integrals of the polynomials' squares and the weights 1, 2/3
+    // and 1/4 of Ramamoorthi and Hanrahan, 2001.
+    EXPECT_EQ(said({1, 2 * y, 2 * z, 2 * x, 3.75 * x * y, 3.75 * y * z, 0.3125 * (3 * z * z - 1),
+                    3.75 * z * x, 0.9375 * (x * x - y * y)},
+                   0.5f),
+              "good")
+        << x << " " << y << " " << z;
+  }
+  const std::string found = "error LIGHT_VALUES light 0";
+  EXPECT_EQ(said({0.5, 0, 1.1, 0, 0, 0, 0, 0, 0}, 1.0f).substr(0, found.size()), found);
+  EXPECT_EQ(said({-0.5, 0, 0, 0, 0, 0, 0, 0, 0}, 1.0f).substr(0, found.size()), found);
+  EXPECT_EQ(said({1e30, 0, 0, 0, 0, 0, 0, 0, 0}, 1.0f).substr(0, found.size()), found);
+  EXPECT_EQ(said({1, 0, 0, 0, 0, 0, 0, 0, 0}, -0.25f).substr(0, 19), "error BUNDLE_NUMBER");
+}
+
+TEST(Check, ANewerMinorVersionIsForDevicesOnly) {
+  Bytes bytes = encode(lit_content());
+  reinterpret_cast<FileHeader*>(bytes.data())->minor = kMinorVersion + 5;
+  rehash(bytes);
+  EXPECT_EQ(report(bytes).front(),
+            "error BUNDLE_MINOR header (byte 10): it states 1.7, this program knows up to 1.2 and "
+            "cannot judge what that added");
+  EXPECT_EQ(first_error(bytes), "BUNDLE_MINOR header");
+  EXPECT_EQ(first_error(bytes, {.release = {}, .accept_newer = true}), "");
+}
+
+/// By the fast look at many vertices and by the slow one, which a layout of floats gets.
+TEST(Check, OcclusionEndsAt127) {
+  for (int value : {127, 128, 255}) {
+    const std::string said = said_of([value](Bytes& b) {
+      b[entry_of(b, SectionType::kVertices).offset + 2 * 16 + 11] =
+          std::byte{static_cast<unsigned char>(value)};
+    });
+    EXPECT_EQ(said.substr(0, 22), value == 127 ? "good" : "error VERTEX_OCCLUSION") << said;
+  }
 }
 
 TEST(Check, GivesBackEveryByteOfTheGreatBuffersOnceAndInOrder) {

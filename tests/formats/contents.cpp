@@ -430,4 +430,11 @@ void add_looks(BundleContent& content) {
   content.extra.push_back(order);
 }
 
+BundleContent lit_content() {
+  BundleContent content = golden_content();
+  content.extra.clear();
+  add_looks(content);
+  return content;
+}
+
 }  // namespace modar::test

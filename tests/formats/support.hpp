@@ -31,6 +31,9 @@ BundleContent golden_content();
 /// hides, its first pattern on a cone and its second on two faces of a box.
 void add_looks(BundleContent& content);
 
+/// A golden_content() with all that version 1.2 added, and no section of an unknown type.
+BundleContent lit_content();
+
 /// Encodes or ends the program: test contents are never wrong.
 Bytes encode(const BundleContent& content);
 

@@ -27,6 +27,9 @@ class InputFile {
     std::filesystem::remove_all(folder_, left);  // and what readers made beside the file
   }
 
+  /// The folder of its own.
+  [[nodiscard]] const std::string& folder() const { return folder_; }
+
   const std::string& write(const std::uint8_t* data, std::size_t size) {
     std::FILE* file = std::fopen(path_.c_str(), "wb");
     // Nothing at all comes as a null pointer.

@@ -25,6 +25,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto again = parse_key_link(key_link_text(*link));
     need(again.has_value() && again->serial == link->serial && again->key == link->key);
   }
+  if (const auto word = parse_root_word(text)) {
+    const auto again = parse_root_word(root_word_text(*word));
+    need(again.has_value() && again->epoch == word->epoch && again->links == word->links &&
+         again->key == word->key);
+  }
+  if (const auto link = parse_root_link(text)) {
+    const auto again = parse_root_link(root_link_text(*link));
+    need(again.has_value() && again->serial == link->serial && again->roots == link->roots);
+  }
+  if (const auto roots = parse_root_set(text)) {
+    need(roots->threshold >= 1 && roots->threshold <= roots->keys.size());
+    need(*parse_root_set(root_set_line(*roots)) == *roots);
+  }
   const auto key = parse_public_key(text);
   if (key) need(*parse_public_key(public_key_line(*key)) == *key);
   if (const auto signature = parse_signature(text)) {

@@ -27,6 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const modar::fetch::StoreState again = store->state();
   need(!again.fresh && again.epoch == state->epoch && again.version == state->version &&
        again.root_key == state->root_key && again.trusted_key == state->trusted_key &&
-       again.key_serial == state->key_serial && again.time == state->time);
+       again.key_serial == state->key_serial && again.roots == state->roots &&
+       again.root_serial == state->root_serial && again.time == state->time);
   return 0;
 }

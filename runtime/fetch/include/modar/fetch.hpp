@@ -30,10 +30,19 @@ struct FetchWait {
   double seconds = 0;     ///< until then
 };
 
+/// A file that a fetch is about to ask for.
+struct FileNeed {
+  std::string path;         ///< below the release folder
+  std::uint64_t from = 0;   ///< first byte that is wanted
+  std::uint64_t limit = 0;  ///< bytes that it has at most, from its first
+};
+
 /// For an app with a network stack of its own, asked from the thread that calls fetch_release(),
 /// for one file at a time: hands the bytes of the file `path` below the release folder, from byte
 /// `from` to its end, to `take` in portions, until that returns false. Errors: kExitMixed
-/// "fetch.missing" (no such file); any other: the fetch tries again.
+/// "fetch.missing" (no such file); "fetch.later": the app brings the files that it was told of
+/// (FetchOptions::needs) and calls again, so this call ends with that error; any other: the fetch
+/// tries again.
 using ByteSource =
     std::function<Result<void>(const std::string& path, std::uint64_t from,
                                const std::function<bool(std::span<const std::byte>)>& take)>;
@@ -41,7 +50,7 @@ using ByteSource =
 struct FetchOptions {
   std::string url;    ///< http://, https://, file:// or a folder that `modar ship publish` filled
   std::string store;  ///< folder of the installed bundles; made where it is missing
-  std::string trusted_key;             ///< text of K.pub
+  std::string trusted_key;             ///< text of K.pub, or of a file of `modar ship trust`
   std::string device;                  ///< only bundles for this profile; empty: for any
   std::vector<std::string> bundles;    ///< only these; empty: all
   unsigned parallel = 4;               ///< pieces at once
@@ -55,6 +64,12 @@ struct FetchOptions {
   /// devices, WebAssembly); 0: std::time().
   std::int64_t now = 0;
   ByteSource source;  ///< instead of the URL; a library built without libcurl needs it
+  /// Told before a source is asked: these files are needed, in this order. May be empty.
+  std::function<void(std::span<const FileNeed>)> needs;
+  /// Releases before this one are refused (11) as if it had been installed: what came with the app
+  /// is of it. 0: none is known.
+  std::uint64_t least_epoch = 0;
+  std::uint64_t least_version = 0;
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
   std::function<void(const FetchWait&)> waiting;       ///< may be empty
 };

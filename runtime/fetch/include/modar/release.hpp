@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -73,6 +74,37 @@ struct Signature {
 Result<Signature> parse_signature(std::string_view text);
 /// Its text. untrusted_comment: one line that nothing signs.
 std::string signature_text(const Signature& signature, std::string_view untrusted_comment);
+
+/// The keys that a device trusts with the word of who signs releases, and how many of them have to
+/// agree: one thief, one lost pass phrase or one colleague alone changes nothing.
+struct RootSet {
+  unsigned threshold = 1;       ///< 1 to the number of keys
+  std::vector<PublicKey> keys;  ///< distinct in number and bytes, in the order of their numbers
+  bool operator==(const RootSet&) const = default;
+};
+inline constexpr std::size_t kMaxRootKeys = 16;
+
+/// Reads a public key (parse_public_key()), which alone is a set of one, or the line, or the file,
+/// of root_set_line(). Errors: kInvalidInput "key.public", "key.set".
+Result<RootSet> parse_root_set(std::string_view text);
+/// A set of several: its threshold and keys with blanks between them. Of one: public_key_line().
+std::string root_set_line(const RootSet& set);
+/// Sorts the keys. Errors: kUsage "key.set" (a key twice, no key, too many, an impossible
+/// threshold).
+Result<RootSet> make_root_set(std::vector<PublicKey> keys, unsigned threshold);
+
+/// Where the signature of a document by one of several keys lies:
+/// "root.json.0123456789abcdef.minisig", in the key's number as its file has it, byte by byte.
+std::string signature_path(const std::string& document, const PublicKey& key);
+
+/// Reads the signature at a path; nothing: there is none.
+using SignatureReader = std::function<Result<std::optional<std::string>>(const std::string& path)>;
+/// Checks that as many keys of the set as it wants signed `text`, which lies at `document`. Each
+/// key counts once; signatures that do not verify count for nothing.
+/// Errors: kExitWrongKey "signature.too-few", and "signature.key" or "signature.bad" for a set of
+/// one; those of the reader.
+Result<void> verify_root_signatures(const std::string& document, std::string_view text,
+                                    const RootSet& set, const SignatureReader& read);
 
 /// Checks that `key` signed both `message` and the trusted comment.
 /// Errors: kExitWrongKey "signature.key" (made with another key), "signature.bad".
@@ -157,6 +189,18 @@ struct RootWord {
 /// Errors: kInvalidInput "release.text".
 Result<RootWord> parse_root_word(std::string_view json);
 std::string root_word_text(const RootWord& word);
+
+/// A link of the chain of root keys: the set that follows, signed by as many keys as the set before
+/// wants and by as many as it wants itself.
+struct RootLink {
+  std::uint32_t serial = 0;  ///< from 1, without gaps
+  RootSet roots;
+};
+/// "roots/S.json".
+std::string root_link_path(std::uint32_t serial);
+/// Errors: kInvalidInput "release.text".
+Result<RootLink> parse_root_link(std::string_view json);
+std::string root_link_text(const RootLink& link);
 /// @}
 
 }  // namespace modar

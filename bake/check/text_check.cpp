@@ -1,0 +1,65 @@
+#include "bake/check/text_check.hpp"
+
+#include <optional>
+
+#include "bake/check/verdict.hpp"
+#include "bake/json.hpp"
+
+namespace modar {
+namespace {
+
+/// How the words of one scene differ from the source's; empty: they do not.
+std::string word_fault(const std::optional<modar::Json>& stated,
+                       const std::map<std::string, std::string>& words) {
+  if (!stated) return "its text is missing";
+  for (const auto& [language, expected] : words) {
+    const auto found = stated->find(language);
+    const auto text = found ? found->text() : std::nullopt;
+    if (!text) return "its text in '" + language + "' is missing";
+    if (*text != expected) {
+      return "its text in '" + language + "' is '" + *text + "', the source's is '" + expected +
+             "'";
+    }
+  }
+  return stated->size() == words.size() ? "" : "it has a text in a language that the source lacks";
+}
+
+}  // namespace
+
+void check_texts(const BundleView& bundle, const std::vector<SceneText>& sources,
+                 const IssueSink& sink) {
+  const auto meta = bundle.section(SectionType::kMeta);
+  const auto offset = meta.empty()
+                          ? std::uint64_t{0}
+                          : static_cast<std::uint64_t>(meta.data() - bundle.bytes().data());
+  const auto tell = [&](const std::string& where, std::string detail) {
+    sink(Issue{&workstation_issue_kind(WorkstationRule::kSourceScene), where, offset,
+               std::move(detail), std::nullopt});
+  };
+  const modar::Json stated =
+      modar::Json::parse(bundle.meta()).find("texts").value_or(modar::Json::array());
+  std::size_t known = 0;
+  for (const SceneText& source : sources) {
+    std::optional<modar::Json> words;
+    for (std::size_t i = 0; i < stated.size() && !words; ++i) {
+      const modar::Json entry = stated.at(i).value_or(modar::Json());
+      const auto named = [&entry](const char* key) {
+        const auto value = entry.find(key);
+        return value ? value->text().value_or("") : "";
+      };
+      if (named("pattern") == source.pattern && named("model") == source.model) {
+        words = entry.find("text");
+      }
+    }
+    known += words ? 1u : 0u;
+    const std::string fault = word_fault(words, source.words);
+    if (!fault.empty())
+      tell("pattern '" + source.pattern + "', model '" + source.model + "'", fault);
+  }
+  if (stated.size() != known) {
+    tell("texts", "it has " + std::to_string(stated.size()) + ", the source " +
+                      std::to_string(sources.size()));
+  }
+}
+
+}  // namespace modar

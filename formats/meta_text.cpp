@@ -1,0 +1,213 @@
+// A recursive descent over JSON that keeps nothing.
+#include "formats/meta_text.hpp"
+
+#include <cstdint>
+
+#include "formats/utf8.hpp"
+
+namespace modar {
+namespace {
+
+bool decimal_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+bool hexadecimal_digit(char c) {
+  return decimal_digit(c) || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+}
+
+/// Reads values one after the other. What returns a bool is false after a fault; the first one
+/// stays.
+class JsonScan {
+ public:
+  explicit JsonScan(std::string_view text) : text_(text) {}
+
+  [[nodiscard]] const std::optional<MetaFault>& fault() const { return fault_; }
+
+  bool refuse(const char* cause) {
+    if (!fault_) fault_ = MetaFault{at_, cause};
+    return false;
+  }
+
+  /// The next character that is no blank; 0 at the end.
+  char peek() {
+    while (at_ < text_.size() &&
+           (text_[at_] == ' ' || text_[at_] == '\n' || text_[at_] == '\r' || text_[at_] == '\t')) {
+      ++at_;
+    }
+    return at_ < text_.size() ? text_[at_] : '\0';
+  }
+
+  [[nodiscard]] bool at_end() { return peek() == '\0' && at_ == text_.size(); }
+
+  bool string(std::string_view* content = nullptr) {
+    if (peek() != '"') return refuse("a string is missing");
+    const std::size_t start = ++at_;
+    while (at_ < text_.size() && text_[at_] != '"') {
+      if (!character()) return false;
+    }
+    if (at_ == text_.size()) return refuse("a string does not end");
+    if (content != nullptr) *content = text_.substr(start, at_ - start);
+    ++at_;
+    return true;
+  }
+
+  /// Any value.
+  bool value() {
+    switch (peek()) {
+      case '{':
+        return object([this](std::string_view) { return value(); });
+      case '[':
+        return array([this] { return value(); });
+      case '"':
+        return string();
+      case 't':
+        return word("true");
+      case 'f':
+        return word("false");
+      case 'n':
+        return word("null");
+      default:
+        return number();
+    }
+  }
+
+  /// member(key): reads the value of a member; the key as it is written.
+  template <class Member>
+  bool object(Member member) {
+    if (peek() != '{') return refuse("an object is missing");
+    return list('}', [&] {
+      std::string_view key;
+      if (!string(&key)) return false;
+      if (peek() != ':') return refuse("a colon is missing");
+      ++at_;
+      return member(key);
+    });
+  }
+
+  template <class Element>
+  bool array(Element element) {
+    if (peek() != '[') return refuse("an array is missing");
+    return list(']', element);
+  }
+
+ private:
+  /// One character of a string, or an escape. Control characters of C1 may stand in JSON.
+  bool character() {
+    const std::string_view rest = text_.substr(at_);
+    if (rest[0] == '\\') return escape(rest);
+    const bool c1 =
+        rest[0] == '\x7F' || (rest.size() > 1 && rest[0] == '\xC2' && utf8_continues(rest[1]));
+    const std::size_t size = c1 ? (rest[0] == '\x7F' ? 1 : 2) : utf8_character(rest);
+    if (size == 0) return refuse("a byte belongs to no character of UTF-8 that a string may hold");
+    at_ += size;
+    return true;
+  }
+
+  bool escape(std::string_view rest) {
+    constexpr std::string_view kEscapes = "\"\\/bfnrt";
+    if (rest.size() > 1 && kEscapes.find(rest[1]) != std::string_view::npos) {
+      at_ += 2;
+      return true;
+    }
+    bool good = rest.size() >= 6 && rest[1] == 'u';
+    for (std::size_t i = 2; good && i < 6; ++i) good = hexadecimal_digit(rest[i]);
+    if (!good) return refuse("an escape of a string is none of JSON's");
+    at_ += 6;
+    return true;
+  }
+
+  bool word(std::string_view expected) {
+    if (!text_.substr(at_).starts_with(expected)) return refuse("a value is none of JSON's");
+    at_ += expected.size();
+    return true;
+  }
+
+  bool digits() {
+    const std::size_t first = at_;
+    while (at_ < text_.size() && decimal_digit(text_[at_])) ++at_;
+    return at_ > first;
+  }
+
+  bool number() {
+    const auto take = [this](char c) {
+      const bool there = at_ < text_.size() && text_[at_] == c;
+      at_ += there ? 1 : 0;
+      return there;
+    };
+    const std::size_t first = at_;
+    take('-');
+    const bool zero = take('0');
+    bool good = zero || digits();
+    if (good && take('.')) good = digits();
+    if (good && (take('e') || take('E'))) {
+      if (!take('+')) take('-');
+      good = digits();
+    }
+    if (good) return true;
+    at_ = first;
+    return refuse("a value is none of JSON's");
+  }
+
+  /// What stands between brackets; the opening one is next.
+  template <class Element>
+  bool list(char close, Element element) {
+    if (++depth_ > kMaxMetaDepth) return refuse("arrays and objects are too deep in each other");
+    ++at_;
+    if (peek() != close) {
+      for (;;) {
+        if (!element()) return false;
+        if (peek() != ',') break;
+        ++at_;
+      }
+      if (peek() != close) return refuse("a comma or a closing bracket is missing");
+    }
+    ++at_;
+    --depth_;
+    return true;
+  }
+
+  std::string_view text_;
+  std::size_t at_ = 0;
+  int depth_ = 0;
+  std::optional<MetaFault> fault_;
+};
+
+/// {"pattern": P, "model": M, "text": {language: words}}.
+bool scan_text(JsonScan& scan) {
+  bool pattern = false;
+  bool words = false;
+  const bool read = scan.object([&](std::string_view key) {
+    if (key == "pattern" || key == "model") {
+      pattern = pattern || key == "pattern";
+      return scan.string();
+    }
+    if (key != "text") return scan.value();
+    words = true;
+    return scan.object([&](std::string_view) { return scan.string(); });
+  });
+  return read && ((pattern && words) || scan.refuse("a text names no pattern, or has no words"));
+}
+
+bool scan_member(JsonScan& scan, std::string_view key) {
+  const auto any_object = [&scan] {
+    return scan.object([&](std::string_view) { return scan.value(); });
+  };
+  if (key.find('\\') != std::string_view::npos) return scan.refuse("a member's name has an escape");
+  if (key == "tool") return scan.string();
+  if (key == "options") return any_object();
+  if (key == "texts") return scan.array([&] { return scan_text(scan); });
+  if (key == "models" || key == "patterns" || key == "scenes") return scan.array(any_object);
+  return scan.value();
+}
+
+}  // namespace
+
+std::optional<MetaFault> check_meta_text(std::string_view text) {
+  JsonScan scan(text);
+  const bool read = scan.object([&scan](std::string_view key) { return scan_member(scan, key); });
+  if (read && !scan.at_end()) scan.refuse("something follows the object");
+  return scan.fault();
+}
+
+}  // namespace modar
