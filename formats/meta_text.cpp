@@ -12,9 +12,26 @@ bool decimal_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-bool hexadecimal_digit(char c) {
-  return decimal_digit(c) || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+/// Of "\\u12AB"; -1 where the text does not begin with such an escape.
+int code_unit(std::string_view text) {
+  if (text.size() < 6 || text[0] != '\\' || text[1] != 'u') return -1;
+  int unit = 0;
+  for (std::size_t i = 2; i < 6; ++i) {
+    const char c = text[i];
+    const int digit = decimal_digit(c)       ? c - '0'
+                      : c >= 'a' && c <= 'f' ? c - 'a' + 10
+                      : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                             : -1;
+    if (digit < 0) return -1;
+    unit = 16 * unit + digit;
+  }
+  return unit;
 }
+
+/// Of a number: more than the shortest text of an f64 takes, and an exponent with which no number
+/// of so many digits is beyond an f64.
+constexpr std::size_t kMaxNumberBytes = 40;
+constexpr unsigned kMaxExponent = 250;
 
 /// Reads values one after the other. What returns a bool is false after a fault; the first one
 /// stays.
@@ -110,10 +127,14 @@ class JsonScan {
       at_ += 2;
       return true;
     }
-    bool good = rest.size() >= 6 && rest[1] == 'u';
-    for (std::size_t i = 2; good && i < 6; ++i) good = hexadecimal_digit(rest[i]);
+    // Halves of a pair that stand alone are characters to some readers and errors to others.
+    const int unit = code_unit(rest);
+    const bool first_half = unit >= 0xD800 && unit < 0xDC00;
+    const int next = first_half && rest.size() > 6 ? code_unit(rest.substr(6)) : -1;
+    const bool good = first_half ? next >= 0xDC00 && next < 0xE000
+                                 : unit >= 0 && (unit < 0xDC00 || unit >= 0xE000);
     if (!good) return refuse("an escape of a string is none of JSON's");
-    at_ += 6;
+    at_ += first_half ? 12 : 6;
     return true;
   }
 
@@ -140,11 +161,23 @@ class JsonScan {
     const bool zero = take('0');
     bool good = zero || digits();
     if (good && take('.')) good = digits();
+    bool small = true;
     if (good && (take('e') || take('E'))) {
-      if (!take('+')) take('-');
+      const bool less = !take('+') && take('-');
+      const std::size_t start = at_;
       good = digits();
+      // Readers differ in what they make of numbers beyond an f64: an infinity, or an error.
+      unsigned exponent = 0;
+      for (std::size_t i = start; i < at_ && exponent <= kMaxExponent; ++i) {
+        exponent = 10 * exponent + static_cast<unsigned>(text_[i] - '0');
+      }
+      small = less || exponent <= kMaxExponent;
     }
-    if (good) return true;
+    if (good && small && at_ - first <= kMaxNumberBytes) return true;
+    if (good) {
+      at_ = first;
+      return refuse("a number is too long, or too great for some readers");
+    }
     at_ = first;
     return refuse("a value is none of JSON's");
   }

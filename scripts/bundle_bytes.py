@@ -218,8 +218,15 @@ class Bundle:
             inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
             return 0 if inner is None else 1 + max(map(deep, inner), default=0)
 
+        def number(kind):
+            def read(word):
+                exponent = int(word.lower().partition("e")[2] or 0)
+                return kind(word) if len(word) <= 40 and exponent <= 250 else no_number(word)
+            return read
+
         try:
-            meta = json.loads(text.decode("utf-8"), parse_constant=no_number)
+            meta = json.loads(text.decode("utf-8"), parse_constant=no_number, parse_int=number(int), parse_float=number(float))
+            json.dumps(meta, ensure_ascii=False).encode("utf-8")  # no half of a surrogate pair
             good = isinstance(meta, dict) and not text.startswith(b"\xef\xbb\xbf") and deep(meta) <= 32
         except (ValueError, RecursionError):
             good = False

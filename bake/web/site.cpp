@@ -11,6 +11,7 @@
 #include "bake/json.hpp"
 #include "bake/output.hpp"
 #include "bake/process.hpp"
+#include "bake/web/page_texts.hpp"
 #include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
@@ -82,13 +83,6 @@ std::string address(std::string_view name) {
   return word.empty() ? "bundle" : word;
 }
 
-/// "red_vase" as people write it.
-std::string title_of(std::string_view name) {
-  std::string title(name);
-  std::replace(title.begin(), title.end(), '_', ' ');
-  return title;
-}
-
 Result<void> choose_languages(Draft& draft) {
   std::vector<std::string> known;
   std::error_code error;
@@ -120,50 +114,13 @@ Result<void> read_texts(Draft& draft) {
               R"(write {"cover": {"en": {"name": "The cover", "text": "Printed in 1890."}}})");
 }
 
-/// Of a pattern, what modar.toml has to say of its scenes in these languages; null where that is
-/// nothing.
-Json bundle_texts(const BundleView& bundle, const std::string& pattern,
-                  const std::vector<std::string>& languages) {
-  const auto meta = bundle.section(SectionType::kMeta);
-  const Json scenes = Json::parse({reinterpret_cast<const char*>(meta.data()), meta.size()})
-                          .find("texts")
-                          .value_or(Json());
-  Json texts;
-  for (std::size_t i = 0; i < scenes.size(); ++i) {
-    const Json scene = *scenes.at(i);
-    if (scene.find("pattern").value_or("").text() != pattern) continue;
-    const Json words = scene.find("text").value_or(Json());
-    for (const std::string& language : languages) {
-      const auto text = words.find(language);
-      if (!text || !text->text()) continue;
-      const auto before = texts.find(language + "/text");
-      texts.set(language,
-                {{"name", title_of(pattern)},
-                 {"text", before ? *before->text() + " " + *text->text() : *text->text()}});
-    }
-  }
-  return texts;
-}
-
 /// The pattern's texts in the site's languages, else those of the bundle; null where none are
 /// given.
 Result<Json> texts_of(Draft& draft, const BundleView& bundle, const std::string& pattern) {
   const auto given = draft.texts.find(pattern);
-  if (!given) return bundle_texts(bundle, pattern, draft.languages);
+  if (!given) return bundle_texts(bundle.meta(), pattern, draft.languages);
   ++draft.texts_used;
-  Json texts = Json::object();
-  for (const std::string& language : draft.languages) {
-    const auto name = given->find(language + "/name");
-    if (!given->find(language)) continue;
-    if (!name || !name->text()) {
-      return fail(ExitCode::kInvalidInput, "web.texts",
-                  draft.options.texts + ", " + pattern + ", " + language, "there is no name",
-                  R"(write {"name": "...", "text": "..."})");
-    }
-    const auto text = given->find(language + "/text");
-    texts.set(language, {{"name", *name}, {"text", text ? *text : Json("")}});
-  }
-  return texts;
+  return given_texts(*given, draft.options.texts, pattern, draft.languages);
 }
 
 /// The picture that the tracker looks for, as a hint for visitors.
@@ -276,15 +233,15 @@ Result<Json> release_of(const SiteOptions& options, const std::string& page) {
   }
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(options.trusted_key));
   MODAR_ASSIGN(
-      const PublicKey key,
-      parse_public_key({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
+      const RootSet key,
+      parse_root_set({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
   if (origin_of(options.release).find('@') != std::string::npos) {
     return fail(ExitCode::kUsage, "web.login", "--release",
                 "the address holds a name or a password, which the page would give to everybody",
                 "give the address without it");
   }
   const bool folder = options.release.ends_with('/');
-  return Json{{"url", options.release + (folder ? "" : "/")}, {"key", public_key_line(key)}};
+  return Json{{"url", options.release + (folder ? "" : "/")}, {"key", root_set_line(key)}};
 }
 
 /// index.html, the manifest and, last of all, sw.js.

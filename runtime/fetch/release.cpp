@@ -356,8 +356,12 @@ Result<ReleaseBundle> read_bundle(const rapidjson::Value& json) {
   if (!members.missing().empty()) return bad("bundle", members.missing() + " is missing or wrong");
   if (!is_plain_name(bundle.name)) return bad("bundle", "its name is not a plain file name");
   for (const rapidjson::Value& device : devices->GetArray()) {
-    if (!device.IsString()) return bad("bundle " + bundle.name, "a device is not a string");
-    bundle.devices.emplace_back(device.GetString(), device.GetStringLength());
+    const std::string_view name =
+        device.IsString() ? std::string_view(device.GetString(), device.GetStringLength())
+                          : std::string_view();
+    // Escapes may make text that is no UTF-8, and control characters.
+    if (!is_plain_name(name)) return bad("bundle " + bundle.name, "a device is not a plain name");
+    bundle.devices.emplace_back(name);
   }
   const auto hash_bytes = bundle_hash_of_hex(hash);
   const auto recipe_id = object_id_of_hex(recipe);

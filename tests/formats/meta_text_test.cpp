@@ -38,12 +38,24 @@ TEST(MetaText, WhatIsNoJsonIsRefusedWhereItEnds) {
        {"01", "+1", ".5", "1.", "1e", "NaN", "Infinity", "tru", "-", "'a'", ""}) {
     EXPECT_NE(said(std::string("{\"a\":") + value + "}"), "") << value;
   }
-  for (const char* inner :
-       {"\\x41", "\\u12g4", "\\u12", "\\", "\n", "\xFF", "\xC0\xAF", "\xED\xA0\x80", "\x1B"}) {
+  for (const char* inner : {"\\x41", "\\u12g4", "\\u12", "\\udee9", "\\ud800", "\\ud800\\u0041",
+                            "\\", "\n", "\xFF", "\xC0\xAF", "\xED\xA0\x80", "\x1B"}) {
     EXPECT_NE(said(std::string("{\"a\":\"") + inner + "\"}"), "") << inner;
   }
   EXPECT_NE(said(std::string("{\"a\":\"\0\"}", 9)), "");
   EXPECT_NE(said(std::string("{}\0", 3)), "");
+}
+
+/// An infinity to JavaScript, an error to others.
+TEST(MetaText, NumbersAreThoseOfAnF64) {
+  for (const char* value : {"1e310", "-1e310", "1E+251", "1e0999",
+                            "123456789012345678901234567890123456789012345678901234567890"}) {
+    EXPECT_NE(said(std::string("{\"a\":") + value + "}"), "") << value;
+  }
+  for (const char* value : {"1e250", "-1.7976931348623157e+99", "1e-99", "4.9406564584124654e-324",
+                            "18446744073709551615"}) {
+    EXPECT_EQ(said(std::string("{\"a\":") + value + "}"), "") << value;
+  }
 }
 
 TEST(MetaText, DepthHasABound) {

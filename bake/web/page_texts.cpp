@@ -1,0 +1,49 @@
+#include "bake/web/page_texts.hpp"
+
+#include <algorithm>
+
+namespace modar {
+
+std::string title_of(std::string_view name) {
+  std::string title(name);
+  std::replace(title.begin(), title.end(), '_', ' ');
+  return title;
+}
+
+Json bundle_texts(std::string_view meta, const std::string& pattern,
+                  const std::vector<std::string>& languages) {
+  const Json scenes = Json::parse(meta).find("texts").value_or(Json());
+  Json texts;
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    const Json scene = scenes.at(i).value_or(Json());
+    if (scene.find("pattern").value_or("").text() != pattern) continue;
+    const Json words = scene.find("text").value_or(Json());
+    for (const std::string& language : languages) {
+      const auto text = words.find(language);
+      if (!text || !text->text()) continue;
+      const auto before = texts.find(language + "/text");
+      texts.set(language,
+                {{"name", title_of(pattern)},
+                 {"text", before ? *before->text() + " " + *text->text() : *text->text()}});
+    }
+  }
+  return texts;
+}
+
+Result<Json> given_texts(const Json& given, const std::string& file, const std::string& pattern,
+                         const std::vector<std::string>& languages) {
+  Json texts = Json::object();
+  for (const std::string& language : languages) {
+    const auto name = given.find(language + "/name");
+    if (!given.find(language)) continue;
+    if (!name || !name->text()) {
+      return fail(ExitCode::kInvalidInput, "web.texts", file + ", " + pattern + ", " + language,
+                  "there is no name", R"(write {"name": "...", "text": "..."})");
+    }
+    const auto text = given.find(language + "/text");
+    texts.set(language, {{"name", *name}, {"text", text ? *text : Json("")}});
+  }
+  return texts;
+}
+
+}  // namespace modar

@@ -1,0 +1,27 @@
+// What a page says of a bundle's patterns, from texts that may be anyone's.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bake/json.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// "red_vase" as people write it.
+std::string title_of(std::string_view name);
+
+/// Of a pattern, what a bundle's meta (modar.toml) has to say of its scenes in these languages:
+/// {LANGUAGE: {"name", "text"}}; null where that is nothing.
+Json bundle_texts(std::string_view meta, const std::string& pattern,
+                  const std::vector<std::string>& languages);
+
+/// The same of the file of `modar web --texts`, {PATTERN: {LANGUAGE: {"name", "text"}}}: `given` is
+/// what it has of the pattern. file: for messages. Errors: kInvalidInput "web.texts" where a
+/// language has no name.
+Result<Json> given_texts(const Json& given, const std::string& file, const std::string& pattern,
+                         const std::vector<std::string>& languages);
+
+}  // namespace modar
