@@ -51,6 +51,10 @@ Result<void> write_png(const RgbaImage& image, const std::string& path, double w
 /// The physical width that a PNG file's pHYs states, in mm; 0: none, or no readable PNG file.
 double png_width_mm(const std::string& path);
 
+/// A progressive JPEG file without the alpha. quality: 1 to 100, as libjpeg counts. Errors:
+/// kInternal "image.encode" where the image is empty or has a side above 65500 pixels.
+Result<std::vector<std::byte>> encode_jpeg(const RgbaImage& image, int quality);
+
 /// Levels from the image itself down to 1x1, each side max(1, floor(side / 2)), filtered in linear
 /// light (sRGB-correct), colours weighted by alpha. repeat: the filter reaches across the edges, as
 /// a texture that repeats does.

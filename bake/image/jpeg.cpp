@@ -4,6 +4,7 @@
 #include <array>
 #include <csetjmp>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 
 #include <jerror.h>
@@ -101,6 +102,56 @@ class JpegReader {
   jpeg_decompress_struct info_{};
 };
 
+class JpegWriter {
+ public:
+  explicit JpegWriter(const RgbaImage& image) : image_(image) {
+    info_.err = jpeg_std_error(&errors_.manager);
+    errors_.manager.error_exit = give_up;
+  }
+  ~JpegWriter() {
+    jpeg_destroy_compress(&info_);
+    std::free(buffer_);
+  }
+  JpegWriter(const JpegWriter&) = delete;
+  JpegWriter& operator=(const JpegWriter&) = delete;
+
+  [[nodiscard]] std::string error() const { return errors_.message.data(); }
+  [[nodiscard]] std::vector<std::byte> bytes() const {
+    const auto* first = reinterpret_cast<const std::byte*>(buffer_);
+    return {first, first + size_};
+  }
+
+  bool write(int quality) {
+    if (setjmp(errors_.escape) != 0) return false;
+    jpeg_create_compress(&info_);
+    jpeg_mem_dest(&info_, &buffer_, &size_);
+    info_.image_width = image_.width;
+    info_.image_height = image_.height;
+    info_.input_components = 4;
+    info_.in_color_space = JCS_EXT_RGBX;
+    jpeg_set_defaults(&info_);
+    jpeg_set_quality(&info_, quality, TRUE);
+    info_.optimize_coding = TRUE;
+    jpeg_simple_progression(&info_);
+    jpeg_start_compress(&info_, TRUE);
+    while (info_.next_scanline < info_.image_height) {
+      const std::uint8_t* row =
+          image_.pixels.data() + std::size_t{info_.next_scanline} * image_.width * 4;
+      JSAMPROW rows[] = {const_cast<std::uint8_t*>(row)};  // libjpeg only reads it
+      jpeg_write_scanlines(&info_, rows, 1);
+    }
+    jpeg_finish_compress(&info_);
+    return true;
+  }
+
+ private:
+  const RgbaImage& image_;
+  ErrorManager errors_{};
+  jpeg_compress_struct info_{};
+  unsigned char* buffer_ = nullptr;  // libjpeg's, by malloc()
+  unsigned long size_ = 0;
+};
+
 /// Adobe's programs store the inks inverted, as libjpeg hands them on: 255 is no ink.
 void cmyk_to_rgba(std::vector<std::uint8_t>& pixels) {
   for (std::size_t i = 0; i < pixels.size(); i += 4) {
@@ -127,6 +178,12 @@ Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::str
   if (!reader.read_pixels(stored.image.pixels.data())) return damaged();
   if (reader.is_cmyk()) cmyk_to_rgba(stored.image.pixels);
   return stored;
+}
+
+Result<std::vector<std::byte>> encode_jpeg(const RgbaImage& image, int quality) {
+  JpegWriter writer(image);
+  if (writer.write(quality)) return writer.bytes();
+  return fail(ExitCode::kInternal, "image.encode", "JPEG", writer.error(), "report this as a bug");
 }
 
 }  // namespace modar

@@ -283,6 +283,25 @@ TEST(ImageReader, ExifTellsTheFocalLengthOfWhatIsNotCropped) {
   EXPECT_EQ(focal(640, 400), 0);
 }
 
+TEST(ImageWriter, JpegIsWhatOpenCvReads) {
+  RgbaImage image{64, 48, std::vector<std::uint8_t>(std::size_t{4} * 64 * 48)};
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    const double x = static_cast<double>(i / 4 % 64);
+    image.pixels[i] =
+        i % 4 == 3
+            ? 255
+            : static_cast<std::uint8_t>(127 + 120 * std::sin(x / 20 + static_cast<double>(i % 4)));
+  }
+  const auto file = encode_jpeg(image, 90);
+  ASSERT_TRUE(file) << to_line(file.error());
+  const cv::Mat read = cv::imdecode(
+      cv::Mat(1, static_cast<int>(file->size()), CV_8U, const_cast<std::byte*>(file->data())),
+      cv::IMREAD_COLOR);
+  ASSERT_EQ(read.size(), cv::Size(64, 48));
+  EXPECT_GT(cv::PSNR(read, to_mat(image)), 38);
+  EXPECT_FALSE(encode_jpeg({}, 90)) << "an empty picture";
+}
+
 TEST(ImageReader, JpegWhoseCodedDataIsCutShortIsRefused) {
   // Everything but the end marker is lost after the first half, so the markers alone look whole.
   Bytes jpeg = encoded(to_mat(test::noise(64, 64, 3)), ".jpg");
