@@ -4,9 +4,13 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
+#include "bake/ship/verify_release.hpp"
 #include "bake/terminal.hpp"
+#include "bake/web/http_reader.hpp"
 #include "bake/web/serve.hpp"
 #include "bake/web/site.hpp"
+#include "formats/utf8.hpp"
+#include "modar/mapped_file.hpp"
 
 namespace modar {
 namespace {
@@ -31,7 +35,36 @@ void print_addresses(const WebCommand& command, const std::vector<std::string>& 
       qr_code(urls.front()).c_str());
 }
 
-Result<ExitCode> run_web(const WebCommand& command) {
+/// The newest release at an address as the page sees it: of the folder that is written, or the web.
+Result<Release> release_at(const SiteOptions& options) {
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(options.trusted_key));
+  MODAR_ASSIGN(
+      const RootSet trusted,
+      parse_root_set({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
+  if (!is_web_address(options.release)) {
+    return newest_release(read_release_folder(options.output + "/" + options.release), trusted);
+  }
+  MODAR_ASSIGN(const auto read, web_reader(options.release));
+  return newest_release(read, trusted);
+}
+
+/// Visitors' browsers believe no release before the newest one of today.
+void note_release(WebCommand& command) {
+  if (command.options.release.empty() || command.options.trusted_key.empty()) return;
+  const auto release = release_at(command.options);
+  if (release) {
+    command.options.release_epoch = release->epoch;
+    command.options.release_version = release->version;
+  } else if (!command.quiet) {
+    std::fprintf(stderr,
+                 "warning: no release is read (%s): a first visitor's browser takes any, "
+                 "old ones too, until the page is made again\n",
+                 printable(release.error().cause).c_str());
+  }
+}
+
+Result<ExitCode> run_web(WebCommand& command) {
+  note_release(command);
   MODAR_ASSIGN(const Site site, write_site(command.options));
   if (command.json) {
     const Json json = {{"folder", command.options.output},

@@ -34,8 +34,8 @@ constexpr std::array<std::string_view, 15> kPageFiles = {
     "engine-simd.wasm", "gyroscope.js",  "icon-180.png",    "icon-512.png",      "icon.svg",
     "installed.js",     "modar-view.js", "modar-worker.js", "modar.js",          "style.css"};
 /// Beside them where the page updates itself.
-constexpr std::array<std::string_view, 3> kUpdateFiles = {"engine-update.js", "engine-update.wasm",
-                                                          "update-worker.js"};
+constexpr std::array<std::string_view, 4> kUpdateFiles = {"download.js", "engine-update.js",
+                                                          "engine-update.wasm", "update-worker.js"};
 
 struct Draft {
   const SiteOptions& options;
@@ -260,7 +260,14 @@ Result<Json> release_of(const SiteOptions& options, const std::string& page) {
                 "give the address without it");
   }
   const bool folder = options.release.ends_with('/');
-  return Json{{"url", options.release + (folder ? "" : "/")}, {"key", root_set_line(key)}};
+  // A connection that brings less than 64 bytes a second for so long is given up, as modar-fetch
+  // does.
+  constexpr int kStallSeconds = 30;
+  return Json{{"url", options.release + (folder ? "" : "/")},
+              {"key", root_set_line(key)},
+              {"epoch", options.release_epoch},
+              {"version", options.release_version},
+              {"stall", kStallSeconds}};
 }
 
 /// index.html, the manifest and, last of all, sw.js.

@@ -19,9 +19,12 @@ struct SiteOptions {
   std::string release;  ///< address of a folder of `modar ship publish`, seen from the page; empty:
                         ///< no updates
   std::string trusted_key;  ///< file K.pub that its releases are verified with
-  std::string page;         ///< folder that the preset `web` built; empty: find_page()
-  std::string output;       ///< folder, made if absent; see claim_output_folder()
-  bool force = false;       ///< write into a folder of other files as well
+  /// The newest release when the page is made: visitors' browsers believe none before it. 0: none.
+  std::uint64_t release_epoch = 0;
+  std::uint64_t release_version = 0;
+  std::string page;    ///< folder that the preset `web` built; empty: find_page()
+  std::string output;  ///< folder, made if absent; see claim_output_folder()
+  bool force = false;  ///< write into a folder of other files as well
 };
 
 struct Site {

@@ -94,9 +94,9 @@ function showPlates() {
   $('lead').textContent = say(patterns.length > 1 ? 'leadMany' : 'lead');
 }
 
-/** The site's own bundles, or those of the release that the last visit brought. */
+/** The site's own bundles, or those of a later release that a visit before has brought. */
 async function chooseBundles() {
-  const installed = site.release && await installedBundles(SCOPE).catch(() => undefined);
+  const installed = site.release && await installedBundles(SCOPE, site.release).catch(() => undefined);
   site.own ??= site.bundles;
   site.bundles = installed ?? site.own;
   $('bundle').replaceChildren(...site.bundles.map(({ title }, i) => new Option(title, i)));
@@ -117,8 +117,7 @@ function update() {
     event.preventDefault();
     end({ state: 'failed' });
   };
-  const { url, key } = site.release;
-  worker.postMessage({ scope: SCOPE, url: new URL(url, location).href, key, hashes: site.own.map(({ hash }) => hash) });
+  worker.postMessage({ scope: SCOPE, ...site.release, url: new URL(site.release.url, location).href, hashes: site.own.map(({ hash }) => hash) });
 }
 
 async function prepare() {
@@ -269,7 +268,8 @@ function loadBundle() {
     } catch (error) {
       const newest = loading?.done === done;
       if (newest) loading = null;  // the next start tries again
-      if (!bundle.installed) throw error;
+      const ofBrowser = error.code === 'web.webgl' || error.code?.startsWith('gl.');
+      if (!bundle.installed || ofBrowser) throw error;
       // What was installed has rotted: the site's own bundles stand in.
       await forgetInstalled(SCOPE);
       await chooseBundles();

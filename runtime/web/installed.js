@@ -25,12 +25,23 @@ export async function installedRelease(cache, scope) {
   return release && { slot, release };
 }
 
-/** Bundles of the release in use, as site.json lists its own; undefined where nothing is installed. */
-export async function installedBundles(scope) {
+/** Whether a release document is of a later release than {epoch, version}. */
+export function isNewer(document, { epoch = 0, version = 0 }) {
+  const release = JSON.parse(document);
+  const its = release.epoch ?? 0;
+  return its > epoch || (its === epoch && release.version > version);
+}
+
+/**
+ * Bundles of the release in use, as site.json lists its own; undefined where nothing is installed, or nothing newer than
+ * the release {epoch, version} that came with the page.
+ */
+export async function installedBundles(scope, least = {}) {
   if (!('caches' in globalThis) || !await caches.has(cacheName(scope))) return undefined;
   const cache = await openStore(scope);
   const installed = await installedRelease(cache, scope);
-  const page = installed && await textOf(cache, address(scope, `${installed.slot}/page.json`));
+  if (!installed || !isNewer(installed.release, least)) return undefined;
+  const page = await textOf(cache, address(scope, `${installed.slot}/page.json`));
   return page && JSON.parse(page).bundles;
 }
 

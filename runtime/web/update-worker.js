@@ -1,9 +1,15 @@
 // Brings what the page shows up to date with a release folder of `modar ship`, beside the page's life: all is checked
 // before it is used, and what is in use stays until the new is whole and stored.
 import load from './engine-update.js';
-import { address, cacheName, installedRelease, openStore } from './installed.js';
+import { Brought } from './download.js';
+import { address, cacheName, installedRelease, isNewer, openStore } from './installed.js';
 
 const STORE = '/store';
+/** As modar-fetch reads of them at most. */
+const LATEST_BYTES = 32;
+const RELEASE_BYTES = 8 << 20;
+/** Of pieces that are brought before the installer takes them: they lie in memory twice. */
+const PORTION_BYTES = 16 << 20;
 
 function pathsBelow(FS, folder) {
   return FS.readdir(folder).filter((name) => name !== '.' && name !== '..').flatMap((name) => {
@@ -114,27 +120,52 @@ function writePage(module) {
   FS.writeFile(`${STORE}/${slot}/page.json`, JSON.stringify({ bundles }));
 }
 
-async function text(url) {
-  const response = await fetch(url, { cache: 'no-cache' });
-  if (!response.ok) throw Object.assign(new Error(`${url}: the server answered ${response.status}`), { code: 'fetch.network' });
-  return response.text();
-}
-
-/** Whether the folder's newest release is what the page has: then nothing is to be believed. */
-async function isCurrent(url, cache, scope, site) {
-  const release = await text(`${url}releases/${(await text(`${url}latest`)).trim()}.json`);
+/** Whether the server's newest release is what the page has: then nothing is to be believed. What cannot be read is not. */
+async function isCurrent(files, cache, scope, { epoch, version, hashes }) {
+  const number = (await files.text('latest', LATEST_BYTES))?.trim();
+  if (!/^\d{1,16}$/.test(number ?? '')) return false;
+  const release = await files.text(`releases/${number}.json`, RELEASE_BYTES);
   const installed = await installedRelease(cache, scope);
-  if (installed) return installed.release === release;
-  const wanted = JSON.parse(release).bundles.map(({ hash }) => hash);
-  return wanted.length === site.length && wanted.every((hash) => site.includes(hash));
+  if (!release) return false;
+  if (installed && isNewer(installed.release, { epoch, version })) return installed.release === release;
+  try {
+    const wanted = JSON.parse(release).bundles.map(({ hash }) => hash);
+    return wanted.length === hashes.length && wanted.every((hash) => hashes.includes(hash));
+  } catch {
+    return false;
+  }
 }
 
-async function update({ scope, url, key, hashes }) {
+/** Brings what the installer asks for next, in portions; at least one file. */
+async function bringNext(module, files) {
+  let size = 0;
+  for (let i = 0; i === 0 || size < PORTION_BYTES; ++i) {
+    const named = module._update_need(i);
+    if (named === 0) return;
+    const from = module._update_need_from(i);
+    const limit = module._update_need_limit(i);
+    const path = module.UTF8ToString(named);
+    await files.bring(path, from, limit);
+    size += path.startsWith('objects/') ? limit - from : 0;
+  }
+}
+
+async function run(module, files, { url, key, epoch, version }) {
+  const words = ['string', 'string', 'string', 'number', 'number', 'number'];
+  for (;;) {
+    const done = module.ccall('update_run', 'number', words, [url, key, STORE, Date.now() / 1000, epoch, version]);
+    if (done !== 2) return done;
+    await bringNext(module, files);
+  }
+}
+
+async function update({ scope, ...site }) {
   const cache = await openStore(scope);
-  if (await isCurrent(url, cache, scope, hashes)) return { state: 'current' };
-  const module = await load();
+  const files = new Brought(site.url, site.stall);
+  if (await isCurrent(files, cache, scope, site)) return { state: 'current' };
+  const module = await load({ brought: (path, from) => files.take(path, from) });
   await restore(module.FS, cache, scope);
-  const done = module.ccall('update_run', 'number', ['string', 'string', 'string', 'number'], [url, key, STORE, Date.now() / 1000]);
+  const done = await run(module, files, site);
   const told = (field) => module.UTF8ToString(module._update_error(field));
   if (done > 0) writePage(module);
   // A failed one, too: what it learnt of keys and versions, and the pieces that it brought.

@@ -1,11 +1,10 @@
 // The installer of releases (modar::fetch) for update-worker.js: the store lies in emscripten's
-// files in memory, which the worker brings from the browser's storage and saves there; files of the
-// release come by the worker's own requests.
-#include <algorithm>
+// files in memory, which the worker brings from the browser's storage and saves there. A run ends
+// where a file of the release is missing; the worker brings it and runs again.
 #include <cstdlib>
 #include <memory>
-#include <set>
 #include <string>
+#include <vector>
 
 #include <emscripten.h>
 
@@ -14,26 +13,20 @@
 #include "modar/fetch.hpp"
 #include "modar/mapped_file.hpp"
 
-// A worker may wait for an answer. The answer's bytes are of malloc(); answers the status, 0 for
-// none. Strings stand in double quotes: C++ reads this, too.
+// Files that the worker has brought, by its own requests, which have limits: brought(path, from) of
+// the module answers {status, bytes, whole}, or nothing for one that is yet to come. The bytes are
+// of malloc(); answers the status, 0 where it broke after these bytes, -1 where there is nothing
+// yet. Strings stand in double quotes: C++ reads this, too.
 // clang-format off
-EM_JS(int, update_get, (const char* url, int fresh, double from, void** bytes, size_t* size), {
-  const request = new XMLHttpRequest();
-  try {
-    request.open("GET", UTF8ToString(url) + (fresh ? "?" + Date.now() : ""), false);
-    request.responseType = "arraybuffer";
-    if (from > 0) request.setRequestHeader("Range", "bytes=" + from + "-");
-    request.send();
-  } catch (error) {
-    return 0;
-  }
-  const answer = new Uint8Array(request.response ?? 0);
-  const at = _malloc(answer.length + 1);
+EM_JS(int, update_take, (const char* path, double from, void** bytes, size_t* size), {
+  const file = Module.brought(UTF8ToString(path), from);
+  if (!file) return -1;
+  const at = _malloc(file.bytes.length + 1);
   if (at === 0) return 0;
-  HEAPU8.set(answer, at);
+  HEAPU8.set(file.bytes, at);
   HEAPU32[bytes >> 2] = at;
-  HEAPU32[size >> 2] = answer.length;
-  return request.status;
+  HEAPU32[size >> 2] = file.bytes.length;
+  return file.whole ? file.status : 0;
 });
 // clang-format on
 
@@ -41,6 +34,8 @@ namespace {
 
 using namespace modar;
 
+constexpr int kBroke = 0;
+constexpr int kYetToCome = -1;
 constexpr int kFound = 200;
 constexpr int kPart = 206;
 
@@ -48,37 +43,25 @@ struct Freed {
   void operator()(void* memory) const { std::free(memory); }
 };
 
-/// Paths that this visit has asked for.
-std::set<std::string> asked;
-
-/// What must not come from the browser's cache: documents, which may have been mended since, and
-/// pieces that are asked for again, since the copy that came first was no good.
-bool past_caches(const std::string& path) {
-  return !asked.insert(path).second || !path.starts_with("objects/");
-}
-
-Result<void> bring(const std::string& folder, const std::string& path, std::uint64_t from,
-                   const std::function<bool(std::span<const std::byte>)>& take) {
-  const std::string url = folder + path;
+/// The bytes from `from` on of a file that the worker has brought.
+Result<void> hand_over(const std::string& path, std::uint64_t from,
+                       const std::function<bool(std::span<const std::byte>)>& take) {
   void* bytes = nullptr;
   std::size_t size = 0;
-  const int status =
-      update_get(url.c_str(), past_caches(path) ? 1 : 0, static_cast<double>(from), &bytes, &size);
+  const int status = update_take(path.c_str(), static_cast<double>(from), &bytes, &size);
   const std::unique_ptr<void, Freed> keeper(bytes);
+  if (status == kYetToCome) {
+    return fail(kExitNetwork, "fetch.later", path, "it is yet to come", "bring it and call again");
+  }
   if (status == 404 || status == 410) {
     return fail(kExitMixed, "fetch.missing", path, "the server has no such file",
                 "publish the release again");
   }
-  if (status != kFound && status != kPart) {
-    return fail(kExitNetwork, "fetch.network", path, "the connection failed or broke",
-                "the next visit tries again");
-  }
-  std::span<const std::byte> all(static_cast<const std::byte*>(bytes), size);
-  // A server without ranges begins at the first byte.
-  if (status == kFound)
-    all = all.subspan(static_cast<std::size_t>(std::min<std::uint64_t>(from, size)));
-  take(all);
-  return {};
+  const bool some = status == kFound || status == kPart || status == kBroke;
+  if (some && size > 0) take({static_cast<const std::byte*>(bytes), size});
+  if (status == kFound || status == kPart) return {};
+  return fail(kExitNetwork, "fetch.network", path, "the connection failed, broke or was too slow",
+              "the next visit tries again");
 }
 
 struct Update {
@@ -87,6 +70,7 @@ struct Update {
   BundleView bundle;
   TrackerRecordView picture;
   std::string text;
+  std::vector<FileNeed> needs;
 };
 Update update;
 
@@ -99,27 +83,43 @@ const char* kept(std::string_view text) {
 
 extern "C" {
 
-/// Brings the store in `store` up to date. now: seconds since 1970, of JavaScript's clock. 1:
-/// something new is installed; 0: nothing is; -1: update_error().
-EMSCRIPTEN_KEEPALIVE int update_run(const char* url, const char* key, const char* store,
-                                    double now) {
+/// Brings the store in `store` up to date. now: seconds since 1970, of JavaScript's clock. epoch,
+/// version: of the release that came with the page, 0 for none known. 1: something new is
+/// installed; 0: nothing is; 2: update_need() tells what has to be brought first; -1:
+/// update_error().
+EMSCRIPTEN_KEEPALIVE int update_run(const char* url, const char* key, const char* store, double now,
+                                    double epoch, double version) {
   FetchOptions options;
   options.url = url;
   options.store = store;
   options.trusted_key = key;
   options.now = static_cast<std::int64_t>(now);
-  // The next visit tries again, with the pieces that this one has brought.
+  options.least_epoch = static_cast<std::uint64_t>(epoch);
+  options.least_version = static_cast<std::uint64_t>(version);
+  // The worker counts how often it brings a file.
   options.attempts = 2;
-  options.first_wait_s = 0.1;
-  options.source = [&](const std::string& path, std::uint64_t from, const auto& take) {
-    return bring(options.url, path, from, take);
+  options.first_wait_s = 0;
+  options.source = hand_over;
+  options.needs = [](std::span<const FileNeed> needs) {
+    update.needs.assign(needs.begin(), needs.end());
   };
   auto report = fetch_release(options);
-  if (!report) {
-    update.error = report.error();
-    return -1;
-  }
-  return report->changed ? 1 : 0;
+  if (report) return report->changed ? 1 : 0;
+  if (report.error().code == "fetch.later") return 2;
+  update.error = report.error();
+  return -1;
+}
+
+/// The path of a file to bring; null behind the last.
+EMSCRIPTEN_KEEPALIVE const char* update_need(uint32_t index) {
+  return index < update.needs.size() ? update.needs[index].path.c_str() : nullptr;
+}
+/// Its first byte that is wanted, and how many bytes it has at most.
+EMSCRIPTEN_KEEPALIVE double update_need_from(uint32_t index) {
+  return static_cast<double>(update.needs[index].from);
+}
+EMSCRIPTEN_KEEPALIVE double update_need_limit(uint32_t index) {
+  return static_cast<double>(update.needs[index].limit);
 }
 
 /// field: 0 code, 1 where, 2 cause, 3 cure.

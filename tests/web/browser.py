@@ -136,6 +136,8 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *_):
         pass
 
+
+class Counted(Quiet):
     def log_request(self, code="-", size="-"):
         self.server.answered.append((self.path, int(code)))
 
@@ -144,7 +146,7 @@ class Server:
     """self.http.answered: (path, status) of each request."""
 
     def __init__(self, folder):
-        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder)))
+        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Counted, directory=str(folder)))
         self.http.answered = []
         self.url = f"http://localhost:{self.http.server_port}/"
         threading.Thread(target=self.http.serve_forever, daemon=True).start()
