@@ -54,7 +54,7 @@ Result<std::vector<DrawItem>> items_in(const BundleView& bundle, const ColourFra
     const SceneRecord& scene = bundle.scenes()[s];
     for (const Detection& detection : seen.visible) {
       if (detection.pattern != scene.pattern) continue;
-      const glm::mat4 world = gl_view(detection.pose);
+      const glm::mat4 world = gl_view(detection.pose, detection.stretch);
       items.push_back({scene.model, world * scene_matrix(scene), s, world});
     }
   }

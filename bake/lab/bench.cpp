@@ -61,7 +61,7 @@ BenchResult bench_load(const BenchOptions& command) {
       opened = opened && file && BundleView::open(file->bytes());
     });
     if (!opened) {
-      return fail(ExitCode::kInvalidInput, "bench.bundle", path, "this is no good bundle",
+      return fail(ExitCode::kInvalidInput, "bench.bundle", path, "this is not a valid bundle",
                   "see what `modar check` says of it");
     }
     const double copy_ms = median_ms(
@@ -192,9 +192,9 @@ BenchResult bench_wild_rows(const BenchOptions& command) {
 
 const std::vector<Bench>& benches() {
   static const std::vector<Bench> all = {
-      {"load", true, "BUNDLE...", "open a bundle (ours) against copying its bytes (reference)",
+      {"load", true, "BUNDLE...", "opening a bundle (ours), next to copying its bytes (reference)",
        bench_load},
-      {"etc1", true, "IMAGE... [--crop SIDE]", "our ETC1 encoder against Android's libetc1",
+      {"etc1", true, "IMAGE... [--crop SIDE]", "the ETC1 encoder, next to Android's libetc1",
        bench_etc1_rows},
       {"ship", true, "BUNDLE|MODEL...",
        "bytes and decoding of what travels, against Draco, meshopt and zstd; models are baked with "
@@ -214,10 +214,10 @@ const std::vector<Bench>& benches() {
        "reading and baking a large OBJ (made from the scan), against tinyobjloader, assimp, "
        "gltfpack, Draco and the goals",
        [](const BenchOptions& command) { return bench_model_rows(command.inputs, command.model); }},
-      {"lod", true, "MODEL...", "levels of detail against meshopt_simplify on the whole mesh",
+      {"lod", true, "MODEL...", "levels of detail, next to meshopt_simplify on the whole mesh",
        [](const BenchOptions& command) { return bench_lod(command.inputs, command.model.jobs); }},
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
-       "our pose loop against the ModAR paper's method, on the same frames",
+       "the pose loop next to the ModAR paper's method, on the same frames",
        [](const BenchOptions& command) { return bench_pose_rows(command.pose); }},
       {"extended", false, "--patterns DIR --backgrounds DIR | --video FILE",
        "the pose of a pattern out of sight, in rendered rooms, or blanked in a video, against the "

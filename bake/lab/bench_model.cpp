@@ -239,7 +239,7 @@ Result<std::vector<BenchRow>> bench_model_rows(const std::vector<std::string>& s
   ModelBench bench(folder.path(), command);
   if (folder.path().empty() || !bench.has_probe()) {
     return fail(ExitCode::kUnsupported, "bench.probe", "modar-model-probe",
-                "it is not installed with modar, or there is no room for temporary files",
+                "it is not installed with modar, or there is no space for temporary files",
                 "run modar from the folder of a build: cmake --build --preset release");
   }
   if (auto ready = bench.prepare(scans); !ready) return tl::unexpected(ready.error());

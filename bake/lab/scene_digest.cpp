@@ -125,7 +125,7 @@ tl::unexpected<Error> trouble(const std::string& reader, const std::string& caus
 Result<std::vector<std::string>> read_scenes(const std::string& reader,
                                              const std::vector<std::span<const std::byte>>& files) {
   const TemporaryFolder folder;
-  if (folder.path().empty()) return trouble(reader, "there is no room for temporary files");
+  if (folder.path().empty()) return trouble(reader, "there is no space for temporary files");
   ProcessRequest request;
   request.words = {"python3", reader, "--scenes"};
   for (std::size_t i = 0; i < files.size(); ++i) {

@@ -32,11 +32,13 @@ double percentile(std::vector<double> values, double share) {
 }
 
 /// The outline by pose and camera.
-Corners outline(const GrayImage& picture, const Camera& camera, const Pose& pose) {
+Corners outline(const GrayImage& picture, const Camera& camera, const Pose& pose,
+                const glm::dmat4x3& stretch = glm::dmat4x3(1.0)) {
   Corners corners;
   const auto flat = pattern_corners(picture.width, picture.height);
   for (std::size_t i = 0; i < 4; ++i) {
-    corners[i] = project(camera, pose.rotation * glm::dvec3(flat[i], 0.0) + pose.translation);
+    const glm::dvec3 drawn = stretch * glm::dvec4(flat[i], 0.0, 1.0);
+    corners[i] = project(camera, pose.rotation * drawn + pose.translation);
   }
   return corners;
 }
@@ -47,8 +49,9 @@ struct WildTally {
   int judged = 0;
   int near = 0;  ///< within kNear
   int far = 0;
-  std::vector<double> errors{};       ///< of the frames in which it is shown
-  std::vector<double> pose_errors{};  ///< the same, of the pose
+  std::vector<double> errors{};        ///< of the frames in which it is shown
+  std::vector<double> pose_errors{};   ///< the same, of the pose
+  std::vector<double> drawn_errors{};  ///< and of the pose and its stretch
   std::map<std::string, int> hidden{};
   double frames = 0;  ///< all, judged or not: ours alone
   double shown = 0;   ///< of these
@@ -200,6 +203,8 @@ Result<Played> play(const WildClip& clip, const GrayPicture& picture, const std:
       camera.fx = camera.fy = seen.camera.focal;
       by_pose.corners = outline(picture.view(), camera, by_pose.pose);
       out.tallies[0].pose_errors.push_back(scale * corner_error(by_pose, {true, truth->second}));
+      by_pose.corners = outline(picture.view(), camera, by_pose.pose, by_pose.stretch);
+      out.tallies[0].drawn_errors.push_back(scale * corner_error(by_pose, {true, truth->second}));
     }
     for (std::size_t k = 0; k < peers.steps.size(); ++k) {
       MODAR_ASSIGN(const auto theirs, peers.steps[k](*frame));
@@ -260,6 +265,8 @@ void add_rows_of(const Played& played, std::vector<BenchRow>& rows) {
   };
   alone("pose_px", percentile(ours.pose_errors, 0.5));
   alone("pose_p95_px", percentile(ours.pose_errors, 0.95));
+  alone("drawn_px", percentile(ours.drawn_errors, 0.5));
+  alone("drawn_p95_px", percentile(ours.drawn_errors, 0.95));
   const auto with_extended = [&](const std::string& what, auto&& figure) {
     const double with = figure(played.extended);
     const double without = figure(ours);

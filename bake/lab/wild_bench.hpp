@@ -26,7 +26,8 @@ struct WildBenchOptions {
 /// - shown_pct: of frames with a truth; shown_frames: of all (the reference);
 /// - error_px, p95_px: mean distance of the corners from the truth, median and 95th percentile,
 ///   pixels of a frame whose longer side has 640; pose_px, pose_p95_px: of the outline that the
-///   pose and the estimated camera draw;
+///   pose and the estimated camera draw; drawn_px, drawn_p95_px: with Detection::stretch, as models
+///   are drawn;
 /// - extended shown_pct, p95_px: with PoseLoopOptions::extended; the reference is without it;
 /// - hidden REASON: frames with a truth in which nothing is shown;
 /// - P@5, P@15 of published clips: share of the judged frames whose corners' root of the mean

@@ -93,7 +93,7 @@ Corners corners_of(const std::vector<double>& values, std::size_t first) {
 
 Error misfit(const std::string& path, std::size_t line, const char* cause) {
   return {ExitCode::kInvalidInput, kCode, path + ":" + std::to_string(line), cause,
-          "write them as `modar bench` and README say"};
+          "write them as bake/lab/README.md describes"};
 }
 
 Result<void> read_ours(const std::string& path, WildClip& clip) {
@@ -101,7 +101,7 @@ Result<void> read_ours(const std::string& path, WildClip& clip) {
   for (const auto& [number, values] : lines) {
     if (values.size() != 9 || !(values[0] >= 0)) {
       return tl::unexpected(
-          misfit(path, number, "this is no frame's number and eight coordinates"));
+          misfit(path, number, "this is not a frame number and eight coordinates"));
     }
     clip.truth[static_cast<std::uint64_t>(values[0])] = corners_of(values, 1);
   }

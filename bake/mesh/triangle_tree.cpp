@@ -29,24 +29,25 @@ double along_segment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3&
   return length > 0 ? std::clamp(glm::dot(p - a, ab) / length, 0.0, 1.0) : 0.0;
 }
 
-Foot foot_of_flat(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
+ClosestPoint closest_of_degenerate(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
   const double ab = along_segment(p, t[0], t[1]);
   const double ac = along_segment(p, t[0], t[2]);
   const double bc = along_segment(p, t[1], t[2]);
-  return std::min({Foot{square(p - glm::mix(t[0], t[1], ab)), ab, 0.0},
-                   Foot{square(p - glm::mix(t[0], t[2], ac)), 0.0, ac},
-                   Foot{square(p - glm::mix(t[1], t[2], bc)), 1.0 - bc, bc}},
-                  [](const Foot& x, const Foot& y) { return x.square < y.square; });
+  return std::min({ClosestPoint{square(p - glm::mix(t[0], t[1], ab)), ab, 0.0},
+                   ClosestPoint{square(p - glm::mix(t[0], t[2], ac)), 0.0, ac},
+                   ClosestPoint{square(p - glm::mix(t[1], t[2], bc)), 1.0 - bc, bc}},
+                  [](const ClosestPoint& x, const ClosestPoint& y) { return x.square < y.square; });
 }
 
 /// Where the distance is not below `best`, the distance from the plane may do.
-inline Foot foot_of(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
+inline ClosestPoint closest_of(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t,
+                               double best) {
   const glm::dvec3 ab = t[1] - t[0];
   const glm::dvec3 ac = t[2] - t[0];
   const glm::dvec3 n = glm::cross(ab, ac);
   const double area = square(n);
   const glm::dvec3 ap = p - t[0];
-  if (!(area > kFlat * square(ab) * square(ac))) return foot_of_flat(p, t);
+  if (!(area > kFlat * square(ab) * square(ac))) return closest_of_degenerate(p, t);
   const double height = glm::dot(ap, n);
   const double plane = height * height / area;
   if (plane >= best) return {plane, 0, 0};
@@ -84,11 +85,11 @@ inline Foot foot_of(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, dou
 }  // namespace
 
 double distance_square(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t, double best) {
-  return foot_of(p, t, best).square;
+  return closest_of(p, t, best).square;
 }
 
-Foot nearest_foot(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
-  return foot_of(p, t, std::numeric_limits<double>::infinity());
+ClosestPoint closest_point(const glm::dvec3& p, const std::array<glm::dvec3, 3>& t) {
+  return closest_of(p, t, std::numeric_limits<double>::infinity());
 }
 
 TriangleTree::TriangleTree(std::span<const glm::dvec3> positions, std::vector<Triangle> triangles)

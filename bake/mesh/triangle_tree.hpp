@@ -21,12 +21,12 @@ double distance_square(const glm::dvec3& point, const std::array<glm::dvec3, 3>&
 
 /// The point of a triangle that is nearest to another: corner 0 + b (corner 1 - corner 0) + c
 /// (corner 2 - corner 0).
-struct Foot {
+struct ClosestPoint {
   double square = 0;  ///< of the distance
   double b = 0;
   double c = 0;
 };
-Foot nearest_foot(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle);
+ClosestPoint closest_point(const glm::dvec3& point, const std::array<glm::dvec3, 3>& triangle);
 
 /// A bounding volume tree, split at the medians of the triangles' centres.
 class TriangleTree {

@@ -152,7 +152,8 @@ constexpr std::size_t kView = 24;
 void* direct(JNIEnv* env, jobject buffer, std::size_t size, const char* what) {
   void* const address = buffer == nullptr ? nullptr : env->GetDirectBufferAddress(buffer);
   if (address == nullptr) {
-    misuse(env, "android.buffer", what, "it is no direct buffer", "use ByteBuffer.allocateDirect");
+    misuse(env, "android.buffer", what, "it is not a direct buffer",
+           "use ByteBuffer.allocateDirect");
     return nullptr;
   }
   const jlong capacity = env->GetDirectBufferCapacity(buffer);
@@ -287,9 +288,16 @@ void place_items(Session& session, const float* poses) {
   for (const modar_scene& each : session.scenes) {
     const float* from = poses + each.pattern * kPoseFloats;
     if (from[1] == 0) continue;
+    // Of the view, which has the stretch in it.
     modar_pose pose{};
-    std::memcpy(pose.rotation, from + 4, sizeof pose.rotation);
-    std::memcpy(pose.translation, from + 13, sizeof pose.translation);
+    for (int row = 0; row < 3; ++row) {
+      const float* view = from + kView + row;
+      const float sign = row == 0 ? 1.0f : -1.0f;  // GL's camera has y up and z backward
+      for (int column = 0; column < 3; ++column) {
+        pose.rotation[3 * row + column] = sign * view[4 * column];
+      }
+      pose.translation[row] = sign * view[12];
+    }
     modar_scene scene = each;
     if (moved) apply(gesture, scene.place);
     session.items.emplace_back();
@@ -318,7 +326,7 @@ bool chroma_planes(JNIEnv* env, modar_picture& picture, jobject u_buffer, jobjec
   const int width = picture.width / 2;
   const int height = picture.height / 2;
   if ((pixel_stride != 1 && pixel_stride != 2) || stride < width * pixel_stride) {
-    misuse(env, "android.planes", "chroma", "these strides belong to no YUV_420_888",
+    misuse(env, "android.planes", "chroma", "these strides are invalid for YUV_420_888",
            "pass those of the Image's planes");
     return false;
   }
@@ -336,8 +344,8 @@ bool chroma_planes(JNIEnv* env, modar_picture& picture, jobject u_buffer, jobjec
     picture.format = v + 1 == u ? MODAR_NV21 : MODAR_NV12;
     picture.planes[1] = v + 1 == u ? v : u;
   } else {
-    throw_error(env, 5, "android.planes", "chroma", "samples of U and V lie apart with gaps",
-                "ask the camera for NV21");
+    throw_error(env, 5, "android.planes", "chroma",
+                "samples of U and V are neither planar nor interleaved", "ask the camera for NV21");
     return false;
   }
   return true;

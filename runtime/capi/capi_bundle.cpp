@@ -1,5 +1,7 @@
 // modar.h: bundles with their names and scenes; the camera, and from a pose to GL's matrices.
 // Nothing of the tracker and nothing of the renderer: what both halves share.
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <new>
 #include <utility>
@@ -116,6 +118,21 @@ size_t modar_model_name(const modar_bundle* bundle, uint32_t index, char* text, 
 size_t modar_pattern_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
   if (index >= bundle->view.patterns().size()) return 0;
   return copy_name(bundle->view.name(bundle->view.patterns()[index].name), text, size);
+}
+
+int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3], float high[3]) {
+  if (index >= bundle->view.models().size()) return 0;
+  const modar::ModelRecord& model = bundle->view.models()[index];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = std::numeric_limits<float>::max();
+    high[axis] = std::numeric_limits<float>::lowest();
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const modar::ChunkRecord& chunk = bundle->view.chunks()[model.first_chunk + c];
+      low[axis] = std::min(low[axis], chunk.bounds_min[axis]);
+      high[axis] = std::max(high[axis], chunk.bounds_max[axis]);
+    }
+  }
+  return 1;
 }
 
 double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index) {

@@ -1,4 +1,6 @@
 // modar.h: our pose loop, the two-frame rule, and poses as GL's matrices.
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <vector>
 
@@ -19,12 +21,15 @@ struct modar_tracker {
 
 namespace {
 
-void set_pose(const modar::Pose& from, modar_pose& to) {
+void set_pose(const modar::Pose& from, const glm::dmat4x3& stretch, modar_pose& to) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       to.rotation[3 * row + column] = static_cast<float>(from.rotation[column][row]);
     }
     to.translation[row] = static_cast<float>(from.translation[row]);
+    for (int column = 0; column < 4; ++column) {
+      to.stretch[4 * row + column] = static_cast<float>(stretch[column][row]);
+    }
   }
 }
 
@@ -88,6 +93,31 @@ int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t strid
   return modar_tracker_step_at(tracker, gray, stride, tracker->time_s + 1.0 / 30.0, error);
 }
 
+void modar_shrink(const uint8_t* gray, size_t stride, int width, int height, int factor,
+                  uint8_t* out) {
+  if (gray == nullptr || out == nullptr || factor < 1 || factor > 256) return;
+  const auto side = static_cast<std::size_t>(factor);
+  const auto columns = static_cast<std::size_t>(std::max(width, 0)) / side;
+  const auto rows = static_cast<std::size_t>(std::max(height, 0)) / side;
+  // Of `factor` pixels one above the other, at most 256 * 255.
+  std::vector<std::uint16_t> sums(columns * side);
+  const std::uint32_t area = static_cast<std::uint32_t>(side * side);
+  for (std::size_t y = 0; y < rows; ++y) {
+    std::fill(sums.begin(), sums.end(), std::uint16_t{0});
+    for (std::size_t k = 0; k < side; ++k) {
+      const std::uint8_t* const row = gray + (y * side + k) * stride;
+      for (std::size_t x = 0; x < sums.size(); ++x) {
+        sums[x] = static_cast<std::uint16_t>(sums[x] + row[x]);
+      }
+    }
+    for (std::size_t x = 0; x < columns; ++x) {
+      std::uint32_t sum = area / 2;
+      for (std::size_t k = 0; k < side; ++k) sum += sums[x * side + k];
+      out[y * columns + x] = static_cast<std::uint8_t>(sum / area);
+    }
+  }
+}
+
 int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
                           modar_error* error) {
   if (gray == nullptr) return modar::hand_over(modar::missing("gray"), error);
@@ -109,11 +139,11 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
     pose.extended = 0;
     pose.position_sigma = 0;
     pose.rotation_sigma = 0;
-    if (states[i].shown) set_pose(states[i].pose, pose);
+    if (states[i].shown) set_pose(states[i].pose, states[i].stretch, pose);
   }
   for (const modar::Detection& seen : tracker->result.visible) {
     modar_pose& pose = tracker->poses[seen.pattern];
-    set_pose(seen.pose, pose);
+    set_pose(seen.pose, seen.stretch, pose);
     pose.visible = 1;
     pose.inliers = seen.inliers;
     pose.fit =
@@ -159,13 +189,19 @@ const char* modar_tracker_reason(const modar_tracker* tracker) {
 
 void modar_view(const modar_pose* pose, float view[16]) {
   modar::Pose ours;
+  glm::dmat4x3 stretch(1.0);
+  const bool none = std::all_of(std::begin(pose->stretch), std::end(pose->stretch),
+                                [](float value) { return value == 0.0f; });
   for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4 && !none; ++column) {
+      stretch[column][row] = static_cast<double>(pose->stretch[4 * row + column]);
+    }
     for (int column = 0; column < 3; ++column) {
       ours.rotation[column][row] = static_cast<double>(pose->rotation[3 * row + column]);
     }
     ours.translation[row] = static_cast<double>(pose->translation[row]);
   }
-  modar::copy_matrix(modar::gl_view(ours), view);
+  modar::copy_matrix(modar::gl_view(ours, stretch), view);
 }
 
 void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose) {

@@ -133,7 +133,8 @@ Result<Camera> read(const cv::FileStorage& file, const std::string& path) {
                               "dist_coeffs", "D"}));
   for (std::size_t i = 0; i < distortion.total(); ++i) {
     const double value = distortion.at<double>(static_cast<int>(i));
-    if (!std::isfinite(value)) return bad("camera.distortion", path, "a coefficient is no number");
+    if (!std::isfinite(value))
+      return bad("camera.distortion", path, "a coefficient is not a number");
     if (i < camera.distortion.size()) {
       camera.distortion[i] = value;
     } else if (value != 0) {

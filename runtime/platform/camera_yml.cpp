@@ -117,7 +117,7 @@ Result<Camera> read_camera_yml(const std::string& path) {
   if (const auto coefficients = after_key(text, "distortion_coefficients")) {
     std::array<double, 14> values{};
     const int count = take_list(*coefficients, values);
-    if (count < 0) return bad("camera.distortion", path, "a coefficient is no number");
+    if (count < 0) return bad("camera.distortion", path, "a coefficient is not a number");
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (i < camera.distortion.size()) {
         camera.distortion[i] = values[i];
@@ -157,7 +157,7 @@ Result<void> validate(const Camera& camera) {
     return refuse("camera.matrix", "its focal length is not positive, or a number is not finite");
   }
   for (const double each : camera.distortion) sum += each;
-  if (!std::isfinite(sum)) return refuse("camera.distortion", "a coefficient is no number");
+  if (!std::isfinite(sum)) return refuse("camera.distortion", "a coefficient is not a number");
   return {};
 }
 

@@ -102,7 +102,7 @@ Result<std::unique_ptr<GlContext>> GlContext::create_offscreen() {
     if (handles->start()) return std::unique_ptr<GlContext>(new GlContext(std::move(handles)));
   }
   return no_context(found_display ? "no OpenGL ES 2.0 context with 8-bit colours could be made"
-                                  : "no display could be opened, and none that needs no screen");
+                                  : "neither a display nor an off-screen context could be opened");
 }
 
 GlContext::GlContext(std::unique_ptr<Handles> handles) : handles_(std::move(handles)) {}
@@ -181,7 +181,7 @@ GlCaps probe_gl_caps() {
 Result<GlCaps> mask_gl_caps(const GlCaps& caps, const std::string& device) {
   const DeviceProfile* profile = find_device_profile(device);
   if (profile == nullptr) {
-    return fail(ExitCode::kUsage, "device.unknown", device, "there is no device of this name",
+    return fail(ExitCode::kUsage, "device.unknown", device, "unknown device",
                 "name one of " + device_profile_names());
   }
   GlCaps masked = caps;

@@ -90,7 +90,7 @@ void Controls::collect(std::span<const Hysteresis::State> states,
     const SceneRecord& scene = bundle_.scenes()[i];
     const Hysteresis::State& state = states[scene.pattern];
     if (!wants(scene.pattern) || !state.shown) continue;
-    const glm::mat4 view = gl_view(state.pose);
+    const glm::mat4 view = gl_view(state.pose, state.stretch);
     const glm::mat4 place = view * scene_matrix(scene);
     items.push_back({scene.model, glm::scale(place, glm::vec3(scale_)), i, view});
   }
@@ -112,7 +112,7 @@ void Controls::add_standard(const Hysteresis::State& state, std::uint32_t model,
   SceneRecord standard{};
   standard.scale = 1;
   standard.rotation[3] = 1;
-  const glm::mat4 view = gl_view(state.pose);
+  const glm::mat4 view = gl_view(state.pose, state.stretch);
   const glm::mat4 place = view * scene_matrix(standard);
   items.push_back({model, glm::scale(place, glm::vec3(scale_)), kNone, view});
 }

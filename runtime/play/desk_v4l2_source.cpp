@@ -124,7 +124,7 @@ class CameraSource final : public FrameSource {
                                   : capability.capabilities;
     constexpr std::uint32_t kNeeded = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
     if (error == 0 && (all & kNeeded) == kNeeded) return {};
-    return fail(ExitCode::kUnsupported, "camera.device", name_, "that is no camera that streams",
+    return fail(ExitCode::kUnsupported, "camera.device", name_, "it is not a streaming camera",
                 "try the next one: camera:1");
   }
 
@@ -257,7 +257,7 @@ Result<int> camera_number(const std::string& input) {
   const char* end = input.data() + input.size();
   const auto [last, error] = std::from_chars(first, end, number);
   if (error == std::errc() && last == end && number >= 0) return number;
-  return fail(ExitCode::kUsage, "input.camera", input, "that is no camera",
+  return fail(ExitCode::kUsage, "input.camera", input, "it is not a camera",
               "say camera, or camera:1 for the second one");
 }
 

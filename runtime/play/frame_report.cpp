@@ -112,6 +112,14 @@ void detection(Writer& writer, const Detection& seen, std::span<const std::strin
   writer.StartArray();
   for (int i = 0; i < 3; ++i) number(writer, seen.pose.translation[i]);
   writer.EndArray();
+  if (seen.stretch != glm::dmat4x3(1.0)) {
+    writer.Key("stretch");
+    writer.StartArray();
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 4; ++column) number(writer, seen.stretch[column][row]);
+    }
+    writer.EndArray();
+  }
   writer.Key("inliers");
   writer.Int(seen.inliers);
   writer.Key("matches");

@@ -100,7 +100,7 @@ Result<void> make_folder(const std::string& path) {
   }
   struct stat status {};
   if (stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode)) return {};
-  return fail(ExitCode::kIo, "out.create", path, "it is there and is no folder",
+  return fail(ExitCode::kIo, "out.create", path, "it exists and is not a folder",
               "choose another place");
 }
 

@@ -147,9 +147,9 @@ int start(int argc, char** argv) {
   const Result<PlayOptions> options =
       parse_options({argv + 1, argc > 0 ? static_cast<std::size_t>(argc - 1) : 0});
   if (!options) return report(options.error());
-  if (options->help || options->version) {
+  if (options->help || options->help_all || options->version) {
     const std::string text =
-        options->help ? std::string(help_text()) : "modar-play " MODAR_VERSION "\n";
+        options->version ? "modar-play " MODAR_VERSION "\n" : help_text(options->help_all);
     const Result<void> printed = print_line(text.substr(0, text.size() - 1));
     return printed ? 0 : report(printed.error());
   }

@@ -74,7 +74,7 @@ struct SwitchOption {
   const char* name;
   bool PlayOptions::*on;
 };
-constexpr std::array<SwitchOption, 14> kSwitches = {
+constexpr std::array<SwitchOption, 15> kSwitches = {
     {{"json", &PlayOptions::json},
      {"extended", &PlayOptions::extended},
      {"homography", &PlayOptions::homography},
@@ -88,6 +88,7 @@ constexpr std::array<SwitchOption, 14> kSwitches = {
      {"quiet", &PlayOptions::quiet},
      {"verify", &PlayOptions::verify},
      {"help", &PlayOptions::help},
+     {"help-all", &PlayOptions::help_all},
      {"version", &PlayOptions::version}}};
 
 /// All options, in the order of the three tables.
@@ -112,8 +113,8 @@ bool take(PlayOptions& options, std::size_t index, std::string_view value) {
 }
 
 Result<void> validate(const PlayOptions& options) {
-  if (options.help || options.version) return {};
-  if (options.bundle.empty()) return usage("usage.bundle", "", "no bundle is named");
+  if (options.help || options.help_all || options.version) return {};
+  if (options.bundle.empty()) return usage("usage.bundle", "", "no bundle is given");
   if (options.input.empty() && options.golden.empty() && options.turntable == 0) {
     return usage("usage.input", "", "none of --input, --golden and --turntable is given");
   }
@@ -137,7 +138,7 @@ Result<void> validate(const PlayOptions& options) {
   }
   if (!options.method.empty() && options.method != "ours" && options.method != "paper") {
     return usage("usage.method", "--method",
-                 "'" + options.method + "' is no method; there are 'ours' and 'paper'");
+                 "'" + options.method + "' is not a method; use 'ours' or 'paper'");
   }
   if (options.method == "ours" && !options.parameters.empty()) {
     return usage("usage.conflict", "--parameters", "the sets are those of --method paper");
@@ -167,7 +168,7 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
                                   }));
   for (const std::string& argument : rest) {
     if (!options.bundle.empty()) {
-      return usage("usage.argument", "", "'" + argument + "' is one argument too many");
+      return usage("usage.argument", "", "'" + argument + "' is an unexpected argument");
     }
     options.bundle = argument;
   }
@@ -175,61 +176,76 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
   return options;
 }
 
-const char* help_text() {
-  return R"(modar-play: plays a bundle over a video, pictures or a camera
+std::string help_text(bool all) {
+  // The usual options, then the others, then what follows either.
+  constexpr const char* kUsual = R"(modar-play: plays a bundle over a video, pictures or a camera
 
 Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
        modar-play BUNDLE --turntable N --out FOLDER|FILE.mp4
 
-  --input INPUT       frames: a video, a picture, a folder of pictures (by name), a camera,
-                      - or FILE.y4m (Y4M from a pipe or file), nv21:640x480@30:FILE (raw frames,
-                      - for a pipe; i420, nv12, yuyv, grey alike)
-  --out OUT           pictures into FILE.mp4, or as frame_000000.png ... into a folder
-  --report FOLDER     overlay.mp4, contact_sheet.png, frames.jsonl and an index.html of them
-  --force             writes into a folder of --out or --report that holds other files
-  --window            shows the pictures in a window; its keys: Q or Escape ends, space pauses,
-                      M or arrows change the model, P the pattern, + and - its size, O the outline,
-                      D the display; F holds the picture, and four clicks on the corners of
+Input and output:
+  --input INPUT       a video, a picture, a folder of pictures (sorted by name), a camera, Y4M
+                      (- or FILE.y4m) or raw frames (nv21:640x480@30:FILE, with - for a pipe;
+                      also i420, nv12, yuyv, grey)
+  --out OUT           write pictures to FILE.mp4, or to a folder as frame_000000.png ...
+  --report FOLDER     write overlay.mp4, contact_sheet.png, frames.jsonl and index.html
+  --window            show a window; its keys: Q or Escape quits, space pauses, M or the arrows
+                      switch the model, P the pattern, + and - its size, O the outline, D the
+                      display; F freezes the picture, and four clicks on the corners of
                       something flat make it the pattern
-  --live              goes on with the new bundle when its file is replaced (see modar bake --watch)
-  --extended          learns what stands still around a pattern, and goes on from it while the
-                      pattern is hidden or out of the frame
-  --gyro FILE         of --extended: how the camera turned, a line a frame of three numbers, the
-                      rotation vector from the frame before in radians (x right, y down, z forward)
-  --outline           draws the outline of each pattern that is seen; amber where it is extended
-  --no-light-estimate models keep their light, whatever the camera shows of the patterns
-  --osd               paints state, reason and inliers on the pictures
-  --json              one JSON line a frame and a summary, to standard output
-  --homography        in these lines, the map of each pattern's unit square to the frame: all that
-                      a camera of unknown focal length tells
-  --camera FILE.yml   camera matrix and distortion as OpenCV writes them
-                      (default: the focal length starts at the frame's longer side and is
-                      estimated from what is seen, as --json reports; see also modar calibrate)
-  --method METHOD     how patterns are found: ours (default where the bundle has records for it),
-                      or paper, the ModAR paper's
-  --parameters SET    of --method paper, which it implies: orb-2000 (default), orb-500, brisk-3 or
-                      brisk-2, as baked
-  --device NAME       acts as this device: masks what its OpenGL ES lacks
-  --realtime          plays a file at its own speed and drops frames that come too early
-  --smooth MS         takes the trembling out of resting models, which may then lag by so much
-                      (default 0: off; see ms.smoothing of each frame in the JSON)
-  --gpu-budget SIZE   keeps at most so much in GL, nearest and visible first (64M, 1G)
-  --record FOLDER     keeps frames and poses
-  --golden FOLDER     replays a recording and compares: exit code 10 where it differs
-  --tolerance PX      of --golden: greatest mean distance of four corners (default 0.5)
-  --qos FILE          a log for field trials: times, found and lost, reasons, memory by kind
-  --turntable N       N pictures of each model turning, without any pattern
-  --size WxH          of the turntable's pictures (default 640x480)
-  --verify            checks every byte of the bundle first, not its tables alone
-  --quiet             no progress, no summary
-  --help, --version
+  --json              print one JSON line per frame and a summary to standard output
+
+Tracking:
+  --camera FILE.yml   camera matrix and distortion in OpenCV's format (default: the focal length
+                      starts at the frame's longer side and is estimated, as --json reports; see
+                      also modar calibrate)
+  --extended          learn the static surroundings of a pattern, and go on while the pattern is
+                      covered or out of view
+  --smooth MS         steady models at rest, which may lag by this much (default: 0, off)
+  --outline           draw the outline of each visible pattern (amber while it is extended)
+)";
+  constexpr const char* kMore =
+      R"(  --gyro FILE         with --extended: rotations of the camera, one line per frame with the rotation
+                      vector since the frame before, in radians (x right, y down, z forward)
+  --homography        add to the JSON lines the map from each pattern's unit square to the frame,
+                      for cameras of unknown focal length
+  --method METHOD     ours (default if the bundle has records for it) or paper, the ModAR paper's
+  --parameters SET    for --method paper, which it implies: orb-2000 (default), orb-500, brisk-3
+                      or brisk-2, as baked
+
+Display:
+  --no-light-estimate keep the light of models, whatever the camera shows of the patterns
+  --osd               draw state, reason and inliers on the pictures
+  --device NAME       simulate a device by masking OpenGL ES features that it lacks
+  --gpu-budget SIZE   GPU memory limit, nearest and visible models first (64M, 1G)
+  --turntable N       render N pictures of each model turning, without a pattern
+  --size WxH          size of the turntable's pictures (default: 640x480)
+
+Running:
+  --live              reload the bundle when its file is replaced (see modar bake --watch)
+  --realtime          play a file at its own speed, dropping frames
+  --force             write into a folder of --out or --report that contains other files
+  --verify            check every byte of the bundle first, not just its tables
+  --quiet             no progress or summary
+
+Recording and field trials:
+  --record FOLDER     record frames and poses
+  --golden FOLDER     replay a recording and compare: exit code 10 if it differs
+  --tolerance PX      with --golden: largest mean distance of the four corners (default: 0.5)
+  --qos FILE          write a log with times, found and lost patterns, reasons and memory use
+)";
+  constexpr const char* kEnd = R"(
+Help:
+  --help, --help-all  the usual options; all of them
+  --version
 
 Example: modar-play spider.modar --input box.mp4 --outline --report out/demo
 
 Exit codes: 0 done (whether or not a pattern was seen), 1 usage, 2 a file cannot be read or
-written, 3 bad input, 4 internal error, 5 beyond this build or device, 10 --golden found a
-difference.
+written, 3 invalid input, 4 internal error, 5 not supported by this build or device, 10 --golden
+found a difference.
 )";
+  return std::string(kUsual) + (all ? kMore : "") + kEnd;
 }
 
 }  // namespace modar

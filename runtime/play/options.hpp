@@ -45,6 +45,7 @@ struct PlayOptions {
   bool quiet = false;
   bool verify = false;  ///< hash the whole bundle before playing it
   bool help = false;
+  bool help_all = false;
   bool version = false;
 };
 
@@ -54,7 +55,7 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments);
 /// "64M", "1G", "512K" or plain bytes; 0 where it is none of these.
 std::uint64_t parse_bytes(std::string_view text);
 
-/// What --help prints.
-const char* help_text();
+/// What --help prints, or with `all` --help-all.
+std::string help_text(bool all);
 
 }  // namespace modar

@@ -308,10 +308,10 @@ Result<void> read_tag(RawInput& raw, std::string_view tag) {
   const std::string_view value = tag.substr(1);
   switch (tag[0]) {
     case 'W':
-      if (!read_number(value, raw.format.width)) return bad_header("its width is no number");
+      if (!read_number(value, raw.format.width)) return bad_header("its width is not a number");
       break;
     case 'H':
-      if (!read_number(value, raw.format.height)) return bad_header("its height is no number");
+      if (!read_number(value, raw.format.height)) return bad_header("its height is not a number");
       break;
     case 'F':
       // 0:0 stands for an unknown rate.
@@ -429,7 +429,7 @@ class RawSource final : public FrameSource {
       if (got == 0 && line.empty()) return false;
       if (got == 0 || line.size() == kMaxLine) {
         return fail(ExitCode::kInvalidInput, "input.y4m", name_, "a header line does not end",
-                    "this is no Y4M");
+                    "this is not a Y4M file");
       }
       if (letter == '\n') return true;
       line += static_cast<char>(letter);

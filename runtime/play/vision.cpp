@@ -108,7 +108,7 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
   if (sets.empty()) {
     if (method == "ours") return 0;
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
-                "the bundle holds no pattern that the paper's method can look for",
+                "the bundle contains no pattern for the paper's method",
                 "bake it with --pattern IMAGE, and without --parameters none");
   }
   const std::string_view wanted = name.empty() ? std::string_view("orb-2000") : name;

@@ -28,7 +28,7 @@ struct Track {
   int frames_since_lost = kRecentFrames;
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
   Reason shown_reason = Reason::kVisible;    ///< why it is tracked and not shown, if it is not
-  bool judged = false;                       ///< by the PrintJudge
+  bool verified = false;                     ///< by the PrintVerifier
   bool measured = false;                     ///< by a free homography, while it is tracked
   int frames_to_measure = 0;                 ///< so again
   bool again = false;                        ///< it was lost a moment before it was found

@@ -321,9 +321,11 @@ glm::dmat3 rotation_matrix(const glm::dvec3& vector) {
   return to_glm(exponential(Eigen::Vector3d(vector.x, vector.y, vector.z)));
 }
 
-glm::mat4 gl_view(const Pose& pose) {
-  glm::dmat4 view(pose.rotation);
-  view[3] = glm::dvec4(pose.translation, 1.0);
+glm::mat4 gl_view(const Pose& pose, const glm::dmat4x3& stretch) {
+  // From floats, as modar_pose holds them: an app that draws by those gets the player's picture.
+  const glm::dmat3 rotation(glm::mat3(pose.rotation));
+  glm::dmat4 view(rotation * glm::dmat4x3(glm::mat4x3(stretch)));
+  view[3] += glm::dvec4(glm::vec3(pose.translation), 0.0);
   // GL's camera has y up and z backward.
   for (int column = 0; column < 4; ++column) {
     view[column][1] = -view[column][1];

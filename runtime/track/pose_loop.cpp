@@ -11,7 +11,7 @@
 #include "camera_estimator.hpp"
 #include "frame_tracker.hpp"
 #include "pattern_search.hpp"
-#include "print_judge.hpp"
+#include "print_verifier.hpp"
 #include "runtime/platform/lap_clock.hpp"
 #include "surroundings.hpp"
 
@@ -20,65 +20,67 @@ namespace {
 
 using tracker::DetectionCandidate;
 using tracker::PatchFit;
-using tracker::PrintJudge;
+using tracker::PrintVerifier;
 using tracker::SearchPriority;
 using tracker::Track;
 using tracker::TrackedPattern;
 
-// Millions of instructions a frame from which a pattern can be brought to it, precisely, and
-// judged. Within less the next frame does both, and this one does not show it.
-constexpr int kJudgingBudget = 20;
+// Budget of a frame, in millions of instructions, from which a find is refined and verified in the
+// frame that completes the search. With a smaller budget the next frame does both.
+constexpr int kVerifyingBudget = 20;
 
-// Pixels by which a prediction missed from which a pose may have slipped, unless so many patches
-// and so much of them fit; and frames for which what was seen before a loss tells of a find. By
-// hand: they trade the time of a look at all cells, and finds in a picture that has become less
-// sharp, for poses that are wrong.
+// When to test whether a pose has slipped off its pattern: if the prediction missed by this many
+// pixels, unless at least kSurePatches patches fit, and kSurePercent of those in view. A pattern
+// that is found again within kRemembered frames of its loss is tested as well. Testing more often
+// costs time (it compares all cells) and rejects finds in pictures that have become less sharp;
+// testing less often shows wrong poses. Not measured.
 constexpr double kSlippingSurprise = 2.5;
 constexpr int kSurePatches = 30;
 constexpr int kSurePercent = 95;
 constexpr int kRemembered = 10;
 
-// Frames of a pattern that is not seen between looks where it should be: trades the time of a look,
-// as much as following takes, for how soon it is measured again.
+// Frames between attempts to find a covered pattern where its surroundings place it: trades the
+// time of an attempt, about that of tracking, for how soon the pattern is measured again.
 constexpr int kLookEvery = 4;
 
-// Frames between measurements of a plane: trades their time, half of tracking's, for how soon the
-// camera is known. Where the last one moved a corner by so many pixels the next comes sooner: with
-// a wrong focal length a shape lags behind a turn. And the patches that must fit, and their share,
-// for paper to be taken as flat and uncovered.
+// Frames between measurements of a plane for the camera's estimate: trades their time, half of that
+// of tracking, for how soon the camera is known. The next one comes after kMeasureSoon frames if
+// the last one moved a corner by kMovedShape pixels: with a wrong focal length, the shape lags
+// behind a rotation. A plane counts as flat and uncovered if at least kFlatPatches patches fit, and
+// kFlatRatio of those in view.
 constexpr int kMeasureEvery = 5;
 constexpr int kMeasureSoon = 2;
 constexpr double kMovedShape = 0.4;
 constexpr int kFlatPatches = 24;
 constexpr double kFlatRatio = 0.6;
-// Steps of a homography from where a pose has the pattern, and the share that a measurement has in
-// the shape: less lags, more trembles.
+// Iterations of a free homography that starts at the pose, and the weight of a new measurement in
+// the shape: a smaller one lags, a larger one jitters.
 constexpr int kMeasuringSteps = 2;
 constexpr double kNewShape = 0.7;
-// Share by which a focal length may change until what was learned around a pattern is wrong.
+// Relative change of the focal length after which the learned surroundings are discarded.
 constexpr double kLearnedAnew = 0.01;
 
-/// What was shown, brought to what is known better now, over some frames.
-struct Return {
-  double share = 0;  ///< of the difference, that is left
-  double step = 0;   ///< of it, that goes in a frame
-  glm::dvec3 turn{};
-  glm::dvec3 way{};
+/// A correction of the shown pose that is spread over several frames.
+struct PoseBlend {
+  double share = 0;       ///< of the correction that is not yet applied, 1 to 0
+  double step = 0;        ///< decrease of `share` per frame
+  glm::dvec3 rotation{};  ///< rotation vector, radians
+  glm::dvec3 translation{};
 };
 
 bool shows_flat(const PatchFit& fit) {
   return fit.inliers >= kFlatPatches && (fit.inlier_ratio() >= kFlatRatio || fit.covered());
 }
 
-/// Largest way of a corner, pixels.
+/// Largest distance between corresponding corners, pixels.
 double way_of(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
   double most = 0;
   for (std::size_t i = 0; i < 4; ++i) most = std::max(most, glm::length(a[i] - b[i]));
   return most;
 }
 
-/// Four places of a pattern, the corners of as much of it as the frame shows, and where the map has
-/// them; false if that is too little.
+/// Four points of a pattern, the corners of the part of it that is in the frame, with their pixels;
+/// false if that part is too small.
 bool places_in_view(const TrackedPattern& pattern, const tracker::PlaneMap& map,
                     const Camera& camera, tracker::CameraEstimator::View& view) {
   constexpr double kLeast = 0.4;  // of each side
@@ -126,27 +128,28 @@ struct PoseLoop::State {
   Camera search_camera;
   PoseLoopOptions options;
   std::vector<TrackedPattern> patterns;
-  std::vector<TrackedPattern> searched;  ///< a search's own
-  std::vector<Track> tracks;             ///< one a pattern
-  std::unique_ptr<PrintJudge> print_judge;
+  std::vector<TrackedPattern> searched;  ///< copies for the search
+  std::vector<Track> tracks;             ///< one per pattern
+  std::unique_ptr<PrintVerifier> print_verifier;
   tracker::FrameTracker frame_tracker;
-  std::unique_ptr<tracker::CameraEstimator> estimator;  ///< where the camera is a guess
-  double learned_focal = 0;                             ///< by which the surroundings are known
-  std::unique_ptr<tracker::PatternSearch> search;       ///< on the caller's thread, or
-  std::unique_ptr<tracker::AsyncDetector> async;        ///< on its own
-  std::unique_ptr<tracker::SlicedDetector> sliced;      ///< there, within the budget of a frame
+  std::unique_ptr<tracker::CameraEstimator> estimator;  ///< if the camera is a guess
+  double learned_focal = 0;                         ///< with which the surroundings were learned
+  std::unique_ptr<tracker::PatternSearch> search;   ///< searches on the caller's thread,
+  std::unique_ptr<tracker::AsyncDetector> async;    ///< on a separate thread,
+  std::unique_ptr<tracker::SlicedDetector> sliced;  ///< or in slices within the budget
   std::vector<SearchPriority> priorities;
   tracker::DetectionCandidates candidates;
   int frames_to_search = 0;
-  bool discard_found = false;  ///< what the running search finds is of before a reset
-  std::unique_ptr<tracker::Surroundings> surroundings;  ///< of the pattern `home`
-  std::size_t home = 0;
-  double usual_patches = 0;  ///< of it, that fitted in the last second
+  bool discard_found = false;  ///< the running search started before a reset
+  std::unique_ptr<tracker::Surroundings> surroundings;  ///< of the pattern `anchor`
+  std::size_t anchor = 0;
+  double usual_patches = 0;  ///< patches of it that fitted in the last second
   int frames_unseen = 0;
-  bool follows = false;  ///< the last frame's pose of it was of the surroundings
-  Return back;
-  std::optional<std::array<glm::dvec2, 4>> aside;  ///< by which the last frame saw its corners
-                                                   ///< beside where the surroundings had them
+  bool extending = false;  ///< the last frame took its pose from the surroundings
+  PoseBlend blend;
+  std::optional<std::array<glm::dvec2, 4>>
+      last_offset;                 ///< by which the last frame saw its corners
+                                   ///< beside where the surroundings had them
   std::optional<glm::dvec3> turn;  ///< of what the camera sees, since the last frame
   [[nodiscard]] const glm::dvec3* turn_seen() const { return turn.has_value() ? &*turn : nullptr; }
 
@@ -158,32 +161,33 @@ struct PoseLoop::State {
   bool measure_first(std::size_t i, tracker::CameraEstimator::View& view);
   bool measure_again(std::size_t i, tracker::CameraEstimator::View& view);
   void apply_estimate();
+  void place_pictures(TrackResult& result) const;
   void advance_search(TrackResult& result);
   bool search_due(bool any_tracked);
   void accept(TrackResult& result);
-  /// A find is brought to the frame precisely, judged and shown.
-  [[nodiscard]] bool judges_finds() const {
-    return sliced == nullptr || options.budget >= kJudgingBudget;
+  /// Whether finds are refined, verified and shown in the frame that completes the search.
+  [[nodiscard]] bool verifies_finds() const {
+    return sliced == nullptr || options.budget >= kVerifyingBudget;
   }
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
                    Detection& detection) const;
-  [[nodiscard]] bool slipped(std::size_t i, const Track& track) const;
+  [[nodiscard]] bool has_slipped(std::size_t i, const Track& track) const;
   bool resolve_overlap(std::size_t i, const Detection& detection, TrackResult& result);
-  bool show(std::size_t i, const PrintJudge::Verdict& verdict, Detection& detection,
+  bool show(std::size_t i, const PrintVerifier::Verification& verification, Detection& detection,
             TrackResult& result);
-  bool rename(std::size_t from, std::size_t to, Detection& detection);
+  bool switch_pattern(std::size_t from, std::size_t to, Detection& detection);
   void extend(TrackResult& result);
-  Detection* choose_home(TrackResult& result);
+  Detection* choose_anchor(TrackResult& result);
   [[nodiscard]] bool doubts(const Detection& seen) const;
-  bool follow(Detection& detection);
-  void see_again(const Pose& followed);
+  bool follow_surroundings(Detection& detection);
+  void find_again(const Pose& followed);
   bool corners_of(const Pose& pose, std::array<glm::dvec2, 4>& corners) const;
   bool seen_twice(const Detection& seen, const Detection& followed);
   void smooth_correction(const tracker::ExtendedPose& extended,
                          const std::array<glm::dvec2, 4>& corners);
-  [[nodiscard]] Pose returning(const Pose& pose) const;
-  void start_return(const Pose& from, const Pose& to);
-  void go_on_returning(Detection& detection);
+  [[nodiscard]] Pose blended(const Pose& pose) const;
+  void start_blend(const Pose& from, const Pose& to);
+  void continue_blend(Detection& detection);
 };
 
 PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -211,7 +215,8 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   }
   state->searched = state->patterns;
   state->tracks.resize(state->patterns.size());
-  state->print_judge = std::make_unique<PrintJudge>(state->patterns, !options.estimate_camera);
+  state->print_verifier =
+      std::make_unique<PrintVerifier>(state->patterns, !options.estimate_camera);
   state->priorities.resize(state->patterns.size());
   state->candidates.patterns.resize(state->patterns.size());
   if (options.async_search) {
@@ -243,9 +248,9 @@ void PoseLoop::reset() {
   if (state_->sliced != nullptr) state_->sliced->cancel();
   state_->discard_found = state_->async != nullptr && !state_->async->idle();
   if (state_->surroundings != nullptr) state_->surroundings->clear();
-  state_->follows = false;
-  state_->back = {};
-  state_->aside.reset();
+  state_->extending = false;
+  state_->blend = {};
+  state_->last_offset.reset();
 }
 
 Result<TrackResult> PoseLoop::step(const GrayImage& frame) {
@@ -284,7 +289,7 @@ bool PoseLoop::State::search_due(bool any_tracked) {
   --frames_to_search;
   // While one is tracked, only patterns lost a moment ago are worth a search in every frame; while
   // the surroundings say where one is, it is looked for there.
-  const bool waits = follows || (any_tracked && !recently);
+  const bool waits = extending || (any_tracked && !recently);
   if (!missing || (waits && frames_to_search > 0)) return false;
   if (async != nullptr && !async->idle()) return false;
   if (sliced != nullptr && !sliced->idle()) return false;
@@ -323,6 +328,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
     }
   }
   if (surroundings != nullptr) extend(result);
+  if (estimator != nullptr) place_pictures(result);
   turn.reset();
   for (const Track& track : tracks) {
     const Reason reason = track.tracked ? track.shown_reason : track.last_reason;
@@ -339,7 +345,7 @@ void PoseLoop::State::advance_search(TrackResult& result) {
   constexpr std::int64_t kTrackCost = 3'000'000;  // of a pattern; as much to bring a find here
   const auto tracked =
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.tracked; });
-  const std::int64_t extended = follows ? 1 : 0;  // costs no more than a pattern
+  const std::int64_t extended = extending ? 1 : 0;  // costs no more than a pattern
   const std::int64_t work =
       std::int64_t{1'000'000} * options.budget - kFrameCost - kTrackCost * (tracked + extended + 1);
   if (sliced->advance(work, candidates, priorities)) accept(result);
@@ -356,7 +362,7 @@ void PoseLoop::State::track_all(TrackResult& result) {
     track.tracked = options.track && frame_tracker.update(patterns[i], track, detection);
     const bool sure = detection.inliers >= kSurePatches &&
                       detection.inliers * 100 >= detection.matches * kSurePercent;
-    if (track.tracked && !sure && track.surprise >= kSlippingSurprise && slipped(i, track)) {
+    if (track.tracked && !sure && track.surprise >= kSlippingSurprise && has_slipped(i, track)) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kLostByBlur;
     }
@@ -366,10 +372,10 @@ void PoseLoop::State::track_all(TrackResult& result) {
       measure(i, detection);
       const auto frame = frame_tracker.frame();
       show(i,
-           track.judged ? print_judge->follow(i, frame, track)
-                        : print_judge->meet(i, frame, track, track.again),
+           track.verified ? print_verifier->verify_tracked(i, frame, track)
+                          : print_verifier->verify_found(i, frame, track, track.again),
            detection, result);
-      track.judged = true;
+      track.verified = true;
     } else {
       track.frames_since_lost = options.track ? 0 : tracker::kRecentFrames;
     }
@@ -497,55 +503,72 @@ void PoseLoop::State::apply_estimate() {
   }
 }
 
-bool PoseLoop::State::slipped(std::size_t i, const Track& track) const {
-  return track.judged && !track.homography_only &&
-         print_judge->slipped(i, frame_tracker.frame(), track);
+/// Poses as others use them, in place of those by which the loop splits its maps.
+void PoseLoop::State::place_pictures(TrackResult& result) const {
+  for (Detection& seen : result.visible) {
+    const auto which =
+        std::find_if(patterns.begin(), patterns.end(),
+                     [&](const TrackedPattern& pattern) { return pattern.index == seen.pattern; });
+    if (which == patterns.end() || !which->surface.flat()) continue;
+    const auto i = static_cast<std::size_t>(which - patterns.begin());
+    const tracker::DrawnPose drawn =
+        tracker::drawn_pose(*which, camera, seen.pose, estimator->aspect(i));
+    seen.pose = drawn.pose;
+    seen.stretch = drawn.stretch;
+  }
 }
 
-/// Adds what is tracked to the result, by the name that the judge gives it, unless it is not to be
-/// shown. Returns whether it was added.
-bool PoseLoop::State::show(std::size_t i, const PrintJudge::Verdict& verdict, Detection& detection,
-                           TrackResult& result) {
-  tracks[i].shown_reason = verdict.reason;
-  detection.agreeing = verdict.agreeing;
-  detection.likeness = verdict.likeness;
-  if (verdict.rival >= 0 && rename(i, static_cast<std::size_t>(verdict.rival), detection)) {
+bool PoseLoop::State::has_slipped(std::size_t i, const Track& track) const {
+  return track.verified && !track.homography_only &&
+         print_verifier->has_slipped(i, frame_tracker.frame(), track);
+}
+
+/// Adds a tracked pattern, or the pattern that the verifier found in its place, to the result,
+/// unless its verification failed. Returns whether it was added.
+bool PoseLoop::State::show(std::size_t i, const PrintVerifier::Verification& verification,
+                           Detection& detection, TrackResult& result) {
+  tracks[i].shown_reason = verification.reason;
+  detection.agreeing = verification.agreeing;
+  detection.likeness = verification.likeness;
+  if (verification.actual_pattern >= 0 &&
+      switch_pattern(i, static_cast<std::size_t>(verification.actual_pattern), detection)) {
     result.visible.push_back(detection);
     return true;
   }
-  if (verdict.reason != Reason::kVisible) return false;
+  if (verification.reason != Reason::kVisible) return false;
   result.visible.push_back(detection);
   return true;
 }
 
-/// The frame shows another pattern in the place of a tracked one: goes on with that one.
-bool PoseLoop::State::rename(std::size_t from, std::size_t to, Detection& detection) {
+/// The frame shows another pattern in the place of a tracked one: tracks that pattern instead.
+bool PoseLoop::State::switch_pattern(std::size_t from, std::size_t to, Detection& detection) {
   if (tracks[to].tracked || tracks[from].homography_only) return false;
   const TrackedPattern& pattern = patterns[to];
   Track next;
   next.pose = tracks[from].pose;
   PatchFit fit;
-  Detection renamed = detection;
+  Detection switched = detection;
   if (!tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kClose, next.pose,
                        fit) ||
-      !frame_tracker.locate(pattern, next, renamed)) {
+      !frame_tracker.locate(pattern, next, switched)) {
     return false;
   }
-  const PrintJudge::Verdict verdict = print_judge->meet(to, frame_tracker.frame(), next, false);
-  if (verdict.reason != Reason::kVisible || verdict.rival >= 0) return false;
-  renamed.agreeing = verdict.agreeing;
-  renamed.likeness = verdict.likeness;
-  renamed.matches = fit.visible;
-  renamed.inliers = fit.inliers;
-  next.tracked = next.judged = true;
+  const PrintVerifier::Verification verification =
+      print_verifier->verify_found(to, frame_tracker.frame(), next, false);
+  if (verification.reason != Reason::kVisible || verification.actual_pattern >= 0) return false;
+  switched.agreeing = verification.agreeing;
+  switched.likeness = verification.likeness;
+  switched.matches = fit.visible;
+  switched.inliers = fit.inliers;
+  next.tracked = next.verified = true;
   tracks[to] = next;
   tracks[from] = {};
   tracks[from].last_reason = Reason::kOtherPrint;
-  detection = renamed;
+  detection = switched;
   return true;
 }
 
-/// Starts a track; false if the candidate is not visible in the present frame.
+/// Starts a track; false if the candidate is not visible in the current frame.
 bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
                                   const DetectionCandidate& candidate, Detection& detection) const {
   Track next;
@@ -561,7 +584,7 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
         next.homography_only
             ? tracker::refine_map(pattern, frame_tracker.frame(), next.map, fit)
             : tracker::refine(pattern, frame_tracker.frame(), tracker::SearchRadius::kFar,
-                              next.pose, fit, judges_finds()) &&
+                              next.pose, fit, verifies_finds()) &&
                   tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) >=
                       (fit.close >= tracker::kClosePatches ? tracker::kClosePatchesPercent
                                                            : tracker::kMinPercent);
@@ -573,9 +596,9 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
   return true;
 }
 
-/// Prints of one series share so much that one is taken for the other: of those that claim one
-/// place, the one stays that shows more. Returns whether the new pattern i stays; the others are
-/// then dropped.
+/// Prints of one series are so similar that one is mistaken for the other: of patterns in the same
+/// place, only the one that matches the picture best stays. Returns whether the new pattern i
+/// stays; the others are then dropped.
 bool PoseLoop::State::resolve_overlap(std::size_t i, const Detection& detection,
                                       TrackResult& result) {
   const auto percent_of = [this](std::size_t which) {
@@ -588,11 +611,12 @@ bool PoseLoop::State::resolve_overlap(std::size_t i, const Detection& detection,
   // None is dropped before the new one is known to stay.
   for (const bool drop : {false, true}) {
     for (std::size_t k = 0; k < tracks.size(); ++k) {
-      Detection rival;
-      const bool other =
-          k != i && tracks[k].tracked && frame_tracker.locate(patterns[k], tracks[k], rival);
-      if (!other || !tracker::same_place(frame_tracker.place(patterns[k], tracks[k], rival),
-                                         frame_tracker.place(patterns[i], tracks[i], detection))) {
+      Detection other_detection;
+      const bool other = k != i && tracks[k].tracked &&
+                         frame_tracker.locate(patterns[k], tracks[k], other_detection);
+      if (!other ||
+          !tracker::same_place(frame_tracker.place(patterns[k], tracks[k], other_detection),
+                               frame_tracker.place(patterns[i], tracks[i], detection))) {
         continue;
       }
       if (!drop) {
@@ -601,13 +625,14 @@ bool PoseLoop::State::resolve_overlap(std::size_t i, const Detection& detection,
       }
       tracks[k] = {};
       tracks[k].last_reason = Reason::kFailedVerification;
-      std::erase_if(result.visible, [&](const Detection& s) { return s.pattern == rival.pattern; });
+      std::erase_if(result.visible,
+                    [&](const Detection& s) { return s.pattern == other_detection.pattern; });
     }
   }
   return true;
 }
 
-/// Brings what a search found into the tracks and the frame's result.
+/// Starts tracks from the candidates of a search, and adds them to the frame's result.
 void PoseLoop::State::accept(TrackResult& result) {
   result.features = candidates.features;
   result.times.detect = candidates.times.detect;
@@ -621,8 +646,8 @@ void PoseLoop::State::accept(TrackResult& result) {
     Detection detection;
     bool here = candidate.reason == Reason::kVisible &&
                 start_track(patterns[i], track, candidate, detection);
-    if (here && before.judged && before.frames_since_lost < kRemembered &&
-        print_judge->slipped(i, frame_tracker.frame(), track)) {
+    if (here && before.verified && before.frames_since_lost < kRemembered &&
+        print_verifier->has_slipped(i, frame_tracker.frame(), track)) {
       here = false;
       track = before;
     }
@@ -630,14 +655,15 @@ void PoseLoop::State::accept(TrackResult& result) {
         candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
     if (here) {
       track.again = before.frames_since_lost < tracker::kRecentFrames;
-      PrintJudge::Verdict verdict;
-      track.judged = judges_finds();
-      if (track.judged) measure(i, detection);
-      if (track.judged) verdict = print_judge->meet(i, frame_tracker.frame(), track, track.again);
-      track.shown_reason = verdict.reason;
+      PrintVerifier::Verification verification;
+      track.verified = verifies_finds();
+      if (track.verified) measure(i, detection);
+      if (track.verified)
+        verification = print_verifier->verify_found(i, frame_tracker.frame(), track, track.again);
+      track.shown_reason = verification.reason;
       if (resolve_overlap(i, detection, result)) {
-        if (!track.judged) verdict.reason = before.last_reason;
-        show(i, verdict, detection, result);
+        if (!track.verified) verification.reason = before.last_reason;
+        show(i, verification, detection, result);
         continue;
       }
       reason = Reason::kOtherPrint;
@@ -649,34 +675,36 @@ void PoseLoop::State::accept(TrackResult& result) {
   }
 }
 
-/// Learns from a frame that shows the home pattern, or follows its pose in one that does not.
+/// Learns the surroundings from a frame that shows the anchor pattern, or else derives its pose
+/// from them.
 void PoseLoop::State::extend(TrackResult& result) {
-  Detection* shown = choose_home(result);
-  Track& track = tracks[home];
-  // What covers a pattern draws the pose of the last patches aside: degrees, before it is lost.
-  // What the first features of one that comes back say of it is no better.
-  const bool was = follows;
+  Detection* shown = choose_anchor(result);
+  Track& track = tracks[anchor];
+  // While a pattern is being covered, the pose from its last patches is wrong by degrees before it
+  // is lost; the pose from the first features of a pattern that comes back is no better.
+  const bool was = extending;
   const bool doubtful = shown != nullptr && (track.has_motion || was) && doubts(*shown);
   Detection followed;
-  follows = (shown == nullptr || doubtful || was) && !track.homography_only && follow(followed);
+  extending = (shown == nullptr || doubtful || was) && !track.homography_only &&
+              follow_surroundings(followed);
   const bool seen = shown != nullptr && !doubtful;
   constexpr double kForgotten = 0.98;  // of the usual patches, a frame: half in a second
   usual_patches *= kForgotten;
-  if (seen && (!follows || seen_twice(*shown, followed))) {
+  if (seen && (!extending || seen_twice(*shown, followed))) {
     usual_patches = std::max(usual_patches, 1.0 * shown->inliers);
-    if (follows) {
+    if (extending) {
       surroundings->correct(followed.pose, shown->pose);
-      start_return(followed.pose, shown->pose);
+      start_blend(followed.pose, shown->pose);
     }
-    follows = false;
+    extending = false;
     surroundings->learn(frame_tracker.frame(), shown->pose, shown->corners, shown->inliers,
                         turn_seen());
-    go_on_returning(*shown);
+    continue_blend(*shown);
     return;
   }
-  if (!seen) aside.reset();
-  if (!follows) {
-    back = {};
+  if (!seen) last_offset.reset();
+  if (!extending) {
+    blend = {};
     return;
   }
   if (doubtful) {
@@ -684,23 +712,23 @@ void PoseLoop::State::extend(TrackResult& result) {
     track.has_motion = false;
   }
   const Pose known = followed.pose;
-  go_on_returning(followed);
+  continue_blend(followed);
   if (shown != nullptr) {
     *shown = followed;
     return;
   }
   if (track.tracked && track.shown_reason == Reason::kOtherPrint) return;
-  if (!track.tracked && ++frames_unseen % kLookEvery == 0) see_again(known);
+  if (!track.tracked && ++frames_unseen % kLookEvery == 0) find_again(known);
   result.visible.push_back(followed);
 }
 
-/// The home pattern's detection in this frame, null if it is not shown. Another becomes home where
-/// it has none to lose.
-Detection* PoseLoop::State::choose_home(TrackResult& result) {
+/// The detection of the anchor pattern in this frame, or null if it is not shown. Chooses another
+/// anchor if no surroundings would be lost.
+Detection* PoseLoop::State::choose_anchor(TrackResult& result) {
   Detection* largest = nullptr;
   double most = 0;
   for (Detection& one : result.visible) {
-    if (patterns[home].index == one.pattern) return &one;
+    if (patterns[anchor].index == one.pattern) return &one;
     const glm::dvec2 a = one.corners[2] - one.corners[0];
     const glm::dvec2 b = one.corners[3] - one.corners[1];
     const double area = std::abs(a.x * b.y - a.y * b.x);
@@ -708,16 +736,17 @@ Detection* PoseLoop::State::choose_home(TrackResult& result) {
     most = area;
     largest = &one;
   }
-  if (largest == nullptr || follows || surroundings->ready()) return nullptr;
+  if (largest == nullptr || extending || surroundings->ready()) return nullptr;
   for (std::size_t i = 0; i < patterns.size(); ++i) {
-    if (patterns[i].index == largest->pattern) home = i;
+    if (patterns[i].index == largest->pattern) anchor = i;
   }
   surroundings->clear();
   usual_patches = 0;
   return largest;
 }
 
-/// Whether so little of the home pattern fits, or is in view, that its surroundings know better.
+/// Whether so little of the anchor pattern fits, or is in view, that the pose from its surroundings
+/// is better.
 bool PoseLoop::State::doubts(const Detection& seen) const {
   // Shares of the patches in view that fit, and of those that fitted a moment ago: what covers a
   // pattern, or the little that the frame's edge leaves of it, gives poses that are off by degrees,
@@ -736,14 +765,14 @@ bool PoseLoop::State::doubts(const Detection& seen) const {
   return surroundings->agreement(frame_tracker.frame(), seen.pose) < kContradicted;
 }
 
-/// The home pattern's pose as its surroundings tell it.
-bool PoseLoop::State::follow(Detection& detection) {
-  if (!follows && !surroundings->ready()) return false;
+/// The pose of the anchor pattern from its surroundings.
+bool PoseLoop::State::follow_surroundings(Detection& detection) {
+  if (!extending && !surroundings->ready()) return false;
   tracker::ExtendedPose extended;
   if (!surroundings->follow(frame_tracker.frame(), turn_seen(), extended)) {
     return false;
   }
-  detection.pattern = patterns[home].index;
+  detection.pattern = patterns[anchor].index;
   detection.pose = extended.pose;
   detection.extended = true;
   detection.position_sigma = extended.position_sigma;
@@ -753,11 +782,11 @@ bool PoseLoop::State::follow(Detection& detection) {
   return true;
 }
 
-/// Points that come into view again may correct the pose from one frame to the next: not what is
-/// shown.
+/// Points that come into view again may correct the pose abruptly: spreads the correction over
+/// several frames.
 void PoseLoop::State::smooth_correction(const tracker::ExtendedPose& extended,
                                         const std::array<glm::dvec2, 4>& corners) {
-  constexpr double kCorrected = 4.0;  // pixels beside where motion has the corners. By hand
+  constexpr double kCorrected = 4.0;  // pixels from the corners that motion predicts; not measured
   const auto in_frame = [&](glm::dvec2 p) {
     return p.x >= 0 && p.y >= 0 && p.x < camera.width && p.y < camera.height;
   };
@@ -774,30 +803,30 @@ void PoseLoop::State::smooth_correction(const tracker::ExtendedPose& extended,
       least = way;
     }
   }
-  if (nearest != nullptr && least > kCorrected) start_return(*nearest, extended.pose);
+  if (nearest != nullptr && least > kCorrected) start_blend(*nearest, extended.pose);
 }
 
 bool PoseLoop::State::corners_of(const Pose& pose, std::array<glm::dvec2, 4>& corners) const {
-  return tracker::map_corners(patterns[home], tracker::map_of_pose(patterns[home], camera, pose),
-                              corners);
+  return tracker::map_corners(patterns[anchor],
+                              tracker::map_of_pose(patterns[anchor], camera, pose), corners);
 }
 
-/// Whether two frames in a row see the home pattern equally far from where the surroundings have
-/// it: the first features of one that comes back can give any pose.
+/// Whether two consecutive frames measure the same offset of the anchor pattern from the pose of
+/// the surroundings: the first features of a pattern that comes back can give any pose.
 bool PoseLoop::State::seen_twice(const Detection& seen, const Detection& followed) {
   constexpr double kSame = 0.02;  // of the outline's diagonal. By hand
   std::array<glm::dvec2, 4> now;
   for (std::size_t i = 0; i < 4; ++i) now[i] = seen.corners[i] - followed.corners[i];
   const double diagonal = std::max(glm::length(followed.corners[2] - followed.corners[0]),
                                    glm::length(followed.corners[3] - followed.corners[1]));
-  const bool twice = aside.has_value() && way_of(now, *aside) < kSame * diagonal;
-  aside = now;
+  const bool twice = last_offset.has_value() && way_of(now, *last_offset) < kSame * diagonal;
+  last_offset = now;
   return twice;
 }
 
-/// Looks where the surroundings say that the home pattern is, and tracks it if it is there.
-void PoseLoop::State::see_again(const Pose& followed) {
-  const TrackedPattern& pattern = patterns[home];
+/// Tries to find the anchor pattern where its surroundings place it, and tracks it.
+void PoseLoop::State::find_again(const Pose& followed) {
+  const TrackedPattern& pattern = patterns[anchor];
   const tracker::PlaneMap map = tracker::map_of_pose(pattern, camera, followed);
   if (!tracker::in_view(pattern, map, camera)) return;
   Track next;
@@ -813,43 +842,43 @@ void PoseLoop::State::see_again(const Pose& followed) {
   }
   next.tracked = true;
   next.again = true;
-  tracks[home] = next;
+  tracks[anchor] = next;
 }
 
-/// `pose`, as much beside its place as is still to be shown.
-Pose PoseLoop::State::returning(const Pose& pose) const {
-  return {rotation_matrix(back.share * back.turn) * pose.rotation,
-          pose.translation + back.share * back.way};
+/// `pose` with the part of the correction that is not yet applied.
+Pose PoseLoop::State::blended(const Pose& pose) const {
+  return {rotation_matrix(blend.share * blend.rotation) * pose.rotation,
+          pose.translation + blend.share * blend.translation};
 }
 
-/// Shows what was taken for `from` and is known to be `to` now, at first as if it were not known.
-void PoseLoop::State::start_return(const Pose& from, const Pose& to) {
-  // Frames that a return takes, at least and at most, and pixels by which it moves the corners in
-  // one: a slower return shows the wrong place longer. By hand.
+/// Starts a correction of the shown pose from `from` to `to`.
+void PoseLoop::State::start_blend(const Pose& from, const Pose& to) {
+  // Shortest and longest correction, in frames, and the pixels by which it moves the corners per
+  // frame: a slower one shows the wrong pose for longer. Not measured.
   constexpr double kFrames = 10;
   constexpr double kMostFrames = 40;
   constexpr double kStep = 3.0;
-  const Pose shown = returning(from);
+  const Pose shown = blended(from);
   std::array<glm::dvec2, 4> shown_corners;
   std::array<glm::dvec2, 4> corners;
   const bool known = corners_of(shown, shown_corners) && corners_of(to, corners);
   const double way = known ? way_of(shown_corners, corners) : 0;
-  back.turn = rotation_vector(shown.rotation * glm::transpose(to.rotation));
-  back.way = shown.translation - to.translation;
-  back.share = 1;
-  back.step = 1 / std::clamp(way / kStep, kFrames, kMostFrames);
+  blend.rotation = rotation_vector(shown.rotation * glm::transpose(to.rotation));
+  blend.translation = shown.translation - to.translation;
+  blend.share = 1;
+  blend.step = 1 / std::clamp(way / kStep, kFrames, kMostFrames);
 }
 
-void PoseLoop::State::go_on_returning(Detection& detection) {
-  if (back.share <= 0) return;
+void PoseLoop::State::continue_blend(Detection& detection) {
+  if (blend.share <= 0) return;
   Track shown;
-  shown.pose = returning(detection.pose);
-  if (frame_tracker.locate(patterns[home], shown, detection)) {
+  shown.pose = blended(detection.pose);
+  if (frame_tracker.locate(patterns[anchor], shown, detection)) {
     detection.extended = true;
-    detection.position_sigma += back.share * glm::length(back.way);
-    detection.rotation_sigma += back.share * glm::length(back.turn);
+    detection.position_sigma += blend.share * glm::length(blend.translation);
+    detection.rotation_sigma += blend.share * glm::length(blend.rotation);
   }
-  back.share -= back.step;
+  blend.share -= blend.step;
 }
 
 }  // namespace modar

@@ -299,6 +299,72 @@ void refine_from_inliers(const TrackedPattern& pattern, const FrameView& frame,
   pose = now;
 }
 
+// ---- What is drawn on a picture ----
+
+namespace {
+
+using Corners3 = std::array<glm::dvec3, 4>;  // of a picture, pattern axes
+
+/// Brings the pose to where it has the outline nearest to these pixels. False if a corner lies
+/// behind the camera.
+bool fit_outline(const Camera& camera, const Corners3& world,
+                 const std::array<glm::dvec2, 4>& pixels, Pose& pose) {
+  // Quadratic from some pixels away: most frames take three.
+  constexpr int kOutlineSteps = 5;
+  constexpr double kStill = 1e-4;  // radians, and of the distance
+  const std::array<double, 4> sigma = {1, 1, 1, 1};
+  Pose now = pose;
+  for (int k = 0; k < kOutlineSteps; ++k) {
+    PoseInformation sum;
+    for (std::size_t i = 0; i < world.size(); ++i) {
+      if (!((now.rotation * world[i] + now.translation).z > 0.0)) return false;
+      const glm::dvec2 miss = residual(camera, now, {world, pixels, sigma}, i);
+      add(jacobian_of(camera, now, world[i], 1.0), Eigen::Matrix2d::Identity(), {miss.x, miss.y},
+          sum);
+    }
+    const Vector6 change = solve_symmetric(sum.matrix, sum.vector);
+    if (!change.allFinite() || change.head<3>().norm() > kMaxRotation) return false;
+    now.rotation = rotation_matrix({change(0), change(1), change(2)}) * now.rotation;
+    now.translation += glm::dvec3(change(3), change(4), change(5));
+    if (change.cwiseAbs().maxCoeff() < kStill) break;
+  }
+  if (!(now.translation.z > 0.0)) return false;
+  pose = now;
+  return true;
+}
+
+}  // namespace
+
+DrawnPose drawn_pose(const TrackedPattern& pattern, const Camera& camera, const Pose& pose,
+                     double aspect) {
+  Corners3 print;
+  Corners3 picture;
+  std::array<glm::dvec2, 4> pixels;
+  const auto corners = pattern_corners(pattern.width(), pattern.height());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    picture[i] = {corners[i], 0.0};
+    print[i] = {corners[i].x, aspect * corners[i].y, 0.0};
+    const glm::dvec3 p =
+        pose.rotation * glm::dvec3(pattern.shape * corners[i], 0.0) + pose.translation;
+    if (!(p.z > 0.0)) return {pose};
+    pixels[i] = {camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
+  }
+  Pose upright = pose;
+  if (!fit_outline(camera, print, pixels, upright)) return {pose};
+  DrawnPose out{upright};
+  if (!fit_outline(camera, picture, pixels, out.pose)) return {pose};
+  // The plane's axes and middle as the homography has them, as near to the pose as its scale lets.
+  const glm::dmat3 back = glm::transpose(out.pose.rotation);
+  const double scale = out.pose.translation.z / pose.translation.z;
+  for (int column = 0; column < 2; ++column) {
+    const glm::dvec2 axis = pattern.shape[column];
+    out.stretch[column] = scale * (back * (pose.rotation * glm::dvec3(axis, 0.0)));
+  }
+  out.stretch[2] = back * upright.rotation[2];
+  out.stretch[3] = back * (scale * pose.translation - out.pose.translation);
+  return out;
+}
+
 // ---- Bent prints ----
 
 namespace {

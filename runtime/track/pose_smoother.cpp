@@ -42,6 +42,7 @@ double PoseSmoother::smooth(double time_s, State& state, Detection& detection) c
     state.speed = 0.0;
     state.smooth = raw;
     state.corners = detection.corners;
+    state.stretch = detection.stretch;
   } else {
     const double depth = std::max(raw.translation.z, 1e-9);
     const double moved = glm::length(turn_between(state.raw, raw)) +
@@ -52,6 +53,7 @@ double PoseSmoother::smooth(double time_s, State& state, Detection& detection) c
     state.smooth.rotation =
         rotation_matrix(part * turn_between(state.smooth, raw)) * state.smooth.rotation;
     state.smooth.translation += part * (raw.translation - state.smooth.translation);
+    state.stretch += part * (detection.stretch - state.stretch);
     for (std::size_t i = 0; i < state.corners.size(); ++i) {
       state.corners[i] += part * (detection.corners[i] - state.corners[i]);
     }
@@ -61,6 +63,7 @@ double PoseSmoother::smooth(double time_s, State& state, Detection& detection) c
   state.raw = raw;
   pose = state.smooth;
   detection.corners = state.corners;
+  detection.stretch = state.stretch;
   return latency;
 }
 

@@ -70,6 +70,7 @@ std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> v
     counter.moving = predict_ && counter.seen > 0;
     counter.previous = counter.state.pose;
     counter.state.pose = detection.pose;
+    counter.state.stretch = detection.stretch;
   }
   for (std::size_t i = 0; i < counters_.size(); ++i) {
     Counter& counter = counters_[i];

@@ -34,8 +34,8 @@ TEST(TriangleTree, NearestPointsOfATriangleBeatARaster) {
       }
     }
     const double found = std::sqrt(distance_square(p, {a, b, c}));
-    const Foot foot = nearest_foot(p, {a, b, c});
-    EXPECT_NEAR(glm::length(a + foot.b * (b - a) + foot.c * (c - a) - p), found, 1e-12);
+    const ClosestPoint closest = closest_point(p, {a, b, c});
+    EXPECT_NEAR(glm::length(a + closest.b * (b - a) + closest.c * (c - a) - p), found, 1e-12);
     EXPECT_LE(found, least + 1e-12);
     EXPECT_GE(found, least - 0.05);  // the raster is that coarse
   }

@@ -224,7 +224,7 @@ TEST(Score, SaysWhereAPatternWorksAndHowGoodThatIs) {
   EXPECT_EQ(
       range_sentence(range, 0),
       "recognised from 0.65 to 6.5 times its width, to 70 degrees, 90 % right when half covered");
-  EXPECT_EQ(range_sentence({}, 200), "recognised at no distance");
+  EXPECT_EQ(range_sentence({}, 200), "not recognised at any distance");
   EXPECT_EQ(
       range_sentence({0.65, 6.5, 70.4, 0.9, true}, 66),
       "recognised from 4 cm to 43 cm, over 141 degrees around it, 90 % right when half covered");

@@ -71,6 +71,15 @@ TEST(JsonLines, TheHomographyTakesTheUnitSquareToTheCorners) {
   EXPECT_TRUE(json::parse(frame_line(report, {}, true))["visible"][0]["homography"].is_null());
 }
 
+TEST(JsonLines, WhatThePoseDoesNotExplainIsWrittenByRows) {
+  FrameReport report = seen_frame();
+  EXPECT_FALSE(json::parse(frame_line(report, {}))["visible"][0].contains("stretch"));
+  report.visible[0].stretch[1].x = 0.25;
+  report.visible[0].stretch[3] = {1, 2, 3};
+  EXPECT_EQ(json::parse(frame_line(report, {}))["visible"][0]["stretch"],
+            json({1.0, 0.25, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0}));
+}
+
 TEST(JsonLines, AnExtendedPoseSaysSo) {
   FrameReport report = seen_frame();
   EXPECT_FALSE(json::parse(frame_line(report, {}))["visible"][0].contains("extended"));

@@ -121,7 +121,10 @@ TEST(Options, DecimalsAreTheNearestDouble) {
 TEST(Options, HelpAndVersionNeedNothingElse) {
   EXPECT_TRUE(parse({"--help"})->help);
   EXPECT_TRUE(parse({"--version"})->version);
-  EXPECT_NE(std::string(help_text()).find("Example:"), std::string::npos);
+  EXPECT_TRUE(parse({"--help-all"})->help_all);
+  EXPECT_NE(help_text(false).find("Example:"), std::string::npos);
+  EXPECT_EQ(help_text(false).find("--tolerance"), std::string::npos);
+  EXPECT_NE(help_text(true).find("--tolerance"), std::string::npos);
 }
 
 TEST(Options, RefusesWhatIsNotThere) {

@@ -163,6 +163,50 @@ TEST_F(CapiTest, RefusesACameraThatCannotBe) {
   modar_bundle_close(bundle);
 }
 
+TEST_F(CapiTest, ShrinksByTheMeanOfSquares) {
+  constexpr int kWide = 23;  // no multiple of the factor: the rest is left out
+  constexpr int kHigh = 11;
+  constexpr std::size_t kStride = 29;
+  std::vector<std::uint8_t> gray(kStride * kHigh);
+  for (std::size_t i = 0; i < gray.size(); ++i) gray[i] = static_cast<std::uint8_t>(i * i * 7919);
+  for (const int factor : {1, 2, 3, 5}) {
+    const int columns = kWide / factor;
+    const int rows = kHigh / factor;
+    std::vector<std::uint8_t> expected;
+    for (int i = 0; i < columns * rows; ++i) {
+      double sum = 0;
+      for (int k = 0; k < factor * factor; ++k) {
+        const int x = i % columns * factor + k % factor;
+        const int y = i / columns * factor + k / factor;
+        sum += gray[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)];
+      }
+      expected.push_back(static_cast<std::uint8_t>(std::floor(sum / (factor * factor) + 0.5)));
+    }
+    std::vector<std::uint8_t> in_place = gray;
+    modar_shrink(in_place.data(), kStride, kWide, kHigh, factor, in_place.data());
+    in_place.resize(expected.size());
+    EXPECT_EQ(in_place, expected) << factor;
+  }
+}
+
+TEST_F(CapiTest, StatesAModelsBox) {
+  modar_error error{};
+  const auto bytes = bundle_->view->bytes();
+  modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), &error);
+  ASSERT_NE(bundle, nullptr) << error.cause;
+  float low[3] = {7, 7, 7};
+  float high[3] = {7, 7, 7};
+  EXPECT_EQ(modar_model_bounds(bundle, 1, low, high), 0);
+  EXPECT_EQ(low[0], 7);
+  ASSERT_EQ(modar_model_bounds(bundle, 0, low, high), 1);
+  const float corners[2][3] = {{-1, -1, 0}, {1, 1, 0}};  // of one_triangle()
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(low[axis], corners[0][axis], 0.002) << axis;  // boxes hold what halves make of them
+    EXPECT_NEAR(high[axis], corners[1][axis], 0.002) << axis;
+  }
+  modar_bundle_close(bundle);
+}
+
 TEST_F(CapiTest, StatesItsVersion) {
   EXPECT_EQ(modar_version(), static_cast<std::uint32_t>(MODAR_VERSION_NUMBER));
 }

@@ -6,7 +6,7 @@
 
 #include "bake/lab/field_scene.hpp"
 #include "modar/pose_loop.hpp"
-#include "runtime/track/print_judge.hpp"
+#include "runtime/track/print_verifier.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 
 namespace modar {
@@ -160,7 +160,7 @@ TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
   const Camera camera = default_camera(kWidth, kHeight);
   const auto extractor = FeatureExtractor::create(kWidth, kHeight, {});
   tracker::PatchCache patches;
-  tracker::PrintJudge judge(std::span(&*pattern, 1));
+  tracker::PrintVerifier verifier(std::span(&*pattern, 1));
   const auto see = [&](const SceneFrame& scene) {
     extractor->set_frame(scene.picture.view());
     return tracker::FrameView{camera, extractor->pyramid(), tracker::kernels(), patches};
@@ -168,15 +168,15 @@ TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
   tracker::Track track;
   track.pose = pose_of(look_at(2.8, 10, 20, 10));
   const SceneFrame plain = frame_of(look_at(2.8, 10, 20, 10), clutter(kWidth, kHeight, 77));
-  judge.meet(0, see(plain), track, false);
-  EXPECT_FALSE(judge.slipped(0, see(plain), track));
+  verifier.verify_found(0, see(plain), track, false);
+  EXPECT_FALSE(verifier.has_slipped(0, see(plain), track));
   SceneFrame covered = plain;
   for (int y = 0; y < kHeight; ++y) {
     std::fill_n(covered.picture.pixels.begin() + y * kWidth, kWidth / 2, std::uint8_t{90});
   }
-  EXPECT_FALSE(judge.slipped(0, see(covered), track));
+  EXPECT_FALSE(verifier.has_slipped(0, see(covered), track));
   track.pose.translation.x += 0.04;  // of half the longer side: 9 pixels
-  EXPECT_TRUE(judge.slipped(0, see(plain), track));
+  EXPECT_TRUE(verifier.has_slipped(0, see(plain), track));
 }
 
 TEST(Prints, APoseThatItsPatchesContradictIsNotShown) {

@@ -12,7 +12,7 @@ namespace modar {
 /// length is not positive or a number is not finite.
 Result<void> validate(const Camera& camera);
 
-/// Reads the YAML that `modar calibrate` (OpenCV's FileStorage) writes; a size of 0 where it states
+/// Reads the YAML that `modar calibrate` (OpenCV's FileStorage) writes; a size of 0 if it states
 /// none. Errors: kIo "camera.open", kInvalidInput "camera.*", kUnsupported "camera.distortion"
 /// beyond five coefficients.
 Result<Camera> read_camera_yml(const std::string& path);

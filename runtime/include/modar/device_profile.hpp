@@ -1,4 +1,4 @@
-// What the devices that we bake for can do: one table, compiled in from assets/devices/*.json.
+// Limits of the supported devices: one table, compiled in from assets/devices/*.json.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,17 @@ namespace modar {
 
 /// One device or class of devices. Strings live as long as the program.
 struct DeviceProfile {
-  std::string_view name;  ///< what `--device` takes
+  std::string_view name;  ///< for `--device`
   std::string_view title;
   std::string_view source;      ///< where the figures come from
-  std::string_view extensions;  ///< names with a blank before and after each
+  std::string_view extensions;  ///< names, each with a space before and after
   int es_version;               ///< 20: OpenGL ES 2.0; 30 and up has instancing in its core
   int max_texture_size;         ///< pixels
   int max_vertex_uniform_vectors;
   int max_fragment_uniform_vectors;
   int max_vertex_attributes;
   int max_varying_vectors;
-  std::uint32_t gpu_memory_mib;  ///< what one app should plan for
+  std::uint32_t gpu_memory_mib;  ///< budget of one app
   std::uint32_t ram_mib;
   std::uint32_t storage_mib;
   int cores;

@@ -1,4 +1,4 @@
-// An OpenGL ES 2.0 context without a window (EGL pbuffer). A program with a window brings its own.
+// An OpenGL ES 2.0 context without a window (EGL pbuffer). Programs with a window use their own.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace modar {
 
-/// What the current context offers, or less where a device profile masks it.
+/// What the current context supports, or less if a device profile masks it.
 struct GlCaps {
   std::string vendor;
   std::string renderer;
@@ -26,9 +26,9 @@ struct GlCaps {
   bool debug_groups = false;           ///< GL_KHR_debug or GL_EXT_debug_marker
   bool instanced_arrays = false;       ///< GL_EXT/ANGLE_instanced_arrays, or the core of ES 3
   bool vertex_arrays = false;          ///< GL_OES_vertex_array_object, or the core of ES 3
-  bool es3 = false;                    ///< has the state of ES 3 besides
+  bool es3 = false;                    ///< also has the state of ES 3
   bool multisampled_textures = false;  ///< GL_EXT_multisampled_render_to_texture
-  int max_samples = 1;                 ///< of a framebuffer of ours; 1: no antialiasing
+  int max_samples = 1;                 ///< of an off-screen framebuffer; 1: no antialiasing
   int max_texture_size = 64;
   int max_vertex_uniform_vectors = 128;
   int max_vertex_attributes = 8;

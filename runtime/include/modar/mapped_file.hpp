@@ -1,4 +1,4 @@
-// A file mapped for reading: nothing is copied, pages come when they are touched.
+// A file mapped for reading: nothing is copied, and pages are loaded when they are accessed.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +15,10 @@ class MappedFile {
  public:
   /// Errors: kIo "io.open", "io.map"; an empty file is kInvalidInput "io.empty".
   static Result<MappedFile> open(const std::string& path);
-  /// `length` bytes of an open file from `offset` on, an asset inside an APK say. The descriptor
-  /// stays the caller's and may be closed. Where the offset is not a multiple of 8, as tables need
-  /// it, the bytes are copied instead of mapped. Errors: kIo "io.map", kUsage "io.range" where the
-  /// file does not hold them.
+  /// `length` bytes of an open file from `offset` on, such as an asset inside an APK. The caller
+  /// keeps the descriptor and may close it. If the offset is not a multiple of 8, as tables
+  /// require, the bytes are copied instead of mapped. Errors: kIo "io.map", kUsage "io.range" if
+  /// the file is shorter.
   static Result<MappedFile> open(int descriptor, std::uint64_t offset, std::uint64_t length);
   MappedFile() = default;
   MappedFile(MappedFile&& other) noexcept;
@@ -35,12 +35,12 @@ class MappedFile {
   std::unique_ptr<std::byte[]> copy_;
 };
 
-/// Tells the system that these bytes (a part of a mapping, or any memory) are read next, front to
-/// back, so that it may fetch them ahead. Never fails: where it cannot help, it does nothing.
+/// Advises the system that these bytes (part of a mapping, or any memory) will be read next, front
+/// to back, so that it can read ahead. Never fails; without support it does nothing.
 void expect_reading(std::span<const std::byte> bytes);
 
-/// Gives the memory behind bytes of a MappedFile back to the system: they were read and are not
-/// needed soon. Reading them again is right, only slower. Never fails.
+/// Returns the memory behind bytes of a MappedFile to the system: they were read and are not needed
+/// soon. Reading them again is correct, only slower. Never fails.
 void forget_read(std::span<const std::byte> bytes);
 
 }  // namespace modar

@@ -6,6 +6,7 @@
 #include <span>
 
 #include <glm/mat3x3.hpp>
+#include <glm/mat4x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -51,7 +52,8 @@ Pose refine_pose(const Camera& camera, std::span<const glm::dvec3> world,
 glm::dvec3 rotation_vector(const glm::dmat3& rotation);
 glm::dmat3 rotation_matrix(const glm::dvec3& vector);
 
-/// Model-view matrix of GL (camera y up, z backward) for a pose (ModAR Eq. 6: M_VIEW).
-glm::mat4 gl_view(const Pose& pose);
+/// Model-view matrix of GL (camera y up, z backward) for a pose (ModAR Eq. 6: M_VIEW). stretch:
+/// Detection::stretch.
+glm::mat4 gl_view(const Pose& pose, const glm::dmat4x3& stretch = glm::dmat4x3(1.0));
 
 }  // namespace modar

@@ -20,26 +20,26 @@ namespace modar {
 
 struct PoseLoopOptions {
   DetectOptions detect;
-  bool track = true;  ///< false: every frame is searched anew
-  /// Frames between searches for further patterns while one is tracked: trades the time of a
-  /// search, some fifteen times that of tracking, for how soon a second pattern appears. Set by
-  /// hand.
+  bool track = true;  ///< false: search every frame
+  /// Frames between searches for more patterns while one is tracked: trades the time of a search,
+  /// about fifteen times that of tracking, for how soon a second pattern appears. Chosen without a
+  /// measurement.
   int search_every = 10;
-  /// Searches on a thread of its own, on the latest frame, while tracking goes on: no frame waits,
-  /// but what is found depends on timing. False: the same frames always give the same results.
+  /// Searches on a separate thread, on the latest frame, while tracking continues: no frame waits,
+  /// but results depend on timing. False: the same frames always give the same results.
   bool async_search = false;
-  /// ARMv7 instructions that a frame may take, in millions, 0: no limit; without async_search. A
-  /// search goes on over several frames then, and what it found is brought to the present one.
-  /// Smaller budgets find later, and lose fast motion while they search. Counted, not clocked: the
-  /// same frames give the same results. 12 or more: the longest step takes 5, tracking a pattern 3.
+  /// Limit of ARMv7 instructions per frame, in millions, for async_search = false; 0: no limit. A
+  /// search is then spread over several frames, and its result is carried to the current one.
+  /// Smaller budgets find patterns later, and lose fast ones during a search. Counted, not clocked:
+  /// the same frames give the same results. At least 12: the longest step takes 5, tracking 3.
   int budget = 0;
-  /// Learns what stands still around the pattern that shows largest, and goes on from it when the
-  /// pattern is hidden or leaves the frame: Detection::extended. Costs some 0.4 MB. The camera has
-  /// to move before: depth comes from motion.
+  /// Learns the static surroundings of the largest pattern in view, and continues from them while
+  /// the pattern is covered or out of the frame: Detection::extended. Takes about 0.4 MB. The
+  /// camera must move beforehand: depth comes from motion.
   bool extended = false;
-  /// The camera is a guess. Its focal length, and the aspects of flat patterns, are estimated from
-  /// the frames (TrackResult::camera), and no print is hidden because it seems bent: a wrong camera
-  /// bends, too.
+  /// The camera is a guess: its focal length and the aspects of flat patterns are estimated from
+  /// the frames (TrackResult::camera), and no print is hidden for being curved, since a wrong
+  /// camera makes flat prints look curved.
   bool estimate_camera = false;
 };
 
@@ -58,11 +58,11 @@ class PoseLoop {
   /// One frame of the camera's size.
   /// Errors: kInvalidInput "tracker.frame-size".
   Result<TrackResult> step(const GrayImage& frame);
-  /// The same into a result of the caller's, whose memory is reused.
+  /// The same, writing to a result of the caller, whose memory is reused.
   Result<void> step(const GrayImage& frame, TrackResult& result);
-  /// How the camera turned from the last frame to the next one, as a gyroscope says: a rotation
-  /// vector, radians, in the camera's axes (x right, y down, z forward; the axes of a phone's
-  /// sensors are others). Helps `extended`; not given, it is estimated.
+  /// The camera's rotation from the last frame to the next one, from a gyroscope: a rotation vector
+  /// in radians, in the camera's axes (x right, y down, z forward; those of a phone's sensors
+  /// differ). Helps `extended`; without it, the rotation is estimated.
   void set_turn(const glm::dvec3& rotation);
   /// Forgets all tracks, and the surroundings.
   void reset();

@@ -22,8 +22,8 @@ class PoseSmoother {
   /// of sight.
   PoseSmoother(std::size_t pattern_count, double max_latency_ms);
 
-  /// time_s: of the frame, increasing. Changes poses, and corners alike. A pattern that was not in
-  /// the last frame starts anew. Returns the largest latency, milliseconds.
+  /// time_s: of the frame, increasing. Changes poses, and corners and stretches alike. A pattern
+  /// that was not in the last frame starts anew. Returns the largest latency, milliseconds.
   double step(double time_s, std::span<Detection> visible);
 
  private:
@@ -35,6 +35,7 @@ class PoseSmoother {
     Pose raw;
     Pose smooth;
     std::array<glm::dvec2, 4> corners{};  ///< smooth, too
+    glm::dmat4x3 stretch{1.0};            ///< as well
   };
   double smooth(double time_s, State& state, Detection& detection) const;
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <glm/mat4x3.hpp>
 #include <glm/vec2.hpp>
 
 #include "modar/camera.hpp"
@@ -18,34 +19,38 @@ enum class Reason : std::uint8_t {
   kVisible,
   kNoFeatures,  ///< the frame has no corners to describe
   kFewMatches,  ///< too few features match the pattern's
-  kNoGeometry,  ///< "not in view": some features match, as in any picture, and no place agrees
-  kFailedVerification,  ///< the homography is impossible, or the frame does not look like it
-  kLostByBlur,          ///< it was tracked, should be in view, and does not fit
+  kNoGeometry,  ///< "not in view": some features match, as in any picture, but no pose agrees
+  kFailedVerification,  ///< the homography is impossible, or the frame does not match it
+  kLostByBlur,          ///< it was tracked and should be in view, but does not match
   kOutOfView,           ///< it was tracked and left the frame
-  kOtherPrint,          ///< it is there in part: another print of its series, or its mirror image
-  kCurved,              ///< it is there, on paper too bent for a plane's pose
+  kOtherPrint,  ///< a part of it is in view: another print of its series, or its mirror image
+  kCurved,      ///< it is in view, but its paper is too curved for a planar pose
 };
 /// "visible", "no features", "few matches", ...
 const char* to_string(Reason reason);
-/// How far a pattern came, 1 to 7: a frame reports the reason of the one that came furthest.
+/// How many stages a pattern passed, 1 to 7: a frame reports the reason of the one with most.
 int progress(Reason reason);
 
 /// A pattern measured in this frame.
 struct Detection {
   std::uint32_t pattern = 0;
   std::array<glm::dvec2, 4>
-      corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left; of a curved
-                  ///< pattern hidden ones, too; of a box those of its first face
+      corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left; including
+                  ///< hidden ones of a curved pattern; of a box those of its first face
   Pose pose;
+  /// Of a flat pattern, while the camera is a guess: what no pose explains of where its picture
+  /// lies, as the lens and the picture's proportions are unknown. What is to lie on the picture is
+  /// drawn by gl_view(pose, stretch): X_camera = rotation * (stretch * (X_world, 1)) + translation.
+  glm::dmat4x3 stretch{1.0};
   int matches = 0;  ///< features that match, or patches in view if tracked
   int inliers = 0;  ///< of those, the ones that agree with the pose
-  /// Share of the pattern's textured cells (of 8x8) in view that look like it, and their mean
-  /// correlation, each 0 to 1; of a tracked pattern as the last 16 frames saw them.
+  /// Share of the pattern's textured cells (of 8x8) in view that match it, and their mean
+  /// correlation, each 0 to 1; for a tracked pattern over the last 16 frames.
   double agreeing = 0;
   double likeness = 0;
-  /// It is hidden or out of the frame: the pose follows from its surroundings, with these standard
-  /// deviations of its position (pattern units) and rotation (radians). Also while the pose is
-  /// brought back to a pattern that is seen again.
+  /// It is covered or out of the frame: the pose is derived from its surroundings, with these
+  /// standard deviations of its position (pattern units) and rotation (radians). Also while the
+  /// pose is blended back to a pattern that has become visible again.
   bool extended = false;
   double position_sigma = 0;
   double rotation_sigma = 0;
@@ -60,8 +65,8 @@ struct TrackTimes {
   double pose = 0;
 };
 
-/// The focal length by which a frame's poses were measured, pixels, and while it is estimated its
-/// standard deviation.
+/// The focal length with which a frame's poses were measured, in pixels, and its standard deviation
+/// if it is estimated.
 struct CameraEstimate {
   double focal = 0;
   double sigma = 0;
@@ -70,25 +75,26 @@ struct CameraEstimate {
 
 struct TrackResult {
   std::vector<Detection> visible;       ///< in the order of the bundle's patterns
-  Reason reason = Reason::kNoFeatures;  ///< of the pattern that came furthest
+  Reason reason = Reason::kNoFeatures;  ///< of the pattern that passed most stages
   int features = 0;                     ///< keypoints of the frame
   TrackTimes times;
   CameraEstimate camera;
 };
 
 /// The two-frame rule of the ModAR paper: a model is shown once its pattern was seen in two
-/// consecutive frames, and stays for two frames after its loss. There it goes on as it moved
-/// between the last two frames that saw it: a print that leaves the frame fast takes its model
-/// along.
+/// consecutive frames, and stays for two frames after its loss. During these its motion between the
+/// last two frames that saw it continues: a print that leaves the frame fast takes its model with
+/// it.
 class Hysteresis {
  public:
-  /// predict: false leaves the model of a lost pattern where it was, as the paper does.
+  /// predict: false leaves the model of a lost pattern in place, as the paper does.
   explicit Hysteresis(std::size_t pattern_count, bool predict = true);
 
   struct State {
     bool shown = false;     ///< draw the model, at `pose`
-    bool measured = false;  ///< the pose is of this frame, not predicted from those before
+    bool measured = false;  ///< the pose is measured in this frame, not predicted
     Pose pose;
+    glm::dmat4x3 stretch{1.0};  ///< Detection::stretch
   };
   /// Takes a frame's detections; returns one state per pattern, valid until the next call.
   std::span<const State> step(std::span<const Detection> visible);

@@ -21,12 +21,13 @@ inline constexpr int kTrackerBorder = 18;
 
 struct DetectOptions {
   /// FAST threshold, gray values, 1 to 255: lower finds more corners in dim frames, and more noise.
-  /// Set by hand.
+  /// Chosen without a measurement.
   int threshold = 14;
-  /// Features are spread over squares of so many pixels of a level: smaller ones spread better, and
-  /// let weaker corners in. From the study that the detector follows.
+  /// Side of the squares over which features are spread, in pixels of a level: smaller ones spread
+  /// better, but admit weaker corners. From the study that the detector follows.
   int cell = 64;
-  /// Most features of a cell, the strongest: with `cell`, bounds what one object takes. By hand.
+  /// Most features per cell, the strongest: with `cell`, limits what one object takes. Not
+  /// measured.
   int per_cell = 12;
   /// Most features of a frame, the strongest, and of high-contrast ones each cell's best. Time of
   /// matching grows with it. 1,000 / 1,250 / 1,500: half-covered patterns were 95.0 % right with
@@ -34,8 +35,8 @@ struct DetectOptions {
   int max_features = 1500;
   /// Levels of the pyramid that are searched for features, at most.
   int levels = 8;
-  /// SIMD level, 0: the least that this program was built for; -1: the best that the processor has.
-  /// All give the same bits.
+  /// SIMD level, 0: the lowest that this program was built for; -1: the best of this processor. All
+  /// give the same bits.
   int simd = -1;
 };
 

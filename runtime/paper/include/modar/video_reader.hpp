@@ -28,7 +28,7 @@ class VideoReader {
   VideoReader(VideoReader&&) noexcept;
   ~VideoReader();
 
-  /// Frames a second; 30 where the video does not state it.
+  /// Frames per second; 30 if the video does not state it.
   [[nodiscard]] double fps() const;
   /// Frames of the file as its header states them; 0: unknown, or a camera.
   [[nodiscard]] std::uint64_t frames() const;

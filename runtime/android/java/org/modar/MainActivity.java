@@ -38,7 +38,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
-    private Fingers fingers = new Fingers();
+    private Gestures gestures = new Gestures();
     private Words words;
     private Bundles bundles;
     private Stage stage;
@@ -265,7 +265,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
         diagnostics.bundle = from.name + " (" + from.origin + ")";
         diagnostics.release = Fetch.AVAILABLE ? Fetch.version(bundles.store.getPath()) : "none";
         stage.show(opened, bundles.lens());
-        fingers = new Fingers();
+        gestures = new Gestures();
         move();
         from.session = opened;
         if (!bundles.isVerified(from)) new Job("modar-verify", from).start();
@@ -426,20 +426,20 @@ public final class MainActivity extends Activity implements Handler.Callback {
         complain(words.get("camera", cause));
     }
 
-    // --- Fingers ---
+    // --- Gestures ---
 
     @Override
     public boolean onTouchEvent(MotionEvent event) {
-        int done = fingers.touch(event, view.getWidth(), view.getHeight());
-        if (done == Fingers.MOVED) move();
-        if (done == Fingers.TAPPED) tapped(event.getX(), event.getY());
+        int done = gestures.touch(event, view.getWidth(), view.getHeight());
+        if (done == Gestures.MOVED) move();
+        if (done == Gestures.TAPPED) tapped(event.getX(), event.getY());
         return true;
     }
 
     private void move() {
         if (session == 0) return;
         try {
-            Native.setGesture(session, fingers.scale, fingers.turn, 0, fingers.shift);
+            Native.setGesture(session, gestures.scale, gestures.turn, 0, gestures.shift);
         } catch (ModarException error) {
             failed(error);
         }

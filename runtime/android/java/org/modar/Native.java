@@ -89,7 +89,7 @@ public final class Native {
     public static native void onSurfaceChanged(long session, int width, int height, int rotation, boolean mirror)
             throws ModarException;
 
-    /** What the visitor's fingers did: a factor, radians about the pattern's normal, half largest sides along it. */
+    /** The visitor's gesture: a scale factor, radians about the pattern's normal, and a shift along it in half longest sides. */
     public static native void setGesture(long session, float scale, float turn, float x, float y)
             throws ModarException;
 

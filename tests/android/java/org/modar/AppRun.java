@@ -229,7 +229,7 @@ public final class AppRun {
         check(!deliver(0), "no frame in a pause");
         Camera.busy = true;
         app.onResume();
-        check(status().startsWith("The camera does not answer"), "another app has it");
+        check(status().startsWith("The camera is not responding"), "another app has it");
         app.onPause();
         Camera.busy = false;
         app.onResume();
@@ -378,7 +378,7 @@ public final class AppRun {
         }
         check(updated().equals("Updated") && installed().length == 1, "the first release");
         check(deliver(0) && deliver(1), "goes on with the first release");
-        check(updated().equals("What is installed is the newest"), "nothing new");
+        check(updated().equals("The newest release is already installed"), "nothing new");
         step(folder, "second");
         check(updated().equals("Updated"), "the second release");
         check(deliver(0) && deliver(1), "goes on with the second release");

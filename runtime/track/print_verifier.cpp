@@ -1,5 +1,5 @@
-// Cells seen again, mirror images, rivals in one place, and bent paper.
-#include "print_judge.hpp"
+// Evidence from cells, mirror images, other patterns in the same place, and curved paper.
+#include "print_verifier.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,39 +10,39 @@
 namespace modar::tracker {
 namespace {
 
-// Cells that a frame looks at; after 16 frames it was all.
+// Cells compared per frame; all of them within 16 frames.
 constexpr int kCellsOfFrame = 4;
 constexpr std::uint32_t kCellStride = 23;  // spreads them; coprime to their number
 constexpr std::uint32_t kBendEvery = 16;   // frames between measurements of a bend
-// Variance from which what the frame shows in a cell is a picture.
+// Variance above which the frame's contents of a cell count as textured.
 constexpr float kShownContrast = 9.0f;
-// Correlation of what a cell showed before with what it shows: from the first on it is the same,
-// below the second another.
+// Correlation between earlier and current contents of a cell: from kSamePrint on they are the same,
+// below kChanged they differ.
 constexpr float kSamePrint = 0.7f;
 constexpr float kChanged = 0.5f;
-// Cosine of the angle between two directions, six degrees, from which something above the paper
-// would show another place: half a cell beside, at the height of half the print's longer side.
+// Cosine of the smallest angle (six degrees) between two directions from which an object above the
+// paper covers different places: half a cell apart at a height of half the print's longer side.
 constexpr float kElsewhere = 0.9945f;
-// Printed cells from which it is another print: a number, and a share of the textured cells in
-// view; and the share of cells that differ at all below which it is the pattern again.
+// Number of cells with printed evidence from which it is another print, also as a share (1 / n) of
+// the textured cells in view; and the share of differing cells below which it is the pattern again.
 constexpr int kOtherCells = 6;
 constexpr int kOtherShare = 8;
 constexpr int kAgainShare = 10;
-// Cells by which a mirror image, or another pattern, must agree with more.
+// Margin in cells by which a mirror image, or another pattern, must agree better.
 constexpr int kFlippedCells = 4;
-constexpr double kSureShare = 0.6;  // of the textured cells agree: it is no mirror image after all
-constexpr double kItselfShare = 0.94;       // of them agree: fewer than kFlippedCells do not
-constexpr double kTriedMirrorShare = 0.75;  // more of them did not agree in any mirror image
-constexpr int kRivalCells = 3;
-// Of what a cell's correlation was (in percent): below it the pose, or blur, has changed what it
-// shows; and the share of the agreeing cells from which a pose has slipped. On twelve patterns, 60
-// frames each of three fast paths, they named the 6 poses that had slipped by 10 to 69 pixels, and
-// 8 of 2,100 others, 6 of which PoseLoop does not ask for.
+constexpr double kSureShare = 0.6;  // share of agreeing textured cells that refutes a mirror image
+constexpr double kItselfShare = 0.94;       // from here on fewer than kFlippedCells disagree
+constexpr double kTriedMirrorShare = 0.75;  // no mirror image left a larger share in agreement
+constexpr int kActualCells = 3;
+// Relative drop of a cell's correlation (stored in percent) that counts as changed by the pose or
+// by blur, and the share (1 / n) of agreeing cells that must have changed for a slipped pose. On
+// twelve patterns, 60 frames each of three fast paths, this found all 6 poses that had slipped by
+// 10 to 69 pixels, and 8 of 2,100 others, 6 of which PoseLoop does not test.
 constexpr float kSlippedLikeness = 0.85f * 0.01f;
 constexpr int kSlippedShare = 4;
-// A bend moves the corners by so many frame pixels: in a frame 1280 wide it catches the eye. More
-// where the pose is but the nearest to a map, since a wrong focal length bends, too, unless that
-// map shows nearly all: share of the textured cells.
+// Displacement of the corners by curvature, in frame pixels, above which a print is curved: visible
+// in a frame 1280 wide. A larger one is needed if the pose is only the closest to a map, since a
+// wrong focal length looks like curvature, unless that map explains this share of textured cells.
 constexpr double kBentPixels = 5.0;
 constexpr double kMapBentPixels = 10.0;
 constexpr double kFlatMapShare = 0.9;
@@ -61,16 +61,17 @@ glm::vec3 direction_of(const Pose& pose) {
 
 }  // namespace
 
-PrintJudge::PrintJudge(std::span<const TrackedPattern> patterns, bool known_camera)
+PrintVerifier::PrintVerifier(std::span<const TrackedPattern> patterns, bool known_camera)
     : patterns_(patterns),
       known_camera_(known_camera),
       evidence_(patterns.size()),
       relations_(patterns.size() * patterns.size()),
       mirrors_(patterns.size(), {Mirror{true}, Mirror{false}}) {}
 
-/// kFlip bits of a cell. Where the mirror image of the cell lies in the outline, pattern and mirror
-/// image are compared with what is seen of the cell; else each shows nothing where the other is.
-std::uint8_t PrintJudge::flips_of(std::size_t pattern, const CellGrid& grid, int at) const {
+/// kFlip bits of a cell. If the mirror image of the cell is inside the outline, pattern and mirror
+/// image are both compared with the frame; otherwise each is tested where the other has no
+/// contents.
+std::uint8_t PrintVerifier::flips_of(std::size_t pattern, const CellGrid& grid, int at) const {
   const TrackedPattern& print = patterns_[pattern];
   CellSamples seen{};
   CellSamples expected{};
@@ -98,8 +99,8 @@ std::uint8_t PrintJudge::flips_of(std::size_t pattern, const CellGrid& grid, int
   return flips;
 }
 
-void PrintJudge::update(std::size_t pattern, const CellGrid& grid, const glm::vec3& from, int at,
-                        Cell& cell) const {
+void PrintVerifier::update(std::size_t pattern, const CellGrid& grid, const glm::vec3& from, int at,
+                           Cell& cell) const {
   CellSamples expected{};
   CellSamples seen{};
   CellGrid::expect(patterns_[pattern], at, expected, nullptr, grid.spread());
@@ -132,7 +133,8 @@ void PrintJudge::update(std::size_t pattern, const CellGrid& grid, const glm::ve
   }
 }
 
-bool PrintJudge::slipped(std::size_t pattern, const FrameView& frame, const Track& track) const {
+bool PrintVerifier::has_slipped(std::size_t pattern, const FrameView& frame,
+                                const Track& track) const {
   const TrackedPattern& print = patterns_[pattern];
   const PlaneMap map = map_of_track(print, frame, track);
   const CellGrid grid(print, map, frame.pyramid);
@@ -152,7 +154,8 @@ bool PrintJudge::slipped(std::size_t pattern, const FrameView& frame, const Trac
   return less * kSlippedShare >= agreeing && less > 0;
 }
 
-void PrintJudge::look(std::size_t pattern, const FrameView& frame, const Track& track, int count) {
+void PrintVerifier::look(std::size_t pattern, const FrameView& frame, const Track& track,
+                         int count) {
   const TrackedPattern& print = patterns_[pattern];
   Evidence& seen = evidence_[pattern];
   const PlaneMap map = map_of_track(print, frame, track);
@@ -165,8 +168,8 @@ void PrintJudge::look(std::size_t pattern, const FrameView& frame, const Track& 
 }
 
 /// The same of mirror images, of the cells that were looked at last.
-void PrintJudge::look_for_mirrors(std::size_t pattern, const FrameView& frame, const Track& track,
-                                  int count) {
+void PrintVerifier::look_for_mirrors(std::size_t pattern, const FrameView& frame,
+                                     const Track& track, int count) {
   Evidence& seen = evidence_[pattern];
   const PlaneMap map = map_of_track(patterns_[pattern], frame, track);
   const CellGrid grid(patterns_[pattern], map, frame.pyramid);
@@ -178,8 +181,8 @@ void PrintJudge::look_for_mirrors(std::size_t pattern, const FrameView& frame, c
 }
 
 /// Whether a mirror image, fitted as the pattern was, agrees with more of the frame.
-bool PrintJudge::fits_mirrored(std::size_t pattern, const FrameView& frame,
-                               const Track& track) const {
+bool PrintVerifier::fits_mirrored(std::size_t pattern, const FrameView& frame,
+                                  const Track& track) const {
   const TrackedPattern& print = patterns_[pattern];
   if (!print.surface.flat()) return false;
   const PlaneMap map = map_of_track(print, frame, track);
@@ -198,7 +201,7 @@ bool PrintJudge::fits_mirrored(std::size_t pattern, const FrameView& frame,
 
 /// A search finds a mirror image where a part of the pattern is its own one: the mirror lies where
 /// most of the cells that agree are alike.
-void PrintJudge::place_mirrors(std::size_t pattern) {
+void PrintVerifier::place_mirrors(std::size_t pattern) {
   std::array<bool, kCells> agreeing{};
   for (std::size_t at = 0; at < agreeing.size(); ++at) {
     agreeing[at] = evidence_[pattern].cells[at].state == CellState::kAgrees;
@@ -207,7 +210,7 @@ void PrintJudge::place_mirrors(std::size_t pattern) {
                        most_alike_mirror(patterns_[pattern], false, agreeing)};
 }
 
-double PrintJudge::agreeing_share(const Evidence& seen) {
+double PrintVerifier::agreeing_share(const Evidence& seen) {
   int textured = 0;
   int agreeing = 0;
   for (const Cell& cell : seen.cells) {
@@ -217,14 +220,14 @@ double PrintJudge::agreeing_share(const Evidence& seen) {
   return textured > 0 ? 1.0 * agreeing / textured : 0.0;
 }
 
-void PrintJudge::forget_mirrors(Evidence& seen) {
+void PrintVerifier::forget_mirrors(Evidence& seen) {
   for (Cell& cell : seen.cells) cell.flips = 0;
   seen.flipped = false;
 }
 
 /// at_once: one measurement decides; else two do, one after the other.
-void PrintJudge::measure(const TrackedPattern& print, const FrameView& frame, const Track& track,
-                         bool at_once, Evidence& seen) const {
+void PrintVerifier::measure(const TrackedPattern& print, const FrameView& frame, const Track& track,
+                            bool at_once, Evidence& seen) const {
   if (!known_camera_ || !print.surface.flat()) return;
   const bool flat = track.homography_only && agreeing_share(seen) >= kFlatMapShare;
   const double least = track.homography_only ? kMapBentPixels : kBentPixels;
@@ -233,7 +236,7 @@ void PrintJudge::measure(const TrackedPattern& print, const FrameView& frame, co
   seen.was_bent = bent;
 }
 
-PrintJudge::Verdict PrintJudge::judge(Evidence& seen) {
+PrintVerifier::Verification PrintVerifier::conclude(Evidence& seen) {
   int textured = 0;
   int printed = 0;
   int differing = 0;
@@ -256,17 +259,17 @@ PrintJudge::Verdict PrintJudge::judge(Evidence& seen) {
   const int most = std::max(for_flip[0], for_flip[1]);
   if (most >= kFlippedCells) seen.flipped = true;
   if (most <= -kFlippedCells && agreeing >= kSureShare) seen.flipped = false;
-  Verdict verdict;
-  if (seen.curved) verdict.reason = Reason::kCurved;
-  if (seen.other_print || seen.flipped) verdict.reason = Reason::kOtherPrint;
+  Verification verification;
+  if (seen.curved) verification.reason = Reason::kCurved;
+  if (seen.other_print || seen.flipped) verification.reason = Reason::kOtherPrint;
   if (textured > 0) {
-    verdict.agreeing = agreeing;
-    verdict.likeness = 0.01 * likeness / textured;
+    verification.agreeing = agreeing;
+    verification.likeness = 0.01 * likeness / textured;
   }
-  return verdict;
+  return verification;
 }
 
-bool PrintJudge::related_to(std::size_t a, std::size_t b, int& work) {
+bool PrintVerifier::related_to(std::size_t a, std::size_t b, int& work) {
   std::uint8_t& known = relations_[a * patterns_.size() + b];
   if (known == 0) {
     known = related(patterns_[a], patterns_[b]) ? 2 : 1;
@@ -275,28 +278,29 @@ bool PrintJudge::related_to(std::size_t a, std::size_t b, int& work) {
   return known == 2;
 }
 
-/// A pattern that the frame shows rather than this one. work: patterns that are looked at.
-std::int32_t PrintJudge::rival_of(std::size_t pattern, const FrameView& frame, const Track& track,
-                                  int work) {
+/// The pattern that the frame shows instead of this one, or -1. work: number of patterns to
+/// compare.
+std::int32_t PrintVerifier::find_actual_pattern(std::size_t pattern, const FrameView& frame,
+                                                const Track& track, int work) {
   Evidence& seen = evidence_[pattern];
   const PlaneMap map = map_of_track(patterns_[pattern], frame, track);
-  std::int32_t rival = -1;
-  int most = kRivalCells - 1;
+  std::int32_t actual_pattern = -1;
+  int most = kActualCells - 1;
   for (std::size_t tried = 1; tried < patterns_.size() && work > 0; ++tried) {
-    const std::size_t other = seen.next_rival++ % patterns_.size();
+    const std::size_t other = seen.next_other++ % patterns_.size();
     if (other == pattern || !related_to(pattern, other, work)) continue;
     --work;
     const PrintDifference difference =
         compare_prints(patterns_[pattern], patterns_[other], map, frame.pyramid);
     if (difference.second - difference.first <= most) continue;
     most = difference.second - difference.first;
-    rival = static_cast<std::int32_t>(other);
+    actual_pattern = static_cast<std::int32_t>(other);
   }
-  return rival;
+  return actual_pattern;
 }
 
-PrintJudge::Verdict PrintJudge::meet(std::size_t pattern, const FrameView& frame,
-                                     const Track& track, bool again) {
+PrintVerifier::Verification PrintVerifier::verify_found(std::size_t pattern, const FrameView& frame,
+                                                        const Track& track, bool again) {
   Evidence& seen = evidence_[pattern];
   if (!again) seen = {};
   look(pattern, frame, track, kCells);
@@ -310,13 +314,14 @@ PrintJudge::Verdict PrintJudge::meet(std::size_t pattern, const FrameView& frame
     forget_mirrors(seen);
   }
   measure(patterns_[pattern], frame, track, true, seen);
-  Verdict verdict = judge(seen);
-  verdict.rival = rival_of(pattern, frame, track, 8);
-  return verdict;
+  Verification verification = conclude(seen);
+  verification.actual_pattern = find_actual_pattern(pattern, frame, track, 8);
+  return verification;
 }
 
-PrintJudge::Verdict PrintJudge::follow(std::size_t pattern, const FrameView& frame,
-                                       const Track& track) {
+PrintVerifier::Verification PrintVerifier::verify_tracked(std::size_t pattern,
+                                                          const FrameView& frame,
+                                                          const Track& track) {
   Evidence& seen = evidence_[pattern];
   look(pattern, frame, track, kCellsOfFrame);
   if (agreeing_share(seen) < kItselfShare) {
@@ -327,9 +332,9 @@ PrintJudge::Verdict PrintJudge::follow(std::size_t pattern, const FrameView& fra
   if (seen.next_cell / kCellsOfFrame % kBendEvery == 0) {
     measure(patterns_[pattern], frame, track, false, seen);
   }
-  Verdict verdict = judge(seen);
-  verdict.rival = rival_of(pattern, frame, track, 1);
-  return verdict;
+  Verification verification = conclude(seen);
+  verification.actual_pattern = find_actual_pattern(pattern, frame, track, 1);
+  return verification;
 }
 
 }  // namespace modar::tracker

@@ -2,18 +2,18 @@ package org.modar;
 
 import android.view.MotionEvent;
 
-/** Pinch: size. Drag with one finger: turn across, shift along. A tap: what was touched. */
-final class Fingers {
+/** Touch gestures: a pinch scales; a drag turns (across) and shifts (along); a tap selects. */
+final class Gestures {
     static final int NOTHING = 0;
     static final int MOVED = 1;
     static final int TAPPED = 2;
 
     private static final float MIN_SCALE = 0.2f;
     private static final float MAX_SCALE = 5;
-    /** A finger that moves less than this share of the screen taps. */
+    /** A touch that moves less than this share of the screen is a tap. */
     private static final float TAP = 0.02f;
 
-    /** A factor; radians; half largest sides of the pattern. */
+    /** A factor; radians; half longest sides of the pattern. */
     float scale = 1;
     float turn;
     float shift;
@@ -22,7 +22,7 @@ final class Fingers {
     private float lastSpread;
     private boolean tap;
 
-    /** What the event came to: NOTHING, MOVED or TAPPED. */
+    /** Handles an event; returns NOTHING, MOVED or TAPPED. */
     int touch(MotionEvent event, int width, int height) {
         float x = event.getX();
         float y = event.getY();
