@@ -86,7 +86,7 @@ Result<void> write_secret(const std::string& path, const std::string& text) {
   auto written = write_file(path, std::string_view(text));
   ::umask(mask);
   if (written && ::chmod(path.c_str(), S_IRUSR | S_IWUSR) != 0) {
-    return fail(ExitCode::kIo, "io.write", path, std::strerror(errno), "see that it is yours");
+    return fail(ExitCode::kIo, "io.write", path, std::strerror(errno), "check its owner");
   }
   return written;
 }
@@ -105,7 +105,7 @@ Result<void> take_devices(const std::string& text, PublishRequest& request) {
     const std::string device = rest.substr(0, comma);
     if (find_device_profile(device) == nullptr) {
       return fail(ExitCode::kUsage, "ship.for", device, "there is no such device profile",
-                  "choose of " + device_profile_names());
+                  "choose from " + device_profile_names());
     }
     request.devices[name].push_back(device);
     rest.erase(0, comma + 1);
@@ -119,8 +119,7 @@ Result<void> take_devices(const std::string& text, PublishRequest& request) {
 
 std::string expiry_text(std::int64_t expires) {
   if (expires == kNever) return "does not expire";
-  return (expires <= std::time(nullptr) ? "expired " : "devices believe it until ") +
-         time_text(expires);
+  return (expires <= std::time(nullptr) ? "expired " : "valid until ") + time_text(expires);
 }
 
 /// What `ship rotate` and `ship root` work on.
@@ -222,8 +221,8 @@ int run_keygen(const KeygenCommand& command) {
   const std::string public_file = command.out + ".pub";
   if (!command.force &&
       (::access(command.out.c_str(), F_OK) == 0 || ::access(public_file.c_str(), F_OK) == 0)) {
-    return print_error({ExitCode::kUsage, "key.exists", command.out, "a key is there already",
-                        "choose another name, or --force to lose it"});
+    return print_error({ExitCode::kUsage, "key.exists", command.out, "the key already exists",
+                        "choose another name, or overwrite it with --force"});
   }
   std::string pass_phrase;
   if (!command.pass_phrase_file.empty()) {
@@ -298,7 +297,7 @@ int run_rotate(const RotateCommand& command) {
   const auto& [key, next, folder] = *change;
   if (auto fine = folder.check_signer(key.public_key); !fine) return print_error(fine.error());
   if (auto added = folder.add_key(next, key); !added) return print_error(added.error());
-  std::fprintf(stderr, "link %u of the chain: devices follow to key %s\n", folder.key_links(),
+  std::fprintf(stderr, "link %u of the chain: devices move to key %s\n", folder.key_links(),
                to_hex(next.id).c_str());
   return static_cast<int>(ExitCode::kOk);
 }
@@ -325,13 +324,13 @@ int run_refresh(const RefreshCommand& command) {
   if (!newest) return print_error(newest.error());
   if (!*newest || (*newest)->fresh_days == 0) {
     return print_error({ExitCode::kUsage, "ship.fresh", command.folder,
-                        "its newest release asks for no freshness",
+                        "its newest release has no --fresh-days",
                         "publish with --fresh-days 7 first"});
   }
   if (auto signed_ = folder->add_freshness(**newest, std::time(nullptr), *key); !signed_) {
     return print_error(signed_.error());
   }
-  std::fprintf(stderr, "release %llu is the newest, for %llu days\n",
+  std::fprintf(stderr, "release %llu confirmed as the newest for %llu days\n",
                static_cast<unsigned long long>((*newest)->version),
                static_cast<unsigned long long>((*newest)->fresh_days));
   return static_cast<int>(ExitCode::kOk);
@@ -403,7 +402,7 @@ int run_verify(const VerifyCommand& command) {
                         "remove them and publish their bundles again, or copy them again"});
   }
   if (!command.json) {
-    std::fprintf(stderr, "release %llu is whole: %zu bundles, %llu objects, %s; %s\n",
+    std::fprintf(stderr, "release %llu is complete: %zu bundles, %llu objects, %s; %s\n",
                  static_cast<unsigned long long>(report->release.version),
                  report->release.bundles.size(), static_cast<unsigned long long>(report->objects),
                  human_bytes(report->bytes).c_str(), expiry_text(report->release.expires).c_str());
@@ -415,13 +414,14 @@ int run_plan(const PlanCommand& command) {
   const Link* link = find_link(command.link);
   if (link == nullptr) {
     return print_error({ExitCode::kUsage, "ship.link", command.link, "there is no such network",
-                        "choose of 2g, 3g, 4g, wifi"});
+                        "choose from 2g, 3g, 4g, wifi"});
   }
   const DeviceProfile* device =
       command.device.empty() ? nullptr : find_device_profile(command.device);
   if (!command.device.empty() && device == nullptr) {
     return print_error({ExitCode::kUsage, "ship.device", command.device,
-                        "there is no such device profile", "choose of " + device_profile_names()});
+                        "there is no such device profile",
+                        "choose from " + device_profile_names()});
   }
   const auto plan = plan_update(command.old_bundle, command.new_bundle, *link, command.recipe);
   if (!plan) return print_error(plan.error());

@@ -87,7 +87,7 @@ bool read_record(std::string_view text, Record& record) {
 Result<SecretKey> make_key() {
   if (sodium_init() < 0) {
     return fail(ExitCode::kInternal, "key.random", "", "the system provides no random numbers",
-                "see that /dev/urandom is there");
+                "check that /dev/urandom exists");
   }
   SecretKey key;
   randombytes_buf(key.public_key.id.data(), key.public_key.id.size());
@@ -112,7 +112,7 @@ Result<std::string> secret_key_text(const SecretKey& key, const std::string& pas
   std::copy(sum.begin(), sum.end(), masked + 72);
   if (!pass_phrase.empty() && !apply_mask(record, pass_phrase)) {
     return fail(ExitCode::kInternal, "key.memory", "",
-                "scrypt cannot get the 1 GiB of memory that it needs",
+                "scrypt needs 1 GiB of memory, which is not available",
                 "free memory, or use no pass phrase");
   }
   return std::string("untrusted comment: minisign ") +

@@ -62,7 +62,7 @@ Result<std::uint64_t> next_version(const ReleaseFolder& folder, std::uint64_t ep
   return fail(ExitCode::kUsage, "ship.version", std::to_string(wanted),
               "release " + std::to_string(std::max(newest, taken.contains(wanted) ? wanted : 0)) +
                   " was published already",
-              "choose a greater number, or none");
+              "choose a higher number, or none");
 }
 
 const ReleaseBundle* find_bundle(const std::vector<ReleaseBundle>& bundles,
@@ -235,8 +235,9 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
                 "publish them into several folders");
   }
   if (const auto readable = parse_release(release_text(done.release)); !readable) {
-    return fail(ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
-                "name each bundle's file with letters, digits, '.', '_' and '-', no two alike");
+    return fail(
+        ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
+        "name each bundle's file with letters, digits, '.', '_' and '-', no two of them equal");
   }
   if (request.dry_run) return done;
   MODAR_TRY(check_kept(request, folder, done.release, ledger));

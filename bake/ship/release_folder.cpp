@@ -31,7 +31,7 @@ Result<void> make_folders(const fs::path& path) {
   fs::create_directories(path, error);
   if (error) {
     return fail(ExitCode::kIo, "io.create", path.string(), error.message(),
-                "see that the folder can be written");
+                "check that the folder is writable");
   }
   return {};
 }
@@ -112,7 +112,7 @@ Result<void> ReleaseFolder::check_signer(const PublicKey& key) const {
     return fail(ExitCode::kUsage, "ship.key", path_,
                 "it is signed with key " + to_hex(wanted) + ", not with " + to_hex(key.id) +
                     ", which devices would refuse",
-                "give the secret key of that one, or lead devices to yours: `modar ship rotate`");
+                "use that secret key, or move devices to yours: `modar ship rotate`");
   };
   MODAR_ASSIGN(const RootWord word, root_word());
   const std::uint32_t links = key_links();
@@ -259,7 +259,7 @@ Result<RootWord> ReleaseFolder::add_root_word(const PublicKey& next, const Secre
     const bool several =
         name.starts_with("root.json.") && name.ends_with(".minisig") && name != "root.json.minisig";
     if (!several && root_links() == 0) continue;
-    return fail(ExitCode::kUsage, "ship.root", path_, "several root keys have to agree here",
+    return fail(ExitCode::kUsage, "ship.root", path_, "several root keys must agree here",
                 "write a draft for all to sign: `modar ship root --draft FILE`");
   }
   if (word.epoch != 0) {

@@ -23,8 +23,7 @@ std::string describe(const RootWord& word, const PublicKey& key) {
 std::string describe(const RootLink& link) {
   std::string text = "link " + std::to_string(link.serial) +
                      " of the chain of root keys: " + std::to_string(link.roots.threshold) +
-                     " of " + std::to_string(link.roots.keys.size()) +
-                     " have to agree from now on:";
+                     " of " + std::to_string(link.roots.keys.size()) + " must agree from now on:";
   for (const PublicKey& key : link.roots.keys) text += " " + to_hex(key.id);
   return text;
 }
@@ -70,7 +69,7 @@ Result<RootDraft> read_root_draft(const std::string& file) {
     return RootDraft{root_link_path(link->serial), *text, describe(*link)};
   }
   return fail(ExitCode::kInvalidInput, "ship.draft", file,
-              "it says neither who signs releases nor which root keys follow",
+              "it names neither a signing key nor new root keys",
               "give the file that `modar ship root --draft` wrote");
 }
 

@@ -109,7 +109,7 @@ Result<void> check_fresh(const ReleaseReader& read, const Release& release, cons
   MODAR_TRY(verify_signature(document->text, document->signature, trust.key));
   MODAR_ASSIGN(const auto fresh, parse_freshness(document->text));
   if (fresh.version == release.version && fresh.epoch == release.epoch) return {};
-  return fail(kExitMixed, "ship.mixed", path, "it speaks of another release",
+  return fail(kExitMixed, "ship.mixed", path, "it refers to another release",
               "sign it again: `modar ship refresh`");
 }
 
@@ -153,8 +153,7 @@ class ObjectVerifier {
       if (first) report_.bytes += size;
       return **bytes;
     }
-    if (first)
-      damage(bundle, id, *bytes ? "its bytes are not what its name says" : "it is missing");
+    if (first) damage(bundle, id, *bytes ? "its bytes do not match its name" : "it is missing");
     return std::string();
   }
 

@@ -20,8 +20,8 @@ constexpr std::uint64_t kLeastProgress = 1024;
 
 bool Attempts::begin(Transfer& transfer) {
   transfer.too_long = false;
-  if (transfer.wanted == nullptr) return true;
-  const Folder& folder = *transfer.wanted->folder;
+  if (transfer.object == nullptr) return true;
+  const Folder& folder = *transfer.object->folder;
   auto file = folder.resume(transfer.part_name());
   if (!file) {
     transfer.error = file.error();
@@ -32,7 +32,7 @@ bool Attempts::begin(Transfer& transfer) {
   if (transfer.have == 0) tell(static_cast<std::int64_t>(have));
   transfer.have = have;
   // A complete part file was never verified (the run was killed): download it again.
-  if (have >= transfer.wanted->size) discard(transfer);
+  if (have >= transfer.object->size) discard(transfer);
   return true;
 }
 
@@ -41,7 +41,7 @@ bool Attempts::take(Transfer& transfer, std::span<const std::byte> bytes) {
     transfer.too_long = true;
     return false;
   }
-  if (transfer.wanted == nullptr) {
+  if (transfer.object == nullptr) {
     transfer.text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   } else if (auto written = transfer.part->write_at(transfer.have, bytes.data(), bytes.size());
              !written) {
@@ -55,7 +55,7 @@ bool Attempts::take(Transfer& transfer, std::span<const std::byte> bytes) {
 }
 
 void Attempts::discard(Transfer& transfer) {
-  if (transfer.wanted != nullptr) {
+  if (transfer.object != nullptr) {
     tell(-static_cast<std::int64_t>(transfer.have));
     if (auto emptied = transfer.part->resize(0); !emptied) transfer.error = emptied.error();
   } else {
@@ -67,14 +67,14 @@ void Attempts::discard(Transfer& transfer) {
 Outcome Attempts::end(Transfer& transfer, const Answer& answer) {
   // What cannot be written is not tried again.
   const bool written = transfer.error.code.empty();
-  Outcome outcome = written ? judge(transfer, answer) : Outcome::kFailed;
+  Outcome outcome = written ? classify(transfer, answer) : Outcome::kFailed;
   if (!transfer.error.code.empty()) outcome = Outcome::kFailed;
   transfer.part.reset();
   return outcome;
 }
 
-Outcome Attempts::judge(Transfer& transfer, const Answer& answer) {
-  if (transfer.too_long && transfer.wanted == nullptr) {  // no document of a release is so long
+Outcome Attempts::classify(Transfer& transfer, const Answer& answer) {
+  if (transfer.too_long && transfer.object == nullptr) {  // no document of a release is so long
     transfer.error = {kExitMixed, "fetch.too-long", address_of(transfer),
                       "it is longer than " + std::to_string(transfer.limit) + " bytes",
                       "publish the release again, or use a newer modar-fetch"};
@@ -103,28 +103,28 @@ Outcome Attempts::judge(Transfer& transfer, const Answer& answer) {
       break;
   }
   const bool ended = answer.kind == Answer::Kind::kEnded;
-  if (transfer.wanted == nullptr) {
+  if (transfer.object == nullptr) {
     if (ended) return Outcome::kDone;
     discard(transfer);  // a text is not resumed: its length is not known
     return again(transfer, answer.cause);
   }
-  if (transfer.have == transfer.wanted->size) return judge_object(transfer);
+  if (transfer.have == transfer.object->size) return check_object(transfer);
   return again(transfer, ended ? "the connection ended early" : answer.cause);
 }
 
 /// Verifies a complete object; discards it and tries again if it is wrong.
-Outcome Attempts::judge_object(Transfer& transfer) {
+Outcome Attempts::check_object(Transfer& transfer) {
   bool right = false;
-  const Wanted& wanted = *transfer.wanted;
-  if (const auto file = wanted.folder->map(transfer.part_name())) {
-    right = object_id(file->bytes()) == wanted.id;
+  const ObjectRequest& object = *transfer.object;
+  if (const auto file = object.folder->map(transfer.part_name())) {
+    right = object_id(file->bytes()) == object.id;
   }
   if (!right) {
     ++stats_.corrupt;
     discard(transfer);
-    return again(transfer, "what came is not what was published");
+    return again(transfer, "the received data differs from the published data");
   }
-  if (auto moved = wanted.folder->rename(transfer.part_name(), to_hex(wanted.id)); !moved) {
+  if (auto moved = object.folder->rename(transfer.part_name(), to_hex(object.id)); !moved) {
     transfer.error = moved.error();
     return Outcome::kFailed;
   }

@@ -20,11 +20,12 @@ namespace modar::fetch {
 struct Transfer {
   using Clock = std::chrono::steady_clock;
 
-  std::string path;                ///< below the release folder
-  std::size_t limit = 0;           ///< most bytes that are accepted
-  const Wanted* wanted = nullptr;  ///< an object, received into its part file; nullptr: a text
-  std::string text;                ///< what was received of a text
-  bool optional = false;           ///< believe the first answer "no such file"
+  std::string path;       ///< below the release folder
+  std::size_t limit = 0;  ///< most bytes that are accepted
+  const ObjectRequest* object =
+      nullptr;            ///< an object, received into its part file; nullptr: a text
+  std::string text;       ///< what was received of a text
+  bool optional = false;  ///< believe the first answer "no such file"
 
   std::optional<OutputFile> part;
   std::uint64_t have = 0;      ///< bytes of the part file, or of the text
@@ -35,7 +36,7 @@ struct Transfer {
   Clock::time_point not_before{};  ///< of the next attempt
   Error error;                     ///< after Outcome::kFailed
 
-  [[nodiscard]] std::string part_name() const { return to_hex(wanted->id) + ".part"; }
+  [[nodiscard]] std::string part_name() const { return to_hex(object->id) + ".part"; }
 };
 
 /// How an attempt ended, as far as the network knows.
@@ -83,8 +84,8 @@ class Attempts {
   Outcome end(Transfer& transfer, const Answer& answer);
 
  private:
-  Outcome judge(Transfer& transfer, const Answer& answer);
-  Outcome judge_object(Transfer& transfer);
+  Outcome classify(Transfer& transfer, const Answer& answer);
+  Outcome check_object(Transfer& transfer);
   Outcome again(Transfer& transfer, const std::string& cause);
   void tell(std::int64_t bytes) const {
     if (on_bytes_ && bytes != 0) on_bytes_(bytes);

@@ -48,7 +48,7 @@ Result<DracoMesh> decode_draco(std::span<const std::byte> buffer) {
   if (!decoded.ok()) return broken("Draco cannot decode it");
   const std::unique_ptr<draco::Mesh> mesh = std::move(decoded).value();
   if (mesh->num_points() > kMaxPoints || mesh->num_faces() > kMaxFaces) {
-    return broken("it holds more than a chunk may");
+    return broken("it exceeds the limits of a chunk");
   }
   DracoMesh out;
   out.point_count = mesh->num_points();
@@ -57,7 +57,7 @@ Result<DracoMesh> decode_draco(std::span<const std::byte> buffer) {
     const draco::Mesh::Face& face = mesh->face(draco::FaceIndex(f));
     for (std::size_t c = 0; c < 3; ++c) {
       const std::uint32_t point = face[c].value();
-      if (point >= out.point_count) return broken("a triangle names a point that is not there");
+      if (point >= out.point_count) return broken("a triangle refers to a missing point");
       out.corners.push_back(point);
     }
   }

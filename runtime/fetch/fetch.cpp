@@ -94,7 +94,7 @@ Result<void> follow_root(Transfers& transfers, Belief& belief) {
   if (!text && !state.trusted_key.empty()) return {};
   if (!text) {
     return fail(kExitWrongKey, "fetch.no-root", path,
-                "the server does not say which key signs, and several root keys sign no releases",
+                "the server names no signing key, and root keys do not sign releases",
                 "name the key that signs: `modar ship root`");
   }
   if (roots.keys.size() == 1) {
@@ -116,13 +116,13 @@ Result<void> follow_root(Transfers& transfers, Belief& belief) {
   return belief.save();
 }
 
-/// Moves the trust along the chain of keys until `wanted` is trusted; to the chain's end where the
+/// Moves the trust along the chain of keys until `target` is trusted; to the chain's end where the
 /// state is fresh, so that a key that was left behind is not believed again. What verifies is saved
 /// at once.
-Result<void> follow_chain(Transfers& transfers, const Signature& wanted, Belief& belief) {
+Result<void> follow_chain(Transfers& transfers, const Signature& target, Belief& belief) {
   StoreState& state = belief.state;
   MODAR_ASSIGN(auto trusted, parse_public_key(state.trusted_key));
-  while ((state.fresh || trusted.id != wanted.key_id) && state.key_serial < kMaxLinks) {
+  while ((state.fresh || trusted.id != target.key_id) && state.key_serial < kMaxLinks) {
     const std::uint32_t serial = state.key_serial + 1;
     const std::string path = "keys/" + std::to_string(serial) + ".json";
     const auto document = download_trust(transfers, path);
@@ -143,7 +143,7 @@ Result<void> follow_chain(Transfers& transfers, const Signature& wanted, Belief&
     MODAR_TRY(belief.save());
   }
   belief.passed.push_back(trusted.id);
-  return {};  // where the end of the chain is not `wanted`, the signature check reports it
+  return {};  // where the end of the chain is not `target`, the signature check reports it
 }
 
 /// Puts the key that --trust gives into the state, unless the state knows where the chain of keys
@@ -158,26 +158,26 @@ Result<void> recall_trust(const std::string& given_key, StoreState& state) {
   return {};
 }
 
-/// The Freshness of a release that has one, into `news`. Errors: kExitMixed "fetch.mixed";
+/// The Freshness of a release that has one, into `offered`. Errors: kExitMixed "fetch.mixed";
 /// kExitExpired "fetch.stale"; as download_release().
 Result<void> check_freshness(Transfers& transfers, const PublicKey& trusted, std::int64_t clock,
-                             StoreState& state, SignedRelease& news) {
-  if (news.release.fresh_days == 0) return {};
-  const std::string path = freshness_path(news.release.version);
-  MODAR_ASSIGN(news.fresh_text, transfers.text(path, kMaxLinkBytes));
+                             StoreState& state, SignedRelease& offered) {
+  if (offered.release.fresh_days == 0) return {};
+  const std::string path = freshness_path(offered.release.version);
+  MODAR_ASSIGN(offered.fresh_text, transfers.text(path, kMaxLinkBytes));
   MODAR_ASSIGN(const auto signature_text, transfers.text(path + ".minisig", kMaxSignatureBytes));
   MODAR_ASSIGN(const auto signature, parse_signature(signature_text));
-  MODAR_TRY(verify_signature(news.fresh_text, signature, trusted));
-  MODAR_ASSIGN(const auto fresh, parse_freshness(news.fresh_text));
-  if (fresh.version != news.release.version || fresh.epoch != news.release.epoch) {
-    return fail(kExitMixed, "fetch.mixed", path, "it speaks of another release",
+  MODAR_TRY(verify_signature(offered.fresh_text, signature, trusted));
+  MODAR_ASSIGN(const auto fresh, parse_freshness(offered.fresh_text));
+  if (fresh.version != offered.release.version || fresh.epoch != offered.release.epoch) {
+    return fail(kExitMixed, "fetch.mixed", path, "it refers to another release",
                 "sign it again: `modar ship refresh`");
   }
   if (fresh.expires <= clock) {
     return fail(
         kExitExpired, "fetch.stale", path,
-        "nobody has said since " + time_text(fresh.time) + " that this release is the newest",
-        "sign it again: `modar ship refresh`, or set this device's clock");
+        "nobody has confirmed since " + time_text(fresh.time) + " that this release is the newest",
+        "sign it again: `modar ship refresh`, or correct this device's clock");
   }
   state.time = std::max(state.time, fresh.time);
   return {};
@@ -191,27 +191,27 @@ Result<SignedRelease> download_release(Transfers& transfers, std::int64_t clock,
   MODAR_ASSIGN(const auto latest, transfers.text("latest", kMaxLatestBytes));
   MODAR_ASSIGN(const auto version, parse_latest(latest));
   const std::string path = "releases/" + std::to_string(version) + ".json";
-  SignedRelease news;
+  SignedRelease offered;
   MODAR_ASSIGN(auto text, transfers.text(path, kMaxReleaseBytes));
   MODAR_ASSIGN(auto signature_text, transfers.text(path + ".minisig", kMaxSignatureBytes));
-  news.text = std::move(text);
-  news.signature_text = std::move(signature_text);
-  MODAR_ASSIGN(const auto signature, parse_signature(news.signature_text));
+  offered.text = std::move(text);
+  offered.signature_text = std::move(signature_text);
+  MODAR_ASSIGN(const auto signature, parse_signature(offered.signature_text));
   const auto before = parse_public_key(state.trusted_key);  // none: no root's word is known yet
   if (state.fresh || !before || before->id != signature.key_id) {
     MODAR_TRY(follow_root(transfers, belief));
     MODAR_TRY(follow_chain(transfers, signature, belief));
   }
   MODAR_ASSIGN(const auto trusted, parse_public_key(state.trusted_key));
-  MODAR_TRY(verify_signature(news.text, signature, trusted));
-  MODAR_ASSIGN(auto release, parse_release(news.text));
+  MODAR_TRY(verify_signature(offered.text, signature, trusted));
+  MODAR_ASSIGN(auto release, parse_release(offered.text));
   if (release.version != version) {
     return fail(kExitMixed, "fetch.mixed", path, "it is release " + std::to_string(release.version),
                 "publish the release again");
   }
-  news.release = std::move(release);
-  MODAR_TRY(check_freshness(transfers, trusted, clock, state, news));
-  return news;
+  offered.release = std::move(release);
+  MODAR_TRY(check_freshness(transfers, trusted, clock, state, offered));
+  return offered;
 }
 
 // --- What this device wants ---
@@ -234,36 +234,39 @@ TransferOptions transfer_options(const FetchOptions& options, const std::string&
 
 /// Refuses a release that is older than what was installed or than `least` (epoch, version), has
 /// expired, or differs from the installed one of the same number.
-Result<void> judge_release(const SignedRelease& news, const StoreState& state,
+Result<void> check_release(const SignedRelease& offered, const StoreState& state,
                            const std::optional<InstalledRelease>& active, std::int64_t now,
                            const std::pair<std::uint64_t, std::uint64_t>& least) {
   // The active release counts too, in case the state was lost; not one of an epoch before.
   const bool counts = active && active->release.epoch == state.epoch;
   const std::uint64_t known =
       std::max(state.version, counts ? active->release.version : std::uint64_t{0});
-  const std::string where = "release " + std::to_string(news.release.version);
-  if (news.release.epoch != state.epoch) {
-    return fail(news.release.epoch < state.epoch ? kExitRollBack : kExitMixed, "fetch.epoch", where,
-                "it is of epoch " + std::to_string(news.release.epoch) +
+  const std::string where = "release " + std::to_string(offered.release.version);
+  if (offered.release.epoch != state.epoch) {
+    return fail(offered.release.epoch < state.epoch ? kExitRollBack : kExitMixed, "fetch.epoch",
+                where,
+                "it is of epoch " + std::to_string(offered.release.epoch) +
                     ", the root key's word of epoch " + std::to_string(state.epoch),
                 "publish it again");
   }
-  if (std::tie(news.release.epoch, news.release.version) < std::tie(least.first, least.second)) {
+  if (std::tie(offered.release.epoch, offered.release.version) <
+      std::tie(least.first, least.second)) {
     return fail(kExitRollBack, "fetch.roll-back", where,
                 "release " + std::to_string(least.second) + " came with this program",
                 "publish it under a higher number");
   }
-  if (news.release.version < known) {
+  if (offered.release.version < known) {
     return fail(kExitRollBack, "fetch.roll-back", where,
                 "release " + std::to_string(known) + " was installed before",
                 "publish it under a higher number");
   }
-  if (news.release.expires != kNever && news.release.expires <= now) {
+  if (offered.release.expires != kNever && offered.release.expires <= now) {
     return fail(kExitExpired, "fetch.expired", where,
-                "it expired at " + time_text(news.release.expires),
-                "publish it again, or set this device's clock");
+                "it expired at " + time_text(offered.release.expires),
+                "publish it again, or correct this device's clock");
   }
-  if (counts && active->release.version == news.release.version && active->text != news.text) {
+  if (counts && active->release.version == offered.release.version &&
+      active->text != offered.text) {
     return fail(kExitMixed, "fetch.same-number", where,
                 "another release was installed under this number",
                 "publish it under a higher number");
@@ -273,14 +276,14 @@ Result<void> judge_release(const SignedRelease& news, const StoreState& state,
 
 /// Where the state was lost, the installed release tells what was believed: no epoch before its
 /// own, and in its epoch no keys that do not lead past the one that signed it.
-Result<void> judge_lost_state(const SignedRelease& news, const Belief& belief,
+Result<void> check_lost_state(const SignedRelease& offered, const Belief& belief,
                               const std::optional<InstalledRelease>& installed) {
-  if (!belief.lost || !installed || news.release.epoch > installed->release.epoch) return {};
-  const std::string where = "release " + std::to_string(news.release.version);
-  if (news.release.epoch < installed->release.epoch) {
+  if (!belief.lost || !installed || offered.release.epoch > installed->release.epoch) return {};
+  const std::string where = "release " + std::to_string(offered.release.version);
+  if (offered.release.epoch < installed->release.epoch) {
     return fail(kExitRollBack, "fetch.epoch", where,
-                "it is of epoch " + std::to_string(news.release.epoch) + ", the installed one of " +
-                    std::to_string(installed->release.epoch),
+                "it is of epoch " + std::to_string(offered.release.epoch) +
+                    ", the installed one of " + std::to_string(installed->release.epoch),
                 "publish it again; for another publisher, name another store");
   }
   const auto text = installed->folder.read("release.json.minisig", kMaxSignatureBytes);
@@ -362,29 +365,29 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   MODAR_TRY(recall_trust(options.trusted_key, state));
   const std::int64_t known_time = state.time;
   const std::int64_t clock = clock_of(options, state, active);
-  MODAR_ASSIGN(const auto news, download_release(transfers, clock, belief));
-  MODAR_TRY(judge_lost_state(news, belief, active));
+  MODAR_ASSIGN(const auto offered, download_release(transfers, clock, belief));
+  MODAR_TRY(check_lost_state(offered, belief, active));
   MODAR_TRY(
-      judge_release(news, state, active, clock, {options.least_epoch, options.least_version}));
-  MODAR_ASSIGN(const auto chosen, choose_bundles(news.release, options));
+      check_release(offered, state, active, clock, {options.least_epoch, options.least_version}));
+  MODAR_ASSIGN(const auto chosen, choose_bundles(offered.release, options));
 
   FetchReport report;
-  report.version = news.release.version;
-  report.changed = !active || active->text != news.text || !is_installed(*active, chosen);
+  report.version = offered.release.version;
+  report.changed = !active || active->text != offered.text || !is_installed(*active, chosen);
   if (report.changed) {
-    MODAR_TRY(install({options, store, transfers, news, std::move(active), chosen}, report));
+    MODAR_TRY(install({options, store, transfers, offered, std::move(active), chosen}, report));
   } else {
-    if (!news.fresh_text.empty() && state.time > known_time) {
-      MODAR_TRY(active->folder.replace("fresh.json", news.fresh_text));
+    if (!offered.fresh_text.empty() && state.time > known_time) {
+      MODAR_TRY(active->folder.replace("fresh.json", offered.fresh_text));
     }
-    MODAR_TRY(store.link_bundles(news.release));
+    MODAR_TRY(store.link_bundles(offered.release));
   }
-  state.version = news.release.version;
+  state.version = offered.release.version;
   MODAR_TRY(store.save_state(state));
   MODAR_TRY(store.remove_pieces({}));
-  report.epoch = news.release.epoch;
-  report.expires = news.release.expires;
-  report.blocked = store.blocked_links(news.release);
+  report.epoch = offered.release.epoch;
+  report.expires = offered.release.expires;
+  report.blocked = store.blocked_links(offered.release);
   if (const auto now = store.active()) report.bundles = installed_paths(store.folder(), *now);
   report.downloaded_bytes = transfers.stats().bytes;
   report.retries = transfers.stats().retries;

@@ -129,8 +129,8 @@ Result<Folder> Folder::below(const std::string& name, bool make) const {
       ::openat(number(), name.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW));
   if (opened->number >= 0) return Folder(std::move(opened), path);
   if (errno != ENOENT && !link_target(name).empty()) {
-    return fail(ExitCode::kIo, "store.link", path, "it is a link, which may lead anywhere",
-                "remove the link; a store on another disk is named by --store");
+    return fail(ExitCode::kIo, "store.link", path, "it is a symbolic link",
+                "remove the link; use --store for a store on another disk");
   }
   return io("io.create", path);
 }

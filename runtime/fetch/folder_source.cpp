@@ -12,7 +12,7 @@
 #include <thread>
 #include <utility>
 
-#include "line.hpp"
+#include "downloader.hpp"
 
 namespace modar::fetch {
 namespace {

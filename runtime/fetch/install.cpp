@@ -213,7 +213,7 @@ class Installation {
       : options_(job.options),
         store_(job.store),
         transfers_(job.transfers),
-        news_(job.news),
+        offered_(job.offered),
         active_(job.active),
         chosen_(job.chosen),
         slot_(job.store.spare_folder()),
@@ -234,13 +234,13 @@ class Installation {
  private:
   Result<void> bring_recipes() {
     assemblies_.reserve(chosen_.size());
-    std::vector<Wanted> wanted;
+    std::vector<ObjectRequest> requests;
     std::set<ObjectId> known;  // bundles of equal content share a recipe
     for (const ReleaseBundle& bundle : chosen_) {
       if (!known.insert(bundle.recipe).second || pieces_.size(to_hex(bundle.recipe))) continue;
-      wanted.push_back(want(bundle.recipe, bundle.recipe_size));
+      requests.push_back(request(bundle.recipe, bundle.recipe_size));
     }
-    MODAR_TRY(transfers_.objects(wanted, [](std::int64_t) {}));
+    MODAR_TRY(transfers_.objects(requests, [](std::int64_t) {}));
     for (const ReleaseBundle& bundle : chosen_) {
       Assembly& assembly = assemblies_.emplace_back();
       assembly.bundle = bundle;
@@ -311,13 +311,13 @@ class Installation {
   }
 
   Result<void> bring_pieces() {
-    std::vector<Wanted> wanted;
+    std::vector<ObjectRequest> requests;
     std::uint64_t total = 0;
     std::uint64_t needed = kSpareBytes;
     std::uint64_t reclaimed = 0;  // by clearing the spare slot once the pieces are here
     for (const auto& [id, size] : missing_pieces()) {
       if (is_whole(id, size)) continue;
-      wanted.push_back(want(id, size));
+      requests.push_back(request(id, size));
       total += size;
       const auto part = pieces_.size(to_hex(id) + ".part").value_or(0);
       needed += size - std::min(part, size);
@@ -339,7 +339,7 @@ class Installation {
           "make room and run modar-fetch again");
     }
     ProgressReporter progress(options_, total);
-    return transfers_.objects(wanted, [&](std::int64_t bytes) { progress.add(bytes); });
+    return transfers_.objects(requests, [&](std::int64_t bytes) { progress.add(bytes); });
   }
 
   /// Whether the store has a piece with the right content; one with the wrong content is removed.
@@ -364,7 +364,7 @@ class Installation {
       // The recipe first: clear_slot() takes it for the sign that the bundle is ours.
       if (slot_.has(assembly.name)) {
         return fail(ExitCode::kIo, "store.foreign", slot_.path_of(assembly.name),
-                    "modar-fetch has not written it", "move it elsewhere");
+                    "modar-fetch did not write it", "move it elsewhere");
       }
       MODAR_TRY(slot_.replace(assembly.bundle.name + ".recipe", assembly.recipe_stored));
       MODAR_TRY(build_bundle(assembly, report));
@@ -392,22 +392,22 @@ class Installation {
 
   /// The documents last: a slot with a release.json is complete.
   Result<void> finish() {
-    if (!news_.fresh_text.empty()) MODAR_TRY(slot_.replace("fresh.json", news_.fresh_text));
-    return slot_.replace("release.json.minisig", news_.signature_text)
-        .and_then([&] { return slot_.replace("release.json", news_.text); })
+    if (!offered_.fresh_text.empty()) MODAR_TRY(slot_.replace("fresh.json", offered_.fresh_text));
+    return slot_.replace("release.json.minisig", offered_.signature_text)
+        .and_then([&] { return slot_.replace("release.json", offered_.text); })
         .and_then([&] {
-          return store_.activate({slot_, news_.text, news_.release});
+          return store_.activate({slot_, offered_.text, offered_.release});
         });
   }
 
-  [[nodiscard]] Wanted want(const ObjectId& id, std::uint64_t size) const {
+  [[nodiscard]] ObjectRequest request(const ObjectId& id, std::uint64_t size) const {
     return {id, size, "objects/" + object_path(id), &pieces_};
   }
 
   const FetchOptions& options_;
   const Store& store_;
   Transfers& transfers_;
-  const SignedRelease& news_;
+  const SignedRelease& offered_;
   const std::optional<InstalledRelease>& active_;
   const std::vector<ReleaseBundle>& chosen_;
   const Folder& slot_;
@@ -430,13 +430,13 @@ Result<void> verify_bundle(const Folder& slot, const ReleaseBundle& bundle) {
   MODAR_ASSIGN(const auto mapped, slot.map(bundle.name + ".modar"));
   const std::string file = slot.path_of(bundle.name + ".modar");
   if (mapped.bytes().size() != bundle.size || bundle_hash(mapped.bytes()) != bundle.hash) {
-    return fail(kExitBadBundle, "store.hash", file, "it is not what was signed",
+    return fail(kExitBadBundle, "store.hash", file, "it differs from what was signed",
                 "run modar-fetch again");
   }
   const std::string error = first_error(mapped.bytes(), {.release = {}, .accept_newer = true});
   if (error.empty()) return {};
   return fail(kExitBadBundle, "store.rules", file, error,
-              "tell the publisher: `modar check` finds it before publishing");
+              "inform the publisher: `modar check` finds this before publishing");
 }
 
 Result<void> install(const InstallationJob& job, FetchReport& report) {

@@ -23,7 +23,7 @@ struct InstallationJob {
   const FetchOptions& options;
   const Store& store;
   Transfers& transfers;
-  const SignedRelease& news;
+  const SignedRelease& offered;
   std::optional<InstalledRelease> active;  ///< the release in use, whose pieces are reused
   const std::vector<ReleaseBundle>& chosen;
 };

@@ -28,33 +28,34 @@ Usage:
   modar-fetch URL --store DIR --trust K.pub [OPTION]...
   modar-fetch --store DIR --verify
 
-URL is http(s)://HOST/PATH, or a folder (a USB stick), that `modar ship publish` filled. The installed
-bundles are DIR/NAME.modar. Interrupted at any moment, the release in use stays whole, and the next run
-resumes the download. DIR must be on a file system that can lock files; where it has no symbolic
-links (FAT, /sdcard), the bundles are DIR/slots/*/NAME.modar: the paths that are printed.
+URL is http(s)://HOST/PATH or a folder (a USB stick) that `modar ship publish` filled. The installed
+bundles are DIR/NAME.modar. If a fetch is interrupted, the release in use stays intact, and the next run
+resumes the download. DIR must be on a file system that supports file locks; if it has no symbolic
+links (FAT, /sdcard), the bundles are DIR/slots/*/NAME.modar, and these paths are printed.
 
-  --store DIR       where releases are installed; made where it is missing
-  --trust K.pub     the publisher's public key, of `modar ship keygen`
-  --device NAME     only bundles for this device profile
-  --bundle NAME     only this bundle; may be given again
-  --parallel N      pieces at once, 1 to 32 (4)
-  --limit-rate N    bytes a second at most; 16k and 1M are understood
-  --attempts N      give up after so many attempts in a row without any data (8)
-  --cacert FILE     authorities of HTTPS servers, PEM; else those of CURL_CA_BUNDLE, SSL_CERT_FILE and
-                    SSL_CERT_DIR, else the system's. Proxies as for curl: https_proxy, no_proxy
-  --status FILE     write what happened as JSON, also where it fails, for whoever looks after devices
-  --verify          check what is installed; go back to the release before if it is damaged
-  --json            print what was done as JSON
-  --quiet           no progress, no word of waits, no summary
+  --store DIR       folder for installed releases; created if it is missing
+  --trust K.pub     the publisher's public key, from `modar ship keygen`
+  --device NAME     install bundles for this device profile only
+  --bundle NAME     install this bundle only; repeatable
+  --parallel N      simultaneous downloads, 1 to 32 (default: 4)
+  --limit-rate N    bytes per second at most, such as 16k or 1M
+  --attempts N      give up after this many attempts in a row without any data (default: 8)
+  --cacert FILE     certificate authorities for HTTPS, PEM (default: those of CURL_CA_BUNDLE,
+                    SSL_CERT_FILE and SSL_CERT_DIR, else the system's). Proxies as for curl:
+                    https_proxy, no_proxy
+  --status FILE     write the result as JSON, also after a failure, for monitoring
+  --verify          check the installed release; fall back to the one before if it is damaged
+  --json            print the result as JSON
+  --quiet           no progress or summary
   --help, --version
 
 Example:
   modar-fetch http://museum.example/ar --store /sdcard/modar --trust museum.pub
 
 Exit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input, 4 internal error,
-5 nothing for this device or this version; 10 not signed by the trusted key, 11 older than what is
-installed, 12 expired, 13 the server's files belong to different releases, 14 not enough free space,
-15 another fetch is running, 16 the network failed (run it again), 17 the new bundle fails validation.
+5 nothing for this device or this version; 10 not signed by the trusted key, 11 older than the installed
+release, 12 expired, 13 the server's files belong to different releases, 14 not enough free space,
+15 another fetch is running, 16 the network failed (run it again), 17 the new bundle is invalid.
 )";
 
 // --- Command line ---
@@ -153,7 +154,7 @@ Result<CommandLine> read_command_line(std::span<const char* const> arguments) {
                                     return kOptions[index].set(line, value);
                                   }));
   if (line.help || line.version) return line;
-  if (urls.size() > 1) return usage("cli.url", urls[1], "there is one URL already");
+  if (urls.size() > 1) return usage("cli.url", urls[1], "only one URL is allowed");
   if (!urls.empty()) line.options.url = urls.front();
   if (line.options.store.empty()) return usage("cli.store", "--store", "it is missing");
   if (line.verify) return line;
@@ -274,7 +275,7 @@ Result<void> keep_no_status(const std::string& path) {
     return {};
   }
   return fail(ExitCode::kUsage, "out.foreign", path,
-              "the output would overwrite a file that is no status of modar-fetch",
+              "the output would overwrite a file that is not a status of modar-fetch",
               "name another output");
 }
 
@@ -324,9 +325,9 @@ int run_fetch(CommandLine& line) {
   if (!report) return fail_with_status(line, report.error());
   write_status(line, nullptr, report->version, report->changed, report->bundles);
   for (const std::string& path : report->blocked) {
-    std::fprintf(stderr,
-                 "modar-fetch: %s is a file of somebody else's and stays; see the paths below\n",
-                 path.c_str());
+    std::fprintf(
+        stderr, "modar-fetch: %s was not written by modar-fetch and is kept; see the paths below\n",
+        path.c_str());
   }
   if (line.json) {
     print_json(*report);
@@ -356,6 +357,6 @@ int main(int argc, char** argv) {
   const int code = line->verify ? run_verify(*line) : run_fetch(*line);
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   const int told = answer({ExitCode::kIo, "io.stdout", "standard output",
-                           "what was done could not be printed", "make room where it goes"});
+                           "the result could not be printed", "free space at its destination"});
   return code == 0 ? told : code;
 }

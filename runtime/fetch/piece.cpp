@@ -89,7 +89,7 @@ Result<std::vector<std::byte>> raw_bytes(const PieceRecord& piece,
     case PieceForm::kLevel:
       return level_bytes(piece, stored);
   }
-  return fail(ExitCode::kUnsupported, "piece.form", "piece", "its form is not known",
+  return fail(ExitCode::kUnsupported, "piece.form", "piece", "its form is unknown",
               "use a newer modar-fetch");
 }
 
@@ -112,7 +112,7 @@ Result<std::vector<std::byte>> decode_piece(const PieceRecord& piece,
   if (!raw) return raw;
   if (raw->size() != piece.raw_size || raw_hash(*raw) != piece.raw_hash) {
     return fail(ExitCode::kInvalidInput, "piece.hash", "piece",
-                "it decodes to other bytes than were published", kCure);
+                "it decodes to different bytes than were published", kCure);
   }
   return raw;
 }

@@ -230,7 +230,7 @@ Result<RootSet> parse_root_set(std::string_view text) {
   unsigned threshold = 0;
   const auto number = std::from_chars(line.data(), line.data() + line.size(), threshold);
   if (number.ec != std::errc())
-    return bad_set(ExitCode::kInvalidInput, "its threshold is no number");
+    return bad_set(ExitCode::kInvalidInput, "its threshold is not a number");
   line.remove_prefix(static_cast<std::size_t>(number.ptr - line.data()));
   std::vector<PublicKey> keys;
   while (!line.empty()) {
@@ -272,7 +272,7 @@ Result<void> verify_root_signatures(const std::string& document, std::string_vie
   return fail(kExitWrongKey, "signature.too-few", document,
               std::to_string(good) + " of the root keys signed it, " +
                   std::to_string(set.threshold) + " have to",
-              "have it signed by more: `modar ship root --sign`");
+              "get more signatures: `modar ship sign`");
 }
 
 // --- Release documents ---

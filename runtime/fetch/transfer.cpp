@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "line.hpp"
+#include "downloader.hpp"
 
 namespace modar::fetch {
 
@@ -17,12 +17,12 @@ std::string without_login(const std::string& url) {
 
 struct Transfers::State {
   Attempts attempts;
-  std::unique_ptr<Line> line;
+  std::unique_ptr<Downloader> downloader;
   std::function<void(std::span<const FileNeed>)> needs;
 
   Result<void> run(std::vector<Transfer>& transfers) {
     if (needs) needs(needs_of(transfers));
-    return line->run(transfers, attempts);
+    return downloader->run(transfers, attempts);
   }
 
   /// What a part that is there already has is not asked for; a complete one is, from the start.
@@ -30,8 +30,8 @@ struct Transfers::State {
     std::vector<FileNeed> list;
     for (const Transfer& transfer : transfers) {
       FileNeed need{transfer.path, 0, transfer.limit};
-      if (transfer.wanted != nullptr) {
-        const auto have = transfer.wanted->folder->size(transfer.part_name()).value_or(0);
+      if (transfer.object != nullptr) {
+        const auto have = transfer.object->folder->size(transfer.part_name()).value_or(0);
         need.from = have < transfer.limit ? have : 0;
       }
       list.push_back(std::move(need));
@@ -46,8 +46,9 @@ Transfers::~Transfers() = default;
 
 Result<Transfers> Transfers::create(const TransferOptions& options) {
   if (options.source) {
-    return Transfers(std::make_unique<State>(State{
-        Attempts(options, "the release folder"), make_source_line(options.source), options.needs}));
+    return Transfers(
+        std::make_unique<State>(State{Attempts(options, "the release folder"),
+                                      make_source_downloader(options.source), options.needs}));
   }
   std::string address = options.url;
   while (address.size() > 1 && address.back() == '/') address.pop_back();
@@ -58,12 +59,12 @@ Result<Transfers> Transfers::create(const TransferOptions& options) {
     }
     return Transfers(std::make_unique<State>(
         State{Attempts(options, *folder),
-              make_source_line(folder_source(*folder, options.bytes_per_second)),
+              make_source_downloader(folder_source(*folder, options.bytes_per_second)),
               {}}));
   }
-  MODAR_ASSIGN(auto line, make_curl_line(options, address));
+  MODAR_ASSIGN(auto downloader, make_curl_downloader(options, address));
   return Transfers(std::make_unique<State>(
-      State{Attempts(options, without_login(address)), std::move(line), {}}));
+      State{Attempts(options, without_login(address)), std::move(downloader), {}}));
 }
 
 Result<std::string> Transfers::text(const std::string& path, std::size_t limit, bool optional) {
@@ -75,13 +76,13 @@ Result<std::string> Transfers::text(const std::string& path, std::size_t limit, 
   return std::move(transfers[0].text);
 }
 
-Result<void> Transfers::objects(std::span<const Wanted> wanted,
+Result<void> Transfers::objects(std::span<const ObjectRequest> requests,
                                 const std::function<void(std::int64_t)>& on_bytes) {
-  std::vector<Transfer> transfers(wanted.size());
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    transfers[i].path = wanted[i].path;
-    transfers[i].wanted = &wanted[i];
-    transfers[i].limit = static_cast<std::size_t>(wanted[i].size);
+  std::vector<Transfer> transfers(requests.size());
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    transfers[i].path = requests[i].path;
+    transfers[i].object = &requests[i];
+    transfers[i].limit = static_cast<std::size_t>(requests[i].size);
   }
   state_->attempts.tell_progress(on_bytes);
   auto done = state_->run(transfers);

@@ -32,7 +32,7 @@ struct TransferOptions {
 };
 
 /// One object to download.
-struct Wanted {
+struct ObjectRequest {
   ObjectId id{};
   std::uint64_t size = 0;          ///< bytes
   std::string path;                ///< below the URL
@@ -62,7 +62,7 @@ class Transfers {
 
   /// Downloads objects into their files, each verified by its id. `on_bytes` receives the number of
   /// bytes since the last call (negative: discarded). Errors: as text(); kIo "io.*".
-  Result<void> objects(std::span<const Wanted> wanted,
+  Result<void> objects(std::span<const ObjectRequest> requests,
                        const std::function<void(std::int64_t)>& on_bytes);
 
   [[nodiscard]] const TransferStats& stats() const;

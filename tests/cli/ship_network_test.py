@@ -197,7 +197,7 @@ class RudeServers(ShipTest):
 
     def test_garbage_for_ever_gives_up(self):
         done = self.fetch_from(lambda path, _: "garbage" if "objects" in path else None, "--attempts", "2")
-        self.assert_fails(done, 16, "fetch.network", "not what was published")
+        self.assert_fails(done, 16, "fetch.network", "differs from the published")
         self.assertFalse((pathlib.Path(self.store) / "museum.modar").exists())
 
 

@@ -27,9 +27,9 @@ struct MeshBytes {
   std::vector<std::uint16_t> indices;
 };
 
-/// Start of a mesh object: Draco carries the connectivity and what it predicts well, plain bits the
-/// rest. Behind it lie `attribute_count` AttributeRecords, the Draco buffer, the fine bits and the
-/// corrections.
+/// Header of a mesh object: Draco encodes the connectivity and what it predicts well, plain bits
+/// the rest. It is followed by `attribute_count` AttributeRecords, the Draco buffer, the fine bits
+/// and the corrections.
 struct MeshObjectHeader {
   std::uint8_t version;               ///< 1
   std::uint8_t attribute_count;       ///< 1 to 8
@@ -39,7 +39,7 @@ struct MeshObjectHeader {
   std::uint16_t attributes_reserved;  ///< 0
   std::uint32_t draco_size;           ///< bytes
   std::uint32_t fine_size;            ///< bytes: fine bits of the position values, lowest bit first
-  std::uint32_t corrections_size;     ///< bytes, zstd: 3 a normal value, then loose triangles
+  std::uint32_t corrections_size;     ///< bytes, zstd: 3 per normal value, then loose triangles
   std::uint32_t loose_triangles;      ///< triangles that Draco drops, as 3 whole vertices each
 };
 static_assert(sizeof(MeshObjectHeader) == 24);
@@ -61,7 +61,7 @@ struct DracoValues {
 };
 struct DracoMesh {
   std::vector<DracoValues> attributes;  ///< in the order in which they were added
-  std::vector<std::uint32_t> corners;   ///< points, 3 a triangle
+  std::vector<std::uint32_t> corners;   ///< points, 3 per triangle
   std::uint32_t point_count = 0;
 };
 

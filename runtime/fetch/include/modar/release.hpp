@@ -1,4 +1,4 @@
-// What a publisher signs and a device believes: release documents, keys, signatures, and the hashes
+// What a publisher signs and a device verifies: release documents, keys, signatures, and the hashes
 // that name everything else. formats/shipping.md is the normative text.
 #pragma once
 
@@ -19,7 +19,7 @@ namespace modar {
 
 /// Exit codes of a fetch beyond the common ones (ExitCode leaves 10 and up to the commands).
 inline constexpr ExitCode kExitWrongKey{10};  ///< not signed by the trusted key
-inline constexpr ExitCode kExitRollBack{11};  ///< older than what is installed
+inline constexpr ExitCode kExitRollBack{11};  ///< older than the installed release
 inline constexpr ExitCode kExitExpired{12};   ///< past its expiry
 inline constexpr ExitCode kExitMixed{13};     ///< the server's files belong to different releases
 inline constexpr ExitCode kExitNoSpace{14};   ///< not enough free space
@@ -75,8 +75,8 @@ Result<Signature> parse_signature(std::string_view text);
 /// Its text. untrusted_comment: one line that nothing signs.
 std::string signature_text(const Signature& signature, std::string_view untrusted_comment);
 
-/// The keys that a device trusts with the word of who signs releases, and how many of them have to
-/// agree: one thief, one lost pass phrase or one colleague alone changes nothing.
+/// The keys that a device trusts to name the signing key, and how many of them must agree, so that
+/// a single stolen key, lost pass phrase or colleague changes nothing.
 struct RootSet {
   unsigned threshold = 1;       ///< 1 to the number of keys
   std::vector<PublicKey> keys;  ///< distinct in number and bytes, in the order of their numbers
@@ -84,23 +84,23 @@ struct RootSet {
 };
 inline constexpr std::size_t kMaxRootKeys = 16;
 
-/// Reads a public key (parse_public_key()), which alone is a set of one, or the line, or the file,
-/// of root_set_line(). Errors: kInvalidInput "key.public", "key.set".
+/// Reads a public key (parse_public_key()), which is a set of one, or the line or the file of
+/// root_set_line(). Errors: kInvalidInput "key.public", "key.set".
 Result<RootSet> parse_root_set(std::string_view text);
-/// A set of several: its threshold and keys with blanks between them. Of one: public_key_line().
+/// A set of several: its threshold and keys, separated by spaces. Of one: public_key_line().
 std::string root_set_line(const RootSet& set);
 /// Sorts the keys. Errors: kUsage "key.set" (a key twice, no key, too many, an impossible
 /// threshold).
 Result<RootSet> make_root_set(std::vector<PublicKey> keys, unsigned threshold);
 
-/// Where the signature of a document by one of several keys lies:
-/// "root.json.0123456789abcdef.minisig", in the key's number as its file has it, byte by byte.
+/// The path of the signature of a document by one of several keys:
+/// "root.json.0123456789abcdef.minisig", with the key's number as in its file, byte by byte.
 std::string signature_path(const std::string& document, const PublicKey& key);
 
-/// Reads the signature at a path; nothing: there is none.
+/// Reads the signature at a path; nullopt if there is none.
 using SignatureReader = std::function<Result<std::optional<std::string>>(const std::string& path)>;
-/// Checks that as many keys of the set as it wants signed `text`, which lies at `document`. Each
-/// key counts once; signatures that do not verify count for nothing.
+/// Checks that enough keys of the set signed `text`, the contents of `document`. Each key counts
+/// once; invalid signatures are ignored.
 /// Errors: kExitWrongKey "signature.too-few", and "signature.key" or "signature.bad" for a set of
 /// one; those of the reader.
 Result<void> verify_root_signatures(const std::string& document, std::string_view text,
@@ -114,7 +114,7 @@ Result<void> verify_signature(std::string_view message, const Signature& signatu
 
 /// @name Release documents
 /// @{
-/// Of a document; some 350 a bundle.
+/// Largest document; about 350 bytes per bundle.
 inline constexpr std::size_t kMaxReleaseBytes = 8u << 20;
 inline constexpr std::size_t kMaxRecipeBytes =
     sizeof(RecipeHeader) + std::size_t{kMaxPieces} * sizeof(PieceRecord);
@@ -123,24 +123,24 @@ struct ReleaseBundle {
   std::string name;        ///< a file name without its extension: letters, digits, . _ - only
   std::uint64_t size = 0;  ///< bytes of the installed bundle
   BundleHash hash{};       ///< of the installed bundle
-  ObjectId recipe{};       ///< the object that holds the recipe
+  ObjectId recipe{};       ///< the object with the recipe
   std::uint32_t recipe_size = 0;      ///< bytes as stored (zstd)
   std::uint32_t recipe_raw_size = 0;  ///< bytes unpacked
   std::uint32_t pieces = 0;
   std::uint64_t download_size = 0;   ///< bytes of all its objects, for a device that has none
-  std::vector<std::string> devices;  ///< profiles that it is for; empty: all
+  std::vector<std::string> devices;  ///< profiles for which it is meant; empty: all
 };
 
 struct Release {
-  std::uint64_t epoch = 0;             ///< of the root's word that named the signing key; 0: none
-  std::uint64_t version = 0;           ///< 1 or more; only grows within an epoch
-  std::int64_t expires = 0;            ///< seconds since 1970-01-01, UTC; kNever: does not
-  std::uint64_t fresh_days = 0;        ///< so often its Freshness is signed anew; 0: it has none
+  std::uint64_t epoch = 0;       ///< of the root document that named the signing key; 0: none
+  std::uint64_t version = 0;     ///< 1 or more; only grows within an epoch
+  std::int64_t expires = 0;      ///< seconds since 1970-01-01, UTC; kNever: does not
+  std::uint64_t fresh_days = 0;  ///< interval in which its Freshness is signed; 0: it has none
   std::vector<ReleaseBundle> bundles;  ///< at least one; names differ in more than case
 };
 inline constexpr std::int64_t kNever = 0;
 
-/// A bundle's name as file systems compare it that ignore case.
+/// A bundle's name as case-insensitive file systems compare it.
 std::string lower_case(std::string_view name);
 
 /// Errors: kInvalidInput "release.*"; kUnsupported "release.version".
@@ -156,13 +156,13 @@ Result<std::uint64_t> parse_latest(std::string_view text);
 Result<std::int64_t> parse_time(std::string_view text);
 std::string time_text(std::int64_t seconds);
 
-/// Says, signed anew every few days, that a release is still the newest: who holds updates back
-/// cannot say so.
+/// States that a release is still the newest, and is signed every few days: an attacker who
+/// withholds updates cannot sign it.
 struct Freshness {
   std::uint64_t epoch = 0;
   std::uint64_t version = 0;  ///< of the release
   std::int64_t time = 0;      ///< when it was signed, seconds since 1970, UTC
-  std::int64_t expires = 0;   ///< until when it counts
+  std::int64_t expires = 0;   ///< end of its validity
 };
 /// "releases/N.fresh.json".
 std::string freshness_path(std::uint64_t version);
@@ -179,8 +179,9 @@ struct KeyLink {
 Result<KeyLink> parse_key_link(std::string_view json);
 std::string key_link_text(const KeyLink& link);
 
-/// The word of the root key, which stays offline: the signing key from now on. Each word begins an
-/// epoch, in which versions count anew; the chain goes on behind its first `links` links.
+/// The root document, signed by the root key that stays offline: names the signing key. Each
+/// document begins an epoch, in which versions start again; the chain continues after its first
+/// `links` links.
 struct RootWord {
   std::uint64_t epoch = 0;  ///< from 1; only grows
   std::uint32_t links = 0;
@@ -190,8 +191,8 @@ struct RootWord {
 Result<RootWord> parse_root_word(std::string_view json);
 std::string root_word_text(const RootWord& word);
 
-/// A link of the chain of root keys: the set that follows, signed by as many keys as the set before
-/// wants and by as many as it wants itself.
+/// A link of the chain of root keys: the next set, signed by enough keys of the previous set and by
+/// enough of its own.
 struct RootLink {
   std::uint32_t serial = 0;  ///< from 1, without gaps
   RootSet roots;

@@ -8,7 +8,7 @@
 
 #include <curl/curl.h>
 
-#include "line.hpp"
+#include "downloader.hpp"
 #include "modar/release.hpp"
 
 namespace modar::fetch {
@@ -90,13 +90,13 @@ struct Download {
   Attempts* attempts = nullptr;
   CURL* handle = nullptr;
   std::uint64_t asked_from = 0;
-  bool judged = false;                         ///< the status code was looked at
+  bool status_checked = false;                 ///< the status code was looked at
   bool welcome = false;                        ///< the body is the file, not an error page
   std::array<char, CURL_ERROR_SIZE> reason{};  ///< libcurl's words
 };
 
-void judge_status(Download& download) {
-  download.judged = true;
+void check_status(Download& download) {
+  download.status_checked = true;
   long status = 0;
   curl_easy_getinfo(download.handle, CURLINFO_RESPONSE_CODE, &status);
   download.welcome = status == 206 || status == 200;
@@ -108,7 +108,7 @@ std::size_t on_body(char* bytes, std::size_t unit, std::size_t count, void* user
   auto& download = *static_cast<Download*>(user);
   const std::size_t size = unit * count;
   download.attempts->count(size);
-  if (!download.judged) judge_status(download);
+  if (!download.status_checked) check_status(download);
   if (!download.welcome) return size;
   const auto body = std::as_bytes(std::span(bytes, size));
   return download.attempts->take(*download.transfer, body) ? size : 0;
@@ -124,30 +124,30 @@ Answer answer_of(const Download& download, CURLcode code) {
             {},
             {kExitNetwork, "fetch.tls", download.attempts->address_of(*download.transfer),
              std::string("the TLS connection failed: ") + words,
-             "give the authority of its certificate with --cacert, and check the clock"}};
+             "pass its certificate authority with --cacert, and check the clock"}};
   }
   if (code == CURLE_UNSUPPORTED_PROTOCOL) {
     return {Answer::Kind::kFatal,
             {},
             {kExitNetwork, "fetch.redirect", download.attempts->address_of(*download.transfer),
              "the server redirects to an address that is not HTTPS",
-             "fetch from an address that stays with HTTPS"}};
+             "fetch from an address that stays on HTTPS"}};
   }
   if (status == 404 || status == 410) return {Answer::Kind::kMissing, {}, {}};
   if (status == 416 || code == CURLE_RANGE_ERROR || code == CURLE_BAD_DOWNLOAD_RESUME) {
     return {Answer::Kind::kNoRange, {}, {}};
   }
   if (status >= 400) {
-    return {Answer::Kind::kBroken, "the server answers " + std::to_string(status), {}};
+    return {Answer::Kind::kBroken, "the server responded with " + std::to_string(status), {}};
   }
   if (code != CURLE_OK) return {Answer::Kind::kBroken, curl_easy_strerror(code), {}};
   return {};
 }
 
 /// All transfers over one multi handle.
-class CurlLine : public Line {
+class CurlDownloader : public Downloader {
  public:
-  CurlLine(TransferOptions options, std::string address, CURLM* multi)
+  CurlDownloader(TransferOptions options, std::string address, CURLM* multi)
       : options_(std::move(options)),
         address_(std::move(address)),
         multi_(multi),
@@ -157,9 +157,9 @@ class CurlLine : public Line {
       ready_ = ready_ && set_common(place.handle, options_, address_);
     }
   }
-  CurlLine(const CurlLine&) = delete;
-  CurlLine& operator=(const CurlLine&) = delete;
-  ~CurlLine() override {
+  CurlDownloader(const CurlDownloader&) = delete;
+  CurlDownloader& operator=(const CurlDownloader&) = delete;
+  ~CurlDownloader() override {
     for (const Download& place : places_) curl_easy_cleanup(place.handle);
     curl_multi_cleanup(multi_);
   }
@@ -180,7 +180,7 @@ class CurlLine : public Line {
 };
 
 /// There is a free place. False: the transfer's error says why.
-bool CurlLine::start(Transfer& transfer, Attempts& attempts) {
+bool CurlDownloader::start(Transfer& transfer, Attempts& attempts) {
   if (!attempts.begin(transfer)) return false;
   Download& download = *std::ranges::find(places_, nullptr, &Download::transfer);
   CURL* handle = download.handle;
@@ -195,11 +195,11 @@ bool CurlLine::start(Transfer& transfer, Attempts& attempts) {
   if (ready_ && set.good() && curl_multi_add_handle(multi_, handle) == CURLM_OK) return true;
   download.transfer = nullptr;
   transfer.error = {ExitCode::kInternal, "fetch.curl", without_login(address_),
-                    "libcurl refuses to start", "report this as a bug"};
+                    "libcurl cannot be initialised", "report this as a bug"};
   return false;
 }
 
-Outcome CurlLine::finish(Download& download, CURLcode code) {
+Outcome CurlDownloader::finish(Download& download, CURLcode code) {
   const Answer answer = answer_of(download, code);
   curl_multi_remove_handle(multi_, download.handle);
   return download.attempts->end(*std::exchange(download.transfer, nullptr), answer);
@@ -207,7 +207,7 @@ Outcome CurlLine::finish(Download& download, CURLcode code) {
 
 /// Sleeps until the bytes received are within the rate limit. Meanwhile the socket fills up, and
 /// the server waits, too.
-void CurlLine::limit_rate(const Attempts& attempts) const {
+void CurlDownloader::limit_rate(const Attempts& attempts) const {
   if (options_.bytes_per_second == 0) return;
   const double allowed = std::chrono::duration<double>(Clock::now() - begin_).count();
   const double taken =
@@ -216,7 +216,7 @@ void CurlLine::limit_rate(const Attempts& attempts) const {
   if (ahead > 0) std::this_thread::sleep_for(std::chrono::duration<double>(ahead));
 }
 
-Result<void> CurlLine::run(std::vector<Transfer>& transfers, Attempts& attempts) {
+Result<void> CurlDownloader::run(std::vector<Transfer>& transfers, Attempts& attempts) {
   std::deque<Transfer*> waiting;
   for (Transfer& transfer : transfers) waiting.push_back(&transfer);
   std::size_t busy = 0;
@@ -258,15 +258,15 @@ Result<void> CurlLine::run(std::vector<Transfer>& transfers, Attempts& attempts)
 
 }  // namespace
 
-Result<std::unique_ptr<Line>> make_curl_line(const TransferOptions& options,
-                                             const std::string& address) {
+Result<std::unique_ptr<Downloader>> make_curl_downloader(const TransferOptions& options,
+                                                         const std::string& address) {
   static const CURLcode global = curl_global_init(CURL_GLOBAL_DEFAULT);
   CURLM* multi = global == CURLE_OK ? curl_multi_init() : nullptr;
   if (multi == nullptr) {
-    return fail(ExitCode::kInternal, "fetch.curl", without_login(address), "libcurl does not start",
-                "report this as a bug");
+    return fail(ExitCode::kInternal, "fetch.curl", without_login(address),
+                "libcurl cannot be initialised", "report this as a bug");
   }
-  return std::make_unique<CurlLine>(options, address, multi);
+  return std::make_unique<CurlDownloader>(options, address, multi);
 }
 
 }  // namespace modar::fetch

@@ -1,14 +1,14 @@
 #include <thread>
 #include <utility>
 
-#include "line.hpp"
+#include "downloader.hpp"
 
 namespace modar::fetch {
 namespace {
 
-class SourceLine : public Line {
+class SourceDownloader : public Downloader {
  public:
-  explicit SourceLine(ByteSource source) : source_(std::move(source)) {}
+  explicit SourceDownloader(ByteSource source) : source_(std::move(source)) {}
 
   Result<void> run(std::vector<Transfer>& transfers, Attempts& attempts) override {
     for (Transfer& transfer : transfers) {
@@ -47,8 +47,8 @@ class SourceLine : public Line {
 
 }  // namespace
 
-std::unique_ptr<Line> make_source_line(ByteSource source) {
-  return std::make_unique<SourceLine>(std::move(source));
+std::unique_ptr<Downloader> make_source_downloader(ByteSource source) {
+  return std::make_unique<SourceDownloader>(std::move(source));
 }
 
 }  // namespace modar::fetch
