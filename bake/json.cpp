@@ -57,6 +57,13 @@ bool Json::is_array() const {
   return value_->json.is_array();
 }
 
+std::vector<std::string> Json::keys() const {
+  std::vector<std::string> keys;
+  if (!value_->json.is_object()) return keys;
+  for (const auto& member : value_->json.items()) keys.push_back(member.key());
+  return keys;
+}
+
 std::size_t Json::size() const {
   return value_->json.is_structured() ? value_->json.size() : 0;
 }

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace modar {
 
@@ -49,6 +50,8 @@ class Json {
   [[nodiscard]] bool is_null() const;
   /// Elements of an array, members of an object; else 0.
   [[nodiscard]] std::size_t size() const;
+  /// Of an object's members; empty for anything else.
+  [[nodiscard]] std::vector<std::string> keys() const;
   /// An element of an array. Nothing: there is none, or this is no array.
   [[nodiscard]] std::optional<Json> at(std::size_t index) const;
   /// A member of an object; "a/b" is b of a. Nothing: there is none.

@@ -27,7 +27,7 @@ Result<void> make_output_folder(const std::string& folder) {
   fs::create_directories(folder, error);
   if (error) {
     return fail(ExitCode::kIo, "io.folder", folder, error.message(),
-                "name a folder that can be made");
+                "name a folder that can be created");
   }
   return {};
 }
@@ -38,7 +38,7 @@ Result<void> claim_output_folder(const std::string& folder, bool force) {
   const bool empty = !fs::exists(folder, error) || fs::is_empty(folder, error);
   if (!error && !empty && !force && !fs::exists(mark, error)) {
     return fail(ExitCode::kUsage, "out.foreign-folder", folder,
-                "the folder holds files that modar has not written",
+                "the folder contains files that modar has not written",
                 "name a new or an empty folder, or write into this one with --force");
   }
   MODAR_TRY(make_output_folder(folder));
@@ -64,7 +64,7 @@ Result<void> keep_other_kinds(const std::string& output, const std::string& kind
   start.resize(static_cast<std::size_t>(file.gcount()));
   if (start.empty() || is_ours(start)) return {};
   return fail(ExitCode::kUsage, "out.foreign", output,
-              "the output would overwrite a file that is no " + kind, "name another output");
+              "the output would overwrite a file that is not a " + kind, "name another output");
 }
 
 Result<void> try_output(const std::string& path, std::uint64_t bytes) {
@@ -78,7 +78,7 @@ Result<void> try_output(const std::string& path, std::uint64_t bytes) {
   if (file < 0) {
     return fail(ExitCode::kIo, "io.folder", path,
                 "its folder cannot be written: " + std::string(std::strerror(errno)),
-                "name a place that can be written");
+                "name a writable place");
   }
   ::close(file);
   ::unlink(probe.c_str());

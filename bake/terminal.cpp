@@ -87,9 +87,9 @@ int finish_output(int code) {
   const bool failed = std::ferror(stdout) != 0;
   if (std::fflush(stdout) == 0 && !failed) return code;
   if (!failed && (errno == EPIPE || errno == EBADF)) return code;  // nobody wants it
-  const char* cause = failed ? "a part of it could not be written" : std::strerror(errno);
+  const char* cause = failed ? "it could not be written completely" : std::strerror(errno);
   const int told = print_error(
-      {ExitCode::kIo, "io.stdout", "standard output", cause, "make room where it goes"});
+      {ExitCode::kIo, "io.stdout", "standard output", cause, "free space at its destination"});
   return code == 0 ? told : code;
 }
 
@@ -97,12 +97,13 @@ int guarded(const std::function<int()>& work) {
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    return print_error({ExitCode::kIo, "modar.memory", "",
-                        "there is not enough memory, or not enough room on the disk for --memory",
-                        "free some, or give `modar bake` a --memory below what the machine has"});
+    return print_error(
+        {ExitCode::kIo, "modar.memory", "",
+         "not enough memory, or not enough disk space for --memory",
+         "free some, or use `modar bake --memory` with less than the machine's memory"});
   } catch (const std::exception& error) {
     return print_error({ExitCode::kInternal, "modar.bug", "", error.what(),
-                        "this is a bug of ours: please report it with the command line"});
+                        "internal error: please report it with the command line"});
   }
 }
 
@@ -129,7 +130,7 @@ void print_group(const std::vector<const Diagnostic*>& group, std::size_t whole)
     Diagnostic one = *group[i];
     if (i + 1 == shown && shown < group.size()) {
       one.cure += (one.cure.empty() ? "" : "; ") + std::to_string(group.size() - shown) +
-                  " more like it: --notes shows them";
+                  " more of this kind: --notes shows them";
     }
     print_diagnostic(one);
   }
@@ -164,7 +165,7 @@ void print_findings(const std::vector<Diagnostic>& findings, bool all) {
         print_group(groups[g], whole);
       }
     }
-    if (left_out != 0) std::fprintf(stderr, "note: %zu more notes: --notes shows them\n", left_out);
+    if (left_out != 0) std::fprintf(stderr, "note: %zu more notes; --notes shows them\n", left_out);
   }
 }
 
@@ -185,7 +186,7 @@ void warn_of_readers(const std::string& path) {
   if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) == 0) return;
   std::fprintf(stderr,
-               "modar: warning: %s: others may read this secret key; chmod 600 it [key.mode]\n",
+               "modar: warning: %s: other users can read this secret key: chmod 600 [key.mode]\n",
                printable(path).c_str());
 }
 

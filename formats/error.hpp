@@ -16,8 +16,8 @@ enum class ExitCode : int {
   kOk = 0,
   kUsage = 1,         ///< the command line is wrong
   kIo = 2,            ///< a file cannot be opened, read, written or renamed
-  kInvalidInput = 3,  ///< a file was read and is not what it should be
-  kInternal = 4,      ///< a bug of ours or of a library
+  kInvalidInput = 3,  ///< a file was read and is invalid
+  kInternal = 4,      ///< a defect of ModAR or of a library
   kUnsupported = 5,   ///< valid, but beyond this build, this device or this version
 };
 

@@ -15,7 +15,7 @@ Result<FolderLock> FolderLock::take(const std::string& file, const Error& busy) 
   const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
   if (descriptor < 0) {
     return fail(ExitCode::kIo, "io.create", file, std::strerror(errno),
-                "see that the folder can be written");
+                "check that the folder is writable");
   }
   if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     ::close(descriptor);

@@ -206,7 +206,7 @@ class JsonScan {
   std::optional<MetaFault> fault_;
 };
 
-/// {"pattern": P, "model": M, "text": {language: words}}.
+/// {"pattern": P, "model": M, "text": {language: words}, "alt": {language: words}}.
 bool scan_text(JsonScan& scan) {
   bool pattern = false;
   bool words = false;
@@ -215,7 +215,7 @@ bool scan_text(JsonScan& scan) {
       pattern = pattern || key == "pattern";
       return scan.string();
     }
-    if (key != "text") return scan.value();
+    if (key != "text" && key != "alt") return scan.value();
     words = true;
     return scan.object([&](std::string_view) { return scan.string(); });
   });

@@ -207,8 +207,8 @@ Result<double> max_error_of(const BakeRequest& request, const TriMesh& mesh) {
   }
   if (!(request.unit_metres > 0)) {
     return fail(ExitCode::kUsage, "bake.max-error-unit", "--max-error",
-                "it names a unit, and the models' own unit is not known",
-                "say it with --unit, or give the error in source units or percent");
+                "it has a unit, but the unit of the models is unknown",
+                "state it with --unit, or give the error in source units or percent");
   }
   return request.max_error.value / request.unit_metres;
 }
@@ -244,7 +244,7 @@ void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, PositionK
                   "positions are stored as floats, %u bytes a vertex: no grid of 16-bit integers "
                   "is as fine as was asked and spans the longest triangle",
                   packed.layout.stride);
-    cure = "a greater --max-error takes less";
+    cure = "a larger --max-error needs fewer bytes";
   } else {
     const double edge = mean_edge(mesh);
     const double error = packed.record.position_error_max;

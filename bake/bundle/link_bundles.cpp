@@ -28,7 +28,7 @@ std::uint32_t index_in(std::vector<T>& list, const T& record) {
 }
 
 tl::unexpected<Error> no_part(const LinkPart& part, const std::string& what) {
-  return fail(ExitCode::kInvalidInput, "link.part", part.name, "it is no bundle of one " + what,
+  return fail(ExitCode::kInvalidInput, "link.part", part.name, "it is not a bundle of one " + what,
               "bake it again");
 }
 

@@ -65,19 +65,19 @@ tl::expected<double, WrongValue> parse_scale(std::string_view text) {
   const bool percent = text.ends_with('%');
   const std::string_view digits = percent ? text.substr(0, text.size() - 1) : text;
   if (!parse_number(digits, value)) {
-    return tl::unexpected(WrongValue{"it is no number", "write a factor, as in scale=0.8"});
+    return tl::unexpected(WrongValue{"it is not a number", "write a factor, as in scale=0.8"});
   }
   if (percent) {
     return tl::unexpected(
         WrongValue{"it is a factor, not a percentage", "write scale=" + number_text(value / 100)});
   }
   if (!(value >= kLeastScale)) {
-    return tl::unexpected(WrongValue{"a model of that size would not be seen",
+    return tl::unexpected(WrongValue{"a model of that size would be invisible",
                                      "write a factor above 0, as in scale=0.8"});
   }
   if (value > kMostScale) {
     return tl::unexpected(WrongValue{"that is more than " + number_text(kMostScale),
-                                     "write a factor on the pattern's largest side"});
+                                     "write a multiple of the pattern's longest side"});
   }
   return value;
 }
@@ -125,10 +125,11 @@ tl::expected<double, WrongValue> parse_millimetres(std::string_view text) {
     std::string point = number;
     point[comma] = '.';
     return tl::unexpected(
-        WrongValue{"a comma stands in the number", "write " + point + unit + ", with a point"});
+        WrongValue{"the number contains a comma", "write " + point + unit + ", with a point"});
   }
   if (!parse_number(number, value)) {
-    return tl::unexpected(WrongValue{"it is no length", "write a number and a unit, as in 210mm"});
+    return tl::unexpected(
+        WrongValue{"it is not a length", "write a number and a unit, as in 210mm"});
   }
   if (unit.empty()) {
     return tl::unexpected(WrongValue{
@@ -159,7 +160,7 @@ tl::expected<std::array<double, 3>, WrongValue> parse_turn(std::string_view text
   }
   if (good) return turn;
   return tl::unexpected(WrongValue{
-      "it is neither an angle nor three of them",
+      "it is neither one angle nor three",
       "write degrees: turn=90 about the axis out of the pattern, or turn=X:Y:Z about each axis"});
 }
 
@@ -176,8 +177,8 @@ tl::expected<SceneOffset, WrongValue> parse_offset(std::string_view text) {
   if (!good || !metres) {
     return tl::unexpected(WrongValue{"it is not three numbers",
                                      "write X:Y:Z, as in offset=0:0:20mm; without a unit they are "
-                                     "millimetres where the pattern's width is known, else its "
-                                     "largest side"});
+                                     "millimetres if the pattern's width is known, else its "
+                                     "longest sides"});
   }
   if (!unit.empty()) {
     offset.unit = SceneOffset::Unit::kMillimetres;
@@ -257,7 +258,7 @@ Result<SceneRequest> parse_scene(const std::string& text) {
     if (!*taken || !valued) return scene_error(text, quoted + " is not understood");
     if (key != "scale" && key != "height" && key != "width") continue;
     if (!sized.empty()) {
-      return scene_error(text, "it gives its size twice", "leave " + quoted + " out");
+      return scene_error(text, "it states the size twice", "leave " + quoted + " out");
     }
     sized = key;
   }
@@ -391,7 +392,7 @@ Result<PatternRequest> parse_pattern(const std::string& text) {
   if (!width) {
     if (!looks_like_length(tail) || is_file(text)) return request;
     return fail(ExitCode::kUsage, "cli.pattern", "--pattern " + text,
-                "'" + std::string(tail) + "' is no width: " + width.error().cause,
+                "'" + std::string(tail) + "' is not a width: " + width.error().cause,
                 width.error().cure);
   }
   request.width_mm = *width;
@@ -418,7 +419,7 @@ Result<MaxError> parse_max_error(const std::string& text) {
   }
   if (good) return error;
   return fail(ExitCode::kUsage, "cli.max-error", "--max-error " + text,
-              "this is no length above 0 that we understand",
+              "this is not a length above 0",
               "write a number of source units, a percentage of the diagonal as 0.01%, or a length "
               "as 2mm");
 }

@@ -138,7 +138,7 @@ bool needs_width(const SceneRequest& request) {
 tl::unexpected<Error> no_width(const SceneRequest& request) {
   return scene_error(
       "scene.no-width", request,
-      "it gives a length, and the printed width of '" + request.pattern + "' is unknown",
+      "it gives a length, but the printed width of '" + request.pattern + "' is unknown",
       "give the width with the picture, as in --pattern FILE:210mm, or use scale=");
 }
 

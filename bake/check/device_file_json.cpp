@@ -121,7 +121,7 @@ Result<const DeviceProfile*> choose_device(const std::string& word, DeviceFile& 
   }
   const DeviceProfile* device = find_device_profile(word);
   if (device != nullptr) return device;
-  return fail(ExitCode::kUsage, "device.unknown", word, "there is no profile of that name",
+  return fail(ExitCode::kUsage, "device.unknown", word, "unknown device profile",
               "choose one of " + device_profile_names() + ", or a file NAME.json");
 }
 

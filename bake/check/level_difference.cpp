@@ -62,7 +62,7 @@ const char* vertex_difference(const VertexDecoder& decoder, const std::byte* a,
                               const ChunkRecord& at, const VertexDecoder& other, const std::byte* b,
                               const ChunkRecord& there, double slack) {
   if (!(glm::length(decoder.position(a, at) - other.position(b, there)) <= slack)) {
-    return "a vertex lies elsewhere";
+    return "a vertex has another position";
   }
   if (!(glm::dot(decoder.normal(a), other.normal(b)) >= kNormalCosine)) {
     return "a normal points elsewhere";

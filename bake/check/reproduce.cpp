@@ -100,7 +100,7 @@ std::vector<std::string> second_environment(const std::string& folder) {
 Result<void> prove_reproducible(const BakeRequest& request, const std::vector<std::string>& words,
                                 std::span<const std::byte> baked) {
   const TemporaryFolder folder;
-  if (folder.path().empty()) return trouble("there is no room for temporary files");
+  if (folder.path().empty()) return trouble("there is no space for temporary files");
   OtherPaths paths(folder.path());
   bool linked = true;
   for (const ModelRequest& model : request.models) linked = paths.add(model.path) && linked;
@@ -122,7 +122,7 @@ Result<void> prove_reproducible(const BakeRequest& request, const std::vector<st
               "byte " + std::to_string(a - baked.begin()),
               "a second bake under other circumstances gave " + std::to_string(bytes.size()) +
                   " bytes that differ from the " + std::to_string(baked.size()) + " of the first",
-              "this is a bug of ours: please report it with the input");
+              "internal error: please report it with the input");
 }
 
 }  // namespace modar

@@ -411,9 +411,9 @@ class SourceCheck {
         fit.stated_error + kRounding * (model.diagonal + glm::length(mesh.placement.center));
     if (!(fit.source_to_bundle <= limit && fit.bundle_to_source <= limit)) {
       tell(WorkstationRule::kSourceSurface, where, &model.position_error_max,
-           "the source lies up to " + std::to_string(fit.source_to_bundle) +
-               " beside the bundle, the bundle up to " + std::to_string(fit.bundle_to_source) +
-               " beside the source, " + std::to_string(fit.stated_error) + " is stated");
+           "the source deviates from the bundle by up to " + std::to_string(fit.source_to_bundle) +
+               ", the bundle from the source by up to " + std::to_string(fit.bundle_to_source) +
+               "; " + std::to_string(fit.stated_error) + " is stated");
     }
     if (fit.colour_error > kColourLimit) {
       tell(WorkstationRule::kSourceColour, where, &model,
@@ -570,7 +570,7 @@ class SourceCheck {
     const bool place = near(a.low[0], b.low[0]) && near(a.low[1], b.low[1]) &&
                        near(a.high[0], b.high[0]) && near(a.high[1], b.high[1]);
     if (!place || ours.size() != theirs.size())
-      return "its shadow lies elsewhere than the source's";
+      return "its shadow has another position than the source's";
     double sum = 0;
     int worst = 0;
     for (std::size_t i = sizeof a; i < ours.size(); ++i) {

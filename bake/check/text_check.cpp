@@ -11,6 +11,7 @@ namespace {
 /// How the words of one scene differ from the source's; empty: they do not.
 std::string word_fault(const std::optional<modar::Json>& stated,
                        const std::map<std::string, std::string>& words) {
+  if (words.empty() && !stated) return "";
   if (!stated) return "its text is missing";
   for (const auto& [language, expected] : words) {
     const auto found = stated->find(language);
@@ -40,21 +41,21 @@ void check_texts(const BundleView& bundle, const std::vector<SceneText>& sources
       modar::Json::parse(bundle.meta()).find("texts").value_or(modar::Json::array());
   std::size_t known = 0;
   for (const SceneText& source : sources) {
-    std::optional<modar::Json> words;
-    for (std::size_t i = 0; i < stated.size() && !words; ++i) {
-      const modar::Json entry = stated.at(i).value_or(modar::Json());
-      const auto named = [&entry](const char* key) {
-        const auto value = entry.find(key);
+    modar::Json entry;
+    for (std::size_t i = 0; i < stated.size() && entry.is_null(); ++i) {
+      const modar::Json each = stated.at(i).value_or(modar::Json());
+      const auto named = [&each](const char* key) {
+        const auto value = each.find(key);
         return value ? value->text().value_or("") : "";
       };
-      if (named("pattern") == source.pattern && named("model") == source.model) {
-        words = entry.find("text");
-      }
+      if (named("pattern") == source.pattern && named("model") == source.model) entry = each;
     }
-    known += words ? 1u : 0u;
-    const std::string fault = word_fault(words, source.words);
-    if (!fault.empty())
+    known += entry.is_null() ? 0u : 1u;
+    for (const std::string& fault : {word_fault(entry.find("text"), source.words),
+                                     word_fault(entry.find("alt"), source.alts)}) {
+      if (fault.empty()) continue;
       tell("pattern '" + source.pattern + "', model '" + source.model + "'", fault);
+    }
   }
   if (stated.size() != known) {
     tell("texts", "it has " + std::to_string(stated.size()) + ", the source " +

@@ -14,7 +14,8 @@ namespace modar {
 struct SceneText {
   std::string pattern;
   std::string model;
-  std::map<std::string, std::string> words;  ///< by language
+  std::map<std::string, std::string> words;   ///< by language
+  std::map<std::string, std::string> alts{};  ///< the same
 };
 
 /// Holds the texts in the bundle's meta against those of its sources, both ways: SOURCE_SCENE for

@@ -86,7 +86,7 @@ Result<void> Verdict::override_severity(const std::string& text) {
   const bool known = std::any_of(kinds.begin(), kinds.end(),
                                  [&id](const IssueKind* kind) { return id == kind->id; });
   if (!known) {
-    return fail(ExitCode::kUsage, "check.severity", text, "'" + id + "' is no kind of issue",
+    return fail(ExitCode::kUsage, "check.severity", text, "'" + id + "' is not a kind of issue",
                 "modar check --list-issues shows all of them");
   }
   for (const Severity severity : {Severity::kError, Severity::kWarning, Severity::kInfo}) {
@@ -99,7 +99,7 @@ Result<void> Verdict::override_severity(const std::string& text) {
     overrides_[id] = std::nullopt;
     return {};
   }
-  return fail(ExitCode::kUsage, "check.severity", text, "'" + word + "' is no severity",
+  return fail(ExitCode::kUsage, "check.severity", text, "'" + word + "' is not a severity",
               "write ID=error, ID=warning, ID=info or ID=ignore");
 }
 

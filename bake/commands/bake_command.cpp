@@ -241,63 +241,98 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
   return ExitCode::kOk;
 }
 
-void add_texture_options(CommandLine& line, TextureOptions& textures) {
-  line.option("--max-texture", &textures.max_side, "Longest side of a texture, in pixels",
-              {.shows_default = true, .least = 4, .most = kMaxTextureSide});
-  line.flag("!--no-mipmaps", textures.mipmaps, "Store level 0 of textures only");
-  line.choice<TextureEffort>("--effort", textures.effort,
-                             {{"fast", TextureEffort::kFast},
-                              {"good", TextureEffort::kGood},
-                              {"best", TextureEffort::kBest}},
-                             "Of the ETC1 encoder: fast, good (default) or best",
-                             {.type = "EFFORT"});
-  line.flag("--perceptual", textures.perceptual, "Weigh ETC1 errors as the eye does, by luma");
-  line.option("--min-psnr", &textures.min_psnr_db, "Report textures below this, in dB");
-  line.option("--min-ssim", &textures.min_ssim, "Report textures below this",
-              {.least = 0, .most = 1});
-  line.option("--texture-pictures", &textures.picture_folder,
-              "Write source, decoded and difference of each texture as PNG", {.type = "DIR"});
+void add_input_options(CommandLine& line, BakeCommand& command) {
+  line.group("Input and output");
+  line.option("--model", &command.models,
+              "OBJ, glTF, GLB, PLY or STL files; NAME=FILE gives the model another name",
+              {.type = "[NAME=]FILE"});
+  line.option("--pattern", &command.patterns,
+              "Frontal pictures of flat things; :210mm, :21cm or :8.3in states the printed width; "
+              ":shape=cylinder,diameter=66mm,arc=120 is a label around a bottle, "
+              ":shape=cone,top=80mm,bottom=60mm,arc=100 one around a cup, "
+              ":shape=box,size=120x180x40mm,right=FILE a box (also back, left, top and bottom)",
+              {.type = "FILE[:WIDTH][:shape=...]"});
+  line.option(
+      "--scene", &command.scenes,
+      "Which model stands on which pattern (required if there are several of either), and how: "
+      "height=120mm or width=80mm or scale=0.8 (of the pattern's longest side), up=x|y|z|-x|-y|-z, "
+      "turn=DEGREES or turn=X:Y:Z, offset=X:Y:Z (in mm if the pattern's width is known, else in "
+      "longest sides), centred, light=FILE",
+      {.type = "PATTERN=MODEL[,KEY=VALUE...]"});
+  line.option("-o,--output", &command.output, "Bundle to write", {.type = "OUT.modar"});
 }
 
-void add_geometry_options(CommandLine& line, BakeCommand& command) {
-  BakeRequest& request = command.request;
+void add_target_options(CommandLine& line, BakeCommand& command) {
+  line.group("Units, light and target devices");
   line.option("--unit", &command.unit, "Unit of the models' coordinates: mm, cm, m, km, in, ft");
-  line.option("--max-error", &command.max_error,
-              "Of packed positions: source units, a percentage of the diagonal (0.01%), or a "
-              "length (2mm, with --unit)",
+  line.option("--light", &command.light,
+              "Radiance HDR panorama or photo of the room that lights scenes without a light=FILE",
+              {.type = "FILE"});
+  line.option("--tier", &command.tier,
+              "Reduce models to thumb (20,000 triangles, textures of 512 pixels), phone (100,000, "
+              "2048) or desktop (150,000, 4096)",
+              {.type = "TIER", .choices = {"thumb", "phone", "desktop"}});
+  line.option("--device", &command.device,
+              "Fit a device's texture size and GPU memory (" + device_profile_names() + ")",
+              {.type = "NAME"});
+}
+
+void add_geometry_options(CommandLine& line, BakeRequest& request, std::string& max_error) {
+  line.group("Geometry", Shown::kInFull);
+  line.option("--max-error", &max_error,
+              "Largest error of stored positions: in source units, as a percentage of the diagonal "
+              "(0.01%), or as a length (2mm, with --unit)",
               {.type = "LENGTH"});
   line.choice<PositionKind>(
       "--positions", request.positions,
       {{"half", PositionKind::kHalf}, {"int16", PositionKind::kInt16}},
-      "Store them as half or int16 (else: int16 or float where --max-error needs it)",
-      {.type = "LAYOUT"});
+      "Position format: half or int16 (default: half; int16 or float if --max-error requires it)",
+      {.type = "FORMAT"});
   line.option("--lods", &request.levels,
-              "Levels of detail at most, the finest counted, each of half the triangles before it "
-              "(above a million: a quarter)",
+              "Most levels of detail, including the finest; each has half the triangles of the one "
+              "before (a quarter above a million)",
               {.shows_default = true, .least = 1, .most = kMaxLevels});
-  line.flag("--no-lods", [&request] { request.levels = 1; }, "The finest level only",
+  line.flag("--no-lods", [&request] { request.levels = 1; }, "Store the finest level only",
             {.excludes = "--lods"});
-  line.option(
-      "--light", &command.light,
-      "Radiance HDR panorama or photo of the room whose light falls on scenes without one of "
-      "their own",
-      {.type = "FILE"});
   line.flag("!--no-shadows", request.shadows, "Do not bake models' shadows on their patterns");
-  line.flag("!--no-ao", request.occlusion, "Do not store how much light reaches each vertex");
+  line.flag("!--no-ao", request.occlusion, "Do not store ambient occlusion");
+  line.flag("--topology,!--no-topology", request.topology,
+            "Measure the models' topology and store the result in the bundle");
+}
+
+void add_texture_options(CommandLine& line, BakeRequest& request) {
+  TextureOptions& textures = request.textures;
+  line.group("Textures", Shown::kInFull);
+  line.option("--max-texture", &textures.max_side, "Longest side of a texture, in pixels",
+              {.shows_default = true, .least = 4, .most = kMaxTextureSide});
+  line.choice<TextureEffort>("--effort", textures.effort,
+                             {{"fast", TextureEffort::kFast},
+                              {"good", TextureEffort::kGood},
+                              {"best", TextureEffort::kBest}},
+                             "Effort of the ETC1 encoder: fast, good (default) or best",
+                             {.type = "EFFORT"});
   line.flag(
       "--atlas", [&request] { request.atlas = AtlasMode::kAlways; },
-      "Repack what models show of their pictures onto shared pages (else: where it saves a "
-      "third of the bytes, or half of the materials)");
+      "Repack the used parts of textures onto shared pages (default: if it saves a third of the "
+      "bytes or half of the materials)");
   line.flag("--no-atlas", [&request] { request.atlas = AtlasMode::kNever; },
-            "Keep the pictures apart", {.excludes = "--atlas"});
-  line.flag("--topology,!--no-topology", request.topology,
-            "Measure the models' topology and state it in the bundle");
+            "Keep textures separate", {.excludes = "--atlas"});
+  line.flag("!--no-mipmaps", textures.mipmaps, "Store level 0 of textures only");
+  line.flag("--perceptual", textures.perceptual, "Weight ETC1 errors by luma");
+  line.option("--min-psnr", &textures.min_psnr_db, "Report textures below this PSNR, in dB");
+  line.option("--min-ssim", &textures.min_ssim, "Report textures below this SSIM",
+              {.least = 0, .most = 1});
+  line.option("--texture-pictures", &textures.picture_folder,
+              "Write each texture's source, decoded image and difference as PNG files",
+              {.type = "DIR"});
 }
 
 void add_pattern_options(CommandLine& line, BakeRequest& request) {
-  line.option("--loop-views", &request.loop.trial_views,
-              "Random views that try a pattern's features: fewer bake faster, more hold better",
-              {.least = 1, .most = 10000});
+  line.group("Patterns", Shown::kInFull);
+  line.option(
+      "--loop-views", &request.loop.trial_views,
+      "Random views that test a pattern's features: fewer bake faster, more are more robust",
+      {.least = 1, .most = 10000});
   std::vector<std::string> sets = {"none"};
   std::string names = "none";
   for (const ParameterSetRecord& set : paper_parameter_sets()) {
@@ -306,63 +341,43 @@ void add_pattern_options(CommandLine& line, BakeRequest& request) {
   }
   line.option(
       "--parameters", &request.parameters,
-      "The ModAR paper's sets to store beside our record of a pattern, as YML and mapped: " +
-          names + " (default: all)",
+      "Keypoints of the ModAR paper's method to store as well: " + names + " (default: all)",
       {.type = "SET,SET", .choices = sets, .separator = ','});
   line.flag("!--no-score", request.loop.score, "Do not score the patterns");
+}
+
+void add_run_options(CommandLine& line, BakeCommand& command) {
+  line.group("Run and report", Shown::kInFull);
+  line.option("--jobs", &command.request.jobs, "Threads; the output does not depend on it",
+              {.shows_default = true, .least = 1, .most = 256});
+  line.size("--memory", command.request.memory_bytes,
+            "Memory limit (1G, 800M): large arrays are kept in files next to the bundle",
+            {.type = "SIZE"});
+  line.flag("--prove-reproducible", command.prove_reproducible,
+            "Bake again with other threads, paths, locale and time zone, and compare the bytes");
+  line.flag("--quiet", command.quiet, "No progress, summary or diagnostics on stderr");
+  line.flag("--notes", command.notes, "Show every note, not just the first of each kind");
+  line.flag("--json", command.json, "Print contents, stages and diagnostics as JSON");
 }
 
 }  // namespace
 
 void add_bake(CommandLine& program) {
-  CommandLine& line = program.command("bake", "Models and pattern images to one bundle");
+  CommandLine& line = program.command("bake", "Bake models and pattern images into one bundle");
   const auto command = std::make_shared<BakeCommand>();
   BakeRequest& request = command->request;
   request.jobs = std::max(1u, std::thread::hardware_concurrency());
-  line.option("--model", &command->models,
-              "OBJ, glTF, GLB, PLY or STL files; NAME=FILE names one that shares its file's name",
-              {.type = "[NAME=]FILE"});
-  line.option(
-      "--pattern", &command->patterns,
-      "Images of flat things, frontal; :WIDTH tells the printed width (:210mm, :21cm, :8.3in); "
-      ":shape=cylinder,diameter=66mm,arc=120 a label around a bottle, "
-      ":shape=cone,top=80mm,bottom=60mm,arc=100 one around a cup, "
-      ":shape=box,size=120x180x40mm,right=FILE a box (as well back, left, top and bottom)",
-      {.type = "FILE[:WIDTH][:shape=...]"});
-  line.option(
-      "--scene", &command->scenes,
-      "Which model stands on which pattern, needed where there is more than one of either, and "
-      "how: "
-      "height=120mm or width=80mm or scale=0.8 (of the pattern's largest side), up=x|y|z|-x|-y|-z, "
-      "turn=DEGREES or turn=X:Y:Z, offset=X:Y:Z (mm where the pattern's width is known, else its "
-      "largest side), centred, light=FILE",
-      {.type = "PATTERN=MODEL[,KEY=VALUE...]"});
-  line.option("-o,--output", &command->output, "The bundle to write", {.type = "OUT.modar"});
+  add_input_options(line, *command);
   add_project_options(line, command->project);
-  line.flag("--prove-reproducible", command->prove_reproducible,
-            "Bake again with other threads, paths, locale, time zone; compare the bytes");
-  add_geometry_options(line, *command);
-  add_texture_options(line, request.textures);
-  line.option("--tier", &command->tier,
-              "Make models for thumb (20,000 triangles, textures of 512), phone (100,000, 2048) or "
-              "desktop (150,000, 4096)",
-              {.type = "TIER", .choices = {"thumb", "phone", "desktop"}});
-  line.option("--device", &command->device,
-              "Plan for a device: its texture size and GPU memory (" + device_profile_names() + ")",
-              {.type = "NAME"});
+  add_target_options(line, *command);
+  add_geometry_options(line, request, command->max_error);
+  add_texture_options(line, request);
   add_pattern_options(line, request);
-  line.option("--jobs", &request.jobs, "Threads; the bytes do not depend on it",
-              {.shows_default = true, .least = 1, .most = 256});
-  line.size("--memory", request.memory_bytes,
-            "Hold the process there (1G, 800M): large arrays live in files beside the bundle",
-            {.type = "SIZE"});
-  line.flag("--quiet", command->quiet, "No progress, no summary, no diagnostics on stderr");
-  line.flag("--notes", command->notes, "Show every note, not the first of each kind");
-  line.flag("--json", command->json, "Print what was baked, stages and diagnostics as JSON");
+  add_run_options(line, *command);
   line.footer(
       example("  modar bake --model spider.obj --pattern box.png:210mm"
               " --scene box=spider,up=y,scale=0.8 -o spider.modar\n"
-              "  modar init && modar bake    # a whole folder, and next time what changed\n"));
+              "  modar init && modar bake    # a whole folder; later only what changed\n"));
   line.run([command, &program] { return run_bake(*command, program.words()); });
 }
 

@@ -34,66 +34,68 @@ Result<ExitCode> print_rows(const BenchOptions& bench) {
 }
 
 void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
+  line.group("Tracking: pose, wild, extended (light and render where it says so)");
   line.option(
       "--patterns", &pose.patterns,
-      "pose: folder of pattern pictures, or one picture; light: one; wild: to look for, too, "
-      "in clips that show none");
-  line.option("--backgrounds", &pose.backgrounds, "pose: folder of photos without a pattern");
+      "Folder of pattern pictures, or one picture (light: one picture; wild: patterns to look for "
+      "in clips that show none)");
+  line.option("--backgrounds", &pose.backgrounds, "Folder of photos without a pattern");
+  line.group("Tracking: pose, wild, extended (light and render where it says so)", Shown::kInFull);
   line.option("--video", &pose.video,
-              "pose: a video as well; extended: one to blank; render: the player on it");
-  line.option("--truth", &pose.truth, "pose: corners of the video's pattern (CSV)");
+              "Also measure on a video (extended: a video to blank; render: play it headless)");
+  line.option("--truth", &pose.truth, "True corners of the video's pattern (CSV)");
   line.option("--video-pattern", &pose.video_pattern,
-              "pose: picture of the video's pattern (default: pattern.png beside the video)");
-  line.option("--frames", &pose.frames, "pose: rendered frames a band and pattern",
+              "Picture of the video's pattern (default: pattern.png in the video's folder)");
+  line.option("--frames", &pose.frames, "Rendered frames per band and pattern",
               {.least = 1, .most = 100000});
-  line.option("--clutter", &pose.clutter, "pose: frames without a pattern, in all",
+  line.option("--clutter", &pose.clutter, "Total frames without a pattern",
               {.least = 1, .most = 10000000});
   line.flag("--tables", pose.tables,
-            "pose: the ModAR paper's Tables 6 to 8 and accuracy beside its four sets and ours");
+            "Reproduce Tables 6 to 8 of the ModAR paper with its four parameter sets, and compare");
   line.flag("--scores", pose.scores,
-            "pose: the patterns' scores beside their working ranges, and how well they agree");
-  line.flag(
-      "--many", pose.many, 50,
-      "pose: 1, 10 and 50 (--many=N: N) patterns: detection, set-up, return from behind things");
+            "Compare the patterns' scores with their measured working ranges");
+  line.flag("--many", pose.many, 50,
+            "Use 1, 10 and 50 patterns at once (--many=N: N): detection, set-up, recovery after "
+            "occlusion");
   line.flag("--field", pose.field,
-            "pose: frames as phones take them: blur, low light, JPEG, glare, rolling shutter, bent "
-            "paper, mirrored prints, other editions");
+            "Simulate phone cameras: blur, low light, JPEG, glare, rolling shutter, bent paper, "
+            "mirrored prints, other editions");
   line.flag("--shape", pose.shape,
-            "pose: labels on cylinders and cones, and boxes, from 0 to 70 degrees about the axis");
+            "Labels on cylinders and cones, and boxes, from 0 to 70 degrees about the axis");
   line.flag("--lookalikes", pose.lookalikes,
-            "pose: two seconds each of other editions, mirror images and covered prints");
+            "Two seconds each of other editions, mirror images and covered prints");
   line.option("--path", &pose.path,
-              "pose: replay a camera path: a homography (9 numbers) or pose (12) a line");
-  line.flag("--sift", pose.sift, "pose: OpenCV's SIFT with MAGSAC on the same frames");
+              "Replay a camera path: one homography (9 numbers) or pose (12) per line");
+  line.flag("--sift", pose.sift, "Compare with OpenCV's SIFT and MAGSAC on the same frames");
   line.flag("--known-camera", pose.known_camera,
-            "pose: tell the tracker lens and aspect, which are unknown to it and drawn at random "
-            "otherwise");
+            "Give the tracker the lens and aspect (default: drawn at random and unknown to it)");
   line.option("--parameters", &pose.parameters,
-              "pose, wild: set of the ModAR paper's method, none: ours alone");
-  line.option("--only", &pose.only, "pose, wild: bands or clips whose name holds this text");
-  line.option("--seed", &pose.seed, "pose: of the rendered frames");
-  line.flag("--quiet", pose.quiet, "No progress bar");
+              "Parameter set of the ModAR paper's method; none: leave it out");
+  line.option("--only", &pose.only, "Bands or clips whose name contains this text");
+  line.option("--seed", &pose.seed, "Random seed of the rendered frames");
 }
 
 }  // namespace
 
 void add_bench(CommandLine& program) {
-  CommandLine& line = program.command("bench", "Measure, as ratios to a reference in the same run");
+  CommandLine& line =
+      program.command("bench", "Measure quality and speed, next to a reference in the same run");
   const auto bench = std::make_shared<BenchOptions>();
   bench->model.jobs = std::max(1u, std::thread::hardware_concurrency());
-  line.option("name", &bench->name, "Which bench; an unknown name lists them",
+  line.option("name", &bench->name, "Name of the bench; an unknown name lists them all",
               {.type = "NAME", .required = true});
-  line.option("inputs", &bench->inputs, "Its input files");
+  line.option("inputs", &bench->inputs, "Input files of the bench");
   line.option("--crop", &bench->crop, "etc1: side of the centre crop, in pixels");
-  line.option("-o,--output", &bench->output, "light: folder that exists, for the pictures",
+  line.option("-o,--output", &bench->output, "light: existing folder for the pictures",
               {.type = "FOLDER"});
   line.option("--device", &bench->device, "render: draw as this device would (assets/devices)");
-  line.option("--obj", &bench->model.obj, "model: measure this OBJ instead of making one");
-  line.flag("--big", bench->model.big, "model: of 14.6 million triangles, some minutes");
-  line.option("--jobs", &bench->model.jobs, "model: threads of our own runs",
+  line.option("--obj", &bench->model.obj, "model: measure this OBJ instead of a generated one");
+  line.flag("--big", bench->model.big, "model: 14.6 million triangles, takes minutes");
+  line.option("--jobs", &bench->model.jobs, "model: threads of ModAR's runs",
               {.shows_default = true, .least = 1, .most = 256});
-  add_pose_options(line, bench->pose);
   line.flag("--json", bench->json, "Print the rows as JSON");
+  line.flag("--quiet", bench->pose.quiet, "No progress bar");
+  add_pose_options(line, bench->pose);
   line.footer(
       example("  modar bench load spider.modar --json\n"
               "  modar bench model scan.obj --big --json\n"

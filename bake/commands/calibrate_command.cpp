@@ -40,8 +40,8 @@ Json calibration_json(const Calibration& calibration) {
 Result<void> complete(CalibrateCommand& command) {
   CalibrateOptions& options = command.options;
   if (command.board.empty() == options.pattern.empty()) {
-    return fail(ExitCode::kUsage, "calibrate.plane", "calibrate", "no plane is named to look for",
-                "give --board 9x6 or --pattern IMAGE");
+    return fail(ExitCode::kUsage, "calibrate.plane", "calibrate",
+                "neither a board nor a pattern is given", "give --board 9x6 or --pattern IMAGE");
   }
   char cross = 0;
   char more = 0;
@@ -50,8 +50,8 @@ Result<void> complete(CalibrateCommand& command) {
                    &options.board_rows, &more) != 3 ||
        cross != 'x' || std::min(options.board_columns, options.board_rows) < 3 ||
        std::max(options.board_columns, options.board_rows) > 100)) {
-    return fail(ExitCode::kUsage, "calibrate.board", command.board, "this is no size of a board",
-                "count the inner corners: --board 9x6");
+    return fail(ExitCode::kUsage, "calibrate.board", command.board, "this is not a board size",
+                "count the inner corners, as in --board 9x6");
   }
   return open_folders(options.inputs);
 }
@@ -88,19 +88,19 @@ Result<ExitCode> run_calibrate(CalibrateCommand& command) {
 }  // namespace
 
 void add_calibrate(CommandLine& program) {
-  CommandLine& line =
-      program.command("calibrate", "A camera file from a chessboard or any pattern, filmed");
+  CommandLine& line = program.command(
+      "calibrate", "Calibrate a camera from photos or a video of a chessboard or pattern");
   const auto command = std::make_shared<CalibrateCommand>();
-  line.option("inputs", &command->options.inputs, "Pictures, folders of them, videos",
+  line.option("inputs", &command->options.inputs, "Pictures, folders of pictures, and videos",
               {.type = "VIDEO|IMAGE|DIR...", .required = true});
-  line.option("--board", &command->board, "A chessboard of that many inner corners",
+  line.option("--board", &command->board, "Chessboard with this many inner corners",
               {.type = "COLUMNSxROWS"});
   line.option("--pattern", &command->options.pattern,
-              "Any pattern instead: its picture, or a bundle whose first one it is",
+              "Use a pattern instead: its picture, or a bundle that has it as its first pattern",
               {.type = "IMAGE|BUNDLE", .excludes = "--board"});
-  line.option("--views", &command->options.most_views, "Most views to calibrate from",
+  line.option("--views", &command->options.most_views, "Most views to use",
               {.shows_default = true, .least = 5, .most = 1000});
-  line.option("-o,--output", &command->output, "The camera file to write (OpenCV's YML)",
+  line.option("-o,--output", &command->output, "Camera file to write (OpenCV's YML)",
               {.type = "CAMERA.yml", .required = true});
   line.flag("--quiet", command->quiet, "No progress bar");
   line.flag("--json", command->json, "Print the camera as JSON");
@@ -110,8 +110,8 @@ void add_calibrate(CommandLine& program) {
       "  modar calibrate photos --board 9x6 -o phone.yml\n"
       "  modar calibrate walk.mp4 --pattern cover.png -o phone.yml\n"
       "  modar-play vase.modar --input camera --camera phone.yml\n"
-      "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 the views do not\n"
-      "tell the camera, 4 a bug of ours.\n");
+      "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 the views are not\n"
+      "enough to calibrate, 4 internal error.\n");
   line.run([command] { return run_calibrate(*command); });
 }
 

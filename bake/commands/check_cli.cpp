@@ -12,36 +12,38 @@ namespace modar {
 namespace {
 
 void add_source_options(CommandLine& line, CheckCommand& check) {
+  line.group("Compare with the sources");
   line.option("--source", &check.sources,
-              "Bake these models and pattern images again and compare; measure what differs; "
-              "modar.toml stands for all of a project's, and for its texts",
+              "Bake these models and pattern images again, compare, and measure what differs; "
+              "modar.toml stands for all files of a project",
               {.type = "FILE[:WIDTHmm]"});
   line.flag("--pose", check.pose,
-            "Track the patterns of --source in rendered views: errors and working range",
+            "Track the patterns of --source in rendered views: error and working range",
             {.needs = "--source"});
-  line.option("--pose-views", &check.pose_views, "Views of each size and tilt",
+  line.option("--pose-views", &check.pose_views, "Views per size and tilt",
               {.shows_default = true, .least = 1, .most = 1000, .needs = "--pose"});
   line.option("--visual", &check.visual,
-              "Render the models of --source and of the bundle from 12 sides and compare; the "
-              "worst view of each goes to DIR",
+              "Render the models of --source and of the bundle from 12 sides and compare; write "
+              "the worst view of each to DIR",
               {.type = "DIR", .needs = "--source"});
 }
 
 void add_mutate_options(CommandLine& line, CheckCommand& check) {
+  line.group("Test the checker itself", Shown::kInFull);
   line.option("--mutate", &check.mutations,
-              "Prove the checker instead: damage N copies of the bundle, count those found",
+              "Damage N copies of the bundle and count how many are found",
               {.type = "N", .positive = true});
-  line.option("--seed", &check.seed, "Which mutations",
+  line.option("--seed", &check.seed, "Random seed of the damage",
               {.shows_default = true, .needs = "--mutate"});
   line.option("--second-reader", &check.second_reader,
-              "scripts/read_bundle.py: tells which survivors changed nothing",
+              "scripts/read_bundle.py, which decides which unnoticed changes have no effect",
               {.type = "FILE", .needs = "--mutate"});
 }
 
 int run(const CheckCommand& check) {
   if (check.bundle.empty() && !check.list_issues) {
     return print_error(
-        {ExitCode::kUsage, "cli.bundle", "check", "no bundle is named", "modar check BUNDLE"});
+        {ExitCode::kUsage, "cli.bundle", "check", "no bundle is given", "modar check BUNDLE"});
   }
   return run_check(check);
 }
@@ -49,33 +51,35 @@ int run(const CheckCommand& check) {
 }  // namespace
 
 void add_check(CommandLine& program) {
-  CommandLine& line = program.command("check", "Prove that a bundle is good");
+  CommandLine& line =
+      program.command("check", "Validate a bundle, for a device and against its sources");
   const auto check = std::make_shared<CheckCommand>();
   check->jobs = std::max(1u, std::thread::hardware_concurrency());
   check->tool_version = MODAR_VERSION;
   line.option("bundle", &check->bundle, "The bundle", {.type = "BUNDLE"});
   line.flag("--list-issues", check->list_issues,
-            "Print all kinds of issues with their cures (ISSUES.md)", {.excludes = "bundle"});
+            "List every kind of issue with its cure (ISSUES.md)", {.excludes = "bundle"});
   line.flag("--json", check->json, "Print verdict and issues as JSON");
-  line.flag("--sarif", check->sarif, "Print them as SARIF 2.1.0, for CI systems",
+  line.flag("--sarif", check->sarif, "Print issues as SARIF 2.1.0, for CI systems",
             {.excludes = "--json"});
   line.option("--device", &check->device,
-              "Hold the bundle against a device too: " + device_profile_names() +
-                  ", or a file like those of assets/devices/",
+              "Also check the limits of a device: " + device_profile_names() +
+                  ", or a profile file as in assets/devices/",
               {.type = "NAME|FILE.json"});
   add_source_options(line, *check);
+  line.group("Severity");
   line.option("--severity", &check->severities,
-              "Weigh a kind of issue anew: ID=error, warning, info or ignore; repeatable",
+              "Set the severity of a kind of issue: error, warning, info or ignore; repeatable",
               {.type = "ID=SEVERITY", .repeatable = true});
-  line.flag("--warnings-as-errors", check->warnings_as_errors, "A warning makes the bundle bad");
+  line.flag("--warnings-as-errors", check->warnings_as_errors, "Treat warnings as errors");
   add_mutate_options(line, *check);
   line.footer(
       "\nExample:\n"
       "  modar check spider.modar --device mali400 --source spider.obj cover.png\n"
       "  modar check --mutate 100000 --second-reader scripts/read_bundle.py spider.modar\n"
       "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
-      "4 a bug of ours, 5 not supported. A bad bundle answers 3, and so does a proof that misses\n"
-      "its goals.\n");
+      "4 internal error, 5 not supported. A bad bundle exits with 3, and so does a --mutate run\n"
+      "that misses its goals.\n");
   line.run([check] { return ExitCode{run(*check)}; });
 }
 

@@ -46,7 +46,7 @@ Result<void> weigh(const CheckCommand& command, Verdict& verdict) {
 void print_looks(const std::vector<ModelLook>& looks) {
   for (const ModelLook& look : looks) {
     if (!look.judged) {
-      std::printf("model '%s': translucent, its looks are not judged\n", look.name.c_str());
+      std::printf("model '%s': translucent, not compared\n", look.name.c_str());
       continue;
     }
     std::printf("model '%s': SSIM %.4f, worst %.4f; colour off by %.2f, worst %.2f; see %s\n",
@@ -73,14 +73,15 @@ void print_ranges(const std::vector<PatternRange>& ranges) {
 void print_fit(const SourceFit& fit) {
   for (const ModelFit& model : fit.models) {
     std::printf(
-        "model '%s': %s; the source lies up to %.3g beside the bundle, the bundle up to "
-        "%.3g beside the source, %.3g is stated\n",
+        "model '%s': %s; the source deviates from the bundle by up to %.3g, the bundle from the "
+        "source by up to %.3g; %.3g is stated\n",
         model.name.c_str(),
-        model.same_bytes ? "the same bytes, baked again" : "other bytes, baked again",
+        model.same_bytes ? "a second bake gave the same bytes"
+                         : "a second bake gave different bytes",
         model.source_to_bundle, model.bundle_to_source, model.stated_error);
   }
   for (const std::string& asset : fit.same) {
-    std::printf("%s: the same bytes, baked again\n", asset.c_str());
+    std::printf("%s: a second bake gave the same bytes\n", asset.c_str());
   }
 }
 

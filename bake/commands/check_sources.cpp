@@ -52,11 +52,11 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
   sources.texts.emplace();
   for (const ProjectScene& scene : project.scenes) {
     const SceneRequest& asked = scene.request;
-    if (scene.texts.empty() || !holds(bundle.patterns(), asked.pattern) ||
+    if ((scene.texts.empty() && scene.alts.empty()) || !holds(bundle.patterns(), asked.pattern) ||
         !holds(bundle.models(), asked.model)) {
       continue;
     }
-    sources.texts->push_back({asked.pattern, asked.model, scene.texts});
+    sources.texts->push_back({asked.pattern, asked.model, scene.texts, scene.alts});
   }
   std::set<std::string> lights;
   for (const ProjectScene& scene : project.scenes) {

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
+#include <set>
 #include <type_traits>
 
 #include "bake/terminal.hpp"
@@ -20,6 +21,17 @@ struct CommandLine::Parts {
   std::vector<std::unique_ptr<CommandLine>> commands;
   std::map<const CLI::Option*, std::vector<std::string>> choices;
   std::map<const CLI::Option*, OptionRules> rules;
+  std::string heading;
+  Shown shown = Shown::kAlways;
+  /// Options and subcommands that --help-all alone shows; one set for the whole program.
+  std::shared_ptr<std::set<const void*>> in_full;
+
+  /// Puts an option or a subcommand under the present heading.
+  template <class Declared>
+  void place(Declared& declared) const {
+    if (!heading.empty()) declared.group(heading);
+    if (shown == Shown::kInFull) in_full->insert(&declared);
+  }
 };
 
 namespace {
@@ -97,9 +109,31 @@ std::string wrapped(const std::string& text, std::size_t width) {
 }
 
 /// Options without their validators' notes, which apply() has put into words, in lines of 80
-/// columns.
+/// columns. Leaves out what --help-all alone shows, unless that is asked for.
 class HelpFormatter : public CLI::Formatter {
  public:
+  explicit HelpFormatter(std::shared_ptr<std::set<const void*>> in_full)
+      : in_full_(std::move(in_full)) {
+    label("Positionals", "Arguments");
+    label("SUBCOMMAND", "COMMAND");
+  }
+
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    return make_description(app) + make_usage(app, std::move(name)) + make_positionals(app) +
+           options_text(app, mode) + make_subcommands(app, mode) + '\n' + make_footer(app);
+  }
+  std::string make_subcommands(const CLI::App* app, CLI::AppFormatMode mode) const override {
+    std::string text;
+    std::string heading;
+    for (const CLI::App* command : app->get_subcommands({})) {
+      if (!shown(command, mode)) continue;
+      if (command->get_group() != heading) text += "\n" + command->get_group() + ":\n";
+      heading = command->get_group();
+      text += make_subcommand(command);
+    }
+    return text;
+  }
   std::string make_option_desc(const CLI::Option* option) const override {
     return wrapped(CLI::Formatter::make_option_desc(option), kColumns - column_width_);
   }
@@ -115,7 +149,40 @@ class HelpFormatter : public CLI::Formatter {
   }
 
  private:
+  [[nodiscard]] bool shown(const void* declared, CLI::AppFormatMode mode) const {
+    return mode == CLI::AppFormatMode::All || !in_full_->contains(declared);
+  }
+  /// The options under their headings, help last.
+  [[nodiscard]] std::string options_text(const CLI::App* app, CLI::AppFormatMode mode) const {
+    std::vector<std::pair<std::string, std::vector<const CLI::Option*>>> groups;
+    std::vector<const CLI::Option*> help = {app->get_help_ptr()};
+    if (has_more(*app)) help.push_back(app->get_help_all_ptr());
+    for (const std::string& heading : app->get_groups()) {
+      auto options = app->get_options([&](const CLI::Option* option) {
+        return option->get_group() == heading && option->nonpositional() && shown(option, mode) &&
+               option != app->get_help_ptr() && option != app->get_help_all_ptr();
+      });
+      if (!options.empty()) groups.emplace_back(heading, std::move(options));
+    }
+    if (groups.size() != 1) groups.emplace_back(groups.empty() ? "Options" : "Help", help);
+    auto& last = groups.back().second;
+    if (last != help) last.insert(last.end(), help.begin(), help.end());
+    std::string text;
+    for (const auto& [heading, options] : groups) text += make_group(heading, false, options);
+    return text;
+  }
+
+  /// Whether --help leaves out options or subcommands of `app`.
+  [[nodiscard]] bool has_more(const CLI::App& app) const {
+    const auto hidden = [this](const void* declared) { return in_full_->contains(declared); };
+    const auto options = app.get_options();
+    const auto commands = app.get_subcommands({});
+    return std::any_of(options.begin(), options.end(), hidden) ||
+           std::any_of(commands.begin(), commands.end(), hidden);
+  }
+
   static constexpr std::size_t kColumns = 80;
+  std::shared_ptr<std::set<const void*>> in_full_;
 };
 
 /// The first word of the command line that nothing takes, and the name that it is nearest to.
@@ -229,7 +296,7 @@ Error usage_error(const CLI::ParseError& thrown, const CLI::Option* option,
     error.cause = quoted + " is none of its values";
     error.cure = meant.empty() ? "name one of " + list : "did you mean " + std::string(meant) + "?";
   } else {
-    error.cause = quoted + (number_in(value) ? " is out of its range" : " is no number");
+    error.cause = quoted + (number_in(value) ? " is out of range" : " is not a number");
     error.cure = number_cure(rules, name, value);
   }
   return error;
@@ -240,7 +307,7 @@ Error usage_error(const CLI::ParseError& thrown, const CLI::Option* option,
 std::string example(const std::string& text, const std::string& codes) {
   return "\nExample:\n" + text +
          "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
-         "4 a bug of ours, 5 not supported" +
+         "4 internal error, 5 not supported" +
          codes + ".\n";
 }
 
@@ -248,8 +315,11 @@ CommandLine::CommandLine(const std::string& about, const std::string& version)
     : parts_(std::make_unique<Parts>()) {
   parts_->own = std::make_unique<CLI::App>(about, "modar");
   parts_->app = parts_->own.get();
+  parts_->in_full = std::make_shared<std::set<const void*>>();
   parts_->app->set_version_flag("--version", version);
-  parts_->app->formatter(std::make_shared<HelpFormatter>());
+  parts_->app->set_help_flag("-h,--help", "Print this help and exit");
+  parts_->app->set_help_all_flag("--help-all", "Print this help in full and exit");
+  parts_->app->formatter(std::make_shared<HelpFormatter>(parts_->in_full));
 }
 
 CommandLine::CommandLine(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -260,8 +330,53 @@ CommandLine& CommandLine::command(const std::string& name, const std::string& ab
   auto parts = std::make_unique<Parts>();
   parts_->app->require_subcommand(1);
   parts->app = parts_->app->add_subcommand(name, about);
+  parts->in_full = parts_->in_full;
+  parts_->place(*parts->app);
   parts_->commands.emplace_back(new CommandLine(std::move(parts)));
   return *parts_->commands.back();
+}
+
+void CommandLine::group(const std::string& heading, Shown shown) {
+  parts_->heading = heading;
+  parts_->shown = shown;
+}
+
+void CommandLine::add_help() {
+  CommandLine& line = command("help", "Show the help of a command; `help all` lists all commands");
+  const auto words = std::make_shared<std::vector<std::string>>();
+  line.option("command", words.get(), "Its name; `all` after it shows every option",
+              {.type = "COMMAND|all"});
+  line.run([this, words]() -> Result<ExitCode> {
+    MODAR_ASSIGN(const std::string text, help(*words));
+    std::fputs(text.c_str(), stdout);
+    return ExitCode::kOk;
+  });
+}
+
+Result<std::string> CommandLine::help(std::vector<std::string> words) const {
+  const bool all = !words.empty() && words.back() == "all";
+  if (all) words.pop_back();
+  const CommandLine* chosen = this;
+  std::string name = parts_->app->get_name();
+  for (const std::string& word : words) {
+    std::vector<std::string> known;
+    const CommandLine* next = nullptr;
+    for (const auto& command : chosen->parts_->commands) {
+      known.push_back(command->parts_->app->get_name());
+      if (known.back() == word) next = command.get();
+    }
+    if (next == nullptr) {
+      const std::string_view meant = nearest_name(word, known);
+      return fail(
+          ExitCode::kUsage, "cli.unknown", word, "there is no such command",
+          meant.empty() ? "see `modar help all`" : "did you mean " + std::string(meant) + "?");
+    }
+    chosen = next;
+    name += " " + word;
+  }
+  const CLI::App& app = *chosen->parts_->app;
+  return app.get_formatter()->make_help(&app, name,
+                                        all ? CLI::AppFormatMode::All : CLI::AppFormatMode::Normal);
 }
 
 void CommandLine::option(const std::string& names, Value value, const std::string& help,
@@ -271,6 +386,7 @@ void CommandLine::option(const std::string& names, Value value, const std::strin
         CLI::Option* option = parts_->app->add_option(names, *target, help);
         limit<std::remove_pointer_t<decltype(target)>>(rules, *option);
         apply(rules, *parts_->app, *option);
+        parts_->place(*option);
         parts_->choices[option] = rules.choices;
         parts_->rules[option] = rules;
       },
@@ -282,20 +398,25 @@ void CommandLine::size(const std::string& names, std::uint64_t& bytes, const std
   CLI::Option* option = parts_->app->add_option(names, bytes, help);
   option->transform(CLI::Validator(size_in_bytes, ""));
   apply(rules, *parts_->app, *option);
+  parts_->place(*option);
 }
 
 void CommandLine::flag(const std::string& names, bool& value, const std::string& help,
                        const OptionRules& rules) {
-  apply(rules, *parts_->app, *parts_->app->add_flag(names, value, help));
+  CLI::Option* option = parts_->app->add_flag(names, value, help);
+  apply(rules, *parts_->app, *option);
+  parts_->place(*option);
 }
 
 void CommandLine::flag(const std::string& names, std::function<void()> seen,
                        const std::string& help, const OptionRules& rules) {
-  apply(rules, *parts_->app, *parts_->app->add_flag_callback(names, std::move(seen), help));
+  CLI::Option* option = parts_->app->add_flag_callback(names, std::move(seen), help);
+  apply(rules, *parts_->app, *option);
+  parts_->place(*option);
 }
 
 void CommandLine::flag(const std::string& names, int& value, int plain, const std::string& help) {
-  parts_->app->add_flag(names + "{" + std::to_string(plain) + "}", value, help);
+  parts_->place(*parts_->app->add_flag(names + "{" + std::to_string(plain) + "}", value, help));
 }
 
 void CommandLine::choose(const std::string& names, std::function<void(int)> take,
@@ -304,6 +425,7 @@ void CommandLine::choose(const std::string& names, std::function<void(int)> take
   CLI::Option* option = parts_->app->add_option_function<int>(names, std::move(take), help);
   option->transform(CLI::CheckedTransformer(words).description(""));
   apply(rules, *parts_->app, *option);
+  parts_->place(*option);
   for (const auto& [word, number] : words) parts_->choices[option].push_back(word);
 }
 
@@ -323,7 +445,8 @@ CommandText CommandLine::describe() const {
   }
   for (const CLI::Option* option : app.get_options()) {
     const auto known = parts_->choices.find(option);
-    OptionText one{{}, "", option->get_description(), option->get_required(), {}};
+    OptionText one{
+        {}, "", option->get_description(), option->get_required(), {}, option->get_group()};
     for (const std::string& name : option->get_snames()) one.names.push_back("-" + name);
     for (const std::string& name : option->get_lnames()) one.names.push_back("--" + name);
     if (option->get_positional()) one.names = {option->get_name(true)};
@@ -338,7 +461,7 @@ CommandText CommandLine::describe() const {
   return text;
 }
 
-Error CommandLine::told(const std::exception& error) const {
+Error CommandLine::explained(const std::exception& error) const {
   const CommandLine* chosen = this;
   for (bool deeper = true; deeper;) {
     deeper = false;
@@ -368,7 +491,7 @@ int CommandLine::parse_and_run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {
       if (const auto unknown = unknown_word(parts_->app)) return print_error(*unknown);
-      return print_error(told(error));
+      return print_error(explained(error));
     }
     return parts_->app->exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
                                          : static_cast<int>(ExitCode::kUsage);

@@ -41,6 +41,7 @@ struct OptionText {
   std::string help;
   bool required = false;
   std::vector<std::string> choices;  ///< empty: any value
+  std::string group;                 ///< the heading that it stands under
 };
 
 /// A command as --help shows it.
@@ -51,6 +52,9 @@ struct CommandText {
   std::vector<OptionText> options;
   std::vector<CommandText> commands;
 };
+
+/// Which help shows what is declared: --help and --help-all, or --help-all alone.
+enum class Shown { kAlways, kInFull };
 
 /// A command with its options and subcommands. Variables must live until parse_and_run() returns.
 class CommandLine {
@@ -64,6 +68,11 @@ class CommandLine {
 
   /// A subcommand, which stays this object's. A command that has some runs none itself.
   CommandLine& command(const std::string& name, const std::string& about);
+  /// Adds the subcommand `help [COMMAND ...] [all]`.
+  void add_help();
+
+  /// The heading of the options or subcommands that are declared from now on.
+  void group(const std::string& heading, Shown shown = Shown::kAlways);
 
   /// names: "-o,--output"; without dashes a positional argument.
   void option(const std::string& names, Value value, const std::string& help,
@@ -107,7 +116,7 @@ class CommandLine {
   /// What followed the program's name.
   [[nodiscard]] const std::vector<std::string>& words() const { return words_; }
 
-  /// --help and --version go to stdout with 0, a wrong command line to stderr with
+  /// --help, --help-all and --version go to stdout with 0, a wrong command line to stderr with
   /// ExitCode::kUsage; else what the chosen command answers.
   int parse_and_run(int argc, char** argv);
 
@@ -115,7 +124,9 @@ class CommandLine {
   struct Parts;
   explicit CommandLine(std::unique_ptr<Parts> parts);
   /// What the parser threw, with cause and cure.
-  [[nodiscard]] Error told(const std::exception& error) const;
+  [[nodiscard]] Error explained(const std::exception& error) const;
+  /// The help of the command that `words` name, in full where the last one is "all".
+  [[nodiscard]] Result<std::string> help(std::vector<std::string> words) const;
   void choose(const std::string& names, std::function<void(int)> take,
               const std::map<std::string, int>& words, const std::string& help,
               const OptionRules& rules);

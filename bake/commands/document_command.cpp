@@ -64,7 +64,12 @@ std::string manual_page(const CommandText& command, const std::string& version) 
     text += ".TP\n.BR " + roff(page_name(each.name)) + " (1)\n" + roff(each.about) + "\n";
   }
   text += ".SH OPTIONS\n";
+  const OptionText* before = nullptr;
   for (const OptionText& option : command.options) {
+    if (before != nullptr && option.group != before->group) {
+      text += ".SS " + roff(option.group) + "\n";
+    }
+    before = &option;
     text += ".TP\n\\fB" + roff(joined(option.names, ", ")) + "\\fR";
     if (!option.value.empty()) text += " \\fI" + roff(option.value) + "\\fR";
     text += "\n" + roff(option.help) + (option.required ? " (required)" : "") + "\n";
@@ -250,11 +255,10 @@ Result<ExitCode> write_documents(const CommandLine& program, const std::string& 
 }  // namespace
 
 void add_document(CommandLine& program) {
-  CommandLine& line =
-      program.command("document", "Write manual pages and completions for bash, zsh and fish");
+  CommandLine& line = program.command("document", "Write manual pages and shell completion");
   const auto folder = std::make_shared<std::string>();
   line.option("-o,--output", folder.get(),
-              "Laid out as /usr/share or ~/.local/share: man, bash-completion, zsh, fish",
+              "Folder with the layout of /usr/share: man, bash-completion, zsh, fish",
               {.type = "DIR", .required = true});
   line.footer(example("  modar document -o ~/.local/share && man modar-bake\n"));
   line.run([folder, &program] { return write_documents(program, *folder); });

@@ -118,12 +118,12 @@ Result<ExitCode> run_inspect(const InspectCommand& command) {
 }  // namespace
 
 void add_inspect(CommandLine& program) {
-  CommandLine& line = program.command("inspect", "Show what a bundle holds, or take it out");
+  CommandLine& line = program.command("inspect", "Show or extract what a bundle contains");
   const auto command = std::make_shared<InspectCommand>();
-  line.option("bundle", &command->bundle, "The bundle", {.type = "BUNDLE", .required = true});
+  line.option("bundle", &command->bundle, "Bundle to read", {.type = "BUNDLE", .required = true});
   line.option("--extract", &command->extract,
               "Write models as GLB, textures as PKM and KTX, patterns as YML", {.type = "DIR"});
-  line.flag("--force", command->force, "Extract into a folder that holds other files as well");
+  line.flag("--force", command->force, "Extract into a folder that contains other files");
   line.flag("--json", command->json, "Print as JSON");
   line.footer(example("  modar inspect spider.modar --extract out/\n"));
   line.run([command] { return run_inspect(*command); });

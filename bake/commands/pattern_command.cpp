@@ -97,18 +97,18 @@ Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   MODAR_TRY(keep_inputs(command.picture, {command.photo, command.output}));
   MODAR_ASSIGN(const RgbaImage picture, corners_picture(photo, found.corners));
   MODAR_TRY(write_png(picture, command.picture));
-  std::fprintf(stderr,
-               "found the corners %s, see %s; if they are wrong, give others with --corners\n",
+  std::fprintf(stderr, "found the corners %s, see %s; if they are wrong, pass --corners\n",
                corners_text(found.corners).c_str(), command.picture.c_str());
   const char* doubt = found.sharpness < kDoubtfulSharpness ? "an edge is hidden or blurred"
-                      : found.framed ? "another edge lies around them, perhaps the sheet's"
-                      : found.fills  ? "they fill the photo, which may be the picture already"
-                                     : nullptr;
+                      : found.framed
+                          ? "there is another edge around them, perhaps that of the sheet"
+                      : found.fills ? "they fill the photo, which may already be the picture"
+                                    : nullptr;
   command.doubtful = doubt != nullptr;
   if (command.doubtful) {
     print_diagnostic({"rectify.doubtful", DiagnosticSeverity::kWarning, command.photo, 0,
                       std::string("the corners may be wrong: ") + doubt,
-                      "look at " + command.picture + ", and give --corners where they are"});
+                      "look at " + command.picture + ", and pass the right ones with --corners"});
   }
   return {};
 }
@@ -126,13 +126,15 @@ void print_rectified(const RectifyCommand& command, const Rectified& done) {
   std::fputc('\n', stderr);
   if (aspect.spread < kWellKnown * aspect.aspect) return;
   char cause[96];
-  std::snprintf(cause, sizeof cause, "how long the sides are follows from perspective, to %.0f %%",
+  std::snprintf(cause, sizeof cause,
+                "the side lengths are estimated from perspective, with an uncertainty of %.0f %%",
                 100 * aspect.spread / aspect.aspect);
-  print_diagnostic({"rectify.aspect", DiagnosticSeverity::kWarning, command.photo, 0, cause,
-                    command.options.width_mm > 0
-                        ? "measure the height, and give --height-mm"
-                        : "measure the sides and give --width-mm and --height-mm, or take a photo "
-                          "from straight in front"});
+  print_diagnostic(
+      {"rectify.aspect", DiagnosticSeverity::kWarning, command.photo, 0, cause,
+       command.options.width_mm > 0
+           ? "measure the height, and give --height-mm"
+           : "measure the sides and give --width-mm and --height-mm, or take a frontal "
+             "photo"});
 }
 
 Result<ExitCode> run_rectify(RectifyCommand& command) {
@@ -170,27 +172,28 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
 }
 
 void add_rectify(CommandLine& pattern) {
-  CommandLine& line = pattern.command("rectify", "A frontal picture of a flat thing from a photo");
+  CommandLine& line =
+      pattern.command("rectify", "Make a frontal picture of a flat thing from a photo");
   const auto command = std::make_shared<RectifyCommand>();
   line.option("photo", &command->photo, "The photo", {.type = "PHOTO", .required = true});
-  line.option("--corners", &command->corners,
-              "Pixels of the top-left, top-right, bottom-right and bottom-left corner; without it, "
-              "they are looked for, and a picture shows them",
-              {.type = "x,y,x,y,x,y,x,y"});
+  line.option(
+      "--corners", &command->corners,
+      "Pixels of the top-left, top-right, bottom-right and bottom-left corner (default: they "
+      "are detected, and a picture shows them)",
+      {.type = "x,y,x,y,x,y,x,y"});
   line.option("--picture", &command->picture,
-              "Where the picture of the corners goes (default: OUTPUT.corners.png)",
+              "Picture of the detected corners (default: OUTPUT.corners.png)",
               {.type = "FILE", .excludes = "--corners"});
   line.option("--width-mm", &command->options.width_mm, "Physical width of the thing",
               {.positive = true});
   line.option("--height-mm", &command->options.height_mm,
-              "Physical height; without it the aspect ratio comes from the perspective and its "
-              "spread is told",
+              "Physical height (default: estimated from the perspective, with its uncertainty)",
               {.positive = true});
   line.option("--max-side", &command->options.max_side, "Longest side of the result, in pixels",
               {.shows_default = true, .least = 16, .most = kMaxTextureSide});
-  line.option("-o,--output", &command->output, "The PNG to write",
+  line.option("-o,--output", &command->output, "PNG file to write",
               {.type = "IMAGE", .required = true});
-  line.flag("--json", command->json, "Print the image's size as JSON");
+  line.flag("--json", command->json, "Print size, aspect and corners as JSON");
   line.footer(
       example("  modar pattern rectify photo.jpg --width-mm 210 -o cover.png\n"
               "  modar pattern rectify photo.jpg --corners 212,80,905,131,870,640,190,602"
@@ -287,17 +290,17 @@ Result<ExitCode> run_score(ScoreCommand& command) {
 
 void add_score(CommandLine& pattern) {
   CommandLine& line = pattern.command(
-      "score", "A to E: from where pictures are recognised as patterns, and what to do");
+      "score", "Grade pictures as patterns, A to E, with their working range and advice");
   const auto command = std::make_shared<ScoreCommand>();
   command->jobs = cores();
   line.option("patterns", &command->patterns, "Pattern pictures, or folders of them",
               {.type = "IMAGE|DIR...", .required = true});
   line.option("--overlay", &command->overlay_folder,
-              "Write NAME.png of each: features that hold (green), that hold at times (orange), "
-              "places without any (dark)",
+              "Write NAME.png for each: robust features (green), weak features (orange), areas "
+              "without features (dark)",
               {.type = "DIR"});
   line.option("--shape", &command->shape,
-              "What it is printed on, as `modar pattern simulate` takes it", {.type = "SHAPE"});
+              "Surface that it is printed on, as for `modar pattern simulate`", {.type = "SHAPE"});
   line.option("--jobs", &command->jobs, "Threads; the scores do not depend on it",
               {.least = 1, .most = 256});
   line.flag("--json", command->json, "Print as JSON");
@@ -408,27 +411,27 @@ Result<ExitCode> run_simulate(SimulateCommand& command) {
 
 void add_simulate(CommandLine& pattern) {
   CommandLine& line = pattern.command(
-      "simulate", "How far, tilted, dark, blurred or covered a pattern may be: the device's loop");
+      "simulate", "Measure how far, tilted, dark, blurred or covered a pattern may be");
   const auto command = std::make_shared<SimulateCommand>();
   SimulateOptions& options = command->options;
   options.jobs = cores();
   line.option("patterns", &command->patterns, "Pattern pictures, or folders of them",
               {.type = "IMAGE|DIR...", .required = true});
   line.option("--camera", &command->camera_file,
-              "Calibration of the camera (OpenCV's YML): intrinsics and resolution",
-              {.type = "FILE"});
+              "Camera file (OpenCV's YML): intrinsics and resolution", {.type = "FILE"});
   line.option("--backgrounds", &command->backgrounds,
-              "A folder of photos without the pattern; else made ones", {.type = "DIR"});
+              "Folder of photos without the pattern (default: generated ones)", {.type = "DIR"});
   line.option("--width-mm", &options.width_mm, "Printed width of the pattern", {.positive = true});
-  line.option("--shape", &command->shape,
-              "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,"
-              "arc=100, or a box as in bake --pattern",
-              {.type = "SHAPE"});
-  line.option("--views", &options.views, "Views of each value of a band",
+  line.option(
+      "--shape", &command->shape,
+      "Surface that it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,"
+      "arc=100, or a box as in bake --pattern",
+      {.type = "SHAPE"});
+  line.option("--views", &options.views, "Views per value",
               {.shows_default = true, .least = 1, .most = 1000});
-  line.option("--seed", &options.seed, "Of the views", {.shows_default = true});
+  line.option("--seed", &options.seed, "Random seed of the views", {.shows_default = true});
   line.option("--picture", &command->picture_folder,
-              "Write a contact sheet NAME.png of each pattern's views", {.type = "DIR"});
+              "Write a contact sheet of the views, NAME.png, for each pattern", {.type = "DIR"});
   line.option("--jobs", &options.jobs, "Threads; the figures do not depend on it",
               {.least = 1, .most = 256});
   line.flag("--quiet", command->quiet, "No progress bar");
@@ -468,7 +471,7 @@ Json confusion_json(const Confusion& confusion) {
 
 void print_confusion(const Confusion& confusion) {
   const std::size_t count = confusion.names.size();
-  std::printf("%-24s %14s %14s  %s\n", "shown", "recognised", "in photos", "taken for");
+  std::printf("%-24s %14s %14s  %s\n", "shown", "recognised", "in photos", "mistaken for");
   for (std::size_t shown = 0; shown < count; ++shown) {
     std::printf("%-24s %7d of %3d %7d of %3d  ", confusion.names[shown].c_str(),
                 confusion.recognised[shown * count + shown], confusion.views,
@@ -489,7 +492,7 @@ void print_confusion(const Confusion& confusion) {
     std::printf("%s is recognised in its mirror image (%d of %d)\n", confusion.names[i].c_str(),
                 confusion.mirrored[i], confusion.views);
   }
-  std::printf("false recognitions: %d, each asked for alone; %d with all in one bundle\n",
+  std::printf("false recognitions: %d with one pattern at a time, %d with all in one bundle\n",
               confusion.false_recognitions(), confusion.together);
 }
 
@@ -522,33 +525,34 @@ Result<ExitCode> run_confusion(ConfusionCommand& command) {
 }
 
 void add_confusion(CommandLine& pattern) {
-  CommandLine& line =
-      pattern.command("confusion", "Is a pattern taken for another, or seen in photos without it?");
+  CommandLine& line = pattern.command(
+      "confusion",
+      "Find patterns that are mistaken for each other, or seen in photos without them");
   const auto command = std::make_shared<ConfusionCommand>();
   ConfusionOptions& options = command->options;
   options.jobs = cores();
   line.option("inputs", &command->inputs,
-              "Bundles, pattern pictures and folders of them: all of a project",
+              "Bundles, pattern pictures and folders of them: all patterns of a project",
               {.type = "BUNDLE|IMAGE|DIR...", .required = true});
-  line.option("--backgrounds", &command->photos, "A folder of photos without a pattern",
+  line.option("--backgrounds", &command->photos, "Folder of photos without a pattern",
               {.type = "DIR"});
-  line.option("--views", &options.views, "Of each pattern and photo",
+  line.option("--views", &options.views, "Views per pattern and photo",
               {.shows_default = true, .least = 1, .most = 10000});
-  line.option("--seed", &options.seed, "Of the views", {.shows_default = true});
+  line.option("--seed", &options.seed, "Random seed of the views", {.shows_default = true});
   line.option("--jobs", &options.jobs, "Threads; the counts do not depend on it",
               {.least = 1, .most = 256});
   line.flag("--quiet", command->quiet, "No progress bar");
   line.flag("--json", command->json, "Print the counts as JSON");
   line.footer(example("  modar pattern confusion museum.modar --backgrounds photos\n") +
-              "Answers 3 where a pattern is recognised that is not there.\n");
+              "Exits with 3 if a pattern is recognised that is not there.\n");
   line.run([command] { return run_confusion(*command); });
 }
 
 }  // namespace
 
 void add_pattern(CommandLine& program) {
-  CommandLine& line =
-      program.command("pattern", "Work on pattern images: rectify, score, simulate, confusion");
+  CommandLine& line = program.command(
+      "pattern", "Prepare and measure patterns: rectify, score, simulate, confusion");
   add_rectify(line);
   add_score(line);
   add_simulate(line);

@@ -57,7 +57,7 @@ Result<void> refuse_other_options(const std::vector<std::string>& words) {
     }
     return fail(
         ExitCode::kUsage, "bake.project-option", name,
-        "without --model and --pattern, a project is baked, and this belongs in its file",
+        "without --model and --pattern a project is baked, which sets this in its file",
         name == "-o" || name == "--output" ? "set out and name in [project]" : "set it in [bake]");
   }
   return {};
@@ -180,28 +180,26 @@ void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run, bo
 }  // namespace
 
 void add_project_options(CommandLine& line, ProjectCommand& command) {
+  line.group("Projects (without --model and --pattern)");
+  line.flag("--explain", command.explain, "Explain why each asset is rebuilt");
+  line.flag("--watch", command.watch, "Rebuild whenever a file is saved, until Ctrl-C");
+  line.group("Projects (without --model and --pattern)", Shown::kInFull);
   line.option("--project", &command.file,
-              "Bake this project; without --model and --pattern: modar.toml in the current folder",
-              {.type = "FILE"});
+              "Project file to bake (default: modar.toml in the current folder)", {.type = "FILE"});
+  line.flag("--dry-run", command.dry_run, "List what would be rebuilt, and build nothing",
+            {.excludes = "--watch"});
   line.option("--cache", &command.cache,
-              "Of a project: folder of what is baked already; several machines may share it",
+              "Folder of assets that are already baked; several machines may share it",
               {.type = "DIR"});
-  line.option(
-      "--cache-key", &command.cache_key,
-      "Of a project: sign what goes into the cache with this secret key, believe nothing else",
-      {.type = "K"});
+  line.option("--cache-key", &command.cache_key,
+              "Sign cache entries with this secret key, and ignore entries that it did not sign",
+              {.type = "K"});
   line.flag("--outside", command.outside,
-            "Of a project that you trust: let it use files outside its folder");
-  line.flag("--dry-run", command.dry_run, "Of a project: say what would be baked, bake nothing");
-  line.flag("--explain", command.explain, "Of a project: say why each asset is baked");
+            "Allow files outside the project's folder, for a project that you trust");
   line.option("--asset", &command.asset,
-              "Of a project: bake this model or pattern into the cache, and write no bundle",
-              {.type = "NAME"});
-  line.option("--depfile", &command.depfile,
-              "Of a project: write what the bundles depend on, as rules of make", {.type = "FILE"});
-  line.flag("--watch", command.watch,
-            "Of a project: bake again whenever a file is saved, until Ctrl-C",
-            {.excludes = "--dry-run"});
+              "Bake this model or pattern into the cache, and write no bundle", {.type = "NAME"});
+  line.option("--depfile", &command.depfile, "Write what the bundles depend on, as make rules",
+              {.type = "FILE"});
 }
 
 namespace {
@@ -320,18 +318,18 @@ Result<ExitCode> run_init(const InitCommand& command) {
       MODAR_TRY(make_output_folder((std::filesystem::path(command.folder) / folder).string()));
     }
     std::fprintf(stderr,
-                 "%s: made, with folders for models and for pictures of patterns; fill them, then "
-                 "`modar init %s` once more\n",
+                 "%s: created, with folders for models and pattern pictures; fill them, then run "
+                 "`modar init %s` again\n",
                  command.folder.c_str(), command.folder.c_str());
     return ExitCode::kOk;
   }
   if (!command.force && std::filesystem::exists(path, error)) {
-    return fail(ExitCode::kUsage, "init.exists", path, "there is a project file already",
-                "edit it, or write a new one with --force");
+    return fail(ExitCode::kUsage, "init.exists", path, "a project file already exists",
+                "edit it, or replace it with --force");
   }
   MODAR_ASSIGN(const InitialProject initial, initial_project(command.folder));
   MODAR_TRY(write_file(path, std::string_view(initial.text)));
-  std::fprintf(stderr, "%s: written; look through it, then `modar bake` in its folder%s\n",
+  std::fprintf(stderr, "%s: written; review it, then run `modar bake` in its folder%s\n",
                path.c_str(), initial.left_out.c_str());
   return ExitCode::kOk;
 }
@@ -418,8 +416,8 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
   const std::string outside = command.outside ? " --outside" : "";
   const bool keyed = !command.cache_key.empty();
   std::string text =
-      "# modar plan --ninja: save it as build.ninja, and run `ninja` as often as something "
-      "changes.\n"
+      "# modar plan --ninja: save it as build.ninja, and run `ninja` after each "
+      "change.\n"
       "ninja_required_version = 1.5\n"
       "rule asset\n  command = " +
       runner + "modar bake --quiet" + outside + " --project " + word(path(command.file)) +
@@ -504,9 +502,9 @@ Result<ExitCode> run_prune(const CacheCommand& command) {
     return ExitCode::kOk;
   }
   MODAR_ASSIGN(const CacheSummary all, summarise_cache(folder));
-  print_summary(command, all, "nothing was removed of ");
+  print_summary(command, all, "nothing removed of ");
   if (command.json || all.entries == 0) return ExitCode::kOk;
-  std::printf("--size keeps what was used last:\n");
+  std::printf("--size keeps the most recently used entries:\n");
   for (const std::uint64_t bytes : {all.bytes / 2, all.bytes / 10, std::uint64_t{0}}) {
     MODAR_ASSIGN(const CacheSummary removed, prune_cache(folder, bytes, true));
     std::printf(
@@ -518,37 +516,38 @@ Result<ExitCode> run_prune(const CacheCommand& command) {
 
 void add_cache_options(CommandLine& line, CacheCommand& command) {
   line.option("--cache", &command.folder,
-              "The folder; without it, that of the project in the current folder", {.type = "DIR"});
+              "Cache folder (default: that of the project in the current folder)", {.type = "DIR"});
   line.flag("--json", command.json, "Print the counts as JSON");
 }
 
 }  // namespace
 
 void add_init(CommandLine& program) {
-  CommandLine& line =
-      program.command("init", "Write modar.toml for the models and pictures of a folder");
+  CommandLine& line = program.command(
+      "init", "Write a project file, modar.toml, for a folder of models and pictures");
   const auto command = std::make_shared<InitCommand>();
-  line.option("folder", &command->folder, "Looked through with all folders in it",
+  line.option("folder", &command->folder, "Folder to search, with its subfolders",
               {.shows_default = true});
-  line.flag("--force", command->force, "Replace a modar.toml that is there");
+  line.flag("--force", command->force, "Replace an existing modar.toml");
   line.footer(example("  modar init museum && cd museum && modar bake\n"));
   line.run([command] { return run_init(*command); });
 }
 
 void add_plan(CommandLine& program) {
   CommandLine& line =
-      program.command("plan", "Write a build file that bakes a project's assets apart");
+      program.command("plan", "Write a build file that bakes each asset of a project on its own");
   const auto command = std::make_shared<NinjaPlanCommand>();
   line.flag("--ninja", command->ninja,
-            "For Ninja, to stdout: one edge an asset, and one for the bundles", {.required = true});
-  line.option("--project", &command->file, "The project", {.type = "FILE", .shows_default = true});
-  line.option("--cache", &command->cache, "Of what is baked; all machines see it under this path",
-              {.type = "DIR"});
+            "Write it for Ninja, to stdout: one edge per asset, and one for the bundles",
+            {.required = true});
+  line.option("--project", &command->file, "Project file", {.type = "FILE", .shows_default = true});
+  line.option("--cache", &command->cache,
+              "Cache of baked assets; every machine sees it under this path", {.type = "DIR"});
   line.option("--cache-key", &command->cache_key,
-              "Signs what goes into the cache; nothing else is believed", {.type = "K"});
-  line.flag("--outside", command->outside, "Let the project use files outside its folder");
-  line.option("--run", &command->runner,
-              "Put before each asset's command: srun -Q -n1, or ssh HOST", {.type = "WORDS"});
+              "Sign cache entries with this secret key, and ignore all others", {.type = "K"});
+  line.flag("--outside", command->outside, "Allow files outside the project's folder");
+  line.option("--run", &command->runner, "Prefix of each asset's command: srun -Q -n1, or ssh HOST",
+              {.type = "WORDS"});
   line.footer(
       example("  modar plan --ninja --run 'srun -Q -n1' --cache /srv/modar-cache > build.ninja && "
               "ninja\n"));
@@ -556,9 +555,9 @@ void add_plan(CommandLine& program) {
 }
 
 void add_cache(CommandLine& program) {
-  CommandLine& cache = program.command("cache", "Show, prune or verify what projects have baked");
+  CommandLine& cache = program.command("cache", "Show, prune or verify a cache of baked assets");
   const auto command = std::make_shared<CacheCommand>();
-  CommandLine& show = cache.command("show", "Count the entries and their bytes");
+  CommandLine& show = cache.command("show", "Show the number of entries and their size");
   add_cache_options(show, *command);
   show.run([command]() -> Result<ExitCode> {
     MODAR_ASSIGN(const std::string folder, cache_folder(command->folder));
@@ -566,17 +565,15 @@ void add_cache(CommandLine& program) {
     print_summary(*command, summary, "");
     return ExitCode::kOk;
   });
-  CommandLine& prune = cache.command("prune", "Remove the entries that were used longest ago");
+  CommandLine& prune = cache.command("prune", "Remove the least recently used entries");
   add_cache_options(prune, *command);
-  prune.size(
-      "--size", command->bytes,
-      "Keep at most this much (1G, 800M); without it, nothing is removed, and it is said what "
-      "would be",
-      {.type = "SIZE"});
+  prune.size("--size", command->bytes,
+             "Keep at most this much (1G, 800M); without it, only report what would be removed",
+             {.type = "SIZE"});
   prune.run([command] { return run_prune(*command); });
-  CommandLine& verify = cache.command("verify", "Read every entry, remove those that are damaged");
+  CommandLine& verify = cache.command("verify", "Read every entry and remove damaged ones");
   add_cache_options(verify, *command);
-  verify.option("--cache-key", &command->key, "Remove what this key has not signed as well",
+  verify.option("--cache-key", &command->key, "Also remove entries that this key did not sign",
                 {.type = "K"});
   verify.footer(example("  modar cache verify --cache /srv/modar-cache\n"));
   verify.run([command]() -> Result<ExitCode> {

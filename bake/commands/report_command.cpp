@@ -54,24 +54,24 @@ Result<ExitCode> run_report(ReportCommand& command) {
 
 void add_report(CommandLine& program) {
   CommandLine& line =
-      program.command("report", "A bundle as one HTML file: pictures, sizes, errors, verdict");
+      program.command("report", "Show a bundle as one HTML page: pictures, sizes, errors, verdict");
   const auto command = std::make_shared<ReportCommand>();
   command->options.jobs = std::max(1u, std::thread::hardware_concurrency());
-  line.option("bundle", &command->bundle, "The bundle", {.type = "BUNDLE.modar", .required = true});
-  line.option("-o,--output", &command->output, "The page to write",
+  line.option("bundle", &command->bundle, "Bundle to read",
+              {.type = "BUNDLE.modar", .required = true});
+  line.option("-o,--output", &command->output, "Page to write",
               {.type = "FILE.html", .required = true});
   line.flag("--range", command->options.range,
-            "Simulate each pattern's working range, too: seconds each");
+            "Also simulate each pattern's working range (seconds per pattern)");
   line.option("--bake", &command->bake_file,
-              "What `modar bake --json` printed of it: adds what each stage took",
-              {.type = "FILE.json"});
+              "Output of `modar bake --json`: adds the time of each stage", {.type = "FILE.json"});
   line.option(
       "--texture-pictures", &command->options.texture_pictures,
-      "Of `modar bake --texture-pictures`: adds each texture's source, decoded and difference",
+      "Folder of `modar bake --texture-pictures`: adds each texture's source and difference",
       {.type = "DIR"});
   line.option("--jobs", &command->options.jobs, "Threads",
               {.shows_default = true, .least = 1, .most = 256});
-  line.flag("--quiet", command->quiet, "No progress, no summary on stderr");
+  line.flag("--quiet", command->quiet, "No progress or summary on stderr");
   line.footer(example("  modar report museum.modar -o museum.html\n"));
   line.run([command] { return run_report(*command); });
 }

@@ -21,7 +21,7 @@ Result<std::vector<std::byte>> read_bytes(const std::string& path) {
       is_regular_file(path) ? std::fopen(path.c_str(), "rb") : nullptr, &std::fclose);
   const auto error = [&path] {
     return fail(ExitCode::kIo, "io.open", path, "the image cannot be opened or read",
-                "check its name and your rights to read it");
+                "check its name and permissions");
   };
   if (!file) return error();
   std::vector<std::byte> bytes;

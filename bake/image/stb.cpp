@@ -101,7 +101,7 @@ Result<LinearImage> decode_radiance(std::span<const std::byte> bytes, const std:
   int height = 0;
   int channels = 0;
   if (stbi_info_from_callbacks(&kCallbacks, &header, &width, &height, &channels) == 0) {
-    return damaged_image(name, "its header is none of a Radiance file that we read");
+    return damaged_image(name, "its header is not that of a supported Radiance file");
   }
   const auto columns = static_cast<std::uint64_t>(std::max(width, 0));
   const auto rows = static_cast<std::uint64_t>(std::max(height, 0));
@@ -115,7 +115,7 @@ Result<LinearImage> decode_radiance(std::span<const std::byte> bytes, const std:
       stbi_loadf_from_callbacks(&kCallbacks, &file, &width, &height, &channels, 4),
       &stbi_image_free);
   if (file.beyond_end) return truncated();
-  if (!pixels) return damaged_image(name, "as a Radiance file it is damaged or of an unknown kind");
+  if (!pixels) return damaged_image(name, "the Radiance data is damaged or of an unknown kind");
   LinearImage image;
   image.width = static_cast<std::uint32_t>(width);
   image.height = static_cast<std::uint32_t>(height);
@@ -132,7 +132,7 @@ Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::stri
   if (bytes.size() < kTgaHeader || is_radiance(bytes) ||
       stbi_info_from_callbacks(&kCallbacks, &header, &width, &height, &channels) == 0) {
     return fail(ExitCode::kInvalidInput, "image.decode", name,
-                "this is no PNG, JPEG, BMP, TGA, WebP or TIFF file that can be read",
+                "this is not a readable PNG, JPEG, BMP, TGA, WebP or TIFF file",
                 "save the image in one of these formats");
   }
   const auto columns = static_cast<std::uint64_t>(std::abs(std::int64_t{width}));
@@ -151,8 +151,8 @@ Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::stri
       &stbi_image_free);
   if (file.beyond_end) return truncated();
   if (!pixels) {
-    return damaged_image(name, std::string(bmp ? "as a BMP" : "as a TGA") +
-                                   " file it is damaged or of an unknown kind");
+    return damaged_image(
+        name, std::string(bmp ? "the BMP" : "the TGA") + " data is damaged or of an unknown kind");
   }
   StoredImage stored;
   allocate_pixels(stored.image, static_cast<std::uint32_t>(width),

@@ -262,7 +262,7 @@ class Page {
         html_ += image;
       }
       html_ += "<svg viewBox=\"0 0 400 300\" role=\"img\" aria-label=\"" + escape_html(title) +
-               ": its triangles, each chunk in a colour of its own\" stroke=\"#fff\" "
+               ": its triangles, each chunk in its own colour\" stroke=\"#fff\" "
                "stroke-width=\".25\" "
                "stroke-linejoin=\"round\">" +
                wires + "</svg></div><div><h3>" + escape_html(title) + "</h3><dl>" + model_rows(m) +
@@ -363,10 +363,10 @@ class Page {
     const std::optional<Json> stages = json.find("stages");
     if (!stages || !stages->is_array()) {
       return fail(ExitCode::kInvalidInput, "report.bake", "--bake",
-                  "the file holds no stages of a bake",
-                  "give what `modar bake --model ... --json` printed");
+                  "the file contains no stages of a bake",
+                  "pass the output of `modar bake --model ... --json`");
     }
-    section("timings", "What the bake took");
+    section("timings", "Time of the bake");
     html_ +=
         "<div class=\"scroll\"><table class=\"figures\"><thead><tr><th scope=\"col\">Stage</th><th "
         "scope=\"col\">Seconds</th><th scope=\"col\">In</th><th scope=\"col\">Out</th></tr></thead>"
@@ -400,7 +400,7 @@ class Page {
       MODAR_TRY(pattern(p));
     }
     html_ +=
-        "</div>\n<p class=\"note\">Dots are where the tracker looks for the pattern: dense and "
+        "</div>\n<p class=\"note\">Dots are the features that the tracker uses: dense and "
         "even is good.</p>\n</section>\n";
     return {};
   }

@@ -206,8 +206,8 @@ class ViewCollector {
     ++out_.frames;
     if (size != out_.size) {
       out_.error = Error{ExitCode::kInvalidInput, "calibrate.size", path,
-                         "it has another size than the frames before",
-                         "give frames of one camera in one resolution"};
+                         "its size differs from that of the frames before",
+                         "use frames of one camera in one resolution"};
       return;
     }
     PlanePoints points;
@@ -430,16 +430,16 @@ std::vector<PlanePoints> without_outliers(const std::vector<PlanePoints>& views,
 
 /// Errors: kInvalidInput "calibrate.weak".
 Result<void> check_observable(const Solved& solved) {
-  const char* cure =
-      "tilt the plane by 30 to 50 degrees, to every side, near and large in the frame";
+  const char* cure = "tilt the plane by 30 to 50 degrees to every side, close to the camera";
   // Without tilts the solver's own spread means nothing: distance and focal length are ambiguous.
   const double focal = solved.matrix.at<double>(0, 0);
   if (solved.tilted < kFewestTilted || !(solved.focal_spread <= kWeakest * focal)) {
     char cause[120];
-    std::snprintf(cause, sizeof cause,
-                  "the views are too alike to tell the focal length: %.0f +- %.0f pixels, %.0f are "
-                  "needed",
-                  focal, solved.focal_spread, kWeakest * focal);
+    std::snprintf(
+        cause, sizeof cause,
+        "the views are too similar to determine the focal length: %.0f +- %.0f pixels, %.0f are "
+        "needed",
+        focal, solved.focal_spread, kWeakest * focal);
     return fail(ExitCode::kInvalidInput, "calibrate.weak", "", cause, cure);
   }
   if (solved.tilts.along < kFocalScatter) {
@@ -478,7 +478,7 @@ Result<Calibration> calibrate_from(PlaneViews found, int most_views, bool board)
     return fail(ExitCode::kInvalidInput, "calibrate.few-views", "",
                 "the plane was found in " + std::to_string(views.size()) + " of " +
                     std::to_string(found.frames) + " frames, 5 are needed",
-                "show all of it, sharp and large, from more sides");
+                "show all of it, sharp and close, from more sides");
   }
   const double aspect = board ? 1.0 : fitted_aspect(views, found.size);
   Solved solved = solve(views, found.size, board, false, aspect);

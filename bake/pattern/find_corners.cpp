@@ -441,10 +441,10 @@ const Figure& outermost(const std::vector<Figure>& figures) {
 }
 
 tl::unexpected<Error> not_found(const char* cause) {
-  return fail(ExitCode::kInvalidInput, "rectify.not-found", "", cause,
-              "give the four corners with --corners, or take the photo with all of the thing's "
-              "edges in it, "
-              "before an even background; a scan or a frontal picture is baked as it is");
+  return fail(
+      ExitCode::kInvalidInput, "rectify.not-found", "", cause,
+      "pass the four corners with --corners, or take a photo that shows all edges on a plain "
+      "background; a scan or a frontal picture is baked as it is");
 }
 
 /// Another figure of about the same score that is neither within the best one nor nearly it.

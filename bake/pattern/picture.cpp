@@ -48,8 +48,8 @@ Result<GrayPicture> load_gray(const std::string& path) {
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
   if (path.ends_with(".mind")) {
     return fail(ExitCode::kUnsupported, "pattern.mind", path,
-                "a compiled file of MindAR holds small copies of its pictures only",
-                "name the pictures that it was compiled from, in their order");
+                "a compiled MindAR file contains only small copies of its pictures",
+                "pass the pictures that it was compiled from, in the same order");
   }
   MODAR_ASSIGN(GrayPicture gray, is_target_file(path) ? load_target(path) : load_gray(path));
   const int longest = std::max(gray.width, gray.height);

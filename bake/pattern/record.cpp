@@ -593,7 +593,7 @@ Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned 
 Result<void> TrackerRecordOptions::validate() const {
   if (features < 32 || features > 32768 || trial_views < 1 || trial_views > 10000 ||
       patches_per_level < 8 || patches_per_level > 256) {
-    return fail(ExitCode::kUsage, "pattern.loop-options", "", "an option is out of its range",
+    return fail(ExitCode::kUsage, "pattern.loop-options", "", "an option is out of range",
                 "features 32 to 32768, trial views 1 to 10000, patches 8 to 256");
   }
   return {};
@@ -615,7 +615,7 @@ Result<std::vector<std::byte>> bake_tracker_record(const GrayImage& pattern,
   const std::vector<std::uint32_t> chosen = choose(trials, options.features);
   if (chosen.size() < 8) {
     return fail(ExitCode::kInvalidInput, "pattern.no-features", "",
-                "fewer than 8 features of the picture repeat from view to view",
+                "fewer than 8 features of the picture are found again in other views",
                 "take a picture with more texture");
   }
   return assemble(levels, candidates, chosen,
@@ -652,7 +652,7 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
   const std::size_t found = sets.empty() ? 0 : out.features.front().keypoints.size();
   if (!sets.empty() && found < sets.front().min_matches) {
     return fail(ExitCode::kInvalidInput, "pattern.no-features", path,
-                "the picture holds " + std::to_string(found) + " features, too few to recognise it",
+                "the picture has " + std::to_string(found) + " features, too few to recognise it",
                 "take a larger, sharper picture with more texture");
   }
   auto record = bake_tracker_record(gray, options, surface);

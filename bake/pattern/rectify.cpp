@@ -87,7 +87,7 @@ Result<Rectified> rectify(const RgbaImage& photo, const RectifyOptions& options)
   const double height = photo.height;
   for (const PixelPoint& corner : options.corners) {
     if (corner.x < -0.5 || corner.y < -0.5 || corner.x > width - 0.5 || corner.y > height - 0.5) {
-      return bad_corners("a corner lies outside of the photo");
+      return bad_corners("a corner is outside the photo");
     }
   }
   const auto& c = options.corners;

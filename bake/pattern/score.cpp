@@ -626,15 +626,15 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
   const double aspect =
       1.0 * std::min(pattern.width, pattern.height) / std::max(pattern.width, pattern.height);
   const char* const advices[9] = {
-      "choose or add detail with corners: print, ornaments, photos of rough things",
+      "choose or add detail with corners: print, ornaments, photos of rough surfaces",
       "crop away empty margins, or put detail into the empty parts",
       "photograph it in even, brighter light, or print it with more contrast",
       "avoid grids, tiles and repeated letters: each part should look like no other",
-      "crop it closer to a square: long strips hold a pose badly",
+      "crop it closer to a square: the pose of long strips is unstable",
       "give a larger picture: 300 pixels or more on each side",
       "take a sharper picture: hold still, focus, do not enlarge a small one",
-      "make the two sides differ: its mirror image is taken for it",
-      "choose larger print: lines this fine blur into gray from arm's length on"};
+      "make the two sides differ: it is confused with its mirror image",
+      "choose larger print: lines this fine blur into gray at arm's length"};
   // Each cause's scale runs to what good patterns have: set by hand on twelve pictures and on those
   // with one known fault that the tests make.
   const int values[9] = {share_of(trial.held, 60),
@@ -685,7 +685,7 @@ char grade_of(const ScoreRange& range) {
 }
 
 std::string range_sentence(const ScoreRange& range, double width_mm) {
-  if (range.farthest <= 0) return "recognised at no distance";
+  if (range.farthest <= 0) return "not recognised at any distance";
   char reach[80];
   std::snprintf(reach, sizeof reach,
                 range.curved ? "over %.0f degrees around it, %.0f %% right when half covered"

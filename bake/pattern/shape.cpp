@@ -29,19 +29,18 @@ Result<double> arc_of(const ShapeRequest& request, double width_mm) {
   const double around = pi * 0.5 * (request.top_mm + request.bottom_mm);
   const double told = around > 0 ? 360 * width_mm / around : 0;
   if (request.arc_deg <= 0 && told <= 0) {
-    return contradiction(request, "it does not say how far the picture reaches around",
+    return contradiction(request, "the angle that the picture covers is missing",
                          "add arc=DEGREES, or the diameter and the picture's width");
   }
   const double arc = request.arc_deg > 0 ? request.arc_deg : told;
   if (arc > 360) {
-    return contradiction(request,
-                         "a picture " + rounded(width_mm) + " mm wide reaches around by " +
-                             rounded(arc) + " degrees",
-                         "correct the width or the diameter");
+    return contradiction(
+        request, "a picture " + rounded(width_mm) + " mm wide covers " + rounded(arc) + " degrees",
+        "correct the width or the diameter");
   }
   if (told > 0 && std::fabs(told / arc - 1) > kSlack) {
     return contradiction(
-        request, "width and diameter make " + rounded(told) + " degrees, not " + rounded(arc),
+        request, "width and diameter give " + rounded(told) + " degrees, not " + rounded(arc),
         "leave out the width or the arc");
   }
   return arc;

@@ -25,13 +25,13 @@ Result<Json> read_target(const std::string& path) {
   Json json =
       Json::parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
   const auto type = json.find("type");
-  if (!type || !type->text()) return no_target(path, "it is no image target of 8th Wall");
+  if (!type || !type->text()) return no_target(path, "it is not an image target of 8th Wall");
   for (const char* known : {"PLANAR", "CYLINDER", "CONICAL"}) {
     if (*type->text() == known) return json;
   }
   return fail(ExitCode::kUnsupported, "target.type", path,
-              "its picture is on a thing of a kind that we do not know (" + *type->text() + ")",
-              "PLANAR, CYLINDER and CONICAL are known: choose another for this place");
+              "its picture is on an unknown kind of thing (" + *type->text() + ")",
+              "PLANAR, CYLINDER and CONICAL are supported: choose another target");
 }
 
 /// A member of the target's geometry, which newer files call properties.
@@ -61,7 +61,7 @@ Result<CurvedTarget> read_curved(const Json& json, const std::string& path) {
   for (std::size_t i = 0; i < std::size(kKeys); ++i) {
     const auto value = member(json, kKeys[i]);
     if (!value || !value->number()) {
-      return no_target(path, std::string("it is on a curved thing and has no ") + kKeys[i]);
+      return no_target(path, std::string("it is on a curved thing but has no ") + kKeys[i]);
     }
     numbers[i] = *value->number();
   }
@@ -71,7 +71,7 @@ Result<CurvedTarget> read_curved(const Json& json, const std::string& path) {
   const double whole = whole_height ? whole_height->number().value_or(0) : 0;
   const bool sane = top_around > 0 && bottom_around > 0 && side > 0 && arc > 0 && arc <= 360 &&
                     width > 0 && height > 0 && width <= whole_width && height <= whole;
-  if (!sane) return no_target(path, "its geometry has numbers that no thing has");
+  if (!sane) return no_target(path, "its geometry is impossible");
   // A target on its side has its crop measured after the turn, by a quarter with the clock.
   const auto turned = member(json, "isRotated");
   const bool on_side = turned && turned->dump().starts_with("true");
@@ -155,8 +155,8 @@ Result<std::string> target_picture(const std::string& path) {
     named += (named.empty() ? "" : ", ") + *value->text();
   }
   if (named.empty()) return no_target(path, "it names no picture");
-  return fail(ExitCode::kIo, "target.picture", path, "none of its pictures is there: " + named,
-              "copy them beside it, or name the picture itself with --pattern");
+  return fail(ExitCode::kIo, "target.picture", path, "none of its pictures exists: " + named,
+              "copy them next to it, or pass the picture itself with --pattern");
 }
 
 Result<GrayPicture> load_target(const std::string& path) {

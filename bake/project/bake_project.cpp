@@ -221,7 +221,7 @@ class ProjectBake {
                      : digest == kNoFile ? " is there now"
                                          : " changed");
     }
-    return "the cache does not have it";
+    return "it is not in the cache";
   }
 
   [[nodiscard]] std::optional<Json> last_of(const Task& task) const {
@@ -283,6 +283,7 @@ class ProjectBake {
       text += "\n" + request.light + " " + digests_.of(project_.path(request.light));
     }
     for (const auto& [language, words] : scene.texts) text += "\n" + language + " " + words;
+    for (const auto& [language, words] : scene.alts) text += "\nalt " + language + " " + words;
     return text + "\n";
   }
 
@@ -366,10 +367,10 @@ class ProjectBake {
       return obtain(task, jobs);
     } catch (const std::bad_alloc&) {
       return fail(ExitCode::kIo, "modar.memory", task.asset->file, "there is not enough memory",
-                  "fewer --jobs, or --memory below what the machine has");
+                  "use fewer --jobs, or a --memory below the machine's");
     } catch (const std::exception& error) {
       return fail(ExitCode::kInternal, "modar.bug", task.asset->file, error.what(),
-                  "this is a bug of ours: please report it with the file");
+                  "internal error: please report it with the file");
     }
   }
 
@@ -408,14 +409,14 @@ class ProjectBake {
     BakeTrace trace;
     MODAR_ASSIGN(const BundleContent content, build_bundle(request, report, &trace));
     if (digests_.of(file) != task.inputs[0].digest) {
-      return fail(ExitCode::kIo, "project.changing", file, "it changed while it was baked",
+      return fail(ExitCode::kIo, "project.changing", file, "it changed during the bake",
                   "bake again");
     }
     for (const std::string& named : trace.files) {
       if (project_.may_use(named)) continue;
       return fail(ExitCode::kInvalidInput, "project.outside", file,
-                  "it names " + named + ", which lies outside the project's folder",
-                  "copy it into the folder; where you trust the project, bake with --outside");
+                  "it names " + named + ", which is outside the project's folder",
+                  "copy it into the folder; if you trust the project, bake with --outside");
     }
     take_inputs(task, named_files(task, trace.files));
     PartNotes notes;
@@ -468,7 +469,7 @@ class ProjectBake {
     }
     if (models.empty() && patterns.empty()) {
       return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
-                  "it would hold neither a model nor a pattern", "name some that there are");
+                  "it would contain neither a model nor a pattern", "name existing ones");
     }
     MODAR_ASSIGN(BundleContent content, link_bundles(models, patterns, described));
     add_texts(target, content);
@@ -481,12 +482,15 @@ class ProjectBake {
   static void add_texts(const Target& target, BundleContent& content) {
     Json texts = Json::array();
     for (const ProjectScene* scene : target.scenes) {
-      if (scene->texts.empty()) continue;
-      Json words = Json::object();
-      for (const auto& [language, text] : scene->texts) words.set(language, text);
-      texts.push_back({{"pattern", scene->request.pattern},
-                       {"model", scene->request.model},
-                       {"text", std::move(words)}});
+      if (scene->texts.empty() && scene->alts.empty()) continue;
+      Json entry = {{"pattern", scene->request.pattern}, {"model", scene->request.model}};
+      for (const auto& [key, words] : {std::pair("text", &scene->texts), {"alt", &scene->alts}}) {
+        if (words->empty()) continue;
+        Json by_language = Json::object();
+        for (const auto& [language, text] : *words) by_language.set(language, text);
+        entry.set(key, std::move(by_language));
+      }
+      texts.push_back(std::move(entry));
     }
     if (texts.size() == 0) return;
     Json meta = Json::parse(content.meta);
@@ -502,7 +506,7 @@ class ProjectBake {
       std::snprintf(text, sizeof text, "%s: its %s is %.4g, and [gates] asks for %.4g",
                     content.names.substr(name.offset, name.length).c_str(), what, value, least);
       return fail(ExitCode::kInvalidInput, "project.gate", target.path, text,
-                  "mend the source, or lower the gate; the bundle is not written");
+                  "fix the source, or lower the gate; the bundle is not written");
     };
     for (const TextureRecord& texture : content.textures) {
       const double psnr = static_cast<double>(texture.psnr_db);

@@ -178,9 +178,9 @@ void remove_entry(const std::string& stem) {
   for (const char* kind : kEntryFiles) fs::remove_all(stem + kind, error);
 }
 
-constexpr const char* kEntryDamaged = "its entry in the cache was damaged";
-constexpr const char* kEntryOther = "its entry in the cache is that of another part";
-constexpr const char* kEntryUnsigned = "its entry in the cache is not signed with the cache's key";
+constexpr const char* kEntryDamaged = "its cache entry was damaged";
+constexpr const char* kEntryOther = "its cache entry belongs to another part";
+constexpr const char* kEntryUnsigned = "its cache entry is not signed with the cache's key";
 
 /// Whether `signer` has signed the notes, which name the bundle's hash.
 bool is_signed(const std::string& stem, std::string_view notes, const SecretKey& signer) {
@@ -377,7 +377,7 @@ Result<std::optional<SecretKey>> read_cache_key(const std::string& path) {
   MODAR_ASSIGN(const auto file, MappedFile::open(path));
   if (needs_pass_phrase(text_of(file))) {
     return fail(ExitCode::kInvalidInput, "key.pass-phrase", path, "the secret key is encrypted",
-                "give the cache a key of its own, without a pass phrase: `modar ship keygen`");
+                "make a separate key for the cache, without a pass phrase: `modar ship keygen`");
   }
   auto key = parse_secret_key(text_of(file), "");
   if (!key) key.error().where = path;

@@ -34,6 +34,7 @@ struct ProjectAsset {
 struct ProjectScene {
   SceneRequest request;                      ///< its light: relative to the project's folder
   std::map<std::string, std::string> texts;  ///< by language: {"en", "A vase."}
+  std::map<std::string, std::string> alts;   ///< the same: what a screen reader says is seen
 };
 
 /// Which assets go into one file. Models of the patterns' scenes come along.

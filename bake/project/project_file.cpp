@@ -141,7 +141,7 @@ class TableReader {
   [[nodiscard]] tl::unexpected<Error> wrong(std::string_view key,
                                             const std::string& expected) const {
     return fail(ExitCode::kInvalidInput, "project.value", at(key),
-                "'" + std::string(key) + "' in " + name_ + " is not what it should be",
+                "'" + std::string(key) + "' in " + name_ + " has the wrong type",
                 "write " + expected);
   }
 
@@ -300,8 +300,8 @@ class ProjectReader {
     if (project_.models.empty() && project_.patterns.empty()) {
       return fail(ExitCode::kInvalidInput, "project.empty", project_.file,
                   "it lists neither a model nor a pattern",
-                  "add [[model]] file = \"vase.glb\" and [[pattern]] file = \"cover.png\", or let "
-                  "`modar init --force` write it anew");
+                  "add [[model]] file = \"vase.glb\" and [[pattern]] file = \"cover.png\", or "
+                  "write it again with `modar init --force`");
     }
     return std::move(project_);
   }
@@ -338,7 +338,7 @@ class ProjectReader {
     if (path.empty() || project_.may_use(project_.path(path))) return {};
     return fail(ExitCode::kInvalidInput, "project.outside", reader.at(key),
                 "'" + path + "' leads outside the project's folder",
-                "copy it into the folder; where you trust the project, bake with --outside");
+                "copy it into the folder; if you trust the project, bake with --outside");
   }
 
   Result<void> read_bake() {
@@ -379,7 +379,8 @@ class ProjectReader {
                           std::vector<ProjectAsset>& assets) {
     std::vector<std::string> globs;
     MODAR_TRY(reader.take("file", globs));
-    if (globs.empty()) return reader.wrong("file", "file = \"NAME\", where * matches any letters");
+    if (globs.empty())
+      return reader.wrong("file", "file = \"NAME\", where * matches any characters");
     ProjectAsset asset;
     asset.pattern = pattern;
     MODAR_TRY(reader.take("name", asset.name));
@@ -406,7 +407,7 @@ class ProjectReader {
       const std::vector<std::string> files = expand(project_.folder, glob);
       if (files.empty()) {
         return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("file"),
-                    "there is no file '" + glob + "'", "correct the name, or take the line out");
+                    "there is no file '" + glob + "'", "correct the name, or remove the line");
       }
       for (const std::string& file : files) {
         if (left_out.count(file) != 0) continue;
@@ -416,7 +417,7 @@ class ProjectReader {
         if (!seen.insert(asset.name).second) {
           return fail(ExitCode::kInvalidInput, "project.same-name", reader.at("file"),
                       "two files are named '" + asset.name + "', the second is " + file,
-                      "give each a table of its own with another name = \"...\"");
+                      "give each its own table with a different name = \"...\"");
         }
         assets.push_back(asset);
       }
@@ -428,7 +429,7 @@ class ProjectReader {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
     for (const TableReader& reader : readers) {
       MODAR_TRY(reader.allow({"pattern", "model", "scale", "height", "width", "up", "turn",
-                              "offset", "centred", "light", "text"}));
+                              "offset", "centred", "light", "text", "alt"}));
       ProjectScene scene;
       MODAR_TRY(reader.take("pattern", scene.request.pattern));
       MODAR_TRY(reader.take("model", scene.request.model));
@@ -439,6 +440,7 @@ class ProjectReader {
       scene.request.light = light_;
       MODAR_TRY(take_light(reader, scene.request.light));
       MODAR_TRY(reader.take("text", scene.texts));
+      MODAR_TRY(reader.take("alt", scene.alts));
       project_.scenes.push_back(std::move(scene));
     }
     if (readers.empty()) make_scenes();
@@ -473,7 +475,7 @@ class ProjectReader {
     if (!light.empty()) MODAR_TRY(keep_inside(reader, "light", light));
     if (light.empty() || fs::is_regular_file(project_.path(light), error)) return {};
     return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("light"),
-                "there is no file '" + light + "'", "correct the name, or take the line out");
+                "there is no file '" + light + "'", "correct the name, or remove the line");
   }
 
   static Result<void> known(const TableReader& reader, const char* key, const std::string& name,
@@ -567,8 +569,7 @@ Result<Project> read_project(const std::string& path, bool outside) {
   const toml::parse_result parsed = toml::parse_file(path);
   if (!parsed) {
     return fail(ExitCode::kInvalidInput, "project.toml", place(path, parsed.error().source()),
-                std::string(parsed.error().description()),
-                "correct the line: toml.io has the rules");
+                std::string(parsed.error().description()), "correct the line; see toml.io");
   }
   return ProjectReader(path, parsed.table(), outside).run();
 }

@@ -150,7 +150,7 @@ void judge(const std::string& path, const TextureLevel& level, const TextureOpti
        "compressed it has " + decimals(level.psnr_db) + " dB and SSIM " + decimals(level.ssim) +
            "; its worst block, at pixel " + std::to_string(level.worst_x) + "," +
            std::to_string(level.worst_y) + ", has " + decimals(level.worst_psnr_db) + " dB",
-       "bake it with more effort, larger, or lower the threshold"});
+       "bake it larger or with more effort, or lower the threshold"});
 }
 
 Result<void> write_picture(const RgbaImage& image, const Texture& texture,
@@ -189,10 +189,9 @@ Result<Texture> bake_texture(const std::string& path, const TextureOptions& opti
 Result<Texture> bake_texture(const RgbaImage& source, const std::string& path,
                              const TextureOptions& options, Report& report) {
   if (options.max_side == 0 || options.max_side > kMaxTextureSide) {
-    return fail(
-        ExitCode::kUsage, "texture.max-side", std::to_string(options.max_side),
-        "a texture's greatest side must lie between 1 and " + std::to_string(kMaxTextureSide),
-        "choose another");
+    return fail(ExitCode::kUsage, "texture.max-side", std::to_string(options.max_side),
+                "a texture's longest side must be from 1 to " + std::to_string(kMaxTextureSide),
+                "choose another");
   }
   StageTimer mip_timer(report, "texture.mips");
   Texture texture;

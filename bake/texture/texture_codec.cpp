@@ -13,7 +13,7 @@ constexpr std::array kCodecs = {
     TextureCodec{*find_texture_format(static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb)),
                  encode_etc1},
 };
-static_assert(kCodecs.size() == kTextureFormats.size(), "a format lacks its codec");
+static_assert(kCodecs.size() == kTextureFormats.size(), "a format has no codec");
 
 }  // namespace
 

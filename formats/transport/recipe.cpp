@@ -26,7 +26,7 @@ bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t limit) {
 /// What is wrong with a piece, or nullptr.
 const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
   const auto form = static_cast<PieceForm>(piece.form);
-  if (form < PieceForm::kStored || form > PieceForm::kLevel) return "its form is not known";
+  if (form < PieceForm::kStored || form > PieceForm::kLevel) return "its form is unknown";
   if (!is_zero(piece.reserved)) return "its reserved bytes are not zero";
   if (piece.raw_size == 0 || piece.raw_size > kMaxPieceBytes ||
       piece.stored_size > kMaxPieceBytes) {

@@ -274,6 +274,8 @@ TEST(SourceTexts, AreThoseOfTheProject) {
   EXPECT_EQ(said({{"p", "m", {{"en", "A vase."}}}}),
             "SOURCE_SCENE pattern 'p', model 'm': it has a text in a language that the source "
             "lacks\n");
+  EXPECT_EQ(said({{"p", "m", {{"en", "A vase."}, {"de", "Eine Vase."}}, {{"en", "A red vase"}}}}),
+            "SOURCE_SCENE pattern 'p', model 'm': its text is missing\n");
   EXPECT_EQ(said({}), "SOURCE_SCENE texts: it has 1, the source 0\n");
   EXPECT_EQ(said({{"q", "m", {{"en", "A cup."}}}}),
             "SOURCE_SCENE pattern 'q', model 'm': its text is missing\n"

@@ -23,17 +23,43 @@ class Document(ProgramTest):
         return done.stdout.split()
 
     def test_every_command_has_a_page_with_the_words_of_its_help(self):
-        commands = re.findall(r"^  ([a-z]+) ", self.modar("--help").stdout, re.MULTILINE)
+        commands = re.findall(r"^  ([a-z]+) ", self.modar("help", "all").stdout, re.MULTILINE)
         self.assertGreater(len(commands), 10)
         for name in commands:
             page = (self.share / f"man/man1/modar-{name}.1").read_text().replace("\\-", "-")
-            for option in re.findall(r"^  .*?(--[a-z-]+)", self.modar(name, "--help").stdout, re.MULTILINE):
+            for option in re.findall(r"^  .*?(--[a-z-]+)", self.modar(name, "--help-all").stdout, re.MULTILINE):
                 self.assertIn(option, page)
         self.assertIn("A to E", (self.share / "man/man1/modar-pattern-score.1").read_text())
 
+    def test_help_is_short_and_help_all_is_whole(self):
+        def listed(*words):
+            """The commands or options of a help text."""
+            done = self.modar(*words)
+            self.assertEqual((done.returncode, done.stderr), (0, ""), words)
+            text = done.stdout.partition("\nExample:")[0]
+            return re.findall(r"^  ((?:-\w,)?--[\w-]+|[a-z]+)\b", text, re.MULTILINE)
+
+        first = [name for name in listed("--help") if not name.startswith("-")]
+        self.assertEqual(sorted(first), ["bake", "check", "init", "pattern", "report", "web"])
+        every = [name for name in listed("help", "all") if not name.startswith("-")]
+        self.assertEqual(every, [name for name in listed("--help-all") if not name.startswith("-")])
+        self.assertTrue(set(first) < set(every))
+        self.assertLessEqual(len(listed("bake", "--help")), 12)
+        self.assertGreater(len(listed("bake", "--help-all")), 40)
+        self.assertEqual(listed("help", "bake"), listed("bake", "--help"))
+        self.assertEqual(listed("help", "bake", "all"), listed("bake", "--help-all"))
+        self.assertEqual(listed("help", "pattern", "score"), listed("pattern", "score", "--help"))
+        for name in every:
+            shown = [option for option in listed(name, "--help") if option.startswith("-")]
+            self.assertLessEqual(len(shown), 16, name)
+            self.assertTrue(set(shown) <= set(listed(name, "--help-all")), name)
+        wrong = self.modar("help", "bakes")
+        self.assertEqual(wrong.returncode, 1)
+        self.assertIn("did you mean bake?", wrong.stderr)
+
     def test_help_wraps(self):
         for words in (["bake"], ["pattern", "simulate"], ["bench"]):
-            for line in self.modar(*words, "--help").stdout.splitlines():
+            for line in self.modar(*words, "--help-all").stdout.splitlines():
                 if line.startswith(" " * 30):
                     self.assertLessEqual(len(line), 80, line)
 

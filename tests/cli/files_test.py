@@ -43,7 +43,7 @@ class Inputs(ProgramTest):
         shutil.copy(COVER, self.folder / "skin.png")
         for path in (materials, self.folder / "skin.png"):
             before = path.read_bytes()
-            self.assert_fails(self.modar("bake", "--model", "m.obj", "-o", path), 1, path.name, "no bundle")
+            self.assert_fails(self.modar("bake", "--model", "m.obj", "-o", path), 1, path.name, "not a bundle")
             self.assertEqual(path.read_bytes(), before)
 
     def test_rectify_and_calibrate(self):
@@ -237,10 +237,10 @@ class Words(ProgramTest):
 
     def test_help_says_ranges_and_exclusions_in_words(self):
         for words in (["bake"], ["check"], ["pattern", "rectify"], ["ship", "publish"], ["bench"]):
-            text = self.modar(*words, "--help").stdout
+            text = self.modar(*words, "--help-all").stdout
             for code in ("{false}", "Excludes:", "Needs:", " in [", "UINT", ":POSITIVE"):
                 self.assertNotIn(code, text)
-        text = " ".join(self.modar("bake", "--help").stdout.split())
+        text = " ".join(self.modar("bake", "--help-all").stdout.split())
         self.assertIn("(1 to 12, default 12)", text)
         self.assertIn("(not with --lods)", text)
 

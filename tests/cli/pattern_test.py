@@ -152,7 +152,7 @@ class Pattern(ProgramTest):
         refuse(mind, 5, "compiled from")
         wrong = self.folder / "wrong.json"
         wrong.write_text("[]")
-        refuse(wrong, 3, "no image target")
+        refuse(wrong, 3, "not an image target")
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
     def test_a_project_follows_the_pictures_of_targets(self):

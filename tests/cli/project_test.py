@@ -412,7 +412,7 @@ class Cache(ProjectTest):
         self.assertEqual(len(self.parts(cache)), 2)
         would = self.modar("cache", "prune", "--cache", cache)
         self.assertEqual((would.returncode, len(self.parts(cache))), (0, 2))
-        self.assertRegex(would.stdout, r"nothing was removed of 2 entries, .*\n(.*\n)+  --size 0 +would remove 2 entries")
+        self.assertRegex(would.stdout, r"nothing removed of 2 entries, .*\n(.*\n)+  --size 0 +would remove 2 entries")
         os.utime(files[2], (1, 1))
         left_behind = files[1].with_name(files[1].name + ".host.77")
         left_behind.write_text("half of it")
@@ -451,7 +451,7 @@ class Cache(ProjectTest):
             for suffix in suffixes:
                 exchange(suffix)
             self.assertEqual(self.states_with(cache), ["baked", "baked", "cached"], suffixes)
-            self.assertIn("was damaged" if suffixes == [".modar"] else "of another part", self.told)
+            self.assertIn("was damaged" if suffixes == [".modar"] else "another part", self.told)
             for suffix in suffixes:
                 exchange(suffix)
             damaged = self.modar("cache", "verify", "--cache", cache)
@@ -681,7 +681,7 @@ class Init(ProjectTest):
         fresh = self.folder / "nowhere"
         done = self.modar("init", fresh)
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("once more", done.stderr)
+        self.assertIn("again", done.stderr)
         self.assertEqual(sorted(path.name for path in fresh.iterdir()), ["models", "patterns"])
         self.assert_fails(self.modar("init", fresh), 3, "project.nothing")
 

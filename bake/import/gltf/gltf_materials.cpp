@@ -86,17 +86,19 @@ class MaterialReader {
                               std::to_string(count) + " materials " + what, ""});
     };
     add("gltf.emissive-map", emissive_.folded,
-        "have an emissive map, which is added to the base colour: it is lit like that");
+        "have an emissive map, which is added to the base colour and then lit");
     add("gltf.emissive-map", emissive_.left_out,
-        "have an emissive map on other coordinates than the base colour, which is left out");
+        "have an emissive map with other texture coordinates than the base colour, which is "
+        "ignored");
     add("gltf.occlusion-map", occlusion_.folded,
         "have an occlusion map; the base colour is darkened by half of it");
     add("gltf.occlusion-map", occlusion_.left_out,
-        "have an occlusion map on other coordinates than the base colour, which is left out");
+        "have an occlusion map with other texture coordinates than the base colour, which is "
+        "ignored");
     add("gltf.metal-map", averaged_,
         "have a metallic-roughness map; its means set the highlight of the whole material");
     add("gltf.alpha-mask", cut_out_,
-        "are cut out at an alpha value: what is below it is left out, the rest is opaque");
+        "are cut out at an alpha value: lower values are transparent, the others opaque");
   }
 
  private:
@@ -262,7 +264,7 @@ class MaterialReader {
     }
     diagnostics_.push_back({"gltf.missing-image", DiagnosticSeverity::kWarning, label_, 0,
                             "the image '" + image.uri + "' is not there",
-                            "put the image beside the file under that name"});
+                            "put the image next to the file under that name"});
     return {};
   }
 

@@ -183,7 +183,7 @@ class Rewriter {
   Result<void> place(std::size_t index, const EncodedView& encoded, Json& view) {
     MODAR_ASSIGN(const std::string* buffer, load(index, encoded.buffer));
     const std::optional<std::string> bytes = decoded(encoded, *buffer);
-    if (!bytes) return fail_at(index, "its bytes are not what its extension says");
+    if (!bytes) return fail_at(index, "its bytes contradict its extension");
     align(all_, '\0');
     view.set("buffer", buffers_.size());
     view.set("byteOffset", all_.size());
@@ -197,7 +197,7 @@ class Rewriter {
 
   Result<const std::string*> load(std::size_t view, std::uint64_t index) {
     const auto buffer = buffers_.at(index);
-    if (!buffer) return fail_at(view, "it is in a buffer that is not there");
+    if (!buffer) return fail_at(view, "its buffer does not exist");
     const auto uri = buffer->find("uri");
     if (!uri) return &binary_;
     std::optional<std::string>& bytes = loaded_[index];
@@ -229,7 +229,7 @@ class Rewriter {
   [[nodiscard]] tl::unexpected<Error> fail_at(std::size_t view, const std::string& why) const {
     return fail(ExitCode::kInvalidInput, "gltf.meshopt", label_,
                 "its buffer view " + std::to_string(view) + " cannot be decoded: " + why,
-                "put its buffers beside it, or export it again");
+                "put its buffers next to it, or export it again");
   }
 
   Json json_;

@@ -87,7 +87,7 @@ class SceneReader {
   Result<void> walk(int index, const glm::dmat4& parent, int depth) {
     if (index < 0 || static_cast<std::size_t>(index) >= gltf_.nodes.size() || depth > kMaxDepth ||
         seen_[static_cast<std::size_t>(index)]) {
-      return wrong("gltf.read", "its nodes refer to nodes that are not there, or meet twice");
+      return wrong("gltf.read", "its nodes refer to missing nodes, or are reached twice");
     }
     seen_[static_cast<std::size_t>(index)] = true;
     const tinygltf::Node& node = gltf_.nodes[static_cast<std::size_t>(index)];
@@ -101,7 +101,7 @@ class SceneReader {
 
   Result<void> add_mesh(const tinygltf::Node& node, const glm::dmat4& to_scene) {
     const auto copies = node_copies(gltf_, node);
-    if (!copies) return wrong("gltf.accessor", "the copies of a node leave their buffer");
+    if (!copies) return wrong("gltf.accessor", "the instances of a node exceed their buffer");
     for (const glm::dmat4& copy : *copies) {
       if (copies->size() > 1 && model_.positions.size() > kMostCopied) {
         return wrong("gltf.copies", "its instanced nodes make more than " +
@@ -145,7 +145,7 @@ class SceneReader {
         !open(primitive, "NORMAL", positions.size(), 3, normals, has_normals) ||
         !open(primitive, placing.attribute, positions.size(), 2, uvs, has_uvs) ||
         !open(primitive, "COLOR_0", positions.size(), 3, colours, has_colours)) {
-      return wrong("gltf.accessor", "an accessor leaves its buffer, or has no sense");
+      return wrong("gltf.accessor", "an accessor exceeds its buffer or is invalid");
     }
     if (!there) return {};
     if (model_.positions.size() + positions.size() >= kNoIndex) {
@@ -160,7 +160,8 @@ class SceneReader {
     for (std::size_t v = 0; v < positions.size(); ++v) {
       if (v == 0 || places->skinned()) {
         place = places->of(v);
-        if (!place) return wrong("gltf.skin", "a vertex names a joint that its skin has not");
+        if (!place)
+          return wrong("gltf.skin", "a vertex refers to a joint that its skin does not have");
         turn = glm::transpose(glm::inverse(glm::dmat3(*place)));
       }
       model_.positions.push_back(glm::dvec3(*place * glm::dvec4(vector(positions, v), 1.0)));
@@ -203,7 +204,7 @@ class SceneReader {
     GltfAccessor indices;
     const bool indexed = primitive.indices >= 0;
     if (indexed && !indices.open(gltf_, primitive.indices)) {
-      return wrong("gltf.accessor", "the indices of a primitive leave their buffer");
+      return wrong("gltf.accessor", "the indices of a primitive exceed their buffer");
     }
     const std::size_t count = indexed ? indices.size() : vertices;
     const bool list = mode == TINYGLTF_MODE_TRIANGLES;
@@ -391,7 +392,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
     std::replace(error.begin(), error.end(), '\n', ' ');
     return fail(
         ExitCode::kInvalidInput, "gltf.read", path, "it cannot be read as glTF 2.0: " + error,
-        "put its buffers beside it, or check it with the glTF validator and export it again");
+        "put its buffers next to it, or check it with the glTF validator and export it again");
   }
   SourceModel model;
   model.name = std::filesystem::path(path).stem().string();
@@ -406,7 +407,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   MODAR_TRY(scene.run());
   report_left_out(gltf, scene.left_out(), path, model.diagnostics);
   if (model.corner_positions.empty()) {
-    return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it shows no triangles",
+    return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it contains no triangles",
                 "export a mesh in its default scene");
   }
   return model;

@@ -251,7 +251,7 @@ void take_map(std::string_view text, MtlContext& context, std::string& path) {
     }
     context.diagnostics.push_back({"mtl.missing-map", DiagnosticSeverity::kWarning, context.label,
                                    context.line, "texture '" + name + "' was not found",
-                                   "put the image beside the MTL file, or correct its name"});
+                                   "put the image next to the MTL file, or correct its name"});
   } else if (transformed) {
     context.diagnostics.push_back({"mtl.map-transform", DiagnosticSeverity::kWarning, context.label,
                                    context.line,
@@ -264,10 +264,10 @@ void take_map(std::string_view text, MtlContext& context, std::string& path) {
 /// part.
 void take_opacity(float opacity, MtlContext& context, SourceMaterial& material) {
   if (opacity <= 0.0f) {
-    context.diagnostics.push_back({"mtl.invisible", DiagnosticSeverity::kInfo, context.label,
-                                   context.line,
-                                   "material '" + material.name + "' would be wholly transparent",
-                                   "it is taken as opaque; remove its d or Tr line"});
+    context.diagnostics.push_back(
+        {"mtl.invisible", DiagnosticSeverity::kInfo, context.label, context.line,
+         "material '" + material.name + "' would be completely transparent",
+         "it is taken as opaque; remove its d or Tr line"});
     opacity = 1.0f;
   }
   material.opacity = std::min(opacity, 1.0f);
@@ -404,7 +404,7 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label,
     model.files.push_back((fs::path(folder) / name).string());
     diagnostics.push_back({"obj.missing-mtl", DiagnosticSeverity::kWarning, label, line,
                            "material file '" + name + "' was not found",
-                           "put it beside the OBJ file, or correct the mtllib line"});
+                           "put it next to the OBJ file, or correct the mtllib line"});
   };
   for (const Named& library : libraries_) {
     if (std::string whole = find_named_file(library.name, folder); !whole.empty()) {
@@ -423,7 +423,7 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label,
   if (paths.empty() && (used_.size() > 1 || !libraries_.empty())) {
     if (std::string beside = find_named_file(model.name + ".mtl", folder); !beside.empty()) {
       diagnostics.push_back({"obj.mtl-beside", DiagnosticSeverity::kInfo, label, 0,
-                             "'" + name_of(beside) + "' is taken for the material file",
+                             "'" + name_of(beside) + "' is used as the material file",
                              "name it in an mtllib line"});
       paths.push_back(std::move(beside));
     }

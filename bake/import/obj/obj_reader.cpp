@@ -79,8 +79,8 @@ struct NoteText {
 constexpr NoteText kNoteTexts[] = {
     {"obj.not-finite", DiagnosticSeverity::kWarning, "numbers are not finite (nan, inf)",
      "export again; faces that use such a vertex are left out"},
-    {"obj.bad-number", DiagnosticSeverity::kWarning, "words are not the number they should be",
-     "export again; what could be read of them is used, faces with such corners are left out"},
+    {"obj.bad-number", DiagnosticSeverity::kWarning, "values are not numbers",
+     "export again; readable parts are used, faces with such corners are left out"},
     {"obj.short-vertex", DiagnosticSeverity::kWarning, "vertices have fewer than three coordinates",
      "the missing ones are taken as 0"},
     {"obj.weight", DiagnosticSeverity::kInfo, "vertices have a weight other than 1",
@@ -261,7 +261,7 @@ void ObjAssembler::finish_colours(const std::string& label) {
   }
   if (bytes) {
     model_.diagnostics.push_back({"obj.byte-colours", DiagnosticSeverity::kInfo, label, 0,
-                                  "vertex colours go beyond 1", "they are taken as 0 to 255"});
+                                  "vertex colours exceed 1", "they are taken as 0 to 255"});
   }
 }
 
@@ -325,10 +325,9 @@ Result<void> to_result(LoadResult worst, const std::string& label) {
                 "check the disk and the file's permissions");
   }
   if (worst == LoadResult::kTooLarge) {
-    return fail(
-        ExitCode::kInvalidInput, "obj.too-large", label,
-        "the file holds more than 1,073,741,823 vertices, corners or bytes in one statement",
-        "split the model into several files");
+    return fail(ExitCode::kInvalidInput, "obj.too-large", label,
+                "the file has more than 1,073,741,823 vertices, corners or bytes in one statement",
+                "split the model into several files");
   }
   return {};
 }
@@ -422,10 +421,10 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
     MODAR_TRY(parse_once(source, folder, label, 1, &*bad, model));
   }
   if (model.face_count() == 0) {
-    return fail(ExitCode::kInvalidInput, "obj.no-faces", label,
-                "the file has " + std::to_string(model.positions.size()) +
-                    " vertices and no face that can be kept",
-                "export the model as polygons (point clouds must be meshed first)");
+    return fail(
+        ExitCode::kInvalidInput, "obj.no-faces", label,
+        "the file has " + std::to_string(model.positions.size()) + " vertices but no usable face",
+        "export the model as polygons (point clouds must be meshed first)");
   }
   if (const auto up = up_in_comments(head)) model.up = {*up, UpReason::kHeader};
   shrink_arrays(model);

@@ -45,7 +45,8 @@ class HeaderParser {
       if (!ended) MODAR_TRY(take_line(line));
     }
     if (ended && stated_format_) return std::move(header_);
-    return error(header_.lines == 0 ? "this is no PLY file" : "the header has no end or no format");
+    return error(header_.lines == 0 ? "this is not a PLY file"
+                                    : "the header has no end or no format");
   }
 
  private:
@@ -82,7 +83,7 @@ class HeaderParser {
     else if (name == "binary_big_endian")
       header_.encoding = PlyHeader::Encoding::kBig;
     else
-      return error("there is no format '" + std::string(name.substr(0, 32)) + "'");
+      return error("unknown format '" + std::string(name.substr(0, 32)) + "'");
     return {};
   }
 
@@ -107,7 +108,7 @@ class HeaderParser {
       property.list = true;
       const auto count = type_of(next_word(line));
       if (!count || *count == PlyType::kF32 || *count == PlyType::kF64) {
-        return error("the count of a list has no whole type");
+        return error("the count of a list has no integer type");
       }
       property.count_type = *count;
       type = next_word(line);

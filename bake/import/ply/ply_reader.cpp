@@ -165,7 +165,7 @@ class PlyReader {
                     label_ + ": byte " + std::to_string(values_.offset()),
                     "the header states " + std::to_string(element.count) + " elements '" +
                         element.name + "' and the file has room for " + std::to_string(room),
-                    "the file is cut short; copy or export it again");
+                    "the file is truncated; copy or export it again");
       }
       if (least == 0) continue;
       // Of several elements of that name, which no program writes, the first holds the vertices.
@@ -183,9 +183,9 @@ class PlyReader {
                                                 std::uint64_t index) const {
     return fail(ExitCode::kInvalidInput, values_.left() == 0 ? "ply.short" : "ply.number",
                 label_ + ": byte " + std::to_string(values_.offset()),
-                "the file ends, or holds no number, at " + element.name + " " +
+                "the file ends, or has no number, at " + element.name + " " +
                     std::to_string(index) + " of " + std::to_string(element.count),
-                "the file is cut short or damaged; copy or export it again");
+                "the file is truncated or damaged; copy or export it again");
   }
 
   /// Reads a list into list_. False at the end.
@@ -318,7 +318,7 @@ class PlyReader {
     if (faces_ == 0) {
       return fail(ExitCode::kInvalidInput, "ply.no-faces", label_,
                   "the file has " + std::to_string(model_.positions.size()) +
-                      " vertices and no face that can be kept",
+                      " vertices but no usable face",
                   "mesh the point cloud first, in MeshLab or CloudCompare");
     }
     if (left_out_ != 0) {

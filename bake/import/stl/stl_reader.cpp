@@ -194,7 +194,7 @@ Result<void> read_text(std::string_view text, const std::string& label, SourceMo
     }
     if (good) continue;
     return fail(ExitCode::kInvalidInput, "stl.text", label + ":" + std::to_string(number),
-                "'" + std::string(word.substr(0, 32)) + "' is no line of an ASCII STL",
+                "'" + std::string(word.substr(0, 32)) + "' is not a line of an ASCII STL file",
                 "export the model again, as binary STL, PLY or OBJ");
   }
   return {};
@@ -226,7 +226,7 @@ Result<SourceModel> parse_stl(std::string_view bytes, const std::string& label) 
       return fail(ExitCode::kInvalidInput, "stl.short", label + ": byte 80",
                   "the file states " + std::to_string(*count) + " triangles and has room for " +
                       std::to_string(std::min(there, kMostFacets)),
-                  "the file is cut short or no STL; copy or export it again");
+                  "the file is truncated or not an STL file; copy or export it again");
     }
     read_binary(bytes, *count, model, index, skipped);
   } else {

@@ -27,7 +27,7 @@ struct KeptTriangle {
 
 struct Projection {
   const KeptTriangle* face = nullptr;
-  Foot foot;
+  ClosestPoint closest;
 };
 
 Projection nearest_of(const ChunkVertices& vertices, std::uint16_t vertex,
@@ -35,10 +35,11 @@ Projection nearest_of(const ChunkVertices& vertices, std::uint16_t vertex,
   Projection nearest;
   for (const KeptTriangle& face : faces) {
     const auto& [a, b, c] = face.corners;
-    const Foot foot =
-        nearest_foot(vertices.positions[vertex],
-                     {vertices.positions[a], vertices.positions[b], vertices.positions[c]});
-    if (nearest.face == nullptr || foot.square < nearest.foot.square) nearest = {&face, foot};
+    const ClosestPoint closest =
+        closest_point(vertices.positions[vertex],
+                      {vertices.positions[a], vertices.positions[b], vertices.positions[c]});
+    if (nearest.face == nullptr || closest.square < nearest.closest.square)
+      nearest = {&face, closest};
   }
   return nearest;
 }
@@ -47,7 +48,7 @@ double shift_at(const ChunkVertices& vertices, std::uint16_t vertex, const Proje
   const auto& [a, b, c] = projection.face->corners;
   const std::span<const glm::dvec2> uvs = vertices.uvs;
   const glm::dvec2 there =
-      uvs[a] + projection.foot.b * (uvs[b] - uvs[a]) + projection.foot.c * (uvs[c] - uvs[a]);
+      uvs[a] + projection.closest.b * (uvs[b] - uvs[a]) + projection.closest.c * (uvs[c] - uvs[a]);
   return glm::length(there - uvs[vertex]);
 }
 

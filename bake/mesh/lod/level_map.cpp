@@ -162,15 +162,15 @@ class LevelMap {
       return;
     }
     const std::array<glm::dvec3, 3> t = coarse_.triangle(triangle);
-    const Foot foot = nearest_foot(fine_.position(vertex), t);
-    place.point = t[0] + foot.b * (t[1] - t[0]) + foot.c * (t[2] - t[0]);
+    const ClosestPoint closest = closest_point(fine_.position(vertex), t);
+    place.point = t[0] + closest.b * (t[1] - t[0]) + closest.c * (t[2] - t[0]);
     const glm::dvec3 off = fine_.position(vertex) - place.point;
     place.square = glm::dot(off, off);
     std::size_t count = 0;
     place.on.fill(kNoVertex);
-    if (foot.b + foot.c < 1) place.on[count++] = v[0];
-    if (foot.b > 0) place.on[count++] = v[1];
-    if (foot.c > 0) place.on[count++] = v[2];
+    if (closest.b + closest.c < 1) place.on[count++] = v[0];
+    if (closest.b > 0) place.on[count++] = v[1];
+    if (closest.c > 0) place.on[count++] = v[2];
   }
 
   /// Finds how far the farthest vertex is off, and better places for those that seem to be farther:

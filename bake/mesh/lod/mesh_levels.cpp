@@ -425,11 +425,12 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
                          const std::vector<std::uint32_t>& nearby, double limit) {
   const auto shift_on = [&](std::size_t v, const std::array<std::uint32_t, 3>& t) {
     const auto& [a, b, c] = t;
-    const Foot foot =
-        nearest_foot(vertices.positions[v],
-                     {vertices.positions[a], vertices.positions[b], vertices.positions[c]});
+    const ClosestPoint closest =
+        closest_point(vertices.positions[v],
+                      {vertices.positions[a], vertices.positions[b], vertices.positions[c]});
     const std::span<const glm::dvec2> uvs = vertices.uvs;
-    return glm::length(uvs[a] + foot.b * (uvs[b] - uvs[a]) + foot.c * (uvs[c] - uvs[a]) - uvs[v]);
+    return glm::length(uvs[a] + closest.b * (uvs[b] - uvs[a]) + closest.c * (uvs[c] - uvs[a]) -
+                       uvs[v]);
   };
   double greatest = 0;
   for (std::size_t v = 0; v < vertices.uvs.size(); ++v) {
@@ -464,9 +465,9 @@ double shading_of(const LevelSurface& surface, const TriMesh& mesh, const Chunk&
     ++count;
     if (become[v] == v) continue;
     const std::uint16_t* t = surface.corners(nearby[v]);
-    const Foot foot = nearest_foot(positions[v], surface.triangle(nearby[v]));
-    const glm::dvec3 mean =
-        (1 - foot.b - foot.c) * normal(t[0]) + foot.b * normal(t[1]) + foot.c * normal(t[2]);
+    const ClosestPoint closest = closest_point(positions[v], surface.triangle(nearby[v]));
+    const glm::dvec3 mean = (1 - closest.b - closest.c) * normal(t[0]) + closest.b * normal(t[1]) +
+                            closest.c * normal(t[2]);
     const double length = glm::length(mean);
     const double off = length > 0 ? glm::length(mean / length - normal(v)) : 1.0;
     double square = std::numeric_limits<double>::infinity();

@@ -279,8 +279,8 @@ Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& rep
     const Stretch part = {begins[m], begins[m + 1]};
     if (part.size() != 0 && !builder.split(part, m)) {
       return fail(ExitCode::kUnsupported, "model.max-error", result.mesh.name,
-                  "a triangle is too long for the grid that the requested error needs",
-                  "allow a greater --max-error, or divide the model's longest triangles");
+                  "a triangle is too long for the grid that the requested error requires",
+                  "allow a larger --max-error, or split the model's longest triangles");
     }
   }
   timer.done(result.mesh.triangles.size(), result.chunks.size());

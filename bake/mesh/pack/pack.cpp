@@ -241,8 +241,8 @@ void tell_collapsed(const std::string& name, std::size_t count, Report& report) 
   if (count == 0) return;
   report.diagnostics.push_back({"model.collapsed", DiagnosticSeverity::kInfo, name, 0,
                                 std::to_string(count) +
-                                    " triangles are smaller than stored positions tell apart and "
-                                    "are left out",
+                                    " triangles are smaller than the resolution of stored "
+                                    "positions and are left out",
                                 "--positions int16 or --max-error keeps more of them"});
 }
 
@@ -306,7 +306,7 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   out.record.chunk_count = static_cast<std::uint32_t>(out.chunks.size());
   if (out.chunks.empty()) {
     return fail(ExitCode::kInvalidInput, "model.no-area", mesh.name,
-                "all its triangles are smaller than positions can tell apart",
+                "all its triangles are smaller than the resolution of positions",
                 "bake it with --positions int16 or a --max-error");
   }
   tell_collapsed(mesh.name, collapsed, report);

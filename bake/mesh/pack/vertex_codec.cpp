@@ -73,7 +73,7 @@ tl::unexpected<Error> too_fine(const TriMesh& mesh, const PositionRequest& reque
                                const std::string& cause) {
   return fail(ExitCode::kUnsupported, "model.max-error", mesh.name,
               "an error of at most " + std::to_string(request.max_error) + " units: " + cause,
-              "allow a greater --max-error, or split the model in several");
+              "allow a larger --max-error, or split the model into several");
 }
 
 }  // namespace

@@ -300,9 +300,7 @@ void add_diagnostics(const TriMesh& mesh, const MeshTopology& topology, Report& 
       std::to_string(topology.duplicate_triangles) + " triangles repeat an earlier one",
       "they are kept; remove them in a modelling program, they cost time and may flicker");
   add(topology.flipped_edges, "model.flipped",
-      std::to_string(topology.flipped_edges) +
-          " edges lie between triangles that wind against "
-          "each other",
+      std::to_string(topology.flipped_edges) + " edges join triangles of opposite winding",
       "recalculate the normals in a modelling program if sides of the model are missing");
   if (!topology.half_edges) return;
   add(topology.half_edges->copied_faces, "model.copied-faces",

@@ -624,16 +624,16 @@ void report_counts(const std::string& name, const WeldCounts& counts, std::size_
   add(counts.flat, "model.degenerate",
       much ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo,
       "triangles without area left out (corners on one line, or one corner twice)",
-      much ? "check that the model was exported as it should be" : "");
+      much ? "check the export of the model" : "");
   add(counts.not_finite, "model.not-finite", DiagnosticSeverity::kWarning,
-      "triangles with vertices at no finite place left out", "export the model again");
+      "triangles with non-finite vertices left out", "export the model again");
   add(counts.tangled, "model.tangled-polygon", DiagnosticSeverity::kWarning,
-      "polygons cross themselves or are too large to cut well",
+      "polygons intersect themselves or are too large to triangulate well",
       "triangulate the model before export");
   add(counts.bad_normals, "model.bad-normal", DiagnosticSeverity::kInfo,
-      "corners have a normal without direction", "normals were made for them");
+      "corners have a normal of length 0", "normals were computed for them");
   add(counts.made_normals, "model.made-normals", DiagnosticSeverity::kInfo,
-      "normals were made from the faces", "");
+      "normals were computed from the faces", "");
 }
 
 }  // namespace
@@ -653,7 +653,7 @@ Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& op
   }
   if (mesh.triangles.empty()) {
     return fail(ExitCode::kInvalidInput, "model.empty", source.name,
-                "no triangle is left: all faces are without area or at no finite place",
+                "no triangle is left: all faces have no area or non-finite vertices",
                 "check the model in a viewer and export it again");
   }
   normalise(mesh);
