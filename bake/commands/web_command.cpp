@@ -91,34 +91,43 @@ Result<ExitCode> run_web(WebCommand& command) {
 }  // namespace
 
 void add_web(CommandLine& program) {
-  CommandLine& line = program.command("web", "A page that plays bundles in a browser, offline too");
+  CommandLine& line = program.command("web", "Make a web page that plays bundles, offline too");
   const auto command = std::make_shared<WebCommand>();
   SiteOptions& options = command->options;
-  line.option("bundles", &options.bundles, "What the page plays",
+  line.option("bundles", &options.bundles, "Bundles that the page plays",
               {.type = "BUNDLE...", .required = true});
-  line.option("-o,--output", &options.output, "The folder to write: any web server serves it",
+  line.option("-o,--output", &options.output, "Folder to write, for any web server",
               {.type = "DIR", .required = true});
-  line.option("--title", &options.title, "Its title; else the first bundle's name",
+  line.flag("--serve", command->serve, "Serve it over HTTPS, and print a QR code of the address");
+  line.option("--title", &options.title, "Title of the page (default: the first bundle's name)",
               {.type = "TEXT"});
-  line.option("--languages", &options.languages, "Of its words, the first for all others: de,en",
+  line.option("--languages", &options.languages,
+              "Languages of the page, the first one as default: de,en",
               {.type = "LANGUAGE", .separator = ','});
-  line.option("--texts", &options.texts, "Names and texts of the patterns, in these languages",
+  line.option("--texts", &options.texts, "Names and texts of the patterns in these languages",
               {.type = "JSON"});
-  line.option("--release", &options.release,
-              "Address of a folder of `modar ship publish`: the page updates its bundles from it",
-              {.type = "URL"});
-  line.option("--trust", &options.trusted_key, "The key that signs those releases: K.pub",
-              {.type = "FILE"});
-  line.option("--page", &options.page, "The page's files; else those installed or built with modar",
+  line.option("--words", &options.words,
+              "Folder of more languages: LANGUAGE.json, like words/en.json of the page",
               {.type = "DIR"});
-  line.flag("--force", options.force, "Write into a folder that holds other files as well");
-  line.flag("--serve", command->serve, "Serve it by HTTPS, with a QR code of the address");
-  line.option("--bind", &command->bind,
-              "Of that server: this address alone, 127.0.0.1 for this machine; 0.0.0.0: all",
-              {.type = "ADDRESS", .shows_default = true});
-  line.option("--port", &command->port, "Of that server; 0: any that is free",
+  line.option("--link", &options.links, "Link at the foot of the cover: 'Imprint=https://...'",
+              {.type = "TEXT=URL"});
+  line.option(
+      "--release", &options.release,
+      "Address of a folder of `modar ship publish`, from which the page updates its bundles",
+      {.type = "URL"});
+  line.option("--trust", &options.trusted_key, "Public key of those releases: K.pub",
+              {.type = "FILE"});
+  line.group("Files and server", Shown::kInFull);
+  line.option("--page", &options.page,
+              "Files of the page (default: those installed or built with modar)", {.type = "DIR"});
+  line.flag("--force", options.force, "Write into a folder that contains other files");
+  line.option(
+      "--bind", &command->bind,
+      "Address that the server listens on: 127.0.0.1 for this machine only, 0.0.0.0 for all",
+      {.type = "ADDRESS", .shows_default = true});
+  line.option("--port", &command->port, "Port of the server; 0: any free port",
               {.shows_default = true, .least = 0, .most = 65535});
-  line.flag("--quiet", command->quiet, "Print nothing but errors and addresses");
+  line.flag("--quiet", command->quiet, "Print errors and addresses only");
   line.flag("--json", command->json, "Print what was written as JSON");
   line.footer(example(
       "  modar web vase.modar -o site --title 'The red vase' --languages de,en --texts texts.json\n"
@@ -126,7 +135,7 @@ void add_web(CommandLine& program) {
       "  modar web vase.modar -o site --release release --trust museum.key.pub\n"
       "\n"
       "texts.json: {\"cover\": {\"en\": {\"name\": \"The cover\", \"text\": \"Printed in "
-      "1890.\"}}}\n"));
+      "1890.\", \"alt\": \"A red vase\"}}}\n"));
   line.run([command] { return run_web(*command); });
 }
 

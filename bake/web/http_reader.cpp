@@ -77,7 +77,7 @@ class WebReader {
       if (answer->status == 404 || answer->status == 410) return std::optional<std::string>();
       if (answer->status == 200) return std::optional<std::string>(std::move(body));
       return fail(ExitCode::kIo, "http.answer", address_.origin + asked,
-                  "the server answers " + std::to_string(answer->status),
+                  "the server responded with " + std::to_string(answer->status),
                   "give the address at which devices find the files");
     }
   }

@@ -17,14 +17,15 @@ Json bundle_texts(std::string_view meta, const std::string& pattern,
   for (std::size_t i = 0; i < scenes.size(); ++i) {
     const Json scene = scenes.at(i).value_or(Json());
     if (scene.find("pattern").value_or("").text() != pattern) continue;
-    const Json words = scene.find("text").value_or(Json());
     for (const std::string& language : languages) {
-      const auto text = words.find(language);
-      if (!text || !text->text()) continue;
-      const auto before = texts.find(language + "/text");
-      texts.set(language,
-                {{"name", title_of(pattern)},
-                 {"text", before ? *before->text() + " " + *text->text() : *text->text()}});
+      for (const char* key : {"text", "alt"}) {
+        const auto words = scene.find(std::string(key) + "/" + language);
+        if (!words || !words->text()) continue;
+        Json entry = texts.find(language).value_or(Json{{"name", title_of(pattern)}, {"text", ""}});
+        const std::string before = entry.find(key).value_or("").text().value_or("");
+        entry.set(key, before.empty() ? *words->text() : before + " " + *words->text());
+        texts.set(language, entry);
+      }
     }
   }
   return texts;
@@ -38,10 +39,12 @@ Result<Json> given_texts(const Json& given, const std::string& file, const std::
     if (!given.find(language)) continue;
     if (!name || !name->text()) {
       return fail(ExitCode::kInvalidInput, "web.texts", file + ", " + pattern + ", " + language,
-                  "there is no name", R"(write {"name": "...", "text": "..."})");
+                  "there is no name", R"(write {"name": "...", "text": "...", "alt": "..."})");
     }
     const auto text = given.find(language + "/text");
-    texts.set(language, {{"name", *name}, {"text", text ? *text : Json("")}});
+    Json entry = {{"name", *name}, {"text", text ? *text : Json("")}};
+    if (const auto alt = given.find(language + "/alt")) entry.set("alt", *alt);
+    texts.set(language, entry);
   }
   return texts;
 }

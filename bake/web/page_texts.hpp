@@ -14,13 +14,13 @@ namespace modar {
 std::string title_of(std::string_view name);
 
 /// Of a pattern, what a bundle's meta (modar.toml) has to say of its scenes in these languages:
-/// {LANGUAGE: {"name", "text"}}; null where that is nothing.
+/// {LANGUAGE: {"name", "text", "alt"}}; null where that is nothing.
 Json bundle_texts(std::string_view meta, const std::string& pattern,
                   const std::vector<std::string>& languages);
 
-/// The same of the file of `modar web --texts`, {PATTERN: {LANGUAGE: {"name", "text"}}}: `given` is
-/// what it has of the pattern. file: for messages. Errors: kInvalidInput "web.texts" where a
-/// language has no name.
+/// The same of the file of `modar web --texts`, {PATTERN: {LANGUAGE: {"name", "text", "alt"}}}:
+/// `given` is what it has of the pattern. file: for messages. Errors: kInvalidInput "web.texts"
+/// where a language has no name.
 Result<Json> given_texts(const Json& given, const std::string& file, const std::string& pattern,
                          const std::vector<std::string>& languages);
 

@@ -107,7 +107,7 @@ void serve_guest(int client, int to_port) {
 Result<Listener> listen_on(const std::string& bind, int port) {
   in_addr host{};
   if (::inet_pton(AF_INET, bind.c_str(), &host) != 1) {
-    return fail(ExitCode::kUsage, "web.bind", "--bind " + bind, "it is no IPv4 address",
+    return fail(ExitCode::kUsage, "web.bind", "--bind " + bind, "it is not an IPv4 address",
                 "write it as 127.0.0.1, or 0.0.0.0 for all of this machine");
   }
   Listener listener{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), port};

@@ -3,22 +3,21 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+
 #include <filesystem>
 #include <span>
 #include <string_view>
 
-#include "bake/image/image.hpp"
-#include "bake/image/resample.hpp"
 #include "bake/json.hpp"
 #include "bake/output.hpp"
 #include "bake/process.hpp"
+#include "bake/web/hint.hpp"
 #include "bake/web/page_texts.hpp"
 #include "formats/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/html.hpp"
-#include "formats/tracker_record.hpp"
+#include "formats/pattern_shape.hpp"
 #include "formats/trim.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/release.hpp"
@@ -29,10 +28,27 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What is copied as it is; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 15> kPageFiles = {
-    "app.js",           "engine.js",     "engine-plain.js", "engine-plain.wasm", "engine-simd.js",
-    "engine-simd.wasm", "gyroscope.js",  "icon-180.png",    "icon-512.png",      "icon.svg",
-    "installed.js",     "modar-view.js", "modar-worker.js", "modar.js",          "style.css"};
+constexpr std::array<std::string_view, 21> kPageFiles = {"app.js",
+                                                         "camera.js",
+                                                         "engine-plain.js",
+                                                         "engine-plain.wasm",
+                                                         "engine-simd.js",
+                                                         "engine-simd.wasm",
+                                                         "engine.js",
+                                                         "gyroscope.js",
+                                                         "icon-180.png",
+                                                         "icon-512.png",
+                                                         "icon.svg",
+                                                         "installed.js",
+                                                         "modar-view.js",
+                                                         "modar-worker-plain.js",
+                                                         "modar-worker-simd.js",
+                                                         "modar-worker.js",
+                                                         "modar.js",
+                                                         "recorder.js",
+                                                         "storage.js",
+                                                         "style.css",
+                                                         "turntable.js"};
 /// Beside them where the page updates itself.
 constexpr std::array<std::string_view, 4> kUpdateFiles = {"download.js", "engine-update.js",
                                                           "engine-update.wasm", "update-worker.js"};
@@ -85,11 +101,57 @@ std::string address(std::string_view name) {
   return word.empty() ? "bundle" : word;
 }
 
+/// Folders that may hold LANGUAGE.json: the project's own come first.
+std::vector<std::string> word_folders(const Draft& draft) {
+  if (draft.options.words.empty()) return {draft.page + "/words"};
+  return {draft.options.words, draft.page + "/words"};
+}
+
+Result<std::string> words_of(const Draft& draft, const std::string& language) {
+  for (const std::string& folder : word_folders(draft)) {
+    const std::string path = folder + "/" + language + ".json";
+    if (!fs::exists(path)) continue;
+    MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+    return std::string(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
+  }
+  return fail(ExitCode::kIo, "web.words", language, "its words are gone", "try again");
+}
+
+/// Each text that English has is there, as a text, and as two of them for an error.
+Result<void> check_words(const Draft& draft, const std::string& language) {
+  MODAR_ASSIGN(const std::string english, page_text(draft, "words/en.json"));
+  MODAR_ASSIGN(const std::string own, words_of(draft, language));
+  const Json wanted = Json::parse(english);
+  const Json given = Json::parse(own);
+  const auto said = [](const std::optional<Json>& text) {
+    return text && !text->text().value_or("").empty();
+  };
+  const auto missing = [&](const std::string& text) {
+    return fail(ExitCode::kInvalidInput, "web.words", language + ".json",
+                "it has no text '" + text + "'", "translate each text of words/en.json");
+  };
+  for (const std::string& key : wanted.keys()) {
+    if (wanted.find(key)->text() && !said(given.find(key))) return missing(key);
+  }
+  for (const std::string& each : wanted.find("errors")->keys()) {
+    const Json pair = given.find("errors/" + each).value_or(Json());  // what happened, what to do
+    if (!said(pair.at(0)) || !said(pair.at(1))) return missing("errors/" + each);
+  }
+  return {};
+}
+
 Result<void> choose_languages(Draft& draft) {
   std::vector<std::string> known;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(draft.page + "/words", error)) {
-    if (entry.path().extension() == ".json") known.push_back(entry.path().stem().string());
+  for (const std::string& folder : word_folders(draft)) {
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+      const std::string name = entry.path().stem().string();
+      if (entry.path().extension() != ".json") continue;
+      if (std::find(known.begin(), known.end(), name) == known.end()) known.push_back(name);
+    }
+    if (!error) continue;
+    return fail(ExitCode::kIo, "web.words", folder, "it cannot be read: " + error.message(),
+                "name a folder of files like de.json");
   }
   // English first: it serves where a visitor reads none of the others.
   std::sort(known.begin(), known.end(), [](const std::string& a, const std::string& b) {
@@ -97,11 +159,15 @@ Result<void> choose_languages(Draft& draft) {
   });
   draft.languages = draft.options.languages.empty() ? known : draft.options.languages;
   for (const std::string& language : draft.languages) {
-    if (std::find(known.begin(), known.end(), language) != known.end()) continue;
+    if (std::find(known.begin(), known.end(), language) != known.end()) {
+      MODAR_TRY(check_words(draft, language));
+      continue;
+    }
     std::string all;
     for (const std::string& each : known) all += (all.empty() ? "" : ", ") + each;
     return fail(ExitCode::kUsage, "web.language", language,
-                "the page has no words of this language", "name some of " + all);
+                "the page has no translation into this language",
+                "choose from " + all + ", or name a folder that has more with --words");
   }
   return {};
 }
@@ -112,7 +178,8 @@ Result<void> read_texts(Draft& draft) {
   draft.texts =
       Json::parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
   if (!draft.texts.is_null() && !draft.texts.is_array()) return {};
-  return fail(ExitCode::kInvalidInput, "web.texts", draft.options.texts, "this is no JSON object",
+  return fail(ExitCode::kInvalidInput, "web.texts", draft.options.texts,
+              "this is not a JSON object",
               R"(write {"cover": {"en": {"name": "The cover", "text": "Printed in 1890."}}})");
 }
 
@@ -125,47 +192,15 @@ Result<Json> texts_of(Draft& draft, const BundleView& bundle, const std::string&
   return given_texts(*given, draft.options.texts, pattern, draft.languages);
 }
 
-/// A JPEG file that loads at once on a phone's line; with the greatest side that a cover shows.
-Result<std::vector<std::byte>> hint_file(const RgbaImage& image) {
-  constexpr std::uint32_t kMostSide = 512;       // pixels
-  constexpr std::size_t kMostBytes = 45 * 1000;  // 0.25 s at 1.6 Mbit/s
-  const double shrink =
-      std::min(1.0, static_cast<double>(kMostSide) / std::max(image.width, image.height));
-  const auto side = [shrink](std::uint32_t pixels) {
-    return std::max(1u, static_cast<std::uint32_t>(std::lround(pixels * shrink)));
-  };
-  const RgbaImage small =
-      shrink < 1 ? resize(image, side(image.width), side(image.height), {}) : image;
-  for (int quality = 85;; quality -= 10) {
-    MODAR_ASSIGN(std::vector<std::byte> file, encode_jpeg(small, quality));
-    if (file.size() <= kMostBytes || quality <= 25) return file;
-  }
-}
-
 /// The picture that the tracker looks for, as a hint for visitors.
 Result<Json> put_hint(Draft& draft, const BundleView& bundle, std::uint32_t pattern,
                       const std::string& file) {
   const std::string name(bundle.name(bundle.patterns()[pattern].name));
-  TrackerRecordView record;
-  const auto bytes = bundle.section(SectionType::kTrackerRecord, pattern);
-  if (bytes.empty() || view_tracker_record(bytes, record)) {
-    return fail(ExitCode::kInvalidInput, "web.pattern", "pattern '" + name + "'",
-                "it has no tracker record", "bake the bundle with this version of modar");
-  }
-  RgbaImage image{record.header.width, record.header.height, {}};
-  const std::size_t pixels = std::size_t{image.width} * image.height;
-  image.pixels.resize(4 * pixels);
-  for (std::size_t i = 0; i < pixels; ++i) {
-    std::fill_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(4 * i), 3, record.pixels[i]);
-    image.pixels[4 * i + 3] = 255;
-  }
-  MODAR_ASSIGN(const std::vector<std::byte> hint, hint_file(image));
-  MODAR_TRY(put(draft, file, hint));
-  Json json = {{"name", name},
-               {"title", title_of(name)},
-               {"image", file},
-               {"width", image.width},
-               {"height", image.height}};
+  MODAR_ASSIGN(const Hint hint, hint_of(bundle, pattern));
+  MODAR_TRY(put(draft, file, hint.file));
+  Json json = {{"name", name},          {"title", title_of(name)},
+               {"image", file},         {"width", hint.width},
+               {"height", hint.height}, {"flat", bundle.section(kPatternShape, pattern).empty()}};
   MODAR_ASSIGN(const Json texts, texts_of(draft, bundle, name));
   if (!texts.is_null()) json.set("texts", texts);
   return json;
@@ -223,12 +258,29 @@ Result<void> put_page(Draft& draft) {
     draft.site.page_bytes += file.bytes().size();
   }
   for (const std::string& language : draft.languages) {
-    const std::string name = "words/" + language + ".json";
-    MODAR_ASSIGN(const std::string words, page_text(draft, name));
-    MODAR_TRY(put(draft, name, words));
+    MODAR_ASSIGN(const std::string words, words_of(draft, language));
+    MODAR_TRY(put(draft, "words/" + language + ".json", words));
     draft.site.page_bytes += words.size();
   }
   return {};
+}
+
+/// "Imprint=https://..." as {"text", "url"}.
+Result<Json> links_of(const SiteOptions& options) {
+  Json links = Json::array();
+  for (const std::string& link : options.links) {
+    const std::size_t equals = link.find('=');
+    const std::string url = equals == std::string::npos ? "" : link.substr(equals + 1);
+    const bool known = url.starts_with("https://") || url.starts_with("http://") ||
+                       url.starts_with("mailto:") || url.starts_with("tel:");
+    const bool beside = !url.empty() && url.find(':') == std::string::npos && url[0] != '/';
+    if (equals == 0 || (!known && !beside)) {
+      return fail(ExitCode::kUsage, "web.link", link, "this is no text with an address",
+                  "write --link 'Imprint=https://museum.org/imprint'");
+    }
+    links.push_back({{"text", link.substr(0, equals)}, {"url", url}});
+  }
+  return links;
 }
 
 /// Scheme and host of an address elsewhere; empty for one below the page's own.
@@ -242,8 +294,7 @@ std::string origin_of(const std::string& url) {
 Result<Json> release_of(const SiteOptions& options, const std::string& page) {
   if (options.release.empty() && options.trusted_key.empty()) return Json();
   if (options.release.empty() || options.trusted_key.empty()) {
-    return fail(ExitCode::kUsage, "web.trust", "--release, --trust",
-                "one is given without the other",
+    return fail(ExitCode::kUsage, "web.trust", "--release, --trust", "one is missing",
                 "name the release folder's address and the key that signs it, K.pub");
   }
   if (!fs::exists(page + "/engine-update.wasm")) {
@@ -256,8 +307,8 @@ Result<Json> release_of(const SiteOptions& options, const std::string& page) {
       parse_root_set({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
   if (origin_of(options.release).find('@') != std::string::npos) {
     return fail(ExitCode::kUsage, "web.login", "--release",
-                "the address holds a name or a password, which the page would give to everybody",
-                "give the address without it");
+                "the address contains a user name or password, which the page would publish",
+                "remove it");
   }
   const bool folder = options.release.ends_with('/');
   // A connection that brings less than 64 bytes a second for so long is given up, as modar-fetch
@@ -322,6 +373,7 @@ Result<Site> write_site(const SiteOptions& options) {
   MODAR_TRY(choose_languages(draft));
   MODAR_TRY(read_texts(draft));
   MODAR_ASSIGN(const Json release, release_of(options, draft.page));
+  MODAR_ASSIGN(const Json links, links_of(options));
   MODAR_TRY(claim_output_folder(options.output, options.force));
   for (const char* folder : {"/bundles", "/patterns", "/words"}) {
     MODAR_TRY(make_output_folder(options.output + folder));
@@ -334,13 +386,14 @@ Result<Site> write_site(const SiteOptions& options) {
   }
   if (draft.texts_used < draft.texts.size()) {
     return fail(ExitCode::kInvalidInput, "web.texts", options.texts,
-                "it has texts for a pattern that is in none of the bundles",
+                "it has texts for a pattern that no bundle contains",
                 "name patterns as `modar inspect` prints them");
   }
   const std::string title = options.title.empty()
                                 ? title_of(fs::path(options.bundles.front()).stem().string())
                                 : options.title;
   Json site = {{"title", title}, {"languages", Json::list(draft.languages)}, {"bundles", bundles}};
+  if (links.size() != 0) site.set("links", links);
   if (!release.is_null()) site.set("release", release);
   MODAR_TRY(put(draft, "site.json", site.dump()));
   MODAR_TRY(put_page(draft));

@@ -15,7 +15,10 @@ struct SiteOptions {
   std::string title;                 ///< empty: the first bundle's name
   std::vector<std::string>
       languages;  ///< of the page's words, the first for those who have none of them; empty: all
-  std::string texts;  ///< JSON {PATTERN: {LANGUAGE: {"name", "text"}}}; empty: those of the bundles
+  std::string words;  ///< folder of LANGUAGE.json, as those of the page; empty: none beside these
+  std::vector<std::string> links;  ///< "Imprint=https://...": at the foot of the cover
+  std::string
+      texts;  ///< JSON {PATTERN: {LANGUAGE: {"name", "text", "alt"}}}; empty: those of the bundles
   std::string release;  ///< address of a folder of `modar ship publish`, seen from the page; empty:
                         ///< no updates
   std::string trusted_key;  ///< file K.pub that its releases are verified with
@@ -41,7 +44,7 @@ Result<std::string> find_page();
 /// Writes the folder. The same bundles and options give the same bytes. sw.js comes last: what a
 /// visitor keeps changes when all else is there. Errors: those of the bundles; kInvalidInput
 /// "web.pattern", "web.texts", "key.public"; kUsage "web.trust"; kUsage "web.language",
-/// "web.twice"; kUnsupported "web.page"; kIo.
+/// "web.twice", "web.link", "web.words"; kUnsupported "web.page"; kIo.
 Result<Site> write_site(const SiteOptions& options);
 
 }  // namespace modar

@@ -1,8 +1,12 @@
 // The page: a cover with a start button, then the camera with models, label and tools.
+import { Camera, hostApp, ownBrowser } from './camera.js';
 import { allowMotion, load, ModarError } from './modar.js';
 import { POSE, POSE_FLOATS } from './engine.js';
 import { View } from './modar-view.js';
 import { forgetInstalled, installedBundles, installedFile } from './installed.js';
+import { canRecord, Recorder } from './recorder.js';
+import { forgetStored, store, stored } from './storage.js';
+import { Turntable } from './turntable.js';
 
 const $ = (id) => document.getElementById(id);
 const root = document.documentElement;
@@ -18,6 +22,10 @@ const TURN_A_KEY = Math.PI / 18;
 const SIZE_A_KEY = 1.1;
 const SMALLEST = 0.2;
 const LARGEST = 5;
+const KEPT_LANGUAGE = 'modar-language';
+/** Written from right to left. */
+const FROM_RIGHT = ['ar', 'dv', 'fa', 'he', 'ku', 'ps', 'sd', 'ug', 'ur', 'yi'];
+const directionOf = (language) => (FROM_RIGHT.includes(language.split('-')[0]) ? 'rtl' : 'ltr');
 
 let site;
 let words;
@@ -25,15 +33,21 @@ let modar = null;
 let view = null;
 /** {bundle, done}: what is or was loaded, and the promise of it. */
 let loading = null;
-let stream = null;
-let facing = 'environment';
-let chosenCamera = '';
+const camera = new Camera();
 let scenePattern = -1;
 let unseenSince = 0;
 const gesture = { turn: 0, size: 1, mirror: false };
+/** While models are looked at without a camera. */
+let table = null;
+let recorder = null;
+/** Until what is kept on the device is whole; and whether the visitor has deleted it since the page was opened. */
+let keeping = null;
+let forgotten = false;
+
+const fill = (text, values) => text.replace(/\{(\w+)\}/g, (_, name) => values[name] ?? '');
 
 function say(key, values = {}) {
-  return words[key].replace(/\{(\w+)\}/g, (_, name) => values[name] ?? '');
+  return fill(words[key], values);
 }
 
 function setState(state) {
@@ -50,7 +64,7 @@ async function fetchJson(address) {
 
 function chooseLanguage(languages) {
   const wanted = new URLSearchParams(location.search).get('lang');
-  const liked = [wanted, ...navigator.languages].filter(Boolean).map((tag) => tag.toLowerCase().split('-')[0]);
+  const liked = [wanted, stored(KEPT_LANGUAGE), ...navigator.languages].filter(Boolean).map((tag) => tag.toLowerCase().split('-')[0]);
   return liked.find((tag) => languages.includes(tag)) ?? languages[0];
 }
 
@@ -61,14 +75,41 @@ function showWords() {
     if (element.localName === 'button') element.title = say(element.dataset.label);
   }
   $('models').setAttribute('aria-label', say('nothingSeen'));
+  $('models').setAttribute('aria-roledescription', say('scene'));
   $('photo-image').alt = say('photoAlt');
 }
 
-/** What the site says of a pattern in this language, else in its first, else in any: {name, text}; else its own name. */
+async function useLanguage(language) {
+  words = await fetchJson(`words/${language}.json`);
+  root.lang = language;
+  root.dir = directionOf(language);
+  showWords();
+  showPlates();
+}
+
+function showLanguages() {
+  const nameOf = (language) => {
+    const name = new Intl.DisplayNames([language], { type: 'language' }).of(language);
+    return name.charAt(0).toLocaleUpperCase(language) + name.slice(1);
+  };
+  $('language').replaceChildren(...site.languages.map((language) => {
+    const option = new Option(nameOf(language), language, false, language === root.lang);
+    option.lang = language;
+    return option;
+  }));
+  $('tongue').hidden = site.languages.length < 2;
+}
+
+function showLinks() {
+  $('links').replaceChildren(...(site.links ?? []).map(({ text, url }) =>
+    Object.assign(document.createElement('a'), { textContent: text, href: url, rel: 'noopener' })));
+}
+
+/** What the site says of a pattern in this language, else in its first, else in any: {language, name, text, alt}. */
 function labelOf(bundle, pattern) {
   const texts = bundle.patterns[pattern].texts ?? {};
-  return texts[root.lang] ?? texts[site.languages[0]] ?? Object.values(texts)[0]
-    ?? { name: bundle.patterns[pattern].title, text: '' };
+  const language = [root.lang, site.languages[0], ...Object.keys(texts)].find((each) => texts[each]);
+  return { language: language ?? '', name: bundle.patterns[pattern].title, text: '', alt: '', ...texts[language] };
 }
 
 // ---- the cover ----
@@ -77,13 +118,19 @@ function currentBundle() {
   return site.bundles[Number($('bundle').value) || 0];
 }
 
+/** Where a hint's picture is: in the site's folder, or in what an update has brought. */
+async function addressOf(image) {
+  if (!currentBundle().installed) return image;
+  const blob = await installedFile(SCOPE, image);
+  return blob ? URL.createObjectURL(blob) : '';
+}
+
 function showPlates() {
-  const { patterns, installed } = currentBundle();
+  const { patterns } = currentBundle();
   const plate = ({ image, width, height, title }, described) => {
     const picture = document.createElement('img');
     Object.assign(picture, { width, height, alt: described ? title : '', decoding: 'async' });
-    if (!installed) picture.src = image;
-    else installedFile(SCOPE, image).then((blob) => { if (blob) picture.src = URL.createObjectURL(blob); });
+    addressOf(image).then((address) => { picture.src = address; });
     return picture;
   };
   $('plates').replaceChildren(...patterns.map((pattern) => plate(pattern, true)));
@@ -122,13 +169,12 @@ function update() {
 
 async function prepare() {
   site = await fetchJson('site.json');
-  root.lang = chooseLanguage(site.languages);
-  words = await fetchJson(`words/${root.lang}.json`);
   document.title = site.title;
   $('title').textContent = site.title;
   await chooseBundles();
-  showWords();
-  showPlates();
+  await useLanguage(chooseLanguage(site.languages));
+  showLanguages();
+  showLinks();
   if (!navigator.connection?.saveData) loadBundle().catch(() => {});  // the start button tells what is wrong
   update();
 }
@@ -144,86 +190,71 @@ const BY_CODE = {
   'web.insecure': 'insecure', 'web.old': 'old', 'web.ended': 'ended', 'web.worker': 'other',
 };
 
+/** What the browser of another app may lack, and the phone's own has. */
+const OF_HOSTS = ['refused', 'none', 'busy', 'old'];
+
 function kindOf(error) {
-  if (!(error instanceof ModarError)) return BY_NAME[error?.name] ?? 'other';
-  return BY_CODE[error.code] ?? (error.code.startsWith('gl.') ? 'webgl' : 'bundle');
+  const byCode = ({ code }) => BY_CODE[code] ?? (code.startsWith('gl.') ? 'webgl' : 'bundle');
+  const kind = error instanceof ModarError ? byCode(error) : BY_NAME[error?.name] ?? 'other';
+  return hostApp() && OF_HOSTS.includes(kind) ? 'host' : kind;
 }
 
 function tell(error) {
   stop();
   const kind = kindOf(error);
   const [title, cure] = words?.errors[kind] ?? ['The page could not be loaded', 'Check the network and load it again.'];
-  $('problem-title').textContent = title;
-  $('problem-cure').textContent = cure;
-  $('problem-detail').textContent = ['refused', 'none', 'insecure'].includes(kind) ? '' : String(error?.message ?? error);
+  const host = { app: hostApp(), browser: ownBrowser() };
+  $('problem-title').textContent = fill(title, host);
+  $('problem-cure').textContent = fill(cure, host);
+  const plain = ['refused', 'none', 'insecure'].includes(kind);
+  $('problem-detail').textContent = kind === 'host' ? location.href : plain ? '' : String(error?.message ?? error);
+  $('copy').hidden = kind !== 'host';
+  $('again').hidden = kind === 'host';
+  // Models can be looked at wherever they can be drawn.
+  $('look-instead').hidden = !words || ['webgl', 'network', 'bundle', 'memory', 'other'].includes(kind);
   setState('error');
   root.dataset.error = kind;
   if (!$('problem').open) $('problem').showModal();
 }
 
-// ---- the camera ----
-
-function cameraKey(track) {
-  const { deviceId = '' } = track.getSettings();
-  return `modar-focal:${deviceId || track.label}`;
-}
-
-function rememberedFocal(track) {
+/** For another browser. Where the clipboard is closed, the address is selected, to be copied by hand. */
+async function copyAddress() {
   try {
-    const [focal, focalSide] = JSON.parse(localStorage.getItem(cameraKey(track)) ?? '[0, 0]');
-    return { focal, focalSide };
+    await navigator.clipboard.writeText(location.href);
+    $('copy').textContent = say('copied');
   } catch {
-    return { focal: 0, focalSide: 0 };  // storage that is switched off costs a measurement, no more
+    getSelection().selectAllChildren($('problem-detail'));
   }
 }
 
-function rememberFocal({ foundFocal, camera }) {
-  try {
-    const [track] = stream.getVideoTracks();
-    localStorage.setItem(cameraKey(track), JSON.stringify([foundFocal, Math.max(camera.width, camera.height)]));
-  } catch { /* as above */ }
-}
+// ---- the camera ----
 
-/** Asks for the camera and shows it. */
-async function openStream() {
-  if (!globalThis.isSecureContext) throw new ModarError({ code: 'web.insecure', cause: 'the page came by http' });
-  if (!navigator.mediaDevices?.getUserMedia) throw new ModarError({ code: 'web.old', cause: 'this browser opens no camera' });
-  const video = { width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } };
-  if (chosenCamera) video.deviceId = { exact: chosenCamera };
-  else video.facingMode = { ideal: facing };
-  stream = await navigator.mediaDevices.getUserMedia({ video, audio: false });
-  const [track] = stream.getVideoTracks();
-  track.addEventListener('ended', () => tell(new ModarError({ code: 'web.ended', cause: 'the camera ended' })));
-  const settings = track.getSettings();
-  facing = settings.facingMode ?? facing;
-  gesture.mirror = settings.facingMode === 'user';
-  $('video').srcObject = stream;
-  await $('video').play();
+async function openCamera() {
+  await camera.open($('video'), () => tell(new ModarError({ code: 'web.ended', cause: 'the camera ended' })));
+  gesture.mirror = camera.mirrored;
   performance.mark('camera');
 }
 
 /** Tracks in what the camera brings, with the tools that it has. */
 async function follow() {
-  const [track] = stream.getVideoTracks();
-  await modar.start($('video'), { ...rememberedFocal(track), extended: true });
-  const devices = (await navigator.mediaDevices.enumerateDevices()).filter(({ kind }) => kind === 'videoinput');
-  $('flip').hidden = devices.length < 2;
-  $('torch').hidden = !track.getCapabilities?.().torch;
+  await modar.start($('video'), { ...camera.focal, extended: true });
+  $('flip').hidden = (await camera.list()).length < 2;
+  $('torch').hidden = !camera.track.getCapabilities?.().torch;
   $('torch').setAttribute('aria-pressed', 'false');
-  $('full').hidden = !document.fullscreenEnabled;
+  $('record').hidden = !canRecord();
 }
 
 function closeCamera() {
+  recorder?.stop();
   modar?.stop();
-  for (const track of stream?.getTracks() ?? []) track.stop();
-  stream = null;
+  camera.close();
   $('video').srcObject = null;
 }
 
 async function reopenCamera() {
   closeCamera();
   try {
-    await openStream();
+    await openCamera();
     await follow();
   } catch (error) {
     tell(error);
@@ -251,7 +282,7 @@ async function openBundle(bundle) {
   modar = opened;
   modar.bytes = null;  // the engines have their own copies
   modar.addEventListener('frame', ({ detail }) => onFrame(detail));
-  modar.addEventListener('dropped', ({ detail }) => { if (stream) view.show(detail.source, gesture); });
+  modar.addEventListener('dropped', ({ detail }) => { if (camera.stream) view.show(detail.source, gesture); });
   modar.addEventListener('error', ({ detail }) => tell(detail));
 }
 
@@ -299,16 +330,12 @@ async function start() {
     const loaded = loadBundle();
     loaded.catch(() => {});  // told below, after the camera's own troubles
     await allowMotion();  // first: iOS asks for it within the click only
-    await openStream();
+    await openCamera();
     await loaded;
     await follow();
-    $('cover').hidden = true;
-    $('stage').hidden = false;
     unseenSince = performance.now();
-    scenePattern = -1;
     $('reason').textContent = lookWords();
-    setState('looking');
-    $('models').focus({ preventScroll: true });
+    enter('looking');
   } catch (error) {
     tell(error);
   } finally {
@@ -316,8 +343,47 @@ async function start() {
   }
 }
 
+/** Shows the stage instead of the cover. */
+function enter(state) {
+  $('cover').hidden = true;
+  $('stage').hidden = false;
+  scenePattern = -1;
+  $('full').hidden = !document.fullscreenEnabled;
+  setState(state);
+  $('models').focus({ preventScroll: true });
+}
+
+// ---- a look without a camera ----
+
+async function lookAround() {
+  $('look').disabled = true;
+  try {
+    await loadBundle();
+    const { patterns } = currentBundle();
+    $('scene').replaceChildren(...patterns.map((_, i) => new Option(labelOf(currentBundle(), i).name, i)));
+    $('which').hidden = patterns.length < 2;
+    enter('around');
+    table = new Turntable(view, $('ground'));
+    await showScene(0);
+  } catch (error) {
+    tell(error);
+  } finally {
+    $('look').disabled = false;
+  }
+}
+
+async function showScene(pattern) {
+  const picture = currentBundle().patterns[pattern];
+  Object.assign($('ground'), { width: picture.width, height: picture.height, src: await addressOf(picture.image) });
+  table.show(pattern, picture);
+  showLabel(pattern);
+}
+
 function stop() {
   closeCamera();
+  table?.close();
+  table = null;
+  $('which').hidden = true;
   if (document.fullscreenElement) document.exitFullscreen();
   $('stage').hidden = true;
   $('cover').hidden = false;
@@ -352,16 +418,16 @@ function showLabel(pattern) {
     $('label').hidden = true;
     return;
   }
-  const { name, text } = labelOf(currentBundle(), pattern);
+  const { language, name, text, alt } = labelOf(currentBundle(), pattern);
   $('label-name').textContent = name;
   $('label-text').textContent = text;
-  $('label').hidden = false;
+  Object.assign($('label'), { hidden: false, lang: language, dir: language ? directionOf(language) : '' });
   const models = modar.scenes.filter((scene) => scene.pattern === pattern).map(({ model }) => model);
-  $('models').setAttribute('aria-label', say('seen', { name: models.join(', '), pattern: currentBundle().patterns[pattern].title }));
+  $('models').setAttribute('aria-label', say('seen', { name: alt || models.join(', '), pattern: name }));
 }
 
 function onFrame(frame) {
-  if (!stream) return;
+  if (!camera.stream) return;
   if (root.dataset.state === 'looking' && frame.reason === 'visible') performance.mark('tracked');
   try {
     view.draw(frame, gesture);
@@ -369,7 +435,9 @@ function onFrame(frame) {
     tell(error);
     return;
   }
-  if (frame.foundFocal) rememberFocal(frame);
+  camera.copied(frame.copyMs);
+  recorder?.add();
+  if (frame.foundFocal) camera.keepFocal(frame.foundFocal, Math.max(frame.camera.width, frame.camera.height));
   const now = performance.now();
   let first = -1;
   for (let p = modar.patterns.length - 1; p >= 0; --p) {
@@ -404,7 +472,10 @@ function listenToGestures(canvas) {
     if (!finger) return;
     const before = fingers.size === 2 ? spread() : 0;
     // Across the whole canvas: one turn.
-    if (fingers.size === 1) gesture.turn += ((event.clientX - finger.x) / canvas.clientWidth) * 2 * Math.PI;
+    if (fingers.size === 1) {
+      turn(((event.clientX - finger.x) / canvas.clientWidth) * 2 * Math.PI);
+      tilt(((event.clientY - finger.y) / canvas.clientHeight) * Math.PI);
+    }
     finger.x = event.clientX;
     finger.y = event.clientY;
     if (before > 0) resize(spread() / before);
@@ -418,54 +489,100 @@ function listenToGestures(canvas) {
   }, { passive: false });
 }
 
-function resize(factor) {
-  gesture.size = Math.min(LARGEST, Math.max(SMALLEST, gesture.size * factor));
+/** What a visitor's hand moves: models before the camera at the next frame, the turntable at once. */
+function change(by) {
+  by(table?.gesture ?? gesture);
+  table?.touched();
+}
+
+const turn = (radians) => change((held) => { held.turn += radians; });
+const resize = (factor) => change((held) => { held.size = Math.min(LARGEST, Math.max(SMALLEST, held.size * factor)); });
+/** Of the turntable alone: before the camera, the visitor walks. */
+const tilt = (radians) => { if (table) change((held) => { held.tilt += radians; }); };
+
+function undo() {
+  Object.assign(gesture, { turn: 0, size: 1 });
+  table?.reset();
 }
 
 const KEYS = {
-  ArrowLeft: () => { gesture.turn -= TURN_A_KEY; },
-  ArrowRight: () => { gesture.turn += TURN_A_KEY; },
+  ArrowLeft: () => turn(-TURN_A_KEY),
+  ArrowRight: () => turn(TURN_A_KEY),
   ArrowUp: () => resize(SIZE_A_KEY),
   ArrowDown: () => resize(1 / SIZE_A_KEY),
+  PageUp: () => tilt(TURN_A_KEY),
+  PageDown: () => tilt(-TURN_A_KEY),
   '+': () => resize(SIZE_A_KEY),
   '-': () => resize(1 / SIZE_A_KEY),
-  0: () => Object.assign(gesture, { turn: 0, size: 1 }),
+  0: () => undo(),
   Escape: () => stop(),
+};
+/** The same for those who do not drag, pinch or type. */
+const HANDLES = {
+  'turn-left': KEYS.ArrowLeft, 'turn-right': KEYS.ArrowRight, larger: KEYS['+'], smaller: KEYS['-'], higher: KEYS.PageUp,
+  lower: KEYS.PageDown, reset: KEYS[0],
 };
 
 // ---- tools ----
 
 async function shoot() {
-  const blob = await view.photograph();
-  const file = new File([blob], 'modar.jpg', { type: 'image/jpeg' });
-  URL.revokeObjectURL($('photo-image').src);
-  $('photo-image').src = URL.createObjectURL(blob);
-  Object.assign($('save'), { href: $('photo-image').src, download: file.name });
+  offer(new File([await view.photograph()], 'modar.jpg', { type: 'image/jpeg' }));
+}
+
+/** A film from the first press to the second, or as long as films get. */
+async function record() {
+  if (recorder) {
+    recorder.stop();
+    return;
+  }
+  const pressed = (on) => $('record').setAttribute('aria-pressed', String(on));
+  try {
+    recorder = new Recorder([$('picture'), $('models')]);
+    pressed(true);
+    const file = await recorder.done;
+    if (file.size) offer(file);
+  } catch (error) {
+    tell(error);
+  } finally {
+    recorder = null;
+    pressed(false);
+  }
+}
+
+/** A photo or film, to be looked at, sent and kept. */
+function offer(file) {
+  const film = file.type.startsWith('video/');
+  URL.revokeObjectURL($('save').href);
+  $('save').href = URL.createObjectURL(file);
+  $('save').download = file.name;
+  $('photo-image').hidden = film;
+  $('film').hidden = !film;
+  $(film ? 'film' : 'photo-image').src = $('save').href;
+  $('photo-title').textContent = say(film ? 'film' : 'photo');
   $('share').hidden = !navigator.canShare?.({ files: [file] });
   $('share').onclick = () => navigator.share({ files: [file], title: site.title }).catch(() => {});  // closing it is no error
   $('photo').showModal();
 }
 
 async function flip() {
-  facing = facing === 'user' ? 'environment' : 'user';
-  chosenCamera = '';
+  camera.flip();
   await reopenCamera();
 }
 
 async function toggleTorch() {
   const lit = $('torch').getAttribute('aria-pressed') !== 'true';
-  await stream.getVideoTracks()[0].applyConstraints({ advanced: [{ torch: lit }] });
+  await camera.track.applyConstraints({ advanced: [{ torch: lit }] });
   $('torch').setAttribute('aria-pressed', String(lit));
 }
 
 async function showCameras() {
-  const devices = (await navigator.mediaDevices.enumerateDevices()).filter(({ kind }) => kind === 'videoinput');
-  const current = stream.getVideoTracks()[0].getSettings().deviceId;
+  const devices = await camera.list();
+  const current = camera.track.getSettings().deviceId;
   $('choose-list').replaceChildren(...devices.map((device, i) => {
     const label = document.createElement('label');
     const input = Object.assign(document.createElement('input'), { type: 'radio', name: 'camera', checked: device.deviceId === current });
     input.addEventListener('change', () => {
-      chosenCamera = device.deviceId;
+      camera.choose(device.deviceId);
       $('choose').close();
       reopenCamera();
     });
@@ -481,40 +598,79 @@ function listen() {
     showPlates();
     loadBundle().catch(() => {});
   });
+  for (const id of ['look', 'look-instead']) {
+    $(id).addEventListener('click', () => {
+      $('problem').close();
+      lookAround();
+    });
+  }
+  $('scene').addEventListener('change', () => showScene(Number($('scene').value)));
+  $('language').addEventListener('change', () => {
+    store(KEPT_LANGUAGE, $('language').value);
+    useLanguage($('language').value).catch(tell);
+  });
+  $('about').addEventListener('click', () => $('notes').showModal());
+  $('notes-close').addEventListener('click', () => $('notes').close());
+  $('forget').addEventListener('click', forget);
+  for (const [id, move] of Object.entries(HANDLES)) $(id).addEventListener('click', move);
+  addEventListener('resize', () => table?.draw());
   $('close').addEventListener('click', stop);
   $('flip').addEventListener('click', flip);
   $('shoot').addEventListener('click', shoot);
+  $('record').addEventListener('click', record);
   $('torch').addEventListener('click', toggleTorch);
   $('cameras').addEventListener('click', showCameras);
   $('full').addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : $('stage').requestFullscreen()));
   $('photo-close').addEventListener('click', () => $('photo').close());
+  $('photo').addEventListener('close', () => $('film').pause());
   $('choose-close').addEventListener('click', () => $('choose').close());
   $('problem-close').addEventListener('click', () => $('problem').close());
+  $('copy').addEventListener('click', copyAddress);
   $('again').addEventListener('click', () => {
     $('problem').close();
     if (words) start();
     else location.reload();
   });
-  $('problem').addEventListener('close', () => { setState('start'); delete root.dataset.error; });
+  $('problem').addEventListener('close', () => {
+    if (root.dataset.state === 'error') setState('start');
+    delete root.dataset.error;
+  });
   listenToGestures($('models'));
   $('stage').addEventListener('keydown', (event) => {
-    if (event.target.localName === 'button' && event.key !== 'Escape') return;
+    if (['button', 'select'].includes(event.target.localName) && event.key !== 'Escape') return;
     if (event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
     event.preventDefault();
     KEYS[event.key]();
   });
   // A page that nobody looks at has no business with the camera.
   document.addEventListener('visibilitychange', () => {
-    if ($('stage').hidden) return;
+    if ($('stage').hidden || table) return;
     if (document.hidden) closeCamera();
     else reopenCamera();
   });
 }
 
+/** Takes from this device all that the page has kept on it. */
+async function forget() {
+  forgotten = true;
+  forgetStored();
+  await keeping;
+  const worker = await navigator.serviceWorker?.getRegistration(SCOPE);
+  if (worker) await navigator.serviceWorker.ready;  // one that is still installing would write on
+  await worker?.unregister();
+  for (const name of await globalThis.caches?.keys() ?? []) if (name.startsWith(`modar ${SCOPE} `)) await caches.delete(name);
+  $('forget').textContent = say('forgotten');
+  $('forget').disabled = true;
+}
+
 /** Keeps the page for visits without a network, once it has what it needs now. */
 function keep() {
-  if (!('serviceWorker' in navigator) || !globalThis.isSecureContext) return;
-  navigator.serviceWorker.register('sw.js').catch(() => {});  // the page works without it, but not offline
+  if (forgotten || !('serviceWorker' in navigator) || !globalThis.isSecureContext) return;
+  keeping = navigator.serviceWorker.register('sw.js').then(({ active }) => active && new Promise((resolve) => {
+    const { port1, port2 } = new MessageChannel();
+    port1.onmessage = resolve;
+    active.postMessage('keep', [port2]);
+  })).catch(() => {});  // the page works without it, but not offline
 }
 
 listen();

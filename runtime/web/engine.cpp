@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
+#include <limits>
 
 #include <GLES2/gl2.h>
 #include <emscripten.h>
@@ -135,6 +136,30 @@ EMSCRIPTEN_KEEPALIVE const char* web_model_name(uint32_t index) {
 EMSCRIPTEN_KEEPALIVE double web_pattern_width_mm(uint32_t index) {
   return modar_pattern_width_mm(engine.bundle, index);
 }
+/// The box of what stands on a pattern, in its space: least x, y, z, then greatest; 0 where nothing
+/// does.
+EMSCRIPTEN_KEEPALIVE const float* web_bounds(uint32_t pattern) {
+  static float bounds[6];
+  const float largest = std::numeric_limits<float>::max();
+  glm::vec3 low(largest);
+  glm::vec3 high(-largest);
+  modar_scene scene;
+  for (uint32_t s = 0; modar_scene_at(engine.bundle, s, &scene) != 0; ++s) {
+    glm::vec3 box[2];
+    if (scene.pattern != pattern) continue;
+    if (modar_model_bounds(engine.bundle, scene.model, &box[0].x, &box[1].x) == 0) continue;
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::vec4 at(box[corner & 1].x, box[corner >> 1 & 1].y, box[corner >> 2].z, 1.0f);
+      const glm::vec3 placed(glm::make_mat4(scene.place) * at);
+      low = glm::min(low, placed);
+      high = glm::max(high, placed);
+    }
+  }
+  if (low.x > high.x) return nullptr;
+  std::memcpy(bounds, &low, sizeof low);
+  std::memcpy(bounds + 3, &high, sizeof high);
+  return bounds;
+}
 /// Which models stand on which patterns. part: 0 pattern, 1 model.
 EMSCRIPTEN_KEEPALIVE uint32_t web_scene(uint32_t index, int part) {
   modar_scene scene{};
@@ -214,6 +239,11 @@ EMSCRIPTEN_KEEPALIVE void web_gray_from_rgba(uint8_t* pixels, size_t count) {
     pixels[i] =
         static_cast<uint8_t>((19595 * rgba[0] + 38470 * rgba[1] + 7471 * rgba[2] + 32768) >> 16);
   }
+}
+/// A gray picture of `factor` times the size becomes width x height, in place.
+EMSCRIPTEN_KEEPALIVE void web_shrink(uint8_t* gray, size_t stride, int width, int height,
+                                     int factor) {
+  modar_shrink(gray, stride, width * factor, height * factor, factor, gray);
 }
 /// Luma of video (16 to 235) brought to 0 to 255, as the player does.
 EMSCRIPTEN_KEEPALIVE void web_widen_luma(uint8_t* gray, size_t count) {

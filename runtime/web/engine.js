@@ -29,7 +29,18 @@ export class ModarError extends Error {
 }
 
 export function hasSimd() {
+  if (typeof WebAssembly !== 'object') {
+    throw new ModarError({ code: 'web.wasm', cause: 'this browser has no WebAssembly', cure: 'update the browser' });
+  }
   return WebAssembly.validate(NEEDS_SIMD);
+}
+
+/** Vite's server before version 8 copies modules into a folder that has no other file of this package. */
+const STRANDED = new URL('./engine-simd.wasm', import.meta.url).pathname.includes('/.vite/deps/');
+
+/** Where that server has a file of this package; null in any other place, where bundlers see the addresses that modules name. */
+export function strandedFile(name) {
+  return STRANDED ? import.meta.url.replace(/\/\.vite\/deps\/.*$/, `/modar/${name}`) : null;
 }
 
 export class Engine {
@@ -42,14 +53,9 @@ export class Engine {
     this.frameBytes = 0;
   }
 
-  /** @param {{simd?: boolean}} options simd: false for the plain build. */
-  static async create({ simd = true } = {}) {
-    if (typeof WebAssembly !== 'object') {
-      throw new ModarError({ code: 'web.wasm', cause: 'this browser has no WebAssembly', cure: 'update the browser' });
-    }
-    const vectors = simd && hasSimd();
-    const { default: load } = await (vectors ? import('./engine-simd.js') : import('./engine-plain.js'));
-    return new Engine(await load(), vectors ? 'simd' : 'plain');
+  /** load: what a build's JavaScript exports. */
+  static async of(load, kind) {
+    return new Engine(await load(STRANDED ? { locateFile: strandedFile } : {}), kind);
   }
 
   #check(exitCode) {
@@ -79,6 +85,14 @@ export class Engine {
     this.scenes = Array.from({ length: m._web_scene_count() }, (_, i) => ({
       pattern: m._web_scene(i, 0), model: m.UTF8ToString(m._web_model_name(m._web_scene(i, 1))),
     }));
+  }
+
+  /** The box of what stands on a pattern, in its space: {low, high}, or null where nothing does. */
+  bounds(pattern) {
+    const address = this.#module._web_bounds(pattern);
+    if (address === 0) return null;
+    const numbers = new Float32Array(this.#module.HEAPU8.buffer, address, 6);
+    return { low: [...numbers.subarray(0, 3)], high: [...numbers.subarray(3)] };
   }
 
   /** Of the camera's frames. focal: in pixels, 0: unknown (the longer side, to begin with). */
@@ -124,6 +138,11 @@ export class Engine {
   /** The frame buffer's RGBA becomes gray, in place. */
   grayFromRgba() {
     this.#module._web_gray_from_rgba(this.frameAt, this.width * this.height);
+  }
+
+  /** The frame buffer's gray picture, `shrink` times the camera's size, becomes that size, in place; its stride is the width. */
+  shrink(stride, shrink) {
+    this.#module._web_shrink(this.frameAt, stride, this.width, this.height, shrink);
   }
 
   /** The frame buffer's luma of video (16 to 235) becomes 0 to 255. */

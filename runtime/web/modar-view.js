@@ -1,9 +1,8 @@
 // Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. Both change in the same
 // task, so picture and models never part.
-import { Engine, ModarError, POSE, POSE_FLOATS } from './engine.js';
+import { Engine, hasSimd, ModarError, POSE, POSE_FLOATS } from './engine.js';
+import { drawFrame, fitCanvases } from './modar.js';
 
-/** Screens of phones have more pixels than a camera's picture or a scan's texture fills. */
-const MOST_PIXELS_A_CSS_PIXEL = 2;
 /** Frames between looks at the room's light, and how wide the copy is that is looked at: reading a picture back is slow. */
 const LIGHT_EVERY = 4;
 const LIGHT_WIDTH = 160;
@@ -19,6 +18,13 @@ function openContext(canvas, webgl1) {
     });
   }
   return { context, version: context2 ? 2 : 1 };
+}
+
+/** The build of the engine that this browser runs. Not for workers, which bundlers do not split. */
+async function openEngine(simd) {
+  const vectors = simd && hasSimd();
+  const { default: load } = await (vectors ? import('./engine-simd.js') : import('./engine-plain.js'));
+  return Engine.of(load, vectors ? 'simd' : 'plain');
 }
 
 export class View {
@@ -43,7 +49,7 @@ export class View {
     view.#picture = picture;
     view.#models = models;
     view.#gl = openContext(models, webgl1);
-    view.#engine = await Engine.create({ simd });
+    view.#engine = await openEngine(simd);
     view.#engine.open(await bytes);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
     view.#engine.upload(false, fixedLight);
@@ -62,41 +68,42 @@ export class View {
     this.#lost = false;
   }
 
-  /** Width, height of both canvases, as large as they are shown. */
-  #fit() {
-    const scale = Math.min(globalThis.devicePixelRatio || 1, MOST_PIXELS_A_CSS_PIXEL);
-    const width = Math.max(1, Math.round(this.#models.clientWidth * scale));
-    const height = Math.max(1, Math.round(this.#models.clientHeight * scale));
-    for (const canvas of [this.#picture, this.#models]) {
-      if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    }
-    return { width, height };
-  }
-
   /** The picture alone, of a frame that nothing is known of. */
-  show(source, gesture = {}) {
-    const width = source.displayWidth ?? source.width;
-    this.#drawPicture(source, { width, height: source.displayHeight ?? source.height }, gesture);
-  }
-
-  #drawPicture(source, camera, gesture) {
-    const { width, height } = this.#fit();
-    const context = this.#picture.getContext('2d', { alpha: false });
-    const cover = Math.max(width / camera.width, height / camera.height);
-    context.setTransform(gesture.mirror ? -cover : cover, 0, 0, cover, width / 2, height / 2);
-    context.drawImage(source, -camera.width / 2, -camera.height / 2, camera.width, camera.height);
-    return { width, height };
+  show(source, gesture) {
+    const camera = { width: source.displayWidth ?? source.width, height: source.displayHeight ?? source.height };
+    drawFrame(this.#picture, { source, camera }, gesture);
   }
 
   /** frame: the detail of modar.js's event. gesture: {mirror, turn (radians), size}. */
   draw({ source, camera, poses }, gesture = {}) {
-    const { width, height } = this.#drawPicture(source, camera, gesture);
+    const { width, height } = fitCanvases(this.#models, this.#picture);
+    drawFrame(this.#picture, { source, camera }, gesture);
     if (this.#lost) return;
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
     this.#engine.poses().set(poses);
     if (!this.#fixedLight) this.#look(source, camera, poses);
     const as = { ...gesture };
     this.#redraw = () => this.#engine.draw(width, height, as);
+    this.#redraw();
+  }
+
+  /** The box of what stands on a pattern, in its space: {low, high}, or null where nothing does. */
+  bounds(pattern) {
+    return this.#engine.bounds(pattern);
+  }
+
+  /**
+   * The models of one pattern alone, without a camera's picture, as a camera sees them that stands anywhere.
+   * view: pattern space to GL's eye space, column-major. focal: CSS pixels
+   */
+  drawFrom(pattern, view, focal) {
+    const size = fitCanvases(this.#models, this.#picture);
+    if (this.#lost) return;
+    this.#engine.setCamera(size.width, size.height, (focal * size.width) / this.#models.clientWidth);
+    const poses = this.#engine.poses().fill(0);
+    poses[pattern * POSE_FLOATS + POSE.shown] = 1;
+    poses.set(view, pattern * POSE_FLOATS + POSE.view);
+    this.#redraw = () => this.#engine.draw(size.width, size.height);
     this.#redraw();
   }
 

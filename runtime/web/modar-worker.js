@@ -1,11 +1,12 @@
-// The worker: one engine that tracks. modar.js sends it one frame at a time.
+// What a worker does: one engine that tracks. modar.js sends it one frame at a time.
 import { Engine, ModarError } from './engine.js';
 
 /** Share of the focal length below which its spread makes it worth keeping for the next start. */
 const KNOWN_FOCAL = 0.03;
 
+let loading;
 let engine;
-let camera = { focal: 0, findFocal: false };
+let camera = { focal: 0, side: 0, findFocal: true, budget: 0, extended: false };
 let told = false;
 
 function useSize(width, height) {
@@ -16,16 +17,21 @@ function useSize(width, height) {
   engine.track(camera.findFocal, camera.budget, camera.extended);
 }
 
-/** The frame's luma into the engine's buffer; its stride, or 0 where this frame cannot be read so. */
-async function takeVideoFrame(frame) {
+/** The frame's luma into the engine's buffer, its sides divided by `shrink`; its stride, or 0 where it cannot be read so. */
+async function takeVideoFrame(frame, shrink) {
   const planar = frame.format === 'I420' || frame.format === 'NV12';
   if (!planar || frame.rotation || frame.flip) return 0;
   const { width, height } = frame.visibleRect;
   const layout = await frame.copyTo(engine.frameBuffer(frame.allocationSize()));
-  useSize(width, height);
   if (layout[0].offset !== 0) return 0;
-  if (frame.colorSpace?.fullRange === false) engine.widenLuma(layout[0].stride);
-  return layout[0].stride;
+  let { stride } = layout[0];
+  useSize(Math.floor(width / shrink), Math.floor(height / shrink));
+  if (shrink > 1) {
+    engine.shrink(stride, shrink);
+    stride = engine.width;
+  }
+  if (frame.colorSpace?.fullRange === false) engine.widenLuma(stride);
+  return stride;
 }
 
 function takePixels({ width, height, pixels, kind }) {
@@ -39,7 +45,7 @@ async function track(message) {
   const began = performance.now();
   let stride = 0;
   if (message.frame) {
-    stride = await takeVideoFrame(message.frame);
+    stride = await takeVideoFrame(message.frame, message.shrink);
     message.frame.close();
   } else {
     stride = takePixels(message);
@@ -72,8 +78,8 @@ function lumaOf(stride) {
 }
 
 const answers = {
-  async prepare({ simd }) {
-    engine = await Engine.create({ simd });
+  async prepare() {
+    engine = await loading;
     return { type: 'prepared' };
   },
   open({ bytes }) {
@@ -89,13 +95,20 @@ const answers = {
   frame: track,
 };
 
-self.onmessage = async ({ data }) => {
+async function answer({ data }) {
   try {
-    const answer = await answers[data.type](data);
-    self.postMessage({ ...answer, call: data.call });
+    const told = await answers[data.type](data);
+    self.postMessage({ ...told, call: data.call });
   } catch (error) {
     data.frame?.close();
     const told = error instanceof ModarError ? error.plain() : { code: 'web.worker', cause: String(error.message ?? error) };
     self.postMessage({ type: 'failed', call: data.call, error: told });
   }
-};
+}
+
+/** Starts this worker with one of the builds of the engine. @see Engine.of */
+export function serve(load, kind) {
+  loading = Engine.of(load, kind);
+  loading.catch(() => {});  // answered to the first message
+  self.onmessage = answer;
+}

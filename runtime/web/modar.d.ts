@@ -83,6 +83,7 @@ interface ModarEvents {
   found: CustomEvent<Sighting>;
   updated: CustomEvent<Sighting>;
   lost: CustomEvent<{ pattern: number; name: string; time: number; reason: string }>;
+  /** After the events of this frame's patterns: draw now. */
   frame: CustomEvent<Frame>;
   /** While nothing is known: a frame that came during a search and is not looked at. Draw it as in `frame`. */
   dropped: CustomEvent<{ source: VideoFrame | HTMLCanvasElement; time: number }>;
@@ -120,11 +121,18 @@ export class Modar extends EventTarget {
    * last frame, as a gyroscope says: a rotation vector, radians, in camera space.
    */
   step(gray: Uint8Array, width: number, height: number, time: number, turn?: [number, number, number]): Promise<Frame>;
-  addEventListener<K extends keyof ModarEvents>(type: K, listener: (event: ModarEvents[K]) => void): void;
+  addEventListener<K extends keyof ModarEvents>(
+    type: K, listener: (event: ModarEvents[K]) => void, options?: boolean | AddEventListenerOptions): void;
+  addEventListener(
+    type: string, listener: EventListenerOrEventListenerObject | null, options?: boolean | AddEventListenerOptions): void;
+  removeEventListener<K extends keyof ModarEvents>(
+    type: K, listener: (event: ModarEvents[K]) => void, options?: boolean | EventListenerOptions): void;
+  removeEventListener(
+    type: string, listener: EventListenerOrEventListenerObject | null, options?: boolean | EventListenerOptions): void;
 }
 
 /** Opens a bundle: its address, or its bytes. Errors: ModarError. */
-export function load(bundle: string | URL | ArrayBuffer, options?: {
+export function load(bundle: string | URL | ArrayBuffer | Uint8Array, options?: {
   /** false: the build without SIMD, which sees the same. */
   simd?: boolean;
   onProgress?: (got: number, total: number) => void;
@@ -136,5 +144,13 @@ export function load(bundle: string | URL | ArrayBuffer, options?: {
  */
 export function allowMotion(): Promise<boolean>;
 
-/** GL's projection for a viewport that shows the whole frame. */
-export function projectionOf(camera: Camera, near?: number, far?: number): Float32Array;
+/** GL's projection for a viewport that the frame fills, cropped where shapes differ; without one, for the whole frame. */
+export function projectionOf(
+  camera: Camera, near?: number, far?: number, viewport?: { width: number; height: number }): Float32Array;
+
+/**
+ * Draws the frame that was tracked so that it fills the canvas, in the handler of `frame`: of a video that plays on under its
+ * models, these lie where it was. Makes the canvas as large as it is shown. @returns its size in pixels, for projectionOf().
+ */
+export function drawFrame(
+  canvas: HTMLCanvasElement, frame: Pick<Frame, 'source' | 'camera'>, options?: { mirror?: boolean }): { width: number; height: number };

@@ -6,7 +6,7 @@
 //   await modar.start(video);
 //
 // Types and words: modar.d.ts. The drawing of a bundle's own models is in modar-view.js.
-import { ModarError, POSE, POSE_FLOATS } from './engine.js';
+import { hasSimd, ModarError, POSE, POSE_FLOATS, strandedFile } from './engine.js';
 import { allowMotion, Gyroscope } from './gyroscope.js';
 
 export { allowMotion, ModarError };
@@ -38,13 +38,23 @@ async function fetchBundle(address, onProgress) {
   return new Uint8Array(await new Blob(parts).arrayBuffer());
 }
 
+/** Bundlers follow an address that is written out in the call. */
+function openWorker(simd) {
+  const stranded = strandedFile(`modar-worker-${simd ? 'simd' : 'plain'}.js`);
+  if (stranded) return new Worker(stranded, { type: 'module' });
+  return simd ? new Worker(new URL('./modar-worker-simd.js', import.meta.url), { type: 'module' })
+    : new Worker(new URL('./modar-worker-plain.js', import.meta.url), { type: 'module' });
+}
+
 /** A worker whose answers are promises; frames wait for one another. */
 class Tracker {
-  #worker = new Worker(new URL('./modar-worker.js', import.meta.url), { type: 'module' });
+  #worker;
   #waiting = new Map();
   #calls = 0;
 
-  constructor() {
+  /** simd: false for the plain build of the engine. */
+  constructor(simd) {
+    this.#worker = openWorker(simd && hasSimd());
     this.#worker.onmessage = ({ data }) => {
       const { resolve, reject } = this.#waiting.get(data.call);
       this.#waiting.delete(data.call);
@@ -77,41 +87,56 @@ class Tracker {
   }
 }
 
-/** Takes frames from a video: VideoFrame where the browser has it, else a canvas that is read back. */
+/**
+ * Frames are tracked with a longer side from this to twice it, pixels: features are found there as well as in larger ones,
+ * for a fraction of the time. What is shown stays as large as the camera gives it.
+ */
+const TRACKED_SIDE = 640;
+
+/** By how much the sides of a frame are divided before it is tracked. */
+const shrinkOf = (width, height) => Math.max(1, Math.floor(Math.max(width, height) / TRACKED_SIDE));
+
+/** Takes frames from a video: VideoFrame where the browser has it, else canvases, the smaller of which is read back. */
 class FrameGrabber {
   #video;
-  #canvas = document.createElement('canvas');
-  #context = null;
+  /** Not in use: one is shown, one is tracked and one waits at most. */
+  #canvases = [];
+  #small = null;
   useCanvas = typeof VideoFrame !== 'function';
 
   constructor(video) {
     this.#video = video;
   }
 
-  /** {source, message, transfer}: what to draw, and what the worker is told. */
+  /** {source, message, transfer, release}: what to draw until release(), and what the worker is told. */
   grab(time) {
     const { videoWidth: width, videoHeight: height } = this.#video;
-    if (!this.useCanvas) {
-      const source = new VideoFrame(this.#video, { timestamp: Math.round(time * 1e6) });
-      const frame = source.clone();
-      return { source, time, message: { type: 'frame', time, frame }, transfer: [frame] };
-    }
-    this.#context ??= this.#canvas.getContext('2d', { willReadFrequently: true, alpha: false });
-    if (this.#canvas.width !== width || this.#canvas.height !== height) {
-      Object.assign(this.#canvas, { width, height });
-    }
-    this.#context.drawImage(this.#video, 0, 0);
-    const pixels = this.#context.getImageData(0, 0, width, height).data.buffer;
+    const shrink = shrinkOf(width, height);
+    if (this.useCanvas) return this.#copy(time, width, height, shrink);
+    const source = new VideoFrame(this.#video, { timestamp: Math.round(time * 1e6) });
+    const frame = source.clone();
     return {
-      source: this.#canvas, time, transfer: [pixels],
-      message: { type: 'frame', kind: 'rgba', time, width, height, pixels },
+      source, time, message: { type: 'frame', time, frame, shrink }, transfer: [frame],
+      release: () => { frame.close(); source.close(); },
     };
   }
-}
 
-function release(grabbed) {
-  grabbed?.message.frame?.close();
-  if (typeof VideoFrame === 'function' && grabbed?.source instanceof VideoFrame) grabbed.source.close();
+  #copy(time, width, height, shrink) {
+    const source = this.#canvases.pop() ?? document.createElement('canvas');
+    if (source.width !== width || source.height !== height) Object.assign(source, { width, height });
+    source.getContext('2d', { alpha: false }).drawImage(this.#video, 0, 0);
+    const size = { width: Math.floor(width / shrink), height: Math.floor(height / shrink) };
+    this.#small ??= document.createElement('canvas').getContext('2d', { willReadFrequently: true, alpha: false });
+    const { canvas } = this.#small;
+    if (canvas.width !== size.width || canvas.height !== size.height) Object.assign(canvas, size);
+    this.#small.imageSmoothingQuality = 'medium';
+    this.#small.drawImage(source, 0, 0, size.width, size.height);
+    const pixels = this.#small.getImageData(0, 0, size.width, size.height).data.buffer;
+    return {
+      source, time, message: { type: 'frame', kind: 'rgba', time, ...size, pixels }, transfer: [pixels],
+      release: () => this.#canvases.push(source),
+    };
+  }
 }
 
 /**
@@ -134,17 +159,45 @@ function onFrames(video, callback) {
   return () => (byFrame ? video.cancelVideoFrameCallback(handle) : cancelAnimationFrame(handle));
 }
 
-/** GL's projection: pixels of a frame land on a viewport that shows it, as modar_projection() has it. */
-export function projectionOf({ width, height, focal }, near = 0.05, far = 100) {
+/** How much larger a frame is shown where it fills a viewport. */
+const coverScale = (camera, { width, height }) => Math.max(width / camera.width, height / camera.height);
+
+/** @see modar.d.ts */
+export function projectionOf(camera, near = 0.05, far = 100, viewport = camera) {
+  const scale = 2 * camera.focal * coverScale(camera, viewport);
   return Float32Array.of(
-    (2 * focal) / width, 0, 0, 0,
-    0, (2 * focal) / height, 0, 0,
+    scale / viewport.width, 0, 0, 0,
+    0, scale / viewport.height, 0, 0,
     0, 0, -(far + near) / (far - near), -1,
     0, 0, (-2 * far * near) / (far - near), 0);
 }
 
+/** Screens of phones have more pixels than a camera's picture or a scan's texture fills. */
+const MOST_PIXELS_A_CSS_PIXEL = 2;
+
+/** Makes canvases as large as the first of them is shown. @returns {width, height}, pixels */
+export function fitCanvases(...canvases) {
+  const scale = Math.min(globalThis.devicePixelRatio || 1, MOST_PIXELS_A_CSS_PIXEL);
+  const width = Math.max(1, Math.round(canvases[0].clientWidth * scale));
+  const height = Math.max(1, Math.round(canvases[0].clientHeight * scale));
+  for (const canvas of canvases) {
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  }
+  return { width, height };
+}
+
+/** @see modar.d.ts */
+export function drawFrame(canvas, { source, camera }, { mirror = false } = {}) {
+  const viewport = fitCanvases(canvas);
+  const context = canvas.getContext('2d', { alpha: false });
+  const scale = coverScale(camera, viewport);
+  context.setTransform(mirror ? -scale : scale, 0, 0, scale, viewport.width / 2, viewport.height / 2);
+  context.drawImage(source, -camera.width / 2, -camera.height / 2, camera.width, camera.height);
+  return viewport;
+}
+
 export class Modar extends EventTarget {
-  #tracker = new Tracker();
+  #tracker;
   #stopFrames = null;
   #waiting = null;
   #busy = false;
@@ -159,8 +212,9 @@ export class Modar extends EventTarget {
   static async open(bundle, { simd = true, onProgress } = {}) {
     const given = typeof bundle === 'string' || bundle instanceof URL;
     const modar = new Modar();
+    modar.#tracker = new Tracker(simd);
     // The engine is compiled while the bundle comes.
-    const prepared = modar.#tracker.ask({ type: 'prepare', simd });
+    const prepared = modar.#tracker.ask({ type: 'prepare' });
     prepared.catch(() => {});  // told below
     try {
       modar.bytes = given ? await fetchBundle(bundle, onProgress) : new Uint8Array(bundle);
@@ -194,7 +248,7 @@ export class Modar extends EventTarget {
     this.#gyroscope = null;
     this.#trackedAt = undefined;
     ++this.#runs;
-    release(this.#waiting);
+    this.#waiting?.release();
     this.#waiting = null;
   }
 
@@ -213,7 +267,9 @@ export class Modar extends EventTarget {
   #take(time, captured, run) {
     let grabbed;
     try {
+      const began = performance.now();
       grabbed = { ...this.#grabber.grab(time), captured };
+      grabbed.grabMs = performance.now() - began;
     } catch (error) {
       this.#grabber.useCanvas = true;
       return;
@@ -223,7 +279,7 @@ export class Modar extends EventTarget {
       const { source } = this.#waiting;
       this.dispatchEvent(new CustomEvent('dropped', { detail: { source, time: this.#waiting.time } }));
     }
-    release(this.#waiting);
+    this.#waiting?.release();
     this.#waiting = grabbed;
     if (!this.#busy) this.#pump(run);
   }
@@ -245,16 +301,14 @@ export class Modar extends EventTarget {
       } catch (error) {
         if (run === this.#runs) this.dispatchEvent(new CustomEvent('error', { detail: error }));
       }
-      // The worker closed its own copy.
-      if (grabbed.source !== undefined) release({ message: {}, source: grabbed.source });
+      grabbed.release();
     }
     this.#busy = false;
   }
 
-  #tell(answer, { source, time }) {
+  #tell(answer, { source, time, grabMs }) {
     const { poses } = answer;
     const camera = { width: answer.width, height: answer.height, focal: answer.focal, focalSigma: answer.focalSigma };
-    this.dispatchEvent(new CustomEvent('frame', { detail: { ...answer, camera, source, time } }));
     let projection = null;
     for (let pattern = 0; pattern < this.patterns.length; ++pattern) {
       const pose = poses.subarray(pattern * POSE_FLOATS, (pattern + 1) * POSE_FLOATS);
@@ -276,6 +330,7 @@ export class Modar extends EventTarget {
       }
       this.#known[pattern] = shown;
     }
+    this.dispatchEvent(new CustomEvent('frame', { detail: { ...answer, copyMs: grabMs + answer.copyMs, camera, source, time } }));
   }
 }
 

@@ -8,15 +8,22 @@ const INSTALLED = `${OURS}installed`;  // by updates, see installed.js
 const SIMD = WebAssembly.validate(Uint8Array.of(
   0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11));
 
-self.addEventListener('install', (event) => {
+async function keepAll() {
   const other = SIMD ? 'engine-plain.' : 'engine-simd.';
   const files = SITE.files.filter((file) => !file.startsWith(other));
   // Past the browser's own cache, where files of an older site may lie; but what has its hash in its address is the
   // same wherever it lies, and the page has just loaded it.
   const cacheOf = (file) => (file.includes('?v=') ? 'force-cache' : 'no-cache');
   const requests = ['./', ...files].map((file) => new Request(file, { cache: cacheOf(file) }));
-  event.waitUntil(caches.open(CACHE).then((cache) => cache.addAll(requests)));
-});
+  await (await caches.open(CACHE)).addAll(requests);
+}
+
+self.addEventListener('install', (event) => event.waitUntil(keepAll()));
+
+// A visitor may have deleted what was stored, and come back.
+self.addEventListener('message', (event) => event.waitUntil(
+  caches.has(CACHE).then((kept) => kept || keepAll()).catch(() => caches.delete(CACHE))
+    .then(() => event.ports[0]?.postMessage('done'))));
 
 self.addEventListener('activate', (event) => {
   event.waitUntil(caches.keys().then((names) => Promise.all(
@@ -25,7 +32,6 @@ self.addEventListener('activate', (event) => {
 
 self.addEventListener('fetch', (event) => {
   if (event.request.method !== 'GET') return;
-  event.respondWith(caches.open(CACHE)
-    .then((cache) => cache.match(event.request, { ignoreSearch: true }))
+  event.respondWith(caches.match(event.request, { cacheName: CACHE, ignoreSearch: true })
     .then((kept) => kept ?? fetch(event.request)));
 });

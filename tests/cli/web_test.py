@@ -14,7 +14,7 @@ import unittest
 import urllib.error
 import urllib.request
 
-from programs import BIN, ROOT, ProgramTest
+from programs import BIN, COVER, ROOT, ProgramTest
 
 PAGE = ROOT / "runtime" / "web"
 ENGINES = ("engine-plain.js", "engine-plain.wasm", "engine-simd.js", "engine-simd.wasm")
@@ -49,7 +49,7 @@ class Web(ProgramTest):
     def test_the_folder(self):
         bundle = self.bake_demo("red_vase.modar")
         texts = self.folder / "texts.json"
-        texts.write_text(json.dumps({"cover": {"de": {"name": "Einband", "text": "Um 1890."}, "en": {"name": "Cover"}}}))
+        texts.write_text(json.dumps({"cover": {"de": {"name": "Einband", "text": "Um 1890.", "alt": "Eine Vase"}, "en": {"name": "Cover"}}}))
         done = self.web(bundle, "--title", 'A <b> & "c"', "--languages", "de,en", "--texts", texts, "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         written = json.loads(done.stdout)
@@ -65,13 +65,14 @@ class Web(ProgramTest):
         self.assertEqual((site["title"], site["languages"]), ('A <b> & "c"', ["de", "en"]))
         [pattern] = site["bundles"][0]["patterns"]
         self.assertEqual(site["bundles"][0]["title"], "red vase")
-        self.assertEqual(pattern["texts"], {"de": {"name": "Einband", "text": "Um 1890."}, "en": {"name": "Cover", "text": ""}})
+        self.assertEqual(pattern["texts"], {"de": {"name": "Einband", "text": "Um 1890.", "alt": "Eine Vase"}, "en": {"name": "Cover", "text": ""}})
         hint = self.read(pattern["image"])
         self.assertTrue(hint.startswith(b"\xff\xd8") and hint.endswith(b"\xff\xd9"))
         self.assertLess(len(hint), 45_000)
         frame = hint.index(b"\xff\xc2")  # the header of a progressive frame
         height, width = struct.unpack(">HH", hint[frame + 5:frame + 9])
         self.assertEqual(max(width, height), 512)
+        self.assert_tinted(self.folder / "site" / pattern["image"])
         self.assertAlmostEqual(width / height, pattern["width"] / pattern["height"], delta=0.01)
         self.assertIn(f"<title>{html.escape(site['title'])}</title>", self.read("index.html").decode())
         self.assertEqual(json.loads(self.read("manifest.webmanifest"))["name"], 'A <b> & "c"')
@@ -90,6 +91,43 @@ class Web(ProgramTest):
         for name in json.loads(self.web(bundle, "--title", "One", "--json", output="a").stdout)["files"]:
             self.assertEqual(self.read(name, "a"), self.read(name, "b"), name)
         self.assertNotEqual(self.read("sw.js", "a"), self.read("sw.js", "c"))
+
+    def assert_tinted(self, hint):
+        """The means of 4 x 8 parts of the hint are nearer to the picture's colours than gray is."""
+        def chroma(path):
+            raw = subprocess.run(["ffmpeg", "-loglevel", "error", "-i", path, "-vf", "scale=4:8:flags=area", "-pix_fmt", "rgb24", "-f",
+                                  "rawvideo", "-"], capture_output=True, check=True).stdout
+            parts = zip(raw[0::3], raw[1::3], raw[2::3])
+            return [c - (0.299 * r + 0.587 * g + 0.114 * b) for r, g, b in parts for c in (r, g, b)]
+        truth = chroma(COVER)
+        off = sum(abs(ours - theirs) for ours, theirs in zip(chroma(hint), truth))
+        self.assertLess(off / sum(map(abs, truth)), 0.8)
+
+    def test_languages_are_complete_and_more_can_be_added(self):
+        bundle = self.bake_demo()
+        english = json.loads((PAGE / "words" / "en.json").read_text())
+        shown = lambda text: sorted(re.findall(r"\{\w+\}", text))
+        for file in (PAGE / "words").glob("*.json"):
+            words = json.loads(file.read_text())
+            self.assertEqual(list(words), list(english), file.name)
+            self.assertEqual(list(words["errors"]), list(english["errors"]), file.name)
+            for key, text in english.items():
+                if key != "errors":
+                    self.assertEqual(shown(words[key]), shown(text), f"{file.name}, {key}")
+        more = self.folder / "more"
+        more.mkdir()
+        (more / "cs.json").write_text(json.dumps({**english, "start": "Spustit fotoaparát"}))
+        self.assertEqual(self.web(bundle, "--words", more, "--languages", "cs,pl", "--link", "Imprint=imprint.html").returncode, 0)
+        self.assertIn("Spustit", self.read("words/cs.json").decode())
+        site = json.loads(self.read("site.json"))
+        self.assertEqual((site["languages"], site["links"]), (["cs", "pl"], [{"text": "Imprint", "url": "imprint.html"}]))
+        for without, said in (({**english, "start": ""}, "start"),
+                              ({**english, "errors": {**english["errors"], "busy": ["only one"]}}, "errors/busy")):
+            (more / "cs.json").write_text(json.dumps(without))
+            self.assert_fails(self.web(bundle, "--words", more), 3, "cs.json", said)
+        self.assert_fails(self.web(bundle, "--words", self.folder / "none"), 2, "none")
+        for link in ("Imprint", "=https://example.org", "Bad=javascript:alert(1)", "Bad=/etc/passwd"):
+            self.assert_fails(self.web(bundle, "--link", link), 1, "--link 'Imprint=")
 
     def test_what_it_refuses(self):
         bundle = self.bake_demo()

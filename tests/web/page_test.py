@@ -100,6 +100,35 @@ PHONE = """(() => {
 })()"""
 
 
+# A camera of 1920 x 1440: the clip enlarged, with stripes in a corner; the page asks for its size, and tells what it tracks.
+LARGE = """(async () => {
+  const canvas = Object.assign(document.createElement('canvas'), { width: 1920, height: 1440 });
+  const context = canvas.getContext('2d');
+  const frame = await createImageBitmap(await (await fetch('/clip/frame_00000.png')).blob());
+  const draw = () => {
+    context.drawImage(frame, 0, 0, 1920, 1440);
+    for (let x = 0; x < 200; x += 4) {
+      context.fillStyle = '#000';
+      context.fillRect(x, 0, 2, 200);
+      context.fillStyle = '#fff';
+      context.fillRect(x + 2, 0, 2, 200);
+    }
+    requestAnimationFrame(draw);
+  };
+  draw();
+  navigator.mediaDevices.getUserMedia = async ({ video }) => {
+    globalThis.asked = video;
+    return canvas.captureStream(30);
+  };
+  const { View } = await import('/modar-view.js');
+  const shown = View.prototype.draw;
+  View.prototype.draw = function (detail, ...rest) {
+    globalThis.tracked = [detail.camera.width, detail.camera.height];
+    return shown.call(this, detail, ...rest);
+  };
+})()"""
+
+
 def rounded(value):
     """To a float and back, as C does."""
     return struct.unpack("f", struct.pack("f", value))[0]
@@ -115,9 +144,16 @@ class Page(ProgramTest):
         test = cls("run_program")
         test.folder = cls.base
         bundle, site = cls.base / "demo.modar", cls.base / "site"
+        texts = cls.base / "texts.json"
+        texts.write_text(json.dumps({"cover": {"en": {"name": "The book of owls", "text": "A pot.", "alt": "A pot with two handles"},
+                                               "de": {"name": "Das Buch der Eulen"}}}))
+        words = cls.base / "words"
+        words.mkdir()
+        shutil.copy(PAGE / "words" / "en.json", words / "ar.json")  # any words: what is looked at is their direction
         for words in (["bake", "--model", POTTERY, "--pattern", COVER, "--scene", "cover=pottery,scale=0.5", "-o", bundle,
                        "--quiet", "--no-lods", *QUICK],
-                      ["web", bundle, "-o", site, "--title", "Pots & pans", "--quiet"]):
+                      ["web", bundle, "-o", site, "--title", "Pots & pans", "--words", words, "--link", "Imprint=https://example.org/imprint",
+                       "--link", "Write to us=mailto:us@example.org", "--texts", texts, "--quiet"]):
             done = test.modar(*words)
             if done.returncode != 0:
                 raise AssertionError(done.stderr)
@@ -134,7 +170,7 @@ class Page(ProgramTest):
         (site / "played").mkdir()
         shutil.copytree(clip, site / "clip")
         # Both in the light that the bundle has: the page looks at a smaller copy of the camera's picture.
-        plain = [word for word in ["--no-light-estimate"] if word in test.run_program("modar-play", "--help").stdout]
+        plain = [word for word in ["--no-light-estimate"] if word in test.run_program("modar-play", "--help-all").stdout]
         test.run_program("modar-play", bundle, "--input", clip, "--out", site / "played", *plain)
         cls.server = Server(site)
         cls.site = site
@@ -263,7 +299,7 @@ class Page(ProgramTest):
               for each in ("tracked", "seen")]
         print("from the camera to the first tracked frame {:.0f} ms, to the model {:.0f} ms".format(*ms))
         self.keep("stage-portrait.png")
-        self.assertEqual(self.browser.run("document.getElementById('label-name').textContent"), "cover")
+        self.assertEqual(self.browser.run("document.getElementById('label-name').textContent"), "The book of owls")
         # Long after the models were drawn: browsers have emptied their canvas by then. What the picture shows alone is kept.
         self.browser.run("""new Promise((shot) => { setTimeout(() => {
           const picture = document.getElementById('picture');
@@ -312,12 +348,12 @@ class Page(ProgramTest):
             roles = {}
             for node in nodes:
                 role = node["role"]["value"]
-                if role in ("button", "image", "combobox", "heading", "link", "toolbar", "region"):
+                if role in ("button", "image", "combobox", "heading", "link", "toolbar", "region", "application"):
                     roles.setdefault(role, []).append(node.get("name", {}).get("value", ""))
             self.assertIn("button", roles)
             for role, names in roles.items():
                 self.assertNotIn("", names, role)
-        self.assertIn("pottery stands on the picture cover.", roles["image"])
+        self.assertIn("A pot with two handles, standing on the picture The book of owls.", roles["application"])
 
     def test_keys_turn_and_resize(self):
         self.browser.resize(640, 480)
@@ -339,6 +375,194 @@ class Page(ProgramTest):
         self.browser.run("loser.restoreContext()")
         self.browser.wait(f"({DRAWN}) > 500", "models after the loss")
         self.assertEqual(self.browser.run("document.documentElement.dataset.error ?? ''"), "")
+
+    def around(self, address=""):
+        self.browser.open(self.server.url + address)
+        self.browser.wait("document.getElementById('look').textContent !== ''", "the cover")
+        self.browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
+        self.addCleanup(self.browser.call, "Emulation.setEmulatedMedia", features=[])
+        self.browser.run("document.getElementById('look').click()")
+        self.browser.wait("document.documentElement.dataset.state === 'around'", "the turntable")
+
+    def test_a_look_without_a_camera(self):
+        self.browser.resize(390, 844, 2, True)
+        self.around()
+        self.assertTrue(self.browser.run("document.getElementById('video').srcObject === null"))
+        picture = """(async () => {
+          await new Promise(requestAnimationFrame);
+          const { width, height } = document.getElementById('models');
+          const copy = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+          Object.assign(copy.canvas, { width, height });
+          document.getElementById('%s').click();
+          copy.drawImage(document.getElementById('models'), 0, 0);
+          const { data } = copy.getImageData(0, 0, width, height);
+          let [drawn, left] = [0, 0];
+          for (let i = 3; i < data.length; i += 4) if (data[i] === 255) { ++drawn; left += i / 4 %% width < width / 2; }
+          let hash = 0;
+          for (const value of data) hash = (hash * 31 + value) | 0;
+          return [drawn, left / drawn, hash];
+        })()"""
+        first = self.browser.run(picture % "reset")
+        self.assertGreater(first[0], 20000)
+        self.assertAlmostEqual(first[1], 0.5, delta=0.05, msg="the pot stands in the middle")
+        self.keep("around-portrait.png")
+        for handle in ("turn-left", "larger", "higher"):
+            self.assertNotEqual(self.browser.run(picture % handle)[2], first[2], handle)
+            self.assertEqual(self.browser.run(picture % "reset")[2], first[2], handle)
+        self.assertGreater(self.browser.run(picture % "larger")[0], first[0])
+        label = self.browser.run("document.getElementById('label').textContent")
+        self.assertIn("The book of owls", label)
+        self.browser.resize(844, 390, 2, True)
+        self.keep("around-landscape.png")
+        self.assertEqual(self.browser.errors, [])
+        self.browser.run("document.getElementById('close').click()")
+        self.assertFalse(self.browser.run("document.getElementById('cover').hidden"))
+
+    def test_the_picture_lies_where_the_turntables_eye_sees_it(self):
+        self.browser.open(self.server.url)
+        for turn, tilt in ((0, 0.5), (0.7, 0.3), (-2.5, 1.4)):
+            target, distance, focal, (width, height), size = (0.1, -0.2, 0.4), 5.0, 700.0, (390, 844), (300, 500)
+            matrix = self.browser.run("""(async () => {
+              const { groundTransform, viewFrom } = await import('/turntable.js');
+              return groundTransform(viewFrom({ target: %s, turn: %s, tilt: %s, distance: %s }), %s, { width: %s, height: %s }, { width: %s, height: %s });
+            })()""" % (json.dumps(target), turn, tilt, distance, focal, width, height, *size))
+            # An eye on a sphere about the target, its axes from where it is and what is up.
+            back = (math.sin(turn) * math.cos(tilt), -math.cos(turn) * math.cos(tilt), math.sin(tilt))
+            cross = lambda a, b: tuple(a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3] for i in range(3))
+            right = cross((0, 0, 1), back)
+            right = tuple(c / math.hypot(*right) for c in right)
+            up = cross(back, right)
+            for x, y in ((0, 0), (300, 0), (120, 500)):
+                from_eye = tuple(at - (target[i] + distance * back[i]) for i, at in enumerate(((2 * x - 300) / 500, (500 - 2 * y) / 500, 0)))
+                dot = lambda axis: sum(a * b for a, b in zip(axis, from_eye))
+                depth = -dot(back)
+                column = [matrix[i] * x + matrix[4 + i] * y + matrix[12 + i] for i in range(4)]
+                self.assertAlmostEqual(column[0] / column[3], width / 2 + focal * dot(right) / depth, 3)
+                self.assertAlmostEqual(column[1] / column[3], height / 2 - focal * dot(up) / depth, 3)
+
+    def test_a_language_is_chosen_and_kept(self):
+        self.browser.resize(390, 844, 2, True)
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('language').options.length === 9", "the languages")
+        choose = "(() => { const l = document.getElementById('language'); l.value = '%s'; l.dispatchEvent(new Event('change')); })()"
+        self.browser.run(choose % "de")
+        self.browser.wait("document.getElementById('start').textContent === 'Kamera starten'", "German")
+        self.assertEqual(self.browser.run("document.getElementById('caption').textContent"), "Das Buch der Eulen")
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('start').textContent === 'Kamera starten'", "German again")
+        self.browser.open(self.server.url + "?lang=ar")
+        self.browser.wait("document.documentElement.dir === 'rtl'", "right to left")
+        self.keep("cover-from-right.png")
+        self.browser.run("document.getElementById('about').click(), document.getElementById('forget').click()")
+        self.browser.wait("document.getElementById('forget').disabled", "what was kept goes")
+        self.assertEqual(self.browser.run("Object.keys(localStorage).filter((key) => key.startsWith('modar-')).length"), 0)
+        self.assertEqual(self.browser.run("caches.keys().then((names) => names.length)"), 0)
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('start').textContent === 'Start the camera'", "English")
+        self.browser.wait("caches.match('words/en.json').then(Boolean)", "what is kept again")
+        links = self.browser.run("[...document.querySelectorAll('#links a')].map(({ href, textContent }) => [textContent, href])")
+        self.assertEqual(links, [["Imprint", "https://example.org/imprint"], ["Write to us", "mailto:us@example.org"]])
+
+    def test_a_film_shows_the_model(self):
+        self.browser.resize(390, 844, 1, True)
+        self.browser.open(self.server.url)
+        self.browser.run(LARGE)  # stands still
+        self.start()
+        press = "document.getElementById('record').click()"
+        self.browser.run(press)
+        self.browser.run("new Promise((resolve) => setTimeout(resolve, 1500))")
+        self.assertEqual(self.browser.run("document.getElementById('record').getAttribute('aria-pressed')"), "true")
+        self.browser.run(press)
+        self.browser.wait("document.getElementById('photo').open", "the film")
+        # Its last frame against the camera's picture without models.
+        seen = self.browser.run("""(async () => {
+          const film = document.getElementById('film');
+          await new Promise((resolve) => { film.onseeked = resolve; film.currentTime = 1e6; });
+          const { videoWidth: width, videoHeight: height, duration } = film;
+          const copy = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+          Object.assign(copy.canvas, { width, height });
+          const read = (source) => { copy.drawImage(source, 0, 0, width, height); return copy.getImageData(0, 0, width, height).data; };
+          const shot = read(film), alone = read(document.getElementById('picture'));
+          let lit = 0;
+          for (let i = 0; i < shot.length; i += 4) lit += Math.abs(shot[i] - alone[i]) + Math.abs(shot[i + 1] - alone[i + 1]) > 96;
+          return { width, height, seconds: film.currentTime, lit: lit / (width * height), name: document.getElementById('save').download };
+        })()""")
+        print(f"the film: {seen}")
+        self.assertEqual([seen["width"], seen["height"]], [390, 844])
+        self.assertGreater(seen["seconds"], 0.8)
+        self.assertGreater(seen["lit"], 0.03)
+        self.assertLess(seen["lit"], 0.4)
+        self.assertRegex(seen["name"], r"^modar\.(mp4|webm)$")
+        self.assertEqual(self.browser.errors, [])
+
+    def test_a_large_camera_is_tracked_small_and_shown_large(self):
+        self.browser.resize(960, 720, 2)
+        self.browser.open(self.server.url)
+        self.browser.run(LARGE)
+        self.start()
+        seen = self.browser.run("globalThis.asked")
+        self.assertEqual([seen["width"]["ideal"], seen["height"]["ideal"]], [1920, 1080])
+        self.assertEqual(self.browser.run("(async () => { for (;;) { if (globalThis.tracked) return tracked; await new Promise(requestAnimationFrame); } })()"),
+                         [640, 480])
+        # Stripes two pixels wide, which a copy of 640 pixels would make gray.
+        contrast = """(() => {
+          const canvas = document.getElementById('picture');
+          const copy = document.createElement('canvas').getContext('2d');
+          Object.assign(copy.canvas, { width: 64, height: 8 });
+          copy.drawImage(canvas, 100, 100, 64, 8, 0, 0, 64, 8);
+          const row = [...copy.getImageData(0, 4, 64, 1).data].filter((_, i) => i % 4 === 1);
+          return Math.max(...row) - Math.min(...row);
+        })()"""
+        self.assertEqual(self.browser.run("document.getElementById('picture').width"), 1920)
+        self.assertGreater(self.browser.run(contrast), 150)
+        self.assertEqual(self.browser.errors, [])
+
+    def test_a_slow_camera_is_asked_for_less(self):
+        self.browser.open(self.server.url)
+        sizes = self.browser.run("""(async () => {
+          const { Camera } = await import('/camera.js');
+          const camera = new Camera(), asked = [];
+          const track = { applyConstraints: async ({ width }) => { asked.push(width.ideal); } };
+          camera.stream = { getVideoTracks: () => [track] };
+          for (const milliseconds of [2, 30, 30, 30, 30]) for (let i = 0; i < 15; ++i) await camera.copied(milliseconds);
+          return asked;
+        })()""")
+        self.assertEqual(sizes, [1280, 640])
+
+    def test_the_main_camera_is_chosen_and_a_choice_kept(self):
+        self.browser.open(self.server.url)
+        phones = {  # as browsers name them: Android's with four, an iPhone's, one without names
+            "a": ["camera2 1, facing front", "camera2 3, facing back", "camera2 2, facing back", "camera2 0, facing back"],
+            "b": ["Front Camera", "Back Ultra Wide Camera", "Back Dual Wide Camera", "Back Camera", "Back Telephoto Camera"],
+            "c": ["", ""], "d": ["Integrated Webcam"]}
+        found = self.browser.run("""(async () => {
+          const { mainCamera, Camera } = await import('/camera.js');
+          const main = Object.values(%s).map((labels) =>
+            mainCamera(labels.map((label, i) => ({ kind: 'videoinput', label, deviceId: String(i) })))?.label ?? null);
+          new Camera().choose('the third');
+          const kept = localStorage.getItem('modar-camera');
+          new Camera().choose('');
+          return [...main, kept];
+        })()""" % json.dumps(phones))
+        self.assertEqual(found, ["camera2 0, facing back", "Back Camera", None, None, "the third"])
+
+    def test_a_browser_within_an_app_says_where_to_open_the_page(self):
+        agent = "Mozilla/5.0 (iPhone; CPU iPhone OS 17_5 like Mac OS X) AppleWebKit/605.1.15 (KHTML, like Gecko) Mobile/15E148 Instagram 331.0.0.29.90"
+        self.browser.resize(390, 844, 2, True)
+        self.browser.call("Emulation.setUserAgentOverride", userAgent=agent)
+        self.browser.camera("denied")
+        try:
+            self.browser.open(self.server.url)
+            self.start("error")
+            self.assertEqual(self.browser.run("document.documentElement.dataset.error"), "host")
+            words = self.browser.run("document.getElementById('problem').innerText")
+            for word in ("Instagram", "Safari", self.server.url):
+                self.assertIn(word, words)
+            self.assertTrue(self.browser.run("document.getElementById('copy').checkVisibility() && !document.getElementById('again').checkVisibility()"))
+            self.keep("within-an-app.png")
+        finally:
+            self.browser.camera("granted")
+            self.browser.call("Emulation.setUserAgentOverride", userAgent="")
 
     def test_a_hidden_page_stops_the_camera(self):
         self.browser.resize(640, 480)
@@ -380,7 +604,7 @@ class Page(ProgramTest):
     def test_without_the_server_the_second_visit_works(self):
         self.browser.resize(640, 480)
         self.browser.open(self.server.url)
-        self.browser.wait("navigator.serviceWorker.ready.then(() => true)", "the service worker")
+        self.browser.wait("navigator.serviceWorker.ready.then(() => caches.match('words/en.json')).then(Boolean)", "the service worker")
         type(self).server.close()
         try:
             self.browser.open(self.server.url + "?again")
@@ -411,30 +635,31 @@ class Page(ProgramTest):
         installed = run("install", "--no-audit", "--no-fund", packed.stdout.strip(), "three@0.160.0")
         if installed.returncode != 0:
             self.skipTest("npm cannot fetch three.js: " + installed.stderr[-200:])
-        names = {file.name for file in (project / "node_modules" / "modar").iterdir()}
-        self.assertEqual(names, {"package.json", "modar.js", "modar.d.ts", "modar-view.js", "modar-worker.js", "gyroscope.js",
-                                 "engine.js", *(f"engine-{kind}.{end}" for kind in ("simd", "plain") for end in ("js", "wasm"))})
         shutil.copy(ROOT / "runtime" / "web" / "example" / "three.html", project)
         shutil.copy(self.bundle, project)
-        self.browser.resize(640, 480)
-        self.browser.open(self.server.url + "project/three.html")
-        self.browser.wait("globalThis.sighting !== undefined", "a sighting")
-        # The cube's green over the middle of the picture, by the corners that the tracker states.
-        self.browser.wait("""(() => {
-          const { corners, camera } = sighting;
-          const mean = (first) => (corners[first] + corners[first + 2] + corners[first + 4] + corners[first + 6]) / 4;
-          const source = document.querySelector('canvas');
-          const gl = source.getContext('webgl2');
-          const copy = document.createElement('canvas');
-          copy.width = source.width, copy.height = source.height;
-          const context = copy.getContext('2d', { willReadFrequently: true });
-          return new Promise((resolve) => requestAnimationFrame(() => {
-            context.drawImage(source, 0, 0);
-            const x = mean(0) / camera.width * copy.width, y = mean(1) / camera.height * copy.height;
-            const [r, g, b] = context.getImageData(x, y, 1, 1).data;
-            resolve(g > 200 && r < 50 && b < 50);
-          }));
-        })()""", "the cube", 30)
+        # The cube's green over the middle of the picture, by the corners that the tracker states, and the tracked frame around it:
+        # also on a phone, where the frame is cropped.
+        for size in ((640, 480), (390, 844)):
+            self.browser.resize(*size, 2, True)
+            self.browser.open(self.server.url + "project/three.html")
+            self.browser.wait("globalThis.sighting !== undefined", "a sighting")
+            self.browser.wait("""new Promise((resolve) => requestAnimationFrame(() => {
+              const { corners, camera } = sighting;
+              const mean = (first) => (corners[first] + corners[first + 2] + corners[first + 4] + corners[first + 6]) / 4;
+              const [picture, models] = document.querySelectorAll('canvas');
+              const copy = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+              const { width, height } = Object.assign(copy.canvas, { width: models.width, height: models.height });
+              const cover = Math.max(width / camera.width, height / camera.height);
+              const x = width / 2 + cover * (mean(0) - camera.width / 2), y = height / 2 + cover * (mean(1) - camera.height / 2);
+              const mixed = (canvas) => {
+                copy.clearRect(0, 0, width, height);
+                copy.drawImage(canvas, 0, 0);
+                return copy.getImageData(x, y, 1, 1).data;
+              };
+              const [r, g, b] = mixed(models);
+              const frame = mixed(picture);
+              resolve(g > 200 && r < 50 && b < 50 && picture.width === width && frame[3] === 255 && Math.max(...frame.slice(0, 3)) > 20);
+            }))""", f"the cube at {size}", 30)
         self.assertEqual(self.browser.errors, [])
 
 

@@ -1,0 +1,23 @@
+// The picture that a page shows of a pattern, so that visitors find the print.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "formats/bundle_view.hpp"
+#include "formats/error.hpp"
+
+namespace modar {
+
+/// A JPEG file of at most 512 pixels a side and about 45 KB: the gray picture that the tracker
+/// looks for, in the colours of its cells (section 259) where the bundle has them. width, height:
+/// of the tracker's picture. Errors: kInvalidInput "web.pattern".
+struct Hint {
+  std::vector<std::byte> file;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+};
+Result<Hint> hint_of(const BundleView& bundle, std::uint32_t pattern);
+
+}  // namespace modar

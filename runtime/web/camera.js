@@ -1,0 +1,148 @@
+// Which camera a page opens, how large, and where it can be opened at all.
+import { ModarError } from './engine.js';
+import { store, stored } from './storage.js';
+
+/**
+ * What is asked of a camera, best first. The picture is shown as it comes and tracked in a smaller copy; a phone that takes too
+ * long to hand a large one over gets the next.
+ */
+const SIZES = [{ width: 1920, height: 1080 }, { width: 1280, height: 720 }, { width: 640, height: 480 }];
+/** Milliseconds that handing a frame over may take, of 33 between two of them, as the median of so many frames. */
+const MOST_COPY_MS = 12;
+const COPIES = 15;
+
+const KEPT_CAMERA = 'modar-camera';
+
+/** A browser within another app, many of which refuse the camera. @returns its app's name, or '' */
+export function hostApp(agent = navigator.userAgent) {
+  const apps = [
+    [/\bInstagram\b/, 'Instagram'], [/\bFBA[NV]\b|\bFB_IAB\b/, 'Facebook'], [/\bMicroMessenger\b/, 'WeChat'],
+    [/\bLinkedInApp\b/, 'LinkedIn'], [/\b(TikTok|musical_ly|BytedanceWebview)\b/, 'TikTok'], [/\bSnapchat\b/, 'Snapchat'],
+    [/\bPinterest\b/, 'Pinterest'], [/\bLine\//, 'LINE'], [/\bTwitter(Android)?\b/, 'X'], [/\bTelegram\b/, 'Telegram'],
+    [/; wv\)/, 'Android'],
+  ];
+  return apps.find(([mark]) => mark.test(agent))?.[1] ?? '';
+}
+
+/** The browser that this phone has of its own. */
+export function ownBrowser(agent = navigator.userAgent) {
+  return /iPhone|iPad|Macintosh/.test(agent) ? 'Safari' : 'Chrome';
+}
+
+/**
+ * Of cameras that look away from the visitor, the main one: phones have others with wide angles, long lenses or no colour
+ * beside it. Chrome on Android names them "camera2 0, facing back", the main one first; Safari "Back Camera", "Back Ultra Wide
+ * Camera" and others, in the phone's language. @returns undefined where labels do not tell.
+ * @param {{kind: string, label: string, deviceId: string}[]} devices
+ */
+export function mainCamera(devices) {
+  const back = devices.filter(({ kind, label }) => kind === 'videoinput' && /facing back|\bback\b|\brear\b/i.test(label));
+  const plain = back.filter(({ label }) => !/wide|tele|macro|depth|infrared|mono|\btof\b|dual|triple|quad/i.test(label));
+  const number = ({ label }) => Number(/camera2? (\d+)/i.exec(label)?.[1] ?? Infinity);
+  return plain.sort((a, b) => (number(a) < number(b) ? -1 : Number(number(a) > number(b))))[0];
+}
+
+/** A camera that is open: its stream, and what is known of it. */
+export class Camera {
+  stream = null;
+  facing = 'environment';
+  /** The visitor's own choice, for later visits, too. */
+  #chosen = stored(KEPT_CAMERA);
+  #size = 0;
+  #copies = [];
+
+  get track() {
+    return this.stream?.getVideoTracks()[0];
+  }
+
+  get mirrored() {
+    return this.track?.getSettings().facingMode === 'user';
+  }
+
+  /** Shows the camera in the video. onEnd: called where it is taken away. Throws what getUserMedia() throws, or ModarError. */
+  async open(video, onEnd) {
+    if (!globalThis.isSecureContext) throw new ModarError({ code: 'web.insecure', cause: 'the page came by http' });
+    if (!navigator.mediaDevices?.getUserMedia) throw new ModarError({ code: 'web.old', cause: 'this browser opens no camera' });
+    await this.#take(this.#chosen);
+    await this.#preferMain();
+    this.#copies = [];
+    this.track.addEventListener('ended', onEnd);
+    this.facing = this.track.getSettings().facingMode ?? this.facing;
+    video.srcObject = this.stream;
+    await video.play();
+  }
+
+  async #take(deviceId) {
+    const size = SIZES[this.#size];
+    // Cropped or enlarged pictures would be asked of cameras that have none of this size.
+    const wanted = { width: { ideal: size.width }, height: { ideal: size.height }, frameRate: { ideal: 30 }, resizeMode: { ideal: 'none' } };
+    const which = deviceId ? { deviceId: { exact: deviceId } } : { facingMode: { ideal: this.facing } };
+    try {
+      this.stream = await navigator.mediaDevices.getUserMedia({ video: { ...wanted, ...which }, audio: false });
+    } catch (error) {
+      if (!deviceId || error?.name !== 'OverconstrainedError') throw error;
+      this.choose('');  // it is no longer there
+      await this.#take('');
+    }
+  }
+
+  /** Names are told once a camera is open: where another one is the main one, it takes its place. */
+  async #preferMain() {
+    if (this.#chosen || this.facing !== 'environment') return;
+    const main = mainCamera(await this.list());
+    if (!main || main.deviceId === this.track.getSettings().deviceId) return;
+    this.close();
+    await this.#take(main.deviceId).catch(() => this.#take(''));
+  }
+
+  /** Frees it for other pages and programs. */
+  close() {
+    for (const track of this.stream?.getTracks() ?? []) track.stop();
+    this.stream = null;
+  }
+
+  async list() {
+    return (await navigator.mediaDevices.enumerateDevices()).filter(({ kind }) => kind === 'videoinput');
+  }
+
+  /** For the next open(). '': the main one. */
+  choose(deviceId) {
+    this.#chosen = deviceId;
+    store(KEPT_CAMERA, deviceId);
+  }
+
+  flip() {
+    this.facing = this.facing === 'user' ? 'environment' : 'user';
+    this.choose('');
+  }
+
+  /** Told of each frame how long it took to hand over: asks a slow phone's camera for less. */
+  async copied(milliseconds) {
+    this.#copies.push(milliseconds);
+    if (this.#copies.length < COPIES || this.#size + 1 >= SIZES.length) return;
+    const median = this.#copies.sort((a, b) => a - b)[COPIES >> 1];
+    this.#copies = [];
+    if (median <= MOST_COPY_MS) return;
+    const { width, height } = SIZES[++this.#size];
+    await this.track?.applyConstraints({ width: { ideal: width }, height: { ideal: height }, frameRate: { ideal: 30 } }).catch(() => {});
+  }
+
+  /** {focal, focalSide}: what was measured of this camera, or 0. */
+  get focal() {
+    try {
+      const [focal, focalSide] = JSON.parse(stored(this.#key) || '[0, 0]');
+      return { focal, focalSide };
+    } catch {
+      return { focal: 0, focalSide: 0 };
+    }
+  }
+
+  keepFocal(focal, focalSide) {
+    store(this.#key, JSON.stringify([focal, focalSide]));
+  }
+
+  get #key() {
+    const { deviceId = '' } = this.track.getSettings();
+    return `modar-focal:${deviceId || this.track.label}`;
+  }
+}

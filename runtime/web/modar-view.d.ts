@@ -1,0 +1,38 @@
+/** Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. */
+import type { Frame } from './modar.js';
+
+/** How the models of all patterns are changed. */
+export interface Gesture {
+  /** The picture and the models left to right, as a mirror shows them. */
+  mirror?: boolean;
+  /** About the pattern's normal, radians. */
+  turn?: number;
+  size?: number;
+}
+
+export class View {
+  /**
+   * bytes: the bundle, which may still be on its way. picture, models: laid over each other by the page, of one size.
+   * fixedLight: the models' light does not follow the camera's picture. webgl1: for tests. Errors: ModarError.
+   */
+  static create(bytes: Uint8Array | Promise<Uint8Array>, options: {
+    picture: HTMLCanvasElement; models: HTMLCanvasElement; simd?: boolean; webgl1?: boolean; fixedLight?: boolean;
+  }): Promise<View>;
+  /** The picture alone, of a frame that nothing is known of. */
+  show(source: VideoFrame | HTMLCanvasElement, gesture?: Gesture): void;
+  /** In the handler of the event `frame`, with its detail. */
+  draw(frame: Frame, gesture?: Gesture): void;
+  /** The box of what stands on a pattern, in its space; null where nothing does. */
+  bounds(pattern: number): { low: number[]; high: number[] } | null;
+  /**
+   * The models of one pattern alone, as a camera sees them that stands anywhere: for a look without a camera. view: pattern
+   * space to GL's eye space, column-major. focal: CSS pixels.
+   */
+  drawFrom(pattern: number, view: Float32Array, focal: number): void;
+  /** Both canvases in one picture. */
+  photograph(type?: 'image/jpeg' | 'image/png'): Promise<Blob>;
+  /** The version of WebGL that draws. */
+  readonly webgl: 1 | 2;
+  readonly heapBytes: number;
+  readonly gpuBytes: number;
+}

@@ -1,0 +1,37 @@
+// A visitor of the package's: what a strict TypeScript project writes. tests/web/package_test.py builds and opens it.
+import { drawFrame, load, type Modar, projectionOf, type Sighting } from 'modar';
+import { View } from 'modar/view';
+
+declare global {
+  interface Window { result?: string }
+}
+
+async function pictureOf(address: string): Promise<ImageData> {
+  const image = new Image();
+  image.src = address;
+  await image.decode();
+  const context = document.createElement('canvas').getContext('2d')!;
+  Object.assign(context.canvas, { width: image.naturalWidth, height: image.naturalHeight });
+  context.drawImage(image, 0, 0);
+  return context.getImageData(0, 0, image.naturalWidth, image.naturalHeight);
+}
+
+async function main(): Promise<string> {
+  const modar: Modar = await load('demo.modar');
+  const onUpdated = ({ detail }: CustomEvent<Sighting>): void => console.assert(detail.view.length === 16);
+  modar.addEventListener('updated', onUpdated, { passive: true });
+  modar.removeEventListener('updated', onUpdated);
+  modar.addEventListener('error', ({ detail }) => console.error(detail.code));
+  const { data, width, height } = await pictureOf('frame.png');
+  const gray = data.filter((_, i) => i % 4 === 1);
+  const camera = { width, height, focal: width, focalSigma: 0 };
+  let { poses } = await modar.step(new Uint8Array(gray), width, height, 0);
+  for (let i = 1; i < 10 && poses[0] === 0; ++i) ({ poses } = await modar.step(new Uint8Array(gray), width, height, i / 30));
+  const [picture, models] = ['picture', 'models'].map((id) => document.getElementById(id) as HTMLCanvasElement);
+  const view = await View.create(modar.bytes, { picture: picture!, models: models! });
+  const size = drawFrame(picture!, { source: models!, camera });
+  const projection = projectionOf(camera, 0.1, 10, size);
+  return [modar.patterns[0]?.name, poses[0], view.webgl, projection.length].join();
+}
+
+main().then((text) => { window.result = text; }, (error: unknown) => { window.result = String(error); });
