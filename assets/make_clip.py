@@ -118,7 +118,12 @@ def lay(frame, levels, h):
     shrink = (corners[1][0] - corners[0][0]) * (corners[3][1] - corners[0][1]) - (
         corners[1][1] - corners[0][1]) * (corners[3][0] - corners[0][0])
     level = 1 if shrink < 0.42 * full.width * full.height else 0
-    image, size = levels[level], 1 << level
+    warp(frame, levels[level], 1 << level, h, (left, low, right, high))
+
+
+def warp(frame, image, size, h, box):
+    """Draws `image`, a `size`-th of what h maps to the frame, in a box of the frame: left, top, right, bottom."""
+    left, low, right, high = box
     (a, b, c), (d, e, f), (g, i, k) = inverse(h)
     wide, tall, stride, p = image.width - 1, image.height - 1, image.width * 3, image.pixels
     move = (size - 1) / 2

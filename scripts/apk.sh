@@ -2,14 +2,14 @@
 # Makes an Android app of bundles: a signed, aligned APK, with Debian's packages only.
 #   scripts/apk.sh BUNDLE... [--title T] [--id org.museum.vases] [--key FILE] [--out FILE]
 #                  [--release URL --trust K.pub] [--words FILE]
-# --title, --id   what the phone calls the app (ModAR), and its application id (org.modar)
-# --key           keystore (PKCS 12) that signs; its password stands in APK_PASSWORD. Without: a key of your own is made
-#                 once in build/android/debug.p12. Phones take an update only from the key that signed before: keep it.
+# --title, --id   name of the app on the phone (ModAR), and its application id (org.modar)
+# --key           keystore (PKCS 12) that signs, with its password in APK_PASSWORD (default: a new key, made once
+#                 in build/android/debug.p12). Phones accept updates only from the same key: keep it.
 # --release       address of a folder that `modar ship publish` filled, and the key to trust: adds the network permission
-# --words         words.properties: what the screen says, in your language
-# NAME.png, NAME.jpg (what to look for) and NAME.properties (texts) beside NAME.modar go with it.
+# --words         words.properties: the texts of the screen in your language
+# NAME.png or NAME.jpg (the hint) and NAME.properties (texts) next to NAME.modar are included.
 # With ANDROID_NDK set (r25 or newer) it builds the native library for armeabi-v7a, arm64-v8a and x86 (or ANDROID_ABIS), and with
-# --release the installer; without, the APK holds everything else, and it says so. r25 builds for Android 4.4 (API 19)
+# --release the installer; without it the APK has no native library, and the script says so. r25 builds for Android 4.4 (API 19)
 # and later, newer ones for 5.0 (API 21): the manifest says which. MODAR_NDK_FLAGS: further words for CMake.
 # dx and the signatures of Android's classes come from Debian's source packages, once, into build/android/debian (121 MB).
 set -euo pipefail

@@ -43,7 +43,7 @@ THIRD_PARTIES = {
     "assimp/": (r"bake/lab/assimp_peer\.cpp", r"tests/mesh/assimp_oracle\.cpp"),
     "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),
     "bake/lab/tinyobj_library": (r"bake/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),
-    "curl/": (r"runtime/fetch/curl_line\.cpp",),
+    "curl/": (r"runtime/fetch/curl_downloader\.cpp",),
     "httplib.h": (r"bake/web/(http_reader|serve)\.cpp",),
     "openssl/": (r"bake/web/serve\.cpp",),
     "qrencode.h": (r"bake/web/serve\.cpp",),

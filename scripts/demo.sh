@@ -3,7 +3,7 @@
 #   scripts/demo.sh          a jar on the box of a real hand-held video (Debian's opencv-doc)
 #   scripts/demo.sh --web    the same as a page for browsers in out/web (Debian's emscripten compiles its engine)
 #   scripts/demo.sh --own    the jar on a book's cover, in a clip that it renders: needs no package but the build's
-# Leaves everything in out/demo (out/demo-own) and says where to look; what the programs say goes to build/demo.log.
+# Leaves everything in out/demo (out/demo-own) and prints where to look; the output of the programs goes to build/demo.log.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
@@ -15,7 +15,7 @@ case ${1:-} in
   --own) own=yes ;;
   --web) web=yes ;;
   -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
-  *) echo "demo.sh: '$1' is not understood; try --help" >&2; exit 1 ;;
+  *) echo "demo.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
 esac
 
 mkdir -p build
@@ -137,7 +137,7 @@ play() {
   sed -i "s|<h2>Contact sheet</h2>|$figure\n&|" "$out/index.html"
 }
 
-echo "ModAR: a jar is baked onto a picture, and played on a video. What the programs say goes to $log."
+echo "ModAR: a jar is baked onto a picture, and played on a video. The output of the programs goes to $log."
 step "packages of Debian (about 1.4 GB of disk, the first time)" packages
 step "building modar and modar-play (minutes, the first time)" build
 if [ $own = yes ]; then

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes all that a release attaches, in a folder of its own:
+# Makes all files of a release in one folder:
 #   scripts/release.sh [--key FILE] [--twice] [--out DIR]      (default: out/release)
 #   *.deb                  the Debian packages, clean for lintian, with the page's engine
 #   modar-web-V.tar.gz     the page and its engine, for those who build in place: unpack as build/web
@@ -18,10 +18,10 @@ cd "$root"
 key="" twice=no out=out/release
 while [ $# -gt 0 ]; do
   case $1 in
-    --key | --out) [ $# -ge 2 ] || { echo "release.sh: $1 wants a value" >&2; exit 1; }; printf -v "${1#--}" %s "$2"; shift ;;
+    --key | --out) [ $# -ge 2 ] || { echo "release.sh: $1 needs a value" >&2; exit 1; }; printf -v "${1#--}" %s "$2"; shift ;;
     --twice) twice=yes ;;
     -h | --help) sed -n '2,15s/^# \{0,1\}//p' "$0"; exit 0 ;;
-    *) echo "release.sh: '$1' is not understood; try --help" >&2; exit 1 ;;
+    *) echo "release.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
   esac
   shift
 done
@@ -110,7 +110,7 @@ work=$(mktemp -d "${TMPDIR:-/tmp}/modar-release-XXXXXX")
 trap 'rm -rf "$work"' EXIT
 rm -rf "$out"
 mkdir -p "$out"
-echo "ModAR $version, $(git log -1 --format='%h of %cs'). What the programs say goes to build/release.log."
+echo "ModAR $version, $(git log -1 --format='%h of %cs'). The output of the programs goes to build/release.log."
 step "Debian packages that building takes (2 GB, the first time)" scripts/setup.sh web release
 step "engine and packages" eval 'clone "$work/one" && build "$work/one" "$out"'
 step "lintian" look
@@ -139,4 +139,4 @@ else
   echo "Not signed: --key FILE signs, with a key of \`minisign -G\`."
 fi
 ls -l "$out"
-echo "All of it is in $root/$out."
+echo "Everything is in $root/$out."

@@ -10,7 +10,7 @@ lists=("$here/packages.txt")
 for extra in "$@"; do
   case $extra in
     test | demo | web | release) lists+=("$here/packages-$extra.txt") ;;
-    *) echo "setup.sh: '$extra' is none of test, demo, web and release" >&2; exit 1 ;;
+    *) echo "setup.sh: '$extra' is not one of test, demo, web and release" >&2; exit 1 ;;
   esac
 done
 
@@ -22,15 +22,15 @@ mapfile -t missing < <(comm -23 <(echo "$wanted") <(echo "$there"))
 if [ ${#missing[@]} -eq 0 ]; then exit 0; fi
 
 command -v apt-get >/dev/null || {
-  echo "setup.sh: no apt-get here; install by hand: ${missing[*]}" >&2; exit 5; }
+  echo "setup.sh: apt-get is missing; install these packages: ${missing[*]}" >&2; exit 5; }
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then as_root=(sudo); fi
 mkdir -p "$here/../build"
 log=$here/../build/packages.log
-echo "Installing ${#missing[@]} Debian packages: ${missing[*]} (what apt says goes to build/packages.log)" >&2
+echo "Installing ${#missing[@]} Debian packages: ${missing[*]} (apt's output goes to build/packages.log)" >&2
 # One list that a mirror serves broken (another architecture's, say) does not stop what the other lists hold.
 "${as_root[@]}" apt-get update -qq >"$log" 2>&1 ||
-  echo "setup.sh: some package lists could not be fetched; going on with the others" >&2
+  echo "setup.sh: some package lists could not be fetched; continuing with the others" >&2
 # How much it is, in apt's own words.
 LC_ALL=C apt-get install --assume-no --no-install-recommends "${missing[@]}" 2>&1 |
   grep -E '^([0-9]+ upgraded|Need to get|After this)' >&2 || true

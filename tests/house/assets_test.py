@@ -259,7 +259,7 @@ class Clip(unittest.TestCase):
 
 class Commands(unittest.TestCase):
     def test_help(self):
-        for script in ("make_patterns.py", "make_models.py", "make_church.py", "make_clip.py"):
+        for script in ("make_patterns.py", "make_models.py", "make_church.py", "make_clip.py", "make_demo.py"):
             code, words = run(script, "--help")
             self.assertEqual(code, 0, words)
             self.assertIn("usage: " + script, words)

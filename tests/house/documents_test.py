@@ -7,6 +7,33 @@ import unittest
 
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
 MODAR = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin")) / "modar"
+PAGES = [ROOT / line for line in subprocess.run(
+    ["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.md"], cwd=ROOT, capture_output=True, text=True).stdout.split()] or [
+    page for folder in ("", "bake", "formats", "runtime") for page in sorted((ROOT / folder).glob("*.md" if not folder else "**/*.md"))]
+
+
+def without_code(page):
+    """A page's text without its blocks of code and `code`."""
+    return re.sub(r"`[^`\n]*`", "", re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL))
+
+
+def anchors(page):
+    """The names that a page's headings have in links."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)}
+
+
+def commands_in(text):
+    """The words of each command of ours that a page has in blocks or in `code`."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    lines = [line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    lines += [code.replace("\n", " ") for code in re.findall(r"`([^`]+)`", prose)]
+    for line in lines:
+        for part in re.split(r"&&|\||;", re.sub(r"(^|\s)#.*", "", line)):
+            words = part.split()
+            if words and words[0] in ("modar", "modar-play", "modar-fetch") and len(words) > 1:
+                yield words
 
 
 class Documents(unittest.TestCase):
@@ -17,20 +44,71 @@ class Documents(unittest.TestCase):
 
     def test_paths_that_documents_name_exist(self):
         missing = []
-        for name in ("README.md", "CONTRIBUTING.md", "formats/bundle.md"):
-            text = (ROOT / name).read_text()
-            for path in re.findall(r"`((?:formats|bake|runtime|shaders|assets|tests|scripts)/[\w./-]*)`", text):
+        for page in PAGES:
+            for path in re.findall(r"`((?:formats|bake|runtime|shaders|assets|tests|scripts)/[\w./-]*)`", page.read_text()):
                 if not (ROOT / path.rstrip("/")).exists():
-                    missing.append(f"{name}: {path}")
+                    missing.append(f"{page}: {path}")
         self.assertEqual(missing, [])
 
     def test_links_between_documents_lead_somewhere(self):
-        missing = []
-        for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
-            for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", (ROOT / name).read_text()):
-                if "://" not in target and not (ROOT / target).exists():
-                    missing.append(f"{name}: {target}")
-        self.assertEqual(missing, [])
+        wrong = []
+        for page in PAGES:
+            for target in re.findall(r"\]\(([^)]+)\)", without_code(page)):
+                if "://" in target:
+                    continue
+                path, _, anchor = target.partition("#")
+                file = (page.parent / path).resolve() if path else page
+                if not file.exists():
+                    wrong.append(f"{page}: {target}")
+                elif anchor and anchor not in anchors(file):
+                    wrong.append(f"{page}: {target}: no such heading")
+        self.assertEqual(wrong, [])
+
+    def test_every_guide_is_linked(self):
+        linked = {(page.parent / target.partition("#")[0]).resolve()
+                  for page in PAGES for target in re.findall(r"\]\(([^)#]+)", without_code(page))}
+        self.assertEqual([page for page in PAGES if page.resolve() not in linked and page.name != "README.md"], [])
+        guides = [page for page in PAGES if page.name == "README.md" and page.parent != ROOT]
+        self.assertGreater(len(guides), 4)
+        self.assertEqual([page for page in guides if page.resolve() not in linked], [])
+
+    def test_readme_is_short(self):
+        text = (ROOT / "README.md").read_text()
+        self.assertLessEqual(len(text.splitlines()), 130)
+        self.assertLessEqual(len(text.split()), 1200)
+        picture = re.search(r"!\[[^]]+\]\(([^)]+)\)", text)[1]
+        self.assertLess((ROOT / picture).stat().st_size, 600_000)
+
+    def test_options_that_documents_name_exist(self):
+        """Each `modar COMMAND ... --option` of a page, in code or prose, is an option of that command."""
+        wrong, seen, help_of = [], 0, {}
+        for page in PAGES:
+            if page.name == "CHANGELOG.md":
+                continue
+            for words in commands_in(page.read_text()):
+                options = [word.partition("=")[0] for word in words if re.fullmatch(r"--[a-z][\w-]*(=.*)?", word)]
+                command = [words[0]]
+                for word in words[1:]:
+                    if command[0] != "modar" or not re.fullmatch(r"[a-z]+", word) or len(command) == 3:
+                        break
+                    if len(command) == 2 and command[1] not in ("pattern", "ship", "cache"):
+                        break
+                    command.append(word)
+                if words[:2] == ["modar", "help"] or command == ["modar", "COMMAND"]:
+                    continue
+                key = tuple(command)
+                if key not in help_of:
+                    ask = "--help" if command[0] == "modar-fetch" else "--help-all"
+                    done = subprocess.run([str(MODAR.with_name(command[0])), *command[1:], ask], capture_output=True, text=True)
+                    help_of[key] = done.stdout if done.returncode == 0 else None
+                if help_of[key] is None:
+                    wrong.append(f"{page}: {' '.join(command)}")
+                    continue
+                known = set(re.findall(r"--[a-z][\w-]*", help_of[key])) | {"--help", "--help-all", "--version"}
+                wrong += [f"{page}: {' '.join(words)}: {option}" for option in options if option not in known]
+                seen += len(options)
+        self.assertEqual(wrong, [])
+        self.assertGreater(seen, 60)
 
     def test_each_attack_of_the_specification_has_a_test(self):
         table = (ROOT / "formats/shipping.md").read_text().partition("## Attacks and accidents\n")[2].partition("\n## ")[0]
