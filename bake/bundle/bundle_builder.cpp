@@ -336,8 +336,7 @@ Result<void> add_models(const BakeRequest& request, BundleContent& content, Repo
   options.jobs = request.jobs;
   if (request.atlas != AtlasMode::kNever) {
     AtlasOptions atlas = {request.atlas, options, options.max_side};
-    MODAR_ASSIGN(atlas.textures.max_side,
-                 affordable_side(textures, options, request.texture_budget));
+    atlas.textures.max_side = affordable_side(textures, options, request.texture_budget);
     for (WeldedModel& model : models) {
       MODAR_TRY(make_atlases(atlas, model.mesh, model.uses, textures, report));
     }

@@ -486,9 +486,8 @@ void take_atlas(const Plan& plan, Pages pages, double bytes, Materials merged, T
 }
 
 /// The pictures of the mesh that may be repacked.
-Result<std::vector<Sheet>> find_sheets(const AtlasOptions& options,
-                                       const std::vector<std::uint32_t>& uses,
-                                       const TextureUses& textures) {
+std::vector<Sheet> find_sheets(const AtlasOptions& options, const std::vector<std::uint32_t>& uses,
+                               const TextureUses& textures) {
   std::vector<Sheet> sheets;
   std::vector<std::uint32_t> candidates;
   for (const std::uint32_t use : uses) {
@@ -498,11 +497,12 @@ Result<std::vector<Sheet>> find_sheets(const AtlasOptions& options,
   }
   if (candidates.size() < 2 && options.mode != AtlasMode::kAlways) return sheets;
   for (const std::uint32_t use : candidates) {
-    MODAR_ASSIGN(const RgbaImage image, read_image(textures.uses[use].path));
-    const TextureSize apart = texture_size({image.width, image.height}, options.textures);
+    const auto image = read_image(textures.uses[use].path);
+    if (!image) continue;  // told where it is baked
+    const TextureSize apart = texture_size({image->width, image->height}, options.textures);
     const double scale =
-        std::min({1.0, double(apart.width) / image.width, double(apart.height) / image.height});
-    sheets.push_back({use, image.width, image.height, is_opaque(image), scale});
+        std::min({1.0, double(apart.width) / image->width, double(apart.height) / image->height});
+    sheets.push_back({use, image->width, image->height, is_opaque(*image), scale});
   }
   return sheets;
 }
@@ -541,7 +541,7 @@ Result<void> make_atlas(const AtlasOptions& options, std::vector<Sheet> sheets, 
 Result<void> make_atlases(const AtlasOptions& options, TriMesh& mesh,
                           std::vector<std::uint32_t>& uses, TextureUses& textures, Report& report) {
   if (options.mode == AtlasMode::kNever || mesh.uvs.empty()) return {};
-  MODAR_ASSIGN(const std::vector<Sheet> sheets, find_sheets(options, uses, textures));
+  std::vector<Sheet> sheets = find_sheets(options, uses, textures);
   for (const bool opaque : {true, false}) {
     std::vector<Sheet> alike;
     for (const Sheet& sheet : sheets) {

@@ -138,8 +138,8 @@ std::uint32_t plan_max_side(std::span<const TexturePlan> textures, const Texture
   return smaller.max_side;
 }
 
-Result<std::uint32_t> affordable_side(const TextureUses& textures, const TextureOptions& options,
-                                      std::uint64_t budget) {
+std::uint32_t affordable_side(const TextureUses& textures, const TextureOptions& options,
+                              std::uint64_t budget) {
   if (budget == 0) return options.max_side;
   std::vector<TexturePlan> files;
   std::vector<TexturePlan> pages;
@@ -148,19 +148,34 @@ Result<std::uint32_t> affordable_side(const TextureUses& textures, const Texture
     if (use.image) {
       pages.push_back({use.image->width, use.image->height, !is_opaque(*use.image)});
     } else {
-      MODAR_ASSIGN(const RgbaImage image, read_image(use.path));
-      files.push_back({image.width, image.height, !is_opaque(image)});
+      const auto image = read_image(use.path);
+      if (image) files.push_back({image->width, image->height, !is_opaque(*image)});
     }
   }
   const std::uint64_t taken = planned_bytes(pages, options);
   return plan_max_side(files, options, budget > taken ? budget - taken : 0);
 }
 
+namespace {
+
+/// One unreadable picture of many is no reason to refuse a model: grey stands in for it.
+Result<Texture> bake_use(const TextureUse& use, const TextureOptions& options, Report& report) {
+  if (use.image) return bake_texture(*use.image, use.path, options, report);
+  Result<Texture> texture = bake_texture(use.path, options, report);
+  if (texture || texture.error().exit == ExitCode::kUsage) return texture;
+  const Error& error = texture.error();
+  report.diagnostics.push_back({error.code, DiagnosticSeverity::kWarning, error.where, 0,
+                                error.cause + "; grey stands in for it", error.cure});
+  return bake_texture(RgbaImage{1, 1, {128, 128, 128, 255}}, use.path, options, report);
+}
+
+}  // namespace
+
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,
                                                   BundleContent& content, Report& report) {
   const std::uint32_t page_side = options.max_side;
-  MODAR_ASSIGN(const std::uint32_t file_side, affordable_side(textures, options, budget));
+  const std::uint32_t file_side = affordable_side(textures, options, budget);
   std::vector<Texture> baked;
   std::vector<std::size_t> numbers;  // of their uses
   for (std::size_t i = 0; i < textures.uses.size(); ++i) {
@@ -169,8 +184,7 @@ Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
     options.repeat = use.repeat;
     options.coverage = use.coverage.full ? nullptr : &use.coverage;
     options.max_side = use.image ? page_side : file_side;
-    MODAR_ASSIGN(Texture texture, use.image ? bake_texture(*use.image, use.path, options, report)
-                                            : bake_texture(use.path, options, report));
+    MODAR_ASSIGN(Texture texture, bake_use(use, options, report));
     baked.push_back(std::move(texture));
     numbers.push_back(i);
   }

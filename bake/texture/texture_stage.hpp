@@ -61,10 +61,10 @@ std::uint32_t plan_max_side(std::span<const TexturePlan> textures, const Texture
                             std::uint64_t budget);
 
 /// The greatest side under which all files of the uses fit into `budget` bytes beside the pages of
-/// atlases, which keep their sides; options.max_side where the budget is 0. Errors: those of
-/// read_image().
-Result<std::uint32_t> affordable_side(const TextureUses& textures, const TextureOptions& options,
-                                      std::uint64_t budget);
+/// atlases, which keep their sides; options.max_side where the budget is 0. Files that cannot be
+/// read take nothing.
+std::uint32_t affordable_side(const TextureUses& textures, const TextureOptions& options,
+                              std::uint64_t budget);
 
 /// What became of a use: a texture of the bundle, or one colour that stands for it.
 struct TextureOutcome {
@@ -76,7 +76,8 @@ struct TextureOutcome {
 
 /// Bakes each use once, keeps identical results once, folds constant ones to their colour. budget:
 /// bytes that all of them together may take on the GPU, 0: any; the greatest side is lowered for
-/// it, but for pages of an atlas, which keep theirs. Errors: those of bake_texture().
+/// it, but for pages of an atlas, which keep theirs. Grey stands in for a file that cannot be read,
+/// with a warning. Errors: those of bake_texture().
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,
                                                   BundleContent& content, Report& report);

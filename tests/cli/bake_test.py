@@ -2,6 +2,7 @@
 import json
 import os
 import shutil
+import subprocess
 import unittest
 
 from programs import COVER, POTTERY, QUICK, ROOT, STATUE, ProgramTest, picture
@@ -263,6 +264,25 @@ class Bake(ProgramTest):
         beside = self.modar_json("check", self.folder / "two1.modar", "--source", sheets, "--visual", self.folder / "apart")
         self.assertLess(checked["looks"][0]["delta_e_worst"], beside["looks"][0]["delta_e_worst"] + 0.5)
         self.assert_fails(self.modar("bake", "--model", sheets, "--atlas", "--no-atlas", "-o", out), 1, "atlas")
+
+    def test_grey_stands_in_for_a_picture_that_cannot_be_read(self):
+        (self.folder / "m.mtl").write_text("newmtl good\nKd 1 1 1\nmap_Kd pottery.png\nnewmtl bad\nKd 0.5 1 0\nmap_Kd bad.png\n")
+        (self.folder / "m.obj").write_text("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+                                           "usemtl good\nf 1/1 2/2 3/3\nusemtl bad\nf 3/3 2/2 1/1\n")
+        shutil.copy(POTTERY.parent / "pottery.png", self.folder)
+        whole = (POTTERY.parent / "pottery.png").read_bytes()
+        (self.folder / "bad.png").write_bytes(whole[:len(whole) // 2])
+        for options in ([], ["--atlas"], ["--device", "ace2"]):
+            report = self.modar_json("bake", "--model", "m.obj", *options, "-o", "m.modar")
+            told = [f for f in report["findings"] if f["severity"] == "warning"]
+            self.assertEqual([f["id"] for f in told], ["image.decode"], options)
+            self.assertIn("bad.png", told[0]["file"])
+            self.assertIn("grey stands in for it", told[0]["message"])
+            read = json.loads(subprocess.run(["python3", ROOT / "scripts" / "read_bundle.py", "m.modar", "--json"],
+                                             cwd=self.folder, capture_output=True).stdout)
+            colours = {m["name"]: [round(c, 3) for c in m["diffuse"]] for m in read["materials"]}
+            self.assertEqual(colours["bad"], [0.251, 0.502, 0.0])
+            self.assertEqual(colours["good"], [1.0, 1.0, 1.0])
 
     def test_a_progress_bar_stays_out_of_pipes(self):
         done = self.modar("bake", "--model", POTTERY, "--no-lods", "--no-ao", "-o", self.folder / "a.modar")

@@ -212,7 +212,7 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
   };
   EXPECT_TRUE(requires_these(R"("KHR_mesh_quantization","KHR_texture_transform")"));
   EXPECT_TRUE(requires_these(R"("KHR_lights_punctual","KHR_materials_clearcoat")"));
-  EXPECT_FALSE(requires_these(R"("KHR_materials_pbrSpecularGlossiness")"));
+  EXPECT_TRUE(requires_these(R"("KHR_materials_pbrSpecularGlossiness")"));
   const auto refused = requires_these(R"("KHR_texture_basisu","MODAR_none")");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().exit, ExitCode::kUnsupported);
@@ -231,6 +231,39 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
   EXPECT_EQ(ids, (std::vector<std::string>{"gltf.alpha-mask", "gltf.left-out"}));
   EXPECT_EQ(used->diagnostics.back().message,
             "left out: 1 animation, 1 normal map, extensions KHR_materials_clearcoat");
+}
+
+TEST_F(Gltf, GlassAndGlossinessHaveTheCoresNearest) {
+  const std::string gloss = R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{)";
+  const auto model = read(
+      std::string(kOneTriangle) +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
+          R"("nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],)"
+          R"("images":[{"uri":"data:image/png;base64,iVBORw0KGgo="}],"textures":[{"source":0}],)"
+          R"("materials":[)" +
+          gloss + R"("diffuseFactor":[0.5,0,0,0.25],"specularFactor":[0.04,0.04,0.04],)" +
+          R"("glossinessFactor":0}},"alphaMode":"BLEND"},)" + gloss +
+          R"("diffuseFactor":[0,0,0,1],"specularFactor":[1,0.2140411,0]}}},)" + gloss +
+          R"("diffuseTexture":{"index":0}}}},)"
+          R"({"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}},)"
+          R"({"extensions":{"KHR_materials_transmission":{"transmissionFactor":"x"}}},)" +
+          gloss + R"("diffuseFactor":[1],"diffuseTexture":[2]}}}])",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  const std::vector<SourceMaterial>& m = model->materials;
+  EXPECT_NEAR(m[0].diffuse.r, 0.735, 1e-3);  // sRGB of 0.5
+  EXPECT_EQ(m[0].diffuse.g, 0.0f);
+  EXPECT_EQ(m[0].opacity, 0.25f);
+  EXPECT_EQ(m[0].specular, glm::vec3(0.0f)) << "rough";
+  // Reflects more than it scatters: a metal of that colour.
+  EXPECT_EQ(m[1].diffuse.r, 1.0f);
+  EXPECT_NEAR(m[1].diffuse.g, 0.5, 1e-3);
+  EXPECT_GT(m[1].specular.r, m[1].specular.b);
+  EXPECT_FALSE(m[2].diffuse_map.empty());
+  EXPECT_EQ(m[2].diffuse, glm::vec3(1.0f));
+  EXPECT_NEAR(m[3].opacity, 0.2, 1e-6);
+  EXPECT_EQ(m[4].opacity, 1.0f);
+  EXPECT_EQ(m[5].diffuse, glm::vec3(1.0f)) << "wrong types are left out";
 }
 
 TEST_F(Gltf, VersionOneIsRefusedAsSuch) {

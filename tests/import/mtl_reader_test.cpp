@@ -1,9 +1,11 @@
 // MTL statements, and names of files as exporters write them.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 
+#include "bake/image/image.hpp"
 #include "bake/import/obj/mtl_reader.hpp"
 #include "bake/import/read_model.hpp"
 
@@ -91,6 +93,36 @@ TEST_F(MtlReader, ReadsProperties) {
   EXPECT_EQ(findings_[0].id, "mtl.missing-map");
   EXPECT_EQ(findings_[0].line, 16u);
   EXPECT_EQ(findings_[1].id, "mtl.invisible");
+}
+
+TEST_F(MtlReader, TheMeanOfATextureIsNotMultipliedByIt) {
+  // Half of it (200, 100, 50), half (100, 0, 0): as SketchUp's exporter writes it.
+  RgbaImage image{4, 4, {}};
+  for (int p = 0; p < 16; ++p) {
+    const std::array<std::uint8_t, 4> one = {200, 100, 50, 255};
+    const std::array<std::uint8_t, 4> other = {100, 0, 0, 255};
+    const auto& pixel = p % 2 == 0 ? one : other;
+    image.pixels.insert(image.pixels.end(), pixel.begin(), pixel.end());
+  }
+  ASSERT_TRUE(write_png(image, (folder_ / "brick.png").string()));
+  std::ofstream(folder_ / "m.mtl") << "newmtl mean\nKa 0 0 0\nKd 0.5882 0.1961 0.0980\n"
+                                      "map_Kd brick.png\n"
+                                      "newmtl tint\nKd 0.5882 0.1961 0.2\nmap_Kd brick.png\n"
+                                      "newmtl broken\nKd 0.5 0.5 0.5\nmap_Kd wood.jpg\n"
+                                      "newmtl plain\nKd 0.5882 0.1961 0.0980\n";
+  std::ofstream(folder_ / "m.obj") << "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+                                      "usemtl mean\nf 1 2 3\nusemtl tint\nf 1 2 3\n"
+                                      "usemtl broken\nf 1 2 3\nusemtl plain\nf 1 2 3\n";
+  const auto model = read_model((folder_ / "m.obj").string(), 1);
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->materials.size(), 5u);
+  EXPECT_EQ(model->materials[1].diffuse, glm::vec3(1.0f));
+  EXPECT_EQ(model->materials[1].ambient, glm::vec3(1.0f));
+  EXPECT_EQ(model->materials[2].diffuse, glm::vec3(0.5882f, 0.1961f, 0.2f));
+  EXPECT_EQ(model->materials[3].diffuse, glm::vec3(0.5f));
+  EXPECT_EQ(model->materials[4].diffuse, glm::vec3(0.5882f, 0.1961f, 0.0980f));
+  ASSERT_EQ(model->diagnostics.size(), 1u);
+  EXPECT_EQ(model->diagnostics[0].id, "mtl.mean-colour");
 }
 
 TEST_F(MtlReader, ObjTakesTheFileBesideItWhenItNamesAnother) {

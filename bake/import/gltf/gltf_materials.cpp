@@ -52,6 +52,75 @@ std::string plain_name(const std::string& name, const std::string& other) {
   return plain.empty() ? other : plain;
 }
 
+/// The part of opacity that a material gives up where all light goes through it. By eye: clear
+/// glass keeps its outline and its reflections, tinted glass its tint.
+constexpr float kClear = 0.8f;
+
+/// KHR_materials_transmission's factor, 0 to 1. Its map is ignored.
+float transmission_of(const tinygltf::Material& material) {
+  const auto found = material.extensions.find("KHR_materials_transmission");
+  if (found == material.extensions.end() || !found->second.IsObject()) return 0.0f;
+  const tinygltf::Value& factor = found->second.Get("transmissionFactor");
+  const double value = factor.IsNumber() ? factor.GetNumberAsDouble() : 0.0;
+  return static_cast<float>(std::clamp(value, 0.0, 1.0));
+}
+
+/// KHR_materials_pbrSpecularGlossiness, or null.
+const tinygltf::Value* glossiness_of(const tinygltf::Material& material) {
+  const auto found = material.extensions.find("KHR_materials_pbrSpecularGlossiness");
+  const bool is_there = found != material.extensions.end() && found->second.IsObject();
+  return is_there ? &found->second : nullptr;
+}
+
+/// Numbers of an array, or `others` where it has not as many.
+std::vector<double> numbers_of(const tinygltf::Value& gloss, const char* key,
+                               std::vector<double> others) {
+  const tinygltf::Value& value = gloss.Get(key);
+  if (!value.IsArray() || value.ArrayLen() != others.size()) return others;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    if (value.Get(static_cast<int>(i)).IsNumber()) {
+      others[i] = value.Get(static_cast<int>(i)).GetNumberAsDouble();
+    }
+  }
+  return others;
+}
+
+/// A texture that an extension refers to, as the core's materials do.
+tinygltf::TextureInfo texture_info(const tinygltf::Value& value) {
+  tinygltf::TextureInfo info;
+  if (!value.IsObject()) return info;
+  if (value.Get("index").IsInt()) info.index = value.Get("index").GetNumberAsInt();
+  if (value.Get("texCoord").IsInt()) info.texCoord = value.Get("texCoord").GetNumberAsInt();
+  const tinygltf::Value& extensions = value.Get("extensions");
+  if (extensions.IsObject()) {
+    for (const std::string& name : extensions.Keys()) info.extensions[name] = extensions.Get(name);
+  }
+  return info;
+}
+
+/// The metallic-roughness material nearest to a specular-glossiness one. What reflects more than it
+/// scatters, as metals do, has its colour from the reflection.
+tinygltf::PbrMetallicRoughness metallic_roughness_of(const tinygltf::Value& gloss) {
+  constexpr double kHalf = 0.5;  // of the glossiness where a map, which is not read, lowers it
+  tinygltf::PbrMetallicRoughness pbr;
+  pbr.baseColorFactor = numbers_of(gloss, "diffuseFactor", {1, 1, 1, 1});
+  pbr.baseColorTexture = texture_info(gloss.Get("diffuseTexture"));
+  const bool mapped = gloss.Has("specularGlossinessTexture");
+  const tinygltf::Value& stated = gloss.Get("glossinessFactor");
+  const double glossiness = stated.IsNumber() ? stated.GetNumberAsDouble() : 1.0;
+  pbr.roughnessFactor = std::clamp(1 - (mapped ? kHalf : 1.0) * glossiness, 0.0, 1.0);
+  pbr.metallicFactor = 0;
+  const std::vector<double> specular = numbers_of(gloss, "specularFactor", {1, 1, 1});
+  const double reflected = *std::max_element(specular.begin(), specular.end());
+  const auto colour_end = pbr.baseColorFactor.begin() + 3;
+  const double scattered = *std::max_element(pbr.baseColorFactor.begin(), colour_end);
+  if (!mapped && pbr.baseColorTexture.index < 0 && reflected > scattered) {
+    pbr.metallicFactor = 1;
+    std::copy(specular.begin(), specular.end(), pbr.baseColorFactor.begin());
+  }
+  return pbr;
+}
+
 class MaterialReader {
  public:
   MaterialReader(const tinygltf::Model& gltf, std::string folder, std::string label,
@@ -73,6 +142,7 @@ class MaterialReader {
     m.two_sided = source.doubleSided;
     set_highlight(pbr, m);
     set_pictures(source, m);
+    m.opacity *= 1 - kClear * transmission_of(source);
     m.ambient = m.diffuse;
     if (folder_of_images_ != nullptr) m.keeper = folder_of_images_;
     return m;
@@ -97,6 +167,14 @@ class MaterialReader {
         "ignored");
     add("gltf.metal-map", averaged_,
         "have a metallic-roughness map; its means set the highlight of the whole material");
+    add("gltf.glossiness-map",
+        static_cast<int>(std::count_if(gltf_.materials.begin(), gltf_.materials.end(),
+                                       [](const tinygltf::Material& material) {
+                                         const tinygltf::Value* gloss = glossiness_of(material);
+                                         return gloss && gloss->Has("specularGlossinessTexture");
+                                       })),
+        "have a specular-glossiness map; half of their glossiness sets the highlight of the whole "
+        "material");
     add("gltf.alpha-mask", cut_out_,
         "are cut out at an alpha value: lower values are transparent, the others opaque");
   }
@@ -283,6 +361,14 @@ class MaterialReader {
 };
 
 }  // namespace
+
+void use_metallic_roughness(tinygltf::Model& gltf) {
+  for (tinygltf::Material& material : gltf.materials) {
+    if (const tinygltf::Value* gloss = glossiness_of(material)) {
+      material.pbrMetallicRoughness = metallic_roughness_of(*gloss);
+    }
+  }
+}
 
 std::string percent_decoded(const std::string& uri) {
   const auto digit = [](char c) {

@@ -22,6 +22,10 @@ std::string percent_decoded(const std::string& uri);
 bool keep_image_bytes(tinygltf::Image* image, int index, std::string* error, std::string* warning,
                       int width, int height, const unsigned char* bytes, int size, void* user);
 
+/// Replaces what materials with KHR_materials_pbrSpecularGlossiness say of the core's model by the
+/// nearest to the extension: exporters leave the core's white.
+void use_metallic_roughness(tinygltf::Model& gltf);
+
 /// One material for each of the file's, followed by a white one for primitives without a material:
 /// emission, occlusion, roughness, metalness and the modes of alpha as far as our shader has them.
 /// Findings say what was folded into what, and what was left out.

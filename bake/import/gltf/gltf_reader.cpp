@@ -269,10 +269,12 @@ bool read_bytes(const std::string& path, std::string& bytes) {
 }
 
 /// Extensions that are read in full.
-constexpr const char* kKnownExtensions[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
-                                            "EXT_texture_webp",        "KHR_draco_mesh_compression",
-                                            "KHR_materials_unlit",     "KHR_mesh_quantization",
-                                            "KHR_texture_transform"};
+constexpr const char* kKnownExtensions[] = {
+    "EXT_mesh_gpu_instancing",   "EXT_meshopt_compression",
+    "EXT_texture_webp",          "KHR_draco_mesh_compression",
+    "KHR_materials_unlit",       "KHR_mesh_quantization",
+    "KHR_texture_transform",     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_transmission"};
 
 bool is_known(const std::string& extension) {
   return std::find(std::begin(kKnownExtensions), std::end(kKnownExtensions), extension) !=
@@ -286,8 +288,7 @@ bool is_dispensable(const std::string& extension) {
       "KHR_lights_punctual", "EXT_lights_ies", "EXT_lights_image_based",
       "KHR_xmp_json_ld",     "KHR_xmp",        "KHR_animation_pointer"};
   return std::find(std::begin(kAlone), std::end(kAlone), extension) != std::end(kAlone) ||
-         (extension.starts_with("KHR_materials_") &&
-          extension != "KHR_materials_pbrSpecularGlossiness");
+         extension.starts_with("KHR_materials_");
 }
 
 /// Refuses glTF 1.0 and required extensions that are not read. gltf: may be half read.
@@ -402,6 +403,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   };
   for (const tinygltf::Buffer& buffer : gltf.buffers) note_file(buffer.uri);
   for (const tinygltf::Image& image : gltf.images) note_file(image.uri);
+  use_metallic_roughness(gltf);
   model.materials = gltf_materials(gltf, folder, path, model.diagnostics);
   SceneReader scene(gltf, model, path);
   MODAR_TRY(scene.run());
