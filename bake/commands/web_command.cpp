@@ -109,6 +109,8 @@ void add_web(CommandLine& program) {
   line.option("--words", &options.words,
               "Folder of more languages: LANGUAGE.json, like words/en.json of the page",
               {.type = "DIR"});
+  line.flag("--room", options.room,
+            "Add USDZ and GLB files, which iPhones and Android phones show in the visitor's room");
   line.option("--link", &options.links, "Link at the foot of the cover: 'Imprint=https://...'",
               {.type = "TEXT=URL"});
   line.option(

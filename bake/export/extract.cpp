@@ -7,7 +7,9 @@
 #include <system_error>
 
 #include "bake/export/glb_writer.hpp"
+#include "bake/export/room_models.hpp"
 #include "bake/export/texture_files.hpp"
+#include "bake/export/usdz_writer.hpp"
 #include "bake/output.hpp"
 #include "bake/texture/texture_codec.hpp"
 #include "formats/atomic_file.hpp"
@@ -108,28 +110,19 @@ Result<void> Extraction::patterns() {
 }
 
 Result<void> Extraction::models() {
-  std::vector<GlbImage> images;
-  for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
-    const TextureRecord& texture = bundle_.textures()[t];
-    const TextureLevelRecord& level = bundle_.texture_levels()[texture.first_level];
-    GlbImage image;
-    image.texture = t;
-    image.pixels =
-        decode_texture(format_of(texture), plane(t, level, false), level.width, level.height);
-    if ((texture.flags & kTextureAlpha) != 0) {
-      const RgbaImage alpha =
-          decode_texture(format_of(texture), plane(t, level, true), level.width, level.height);
-      for (std::size_t i = 0; i < alpha.pixels.size(); i += 4) {
-        image.pixels.pixels[i + 3] = alpha.pixels[i];
-      }
-    }
-    images.push_back(std::move(image));
-  }
+  const std::vector<GlbImage> images = decoded_textures(bundle_);
   for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
     const std::string stem = file_name(bundle_.name(bundle_.models()[m].name));
     if (auto written = write_glb(bundle_, m, images, path_for(stem, ".glb")); !written) {
       return written;
     }
+  }
+  for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) {
+    const std::vector<RoomModel> placed = models_in_room(bundle_, p);
+    if (placed.empty()) continue;
+    const std::string stem = file_name(bundle_.name(bundle_.patterns()[p].name));
+    MODAR_ASSIGN(const auto file, encode_usdz(bundle_, placed, images));
+    MODAR_TRY(write_file(path_for(stem, ".usdz"), std::span<const std::byte>(file)));
   }
   return {};
 }

@@ -15,36 +15,32 @@
 namespace modar {
 namespace {
 
-/// glTF colours are linear, ours are sRGB (IEC 61966-2-1).
-double to_linear(double c) {
-  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-}
-
 class GlbBuilder {
  public:
-  GlbBuilder(const BundleView& bundle, const ModelRecord& model)
-      : bundle_(bundle), model_(model), decoder_(bundle.layouts()[model.layout]) {
+  explicit GlbBuilder(const BundleView& bundle) : bundle_(bundle) {
     gltf_.asset.version = "2.0";
     gltf_.asset.generator = "ModAR";
     gltf_.buffers.emplace_back();
+    gltf_.scenes.emplace_back();
+    gltf_.defaultScene = 0;
   }
 
-  void add_images(std::span<const GlbImage> images);
-  void add_materials();
-  Result<void> add_chunk(const ChunkRecord& chunk);
-  void add_scene();
-  [[nodiscard]] const tinygltf::Model& gltf() const { return gltf_; }
+  /// factor: on the positions of its own space. node: where it goes.
+  Result<void> add_model(std::uint32_t index, std::span<const GlbImage> images, double factor,
+                         tinygltf::Node node);
+  Result<std::vector<std::byte>> file();
 
  private:
+  void add_images(const ModelRecord& model, std::span<const GlbImage> images);
+  void add_materials(const ModelRecord& model);
+  Result<void> add_chunk(const LayoutRecord& layout, const ChunkRecord& chunk, int material,
+                         double factor, tinygltf::Mesh& mesh);
   int add_view(const void* data, std::size_t size, int target);
   int add_accessor(int view, int type, int component, std::size_t count);
   int add_floats(const std::vector<float>& values, int type, std::size_t components);
 
   const BundleView& bundle_;
-  const ModelRecord& model_;
-  VertexDecoder decoder_;
   tinygltf::Model gltf_;
-  tinygltf::Mesh mesh_;
   std::vector<std::pair<std::uint32_t, int>> textures_;  // of the bundle, of the file
 };
 
@@ -78,13 +74,11 @@ int GlbBuilder::add_floats(const std::vector<float>& values, int type, std::size
   return add_accessor(view, type, TINYGLTF_COMPONENT_TYPE_FLOAT, values.size() / components);
 }
 
-void GlbBuilder::add_images(std::span<const GlbImage> images) {
+void GlbBuilder::add_images(const ModelRecord& model, std::span<const GlbImage> images) {
   for (const GlbImage& source : images) {
-    bool used = false;
-    for (std::uint32_t m = 0; m < model_.material_count; ++m) {
-      used = used || bundle_.materials()[model_.first_material + m].texture == source.texture;
-    }
-    if (!used) continue;
+    const auto there = [&](const auto& pair) { return pair.first == source.texture; };
+    if (std::any_of(textures_.begin(), textures_.end(), there)) continue;
+    if (!shows_texture(bundle_, model, source.texture)) continue;
     const Result<std::vector<std::byte>> png = encode_png(source.pixels);
     if (!png) continue;
     tinygltf::Image image;
@@ -106,9 +100,9 @@ void GlbBuilder::add_images(std::span<const GlbImage> images) {
   }
 }
 
-void GlbBuilder::add_materials() {
-  for (std::uint32_t m = 0; m < model_.material_count; ++m) {
-    const MaterialRecord& source = bundle_.materials()[model_.first_material + m];
+void GlbBuilder::add_materials(const ModelRecord& model) {
+  for (std::uint32_t m = 0; m < model.material_count; ++m) {
+    const MaterialRecord& source = bundle_.materials()[model.first_material + m];
     tinygltf::Material material;
     material.name = std::string(bundle_.name(source.name));
     auto& pbr = material.pbrMetallicRoughness;
@@ -119,9 +113,9 @@ void GlbBuilder::add_materials() {
     material.emissiveFactor.assign(3, 0.0);
     for (std::size_t i = 0; i < 3; ++i) {
       pbr.baseColorFactor[i] =
-          std::clamp(to_linear(static_cast<double>(source.diffuse[i])), 0.0, 1.0);
+          std::clamp(linear_of_srgb(static_cast<double>(source.diffuse[i])), 0.0, 1.0);
       material.emissiveFactor[i] =
-          std::clamp(to_linear(static_cast<double>(source.emission[i])), 0.0, 1.0);
+          std::clamp(linear_of_srgb(static_cast<double>(source.emission[i])), 0.0, 1.0);
     }
     pbr.baseColorFactor[3] = std::clamp(static_cast<double>(source.opacity), 0.0, 1.0);
     bool blend = source.opacity < 1.0f;
@@ -139,112 +133,171 @@ void GlbBuilder::add_materials() {
   }
 }
 
-Result<void> GlbBuilder::add_chunk(const ChunkRecord& chunk) {
-  const LevelRecord& level = bundle_.levels()[chunk.first_level];
-  if (level.index_count == 0) return {};
-  std::vector<std::uint16_t> indices(level.index_count);
-  std::memcpy(indices.data(), bundle_.indices().data() + level.index_offset, 2 * indices.size());
-  const auto [low, high] = std::minmax_element(indices.begin(), indices.end());
-  const std::uint16_t first = *low;
-  const std::size_t count = std::size_t{*high} - first + 1;
-  if (*high >= level.vertex_count) {
-    return fail(ExitCode::kInvalidInput, "glb.index", "", "an index exceeds its chunk's vertices",
-                "run `modar check` on the bundle and bake it again");
-  }
-  for (std::uint16_t& index : indices) index = static_cast<std::uint16_t>(index - first);
-
+Result<void> GlbBuilder::add_chunk(const LayoutRecord& layout, const ChunkRecord& chunk,
+                                   int material, double factor, tinygltf::Mesh& mesh) {
+  MODAR_ASSIGN(const DecodedLevel level, decode_level(bundle_, layout, chunk));
+  if (level.indices.empty()) return {};
   std::vector<float> positions;
   std::vector<float> normals;
   std::vector<float> uvs;
   std::vector<float> colours;
   std::vector<double> least(3, std::numeric_limits<double>::infinity());
   std::vector<double> greatest(3, -std::numeric_limits<double>::infinity());
-  for (std::size_t v = 0; v < count; ++v) {
-    const std::byte* vertex =
-        bundle_.vertices().data() + level.vertex_offset + (first + v) * decoder_.stride();
-    const glm::dvec3 p = decoder_.position(vertex, chunk) * model_.scale;
-    const glm::dvec3 n = decoder_.normal(vertex);
+  for (std::size_t v = 0; v < level.positions.size(); ++v) {
     for (int i = 0; i < 3; ++i) {
       const auto axis = static_cast<std::size_t>(i);
-      positions.push_back(static_cast<float>(p[i]));
-      normals.push_back(static_cast<float>(n[i]));
+      positions.push_back(static_cast<float>(level.positions[v][i] * factor));
+      normals.push_back(static_cast<float>(level.normals[v][i]));
       least[axis] = std::min(least[axis], static_cast<double>(positions.back()));
       greatest[axis] = std::max(greatest[axis], static_cast<double>(positions.back()));
     }
-    const glm::dvec2 uv = decoder_.uv(vertex, chunk);
+  }
+  for (const glm::dvec2& uv : level.uvs) {
     uvs.insert(uvs.end(), {static_cast<float>(uv.x), static_cast<float>(uv.y)});
-    const glm::dvec4 c = decoder_.colour(vertex);
-    colours.insert(colours.end(),
-                   {static_cast<float>(to_linear(c.r)), static_cast<float>(to_linear(c.g)),
-                    static_cast<float>(to_linear(c.b)), static_cast<float>(c.a)});
+  }
+  for (const glm::dvec4& c : level.colours) {
+    for (int i = 0; i < 3; ++i) colours.push_back(static_cast<float>(linear_of_srgb(c[i])));
+    colours.push_back(static_cast<float>(c.a));
   }
   tinygltf::Primitive primitive;
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
-  primitive.material = static_cast<int>(chunk.material - model_.first_material);
+  primitive.material = material;
   const int position = add_floats(positions, TINYGLTF_TYPE_VEC3, 3);
   gltf_.accessors[static_cast<std::size_t>(position)].minValues = least;
   gltf_.accessors[static_cast<std::size_t>(position)].maxValues = greatest;
   primitive.attributes["POSITION"] = position;
   primitive.attributes["NORMAL"] = add_floats(normals, TINYGLTF_TYPE_VEC3, 3);
-  if (decoder_.has(Semantic::kUv)) {
-    primitive.attributes["TEXCOORD_0"] = add_floats(uvs, TINYGLTF_TYPE_VEC2, 2);
-  }
-  if (decoder_.has(Semantic::kColour)) {
+  if (!uvs.empty()) primitive.attributes["TEXCOORD_0"] = add_floats(uvs, TINYGLTF_TYPE_VEC2, 2);
+  if (!colours.empty()) {
     primitive.attributes["COLOR_0"] = add_floats(colours, TINYGLTF_TYPE_VEC4, 4);
   }
-  primitive.indices = add_accessor(
-      add_view(indices.data(), 2 * indices.size(), TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER),
-      TINYGLTF_TYPE_SCALAR, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, indices.size());
-  mesh_.primitives.push_back(primitive);
+  primitive.indices = add_accessor(add_view(level.indices.data(), 2 * level.indices.size(),
+                                            TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER),
+                                   TINYGLTF_TYPE_SCALAR, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT,
+                                   level.indices.size());
+  mesh.primitives.push_back(primitive);
   return {};
 }
 
-void GlbBuilder::add_scene() {
-  mesh_.name = std::string(bundle_.name(model_.name));
-  gltf_.meshes.push_back(mesh_);
-  tinygltf::Node node;
-  node.name = mesh_.name;
-  node.mesh = 0;
-  node.translation = {model_.center[0], model_.center[1], model_.center[2]};
-  gltf_.nodes.push_back(node);
-  tinygltf::Scene scene;
-  scene.nodes = {0};
-  gltf_.scenes.push_back(scene);
-  gltf_.defaultScene = 0;
+Result<void> GlbBuilder::add_model(std::uint32_t index, std::span<const GlbImage> images,
+                                   double factor, tinygltf::Node node) {
+  const ModelRecord& model = bundle_.models()[index];
+  add_images(model, images);
+  const auto first_material = static_cast<int>(gltf_.materials.size());
+  add_materials(model);
+  tinygltf::Mesh mesh;
+  mesh.name = std::string(bundle_.name(model.name));
+  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+    const ChunkRecord& chunk = bundle_.chunks()[model.first_chunk + c];
+    const int material = first_material + static_cast<int>(chunk.material - model.first_material);
+    MODAR_TRY(add_chunk(bundle_.layouts()[model.layout], chunk, material, factor, mesh));
+  }
+  node.name = mesh.name;
+  node.mesh = static_cast<int>(gltf_.meshes.size());
+  gltf_.meshes.push_back(std::move(mesh));
+  gltf_.scenes[0].nodes.push_back(static_cast<int>(gltf_.nodes.size()));
+  gltf_.nodes.push_back(std::move(node));
+  return {};
+}
+
+Result<std::vector<std::byte>> GlbBuilder::file() {
+  if (gltf_.buffers[0].data.size() > 0xF0000000u) {
+    return fail(ExitCode::kUnsupported, "glb.too-large", "",
+                "the model needs more than the 4 GB that a GLB file can hold",
+                "bake a smaller part of it");
+  }
+  std::ostringstream out;
+  tinygltf::TinyGLTF writer;
+  if (!writer.WriteGltfSceneToStream(&gltf_, out, false, true)) {
+    return fail(ExitCode::kInternal, "glb.write", "", "tinygltf cannot write the scene",
+                "report this with the bundle");
+  }
+  const std::string text = std::move(out).str();
+  const auto bytes = std::as_bytes(std::span(text));
+  return std::vector<std::byte>(bytes.begin(), bytes.end());
+}
+
+/// What tinygltf throws, as an error.
+template <class Build>
+Result<std::vector<std::byte>> guarded_build(const BundleView& bundle, Build&& build) {
+  try {
+    GlbBuilder builder(bundle);
+    MODAR_TRY(build(builder));
+    return builder.file();
+  } catch (const std::exception& error) {
+    return fail(ExitCode::kInternal, "glb.write", "", error.what(), "report this with the bundle");
+  }
 }
 
 }  // namespace
 
+double linear_of_srgb(double c) {
+  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+}
+
+bool shows_texture(const BundleView& bundle, const ModelRecord& model, std::uint32_t texture) {
+  for (std::uint32_t m = 0; m < model.material_count; ++m) {
+    if (bundle.materials()[model.first_material + m].texture == texture) return true;
+  }
+  return false;
+}
+
+Result<DecodedLevel> decode_level(const BundleView& bundle, const LayoutRecord& layout,
+                                  const ChunkRecord& chunk) {
+  DecodedLevel out;
+  const LevelRecord& level = bundle.levels()[chunk.first_level];
+  if (level.index_count == 0) return out;
+  out.indices.resize(level.index_count);
+  std::memcpy(out.indices.data(), bundle.indices().data() + level.index_offset,
+              2 * out.indices.size());
+  const auto [low, high] = std::minmax_element(out.indices.begin(), out.indices.end());
+  const std::uint16_t first = *low;
+  const std::size_t count = std::size_t{*high} - first + 1;
+  if (*high >= level.vertex_count) {
+    return fail(ExitCode::kInvalidInput, "model.index", "", "an index exceeds its chunk's vertices",
+                "run `modar check` on the bundle and bake it again");
+  }
+  for (std::uint16_t& index : out.indices) index = static_cast<std::uint16_t>(index - first);
+  const VertexDecoder decoder(layout);
+  for (std::size_t v = 0; v < count; ++v) {
+    const std::byte* vertex =
+        bundle.vertices().data() + level.vertex_offset + (first + v) * decoder.stride();
+    out.positions.push_back(decoder.position(vertex, chunk));
+    out.normals.push_back(decoder.normal(vertex));
+    if (decoder.has(Semantic::kUv)) out.uvs.push_back(decoder.uv(vertex, chunk));
+    if (decoder.has(Semantic::kColour)) out.colours.push_back(decoder.colour(vertex));
+  }
+  return out;
+}
+
+Result<std::vector<std::byte>> encode_glb(const BundleView& bundle,
+                                          std::span<const RoomModel> models,
+                                          std::span<const GlbImage> images) {
+  return guarded_build(bundle, [&](GlbBuilder& builder) -> Result<void> {
+    for (const RoomModel& placed : models) {
+      tinygltf::Node node;
+      for (int column = 0; column < 4; ++column) {
+        for (int row = 0; row < 4; ++row) node.matrix.push_back(placed.place[column][row]);
+      }
+      MODAR_TRY(builder.add_model(placed.model, images, 1.0, std::move(node)));
+    }
+    return {};
+  });
+}
+
 Result<void> write_glb(const BundleView& bundle, std::uint32_t model,
                        std::span<const GlbImage> images, const std::string& path) {
-  const ModelRecord& record = bundle.models()[model];
-  try {
-    GlbBuilder builder(bundle, record);
-    builder.add_images(images);
-    builder.add_materials();
-    for (std::uint32_t c = 0; c < record.chunk_count; ++c) {
-      if (auto added = builder.add_chunk(bundle.chunks()[record.first_chunk + c]); !added) {
-        added.error().where = path;
-        return added;
-      }
-    }
-    builder.add_scene();
-    if (builder.gltf().buffers[0].data.size() > 0xF0000000u) {
-      return fail(ExitCode::kUnsupported, "glb.too-large", path,
-                  "the model needs more than the 4 GB that a GLB file can hold",
-                  "bake a smaller part of it");
-    }
-    std::ostringstream out;
-    tinygltf::TinyGLTF writer;
-    if (!writer.WriteGltfSceneToStream(&builder.gltf(), out, false, true)) {
-      return fail(ExitCode::kInternal, "glb.write", path, "tinygltf cannot write the scene",
-                  "report this with the bundle");
-    }
-    return write_file(path, std::string_view(std::move(out).str()));
-  } catch (const std::exception& error) {
-    return fail(ExitCode::kInternal, "glb.write", path, error.what(),
-                "report this with the bundle");
+  auto file = guarded_build(bundle, [&](GlbBuilder& builder) {
+    const ModelRecord& record = bundle.models()[model];
+    tinygltf::Node node;
+    node.translation = {record.center[0], record.center[1], record.center[2]};
+    return builder.add_model(model, images, record.scale, std::move(node));
+  });
+  if (!file) {
+    file.error().where = path;
+    return tl::unexpected(file.error());
   }
+  return write_file(path, std::span<const std::byte>(*file));
 }
 
 }  // namespace modar

@@ -126,6 +126,8 @@ Result<void> serve_site(const ServeOptions& options,
   }
   server.set_file_extension_and_mimetype_mapping("js", "text/javascript");
   server.set_file_extension_and_mimetype_mapping("wasm", "application/wasm");
+  server.set_file_extension_and_mimetype_mapping("usdz", "model/vnd.usdz+zip");
+  server.set_file_extension_and_mimetype_mapping("glb", "model/gltf-binary");
   server.set_file_extension_and_mimetype_mapping("modar", "application/octet-stream");
   server.set_file_extension_and_mimetype_mapping("webmanifest", "application/manifest+json");
   server.set_default_headers(kSafeHeaders);

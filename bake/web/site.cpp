@@ -8,6 +8,9 @@
 #include <span>
 #include <string_view>
 
+#include "bake/export/glb_writer.hpp"
+#include "bake/export/room_models.hpp"
+#include "bake/export/usdz_writer.hpp"
 #include "bake/json.hpp"
 #include "bake/output.hpp"
 #include "bake/process.hpp"
@@ -28,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What is copied as it is; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 21> kPageFiles = {"app.js",
+constexpr std::array<std::string_view, 22> kPageFiles = {"app.js",
                                                          "camera.js",
                                                          "engine-plain.js",
                                                          "engine-plain.wasm",
@@ -46,6 +49,7 @@ constexpr std::array<std::string_view, 21> kPageFiles = {"app.js",
                                                          "modar-worker.js",
                                                          "modar.js",
                                                          "recorder.js",
+                                                         "room.svg",
                                                          "storage.js",
                                                          "style.css",
                                                          "turntable.js"};
@@ -70,14 +74,20 @@ void add_to_hash(std::uint64_t& hash, std::span<const std::byte> bytes) {
     hash = (hash ^ static_cast<std::uint64_t>(byte)) * 1099511628211u;
 }
 
-/// version: behind the address under which the page asks for the file, where it has one.
-Result<void> put(Draft& draft, const std::string& name, std::span<const std::byte> bytes,
-                 const std::string& version = {}) {
+/// A file that the service worker does not keep.
+Result<void> put_online(Draft& draft, const std::string& name, std::span<const std::byte> bytes) {
   const std::string path = draft.options.output + "/" + name;
   MODAR_TRY(write_file(path, bytes));
   add_to_hash(draft.hash, std::as_bytes(std::span(name)));
   add_to_hash(draft.hash, bytes);
   draft.site.files.push_back(name);
+  return {};
+}
+
+/// version: behind the address under which the page asks for the file, where it has one.
+Result<void> put(Draft& draft, const std::string& name, std::span<const std::byte> bytes,
+                 const std::string& version = {}) {
+  MODAR_TRY(put_online(draft, name, bytes));
   draft.kept.push_back(name + version);
   return {};
 }
@@ -206,6 +216,20 @@ Result<Json> put_hint(Draft& draft, const BundleView& bundle, std::uint32_t patt
   return json;
 }
 
+/// What stands on a pattern, for the viewers of phones. stem: of the files' names.
+Result<void> put_room(Draft& draft, const BundleView& bundle, std::uint32_t pattern,
+                      std::span<const GlbImage> images, const std::string& stem, Json& json) {
+  const std::vector<RoomModel> models = models_in_room(bundle, pattern);
+  if (models.empty()) return {};
+  MODAR_ASSIGN(const auto usdz, encode_usdz(bundle, models, images));
+  MODAR_TRY(put_online(draft, stem + ".usdz", usdz));
+  MODAR_ASSIGN(const auto glb, encode_glb(bundle, models, images));
+  MODAR_TRY(put_online(draft, stem + ".glb", glb));
+  json.set("usdz", stem + ".usdz");
+  json.set("glb", stem + ".glb");
+  return {};
+}
+
 Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::string>& names) {
   const auto named = [&](Error error) {
     error.where = path + (error.where.empty() ? "" : ", " + error.where);
@@ -234,10 +258,12 @@ Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::
   draft.site.bundle_bytes += trimmed.size();
   draft.site.trimmed_bytes += file.bytes().size() - std::min(file.bytes().size(), trimmed.size());
   Json patterns = Json::array();
+  const std::vector<GlbImage> images =
+      draft.options.room ? decoded_textures(*bundle) : std::vector<GlbImage>();
   for (std::uint32_t p = 0; p < bundle->patterns().size(); ++p) {
-    MODAR_ASSIGN(
-        const Json pattern,
-        put_hint(draft, *bundle, p, "patterns/" + name + "-" + std::to_string(p) + ".jpg"));
+    const std::string beside = "patterns/" + name + "-" + std::to_string(p);
+    MODAR_ASSIGN(Json pattern, put_hint(draft, *bundle, p, beside + ".jpg"));
+    if (draft.options.room) MODAR_TRY(put_room(draft, *bundle, p, images, beside, pattern));
     patterns.push_back(pattern);
   }
   return Json{{"title", title_of(stem)},

@@ -16,6 +16,7 @@ struct SiteOptions {
   std::vector<std::string>
       languages;  ///< of the page's words, the first for those who have none of them; empty: all
   std::string words;  ///< folder of LANGUAGE.json, as those of the page; empty: none beside these
+  bool room = false;  ///< add USDZ and GLB files of what stands on each pattern
   std::vector<std::string> links;  ///< "Imprint=https://...": at the foot of the cover
   std::string
       texts;  ///< JSON {PATTERN: {LANGUAGE: {"name", "text", "alt"}}}; empty: those of the bundles

@@ -72,7 +72,7 @@ function showWords() {
   for (const element of document.querySelectorAll('[data-word]')) element.textContent = say(element.dataset.word);
   for (const element of document.querySelectorAll('[data-label]')) {
     element.setAttribute('aria-label', say(element.dataset.label));
-    if (element.localName === 'button') element.title = say(element.dataset.label);
+    if (['a', 'button'].includes(element.localName)) element.title = say(element.dataset.label);
   }
   $('models').setAttribute('aria-label', say('nothingSeen'));
   $('models').setAttribute('aria-roledescription', say('scene'));
@@ -377,7 +377,22 @@ async function showScene(pattern) {
   Object.assign($('ground'), { width: picture.width, height: picture.height, src: await addressOf(picture.image) });
   table.show(pattern, picture);
   showLabel(pattern);
+  showRoom(picture);
 }
+
+/** Links to the viewer that a phone has for its visitor's room: Quick Look or Scene Viewer. */
+function showRoom({ usdz, glb }) {
+  const room = $('room');
+  if (usdz && room.relList.supports('ar')) room.href = usdz;
+  else if (glb && navigator.userAgent.includes('Android')) room.href = sceneViewer(new URL(glb, location.href));
+  else room.removeAttribute('href');
+  room.hidden = !room.hasAttribute('href');
+}
+
+const sceneViewer = (file) =>
+  `intent://arvr.google.com/scene-viewer/1.0?mode=ar_preferred&file=${encodeURIComponent(file.href)}`
+  + '#Intent;scheme=https;package=com.google.android.googlequicksearchbox;action=android.intent.action.VIEW;'
+  + `S.browser_fallback_url=${encodeURIComponent(location.href)};end;`;
 
 function stop() {
   closeCamera();

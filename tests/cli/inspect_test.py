@@ -1,11 +1,13 @@
 """`modar inspect`: the documented keys, and files that other tools read."""
 import json
+import re
 import shutil
 import struct
 import subprocess
 import unittest
+import zipfile
 
-from programs import ROOT, ProgramTest
+from programs import COVER, POTTERY, QUICK, ROOT, ProgramTest
 
 KEYS = {
     "models": {"name", "vertices", "triangles", "chunks", "lods", "materials", "bytes", "bytes_per_triangle", "layout",
@@ -78,6 +80,47 @@ class Extract(ProgramTest):
                         for m in document["meshes"] for p in m["primitives"])
         self.assertEqual(triangles, 3296)  # Table 3 of the article: POTTERY
         self.assertEqual(len(document["images"]), 1)
+
+    def test_what_stands_on_a_picture_is_a_usdz(self):
+        bundle, out = self.folder / "tall.modar", self.folder / "tall"
+        self.modar_json("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene", "cover=pottery,height=120mm,offset=0:30:5mm",
+                        "-o", bundle, *QUICK)
+        self.assertEqual(self.modar("inspect", bundle, "--extract", out).returncode, 0)
+        path = out / "cover.usdz"
+        with zipfile.ZipFile(path) as archive:
+            self.assertIsNone(archive.testzip())
+            names = archive.namelist()
+            self.assertEqual(names, ["Model.usda", "textures/0.jpg"])
+            for entry in archive.infolist():  # stored, each file at a multiple of 64 bytes: the USDZ specification
+                name, extra = struct.unpack_from("<HH", path.read_bytes(), entry.header_offset + 26)
+                self.assertEqual((entry.compress_type, (entry.header_offset + 30 + name + extra) % 64), (zipfile.ZIP_STORED, 0))
+            usda, picture = archive.read(names[0]).decode(), archive.read(names[1])
+        self.assertIn("metersPerUnit = 1\n    upAxis = \"Y\"", usda)
+        self.assertTrue(picture.startswith(b"\xff\xd8") and picture.endswith(b"\xff\xd9"))
+
+        def values(what):
+            return [tuple(map(float, v.split(","))) for text in re.findall(what + r" = \[(.*?)\]", usda)
+                    for v in re.findall(r"\(([^()]*)\)", text)]
+
+        points, normals, uvs = values(r"point3f\[\] points"), values(r"normal3f\[\] normals"), values(r"primvars:st")
+        counts = [len(text.split(",")) for text in re.findall(r"faceVertexIndices = \[(.*?)\]", usda)]
+        self.assertEqual(sum(counts) // 3, 3296)
+        self.assertEqual(len(points), len(normals))
+        self.assertEqual(len(points), len(uvs))
+        low, high = [min(p[i] for p in points) for i in range(3)], [max(p[i] for p in points) for i in range(3)]
+        # 120 mm high, 5 mm above the ground, 30 mm towards the picture's top, which is away from who looks.
+        for got, wanted in ((low[1], 0.005), (high[1], 0.125), ((low[0] + high[0]) / 2, 0), ((low[2] + high[2]) / 2, -0.03)):
+            self.assertAlmostEqual(got, wanted, delta=0.0005)
+        for normal in normals[::50]:
+            self.assertAlmostEqual(sum(n * n for n in normal), 1, delta=1e-4)
+        # The same surface: corners of each triangle turn around its normals.
+        indices = [int(i) for i in re.search(r"faceVertexIndices = \[(.*?)\]", usda)[1].split(",")]
+        turned = 0
+        for a, b, c in zip(indices[::3], indices[1::3], indices[2::3]):
+            u, v = ([points[k][i] - points[a][i] for i in range(3)] for k in (b, c))
+            cross = [u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3] for i in range(3)]
+            turned += sum(x * n for x, n in zip(cross, normals[a])) > 0
+        self.assertGreater(turned / (len(indices) // 3), 0.99)
 
     def test_the_glb_bakes_to_the_same_model(self):
         source = self.modar_json("inspect", self.bake_demo())["models"][0]

@@ -84,6 +84,30 @@ class Web(ProgramTest):
         self.assertIn(site["bundles"][0]["file"], files)
         self.assertIn("?v=", site["bundles"][0]["file"])
 
+    def test_files_for_the_visitors_room(self):
+        done = self.web(self.bake_demo(), "--room", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        [pattern] = json.loads(self.read("site.json"))["bundles"][0]["patterns"]
+        usdz, glb = self.read(pattern["usdz"]), self.read(pattern["glb"])
+        self.assertEqual((usdz[:4], glb[:4]), (b"PK\x03\x04", b"glTF"))
+        # Both in metres, y up: the model's places in the one are those in the other.
+        length = struct.unpack_from("<I", glb, 12)[0]
+        document = json.loads(glb[20:20 + length])
+        [node] = document["nodes"]
+        matrix = node["matrix"]
+        corners = [document["accessors"][document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]][end] for end in ("min", "max")]
+        places = [[sum(matrix[4 * k + row] * corner[k] for k in range(3)) + matrix[12 + row] for row in range(3)] for corner in corners]
+        text = re.search(rb"point3f\[\] points = \[(.*?)\]", usdz)[1].decode()
+        points = [tuple(map(float, v.split(","))) for v in re.findall(r"\(([^()]*)\)", text)]
+        for axis in range(3):
+            low, high = sorted(place[axis] for place in places)
+            self.assertAlmostEqual(low, min(p[axis] for p in points), delta=1e-5)
+            self.assertAlmostEqual(high, max(p[axis] for p in points), delta=1e-5)
+        # A page without a network cannot open them: they are not kept.
+        files = json.loads(re.match(r"const SITE = (\{.*?\n\})\s*;\n", self.read("sw.js").decode(), re.S)[1])["files"]
+        self.assertNotIn(pattern["usdz"], files)
+        self.assertNotIn(pattern["glb"], files)
+
     def test_same_input_same_bytes_and_a_change_is_a_new_version(self):
         bundle = self.bake_demo()
         for output, title in (("a", "One"), ("b", "One"), ("c", "Two")):

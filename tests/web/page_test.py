@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Server  # noqa: E402
@@ -153,7 +154,7 @@ class Page(ProgramTest):
         for words in (["bake", "--model", POTTERY, "--pattern", COVER, "--scene", "cover=pottery,scale=0.5", "-o", bundle,
                        "--quiet", "--no-lods", *QUICK],
                       ["web", bundle, "-o", site, "--title", "Pots & pans", "--words", words, "--link", "Imprint=https://example.org/imprint",
-                       "--link", "Write to us=mailto:us@example.org", "--texts", texts, "--quiet"]):
+                       "--link", "Write to us=mailto:us@example.org", "--texts", texts, "--room", "--quiet"]):
             done = test.modar(*words)
             if done.returncode != 0:
                 raise AssertionError(done.stderr)
@@ -417,6 +418,27 @@ class Page(ProgramTest):
         self.assertEqual(self.browser.errors, [])
         self.browser.run("document.getElementById('close').click()")
         self.assertFalse(self.browser.run("document.getElementById('cover').hidden"))
+
+    def test_phones_have_a_link_to_their_own_viewer(self):
+        room = """(async () => {
+          const links = [];
+          for (const [name, viewer] of [['iPhone', true], ['Android', false], ['desk', false]]) {
+            DOMTokenList.prototype.supports = () => viewer;
+            Object.defineProperty(navigator, 'userAgent', { value: name, configurable: true });
+            document.getElementById('scene').dispatchEvent(new Event('change'));
+            await new Promise((resolve) => setTimeout(resolve, 300));
+            const link = document.getElementById('room');
+            links.push([link.checkVisibility(), link.href, link.children.length, link.title]);
+          }
+          return links;
+        })()"""
+        self.around()
+        iphone, android, desk = self.browser.run(room)
+        self.assertEqual(iphone, [True, f"{self.server.url}patterns/demo-0.usdz", 1, "View in your room"])
+        self.assertEqual(android[0], True)
+        self.assertIn("file=" + urllib.parse.quote(f"{self.server.url}patterns/demo-0.glb", safe=""), android[1])
+        self.assertRegex(android[1], "^intent://arvr.google.com/scene-viewer/.*scheme=https;.*end;$")
+        self.assertEqual(desk[0], False)
 
     def test_the_picture_lies_where_the_turntables_eye_sees_it(self):
         self.browser.open(self.server.url)
