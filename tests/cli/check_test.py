@@ -3,6 +3,8 @@ import json
 import os
 import pathlib
 import shutil
+import subprocess
+import tarfile
 import unittest
 
 try:
@@ -73,6 +75,20 @@ class Check(ProgramTest):
         jsonschema.validate(sarif, SARIF)
         uri = sarif["runs"][0]["artifacts"][0]["location"]["uri"]
         self.assertTrue(uri.endswith("/a%20b%25%C3%A9.modar"), uri)
+
+    def test_sarif_keeps_the_schema_of_oasis(self):
+        packed = shutil.which("npm") and subprocess.run(["npm", "pack", "--silent", "@microsoft/jest-sarif@1.0.0-beta.0"],
+                                                        cwd=self.folder, capture_output=True, text=True)
+        if not packed or packed.returncode != 0:
+            self.skipTest("npm cannot fetch the schema")
+        with tarfile.open(self.folder / packed.stdout.strip().splitlines()[-1]) as package:
+            schema = json.load(package.extractfile("package/lib/schemas/sarif-2.1.0-rtm.5.json"))
+        oasis = jsonschema.Draft4Validator(schema)
+        for path in [GOLDEN, *CORRUPT[::15]]:
+            with self.subTest(path.stem):
+                oasis.validate(json.loads(self.modar("check", path, "--sarif").stdout))
+        with self.assertRaises(jsonschema.ValidationError):
+            oasis.validate({"version": "2.1.0", "runs": [{"results": []}]})
 
     def test_severities_are_weighed_anew(self):
         bad = ROOT / "tests" / "corrupt" / "MODEL_COUNTS.modar"
