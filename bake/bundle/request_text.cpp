@@ -165,24 +165,27 @@ tl::expected<std::array<double, 3>, WrongValue> parse_turn(std::string_view text
 }
 
 tl::expected<SceneOffset, WrongValue> parse_offset(std::string_view text) {
-  const std::size_t digits = unit_start(text);
-  const std::string unit(text.substr(digits));
-  const std::vector<std::string_view> parts = split(text.substr(0, digits), ':');
+  const tl::unexpected<WrongValue> wrong(
+      WrongValue{"it is not three numbers",
+                 "write X:Y:Z, as in offset=0:0:20mm; without a unit they are millimetres if the "
+                 "pattern's width is known, else its longest sides"});
+  const std::vector<std::string_view> parts = split(text, ':');
   SceneOffset offset;
-  bool good = parts.size() == offset.value.size();
-  for (std::size_t i = 0; good && i < parts.size(); ++i) {
-    good = parse_number(parts[i], offset.value[i]) && std::fabs(offset.value[i]) <= kMostOffset;
-  }
-  const Result<double> metres = unit.empty() ? 1.0 : parse_unit(unit);
-  if (!good || !metres) {
-    return tl::unexpected(WrongValue{"it is not three numbers",
-                                     "write X:Y:Z, as in offset=0:0:20mm; without a unit they are "
-                                     "millimetres if the pattern's width is known, else its "
-                                     "longest sides"});
-  }
-  if (!unit.empty()) {
+  if (parts.size() != offset.value.size()) return wrong;
+  // A number without a unit has that of the last one.
+  const std::string_view last = parts.back().substr(unit_start(parts.back()));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::size_t digits = unit_start(parts[i]);
+    const std::string unit(digits < parts[i].size() ? parts[i].substr(digits) : last);
+    double& value = offset.value[i];
+    if (!parse_number(parts[i].substr(0, digits), value) || !(std::fabs(value) <= kMostOffset)) {
+      return wrong;
+    }
+    if (unit.empty()) continue;
+    const Result<double> metres = parse_unit(unit);
+    if (!metres || last.empty()) return wrong;
     offset.unit = SceneOffset::Unit::kMillimetres;
-    for (double& value : offset.value) value = unit == "mm" ? value : value * *metres * 1000;
+    if (unit != "mm") value *= *metres * 1000;
   }
   return offset;
 }

@@ -83,7 +83,7 @@ class Extract(ProgramTest):
 
     def test_what_stands_on_a_picture_is_a_usdz(self):
         bundle, out = self.folder / "tall.modar", self.folder / "tall"
-        self.modar_json("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene", "cover=pottery,height=120mm,offset=0:30:5mm",
+        self.modar_json("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene", "cover=pottery,height=120mm,offset=0:30mm:5mm",
                         "-o", bundle, *QUICK)
         self.assertEqual(self.modar("inspect", bundle, "--extract", out).returncode, 0)
         path = out / "cover.usdz"

@@ -34,6 +34,11 @@ TEST(Scene, DefaultsAndOptions) {
   EXPECT_EQ(sized->turn, (std::array<double, 3>{10, 20, -30}));
   EXPECT_EQ(sized->offset.unit, SceneOffset::Unit::kMillimetres);
   EXPECT_DOUBLE_EQ(sized->offset.value[2], 25.4);
+
+  const auto apart = parse_scene("a=b,offset=1in:2:3cm");
+  ASSERT_TRUE(apart) << to_line(apart.error());
+  EXPECT_EQ(apart->offset.unit, SceneOffset::Unit::kMillimetres);
+  EXPECT_EQ(apart->offset.value, (std::array<double, 3>{25.4, 20, 30}));
 }
 
 TEST(Scene, Refused) {
@@ -57,6 +62,7 @@ TEST(Scene, Refused) {
                            "a=b,turn=361",
                            "a=b,scale=1,height=5mm",
                            "a=b,offset=1:2:3furlong",
+                           "a=b,offset=1mm:2:3",
                            "a=b,centred=no"}) {
     const auto scene = parse_scene(text);
     ASSERT_FALSE(scene) << text;
