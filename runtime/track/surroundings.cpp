@@ -50,6 +50,12 @@ constexpr int kBridged = 10;
 // those of one side alone tell a pose badly. By hand.
 constexpr double kNewWeight = 0.3;
 constexpr int kEnoughSteady = 5;
+// And someone who fills the frame hides all others for a while, and would turn the world with him:
+// of the points that were learned from the pattern, or seen for a second, a share must be where
+// they should be, if so many are in view. By hand.
+constexpr int kKnownHits = 30;
+constexpr int kLeastKnown = 8;
+constexpr double kKnownShare = 0.35;
 // Information of a patch's equations as they stand, 1 / square pixels. By hand; see kHonest.
 constexpr double kInformation = 1.0;
 // What one frame adds to a depth, of that: frames in a row see the same template with the same
@@ -210,6 +216,7 @@ struct MapFit {
   int visible = 0;
   int inliers = 0;
   double weight = 0;  ///< of the visible
+  int known = 0;      ///< of the visible
 };
 
 /// Observes the points at a pose.
@@ -229,6 +236,7 @@ MapFit linearise(const Camera& camera, const FrameView& frame, std::span<const M
     one.weight = point.of_pattern ? 1.0 : new_weight;
     fit.weight += one.weight;
     ++fit.visible;
+    fit.known += point.known() ? 1 : 0;
     if (one.patch.correlation >= kInlierCorrelation) ++fit.inliers;
     if (one.patch.xx == 0.0f && one.patch.yy == 0.0f) continue;
     const glm::dvec3& q = at.direction;
@@ -336,6 +344,10 @@ void refine_depth(const Projection& at, const PatchNormalEquations& equations, M
 bool MapPoint::steady() const {
   return hits >= kSteadyHits && travel >= kSteadyTravel &&
          inverse_depth * inverse_depth * information >= kSteadyDepth * kSteadyDepth;
+}
+
+bool MapPoint::known() const {
+  return steady() && (of_pattern || hits >= kKnownHits);
 }
 
 bool MapPoint::usable() const {
@@ -468,6 +480,7 @@ bool Surroundings::align_fine(const FrameView& frame, Pose& pose, ExtendedPose& 
     if (moved < kConverged && step > 0) break;
   }
   int placed = 0;
+  int known_placed = 0;
   double placed_weight = 0;
   double anchor_position = 0;
   double anchor_rotation = 0;
@@ -475,6 +488,7 @@ bool Surroundings::align_fine(const FrameView& frame, Pose& pose, ExtendedPose& 
     if (one.patch.correlation < kInlierCorrelation) continue;
     if (glm::length(rest_of(one, Vector6::Zero())) > kPlaced) continue;
     ++placed;
+    known_placed += one.point->known() ? 1 : 0;
     placed_weight += one.weight;
     anchor_position += one.point->anchor_position;
     anchor_rotation += one.point->anchor_rotation;
@@ -482,6 +496,7 @@ bool Surroundings::align_fine(const FrameView& frame, Pose& pose, ExtendedPose& 
   if (placed < kLeastPoints || placed_weight < kLeastShare * fit.weight) {
     return false;
   }
+  if (fit.known >= kLeastKnown && known_placed < kKnownShare * fit.known) return false;
   const Matrix6 fused = solve_symmetric(system.matrix(), Matrix6(Matrix6::Identity()));
   system.expect_rotation(glm::dvec3(0.0), -expected.weight);
   const Matrix6 seen = solve_symmetric(system.matrix(), Matrix6(Matrix6::Identity()));

@@ -43,6 +43,8 @@ struct MapPoint {
   glm::dvec2 origin{};     ///< pixel of the level where it began
   /// Motion has shown its depth, and that it goes with the pattern.
   [[nodiscard]] bool steady() const;
+  /// The same, and it was learned from the pattern or seen for long: not of someone who passes by.
+  [[nodiscard]] bool known() const;
   /// Whether poses may follow from it: steady, or learned since the pattern was seen and gone
   /// along.
   [[nodiscard]] bool usable() const;

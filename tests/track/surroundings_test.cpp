@@ -204,6 +204,34 @@ TEST_F(SurroundingsTest, DoesNotGoWithWhatCoveredThePattern) {
   }
 }
 
+// What is left of a pattern that is covered says its pose, as it does without surroundings.
+TEST_F(SurroundingsTest, LeavesTheFrameTheLastWord) {
+  const auto plain = PoseLoop::create(BundleView::open(bundle_).value(), camera()).value();
+  const auto same = [&](const cv::Mat& frame, int i) {
+    const Detection* seen = step(frame);
+    TrackResult result;
+    EXPECT_TRUE(plain->step(gray(frame), result));
+    if (result.visible.empty()) return false;
+    EXPECT_NE(seen, nullptr) << i;
+    if (seen == nullptr) return true;
+    EXPECT_FALSE(seen->extended) << i;
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_EQ(seen->corners[k], result.visible[0].corners[k]) << i;
+    }
+    return true;
+  };
+  int shown = 0;
+  for (int i = 0; i < 90; ++i) {
+    const View view = eye_at(time_ += 1.0 / 30, 0);
+    Poster hand = pattern_at({2.0 - 1.3 * std::sin(CV_PI * std::max(0, i - 30) / 60), 0, 0.1});
+    hand.picture = cv::Mat(60, 60, CV_8UC1, cv::Scalar(150));
+    std::vector<Poster> posters = with_pattern();
+    if (i >= 30) posters.push_back(hand);
+    shown += same(frame_at(view, posters), i) ? 1 : 0;
+  }
+  EXPECT_GE(shown, 85);
+}
+
 // A jerk moves the frame further than patches are looked for; a gyroscope tells it.
 TEST_F(SurroundingsTest, FollowsAJerkByAGyroscope) {
   for (const bool gyroscope : {false, true}) {
