@@ -160,8 +160,9 @@ Result<std::vector<BenchRow>> many_rows(const PoseBenchOptions& options, const s
 }
 
 Result<std::vector<BenchRow>> lookalike_rows(const PoseBenchOptions& options,
+                                             const std::string& only,
                                              const ProgressCallback& progress) {
-  MODAR_ASSIGN(const auto measured, bench_lookalikes(options, progress));
+  MODAR_ASSIGN(const auto measured, bench_lookalikes(options, only, progress));
   std::vector<BenchRow> rows;
   for (const LookalikeRow& row : measured) {
     rows.push_back({row.measure + "_pct", row.percent, kNoFigure, kNoFigure});
@@ -191,7 +192,7 @@ Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command) {
   MODAR_ASSIGN(const PoseBenchOptions options, options_of(command));
   if (command.scores || command.tables || command.lookalikes || command.many > 0) {
     auto rows = command.many > 0     ? many_rows(options, command.only, progress)
-                : command.lookalikes ? lookalike_rows(options, progress)
+                : command.lookalikes ? lookalike_rows(options, command.only, progress)
                 : command.scores     ? score_rows(options, progress)
                                      : paper_rows(options, progress);
     bar.clear();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "bake/lab/family_prints.hpp"
 #include "bake/lab/field_scene.hpp"
 #include "bake/lab/unknown_view.hpp"
 #include "formats/bundle_view.hpp"
@@ -12,8 +13,9 @@
 namespace modar {
 namespace {
 
-constexpr int kFrames = 60;  // two seconds
-constexpr int kDecided = 5;  // frames until the name must be right
+constexpr int kFrames = 60;        // two seconds
+constexpr int kFamilyFrames = 75;  // of which those after two seconds count
+constexpr int kDecided = 5;        // frames until the name must be right
 
 GrayPicture mirror_of(const GrayImage& pattern) {
   GrayPicture out{pattern.width, pattern.height, {}};
@@ -34,6 +36,7 @@ struct Showing {
   double covered = 0;  ///< share that the background hides
   std::uint64_t seed = 0;
   bool known_camera = false;  ///< see PoseBenchOptions
+  int frames = kFrames;
 };
 
 /// A print on a moving hand's path before a tracker.
@@ -59,7 +62,7 @@ Result<void> run_sequence(const GrayImage& picture, std::span<const std::byte> b
   const SceneLight light = draw_light(random);
   const std::uint64_t side = random.next();
   GrayPicture frame;
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < showing.frames; ++i) {
     Random same_side(side);
     const SceneFrame scene = render_still(print, camera, path.at(i / 30.0, 1.0), background, band,
                                           same_side, light.focus, {});
@@ -111,24 +114,100 @@ Result<bool> misnamed(const GrayImage& print, std::span<const std::byte> both, s
   return wrong;
 }
 
+/// Members of a family of which one alone was baked: whether the other one is shown after two
+/// seconds, and whether the true one is hidden then, taken for another print, in view, half covered
+/// and held.
+struct FamilyTally {
+  explicit FamilyTally(const std::string& name)
+      : other{{name + " shown"}},
+        plain{{name + " plain hidden"}},
+        held{{name + " held hidden"}},
+        covered{{name + " covered hidden"}} {}
+  Tally other;
+  Tally plain;
+  Tally held;
+  Tally covered;
+
+  static Result<void> show(const GrayImage& print, std::span<const std::byte> bundle,
+                           const Showing& showing, bool shown, Tally& tally) {
+    return run_sequence(
+        print, bundle, showing, [&](int frame, const TrackResult& seen, const FrameTruth&) {
+          if (frame < kFrames) return;
+          tally.add(shown ? !seen.visible.empty() : seen.reason == Reason::kOtherPrint);
+        });
+  }
+  Result<void> add(const FamilyPrints& prints, const GrayPicture& behind, std::uint64_t seed,
+                   bool known_camera) {
+    const GrayImage own = prints.own.view();
+    MODAR_ASSIGN(const auto record, bake_tracker_record(own, {}));
+    MODAR_ASSIGN(const auto bundle, bundle_of_record(own, record));
+    Random random(seed + 17);
+    const GrayPicture in_hand = held_print(own, random);
+    const double hidden = random.uniform(0.2, 0.6);
+    const Showing open{behind, 0, seed, known_camera, kFamilyFrames};
+    const Showing half{behind, hidden, seed, known_camera, kFamilyFrames};
+    MODAR_TRY(show(prints.other.view(), bundle, open, true, other));
+    MODAR_TRY(show(own, bundle, open, false, plain));
+    MODAR_TRY(show(in_hand.view(), bundle, open, false, held));
+    return show(own, bundle, half, false, covered);
+  }
+  void finish(std::vector<LookalikeRow>& rows) {
+    for (Tally* one : {&other, &plain, &held, &covered}) rows.push_back(one->finish());
+  }
+};
+
+/// Rows of families made of these pictures.
+Result<std::vector<LookalikeRow>> bench_families(const PoseBenchOptions& options,
+                                                 std::span<const GrayPicture> pictures,
+                                                 std::span<const GrayPicture> backgrounds,
+                                                 const ProgressCallback& progress) {
+  FamilyTally title("family title");
+  FamilyTally fruit("family fruit");
+  const std::size_t count = pictures.size();
+  for (std::size_t p = 0; p < count; ++p) {
+    for (int i = 0; i < options.frames; ++i) {
+      const std::uint64_t seed = options.seed + 1000003 * p + 7919 * static_cast<std::uint64_t>(i);
+      Random random(seed + 5);
+      const GrayImage own = pictures[p].view();
+      const GrayPicture& behind = backgrounds[seed % backgrounds.size()];
+      MODAR_TRY(title.add(titled_prints(own, random), behind, seed, options.known_camera));
+      const std::size_t first = p + 1 + random.next() % (count > 2 ? count - 2 : 1);
+      MODAR_TRY(fruit.add(fruit_prints(own, pictures[first % count].view(),
+                                       pictures[(first + 1) % count].view(), random),
+                          behind, seed, options.known_camera));
+      if (progress) {
+        progress("families", (static_cast<double>(p) + (i + 1.0) / options.frames) /
+                                 static_cast<double>(count));
+      }
+    }
+  }
+  std::vector<LookalikeRow> rows;
+  title.finish(rows);
+  fruit.finish(rows);
+  return rows;
+}
+
 }  // namespace
 
 Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& options,
+                                                   const std::string& only,
                                                    const ProgressCallback& progress) {
   MODAR_ASSIGN(const auto backgrounds,
                load_backgrounds(options.backgrounds, options.width, options.height));
-  Tally edition{{"lookalike shown other photo"}};
-  Tally language{{"lookalike shown other language"}};
-  Tally mirror{{"lookalike shown mirrored"}};
-  Tally named{{"lookalike misnamed"}};
-  Tally covered{{"lookalike covered right"}};
-  Tally plain{{"lookalike plain right"}};
   std::vector<GrayPicture> pictures;
   for (const std::string& path : options.patterns) {
     bool shrunk = false;
     MODAR_ASSIGN(auto picture, load_pattern(path, shrunk));
     pictures.push_back(std::move(picture));
   }
+  MODAR_ASSIGN(auto rows, bench_families(options, pictures, backgrounds, progress));
+  if (only == "family") return rows;
+  Tally edition{{"lookalike shown other photo"}};
+  Tally language{{"lookalike shown other language"}};
+  Tally mirror{{"lookalike shown mirrored"}};
+  Tally named{{"lookalike misnamed"}};
+  Tally covered{{"lookalike covered right"}};
+  Tally plain{{"lookalike plain right"}};
   for (std::size_t p = 0; p < pictures.size(); ++p) {
     const GrayImage own = pictures[p].view();
     const GrayPicture photo = edition_of(own, pictures[(p + 1) % pictures.size()].view());
@@ -163,8 +242,10 @@ Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& optio
       }
     }
   }
-  return std::vector<LookalikeRow>{edition.finish(), language.finish(), mirror.finish(),
-                                   named.finish(),   covered.finish(),  plain.finish()};
+  for (Tally* one : {&edition, &language, &mirror, &named, &covered, &plain}) {
+    rows.push_back(one->finish());
+  }
+  return rows;
 }
 
 }  // namespace modar

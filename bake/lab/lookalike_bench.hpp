@@ -21,8 +21,12 @@ struct LookalikeRow {
 /// the pattern alone in the bundle, in the last of these frames; "lookalike misnamed": pattern and
 /// edition in the bundle, one of them shown, the other one reported in the fifth frame or later;
 /// "covered right": half of the pattern behind something that stands still, right in the last
-/// frame, and "plain right". Errors: as of bench_detection().
+/// frame, and "plain right". And families of which one member was baked, of the frames after two
+/// seconds: "shown", of the other member; "hidden", of the true one, taken for another print:
+/// plain, held by thumbs, and covered by 20 to 60 %. only: "family": these alone. Errors: as of
+/// bench_detection().
 Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& options,
+                                                   const std::string& only,
                                                    const ProgressCallback& progress);
 
 }  // namespace modar
