@@ -21,35 +21,45 @@ export class Recorder {
   #timer = 0;
   /** @type {Promise<File>} when it has ended */
   done;
+  #resolve;
+  #reject;
 
-  /** layers: canvases that lie over each other. Ends by stop(), or when it is long enough. */
+  /** layers: canvases that lie over each other. Begins with the first add(); ends by stop(), or when it is long enough. */
   constructor(layers) {
     this.#layers = layers;
     // Encoders take even sides, and keep to the first frame's.
     Object.assign(this.#canvas, { width: layers[0].width & ~1, height: layers[0].height & ~1 });
     this.#context = this.#canvas.getContext('2d', { alpha: false });
-    this.add();
+    this.done = new Promise((resolve, reject) => {
+      this.#resolve = resolve;
+      this.#reject = reject;
+    });
+  }
+
+  /** Takes the layers as they are: call it in the task that has drawn them, as browsers empty them afterwards. */
+  add() {
+    for (const layer of this.#layers) this.#context.drawImage(layer, 0, 0, this.#canvas.width, this.#canvas.height);
+    if (!this.#recorder) this.#begin();
+  }
+
+  #begin() {
     const mimeType = typeOf();
     this.#recorder = new MediaRecorder(this.#canvas.captureStream(FRAMES_A_SECOND), { mimeType, videoBitsPerSecond: BITS });
     this.#recorder.ondataavailable = ({ data }) => this.#parts.push(data);
-    this.done = new Promise((resolve, reject) => {
-      this.#recorder.onstop = () => {
-        const type = mimeType.split(';')[0];
-        resolve(new File(this.#parts, `modar.${type.split('/')[1]}`, { type }));
-      };
-      this.#recorder.onerror = ({ error }) => reject(error ?? new Error('the film could not be written'));
-    });
+    this.#recorder.onstop = () => this.#end(mimeType);
+    this.#recorder.onerror = ({ error }) => this.#reject(error ?? new Error('the film could not be written'));
     this.#recorder.start(1000);
     this.#timer = setTimeout(() => this.stop(), 1000 * LONGEST);
   }
 
-  /** Takes the layers as they are: call it in the task that has drawn them. */
-  add() {
-    for (const layer of this.#layers) this.#context.drawImage(layer, 0, 0, this.#canvas.width, this.#canvas.height);
+  #end(mimeType) {
+    const type = mimeType.split(';')[0];
+    this.#resolve(new File(this.#parts, `modar.${type.split('/')[1]}`, { type }));
   }
 
   stop() {
     clearTimeout(this.#timer);
-    if (this.#recorder.state !== 'inactive') this.#recorder.stop();
+    if (!this.#recorder) this.#end(typeOf());  // nothing was drawn meanwhile: an empty film
+    else if (this.#recorder.state !== 'inactive') this.#recorder.stop();
   }
 }

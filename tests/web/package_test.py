@@ -69,6 +69,7 @@ class Package(unittest.TestCase):
         self.browser.wait("window.result !== undefined", "the end")
         self.assertEqual(self.browser.run("window.result"), "cover,1,2,16")
         self.assertEqual(self.browser.errors, [])
+        self.browser.open("about:blank")  # Vite's pages ask for their server when it is gone
 
     def assert_folder_plays(self, folder):
         server = Server(folder)

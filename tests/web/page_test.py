@@ -492,6 +492,8 @@ class Page(ProgramTest):
         self.start()
         press = "document.getElementById('record').click()"
         self.browser.run("""(async () => {
+          // A page on a loaded machine asks its camera for less, and tracking starts anew.
+          (await import('/camera.js')).Camera.prototype.copied = () => {};
           const { Recorder } = await import('/recorder.js');
           const add = Recorder.prototype.add;
           Recorder.prototype.add = function () { (globalThis.added ??= []).push(performance.now()); return add.call(this); };
@@ -502,24 +504,37 @@ class Page(ProgramTest):
         self.assertEqual(self.browser.run("document.getElementById('record').getAttribute('aria-pressed')"), "true")
         self.browser.run(press)
         self.browser.wait("document.getElementById('photo').open", "the film")
-        # Its last frame against the camera's picture without models.
+        # Its first and its last frame against the camera's picture without models.
         seen = self.browser.run("""(async () => {
           const film = document.getElementById('film');
-          await new Promise((resolve) => { film.onseeked = resolve; film.currentTime = 1e6; });
-          const { videoWidth: width, videoHeight: height, duration } = film;
+          if (film.readyState < 1) await new Promise((resolve) => { film.onloadedmetadata = resolve; });
+          const { videoWidth: width, videoHeight: height } = film;
           const copy = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
           Object.assign(copy.canvas, { width, height });
           const read = (source) => { copy.drawImage(source, 0, 0, width, height); return copy.getImageData(0, 0, width, height).data; };
-          const shot = read(film), alone = read(document.getElementById('picture'));
-          let lit = 0;
-          for (let i = 0; i < shot.length; i += 4) lit += Math.abs(shot[i] - alone[i]) + Math.abs(shot[i + 1] - alone[i + 1]) > 96;
-          return { width, height, seconds: film.currentTime, lit: lit / (width * height), name: document.getElementById('save').download };
+          const mean = (data) => data.reduce((sum, value, i) => sum + (i % 4 === 3 ? 0 : value), 0) / (0.75 * data.length);
+          const alone = read(document.getElementById('picture'));
+          const litAt = async (time) => {
+            await new Promise((resolve) => { film.onseeked = resolve; film.currentTime = time; });
+            let shot, tries = 0;
+            do {  // a browser with other work to do shows a frame some time after it has found it
+              await new Promise((resolve) => setTimeout(resolve, 100));
+              shot = read(film);
+            } while (mean(shot) < 10 && ++tries < 100);
+            let lit = 0;
+            for (let i = 0; i < shot.length; i += 4) lit += Math.abs(shot[i] - alone[i]) + Math.abs(shot[i + 1] - alone[i + 1]) > 96;
+            return lit / (width * height);
+          };
+          const lit = [await litAt(1e6)], seconds = film.currentTime;
+          lit.push(await litAt(0));
+          return { width, height, seconds, lit, name: document.getElementById('save').download };
         })()""")
         print(f"the film: {seen}")
         self.assertEqual([seen["width"], seen["height"]], [390, 844])
         self.assertGreater(seen["seconds"], 0.8)
-        self.assertGreater(seen["lit"], 0.03)
-        self.assertLess(seen["lit"], 0.4)
+        for lit in seen["lit"]:
+            self.assertGreater(lit, 0.03)
+            self.assertLess(lit, 0.4)
         self.assertRegex(seen["name"], r"^modar\.(mp4|webm)$")
         self.assertEqual(self.browser.errors, [])
 
