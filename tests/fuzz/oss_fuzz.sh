@@ -25,7 +25,8 @@ for line in "${targets[@]}"; do
   # What every Debian has (libc, the loader and their like) stays there.
   ldd "$work/bin/$name" | awk '$2 == "=>" && $3 ~ "^/" { print $3 }' |
     grep -vE '/(libc|libm|libdl|librt|libpthread|libgcc_s|libresolv)\.so' | xargs -r cp -Lnt "$OUT/lib"
-  find "${words[@]:1}" -type f -print0 | xargs -0 zip -qj "$OUT/${name}_seed_corpus.zip"
+  seeds=("${words[@]:1}")
+  (cd "$root" && find "${seeds[@]#"$root/"}" -type f | LC_ALL=C sort | zip -qX "$OUT/${name}_seed_corpus.zip" -@)
   [ ! -f "$root/tests/fuzz/$name.dict" ] || cp "$root/tests/fuzz/$name.dict" "$OUT/"
   printf '[libfuzzer]\nmax_len = 65536\ntimeout = 60\nrss_limit_mb = 2048\n' >"$OUT/$name.options"
 done
