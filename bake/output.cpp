@@ -11,7 +11,7 @@
 
 #include "bake/input.hpp"
 #include "bake/terminal.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

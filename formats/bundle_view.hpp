@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {

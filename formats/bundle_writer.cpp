@@ -8,12 +8,12 @@
 #include <tuple>
 #include <utility>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
+#include "formats/base/utf8.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/texture_format.hpp"
-#include "formats/utf8.hpp"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>

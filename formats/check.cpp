@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "formats/bits.hpp"
+#include "formats/base/bits.hpp"
 #include "formats/check_rules.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/meta_text.hpp"

@@ -6,10 +6,10 @@
 #include <charconv>
 #include <functional>
 
+#include "formats/base/shortest_number.hpp"
 #include "formats/check_rules.hpp"
 #include "formats/component.hpp"
 #include "formats/field_table.hpp"
-#include "formats/shortest_number.hpp"
 #include "formats/validate.hpp"
 
 namespace modar {

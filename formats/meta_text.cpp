@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "formats/utf8.hpp"
+#include "formats/base/utf8.hpp"
 
 namespace modar {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "formats/turn.hpp"
+#include "formats/base/turn.hpp"
 
 namespace modar {
 namespace {

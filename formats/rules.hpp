@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "formats/base/error.hpp"
 #include "formats/check.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

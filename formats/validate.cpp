@@ -7,13 +7,13 @@
 #include <cstring>
 #include <tuple>
 
-#include "formats/bits.hpp"
+#include "formats/base/bits.hpp"
+#include "formats/base/utf8.hpp"
 #include "formats/check.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/texture_format.hpp"
-#include "formats/utf8.hpp"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>

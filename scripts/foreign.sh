@@ -83,7 +83,7 @@ tests_there() {
 }
 
 there_in_wasm() { # what the loop needs, without EGL
-  sources="runtime/track/*.cpp formats/bundle_view.cpp formats/pattern_shape.cpp formats/tracker_record.cpp formats/turn.cpp formats/validate.cpp formats/rules.cpp formats/etc1.cpp"
+  sources="runtime/track/*.cpp formats/bundle_view.cpp formats/pattern_shape.cpp formats/tracker_record.cpp formats/base/turn.cpp formats/validate.cpp formats/rules.cpp formats/etc1.cpp"
   # shellcheck disable=SC2086
   NODE_PATH=/usr/share/nodejs em++ -O2 -msimd128 -std=c++20 -ffp-contract=off -fno-exceptions -fno-rtti \
     -DEIGEN_DONT_VECTORIZE -I. -Iruntime/include -idirafter /usr/include/eigen3 -idirafter /usr/include \

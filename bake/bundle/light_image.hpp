@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {

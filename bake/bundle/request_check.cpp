@@ -11,7 +11,7 @@
 
 #include "bake/bundle/light_image.hpp"
 #include "bake/import/read_model.hpp"
-#include "formats/nearest.hpp"
+#include "formats/base/nearest.hpp"
 
 namespace modar {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/pattern/pattern.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

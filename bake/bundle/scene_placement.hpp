@@ -9,9 +9,9 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "bake/up_axis.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/device_profile.hpp"
 
 namespace modar {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

@@ -11,7 +11,7 @@
 
 #include "bake/image/image.hpp"
 #include "bake/mesh/tri_mesh.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/camera.hpp"
 #include "modar/renderer.hpp"
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/error.hpp"
 #include "formats/check.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

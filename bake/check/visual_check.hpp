@@ -11,9 +11,9 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/image/image.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "bake/commands/check_json.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

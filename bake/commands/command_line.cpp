@@ -10,7 +10,7 @@
 #include <type_traits>
 
 #include "bake/terminal.hpp"
-#include "formats/nearest.hpp"
+#include "formats/base/nearest.hpp"
 
 namespace modar {
 

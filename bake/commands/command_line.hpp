@@ -15,7 +15,7 @@
 #include <variant>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -6,7 +6,7 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/output.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

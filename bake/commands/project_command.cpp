@@ -19,7 +19,7 @@
 #include "bake/process.hpp"
 #include "bake/project/project.hpp"
 #include "bake/terminal.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 

@@ -9,7 +9,7 @@
 #include "bake/output.hpp"
 #include "bake/page/report_page.hpp"
 #include "bake/terminal.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {

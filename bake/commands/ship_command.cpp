@@ -20,7 +20,7 @@
 #include "bake/ship/root_draft.hpp"
 #include "bake/terminal.hpp"
 #include "bake/web/http_reader.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/release.hpp"
 

@@ -9,7 +9,7 @@
 #include "bake/web/http_reader.hpp"
 #include "bake/web/serve.hpp"
 #include "bake/web/site.hpp"
-#include "formats/utf8.hpp"
+#include "formats/base/utf8.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {

@@ -12,7 +12,7 @@
 #include "bake/export/usdz_writer.hpp"
 #include "bake/output.hpp"
 #include "bake/texture/texture_codec.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

@@ -9,7 +9,7 @@
 
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/texture_format.hpp"
 
 namespace modar {

@@ -12,8 +12,8 @@
 #include <glm/vec4.hpp>
 
 #include "bake/texture/texture.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

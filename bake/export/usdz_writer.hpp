@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "bake/export/glb_writer.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

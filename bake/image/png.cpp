@@ -9,7 +9,7 @@
 
 #include "bake/image/decoders.hpp"
 #include "bake/input.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

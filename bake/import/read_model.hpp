@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bake/import/source_model.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

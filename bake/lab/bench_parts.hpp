@@ -7,7 +7,7 @@
 #include "bake/lab/bench.hpp"
 #include "bake/lab/play_json.hpp"
 #include "bake/lab/pose_bench.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/image.hpp"
 #include "modar/tracker.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "bake/image/image.hpp"
 #include "bake/lab/bench.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

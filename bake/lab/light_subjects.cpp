@@ -13,7 +13,7 @@
 
 #include "bake/image/image.hpp"
 #include "bake/lab/light_bench.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bake/lab/bench.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -9,7 +9,7 @@
 
 #include "bake/pattern/pattern.hpp"
 #include "bake/report.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

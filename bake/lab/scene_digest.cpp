@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "bake/process.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/component.hpp"

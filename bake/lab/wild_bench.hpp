@@ -7,7 +7,7 @@
 #include "bake/lab/bench.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/report.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -14,7 +14,7 @@
 
 #include "bake/pattern/pattern.hpp"
 #include "bake/video/video.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/image.hpp"
 
 namespace modar {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

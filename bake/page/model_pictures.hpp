@@ -8,8 +8,8 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "bake/image/image.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

@@ -20,7 +20,7 @@
 #include "bake/process.hpp"
 #include "bake/terminal.hpp"
 #include "bake/texture/texture_codec.hpp"
-#include "formats/html.hpp"
+#include "formats/base/html.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/release.hpp"

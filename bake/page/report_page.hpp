@@ -5,8 +5,8 @@
 #include <string>
 
 #include "bake/report.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

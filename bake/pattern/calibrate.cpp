@@ -17,7 +17,7 @@
 #include "bake/pattern/gray_mat.hpp"
 #include "bake/pattern/trial.hpp"
 #include "bake/video/video.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bake/report.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/camera.hpp"
 
 namespace modar {

@@ -10,7 +10,7 @@
 
 #include "bake/pattern/trial.hpp"
 #include "bake/report.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

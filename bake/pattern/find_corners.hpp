@@ -5,7 +5,7 @@
 
 #include "bake/image/image.hpp"
 #include "bake/pattern/rectify.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bake/image/image.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/image.hpp"
 
 namespace modar {

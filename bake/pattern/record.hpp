@@ -10,8 +10,8 @@
 
 #include "bake/pattern/shape.hpp"
 #include "bake/report.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_writer.hpp"
-#include "formats/error.hpp"
 #include "modar/image.hpp"
 
 namespace modar {

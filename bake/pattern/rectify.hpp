@@ -7,7 +7,7 @@
 
 #include "bake/image/image.hpp"
 #include "bake/pattern/plane_aspect.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -10,7 +10,7 @@
 #include <glm/vec2.hpp>
 
 #include "bake/pattern/view_render.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/pattern_shape.hpp"
 #include "modar/camera.hpp"
 #include "modar/pose.hpp"

@@ -9,7 +9,7 @@
 
 #include "bake/image/image.hpp"
 #include "bake/pattern/record.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/image.hpp"
 
 namespace modar {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bake/pattern/picture.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/pattern_shape.hpp"
 
 namespace modar {

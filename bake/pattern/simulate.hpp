@@ -9,7 +9,7 @@
 #include "bake/image/image.hpp"
 #include "bake/pattern/trial.hpp"
 #include "bake/report.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/camera.hpp"
 
 namespace modar {

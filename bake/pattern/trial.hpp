@@ -14,7 +14,7 @@
 #include "bake/pattern/picture.hpp"
 #include "bake/pattern/record.hpp"
 #include "bake/pattern/scene.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/camera.hpp"
 #include "modar/tracker.hpp"
 

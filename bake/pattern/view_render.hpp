@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "bake/pattern/picture.hpp"
+#include "formats/base/turn.hpp"
 #include "formats/pattern_shape.hpp"
-#include "formats/turn.hpp"
 #include "modar/tracker_features.hpp"
 
 namespace modar {

@@ -23,7 +23,7 @@
 #include "bake/project/project.hpp"
 #include "bake/project/settings.hpp"
 #include "bake/terminal.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/content_summary.hpp"
 
 namespace modar {

@@ -14,7 +14,7 @@
 #include "bake/json.hpp"
 #include "bake/project/file_digests.hpp"
 #include "bake/project/project.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

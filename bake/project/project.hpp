@@ -11,7 +11,7 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/report.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

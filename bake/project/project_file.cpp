@@ -16,7 +16,7 @@
 #include "bake/bundle/request_text.hpp"
 #include "bake/project/project.hpp"
 #include "bake/project/settings.hpp"
-#include "formats/nearest.hpp"
+#include "formats/base/nearest.hpp"
 
 namespace modar {
 namespace {

@@ -7,7 +7,7 @@
 #include <ctime>
 #include <string_view>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/release.hpp"
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/transport/recipe.hpp"
 
 namespace modar {

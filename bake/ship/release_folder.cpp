@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "bake/ship/verify_release.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
 

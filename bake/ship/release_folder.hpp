@@ -20,7 +20,7 @@
 #include "bake/ship/keys.hpp"
 #include "bake/ship/object_ledger.hpp"
 #include "bake/ship/recipe_maker.hpp"
-#include "formats/folder_lock.hpp"
+#include "formats/base/folder_lock.hpp"
 #include "modar/release.hpp"
 
 namespace modar {

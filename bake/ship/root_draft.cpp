@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bake/ship/verify_release.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

@@ -8,7 +8,7 @@
 #include "bake/report.hpp"
 #include "bake/texture/texture.hpp"
 #include "bake/texture/texture_stage.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -9,7 +9,7 @@
 
 #include "bake/report.hpp"
 #include "bake/texture/texture_codec.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -16,8 +16,8 @@
 #include "bake/report.hpp"
 #include "bake/texture/coverage.hpp"
 #include "bake/texture/texture.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_writer.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

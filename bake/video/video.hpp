@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/image.hpp"
 
 namespace modar {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 
 namespace modar {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

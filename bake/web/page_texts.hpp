@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bake/json.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "formats/shortest_number.hpp"
+#include "formats/base/shortest_number.hpp"
 
 namespace modar {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

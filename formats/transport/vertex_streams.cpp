@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "formats/bits.hpp"
+#include "formats/base/bits.hpp"
 
 namespace modar {
 namespace {

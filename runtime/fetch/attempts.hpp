@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "store.hpp"
 #include "transfer.hpp"
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar::fetch {

@@ -10,7 +10,7 @@
 
 #include <rapidjson/prettywriter.h>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/fetch.hpp"
 #include "runtime/platform/command_line.hpp"
 #include "store.hpp"

@@ -20,8 +20,8 @@
 #include <vector>
 
 #include "folder.hpp"
-#include "formats/error.hpp"
-#include "formats/folder_lock.hpp"
+#include "formats/base/error.hpp"
+#include "formats/base/folder_lock.hpp"
 #include "modar/release.hpp"
 
 namespace modar::fetch {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "folder.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/transport/recipe.hpp"
 #include "modar/fetch.hpp"
 

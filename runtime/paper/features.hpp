@@ -5,7 +5,7 @@
 
 #include <opencv2/features2d.hpp>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/layout.hpp"
 
 namespace modar::paper {

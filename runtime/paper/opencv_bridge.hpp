@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/layout.hpp"
 #include "modar/image.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <charconv>
 
-#include "formats/nearest.hpp"
+#include "formats/base/nearest.hpp"
 
 namespace modar {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
 

@@ -15,7 +15,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "desk_media.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/video_reader.hpp"
 

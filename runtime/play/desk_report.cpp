@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "frame_report.hpp"
 #include "frame_sink.hpp"
 #include "report_page.hpp"

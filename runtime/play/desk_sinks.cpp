@@ -2,7 +2,7 @@
 #include <cstdio>
 
 #include "desk_media.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

@@ -2,7 +2,7 @@
 // as PPM.
 #include <cstdio>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "frame_sink.hpp"
 #include "frame_source.hpp"
 #include "modar/camera_file.hpp"

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/tracker.hpp"
 
 namespace modar {

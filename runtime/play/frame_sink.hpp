@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "frame_report.hpp"
 #include "modar/image.hpp"
 #include "options.hpp"

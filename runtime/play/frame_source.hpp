@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/image.hpp"
 #include "modar/renderer.hpp"
 

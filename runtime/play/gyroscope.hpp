@@ -6,7 +6,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -9,7 +9,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/pattern_shape.hpp"
 #include "frame_report.hpp"
 #include "modar/camera.hpp"

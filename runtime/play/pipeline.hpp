@@ -10,7 +10,7 @@
 #include <memory>
 #include <utility>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "frame_source.hpp"
 #include "modar/camera.hpp"
 #include "modar/tracker.hpp"

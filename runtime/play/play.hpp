@@ -1,8 +1,8 @@
 // What main.cpp and turntable.cpp share.
 #pragma once
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "options.hpp"
 
 namespace modar {

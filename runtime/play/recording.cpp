@@ -11,7 +11,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "frame_sink.hpp"
 #include "modar/mapped_file.hpp"
 

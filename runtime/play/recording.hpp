@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "frame_report.hpp"
 #include "frame_source.hpp"
 #include "modar/camera.hpp"

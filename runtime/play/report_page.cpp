@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "formats/html.hpp"
+#include "formats/base/html.hpp"
 
 namespace modar {
 namespace {

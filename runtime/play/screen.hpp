@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "controls.hpp"
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "frame_sink.hpp"
 #include "modar/camera.hpp"
 #include "modar/gl_context.hpp"

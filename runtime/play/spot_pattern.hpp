@@ -7,8 +7,8 @@
 
 #include <glm/vec2.hpp>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "modar/image.hpp"
 #include "runtime/platform/semaphore.hpp"
 

@@ -7,8 +7,8 @@
 
 #include <glm/vec3.hpp>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "live_bundle.hpp"
 #include "pipeline.hpp"
 #include "spot_pattern.hpp"

@@ -9,8 +9,8 @@
 
 #include <glm/mat4x4.hpp>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/render/gl.hpp"
 

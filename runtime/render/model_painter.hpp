@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/draw_order.hpp"
-#include "formats/error.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/render/batch_store.hpp"
 #include "runtime/render/draw_list.hpp"

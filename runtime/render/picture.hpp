@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/render/gl.hpp"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "runtime/render/gl.hpp"
 
 namespace modar {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "formats/bits.hpp"
+#include "formats/base/bits.hpp"
 #include "formats/texture_format.hpp"
 #include "modar/mapped_file.hpp"
 

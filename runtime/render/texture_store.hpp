@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "modar/gl_context.hpp"
 #include "runtime/render/gl.hpp"
 

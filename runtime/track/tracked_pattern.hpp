@@ -25,7 +25,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/image.hpp"

@@ -168,7 +168,7 @@ class Targets(unittest.TestCase):
         """r25, the last NDK for Android 4.4, has libc++ of April 2020."""
         lacking = re.compile(r"std::(bit_width|has_single_bit|bit_ceil|bit_floor|bit_cast|numbers|ranges|source_location|chars_format|"
                              r"format|jthread|bind_front)\b|#include <(numbers|ranges|concepts|source_location|format)>")
-        rooms = ["formats", "formats/transport", *(f"runtime/{room}" for room in (
+        rooms = ["formats", "formats/base", "formats/transport", *(f"runtime/{room}" for room in (
             "include/modar", "platform", "track", "render", "capi", "android", "fetch", "fetch/include/modar"))]
         desk = {"curl_downloader.cpp", "main.cpp"}
         files = [file for room in rooms for file in (ROOT / room).glob("*.[hc]pp") if file.name not in desk]

@@ -15,7 +15,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/weld/weld.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/draw_order.hpp"
 #include "modar/gl_context.hpp"

@@ -11,7 +11,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/scene_shadow.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "modar/renderer.hpp"
 
 namespace {

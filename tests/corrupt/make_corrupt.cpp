@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "tests/corrupt/cases.hpp"
 
 namespace {

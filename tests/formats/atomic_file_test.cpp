@@ -1,5 +1,5 @@
 // A reader sees the old file or the new one, and a failure leaves nothing behind.
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

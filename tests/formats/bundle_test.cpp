@@ -6,7 +6,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/draw_order.hpp"

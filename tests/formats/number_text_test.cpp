@@ -11,8 +11,8 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/base/shortest_number.hpp"
 #include "formats/rules.hpp"
-#include "formats/shortest_number.hpp"
 
 namespace modar {
 namespace {

@@ -1,5 +1,5 @@
 // Which bytes may stand in a name.
-#include "formats/utf8.hpp"
+#include "formats/base/utf8.hpp"
 
 #include <gtest/gtest.h>
 

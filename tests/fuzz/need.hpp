@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar::test {
 

@@ -1,7 +1,7 @@
 // Writes the golden bundle of the current version. A released version's file never changes again.
 #include <cstdio>
 
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/content_summary.hpp"
 #include "tests/formats/support.hpp"
 

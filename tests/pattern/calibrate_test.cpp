@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bake/pattern/trial.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/camera_file.hpp"
 #include "tests/track/synthetic.hpp"

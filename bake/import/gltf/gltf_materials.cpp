@@ -15,7 +15,7 @@
 
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -8,7 +8,7 @@
 #include <glm/vec3.hpp>
 
 #include "bake/mesh/tri_mesh.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

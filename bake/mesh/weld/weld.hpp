@@ -3,7 +3,7 @@
 
 #include "bake/import/source_model.hpp"
 #include "bake/mesh/tri_mesh.hpp"
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

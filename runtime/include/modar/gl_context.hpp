@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {

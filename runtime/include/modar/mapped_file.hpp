@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

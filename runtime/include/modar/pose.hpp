@@ -11,7 +11,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/camera.hpp"
 
 namespace modar {

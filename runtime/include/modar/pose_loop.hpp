@@ -9,8 +9,8 @@
 
 #include <glm/vec3.hpp>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "modar/camera.hpp"
 #include "modar/image.hpp"
 #include "modar/tracker.hpp"

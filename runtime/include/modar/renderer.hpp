@@ -19,8 +19,8 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "modar/camera.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/image.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "modar/release.hpp"
 
 namespace modar {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/layout.hpp"
 #include "formats/transport/recipe.hpp"
 

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 #include "formats/transport/recipe.hpp"
 
 namespace modar {

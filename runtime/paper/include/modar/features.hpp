@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "formats/layout.hpp"
 #include "modar/image.hpp"
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <memory>
 
+#include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
-#include "formats/error.hpp"
 #include "modar/image.hpp"
 #include "modar/tracker.hpp"
 

@@ -1,5 +1,5 @@
 // Writes a file beside its place, syncs it and renames it over the old one.
-#include "formats/atomic_file.hpp"
+#include "formats/base/atomic_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,6 +1,6 @@
 // printf rounds correctly and strtod reads correctly in every C library that we build for: what is
 // left is to try one digit more until the number reads back.
-#include "formats/shortest_number.hpp"
+#include "formats/base/shortest_number.hpp"
 
 #include <array>
 #include <cmath>

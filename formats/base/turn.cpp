@@ -1,5 +1,5 @@
 // Taylor's series of an angle within an eighth of a turn.
-#include "formats/turn.hpp"
+#include "formats/base/turn.hpp"
 
 #include <cmath>
 

@@ -7,7 +7,7 @@
 
 #include <tl/expected.hpp>
 
-#include "formats/utf8.hpp"
+#include "formats/base/utf8.hpp"
 
 namespace modar {
 

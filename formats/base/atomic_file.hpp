@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "formats/error.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 

@@ -1,4 +1,4 @@
-#include "formats/folder_lock.hpp"
+#include "formats/base/folder_lock.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>
