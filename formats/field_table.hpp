@@ -1,5 +1,5 @@
 // Every field of the bundle's records by name, for code that walks over all of them (the content
-// summary, `modar check --mutate`). A test compares the table with bundle.md.
+// summary, `modar-lab mutate`). A test compares the table with bundle.md.
 #pragma once
 
 #include <cstddef>

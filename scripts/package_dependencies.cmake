@@ -32,6 +32,10 @@ read_dependencies(player -e${binary}/modar-play -e${binary}/modar-fetch
 set(CPACK_DEBIAN_PLAYER_PACKAGE_DEPENDS "${player_Depends}")
 set(CPACK_DEBIAN_PLAYER_PACKAGE_RECOMMENDS "libgl1-mesa-dri, ${player_Recommends}")
 
+read_dependencies(laboratory -e${binary}/modar-lab)
+set(CPACK_DEBIAN_LABORATORY_PACKAGE_DEPENDS "${laboratory_Depends}")
+set(CPACK_DEBIAN_LABORATORY_PACKAGE_RECOMMENDS "modar-player, libgl1-mesa-dri")
+
 # Of the shared library: its dependencies, and by which version others depend on it, as a whole and function by function.
 set(library ${CPACK_PACKAGE_DIRECTORY}/../runtime/capi/libmodar.so.0)
 read_dependencies(library -e${library})

@@ -11,7 +11,7 @@ out=$2
 version=$3
 mkdir -p "$out"
 
-ninja -C "$build" -t inputs modar modar-play modar-fetch modar_media modar_video_library modar_shared modar_runtime \
+ninja -C "$build" -t inputs modar modar-play modar-fetch modar-lab modar_media modar_video_library modar_shared modar_runtime \
   modar_formats modar_fetch | sort -u >"$out/inputs"
 {
   # Headers of their objects, and archives.

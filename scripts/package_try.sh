@@ -36,10 +36,10 @@ timed() {  # WHAT COMMAND...: runs it in bash, in the clean Debian
 # --- What they bring ---
 in_clean apt-get update -qq
 before=$(megabytes)
-install --no-install-recommends /packages/modar*.deb
+install --no-install-recommends /packages/modar_*.deb /packages/modar-player_*.deb
 say "modar and modar-player with all they require" "$(($(megabytes) - before)) MB"
 in_clean sh -c 'modar --version && modar-play --version && modar-fetch --version' >&2
-install /packages/modar*.deb libgl1-mesa-dri libopencv-videoio406
+install /packages/modar_*.deb /packages/modar-player_*.deb libgl1-mesa-dri libopencv-videoio406
 say "with what they recommend (codecs, software OpenGL)" "$(($(megabytes) - before)) MB"
 install man-db bash-completion >/dev/null
 in_clean sh -c 'man modar-bake | grep -q -- --max-error'

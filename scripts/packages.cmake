@@ -1,18 +1,20 @@
-# Debian packages: modar (the workstation), modar-player (the player, the installer, the readers of videos), libmodar0 (the
-# runtime that apps link) and libmodar-dev (what it takes to build them). `cmake --preset package && cmake --build --preset
+# Debian packages: modar (the workstation), modar-player (the player, the installer, the readers of videos), modar-lab (the
+# benches), libmodar0 (the runtime that apps link) and libmodar-dev (what it takes to build them). `cmake --preset package && cmake --build --preset
 # package` makes them; the same sources give the same bytes. scripts/release.sh makes all that a release has.
 if(MODAR_PACKAGES)
   # Manual pages and completions from the words of --help; the clip of modar-demo.
   set(share ${CMAKE_BINARY_DIR}/share)
   set(player_share ${CMAKE_BINARY_DIR}/player-share)
+  set(laboratory_share ${CMAKE_BINARY_DIR}/laboratory-share)
   set(page -DFOLDER=${player_share} -P ${CMAKE_CURRENT_LIST_DIR}/manual_page.cmake)
   add_custom_command(OUTPUT ${share}/man/man1/modar.1.gz ${player_share}/man/man1/modar-play.1.gz
     COMMAND modar document -o ${share}
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:modar-play> ${page}
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:modar-fetch> ${page}
+    COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:modar-lab> -DFOLDER=${laboratory_share} -P ${CMAKE_CURRENT_LIST_DIR}/manual_page.cmake
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=${CMAKE_SOURCE_DIR}/scripts/modar-demo -DFOLDER=${share} -P ${CMAKE_CURRENT_LIST_DIR}/manual_page.cmake
-    COMMAND sh -c "gzip -9nf '${share}'/man/man1/*.1 '${player_share}'/man/man1/*.1"
-    DEPENDS modar modar-play modar-fetch ${CMAKE_CURRENT_LIST_DIR}/manual_page.cmake)
+    COMMAND sh -c "gzip -9nf '${share}'/man/man1/*.1 '${player_share}'/man/man1/*.1 '${laboratory_share}'/man/man1/*.1"
+    DEPENDS modar modar-play modar-fetch modar-lab ${CMAKE_CURRENT_LIST_DIR}/manual_page.cmake)
   set(clip ${CMAKE_BINARY_DIR}/clip)
   set(assets ${CMAKE_SOURCE_DIR}/assets)
   add_custom_command(OUTPUT ${clip}/clip.mp4
@@ -24,20 +26,20 @@ if(MODAR_PACKAGES)
   set(notices ${CMAKE_BINARY_DIR}/notices)
   add_custom_target(modar_notices COMMAND ${CMAKE_CURRENT_LIST_DIR}/package_notices.sh ${CMAKE_BINARY_DIR} ${notices} ${PROJECT_VERSION}
     COMMAND sh -c "gzip -9nc '${CMAKE_SOURCE_DIR}/CHANGELOG.md' > '${notices}/CHANGELOG.md.gz'" VERBATIM)
-  add_dependencies(modar_notices modar modar-play modar-fetch modar_media modar_video_library modar_shared modar_runtime
+  add_dependencies(modar_notices modar modar-play modar-fetch modar-lab modar_media modar_video_library modar_shared modar_runtime
     modar_formats modar_fetch)
   add_custom_target(modar_package_files ALL DEPENDS ${share}/man/man1/modar.1.gz ${clip}/clip.mp4)
   add_dependencies(modar_package_files modar_notices)
-  foreach(package workstation:modar player:modar-player library:libmodar0 development:libmodar-dev)
+  foreach(package workstation:modar player:modar-player laboratory:modar-lab library:libmodar0 development:libmodar-dev)
     string(REGEX MATCH "^(.*):(.*)$" parts ${package})
     install(FILES ${notices}/copyright ${notices}/changelog.gz
       DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CMAKE_MATCH_2} COMPONENT ${CMAKE_MATCH_1})
   endforeach()
   install(FILES README.md ${notices}/CHANGELOG.md.gz DESTINATION ${CMAKE_INSTALL_DOCDIR})
-  foreach(component workstation player)
+  foreach(component workstation player laboratory)
     set(from ${share})
-    if(component STREQUAL player)
-      set(from ${player_share})
+    if(NOT component STREQUAL workstation)
+      set(from ${${component}_share})
     endif()
     install(DIRECTORY ${from}/ DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT ${component} PATTERN zsh EXCLUDE)
     # Debian's zsh reads its packages' completions here.
@@ -58,7 +60,7 @@ set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_DIRECTORY ${CMAKE_BINARY_DIR}/packages)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL workstation player library development)
+set(CPACK_COMPONENTS_ALL workstation player laboratory library development)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -76,6 +78,11 @@ set(CPACK_DEBIAN_PLAYER_PACKAGE_NAME modar-player)
 set(CPACK_COMPONENT_PLAYER_DESCRIPTION "player of ModAR bundles on videos and cameras
 The commands modar-play and modar-fetch, which installs releases of bundles,
 and the libraries with which they and modar read and write videos.")
+
+set(CPACK_DEBIAN_LABORATORY_PACKAGE_NAME modar-lab)
+set(CPACK_COMPONENT_LABORATORY_DESCRIPTION "measures ModAR next to references
+The command modar-lab runs the benches of tracker, baker and renderer, and
+tests the bundle checker with damaged bundles.")
 
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libmodar0)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)

@@ -28,18 +28,6 @@ void add_source_options(CommandLine& line, CheckCommand& check) {
               {.type = "DIR", .needs = "--source"});
 }
 
-void add_mutate_options(CommandLine& line, CheckCommand& check) {
-  line.group("Test the checker itself", Shown::kInFull);
-  line.option("--mutate", &check.mutations,
-              "Damage N copies of the bundle and count how many are found",
-              {.type = "N", .positive = true});
-  line.option("--seed", &check.seed, "Random seed of the damage",
-              {.shows_default = true, .needs = "--mutate"});
-  line.option("--second-reader", &check.second_reader,
-              "scripts/read_bundle.py, which decides which unnoticed changes have no effect",
-              {.type = "FILE", .needs = "--mutate"});
-}
-
 int run(const CheckCommand& check) {
   if (check.bundle.empty() && !check.list_issues) {
     return print_error(
@@ -72,14 +60,11 @@ void add_check(CommandLine& program) {
               "Set the severity of a kind of issue: error, warning, info or ignore; repeatable",
               {.type = "ID=SEVERITY", .repeatable = true});
   line.flag("--warnings-as-errors", check->warnings_as_errors, "Treat warnings as errors");
-  add_mutate_options(line, *check);
   line.footer(
       "\nExample:\n"
       "  modar check spider.modar --device mali400 --source spider.obj cover.png\n"
-      "  modar check --mutate 100000 --second-reader scripts/read_bundle.py spider.modar\n"
       "\nExit codes: 0 ok, 1 wrong usage, 2 a file cannot be read or written, 3 invalid input,\n"
-      "4 internal error, 5 not supported. A bad bundle exits with 3, and so does a --mutate run\n"
-      "that misses its goals.\n");
+      "4 internal error, 5 not supported. A bad bundle exits with 3.\n");
   line.run([check] { return ExitCode{run(*check)}; });
 }
 

@@ -92,7 +92,6 @@ int run_check(const CheckCommand& command) {
     print_all_kinds();
     return static_cast<int>(ExitCode::kOk);
   }
-  if (command.mutations > 0) return run_mutate(command);
   Verdict verdict;
   if (auto weighed = weigh(command, verdict); !weighed) return print_error(weighed.error());
   DeviceFile from_file;

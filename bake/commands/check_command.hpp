@@ -1,7 +1,6 @@
 // `modar check`: its options, and what it runs. check_cli.cpp fills the options.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -25,10 +24,7 @@ struct CheckCommand {
   unsigned jobs = 1;
   std::string device;  ///< profile that the bundle is held against, or its file; empty: none
   std::string tool_version;
-  bool list_issues = false;     ///< print ISSUES.md instead
-  std::uint64_t mutations = 0;  ///< damage copies of the bundle instead: `--mutate`
-  std::uint64_t seed = 1;
-  std::string second_reader;  ///< scripts/read_bundle.py, to tell harmless mutations
+  bool list_issues = false;  ///< print ISSUES.md instead
 };
 
 /// Rebakes, looks and tracks, as the command asks; command.sources is not empty.
@@ -36,8 +32,7 @@ struct CheckCommand {
 Result<void> check_against_sources(const BundleView& bundle, const CheckCommand& command,
                                    const IssueSink& sink, CheckExtras& extras);
 
-/// Each prints data to stdout and diagnostics to stderr, and answers the exit code.
+/// Prints data to stdout and diagnostics to stderr, and answers the exit code.
 int run_check(const CheckCommand& command);
-int run_mutate(const CheckCommand& command);
 
 }  // namespace modar

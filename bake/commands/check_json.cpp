@@ -9,13 +9,6 @@
 namespace modar {
 namespace {
 
-Json tally_json(const MutationTally& tally) {
-  return {{"tried", tally.tried},
-          {"killed", tally.killed},
-          {"harmless", tally.harmless},
-          {"rate", tally.rate()}};
-}
-
 std::string message_of(const Issue& issue) {
   std::string message = issue.kind->message;
   if (!issue.detail.empty()) message += ": " + issue.detail;
@@ -167,38 +160,6 @@ std::string check_sarif(const Verdict& verdict, const std::string& path,
   const Json document = {{"$schema", "https://json.schemastore.org/sarif-2.1.0.json"},
                          {"version", "2.1.0"},
                          {"runs", Json::array({run})}};
-  return document.dump();
-}
-
-std::string mutation_json(const MutationReport& report) {
-  Json kinds = Json::object();
-  for (const auto& [kind, tally] : report.by_kind) kinds.set(kind, tally_json(tally));
-  Json fields = Json::object();
-  for (const auto& [field, tally] : report.by_field) {
-    Json one = tally_json(tally);
-    one.set("rate_without_statement", tally.rate_without_summary());
-    fields.set(field, std::move(one));
-  }
-  Json survivors = Json::array();
-  for (const MutationSurvivor& survivor : report.survivors) {
-    survivors.push_back({{"number", survivor.number},
-                         {"kind", survivor.kind},
-                         {"rehashed", survivor.rehashed},
-                         {"field", survivor.field},
-                         {"offset", survivor.offset},
-                         {"before", survivor.before},
-                         {"after", survivor.after}});
-  }
-  const Json document = {
-      {"mutation",
-       {{"n", report.n},
-        {"rate_unhashed", report.unhashed.rate()},
-        {"rate_rehashed", report.rehashed.rate()},
-        {"rate_rehashed_without_statement", report.rehashed.rate_without_summary()},
-        {"harmless", report.unhashed.harmless + report.rehashed.harmless},
-        {"by_kind", kinds},
-        {"by_field", fields},
-        {"survivors", survivors}}}};
   return document.dump();
 }
 

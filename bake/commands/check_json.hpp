@@ -8,7 +8,6 @@
 #include "bake/check/source_check.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/check/visual_check.hpp"
-#include "bake/lab/mutate.hpp"
 
 namespace modar {
 
@@ -27,8 +26,5 @@ std::string check_json(const Verdict& verdict, const CheckExtras& extras);
 /// path: of the bundle, as the user wrote it.
 std::string check_sarif(const Verdict& verdict, const std::string& path,
                         const std::string& tool_version);
-
-/// `modar check --mutate N --json`.
-std::string mutation_json(const MutationReport& report);
 
 }  // namespace modar

@@ -10,7 +10,6 @@ void add_bake(CommandLine& program);
 void add_pattern(CommandLine& program);
 void add_check(CommandLine& program);
 void add_inspect(CommandLine& program);
-void add_bench(CommandLine& program);
 void add_ship(CommandLine& program);
 void add_calibrate(CommandLine& program);
 void add_init(CommandLine& program);

@@ -18,7 +18,6 @@ int main(int argc, char** argv) {
     program.group("Look closer", modar::Shown::kInFull);
     modar::add_inspect(program);
     modar::add_calibrate(program);
-    modar::add_bench(program);
     program.group("Build servers and releases", modar::Shown::kInFull);
     modar::add_ship(program);
     modar::add_plan(program);

@@ -1,4 +1,4 @@
-// `modar bench light BUNDLE FRAME...`: a camera's frames with the bundle's models on their
+// `modar-lab bench light BUNDLE FRAME...`: a camera's frames with the bundle's models on their
 // patterns, shaded plainly, in the scenes' own light, and in the light that the frames show.
 #include <cmath>
 #include <filesystem>
@@ -10,11 +10,11 @@
 #include "bake/image/image.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/light_bench.hpp"
+#include "bake/lab/render_bench.hpp"
 #include "bake/process.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"
-#include "modar/render_bench.hpp"
 #include "modar/renderer.hpp"
 
 namespace modar {

@@ -1,4 +1,4 @@
-// `modar bench NAME`: figures as ratios, ours and the reference side by side in one run.
+// `modar-lab bench NAME`: figures as ratios, ours and the reference side by side in one run.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -14,12 +14,12 @@
 #include "bake/lab/extended_bench.hpp"
 #include "bake/lab/light_bench.hpp"
 #include "bake/lab/lod_bench.hpp"
+#include "bake/lab/render_bench.hpp"
 #include "bake/lab/ship_bench.hpp"
 #include "bake/lab/wild_bench.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
-#include "modar/render_bench.hpp"
 
 namespace modar {
 namespace {
@@ -120,7 +120,7 @@ BenchResult bench_light_rows(const BenchOptions& command) {
   }
   if (command.pose.patterns.empty()) {
     return fail(ExitCode::kUsage, "bench.inputs", command.name, "models need something to stand on",
-                "modar bench light MODEL[,up=y]... --patterns PICTURE [-o FOLDER]");
+                "modar-lab bench light MODEL[,up=y]... --patterns PICTURE [-o FOLDER]");
   }
   ProgressBar bar(command.pose.quiet || command.json);
   LightBenchOptions options;
@@ -241,7 +241,7 @@ Result<std::vector<BenchRow>> run_bench(const BenchOptions& options) {
     if (options.name != bench.name) continue;
     if (bench.needs_inputs && options.inputs.empty()) {
       return fail(ExitCode::kUsage, "bench.inputs", options.name, "it needs input files",
-                  std::string("modar bench ") + bench.name + " " + bench.inputs);
+                  std::string("modar-lab bench ") + bench.name + " " + bench.inputs);
     }
     return bench.run(options);
   }

@@ -10,7 +10,7 @@
 
 namespace modar {
 
-/// `modar bench pose`.
+/// `modar-lab bench pose`.
 struct PoseBenchRequest {
   std::string patterns;                 ///< a folder of pictures, or one
   std::string backgrounds;              ///< the same
@@ -34,7 +34,7 @@ struct PoseBenchRequest {
   bool quiet = false;
 };
 
-/// `modar bench model`.
+/// `modar-lab bench model`.
 struct ModelBenchRequest {
   std::string obj;    ///< measured as it is; empty: one is made from the input scan
   bool big = false;   ///< made at the size of the ModAR paper's CHURCH

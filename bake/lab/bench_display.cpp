@@ -1,4 +1,5 @@
-// `modar bench render BUNDLE --video FILE`: the ModAR paper's Table 9 beside a run of the player.
+// `modar-lab bench render BUNDLE --video FILE`: the ModAR paper's Table 9 beside a run of the
+// player.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -10,9 +11,9 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/lab/bench_parts.hpp"
+#include "bake/lab/heap.hpp"
 #include "bake/process.hpp"
 #include "formats/bundle_view.hpp"
-#include "modar/heap.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"
 

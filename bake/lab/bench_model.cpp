@@ -1,4 +1,4 @@
-// `modar bench model`: our reader and our bake beside other programs on the same file.
+// `modar-lab bench model`: our reader and our bake beside other programs on the same file.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -233,7 +233,7 @@ Result<std::vector<BenchRow>> bench_model_rows(const std::vector<std::string>& s
                                                const ModelBenchRequest& command) {
   if (scans.size() != 1 && command.obj.empty()) {
     return fail(ExitCode::kUsage, "bench.inputs", "model", "it needs one scan, or --obj FILE",
-                "modar bench model scan.obj --big");
+                "modar-lab bench model scan.obj --big");
   }
   const TemporaryFolder folder;
   ModelBench bench(folder.path(), command);

@@ -19,27 +19,27 @@ inline double ratio(double a, double b) {
 /// The ModAR paper's parameter set of that name, 0: "none". Errors: kUsage "parameters.unknown".
 Result<std::uint32_t> paper_set_named(const std::string& name);
 
-/// `modar bench pose`: a row a measure and band; the reference is the ModAR paper's method. Values
-/// that do not apply are not finite. Errors: kIo "pictures.folder"; those of reading pictures and
-/// videos.
+/// `modar-lab bench pose`: a row a measure and band; the reference is the ModAR paper's method.
+/// Values that do not apply are not finite. Errors: kIo "pictures.folder"; those of reading
+/// pictures and videos.
 Result<std::vector<BenchRow>> bench_pose_rows(const PoseBenchRequest& command);
 
-/// `modar bench model`: reading and baking a large OBJ beside other programs, each measurement in a
-/// process of its own. A reference that this machine lacks is not finite. Errors: kUsage
+/// `modar-lab bench model`: reading and baking a large OBJ beside other programs, each measurement
+/// in a process of its own. A reference that this machine lacks is not finite. Errors: kUsage
 /// "bench.inputs"; kUnsupported "bench.probe" where modar-model-probe does not lie beside
 /// modar; those of making the file.
 Result<std::vector<BenchRow>> bench_model_rows(const std::vector<std::string>& scans,
                                                const ModelBenchRequest& command);
 
-/// `modar bench pose --tables`: the ModAR paper's Tables 6 to 8 and what it says of accuracy
+/// `modar-lab bench pose --tables`: the ModAR paper's Tables 6 to 8 and what it says of accuracy
 /// (reference) beside its method and ours on these frames ("ours" is what was measured here; of
 /// Tables 7 and 8 the reference is a phone). Errors: those of bench_detection().
 Result<std::vector<BenchRow>> paper_rows(const PoseBenchOptions& options,
                                          const ProgressCallback& progress);
 
-/// `modar bench render BUNDLE... --video FILE`: the ModAR paper's Table 9 (reference) beside the
-/// player, which runs the video at its own speed, headless, in a process of its own. Errors: those
-/// of MappedFile and BundleView; kUsage "bench.scene"; kIo and kInvalidInput "bench.play".
+/// `modar-lab bench render BUNDLE... --video FILE`: the ModAR paper's Table 9 (reference) beside
+/// the player, which runs the video at its own speed, headless, in a process of its own. Errors:
+/// those of MappedFile and BundleView; kUsage "bench.scene"; kIo and kInvalidInput "bench.play".
 Result<std::vector<BenchRow>> bench_display_rows(const BenchOptions& command);
 
 /// Its rows of one run. model: decides which of the ModAR paper's columns is the reference; of

@@ -1,5 +1,5 @@
-// `modar bench pose`: our tracker beside the ModAR paper's method on rendered frames of known pose
-// and on a video with its truth.
+// `modar-lab bench pose`: our tracker beside the ModAR paper's method on rendered frames of known
+// pose and on a video with its truth.
 #include <algorithm>
 #include <cmath>
 #include <string>

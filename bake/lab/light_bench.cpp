@@ -18,11 +18,11 @@
 #include "bake/import/read_model.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/path_tracer.hpp"
+#include "bake/lab/render_bench.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/process.hpp"
 #include "formats/bundle_writer.hpp"
 #include "modar/gl_context.hpp"
-#include "modar/render_bench.hpp"
 #include "modar/renderer.hpp"
 
 namespace modar {

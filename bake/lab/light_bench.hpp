@@ -1,5 +1,5 @@
-// `modar bench light`: models as the device shades them, beside plain shading and a path tracer.
-// Internal to bake/lab.
+// `modar-lab bench light`: models as the device shades them, beside plain shading and a path
+// tracer. Internal to bake/lab.
 #pragma once
 
 #include <functional>

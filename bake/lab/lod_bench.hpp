@@ -1,4 +1,5 @@
-// `modar bench lod`: our levels of detail beside meshoptimizer's simplifier. Internal to bake/lab.
+// `modar-lab bench lod`: our levels of detail beside meshoptimizer's simplifier. Internal to
+// bake/lab.
 #pragma once
 
 #include <string>

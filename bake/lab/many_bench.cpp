@@ -6,10 +6,10 @@
 #include <string_view>
 #include <thread>
 
+#include "bake/lab/heap.hpp"
 #include "bake/parallel.hpp"
 #include "bake/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
-#include "modar/heap.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {

@@ -1,5 +1,5 @@
 // A small path tracer: what a model on a pattern looks like under a room's light. The reference of
-// `modar bench light`. Internal to bake/lab.
+// `modar-lab bench light`. Internal to bake/lab.
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@
 
 namespace modar {
 
-/// Time against quality; `modar bench etc1` measures both.
+/// Time against quality; `modar-lab bench etc1` measures both.
 enum class TextureEffort : std::uint8_t { kFast, kGood, kBest };
 
 struct EncodeOptions {

@@ -397,7 +397,7 @@ class Check(ProgramTest):
         self.assertEqual(self.modar("check", self.folder / "none").returncode, 2)
 
     def test_the_levels_of_a_default_bundle_lie_within_their_bounds(self):
-        done = self.modar("bench", "lod", ROOT / "assets" / "models" / "pottery.obj", "--json")
+        done = self.lab("bench", "lod", ROOT / "assets" / "models" / "pottery.obj", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         rows = {row["measure"]: row for row in json.loads(done.stdout)}
         self.assertAlmostEqual(rows["1/2 triangles/asked pottery"]["ratio"], 1, delta=0.05)
@@ -409,7 +409,7 @@ class Check(ProgramTest):
 
 class Help(ProgramTest):
     def test_help_shows_an_example(self):
-        for command in (["bake"], ["pattern", "rectify"], ["check"], ["inspect"], ["bench"]):
+        for command in (["bake"], ["pattern", "rectify"], ["check"], ["inspect"]):
             done = self.modar(*command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("Example:", done.stdout)
@@ -442,8 +442,10 @@ class Help(ProgramTest):
         self.assertLess(len(libraries), 60)
 
     def test_a_wrong_command_line(self):
-        for arguments in ([], ["fly"], ["bake", "--nonsense"], ["check"], ["bench", "nonsense"]):
+        for arguments in ([], ["fly"], ["bake", "--nonsense"], ["check"]):
             self.assert_fails(self.modar(*arguments), 1)
+        for arguments in ([], ["bench", "nonsense"], ["mutate"], ["check"]):
+            self.assert_fails(self.lab(*arguments), 1)
 
 
 if __name__ == "__main__":

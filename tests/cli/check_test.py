@@ -15,6 +15,7 @@ except ImportError:
 from programs import COVER, POTTERY, ROOT, ProgramTest
 
 OURS = json.loads((ROOT / "bake" / "commands" / "check.schema.json").read_text())
+PROOF = json.loads((ROOT / "bake" / "lab" / "mutation.schema.json").read_text())
 SARIF = json.loads((ROOT / "tests" / "cli" / "sarif.schema.json").read_text())
 CORRUPT = sorted((ROOT / "tests" / "corrupt").glob("*.modar"))
 GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
@@ -132,17 +133,17 @@ class Check(ProgramTest):
 
     def test_the_proof_keeps_its_schema_and_its_goals(self):
         path = self.bundle()
-        text = self.check(0, path, "--mutate", 1000, "--json", "--second-reader",
-                          ROOT / "scripts" / "read_bundle.py")
-        proof = json.loads(text)
-        jsonschema.validate(proof, OURS)
+        words = ("mutate", path, "--count", 1000, "--json", "--second-reader", ROOT / "scripts" / "read_bundle.py")
+        done = self.lab(*words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        proof = json.loads(done.stdout)
+        jsonschema.validate(proof, PROOF)
         self.assertEqual(proof["mutation"]["n"], 1000)
         self.assertEqual(proof["mutation"]["rate_unhashed"], 1)
         self.assertGreaterEqual(proof["mutation"]["rate_rehashed"], 0.995)
-        self.assertEqual(text, self.check(0, path, "--mutate", 1000, "--json", "--second-reader",
-                                          ROOT / "scripts" / "read_bundle.py"))
+        self.assertEqual(done.stdout, self.lab(*words).stdout)
         bad = ROOT / "tests" / "corrupt" / "MODEL_COUNTS.modar"
-        self.assert_fails(self.modar("check", bad, "--mutate", 10), 3, "mutate.bad")
+        self.assert_fails(self.lab("mutate", bad, "--count", 10), 3, "mutate.bad")
 
     # What differs from its source, in shape, colour, counts or looks, is for corrupt_test.py.
     def test_sources_are_held_against_the_bundle(self):

@@ -58,7 +58,7 @@ class Document(ProgramTest):
         self.assertIn("did you mean bake?", wrong.stderr)
 
     def test_help_wraps(self):
-        for words in (["bake"], ["pattern", "simulate"], ["bench"]):
+        for words in (["bake"], ["pattern", "simulate"]):
             for line in self.modar(*words, "--help-all").stdout.splitlines():
                 if line.startswith(" " * 30):
                     self.assertLessEqual(len(line), 80, line)

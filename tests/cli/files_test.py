@@ -236,7 +236,7 @@ class Words(ProgramTest):
         self.assertNotIn("did you mean", done.stderr)
 
     def test_help_says_ranges_and_exclusions_in_words(self):
-        for words in (["bake"], ["check"], ["pattern", "rectify"], ["ship", "publish"], ["bench"]):
+        for words in (["bake"], ["check"], ["pattern", "rectify"], ["ship", "publish"]):
             text = self.modar(*words, "--help-all").stdout
             for code in ("{false}", "Excludes:", "Needs:", " in [", "UINT", ":POSITIVE"):
                 self.assertNotIn(code, text)

@@ -5,7 +5,8 @@ import unittest
 
 from programs import BIN, ROOT, ProgramTest
 
-PROGRAMS = {"workstation": ["modar"], "player": ["modar-fetch", "modar-play"], "library": [], "development": []}
+PROGRAMS = {"workstation": ["modar"], "player": ["modar-fetch", "modar-play"], "laboratory": ["modar-lab"], "library": [],
+            "development": []}
 
 
 class Package(ProgramTest):

@@ -179,7 +179,7 @@ class Pattern(ProgramTest):
         self.assertIn("false recognitions: 4", twice.stdout)
 
     def test_bench_prints_the_article_s_tables_beside_ours(self):
-        rows = self.modar_json("bench", "pose", "--tables", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
+        rows = self.lab_json("bench", "pose", "--tables", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
                                "--quiet")
         found = {row["measure"]: row for row in rows}
         # Of SCYTHE, whose size ours has: Table 6; first of Table 7, milliseconds and share; their sum; accuracy from afar.
@@ -219,7 +219,7 @@ class Pattern(ProgramTest):
             self.assertEqual(found[f"right_pct {band} ours"]["ours"], 100)
 
     def test_bench_of_many_patterns_prints_each_measure(self):
-        rows = self.modar_json("bench", "pose", "--many=2", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
+        rows = self.lab_json("bench", "pose", "--many=2", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
                                "--quiet")
         found = {row["measure"]: row for row in rows}
         self.assertEqual(set(found), {
@@ -233,7 +233,7 @@ class Pattern(ProgramTest):
             self.assertEqual(found[f"detection right_pct x{count}"]["ours"], 100)
             self.assertEqual(found[f"detection others x{count}"]["ours"], 0)
         self.assertEqual(found["return_alone times x2"]["reference"], 1)
-        few = self.modar("bench", "pose", "--many", "--patterns", GAME, "--backgrounds", COVER)
+        few = self.lab("bench", "pose", "--many", "--patterns", GAME, "--backgrounds", COVER)
         self.assertEqual(few.returncode, 1)
         self.assertIn("eight at most of each picture", few.stderr)
 

@@ -143,7 +143,7 @@ class Play(ProgramTest):
 
     def test_a_video_is_played_beside_the_article_s_table_9(self):
         bundle, clip = self.bake_demo(), self.clip()
-        done = self.modar("bench", "render", bundle, "--video", clip, "--json")
+        done = self.lab("bench", "render", bundle, "--video", clip, "--json")
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         rows = {row["measure"]: row for row in json.loads(done.stdout)}
         article = {"recognition_fps": (25, 30), "display_fps": (17, 23), "display_s": (18, 12), "stutters": (0, 0)}
@@ -156,7 +156,7 @@ class Play(ProgramTest):
         if any(heap):  # the sanitizers' allocator does not count
             self.assertLess(heap[0], 10000, "the bundle is mapped")
             self.assertGreater(heap[2], heap[1], "a search takes an index")
-        done = self.modar("bench", "render", bundle, "--video", "none.mp4")
+        done = self.lab("bench", "render", bundle, "--video", "none.mp4")
         self.assert_fails(done, 2, "modar-play")
         self.assertIn("none.mp4", done.stderr)
 

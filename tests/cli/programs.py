@@ -115,6 +115,14 @@ class ProgramTest(unittest.TestCase):
     def modar(self, *arguments, **options):
         return self.run_program("modar", *arguments, **options)
 
+    def lab(self, *arguments, **options):
+        return self.run_program("modar-lab", *arguments, **options)
+
+    def lab_json(self, *arguments, **options):
+        done = self.lab(*arguments, "--json", **options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
     def modar_json(self, *arguments, **options):
         done = self.modar(*arguments, "--json", **options)
         self.assertEqual(done.returncode, 0, done.stderr)

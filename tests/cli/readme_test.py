@@ -27,7 +27,7 @@ NOT_RUN = (
     (r"^modar pattern (simulate|confusion) ", "takes a minute; pattern_test.py"),
     (r"^export ANDROID_NDK=|^scripts/apk\.sh ", "needs an NDK; apk_test.py uses a compiler in its place"),
     (r"^adb |^for phone in |^  adb |^done$", "needs a phone"),
-    (r"^modar bench (pose|wild|extended|light|model|render|lod|etc1) ", "takes minutes; the tests of bake/lab and runtime/bench"),
+    (r"^modar-lab bench (pose|wild|extended|light|model|render|lod|etc1) ", "takes minutes; the tests of bake/lab"),
 )
 
 

@@ -32,7 +32,7 @@ def commands_in(text):
     for line in lines:
         for part in re.split(r"&&|\||;", re.sub(r"(^|\s)#.*", "", line)):
             words = part.split()
-            if words and words[0] in ("modar", "modar-play", "modar-fetch") and len(words) > 1:
+            if words and words[0] in ("modar", "modar-lab", "modar-play", "modar-fetch") and len(words) > 1:
                 yield words
 
 
@@ -89,7 +89,7 @@ class Documents(unittest.TestCase):
                 options = [word.partition("=")[0] for word in words if re.fullmatch(r"--[a-z][\w-]*(=.*)?", word)]
                 command = [words[0]]
                 for word in words[1:]:
-                    if command[0] != "modar" or not re.fullmatch(r"[a-z]+", word) or len(command) == 3:
+                    if command[0] not in ("modar", "modar-lab") or not re.fullmatch(r"[a-z]+", word) or len(command) == 3:
                         break
                     if len(command) == 2 and command[1] not in ("pattern", "ship", "cache"):
                         break

@@ -1,5 +1,5 @@
-// `modar bench wild` on clips that are rendered here, in each form that it reads, with the truth of
-// the renderer.
+// `modar-lab bench wild` on clips that are rendered here, in each form that it reads, with the
+// truth of the renderer.
 #include "bake/lab/wild_bench.hpp"
 
 #include <filesystem>

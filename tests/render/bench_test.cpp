@@ -1,5 +1,5 @@
 // The benchmark's rows on a small bundle, in a process that has opened no context before.
-#include "modar/render_bench.hpp"
+#include "bake/lab/render_bench.hpp"
 
 #include <algorithm>
 

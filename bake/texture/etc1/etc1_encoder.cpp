@@ -19,9 +19,9 @@ constexpr std::size_t kTile = 512;
 using Pixels16 = std::array<std::uint32_t, 16>;
 
 /// What each effort means to the kernel: how far from the mean colour it looks (reach, spread), and
-/// how often it steps on (rounds). Chosen with `modar bench etc1`; on four Kodak photos (512x512
-/// crops) the efforts reach 36.19, 36.63 and 36.78 dB at 57, 14 and 1.2 Mpixel/s, libetc1 34.92 dB
-/// at 2.5.
+/// how often it steps on (rounds). Chosen with `modar-lab bench etc1`; on four Kodak photos
+/// (512x512 crops) the efforts reach 36.19, 36.63 and 36.78 dB at 57, 14 and 1.2 Mpixel/s,
+/// libetc1 34.92 dB at 2.5.
 Etc1Search search_of(const EncodeOptions& options) {
   Etc1Search search;
   search.perceptual = options.perceptual;

@@ -1,12 +1,12 @@
-// `modar bench`: figures as ratios, ours and the reference side by side in one run.
+// `modar-lab bench`: figures as ratios, ours and the reference side by side in one run.
 #include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <thread>
 
-#include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
 #include "bake/lab/bench.hpp"
+#include "bake/lab/commands.hpp"
 #include "bake/terminal.hpp"
 
 namespace modar {
@@ -96,10 +96,10 @@ void add_bench(CommandLine& program) {
   line.flag("--json", bench->json, "Print the rows as JSON");
   line.flag("--quiet", bench->pose.quiet, "No progress bar");
   add_pose_options(line, bench->pose);
-  line.footer(
-      example("  modar bench load spider.modar --json\n"
-              "  modar bench model scan.obj --big --json\n"
-              "  modar bench pose --patterns patterns --backgrounds photos --frames 100 --json\n"));
+  line.footer(example(
+      "  modar-lab bench load spider.modar --json\n"
+      "  modar-lab bench model scan.obj --big --json\n"
+      "  modar-lab bench pose --patterns patterns --backgrounds photos --frames 100 --json\n"));
   line.run([bench] { return print_rows(*bench); });
 }
 

@@ -1,6 +1,6 @@
-// `modar bench render`: curves of the ModAR paper's ways to draw copies of a model, the paper's
+// `modar-lab bench render`: curves of the ModAR paper's ways to draw copies of a model, the paper's
 // gains, loading, and how many triangles culling sends.
-#include "modar/render_bench.hpp"
+#include "bake/lab/render_bench.hpp"
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -21,10 +21,10 @@
 #include <GLES2/gl2.h>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "bake/lab/heap.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/component.hpp"
 #include "modar/camera.hpp"
-#include "modar/heap.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/render/draw_list.hpp"

@@ -2,7 +2,7 @@
 // paper's OpenGL ES programs have it, in stored colours (no linear light), ambient 0.2 (what
 // exporters write as Ka) times 0.3, and a light that turns with the camera. What this project drew
 // with before it had light of the room.
-#include "modar/render_bench.hpp"
+#include "bake/lab/render_bench.hpp"
 #include "runtime/render/program.hpp"
 
 namespace modar {
