@@ -1,6 +1,7 @@
 """The runtime as an app's library: configured where nothing is found, as under a phone's sysroot, built and installed."""
 import os
 import pathlib
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -20,11 +21,11 @@ class Library(unittest.TestCase):
         return subprocess.run(["cmake", *map(str, words)], capture_output=True, text=True, cwd=self.folder,
                               env={**os.environ, "PKG_CONFIG_LIBDIR": "", "PKG_CONFIG_PATH": ""})
 
-    def launcher(self):
-        """Reads each file with all that it includes, and leaves an empty object: the same code, with the same definitions, is
-        compiled for the page by tests/web and for phones by phone_test.py."""
+    def launcher(self, *more):
+        """Checks each file as a compiler does, and leaves an empty object: the same code is optimised and linked for the page by
+        tests/web, and run everywhere else."""
         script = self.folder / "launcher.sh"
-        script.write_text('''"$@" -E || exit
+        script.write_text(f'"$@" -fsyntax-only {shlex.join(map(str, more))} || exit' + '''
 while [ "$1" != -o ]; do compiler=${compiler:-$1}; shift; done
 exec "$compiler" -x c++ -c /dev/null -o "$2"
 ''')
@@ -51,6 +52,15 @@ exec "$compiler" -x c++ -c /dev/null -o "$2"
         self.assertLessEqual({"libmodar.so", "libmodar_runtime.a", "libmodar_formats.a", "modar.h", "modar.pc",
                               "modar-config.cmake"}, installed)
         self.assertEqual(list((self.folder / "build" / "bin").glob("*")), [], "no player")
+
+    def test_a_type_error_is_seen(self):
+        (self.folder / "planted.hpp").write_text('inline int planted = "text";\n')
+        done = self.configure(self.launcher("-include", self.folder / "planted.hpp"), "-DMODAR_LIBRARY_ONLY=ON",
+                              "-DMODAR_INCLUDE_PATHS=/usr/include;/usr/include/eigen3")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.run_cmake("--build", "build", "-j2", "--target", "modar_formats")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("planted.hpp:1", done.stdout)
 
     def test_a_player_is_not_configured_there(self):
         # The same without the option: shows that nothing is found indeed.
