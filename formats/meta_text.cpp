@@ -1,7 +1,9 @@
 // A recursive descent over JSON that keeps nothing.
 #include "formats/meta_text.hpp"
 
+#include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "formats/base/utf8.hpp"
 
@@ -222,6 +224,59 @@ bool scan_text(JsonScan& scan) {
   return read && ((pattern && words) || scan.refuse("a text names no pattern, or has no words"));
 }
 
+/// A string's content with its escapes resolved.
+std::string unescaped(std::string_view content) {
+  std::string out;
+  while (!content.empty()) {
+    if (content[0] != '\\' || content.size() < 2) {
+      out += content[0];
+      content.remove_prefix(1);
+      continue;
+    }
+    int unit = code_unit(content);
+    if (unit < 0) {
+      constexpr std::string_view kWritten = "bfnrt";
+      constexpr std::string_view kMeant = "\b\f\n\r\t";
+      const std::size_t which = kWritten.find(content[1]);
+      out += which == std::string_view::npos ? content[1] : kMeant[which];
+      content.remove_prefix(2);
+      continue;
+    }
+    content.remove_prefix(6);
+    if (unit >= 0xD800 && unit < 0xDC00) {
+      unit = 0x10000 + ((unit - 0xD800) << 10) + (code_unit(content) - 0xDC00);
+      content.remove_prefix(std::min<std::size_t>(6, content.size()));
+    }
+    append_utf8(out, static_cast<std::uint32_t>(unit));
+  }
+  return out;
+}
+
+/// The texts of one element of `texts`, whose pattern may follow them.
+bool visit_text(JsonScan& scan, const std::function<void(const MetaText&)>& visit) {
+  std::string pattern;
+  std::vector<MetaText> found;
+  const bool read = scan.object([&](std::string_view key) {
+    std::string_view content;
+    if (key == "pattern") {
+      if (!scan.string(&content)) return false;
+      pattern = unescaped(content);
+      return true;
+    }
+    if (key != "text" && key != "alt") return scan.value();
+    return scan.object([&](std::string_view language) {
+      if (!scan.string(&content)) return false;
+      found.push_back({"", key == "alt", unescaped(language), unescaped(content)});
+      return true;
+    });
+  });
+  for (MetaText& each : found) {
+    each.pattern = pattern;
+    visit(each);
+  }
+  return read;
+}
+
 bool scan_member(JsonScan& scan, std::string_view key) {
   const auto any_object = [&scan] {
     return scan.object([&](std::string_view) { return scan.value(); });
@@ -241,6 +296,14 @@ std::optional<MetaFault> check_meta_text(std::string_view text) {
   const bool read = scan.object([&scan](std::string_view key) { return scan_member(scan, key); });
   if (read && !scan.at_end()) scan.refuse("something follows the object");
   return scan.fault();
+}
+
+void visit_meta_texts(std::string_view text, const std::function<void(const MetaText&)>& visit) {
+  JsonScan scan(text);
+  scan.object([&](std::string_view key) {
+    if (key != "texts") return scan.value();
+    return scan.array([&] { return visit_text(scan, visit); });
+  });
 }
 
 }  // namespace modar

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace modar {
@@ -20,5 +22,17 @@ struct MetaFault {
 /// Holds a text against *Meta text* of bundle.md. Nothing: it keeps the rules. Time grows with the
 /// text; allocates nothing.
 std::optional<MetaFault> check_meta_text(std::string_view text);
+
+/// A text of the member `texts`.
+struct MetaText {
+  std::string pattern;
+  bool alt = false;  ///< says what is seen, for screen readers
+  std::string language;
+  std::string words;
+};
+
+/// Hands out the texts of a meta text that keeps the rules, in its order; of another one, those
+/// before the fault.
+void visit_meta_texts(std::string_view text, const std::function<void(const MetaText&)>& visit);
 
 }  // namespace modar

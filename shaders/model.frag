@@ -30,11 +30,11 @@ void main() {
   base.rgb = texture2D(u_texture, v_uv).rgb;
 #endif
 #ifdef ALPHA_TWIN
-  base.a *= texture2D(u_alpha, v_uv).g;
+  float alpha = texture2D(u_alpha, v_uv).g;
 #ifdef CUT_OUT
-  if (base.a < 0.5) discard;
-  base.a = 1.0;
+  if (alpha < 0.5) discard;
 #else
+  base.a *= alpha;
   // Empty texels must not fill the depth buffer.
   if (base.a < 0.03) discard;
 #endif

@@ -51,4 +51,20 @@ inline bool utf8_continues(char byte) {
   return (static_cast<unsigned char>(byte) & 0xC0u) == 0x80u;
 }
 
+/// Appends a character. code_point: up to U+10FFFF and no surrogate.
+inline void append_utf8(std::string& text, std::uint32_t code_point) {
+  const auto tail = [&](int shift) {
+    return static_cast<char>(0x80u | (code_point >> shift & 0x3Fu));
+  };
+  if (code_point < 0x80) {
+    text += static_cast<char>(code_point);
+  } else if (code_point < 0x800) {
+    text += {static_cast<char>(0xC0u | code_point >> 6), tail(0)};
+  } else if (code_point < 0x10000) {
+    text += {static_cast<char>(0xE0u | code_point >> 12), tail(6), tail(0)};
+  } else {
+    text += {static_cast<char>(0xF0u | code_point >> 18), tail(12), tail(6), tail(0)};
+  }
+}
+
 }  // namespace modar

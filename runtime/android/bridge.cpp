@@ -37,12 +37,12 @@ struct Session {
   std::mutex tracking;  ///< holds tracker
   std::mutex drawing;   ///< holds renderer, surface, items, gesture
   // Both guards to write, either to read:
-  modar_bundle* bundle = nullptr;  ///< null once it is closed
-  modar_camera camera{};           ///< width 0: not known yet
+  modar_bundle* bundle = nullptr;                      ///< null once it is closed
+  modar_camera camera = modar::sized<modar_camera>();  ///< width 0: not known yet
   std::vector<modar_scene> scenes;
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
-  modar_surface surface{};
+  modar_surface surface = modar::sized<modar_surface>();
   std::vector<modar_item> items;
   Gesture gesture;
 };
@@ -119,7 +119,7 @@ jlong opened(JNIEnv* env, modar_bundle* bundle, const modar_error& error) {
   }
   auto session = std::make_shared<Session>();
   session->bundle = bundle;
-  session->scenes.resize(modar_scene_count(bundle));
+  session->scenes.resize(modar_scene_count(bundle), modar::sized<modar_scene>());
   for (std::uint32_t i = 0; i < session->scenes.size(); ++i) {
     modar_scene_at(bundle, i, &session->scenes[i]);
   }
@@ -240,7 +240,7 @@ std::array<double, 3> frame_axes(const std::array<double, 3>& phone, int degrees
 /// Tracks a frame and writes the poses of all patterns; answers how many are visible.
 jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t stride,
            double time_s, float* poses) {
-  modar_error error{};
+  auto error = modar::sized<modar_error>();
   if (modar_tracker_step_at(session.tracker, luma, stride, time_s, &error) != 0) {
     throw_error(env, error);
     return 0;
@@ -252,7 +252,7 @@ jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t 
   jint visible = 0;
   const std::uint32_t patterns = modar_pattern_count(session.bundle);
   for (std::uint32_t i = 0; i < patterns; ++i, poses += kPoseFloats) {
-    modar_pose pose{};
+    auto pose = modar::sized<modar_pose>();
     visible += modar_tracker_pose(session.tracker, i, &pose);
     poses[0] = static_cast<float>(pose.visible);
     poses[1] = static_cast<float>(pose.shown);
@@ -289,7 +289,7 @@ void place_items(Session& session, const float* poses) {
     const float* from = poses + each.pattern * kPoseFloats;
     if (from[1] == 0) continue;
     // Of the view, which has the stretch in it.
-    modar_pose pose{};
+    auto pose = modar::sized<modar_pose>();
     for (int row = 0; row < 3; ++row) {
       const float* view = from + kView + row;
       const float sign = row == 0 ? 1.0f : -1.0f;  // GL's camera has y up and z backward
@@ -300,7 +300,7 @@ void place_items(Session& session, const float* poses) {
     }
     modar_scene scene = each;
     if (moved) apply(gesture, scene.place);
-    session.items.emplace_back();
+    session.items.push_back(modar::sized<modar_item>());
     modar_item_place(&session.items.back(), &scene, &pose);
   }
 }
@@ -319,8 +319,7 @@ bool can_draw(JNIEnv* env, const Session& session) {
   return false;
 }
 
-/// The planes of an Image in YUV_420_888: three planes, or luma and pairs of chroma that two of the
-/// planes share. False and an exception for anything else.
+/// The chroma of an Image in YUV_420_888. False and an exception where the planes are too small.
 bool chroma_planes(JNIEnv* env, modar_picture& picture, jobject u_buffer, jobject v_buffer,
                    jint stride, jint pixel_stride) {
   const int width = picture.width / 2;
@@ -336,18 +335,10 @@ bool chroma_planes(JNIEnv* env, modar_picture& picture, jobject u_buffer, jobjec
   const auto* v = static_cast<const std::uint8_t*>(direct(env, v_buffer, size, "v"));
   if (v == nullptr) return false;
   picture.strides[1] = picture.strides[2] = stride;
-  if (pixel_stride == 1) {
-    picture.format = MODAR_I420;
-    picture.planes[1] = u;
-    picture.planes[2] = v;
-  } else if (v + 1 == u || u + 1 == v) {
-    picture.format = v + 1 == u ? MODAR_NV21 : MODAR_NV12;
-    picture.planes[1] = v + 1 == u ? v : u;
-  } else {
-    throw_error(env, 5, "android.planes", "chroma",
-                "samples of U and V are neither planar nor interleaved", "ask the camera for NV21");
-    return false;
-  }
+  picture.format = MODAR_YUV_420_888;
+  picture.planes[1] = u;
+  picture.planes[2] = v;
+  picture.chroma_step = pixel_stride;
   return true;
 }
 
@@ -365,12 +356,12 @@ MODAR_NATIVE(jint, version)(JNIEnv*, jclass) {
 }
 
 MODAR_NATIVE(jlong, openFd)(JNIEnv* env, jclass, jint fd, jlong offset, jlong length) {
-  modar_error error{};
+  auto error = modar::sized<modar_error>();
   return opened(env, modar_bundle_open_fd(fd, offset, length, &error), error);
 }
 
 MODAR_NATIVE(jlong, openFile)(JNIEnv* env, jclass, jstring path) {
-  modar_error error{};
+  auto error = modar::sized<modar_error>();
   return opened(env, modar_bundle_open(text_of(env, path).c_str(), &error), error);
 }
 
@@ -385,7 +376,7 @@ MODAR_NATIVE(void, close)(JNIEnv*, jclass, jlong number) {
 
 MODAR_NATIVE(void, verify)(JNIEnv* env, jclass, jlong number) {
   const Use session(env, number, &Session::tracking);
-  modar_error error{};
+  auto error = modar::sized<modar_error>();
   if (session && modar_bundle_verify(session->bundle, &error) != 0) throw_error(env, error);
 }
 
@@ -408,8 +399,9 @@ MODAR_NATIVE(void, setCamera)
   const std::string path = text_of(env, file);
   const Use session(env, number, &Session::tracking);
   if (!session) return;
-  modar_error error{};
-  modar_camera camera = modar_camera_default(width, height);
+  auto error = modar::sized<modar_error>();
+  auto camera = modar::sized<modar_camera>();
+  modar_camera_default(width, height, &camera);
   if (!path.empty()) {
     if (modar_camera_read(path.c_str(), &camera, &error) != 0) return throw_error(env, error);
     modar::Camera lens{camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, {}};
@@ -423,8 +415,7 @@ MODAR_NATIVE(void, setCamera)
     camera.cx = lens.cx;
     camera.cy = lens.cy;
   }
-  modar_tracker_options options{};
-  options.size = sizeof options;
+  auto options = modar::sized<modar_tracker_options>();
   options.async_search = search_apart ? 1 : 0;
   options.extended = extended ? 1 : 0;
   options.estimate_camera = path.empty() ? 1 : 0;
@@ -500,7 +491,7 @@ MODAR_NATIVE(void, onSurfaceCreated)
   const std::string profile = text_of(env, device);
   const Use session(env, number, &Session::drawing);
   if (!session) return;
-  modar_error error{};
+  auto error = modar::sized<modar_error>();
   if (session->renderer != nullptr) {
     // A second surface means that the context was lost with all that was in it.
     if (modar_renderer_restore(session->renderer, &error) != 0) throw_error(env, error);
@@ -519,8 +510,7 @@ MODAR_NATIVE(void, onSurfaceChanged)
 (JNIEnv* env, jclass, jlong number, jint width, jint height, jint rotation, jboolean mirror) {
   const Use session(env, number, &Session::drawing);
   if (!session) return;
-  modar_surface surface{};
-  surface.size = sizeof surface;
+  auto surface = modar::sized<modar_surface>();
   surface.width = width;
   surface.height = height;
   surface.rotation = rotation;
@@ -545,7 +535,7 @@ MODAR_NATIVE(void, onDrawFrame)
   const std::size_t luma = luma_bytes(camera);
   const ArrayBytes frame(env, nv21, luma / 2 * 3);
   if (frame.get() == nullptr) return;
-  modar_picture picture{};
+  auto picture = modar::sized<modar_picture>();
   picture.format = MODAR_NV21;
   picture.width = camera.width;
   picture.height = camera.height;
@@ -564,7 +554,7 @@ MODAR_NATIVE(void, onDrawPlanes)
   const float* const from = pose_floats(env, *session, poses);
   if (from == nullptr) return;
   const modar_camera& camera = session->camera;
-  modar_picture picture{};
+  auto picture = modar::sized<modar_picture>();
   picture.width = camera.width;
   picture.height = camera.height;
   picture.full_range = 1;
@@ -587,7 +577,7 @@ MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) 
   double frame_y = 0;
   modar_surface_to_frame(&session->surface, &session->camera, double{x}, double{y}, &frame_x,
                          &frame_y);
-  modar_hit hit{};
+  auto hit = modar::sized<modar_hit>();
   if (modar_pick(session->bundle, &session->camera, frame_x, frame_y, session->items.data(),
                  session->items.size(), &hit) == 0) {
     return -1;

@@ -13,7 +13,7 @@ namespace modar::android {
 /// Throws org.modar.ModarException with the error's parts; Java sees it when the native call
 /// returns.
 void throw_error(JNIEnv* env, const modar_error& error);
-void throw_error(JNIEnv* env, int exit_code, const char* code, const char* where, const char* cause,
+void throw_error(JNIEnv* env, int status, const char* code, const char* where, const char* cause,
                  const char* cure);
 
 /// Modified UTF-8, which is UTF-8 for what paths and names hold; empty for null.

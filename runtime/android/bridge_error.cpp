@@ -5,7 +5,7 @@
 
 namespace modar::android {
 
-void throw_error(JNIEnv* env, int exit_code, const char* code, const char* where, const char* cause,
+void throw_error(JNIEnv* env, int status, const char* code, const char* where, const char* cause,
                  const char* cure) {
   jclass type = env->FindClass("org/modar/ModarException");
   if (type == nullptr) return;  // NoClassDefFoundError is pending
@@ -20,7 +20,7 @@ void throw_error(JNIEnv* env, int exit_code, const char* code, const char* where
       if (texts[i] == nullptr) return;  // OutOfMemoryError is pending
     }
     auto* thrown = static_cast<jthrowable>(
-        env->NewObject(type, constructor, jint{exit_code}, texts[0], texts[1], texts[2], texts[3]));
+        env->NewObject(type, constructor, jint{status}, texts[0], texts[1], texts[2], texts[3]));
     if (thrown != nullptr) env->Throw(thrown);
     for (jstring text : texts) env->DeleteLocalRef(text);
   }
@@ -28,7 +28,7 @@ void throw_error(JNIEnv* env, int exit_code, const char* code, const char* where
 }
 
 void throw_error(JNIEnv* env, const modar_error& error) {
-  throw_error(env, error.exit_code, error.code, error.where, error.cause, error.cure);
+  throw_error(env, error.status, error.code, error.where, error.cause, error.cure);
 }
 
 std::string text_of(JNIEnv* env, jstring text) {

@@ -4,9 +4,13 @@
 #include <limits>
 #include <memory>
 #include <new>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "formats/check.hpp"
+#include "formats/meta_text.hpp"
+#include "formats/tracker_record.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
 
@@ -99,29 +103,29 @@ int modar_bundle_verify(const modar_bundle* bundle, modar_error* error) {
 }
 
 uint32_t modar_model_count(const modar_bundle* bundle) {
-  return bundle->view.models().size();
+  return bundle == nullptr ? 0 : bundle->view.models().size();
 }
 
 uint32_t modar_pattern_count(const modar_bundle* bundle) {
-  return bundle->view.patterns().size();
+  return bundle == nullptr ? 0 : bundle->view.patterns().size();
 }
 
 uint32_t modar_scene_count(const modar_bundle* bundle) {
-  return bundle->view.scenes().size();
+  return bundle == nullptr ? 0 : bundle->view.scenes().size();
 }
 
 size_t modar_model_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
-  if (index >= bundle->view.models().size()) return 0;
+  if (index >= modar_model_count(bundle)) return 0;
   return copy_name(bundle->view.name(bundle->view.models()[index].name), text, size);
 }
 
 size_t modar_pattern_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
-  if (index >= bundle->view.patterns().size()) return 0;
+  if (index >= modar_pattern_count(bundle)) return 0;
   return copy_name(bundle->view.name(bundle->view.patterns()[index].name), text, size);
 }
 
 int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3], float high[3]) {
-  if (index >= bundle->view.models().size()) return 0;
+  if (index >= modar_model_count(bundle) || low == nullptr || high == nullptr) return 0;
   const modar::ModelRecord& model = bundle->view.models()[index];
   for (std::size_t axis = 0; axis < 3; ++axis) {
     low[axis] = std::numeric_limits<float>::max();
@@ -136,7 +140,7 @@ int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3],
 }
 
 double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index) {
-  if (index >= bundle->view.patterns().size()) return 0.0;
+  if (index >= modar_pattern_count(bundle)) return 0.0;
   return static_cast<double>(bundle->view.patterns()[index].width_mm);
 }
 
@@ -146,28 +150,64 @@ int modar_camera_read(const char* path, modar_camera* camera, modar_error* error
   }
   const auto read = modar::read_camera_yml(path);
   if (!read) return hand_over(read.error(), error);
-  *camera = {read->width, read->height, read->fx, read->fy, read->cx, read->cy, {}};
-  std::copy(read->distortion.begin(), read->distortion.end(), camera->distortion);
-  return 0;
+  modar::give_camera(*read, camera);
+  return MODAR_OK;
 }
 
 int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scene) {
-  if (index >= bundle->view.scenes().size()) return 0;
+  if (index >= modar_scene_count(bundle) || scene == nullptr) return 0;
   const modar::SceneRecord& record = bundle->view.scenes()[index];
-  scene->pattern = record.pattern;
-  scene->model = record.model;
-  modar::copy_matrix(modar::scene_matrix(record), scene->place);
-  scene->number = index + 1;
+  modar_scene ours{0, record.pattern, record.model, {}, index + 1};
+  modar::copy_matrix(modar::scene_matrix(record), ours.place);
+  modar::give(ours, scene);
   return 1;
 }
 
-modar_camera modar_camera_default(int width, int height) {
-  const modar::Camera ours = modar::default_camera(width, height);
-  return {ours.width, ours.height, ours.fx, ours.fy, ours.cx, ours.cy, {}};
+int modar_pattern_picture(const modar_bundle* bundle, uint32_t index, int* width, int* height,
+                          const uint8_t** gray) {
+  if (index >= modar_pattern_count(bundle)) return 0;
+  modar::TrackerRecordView record;
+  const auto section = bundle->view.section(modar::SectionType::kTrackerRecord, index);
+  if (section.empty() || modar::view_tracker_record(section, record)) return 0;
+  if (width != nullptr) *width = static_cast<int>(record.header.width);
+  if (height != nullptr) *height = static_cast<int>(record.header.height);
+  if (gray != nullptr) *gray = record.pixels.data();
+  return 1;
+}
+
+size_t modar_language(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
+  if (bundle == nullptr) return 0;
+  std::vector<std::string> languages;
+  modar::visit_meta_texts(bundle->view.meta(), [&](const modar::MetaText& each) {
+    if (std::find(languages.begin(), languages.end(), each.language) == languages.end()) {
+      languages.push_back(each.language);
+    }
+  });
+  return index < languages.size() ? copy_name(languages[index], text, size) : 0;
+}
+
+size_t modar_pattern_text(const modar_bundle* bundle, uint32_t pattern, int kind,
+                          const char* language, char* text, size_t size) {
+  if (pattern >= modar_pattern_count(bundle) || language == nullptr) return 0;
+  const std::string_view name = bundle->view.name(bundle->view.patterns()[pattern].name);
+  std::string joined;
+  modar::visit_meta_texts(bundle->view.meta(), [&](const modar::MetaText& each) {
+    if (each.pattern != name || each.language != language || each.alt != (kind == MODAR_ALT_TEXT)) {
+      return;
+    }
+    if (!joined.empty()) joined += ' ';
+    joined += each.words;
+  });
+  return joined.empty() ? 0 : copy_name(joined, text, size);
+}
+
+void modar_camera_default(int width, int height, modar_camera* camera) {
+  modar::give_camera(modar::default_camera(width, height), camera);
 }
 
 void modar_projection(const modar_camera* camera, double near_plane, double far_plane,
                       float projection[16]) {
+  if (camera == nullptr || projection == nullptr) return;
   modar::copy_matrix(modar::gl_projection(modar::camera_of(*camera), near_plane, far_plane),
                      projection);
 }

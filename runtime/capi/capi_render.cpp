@@ -1,13 +1,16 @@
 // modar.h: contexts and the renderer. Nothing of the tracker: programs may draw alone.
+#include <algorithm>
 #include <memory>
 #include <vector>
 
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
+#include "runtime/capi/picture.hpp"
 
 static_assert(MODAR_NV21 == static_cast<int>(modar::PictureFormat::kNv21));
 static_assert(MODAR_NV12 == static_cast<int>(modar::PictureFormat::kNv12));
 static_assert(MODAR_I420 == static_cast<int>(modar::PictureFormat::kI420));
+static_assert(MODAR_RGBA == static_cast<int>(modar::PictureFormat::kRgba));
 
 struct modar_context {
   std::unique_ptr<modar::GlContext> context;
@@ -20,6 +23,7 @@ struct modar_renderer {
   std::unique_ptr<modar::Renderer> renderer;
   std::vector<modar::DrawItem> items;
   std::size_t picture_bytes = 0;
+  std::vector<std::uint8_t> chroma;  ///< of a frame whose chroma no format of the renderer has
 };
 
 namespace {
@@ -34,8 +38,44 @@ modar::Result<modar::GlCaps> caps_for(const std::string& device, std::uint64_t g
   return caps;
 }
 
-modar::CameraPicture picture_of(const modar_picture& picture) {
+/// Planes U and V side by side in `chroma`, as I420 has them.
+void pack_chroma(const modar_picture& picture, modar::CameraPicture& ours,
+                 std::vector<std::uint8_t>& chroma) {
+  const auto width = static_cast<std::size_t>(picture.width / 2);
+  const auto height = static_cast<std::size_t>(picture.height / 2);
+  chroma.resize(2 * width * height);
+  std::uint8_t* out = chroma.data();
+  for (std::size_t plane = 1; plane <= 2; ++plane) {
+    ours.planes[plane] = out;
+    ours.strides[plane] = static_cast<std::ptrdiff_t>(width);
+    for (std::size_t y = 0; y < height; ++y) {
+      const std::uint8_t* row =
+          picture.planes[plane] + picture.strides[plane] * static_cast<std::ptrdiff_t>(y);
+      for (std::size_t x = 0; x < width; ++x)
+        *out++ = row[x * static_cast<std::size_t>(picture.chroma_step)];
+    }
+  }
+}
+
+/// Android's planes as the format that they are: their chroma is one plane of pairs on most phones.
+void set_planes(const modar_picture& picture, modar::CameraPicture& ours,
+                std::vector<std::uint8_t>& chroma) {
+  const std::uint8_t* const u = picture.planes[1];
+  const std::uint8_t* const v = picture.planes[2];
+  ours.format = modar::PictureFormat::kI420;
+  if (picture.chroma_step == 1) return;
+  if (picture.strides[1] != picture.strides[2] || (v + 1 != u && u + 1 != v)) {
+    return pack_chroma(picture, ours, chroma);
+  }
+  ours.format = v + 1 == u ? modar::PictureFormat::kNv21 : modar::PictureFormat::kNv12;
+  ours.planes[1] = std::min(u, v);
+}
+
+/// A picture that check_picture() refuses has no size: nothing of it is drawn.
+modar::CameraPicture picture_of(const modar_picture& theirs, std::vector<std::uint8_t>& chroma) {
+  const modar_picture picture = modar::grown(theirs);
   modar::CameraPicture ours;
+  if (!modar::check_picture(picture)) return ours;
   ours.format = static_cast<modar::PictureFormat>(picture.format);
   ours.width = picture.width;
   ours.height = picture.height;
@@ -46,6 +86,7 @@ modar::CameraPicture picture_of(const modar_picture& picture) {
     ours.first_row = picture.first_row;
     ours.row_count = picture.row_count;
   }
+  if (picture.format == MODAR_YUV_420_888) set_planes(picture, ours, chroma);
   return ours;
 }
 
@@ -66,11 +107,14 @@ void set_key(modar::RenderOptions& options, const float* direction) {
 /// The items of models that there are, into the renderer's own list.
 void take_items(modar_renderer& renderer, const modar_item* items, size_t count) {
   renderer.items.clear();
+  count = modar::item_count(items, count);
   for (size_t i = 0; i < count; ++i) {
-    if (items[i].model >= renderer.view.models().size()) continue;
-    modar::DrawItem item{items[i].model, glm::make_mat4(items[i].to_eye), items[i].scene - 1};
-    const glm::mat4 world = glm::make_mat4(items[i].world_to_eye);
+    const modar_item asked = modar::item_at(items, i);
+    if (asked.model >= renderer.view.models().size()) continue;
+    modar::DrawItem item{asked.model, glm::make_mat4(asked.to_eye), asked.scene - 1};
+    const glm::mat4 world = glm::make_mat4(asked.world_to_eye);
     if (world != glm::mat4(0.0f)) item.world_to_eye = world;
+    if (asked.opacity > 0.0f && asked.opacity < 1.0f) item.opacity = asked.opacity;
     renderer.items.push_back(item);
   }
 }
@@ -85,12 +129,14 @@ glm::mat4 projection_of(const modar_renderer& renderer, const modar_camera* came
 }
 
 /// Without a picture, the camera's size alone.
-modar::CameraPicture frame_of(const modar_picture* picture, const modar_camera* camera) {
-  if (picture != nullptr) return picture_of(*picture);
+modar::CameraPicture frame_of(modar_renderer& renderer, const modar_picture* picture,
+                              const modar_camera* camera) {
+  if (picture != nullptr) return picture_of(*picture, renderer.chroma);
   modar::CameraPicture frame;
   if (camera != nullptr) {
-    frame.width = camera->width;
-    frame.height = camera->height;
+    const modar_camera asked = modar::grown(*camera);
+    frame.width = asked.width;
+    frame.height = asked.height;
   }
   return frame;
 }
@@ -139,12 +185,14 @@ void modar_renderer_destroy(modar_renderer* renderer) {
 }
 
 int modar_renderer_restore(modar_renderer* renderer, modar_error* error) {
+  if (renderer == nullptr) return modar::hand_over(modar::missing("renderer"), error);
   const auto caps = caps_for(renderer->device, renderer->gpu_bytes);
   if (!caps) return modar::hand_over(caps.error(), error);
   return modar::hand_over(renderer->renderer->restore(*caps), error);
 }
 
 int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar_error* error) {
+  if (renderer == nullptr) return modar::hand_over(modar::missing("renderer"), error);
   const auto done = renderer->renderer->resize(width, height);
   if (!done) return modar::hand_over(done, error);
   renderer->picture_bytes =
@@ -153,6 +201,7 @@ int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar
 }
 
 void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive) {
+  if (renderer == nullptr || direction == nullptr) return;
   modar::RenderOptions options;
   set_key(options, direction);
   options.exclusive_context = exclusive != 0;
@@ -162,46 +211,58 @@ void modar_renderer_set_light(modar_renderer* renderer, const float direction[3]
 void modar_renderer_render(modar_renderer* renderer, const modar_picture* picture,
                            const modar_camera* camera, const float projection[16],
                            const modar_item* items, size_t count) {
+  if (renderer == nullptr) return;
   take_items(*renderer, items, count);
-  renderer->renderer->render(frame_of(picture, camera),
+  renderer->renderer->render(frame_of(*renderer, picture, camera),
                              projection_of(*renderer, camera, projection), renderer->items);
 }
 
 void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
                          const modar_picture* picture, const modar_camera* camera,
                          const float projection[16], const modar_item* items, size_t count) {
+  if (renderer == nullptr || surface == nullptr) return;
   take_items(*renderer, items, count);
-  renderer->renderer->draw(surface_of(*surface), frame_of(picture, camera),
+  renderer->renderer->draw(surface_of(*surface), frame_of(*renderer, picture, camera),
                            projection_of(*renderer, camera, projection), renderer->items);
 }
 
 void modar_renderer_observe(modar_renderer* renderer, const modar_picture* picture,
                             const modar_camera* camera, const modar_item* items, size_t count) {
+  if (renderer == nullptr || picture == nullptr) return;
+  const modar::CameraPicture frame = picture_of(*picture, renderer->chroma);
+  if (frame.width == 0) return;
   take_items(*renderer, items, count);
-  renderer->renderer->observe(picture_of(*picture), projection_of(*renderer, camera, nullptr),
-                              renderer->items);
+  renderer->renderer->observe(frame, projection_of(*renderer, camera, nullptr), renderer->items);
 }
 
 void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
                             double y, double* frame_x, double* frame_y) {
+  if (surface == nullptr || camera == nullptr) return;
+  const modar_camera asked = modar::grown(*camera);
   const glm::dvec2 pixel =
-      modar::frame_pixel(surface_of(*surface), camera->width, camera->height, {x, y});
-  *frame_x = pixel.x;
-  *frame_y = pixel.y;
+      modar::frame_pixel(surface_of(*surface), asked.width, asked.height, {x, y});
+  if (frame_x != nullptr) *frame_x = pixel.x;
+  if (frame_y != nullptr) *frame_y = pixel.y;
 }
 
 int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double frame_x,
                double frame_y, const modar_item* items, size_t count, modar_hit* hit) {
+  if (bundle == nullptr || camera == nullptr) return 0;
   std::vector<modar::DrawItem> ours;
-  for (size_t i = 0; i < count; ++i)
-    ours.push_back({items[i].model, glm::make_mat4(items[i].to_eye), modar::kNone, {}});
+  count = modar::item_count(items, count);
+  for (size_t i = 0; i < count; ++i) {
+    const modar_item asked = modar::item_at(items, i);
+    ours.push_back({asked.model, glm::make_mat4(asked.to_eye), modar::kNone, {}});
+  }
   const auto found = modar::pick(bundle->view, modar::camera_of(*camera), {frame_x, frame_y}, ours);
   if (!found) return 0;
-  *hit = {found->item, {found->point.x, found->point.y, found->point.z}, found->distance};
+  modar::give({0, found->item, {found->point.x, found->point.y, found->point.z}, found->distance},
+              hit);
   return 1;
 }
 
 void modar_render_options_default(modar_render_options* options) {
+  if (options == nullptr) return;
   const modar::RenderOptions ours;
   *options = {sizeof *options,
               {0.0f, 0.0f, 0.0f},
@@ -215,6 +276,7 @@ void modar_render_options_default(modar_render_options* options) {
 }
 
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options) {
+  if (renderer == nullptr || options == nullptr) return;
   const modar_render_options asked = modar::grown(*options);
   modar::RenderOptions ours;
   set_key(ours, asked.light);
@@ -229,20 +291,23 @@ void modar_renderer_set_options(modar_renderer* renderer, const modar_render_opt
 }
 
 uint64_t modar_renderer_gpu_bytes(const modar_renderer* renderer) {
+  if (renderer == nullptr) return 0;
   const modar::GpuMemory memory = renderer->renderer->gpu_memory();
   return memory.geometry + memory.textures + memory.batches;
 }
 
 void modar_renderer_show(modar_renderer* renderer, int window_width, int window_height) {
-  renderer->renderer->blit_to_window(window_width, window_height);
+  if (renderer != nullptr) renderer->renderer->blit_to_window(window_width, window_height);
 }
 
 void modar_renderer_read_rgba(modar_renderer* renderer, uint8_t* rgba) {
-  renderer->renderer->read_pixels({rgba, renderer->picture_bytes});
+  if (renderer != nullptr) renderer->renderer->read_pixels({rgba, renderer->picture_bytes});
 }
 
-modar_render_stats modar_renderer_stats(const modar_renderer* renderer) {
-  const modar::RenderStats& stats = renderer->renderer->stats();
-  return {stats.draw_calls,    stats.state_changes, stats.chunks_drawn,
-          stats.chunks_culled, stats.triangles,     stats.bytes_uploaded};
+void modar_renderer_stats(const modar_renderer* renderer, modar_render_stats* stats) {
+  if (renderer == nullptr) return;
+  const modar::RenderStats& ours = renderer->renderer->stats();
+  modar::give({0, ours.draw_calls, ours.state_changes, ours.chunks_drawn, ours.chunks_culled,
+               ours.triangles, ours.bytes_uploaded},
+              stats);
 }

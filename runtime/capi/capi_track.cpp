@@ -21,6 +21,9 @@ struct modar_tracker {
 
 namespace {
 
+/// Beyond it, rows would overflow what counts them.
+constexpr std::size_t kMostStride = std::size_t{1} << 24;
+
 void set_pose(const modar::Pose& from, const glm::dmat4x3& stretch, modar_pose& to) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
@@ -78,6 +81,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
 }
 
 void modar_tracker_reset(modar_tracker* tracker) {
+  if (tracker == nullptr) return;
   tracker->loop->reset();
   tracker->hysteresis = modar::Hysteresis(tracker->poses.size());
   tracker->smoother = modar::PoseSmoother(tracker->poses.size(), tracker->smooth_ms);
@@ -90,38 +94,24 @@ void modar_tracker_destroy(modar_tracker* tracker) {
 
 int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride,
                        modar_error* error) {
-  return modar_tracker_step_at(tracker, gray, stride, tracker->time_s + 1.0 / 30.0, error);
-}
-
-void modar_shrink(const uint8_t* gray, size_t stride, int width, int height, int factor,
-                  uint8_t* out) {
-  if (gray == nullptr || out == nullptr || factor < 1 || factor > 256) return;
-  const auto side = static_cast<std::size_t>(factor);
-  const auto columns = static_cast<std::size_t>(std::max(width, 0)) / side;
-  const auto rows = static_cast<std::size_t>(std::max(height, 0)) / side;
-  // Of `factor` pixels one above the other, at most 256 * 255.
-  std::vector<std::uint16_t> sums(columns * side);
-  const std::uint32_t area = static_cast<std::uint32_t>(side * side);
-  for (std::size_t y = 0; y < rows; ++y) {
-    std::fill(sums.begin(), sums.end(), std::uint16_t{0});
-    for (std::size_t k = 0; k < side; ++k) {
-      const std::uint8_t* const row = gray + (y * side + k) * stride;
-      for (std::size_t x = 0; x < sums.size(); ++x) {
-        sums[x] = static_cast<std::uint16_t>(sums[x] + row[x]);
-      }
-    }
-    for (std::size_t x = 0; x < columns; ++x) {
-      std::uint32_t sum = area / 2;
-      for (std::size_t k = 0; k < side; ++k) sum += sums[x * side + k];
-      out[y * columns + x] = static_cast<std::uint8_t>(sum / area);
-    }
-  }
+  const double before = tracker == nullptr ? 0.0 : tracker->time_s;
+  return modar_tracker_step_at(tracker, gray, stride, before + 1.0 / 30.0, error);
 }
 
 int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
                           modar_error* error) {
-  if (gray == nullptr) return modar::hand_over(modar::missing("gray"), error);
+  if (tracker == nullptr || gray == nullptr) {
+    return modar::hand_over(modar::missing(tracker == nullptr ? "tracker" : "gray"), error);
+  }
   const modar::Camera& camera = tracker->camera;
+  if (stride < static_cast<std::size_t>(camera.width) || stride > kMostStride) {
+    return modar::hand_over(
+        {modar::ExitCode::kUsage, "capi.stride", "stride",
+         std::to_string(stride) + " bytes a row, where the camera's frames are " +
+             std::to_string(camera.width) + " pixels wide",
+         "pass the bytes from one row of the gray plane to the next"},
+        error);
+  }
   const auto done = tracker->loop->step(
       {gray, camera.width, camera.height, static_cast<std::ptrdiff_t>(stride)}, tracker->result);
   if (!done) return modar::hand_over(done, error);
@@ -164,30 +154,33 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
 }
 
 void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]) {
+  if (tracker == nullptr || rotation == nullptr) return;
   tracker->loop->set_turn({rotation[0], rotation[1], rotation[2]});
 }
 
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose) {
-  if (pattern >= tracker->poses.size()) return 0;
-  *pose = tracker->poses[pattern];
-  return pose->visible;
+  if (tracker == nullptr || pattern >= tracker->poses.size()) return 0;
+  modar::give(tracker->poses[pattern], pose);
+  return tracker->poses[pattern].visible;
 }
 
 double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera) {
-  const modar::Camera& ours = tracker->camera;
-  *camera = {ours.width, ours.height, ours.fx, ours.fy, ours.cx, ours.cy, {}};
-  std::copy(ours.distortion.begin(), ours.distortion.end(), camera->distortion);
+  if (tracker == nullptr) return 0.0;
+  modar::Camera ours = tracker->camera;
   const modar::CameraEstimate& now = tracker->result.camera;
-  if (!now.estimated) return 0.0;
-  camera->fx = camera->fy = now.focal;
-  return now.sigma;
+  if (now.estimated) ours.fx = ours.fy = now.focal;
+  modar::give_camera(ours, camera);
+  return now.estimated ? now.sigma : 0.0;
 }
 
 const char* modar_tracker_reason(const modar_tracker* tracker) {
-  return modar::to_string(tracker->result.reason);
+  return tracker == nullptr ? "no tracker" : modar::to_string(tracker->result.reason);
 }
 
-void modar_view(const modar_pose* pose, float view[16]) {
+void modar_view(const modar_pose* theirs, float view[16]) {
+  if (theirs == nullptr || view == nullptr) return;
+  const modar_pose asked = modar::grown(*theirs);
+  const modar_pose* const pose = &asked;
   modar::Pose ours;
   glm::dmat4x3 stretch(1.0);
   const bool none = std::all_of(std::begin(pose->stretch), std::end(pose->stretch),
@@ -205,10 +198,12 @@ void modar_view(const modar_pose* pose, float view[16]) {
 }
 
 void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose) {
-  float view[16];
-  modar_view(pose, view);
-  item->model = scene->model;
-  modar::copy_matrix(glm::make_mat4(view) * glm::make_mat4(scene->place), item->to_eye);
-  item->scene = scene->number;
-  std::memcpy(item->world_to_eye, view, sizeof view);
+  if (item == nullptr || scene == nullptr || pose == nullptr) return;
+  const modar_scene place = modar::grown(*scene);
+  modar_item ours = modar::grown(*item);
+  modar_view(pose, ours.world_to_eye);
+  ours.model = place.model;
+  modar::copy_matrix(glm::make_mat4(ours.world_to_eye) * glm::make_mat4(place.place), ours.to_eye);
+  ours.scene = place.number;
+  modar::give(ours, item);
 }

@@ -31,29 +31,58 @@ void copy_text(const std::string& text, char (&to)[kSize]) {
   to[length] = '\0';
 }
 
-/// Tells the caller, who may not want to know; answers the exit code.
+static_assert(MODAR_USAGE == static_cast<int>(ExitCode::kUsage));
+static_assert(MODAR_IO == static_cast<int>(ExitCode::kIo));
+static_assert(MODAR_INVALID == static_cast<int>(ExitCode::kInvalidInput));
+static_assert(MODAR_INTERNAL == static_cast<int>(ExitCode::kInternal));
+static_assert(MODAR_UNSUPPORTED == static_cast<int>(ExitCode::kUnsupported));
+
+/// Into the caller's structure, which may be of an older version and shorter, or of a newer one,
+/// whose further fields stay.
+template <class Struct>
+void give(Struct ours, Struct* to) {
+  if (to == nullptr || to->size < sizeof to->size) return;
+  ours.size = to->size;
+  std::memcpy(to, &ours, std::min(ours.size, sizeof ours));
+}
+
+/// Tells the caller, who may not want to know; answers the status.
 inline int hand_over(const Error& error, modar_error* to) {
-  const int exit = static_cast<int>(error.exit);
-  if (to == nullptr) return exit;
-  to->exit_code = exit;
-  copy_text(error.code, to->code);
-  copy_text(error.where, to->where);
-  copy_text(error.cause, to->cause);
-  copy_text(error.cure, to->cure);
-  return exit;
+  const int status = static_cast<int>(error.exit);
+  if (to == nullptr) return status;
+  modar_error ours{};
+  ours.status = status;
+  copy_text(error.code, ours.code);
+  copy_text(error.where, ours.where);
+  copy_text(error.cause, ours.cause);
+  copy_text(error.cure, ours.cure);
+  give(ours, to);
+  return status;
 }
 
 inline int hand_over(const Result<void>& result, modar_error* to) {
   return result ? 0 : hand_over(result.error(), to);
 }
 
-/// The caller's options in a structure of this version's size: what an older caller did not know is
-/// 0.
-template <class Options>
-Options grown(const Options& options) {
-  Options ours{};
-  std::memcpy(&ours, &options, std::min(options.size, sizeof ours));
+/// The caller's structure in one of this version's size: what an older caller did not know is 0.
+template <class Struct>
+Struct grown(const Struct& theirs) {
+  Struct ours{};
+  std::memcpy(&ours, &theirs, std::min(theirs.size, sizeof ours));
   return ours;
+}
+
+/// An item of an array whose elements have the caller's size.
+inline modar_item item_at(const modar_item* items, std::size_t index) {
+  const auto* bytes = reinterpret_cast<const std::byte*>(items) + index * items->size;
+  modar_item ours{};
+  std::memcpy(&ours, bytes, std::min(items->size, sizeof ours));
+  return ours;
+}
+
+/// 0 for an array that is NULL or whose items have no size.
+inline std::size_t item_count(const modar_item* items, std::size_t count) {
+  return items == nullptr || items->size < sizeof items->size ? 0 : count;
 }
 
 /// What a caller forgot.
@@ -61,10 +90,17 @@ inline Error missing(const char* what) {
   return {ExitCode::kUsage, "capi.null", what, "is NULL", "pass it"};
 }
 
-inline Camera camera_of(const modar_camera& camera) {
+inline Camera camera_of(const modar_camera& theirs) {
+  const modar_camera camera = grown(theirs);
   Camera ours{camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, {}};
   std::copy_n(camera.distortion, ours.distortion.size(), ours.distortion.begin());
   return ours;
+}
+
+inline void give_camera(const Camera& ours, modar_camera* to) {
+  modar_camera camera{0, ours.width, ours.height, ours.fx, ours.fy, ours.cx, ours.cy, {}};
+  std::copy(ours.distortion.begin(), ours.distortion.end(), camera.distortion);
+  give(camera, to);
 }
 
 inline void copy_matrix(const glm::mat4& from, float* to) {

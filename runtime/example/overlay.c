@@ -5,12 +5,13 @@
 
 static int fail(const modar_error* e) {
   fprintf(stderr, "overlay: %s: %s; %s [%s]\n", e->where, e->cause, e->cure, e->code);
-  return e->exit_code;
+  return e->status;
 }
 int main(int argc, char** argv) {
-  modar_error error;
+  modar_error error = {.size = sizeof error};
   if (argc < 4) return fputs("overlay BUNDLE WIDTH HEIGHT\n", stderr), 1;
-  modar_camera camera = modar_camera_default(atoi(argv[2]), atoi(argv[3]));
+  modar_camera camera = {.size = sizeof camera};
+  modar_camera_default(atoi(argv[2]), atoi(argv[3]), &camera);
   size_t width = (size_t)camera.width, pixels = width * (size_t)camera.height;
   modar_context* context = modar_context_create(&error); /* an app with a surface has its own */
   modar_bundle* bundle = context ? modar_bundle_open(argv[1], &error) : NULL;
@@ -19,13 +20,13 @@ int main(int argc, char** argv) {
   if (!renderer || modar_renderer_resize(renderer, camera.width, camera.height, &error)) return fail(&error);
   uint8_t* frame = malloc(pixels * 3 / 2);
   uint8_t* rgba = malloc(pixels * 4);
-  modar_picture picture = {MODAR_NV21, camera.width, camera.height, {frame, frame + pixels},
-                           {camera.width, camera.width}, 1, 0, 0};
-  modar_scene scene = {0};
+  modar_picture picture = {.size = sizeof picture, .format = MODAR_NV21, .width = camera.width, .height = camera.height,
+                           .planes = {frame, frame + pixels}, .strides = {camera.width, camera.width}, .full_range = 1};
+  modar_scene scene = {.size = sizeof scene};
   modar_scene_at(bundle, 0, &scene);
   while (fread(frame, pixels * 3 / 2, 1, stdin) == 1) {
-    modar_pose pose = {0};
-    modar_item item;
+    modar_pose pose = {.size = sizeof pose};
+    modar_item item = {.size = sizeof item};
     if (modar_tracker_step(tracker, frame, width, &error)) return fail(&error);
     int seen = modar_tracker_pose(tracker, scene.pattern, &pose);
     if (seen) modar_item_place(&item, &scene, &pose);

@@ -145,7 +145,7 @@ void DrawList::build(const BundleView& bundle, std::span<const ChunkSetup> setup
       const float distance = eye_distance(view, chunk);
       command.distance = distance >= 0.0f ? distance : 0.0f;
       command.hides = setups[c].hides;
-      command.blended = setups[c].blended;
+      command.blended = setups[c].blended || (items[i].opacity < 1.0f && !command.hides);
       if (levels[command.level].index_count > 0) commands_.push_back(command);
     }
   }

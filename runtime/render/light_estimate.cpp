@@ -49,8 +49,9 @@ glm::vec3 pixel_of(const CameraPicture& frame, int x, int y) {
   const auto at = [&](std::size_t plane, int column, int row) {
     return static_cast<float>(frame.planes[plane][frame.strides[plane] * row + column]);
   };
-  if (frame.format == PictureFormat::kRgb) {
-    return {at(0, 3 * x, y), at(0, 3 * x + 1, y), at(0, 3 * x + 2, y)};
+  if (frame.format == PictureFormat::kRgb || frame.format == PictureFormat::kRgba) {
+    const int pixel = frame.format == PictureFormat::kRgb ? 3 : 4;
+    return {at(0, pixel * x, y), at(0, pixel * x + 1, y), at(0, pixel * x + 2, y)};
   }
   float v = 0;
   float u = 0;

@@ -251,8 +251,10 @@ void ModelPainter::set_light(const PaintJob& job, ProgramState& state, const Pie
 
 void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const Piece& piece) {
   const std::uint32_t material = piece.material;
-  if (state.material == material) return;
+  const float opacity = job.items[piece.item].opacity;
+  if (state.material == material && state.opacity == opacity) return;
   state.material = material;
+  state.opacity = opacity;
   const MaterialRecord& record = bundle_.materials()[material];
   const bool two_sided = (record.flags & kMaterialTwoSided) != 0;
   const ModelProgram& program = state.program;
@@ -272,7 +274,7 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const 
     }
     set_vector(program.albedo, albedo, job.stats);
   }
-  glUniform1f(program.opacity, record.opacity);
+  glUniform1f(program.opacity, record.opacity * opacity);
   job.stats.bytes_uploaded += sizeof record.opacity;
 }
 

@@ -66,6 +66,7 @@ class ModelPainter {
     std::uint64_t frame = 0;      ///< projection is of this frame
     std::uint32_t light = kNone;  ///< or the item whose light it is: see set_light()
     std::uint32_t material = kNone;
+    float opacity = 1.0f;  ///< the item's
     std::uint32_t item = kNone;
     std::uint32_t chunk = kNone;  ///< the one whose decoding is set
   };

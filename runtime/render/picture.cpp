@@ -129,6 +129,8 @@ Layouts layouts_of(PictureFormat format) {
       return {2, {luma, {GL_LUMINANCE_ALPHA, 2, 2}, {}}};
     case PictureFormat::kI420:
       return {3, {luma, {GL_LUMINANCE, 1, 2}, {GL_LUMINANCE, 1, 2}}};
+    case PictureFormat::kRgba:
+      return {1, {PlaneLayout{GL_RGBA, 4, 1}, {}, {}}};
     case PictureFormat::kRgb:
       break;
   }
@@ -155,7 +157,7 @@ std::uint64_t send_rows(const PlaneLayout& layout, const std::uint8_t* pixels,
 }  // namespace
 
 Background::Kind Background::kind_of(PictureFormat format) {
-  if (format == PictureFormat::kRgb) return kRgb;
+  if (format == PictureFormat::kRgb || format == PictureFormat::kRgba) return kRgb;
   return format == PictureFormat::kI420 ? kPlanes : kPair;
 }
 

@@ -31,11 +31,11 @@ struct WebPose {
 static_assert(sizeof(WebPose) == 41 * sizeof(float));
 
 struct Engine {
-  modar_error error;
+  modar_error error = modar::sized<modar_error>();
   modar_bundle* bundle = nullptr;
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
-  modar_camera camera;
+  modar_camera camera = modar::sized<modar_camera>();
   double focal_sigma = 0;    ///< 0 where it is not estimated
   WebPose* poses = nullptr;  ///< one a pattern
   modar_item* items = nullptr;
@@ -57,7 +57,7 @@ glm::mat4 with_gesture(const modar_scene& scene, float turn, float size) {
 /// Shown scenes as items; answers how many.
 size_t collect_items(float turn, float size) {
   size_t count = 0;
-  modar_scene scene;
+  auto scene = modar::sized<modar_scene>();
   for (uint32_t s = 0; modar_scene_at(engine.bundle, s, &scene) != 0; ++s) {
     const WebPose& pose = engine.poses[scene.pattern];
     if (pose.shown == 0.0f) continue;
@@ -101,14 +101,16 @@ EMSCRIPTEN_KEEPALIVE void web_free(void* memory) {
   std::free(memory);
 }
 
-/// Opens the bundle; its bytes, of web_reserve(), stay in use. 0, or the exit code of an error.
+/// Opens the bundle; its bytes, of web_reserve(), stay in use. 0, or the status of an error.
 EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size) {
   engine.bundle = modar_bundle_open_bytes(bytes, size, &engine.error);
-  if (engine.bundle == nullptr) return engine.error.exit_code;
+  if (engine.bundle == nullptr) return engine.error.status;
   const int damaged = modar_bundle_verify(engine.bundle, &engine.error);
   if (damaged != 0) return damaged;
   engine.poses = new WebPose[modar_pattern_count(engine.bundle) + 1]();
-  engine.items = new modar_item[modar_scene_count(engine.bundle) + 1]();
+  const uint32_t scenes = modar_scene_count(engine.bundle);
+  engine.items = new modar_item[scenes + 1]();
+  for (uint32_t i = 0; i <= scenes; ++i) engine.items[i].size = sizeof(modar_item);
   return 0;
 }
 
@@ -143,7 +145,7 @@ EMSCRIPTEN_KEEPALIVE const float* web_bounds(uint32_t pattern) {
   const float largest = std::numeric_limits<float>::max();
   glm::vec3 low(largest);
   glm::vec3 high(-largest);
-  modar_scene scene;
+  auto scene = modar::sized<modar_scene>();
   for (uint32_t s = 0; modar_scene_at(engine.bundle, s, &scene) != 0; ++s) {
     glm::vec3 box[2];
     if (scene.pattern != pattern) continue;
@@ -162,7 +164,7 @@ EMSCRIPTEN_KEEPALIVE const float* web_bounds(uint32_t pattern) {
 }
 /// Which models stand on which patterns. part: 0 pattern, 1 model.
 EMSCRIPTEN_KEEPALIVE uint32_t web_scene(uint32_t index, int part) {
-  modar_scene scene{};
+  auto scene = modar::sized<modar_scene>();
   modar_scene_at(engine.bundle, index, &scene);
   return part == 0 ? scene.pattern : scene.model;
 }
@@ -170,7 +172,7 @@ EMSCRIPTEN_KEEPALIVE uint32_t web_scene(uint32_t index, int part) {
 /// The camera's frames have this size. focal: pixels; 0: the longer side, as for every unknown
 /// camera.
 EMSCRIPTEN_KEEPALIVE void web_camera(int width, int height, double focal) {
-  engine.camera = modar_camera_default(width, height);
+  modar_camera_default(width, height, &engine.camera);
   if (focal > 0) engine.camera.fx = engine.camera.fy = focal;
 }
 EMSCRIPTEN_KEEPALIVE double web_focal() {
@@ -185,14 +187,13 @@ EMSCRIPTEN_KEEPALIVE double web_focal_sigma() {
 /// on from a pattern's surroundings.
 EMSCRIPTEN_KEEPALIVE int web_track(int estimate_camera, int budget, int extended) {
   modar_tracker_destroy(engine.tracker);
-  modar_tracker_options options{};
-  options.size = sizeof options;
+  auto options = modar::sized<modar_tracker_options>();
   options.budget = budget;
   options.extended = extended;
   options.estimate_camera = estimate_camera;
   engine.tracker =
       modar_tracker_create_with(engine.bundle, &engine.camera, &options, &engine.error);
-  return engine.tracker == nullptr ? engine.error.exit_code : 0;
+  return engine.tracker == nullptr ? engine.error.status : 0;
 }
 EMSCRIPTEN_KEEPALIVE void web_reset() {
   modar_tracker_reset(engine.tracker);
@@ -209,7 +210,7 @@ EMSCRIPTEN_KEEPALIVE int web_step(const uint8_t* gray, size_t stride, double tim
   const int failed = modar_tracker_step_at(engine.tracker, gray, stride, time_s, &engine.error);
   if (failed != 0) return failed;
   engine.focal_sigma = modar_tracker_camera(engine.tracker, &engine.camera);
-  modar_pose pose;
+  auto pose = modar::sized<modar_pose>();
   for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p) {
     modar_tracker_pose(engine.tracker, p, &pose);
     WebPose& to = engine.poses[p];
@@ -273,7 +274,7 @@ EMSCRIPTEN_KEEPALIVE int web_upload(int lost, int fixed) {
   if (lost != 0 && engine.renderer != nullptr)
     return modar_renderer_restore(engine.renderer, &engine.error);
   engine.renderer = modar_renderer_create(engine.bundle, nullptr, 0, &engine.error);
-  if (engine.renderer == nullptr) return engine.error.exit_code;
+  if (engine.renderer == nullptr) return engine.error.status;
   modar_render_options options;
   modar_render_options_default(&options);
   options.exclusive = 1;
@@ -289,8 +290,7 @@ EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn
   glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
   glClear(GL_COLOR_BUFFER_BIT);
   const size_t count = collect_items(turn, size);
-  modar_surface surface{};
-  surface.size = sizeof surface;
+  auto surface = modar::sized<modar_surface>();
   surface.width = width;
   surface.height = height;
   surface.mirror = mirror;
@@ -298,17 +298,14 @@ EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn
   modar_renderer_draw(engine.renderer, &surface, nullptr, &engine.camera, nullptr, engine.items,
                       count);
 }
-/// The light on the patterns of web_poses(), as a copy of their frame shows it: RGBA, which is not
-/// kept.
-EMSCRIPTEN_KEEPALIVE void web_look(uint8_t* pixels, int width, int height) {
-  const int count = width * height;
-  for (int i = 0; i < count; ++i) std::memmove(pixels + 3 * i, pixels + 4 * i, 3);
-  modar_picture picture{};
-  picture.format = MODAR_RGB;
+/// The light on the patterns of web_poses(), as a copy of their frame shows it: RGBA.
+EMSCRIPTEN_KEEPALIVE void web_look(const uint8_t* pixels, int width, int height) {
+  auto picture = modar::sized<modar_picture>();
+  picture.format = MODAR_RGBA;
   picture.width = width;
   picture.height = height;
   picture.planes[0] = pixels;
-  picture.strides[0] = 3 * static_cast<ptrdiff_t>(width);
+  picture.strides[0] = 4 * static_cast<ptrdiff_t>(width);
   modar_renderer_observe(engine.renderer, &picture, &engine.camera, engine.items,
                          collect_items(0.0f, 1.0f));
 }

@@ -58,8 +58,8 @@ export class Engine {
     return new Engine(await load(STRANDED ? { locateFile: strandedFile } : {}), kind);
   }
 
-  #check(exitCode) {
-    if (exitCode === 0) return;
+  #check(status) {
+    if (status === 0) return;
     const text = (field) => this.#module.UTF8ToString(this.#module._web_error(field));
     throw new ModarError({ code: text(0), where: text(1), cause: text(2), cure: text(3) });
   }

@@ -5,11 +5,15 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
 from installed_headers import clang, declared_symbols, headers, program
 from programs import BIN, CLIP_HEIGHT, CLIP_WIDTH, COVER, POTTERY, QUICK, ROOT, ProgramTest, demo_clip
+
+sys.path.insert(0, str(ROOT / "assets"))
+from kit import png  # noqa: E402
 
 BUILD = BIN.parent
 SANITIZE = os.environ.get("MODAR_SANITIZE", "")
@@ -33,12 +37,13 @@ DRAW_ALONE = r"""
 #include <stdio.h>
 #include <string.h>
 int main(int argc, char** argv) {
-  modar_error e;
-  modar_camera camera = modar_camera_default(64, 48);
+  modar_error e = {.size = sizeof e};
+  modar_camera camera = {.size = sizeof camera};
+  modar_camera_default(64, 48, &camera);
   static uint8_t rgba[64 * 48 * 4];
   char name[4] = "";
   if (argc < 3) return 9;
-  if (modar_bundle_open("none.modar", &e) || e.exit_code != 2 || strcmp(e.code, "io.open")) return 10;
+  if (modar_bundle_open("none.modar", &e) || e.status != MODAR_IO || strcmp(e.code, "io.open")) return 10;
   if (modar_bundle_verify(NULL, NULL) != 1 || modar_bundle_open(NULL, NULL) || modar_bundle_open_bytes(NULL, 1, NULL)) return 11;
   if (modar_renderer_create(NULL, NULL, 0, &e) || strcmp(e.code, "capi.null")) return 12;
   modar_context* context = modar_context_create(&e);
@@ -46,13 +51,14 @@ int main(int argc, char** argv) {
   if (!context || !bundle || modar_bundle_verify(bundle, &e)) return 13;
   if (modar_model_name(bundle, 0, name, sizeof name) != 7 || strcmp(name, "pot")) return 14;
   if (modar_model_name(bundle, 1, name, sizeof name) || modar_scene_at(bundle, 7, NULL)) return 15;
-  if (modar_renderer_create(bundle, "nokia", 0, &e) || e.exit_code != 1) return 16;
+  if (modar_renderer_create(bundle, "nokia", 0, &e) || e.status != MODAR_USAGE) return 16;
   modar_renderer* renderer = modar_renderer_create(bundle, argv[2], 0, &e);
   if (!renderer || modar_renderer_resize(renderer, 64, 48, &e)) return 17;
-  modar_item items[2] = {{0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -4, 1}, 0, {0}}, {99, {0}, 0, {0}}};
+  modar_item items[2] = {{.size = sizeof(modar_item), .to_eye = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -4, 1}}, {.size = sizeof(modar_item), .model = 99}};
   modar_renderer_render(renderer, NULL, &camera, NULL, items, 2);
   modar_renderer_read_rgba(renderer, rgba);
-  modar_render_stats stats = modar_renderer_stats(renderer);
+  modar_render_stats stats = {.size = sizeof stats};
+  modar_renderer_stats(renderer, &stats);
   int lit = 0;
   for (size_t i = 0; i < sizeof rgba; i += 4) lit += rgba[i] > 0;
   printf("%d %d\n", stats.draw_calls, lit);
@@ -263,14 +269,27 @@ class App(ProgramTest):
             seen[shown] += 1
         self.assertGreater(min(seen.values()), 1500, seen)
 
+    def assert_is_the_cover(self, wide, high, grays):
+        """The means of eight by eight pixels of the pattern's picture are those of the file's same places."""
+        cover = png.read(COVER)
+        self.assertAlmostEqual(wide / high, cover.width / cover.height, delta=0.01)
+        for i, gray in enumerate(grays):
+            x, y = ((2 * at + 1) * side // 8 for at, side in ((i % 4, wide), (i // 4, high)))
+            columns = range(round((x - 4) * cover.width / wide), round((x + 4) * cover.width / wide))
+            rows = range(round((y - 4) * cover.height / high), round((y + 4) * cover.height / high))
+            places = [3 * (cover.width * row + column) for row in rows for column in columns]
+            mean = sum(0.299 * cover.pixels[at] + 0.587 * cover.pixels[at + 1] + 0.114 * cover.pixels[at + 2] for at in places)
+            self.assertAlmostEqual(gray, mean / len(places), delta=6, msg=f"cell {i}")
+
     def assert_asks_of_c(self, bundle, phone):
         truth, nv21, _ = self.clip()
         asset = self.folder / "app.apk"  # an asset lies at a multiple of 4
         asset.write_bytes(b"x" * 12 + bundle.read_bytes() + b"tail")
         done = run(phone, asset, 12, bundle.stat().st_size, WIDTH, HEIGHT, input=nv21)
         self.assertEqual(done.returncode, 0, done.stderr)
-        width, *poses, pick = (line.split() for line in done.stdout.decode().splitlines())
+        width, picture, *poses, pick = (line.split() for line in done.stdout.decode().splitlines())
         self.assertEqual(width, ["width_mm", "210"])
+        self.assert_is_the_cover(*map(float, picture[1:3]), list(map(float, picture[3:])))
         self.assertEqual(len(poses), FRAMES)
         _, visible, fit, *place = (float(word) if word != "pose" else word for word in poses[-1])
         self.assertEqual(visible, 1)

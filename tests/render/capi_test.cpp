@@ -5,11 +5,17 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <string>
+#include <tuple>
+#include <vector>
 
+#include "tests/formats/support.hpp"
 #include "tests/render/scene.hpp"
 
 namespace modar {
@@ -52,7 +58,7 @@ TEST_F(CapiTest, OpensAnAssetWhereverItLies) {
     write_asset(offset);
     const int file = open(path_.c_str(), O_RDONLY);
     ASSERT_GE(file, 0);
-    modar_error error{};
+    auto error = sized<modar_error>();
     modar_bundle* bundle =
         modar_bundle_open_fd(file, static_cast<std::int64_t>(offset), size, &error);
     close(file);
@@ -72,12 +78,12 @@ TEST_F(CapiTest, RefusesARangeThatTheFileDoesNotHold) {
                                        {8, 0},
                                        {-8, 10},
                                        {8, -1}}) {
-    modar_error error{};
+    auto error = sized<modar_error>();
     EXPECT_EQ(modar_bundle_open_fd(file, offset, length, &error), nullptr);
     EXPECT_STREQ(error.code, "io.range") << offset << " " << length;
   }
   close(file);
-  modar_error error{};
+  auto error = sized<modar_error>();
   EXPECT_EQ(modar_bundle_open_fd(-1, 0, 10, &error), nullptr);
   EXPECT_STREQ(error.code, "io.map");
 }
@@ -88,7 +94,7 @@ TEST_F(CapiTest, TakesBytesAtAnyMultipleOfFour) {
   for (std::size_t i = 0; i < 1200; ++i) {
     auto* start = reinterpret_cast<std::byte*>(room.data()) + 4 * i;
     std::memcpy(start, bytes.data(), bytes.size());
-    modar_error error{};
+    auto error = sized<modar_error>();
     modar_bundle* bundle = modar_bundle_open_bytes(start, bytes.size(), &error);
     ASSERT_NE(bundle, nullptr) << error.cause;
     EXPECT_EQ(modar_model_count(bundle), 1u);
@@ -103,8 +109,8 @@ TEST_F(CapiTest, ReadsTheFileThatCalibrateWrites) {
          "   data: [ 5.3612345678901234e+02, 0., 342.5, 0., 5.37e2, 235., 0.,\n       0., 1. ]\n"
          "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n"
          "   data: [ -2.65e-01, -4.67e-02, 1.83e-03, -3.14e-04, 2.52e-01 ]\n";
-  modar_camera camera{};
-  modar_error error{};
+  auto camera = sized<modar_camera>();
+  auto error = sized<modar_error>();
   ASSERT_EQ(modar_camera_read(path_.c_str(), &camera, &error), 0) << error.cause;
   EXPECT_EQ(camera.width, 640);
   EXPECT_EQ(camera.height, 480);
@@ -135,29 +141,31 @@ TEST_F(CapiTest, RefusesDamagedCameraFiles) {
   };
   for (const auto& [text, code] : files) {
     std::ofstream(path_) << text;
-    modar_camera camera{};
-    modar_error error{};
+    auto camera = sized<modar_camera>();
+    auto error = sized<modar_error>();
     EXPECT_NE(modar_camera_read(path_.c_str(), &camera, &error), 0) << text;
     EXPECT_STREQ(error.code, code) << text;
   }
 }
 
 TEST_F(CapiTest, RefusesACameraThatCannotBe) {
-  modar_error error{};
+  auto error = sized<modar_error>();
   modar_bundle* bundle = modar_bundle_open(bundle_->path.c_str(), &error);
   ASSERT_NE(bundle, nullptr);
   const double bad[] = {0.0, -1.0, std::nan(""), HUGE_VAL};
   for (const double focal : bad) {
-    modar_camera camera = modar_camera_default(64, 48);
+    auto camera = sized<modar_camera>();
+    modar_camera_default(64, 48, &camera);
     camera.fx = focal;
     EXPECT_EQ(modar_tracker_create(bundle, &camera, &error), nullptr);
     EXPECT_STREQ(error.code, "camera.matrix") << focal;
   }
-  modar_camera camera = modar_camera_default(64, 48);
+  auto camera = sized<modar_camera>();
+  modar_camera_default(64, 48, &camera);
   camera.distortion[2] = std::nan("");
   EXPECT_EQ(modar_tracker_create(bundle, &camera, &error), nullptr);
   EXPECT_STREQ(error.code, "camera.distortion");
-  camera = modar_camera_default(0, 48);
+  modar_camera_default(0, 48, &camera);
   EXPECT_EQ(modar_tracker_create(bundle, &camera, &error), nullptr);
   EXPECT_STREQ(error.code, "camera.size");
   modar_bundle_close(bundle);
@@ -190,7 +198,7 @@ TEST_F(CapiTest, ShrinksByTheMeanOfSquares) {
 }
 
 TEST_F(CapiTest, StatesAModelsBox) {
-  modar_error error{};
+  auto error = sized<modar_error>();
   const auto bytes = bundle_->view->bytes();
   modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), &error);
   ASSERT_NE(bundle, nullptr) << error.cause;
@@ -205,6 +213,344 @@ TEST_F(CapiTest, StatesAModelsBox) {
     EXPECT_NEAR(high[axis], corners[1][axis], 0.002) << axis;
   }
   modar_bundle_close(bundle);
+}
+
+/// A structure of the caller's with bytes behind it that the library does not know.
+template <class Struct>
+struct Longer {
+  Struct known;
+  std::uint8_t more[24];
+};
+
+TEST_F(CapiTest, WritesNoMoreThanTheCallersStructure) {
+  auto error = sized<modar_error>();
+  modar_bundle* bundle = modar_bundle_open(bundle_->path.c_str(), &error);
+  ASSERT_NE(bundle, nullptr);
+  // A program of today with a library of tomorrow: that one knows fields behind `fy`.
+  modar_camera older{};
+  std::memset(&older, 0x5A, sizeof older);
+  const modar_camera before = older;
+  older.size = offsetof(modar_camera, cx);
+  modar_camera_default(64, 48, &older);
+  EXPECT_EQ(older.size, offsetof(modar_camera, cx));
+  EXPECT_EQ(older.fy, 64.0);
+  EXPECT_EQ(std::memcmp(&older.cx, &before.cx, sizeof older - offsetof(modar_camera, cx)), 0);
+  // A program of tomorrow with today's library.
+  Longer<modar_camera> newer{};
+  std::memset(&newer, 0x5A, sizeof newer);
+  newer.known.size = sizeof newer;
+  modar_camera_default(64, 48, &newer.known);
+  EXPECT_EQ(newer.known.size, sizeof newer);
+  EXPECT_EQ(newer.known.cx, 31.5);
+  for (const std::uint8_t byte : newer.more) EXPECT_EQ(byte, 0x5A);
+  modar_camera none{};  // its size was forgotten
+  modar_camera_default(64, 48, &none);
+  EXPECT_EQ(none.width, 0);
+  modar_error unset{};
+  EXPECT_EQ(modar_bundle_verify(nullptr, &unset), MODAR_USAGE);
+  EXPECT_EQ(unset.code[0], '\0');
+  modar_bundle_close(bundle);
+}
+
+TEST_F(CapiTest, AnswersNullHandles) {
+  auto error = sized<modar_error>();
+  auto camera = sized<modar_camera>();
+  auto pose = sized<modar_pose>();
+  auto scene = sized<modar_scene>();
+  auto item = sized<modar_item>();
+  auto stats = sized<modar_render_stats>();
+  auto picture = sized<modar_picture>();
+  auto surface = sized<modar_surface>();
+  auto hit = sized<modar_hit>();
+  char text[8];
+  float matrix[16];
+  const std::uint8_t gray[4] = {};
+  const double turn[3] = {};
+  const float light[3] = {};
+  EXPECT_EQ(modar_model_count(nullptr) + modar_pattern_count(nullptr) + modar_scene_count(nullptr),
+            0u);
+  EXPECT_EQ(modar_model_name(nullptr, 0, text, sizeof text), 0u);
+  EXPECT_EQ(modar_pattern_name(nullptr, 0, text, sizeof text), 0u);
+  EXPECT_EQ(modar_language(nullptr, 0, text, sizeof text), 0u);
+  EXPECT_EQ(modar_pattern_text(nullptr, 0, MODAR_TEXT, "en", text, sizeof text), 0u);
+  EXPECT_EQ(modar_model_bounds(nullptr, 0, matrix, matrix), 0);
+  EXPECT_EQ(modar_pattern_picture(nullptr, 0, nullptr, nullptr, nullptr), 0);
+  EXPECT_EQ(modar_pattern_width_mm(nullptr, 0), 0.0);
+  EXPECT_EQ(modar_scene_at(nullptr, 0, &scene), 0);
+  EXPECT_EQ(modar_tracker_create(nullptr, &camera, &error), nullptr);
+  modar_tracker_reset(nullptr);
+  modar_tracker_turn(nullptr, turn);
+  for (const int failed :
+       {modar_bundle_verify(nullptr, &error), modar_tracker_step(nullptr, gray, 2, &error),
+        modar_gray(nullptr, nullptr, &error), modar_renderer_restore(nullptr, &error),
+        modar_renderer_resize(nullptr, 8, 8, &error)}) {
+    EXPECT_EQ(failed, MODAR_USAGE);
+    EXPECT_STREQ(error.code, "capi.null");
+  }
+  EXPECT_EQ(modar_tracker_pose(nullptr, 0, &pose), 0);
+  EXPECT_EQ(modar_tracker_camera(nullptr, &camera), 0.0);
+  EXPECT_NE(modar_tracker_reason(nullptr), nullptr);
+  modar_camera_default(8, 8, nullptr);
+  modar_projection(nullptr, 1, 2, matrix);
+  modar_view(nullptr, matrix);
+  modar_item_place(nullptr, &scene, &pose);
+  modar_item_place(&item, nullptr, &pose);
+  modar_renderer_render(nullptr, &picture, &camera, nullptr, &item, 1);
+  modar_renderer_draw(nullptr, &surface, &picture, &camera, nullptr, &item, 1);
+  modar_renderer_observe(nullptr, &picture, &camera, &item, 1);
+  modar_renderer_set_light(nullptr, light, 0);
+  modar_renderer_set_options(nullptr, nullptr);
+  modar_render_options_default(nullptr);
+  modar_renderer_show(nullptr, 8, 8);
+  modar_renderer_read_rgba(nullptr, nullptr);
+  modar_renderer_stats(nullptr, &stats);
+  EXPECT_EQ(modar_renderer_gpu_bytes(nullptr), 0u);
+  EXPECT_EQ(modar_pick(nullptr, &camera, 0, 0, &item, 1, &hit), 0);
+  modar_surface_to_frame(nullptr, &camera, 0, 0, nullptr, nullptr);
+}
+
+TEST_F(CapiTest, NamesTheStrideThatIsWrong) {
+  auto error = sized<modar_error>();
+  auto picture = sized<modar_picture>();
+  std::vector<std::uint8_t> bytes(64 * 48 * 4);
+  picture.width = 64;
+  picture.height = 48;
+  std::fill(picture.planes, picture.planes + 3, bytes.data());
+  const std::tuple<int, std::size_t, std::ptrdiff_t> rows[] = {
+      {MODAR_RGB, 0, 192}, {MODAR_RGBA, 0, 256}, {MODAR_NV21, 0, 64},       {MODAR_NV12, 1, 64},
+      {MODAR_I420, 1, 32}, {MODAR_I420, 2, 32},  {MODAR_YUV_420_888, 2, 63}};
+  std::vector<std::uint8_t> gray(64 * 48);
+  for (const auto& [format, plane, least] : rows) {
+    picture.format = format;
+    picture.chroma_step = 2;
+    std::fill(picture.strides, picture.strides + 3, 256);
+    picture.strides[plane] = least;
+    EXPECT_EQ(modar_gray(&picture, gray.data(), &error), MODAR_OK) << format << error.cause;
+    picture.strides[plane] = least - 1;
+    EXPECT_EQ(modar_gray(&picture, gray.data(), &error), MODAR_USAGE) << format;
+    EXPECT_STREQ(error.code, "capi.stride") << format;
+    const std::string cause = error.cause;
+    EXPECT_NE(cause.find("plane " + std::to_string(plane)), std::string::npos) << cause;
+    EXPECT_NE(cause.find(std::to_string(least - 1)), std::string::npos) << cause;
+  }
+  picture.format = 9;
+  EXPECT_EQ(modar_gray(&picture, gray.data(), &error), MODAR_USAGE);
+  picture.format = MODAR_YUV_420_888;
+  picture.chroma_step = 3;
+  EXPECT_EQ(modar_gray(&picture, gray.data(), &error), MODAR_USAGE);
+  EXPECT_STREQ(error.where, "chroma_step");
+}
+
+TEST(CapiTexts, AreHandedOutByLanguage) {
+  BundleContent content = test::pattern_content();
+  const std::string name = "box";
+  content.meta =
+      R"({"tool":"test","texts":[{"text":{"el":"Βάζο","en":"A \"red\" vase,\u00e9\ud83c\udffa"},"pattern":")" +
+      name + R"("},{"pattern":"other","text":{"de":"Nichts"}},{"pattern":")" + name +
+      R"(","model":"m","text":{"en":"from Athens."},"alt":{"en":"A vase stands there."}}]})";
+  const auto bytes = test::encode(content);
+  modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
+  ASSERT_NE(bundle, nullptr);
+  std::string languages;
+  char text[64];
+  for (std::uint32_t i = 0; modar_language(bundle, i, text, sizeof text) != 0; ++i)
+    languages += std::string(text) + " ";
+  EXPECT_EQ(languages, "el en de ");
+  EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_TEXT, "en", text, sizeof text), 32u);
+  EXPECT_STREQ(text, "A \"red\" vase,\xC3\xA9\xF0\x9F\x8F\xBA from Athens.");
+  EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_ALT_TEXT, "en", text, 8), 20u);
+  EXPECT_STREQ(text, "A vase ");
+  EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_TEXT, "el", text, sizeof text), 8u);
+  EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_TEXT, "de", text, sizeof text), 0u);
+  EXPECT_EQ(modar_pattern_text(bundle, 99, MODAR_TEXT, "en", text, sizeof text), 0u);
+  modar_bundle_close(bundle);
+}
+
+/// Draws through the C API.
+class CapiDrawTest : public GlTest {
+ protected:
+  static constexpr int kWide = 32;
+  static constexpr int kHigh = 24;
+  void SetUp() override {
+    GlTest::SetUp();
+    if (IsSkipped()) return;
+    SceneMaker maker;
+    maker.add_plain_model(Layout::kHalfColoured, {one_triangle()});
+    file_ = std::make_unique<MappedBundle>(maker.content);
+    bundle_ = modar_bundle_open(file_->path.c_str(), nullptr);
+    renderer_ = modar_renderer_create(bundle_, nullptr, 0, nullptr);
+    ASSERT_NE(renderer_, nullptr);
+    ASSERT_EQ(modar_renderer_resize(renderer_, kWide, kHigh, nullptr), 0);
+    modar_camera_default(kWide, kHigh, &camera_);
+    for (std::size_t i = 0; i < luma_.size(); ++i)
+      luma_[i] = static_cast<std::uint8_t>(60 + i * 7 % 120);
+    for (std::size_t i = 0; i < u_.size(); ++i) {
+      u_[i] = static_cast<std::uint8_t>(90 + i % 16 * 4);
+      v_[i] = static_cast<std::uint8_t>(160 - i % 12 * 5);
+    }
+  }
+  void TearDown() override {
+    modar_renderer_destroy(renderer_);
+    modar_bundle_close(bundle_);
+  }
+  std::vector<std::uint8_t> drawn(const modar_picture* picture,
+                                  const std::vector<modar_item>& items = {}) {
+    std::vector<std::uint8_t> rgba(std::size_t{4} * kWide * kHigh);
+    modar_renderer_render(renderer_, picture, &camera_, nullptr, items.data(), items.size());
+    modar_renderer_read_rgba(renderer_, rgba.data());
+    return rgba;
+  }
+  static int farthest(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
+    int most = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i]));
+    return most;
+  }
+  modar_picture yuv(int format) const {
+    auto picture = sized<modar_picture>();
+    picture.format = format;
+    picture.width = kWide;
+    picture.height = kHigh;
+    picture.full_range = 1;
+    picture.planes[0] = luma_.data();
+    picture.planes[1] = u_.data();
+    picture.planes[2] = v_.data();
+    picture.strides[0] = kWide;
+    picture.strides[1] = picture.strides[2] = kWide / 2;
+    picture.chroma_step = 1;
+    return picture;
+  }
+
+  std::unique_ptr<MappedBundle> file_;
+  modar_bundle* bundle_ = nullptr;
+  modar_renderer* renderer_ = nullptr;
+  modar_camera camera_ = sized<modar_camera>();
+  std::vector<std::uint8_t> luma_ = std::vector<std::uint8_t>(std::size_t{kWide} * kHigh);
+  std::vector<std::uint8_t> u_ = std::vector<std::uint8_t>(luma_.size() / 4);
+  std::vector<std::uint8_t> v_ = u_;
+};
+
+TEST_F(CapiDrawTest, TakesAndroidsPlanesHoweverTheyLie) {
+  modar_picture picture = yuv(MODAR_I420);
+  const std::vector<std::uint8_t> expected = drawn(&picture);
+  picture.format = MODAR_YUV_420_888;
+  EXPECT_EQ(farthest(drawn(&picture), expected), 0);
+  std::vector<std::uint8_t> pairs(2 * u_.size());
+  for (const int first : {0, 1}) {  // V before U as in NV21, U before V
+    for (std::size_t i = 0; i < u_.size(); ++i) {
+      pairs[2 * i + static_cast<std::size_t>(1 - first)] = u_[i];
+      pairs[2 * i + static_cast<std::size_t>(first)] = v_[i];
+    }
+    picture.planes[1] = pairs.data() + 1 - first;
+    picture.planes[2] = pairs.data() + first;
+    picture.strides[1] = picture.strides[2] = kWide;
+    picture.chroma_step = 2;
+    EXPECT_LE(farthest(drawn(&picture), expected), 1) << first;
+  }
+  // Two planes with gaps, which no format of GL has.
+  std::vector<std::uint8_t> apart(2 * v_.size());
+  for (std::size_t i = 0; i < v_.size(); ++i) apart[2 * i] = v_[i];
+  picture.planes[1] = pairs.data();
+  picture.planes[2] = apart.data();
+  EXPECT_EQ(farthest(drawn(&picture), expected), 0);
+  picture.strides[2] = kWide - 2;  // too short: refused, nothing is drawn
+  const std::vector<std::uint8_t> refused = drawn(&picture);
+  EXPECT_EQ(refused[0] + refused[1] + refused[2], 0);
+}
+
+TEST_F(CapiDrawTest, TakesRgbaAsRgb) {
+  std::vector<std::uint8_t> rgb(std::size_t{3} * kWide * kHigh);
+  std::vector<std::uint8_t> rgba(std::size_t{4} * kWide * kHigh, 77);
+  for (std::size_t i = 0; i < rgb.size(); ++i) {
+    rgb[i] = static_cast<std::uint8_t>(i * 31 + i / 97);
+    rgba[i / 3 * 4 + i % 3] = rgb[i];
+  }
+  auto picture = sized<modar_picture>();
+  picture.width = kWide;
+  picture.height = kHigh;
+  picture.planes[0] = rgb.data();
+  picture.strides[0] = std::ptrdiff_t{3} * kWide;
+  const std::vector<std::uint8_t> expected = drawn(&picture);
+  EXPECT_EQ(expected[4], rgb[3]);
+  picture.format = MODAR_RGBA;
+  picture.planes[0] = rgba.data();
+  picture.strides[0] = std::ptrdiff_t{4} * kWide;
+  EXPECT_EQ(farthest(drawn(&picture), expected), 0);
+}
+
+TEST_F(CapiDrawTest, ShowsThroughAnItemOfSomeOpacity) {
+  auto item = sized<modar_item>();
+  for (const int i : {0, 5, 10, 15}) item.to_eye[i] = 1.0f;
+  item.to_eye[14] = -2.0f;
+  const modar_picture picture = yuv(MODAR_I420);
+  const std::vector<std::uint8_t> behind = drawn(&picture);
+  const std::vector<std::uint8_t> solid = drawn(&picture, {item});
+  ASSERT_GT(farthest(behind, solid), 40);
+  item.opacity = 1.0f;
+  EXPECT_EQ(farthest(drawn(&picture, {item}), solid), 0);
+  item.opacity = 0.25f;
+  const std::vector<std::uint8_t> faded = drawn(&picture, {item});
+  for (std::size_t i = 0; i < faded.size(); ++i) {
+    if (i % 4 == 3) continue;
+    EXPECT_NEAR(faded[i], 0.25 * solid[i] + 0.75 * behind[i], 2.1) << i;
+  }
+  // Two copies, of which one fades, share no draw call.
+  modar_item other = item;
+  other.opacity = 0.0f;
+  other.to_eye[12] = 30.0f;
+  EXPECT_EQ(farthest(drawn(&picture, {item, other}), faded), 0);
+}
+
+TEST_F(CapiDrawTest, StridesOverItemsOfAnotherVersion) {
+  auto item = sized<modar_item>();
+  for (const int i : {0, 5, 10, 15}) item.to_eye[i] = 1.0f;
+  item.to_eye[14] = -2.0f;
+  const std::vector<std::uint8_t> expected = drawn(nullptr, {item});
+  modar_item away = item;
+  away.to_eye[12] = 30.0f;
+  Longer<modar_item> longer[2] = {{away, {}}, {item, {}}};
+  for (Longer<modar_item>& each : longer) each.known.size = sizeof each;
+  std::vector<std::uint8_t> rgba(expected.size());
+  modar_renderer_render(renderer_, nullptr, &camera_, nullptr, &longer[0].known, 2);
+  modar_renderer_read_rgba(renderer_, rgba.data());
+  EXPECT_EQ(farthest(rgba, expected), 0);
+  EXPECT_GT(*std::max_element(rgba.begin(), rgba.end() - 1), 0);
+  longer[0].known.size = 0;  // forgotten
+  modar_renderer_render(renderer_, nullptr, &camera_, nullptr, &longer[0].known, 2);
+  auto stats = sized<modar_render_stats>();
+  modar_renderer_stats(renderer_, &stats);
+  EXPECT_EQ(stats.draw_calls, 0);
+}
+
+TEST(CapiGray, IsWhatTheStandardSays) {
+  constexpr int kWide = 6;
+  constexpr int kHigh = 4;
+  auto picture = sized<modar_picture>();
+  picture.width = kWide;
+  picture.height = kHigh;
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(kHigh) * 31);
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    pixels[i] = static_cast<std::uint8_t>(i * 37 + i * i);
+  std::uint8_t gray[kWide * kHigh];
+  for (const int format : {MODAR_RGB, MODAR_RGBA, MODAR_NV21}) {
+    for (const int full : {0, 1}) {
+      picture.format = format;
+      picture.full_range = full;
+      std::fill(picture.planes, picture.planes + 3, pixels.data());
+      std::fill(picture.strides, picture.strides + 3, 31);
+      ASSERT_EQ(modar_gray(&picture, gray, nullptr), MODAR_OK);
+      for (int i = 0; i < kWide * kHigh; ++i) {
+        const std::uint8_t* row = pixels.data() + 31 * (i / kWide);
+        const std::uint8_t* at = row + (i % kWide) * (format == MODAR_RGB    ? 3
+                                                      : format == MODAR_RGBA ? 4
+                                                                             : 1);
+        // ITU-R BT.601; limited range has 219 steps from 16 on.
+        const double expected = format != MODAR_NV21 ? 0.299 * at[0] + 0.587 * at[1] + 0.114 * at[2]
+                                : full != 0          ? at[0]
+                                            : std::clamp((at[0] - 16) * 255.0 / 219.0, 0.0, 255.0);
+        EXPECT_NEAR(gray[i], expected, 0.51) << format << " " << full << " " << i;
+      }
+    }
+  }
 }
 
 TEST_F(CapiTest, StatesItsVersion) {

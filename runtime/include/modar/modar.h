@@ -5,8 +5,14 @@
  * Handles are opaque. Threads may share a bundle; a tracker, a renderer and a context are used by
  * one thread at a time, and a renderer only while its context is current. A bundle must outlive
  * everything that was created from it. Functions that take a modar_error fill it on failure; it may
- * be NULL. Functions that return int return 0 on success, else the error's exit_code, unless
- * stated. Matrices are column-major, as in GL. */
+ * be NULL. Functions that return int return MODAR_OK on success, else the error's status, unless
+ * stated. A handle or pointer that is NULL and must not be is an error "capi.null" where there is a
+ * modar_error, else an empty answer: 0, nothing drawn. Matrices are column-major, as in GL.
+ *
+ * Structures begin with `size`: set it to sizeof of the structure before each is first passed, as
+ * in modar_pose pose = {.size = sizeof pose}; and fields that you do not use to 0. The library
+ * reads and writes that many bytes and no more, so that later versions can append fields. All items
+ * of an array have the size of its first one. */
 #ifndef MODAR_MODAR_H
 #define MODAR_MODAR_H
 
@@ -21,6 +27,11 @@
 #define MODAR_VERSION_NUMBER \
   (10000 * MODAR_VERSION_MAJOR + 100 * MODAR_VERSION_MINOR + MODAR_VERSION_PATCH)
 
+/* Marks functions that may change or go in any release. */
+#ifndef MODAR_EXPERIMENTAL
+#define MODAR_EXPERIMENTAL
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -33,9 +44,19 @@ typedef struct modar_tracker modar_tracker;
 typedef struct modar_renderer modar_renderer;
 typedef struct modar_context modar_context;
 
-/* An error, for programs (exit_code, code) and for people. Texts are truncated to fit. */
+enum {
+  MODAR_OK = 0,
+  MODAR_USAGE = 1,       /* the call is wrong */
+  MODAR_IO = 2,          /* a file cannot be read */
+  MODAR_INVALID = 3,     /* what was read is damaged or no such file */
+  MODAR_INTERNAL = 4,    /* internal error */
+  MODAR_UNSUPPORTED = 5, /* this machine or this version cannot do that */
+};
+
+/* An error, for programs (status, code) and for people. Texts are truncated to fit. */
 typedef struct modar_error {
-  int exit_code; /* 1 usage, 2 input or output, 3 invalid input, 4 internal error, 5 unsupported */
+  size_t size;
+  int status;    /* MODAR_USAGE, ... */
   char code[64]; /* stable, like "bundle.truncated" */
   char where[192];
   char cause[256];
@@ -75,9 +96,28 @@ int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3],
 
 /* The printed width of a pattern in millimetres; 0 if the bundle does not state it. */
 double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index);
+/* The gray picture of a pattern as the tracker compares it with frames: `*width` times `*height`
+ * bytes in rows without padding, top row first, which stay in the bundle. Returns 1, or 0 and
+ * changes nothing where there is none. */
+int modar_pattern_picture(const modar_bundle* bundle, uint32_t index, int* width, int* height,
+                          const uint8_t** gray);
+
+/* Languages of the bundle's texts as BCP 47 tags ("en", "pt-BR"), by index from 0 on. Copies and
+ * returns as the names above. */
+MODAR_EXPERIMENTAL size_t modar_language(const modar_bundle* bundle, uint32_t index, char* text,
+                                         size_t size);
+enum {
+  MODAR_TEXT = 0,     /* what to show of a pattern's scene */
+  MODAR_ALT_TEXT = 1, /* what is seen there, for screen readers */
+};
+/* A text of a pattern in a language; several are joined by a space. Copies and returns as the names
+ * above, 0 where there is none. */
+MODAR_EXPERIMENTAL size_t modar_pattern_text(const modar_bundle* bundle, uint32_t pattern, int kind,
+                                             const char* language, char* text, size_t size);
 
 /* A model that stands on a pattern. place: model space to pattern space. */
 typedef struct modar_scene {
+  size_t size;
   uint32_t pattern;
   uint32_t model;
   float place[16];
@@ -91,13 +131,14 @@ int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scen
 /* A pinhole camera with OpenCV's distortion, in pixels; the centre of the top-left pixel is (0, 0).
  */
 typedef struct modar_camera {
+  size_t size;
   int width;
   int height;
   double fx, fy, cx, cy;
   double distortion[5]; /* k1 k2 p1 p2 k3 */
 } modar_camera;
 /* The initial assumption for an unknown camera: its focal length is the frame's longer side. */
-modar_camera modar_camera_default(int width, int height);
+void modar_camera_default(int width, int height, modar_camera* camera);
 /* Reads a file that `modar calibrate` wrote. */
 int modar_camera_read(const char* path, modar_camera* camera, modar_error* error);
 
@@ -105,6 +146,7 @@ int modar_camera_read(const char* path, modar_camera* camera, modar_error* error
  * right, y up, z towards the viewer, the longest side from -1 to 1) to camera space (x right, y
  * down, z forward): X_camera = rotation * X_pattern + translation. */
 typedef struct modar_pose {
+  size_t size;
   float rotation[9];    /* row by row */
   float translation[3]; /* unit: half of the pattern's longest side */
   int visible;          /* 1: measured in this frame */
@@ -119,16 +161,15 @@ typedef struct modar_pose {
   float position_sigma; /* standard deviations: position, in half of the pattern's longest side, */
   float rotation_sigma; /* and rotation, in radians */
   float stretch[12];    /* 3 x 4, row by row; all 0: none. While the camera is estimated, no pose
-                           explains    exactly where a flat pattern's picture lies. Draw what belongs on
-                           it at    X_camera = rotation * (stretch * (X_pattern, 1)) + translation, as
-                           modar_view() does */
+                           explains    exactly where a flat pattern's picture lies. Draw what belongs
+                           on    it at    X_camera = rotation * (stretch * (X_pattern, 1)) + translation,
+                           as    modar_view()    does */
 } modar_pose;
 
 /* Returns NULL and an error if no pattern of the bundle can be tracked. */
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     modar_error* error);
-/* How to track. Set `size` to sizeof(modar_tracker_options) and unused fields to 0: later versions
- * append fields. */
+/* How to track. */
 typedef struct modar_tracker_options {
   size_t size;
   int async_search; /* 1: search on a separate thread; results then depend on timing */
@@ -150,8 +191,9 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
 void modar_tracker_destroy(modar_tracker* tracker);
 /* Forgets tracked patterns, for example after a pause or a cut. */
 void modar_tracker_reset(modar_tracker* tracker);
-/* Processes a frame of the camera's size, 8-bit gray: the luma plane of NV21. stride: bytes from
- * row to row. A frame without a pattern is not an error. */
+/* Processes a frame of the camera's size, 8-bit gray: the luma plane of NV21, or what modar_gray()
+ * makes of other formats. stride: bytes from row to row, at least the camera's width. A frame
+ * without a pattern is not an error. */
 int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride,
                        modar_error* error);
 /* The same with the frame's time, which must increase and is used for smoothing;
@@ -166,7 +208,7 @@ void modar_shrink(const uint8_t* gray, size_t stride, int width, int height, int
 /* The camera's rotation from the last frame to the next one, from a gyroscope: a rotation vector in
  * radians, in the camera's axes (x right, y down, z forward; those of a phone's sensors differ).
  * Helps `extended`. */
-void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]);
+MODAR_EXPERIMENTAL void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]);
 /* The pose of a pattern in the newest frame; returns its flag `visible`. */
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose);
 /* The camera with which the newest frame's poses were measured; draw with it. Returns the standard
@@ -189,20 +231,30 @@ void modar_view(const modar_pose* pose, float view[16]);
 modar_context* modar_context_create(modar_error* error);
 void modar_context_destroy(modar_context* context);
 
-/* A model to draw. to_eye: model space to GL's eye space. Set unused fields to 0. */
+/* A model to draw. to_eye: model space to GL's eye space. */
 typedef struct modar_item {
+  size_t size;
   uint32_t model;
   float to_eye[16];
   uint32_t scene;         /* number of the scene whose light to use; 0: a neutral room's */
   float world_to_eye[16]; /* pattern space, to which the light is fixed, to GL's eye space; zeros: a
                              level camera's world */
+  float opacity; /* 0 or 1: as baked; between: what is behind shows through, as through glass */
 } modar_item;
-/* to_eye = view * place, world_to_eye = view. */
+/* to_eye = view * place, world_to_eye = view; the rest stays. */
 void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose);
 
-enum { MODAR_RGB = 0, MODAR_NV21 = 1, MODAR_NV12 = 2, MODAR_I420 = 3 };
-/* A camera frame, top row first; sides must be even except for MODAR_RGB. */
+enum {
+  MODAR_RGB = 0,
+  MODAR_NV21 = 1,
+  MODAR_NV12 = 2,
+  MODAR_I420 = 3,
+  MODAR_RGBA = 4,        /* alpha is not looked at */
+  MODAR_YUV_420_888 = 5, /* Android's Image: planes Y, U and V, chroma with a pixel stride */
+};
+/* A camera frame, top row first; sides must be even except for MODAR_RGB and MODAR_RGBA. */
 typedef struct modar_picture {
+  size_t size;
   int format;
   int width;
   int height;
@@ -211,9 +263,15 @@ typedef struct modar_picture {
   int full_range; /* 1: luma from 0 to 255, as from cameras; 0: 16 to 235 */
   int first_row;  /* the rows that differ from the picture before; row_count 0: all rows */
   int row_count;
+  int chroma_step; /* of MODAR_YUV_420_888: bytes from one U or V to the next, the pixel stride of
+                      these planes: 1 or 2 */
 } modar_picture;
+/* Converts a frame to the gray that trackers take: rows of `width` bytes, in `gray`, which may be
+ * the picture's own first plane if its rows have no padding. */
+int modar_gray(const modar_picture* picture, uint8_t* gray, modar_error* error);
 
 typedef struct modar_render_stats {
+  size_t size;
   int draw_calls;
   int state_changes;
   int chunks_drawn;
@@ -231,8 +289,7 @@ void modar_renderer_destroy(modar_renderer* renderer);
  */
 int modar_renderer_restore(modar_renderer* renderer, modar_error* error);
 int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar_error* error);
-/* How to draw. modar_render_options_default() fills it, including `size`; later versions append
- * fields. */
+/* How to draw; modar_render_options_default() fills it. */
 typedef struct modar_render_options {
   size_t size;
   float light[3]; /* direction to a key light in pattern space (z towards the viewer); zeros: each
@@ -253,8 +310,7 @@ uint64_t modar_renderer_gpu_bytes(const modar_renderer* renderer);
 /* direction, exclusive: as in modar_render_options. */
 void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive);
 /* The viewport of a camera frame and its models in the bound framebuffer, in pixels, (0, 0) at the
- * bottom left. The frame is turned clockwise by `rotation`. Set `size` to sizeof(modar_surface) and
- * unused fields to 0. */
+ * bottom left. The frame is turned clockwise by `rotation`. */
 typedef struct modar_surface {
   size_t size;
   int x, y, width, height;
@@ -274,22 +330,26 @@ void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
 /* Estimates the light from a frame that the app draws itself (picture NULL above), for later draws.
  * Every fourth frame and a smaller copy of the whole frame are enough. camera: the frame's; items:
  * as drawn on it. Makes no GL calls. */
-void modar_renderer_observe(modar_renderer* renderer, const modar_picture* picture,
-                            const modar_camera* camera, const modar_item* items, size_t count);
+MODAR_EXPERIMENTAL void modar_renderer_observe(modar_renderer* renderer,
+                                               const modar_picture* picture,
+                                               const modar_camera* camera, const modar_item* items,
+                                               size_t count);
 /* Converts a touch (pixels from the viewport's top left, y down) to a pixel of the frame. */
 void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
                             double y, double* frame_x, double* frame_y);
 
 /* The nearest surface of the items under a pixel of the frame. */
 typedef struct modar_hit {
+  size_t size;
   size_t item;    /* index into the items */
   float point[3]; /* in the item's model space */
   float distance; /* from the eye, in eye space */
 } modar_hit;
 /* Returns 1 and the hit, or 0. Reads the triangles from the bundle's bytes: meant for taps, not for
  * every frame. */
-int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double frame_x,
-               double frame_y, const modar_item* items, size_t count, modar_hit* hit);
+MODAR_EXPERIMENTAL int modar_pick(const modar_bundle* bundle, const modar_camera* camera,
+                                  double frame_x, double frame_y, const modar_item* items,
+                                  size_t count, modar_hit* hit);
 
 /* Draws the picture (NULL: the clear colour) and the items over it off-screen, in the picture's (or
  * camera's) aspect. projection NULL: that of `camera`, with depth limits that enclose the items. */
@@ -298,12 +358,24 @@ void modar_renderer_render(modar_renderer* renderer, const modar_picture* pictur
                            const modar_item* items, size_t count);
 /* Copies the rendered picture to the bound framebuffer, as large as it fits. */
 void modar_renderer_show(modar_renderer* renderer, int window_width, int window_height);
-/* Reads the rendered picture, top row first: width * height * 4 bytes. */
+/* Reads the rendered picture, top row first: width * height * 4 bytes, none before a size is known.
+ */
 void modar_renderer_read_rgba(modar_renderer* renderer, uint8_t* rgba);
-modar_render_stats modar_renderer_stats(const modar_renderer* renderer);
+/* Of the last modar_renderer_render() or modar_renderer_draw(). */
+void modar_renderer_stats(const modar_renderer* renderer, modar_render_stats* stats);
 
 #ifdef __cplusplus
 }
+
+namespace modar {
+/// An empty structure of the C API with its size set.
+template <class Struct>
+Struct sized() {
+  Struct empty{};
+  empty.size = sizeof empty;
+  return empty;
+}
+}  // namespace modar
 #endif
 
 #endif

@@ -36,6 +36,7 @@ struct DrawItem {
   /// The space to which the light is fixed (a pattern's: x right, y up, z towards the viewer and
   /// the ceiling) to eye space; see gl_view(). Default: the world of a camera that is held level.
   glm::mat4 world_to_eye{1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
+  float opacity = 1.0f;  ///< factor on that of its materials; below 1, what is behind shows through
 };
 
 /// Light in a space whose z points up to the ceiling. Linear; 1: a white surface in this light is
@@ -63,6 +64,7 @@ enum class PictureFormat : std::uint8_t {
   kNv21,  ///< luma, and pairs of V and U for every 2x2 pixels: the format of Android's cameras
   kNv12,  ///< luma, and pairs of U and V
   kI420,  ///< luma, U, V: the format of Y4M files
+  kRgba,  ///< one plane, 4 bytes a pixel; alpha is not looked at
 };
 
 /// A camera frame, top row first; the caller owns its planes. Sides must be even if chroma is

@@ -1,5 +1,5 @@
 /* phone FILE OFFSET LENGTH WIDTH HEIGHT < frames.nv21: what an app in C asks for, on a bundle inside another file.
- * Prints "width_mm W", a line "pose VISIBLE FIT X Y Z" a frame and "pick DISTANCE X Y Z" of the last one. */
+ * Prints "width_mm W", "picture W H GRAY...", a line "pose VISIBLE FIT X Y Z" a frame and "pick DISTANCE X Y Z" of the last one. */
 #define _XOPEN_SOURCE 700
 #include <fcntl.h>
 #include <modar/modar.h>
@@ -8,7 +8,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static modar_error error;
+static modar_error error = {.size = sizeof error};
 
 static void need(int holds, int line) {
   if (holds) return;
@@ -20,7 +20,8 @@ static void need(int holds, int line) {
 static void check_drawing(const modar_bundle* bundle) {
   uint8_t rgba[8 * 8 * 4];
   modar_render_options options;
-  modar_camera camera = modar_camera_default(8, 8);
+  modar_camera camera = {.size = sizeof camera};
+  modar_camera_default(8, 8, &camera);
   modar_context* context = modar_context_create(&error);
   NEED(context != NULL);
   modar_renderer* renderer = modar_renderer_create(bundle, NULL, 0, &error);
@@ -44,7 +45,7 @@ static int check_search_apart(const modar_bundle* bundle, const modar_camera* ca
   const struct timespec pause = {0, 5000000};
   int frames = 0;
   modar_tracker* tracker = modar_tracker_create_with(bundle, camera, &options, &error);
-  modar_pose pose = {0};
+  modar_pose pose = {.size = sizeof pose};
   NEED(tracker != NULL);
   while (!pose.visible && ++frames < 4000) {
     NEED(modar_tracker_step(tracker, frame, (size_t)camera->width, &error) == 0);
@@ -65,7 +66,19 @@ int main(int argc, char** argv) {
   modar_bundle* bundle = modar_bundle_open_fd(file, atol(argv[2]), atol(argv[3]), &error);
   NEED(bundle != NULL && close(file) == 0);
   printf("width_mm %g\n", modar_pattern_width_mm(bundle, 0));
-  modar_camera camera = modar_camera_default(atoi(argv[4]), atoi(argv[5]));
+  int picture_width = 0, picture_height = 0;
+  const uint8_t* gray = NULL;
+  NEED(modar_pattern_picture(bundle, 0, &picture_width, &picture_height, &gray));
+  NEED(!modar_pattern_picture(bundle, 9, &picture_width, &picture_height, &gray));
+  printf("picture %d %d", picture_width, picture_height);
+  for (int i = 0; i < 16; ++i) { /* the middles of 4 x 4 cells */
+    int x = (2 * (i % 4) + 1) * picture_width / 8, y = (2 * (i / 4) + 1) * picture_height / 8, sum = 0;
+    for (int k = 0; k < 64; ++k) sum += gray[(y - 4 + k / 8) * picture_width + x - 4 + k % 8];
+    printf(" %g", sum / 64.0);
+  }
+  printf("\n");
+  modar_camera camera = {.size = sizeof camera};
+  modar_camera_default(atoi(argv[4]), atoi(argv[5]), &camera);
   /* A caller of an older version knows no smoothing. */
   modar_tracker_options older = {.size = offsetof(modar_tracker_options, smooth_ms), .smooth_ms = 1e300};
   modar_tracker_options options = {.size = sizeof options, .search_every = 5, .smooth_ms = 20.0, .estimate_camera = 1};
@@ -74,8 +87,8 @@ int main(int argc, char** argv) {
   NEED(tracker != NULL);
   size_t width = (size_t)camera.width, pixels = width * (size_t)camera.height;
   uint8_t* frame = malloc(pixels * 3 / 2);
-  modar_scene scene = {0};
-  modar_pose pose = {0};
+  modar_scene scene = {.size = sizeof scene};
+  modar_pose pose = {.size = sizeof pose};
   NEED(modar_scene_at(bundle, 0, &scene));
   for (double time = 1; fread(frame, pixels * 3 / 2, 1, stdin) == 1; time += 0.04) {
     NEED(modar_tracker_step_at(tracker, frame, width, time, &error) == 0);
@@ -85,8 +98,8 @@ int main(int argc, char** argv) {
     NEED(modar_tracker_camera(tracker, &camera) > 0.0 && camera.fx == camera.fy);
   }
   NEED(pose.visible);
-  modar_item item;
-  modar_hit hit;
+  modar_item item = {.size = sizeof item};
+  modar_hit hit = {.size = sizeof hit};
   modar_item_place(&item, &scene, &pose);
   const double x = camera.cx + camera.fx * pose.translation[0] / pose.translation[2];
   const double y = camera.cy + camera.fy * pose.translation[1] / pose.translation[2];
