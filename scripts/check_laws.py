@@ -3,8 +3,10 @@
 player may link, what lies at the top level.
 
   scripts/check_laws.py [--root DIR] [--player FILE]
+  scripts/check_laws.py --rooms
 
 --player: a linked modar-play of the preset `device`, whose symbols and libraries are looked at.
+--rooms: prints the rooms from the top down, with their doors and who comes through them.
 Prints one line a violation, exits 3 if there is one.
 """
 import argparse
@@ -86,14 +88,93 @@ def standard_header(name):
 BAKE_ROOMS = (("bake", "bake/memory"), ("bake/image",), ("bake/import", "bake/video"), ("bake/mesh",),
               ("bake/texture", "bake/pattern"), ("bake/bundle", "bake/export", "bake/ship"), ("bake/web",), ("bake/check",), ("bake/page", "bake/project"), ("bake/commands",), ("bake/lab",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
-# Rooms with one header for all others.
-DOORS = {"bake/pattern": "bake/pattern/pattern.hpp"}
+# The doors of the rooms: the headers that other rooms may include. Those of bake/memory and below are for all. The lab measures
+# what lies inside, and may include everything below it; what it alone includes is no door.
+DOORS = {
+    "bake": ("input.hpp", "json.hpp", "output.hpp", "parallel.hpp", "process.hpp", "report.hpp", "terminal.hpp", "up_axis.hpp"),
+    "bake/memory": ("array.hpp", "memory_limit.hpp"),
+    "bake/image": ("image.hpp", "resample.hpp"),
+    "bake/import": ("read_model.hpp", "source_model.hpp", "gltf/tinygltf_library.hpp"),
+    "bake/video": ("video.hpp",),
+    "bake/mesh": ("weld/weld.hpp", "lod/mesh_levels.hpp", "pack/pack.hpp", "pack/chunk.hpp", "pack/vertex_codec.hpp", "tri_mesh.hpp",
+                  "lod/reduce.hpp", "draw_order.hpp", "occlusion.hpp", "repeating.hpp", "topology/mesh_topology.hpp",
+                  "triangle_tree.hpp", "upright.hpp"),
+    "bake/texture": ("texture.hpp", "texture_codec.hpp", "texture_stage.hpp", "texture_quality.hpp", "atlas.hpp"),
+    "bake/pattern": ("pattern.hpp",),
+    "bake/bundle": ("bundle_builder.hpp", "bundle_json.hpp", "request_text.hpp", "link_bundles.hpp", "alike_patterns.hpp"),
+    "bake/export": ("extract.hpp", "glb_writer.hpp", "usdz_writer.hpp", "room_models.hpp"),
+    "bake/ship": ("publish.hpp", "keys.hpp", "release_folder.hpp", "root_draft.hpp", "verify_release.hpp"),
+    "bake/web": ("site.hpp", "serve.hpp", "http_reader.hpp"),
+    "bake/check": ("verdict.hpp", "source_check.hpp", "visual_check.hpp", "pose_check.hpp", "text_check.hpp", "device_rules.hpp",
+                   "device_file.hpp", "yml_rule.hpp", "reproduce.hpp"),
+    "bake/page": ("report_page.hpp",),
+    "bake/project": ("project.hpp",),
+    "bake/commands": ("command_line.hpp",),
+    "bake/lab": (),
+    # Of the runtime, apps and rooms come through runtime/include and runtime/fetch/include.
+    "runtime/platform": ("command_line.hpp", "extension_list.hpp", "lap_clock.hpp", "semaphore.hpp"),
+    "runtime/track": (),
+    "runtime/render": (),
+    "runtime/paper": (),
+    "runtime/play": (),
+    "runtime/capi": (),
+    "runtime/fetch": (),
+    "runtime/android": (),
+    "runtime/web": (),
+}
+# A room has three doors at most. These have more, and may lose some but gain none.
+MOST_DOORS = 3
+MORE_DOORS = {"bake": 8, "bake/mesh": 13, "bake/texture": 5, "bake/bundle": 5, "bake/export": 4, "bake/ship": 5, "bake/check": 9,
+              "runtime/platform": 4}
 
 
 def bake_room(path):
     """"bake/mesh/weld/a.cpp" -> "bake/mesh"; a file right under bake/ is of "bake"."""
     parts = path.split("/")
     return "/".join(parts[:2]) if len(parts) > 2 else parts[0]
+
+
+def door_violations(path, name):
+    """Of a room's header that is no door of it, included by another room; tests and the lab look inside."""
+    here, there = bake_room(path), bake_room(name)
+    if here == there or name.split("/")[0] not in ("bake", "runtime") or path.startswith(("tests/", "bake/lab/")):
+        return
+    if there in ("runtime/include", "runtime/fetch/include"):
+        return
+    if there not in DOORS:
+        yield f"{there} is no room of DOORS"
+    elif name.removeprefix(there + "/") not in DOORS[there]:
+        doors = ", ".join(DOORS[there]) or "none"
+        yield f"'{name}' is no door of {there}, which has: {doors}"
+
+
+def door_table_violations(root):
+    """Of the table itself: doors that nobody has, and too many of them."""
+    for room, doors in DOORS.items():
+        if len(doors) > MORE_DOORS.get(room, MOST_DOORS):
+            yield f"{room}: has {len(doors)} doors, at most {MORE_DOORS.get(room, MOST_DOORS)} are allowed"
+        for door in doors:
+            if (root / "CMakeLists.txt").exists() and not (root / room / door).exists():
+                yield f"{room}: its door {door} does not exist"
+
+
+def print_rooms(root):
+    """The rooms from the top down, each with its doors and the rooms that come through them."""
+    guests = {}
+    for top in ("bake", "runtime"):
+        for file in sorted((root / top).rglob("*")):
+            if file.suffix not in SOURCES:
+                continue
+            path = file.relative_to(root).as_posix()
+            for name in INCLUDE.findall(file.read_text(encoding="utf-8", errors="replace")):
+                if name.startswith(("bake/", "runtime/")) and bake_room(name) != bake_room(path):
+                    guests.setdefault(name, set()).add(bake_room(path))
+    order = [room for rooms in reversed(BAKE_ROOMS) for room in rooms] + [room for room in DOORS if room.startswith("runtime/")]
+    for room in order:
+        print(room)
+        for door in DOORS.get(room, ()):
+            through = sorted(guests.get(f"{room}/{door}", ()))
+            print(f"  {door:32} {', '.join(through)}")
 
 
 def room_violations(path, name):
@@ -104,14 +185,13 @@ def room_violations(path, name):
         yield f"{there if there not in RANK else here} is no room of BAKE_ROOMS"
     elif RANK[there] >= RANK[here]:
         yield f"{here} lies below {there}, but includes '{name}'"
-    elif there in DOORS and name != DOORS[there]:
-        yield f"{there} is included through {DOORS[there]}, not '{name}'"
 
 
 def include_violations(path, name):
     """Yields what is wrong with file `path` including `name`."""
     room = path.split("/")[0]
     yield from room_violations(path, name)
+    yield from door_violations(path, name)
     for prefix, allowed in THIRD_PARTIES.items():
         if name.startswith(prefix) and not matches(path, allowed):
             yield f"'{name}' may be included by {', '.join(allowed)} only"
@@ -168,8 +248,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent)
     parser.add_argument("--player")
+    parser.add_argument("--rooms", action="store_true")
     arguments = parser.parse_args()
-    violations = list(check_includes(arguments.root)) + list(check_top_level(arguments.root))
+    if arguments.rooms:
+        print_rooms(arguments.root)
+        return 0
+    violations = [*check_includes(arguments.root), *check_top_level(arguments.root), *door_table_violations(arguments.root)]
     if arguments.player:
         violations += list(check_player(arguments.player))
     for violation in violations:

@@ -94,6 +94,34 @@ class PlantedViolations(unittest.TestCase):
         (self.folder / "bake/lab/pose_bench.cpp").rename(self.folder / "bake/lab/render_bench.cpp")
         self.assertEqual(run("--root", self.folder), (0, ""))
 
+    def test_rooms_are_entered_through_their_doors(self):
+        for path, name, doors in (
+                ("runtime/render/a.cpp", "runtime/track/kernels.hpp", "no door of runtime/track"),
+                ("runtime/render/b.cpp", "runtime/fetch/store.hpp", "no door of runtime/fetch"),
+                ("runtime/play/a.cpp", "runtime/render/program.hpp", "no door of runtime/render"),
+                ("bake/mesh/a.cpp", "bake/import/obj/number_parser.hpp", "read_model.hpp"),
+                ("bake/texture/a.cpp", "bake/mesh/lod/level_map.hpp", "weld/weld.hpp"),
+                ("bake/bundle/a.cpp", "bake/texture/etc1/etc1_encoder.hpp", "texture_codec.hpp"),
+                ("bake/check/a.cpp", "bake/bundle/scene_shadow.hpp", "bundle_builder.hpp"),
+                ("bake/commands/a.cpp", "bake/ship/recipe_maker.hpp", "publish.hpp"),
+                ("bake/commands/b.cpp", "bake/pattern/trial.hpp", "pattern.hpp"),
+                ("runtime/attic/a.cpp", "runtime/cellar/a.hpp", "is no room of DOORS")):
+            with self.subTest(name):
+                self.assert_refused(path, f'#include "{name}"\n', doors)
+                (self.folder / path).unlink()
+        # The lab and tests look inside.
+        for path in ("bake/lab/a.cpp", "tests/a.cpp"):
+            (self.folder / path).write_text('#include "bake/ship/recipe_maker.hpp"\n')
+        self.assertEqual(run("--root", self.folder), (0, ""))
+
+    def test_the_rooms_are_printed_with_their_doors(self):
+        code, out = run("--rooms", "--root", ROOT)
+        self.assertEqual(code, 0)
+        lines = out.splitlines()
+        self.assertLess(lines.index("bake/commands"), lines.index("bake/mesh"))
+        self.assertRegex(out, r"\n  report_page.hpp +bake/commands\n")
+        self.assertNotRegex(out, r"\n  [a-z_/]+\.hpp *\n", "a door that nobody comes through")
+
     def test_no_iostream_on_the_device(self):
         self.assert_refused("runtime/track/a.cpp", "#include <iostream>\n", "iostream")
 
