@@ -1,7 +1,11 @@
-// Rectangles of the patterns' planes.
+// Rectangles of the patterns' planes: all shadows of a page in one call, all that hides in another.
 #include "runtime/render/ground.hpp"
 
-#include <glm/gtc/type_ptr.hpp>
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <utility>
+
 #include <glm/matrix.hpp>
 
 #include "runtime/render/program.hpp"
@@ -9,19 +13,11 @@
 namespace modar {
 namespace {
 
-GLuint shadow_texture(std::span<const std::byte> section) {
-  const auto& header = *reinterpret_cast<const ShadowHeader*>(section.data());
-  GLuint texture = 0;
-  glGenTextures(1, &texture);
-  glBindTexture(GL_TEXTURE_2D, texture);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_LUMINANCE, static_cast<GLsizei>(header.width),
-               static_cast<GLsizei>(header.height), 0, GL_LUMINANCE, GL_UNSIGNED_BYTE,
-               section.data() + sizeof header);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  return texture;
+/// Of a page of shadows, which are at most 256 x 256 texels each: every GL of ES 2.0 has it.
+constexpr std::uint32_t kPageSide = 1024;
+
+const ShadowHeader& header_of(std::span<const std::byte> section) {
+  return *reinterpret_cast<const ShadowHeader*>(section.data());
 }
 
 /// The shadow goes with the model where a visitor has turned, moved or enlarged that, and stays in
@@ -33,83 +29,183 @@ glm::mat4 shadow_to_eye(const DrawItem& item, const SceneRecord& scene) {
   return item.world_to_eye * moved;
 }
 
+/// Texels of a page, as far as it is filled. Each shadow has a border of its own outermost texels,
+/// which linear filtering reads.
+struct Page {
+  std::vector<std::uint8_t> texels;
+  std::uint32_t x = 0;       ///< where the next shadow of the shelf begins
+  std::uint32_t top = 0;     ///< of the shelf
+  std::uint32_t bottom = 0;  ///< of the highest shadow of the shelf
+
+  /// Where the shadow's own texels begin; false where the page is full.
+  bool place(const ShadowHeader& header, std::uint32_t& left, std::uint32_t& first_row) {
+    const std::uint32_t width = header.width + 2;
+    if (x + width > kPageSide) {
+      x = 0;
+      top = bottom;
+    }
+    if (top + header.height + 2 > kPageSide) return false;
+    left = x + 1;
+    first_row = top + 1;
+    x += width;
+    bottom = std::max(bottom, top + header.height + 2);
+    texels.resize(std::size_t{kPageSide} * bottom);
+    return true;
+  }
+
+  void fill(std::span<const std::byte> section, std::uint32_t left, std::uint32_t first_row) {
+    const ShadowHeader& header = header_of(section);
+    const auto* from = reinterpret_cast<const std::uint8_t*>(section.data() + sizeof header);
+    for (std::uint32_t y = 0; y < header.height + 2; ++y) {
+      const std::uint32_t row = std::clamp(y, 1u, header.height) - 1;
+      std::uint8_t* to = &texels[std::size_t{kPageSide} * (first_row - 1 + y) + left - 1];
+      to[0] = from[std::size_t{header.width} * row];
+      std::memcpy(to + 1, from + std::size_t{header.width} * row, header.width);
+      to[header.width + 1] = to[header.width];
+    }
+  }
+
+  [[nodiscard]] GLuint upload() const {
+    GLuint texture = 0;
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_LUMINANCE, static_cast<GLsizei>(kPageSide),
+                 static_cast<GLsizei>(bottom), 0, GL_LUMINANCE, GL_UNSIGNED_BYTE, texels.data());
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    return texture;
+  }
+};
+
 }  // namespace
 
 Result<void> Ground::create(const BundleView& bundle) {
   if (bundle.scenes().empty()) return {};
-  const float corners[] = {0, 0, 1, 0, 0, 1, 1, 1};
-  glGenBuffers(1, &rectangle_);
-  glBindBuffer(GL_ARRAY_BUFFER, rectangle_);
-  glBufferData(GL_ARRAY_BUFFER, sizeof corners, corners, GL_STATIC_DRAW);
+  glGenBuffers(1, &buffer_);
   MODAR_ASSIGN(program_, link_program("", shadow_vertex_source(), shadow_fragment_source()));
-  matrix_ = glGetUniformLocation(program_, "u_matrix");
-  place_ = glGetUniformLocation(program_, "u_rectangle");
   depth_ = glGetUniformLocation(program_, "u_depth");
   glUseProgram(program_);
   glUniform1i(glGetUniformLocation(program_, "u_texture"), 0);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  for (std::uint32_t scene = 0; scene < bundle.scenes().size(); ++scene) {
-    const auto section = bundle.section(SectionType::kShadow, scene);
-    textures_.push_back(section.empty() ? 0 : shadow_texture(section));
-  }
+  vertices_.reserve(6 * bundle.scenes().size());
+  lay_out(bundle);
   return {};
 }
 
-void Ground::release(GlState& gl) {
-  for (const GLuint texture : textures_) {
-    gl.forget_texture(texture);
-    glDeleteTextures(1, &texture);
+void Ground::lay_out(const BundleView& bundle) {
+  std::vector<Page> pages;
+  for (std::uint32_t scene = 0; scene < bundle.scenes().size(); ++scene) {
+    shadows_.emplace_back();
+    const auto section = bundle.section(SectionType::kShadow, scene);
+    if (section.empty()) continue;
+    const ShadowHeader& header = header_of(section);
+    std::uint32_t left = 0;
+    std::uint32_t first_row = 0;
+    if (pages.empty() || !pages.back().place(header, left, first_row)) {
+      pages.emplace_back().place(header, left, first_row);
+    }
+    pages.back().fill(section, left, first_row);
+    shadows_.back() = {static_cast<std::uint32_t>(pages.size()), left, first_row};
   }
-  gl.forget_buffer(rectangle_);
-  glDeleteBuffers(1, &rectangle_);
+  for (const Page& page : pages) {
+    pages_.push_back({page.upload(), static_cast<float>(page.bottom)});
+  }
+}
+
+void Ground::release(GlState& gl) {
+  for (const ShadowPage& page : pages_) {
+    gl.forget_texture(page.texture);
+    glDeleteTextures(1, &page.texture);
+  }
+  gl.forget_buffer(buffer_);
+  glDeleteBuffers(1, &buffer_);
   glDeleteProgram(program_);
   *this = Ground();
 }
 
-void Ground::draw_rectangle(const glm::mat4& matrix, const std::array<float, 4>& rectangle,
-                            float depth, GlState& gl, RenderStats& stats) const {
+void Ground::add_rectangle(const glm::mat4& matrix, const Rectangle& plane,
+                           const Rectangle& texels) {
+  const auto corner = [&](float x, float y) {
+    const glm::vec2 place = glm::mix(plane.low, plane.high, glm::vec2(x, y));
+    vertices_.push_back({matrix * glm::vec4(place, 0.0f, 1.0f),
+                         glm::mix(texels.low, texels.high, glm::vec2(x, y))});
+  };
+  for (const auto& [x, y] : {std::pair{0.0f, 0.0f},
+                             {1.0f, 0.0f},
+                             {0.0f, 1.0f},
+                             {0.0f, 1.0f},
+                             {1.0f, 0.0f},
+                             {1.0f, 1.0f}}) {
+    corner(x, y);
+  }
+}
+
+void Ground::draw_rectangles(float depth, GlState& gl, RenderStats& stats) {
+  if (vertices_.empty()) return;
+  const std::size_t bytes = vertices_.size() * sizeof vertices_[0];
   gl.use_program(program_);
   gl.set_culling(false);
-  gl.set_attribute(kAttributePosition, {rectangle_, 2, GL_FLOAT, GL_FALSE, 8, 0});
-  gl.enable_attributes(1u << kAttributePosition);
-  glUniformMatrix4fv(matrix_, 1, GL_FALSE, glm::value_ptr(matrix));
-  glUniform4fv(place_, 1, rectangle.data());
+  gl.bind_array_buffer(buffer_);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(bytes), vertices_.data(), GL_STREAM_DRAW);
+  constexpr GLsizei kStride = sizeof(Vertex);
+  gl.set_attribute(kAttributePosition, {buffer_, 4, GL_FLOAT, GL_FALSE, kStride, 0});
+  gl.set_attribute(kAttributeUv, {buffer_, 2, GL_FLOAT, GL_FALSE, kStride, offsetof(Vertex, uv)});
+  gl.enable_attributes(1u << kAttributePosition | 1u << kAttributeUv);
   glUniform1f(depth_, depth);
-  glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+  glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(vertices_.size()));
   ++stats.draw_calls;
-  stats.bytes_uploaded += sizeof matrix + sizeof rectangle;
+  stats.bytes_uploaded += bytes;
 }
 
 void Ground::draw_shadows(const BundleView& bundle, const glm::mat4& projection,
                           std::span<const DrawItem> items, GlState& gl, RenderStats& stats) {
-  for (const DrawItem& item : items) {
-    if (item.scene >= textures_.size() || textures_[item.scene] == 0) continue;
-    const auto& header = *reinterpret_cast<const ShadowHeader*>(
-        bundle.section(SectionType::kShadow, item.scene).data());
-    gl.bind_texture(0, textures_[item.scene]);
+  for (std::uint32_t p = 0; p < pages_.size(); ++p) {
+    vertices_.clear();
+    for (const DrawItem& item : items) {
+      if (item.scene >= shadows_.size() || shadows_[item.scene].page != p + 1) continue;
+      const Shadow& shadow = shadows_[item.scene];
+      const ShadowHeader& header = header_of(bundle.section(SectionType::kShadow, item.scene));
+      const glm::vec2 scale(1.0f / static_cast<float>(kPageSide), 1.0f / pages_[p].height);
+      const glm::vec2 first(shadow.left, shadow.first_row);
+      const glm::vec2 end = first + glm::vec2(header.width, header.height);
+      // The first row is the one of the greatest y.
+      add_rectangle(projection * shadow_to_eye(item, bundle.scenes()[item.scene]),
+                    {{header.low[0], header.low[1]}, {header.high[0], header.high[1]}},
+                    {glm::vec2(first.x, end.y) * scale, glm::vec2(end.x, first.y) * scale});
+    }
+    if (vertices_.empty()) continue;
+    gl.bind_texture(0, pages_[p].texture);
     gl.set_depth_test(false);
     gl.set_blending(true);
-    draw_rectangle(projection * shadow_to_eye(item, bundle.scenes()[item.scene]),
-                   {header.low[0], header.low[1], header.high[0] - header.low[0],
-                    header.high[1] - header.low[1]},
-                   0.0f, gl, stats);
+    draw_rectangles(0.0f, gl, stats);
   }
 }
 
 void Ground::hide_below(const BundleView& bundle, const glm::mat4& projection,
                         std::span<const DrawItem> items, GlState& gl, RenderStats& stats) {
-  gl.set_colour_writes(false);
-  for (const DrawItem& item : items) {
-    if (item.scene >= bundle.scenes().size()) continue;
-    const PatternRecord& pattern = bundle.patterns()[bundle.scenes()[item.scene].pattern];
-    gl.bind_texture(0, textures_[item.scene]);
-    gl.set_depth_test(true);
-    gl.set_blending(false);
-    draw_rectangle(projection * item.world_to_eye,
-                   {-pattern.half_width, -pattern.half_height, 2 * pattern.half_width,
-                    2 * pattern.half_height},
-                   1.0f, gl, stats);
+  vertices_.clear();
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (items[i].scene >= bundle.scenes().size()) continue;
+    const std::uint32_t pattern = bundle.scenes()[items[i].scene].pattern;
+    // Once for all models of a pattern.
+    const bool known = std::any_of(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(i),
+                                   [&](const DrawItem& before) {
+                                     return before.scene < bundle.scenes().size() &&
+                                            bundle.scenes()[before.scene].pattern == pattern &&
+                                            before.world_to_eye == items[i].world_to_eye;
+                                   });
+    if (known) continue;
+    const PatternRecord& record = bundle.patterns()[pattern];
+    const glm::vec2 half(record.half_width, record.half_height);
+    add_rectangle(projection * items[i].world_to_eye, {-half, half}, {});
   }
+  gl.set_colour_writes(false);
+  gl.bind_texture(0, pages_.empty() ? 0 : pages_[0].texture);
+  gl.set_depth_test(true);
+  gl.set_blending(false);
+  draw_rectangles(1.0f, gl, stats);
   gl.set_colour_writes(true);
 }
 

@@ -2,12 +2,13 @@
 // runtime/render.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
 
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
@@ -18,7 +19,8 @@ namespace modar {
 
 class Ground {
  public:
-  /// One texture a scene that has a shadow. Errors: kUnsupported "gl.shader", "gl.program".
+  /// Shadows lie side by side in few textures, so that one call draws those of many models. Errors:
+  /// kUnsupported "gl.shader", "gl.program".
   Result<void> create(const BundleView& bundle);
   void release(GlState& gl);
 
@@ -30,14 +32,35 @@ class Ground {
                   std::span<const DrawItem> items, GlState& gl, RenderStats& stats);
 
  private:
-  void draw_rectangle(const glm::mat4& matrix, const std::array<float, 4>& rectangle, float depth,
-                      GlState& gl, RenderStats& stats) const;
+  /// A corner in clip space, and where its texel lies.
+  struct Vertex {
+    glm::vec4 place;
+    glm::vec2 uv;
+  };
+  struct Rectangle {
+    glm::vec2 low{0.0f};
+    glm::vec2 high{0.0f};
+  };
+  struct Shadow {
+    std::uint32_t page = 0;  ///< 1: the first; 0: none
+    std::uint32_t left = 0;  ///< texels of the page
+    std::uint32_t first_row = 0;
+  };
+  struct ShadowPage {
+    GLuint texture = 0;
+    float height = 0;  ///< texels
+  };
 
-  std::vector<GLuint> textures_;  ///< one a scene; 0: no shadow
-  GLuint rectangle_ = 0;
+  void lay_out(const BundleView& bundle);
+  void add_rectangle(const glm::mat4& matrix, const Rectangle& plane, const Rectangle& texels);
+  /// All that were added, in one call.
+  void draw_rectangles(float depth, GlState& gl, RenderStats& stats);
+
+  std::vector<Shadow> shadows_;  ///< one a scene
+  std::vector<ShadowPage> pages_;
+  std::vector<Vertex> vertices_;
+  GLuint buffer_ = 0;
   GLuint program_ = 0;
-  GLint matrix_ = -1;
-  GLint place_ = -1;
   GLint depth_ = -1;
 };
 

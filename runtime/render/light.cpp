@@ -2,7 +2,6 @@
 #include "runtime/render/light.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -20,15 +19,6 @@ glm::mat3 rotation_of(const glm::mat4& matrix) {
   }
   return turn;
 }
-
-namespace {
-
-bool same_light(const DrawItem& a, const DrawItem& b) {
-  return a.scene == b.scene &&
-         std::memcmp(&a.world_to_eye, &b.world_to_eye, sizeof a.world_to_eye) == 0;
-}
-
-}  // namespace
 
 RoomLight neutral_room() {
   // A bright ceiling, gray walls and a floor that gives back some of it; a lamp over the viewer's
@@ -102,20 +92,16 @@ void LightList::build(const BundleView& bundle, std::span<const DrawItem> items,
   ambient_strength_ = options.ambient_strength;
   light_strength_ = options.light_strength;
   lights_.clear();
-  first_item_.clear();
   of_item_.clear();
-  for (std::uint32_t i = 0; i < items.size(); ++i) {
-    const auto same =
-        std::find_if(first_item_.begin(), first_item_.end(),
-                     [&](std::uint32_t first) { return same_light(items[first], items[i]); });
-    of_item_.push_back(static_cast<std::uint32_t>(same - first_item_.begin()));
-    if (same != first_item_.end()) continue;
-    first_item_.push_back(i);
-    RoomLight light = options.light ? *options.light : scene_light(bundle, items[i].scene);
+  for (const DrawItem& item : items) {
+    RoomLight light = options.light ? *options.light : scene_light(bundle, item.scene);
     if (estimator != nullptr) {
-      if (const auto gain = estimator->at_model(items[i].scene)) light = scaled_light(light, *gain);
+      if (const auto gain = estimator->at_model(item.scene)) light = scaled_light(light, *gain);
     }
-    lights_.push_back({light, rotation_of(items[i].world_to_eye)});
+    const Light own{light, rotation_of(item.world_to_eye)};
+    const auto same = std::find(lights_.begin(), lights_.end(), own);
+    of_item_.push_back(static_cast<std::uint32_t>(same - lights_.begin()));
+    if (same == lights_.end()) lights_.push_back(own);
   }
 }
 

@@ -32,7 +32,8 @@ RoomLight scaled_light(const RoomLight& light, const glm::vec3& gain);
 TurnedLight turn_light(const RoomLight& light, const glm::mat3& turn, float ambient_strength,
                        float light_strength);
 
-/// One light for all items that share one, so that they can share draw calls.
+/// One light for all items in the same light that is turned the same way, whichever scenes are
+/// theirs, so that they can share draw calls.
 class LightList {
  public:
   /// Keeps its memory from call to call. estimator: null where light is as stated.
@@ -49,9 +50,9 @@ class LightList {
   struct Light {
     RoomLight room;
     glm::mat3 to_eye{1.0f};
+    bool operator==(const Light&) const = default;
   };
   std::vector<Light> lights_;
-  std::vector<std::uint32_t> first_item_;  ///< of each light
   std::vector<std::uint32_t> of_item_;
   float ambient_strength_ = 1.0f;
   float light_strength_ = 1.0f;

@@ -70,6 +70,42 @@ int main(int argc, char** argv) {
 }
 """
 
+# Draws all scenes of a bundle at once, as its arguments say: calls, triangles and pixels that are not black.
+DRAW_SCENES = r"""
+#include <modar/modar.h>
+#include <stdio.h>
+int main(int argc, char** argv) {
+  static uint8_t rgba[64 * 48 * 4];
+  modar_error e = {.size = sizeof e};
+  modar_camera camera = {.size = sizeof camera};
+  modar_camera_default(64, 48, &camera);
+  modar_context* context = modar_context_create(&e);
+  modar_bundle* bundle = modar_bundle_open(argv[1], &e);
+  modar_renderer* renderer = bundle ? modar_renderer_create(bundle, argc > 2 ? argv[2] : NULL, 0, &e) : NULL;
+  if (!renderer || modar_renderer_resize(renderer, 64, 48, &e)) return 10;
+  /* Seen from above: the camera's y points down. */
+  modar_pose pose = {.size = sizeof pose, .rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1}, .translation = {0, 0, 3}};
+  modar_item items[16];
+  size_t count = 0;
+  modar_scene scene = {.size = sizeof scene};
+  for (; count < 16 && modar_scene_at(bundle, (uint32_t)count, &scene); ++count) {
+    items[count] = (modar_item){.size = sizeof items[0]};
+    modar_item_place(&items[count], &scene, &pose);
+  }
+  modar_renderer_render(renderer, NULL, &camera, NULL, items, count);
+  modar_renderer_read_rgba(renderer, rgba);
+  modar_render_stats stats = {.size = sizeof stats};
+  modar_renderer_stats(renderer, &stats);
+  int lit = 0;
+  for (size_t i = 0; i < sizeof rgba; i += 4) lit += rgba[i] + rgba[i + 1] + rgba[i + 2] > 0;
+  printf("%d %d %d\n", stats.draw_calls, (int)stats.triangles, lit);
+  modar_renderer_destroy(renderer);
+  modar_bundle_close(bundle);
+  modar_context_destroy(context);
+  return 0;
+}
+"""
+
 
 def run(*command, **options):
     return subprocess.run([str(word) for word in command], capture_output=True, **options)
@@ -300,6 +336,28 @@ class App(ProgramTest):
         distance, *point = (float(word) for word in pick[1:])
         self.assertAlmostEqual(distance, math.hypot(*place), delta=0.01)
         self.assertLess(math.hypot(*point), 0.01)
+
+    def test_ten_scenes_of_a_model_are_two_calls(self):
+        """The models in one call and their shadows in another, with instances and, masked as a Mali-400, without."""
+        (self.folder / "roof.obj").write_text("v 0 0 0\nv 2 0 0\nv 2 0 2\nv 0 0 2\nv 1 1 1\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n")
+        (self.folder / "draw.c").write_text(DRAW_SCENES)
+        done = run("cc", "-std=c99", "-Wall", "-Wextra", "-Werror", self.folder / "draw.c", "-o", self.folder / "draw",
+                   *self.pkg_config("modar"), *FLAGS, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        drawn = {}
+        for scenes in (1, 10):
+            words = [word for k in range(scenes) for word in
+                     ("--scene", f"cover=roof,scale=0.1,offset={k % 5 * 30 - 60}mm:{k // 5 * 60 - 30}mm:0mm")]
+            done = self.modar("bake", "--model", "roof.obj", "--pattern", f"{COVER}:210mm", *QUICK, *words, "-o", f"{scenes}.modar")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            for device in ((), ("mali400",)):
+                done = run(self.folder / "draw", self.folder / f"{scenes}.modar", *device, text=True)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                drawn[scenes, device] = [int(word) for word in done.stdout.split()]
+        for device in ((), ("mali400",)):
+            one, ten = drawn[1, device], drawn[10, device]
+            self.assertEqual((one[:2], ten[:2]), ([2, 4], [2, 40]), device)
+            self.assertGreater(ten[2], 6 * one[2], device)
 
     def test_two_apps_outside_of_the_tree(self):
         apps, bundle = self.build_apps(), self.bake_flags()

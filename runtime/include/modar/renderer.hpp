@@ -48,6 +48,8 @@ struct RoomLight {
   std::array<glm::vec3, 9> sky{};
   glm::vec3 direction{0.0f, 0.0f, 1.0f};  ///< to the key light, any length > 0
   glm::vec3 key{0.0f};                    ///< the key light on a white surface that faces it
+
+  bool operator==(const RoomLight&) const = default;
 };
 /// Largest exponent of materials: with lighting per vertex, narrower highlights flicker. Chosen by
 /// eye on pictures.
