@@ -144,6 +144,7 @@ struct Renderer::State {
   Result<void> upload() {
     extensions = load_gl_extensions(caps);
     const SavedGlState saved(extensions, !options.exclusive_context);
+    const DebugGroup group(extensions, "upload");
     MODAR_TRY(textures.upload(
         caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2)));
     MODAR_TRY(geometry.upload());
@@ -170,7 +171,11 @@ struct Renderer::State {
   }
 
   void draw_models(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
-    ground.draw_shadows(bundle, projection, items, gl, stats);
+    {
+      const DebugGroup group(extensions, "shadows");
+      ground.draw_shadows(bundle, projection, items, gl, stats);
+    }
+    const DebugGroup group(extensions, "models");
     list.build(bundle, painter.setups(), projection, height, items, options.lod_pixels);
     stats.chunks_culled = list.culled();
     if (geometry.streams()) {
@@ -288,10 +293,7 @@ void Renderer::render(const CameraPicture& background, const glm::mat4& projecti
     s.stats.draw_calls += s.background.draw(exact, {}, s.gl);
     if (s.options.estimate_light) s.estimator.observe(background, projection, items);
   }
-  if (!items.empty()) {
-    const DebugGroup group(s.extensions, "models");
-    s.draw_models(projection, view.height, items);
-  }
+  if (!items.empty()) s.draw_models(projection, view.height, items);
   s.target.finish(s.extensions);
   s.end_frame();
 }
@@ -319,7 +321,6 @@ void Renderer::draw(const SurfaceView& surface, const CameraPicture& frame,
     if (s.options.estimate_light) s.estimator.observe(frame, projection, items);
   }
   if (!items.empty()) {
-    const DebugGroup group(s.extensions, "models");
     glm::mat4 turned(1.0f);
     turned[0] = glm::vec4(turn[0], 0.0f, 0.0f);
     turned[1] = glm::vec4(turn[1], 0.0f, 0.0f);
@@ -359,6 +360,7 @@ void Renderer::blit_to_window(int window_width, int window_height) {
   if (s.target.width() == 0) return;
   const SavedGlState saved(s.extensions, !s.options.exclusive_context);
   if (!s.options.exclusive_context) s.gl.reset();
+  const DebugGroup group(s.extensions, "present");
   const Viewport view = fit(s.target.width(), s.target.height(), window_width, window_height);
   glViewport(0, 0, window_width, window_height);
   glClearColor(0.0f, 0.0f, 0.0f, 1.0f);

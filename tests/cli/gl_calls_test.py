@@ -94,6 +94,27 @@ class GlCalls(ProgramTest):
             offered = set(re.findall(r"GL_(?:EXT|OES|KHR|ANGLE)_\w+", (HEADERS / "gl2ext.h").read_text()))
         self.assertEqual(strangers(dump, offered), {})
 
+    def test_every_draw_call_lies_in_the_group_of_its_pass(self):
+        dump = self.trace(self.bake_demo(), "--input", self.clip(), "--out", "pictures")
+        if "glPushDebugGroup" not in dump and "glPushGroupMarker" not in dump:
+            self.skipTest("this driver has no groups")
+        open_groups, draws = [], collections.Counter()
+        for line in dump.splitlines():
+            pushed = re.match(r'gl(?:PushDebugGroup|PushGroupMarker)\w*\(.*"(.*)"', line)
+            if pushed:
+                open_groups.append(pushed[1])
+            elif re.match(r"gl(PopDebugGroup|PopGroupMarker)", line):
+                open_groups.pop()
+            elif re.match(r"glDraw(Arrays|Elements)", line):
+                draws["/".join(open_groups)] += 1
+            elif re.match(r"gl(Compressed)?TexImage2D|glBufferData\(GL_ELEMENT", line):
+                self.assertIn("/".join(open_groups), ("upload", "camera picture", ""))
+        self.assertEqual(open_groups, [])
+        self.assertEqual(set(draws), {"camera picture", "shadows", "models"}, draws)
+        guide = (ROOT / "runtime/TROUBLESHOOTING.md").read_text()
+        for name in (*draws, "upload", "present"):
+            self.assertIn(f"`{name}`", guide)
+
     def test_a_stranger_is_seen(self):
         dump = ("glBindVertexArray(1)\nglTexImage2D(GL_TEXTURE_2D, 0, GL_RED, 1, 1, 0, GL_RED, GL_UNSIGNED_BYTE, NULL)\n"
                 "glClear(GL_COLOR_BUFFER_BIT)\nglPushGroupMarkerEXT(6, \"models\")\nglReadBuffer(GL_BACK) // fake\n")
