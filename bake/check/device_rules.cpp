@@ -59,6 +59,11 @@ class DeviceCheck {
     const std::uint64_t decoded =
         bytes / format.block_bytes * format.block_side * format.block_side * kDecodedPixelBytes;
     texture_bytes_ += reads ? bytes : decoded;
+    const TextureLevelRecord& smallest =
+        bundle_.texture_levels()[texture.first_level + texture.level_count - 1];
+    const std::uint64_t pixels = std::uint64_t{smallest.width} * smallest.height;
+    smallest_bytes_ += (reads ? smallest.size : pixels * kDecodedPixelBytes) *
+                       (smallest.alpha_offset == kNoOffset ? 1 : 2);
     if (std::max(texture.width, texture.height) >
         static_cast<std::uint32_t>(device_.max_texture_size)) {
       tell(WorkstationRule::kDeviceTextureSize, where, &texture.width,
@@ -79,6 +84,7 @@ class DeviceCheck {
            std::to_string(layout.attribute_count) + " attributes, at most " +
                std::to_string(device_.max_vertex_attributes));
     }
+    most_coarse_bytes_ = std::max(most_coarse_bytes_, coarse_bytes(model, layout));
     std::uint64_t half_bytes = 0;
     for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
       const AttributeRecord& attribute = layout.attributes[a];
@@ -91,6 +97,18 @@ class DeviceCheck {
     tell(WorkstationRule::kDeviceHalfFloat, where, &layout,
          std::to_string(half_bytes) + " bytes of each of " + std::to_string(model.vertex_count) +
              " vertices");
+  }
+
+  /// Vertices and indices of the coarsest level of each chunk.
+  [[nodiscard]] std::uint64_t coarse_bytes(const ModelRecord& model,
+                                           const LayoutRecord& layout) const {
+    std::uint64_t bytes = 0;
+    for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle_.chunks()[c];
+      const LevelRecord& level = bundle_.levels()[chunk.first_level + chunk.level_count - 1];
+      bytes += std::uint64_t{level.vertex_count} * layout.stride + 2ull * level.index_count;
+    }
+    return bytes;
   }
 
   void check_uniforms() {
@@ -122,7 +140,11 @@ class DeviceCheck {
         bundle_.vertices().size() + widened_bytes_ + bundle_.indices().size() + texture_bytes_;
     const void* first = bundle_.bytes().data();
     if (gpu > device_.gpu_memory_mib * kMebibyte) {
-      tell(WorkstationRule::kDeviceGpuMemory, largest_asset(), first,
+      // The renderer keeps to the limit: it leaves out the largest mip levels, and what is nearest
+      // gets its finest levels first.
+      const bool drawn = most_coarse_bytes_ + smallest_bytes_ <= device_.gpu_memory_mib * kMebibyte;
+      tell(drawn ? WorkstationRule::kDeviceGpuDetail : WorkstationRule::kDeviceGpuMemory,
+           largest_asset(), first,
            std::to_string(gpu) + " bytes in all, at most " +
                std::to_string(device_.gpu_memory_mib * kMebibyte));
     }
@@ -145,6 +167,8 @@ class DeviceCheck {
   bool half_ = false;
   bool good_ = true;
   std::uint64_t texture_bytes_ = 0;
+  std::uint64_t smallest_bytes_ = 0;     ///< of the textures' smallest mip levels
+  std::uint64_t most_coarse_bytes_ = 0;  ///< of the model whose coarsest levels take most
   std::uint64_t widened_bytes_ = 0;
 };
 

@@ -18,8 +18,14 @@ constexpr IssueKind kKinds[] = {
      "The shaders need more uniform vectors than the device has",
      "this device cannot run the player; choose another"},
     {"DEVICE_GPU_MEMORY", Severity::kError,
-     "Models and textures exceed the GPU memory that one app should plan for",
-     "bake with --device, smaller textures, or fewer models in one bundle"},
+     "Even the coarsest level of a model and the smallest textures exceed the GPU memory that one "
+     "app "
+     "should plan for",
+     "bake with --tier phone, with levels of detail, or with smaller textures"},
+    {"DEVICE_GPU_DETAIL", Severity::kWarning,
+     "Models and textures do not fit the GPU memory that one app should plan for: the player draws "
+     "smaller textures, and far parts at coarser levels",
+     "none needed if that is fine; else bake with --tier phone, or fewer models in one bundle"},
     {"DEVICE_RAM", Severity::kError, "The bundle is larger than half of the device's RAM",
      "split it into several bundles"},
     {"DEVICE_STORAGE", Severity::kError, "The bundle takes more than half of the device's storage",

@@ -21,6 +21,7 @@ enum class WorkstationRule : std::uint8_t {
   kDeviceAttributes,
   kDeviceUniforms,
   kDeviceGpuMemory,
+  kDeviceGpuDetail,
   kDeviceRam,
   kDeviceStorage,
   kDeviceHalfFloat,

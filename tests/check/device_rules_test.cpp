@@ -76,7 +76,7 @@ TEST(Device, MemoryIsHeldAgainstWhatTheBundleTakes) {
   device.gpu_memory_mib = 2;
   ASSERT_EQ(findings(bytes, device).size(), 1u);
   EXPECT_TRUE(
-      findings(bytes, device)[0].starts_with("DEVICE_GPU_MEMORY texture 'body.png' with 31"));
+      findings(bytes, device)[0].starts_with("DEVICE_GPU_DETAIL texture 'body.png' with 31"));
   // Without ETC1 the same blocks take six times the room.
   device.extensions = " ";
   device.gpu_memory_mib = 17;
@@ -89,6 +89,23 @@ TEST(Device, MemoryIsHeldAgainstWhatTheBundleTakes) {
   device = roomy();
   device.storage_mib = 6;
   EXPECT_TRUE(findings(bytes, device).at(0).starts_with("DEVICE_STORAGE "));
+}
+
+/// As the renderer does: it leaves out large mip levels and fine levels of chunks, never the last.
+TEST(Device, MemoryThatHoldsTheCoarsestLevelsIsEnough) {
+  BundleContent content = model_content();  // two chunks, one of them with two levels
+  content.vertices.resize(5u << 20);
+  DeviceProfile device = roomy();
+  device.gpu_memory_mib = 4;
+  ASSERT_EQ(findings(encode(content), device).size(), 1u);
+  EXPECT_TRUE(findings(encode(content), device)[0].starts_with("DEVICE_GPU_DETAIL "));
+  content.layouts[0].stride = 240;
+  std::uint32_t most = 0;
+  for (LevelRecord& level : content.levels) most = std::max(most, level.vertex_count);
+  content.vertices.resize(std::size_t{66000} * 240);
+  for (LevelRecord& level : content.levels) level.vertex_count = 65000;
+  EXPECT_TRUE(findings(encode(content), device)[0].starts_with("DEVICE_GPU_MEMORY "));
+  EXPECT_LT(most, 100u);
 }
 
 TEST(Verdict, CountsAllButListsTwentyOfAKind) {

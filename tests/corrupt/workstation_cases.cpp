@@ -26,6 +26,22 @@ BundleContent picture(std::uint32_t width, std::uint32_t height) {
   return content;
 }
 
+/// The same with all mip levels.
+BundleContent picture_with_mips(std::uint32_t width, std::uint32_t height) {
+  BundleContent content = picture(width, height);
+  TextureLevelRecord level = content.texture_levels[0];
+  while (level.width > 1 || level.height > 1) {
+    level.offset += level.size;
+    level.width = std::max(1u, level.width / 2);
+    level.height = std::max(1u, level.height / 2);
+    level.size = (level.width + 3) / 4 * ((level.height + 3) / 4) * 8;
+    content.texture_levels.push_back(level);
+  }
+  content.textures[0].level_count = static_cast<std::uint32_t>(content.texture_levels.size());
+  content.texture_data[0].assign(level.offset + level.size, std::byte{0});
+  return content;
+}
+
 /// The octahedron with the material that an OBJ without one gets.
 Bytes plain_octahedron() {
   BundleContent content = model_content();
@@ -77,6 +93,7 @@ constexpr CorruptCase kWorkstationCases[] = {
     {"DEVICE_UNIFORMS", [] { return encode(model_content()); }},
     // 256 KiB of blocks are six times as much once they are decoded.
     {"DEVICE_GPU_MEMORY", [] { return encode(picture(1024, 512)); }},
+    {"DEVICE_GPU_DETAIL", [] { return encode(picture_with_mips(1024, 512)); }},
     // Half of the least memory, and a header.
     {"DEVICE_RAM", [] { return encode(picture(1024, 1024)); }},
     {"DEVICE_STORAGE", [] { return encode(picture(1024, 1024)); }},
