@@ -313,7 +313,7 @@ std::string example(const std::string& text, const std::string& codes) {
 
 CommandLine::CommandLine(const std::string& about, const std::string& version)
     : parts_(std::make_unique<Parts>()) {
-  parts_->own = std::make_unique<CLI::App>(about, "modar");
+  parts_->own = std::make_unique<CLI::App>(about, version.substr(0, version.find(' ')));
   parts_->app = parts_->own.get();
   parts_->in_full = std::make_shared<std::set<const void*>>();
   parts_->app->set_version_flag("--version", version);
@@ -367,9 +367,9 @@ Result<std::string> CommandLine::help(std::vector<std::string> words) const {
     }
     if (next == nullptr) {
       const std::string_view meant = nearest_name(word, known);
-      return fail(
-          ExitCode::kUsage, "cli.unknown", word, "there is no such command",
-          meant.empty() ? "see `modar help all`" : "did you mean " + std::string(meant) + "?");
+      return fail(ExitCode::kUsage, "cli.unknown", word, "there is no such command",
+                  meant.empty() ? "see `" + parts_->app->get_name() + " help all`"
+                                : "did you mean " + std::string(meant) + "?");
     }
     chosen = next;
     name += " " + word;

@@ -62,7 +62,7 @@ class CommandLine {
   using Value =
       std::variant<std::string*, std::vector<std::string>*, double*, int*, unsigned*, std::size_t*>;
 
-  /// The program itself. version: what --version prints.
+  /// The program itself. version: what --version prints, its name and number ("modar 1.0.0").
   CommandLine(const std::string& about, const std::string& version);
   ~CommandLine();
 

@@ -177,6 +177,22 @@ int run_draft(const RootCommand& command) {
   return static_cast<int>(ExitCode::kOk);
 }
 
+/// Says that the newest release is of an earlier epoch than the root's word, which devices refuse.
+/// Answers the exit code.
+int note_stale_release(const ReleaseFolder& folder) {
+  const auto word = folder.root_word();
+  if (!word) return print_error(word.error());
+  const auto newest = folder.newest();
+  if (!newest) return print_error(newest.error());
+  if (*newest && (*newest)->epoch < word->epoch) {
+    std::fprintf(stderr,
+                 "release %llu is of an earlier epoch, so devices refuse it: publish its bundles "
+                 "again with the key that signs now\n",
+                 static_cast<unsigned long long>((*newest)->version));
+  }
+  return static_cast<int>(ExitCode::kOk);
+}
+
 }  // namespace
 
 int run_trust(const TrustCommand& command) {
@@ -214,7 +230,7 @@ int run_accept(const AcceptCommand& command) {
   const auto draft = accept_root_draft(*folder, command.draft, *trust);
   if (!draft) return print_error(draft.error());
   std::fprintf(stderr, "%s: %s\n", draft->path.c_str(), draft->meaning.c_str());
-  return static_cast<int>(ExitCode::kOk);
+  return note_stale_release(*folder);
 }
 
 int run_keygen(const KeygenCommand& command) {
@@ -311,7 +327,7 @@ int run_root(const RootCommand& command) {
   if (!word) return print_error(word.error());
   std::fprintf(stderr, "epoch %llu: key %s signs; publish the next release with it\n",
                static_cast<unsigned long long>(word->epoch), to_hex(next.id).c_str());
-  return static_cast<int>(ExitCode::kOk);
+  return note_stale_release(folder);
 }
 
 int run_refresh(const RefreshCommand& command) {

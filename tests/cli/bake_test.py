@@ -446,6 +446,8 @@ class Help(ProgramTest):
             self.assert_fails(self.modar(*arguments), 1)
         for arguments in ([], ["bench", "nonsense"], ["mutate"], ["check"]):
             self.assert_fails(self.lab(*arguments), 1)
+        self.assertIn("modar-lab [OPTIONS]", self.lab("--help").stdout)
+        self.assert_fails(self.lab("mutate"), 1, "`modar-lab mutate --help`")
 
 
 if __name__ == "__main__":
