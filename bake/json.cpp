@@ -103,6 +103,10 @@ std::optional<std::string> Json::text() const {
   return value_->json.is_string() ? std::optional(value_->json.get<std::string>()) : std::nullopt;
 }
 
+std::optional<bool> Json::truth() const {
+  return value_->json.is_boolean() ? std::optional(value_->json.get<bool>()) : std::nullopt;
+}
+
 std::string Json::dump() const {
   return value_->json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

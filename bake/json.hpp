@@ -60,6 +60,7 @@ class Json {
   [[nodiscard]] std::optional<double> number() const;
   [[nodiscard]] std::optional<std::uint64_t> count() const;
   [[nodiscard]] std::optional<std::string> text() const;
+  [[nodiscard]] std::optional<bool> truth() const;
   [[nodiscard]] bool is_array() const;
 
   /// Indented, with a line break at its end. Infinities become null, bytes that are no UTF-8 are

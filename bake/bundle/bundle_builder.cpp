@@ -14,6 +14,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/request_check.hpp"
+#include "bake/bundle/scene_placement.hpp"
 #include "bake/bundle/scene_shadow.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/draw_order.hpp"
@@ -29,7 +30,6 @@
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
 #include "formats/pattern_shape.hpp"
-#include "modar/device_profile.hpp"
 #include "modar/features.hpp"
 
 namespace modar {
@@ -403,49 +403,7 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   return {};
 }
 
-/// Sizes that collections publish their scans in.
-struct Tier {
-  std::string_view name;
-  std::size_t triangles;
-  std::uint32_t texture_side;
-};
-constexpr Tier kTiers[] = {
-    {"thumb", 20000, 512}, {"phone", 100000, 2048}, {"desktop", 150000, 4096}};
-
-void lower_budget(std::uint64_t bytes, BakeRequest& request) {
-  if (request.texture_budget == 0 || bytes < request.texture_budget) request.texture_budget = bytes;
-}
-
 }  // namespace
-
-Result<void> plan_for_device(const std::string& device, BakeRequest& request) {
-  const DeviceProfile* profile = find_device_profile(device);
-  if (profile == nullptr) {
-    return fail(ExitCode::kUsage, "device.unknown", "--device " + device,
-                "there is no such device profile", "name one of: " + device_profile_names());
-  }
-  const auto side = static_cast<std::uint32_t>(profile->max_texture_size);
-  request.textures.max_side = std::min(request.textures.max_side, side);
-  lower_budget(std::uint64_t{profile->gpu_memory_mib} * 1024 * 1024 / 2, request);
-  request.device = device;
-  return {};
-}
-
-Result<void> plan_for_tier(const std::string& tier, BakeRequest& request) {
-  std::string names;
-  for (const Tier& known : kTiers) {
-    names += (names.empty() ? "" : ", ") + std::string(known.name);
-    if (tier != known.name) continue;
-    request.most_triangles = known.triangles;
-    request.textures.max_side = std::min(request.textures.max_side, known.texture_side);
-    // Four such textures in ETC1, with their mip levels.
-    lower_budget(std::uint64_t{4} * known.texture_side * known.texture_side / 2 * 4 / 3, request);
-    request.tier = tier;
-    return {};
-  }
-  return fail(ExitCode::kUsage, "bake.tier", "--tier " + tier, "there is no such tier",
-              "name one of: " + names);
-}
 
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, BakeTrace* trace) {
   if (request.models.empty() && request.patterns.empty()) {
@@ -477,6 +435,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
     named.scenes.push_back(std::move(resolved));
   }
   MODAR_TRY(light_scenes(named.scenes, named, content, report));
+  named.parameters = parameters_of(content);
   content.meta = bundle_meta(named, report, traced);
   content.summary = content_summary_of(content);
   if (trace != nullptr) *trace = std::move(traced);

@@ -1,12 +1,14 @@
 // The bundle's meta text, written and read, and what `modar inspect` and `modar bake` print of a
 // bundle.
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/scene_placement.hpp"
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <numbers>
 
+#include "bake/options/options.hpp"
+#include "formats/base/path.hpp"
 #include "formats/pattern_shape.hpp"
 
 namespace modar {
@@ -54,37 +56,6 @@ constexpr const char* kReasonNames[] = {"asked",  "standard", "header",    "geor
 Json upright_json(const Upright& upright) {
   return {{"axis", up_axis_name(upright.axis)},
           {"reason", kReasonNames[static_cast<std::size_t>(upright.reason)]}};
-}
-
-const char* max_error_unit(const MaxError& error) {
-  switch (error.unit) {
-    case MaxError::Unit::kAny:
-      return "any";
-    case MaxError::Unit::kSource:
-      return "source";
-    case MaxError::Unit::kPercent:
-      return "percent";
-    case MaxError::Unit::kMetres:
-      break;
-  }
-  return "metres";
-}
-
-const char* atlas_name(AtlasMode mode) {
-  switch (mode) {
-    case AtlasMode::kAlways:
-      return "always";
-    case AtlasMode::kNever:
-      return "never";
-    case AtlasMode::kWhereItPays:
-      break;
-  }
-  return "where it pays";
-}
-
-const char* positions_name(const BakeRequest& request) {
-  if (!request.positions) return "auto";
-  return *request.positions == PositionKind::kHalf ? "half" : "int16";
 }
 
 const char* layout_name(const LayoutRecord& layout) {
@@ -251,12 +222,9 @@ Json pattern_json(const BundleView& bundle, std::uint32_t index) {
 }  // namespace
 
 std::string bundle_meta(const BakeRequest& request, const Report& report, const BakeTrace& trace) {
-  const auto name = [](const std::string& path) {
-    return std::filesystem::path(path).filename().string();
-  };
   Json models = Json::array();
   for (const ModelRequest& asked : request.models) {
-    Json model = {{"file", name(asked.path)}};
+    Json model = {{"file", file_name(asked.path)}};
     if (asked.name != file_stem(asked.path)) model.set("name", asked.name);
     if (models.size() < report.uprights.size()) {
       model.set("up", upright_json(report.uprights[models.size()]));
@@ -271,7 +239,7 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
   }
   Json patterns = Json::array();
   for (const PatternRequest& pattern : request.patterns) {
-    Json stated = {{"file", name(pattern.path)}, {"width_mm", pattern.width_mm}};
+    Json stated = {{"file", file_name(pattern.path)}, {"width_mm", pattern.width_mm}};
     if (!pattern.shape.flat()) stated.set("shape", pattern.shape.text);
     if (pattern.name != file_stem(pattern.path)) stated.set("name", pattern.name);
     if (patterns.size() < trace.ranges.size() && trace.ranges[patterns.size()]) {
@@ -291,33 +259,23 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
                    {"turn", Json::list(scene.turn)},
                    {"centred", scene.centred},
                    {"offset_sides", Json::list(scene.offset.value)}};
-    if (!scene.light.empty()) stated.set("light", name(scene.light));
+    if (!scene.light.empty()) stated.set("light", file_name(scene.light));
     scenes.push_back(std::move(stated));
   }
-  const Json options = {{"device", request.device},
-                        {"tier", request.tier},
-                        {"lods", request.levels},
-                        {"max_error", request.max_error.value},
-                        {"max_error_unit", max_error_unit(request.max_error)},
-                        {"positions", positions_name(request)},
-                        {"occlusion", request.occlusion},
-                        {"shadows", request.shadows},
-                        {"topology", request.topology},
-                        {"atlas", atlas_name(request.atlas)},
-                        {"effort", static_cast<int>(request.textures.effort)},
-                        {"perceptual", request.textures.perceptual},
-                        {"max_texture", request.textures.max_side},
-                        {"mipmaps", request.textures.mipmaps},
-                        {"loop_views", request.loop.trial_views},
-                        {"score", request.loop.score},
-                        {"unit_metres", request.unit_metres},
-                        {"up", request.up ? up_axis_name(*request.up) : ""}};
   const Json meta = {{"tool", "modar " + request.tool_version},
                      {"models", models},
                      {"patterns", patterns},
                      {"scenes", scenes},
-                     {"options", options}};
+                     {"options", state_options(request)}};
   return meta.dump();
+}
+
+std::vector<std::string> parameters_of(const BundleContent& content) {
+  std::vector<std::string> names;
+  for (const ParameterSetRecord& set : content.parameter_sets) {
+    names.push_back(content.names.substr(set.name.offset, set.name.length));
+  }
+  return names.empty() ? std::vector<std::string>{"none"} : names;
 }
 
 std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint32_t model) {

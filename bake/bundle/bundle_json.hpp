@@ -19,6 +19,9 @@ namespace modar {
 /// What the report says of the models and the trace of the patterns stands beside each.
 std::string bundle_meta(const BakeRequest& request, const Report& report, const BakeTrace& trace);
 
+/// The parameter sets that a bundle's patterns are described with, as BakeRequest::parameters.
+std::vector<std::string> parameters_of(const BundleContent& content);
+
 /// What the bundle states of a model's topology and of its levels of detail. Nothing where it was
 /// baked without them, or by others.
 std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint32_t model);

@@ -12,6 +12,7 @@
 #include "bake/bundle/light_image.hpp"
 #include "bake/import/read_model.hpp"
 #include "formats/base/nearest.hpp"
+#include "formats/base/path.hpp"
 
 namespace modar {
 namespace {
@@ -77,10 +78,6 @@ Result<void> check_model(const std::string& path) {
 }
 
 }  // namespace
-
-std::string file_stem(const std::string& path) {
-  return fs::path(path).stem().string();
-}
 
 Result<void> name_assets(BakeRequest& request) {
   MODAR_TRY(name_files(request.models, "model"));

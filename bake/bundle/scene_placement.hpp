@@ -8,46 +8,12 @@
 
 #include <glm/gtc/quaternion.hpp>
 
-#include "bake/up_axis.hpp"
+#include "bake/options/request.hpp"
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
 
 namespace modar {
-
-/// How large the model is on its pattern.
-struct SceneSize {
-  enum class Kind : std::uint8_t {
-    kScale,   ///< the value is a factor on: largest side of the model = that of the pattern
-    kHeight,  ///< millimetres above the pattern, from the lowest to the highest point
-    kWidth    ///< millimetres along the pattern's x axis
-  };
-  Kind kind = Kind::kScale;
-  double value = 1.0;
-};
-
-/// A shift along the pattern's axes, after everything else.
-struct SceneOffset {
-  enum class Unit : std::uint8_t {
-    kUsual,  ///< millimetres where the pattern's width is known, else the pattern's side
-    kSide,   ///< the pattern's largest side
-    kMillimetres
-  };
-  Unit unit = Unit::kUsual;
-  std::array<double, 3> value{};
-};
-
-/// A scene as the user asks for it.
-struct SceneRequest {
-  std::string pattern;  ///< names, see name_assets()
-  std::string model;
-  SceneSize size;
-  std::optional<UpAxis> up;      ///< points out of the pattern; nothing: as find_up() says
-  std::array<double, 3> turn{};  ///< degrees about the pattern's x, y and z, in this order
-  bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
-  SceneOffset offset;
-  std::string light;  ///< picture of its room, see read_light(); empty: a neutral room
-};
 
 /// Model axes to pattern axes: `up` to +z, then degrees about the pattern's x, y and z.
 glm::dquat rotation_of(UpAxis up, const std::array<double, 3>& turn);

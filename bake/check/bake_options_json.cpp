@@ -1,39 +1,30 @@
 // Reads the options of a bake back from the meta text that bundle_meta() wrote.
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <limits>
-#include <map>
-#include <nlohmann/json.hpp>
 
-#include "bake/bundle/request_text.hpp"
 #include "bake/check/source_check.hpp"
-#include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/json.hpp"
+#include "bake/options/options.hpp"
+#include "bake/options/request_text.hpp"
+#include "formats/base/path.hpp"
 
 namespace modar {
 namespace {
 
-using Json = nlohmann::json;
+/// A member of that type; what it is without it. The text may be anyone's.
+std::string text_in(const Json& stated, const char* key) {
+  return stated.find(key).value_or(Json()).text().value_or("");
+}
+double number_in(const Json& stated, const char* key, double otherwise) {
+  return stated.find(key).value_or(Json()).number().value_or(otherwise);
+}
 
-constexpr std::uint32_t kLeastTextureSide = 4;  // as the command line has it
-
-/// Takes a key over where it is there and of that type: the text may be anyone's.
-template <class T>
-void take(const Json& options, const char* key, T& value) {
-  const auto found = options.find(key);
-  if (found == options.end()) return;
-  if constexpr (std::is_same_v<T, bool>) {
-    if (found->is_boolean()) value = found->get<bool>();
-  } else if constexpr (std::is_same_v<T, std::string>) {
-    if (found->is_string()) value = found->get<std::string>();
-  } else if constexpr (std::is_integral_v<T>) {
-    // Numbers beyond the type would be cast to anything.
-    if (found->is_number_integer() && *found >= 0 && *found <= std::numeric_limits<T>::max()) {
-      value = found->get<T>();
-    }
-  } else {
-    if (found->is_number()) value = found->get<T>();
-  }
+/// The objects of an array of the document.
+std::vector<Json> entries_of(const Json& document, const char* kind) {
+  const Json list = document.find(kind).value_or(Json());
+  std::vector<Json> entries;
+  for (std::size_t i = 0; list.is_array() && i < list.size(); ++i) entries.push_back(*list.at(i));
+  return entries;
 }
 
 /// A name of a scene or a pattern that is among the sources: others cannot be baked.
@@ -44,10 +35,10 @@ bool is_given(const Range& sources, const std::string& name) {
 }
 
 void take_three(const Json& stated, const char* key, std::array<double, 3>& values) {
-  const auto found = stated.find(key);
-  if (found == stated.end() || !found->is_array() || found->size() != values.size()) return;
+  const Json list = stated.find(key).value_or(Json());
+  if (!list.is_array() || list.size() != values.size()) return;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if ((*found)[i].is_number()) values[i] = (*found)[i].get<double>();
+    values[i] = list.at(i)->number().value_or(values[i]);
   }
 }
 
@@ -55,152 +46,79 @@ void take_three(const Json& stated, const char* key, std::array<double, 3>& valu
 /// names come first, and two files of one name are told apart by the user alone.
 template <class Asset>
 void read_names(const Json& document, const char* kind, std::vector<Asset>& assets) {
-  const auto entries = document.find(kind);
-  if (entries == document.end() || !entries->is_array()) return;
-  for (const Json& stated : *entries) {
-    std::string file;
-    std::string name;
-    if (!stated.is_object()) continue;
-    take(stated, "file", file);
-    take(stated, "name", name);
+  for (const Json& stated : entries_of(document, kind)) {
+    const std::string file = text_in(stated, "file");
+    const std::string name = text_in(stated, "name");
     const auto same = [&](const Asset& asset) {
-      return asset.name.empty() && std::filesystem::path(asset.path).filename().string() == file;
+      return asset.name.empty() && file_name(asset.path) == file;
     };
     if (name.empty() || std::count_if(assets.begin(), assets.end(), same) != 1) continue;
     std::find_if(assets.begin(), assets.end(), same)->name = name;
   }
 }
 
-/// A picture among the sources that lights a scene and is no pattern of the bundle.
-std::string take_light(const Json& document, const std::string& file, BakeRequest& request) {
-  const auto named = [&file](const PatternRequest& pattern) {
-    return std::filesystem::path(pattern.path).filename().string() == file;
-  };
-  const auto patterns = document.find("patterns");
-  if (patterns != document.end() && patterns->is_array()) {
-    for (const Json& stated : *patterns) {
-      std::string other;
-      if (stated.is_object()) take(stated, "file", other);
-      if (other == file) return "";
-    }
-  }
-  const auto found = std::find_if(request.patterns.begin(), request.patterns.end(), named);
-  if (file.empty() || found == request.patterns.end()) return "";
-  return found->path;
-}
-
 void read_scenes(const Json& document, BakeRequest& request) {
-  const auto scenes = document.find("scenes");
-  if (scenes == document.end() || !scenes->is_array()) return;
-  for (const Json& stated : *scenes) {
-    if (!stated.is_object()) continue;
+  for (const Json& stated : entries_of(document, "scenes")) {
     SceneRequest scene;
-    take(stated, "pattern", scene.pattern);
-    take(stated, "model", scene.model);
-    take(stated, "scale", scene.size.value);
-    std::string up;
-    take(stated, "up", up);
-    scene.up = up_axis_of(up);
-    take(stated, "centred", scene.centred);
+    scene.pattern = text_in(stated, "pattern");
+    scene.model = text_in(stated, "model");
+    scene.size.value = number_in(stated, "scale", scene.size.value);
+    scene.up = up_axis_of(text_in(stated, "up"));
+    scene.centred = stated.find("centred").value_or(Json()).truth().value_or(false);
     take_three(stated, "turn", scene.turn);
     scene.offset.unit = SceneOffset::Unit::kSide;
     take_three(stated, "offset_sides", scene.offset.value);
-    std::string light;
-    take(stated, "light", light);
-    scene.light = take_light(document, light, request);
+    scene.light = source_picture(request, text_in(stated, "light"));
     if (is_given(request.models, scene.model) && is_given(request.patterns, scene.pattern)) {
       request.scenes.push_back(scene);
     }
   }
-  std::erase_if(request.patterns, [&request](const PatternRequest& pattern) {
-    return std::any_of(request.scenes.begin(), request.scenes.end(),
-                       [&](const SceneRequest& scene) { return scene.light == pattern.path; });
-  });
 }
 
 /// The widths and shapes that patterns were baked with, where the user gives none.
 void read_widths(const Json& document, BakeRequest& request) {
-  const auto patterns = document.find("patterns");
-  if (patterns == document.end() || !patterns->is_array()) return;
-  for (const Json& stated : *patterns) {
-    if (!stated.is_object()) continue;
-    std::string file;
-    std::string shape;
-    double width = 0;
-    take(stated, "file", file);
-    take(stated, "width_mm", width);
-    take(stated, "shape", shape);
+  for (const Json& stated : entries_of(document, "patterns")) {
+    const std::string file = text_in(stated, "file");
+    const double width = number_in(stated, "width_mm", 0);
+    const auto shape = parse_shape(text_in(stated, "shape"));
     for (PatternRequest& pattern : request.patterns) {
-      const bool same = std::filesystem::path(pattern.path).filename().string() == file;
-      if (same && pattern.width_mm == 0 && width > 0) pattern.width_mm = width;
-      const auto known = parse_shape(shape);
-      if (same && pattern.shape.flat() && known) pattern.shape = *known;
+      if (file_name(pattern.path) != file) continue;
+      if (pattern.width_mm == 0 && width > 0) pattern.width_mm = width;
+      if (pattern.shape.flat() && shape) pattern.shape = *shape;
     }
   }
+}
+
+/// Pictures among the sources that give light and are no patterns of the bundle.
+void leave_out_lights(const Json& document, BakeRequest& request) {
+  const std::vector<Json> patterns = entries_of(document, "patterns");
+  std::erase_if(request.patterns, [&](const PatternRequest& pattern) {
+    const bool lights =
+        pattern.path == request.light ||
+        std::any_of(request.scenes.begin(), request.scenes.end(),
+                    [&](const SceneRequest& scene) { return scene.light == pattern.path; });
+    return lights && std::none_of(patterns.begin(), patterns.end(), [&](const Json& stated) {
+             return text_in(stated, "file") == file_name(pattern.path);
+           });
+  });
 }
 
 }  // namespace
 
 void read_bake_options(std::string_view meta, BakeRequest& request) {
-  const Json document = Json::parse(meta, nullptr, false);
-  if (!document.is_object()) return;
+  const Json document = Json::parse(meta);
   read_names(document, "models", request.models);
   read_names(document, "patterns", request.patterns);
   if (!name_assets(request)) return;
   read_scenes(document, request);
   read_widths(document, request);
-  if (!document.contains("options")) return;
-  const Json& options = document["options"];
-  if (!options.is_object()) return;
-  take(options, "device", request.device);
-  if (!request.device.empty() && !plan_for_device(request.device, request)) request.device.clear();
-  std::string tier;
-  take(options, "tier", tier);
-  static_cast<void>(plan_for_tier(tier, request));
-  int effort = static_cast<int>(request.textures.effort);
-  take(options, "effort", effort);
-  if (effort >= 0 && effort <= static_cast<int>(TextureEffort::kBest)) {
-    request.textures.effort = static_cast<TextureEffort>(effort);
+  if (const Json options = document.find("options").value_or(Json()); !options.keys().empty()) {
+    // Of bundles that were baked before there was any.
+    request.occlusion = request.shadows = false;
+    request.atlas = AtlasMode::kNever;
+    restore_options(options, request);
   }
-  take(options, "perceptual", request.textures.perceptual);
-  std::uint32_t side = request.textures.max_side;
-  take(options, "max_texture", side);
-  if (side >= kLeastTextureSide && side <= kMaxTextureSide) request.textures.max_side = side;
-  std::uint32_t levels = request.levels;
-  take(options, "lods", levels);
-  if (levels >= 1 && levels <= kMaxLevels) request.levels = levels;
-  take(options, "mipmaps", request.textures.mipmaps);
-  TrackerRecordOptions loop = request.loop;
-  take(options, "loop_views", loop.trial_views);
-  take(options, "score", loop.score);
-  if (loop.validate()) request.loop = loop;
-  // Of bundles that were baked before there was any.
-  request.occlusion = request.shadows = false;
-  request.atlas = AtlasMode::kNever;
-  take(options, "occlusion", request.occlusion);
-  take(options, "shadows", request.shadows);
-  take(options, "topology", request.topology);
-  take(options, "unit_metres", request.unit_metres);
-  take(options, "max_error", request.max_error.value);
-  const std::map<std::string, MaxError::Unit> units = {{"any", MaxError::Unit::kAny},
-                                                       {"source", MaxError::Unit::kSource},
-                                                       {"percent", MaxError::Unit::kPercent},
-                                                       {"metres", MaxError::Unit::kMetres}};
-  std::string word;
-  take(options, "max_error_unit", word);
-  if (const auto unit = units.find(word); unit != units.end())
-    request.max_error.unit = unit->second;
-  word.clear();
-  take(options, "positions", word);
-  if (word == "half") request.positions = PositionKind::kHalf;
-  if (word == "int16") request.positions = PositionKind::kInt16;
-  word.clear();
-  take(options, "up", word);
-  request.up = up_axis_of(word);
-  word.clear();
-  take(options, "atlas", word);
-  if (word == "always") request.atlas = AtlasMode::kAlways;
-  if (word == "where it pays") request.atlas = AtlasMode::kWhereItPays;
+  leave_out_lights(document, request);
 }
 
 }  // namespace modar

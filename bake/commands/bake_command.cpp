@@ -11,17 +11,15 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/bundle_json.hpp"
-#include "bake/bundle/request_text.hpp"
 #include "bake/check/reproduce.hpp"
+#include "bake/commands/bake_options.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/project_command.hpp"
 #include "bake/memory/memory_limit.hpp"
-#include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/options/request_text.hpp"
 #include "bake/output.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
-#include "modar/device_profile.hpp"
-#include "modar/features.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {
@@ -38,11 +36,7 @@ struct BakeCommand {
   std::vector<std::string> models;
   std::vector<std::string> patterns;
   std::vector<std::string> scenes;
-  std::string unit;
-  std::string max_error;
-  std::string device;
-  std::string tier;
-  std::string light;
+  OptionTexts texts;
   ProjectCommand project;
 };
 
@@ -64,6 +58,7 @@ Result<void> refuse_project_options(const BakeCommand& command) {
 /// Reads what the options say as text into the request.
 Result<void> complete(BakeCommand& command) {
   BakeRequest& request = command.request;
+  MODAR_TRY(take_texts(command.texts, request));
   for (const std::string& text : command.models) request.models.push_back(parse_model(text));
   for (const std::string& text : command.patterns) {
     MODAR_ASSIGN(PatternRequest pattern, parse_pattern(text));
@@ -71,18 +66,9 @@ Result<void> complete(BakeCommand& command) {
   }
   for (const std::string& text : command.scenes) {
     MODAR_ASSIGN(SceneRequest scene, parse_scene(text));
-    if (scene.light.empty()) scene.light = command.light;
+    if (scene.light.empty()) scene.light = request.light;
     request.scenes.push_back(std::move(scene));
   }
-  if (!command.unit.empty()) {
-    MODAR_ASSIGN(request.unit_metres, parse_unit(command.unit));
-  }
-  if (!command.max_error.empty()) {
-    MODAR_ASSIGN(request.max_error, parse_max_error(command.max_error));
-  }
-  request.light = command.light;
-  if (!command.tier.empty()) MODAR_TRY(plan_for_tier(command.tier, request));
-  if (!command.device.empty()) MODAR_TRY(plan_for_device(command.device, request));
   request.tool_version = MODAR_VERSION;
   return name_assets(request);
 }
@@ -262,88 +248,13 @@ void add_input_options(CommandLine& line, BakeCommand& command) {
   line.option("-o,--output", &command.output, "Bundle to write", {.type = "OUT.modar"});
 }
 
-void add_target_options(CommandLine& line, BakeCommand& command) {
-  line.group("Units, light and target devices");
-  line.option("--unit", &command.unit, "Unit of the models' coordinates: mm, cm, m, km, in, ft");
-  line.option("--light", &command.light,
-              "Radiance HDR panorama or photo of the room that lights scenes without a light=FILE",
-              {.type = "FILE"});
-  line.option("--tier", &command.tier,
-              "Reduce models to thumb (20,000 triangles, textures of 512 pixels), phone (100,000, "
-              "2048) or desktop (150,000, 4096)",
-              {.type = "TIER", .choices = {"thumb", "phone", "desktop"}});
-  line.option("--device", &command.device,
-              "Fit a device's texture size and GPU memory (" + device_profile_names() + ")",
-              {.type = "NAME"});
-}
-
-void add_geometry_options(CommandLine& line, BakeRequest& request, std::string& max_error) {
-  line.group("Geometry", Shown::kInFull);
-  line.option("--max-error", &max_error,
-              "Largest error of stored positions: in source units, as a percentage of the diagonal "
-              "(0.01%), or as a length (2mm, with --unit)",
-              {.type = "LENGTH"});
-  line.choice<PositionKind>(
-      "--positions", request.positions,
-      {{"half", PositionKind::kHalf}, {"int16", PositionKind::kInt16}},
-      "Position format: half or int16 (default: half; int16 or float if --max-error requires it)",
-      {.type = "FORMAT"});
-  line.option("--lods", &request.levels,
-              "Most levels of detail, including the finest; each has half the triangles of the one "
-              "before (a quarter above a million)",
-              {.shows_default = true, .least = 1, .most = kMaxLevels});
-  line.flag("--no-lods", [&request] { request.levels = 1; }, "Store the finest level only",
-            {.excludes = "--lods"});
-  line.flag("!--no-shadows", request.shadows, "Do not bake models' shadows on their patterns");
-  line.flag("!--no-ao", request.occlusion, "Do not store ambient occlusion");
-  line.flag("--topology,!--no-topology", request.topology,
-            "Measure the models' topology and store the result in the bundle");
-}
-
-void add_texture_options(CommandLine& line, BakeRequest& request) {
-  TextureOptions& textures = request.textures;
-  line.group("Textures", Shown::kInFull);
-  line.option("--max-texture", &textures.max_side, "Longest side of a texture, in pixels",
-              {.shows_default = true, .least = 4, .most = kMaxTextureSide});
-  line.choice<TextureEffort>("--effort", textures.effort,
-                             {{"fast", TextureEffort::kFast},
-                              {"good", TextureEffort::kGood},
-                              {"best", TextureEffort::kBest}},
-                             "Effort of the ETC1 encoder: fast, good (default) or best",
-                             {.type = "EFFORT"});
-  line.flag(
-      "--atlas", [&request] { request.atlas = AtlasMode::kAlways; },
-      "Repack the used parts of textures onto shared pages (default: if it saves a third of the "
-      "bytes or half of the materials)");
-  line.flag("--no-atlas", [&request] { request.atlas = AtlasMode::kNever; },
-            "Keep textures separate", {.excludes = "--atlas"});
-  line.flag("!--no-mipmaps", textures.mipmaps, "Store level 0 of textures only");
-  line.flag("--perceptual", textures.perceptual, "Weight ETC1 errors by luma");
+void add_texture_gates(CommandLine& line, TextureOptions& textures) {
   line.option("--min-psnr", &textures.min_psnr_db, "Report textures below this PSNR, in dB");
   line.option("--min-ssim", &textures.min_ssim, "Report textures below this SSIM",
               {.least = 0, .most = 1});
   line.option("--texture-pictures", &textures.picture_folder,
               "Write each texture's source, decoded image and difference as PNG files",
               {.type = "DIR"});
-}
-
-void add_pattern_options(CommandLine& line, BakeRequest& request) {
-  line.group("Patterns", Shown::kInFull);
-  line.option(
-      "--loop-views", &request.loop.trial_views,
-      "Random views that test a pattern's features: fewer bake faster, more are more robust",
-      {.least = 1, .most = 10000});
-  std::vector<std::string> sets = {"none"};
-  std::string names = "none";
-  for (const ParameterSetRecord& set : paper_parameter_sets()) {
-    sets.emplace_back(parameter_set_name(set.id));
-    names += ", " + sets.back();
-  }
-  line.option(
-      "--parameters", &request.parameters,
-      "Keypoints of the ModAR paper's method to store as well: " + names + " (default: all)",
-      {.type = "SET,SET", .choices = sets, .separator = ','});
-  line.flag("!--no-score", request.loop.score, "Do not score the patterns");
 }
 
 void add_run_options(CommandLine& line, BakeCommand& command) {
@@ -369,10 +280,15 @@ void add_bake(CommandLine& program) {
   request.jobs = std::max(1u, std::thread::hardware_concurrency());
   add_input_options(line, *command);
   add_project_options(line, command->project);
-  add_target_options(line, *command);
-  add_geometry_options(line, request, command->max_error);
-  add_texture_options(line, request);
-  add_pattern_options(line, request);
+  line.group("Units, light and target devices");
+  add_bake_options(line, OptionGroup::kTarget, request, command->texts);
+  line.group("Geometry", Shown::kInFull);
+  add_bake_options(line, OptionGroup::kGeometry, request, command->texts);
+  line.group("Textures", Shown::kInFull);
+  add_bake_options(line, OptionGroup::kTextures, request, command->texts);
+  add_texture_gates(line, request.textures);
+  line.group("Patterns", Shown::kInFull);
+  add_bake_options(line, OptionGroup::kPatterns, request, command->texts);
   add_run_options(line, *command);
   line.footer(
       example("  modar bake --model spider.obj --pattern box.png:210mm"

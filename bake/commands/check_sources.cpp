@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "bake/bundle/request_text.hpp"
 #include "bake/check/text_check.hpp"
 #include "bake/commands/check_command.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/options/request_text.hpp"
 #include "bake/output.hpp"
 #include "bake/project/project.hpp"
 #include "bake/terminal.hpp"

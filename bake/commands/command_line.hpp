@@ -88,22 +88,10 @@ class CommandLine {
             const OptionRules& rules = {});
   /// The same, but --name=N sets another number than `plain`.
   void flag(const std::string& names, int& value, int plain, const std::string& help);
-  /// One of several words.
-  template <class Enum>
-  void choice(const std::string& names, Enum& value, const std::map<std::string, Enum>& words,
-              const std::string& help, const OptionRules& rules = {}) {
-    choose(
-        names, [&value](int chosen) { value = static_cast<Enum>(chosen); }, numbers(words), help,
-        rules);
-  }
-  template <class Enum>
-  void choice(const std::string& names, std::optional<Enum>& value,
-              const std::map<std::string, Enum>& words, const std::string& help,
-              const OptionRules& rules = {}) {
-    choose(
-        names, [&value](int chosen) { value = static_cast<Enum>(chosen); }, numbers(words), help,
-        rules);
-  }
+  /// One of several words; takes its number.
+  void choose(const std::string& names, std::function<void(int)> take,
+              const std::map<std::string, int>& words, const std::string& help,
+              const OptionRules& rules = {});
 
   /// Printed below the options.
   void footer(const std::string& text);
@@ -127,15 +115,6 @@ class CommandLine {
   [[nodiscard]] Error explained(const std::exception& error) const;
   /// The help of the command that `words` name, in full where the last one is "all".
   [[nodiscard]] Result<std::string> help(std::vector<std::string> words) const;
-  void choose(const std::string& names, std::function<void(int)> take,
-              const std::map<std::string, int>& words, const std::string& help,
-              const OptionRules& rules);
-  template <class Enum>
-  static std::map<std::string, int> numbers(const std::map<std::string, Enum>& words) {
-    std::map<std::string, int> numbers;
-    for (const auto& [word, value] : words) numbers[word] = static_cast<int>(value);
-    return numbers;
-  }
 
   std::unique_ptr<Parts> parts_;
   std::vector<std::string> words_;

@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/bundle/request_text.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/json.hpp"
+#include "bake/options/request_text.hpp"
 #include "bake/output.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/terminal.hpp"
+#include "formats/base/path.hpp"
 #include "modar/camera_file.hpp"
 
 namespace modar {

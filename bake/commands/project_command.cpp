@@ -307,9 +307,14 @@ namespace {
 struct InitCommand {
   std::string folder = ".";
   bool force = false;
+  bool schema = false;
 };
 
 Result<ExitCode> run_init(const InitCommand& command) {
+  if (command.schema) {
+    std::fputs(project_schema().c_str(), stdout);
+    return ExitCode::kOk;
+  }
   const std::string path =
       (std::filesystem::path(command.folder) / kProjectFile).lexically_normal();
   std::error_code error;
@@ -529,6 +534,7 @@ void add_init(CommandLine& program) {
   line.option("folder", &command->folder, "Folder to search, with its subfolders",
               {.shows_default = true});
   line.flag("--force", command->force, "Replace an existing modar.toml");
+  line.flag("--schema", command->schema, "Print the JSON schema of modar.toml, and write nothing");
   line.footer(example("  modar init museum && cd museum && modar bake\n"));
   line.run([command] { return run_init(*command); });
 }

@@ -18,7 +18,7 @@ namespace modar {
 namespace {
 
 /// A name of a bundle as a file name: no folders, no control characters, no leading dot.
-std::string file_name(std::string_view name) {
+std::string clean_name(std::string_view name) {
   std::string clean;
   for (const char c : name) {
     const bool bad = c == '/' || c == '\\' || c == ':' || (c >= 0 && c < 0x20);
@@ -73,7 +73,7 @@ std::span<const std::byte> Extraction::plane(std::uint32_t texture, const Textur
 Result<void> Extraction::textures() {
   for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
     const TextureRecord& texture = bundle_.textures()[t];
-    const std::string stem = file_name(bundle_.name(texture.name));
+    const std::string stem = clean_name(bundle_.name(texture.name));
     std::vector<KtxLevel> levels;
     for (std::uint32_t l = 0; l < texture.level_count; ++l) {
       const TextureLevelRecord& level = bundle_.texture_levels()[texture.first_level + l];
@@ -97,12 +97,12 @@ Result<void> Extraction::textures() {
 
 Result<void> Extraction::patterns() {
   for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) {
-    const std::string stem = file_name(bundle_.name(bundle_.patterns()[p].name));
+    const std::string stem = clean_name(bundle_.name(bundle_.patterns()[p].name));
     for (std::uint32_t s = 0; s < bundle_.parameter_sets().size(); ++s) {
       const ParameterSetRecord& set = bundle_.parameter_sets()[s];
       const std::string_view yml = bundle_.feature_yml(p, set.id);
       if (yml.empty()) continue;
-      const std::string name = stem + "." + file_name(bundle_.name(set.name));
+      const std::string name = stem + "." + clean_name(bundle_.name(set.name));
       if (auto written = write_file(path_for(name, ".yml"), yml); !written) return written;
     }
   }
@@ -112,7 +112,7 @@ Result<void> Extraction::patterns() {
 Result<void> Extraction::models() {
   const std::vector<GlbImage> images = decoded_textures(bundle_);
   for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
-    const std::string stem = file_name(bundle_.name(bundle_.models()[m].name));
+    const std::string stem = clean_name(bundle_.name(bundle_.models()[m].name));
     if (auto written = write_glb(bundle_, m, images, path_for(stem, ".glb")); !written) {
       return written;
     }
@@ -120,7 +120,7 @@ Result<void> Extraction::models() {
   for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) {
     const std::vector<RoomModel> placed = models_in_room(bundle_, p);
     if (placed.empty()) continue;
-    const std::string stem = file_name(bundle_.name(bundle_.patterns()[p].name));
+    const std::string stem = clean_name(bundle_.name(bundle_.patterns()[p].name));
     MODAR_ASSIGN(const auto file, encode_usdz(bundle_, placed, images));
     MODAR_TRY(write_file(path_for(stem, ".usdz"), std::span<const std::byte>(file)));
   }

@@ -12,6 +12,7 @@
 #include "bake/lab/light_bench.hpp"
 #include "bake/lab/render_bench.hpp"
 #include "bake/process.hpp"
+#include "formats/base/path.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"

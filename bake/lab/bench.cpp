@@ -18,6 +18,7 @@
 #include "bake/lab/ship_bench.hpp"
 #include "bake/lab/wild_bench.hpp"
 #include "bake/terminal.hpp"
+#include "formats/base/path.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 

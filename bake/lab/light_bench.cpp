@@ -21,6 +21,7 @@
 #include "bake/lab/render_bench.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/process.hpp"
+#include "formats/base/path.hpp"
 #include "formats/bundle_writer.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/scene_placement.hpp"
 #include "bake/check/device_rules.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/image/image.hpp"

@@ -15,6 +15,7 @@
 #include "bake/pattern/score.hpp"
 #include "bake/pattern/view_kernel.hpp"
 #include "bake/pattern/view_render.hpp"
+#include "formats/base/path.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/features.hpp"
 #include "modar/pose.hpp"
@@ -545,14 +546,6 @@ std::vector<TrackerPatchRecord> choose_patches(const std::vector<ViewLevel>& lev
   return patches;
 }
 
-std::string base_name(std::string_view path) {
-  const std::size_t slash = path.find_last_of("/\\");
-  std::string_view name = slash == std::string_view::npos ? path : path.substr(slash + 1);
-  const std::size_t dot = name.find_last_of('.');
-  if (dot != std::string_view::npos && dot > 0) name = name.substr(0, dot);
-  return std::string(name);
-}
-
 Result<FeatureContent> paper_features(const GrayImage& image,
                                       const ParameterSetRecord& parameters) {
   MODAR_ASSIGN(auto features, describe_image(image, parameters));
@@ -636,7 +629,7 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                   ""});
   }
   PatternFeatures out;
-  out.name = base_name(path);
+  out.name = file_stem(path);
   out.record.width = static_cast<std::uint32_t>(gray.width);
   out.record.height = static_cast<std::uint32_t>(gray.height);
   out.record.width_mm = shaped.width_mm;

@@ -114,8 +114,7 @@ class ProjectBake {
     Settings settings = project_.settings;
     for (const auto& [key, value] : tier.settings) settings[key] = value;
     for (const auto& [key, value] : asset.settings) settings[key] = value;
-    settings =
-        settings_of(settings, asset.pattern ? Setting::Part::kPattern : Setting::Part::kModel);
+    settings = settings_of(settings, asset.pattern ? OptionPart::kPattern : OptionPart::kModel);
     for (std::size_t i = 0; i < tasks_.size(); ++i) {
       if (tasks_[i].asset == &asset && tasks_[i].settings == settings) return i;
     }
@@ -239,7 +238,8 @@ class ProjectBake {
 
   /// Empty where the key of an asset is not known yet.
   [[nodiscard]] std::string link_of(const Target& target) const {
-    std::string text = program_ + "\n" + joined(settings_in(target)) + gates_text();
+    std::string text =
+        program_ + "\n" + joined(settings_in(target)) + gates_text() + project_.light + "\n";
     for (const auto* list : {&target.models, &target.patterns}) {
       for (const std::size_t index : *list) {
         const Task& task = tasks_[index];
@@ -462,6 +462,7 @@ class ProjectBake {
     BakeRequest described;
     MODAR_TRY(apply_settings(settings_in(target), described));
     described.tool_version = options_.tool_version;
+    if (!project_.light.empty()) described.light = project_.path(project_.light);
     for (const ProjectScene* scene : target.scenes) {
       described.scenes.push_back(scene->request);
       std::string& light = described.scenes.back().light;

@@ -11,6 +11,7 @@
 #include "bake/input.hpp"
 #include "bake/mesh/upright.hpp"
 #include "bake/mesh/weld/weld.hpp"
+#include "bake/options/options.hpp"
 #include "bake/process.hpp"
 #include "bake/project/project.hpp"
 
@@ -197,6 +198,19 @@ std::string up_line(const Found& found, const std::string& model) {
          "\"        # axis that points up: " + std::string(up_reason_words(up->reason)) + "\n";
 }
 
+/// Options of [bake] that a collection often sets, each commented out with an example.
+std::string suggestions() {
+  constexpr std::string_view kOften[] = {"device", "effort", "unit", "max-error", "up"};
+  std::string text;
+  for (const BakeOption& option : bake_options()) {
+    if (std::find(std::begin(kOften), std::end(kOften), option.key) == std::end(kOften)) continue;
+    std::string line = "#" + std::string(option.key) + " = " + quoted(option.example, false);
+    line.resize(std::max<std::size_t>(line.size(), 26), ' ');
+    text += line + "# " + option_summary(option) + "\n";
+  }
+  return text;
+}
+
 /// Pairs in order, where names do not say what belongs together.
 std::string scenes(const Found& found, const std::vector<std::string>& models,
                    const std::vector<std::string>& patterns) {
@@ -248,12 +262,9 @@ Result<InitialProject> initial_project(const std::string& folder) {
       "#light = \"room.hdr\"      # panorama or photo of the room whose light falls on the "
       "scenes\n\n"
       "[bake]\n"
-      "parameters = [\"none\"]     # the ModAR paper's features are for other programs only\n"
-      "#device = \"ace2\"          # plan textures for a device\n"
-      "#effort = \"best\"          # of textures: fast, good, best\n"
-      "#unit = \"mm\"              # of the models' coordinates\n"
-      "#max-error = \"0.01%\"      # of positions\n"
-      "#up = \"z\"                 # axis of all models that points up; else as each file says\n\n"
+      "parameters = [\"none\"]     # the ModAR paper's features are for other programs only\n" +
+      suggestions() +
+      "\n"
       "#[[tier]]                 # the same bundles once more, for other devices\n"
       "#name = \"low\"\n"
       "#device = \"mali400\"\n"

@@ -66,6 +66,7 @@ struct Project {
   std::string folder;             ///< its folder, with a slash at its end; empty: the current one
   std::string out = "out";        ///< folder of the bundles, relative to the project's
   std::string cache;              ///< folder of the cache, relative; empty: kCacheFolder
+  std::string light;              ///< of scenes that name none, relative; empty: none
   std::set<std::string> folders;  ///< that its globs look into, as the current folder sees them
   std::vector<ProjectAsset> models;
   std::vector<ProjectAsset> patterns;
@@ -99,6 +100,9 @@ struct InitialProject {
 /// (hidden ones and `out` left out). A picture that a model uses as a texture is no pattern.
 /// Errors: kIo "io.folder"; kInvalidInput "project.nothing" where there are none.
 Result<InitialProject> initial_project(const std::string& folder);
+
+/// The JSON schema of project files: modar.schema.json.
+std::string project_schema();
 
 struct ProjectOptions {
   std::string cache;            ///< folder; empty: the project's

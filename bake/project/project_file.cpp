@@ -13,10 +13,11 @@
 #include <optional>
 #include <set>
 
-#include "bake/bundle/request_text.hpp"
+#include "bake/options/request_text.hpp"
 #include "bake/project/project.hpp"
 #include "bake/project/settings.hpp"
 #include "formats/base/nearest.hpp"
+#include "formats/base/path.hpp"
 
 namespace modar {
 namespace {
@@ -119,15 +120,15 @@ class TableReader {
 
   /// The settings of the bake that stand in this table.
   Result<void> take_settings(Settings& settings) const {
-    for (const Setting& setting : all_settings()) {
-      if (!has(setting.key)) continue;
+    for (const BakeOption& option : bake_options()) {
+      if (option.part == OptionPart::kProject || !has(option.key)) continue;
       std::string value;
-      MODAR_TRY(take_setting(setting, value));
-      settings[setting.key] = value;
+      MODAR_TRY(take_setting(option, value));
+      settings[option.key] = value;
       BakeRequest trial;
-      if (auto good = setting.apply(value, trial); !good) {
-        return fail(ExitCode::kInvalidInput, "project.value", at(setting.key),
-                    std::string(setting.key) + ": " + good.error().cause, good.error().cure);
+      if (auto good = take_option(option, value, trial); !good) {
+        return fail(ExitCode::kInvalidInput, "project.value", at(option.key),
+                    std::string(option.key) + ": " + good.error().cause, good.error().cure);
       }
     }
     return {};
@@ -157,22 +158,23 @@ class TableReader {
     return {};
   }
 
-  Result<void> take_setting(const Setting& setting, std::string& value) const {
-    if (setting.kind == Setting::Kind::kTruth) {
+  Result<void> take_setting(const BakeOption& option, std::string& value) const {
+    const auto* word = std::get_if<WordOption>(&option.value);
+    if (std::holds_alternative<TruthOption>(option.value) || (word != nullptr && word->truth)) {
       bool truth = false;
-      MODAR_TRY(take(setting.key, truth));
+      MODAR_TRY(take(option.key, truth));
       value = truth ? "true" : "false";
-    } else if (setting.kind == Setting::Kind::kNumber) {
+    } else if (std::holds_alternative<NumberOption>(option.value)) {
       double number = 0;
-      MODAR_TRY(take(setting.key, number, 0));
+      MODAR_TRY(take(option.key, number, 0));
       value = std::to_string(static_cast<long long>(number));
-      if (number != std::floor(number)) return wrong(setting.key, "a whole number");
-    } else if (setting.kind == Setting::Kind::kTexts) {
+      if (number != std::floor(number)) return wrong(option.key, "a whole number");
+    } else if (std::holds_alternative<WordsOption>(option.value)) {
       std::vector<std::string> words;
-      MODAR_TRY(take(setting.key, words));
-      for (const std::string& word : words) value += (value.empty() ? "" : ",") + word;
+      MODAR_TRY(take(option.key, words));
+      for (const std::string& one : words) value += (value.empty() ? "" : ",") + one;
     } else {
-      MODAR_TRY(take(setting.key, value));
+      MODAR_TRY(take(option.key, value));
     }
     return {};
   }
@@ -238,10 +240,12 @@ std::vector<std::string> expand(const std::string& folder, const std::string& pa
   return files;
 }
 
-/// part: nothing for those of all parts.
-Keys keys_with_settings(Keys keys, std::optional<Setting::Part> part) {
-  for (const Setting& setting : all_settings()) {
-    if (!part || setting.part == *part) keys.push_back(setting.key);
+/// part: nothing for those of [bake].
+Keys keys_with_settings(Keys keys, std::optional<OptionPart> part) {
+  for (const BakeOption& option : bake_options()) {
+    if (part ? option.part == *part : option.part != OptionPart::kProject) {
+      keys.push_back(option.key);
+    }
   }
   return keys;
 }
@@ -318,7 +322,7 @@ class ProjectReader {
     MODAR_TRY(keep_inside(*reader, "out", project_.out));
     MODAR_TRY(reader->take("cache", project_.cache));
     MODAR_TRY(keep_inside(*reader, "cache", project_.cache));
-    return take_light(*reader, light_);
+    return take_light(*reader, project_.light);
   }
 
   /// A name that files get: none of another folder, none that a terminal takes for a command.
@@ -363,8 +367,8 @@ class ProjectReader {
   Result<void> read_assets(const std::string& kind, bool pattern,
                            std::vector<ProjectAsset>& assets) {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, kind));
-    Keys keys = keys_with_settings({"file", "name"},
-                                   pattern ? Setting::Part::kPattern : Setting::Part::kModel);
+    Keys keys =
+        keys_with_settings({"file", "name"}, pattern ? OptionPart::kPattern : OptionPart::kModel);
     if (pattern) keys.insert(keys.end(), {"width-mm", "shape"});
     std::set<std::string> seen;
     for (const TableReader& reader : readers) {
@@ -437,7 +441,7 @@ class ProjectReader {
       MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
       MODAR_TRY(read_placement(reader, scene.request));
       MODAR_TRY(reader.take("centred", scene.request.centred));
-      scene.request.light = light_;
+      scene.request.light = project_.light;
       MODAR_TRY(take_light(reader, scene.request.light));
       MODAR_TRY(reader.take("text", scene.texts));
       MODAR_TRY(reader.take("alt", scene.alts));
@@ -499,7 +503,7 @@ class ProjectReader {
         ProjectScene scene;
         scene.request.pattern = pattern.name;
         scene.request.model = model.name;
-        scene.request.light = light_;
+        scene.request.light = project_.light;
         project_.scenes.push_back(std::move(scene));
       }
     }
@@ -543,8 +547,7 @@ class ProjectReader {
 
   const toml::table& root_;
   Project project_;
-  std::string name_;   // of the only bundle
-  std::string light_;  // of scenes that name none
+  std::string name_;  // of the only bundle
 };
 
 }  // namespace

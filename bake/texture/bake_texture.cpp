@@ -8,6 +8,7 @@
 #include "bake/texture/coverage.hpp"
 #include "bake/texture/texture.hpp"
 #include "bake/texture/texture_quality.hpp"
+#include "formats/base/path.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -21,11 +22,6 @@ std::uint32_t nearest_power(std::uint32_t side, std::uint32_t limit) {
 
 std::uint64_t pixel_count(const RgbaImage& image) {
   return std::uint64_t{image.width} * image.height;
-}
-
-std::string file_name(const std::string& path) {
-  const std::size_t slash = path.find_last_of("/\\");
-  return slash == std::string::npos ? path : path.substr(slash + 1);
 }
 
 RgbaImage resized(const RgbaImage& image, const TextureOptions& options) {

@@ -11,9 +11,9 @@
 #include <set>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/bundle/request_text.hpp"
 #include "bake/check/text_check.hpp"
 #include "bake/image/image.hpp"
+#include "bake/options/request_text.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"

@@ -12,7 +12,7 @@ try:
 except ImportError:
     jsonschema = None
 
-from programs import COVER, POTTERY, ROOT, ProgramTest
+from programs import COVER, POTTERY, ROOT, ProgramTest, picture
 
 OURS = json.loads((ROOT / "bake" / "commands" / "check.schema.json").read_text())
 PROOF = json.loads((ROOT / "bake" / "lab" / "mutation.schema.json").read_text())
@@ -156,6 +156,28 @@ class Check(ProgramTest):
         self.assertGreater(model["stated_error"], 0)
         for way in ("source_to_bundle", "bundle_to_source"):
             self.assertLessEqual(model[way], model["stated_error"])
+
+    def test_bakes_with_other_lights_and_parameters_are_told_apart(self):
+        (self.folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1\nf 1 2 3\nf 1 3 4\n")
+        for name in ("card", "one", "two"):
+            picture(self.folder / f"{name}.png", 144, 108 if name == "card" else 120, mirrored=name == "two")
+        (self.folder / "other").mkdir()
+        shutil.copy(self.folder / "two.png", self.folder / "other/one.png")
+        fast = ["--loop-views", 8, "--no-score", "--no-lods", "--no-ao", "--no-shadows", "--quiet"]
+        baked = {}
+        for light in ("one", "two", "card"):
+            baked[light] = self.folder / f"lit-{light}.modar"
+            done = self.modar("bake", "--model", "a.obj", "--pattern", "card.png", "--light", f"{light}.png", *fast,
+                              "--parameters", "orb-500", "-o", baked[light])
+            self.assertEqual(done.returncode, 0, done.stderr)
+        sources = lambda *names: [word for name in ("a.obj", "card.png", *names) for word in ("--source", name)]
+        found = lambda document: {issue["id"] for issue in document["issues"]}
+        for light, given, ids in (("one", ["one.png"], set()), ("two", ["two.png"], set()), ("card", [], set()),
+                                  ("one", ["two.png"], {"SOURCE_MISSING"}), ("one", ["other/one.png"], {"SOURCE_SCENE"})):
+            done = self.modar("check", baked[light], "--json", *sources(*given))
+            self.assertEqual(found(json.loads(done.stdout)), ids, (light, given))
+        self.assertIn(b'"parameters": [\n      "orb-500"\n    ]', baked["one"].read_bytes())
+        self.assertIn(b'"light": "one.png"', baked["one"].read_bytes())
 
     def test_models_are_looked_at_beside_their_sources(self):
         path = self.folder / "pottery.modar"

@@ -140,7 +140,7 @@ class Files(ProjectTest):
         mistakes = [
             ("[bake]\neffrot = \"best\"\n", "modar.toml:2:1", "did you mean 'effort'", "project.key"),
             ("[modle]\n", "modar.toml:1", "did you mean 'model'", "project.key"),
-            ("[bake]\neffort = \"better\"\n", "modar.toml:2", "best, fast, good", "project.value"),
+            ("[bake]\neffort = \"better\"\n", "modar.toml:2", "fast, good, best", "project.value"),
             ("[bake]\nlods = 99\n", "modar.toml:2", "1 to 12", "project.value"),
             ("[bake]\nmipmaps = 1\n", "modar.toml:2", "true or false", "project.value"),
             ("[bake]\ndevice = \"ace3\"\n", "modar.toml:2", "ace2", "project.value"),
@@ -171,6 +171,10 @@ class Files(ProjectTest):
             done = self.modar("bake", cwd=self.place)
             known = done.stderr.split("the keys are ")[1].split(" [project.key]")[0].split(", ")
             self.assertEqual(sorted(known), sorted(properties), table)
+
+    def test_the_schema_is_that_of_the_program(self):
+        self.assertEqual(json.loads(self.modar("init", "--schema").stdout), SCHEMA,
+                         "stale: modar init --schema > bake/project/modar.schema.json")
 
     def test_the_schema_and_the_program_refuse_the_same(self):
         try:

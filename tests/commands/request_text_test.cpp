@@ -1,7 +1,9 @@
 // Text forms of options: what is taken, and what is refused with a cure.
-#include "bake/bundle/request_text.hpp"
+#include "bake/options/request_text.hpp"
 
 #include <gtest/gtest.h>
+
+#include "bake/bundle/bundle_builder.hpp"
 
 namespace modar {
 namespace {

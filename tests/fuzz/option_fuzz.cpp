@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "bake/bundle/request_text.hpp"
+#include "bake/options/request_text.hpp"
 #include "tests/fuzz/need.hpp"
 
 namespace {

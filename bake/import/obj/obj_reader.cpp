@@ -27,6 +27,7 @@
 #include "bake/import/read_model.hpp"
 #include "bake/import/source_model.hpp"
 #include "bake/import/up_comment.hpp"
+#include "formats/base/path.hpp"
 
 namespace modar {
 namespace {
@@ -431,13 +432,6 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
   return model;
 }
 
-std::string stem_of(const std::string& path) {
-  std::string name = path.substr(path.rfind('/') + 1);
-  const std::size_t dot = name.rfind('.');
-  if (dot != std::string::npos && dot > 0) name.resize(dot);
-  return name;
-}
-
 }  // namespace
 
 Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options) {
@@ -451,14 +445,14 @@ Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options
   const std::size_t slash = path.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
   auto result = parse_source(ByteSource(descriptor, static_cast<std::uint64_t>(status.st_size)),
-                             folder, stem_of(path), path, options);
+                             folder, file_stem(path), path, options);
   ::close(descriptor);
   return result;
 }
 
 Result<SourceModel> parse_obj(std::string_view text, const std::string& folder,
                               const std::string& label, const ReadOptions& options) {
-  return parse_source(ByteSource(text), folder, stem_of(label), label, options);
+  return parse_source(ByteSource(text), folder, file_stem(label), label, options);
 }
 
 }  // namespace modar

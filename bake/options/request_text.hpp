@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bake/bundle/bundle_builder.hpp"
+#include "bake/options/request.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "formats/base/error.hpp"
 

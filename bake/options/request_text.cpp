@@ -1,4 +1,4 @@
-#include "bake/bundle/request_text.hpp"
+#include "bake/options/request_text.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -1,0 +1,120 @@
+// What a bake is asked for: files, where models stand, and every option.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/pack/vertex_codec.hpp"
+#include "bake/pattern/pattern.hpp"
+#include "bake/texture/atlas.hpp"
+#include "bake/texture/texture.hpp"
+#include "bake/up_axis.hpp"
+#include "formats/base/error.hpp"
+
+namespace modar {
+
+/// A model file and what scenes call it.
+struct ModelRequest {
+  ModelRequest() = default;
+  ModelRequest(std::string file, std::string called = {})  // NOLINT: a path is a request
+      : path(std::move(file)), name(std::move(called)) {}
+
+  std::string path;
+  std::string name;  ///< empty: as name_assets() says
+};
+
+struct PatternRequest {
+  std::string path;
+  double width_mm = 0.0;  ///< 0: what the file or the shape states, or unknown
+  ShapeRequest shape{};   ///< what it is printed on; flat where nothing is told
+  std::string name = {};  ///< empty: as name_assets() says
+};
+
+/// How far packed positions may lie from the source's, as the user says it.
+struct MaxError {
+  enum class Unit : std::uint8_t { kAny, kSource, kPercent, kMetres };
+  Unit unit = Unit::kAny;
+  double value = 0.0;  ///< source units, percent of the model's diagonal, or metres
+};
+
+/// How large the model is on its pattern.
+struct SceneSize {
+  enum class Kind : std::uint8_t {
+    kScale,   ///< the value is a factor on: largest side of the model = that of the pattern
+    kHeight,  ///< millimetres above the pattern, from the lowest to the highest point
+    kWidth    ///< millimetres along the pattern's x axis
+  };
+  Kind kind = Kind::kScale;
+  double value = 1.0;
+};
+
+/// A shift along the pattern's axes, after everything else.
+struct SceneOffset {
+  enum class Unit : std::uint8_t {
+    kUsual,  ///< millimetres where the pattern's width is known, else the pattern's side
+    kSide,   ///< the pattern's largest side
+    kMillimetres
+  };
+  Unit unit = Unit::kUsual;
+  std::array<double, 3> value{};
+};
+
+/// A scene as the user asks for it.
+struct SceneRequest {
+  std::string pattern;  ///< names, see name_assets()
+  std::string model;
+  SceneSize size;
+  std::optional<UpAxis> up;      ///< points out of the pattern; nothing: as find_up() says
+  std::array<double, 3> turn{};  ///< degrees about the pattern's x, y and z, in this order
+  bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
+  SceneOffset offset;
+  std::string light;  ///< picture of its room, see read_light(); empty: a neutral room
+};
+
+struct BakeRequest {
+  std::vector<ModelRequest> models;
+  std::vector<PatternRequest> patterns;
+  std::vector<SceneRequest> scenes;
+  std::optional<UpAxis> up;  ///< of all models, for scenes that name none; nothing: see find_up()
+  std::string light;         ///< of scenes that name none
+  TextureOptions textures;
+  std::uint64_t texture_budget = 0;  ///< GPU bytes that all textures may take; 0: any
+  std::size_t most_triangles = 0;    ///< of each model, before its levels of detail; 0: any
+  bool shadows = true;               ///< of each scene's model on its pattern's plane
+  double unit_metres = 0.0;          ///< metres in a source unit of the models; 0: unknown
+  MaxError max_error;
+  std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
+  /// Of detail a chunk at most, the finest counted: halving ends before for all but huge chunks.
+  std::uint32_t levels = kMaxLevels;
+  bool occlusion = true;  ///< measure and store it; not beside int16 positions
+  AtlasMode atlas = AtlasMode::kWhereItPays;
+  bool topology = false;           ///< measure and state each model's
+  std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
+  std::string device;              ///< profile that it is planned for; empty: none
+  std::string tier;                ///< that it is made for; empty: none
+  unsigned jobs = 1;               ///< the bytes do not depend on it
+  TrackerRecordOptions loop;       ///< of patterns; its jobs are those above
+  /// The ModAR paper's parameter sets to describe patterns with; empty: all; "none": the tracker
+  /// record alone.
+  std::vector<std::string> parameters;
+  std::string tool_version;
+};
+
+/// Lowers texture sizes and their budget to what a device profile allows: half of its GPU memory,
+/// so that as much is left for vertices, camera picture and framebuffers. Errors: kUsage
+/// "device.unknown" that lists the names.
+Result<void> plan_for_device(const std::string& device, BakeRequest& request);
+
+/// Lowers triangles, texture sizes and their budget to what a tier allows: "thumb", "phone" or
+/// "desktop". Errors: kUsage "bake.tier" that lists the names.
+Result<void> plan_for_tier(const std::string& tier, BakeRequest& request);
+std::vector<std::string> tier_names();
+
+/// The path of the picture of that file name among the request's patterns; empty: there is none.
+std::string source_picture(const BakeRequest& request, const std::string& file);
+
+}  // namespace modar

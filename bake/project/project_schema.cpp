@@ -1,0 +1,156 @@
+// The JSON schema of modar.toml: the keys of its tables, and the options of the bake from their
+// table.
+#include "bake/options/options.hpp"
+#include "bake/project/project.hpp"
+
+namespace modar {
+namespace {
+
+/// What is no option of the bake.
+constexpr const char* kTables = R"({"$schema": "http://json-schema.org/draft-07/schema#",
+ "title": "modar.toml: a project of ModAR",
+ "type": "object", "additionalProperties": false,
+ "properties": {
+  "project": {"type": "object", "description": "Where things go", "additionalProperties": false,
+    "properties": {
+    "name": {"type": "string",
+      "description": "Of the bundle, out/NAME.modar; without it, the folder's"},
+    "out": {"type": "string", "default": "out", "description": "Folder of the bundles"},
+    "cache": {"type": "string", "default": ".modar/cache",
+      "description": "Folder of what is baked already; several machines may share it"}}},
+  "bake": {"type": "object", "description": "Options for all models and patterns",
+    "additionalProperties": false, "properties": {
+}},
+  "tier": {"type": "array", "items": {"type": "object",
+    "description": "The same bundles once more, for other devices",
+    "additionalProperties": false, "required": ["name"], "properties": {
+    "name": {"type": "string", "description": "Part of the files' names"}}}},
+  "model": {"type": "array", "items": {"type": "object",
+    "description": "Models: OBJ, glTF, GLB", "additionalProperties": false,
+    "required": ["file"], "properties": {
+    "file": {"type": ["string", "array"], "items": {"type": "string"},
+      "description": "Files, relative to this one: * ? [] match, **/ stands for any folders, a ! before it leaves files out"},
+    "name": {"type": "string",
+      "description": "What scenes call it; without it, the file's without extension"}}}},
+  "pattern": {"type": "array", "items": {"type": "object",
+    "description": "Pictures of flat things, frontal", "additionalProperties": false,
+    "required": ["file"], "properties": {
+    "file": {"type": ["string", "array"], "items": {"type": "string"},
+      "description": "Files, relative to this one: * ? [] match, **/ stands for any folders, a ! before it leaves files out"},
+    "name": {"type": "string",
+      "description": "What scenes call it; without it, the file's without extension"},
+    "width-mm": {"type": "number", "minimum": 0,
+      "description": "As printed, in millimetres; without it, what the file or the shape states"},
+    "shape": {"type": "string", "pattern": "^(cylinder|cone|box),",
+      "description": "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or box,size=120x180x40mm,right=right.png"}}}},
+  "scene": {"type": "array", "items": {"type": "object",
+    "description": "Which model stands on which pattern", "additionalProperties": false,
+    "required": ["pattern", "model"], "properties": {
+    "pattern": {"type": "string"},
+    "model": {"type": "string"},
+    "scale": {"type": "number", "exclusiveMinimum": 0, "default": 1,
+      "description": "Largest side of the model, in largest sides of the pattern"},
+    "height": {"type": "string",
+      "description": "Instead of a scale: from the lowest to the highest point, \"120mm\""},
+    "width": {"type": "string",
+      "description": "Instead of a scale: along the picture's width, \"80mm\""},
+    "up": {"enum": ["x", "y", "z", "-x", "-y", "-z"],
+      "description": "Axis of the model that points out of the pattern; without it, as its file and its geometry say"},
+    "turn": {"type": ["number", "array"], "items": {"type": "number"}, "minItems": 3,
+      "maxItems": 3,
+      "description": "Degrees about the axis out of the pattern, or about its x, y and z"},
+    "offset": {"type": ["array", "string"], "items": {"type": "number"}, "minItems": 3,
+      "maxItems": 3,
+      "description": "Right, up the picture, towards the camera: millimetres where the pattern's width is known, else its largest side; \"0:0:20mm\" names the unit"},
+    "centred": {"type": "boolean", "default": false,
+      "description": "The model's centre lies in the pattern's plane; else it stands on it"},
+    "light": {"type": "string",
+      "description": "Radiance HDR panorama or photo of the room whose light falls on it; without it, a neutral room's"},
+    "text": {"type": "object", "additionalProperties": {"type": "string"},
+      "description": "Words about it, by language: text.en = \"A vase.\""},
+    "alt": {"type": "object", "additionalProperties": {"type": "string"},
+      "description": "What is seen, for visitors who cannot see it, by language: alt.en = \"A red vase with two handles\""}}}},
+  "bundle": {"type": "array", "items": {"type": "object",
+    "description": "What goes into one file; models of the patterns' scenes come along",
+    "additionalProperties": false, "required": ["name"], "properties": {
+    "name": {"type": "string", "description": "Of the file, without extension"},
+    "models": {"type": ["string", "array"], "items": {"type": "string"},
+      "description": "Names, where * and ? match"},
+    "patterns": {"type": ["string", "array"], "items": {"type": "string"},
+      "description": "Names, where * and ? match"}}}},
+  "gates": {"type": "object", "description": "What a bundle has to reach to be written",
+    "additionalProperties": false, "properties": {
+    "min-psnr": {"type": "number", "minimum": 0, "description": "Of each texture, dB"},
+    "min-ssim": {"type": "number", "minimum": 0, "maximum": 1, "description": "Of each texture"},
+    "min-score": {"type": "number", "minimum": 0, "maximum": 100,
+      "description": "Of each pattern"},
+    "min-grade": {"enum": ["A", "B", "C", "D", "E"],
+      "description": "Of each pattern, A the best: from where it is recognised"},
+    "max-bytes": {"type": "integer", "minimum": 0, "description": "Of each file"}}}
+}})";
+
+/// What a value of modar.toml is.
+Json schema_of(const BakeOption& option) {
+  Json schema = Json::object();
+  const auto* word = std::get_if<WordOption>(&option.value);
+  const std::vector<std::string> choices = option_choices(option);
+  if (std::holds_alternative<WordsOption>(option.value)) {
+    schema.set("type", Json::list(std::vector<std::string>{"array", "string"}));
+    schema.set("items", {{"type", "string"}});
+  } else if (const auto* number = std::get_if<NumberOption>(&option.value)) {
+    schema.set("type", "integer");
+    schema.set("minimum", number->least);
+    schema.set("maximum", number->most);
+  } else if (!choices.empty()) {
+    schema.set("enum", Json::list(choices));
+  } else {
+    const bool truth =
+        std::holds_alternative<TruthOption>(option.value) || (word != nullptr && word->truth);
+    schema.set("type", truth ? "boolean" : "string");
+  }
+  if (Json usual = option_default(option); !usual.is_null()) {
+    schema.set("default", std::move(usual));
+  }
+  schema.set("description", option.help);
+  return schema;
+}
+
+/// Whether a table of the file may set an option.
+bool takes(const std::string& table, OptionPart part) {
+  if (table == "model") return part == OptionPart::kModel;
+  if (table == "pattern") return part == OptionPart::kPattern;
+  if (table == "project") return part == OptionPart::kProject;
+  return (table == "bake" || table == "tier") && part != OptionPart::kProject;
+}
+
+/// Adds the options of a table to its properties.
+Json with_options(Json table, const std::string& name) {
+  if (const auto items = table.find("items")) {
+    table.set("items", with_options(*items, name));
+    return table;
+  }
+  Json properties = table.find("properties").value_or(Json::object());
+  for (const BakeOption& option : bake_options()) {
+    if (!takes(name, option.part)) continue;
+    properties.set(option.key, {{"$ref", std::string("#/definitions/") + option.key}});
+  }
+  table.set("properties", std::move(properties));
+  return table;
+}
+
+}  // namespace
+
+std::string project_schema() {
+  Json schema = Json::parse(kTables);
+  Json tables = *schema.find("properties");
+  for (const std::string& name : tables.keys()) {
+    tables.set(name, with_options(*tables.find(name), name));
+  }
+  Json definitions = Json::object();
+  for (const BakeOption& option : bake_options()) definitions.set(option.key, schema_of(option));
+  schema.set("properties", std::move(tables));
+  schema.set("definitions", std::move(definitions));
+  return schema.dump();
+}
+
+}  // namespace modar
