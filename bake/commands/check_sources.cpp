@@ -58,12 +58,13 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
     }
     sources.texts->push_back({asked.pattern, asked.model, scene.texts, scene.alts});
   }
-  std::set<std::string> lights;
+  std::set<std::string> given;  // a light may be a pattern, too
+  for (const PatternRequest& pattern : sources.request.patterns) given.insert(pattern.path);
   for (const ProjectScene& scene : project.scenes) {
-    const std::string& light = scene.request.light;
-    if (light.empty() || !lights.insert(light).second) continue;
+    const std::string light = project.path(scene.request.light);
+    if (scene.request.light.empty() || !given.insert(light).second) continue;
     PatternRequest picture;
-    picture.path = project.path(light);
+    picture.path = light;
     sources.request.patterns.push_back(std::move(picture));
   }
   return {};
