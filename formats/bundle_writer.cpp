@@ -265,24 +265,24 @@ bool stream(const SectionList& list, std::uint16_t minor, const ByteSink& sink) 
 }  // namespace
 
 std::uint16_t minor_version_of(const BundleContent& content) {
-  const auto any = [&content](SectionType type) {
-    return std::any_of(content.extra.begin(), content.extra.end(),
-                       [type](const ExtraSection& section) {
-                         return section.type == static_cast<std::uint32_t>(type);
-                       });
+  std::uint16_t minor = 1;  // the content summary's
+  const auto need = [&minor](std::uint16_t since) { minor = std::max(minor, since); };
+  const auto need_section = [&need](SectionType type) {
+    need(section_since(static_cast<std::uint32_t>(type)));
   };
-  const bool shadowed = std::any_of(content.shadows.begin(), content.shadows.end(),
-                                    [](const auto& shadow) { return !shadow.empty(); });
-  const bool hiding =
-      std::any_of(content.materials.begin(), content.materials.end(),
-                  [](const MaterialRecord& m) { return (m.flags & kMaterialOccluder) != 0; });
-  const bool cut_out =
-      std::any_of(content.textures.begin(), content.textures.end(),
-                  [](const TextureRecord& t) { return (t.flags & kTextureCutOut) != 0; });
-  if (shadowed || hiding || any(kPatternColours) || any(kPatternShape) || any(kDrawOrder) ||
-      cut_out || !content.lights.empty() || !content.occlusion.empty())
-    return 2;
-  return 1;
+  for (const ExtraSection& section : content.extra) need(section_since(section.type));
+  for (const MaterialRecord& material : content.materials) {
+    need(flags_since("MaterialRecord", material.flags));
+  }
+  for (const TextureRecord& texture : content.textures) {
+    need(flags_since("TextureRecord", texture.flags));
+  }
+  for (const auto& shadow : content.shadows) {
+    if (!shadow.empty()) need_section(SectionType::kShadow);
+  }
+  if (!content.lights.empty()) need_section(SectionType::kLights);
+  if (!content.occlusion.empty()) need_section(SectionType::kOcclusion);
+  return minor;
 }
 
 NameRef BundleContent::intern(std::string_view name) {

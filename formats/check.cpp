@@ -587,7 +587,7 @@ bool is_tree(std::span<const DrawOrderRecord> nodes, std::size_t triangles) {
 
 void check_draw_orders(FaultLog& log, const BundleParts& parts) {
   for (const SectionEntry& entry : parts.sections) {
-    if (static_cast<SectionType>(entry.type) != kDrawOrder) continue;
+    if (static_cast<SectionType>(entry.type) != SectionType::kDrawOrder) continue;
     const std::span<const std::byte> bytes = section_bytes(parts, entry);
     const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
     const LevelRecord& level = parts.levels[parts.chunks[entry.owner].first_level];
@@ -604,12 +604,11 @@ void check_minor(FaultLog& log, const BundleParts& parts, bool accept_newer) {
   for (const SectionEntry& entry : parts.sections) {
     needed = std::max(needed, section_since(entry.type));
   }
-  constexpr std::uint16_t kFlagsSince = 2;
   for (std::uint32_t i = 0; i < parts.materials.size(); ++i) {
-    if ((parts.materials[i].flags & kMaterialOccluder) != 0) needed = kFlagsSince;
+    needed = std::max(needed, flags_since("MaterialRecord", parts.materials[i].flags));
   }
   for (std::uint32_t i = 0; i < parts.textures.size(); ++i) {
-    if ((parts.textures[i].flags & kTextureCutOut) != 0) needed = kFlagsSince;
+    needed = std::max(needed, flags_since("TextureRecord", parts.textures[i].flags));
   }
   const std::string states = "it states 1." + std::to_string(header.minor) + ", ";
   if (header.minor < needed) {

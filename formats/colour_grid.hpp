@@ -7,8 +7,6 @@
 
 namespace modar {
 
-/// owner: pattern, variant: 0; ColourGridHeader and its cells.
-inline constexpr SectionType kPatternColours{259};
 inline constexpr std::uint32_t kMaxColourCells = 16;  ///< across and down
 
 /// Mean colours of the picture's cells follow, columns * rows of them: red, green, blue, each 16

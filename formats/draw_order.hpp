@@ -11,9 +11,6 @@
 
 namespace modar {
 
-/// owner: chunk, variant: 0; the nodes of a tree of planes.
-inline constexpr SectionType kDrawOrder{262};
-
 /// A node of a tree over the triangles of a chunk's finest level; its subtrees follow it, the one
 /// behind its plane first. Fuchs, Kedem, Naylor, "On Visible Surface Generation by A Priori Tree
 /// Structures", 1980.

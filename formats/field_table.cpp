@@ -180,23 +180,25 @@ constexpr FieldInfo kKeypointRecord[] = {
     MODAR_FIELD(KeypointRecord, class_id)};
 #undef MODAR_FIELD
 
+// The table and its name are those of the registry.
+#define MODAR_TABLE(record)                                                                    \
+  {                                                                                            \
+#record, section_of_record(#record).name, section_of_record(#record).type, sizeof(record), \
+        k##record                                                                              \
+  }
 constexpr RecordInfo kRecords[] = {
-    {"ModelRecord", "models", SectionType::kModels, sizeof(ModelRecord), kModelRecord},
-    {"ChunkRecord", "chunks", SectionType::kChunks, sizeof(ChunkRecord), kChunkRecord},
-    {"LevelRecord", "levels", SectionType::kLevels, sizeof(LevelRecord), kLevelRecord},
-    {"MaterialRecord", "materials", SectionType::kMaterials, sizeof(MaterialRecord),
-     kMaterialRecord},
-    {"LayoutRecord", "layouts", SectionType::kLayouts, sizeof(LayoutRecord), kLayoutRecord},
-    {"TextureRecord", "textures", SectionType::kTextures, sizeof(TextureRecord), kTextureRecord},
-    {"TextureLevelRecord", "texture_levels", SectionType::kTextureLevels,
-     sizeof(TextureLevelRecord), kTextureLevelRecord},
-    {"PatternRecord", "patterns", SectionType::kPatterns, sizeof(PatternRecord), kPatternRecord},
-    {"ParameterSetRecord", "parameter_sets", SectionType::kParameterSets,
-     sizeof(ParameterSetRecord), kParameterSetRecord},
-    {"SceneRecord", "scenes", SectionType::kScenes, sizeof(SceneRecord), kSceneRecord},
-    {"LightRecord", "lights", SectionType::kLights, sizeof(LightRecord), kLightRecord},
-    {"OcclusionRecord", "occlusion", SectionType::kOcclusion, sizeof(OcclusionRecord),
-     kOcclusionRecord},
+    MODAR_TABLE(ModelRecord),
+    MODAR_TABLE(ChunkRecord),
+    MODAR_TABLE(LevelRecord),
+    MODAR_TABLE(MaterialRecord),
+    MODAR_TABLE(LayoutRecord),
+    MODAR_TABLE(TextureRecord),
+    MODAR_TABLE(TextureLevelRecord),
+    MODAR_TABLE(PatternRecord),
+    MODAR_TABLE(ParameterSetRecord),
+    MODAR_TABLE(SceneRecord),
+    MODAR_TABLE(LightRecord),
+    MODAR_TABLE(OcclusionRecord),
     {"FileHeader", nullptr, SectionType::kNames, sizeof(FileHeader), kFileHeader},
     {"SectionEntry", nullptr, SectionType::kNames, sizeof(SectionEntry), kSectionEntry},
     {"TableHeader", nullptr, SectionType::kNames, sizeof(TableHeader), kTableHeader},
@@ -210,6 +212,7 @@ constexpr RecordInfo kRecords[] = {
     {"DrawOrderRecord", nullptr, SectionType::kNames, sizeof(DrawOrderRecord), kDrawOrderRecord},
     {"ShadowHeader", nullptr, SectionType::kNames, sizeof(ShadowHeader), kShadowHeader},
 };
+#undef MODAR_TABLE
 
 }  // namespace
 

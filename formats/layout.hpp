@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "formats/sections.hpp"
+
 namespace modar {
 
 inline constexpr std::array<std::uint8_t, 8> kMagic = {0x89, 'M', 'O', 'D', 0x0D, 0x0A, 0x1A, 0x0A};
@@ -38,39 +40,6 @@ inline constexpr double kMostLight = 1e6;
 inline constexpr double kMostShapeNumber = 1e3;  ///< pattern units
 inline constexpr std::uint64_t kSectionAlignment = 64;
 inline constexpr std::uint64_t kGpuAlignment = 4096;
-
-/// Section types. 1-255 are tables and small text, 256 and up are payloads, so that everything that
-/// opening a bundle reads lies in its first pages.
-enum class SectionType : std::uint32_t {
-  kNames = 1,             ///< UTF-8 names, back to back
-  kMeta = 2,              ///< JSON text: how the bundle was baked
-  kStatement = 3,         ///< the content summary of version 1.0, which is no longer read
-  kContentSummary = 4,    ///< since 1.1: JSON lines derived from the rest, see content_summary.hpp
-  kModels = 16,           ///< table of ModelRecord
-  kChunks = 17,           ///< table of ChunkRecord
-  kLevels = 18,           ///< table of LevelRecord
-  kMaterials = 19,        ///< table of MaterialRecord
-  kLayouts = 20,          ///< table of LayoutRecord
-  kTextures = 32,         ///< table of TextureRecord
-  kTextureLevels = 33,    ///< table of TextureLevelRecord
-  kPatterns = 48,         ///< table of PatternRecord
-  kParameterSets = 49,    ///< table of ParameterSetRecord
-  kScenes = 64,           ///< table of SceneRecord
-  kLights = 65,           ///< since 1.2: table of LightRecord
-  kOcclusion = 66,        ///< since 1.2: table of OcclusionRecord
-  kMappedFeatures = 256,  ///< owner: pattern, variant: parameter set id; FeatureHeader and arrays
-  kFeatureYml = 257,      ///< owner: pattern, variant: parameter set id; OpenCV FileStorage text
-  kTrackerRecord = 258,   ///< owner: pattern, variant: 0; see tracker_record.hpp
-  kShadow = 260,          ///< since 1.2; owner: scene, variant: 0; ShadowHeader and its texels
-  kVertices = 512,        ///< GPU: merged vertex buffer of all models
-  kIndices = 513,         ///< GPU: merged 16-bit index buffer of all models
-  kTextureData = 514,     ///< GPU: owner: texture; ETC1 blocks of all its levels
-};
-
-enum SectionFlags : std::uint16_t {
-  kSectionRequired = 1,  ///< a reader that does not know the type must refuse the bundle
-  kSectionGpu = 2,       ///< offset is a multiple of kGpuAlignment
-};
 
 struct FileHeader {
   std::uint8_t magic[8];
@@ -175,11 +144,6 @@ struct LevelRecord {
 };
 static_assert(sizeof(LevelRecord) == 32);
 
-enum MaterialFlags : std::uint32_t {
-  kMaterialTwoSided = 1,
-  kMaterialOccluder = 2,  ///< since 1.2: hides what is behind it and shows the camera's picture
-};
-
 struct MaterialRecord {
   NameRef name;
   float ambient[3];
@@ -229,10 +193,6 @@ struct LayoutRecord {
 static_assert(sizeof(LayoutRecord) == 72);
 
 enum class TextureFormat : std::uint32_t { kEtc1Rgb = 1 };
-enum TextureFlags : std::uint32_t {
-  kTextureAlpha = 1,   ///< each level has a second ETC1 image whose luminance is alpha
-  kTextureRepeat = 2,  ///< uv leave [0,1]: wrap GL_REPEAT (sides are powers of two), else clamp
-};
 
 struct TextureRecord {
   NameRef name;

@@ -13,8 +13,6 @@
 
 namespace modar {
 
-/// owner: pattern, variant: 0; PatternShapeHeader, then the faces of kFaces.
-inline constexpr SectionType kPatternShape{261};
 inline constexpr std::uint32_t kMaxShapeFaces = 16;
 
 enum class ShapeKind : std::uint32_t {

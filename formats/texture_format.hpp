@@ -12,10 +12,6 @@
 
 namespace modar {
 
-/// Beside TextureFlags, since 1.2, with kTextureAlpha: there is something where alpha is 1/2 and
-/// more, and nothing elsewhere.
-inline constexpr std::uint32_t kTextureCutOut = 4;
-
 /// One of the formats that a bundle's textures can have.
 struct TextureFormatInfo {
   TextureFormat format;

@@ -1,5 +1,5 @@
 // The tracker record of a pattern: its features, patches and image, as the tracker uses them in
-// place (section type 258, owner: pattern, variant: 0). bundle.md is the normative text. Numbers
+// place (SectionType::kTrackerRecord). bundle.md is the normative text. Numbers
 // are little-endian, reserved fields are zero. Checker and tracker read it through
 // view_tracker_record().
 #pragma once

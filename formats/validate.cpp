@@ -21,50 +21,6 @@
 namespace modar {
 namespace {
 
-/// What the specification says about a section type.
-struct KnownType {
-  SectionType type;
-  std::uint16_t flags;
-  bool owned;               ///< owner and variant are used
-  std::uint16_t since = 0;  ///< minor version that added it
-};
-
-constexpr KnownType kKnownTypes[] = {
-    {SectionType::kNames, kSectionRequired, false},
-    {SectionType::kMeta, 0, false},
-    {SectionType::kStatement, 0, false},
-    {SectionType::kContentSummary, 0, false, 1},
-    {SectionType::kModels, kSectionRequired, false},
-    {SectionType::kChunks, kSectionRequired, false},
-    {SectionType::kLevels, kSectionRequired, false},
-    {SectionType::kMaterials, kSectionRequired, false},
-    {SectionType::kLayouts, kSectionRequired, false},
-    {SectionType::kTextures, kSectionRequired, false},
-    {SectionType::kTextureLevels, kSectionRequired, false},
-    {SectionType::kPatterns, kSectionRequired, false},
-    {SectionType::kParameterSets, kSectionRequired, false},
-    {SectionType::kScenes, kSectionRequired, false},
-    {SectionType::kLights, 0, false, 2},
-    {SectionType::kOcclusion, 0, false, 2},
-    {SectionType::kMappedFeatures, kSectionRequired, true},
-    {SectionType::kFeatureYml, 0, true},
-    {SectionType::kTrackerRecord, 0, true},
-    {kPatternColours, 0, true, 2},
-    {SectionType::kShadow, 0, true, 2},
-    {kPatternShape, 0, true, 2},
-    {kDrawOrder, 0, true, 2},
-    {SectionType::kVertices, kSectionRequired | kSectionGpu, false},
-    {SectionType::kIndices, kSectionRequired | kSectionGpu, false},
-    {SectionType::kTextureData, kSectionRequired | kSectionGpu, true},
-};
-
-const KnownType* known_type(std::uint32_t type) {
-  for (const KnownType& known : kKnownTypes) {
-    if (static_cast<std::uint32_t>(known.type) == type) return &known;
-  }
-  return nullptr;
-}
-
 auto key(const SectionEntry& entry) {
   return std::make_tuple(entry.type, entry.owner, entry.variant);
 }
@@ -127,7 +83,7 @@ void check_kind(const RecordCheck& check, const SectionEntry& entry, bool newer)
                 "flags " + std::to_string(entry.flags) + " have unknown bits");
   }
   check.reserved(&entry.reserved, sizeof(entry.reserved));
-  const KnownType* known = known_type(entry.type);
+  const SectionInfo* known = section_info(entry.type);
   if (known == nullptr) {
     if ((entry.flags & kSectionRequired) != 0) {
       check.fault(Rule::kSectionRequired, &entry.type,
@@ -145,7 +101,7 @@ void check_kind(const RecordCheck& check, const SectionEntry& entry, bool newer)
                 "section type " + std::to_string(entry.type) + " has flags " +
                     std::to_string(entry.flags) + ", not " + std::to_string(known->flags));
   }
-  if (!known->owned && (entry.owner != kNone || entry.variant != 0)) {
+  if (known->owner == SectionOwner::kNothing && (entry.owner != kNone || entry.variant != 0)) {
     check.fault(Rule::kSectionOwner, &entry.owner,
                 "section type " + std::to_string(entry.type) + " belongs to no record");
   }
@@ -231,11 +187,11 @@ void check_names(FaultLog& log, const BundleParts& parts) {
 }  // namespace
 
 bool known_section_type(std::uint32_t type) {
-  return known_type(type) != nullptr;
+  return section_info(type) != nullptr;
 }
 
 std::uint16_t section_since(std::uint32_t type) {
-  const KnownType* known = known_type(type);
+  const SectionInfo* known = section_info(type);
   return known != nullptr ? known->since : 0;
 }
 
@@ -429,7 +385,7 @@ void check_material(const RecordCheck& check, const BundleParts& parts,
   check.numbers(material.emission, "emission");
   check.number(material.shininess, "shininess");
   check.number(material.opacity, "opacity");
-  check.flags(material.flags, kMaterialTwoSided | kMaterialOccluder);
+  check.flags(material.flags, known_flags("MaterialRecord"));
   check.reserved(material.reserved, sizeof(material.reserved));
   if (material.texture != kNone && material.texture >= parts.textures.size()) {
     check.fault(Rule::kMaterialRange, &material.texture,
@@ -580,7 +536,7 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
   check.name(texture.name);
   check.number(texture.psnr_db, "psnr_db", 0.0, kMaxPsnr);
   check.number(texture.ssim, "ssim", -1.0, 1.0);
-  check.flags(texture.flags, kTextureAlpha | kTextureRepeat | kTextureCutOut);
+  check.flags(texture.flags, known_flags("TextureRecord"));
   if ((texture.flags & (kTextureAlpha | kTextureCutOut)) == kTextureCutOut) {
     check.fault(Rule::kTextureRange, &texture.flags, "it is cut out, and has no alpha");
   }
@@ -845,13 +801,13 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
       } else if (type == SectionType::kMappedFeatures) {
         check_twin(check, parts, entry, parts.parameter_sets[set]);
       }
-    } else if (type == kPatternColours) {
+    } else if (type == SectionType::kPatternColours) {
       check_colours(check, parts, entry);
-    } else if (type == kPatternShape) {
+    } else if (type == SectionType::kPatternShape) {
       check_shape(check, parts, entry);
     } else if (type == SectionType::kShadow) {
       check_shadow(check, parts, entry);
-    } else if (type == kDrawOrder) {
+    } else if (type == SectionType::kDrawOrder) {
       check_draw_order(check, parts, entry);
     } else if (type == SectionType::kTrackerRecord) {
       if (entry.owner >= parts.patterns.size() || entry.variant != 0) {

@@ -128,7 +128,7 @@ SHADOW = Record("width:I height:I low:2f high:2f reserved:2I")
 DRAW_ORDER = struct.Struct("<4f2I")
 KEYPOINT = struct.Struct("<5f2i")
 SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0}  # type: flags
-OWNED = {256: 1, 257: 0, 259: 0, 260: 0, 261: 0, 262: 0, 514: 3}
+OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 514: 3}
 SINCE = {4: 1, 65: 2, 66: 2, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 

@@ -142,7 +142,7 @@ void add_draw_orders(BundleContent& content) {
     const std::vector<DrawOrderRecord> nodes = draw_order(triangles);
     const auto bytes = std::as_bytes(std::span(nodes));
     ExtraSection section;
-    section.type = static_cast<std::uint32_t>(kDrawOrder);
+    section.type = static_cast<std::uint32_t>(SectionType::kDrawOrder);
     section.owner = c;
     section.bytes.assign(bytes.begin(), bytes.end());
     content.extra.push_back(std::move(section));
@@ -385,7 +385,7 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   content.extra.push_back(std::move(section));
   if (!baked->shape.empty()) {
     ExtraSection shape;
-    shape.type = static_cast<std::uint32_t>(kPatternShape);
+    shape.type = static_cast<std::uint32_t>(SectionType::kPatternShape);
     shape.owner = static_cast<std::uint32_t>(content.patterns.size());
     shape.bytes = std::move(baked->shape);
     content.extra.push_back(std::move(shape));
@@ -393,7 +393,7 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
     // A target file names a part of a picture, and on what is curved light changes from cell to
     // cell: their light is not estimated.
     ExtraSection colours;
-    colours.type = static_cast<std::uint32_t>(kPatternColours);
+    colours.type = static_cast<std::uint32_t>(SectionType::kPatternColours);
     colours.owner = static_cast<std::uint32_t>(content.patterns.size());
     MODAR_ASSIGN(colours.bytes, pattern_colours(request.path));
     content.extra.push_back(std::move(colours));
@@ -455,7 +455,7 @@ Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeReq
   content.shadows.resize(request.shadows ? scenes.size() : 0);
   for (std::uint32_t s = 0; s < content.shadows.size(); ++s) {
     const auto shaped = [&](const ExtraSection& section) {
-      return section.type == static_cast<std::uint32_t>(kPatternShape) &&
+      return section.type == static_cast<std::uint32_t>(SectionType::kPatternShape) &&
              section.owner == content.scenes[s].pattern;
     };
     // A shadow lies in a plane.

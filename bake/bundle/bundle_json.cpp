@@ -185,7 +185,7 @@ namespace {
 /// What the pattern is printed on; null: it is flat.
 Json shape_json(const BundleView& bundle, std::uint32_t index) {
   const PatternRecord& pattern = bundle.patterns()[index];
-  const auto bytes = bundle.section(kPatternShape, index);
+  const auto bytes = bundle.section(SectionType::kPatternShape, index);
   PatternSurface surface;
   if (bytes.empty() || view_pattern_shape(bytes, pattern.width, pattern.height, surface)) return {};
   if (!surface.faces().empty()) return {{"kind", "faces"}, {"faces", surface.faces().size()}};

@@ -128,7 +128,8 @@ class Linker {
 
   void add_chunks(const BundleView& part, const ModelRecord& model, std::uint32_t first_material) {
     for (std::uint32_t c = 0; c < part.chunks().size(); ++c) {
-      add_extra(part, kDrawOrder, c, static_cast<std::uint32_t>(content_.chunks.size()));
+      add_extra(part, SectionType::kDrawOrder, c,
+                static_cast<std::uint32_t>(content_.chunks.size()));
       ChunkRecord chunk = part.chunks()[c];
       chunk.material = chunk.material - model.first_material + first_material;
       chunk.first_level += static_cast<std::uint32_t>(content_.levels.size());
@@ -179,7 +180,8 @@ class Linker {
     const BundleView& part = linked.bundle;
     PatternRecord record = part.patterns()[0];
     record.name = content_.intern(linked.name);
-    for (const SectionType type : {SectionType::kTrackerRecord, kPatternColours, kPatternShape}) {
+    for (const SectionType type :
+         {SectionType::kTrackerRecord, SectionType::kPatternColours, SectionType::kPatternShape}) {
       add_extra(part, type, 0, static_cast<std::uint32_t>(content_.patterns.size()));
     }
     std::vector<FeatureContent> features;

@@ -227,7 +227,7 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
     bool shrunk = false;
     MODAR_ASSIGN(GrayPicture picture, load_pattern(path->path, shrunk));
     PatternSurface surface;
-    const auto shape = bundle.section(kPatternShape, p);
+    const auto shape = bundle.section(SectionType::kPatternShape, p);
     if (!shape.empty()) {
       static_cast<void>(view_pattern_shape(shape, record.width, record.height, surface));
       if (!surface.faces().empty()) picture = baked_picture(bundle, p);

@@ -395,8 +395,8 @@ class SourceCheck {
     const ModelRecord* other = namesake(again_->models, model.name);
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const std::uint32_t chunk = model.first_chunk + c;
-      if (equal(bundle_.section(kDrawOrder, chunk),
-                section_again(kDrawOrder, other->first_chunk + c))) {
+      if (equal(bundle_.section(SectionType::kDrawOrder, chunk),
+                section_again(SectionType::kDrawOrder, other->first_chunk + c))) {
         continue;
       }
       tell(WorkstationRule::kSourceColour,
@@ -706,12 +706,13 @@ class SourceCheck {
     if (!fault.empty()) {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern, fault);
     }
-    if (!equal(bundle_.section(kPatternShape, index), section_again(kPatternShape, which))) {
+    if (!equal(bundle_.section(SectionType::kPatternShape, index),
+               section_again(SectionType::kPatternShape, which))) {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
            "its shape is not the source's");
     }
-    if (!same_colours(bundle_.section(kPatternColours, index),
-                      section_again(kPatternColours, which))) {
+    if (!same_colours(bundle_.section(SectionType::kPatternColours, index),
+                      section_again(SectionType::kPatternColours, which))) {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
            "its colours, by which light is measured, are not the source's");
     }

@@ -169,9 +169,11 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
     out.add_records(record_info("TableHeader"), entry.offset, sizeof(TableHeader), 1);
     out.add_records(record, entry.offset + sizeof(TableHeader), header.stride, header.count);
   }
-  if (static_cast<SectionType>(entry.type) == kPatternColours) return add_colours(out, entry);
-  if (static_cast<SectionType>(entry.type) == kPatternShape) return add_shape(out, bundle, entry);
-  if (static_cast<SectionType>(entry.type) == kDrawOrder) {
+  if (static_cast<SectionType>(entry.type) == SectionType::kPatternColours)
+    return add_colours(out, entry);
+  if (static_cast<SectionType>(entry.type) == SectionType::kPatternShape)
+    return add_shape(out, bundle, entry);
+  if (static_cast<SectionType>(entry.type) == SectionType::kDrawOrder) {
     return out.add_records(record_info("DrawOrderRecord"), entry.offset, sizeof(DrawOrderRecord),
                            entry.size / sizeof(DrawOrderRecord));
   }

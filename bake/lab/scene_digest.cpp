@@ -102,7 +102,8 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
     const auto type = static_cast<SectionType>(entry.type);
     if (type != SectionType::kMappedFeatures && type != SectionType::kFeatureYml &&
         type != SectionType::kTrackerRecord && type != SectionType::kShadow &&
-        type != kPatternColours && type != kPatternShape && type != kDrawOrder) {
+        type != SectionType::kPatternColours && type != SectionType::kPatternShape &&
+        type != SectionType::kDrawOrder) {
       continue;
     }
     digest.add(&entry.type, sizeof entry.type);

@@ -454,7 +454,7 @@ class Page {
     for (std::size_t i = 0; i < image.pixels.size(); i += 4) gray.push_back(image.pixels[i]);
     const GrayImage view{gray.data(), static_cast<int>(image.width), static_cast<int>(image.height),
                          static_cast<std::ptrdiff_t>(image.width)};
-    const auto shape = bundle_.section(kPatternShape, index);
+    const auto shape = bundle_.section(SectionType::kPatternShape, index);
     MODAR_ASSIGN(const PatternScore score,
                  score_pattern(view, bundle_.section(SectionType::kTrackerRecord, index),
                                options_.jobs, {shape.begin(), shape.end()}));

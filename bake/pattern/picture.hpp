@@ -28,8 +28,8 @@ Result<GrayPicture> load_gray(const std::string& path);
 /// its longer side at most 720 pixels. shrunk: whether it was made smaller. Errors: also
 /// kUnsupported "pattern.mind", and those of load_target().
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
-/// The kPatternColours section of a picture: the mean colours of eight by eight cells, in linear
-/// light, transparent pixels as white paper. Errors: those of read_image().
+/// The SectionType::kPatternColours section of a picture: the mean colours of eight by eight cells,
+/// in linear light, transparent pixels as white paper. Errors: those of read_image().
 Result<std::vector<std::byte>> pattern_colours(const std::string& path);
 /// The PNG and JPEG files of a folder sorted by name, or the file itself. Errors: kIo
 /// "pictures.folder" where there is none.

@@ -55,7 +55,7 @@ struct PatternFeatures {
   std::vector<FeatureContent> features;  ///< one for each parameter set, in their order
   std::vector<std::byte> loop_record;    ///< a section of type kTrackerRecord
   std::optional<ScoreRange> range;       ///< where it is recognised; nothing: it was not scored
-  std::vector<std::byte> shape;          ///< a section of type kPatternShape; empty: flat
+  std::vector<std::byte> shape;  ///< a section of type SectionType::kPatternShape; empty: flat
 };
 
 /// Describes an image file for the tracker, and under the ModAR paper's parameter sets as YML with

@@ -46,8 +46,8 @@ struct PatternScore {
 /// runs the device's tracker on them: the range is where it is right, and the grade and the score
 /// follow from the range alone. The causes come from the picture and from the features that are
 /// matched again. A count of decisions, which depends neither on the machine nor on the number of
-/// threads. record: the picture's tracker record. shape: its kPatternShape section, empty: flat;
-/// views of others go around the shape. Errors: those of the tracker.
+/// threads. record: the picture's tracker record. shape: its SectionType::kPatternShape section,
+/// empty: flat; views of others go around the shape. Errors: those of the tracker.
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
                                    unsigned jobs, const std::vector<std::byte>& shape = {});
 

@@ -29,9 +29,10 @@ struct ShapeRequest {
   [[nodiscard]] bool flat() const { return kind == Kind::kFlat; }
 };
 
-/// The kPatternShape section of a picture of that size; empty where the request is flat. Not of
-/// boxes. width_mm: of the picture, along the surface; 0: filled in where the diameters tell it.
-/// Errors: kUsage "pattern.shape" where the parts contradict each other or are too few.
+/// The SectionType::kPatternShape section of a picture of that size; empty where the request is
+/// flat. Not of boxes. width_mm: of the picture, along the surface; 0: filled in where the
+/// diameters tell it. Errors: kUsage "pattern.shape" where the parts contradict each other or are
+/// too few.
 Result<std::vector<std::byte>> shape_section(const ShapeRequest& request, int width, int height,
                                              double& width_mm);
 

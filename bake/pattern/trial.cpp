@@ -52,7 +52,7 @@ void add_record(const GrayImage& pattern, std::vector<std::byte> record, BundleC
 void add_shape(const std::vector<std::byte>& shape, BundleContent& content) {
   if (shape.empty()) return;
   ExtraSection section;
-  section.type = static_cast<std::uint32_t>(kPatternShape);
+  section.type = static_cast<std::uint32_t>(SectionType::kPatternShape);
   section.owner = static_cast<std::uint32_t>(content.patterns.size() - 1);
   section.bytes = shape;
   content.extra.push_back(std::move(section));
@@ -110,7 +110,7 @@ Result<void> read_bundle(const std::string& path, std::vector<NamedPattern>& out
     const std::size_t size = std::size_t{view.header.width} * view.header.height;
     pattern.picture.pixels.assign(view.pixels.begin(),
                                   view.pixels.begin() + static_cast<std::ptrdiff_t>(size));
-    const auto shape = bundle.section(kPatternShape, i);
+    const auto shape = bundle.section(SectionType::kPatternShape, i);
     pattern.shape.assign(shape.begin(), shape.end());
     MODAR_ASSIGN(pattern.bundle, bundle_of_record(pattern.picture.view(),
                                                   {bytes.begin(), bytes.end()}, pattern.shape));

@@ -23,13 +23,14 @@ namespace modar {
 /// A bundle that holds that pattern's tracker record alone. Errors: those of bake_tracker_record().
 Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
                                                  const TrackerRecordOptions& options);
-/// The same with a record that is baked already. shape: its kPatternShape section; empty: flat.
+/// The same with a record that is baked already. shape: its SectionType::kPatternShape section;
+/// empty: flat.
 Result<std::vector<std::byte>> bundle_of_record(const GrayImage& pattern,
                                                 std::vector<std::byte> record,
                                                 const std::vector<std::byte>& shape = {});
 /// A bundle of patterns with a record each. A set other than null adds each pattern's features
 /// under that parameter set of the ModAR paper; a record that is empty is left out. shapes: the
-/// patterns' kPatternShape sections, or none where all are flat.
+/// patterns' SectionType::kPatternShape sections, or none where all are flat.
 Result<std::vector<std::byte>> bundle_of_records(
     std::span<const GrayPicture> patterns, std::span<const std::vector<std::byte>> records,
     const ParameterSetRecord* set = nullptr, std::span<const std::vector<std::byte>> shapes = {});
@@ -39,7 +40,7 @@ struct NamedPattern {
   std::string name;
   GrayPicture picture;
   std::vector<std::byte> bundle;   ///< holds its tracker record and shape alone
-  std::vector<std::byte> shape{};  ///< its kPatternShape section; empty: flat
+  std::vector<std::byte> shape{};  ///< its SectionType::kPatternShape section; empty: flat
 };
 
 /// The patterns of bundles (*.modar, from their tracker records) and of pictures, in the order of

@@ -84,7 +84,7 @@ Result<Hint> hint_of(const BundleView& bundle, std::uint32_t pattern) {
                 "it has no tracker record", "bake the bundle with this version of modar");
   }
   RgbaImage picture = gray_picture(record);
-  const auto colours = bundle.section(kPatternColours, pattern);
+  const auto colours = bundle.section(SectionType::kPatternColours, pattern);
   if (!colours.empty()) tint(picture, cell_colours(colours, picture.width, picture.height));
   for (int quality = 85;; quality -= 10) {
     MODAR_ASSIGN(std::vector<std::byte> file, encode_jpeg(picture, quality));

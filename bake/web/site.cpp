@@ -207,9 +207,12 @@ Result<Json> put_hint(Draft& draft, const BundleView& bundle, std::uint32_t patt
   const std::string name(bundle.name(bundle.patterns()[pattern].name));
   MODAR_ASSIGN(const Hint hint, hint_of(bundle, pattern));
   MODAR_TRY(put(draft, file, hint.file));
-  Json json = {{"name", name},          {"title", title_of(name)},
-               {"image", file},         {"width", hint.width},
-               {"height", hint.height}, {"flat", bundle.section(kPatternShape, pattern).empty()}};
+  Json json = {{"name", name},
+               {"title", title_of(name)},
+               {"image", file},
+               {"width", hint.width},
+               {"height", hint.height},
+               {"flat", bundle.section(SectionType::kPatternShape, pattern).empty()}};
   MODAR_ASSIGN(const Json texts, texts_of(draft, bundle, name));
   if (!texts.is_null()) json.set("texts", texts);
   return json;

@@ -230,8 +230,8 @@ FrameReport Player::begin_report(const Job& job) {
 void Player::outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                      Colour colour) const {
   PatternSurface surface;
-  const auto shape =
-      spot_ ? std::span<const std::byte>() : bundle_.section(kPatternShape, seen.pattern);
+  const auto shape = spot_ ? std::span<const std::byte>()
+                           : bundle_.section(SectionType::kPatternShape, seen.pattern);
   const bool flat = shape.empty() ||
                     view_pattern_shape(shape, bundle_.patterns()[seen.pattern].width,
                                        bundle_.patterns()[seen.pattern].height, surface) != nullptr;

@@ -254,7 +254,7 @@ void LightEstimator::observe(const CameraPicture& frame, const glm::mat4& projec
     const std::uint32_t pattern = bundle_.scenes()[item.scene].pattern;
     Watched& watched = patterns_[pattern];
     if (watched.light.known && frame_ < watched.looked + kLookPause) continue;
-    const auto colours = bundle_.section(kPatternColours, pattern);
+    const auto colours = bundle_.section(SectionType::kPatternColours, pattern);
     if (colours.empty()) continue;
     const PlaneLight light = look_at_pattern(frame, projection * item.world_to_eye,
                                              bundle_.patterns()[pattern], colours);

@@ -55,8 +55,8 @@ class LightEstimator {
 };
 
 /// One look, without the past. matrix: pattern plane (x right, y up, z = 0) to clip space of a
-/// viewport that shows the whole frame. colours: a kPatternColours section. Not known where less
-/// than a quarter of the pattern is seen, or what is seen is all black or all white.
+/// viewport that shows the whole frame. colours: a SectionType::kPatternColours section. Not known
+/// where less than a quarter of the pattern is seen, or what is seen is all black or all white.
 PlaneLight look_at_pattern(const CameraPicture& frame, const glm::mat4& matrix,
                            const PatternRecord& pattern, std::span<const std::byte> colours);
 

@@ -114,8 +114,8 @@ void ModelPainter::find_equals() {
 void ModelPainter::find_orders() {
   std::size_t most = 0;
   for (const SectionEntry& section : bundle_.sections()) {
-    if (section.type != static_cast<std::uint32_t>(kDrawOrder)) continue;
-    const auto bytes = bundle_.section(kDrawOrder, section.owner);
+    if (section.type != static_cast<std::uint32_t>(SectionType::kDrawOrder)) continue;
+    const auto bytes = bundle_.section(SectionType::kDrawOrder, section.owner);
     const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
     orders_.resize(bundle_.chunks().size());
     orders_[section.owner] = {first, bytes.size() / sizeof *first};

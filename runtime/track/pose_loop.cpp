@@ -205,8 +205,9 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
     if (bytes.empty()) continue;
-    MODAR_ASSIGN(const TrackedPattern pattern,
-                 tracker::view_tracked_pattern(bytes, i, bundle.section(kPatternShape, i)));
+    MODAR_ASSIGN(
+        const TrackedPattern pattern,
+        tracker::view_tracked_pattern(bytes, i, bundle.section(SectionType::kPatternShape, i)));
     state->patterns.push_back(pattern);
   }
   if (state->patterns.empty()) {

@@ -58,7 +58,7 @@ struct TrackedPattern {
 /// Views a section's bytes, which must outlive the pattern. Every count and offset is validated,
 /// and every feature and patch lies within the image: nothing later checks again. Errors:
 /// kInvalidInput "tracker.record"; kUnsupported "tracker.record-version". shape: of a
-/// kPatternShape section; none: flat.
+/// SectionType::kPatternShape section; none: flat.
 Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index,
                                             std::span<const std::byte> shape = {});
 

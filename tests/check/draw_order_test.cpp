@@ -109,7 +109,7 @@ double wrong_share(const std::string& path) {
     ADD_FAILURE() << to_line(content.error());
     return 1;
   }
-  EXPECT_EQ(std::ranges::count(content->extra, static_cast<std::uint32_t>(kDrawOrder),
+  EXPECT_EQ(std::ranges::count(content->extra, static_cast<std::uint32_t>(SectionType::kDrawOrder),
                                &ExtraSection::type),
             1);
   const std::vector<std::byte> bytes = *encode_bundle(*content);

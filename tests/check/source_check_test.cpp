@@ -237,7 +237,8 @@ TEST_F(SourceTest, FlagsColoursAndNamesAreThoseOfTheirSources) {
               }).count("SOURCE_COLOUR"));
   EXPECT_EQ(issues([](BundleContent& content) {
               for (ExtraSection& extra : content.extra) {
-                if (extra.type != static_cast<std::uint32_t>(kPatternColours)) continue;
+                if (extra.type != static_cast<std::uint32_t>(SectionType::kPatternColours))
+                  continue;
                 extra.bytes[sizeof(ColourGridHeader) + 1] ^= std::byte{0x40};
               }
             }),
@@ -298,7 +299,7 @@ TEST_F(SourceTest, CornersHaveTheShadesOfTheirSource) {
 TEST_F(SourceTest, GlassIsDrawnInTheOrderOfItsSource) {
   const DrawOrderRecord node{{0, 0, 1, 0}, 0, 0};
   ExtraSection order;
-  order.type = static_cast<std::uint32_t>(kDrawOrder);
+  order.type = static_cast<std::uint32_t>(SectionType::kDrawOrder);
   order.owner = 0;
   const auto bytes = std::as_bytes(std::span(&node, 1));
   order.bytes.assign(bytes.begin(), bytes.end());
@@ -313,7 +314,7 @@ TEST_F(SourceTest, PatternsHaveTheShapesOfTheirSources) {
   EXPECT_EQ(issues(), Ids());
   const Ids found = issues([](BundleContent& content) {
     std::erase_if(content.extra, [](const ExtraSection& extra) {
-      return extra.type == static_cast<std::uint32_t>(kPatternShape);
+      return extra.type == static_cast<std::uint32_t>(SectionType::kPatternShape);
     });
   });
   EXPECT_TRUE(found.count("SOURCE_PATTERN"));

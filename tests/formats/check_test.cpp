@@ -155,7 +155,9 @@ TEST(Check, CornersOfBoxesLieNearTheirPattern) {
       // The second pattern's: two faces.
       for (std::size_t i = 0; i < BundleView::open(b)->sections().size(); ++i) {
         const SectionEntry& entry = BundleView::open(b)->sections()[i];
-        if (entry.type != static_cast<std::uint32_t>(kPatternShape) || entry.owner != 1) continue;
+        if (entry.type != static_cast<std::uint32_t>(SectionType::kPatternShape) ||
+            entry.owner != 1)
+          continue;
         auto* face = reinterpret_cast<ShapeFaceRecord*>(b.data() + entry.offset +
                                                         sizeof(PatternShapeHeader));
         face->corner[2] = place;

@@ -369,7 +369,7 @@ namespace {
 void add_shapes(BundleContent& content) {
   const auto section = [&content](std::uint32_t pattern, const PatternShapeHeader& header) {
     ExtraSection out;
-    out.type = static_cast<std::uint32_t>(kPatternShape);
+    out.type = static_cast<std::uint32_t>(SectionType::kPatternShape);
     out.owner = pattern;
     const auto bytes = std::as_bytes(std::span(&header, 1));
     out.bytes.assign(bytes.begin(), bytes.end());
@@ -408,7 +408,7 @@ void add_looks(BundleContent& content) {
   content.materials[1].flags |= kMaterialOccluder;
   const ColourGridHeader grid{2, 1, {}};
   ExtraSection colours;
-  colours.type = static_cast<std::uint32_t>(kPatternColours);
+  colours.type = static_cast<std::uint32_t>(SectionType::kPatternColours);
   colours.owner = 1;
   const auto grid_bytes = std::as_bytes(std::span(&grid, 1));
   colours.bytes.assign(grid_bytes.begin(), grid_bytes.end());
@@ -417,7 +417,7 @@ void add_looks(BundleContent& content) {
   add_shapes(content);
   const std::uint32_t triangles = content.levels[content.chunks[1].first_level].index_count / 3;
   ExtraSection order;
-  order.type = static_cast<std::uint32_t>(kDrawOrder);
+  order.type = static_cast<std::uint32_t>(SectionType::kDrawOrder);
   order.owner = 1;
   for (std::uint32_t i = 0; i <= triangles; ++i) {
     // Turned by turns; the second node has a plane alone.

@@ -1,6 +1,8 @@
 // Holds the byte-offset tables of formats/bundle.md against the structs, in both directions.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cctype>
 #include <cstddef>
 #include <cstdint>
@@ -209,37 +211,56 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
     if (row.size() == 6 && std::isdigit(row[0][0]) != 0)
       rows[static_cast<unsigned>(std::stoul(row[0]))] = row;
   }
-  using modar::SectionType;
-  const std::map<SectionType, std::string> names = {
-      {SectionType::kNames, "names"},
-      {SectionType::kMeta, "meta"},
-      {SectionType::kStatement, "statement"},
-      {SectionType::kContentSummary, "content summary"},
-      {SectionType::kModels, "models"},
-      {SectionType::kChunks, "chunks"},
-      {SectionType::kLevels, "levels"},
-      {SectionType::kMaterials, "materials"},
-      {SectionType::kLayouts, "layouts"},
-      {SectionType::kTextures, "textures"},
-      {SectionType::kTextureLevels, "texture levels"},
-      {SectionType::kPatterns, "patterns"},
-      {SectionType::kParameterSets, "parameter sets"},
-      {SectionType::kScenes, "scenes"},
-      {SectionType::kLights, "lights"},
-      {SectionType::kOcclusion, "occlusion"},
-      {SectionType::kMappedFeatures, "feature twin"},
-      {SectionType::kFeatureYml, "feature text"},
-      {SectionType::kTrackerRecord, "tracker record"},
-      {modar::kPatternColours, "pattern colours"},
-      {SectionType::kShadow, "shadow"},
-      {modar::kPatternShape, "pattern shape"},
-      {modar::kDrawOrder, "draw order"},
-      {SectionType::kVertices, "vertices"},
-      {SectionType::kIndices, "indices"},
-      {SectionType::kTextureData, "texture data"}};
-  EXPECT_EQ(rows.size(), names.size());
-  for (const auto& [type, name] : names) {
-    EXPECT_EQ(rows[static_cast<unsigned>(type)].at(1), name);
+  const char* const owners[] = {"NONE", "pattern", "scene", "chunk", "texture"};
+  EXPECT_EQ(rows.size(), modar::kSections.size());
+  for (const modar::SectionInfo& section : modar::kSections) {
+    const auto& row = rows[static_cast<unsigned>(section.type)];
+    ASSERT_EQ(row.size(), 6U) << section.name;
+    std::string name = section.name;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    EXPECT_EQ(row[1], name);
+    EXPECT_NE(row[2].find(section.record), std::string::npos) << name;
+    const std::string since = "since 1." + std::to_string(section.since);
+    EXPECT_EQ(row[2].find("since") == std::string::npos ? 0 : row[2].find(since), 0U) << name;
+    EXPECT_EQ(row[2].starts_with("since"), section.since != 0) << name;
+    EXPECT_EQ(row[2].starts_with("table of") || row[2].find(": table of") != std::string::npos,
+              std::string(section.record).ends_with("Record") &&
+                  static_cast<unsigned>(section.type) < 256)
+        << name;
+    const bool required = (section.flags & modar::kSectionRequired) != 0;
+    const bool gpu = (section.flags & modar::kSectionGpu) != 0;
+    EXPECT_EQ(row[3], gpu ? "required, GPU" : required ? "required" : "0") << name;
+    EXPECT_EQ(row[4], owners[static_cast<std::size_t>(section.owner)]) << name;
+  }
+}
+
+TEST(SpecTable, FlagsAreTheSpecifiedOnes) {
+  std::ifstream file(std::string(std::getenv("MODAR_SOURCE_DIR")) + "/formats/bundle.md");
+  std::map<std::string, std::string> flags;  // the bits of each record
+  std::string record;
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("### ")) record = line.substr(4, line.find(" (") - 4);
+    if (line.find("| flags | bit 0") != std::string::npos) flags[record] = line;
+  }
+  std::map<std::string, std::uint32_t> known;
+  for (const modar::FlagInfo& info : modar::kFlags) {
+    const std::string bit = "bit " + std::to_string(std::countr_zero(info.flag));
+    const auto at = flags[info.record].find(bit);
+    ASSERT_NE(at, std::string::npos) << info.record << " " << bit;
+    const std::string since = " (since 1." + std::to_string(info.since);
+    EXPECT_EQ(flags[info.record].compare(at + bit.size(), since.size(), since) == 0,
+              info.since != 0)
+        << info.record << " " << bit;
+    known[info.record] |= info.flag;
+  }
+  for (const auto& [name, line] : flags) {
+    std::uint32_t bits = 0;
+    for (std::size_t at = 0; (at = line.find("bit ", at)) != std::string::npos; at += 4) {
+      if (std::isdigit(line[at + 4]) != 0) bits |= 1U << (line[at + 4] - '0');
+    }
+    // "with bit 0" repeats one.
+    EXPECT_EQ(bits, known[name]) << name;
+    EXPECT_EQ(modar::known_flags(name), known[name]) << name;
   }
 }
 

@@ -58,7 +58,7 @@ unsigned touch(std::string_view text) {
 
 /// Walks over a chunk's draw order as the renderer does: each triangle once.
 unsigned walk_order(const BundleView& view, std::uint32_t chunk) {
-  const auto bytes = view.section(kDrawOrder, chunk);
+  const auto bytes = view.section(SectionType::kDrawOrder, chunk);
   if (bytes.empty()) return 0;
   const LevelRecord& level = view.levels()[view.chunks()[chunk].first_level];
   const auto indices = view.indices().subspan(level.index_offset, level.index_count * 2);
@@ -77,7 +77,7 @@ unsigned walk_order(const BundleView& view, std::uint32_t chunk) {
 
 /// Looks for the light of a frame that shows the whole pattern.
 unsigned look(const BundleView& view, std::uint32_t pattern) {
-  const auto colours = view.section(kPatternColours, pattern);
+  const auto colours = view.section(SectionType::kPatternColours, pattern);
   if (colours.empty()) return 0;
   std::vector<std::uint8_t> pixels(3 * 16 * 16);
   for (std::size_t i = 0; i < pixels.size(); ++i)

@@ -89,7 +89,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   section.bytes.assign(std::as_bytes(all).begin(), std::as_bytes(all).end());
   content.extra.push_back(std::move(section));
   ExtraSection shape;
-  shape.type = static_cast<std::uint32_t>(kPatternShape);
+  shape.type = static_cast<std::uint32_t>(SectionType::kPatternShape);
   shape.owner = 0;
   shape.bytes = shape_of(all.last(8));
   if (!shape.bytes.empty()) content.extra.push_back(std::move(shape));

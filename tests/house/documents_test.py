@@ -3,6 +3,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import unittest
 
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
@@ -37,6 +38,19 @@ def commands_in(text):
 
 
 class Documents(unittest.TestCase):
+    def test_the_second_reader_has_the_section_types_of_the_specification(self):
+        sys.path.insert(0, str(ROOT / "scripts"))
+        from bundle_bytes import OWNED, SINCE, SINGLES, TABLES
+        rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in
+                (ROOT / "formats/bundle.md").read_text().partition("## Section types")[2].partition("\n### ")[0].splitlines()
+                if re.match(r"\| \d", line)]
+        flags = {"0": 0, "required": 1, "required, GPU": 3}
+        self.assertEqual(SINGLES, {int(row[0]): flags[row[3]] for row in rows if row[4] == "NONE"})
+        self.assertEqual(OWNED, {int(row[0]): flags[row[3]] for row in rows if row[4] != "NONE"})
+        self.assertEqual(SINCE, {int(row[0]): int(row[2][8]) for row in rows if row[2].startswith("since 1.")})
+        self.assertEqual({kind: name for kind, (name, _) in TABLES.items()},
+                         {int(row[0]): row[1].replace(" ", "_") for row in rows if "table of" in row[2]})
+
     def test_issues_md_is_fresh(self):
         printed = subprocess.run([str(MODAR), "check", "--list-issues"], capture_output=True, text=True, check=True)
         self.assertEqual((ROOT / "ISSUES.md").read_text(), printed.stdout,

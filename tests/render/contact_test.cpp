@@ -147,7 +147,7 @@ TEST_F(ContactTest, AShadowGoesWithItsModelAndStaysInThePlane) {
 void add_gray_colours(BundleContent& content) {
   const ColourGridHeader grid{8, 8, {}};
   ExtraSection colours;
-  colours.type = static_cast<std::uint32_t>(kPatternColours);
+  colours.type = static_cast<std::uint32_t>(SectionType::kPatternColours);
   colours.owner = 0;
   colours.bytes.resize(sizeof grid);
   std::memcpy(colours.bytes.data(), &grid, sizeof grid);

@@ -1,0 +1,153 @@
+// The registry of numbers in a bundle: every section type and every flag of a record, once. A
+// number that is used twice does not compile. bundle.md is the normative text; tests hold both, and
+// the second reader, against each other.
+//
+// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 67-255; payloads 263-511, 515 and up.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace modar {
+
+/// What the index in a section's `owner` counts; kNothing: it has none, and its variant is 0.
+enum class SectionOwner : std::uint8_t { kNothing, kPattern, kScene, kChunk, kTexture };
+
+enum SectionFlags : std::uint16_t {
+  kSectionRequired = 1,  ///< a reader that does not know the type must refuse the bundle
+  kSectionGpu = 2,       ///< offset is a multiple of kGpuAlignment
+};
+
+// Types below 256 are tables and small text, from 256 on payloads, so that everything that opening
+// a bundle reads lies in its first pages. Numbers are never reused. X(constant, number, name,
+// record of the table or at the start, minor version, flags, owner)
+#define MODAR_SECTIONS(X)                                                                      \
+  X(kNames, 1, "names", "", 0, kSectionRequired, kNothing)                                     \
+  X(kMeta, 2, "meta", "", 0, 0, kNothing)                                                      \
+  X(kStatement, 3, "statement", "", 0, 0, kNothing) /* of 1.0, no longer read */               \
+  X(kContentSummary, 4, "content_summary", "", 1, 0, kNothing)                                 \
+  X(kModels, 16, "models", "ModelRecord", 0, kSectionRequired, kNothing)                       \
+  X(kChunks, 17, "chunks", "ChunkRecord", 0, kSectionRequired, kNothing)                       \
+  X(kLevels, 18, "levels", "LevelRecord", 0, kSectionRequired, kNothing)                       \
+  X(kMaterials, 19, "materials", "MaterialRecord", 0, kSectionRequired, kNothing)              \
+  X(kLayouts, 20, "layouts", "LayoutRecord", 0, kSectionRequired, kNothing)                    \
+  X(kTextures, 32, "textures", "TextureRecord", 0, kSectionRequired, kNothing)                 \
+  X(kTextureLevels, 33, "texture_levels", "TextureLevelRecord", 0, kSectionRequired, kNothing) \
+  X(kPatterns, 48, "patterns", "PatternRecord", 0, kSectionRequired, kNothing)                 \
+  X(kParameterSets, 49, "parameter_sets", "ParameterSetRecord", 0, kSectionRequired, kNothing) \
+  X(kScenes, 64, "scenes", "SceneRecord", 0, kSectionRequired, kNothing)                       \
+  X(kLights, 65, "lights", "LightRecord", 2, 0, kNothing)                                      \
+  X(kOcclusion, 66, "occlusion", "OcclusionRecord", 2, 0, kNothing)                            \
+  X(kMappedFeatures, 256, "feature_twin", "FeatureHeader", 0, kSectionRequired, kPattern)      \
+  X(kFeatureYml, 257, "feature_text", "", 0, 0, kPattern)                                      \
+  X(kTrackerRecord, 258, "tracker_record", "TrackerRecordHeader", 0, 0, kPattern)              \
+  X(kPatternColours, 259, "pattern_colours", "ColourGridHeader", 2, 0, kPattern)               \
+  X(kShadow, 260, "shadow", "ShadowHeader", 2, 0, kScene)                                      \
+  X(kPatternShape, 261, "pattern_shape", "PatternShapeHeader", 2, 0, kPattern)                 \
+  X(kDrawOrder, 262, "draw_order", "DrawOrderRecord", 2, 0, kChunk)                            \
+  X(kVertices, 512, "vertices", "", 0, kSectionRequired | kSectionGpu, kNothing)               \
+  X(kIndices, 513, "indices", "", 0, kSectionRequired | kSectionGpu, kNothing)                 \
+  X(kTextureData, 514, "texture_data", "", 0, kSectionRequired | kSectionGpu, kTexture)
+
+enum class SectionType : std::uint32_t {
+#define MODAR_SECTION(constant, number, ...) constant = number,
+  MODAR_SECTIONS(MODAR_SECTION)
+#undef MODAR_SECTION
+};
+
+/// What the specification says about a section type.
+struct SectionInfo {
+  SectionType type;
+  const char* name;     ///< as in bundle.md, with _ for blanks: what content summaries call a table
+  const char* record;   ///< of its table, or that it starts with; empty: neither
+  std::uint16_t since;  ///< minor version that added it
+  std::uint16_t flags;  ///< SectionFlags that it has
+  SectionOwner owner;
+};
+
+inline constexpr std::array kSections = {
+#define MODAR_SECTION(constant, number, name, record, since, flags, owner) \
+  SectionInfo{SectionType::constant, name, record, since, flags, SectionOwner::owner},
+    MODAR_SECTIONS(MODAR_SECTION)
+#undef MODAR_SECTION
+};
+#undef MODAR_SECTIONS
+
+/// That of a type; nullptr: it is not known.
+constexpr const SectionInfo* section_info(std::uint32_t type) {
+  for (const SectionInfo& section : kSections) {
+    if (static_cast<std::uint32_t>(section.type) == type) return &section;
+  }
+  return nullptr;
+}
+
+/// The table of a record.
+constexpr const SectionInfo& section_of_record(std::string_view record) {
+  const SectionInfo* found = nullptr;
+  for (const SectionInfo& section : kSections) {
+    if (record == section.record) found = &section;
+  }
+  return *found;  // does not compile where there is none
+}
+
+enum MaterialFlags : std::uint32_t {
+  kMaterialTwoSided = 1,
+  kMaterialOccluder = 2,  ///< hides what is behind it and shows the camera's picture
+};
+
+enum TextureFlags : std::uint32_t {
+  kTextureAlpha = 1,   ///< each level has a second ETC1 image whose luminance is alpha
+  kTextureRepeat = 2,  ///< uv leave [0,1]: wrap GL_REPEAT (sides are powers of two), else clamp
+  kTextureCutOut = 4,  ///< with kTextureAlpha: something where alpha is 1/2 and more, else nothing
+};
+
+/// A bit of the `flags` of a record.
+struct FlagInfo {
+  const char* record;
+  std::uint32_t flag;
+  std::uint16_t since;  ///< minor version that added it
+};
+
+inline constexpr FlagInfo kFlags[] = {
+    {"SectionEntry", kSectionRequired, 0},    {"SectionEntry", kSectionGpu, 0},
+    {"MaterialRecord", kMaterialTwoSided, 0}, {"MaterialRecord", kMaterialOccluder, 2},
+    {"TextureRecord", kTextureAlpha, 0},      {"TextureRecord", kTextureRepeat, 0},
+    {"TextureRecord", kTextureCutOut, 2},
+};
+
+/// All flags that a record can have.
+constexpr std::uint32_t known_flags(std::string_view record) {
+  std::uint32_t known = 0;
+  for (const FlagInfo& info : kFlags) known |= record == info.record ? info.flag : 0;
+  return known;
+}
+
+/// The minor version that knows all `flags` of a record.
+constexpr std::uint16_t flags_since(std::string_view record, std::uint32_t flags) {
+  std::uint16_t since = 0;
+  for (const FlagInfo& info : kFlags) {
+    const bool set = record == info.record && (flags & info.flag) != 0;
+    if (set && info.since > since) since = info.since;
+  }
+  return since;
+}
+
+constexpr bool numbers_are_used_once() {
+  for (std::size_t i = 1; i < kSections.size(); ++i) {
+    if (kSections[i].type <= kSections[i - 1].type) return false;
+  }
+  for (const FlagInfo& a : kFlags) {
+    int same = 0;
+    for (const FlagInfo& b : kFlags) {
+      same += std::string_view(a.record) == b.record && (a.flag & b.flag) != 0 ? 1 : 0;
+    }
+    if (same != 1) return false;
+  }
+  return true;
+}
+static_assert(numbers_are_used_once(), "sections in ascending order, a bit a flag");
+
+}  // namespace modar
