@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "bake/image/resample.hpp"
+#include "formats/base/colour.hpp"
 #include "modar/renderer.hpp"
 
 namespace modar {
@@ -65,7 +66,7 @@ std::vector<Patch> patches_of(const LinearImage& image) {
 }
 
 double luma(const glm::dvec3& rgb) {
-  return glm::dot(rgb, glm::dvec3(0.2126, 0.7152, 0.0722));
+  return luminance(rgb.r, rgb.g, rgb.b);
 }
 
 /// Takes the brightest spot out of the patches, down to what is around it; its irradiance.

@@ -15,6 +15,7 @@
 #include "bake/mesh/triangle_tree.hpp"
 #include "bake/parallel.hpp"
 #include "bake/texture/texture_codec.hpp"
+#include "formats/base/colour.hpp"
 #include "formats/component.hpp"
 #include "modar/renderer.hpp"
 
@@ -172,8 +173,8 @@ constexpr std::uint32_t kParts = 4;
 /// What reaches the plane from all around: cosine-weighted, brighter where the light says so.
 std::vector<Ray> light_rays(const RoomLight& light) {
   const auto luma = [](const glm::vec3& rgb) {
-    return 0.2126 * static_cast<double>(rgb.r) + 0.7152 * static_cast<double>(rgb.g) +
-           0.0722 * static_cast<double>(rgb.b);
+    return luminance(static_cast<double>(rgb.r), static_cast<double>(rgb.g),
+                     static_cast<double>(rgb.b));
   };
   std::vector<Ray> rays;
   double sum = 0;

@@ -10,6 +10,7 @@
 #include <glm/matrix.hpp>
 
 #include "bake/mesh/repeating.hpp"
+#include "formats/base/colour.hpp"
 
 namespace modar {
 namespace {
@@ -52,20 +53,11 @@ glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, bool repeat) {
 }  // namespace
 
 glm::dvec3 srgb_to_linear(const glm::dvec3& stored) {
-  glm::dvec3 out;
-  for (int i = 0; i < 3; ++i) {
-    out[i] = stored[i] <= 0.04045 ? stored[i] / 12.92 : std::pow((stored[i] + 0.055) / 1.055, 2.4);
-  }
-  return out;
+  return {linear_of_srgb(stored.r), linear_of_srgb(stored.g), linear_of_srgb(stored.b)};
 }
 
 glm::dvec3 linear_to_srgb(const glm::dvec3& linear) {
-  glm::dvec3 out;
-  for (int i = 0; i < 3; ++i) {
-    out[i] =
-        linear[i] <= 0.0031308 ? 12.92 * linear[i] : 1.055 * std::pow(linear[i], 1 / 2.4) - 0.055;
-  }
-  return out;
+  return {srgb_of_linear(linear.r), srgb_of_linear(linear.g), srgb_of_linear(linear.b)};
 }
 
 glm::dvec4 look_up(const SoftTexture& texture, const glm::dvec2& uv, double level) {

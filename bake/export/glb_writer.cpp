@@ -10,6 +10,7 @@
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/colour.hpp"
 #include "formats/texture_format.hpp"
 
 namespace modar {
@@ -107,9 +108,7 @@ void GlbBuilder::add_materials(const ModelRecord& model) {
     material.name = std::string(bundle_.name(source.name));
     auto& pbr = material.pbrMetallicRoughness;
     pbr.metallicFactor = 0.0;
-    // The roughness whose highlight is as wide as that of the Phong exponent.
-    const double exponent = std::max(0.0, static_cast<double>(source.shininess));
-    pbr.roughnessFactor = std::pow(2.0 / (exponent + 2.0), 0.25);
+    pbr.roughnessFactor = roughness_of(source.shininess);
     material.emissiveFactor.assign(3, 0.0);
     for (std::size_t i = 0; i < 3; ++i) {
       pbr.baseColorFactor[i] =
@@ -231,8 +230,9 @@ Result<std::vector<std::byte>> guarded_build(const BundleView& bundle, Build&& b
 
 }  // namespace
 
-double linear_of_srgb(double c) {
-  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+double roughness_of(float shininess) {
+  const double exponent = std::max(0.0, static_cast<double>(shininess));
+  return std::pow(2.0 / (exponent + 2.0), 0.25);
 }
 
 bool shows_texture(const BundleView& bundle, const ModelRecord& model, std::uint32_t texture) {

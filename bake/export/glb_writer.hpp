@@ -41,8 +41,8 @@ struct DecodedLevel {
 Result<DecodedLevel> decode_level(const BundleView& bundle, const LayoutRecord& layout,
                                   const ChunkRecord& chunk);
 
-/// sRGB to linear light (IEC 61966-2-1).
-double linear_of_srgb(double c);
+/// The roughness whose highlight is as wide as that of the Phong exponent.
+double roughness_of(float shininess);
 
 /// Whether any material of the model shows the texture.
 bool shows_texture(const BundleView& bundle, const ModelRecord& model, std::uint32_t texture);

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "bake/image/image.hpp"
+#include "formats/base/colour.hpp"
 #include "formats/texture_format.hpp"
 
 namespace modar {
@@ -221,10 +222,8 @@ Result<void> Description::add_material(std::uint32_t index, bool coloured) {
   if (emission != glm::dvec3(0.0)) {
     surface += line("color3f inputs:emissiveColor = " + tuple(emission));
   }
-  // The roughness whose highlight is as wide as that of the Phong exponent.
-  const double exponent = std::max(0.0, static_cast<double>(source.shininess));
   std::string roughness = "float inputs:roughness = ";
-  append(roughness, std::pow(2.0 / (exponent + 2.0), 0.25));
+  append(roughness, roughness_of(source.shininess));
   surface += line(roughness) + line("float inputs:metallic = 0") + line(opacity) +
              line("token outputs:surface");
   material_text_ += "        def Material \"m" + std::to_string(index) +

@@ -6,14 +6,10 @@
 #include <cmath>
 
 #include "bake/parallel.hpp"
+#include "formats/base/colour.hpp"
 
 namespace modar {
 namespace {
-
-/// IEC 61966-2-1, electro-optical.
-double srgb_to_linear(double value) {
-  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
-}
 
 /// Rounded to multiples of 2^-23: the last bits of pow() differ between C libraries.
 float steady(double value) {
@@ -25,10 +21,10 @@ struct SrgbTables {
   std::array<float, 255> threshold{};  ///< linear values half-way between value k and k + 1
   SrgbTables() {
     for (std::size_t i = 0; i < 256; ++i) {
-      linear[i] = steady(srgb_to_linear(static_cast<double>(i) / 255));
+      linear[i] = steady(linear_of_srgb(static_cast<double>(i) / 255));
     }
     for (std::size_t i = 0; i < 255; ++i) {
-      threshold[i] = steady(srgb_to_linear((static_cast<double>(i) + 0.5) / 255));
+      threshold[i] = steady(linear_of_srgb((static_cast<double>(i) + 0.5) / 255));
     }
   }
   [[nodiscard]] std::uint8_t to_srgb(float value) const {

@@ -120,9 +120,8 @@ constexpr BakeOption kOptions[] = {
     {"--device", "device", "device", Part::kModel, Group::kTarget, "NAME", "mali400",
      "Fit a device's texture size and GPU memory", kDevice},
     {"--tier", "tier", "tier", Part::kModel, Group::kTarget, "TIER", "phone",
-     "Reduce models: thumb has 20,000 triangles and textures of 512 pixels, phone 100,000 and "
-     "2048, "
-     "desktop 150,000 and 4096",
+     "Reduce models: thumb has 20,000 triangles and textures of 512 pixels, phone 100,000 "
+     "and 2048, desktop 150,000 and 4096",
      kTier},
     {"--lods,--no-lods", "lods", "lods", Part::kModel, Group::kGeometry, nullptr, "4",
      "Most levels of detail, including the finest; each has half the triangles of the one before "

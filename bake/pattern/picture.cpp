@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bake/pattern/target_file.hpp"
+#include "formats/base/colour.hpp"
 #include "formats/colour_grid.hpp"
 
 namespace modar {
@@ -76,8 +77,7 @@ Result<std::vector<std::byte>> pattern_colours(const std::string& path) {
   std::array<std::array<double, 4>, kColourCells * kColourCells> sums{};
   std::array<double, 256> linear{};
   for (std::size_t i = 0; i < linear.size(); ++i) {
-    const double c = static_cast<double>(i) / 255;
-    linear[i] = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+    linear[i] = linear_of_srgb(static_cast<double>(i) / 255);
   }
   for (std::size_t i = 0; i + 3 < image.pixels.size(); i += 4) {
     const std::size_t x = i / 4 % image.width;

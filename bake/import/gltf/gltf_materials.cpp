@@ -213,7 +213,7 @@ class MaterialReader {
       const double base = factor(pbr.baseColorFactor, static_cast<std::size_t>(i), 1.0);
       const double straight = kDielectric + std::clamp(metalness, 0.0, 1.0) * (base - kDielectric);
       const double middle = std::clamp(straight * (exponent + 2) / 8, 0.0, 1.0);
-      m.specular[i] = static_cast<float>(srgb_of_linear(middle));
+      m.specular[i] = static_cast<float>(stored_light(middle));
       brightest = std::max(brightest, middle);
     }
     m.shininess = static_cast<float>(exponent);
@@ -305,7 +305,7 @@ class MaterialReader {
     return i < factors.size() ? factors[i] : other;
   }
   static float channel(const std::vector<double>& factors, int i, double other) {
-    return static_cast<float>(srgb_of_linear(factor(factors, static_cast<std::size_t>(i), other)));
+    return static_cast<float>(stored_light(factor(factors, static_cast<std::size_t>(i), other)));
   }
 
   std::string image_path(int texture) {

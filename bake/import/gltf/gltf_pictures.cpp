@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "bake/image/resample.hpp"
+#include "formats/base/colour.hpp"
 
 namespace modar {
 namespace {
@@ -22,7 +23,7 @@ Result<RgbaImage> read_as_large(const std::string& path, const RgbaImage& other)
 }
 
 /// Linear light of each value.
-std::array<double, 256> linear_of_srgb() {
+std::array<double, 256> linear_of_bytes() {
   RgbaImage ramp = {256, 1, std::vector<std::uint8_t>(std::size_t{4} * 256, 255)};
   for (std::size_t i = 0; i < 256; ++i) ramp.pixels[4 * i] = static_cast<std::uint8_t>(i);
   const LinearImage light = to_linear(ramp);
@@ -47,9 +48,8 @@ std::uint8_t alpha_of(const GltfPictures& pictures, std::uint8_t alpha) {
 
 }  // namespace
 
-double srgb_of_linear(double linear) {
-  const double c = std::clamp(linear, 0.0, 1.0);
-  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
+double stored_light(double linear) {
+  return srgb_of_linear(std::clamp(linear, 0.0, 1.0));
 }
 
 Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures) {
@@ -63,7 +63,7 @@ Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures) {
   if (pictures.colour.empty()) std::fill(image.pixels.begin(), image.pixels.end(), 255);
   MODAR_ASSIGN(const RgbaImage emissive, read_as_large(pictures.emissive, image));
   MODAR_ASSIGN(const RgbaImage occlusion, read_as_large(pictures.occlusion, image));
-  const std::array<double, 256> linear = linear_of_srgb();
+  const std::array<double, 256> linear = linear_of_bytes();
   for (std::size_t p = 0; p < image.pixels.size(); p += 4) {
     std::uint8_t* pixel = &image.pixels[p];
     pixel[3] = alpha_of(pictures, pixel[3]);
@@ -78,7 +78,7 @@ Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures) {
         light = light * pictures.colour_factor[i] +
                 linear[emissive.pixels[p + i]] * pictures.emissive_factor[i];
       }
-      pixel[i] = static_cast<std::uint8_t>(std::lround(255 * srgb_of_linear(light)));
+      pixel[i] = static_cast<std::uint8_t>(std::lround(255 * stored_light(light)));
     }
   }
   return image;

@@ -47,6 +47,6 @@ struct RoughnessMetalness {
 Result<RoughnessMetalness> mean_roughness_metalness(const std::string& path);
 
 /// Linear light to sRGB (IEC 61966-2-1), both in [0,1].
-double srgb_of_linear(double linear);
+double stored_light(double linear);
 
 }  // namespace modar

@@ -180,7 +180,7 @@ class SceneReader {
   static glm::vec3 colour_of(const GltfAccessor& colours, std::size_t v) {
     const glm::dvec3 linear = vector(colours, v);
     return glm::vec3(
-        glm::dvec3(srgb_of_linear(linear.x), srgb_of_linear(linear.y), srgb_of_linear(linear.z)));
+        glm::dvec3(stored_light(linear.x), stored_light(linear.y), stored_light(linear.z)));
   }
 
   static glm::dvec3 vector(const GltfAccessor& accessor, std::size_t v) {
