@@ -82,6 +82,8 @@ class Files(ProjectTest):
                           f"cover=pottery,up=y,scale=0.8,offset=0:0.1:0,light={cover}", *LIT_DIRECT, "-o", direct)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((self.place / "out/one.modar").read_bytes(), direct.read_bytes())
+        checked = self.modar("check", direct, "--json", "--source", "modar.toml", cwd=self.place)
+        self.assertEqual(json.loads(checked.stdout)["issues"], [])  # its light is its pattern
 
     def test_several_assets_are_as_baked_alone(self):
         cover, painting = self.folder / "cover.png", self.folder / "painting.png"
