@@ -31,8 +31,7 @@ struct WildBenchOptions {
 /// - extended shown_pct, p95_px: with PoseLoopOptions::extended; the reference is without it;
 /// - hidden REASON: frames with a truth in which nothing is shown;
 /// - P@5, P@15 of published clips: share of the judged frames whose corners' root of the mean
-/// square
-///   distance is at most so many pixels, as percent; their means over clips at the end;
+///   square distance is at most so many pixels, as percent; their means over clips at the end;
 /// - false_frames: of clips without a truth, beside their number of frames.
 /// Errors: those of find_wild_clips(), of reading pictures and videos and of baking.
 Result<std::vector<BenchRow>> bench_wild(const WildBenchOptions& options,

@@ -34,8 +34,7 @@ struct WildClip {
 /// The clips below a folder, by name. A clip NAME is a video NAME.* or a folder NAME (or NAME/img)
 /// of pictures, and its truth beside it or elsewhere below the folder:
 /// - NAME_corners.csv: lines "frame,x0,y0,...,x3,y3", corners clockwise from the picture's top
-/// left;
-///   the pictures NAME.png and NAME_*.png (or .jpg) beside it show what it is;
+///   left; the pictures NAME.png and NAME_*.png (or .jpg) beside it show what it is;
 /// - POT-210, POT-280: NAME_gt_points.txt and NAME_flag.txt; PlanarTrack: NAME.txt and
 ///   NAME_flag.txt. A line a frame; eight zeros: no truth; another flag than 0: not judged.
 /// A video without a truth shows nothing of what the other clips show.

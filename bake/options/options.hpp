@@ -17,8 +17,7 @@
 namespace modar {
 
 /// What an option changes: [bake] and [[tier]] of modar.toml set those of models, patterns and
-/// scenes,
-/// [[model]] and [[pattern]] their own, [project] those of projects.
+/// scenes, [[model]] and [[pattern]] their own, [project] those of projects.
 enum class OptionPart : std::uint8_t { kModel, kPattern, kScene, kProject };
 
 /// The heading of an option in `modar bake --help`.
@@ -66,8 +65,7 @@ using OptionValue = std::variant<TruthOption, NumberOption, WordOption, TextOpti
 
 struct BakeOption {
   /// "--effort"; flags: "--perceptual" (true), "--no-ao" (false), "--atlas,--no-atlas". Of a
-  /// number,
-  /// "--no-lods" stands for its least.
+  /// number, "--no-lods" stands for its least.
   const char* flag;
   const char* key;   ///< in modar.toml
   const char* meta;  ///< in "options" of the bundle's meta text

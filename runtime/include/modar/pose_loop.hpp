@@ -43,7 +43,7 @@ struct PoseLoopOptions {
   bool estimate_camera = false;
 };
 
-/// Reads the patterns' tracker records and shapes (section types 258 and 261) from the bundle's
+/// Reads the patterns' tracker records and shapes (kTrackerRecord, kPatternShape) from the bundle's
 /// mapped bytes, which must outlive it. Allocates nothing per frame once a TrackResult has grown.
 class PoseLoop {
  public:
