@@ -50,13 +50,12 @@ int cells_of(const TrackedPattern& pattern) {
 }
 
 /// Pattern pixels between samples.
-double step_of(const TrackedPattern& pattern) {
+double step_of(const TrackedPattern& pattern, int side) {
   if (!pattern.surface.faces().empty()) {
     const auto& place = pattern.surface.faces()[0].place;
     return std::max(place[2], place[3]) / static_cast<double>(kFaceCellSide * kCellSamples);
   }
-  return std::max(pattern.width(), pattern.height()) /
-         static_cast<double>(kCellSide * kCellSamples);
+  return std::max(pattern.width(), pattern.height()) / static_cast<double>(side * kCellSamples);
 }
 
 /// Where a sample of a cell lies, in shares of width and height, of `side` by `side` cells.
@@ -69,7 +68,8 @@ glm::dvec2 share_at(int cell, int k, int side) {
 
 /// The same of a pattern's cell. Those of a box lie face by face and are not mirrored: what lies
 /// beside a face in the picture is another one.
-glm::dvec2 place_of(const TrackedPattern& pattern, int cell, int k, const Mirror* mirror) {
+glm::dvec2 place_of(const TrackedPattern& pattern, int cell, int k, const Mirror* mirror,
+                    int side) {
   constexpr int kFaceCells = kFaceCellSide * kFaceCellSide;
   if (!pattern.surface.faces().empty()) {
     const auto faces = pattern.surface.faces();
@@ -79,7 +79,7 @@ glm::dvec2 place_of(const TrackedPattern& pattern, int cell, int k, const Mirror
     return {(face[0] + share.x * face[2]) / pattern.width(),
             (face[1] + share.y * face[3]) / pattern.height()};
   }
-  glm::dvec2 place = share_at(cell, k, kCellSide);
+  glm::dvec2 place = share_at(cell, k, side);
   if (mirror != nullptr) {
     double& share = mirror->upright ? place.x : place.y;
     share = 2.0 * mirror->at - share;
@@ -104,10 +104,10 @@ glm::dmat3 Mirror::pixels_of(const TrackedPattern& pattern) const {
 }
 
 CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
-                   std::span<const GrayImage> pyramid)
-    : pattern_(pattern), map_(map), pyramid_(pyramid) {
+                   std::span<const GrayImage> pyramid, int side)
+    : pattern_(pattern), map_(map), pyramid_(pyramid), side_(side) {
   // Of a print far away the frame shows less than the samples could.
-  const double step = step_of(pattern);
+  const double step = step_of(pattern, side);
   const double scale = scale_of(pattern, map);
   spread_ = std::max(1.0, 1.0 / (step * std::max(scale, 1e-6)));
   pixels_ = spread_ * step * scale;
@@ -117,7 +117,7 @@ bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror) const {
   const Filtered frame(pyramid_, pixels_);
   const GrayImage& whole = pyramid_[0];
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
-    const glm::dvec2 share = place_of(pattern_, cell, k, mirror);
+    const glm::dvec2 share = place_of(pattern_, cell, k, mirror, side_);
     bool in_front = false;
     const glm::dvec2 p =
         map_.at({share.x * pattern_.width() - 0.5, share.y * pattern_.height() - 0.5}, in_front);
@@ -132,11 +132,11 @@ bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror) const {
 }
 
 void CellGrid::expect(const TrackedPattern& print, int cell, CellSamples& expected,
-                      const Mirror* mirror, double spread) {
+                      const Mirror* mirror, double spread, int side) {
   const Filtered picture(std::span(print.levels).first(static_cast<std::size_t>(print.level_count)),
-                         spread * step_of(print));
+                         spread * step_of(print, side));
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
-    const glm::dvec2 share = place_of(print, cell, k, mirror);
+    const glm::dvec2 share = place_of(print, cell, k, mirror, side);
     expected[static_cast<std::size_t>(k)] =
         picture.at(share.x * print.width(), share.y * print.height());
   }

@@ -39,8 +39,9 @@ struct Mirror {
 /// The outline of a pattern in a frame, divided into cells.
 class CellGrid {
  public:
-  /// The arguments must outlive it.
-  CellGrid(const TrackedPattern& pattern, const PlaneMap& map, std::span<const GrayImage> pyramid);
+  /// The arguments must outlive it. side: cells along a side of a flat pattern.
+  CellGrid(const TrackedPattern& pattern, const PlaneMap& map, std::span<const GrayImage> pyramid,
+           int side = kCellSide);
   /// What the frame shows of a cell, of its mirror image if there is one, which may lie beside the
   /// outline; false if that does not lie in the frame.
   bool see(int cell, CellSamples& seen, const Mirror* mirror = nullptr) const;
@@ -49,12 +50,13 @@ class CellGrid {
   /// What a print, or its mirror image, of any size shows there that fills the outline, to a frame
   /// of that spread().
   static void expect(const TrackedPattern& print, int cell, CellSamples& expected,
-                     const Mirror* mirror = nullptr, double spread = 1);
+                     const Mirror* mirror = nullptr, double spread = 1, int side = kCellSide);
 
  private:
   const TrackedPattern& pattern_;
   const PlaneMap& map_;
   std::span<const GrayImage> pyramid_;
+  int side_;
   double spread_ = 1;
   double pixels_ = 1;  ///< of the frame, between samples at that spread
 };

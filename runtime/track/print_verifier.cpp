@@ -28,6 +28,14 @@ constexpr float kElsewhere = 0.9945f;
 constexpr int kOtherCells = 6;
 constexpr int kOtherShare = 8;
 constexpr int kAgainShare = 10;
+// Details compared per frame, all of them within 32: trades instructions, about 3 % of a tracked
+// frame by count of operations, for how soon another print is hidden, here within two seconds.
+constexpr int kDetailsOfFrame = 8;
+// Number of printed differences from which it is another print, and below which it is the pattern
+// again: trades other prints shown for true ones hidden. `modar bench pose --lookalikes --only
+// family` found 8 to 35 on most other prints, and none or one on true ones.
+constexpr int kOtherDetails = 3;
+constexpr int kAgainDetails = 2;
 // Margin in cells by which a mirror image, or another pattern, must agree better.
 constexpr int kFlippedCells = 4;
 constexpr double kSureShare = 0.6;  // share of agreeing textured cells that refutes a mirror image
@@ -165,6 +173,7 @@ void PrintVerifier::look(std::size_t pattern, const FrameView& frame, const Trac
     const std::uint32_t at = seen.next_cell * kCellStride % kCells;
     update(pattern, grid, from, static_cast<int>(at), seen.cells[at]);
   }
+  seen.details.look(print, map, frame.pyramid, from, kDetailsOfFrame);
 }
 
 /// The same of mirror images, of the cells that were looked at last.
@@ -255,13 +264,17 @@ PrintVerifier::Verification PrintVerifier::conclude(Evidence& seen) {
   }
   if (printed >= kOtherCells && printed * kOtherShare >= textured) seen.other_print = true;
   if ((printed + differing) * kAgainShare < textured) seen.other_print = false;
+  const int details = seen.details.differences();
+  if (details >= kOtherDetails) seen.other_details = true;
+  if (details < kAgainDetails) seen.other_details = false;
   const double agreeing = agreeing_share(seen);
   const int most = std::max(for_flip[0], for_flip[1]);
   if (most >= kFlippedCells) seen.flipped = true;
   if (most <= -kFlippedCells && agreeing >= kSureShare) seen.flipped = false;
   Verification verification;
   if (seen.curved) verification.reason = Reason::kCurved;
-  if (seen.other_print || seen.flipped) verification.reason = Reason::kOtherPrint;
+  if (seen.other_print || seen.other_details || seen.flipped)
+    verification.reason = Reason::kOtherPrint;
   if (textured > 0) {
     verification.agreeing = agreeing;
     verification.likeness = 0.01 * likeness / textured;

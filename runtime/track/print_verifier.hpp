@@ -12,6 +12,7 @@
 #include "frame_tracker.hpp"
 #include "modar/tracker.hpp"
 #include "photometry.hpp"
+#include "print_details.hpp"
 
 namespace modar::tracker {
 
@@ -69,9 +70,11 @@ class PrintVerifier {
   };
   struct Evidence {
     std::array<Cell, kCells> cells;
+    PrintDetails details;
     std::uint32_t next_cell = 0;
     std::uint32_t next_other = 0;
     bool other_print = false;
+    bool other_details = false;  ///< a small part of it differs
     bool flipped = false;
     bool curved = false;
     bool was_bent = false;  ///< at the last measurement

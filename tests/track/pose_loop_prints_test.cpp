@@ -85,6 +85,53 @@ TEST(Prints, AnEditionOfWhichASeventhDiffersIsTakenBackForGood) {
   EXPECT_TRUE(seen.visible.empty());
 }
 
+// picture() with a title across its upper part.
+cv::Mat titled(const char* title) {
+  cv::Mat print = picture().clone();
+  print(cv::Rect(40, 30, 220, 40)).setTo(225);
+  cv::putText(print, title, {48, 62}, cv::FONT_HERSHEY_DUPLEX, 1.1, cv::Scalar(30), 2, cv::LINE_AA);
+  return print;
+}
+
+/// Frames of two and a half seconds, after the first two, in which something is shown.
+int shown_late(PoseLoop& loop, Sequence& frames, TrackResult& seen) {
+  int shown = 0;
+  for (int i = 0; i < kTwoSeconds + 15; ++i) {
+    EXPECT_TRUE(loop.step(frames.at(i).picture.view(), seen));
+    shown += i >= kTwoSeconds && !seen.visible.empty() ? 1 : 0;
+  }
+  return shown;
+}
+
+TEST(Prints, AnotherTitleIsTakenBackWithinTwoSeconds) {
+  const auto bundle = bundle_with({record_of(titled("SOMMER"))});
+  const cv::Mat other = titled("KARIBU");
+  const auto loop = loop_on(bundle);
+  Sequence frames(gray(other));
+  TrackResult seen;
+  EXPECT_EQ(shown_late(*loop, frames, seen), 0);
+  EXPECT_EQ(seen.reason, Reason::kOtherPrint);
+}
+
+TEST(Prints, TheTitleItselfStaysWhenHeldAndWhenCovered) {
+  const cv::Mat own = titled("SOMMER");
+  const auto bundle = bundle_with({record_of(own)});
+  // Two textured things that move with the print, from its left and its lower side inwards: as
+  // wide as fingers.
+  cv::Mat held = own.clone();
+  textured_picture(60, 30, 31).copyTo(held(cv::Rect(0, 120, 60, 30)));
+  textured_picture(30, 60, 32).copyTo(held(cv::Rect(150, 180, 30, 60)));
+  for (const cv::Mat* print : {&own, static_cast<const cv::Mat*>(&held)}) {
+    for (const double covered : {0.0, 0.4}) {
+      const auto loop = loop_on(bundle);
+      Sequence frames(gray(*print), covered);
+      TrackResult seen;
+      EXPECT_EQ(shown_late(*loop, frames, seen), 15)
+          << (print == &own ? "bare" : "held") << ", covered by " << covered;
+    }
+  }
+}
+
 // Rows of figures between lines, as fine as the samples of the cells that are compared.
 cv::Mat table() {
   cv::Mat sheet(300, 400, CV_8UC1, cv::Scalar(255));

@@ -1,0 +1,161 @@
+// Printed differences, cell by cell.
+#include "print_details.hpp"
+
+#include <algorithm>
+
+#include <glm/geometric.hpp>
+
+namespace modar::tracker {
+namespace {
+
+// Variance from which a cell has detail to tell, and correlation from which it shows the pattern:
+// trade small differences missed for true prints in doubt. Both by hand; `modar bench pose
+// --lookalikes --only family` hides no true print with them.
+constexpr float kDetailed = 200.0f;
+constexpr float kDetailAgrees = 0.8f;
+// Variance below which the frame shows nothing in a cell with detail; and below which it shows no
+// more than noise in a cell without any. By hand: a thumb on blank paper must not pass for blank.
+constexpr float kBlank = 9.0f;
+constexpr float kPlainSeen = 40.0f;
+// A frame may be so many times less sharp than its samples; and the correlation of a cell with
+// itself at that sharpness below which its detail is too fine to tell. Without it, a table of
+// figures was taken for another one (pose_loop_prints_test).
+constexpr double kBlur = 2.0;
+constexpr float kCoarse = 0.9f;
+// Correlation between earlier and current contents from which they are the same, and below which
+// they differ; the cosine of the smallest angle between two directions (six degrees): as in
+// print_verifier.cpp. And the number of looks that must have shown the same.
+constexpr float kSameDetail = 0.7f;
+constexpr float kOtherDetail = 0.5f;
+constexpr float kOtherView = 0.9945f;
+constexpr int kLooks = 3;
+constexpr std::uint32_t kDetailStride = 97;  // spreads the cells; coprime to their number
+// How many times less than its samples the frame may resolve.
+constexpr double kResolved = 1.01;
+
+/// Whether the half of a cell that lies at the print's edge shows the pattern, or nothing where the
+/// pattern shows nothing: then what differs in the cell does not reach in from outside. False in a
+/// corner.
+bool edge_agrees(int at, const CellSamples& expected, const CellSamples& seen) {
+  const int x = at % PrintDetails::kSide;
+  const int y = at / PrintDetails::kSide;
+  const bool left = x == 0;
+  const bool right = x == PrintDetails::kSide - 1;
+  const bool top = y == 0;
+  const bool bottom = y == PrintDetails::kSide - 1;
+  if (left + right + top + bottom != 1) return false;
+  // The inner half is a copy of the outer one, so that both count alike.
+  constexpr int kLast = kCellSamples - 1;
+  CellSamples outer_expected{};
+  CellSamples outer_seen{};
+  for (int v = 0; v < kCellSamples; ++v) {
+    for (int u = 0; u < kCellSamples; ++u) {
+      const int from_u = left ? std::min(u, kLast - u) : right ? std::max(u, kLast - u) : u;
+      const int from_v = top ? std::min(v, kLast - v) : bottom ? std::max(v, kLast - v) : v;
+      const auto to = static_cast<std::size_t>(v * kCellSamples + u);
+      const auto source = static_cast<std::size_t>(from_v * kCellSamples + from_u);
+      outer_expected[to] = expected[source];
+      outer_seen[to] = seen[source];
+    }
+  }
+  const CellMatch match = compare(outer_expected, outer_seen);
+  return match.correlation >= kDetailAgrees ||
+         (match.expected_contrast < kTexturedCell && match.seen_contrast < kPlainSeen);
+}
+
+}  // namespace
+
+void PrintDetails::update(Cell& cell, const CellMatch& match, bool coarse, const CellSamples& seen,
+                          const glm::vec3& from) {
+  if (match.correlation >= kDetailAgrees) {
+    cell.state = CellState::kAgrees;
+    return;
+  }
+  if (match.expected_contrast < kTexturedCell && match.seen_contrast < kPlainSeen) {
+    cell.state = CellState::kPlain;
+    return;
+  }
+  if (!coarse || match.expected_contrast < kDetailed || match.seen_contrast < kBlank) {
+    cell.state = CellState::kForeign;
+    return;
+  }
+  const bool before = cell.state == CellState::kDiffers || cell.state == CellState::kPrinted;
+  CellSamples shown{};
+  std::copy(cell.shown.begin(), cell.shown.end(), shown.begin());
+  const float alike = before ? compare(shown, seen).correlation : 0.0f;
+  if (alike < kOtherDetail) {
+    cell.state = CellState::kDiffers;
+    cell.looks = 1;
+    cell.from = from;
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      cell.shown[k] = static_cast<std::uint8_t>(seen[k] + 0.5f);
+    }
+  } else if (alike >= kSameDetail) {
+    cell.looks = static_cast<std::uint8_t>(std::min(cell.looks + 1, kLooks));
+    if (cell.looks >= kLooks && glm::dot(cell.from, from) < kOtherView)
+      cell.state = CellState::kPrinted;
+  }
+}
+
+void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
+                        std::span<const GrayImage> pyramid, const glm::vec3& from, int count) {
+  if (!print.surface.flat()) return;
+  const CellGrid grid(print, map, pyramid, kSide);
+  if (grid.spread() > kResolved) return;
+  CellSamples expected{};
+  CellSamples blurred{};
+  CellSamples seen{};
+  for (int tried = 0; tried < kDetailCells && count > 0; ++tried, ++next_) {
+    const std::uint32_t at = next_ * kDetailStride % kDetailCells;
+    Cell& cell = cells_[at];
+    if (cell.state == CellState::kAgrees || cell.state == CellState::kPlain) continue;
+    --count;
+    if (!grid.see(static_cast<int>(at), seen)) continue;
+    CellGrid::expect(print, static_cast<int>(at), expected, nullptr, 1.0, kSide);
+    CellMatch match = compare(expected, seen);
+    bool coarse = true;
+    if (match.correlation < kDetailAgrees && match.expected_contrast >= kDetailed) {
+      CellGrid::expect(print, static_cast<int>(at), blurred, nullptr, kBlur, kSide);
+      match.correlation = std::max(match.correlation, compare(blurred, seen).correlation);
+      coarse = compare(expected, blurred).correlation >= kCoarse;
+    }
+    update(cell, match, coarse, seen, from);
+    if (cell.state == CellState::kAgrees || cell.edge_agrees) continue;
+    cell.edge_agrees = edge_agrees(static_cast<int>(at), expected, seen);
+  }
+}
+
+int PrintDetails::differences() const {
+  // Rows of cells as bits: those that do not agree, and those of them connected with the edge.
+  std::array<std::uint32_t, kSide> open{};
+  std::array<std::uint32_t, kSide> reached{};
+  constexpr std::uint32_t kSides = 1u | 1u << (kSide - 1);
+  for (std::size_t y = 0; y < kSide; ++y) {
+    for (std::size_t x = 0; x < kSide; ++x) {
+      const CellState state = cells_[y * kSide + x].state;
+      const bool passes = state != CellState::kAgrees && state != CellState::kPlain;
+      open[y] |= passes ? 1u << x : 0u;
+      reached[y] |= passes && !cells_[y * kSide + x].edge_agrees ? 1u << x : 0u;
+    }
+    if (y > 0 && y < kSide - 1) reached[y] &= kSides;
+  }
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (std::size_t y = 0; y < kSide; ++y) {
+      std::uint32_t near = reached[y];
+      if (y > 0) near |= reached[y - 1];
+      if (y + 1 < kSide) near |= reached[y + 1];
+      const std::uint32_t now = open[y] & (near | near << 1 | near >> 1);
+      grown = grown || now != reached[y];
+      reached[y] = now;
+    }
+  }
+  int count = 0;
+  for (std::size_t at = 0; at < cells_.size(); ++at) {
+    const bool printed = cells_[at].state == CellState::kPrinted;
+    count += printed && (reached[at / kSide] >> at % kSide & 1u) == 0 ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace modar::tracker
