@@ -18,7 +18,7 @@ constexpr std::size_t kMaxViews = 24;  // bounds time and memory
 constexpr int kViewSteps = 3;          // of a new view: the poses of the others hardly move
 // Standard deviations of what is known before: phones and webcams have 0.6 to 1.3 of the longer
 // side; pictures of prints that were photographed and rectified are off by some percent. With 0.05
-// a lens that bends passed for an aspect of 0.91 on a real sheet of 0.98 (`modar bench wild`).
+// a lens that bends passed for an aspect of 0.91 on a real sheet of 0.98 (`modar-lab bench wild`).
 constexpr double kFocalSpread = 0.3;
 constexpr double kAspectSpread = 0.03;
 // Of a corner that a free homography measures, frame pixels of 640: lens distortion and paper that

@@ -29,7 +29,7 @@ constexpr double kMaxBlurringWay = 80.0;
 constexpr double kMinBlurGain = 0.02;
 // A frame is suspected of blur if its correlation falls under so much of the sharp frames', which
 // fades by kFading a frame so that a change of light does not count as blur for ever. By hand, on
-// `modar bench pose`'s blurred paths: with blurred templates 100 % right at the fast ones.
+// `modar-lab bench pose`'s blurred paths: with blurred templates 100 % right at the fast ones.
 constexpr double kBlurred = 0.96;
 constexpr double kFading = 0.99;
 

@@ -679,7 +679,7 @@ void PoseLoop::State::accept(TrackResult& result) {
 
 /// Learns the surroundings from a frame that shows the anchor pattern, or else derives its pose
 /// from them. What the pattern itself says wins wherever it is shown: following the surroundings
-/// from half-covered patterns on made 0.66 px of three rendered videos into 3.5 (`modar bench
+/// from half-covered patterns on made 0.66 px of three rendered videos into 3.5 (`modar-lab bench
 /// extended --only partly`, 95th percentile). But little of a pattern is nothing to learn from, so
 /// they are followed meanwhile.
 void PoseLoop::State::extend(TrackResult& result) {
@@ -747,7 +747,7 @@ bool PoseLoop::State::doubts(const Detection& seen) const {
   // Shares of the patches in view that fit, and of those that fitted a moment ago: what covers a
   // pattern, or the little that the frame's edge leaves of it, gives poses that are off by degrees,
   // where steady surroundings are off by tenths. Of few patches, which a small pattern has as well,
-  // most of the surroundings have to contradict. Set by hand on `modar bench extended`.
+  // most of the surroundings have to contradict. Set by hand on `modar-lab bench extended`.
   constexpr double kFew = 0.5;
   constexpr double kFewer = 0.8;
   constexpr double kOfUsual = 0.5;

@@ -42,7 +42,7 @@ constexpr double kMinSide = 24.0;
 constexpr double kMaxZoom = 1.35;
 // Share of a coarser level's inlier ratio that a finer one must keep: under blur its patches fit
 // along the motion only, and draw the pose away from what coarse ones found. By hand, on blurred
-// paths of `modar bench pose`.
+// paths of `modar-lab bench pose`.
 constexpr double kMinKept = 0.85;
 // Gauss-Newton steps of a level for a pose, and for a map.
 constexpr int kSteps = 10;

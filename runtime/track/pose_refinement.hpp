@@ -52,8 +52,8 @@ bool refine_plane(TrackedPattern& pattern, const FrameView& frame, Pose& pose, P
 /// nearest to that of `pose` and the pattern's shape, and what that leaves (Detection::stretch).
 /// The pose of a split_map() is no such one: it leaves all that the camera does not explain to the
 /// plane, so that its own outline was 5 to 9 pixels of 640 beside the print's on four real clips,
-/// where this one is 1.3 to 3.2 (`modar bench wild`). aspect: of split_map(); what stands upright
-/// does so on a print with this aspect.
+/// where this one is 1.3 to 3.2 (`modar-lab bench wild`). aspect: of split_map(); what stands
+/// upright does so on a print with this aspect.
 struct DrawnPose {
   Pose pose;
   glm::dmat4x3 stretch{1.0};

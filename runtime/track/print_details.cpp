@@ -9,7 +9,7 @@ namespace modar::tracker {
 namespace {
 
 // Variance from which a cell has detail to tell, and correlation from which it shows the pattern:
-// trade small differences missed for true prints in doubt. Both by hand; `modar bench pose
+// trade small differences missed for true prints in doubt. Both by hand; `modar-lab bench pose
 // --lookalikes --only family` hides no true print with them.
 constexpr float kDetailed = 200.0f;
 constexpr float kDetailAgrees = 0.8f;

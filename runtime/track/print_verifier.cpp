@@ -32,7 +32,7 @@ constexpr int kAgainShare = 10;
 // frame by count of operations, for how soon another print is hidden, here within two seconds.
 constexpr int kDetailsOfFrame = 8;
 // Number of printed differences from which it is another print, and below which it is the pattern
-// again: trades other prints shown for true ones hidden. `modar bench pose --lookalikes --only
+// again: trades other prints shown for true ones hidden. `modar-lab bench pose --lookalikes --only
 // family` found 8 to 35 on most other prints, and none or one on true ones.
 constexpr int kOtherDetails = 3;
 constexpr int kAgainDetails = 2;

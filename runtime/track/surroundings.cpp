@@ -66,9 +66,10 @@ constexpr double kDepthAccuracy = 0.15;
 // by half of it at the frame's far side. By hand.
 constexpr double kMaxOffset = 1.5;
 // Standard deviations are stated so many times larger than the equations say, which take errors of
-// depths and anchors for independent: of `modar bench extended` 95 % lie within two of these then.
+// depths and anchors for independent: of `modar-lab bench extended` 95 % lie within two of these
+// then.
 constexpr double kHonest = 4.0;
-// Standard deviations of a gyroscope's turn: radians a frame, somewhat more than `modar bench
+// Standard deviations of a gyroscope's turn: radians a frame, somewhat more than `modar-lab bench
 // extended` adds, and the share of the whole turn by which its scale may be off. By hand: larger
 // ones leave more to the points.
 constexpr double kTurnSigma = 0.0005;
