@@ -90,7 +90,7 @@ packages() {
 
 build() {
   cmake --preset release
-  cmake --build --preset release --target modar modar-play
+  cmake --build --preset release --target modar modar-play modar-lab
 }
 
 make_pattern() {
@@ -131,7 +131,7 @@ play() {
   else
     ffmpeg -v fatal -nostdin -y -i "$video" -vf 'select=eq(n\,40)+eq(n\,200)+eq(n\,400)' -vsync vfr "$out/frames/%d.png"
   fi
-  "$bin/modar" bench light "$bundle" "$out"/frames/*.png -o "$out"
+  "$bin/modar-lab" bench light "$bundle" "$out"/frames/*.png -o "$out"
   rm -r "$out/frames"
   local figure='<h2>Before and after</h2>\n<a href=before_after.png><img src=before_after.png alt="plain shading, ours, ours in the light that the camera shows"></a>'
   sed -i "s|<h2>Contact sheet</h2>|$figure\n&|" "$out/index.html"
@@ -139,7 +139,7 @@ play() {
 
 echo "ModAR: a jar is baked onto a picture, and played on a video. The output of the programs goes to $log."
 step "packages of Debian (about 1.4 GB of disk, the first time)" packages
-step "building modar and modar-play (minutes, the first time)" build
+step "building modar, modar-play and modar-lab (minutes, the first time)" build
 if [ $own = yes ]; then
   step "the picture: a book's cover; a clip of it" make_pattern
 else
