@@ -132,6 +132,35 @@ TEST(Prints, TheTitleItselfStaysWhenHeldAndWhenCovered) {
   }
 }
 
+/// The print as a photo of it shows it where the paper bulges: its middle lies off by a share of
+/// the longer side, its edges where they are.
+cv::Mat bulged(const cv::Mat& print, double share) {
+  cv::Mat x(print.size(), CV_32F);
+  cv::Mat y(print.size(), CV_32F);
+  for (int v = 0; v < print.rows; ++v) {
+    for (int u = 0; u < print.cols; ++u) {
+      const double off =
+          share * print.cols * std::sin(CV_PI * u / print.cols) * std::sin(CV_PI * v / print.rows);
+      x.at<float>(v, u) = static_cast<float>(u + 0.7 * off);
+      y.at<float>(v, u) = static_cast<float>(v + 0.7 * off);
+    }
+  }
+  cv::Mat out;
+  cv::remap(print, out, x, y, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return out;
+}
+
+TEST(Prints, APictureThatIsAPercentOffInItsMiddleStays) {
+  for (const double share : {0.005, 0.01, 0.015}) {
+    const cv::Mat own = titled("SOMMER");
+    const auto bundle = bundle_with({record_of(bulged(own, share))});
+    const auto loop = loop_on(bundle);
+    Sequence frames(gray(own));
+    TrackResult seen;
+    EXPECT_EQ(shown_late(*loop, frames, seen), 15) << share;
+  }
+}
+
 // Rows of figures between lines, as fine as the samples of the cells that are compared.
 cv::Mat table() {
   cv::Mat sheet(300, 400, CV_8UC1, cv::Scalar(255));
