@@ -334,6 +334,12 @@ bool in_view(const TrackedPattern& pattern, const PlaneMap& map, const Camera& c
   return inside >= kMinInside;
 }
 
+double corner_distance(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b) {
+  double most = 0;
+  for (std::size_t i = 0; i < 4; ++i) most = std::max(most, glm::length(a[i] - b[i]));
+  return most;
+}
+
 }  // namespace modar::tracker
 
 namespace modar {

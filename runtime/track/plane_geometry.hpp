@@ -133,6 +133,9 @@ inline float sample(const GrayImage& image, float x, float y) {
   return top + fy * (bottom - top);
 }
 
+/// Largest distance between corresponding corners, pixels.
+double corner_distance(const std::array<glm::dvec2, 4>& a, const std::array<glm::dvec2, 4>& b);
+
 }  // namespace modar::tracker
 
 namespace modar {

@@ -1,0 +1,54 @@
+// The camera and the flat patterns' aspects, estimated from the frames while no camera was given.
+// Internal to runtime/track.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "camera_estimator.hpp"
+#include "frame_tracker.hpp"
+#include "modar/pose_loop.hpp"
+
+namespace modar::tracker {
+
+/// Measures free homographies of tracked flat patterns, and sets the focal length and the patterns'
+/// shapes by them.
+class SelfCalibration {
+ public:
+  /// All of these must outlive it: the camera that it sets; one track a pattern; frames: holds the
+  /// present frame.
+  SelfCalibration(Camera& camera, std::span<TrackedPattern> patterns, std::span<Track> tracks,
+                  const FrameTracker& frames)
+      : camera_(camera),
+        patterns_(patterns),
+        tracks_(tracks),
+        frames_(frames),
+        estimator_(camera, patterns.size()) {}
+
+  /// Once a frame, before its patterns: goes on with the focal length and the aspects that the
+  /// views so far say. True where the focal length has moved so far since the last time that what
+  /// was learned with it is wrong.
+  bool apply();
+  /// Measures a tracked flat pattern's free homography: what it says of the camera, and what a pose
+  /// leaves of it, since no camera explains the pictures of a stabilised or distorting one.
+  void measure(std::size_t i, Detection& detection);
+  /// Poses as others use them, in place of those by which the loop splits its maps.
+  void place_pictures(TrackResult& result) const;
+  [[nodiscard]] CameraEstimate estimate() const { return estimator_.estimate(); }
+  [[nodiscard]] double aspect(std::size_t i) const { return estimator_.aspect(i); }
+
+ private:
+  bool view_plane(const TrackedPattern& plane, const Pose& pose, CameraEstimator::View& view,
+                  PlaneSplit& split) const;
+  bool measure_first(std::size_t i, CameraEstimator::View& view);
+  bool measure_again(std::size_t i, CameraEstimator::View& view);
+
+  Camera& camera_;
+  std::span<TrackedPattern> patterns_;
+  std::span<Track> tracks_;
+  const FrameTracker& frames_;
+  CameraEstimator estimator_;
+  double learned_focal_ = 0;  ///< that apply() last reported
+};
+
+}  // namespace modar::tracker
