@@ -215,75 +215,68 @@ bool PatternSearch::step(std::int64_t& work) {
     times.detect += clock.lap();
     return any;
   }
-  const std::span<const TrackerFeature> features = extractor_->found();
   if (stage_ == Stage::kSelect) {
-    select(features, priorities_);
+    select(extractor_->found(), priorities_);
     times.match += clock.lap();
     stage_ = Stage::kMatch;
   }
   if (at_ == selected_.size() || (at_ >= likely_ && found_)) return false;
   const TrackedPattern& pattern = patterns_[selected_[at_]];
-  DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   const FrameView frame{camera_, extractor_->pyramid(), kernels_, patches_};
+  const bool matching = stage_ == Stage::kMatch || stage_ == Stage::kHypotheses;
   switch (stage_) {
     case Stage::kMatch:
-      if (matcher_.match(pattern, features,
-                         all_features_ ? features.size() : (features.size() + 1) / 2, next_feature_,
-                         work)) {
-        stage_ = Stage::kHypotheses;
-      }
-      times.match += clock.lap();
-      return true;
+      match_features(pattern, work);
+      break;
     case Stage::kHypotheses:
-      hypotheses_ = matcher_.hypotheses();
-      candidate = {};
-      candidate.matches = matcher_.matches();
-      candidate.reason = candidate.matches < static_cast<int>(kMinMatches) ? Reason::kFewMatches
-                                                                           : Reason::kNoGeometry;
-      best_ = {};
-      hypothesis_ = 0;
-      times.match += clock.lap();
-      next_hypothesis();
-      return true;
+      take_hypotheses();
+      break;
     case Stage::kStart:
-      if (candidate.reason == Reason::kNoGeometry) candidate.reason = Reason::kFailedVerification;
-      fit_starts(pattern, frame);
-      // The features may rule out one of two mirror images; otherwise each shows much of the
-      // pattern, and both are tried.
-      decided_ = start_count_ < 2 || !likely(1) || best_.complete;
+      start_hypothesis(pattern, frame);
       break;
     case Stage::kRefine:
       consider(pattern, frame, refine_start(pattern, frame, starts_[start_]));
       ++start_;
+      after_start();
       break;
-    default: {
-      // Half of the features place a pattern that nothing hides as well as all of them, in 36
-      // instead of 49 million instructions (scripts/foreign.sh budget); else what they found counts
-      // for nothing.
-      if (!all_features_ && !best_.unoccluded) {
-        all_features_ = true;
-        stage_ = Stage::kMatch;
-        times.homography += clock.lap();
-        return true;
-      }
-      // Where a pose shows a part of the pattern only, a plane map may show all of it.
-      if (candidate.reason == Reason::kFailedVerification ||
-          (candidate.reason == Reason::kVisible && !best_.unoccluded)) {
-        find_map(pattern, frame, hypotheses_.front(), best_.percent + kMapGain, candidate);
-      }
-      if (candidate.reason == Reason::kVisible && bent(pattern)) {
-        candidate.reason = Reason::kCurved;
-      }
-      found_ = found_ || candidate.reason == Reason::kVisible;
-      ++at_;
-      next_feature_ = 0;
-      all_features_ = false;
-      stage_ = Stage::kMatch;
-      times.homography += clock.lap();
-      return true;
-    }
+    default:
+      conclude(pattern, frame);
+      break;
   }
-  times.homography += clock.lap();
+  (matching ? times.match : times.homography) += clock.lap();
+  return true;
+}
+
+void PatternSearch::match_features(const TrackedPattern& pattern, std::int64_t& work) {
+  const std::span<const TrackerFeature> features = extractor_->found();
+  const std::size_t count = all_features_ ? features.size() : (features.size() + 1) / 2;
+  if (matcher_.match(pattern, features, count, next_feature_, work)) stage_ = Stage::kHypotheses;
+}
+
+void PatternSearch::take_hypotheses() {
+  DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
+  hypotheses_ = matcher_.hypotheses();
+  candidate = {};
+  candidate.matches = matcher_.matches();
+  candidate.reason =
+      candidate.matches < static_cast<int>(kMinMatches) ? Reason::kFewMatches : Reason::kNoGeometry;
+  best_ = {};
+  hypothesis_ = 0;
+  next_hypothesis();
+}
+
+void PatternSearch::start_hypothesis(const TrackedPattern& pattern, const FrameView& frame) {
+  DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
+  if (candidate.reason == Reason::kNoGeometry) candidate.reason = Reason::kFailedVerification;
+  fit_starts(pattern, frame);
+  // The features may rule out one of two mirror images; otherwise each shows much of the
+  // pattern, and both are tried.
+  decided_ = start_count_ < 2 || !likely(1) || best_.complete;
+  after_start();
+}
+
+/// To the next start of the hypothesis that is worth refining, the next hypothesis, or the end.
+void PatternSearch::after_start() {
   while (start_ < start_count_ && !likely(start_)) ++start_;
   stage_ = Stage::kRefine;
   if (!all_features_ && !(best_.unoccluded && decided_)) {
@@ -293,7 +286,29 @@ bool PatternSearch::step(std::int64_t& work) {
     ++hypothesis_;
     next_hypothesis();
   }
-  return true;
+}
+
+/// Ends the search for a pattern, or starts it once more with all features.
+void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& frame) {
+  stage_ = Stage::kMatch;
+  // Half of the features place a pattern that nothing hides as well as all of them, in 36 instead
+  // of 49 million instructions (scripts/foreign.sh budget); else what they found counts for
+  // nothing.
+  if (!all_features_ && !best_.unoccluded) {
+    all_features_ = true;
+    return;
+  }
+  DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
+  // Where a pose shows a part of the pattern only, a plane map may show all of it.
+  if (candidate.reason == Reason::kFailedVerification ||
+      (candidate.reason == Reason::kVisible && !best_.unoccluded)) {
+    find_map(pattern, frame, hypotheses_.front(), best_.percent + kMapGain, candidate);
+  }
+  if (candidate.reason == Reason::kVisible && bent(pattern)) candidate.reason = Reason::kCurved;
+  found_ = found_ || candidate.reason == Reason::kVisible;
+  ++at_;
+  next_feature_ = 0;
+  all_features_ = false;
 }
 
 /// Goes on with the next hypothesis if it may be better than what was found.

@@ -79,6 +79,11 @@ class PatternSearch {
   };
   bool step(std::int64_t& work);
   bool take_features(std::int64_t& work);
+  void match_features(const TrackedPattern& pattern, std::int64_t& work);
+  void take_hypotheses();
+  void start_hypothesis(const TrackedPattern& pattern, const FrameView& frame);
+  void after_start();
+  void conclude(const TrackedPattern& pattern, const FrameView& frame);
   void next_hypothesis();
   [[nodiscard]] std::int64_t cost_of_step() const;
   /// A refined pose and the evidence for it.
