@@ -13,7 +13,8 @@
 namespace modar {
 namespace {
 
-/// Of a page of shadows, which are at most 256 x 256 texels each: every GL of ES 2.0 has it.
+/// Largest side of a page of shadows, which are at most 256 x 256 texels each: what the smallest
+/// device of assets/devices can hold.
 constexpr std::uint32_t kPageSide = 1024;
 
 const ShadowHeader& header_of(std::span<const std::byte> section) {
@@ -32,6 +33,7 @@ glm::mat4 shadow_to_eye(const DrawItem& item, const SceneRecord& scene) {
 /// Texels of a page, as far as it is filled. Each shadow has a border of its own outermost texels,
 /// which linear filtering reads.
 struct Page {
+  std::uint32_t side = 0;  ///< texels from row to row
   std::vector<std::uint8_t> texels;
   std::uint32_t x = 0;       ///< where the next shadow of the shelf begins
   std::uint32_t top = 0;     ///< of the shelf
@@ -40,7 +42,7 @@ struct Page {
   /// Where the shadow's own texels begin; false where the page is full.
   bool place(const ShadowHeader& header, std::uint32_t& left, std::uint32_t& first_row) {
     const std::uint32_t width = header.width + 2;
-    if (x + width > kPageSide) {
+    if (x + width > side) {
       x = 0;
       top = bottom;
     }
@@ -49,7 +51,7 @@ struct Page {
     first_row = top + 1;
     x += width;
     bottom = std::max(bottom, top + header.height + 2);
-    texels.resize(std::size_t{kPageSide} * bottom);
+    texels.resize(std::size_t{side} * bottom);
     return true;
   }
 
@@ -58,7 +60,7 @@ struct Page {
     const auto* from = reinterpret_cast<const std::uint8_t*>(section.data() + sizeof header);
     for (std::uint32_t y = 0; y < header.height + 2; ++y) {
       const std::uint32_t row = std::clamp(y, 1u, header.height) - 1;
-      std::uint8_t* to = &texels[std::size_t{kPageSide} * (first_row - 1 + y) + left - 1];
+      std::uint8_t* to = &texels[std::size_t{side} * (first_row - 1 + y) + left - 1];
       to[0] = from[std::size_t{header.width} * row];
       std::memcpy(to + 1, from + std::size_t{header.width} * row, header.width);
       to[header.width + 1] = to[header.width];
@@ -69,7 +71,7 @@ struct Page {
     GLuint texture = 0;
     glGenTextures(1, &texture);
     glBindTexture(GL_TEXTURE_2D, texture);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_LUMINANCE, static_cast<GLsizei>(kPageSide),
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_LUMINANCE, static_cast<GLsizei>(side),
                  static_cast<GLsizei>(bottom), 0, GL_LUMINANCE, GL_UNSIGNED_BYTE, texels.data());
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
@@ -95,6 +97,13 @@ Result<void> Ground::create(const BundleView& bundle) {
 }
 
 void Ground::lay_out(const BundleView& bundle) {
+  // As wide as all shadows side by side, where that is less: a single one takes no more than
+  // itself.
+  std::uint32_t side = 0;
+  for (std::uint32_t scene = 0; scene < bundle.scenes().size() && side < kPageSide; ++scene) {
+    const auto section = bundle.section(SectionType::kShadow, scene);
+    if (!section.empty()) side = std::min(side + header_of(section).width + 2, kPageSide);
+  }
   std::vector<Page> pages;
   for (std::uint32_t scene = 0; scene < bundle.scenes().size(); ++scene) {
     shadows_.emplace_back();
@@ -104,13 +113,15 @@ void Ground::lay_out(const BundleView& bundle) {
     std::uint32_t left = 0;
     std::uint32_t first_row = 0;
     if (pages.empty() || !pages.back().place(header, left, first_row)) {
-      pages.emplace_back().place(header, left, first_row);
+      pages.push_back({side, {}, 0, 0, 0});
+      pages.back().place(header, left, first_row);
     }
     pages.back().fill(section, left, first_row);
     shadows_.back() = {static_cast<std::uint32_t>(pages.size()), left, first_row};
   }
   for (const Page& page : pages) {
-    pages_.push_back({page.upload(), static_cast<float>(page.bottom)});
+    pages_.push_back(
+        {page.upload(), static_cast<float>(page.side), static_cast<float>(page.bottom)});
   }
 }
 
@@ -167,7 +178,7 @@ void Ground::draw_shadows(const BundleView& bundle, const glm::mat4& projection,
       if (item.scene >= shadows_.size() || shadows_[item.scene].page != p + 1) continue;
       const Shadow& shadow = shadows_[item.scene];
       const ShadowHeader& header = header_of(bundle.section(SectionType::kShadow, item.scene));
-      const glm::vec2 scale(1.0f / static_cast<float>(kPageSide), 1.0f / pages_[p].height);
+      const glm::vec2 scale(1.0f / pages_[p].width, 1.0f / pages_[p].height);
       const glm::vec2 first(shadow.left, shadow.first_row);
       const glm::vec2 end = first + glm::vec2(header.width, header.height);
       // The first row is the one of the greatest y.

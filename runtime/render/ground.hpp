@@ -48,7 +48,8 @@ class Ground {
   };
   struct ShadowPage {
     GLuint texture = 0;
-    float height = 0;  ///< texels
+    float width = 0;  ///< texels
+    float height = 0;
   };
 
   void lay_out(const BundleView& bundle);

@@ -25,6 +25,14 @@ inline constexpr float kTexturedCell = 16.0f;
 inline constexpr float kAgreeingCell = 0.5f;
 inline constexpr float kDisagreeingCell = 0.3f;
 
+/// Correlation between earlier and current contents of a cell: from kSamePrint on they are the
+/// same, below kChanged they differ.
+inline constexpr float kSamePrint = 0.7f;
+inline constexpr float kChanged = 0.5f;
+/// Cosine of the smallest angle (six degrees) between two directions from which an object above the
+/// paper covers different places: half a cell apart at a height of half the print's longer side.
+inline constexpr float kElsewhere = 0.9945f;
+
 /// A line in which a print's mirror image swaps its sides: u becomes 2 at - u, of the share u of
 /// the width, or of the height if `upright` is false.
 struct Mirror {

@@ -22,12 +22,7 @@ constexpr float kPlainSeen = 40.0f;
 // figures was taken for another one (pose_loop_prints_test).
 constexpr double kBlur = 2.0;
 constexpr float kCoarse = 0.9f;
-// Correlation between earlier and current contents from which they are the same, and below which
-// they differ; the cosine of the smallest angle between two directions (six degrees): as in
-// print_verifier.cpp. And the number of looks that must have shown the same.
-constexpr float kSameDetail = 0.7f;
-constexpr float kOtherDetail = 0.5f;
-constexpr float kOtherView = 0.9945f;
+// Number of looks that must have shown the same.
 constexpr int kLooks = 3;
 constexpr std::uint32_t kDetailStride = 97;  // spreads the cells; coprime to their number
 // How many times less than its samples the frame may resolve.
@@ -83,16 +78,16 @@ void PrintDetails::update(Cell& cell, const CellMatch& match, bool coarse, const
   CellSamples shown{};
   std::copy(cell.shown.begin(), cell.shown.end(), shown.begin());
   const float alike = before ? compare(shown, seen).correlation : 0.0f;
-  if (alike < kOtherDetail) {
+  if (alike < kChanged) {
     cell.state = CellState::kDiffers;
     cell.looks = 1;
     cell.from = from;
     for (std::size_t k = 0; k < seen.size(); ++k) {
       cell.shown[k] = static_cast<std::uint8_t>(seen[k] + 0.5f);
     }
-  } else if (alike >= kSameDetail) {
+  } else if (alike >= kSamePrint) {
     cell.looks = static_cast<std::uint8_t>(std::min(cell.looks + 1, kLooks));
-    if (cell.looks >= kLooks && glm::dot(cell.from, from) < kOtherView)
+    if (cell.looks >= kLooks && glm::dot(cell.from, from) < kElsewhere)
       cell.state = CellState::kPrinted;
   }
 }

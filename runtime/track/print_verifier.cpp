@@ -16,13 +16,6 @@ constexpr std::uint32_t kCellStride = 23;  // spreads them; coprime to their num
 constexpr std::uint32_t kBendEvery = 16;   // frames between measurements of a bend
 // Variance above which the frame's contents of a cell count as textured.
 constexpr float kShownContrast = 9.0f;
-// Correlation between earlier and current contents of a cell: from kSamePrint on they are the same,
-// below kChanged they differ.
-constexpr float kSamePrint = 0.7f;
-constexpr float kChanged = 0.5f;
-// Cosine of the smallest angle (six degrees) between two directions from which an object above the
-// paper covers different places: half a cell apart at a height of half the print's longer side.
-constexpr float kElsewhere = 0.9945f;
 // Number of cells with printed evidence from which it is another print, also as a share (1 / n) of
 // the textured cells in view; and the share of differing cells below which it is the pattern again.
 constexpr int kOtherCells = 6;

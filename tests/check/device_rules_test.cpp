@@ -100,12 +100,9 @@ TEST(Device, MemoryThatHoldsTheCoarsestLevelsIsEnough) {
   ASSERT_EQ(findings(encode(content), device).size(), 1u);
   EXPECT_TRUE(findings(encode(content), device)[0].starts_with("DEVICE_GPU_DETAIL "));
   content.layouts[0].stride = 240;
-  std::uint32_t most = 0;
-  for (LevelRecord& level : content.levels) most = std::max(most, level.vertex_count);
   content.vertices.resize(std::size_t{66000} * 240);
   for (LevelRecord& level : content.levels) level.vertex_count = 65000;
   EXPECT_TRUE(findings(encode(content), device)[0].starts_with("DEVICE_GPU_MEMORY "));
-  EXPECT_LT(most, 100u);
 }
 
 TEST(Verdict, CountsAllButListsTwentyOfAKind) {
