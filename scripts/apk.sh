@@ -1,14 +1,20 @@
 #!/usr/bin/env bash
 # Makes an Android app of bundles: a signed, aligned APK, with Debian's packages only.
 #   scripts/apk.sh BUNDLE... [--title T] [--id org.museum.vases] [--key FILE] [--out FILE]
-#                  [--release URL --trust K.pub] [--words FILE]
+#                  [--release URL --trust K.pub] [--words FILE] [--icon FILE] [--version-code N] [--version-name V] [--store DIR]
 # --title, --id   name of the app on the phone (ModAR), and its application id (org.modar)
 # --key           keystore (PKCS 12) that signs, with its password in APK_PASSWORD (default: a new key, made once
 #                 in build/android/debug.p12). Phones accept updates only from the same key: keep it.
 # --release       address of a folder that `modar ship publish` filled, and the key to trust: adds the network permission
-# --words         words.properties: the texts of the screen in your language
+# --words         words.properties: the texts of the screen, instead of ours in de, el, en, es, fr, it, nl, pl; words-ca.properties: for
+#                 phones in that language
+# --icon          PNG or JPEG, its middle square (default: the first bundle's hint, else ModAR's)
+# --version-code, --version-name   stores want a higher code each time (default: the number of the newest release at --release,
+#                 else 1 and ModAR's version)
+# --store         what stores ask for: an Android App Bundle, icon and texts of the listing, privacy policy, data safety answers,
+#                 metadata for F-Droid
 # NAME.png or NAME.jpg (the hint) and NAME.properties (texts) next to NAME.modar are included.
-# With ANDROID_NDK set (r25 or newer) it builds the native library for armeabi-v7a, arm64-v8a and x86 (or ANDROID_ABIS), and with
+# With ANDROID_NDK set (r25 or newer) it builds the native library for armeabi-v7a, arm64-v8a, x86 and x86_64 (or ANDROID_ABIS), and with
 # --release the installer; without it the APK has no native library, and the script says so. r25 builds for Android 4.4 (API 19)
 # and later, newer ones for 5.0 (API 21): the manifest says which. MODAR_NDK_FLAGS: further words for CMake.
 # dx and the signatures of Android's classes come from Debian's source packages, once, into build/android/debian (121 MB).
@@ -20,32 +26,55 @@ app=$root/runtime/android
 say() { echo "apk.sh: $*" >&2; }
 stop() { say "$2"; exit "$1"; }
 
-least=19 title=ModAR id=org.modar key="" out="" release="" trust="" words="" bundles=()
+least=19 title=ModAR id=org.modar key="" out="" release="" trust="" words="" icon="" code="" name="" store="" bundles=()
 while [ $# -gt 0 ]; do
   case $1 in
-    -h | --help) sed -n '2,16s/^# \{0,1\}//p' "$0"; exit 0 ;;
-    --title | --id | --key | --out | --release | --trust | --words)
+    -h | --help) sed -n '2,22s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    --title | --id | --key | --out | --release | --trust | --words | --icon | --store | --version-code | --version-name)
       [ $# -ge 2 ] || stop 1 "$1 wants a value"
-      printf -v "${1#--}" %s "$2"; shift 2 ;;
+      word=${1#--}
+      printf -v "${word#version-}" %s "$2"; shift 2 ;;
     -*) stop 1 "unknown option '$1'; try --help" ;;
     *) bundles+=("$1"); shift ;;
   esac
 done
 [ ${#bundles[@]} -gt 0 ] || stop 1 "name a bundle: scripts/apk.sh vase.modar"
 [[ $id =~ ^[a-zA-Z][a-zA-Z0-9_]*(\.[a-zA-Z][a-zA-Z0-9_]*)+$ ]] || stop 1 "--id '$id' is no application id like org.museum.vases"
+[[ ${code:-1} =~ ^[1-9][0-9]{0,9}$ && ${code:-1} -le 2100000000 ]] || stop 1 "--version-code '$code' is no number from 1 to 2100000000"
+[ -z "$icon" ] || [ -r "$icon" ] || stop 2 "--icon $icon cannot be read"
 [ -z "$release" ] || [ -r "$trust" ] || stop 1 "--release wants --trust K.pub, the key that signs the releases"
 out=${out:-$root/out/${id##*.}.apk}
 for bundle in "${bundles[@]}"; do
   [ "$(head -c 8 "$bundle" 2>/dev/null | tr -d '\0')" != "" ] || stop 2 "$bundle cannot be read"
 done
 missing=()
-for tool in javac aapt zipalign apksigner keytool proguard python3 xz; do
+for tool in javac aapt aapt2 zipalign apksigner jarsigner keytool proguard python3 xz; do
   command -v $tool >/dev/null || missing+=("$tool")
 done
+/usr/bin/python3 -c 'import PIL' 2>/dev/null || missing+=(python3-pil)
 [ ${#missing[@]} -eq 0 ] ||
-  stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless proguard-cli python3 xz-utils"
+  stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless proguard-cli python3-pil xz-utils"
 framework=/usr/share/android-framework-res/framework-res.apk
 [ -r $framework ] || stop 5 "missing: $framework; apt-get install android-framework-res"
+
+if [ -n "$release" ] && [ -z "$code" ]; then
+  code=$(python3 - "$release/latest" <<'P'
+import sys, urllib.request
+try:
+    with urllib.request.urlopen(sys.argv[1], timeout=10) as answer:
+        print(int(answer.read(32)))
+except (OSError, ValueError):
+    pass
+P
+)
+  [ -n "$code" ] || say "$release/latest cannot be read: the version code is 1; --version-code sets it"
+  name=${name:-$code}
+fi
+code=${code:-1}
+name=${name:-$(sed -n 's/^project(modar VERSION \([0-9.]*\).*/\1/p' "$root/CMakeLists.txt")}
+for hint in "${bundles[0]%.modar}".png "${bundles[0]%.modar}".jpg; do
+  [ -n "$icon" ] || [ ! -r "$hint" ] || icon=$hint
+done
 
 mkdir -p "$work"
 exec 9> "$work/lock"
@@ -78,22 +107,22 @@ if [ ! -f "$work/current.txt" ]; then
   mv "$work/current.txt.tmp" "$work/current.txt"
 fi
 
-# The app's code, once for all APKs: compiled beside the stubs, shrunk (to $code/classes), turned into a phone's.
-code=$work/code
+# The app's code, once for all APKs: compiled beside the stubs, shrunk (to $java/classes), turned into a phone's.
+java=$work/code
 made_of=$(cat "$work/current.txt" "$0" "$root/scripts/android_stubs.py" "$app/proguard-rules.pro" "$app/AndroidManifest.xml" \
   "$app"/res/*/* "$app"/java/org/modar/* | sha256sum)
-if [ "$made_of" != "$(cat "$code/made_of" 2>/dev/null)" ]; then
-  rm -rf "$code"
-  mkdir -p "$code/stub-classes" "$code/all-classes" "$code/names"
-  python3 "$root/scripts/android_stubs.py" "$work/current.txt" "$app/java" "$code/stubs"
-  find "$code/stubs" -name '*.java' > "$code/stubs.list"
-  aapt package -m -J "$code/names" -M "$app/AndroidManifest.xml" -S "$app/res" -I $framework >&2
-  find "$app/java" "$code/names" -name '*.java' > "$code/app.list"
-  javac "${quick[@]}" --release 7 -d "$code/stub-classes" "@$code/stubs.list"
-  javac "${quick[@]}" -g:none --release 7 -cp "$code/stub-classes" -d "$code/all-classes" "@$code/app.list"
+if [ "$made_of" != "$(cat "$java/made_of" 2>/dev/null)" ]; then
+  rm -rf "$java"
+  mkdir -p "$java/stub-classes" "$java/all-classes" "$java/names"
+  python3 "$root/scripts/android_stubs.py" "$work/current.txt" "$app/java" "$java/stubs"
+  find "$java/stubs" -name '*.java' > "$java/stubs.list"
+  aapt package -m -J "$java/names" -M "$app/AndroidManifest.xml" -S "$app/res" -I $framework >&2
+  find "$app/java" "$java/names" -name '*.java' > "$java/app.list"
+  javac "${quick[@]}" --release 7 -d "$java/stub-classes" "@$java/stubs.list"
+  javac "${quick[@]}" -g:none --release 7 -cp "$java/stub-classes" -d "$java/all-classes" "@$java/app.list"
   # Java's own classes as the JDK lists them for --release 7. Its lists are in a format newer than ProGuard; what the format
   # added is not in them.
-  python3 - "$(dirname "$(dirname "$(readlink -f "$(command -v javac)")")")/lib/ct.sym" "$code/java.jar" <<'P'
+  python3 - "$(dirname "$(dirname "$(readlink -f "$(command -v javac)")")")/lib/ct.sym" "$java/java.jar" <<'P'
 import sys, zipfile
 with zipfile.ZipFile(sys.argv[1]) as lists, zipfile.ZipFile(sys.argv[2], "w") as out:
     for name in lists.namelist():
@@ -102,25 +131,28 @@ with zipfile.ZipFile(sys.argv[1]) as lists, zipfile.ZipFile(sys.argv[2], "w") as
             content = lists.read(name)
             out.writestr(path[:-4] + ".class", content[:4] + bytes((0, 0, 0, 51)) + content[8:])
 P
-  JDK_JAVA_OPTIONS="${short[*]}" proguard -injars "$code/all-classes" -outjars "$code/classes" -libraryjars "$code/java.jar" \
-    -libraryjars "$code/stub-classes" "@$app/proguard-rules.pro" &> "$code/proguard.log" || stop 4 "$(cat "$code/proguard.log")"
+  JDK_JAVA_OPTIONS="${short[*]}" proguard -injars "$java/all-classes" -outjars "$java/classes" -libraryjars "$java/java.jar" \
+    -libraryjars "$java/stub-classes" "@$app/proguard-rules.pro" &> "$java/proguard.log" || stop 4 "$(cat "$java/proguard.log")"
   java "${short[@]}" -cp "$work/dx.jar" com.android.dx.command.Main --dex --min-sdk-version=19 \
-    --output="$code/classes.dex" "$code/classes"
-  echo "$made_of" > "$code/made_of"
+    --output="$java/classes.dex" "$java/classes"
+  echo "$made_of" > "$java/made_of"
 fi
 
 step=$work/apk
 rm -rf "$step"
 mkdir -p "$step/tree/assets/bundles" "$(dirname "$out")"
-cp "$code/classes.dex" "$step/tree/"
+cp "$java/classes.dex" "$step/tree/"
 for bundle in "${bundles[@]}"; do
   cp "$bundle" "$step/tree/assets/bundles/"
   for beside in png jpg properties; do
     [ ! -f "${bundle%.modar}.$beside" ] || cp "${bundle%.modar}.$beside" "$step/tree/assets/bundles/"
   done
 done
-# Of a key that is there twice, the later line counts.
-cat "$app/assets/words.properties" ${words:+"$words"} > "$step/tree/assets/words.properties"
+# Of a key that is there twice, the later line counts. Own words are for all phones, those of a file like my-ca.properties for one language.
+language=$(sed -n 's/.*-\([a-z][a-z]\(-[A-Z][A-Z]\)\?\)\.properties$/-\1/p' <<< "$words")
+[ -n "$words" ] && [ -z "$language" ] || cp "$app"/assets/words-*.properties "$step/tree/assets/"
+cp "$app/assets/words.properties" "$step/tree/assets/"
+[ -z "$words" ] || cat "$words" >> "$step/tree/assets/words$language.properties"
 if [ -n "$release" ]; then
   printf '%s\n' "$release" > "$step/tree/assets/release.txt"
   cp "$trust" "$step/tree/assets/release.pub"
@@ -132,9 +164,9 @@ if [ -n "${ANDROID_NDK:-}" ]; then
   revision=$(sed -n 's/^Pkg.Revision *= *\([0-9]*\).*/\1/p' "$ANDROID_NDK/source.properties" 2>/dev/null)
   [ "${revision:-0}" -ge 25 ] || stop 5 "ANDROID_NDK: $ANDROID_NDK is no NDK of r25 or newer (its source.properties says '$revision')"
   [ "$revision" -lt 26 ] || least=21
-  for abi in ${ANDROID_ABIS:-armeabi-v7a arm64-v8a x86}; do
+  for abi in ${ANDROID_ABIS:-armeabi-v7a arm64-v8a x86 x86_64}; do
     level=$least
-    [ "$abi" != arm64-v8a ] || level=21
+    [[ $abi != *64* ]] || level=21
     # An app that fetches carries the installer and its libraries, out of Debian's sources.
     target=(modar_jni) sources=()
     if [ -n "$release" ]; then
@@ -155,10 +187,12 @@ else
   say "ANDROID_NDK is not set: the APK holds no native library and will not start on a phone"
 fi
 
-python3 - "$app" "$step" "$title" "$release" $least <<'P'
+python3 - "$app" "$step" "$title" "$release" $least "$code" "$name" <<'P'
 import html, pathlib, shutil, sys
 app, step, title, release = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4]
 manifest = (app / "AndroidManifest.xml").read_text().replace('minSdkVersion="19"', f'minSdkVersion="{sys.argv[5]}"')
+manifest = manifest.replace('versionCode="1" android:versionName="0.1.0"',
+                            f'versionCode="{sys.argv[6]}" android:versionName="{html.escape(sys.argv[7])}"')
 if release:
     network = '    <uses-permission android:name="android.permission.INTERNET" />\n    <application'
     manifest = manifest.replace("    <application", network, 1)
@@ -170,6 +204,11 @@ strings = step / "res" / "values" / "strings.xml"
 quoted = html.escape(title, quote=False).replace("\\", "\\\\").replace("'", "\\'").replace('"', '\\"')
 strings.write_text(strings.read_text().replace(">ModAR<", f">{quoted}<"))
 P
+if [ -n "$icon" ]; then
+  "$root/scripts/android_icon.py" "$icon" "$step/res" "$step/icon.png" || exit 2
+else
+  cp "$root/runtime/web/icon-512.png" "$step/icon.png"
+fi
 # Bundles are stored as they are, so that the phone maps them inside the APK.
 aapt package -f -M "$step/AndroidManifest.xml" -S "$step/res" -I $framework --rename-manifest-package "$id" -0 modar \
   -F "$step/unaligned.apk" "$step/tree" >&2
@@ -188,5 +227,22 @@ apksigner "${short[@]/#-/-J}" sign --ks "$key" --ks-pass env:APK_PASSWORD --min-
   --v1-signing-enabled true --v2-signing-enabled true --v3-signing-enabled true --out "$out.tmp" "$step/aligned.apk"
 rm -f "$out.tmp.idsig"
 mv "$out.tmp" "$out"
+if [ -n "$store" ]; then
+  # The code names resources by the numbers that aapt gave them.
+  sed -n 's/.*static final class \([a-z]*\) {.*/\1/p; s/.*static final int \([a-z_]*\)=\(0x[0-9a-f]*\);.*/\1 \2/p' \
+    "$java/names/org/modar/R.java" | awk 'NF == 1 { kind = $1 } NF == 2 { print "org.modar:" kind "/" $1 " = " $2 }' > "$step/ids"
+  aapt2 compile --dir "$step/res" -o "$step/res.zip" >&2
+  aapt2 link --proto-format -o "$step/proto.apk" -I $framework --manifest "$step/AndroidManifest.xml" \
+    --rename-manifest-package "$id" --stable-ids "$step/ids" "$step/res.zip" >&2
+  mkdir -p "$store"
+  bundle=$store/$(basename "${out%.apk}").aab
+  "$root/scripts/android_bundle.py" "$step/proto.apk" "$step/tree" "$bundle.tmp"
+  owner=$(keytool "${short[@]/#/-J}" -list -keystore "$key" -storepass:env APK_PASSWORD | sed -n 's/,.*PrivateKeyEntry.*//p' | head -n 1)
+  jarsigner "${short[@]/#/-J}" -keystore "$key" -storepass:env APK_PASSWORD "$bundle.tmp" "$owner" >/dev/null ||
+    { rm -f "$bundle.tmp"; stop 4 "$bundle could not be signed with $key"; }
+  mv "$bundle.tmp" "$bundle"
+  python3 "$root/scripts/android_listing.py" "$store" "$step/icon.png" "$title" "$id" "$name" "$code" "$release"
+  say "$store: read the texts before you publish them"
+fi
 say "$(wc -c < "$out") bytes, $(wc -c < "$step/tree/classes.dex") of them code in Java"
 echo "$out"

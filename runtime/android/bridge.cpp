@@ -2,20 +2,28 @@
 // thread. A frame costs no copy of ours, no allocation and no reference that outlives the call.
 #include "runtime/android/bridge.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "formats/base/utf8.hpp"
 #include "modar/camera.hpp"
 
 namespace modar::android {
 
 namespace {
+
+/// Share of the focal length below which its spread makes it worth keeping for the next start, as
+/// on the page.
+constexpr double kKnownFocal = 0.03;
 
 /// A caller's mistake, exit code 1.
 void misuse(JNIEnv* env, const char* code, const char* where, const char* cause, const char* cure) {
@@ -35,7 +43,7 @@ struct Gesture {
 /// A bundle with what was made of it. The camera's thread tracks while GL's thread draws.
 struct Session {
   std::mutex tracking;  ///< holds tracker
-  std::mutex drawing;   ///< holds renderer, surface, items, gesture
+  std::mutex drawing;   ///< holds renderer, surfaces, items, gesture
   // Both guards to write, either to read:
   modar_bundle* bundle = nullptr;                      ///< null once it is closed
   modar_camera camera = modar::sized<modar_camera>();  ///< width 0: not known yet
@@ -43,6 +51,9 @@ struct Session {
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
   modar_surface surface = modar::sized<modar_surface>();
+  modar_surface drawn_surface =
+      modar::sized<modar_surface>();                         ///< how the items lie on the screen,
+  modar_camera drawn_camera = modar::sized<modar_camera>();  ///< width 0: nothing drawn yet
   std::vector<modar_item> items;
   Gesture gesture;
 };
@@ -127,6 +138,28 @@ jlong opened(JNIEnv* env, modar_bundle* bundle, const modar_error& error) {
   return sessions().add(std::move(session));
 }
 
+/// UTF-8 as a Java string. JNI's own function takes another encoding, without emoji.
+jstring java_text(JNIEnv* env, std::string_view text) {
+  std::u16string utf16;
+  while (!text.empty()) {
+    const std::size_t size = modar::utf8_character(text);
+    std::uint32_t point = static_cast<unsigned char>(text[0]);
+    if (size == 0) point = 0xFFFD;
+    if (size > 1) point &= 0x7Fu >> size;
+    for (std::size_t i = 1; i < size; ++i) {
+      point = point << 6 | (static_cast<unsigned char>(text[i]) & 0x3Fu);
+    }
+    if (point >= 0x10000) {
+      utf16 += static_cast<char16_t>(0xD7C0 + (point >> 10));
+      point = 0xDC00 + (point & 0x3FF);
+    }
+    utf16 += static_cast<char16_t>(point);
+    text.remove_prefix(size == 0 ? 1 : size);
+  }
+  return env->NewString(reinterpret_cast<const jchar*>(utf16.data()),
+                        static_cast<jsize>(utf16.size()));
+}
+
 /// The name of an index, by strlcpy's contract.
 jstring name_of(JNIEnv* env, jlong number, jint index,
                 size_t (*name)(const modar_bundle*, uint32_t, char*, size_t)) {
@@ -138,7 +171,7 @@ jstring name_of(JNIEnv* env, jlong number, jint index,
     misuse(env, "android.index", "index", "the bundle has nothing of that number", "count first");
     return nullptr;
   }
-  return env->NewStringUTF(text.data());
+  return java_text(env, text.data());
 }
 
 // --- Pixels and poses ---
@@ -305,10 +338,35 @@ void place_items(Session& session, const float* poses) {
   }
 }
 
+void draw_items(Session& session, const modar_surface& surface, const modar_camera& camera,
+                const modar_picture* picture) {
+  session.drawn_surface = surface;
+  session.drawn_camera = camera;
+  modar_renderer_draw(session.renderer, &surface, picture, &camera, nullptr, session.items.data(),
+                      session.items.size());
+}
+
 void draw(Session& session, const modar_picture* picture, const float* poses) {
   place_items(session, poses);
-  modar_renderer_draw(session.renderer, &session.surface, picture, &session.camera, nullptr,
-                      session.items.data(), session.items.size());
+  draw_items(session, session.surface, session.camera, picture);
+}
+
+/// What stands on a pattern, from an eye that goes around it as fingers say.
+void draw_orbit(Session& session, std::uint32_t pattern, double turn, double tilt, double zoom) {
+  auto surface = session.surface;
+  surface.rotation = surface.mirror = 0;
+  auto camera = modar::sized<modar_camera>();
+  camera.width = surface.width;
+  camera.height = surface.height;
+  auto pose = modar::sized<modar_pose>();
+  if (modar_orbit(session.bundle, pattern, turn, tilt, zoom, &camera, &pose) == 0) return;
+  session.items.clear();
+  for (const modar_scene& scene : session.scenes) {
+    if (scene.pattern != pattern) continue;
+    session.items.push_back(modar::sized<modar_item>());
+    modar_item_place(&session.items.back(), &scene, &pose);
+  }
+  draw_items(session, surface, camera, nullptr);
 }
 
 /// False and an exception where there is no renderer or no surface yet.
@@ -393,15 +451,42 @@ MODAR_NATIVE(jstring, modelName)(JNIEnv* env, jclass, jlong number, jint index) 
   return name_of(env, number, index, modar_model_name);
 }
 
+MODAR_NATIVE(jstring, language)(JNIEnv* env, jclass, jlong number, jint index) {
+  const Use session(env, number, &Session::tracking);
+  std::array<char, 64> tag{};
+  if (!session || index < 0 ||
+      modar_language(session->bundle, static_cast<std::uint32_t>(index), tag.data(), tag.size()) ==
+          0) {
+    return nullptr;
+  }
+  return java_text(env, tag.data());
+}
+
+MODAR_NATIVE(jstring, patternText)
+(JNIEnv* env, jclass, jlong number, jint pattern, jboolean alternative, jstring language) {
+  const std::string tag = text_of(env, language);
+  const Use session(env, number, &Session::tracking);
+  if (!session || pattern < 0) return nullptr;
+  const auto index = static_cast<std::uint32_t>(pattern);
+  const int kind = alternative != 0 ? MODAR_ALT_TEXT : MODAR_TEXT;
+  const std::size_t size =
+      modar_pattern_text(session->bundle, index, kind, tag.c_str(), nullptr, 0);
+  if (size == 0) return nullptr;
+  std::string text(size + 1, '\0');
+  modar_pattern_text(session->bundle, index, kind, tag.c_str(), text.data(), text.size());
+  return java_text(env, text.c_str());
+}
+
 MODAR_NATIVE(void, setCamera)
-(JNIEnv* env, jclass, jlong number, jint width, jint height, jstring file, jboolean search_apart,
- jboolean extended) {
+(JNIEnv* env, jclass, jlong number, jint width, jint height, jstring file, jdouble focal,
+ jboolean search_apart, jboolean extended) {
   const std::string path = text_of(env, file);
   const Use session(env, number, &Session::tracking);
   if (!session) return;
   auto error = modar::sized<modar_error>();
   auto camera = modar::sized<modar_camera>();
   modar_camera_default(width, height, &camera);
+  if (focal > 0.0) camera.fx = camera.fy = focal * std::max(width, height);
   if (!path.empty()) {
     if (modar_camera_read(path.c_str(), &camera, &error) != 0) return throw_error(env, error);
     modar::Camera lens{camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, {}};
@@ -424,6 +509,15 @@ MODAR_NATIVE(void, setCamera)
   modar_tracker_destroy(std::exchange(session->tracker, tracker));
   const std::lock_guard drawing(session->drawing);
   session->camera = camera;
+}
+
+MODAR_NATIVE(jdouble, focal)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::tracking);
+  if (!session || session->tracker == nullptr) return 0;
+  auto camera = modar::sized<modar_camera>();
+  const double sigma = modar_tracker_camera(session->tracker, &camera);
+  if (sigma <= 0.0 || sigma >= kKnownFocal * camera.fx) return 0;
+  return camera.fx / std::max(camera.width, camera.height);
 }
 
 MODAR_NATIVE(void, onTurn)
@@ -475,6 +569,11 @@ MODAR_NATIVE(void, reset)(JNIEnv* env, jclass, jlong number) {
   if (session && session->tracker != nullptr) modar_tracker_reset(session->tracker);
 }
 
+MODAR_NATIVE(void, trim)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::tracking);
+  if (session) modar_tracker_destroy(std::exchange(session->tracker, nullptr));
+}
+
 MODAR_NATIVE(void, projection)
 (JNIEnv* env, jclass, jlong number, jdouble near_plane, jdouble far_plane, jobject matrix) {
   const Use session(env, number, &Session::tracking);
@@ -500,7 +599,7 @@ MODAR_NATIVE(void, onSurfaceCreated)
   session->renderer = modar_renderer_create(session->bundle,
                                             profile.empty() ? nullptr : profile.c_str(), 0, &error);
   if (session->renderer == nullptr) return throw_error(env, error);
-  modar_render_options options;
+  auto options = modar::sized<modar_render_options>();
   modar_render_options_default(&options);
   options.exclusive = 1;  // GLSurfaceView's context is the app's alone
   modar_renderer_set_options(session->renderer, &options);
@@ -570,15 +669,22 @@ MODAR_NATIVE(void, onDrawPlanes)
   draw(*session, &picture, from);
 }
 
+MODAR_NATIVE(void, onDrawOrbit)
+(JNIEnv* env, jclass, jlong number, jint pattern, jdouble turn, jdouble tilt, jdouble zoom) {
+  const Use session(env, number, &Session::drawing);
+  if (!session || !can_draw(env, *session) || pattern < 0) return;
+  draw_orbit(*session, static_cast<std::uint32_t>(pattern), turn, tilt, zoom);
+}
+
 MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) {
   const Use session(env, number, &Session::drawing);
-  if (!session || !has_camera(env, *session) || !can_draw(env, *session)) return -1;
+  if (!session || !can_draw(env, *session) || session->drawn_camera.width == 0) return -1;
   double frame_x = 0;
   double frame_y = 0;
-  modar_surface_to_frame(&session->surface, &session->camera, double{x}, double{y}, &frame_x,
-                         &frame_y);
+  modar_surface_to_frame(&session->drawn_surface, &session->drawn_camera, double{x}, double{y},
+                         &frame_x, &frame_y);
   auto hit = modar::sized<modar_hit>();
-  if (modar_pick(session->bundle, &session->camera, frame_x, frame_y, session->items.data(),
+  if (modar_pick(session->bundle, &session->drawn_camera, frame_x, frame_y, session->items.data(),
                  session->items.size(), &hit) == 0) {
     return -1;
   }

@@ -1,12 +1,17 @@
 // modar.h: bundles with their names and scenes; the camera, and from a pose to GL's matrices.
 // Nothing of the tracker and nothing of the renderer: what both halves share.
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <new>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
 
 #include "formats/check.hpp"
 #include "formats/meta_text.hpp"
@@ -17,6 +22,11 @@
 using modar::hand_over;
 
 namespace {
+
+// modar_orbit(): the field of view across the smaller side, in radians, as from a hand's distance;
+// and room around what is shown, as the page's turntable has them.
+constexpr double kOrbitField = 0.6981317007977318;
+constexpr double kOrbitMargin = 1.06;
 
 modar_bundle* opened(modar::MappedFile file, std::span<const std::byte> bytes, modar_error* error) {
   auto view = modar::BundleView::open(bytes);
@@ -163,6 +173,31 @@ int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scen
   return 1;
 }
 
+int modar_pattern_bounds(const modar_bundle* bundle, uint32_t pattern, float low[3],
+                         float high[3]) {
+  if (low == nullptr || high == nullptr) return 0;
+  glm::vec3 least(std::numeric_limits<float>::max());
+  glm::vec3 greatest(std::numeric_limits<float>::lowest());
+  auto scene = modar::sized<modar_scene>();
+  for (uint32_t s = 0; modar_scene_at(bundle, s, &scene) != 0; ++s) {
+    glm::vec3 box[2];
+    if (scene.pattern != pattern) continue;
+    if (modar_model_bounds(bundle, scene.model, &box[0].x, &box[1].x) == 0) continue;
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::vec4 at(box[corner & 1].x, box[corner >> 1 & 1].y, box[corner >> 2].z, 1.0f);
+      const glm::vec3 placed(glm::make_mat4(scene.place) * at);
+      least = glm::min(least, placed);
+      greatest = glm::max(greatest, placed);
+    }
+  }
+  if (least.x > greatest.x) return 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    low[axis] = least[axis];
+    high[axis] = greatest[axis];
+  }
+  return 1;
+}
+
 int modar_pattern_picture(const modar_bundle* bundle, uint32_t index, int* width, int* height,
                           const uint8_t** gray) {
   if (index >= modar_pattern_count(bundle)) return 0;
@@ -203,6 +238,40 @@ size_t modar_pattern_text(const modar_bundle* bundle, uint32_t pattern, int kind
 
 void modar_camera_default(int width, int height, modar_camera* camera) {
   modar::give_camera(modar::default_camera(width, height), camera);
+}
+
+int modar_orbit(const modar_bundle* bundle, uint32_t pattern, double turn, double tilt, double zoom,
+                modar_camera* camera, modar_pose* pose) {
+  if (pattern >= modar_pattern_count(bundle) || camera == nullptr || pose == nullptr) return 0;
+  modar_camera lens = modar::grown(*camera);
+  if (lens.width < 1 || lens.height < 1 || !(zoom > 0.0)) return 0;
+  const modar::PatternRecord& plane = bundle->view.patterns()[pattern];
+  glm::vec3 low(-plane.half_width, -plane.half_height, 0.0f);
+  glm::vec3 high = -low;
+  modar_pattern_bounds(bundle, pattern, &low.x, &high.x);
+  lens.fx = lens.fy = 0.5 * std::min(lens.width, lens.height) / std::tan(0.5 * kOrbitField);
+  lens.cx = 0.5 * (lens.width - 1);
+  lens.cy = 0.5 * (lens.height - 1);
+  std::fill(std::begin(lens.distortion), std::end(lens.distortion), 0.0);
+  const glm::dvec3 right(std::cos(turn), std::sin(turn), 0.0);
+  const glm::dvec3 back(std::sin(turn) * std::cos(tilt), -std::cos(turn) * std::cos(tilt),
+                        std::sin(tilt));
+  const glm::dvec3 down = -glm::cross(back, right);
+  const glm::dvec3 axes[3] = {right, down, -back};
+  const double radius = 0.5 * glm::length(glm::dvec3(high - low));
+  const double distance = kOrbitMargin * radius / std::sin(0.5 * kOrbitField) / zoom;
+  const glm::dvec3 eye = 0.5 * glm::dvec3(high + low) + distance * back;
+  modar_pose ours{};
+  ours.visible = ours.shown = 1;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      ours.rotation[3 * row + column] = static_cast<float>(axes[row][column]);
+    }
+    ours.translation[row] = static_cast<float>(-glm::dot(axes[row], eye));
+  }
+  modar::give(lens, camera);
+  modar::give(ours, pose);
+  return 1;
 }
 
 void modar_projection(const modar_camera* camera, double near_plane, double far_plane,

@@ -264,15 +264,17 @@ int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double fr
 void modar_render_options_default(modar_render_options* options) {
   if (options == nullptr) return;
   const modar::RenderOptions ours;
-  *options = {sizeof *options,
-              {0.0f, 0.0f, 0.0f},
-              ours.light_strength,
-              ours.ambient_strength,
-              {ours.clear_colour.r, ours.clear_colour.g, ours.clear_colour.b, ours.clear_colour.a},
-              ours.lod_pixels,
-              ours.exclusive_context ? 1 : 0,
-              ours.estimate_light ? 0 : 1,
-              ours.samples};
+  const glm::vec4& clear = ours.clear_colour;
+  const modar_render_options filled{0,
+                                    {0.0f, 0.0f, 0.0f},
+                                    ours.light_strength,
+                                    ours.ambient_strength,
+                                    {clear.r, clear.g, clear.b, clear.a},
+                                    ours.lod_pixels,
+                                    ours.exclusive_context ? 1 : 0,
+                                    ours.estimate_light ? 0 : 1,
+                                    ours.samples};
+  modar::give(filled, options);
 }
 
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options) {

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
-#include <limits>
 
 #include <GLES2/gl2.h>
 #include <emscripten.h>
@@ -142,25 +141,7 @@ EMSCRIPTEN_KEEPALIVE double web_pattern_width_mm(uint32_t index) {
 /// does.
 EMSCRIPTEN_KEEPALIVE const float* web_bounds(uint32_t pattern) {
   static float bounds[6];
-  const float largest = std::numeric_limits<float>::max();
-  glm::vec3 low(largest);
-  glm::vec3 high(-largest);
-  auto scene = modar::sized<modar_scene>();
-  for (uint32_t s = 0; modar_scene_at(engine.bundle, s, &scene) != 0; ++s) {
-    glm::vec3 box[2];
-    if (scene.pattern != pattern) continue;
-    if (modar_model_bounds(engine.bundle, scene.model, &box[0].x, &box[1].x) == 0) continue;
-    for (int corner = 0; corner < 8; ++corner) {
-      const glm::vec4 at(box[corner & 1].x, box[corner >> 1 & 1].y, box[corner >> 2].z, 1.0f);
-      const glm::vec3 placed(glm::make_mat4(scene.place) * at);
-      low = glm::min(low, placed);
-      high = glm::max(high, placed);
-    }
-  }
-  if (low.x > high.x) return nullptr;
-  std::memcpy(bounds, &low, sizeof low);
-  std::memcpy(bounds + 3, &high, sizeof high);
-  return bounds;
+  return modar_pattern_bounds(engine.bundle, pattern, bounds, bounds + 3) != 0 ? bounds : nullptr;
 }
 /// Which models stand on which patterns. part: 0 pattern, 1 model.
 EMSCRIPTEN_KEEPALIVE uint32_t web_scene(uint32_t index, int part) {
@@ -275,7 +256,7 @@ EMSCRIPTEN_KEEPALIVE int web_upload(int lost, int fixed) {
     return modar_renderer_restore(engine.renderer, &engine.error);
   engine.renderer = modar_renderer_create(engine.bundle, nullptr, 0, &engine.error);
   if (engine.renderer == nullptr) return engine.error.status;
-  modar_render_options options;
+  auto options = modar::sized<modar_render_options>();
   modar_render_options_default(&options);
   options.exclusive = 1;
   options.fixed_light = fixed;

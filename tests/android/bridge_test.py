@@ -9,8 +9,8 @@ import subprocess
 import tempfile
 import unittest
 
-from machine import (APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest, compile_java, have, make_clip, make_covered_clip,
-                     run_java, write_fakes)
+from machine import (APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest, bake_with_texts, compile_java, have, make_clip,
+                     make_covered_clip, make_long_clip, run_java, write_fakes)
 
 from programs import COVERED, READINGS, SEEN, TURNED, TURNS, write_turns  # noqa: E402
 
@@ -142,6 +142,21 @@ class Bridge(ProgramTest):
             wanted = decoded[i * WIDTH * HEIGHT * 3:(i + 1) * WIDTH * HEIGHT * 3]
             self.assertEqual(rgb, wanted, f"frame {i}: off by {max(abs(a - b) for a, b in zip(rgb, wanted))}")
 
+    def test_texts_are_the_projects(self):
+        told = [bytes.fromhex(line).decode("utf-16-be") for line in self.bridge("texts", bake_with_texts(self, "texts.modar")).split()]
+        self.assertEqual({tuple(told[i:i + 3]) for i in range(0, len(told), 3)},
+                         {("en", "A vase.", "A vase \U0001F3FA"), ("de", "Eine Vase.", "Eine Vase \U0001F3FA")})
+
+    def test_the_lens_is_what_the_player_says_once_it_is_known(self):
+        clip, bundle = make_long_clip(self.folder / "long", 30), self.bake_demo()
+        told = [float(line) for line in self.bridge("focal", bundle, clip=clip).split()]
+        cameras = [json.loads(line)["camera"] for line in self.play(bundle, "--json", "--quiet", clip=clip).stdout.splitlines()[:30]]
+        wanted = [camera["focal_px"] if 0 < camera.get("sigma_px", 0) < 0.03 * camera["focal_px"] else 0 for camera in cameras]
+        self.assertGreater(wanted.count(0), 10)
+        self.assertGreater(wanted[-1], 0)
+        for share, focal in zip(told, wanted, strict=True):
+            self.assertAlmostEqual(share * WIDTH, focal, delta=0.01)
+
     def test_every_misuse_throws_and_crashes_nothing(self):
         bundle = self.bake_demo()
         damaged = self.folder / "damaged.modar"
@@ -192,7 +207,7 @@ class Targets(unittest.TestCase):
             unit = folder / "unit.cpp"
             unit.write_text("".join(f'#include "{file}"\n' for file in sorted((ROOT / "runtime" / "android").glob("*.cpp"))))
             # glibc stands for bionic, so the compiler must not say that this is Android.
-            for target in ("armv7a-linux-androideabi19", "aarch64-linux-android21", "i686-linux-android19"):
+            for target in ("armv7a-linux-androideabi19", "aarch64-linux-android21", "i686-linux-android19", "x86_64-linux-android21"):
                 with self.subTest(target=target):
                     done = subprocess.run(
                         ["clang++-14", f"--target={target}", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Wconversion",

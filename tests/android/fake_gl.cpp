@@ -69,7 +69,8 @@ FAKE_GL(void, read)(JNIEnv* env, jclass, jobject rgba) {
                env->GetDirectBufferAddress(rgba));
 }
 
-FAKE_GL(void, clear)(JNIEnv*, jclass) {
+FAKE_GL(void, clear)(JNIEnv*, jclass, jfloat gray) {
+  glClearColor(gray, gray, gray, 1.0f);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
 }
 

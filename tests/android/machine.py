@@ -8,7 +8,7 @@ import sys
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(ROOT / "tests" / "cli"))
 
-from programs import BIN, CLIP_HEIGHT, CLIP_WIDTH, COVER, ProgramTest, covered_clip, demo_clip  # noqa: E402, F401
+from programs import BIN, CLIP_HEIGHT, CLIP_WIDTH, COVER, POTTERY, ProgramTest, covered_clip, demo_clip  # noqa: E402, F401
 
 JNI = os.environ.get("MODAR_JNI", str(BIN.parent / "runtime" / "android"))
 FAKE_GL = os.environ.get("MODAR_FAKE_GL", str(BIN.parent / "tests" / "android"))
@@ -43,6 +43,17 @@ def run_java(classpath, *words, timeout=1800 if SOAK else 300):
 def make_clip(folder, frames=FRAMES):
     """NV21 as a phone's camera gives it, one file: our cover before clutter, held in a hand."""
     demo_clip(folder, frames)
+    return nv21_of(folder)
+
+
+def make_long_clip(folder, frames):
+    """The same for longer than the demo's clip, from other directions."""
+    subprocess.run([sys.executable, ROOT / "assets" / "make_clip.py", "--pattern", COVER, "--frames", str(frames), "--size",
+                    f"{WIDTH}x{HEIGHT}", folder], check=True)
+    return nv21_of(folder)
+
+
+def nv21_of(folder):
     file = folder / "clip.nv21"
     subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", str(folder / "*.png"), "-vf", "scale=out_range=full",
                     "-pix_fmt", "nv21", "-f", "rawvideo", str(file)], check=True)
@@ -57,6 +68,22 @@ def make_covered_clip(folder):
     size, luma = WIDTH * HEIGHT, gray.read_bytes()
     file.write_bytes(b"".join(luma[at:at + size] + b"\x80" * (size // 2) for at in range(0, len(luma), size)))
     return file
+
+
+def bake_with_texts(test, name):
+    """Pottery on the cover, as bake_demo() has it, with texts in two languages."""
+    project = test.folder / "project"
+    project.mkdir()
+    (project / "models").symlink_to(POTTERY.parent)
+    (project / "cover.png").symlink_to(COVER)
+    text = {"en": "A vase.", "de": "Eine Vase."}
+    (project / "modar.toml").write_text(
+        '[project]\nname = "vase"\n[bake]\nup = "z"\nlods = 1\nloop-views = 8\nscore = false\n[[model]]\nfile = "models/pottery.obj"\n'
+        '[[pattern]]\nfile = "cover.png"\n[[scene]]\npattern = "cover"\nmodel = "pottery"\nscale = 0.5\n' +
+        "".join(f'text.{language} = "{each}"\nalt.{language} = "{each[:-1]} \U0001F3FA"\n' for language, each in text.items()))
+    done = test.modar("bake", "--outside", "--quiet", cwd=project)
+    test.assertEqual(done.returncode, 0, done.stderr)
+    return pathlib.Path(shutil.copyfile(project / "out" / "vase.modar", test.folder / name))
 
 
 def write_fakes(folder):

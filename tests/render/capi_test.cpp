@@ -366,6 +366,76 @@ TEST(CapiTexts, AreHandedOutByLanguage) {
   modar_bundle_close(bundle);
 }
 
+/// A triangle of sides 1 that stands upright on the pattern, facing its lower edge, a quarter to
+/// the right of its centre.
+BundleContent standing_triangle() {
+  SceneMaker maker;
+  maker.add_plain_model(Layout::kHalfColoured, {one_triangle()});
+  BundleContent content = std::move(maker.content);
+  const BundleContent pattern = test::pattern_content();
+  content.patterns = pattern.patterns;
+  content.parameter_sets = pattern.parameter_sets;
+  for (auto& each : content.patterns) each.name = content.models[0].name;
+  for (auto& each : content.parameter_sets) each.name = content.models[0].name;
+  const float half = std::sqrt(0.5f);
+  content.scenes = {{0, 0, 0.5f, {0.25f, 0.0f, 0.5f}, {half, 0.0f, 0.0f, half}, {}}};
+  return content;
+}
+
+TEST(CapiOrbit, GoesAroundWhatStandsOnAPattern) {
+  const auto bytes = test::encode(standing_triangle());
+  auto error = sized<modar_error>();
+  modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), &error);
+  ASSERT_NE(bundle, nullptr) << error.code << error.where << error.cause;
+  float box[2][3] = {{7}, {7}};
+  EXPECT_EQ(modar_pattern_bounds(bundle, 1, box[0], box[1]), 0);
+  EXPECT_EQ(box[0][0], 7);
+  ASSERT_EQ(modar_pattern_bounds(bundle, 0, box[0], box[1]), 1);
+  const float wanted[2][3] = {{-0.25f, 0.0f, 0.0f}, {0.75f, 0.0f, 1.0f}};
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(box[i / 3][i % 3], wanted[i / 3][i % 3], 0.002) << i;
+
+  auto camera = sized<modar_camera>();
+  camera.width = 300;
+  camera.height = 200;
+  auto pose = sized<modar_pose>();
+  EXPECT_EQ(modar_orbit(bundle, 1, 0, 0, 1, &camera, &pose), 0);
+  EXPECT_EQ(modar_orbit(bundle, 0, 0, 0, 0, &camera, &pose), 0);
+  // Where a point of the pattern's space is seen.
+  const auto pixel = [&](double x, double y, double z) {
+    const double at[3] = {x, y, z};
+    double eye[3];
+    for (int row = 0; row < 3; ++row) {
+      eye[row] = static_cast<double>(pose.translation[row]);
+      for (int k = 0; k < 3; ++k)
+        eye[row] += static_cast<double>(pose.rotation[3 * row + k]) * at[k];
+    }
+    EXPECT_GT(eye[2], 0.0);
+    return glm::dvec2(camera.cx + camera.fx * eye[0] / eye[2],
+                      camera.cy + camera.fy * eye[1] / eye[2]);
+  };
+  for (const double turn : {0.0, 1.0, 3.0, -2.0}) {
+    for (const double tilt : {0.1, 0.7, 1.5}) {
+      ASSERT_EQ(modar_orbit(bundle, 0, turn, tilt, 1, &camera, &pose), 1);
+      EXPECT_NEAR(glm::distance(pixel(0.25, 0, 0.5), {149.5, 99.5}), 0, 0.1) << turn << " " << tilt;
+      const glm::dvec2 tip = pixel(0.25, 0, 1);
+      EXPECT_LT(tip.y, 99.5) << "up is up";
+      for (const glm::dvec2 seen : {tip, pixel(-0.25, 0, 0), pixel(0.75, 0, 0)}) {
+        EXPECT_TRUE(seen.x > 0 && seen.x < 299 && seen.y > 0 && seen.y < 199)
+            << seen.x << " " << seen.y;
+      }
+    }
+  }
+  // From the pattern's lower edge, its right is on the right; half around, on the left.
+  modar_orbit(bundle, 0, 0, 0.1, 1, &camera, &pose);
+  const double wide = pixel(0.75, 0, 0.5).x - pixel(-0.25, 0, 0.5).x;
+  EXPECT_GT(wide, 80);
+  modar_orbit(bundle, 0, 0, 0.1, 2, &camera, &pose);
+  EXPECT_GT(pixel(0.75, 0, 0.5).x - pixel(-0.25, 0, 0.5).x, 1.9 * wide);
+  modar_orbit(bundle, 0, 3.14159265, 0.1, 1, &camera, &pose);
+  EXPECT_NEAR(pixel(0.75, 0, 0.5).x - pixel(-0.25, 0, 0.5).x, -wide, 0.1);
+  modar_bundle_close(bundle);
+}
+
 /// Draws through the C API.
 class CapiDrawTest : public GlTest {
  protected:

@@ -125,6 +125,9 @@ typedef struct modar_scene {
 } modar_scene;
 /* Returns 1 and the scene, or 0 for an invalid index. */
 int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scene);
+/* The box of what stands on a pattern, in the pattern's space. Returns 0 and changes nothing where
+ * nothing does. */
+int modar_pattern_bounds(const modar_bundle* bundle, uint32_t pattern, float low[3], float high[3]);
 
 /* ---- the camera and its pose ---- */
 
@@ -162,8 +165,8 @@ typedef struct modar_pose {
   float rotation_sigma; /* and rotation, in radians */
   float stretch[12];    /* 3 x 4, row by row; all 0: none. While the camera is estimated, no pose
                            explains    exactly where a flat pattern's picture lies. Draw what belongs
-                           on    it at    X_camera = rotation * (stretch * (X_pattern, 1)) + translation,
-                           as    modar_view()    does */
+                           on    it at    X_camera = rotation * (stretch * (X_pattern, 1)) +
+                           translation,    as    modar_view()    does */
 } modar_pose;
 
 /* Returns NULL and an error if no pattern of the bundle can be tracked. */
@@ -221,6 +224,15 @@ const char* modar_tracker_reason(const modar_tracker* tracker);
  * shows it. */
 void modar_projection(const modar_camera* camera, double near_plane, double far_plane,
                       float projection[16]);
+/* A look without a camera: the pose of a pattern for a camera that goes around what stands on it
+ * and shows all of that (where nothing does, the pattern). turn: radians about the pattern's
+ * normal; tilt: radians above its plane; zoom: 1 to show all, 2 for twice as large. Sets the focal
+ * length and centre of `camera`, which has the size of the picture, and the pose to `shown`.
+ * Returns 0 and changes nothing for an invalid index or size.
+ */
+MODAR_EXPERIMENTAL int modar_orbit(const modar_bundle* bundle, uint32_t pattern, double turn,
+                                   double tilt, double zoom, modar_camera* camera,
+                                   modar_pose* pose);
 /* Pattern space to GL's eye space (x right, y up, z backward). */
 void modar_view(const modar_pose* pose, float view[16]);
 

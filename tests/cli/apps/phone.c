@@ -19,7 +19,7 @@ static void need(int holds, int line) {
 
 static void check_drawing(const modar_bundle* bundle) {
   uint8_t rgba[8 * 8 * 4];
-  modar_render_options options;
+  modar_render_options options = {.size = sizeof options};
   modar_camera camera = {.size = sizeof camera};
   modar_camera_default(8, 8, &camera);
   modar_context* context = modar_context_create(&error);

@@ -18,7 +18,7 @@ public final class GlContext {
     /** RGBA from the bottom up, of the whole surface. */
     public static native void read(ByteBuffer rgba);
 
-    public static native void clear();
+    public static native void clear(float gray);
 
     public static native String string(int name);
 }

@@ -48,6 +48,7 @@ final class Bundles {
     final File folder;
     final File store;
     private final File verified;
+    private final File focal;
 
     Bundles(Context context) {
         this.context = context;
@@ -55,6 +56,7 @@ final class Bundles {
         folder = outside != null ? outside : context.getFilesDir();
         store = new File(context.getFilesDir(), "store");
         verified = new File(context.getFilesDir(), "verified");
+        focal = new File(context.getFilesDir(), "focal");
     }
 
     List<Source> list() {
@@ -164,6 +166,21 @@ final class Bundles {
     String lens() {
         File file = new File(folder, "camera.yml");
         return file.exists() ? file.getPath() : null;
+    }
+
+    /** What Native.focal() said when the app was last used; 0: unknown. */
+    double focal() {
+        try {
+            return Double.parseDouble(text(new FileInputStream(focal)));
+        } catch (IOException none) {
+            return 0;
+        } catch (NumberFormatException torn) {
+            return 0;
+        }
+    }
+
+    void setFocal(double share) throws IOException {
+        write(focal, Double.toString(share), false);
     }
 
     String asset(String name) throws IOException {

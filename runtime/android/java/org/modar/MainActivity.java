@@ -2,6 +2,7 @@ package org.modar;
 
 import android.Manifest;
 import android.app.Activity;
+import android.content.ActivityNotFoundException;
 import android.content.pm.PackageManager;
 import android.content.res.Configuration;
 import android.graphics.Bitmap;
@@ -14,17 +15,17 @@ import android.os.Message;
 import android.view.Display;
 import android.view.MotionEvent;
 import android.view.View;
+import android.view.ViewGroup;
 import android.view.WindowManager;
 import android.widget.ImageView;
 import android.widget.TextView;
 import java.io.File;
-import java.io.FileOutputStream;
 import java.io.IOException;
 import java.nio.ByteBuffer;
 import java.util.List;
-import java.util.Properties;
+import java.util.Locale;
 
-/** The one screen: the camera's picture with models on it, a line of advice, four buttons. */
+/** The one screen: the camera's picture with models on it, or the models alone; a line of advice, and buttons. */
 public final class MainActivity extends Activity implements Handler.Callback {
     /** How often the line of advice follows what the tracker says. */
     private static final int TICK_MS = 500;
@@ -35,29 +36,38 @@ public final class MainActivity extends Activity implements Handler.Callback {
     private static final int TROUBLE = 2;
     private static final int DAMAGED = 3;
     private static final int FETCHED = 4;
+    private static final int SAVED = 5;
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
     private Gestures gestures = new Gestures();
     private Words words;
     private Bundles bundles;
+    private Photos photos;
     private Stage stage;
     private CameraFeed feed;
     private CameraFeed stopped;
     private boolean resumed;
     private boolean asked;
+    /** The phone wanted memory back: what can be made again is gone. */
+    private boolean trimmed;
 
     // What is shown:
     private List<Bundles.Source> sources;
     private int source = -1;
     private long session;
     private String[] patterns = {};
-    private Properties texts = new Properties();
+    private Texts texts;
+    /** A look without the camera; null: with it. */
+    private Orbit orbit;
     /** An error stays on the screen until something works again; null: advice. */
     private String trouble;
     private long noticeUntil;
 
     private GLSurfaceView view;
+    private ViewGroup screen;
+    private String described = "";
+    private String said = "";
     private TextView status;
     private ImageView hint;
     private View info;
@@ -65,20 +75,25 @@ public final class MainActivity extends Activity implements Handler.Callback {
     @Override
     protected void onCreate(Bundle state) {
         super.onCreate(state);
-        words = new Words(getAssets());
+        words = new Words(getAssets(), Locale.getDefault());
         bundles = new Bundles(this);
+        photos = new Photos(this, getString(R.string.title));
         diagnostics = new Diagnostics();
         setContentView(R.layout.main);
+        screen = (ViewGroup) findViewById(R.id.screen);
         view = (GLSurfaceView) findViewById(R.id.view);
         status = (TextView) findViewById(R.id.status);
         hint = (ImageView) findViewById(R.id.hint);
         info = findViewById(R.id.info);
         label(R.id.picture, "picture");
+        label(R.id.share, "share");
+        label(R.id.around, "around");
         label(R.id.models, "models");
         label(R.id.update, "update");
         label(R.id.about, "about");
         showIf(findViewById(R.id.update), Fetch.AVAILABLE);
         stage = new Stage(view, this, diagnostics);
+        stage.focal = bundles.focal();
         view.setEGLContextClientVersion(2);
         view.setEGLConfigChooser(new Samples());
         view.setPreserveEGLContextOnPause(true);
@@ -113,6 +128,10 @@ public final class MainActivity extends Activity implements Handler.Callback {
             case DAMAGED:
                 drop((Bundles.Source) message.obj);
                 break;
+            case SAVED:
+                showIf(findViewById(R.id.share), true);
+                notice(words.get("saved"));
+                break;
             default:
                 findViewById(R.id.update).setEnabled(true);
                 if (message.arg1 != 0) showAll();
@@ -126,8 +145,13 @@ public final class MainActivity extends Activity implements Handler.Callback {
     protected void onResume() {
         super.onResume();
         resumed = true;
+        if (trimmed) screen.addView(view, 0);
+        if (trimmed && source >= 0) hint.setImageBitmap(bundles.hint(sources.get(source)));
+        trimmed = false;
         view.onResume();
-        if (!mayUseCamera()) {
+        if (orbit != null) {
+            stage.look(orbit);
+        } else if (!mayUseCamera()) {
             if (!asked) askForCamera();
         } else {
             startCamera();
@@ -142,8 +166,38 @@ public final class MainActivity extends Activity implements Handler.Callback {
         stopCamera();
         view.onPause();
         closeCamera();
+        keepFocal();
         writeDiagnostics();
         super.onPause();
+    }
+
+    /** What the camera's frames told of its lens is where the next visit starts. */
+    private void keepFocal() {
+        try {
+            double focal = session == 0 ? 0 : Native.focal(session);
+            if (focal == 0) return;
+            stage.focal = focal;
+            bundles.setFocal(focal);
+        } catch (ModarException gone) {
+            diagnostics.error(gone.getMessage());
+        } catch (IOException full) {
+            diagnostics.error(full.getMessage());
+        }
+    }
+
+    /** In the background: GL's context with the models, the tracker and the hint can be made again. */
+    @Override
+    public void onTrimMemory(int level) {
+        super.onTrimMemory(level);
+        if (resumed || trimmed || level < TRIM_MEMORY_BACKGROUND) return;
+        trimmed = true;
+        screen.removeView(view);
+        hint.setImageBitmap(null);
+        try {
+            if (session != 0) Native.trim(session);
+        } catch (ModarException gone) {
+            diagnostics.error(gone.getMessage());
+        }
     }
 
     @Override
@@ -183,7 +237,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
     }
 
     private void startCamera() {
-        if (feed != null || session == 0) return;
+        if (feed != null || session == 0 || orbit != null) return;
         trouble = null;
         followDisplay();
         try {
@@ -231,7 +285,8 @@ public final class MainActivity extends Activity implements Handler.Callback {
             trouble = damage != null ? words.get("bundle", damage.getMessage()) : words.get("empty", bundles.folder);
         }
         closeCamera();
-        showIf(findViewById(R.id.models), sources.size() > 1);
+        if (orbit != null) look(session == 0 ? null : new Orbit(0));
+        showMore();
         if (resumed && mayUseCamera()) startCamera();
         follow();
     }
@@ -260,7 +315,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
         patterns = new String[Native.patternCount(opened)];
         for (int i = 0; i < patterns.length; i++) patterns[i] = Native.patternName(opened, i);
         session = opened;
-        texts = bundles.texts(from);
+        texts = new Texts(bundles.texts(from), opened, patterns, Locale.getDefault());
         hint.setImageBitmap(bundles.hint(from));
         diagnostics.bundle = from.name + " (" + from.origin + ")";
         diagnostics.release = Fetch.AVAILABLE ? Fetch.version(bundles.store.getPath()) : "none";
@@ -377,11 +432,27 @@ public final class MainActivity extends Activity implements Handler.Callback {
         if (text == null) {
             int seen = stage.seen();
             looking = seen < 0;
-            text = looking ? advice() : texts.getProperty(patterns[seen], "");
+            text = looking ? advice() : texts.shown(seen);
+            describe(seen);
         }
-        status.setText(text);
-        showIf(status, !text.isEmpty());
+        say(text);
         showIf(hint, looking);
+    }
+
+    /** What is seen, for those who do not see it. */
+    private void describe(int seen) {
+        String alternative = seen < 0 ? words.get("view") : texts.alternative(seen);
+        String text = alternative != null ? alternative : words.get("seen", texts.name(patterns[seen]));
+        if (text.equals(described)) return;
+        described = text;
+        view.setContentDescription(text);
+    }
+
+    /** A screen reader speaks what changes. */
+    private void say(String text) {
+        if (!text.equals(said)) status.setText(text);
+        said = text;
+        showIf(status, !text.isEmpty());
     }
 
     /** What to look for, and what the tracker misses. */
@@ -389,7 +460,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
         StringBuilder names = new StringBuilder();
         for (String pattern : patterns) {
             if (names.length() > 0) names.append(", ");
-            names.append(texts.getProperty(pattern + ".name", pattern));
+            names.append(texts.name(pattern));
         }
         String look = words.get("look", names);
         if (diagnostics.frames() == 0) return look;
@@ -402,8 +473,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
 
     private void notice(String text) {
         noticeUntil = System.nanoTime() + 3000000000L;
-        status.setText(text);
-        showIf(status, true);
+        say(text);
     }
 
     /** From any thread. what: NOTICE or TROUBLE. */
@@ -426,6 +496,36 @@ public final class MainActivity extends Activity implements Handler.Callback {
         complain(words.get("camera", cause));
     }
 
+    // --- Without the camera ---
+
+    /** From the camera's picture to the models alone, and back. */
+    private void lookAround() {
+        if (session == 0 || patterns.length == 0) return;
+        look(orbit == null ? new Orbit(Math.max(0, stage.seen())) : null);
+    }
+
+    private void look(Orbit around) {
+        orbit = around;
+        gestures = new Gestures();
+        if (around != null) {
+            trouble = null;
+            stopCamera();
+            closeCamera();
+        }
+        stage.look(around);
+        label(R.id.around, around == null ? "around" : "camera-again");
+        showMore();
+        if (around == null && resumed) {
+            if (mayUseCamera()) startCamera();
+            else askForCamera();
+        }
+        follow();
+    }
+
+    private void showMore() {
+        showIf(findViewById(R.id.models), sources.size() > 1 || (orbit != null && patterns.length > 1));
+    }
+
     // --- Gestures ---
 
     @Override
@@ -438,6 +538,11 @@ public final class MainActivity extends Activity implements Handler.Callback {
 
     private void move() {
         if (session == 0) return;
+        if (orbit != null) {
+            orbit.follow(gestures);
+            view.requestRender();
+            return;
+        }
         try {
             Native.setGesture(session, gestures.scale, gestures.turn, 0, gestures.shift);
         } catch (ModarException error) {
@@ -446,7 +551,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
     }
 
     private void tapped(float x, float y) {
-        if (!mayUseCamera()) {
+        if (orbit == null && !mayUseCamera()) {
             askForCamera();
             return;
         }
@@ -454,7 +559,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
             int model = session == 0 ? -1 : Native.pick(session, x, y);
             if (model < 0) return;
             String name = Native.modelName(session, model);
-            notice(texts.getProperty(name, name));
+            notice(texts.model(name));
         } catch (ModarException notYet) {
             diagnostics.error(notYet.getMessage());
         }
@@ -466,8 +571,18 @@ public final class MainActivity extends Activity implements Handler.Callback {
             case R.id.picture:
                 stage.takePicture();
                 break;
+            case R.id.share:
+                share();
+                break;
+            case R.id.around:
+                lookAround();
+                break;
             case R.id.models:
-                showNext();
+                if (orbit != null && orbit.pattern + 1 < patterns.length) {
+                    look(new Orbit(orbit.pattern + 1));
+                } else {
+                    showNext();
+                }
                 break;
             case R.id.update:
                 startUpdate();
@@ -496,20 +611,23 @@ public final class MainActivity extends Activity implements Handler.Callback {
     }
 
     private void save(Bitmap bitmap) {
-        File file = new File(bundles.folder, "picture-" + System.currentTimeMillis() + ".png");
         try {
-            FileOutputStream out = new FileOutputStream(file);
-            try {
-                if (!bitmap.compress(Bitmap.CompressFormat.PNG, 100, out)) throw new IOException("no space is left");
-                out.getFD().sync();
-            } finally {
-                out.close();
-            }
-            say(NOTICE, words.get("saved", file.getPath()));
+            photos.save(bitmap);
+            main.sendEmptyMessage(SAVED);
         } catch (IOException failed) {
-            file.delete(); // nothing half-written stays
             diagnostics.error(failed.getMessage());
             say(NOTICE, words.get("space", failed.getMessage()));
+        } catch (RuntimeException refused) { // galleries throw what they like: no card, a profile without storage
+            diagnostics.error(refused.getMessage());
+            say(NOTICE, words.get("space", refused.getMessage()));
+        }
+    }
+
+    private void share() {
+        try {
+            if (photos.newest != null) startActivity(photos.share());
+        } catch (ActivityNotFoundException none) {
+            diagnostics.error(none.getMessage());
         }
     }
 

@@ -34,16 +34,31 @@ public final class Native {
 
     public static native String modelName(long session, int index) throws ModarException;
 
+    /** Languages of the bundle's texts as BCP 47 tags, by index from 0 on; null: no more. */
+    public static native String language(long session, int index) throws ModarException;
+
+    /**
+     * A pattern's text in a language of language(), or null.
+     *
+     * @param alternative what is seen there, for screen readers, instead of what to show
+     */
+    public static native String patternText(long session, int pattern, boolean alternative, String language)
+            throws ModarException;
+
     /**
      * The size of the camera's frames, and its lens.
      *
      * @param file what `modar calibrate` wrote; null: the focal length is estimated from the frames
+     * @param focal what focal() said of the same camera, to start from; 0: unknown
      * @param searchApart searches for patterns on a thread of its own; then results depend on time
      * @param extended learns what stands still around a pattern, and goes on from it while the pattern is out of sight
      */
     public static native void setCamera(
-            long session, int width, int height, String file, boolean searchApart, boolean extended)
+            long session, int width, int height, String file, double focal, boolean searchApart, boolean extended)
             throws ModarException;
+
+    /** The estimated focal length as a share of the frame's longer side once it is known well, else 0. */
+    public static native double focal(long session) throws ModarException;
 
     /**
      * Before a frame, for `extended`: how the phone turned since the last one, as Sensor.TYPE_GYROSCOPE says.
@@ -75,6 +90,9 @@ public final class Native {
     /** Forgets what is tracked: after a pause. */
     public static native void reset(long session) throws ModarException;
 
+    /** Frees the tracker's memory, until setCamera(). */
+    public static native void trim(long session) throws ModarException;
+
     /** GL's projection of the camera into 16 floats of a direct buffer, column-major. */
     public static native void projection(long session, double nearPlane, double farPlane, ByteBuffer matrix)
             throws ModarException;
@@ -100,7 +118,18 @@ public final class Native {
     public static native void onDrawPlanes(long session, ByteBuffer y, int yStride, ByteBuffer u, ByteBuffer v,
             int uvStride, int uvPixelStride, ByteBuffer poses) throws ModarException;
 
-    /** The model drawn last under a touch (pixels from the surface's top left), or -1. */
+    /**
+     * Draws what stands on a pattern without a camera, for an eye that goes around it: see modar_orbit(). The surface is
+     * cleared before.
+     *
+     * @param turn radians about the pattern's normal
+     * @param tilt radians above its plane
+     * @param zoom 1: all of it is seen
+     */
+    public static native void onDrawOrbit(long session, int pattern, double turn, double tilt, double zoom)
+            throws ModarException;
+
+    /** The model drawn last under a touch (pixels from the surface's top left), or -1; by onDrawOrbit() as well. */
     public static native int pick(long session, float x, float y) throws ModarException;
 
     /** GL memory that the bundle takes. */

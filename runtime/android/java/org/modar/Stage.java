@@ -13,11 +13,17 @@ final class Stage implements GLSurfaceView.Renderer {
     private final MainActivity screen;
     private final Diagnostics diagnostics;
     private final AtomicReference<Frame> next = new AtomicReference<>();
+    /** Behind models without the camera: a light gray, on which black and white ones have an outline. */
+    private static final float GROUND = 0.85f;
     /** Set false by tests: searches in step with the frames, so that results do not depend on time. */
     static volatile boolean searchApart = true;
 
     private volatile long session;
     private volatile String cameraFile;
+    /** What Native.focal() said of this phone's camera before; 0: unknown. */
+    volatile double focal;
+    /** A look without the camera; null: with it. */
+    private volatile Orbit orbit;
     private volatile boolean wantsPicture;
     private volatile int displayDegrees;
     private volatile int sensorDegrees;
@@ -57,9 +63,17 @@ final class Stage implements GLSurfaceView.Renderer {
         displayDegrees = degrees;
     }
 
-    /** The first pattern that something stands on in the newest frame, or -1. */
+    /** The first pattern that something stands on in what is shown, or -1. */
     int seen() {
-        return seen;
+        Orbit now = orbit;
+        return now != null ? now.pattern : seen;
+    }
+
+    /** With the camera stopped. around: what to look at, or null for the camera's picture again. */
+    void look(Orbit around) {
+        orbit = around;
+        seen = -1;
+        view.requestRender();
     }
 
     void takePicture() {
@@ -82,7 +96,7 @@ final class Stage implements GLSurfaceView.Renderer {
         sensorDegrees = turn;
         diagnostics.camera = frameWidth + " x " + frameHeight + ", turned by " + turn;
         try {
-            Native.setCamera(session, frameWidth, frameHeight, cameraFile, searchApart, true);
+            Native.setCamera(session, frameWidth, frameHeight, cameraFile, focal, searchApart, true);
         } catch (ModarException error) {
             screen.failed(error);
         }
@@ -144,11 +158,19 @@ final class Stage implements GLSurfaceView.Renderer {
         long start = System.nanoTime();
         try {
             prepare();
-            if (shown == null) {
+            Orbit around = session == 0 ? null : orbit;
+            float ground = around != null ? GROUND : 0;
+            if (around != null || shown == null) {
+                GLES20.glClearColor(ground, ground, ground, 1);
                 GLES20.glClear(GLES20.GL_COLOR_BUFFER_BIT | GLES20.GL_DEPTH_BUFFER_BIT);
+            }
+            if (around != null) {
+                Native.onDrawOrbit(session, around.pattern, around.turn, around.tilt, around.zoom);
+            } else if (shown != null) {
+                shown.draw(session);
+            } else {
                 return;
             }
-            shown.draw(session);
         } catch (ModarException error) {
             screen.failed(error);
             return;

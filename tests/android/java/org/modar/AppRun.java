@@ -44,12 +44,16 @@ public final class AppRun {
             return;
         }
         permission();
+        withoutPermission();
         frames(words[5]);
         camera2();
         gyroscope(words[7]);
         fingers();
         pauses();
+        around(words[5]);
+        memory();
         pictures();
+        german();
         damage();
         AssetManager.apk = words[0];
         rot();
@@ -251,10 +255,110 @@ public final class AppRun {
         check(deliver(1) && changed(upright, picture()) < 0.01, "turned back");
     }
 
-    private static long pictureFiles() throws Exception {
-        try (java.util.stream.Stream<Path> all = Files.list(Context.folder.toPath())) {
-            return all.filter(file -> file.getFileName().toString().startsWith("picture-")).count();
+    /** The share of a picture in the gray that lies behind models without a camera: 0.85 of 255. */
+    private static double ground(byte[] picture) {
+        int gray = 0;
+        for (int i = 0; i < picture.length; i += 4) {
+            if (Math.abs((picture[i] & 0xFF) - 217) + Math.abs((picture[i + 1] & 0xFF) - 217) < 3) gray++;
         }
+        return 4.0 * gray / picture.length;
+    }
+
+    private static void drag(float x, float y) {
+        view.touch(new MotionEvent(MotionEvent.ACTION_DOWN, 240, 180));
+        view.touch(new MotionEvent(MotionEvent.ACTION_MOVE, 240 + x, 180 + y));
+        view.touch(new MotionEvent(MotionEvent.ACTION_UP, 240 + x, 180 + y));
+        view.frame();
+    }
+
+    /** Refused, the models can be looked at all the same. */
+    private static void withoutPermission() {
+        Activity.allowed = false;
+        click(R.id.around);
+        view.frame();
+        check(Camera.opened == 0 && ground(picture()) > 0.2 && ground(picture()) < 0.95, "without the camera");
+        Activity.allowed = true;
+        click(R.id.around);
+        check(Camera.opened == 1, "the camera again");
+    }
+
+    /** A look without the camera: the model alone, turned by fingers, told by a tap; and back. The picture goes to a file. */
+    private static void around(String out) throws Exception {
+        check(deliver(0) && deliver(1), "the camera");
+        check(view.described.equals("Eine Vase \uD83C\uDFFA") || view.described.equals("A vase \uD83C\uDFFA"), view.described);
+        click(R.id.around);
+        check(Camera.opened == 0, "the camera is off");
+        view.frame();
+        byte[] front = picture();
+        Files.write(Paths.get(out + ".around"), front);
+        check(ground(front) > 0.2 && ground(front) < 0.95, "a model before gray: " + ground(front));
+        check(status().equals("Found in 1922."), "its text");
+        drag(120, 0);
+        byte[] turned = picture();
+        check(changed(front, turned) > 0.01, "turned: " + changed(front, turned));
+        drag(0, 60);
+        check(changed(turned, picture()) > 0.01, "from above");
+        view.touch(new MotionEvent(MotionEvent.ACTION_DOWN, 240, 180));
+        view.touch(new MotionEvent(MotionEvent.ACTION_UP, 240, 180));
+        check(status().equals("pottery"), "a tap tells the model: " + status());
+        app.onPause();
+        app.onResume();
+        check(Camera.opened == 0, "a pause does not bring the camera");
+        view.frame();
+        check(ground(picture()) > 0.2, "still without it");
+        click(R.id.around);
+        check(Camera.opened == 1 && deliver(0) && deliver(1), "the camera again");
+        check(ground(picture()) < 0.2, "its picture");
+    }
+
+    /** In the background the phone wants memory back; later the same picture is there. */
+    private static void memory() throws Exception {
+        for (int i = 0; i < 20; i++) check(deliver(1), "settles");
+        byte[] before = picture();
+        app.onTrimMemory(40);
+        check(((android.view.ViewGroup) app.findViewById(R.id.screen)).gone == 0, "nothing goes while it is in use");
+        app.onPause();
+        app.onTrimMemory(20);
+        check(((android.view.ViewGroup) app.findViewById(R.id.screen)).gone == 0, "hidden only");
+        app.onTrimMemory(40);
+        app.onTrimMemory(80);
+        check(((android.view.ViewGroup) app.findViewById(R.id.screen)).gone == 1, "GL's memory is given back, once");
+        app.onResume();
+        view.surface(Camera.width, Camera.height, true);
+        for (int i = 0; i < 20; i++) check(deliver(1), "goes on");
+        check(changed(before, picture()) < 0.01, "the same picture: " + changed(before, picture()));
+    }
+
+    /** Another language of the phone: the screen's words and the bundle's texts. */
+    private static void german() throws Exception {
+        Files.write(new File(Context.folder, "focal").toPath(), "torn".getBytes());
+        java.util.Locale.setDefault(new java.util.Locale("de", "CH"));
+        start();
+        check(status().startsWith("Richten Sie die Kamera auf: cover"), status());
+        check(((TextView) app.findViewById(R.id.around)).text.equals("Ohne Kamera"), "buttons");
+        check(view.described.startsWith("Das Kamerabild"), view.described);
+        for (int i = 0; i < 10; i++) check(deliver(i), "frame " + i);
+        Handler.pump();
+        check(view.described.equals("Eine Vase \uD83C\uDFFA"), view.described);
+        app.onPause();
+        app.onDestroy();
+        java.util.Locale.setDefault(java.util.Locale.ENGLISH);
+    }
+
+    private static File[] pictureFiles(String folder) {
+        File[] all = new File(Context.folder, folder).listFiles((in, name) -> name.startsWith("picture-"));
+        return all == null ? new File[0] : all;
+    }
+
+    /** What Bitmap.compress() of the fake wrote, 0xAARRGGBB from the top, as picture() is. */
+    private static byte[] shownPixels(byte[] file) {
+        byte[] rgba = new byte[file.length];
+        int row = 4 * Camera.width;
+        for (int i = 0; i < file.length; i += 4) {
+            int to = (file.length / row - 1 - i / row) * row + i % row;
+            for (int k = 0; k < 4; k++) rgba[to + k] = file[i + (k + 1) % 4];
+        }
+        return rgba;
     }
 
     private static void savedPicture() throws Exception {
@@ -265,14 +369,29 @@ public final class AppRun {
         }
     }
 
-    /** Saved; on a full storage it says so and leaves nothing. */
+    /** By each version of Android: saved with what the screen shows, and shared; on a full storage it says so and leaves nothing. */
     private static void pictures() throws Exception {
-        savedPicture();
-        check(pictureFiles() == 1, "saved");
-        Bitmap.full = true;
-        savedPicture();
-        check(status().startsWith("The picture was not saved"), "full");
-        check(pictureFiles() == 1, "nothing half-written");
+        int[] versions = {19, 21, 29};
+        String[] folders = {"Pictures/ModAR", "media", "gallery"};
+        for (int i = 0; i < versions.length; i++) {
+            android.os.Build.VERSION.SDK_INT = versions[i];
+            savedPicture();
+            Handler.pump();
+            File[] saved = pictureFiles(folders[i]);
+            check(saved.length == 1 && status().equals("Saved to your pictures"), "saved " + folders[i] + ": " + status());
+            check(changed(shownPixels(Files.readAllBytes(saved[0].toPath())), picture()) == 0, "the screen's own picture");
+            click(R.id.share);
+            android.content.Intent send = Context.started.of;
+            check(send.action.equals(android.content.Intent.ACTION_SEND) && send.type.equals("image/jpeg") && send.flags == 1, "shared");
+            check(((android.net.Uri) send.stream).path.replace("pending-", "").equals(saved[0].getPath()), "the newest");
+            Bitmap.full = true;
+            savedPicture();
+            Handler.pump();
+            check(status().startsWith("The picture was not saved"), "full: " + status());
+            check(new File(Context.folder, folders[i]).list().length == 1, "nothing half-written");
+            Bitmap.full = false;
+        }
+        android.os.Build.VERSION.SDK_INT = 19;
         app.onPause();
         app.onDestroy();
     }

@@ -35,13 +35,15 @@ public final class BridgeRun {
             case "pictures": pictures(words[1], words[5]); break;
             case "misuse": misuse(words[1], words[5]); break;
             case "close": closeWhileBusy(words[1]); break;
+            case "texts": texts(words[1]); break;
+            case "focal": focal(words[1]); break;
             default: soak(words[1], Integer.parseInt(words[5]));
         }
     }
 
     private static long opened(String bundle) throws Exception {
         long session = Native.openFile(bundle);
-        Native.setCamera(session, width, height, null, false, false);
+        Native.setCamera(session, width, height, null, 0, false, false);
         return session;
     }
 
@@ -102,10 +104,10 @@ public final class BridgeRun {
         number.setAccessible(true);
         long planes = Native.openFd(number.getInt(file.getFD()), 0, file.getChannel().size());
         file.close(); // the mapping outlives it
-        Native.setCamera(planes, width, height, null, false, false);
+        Native.setCamera(planes, width, height, null, 0, false, false);
         if (lines != null) {
-            Native.setCamera(arrays, width, height, null, false, true);
-            Native.setCamera(planes, width, height, null, false, true);
+            Native.setCamera(arrays, width, height, null, 0, false, true);
+            Native.setCamera(planes, width, height, null, 0, false, true);
         }
         Native.verify(planes);
         int patterns = Native.patternCount(arrays);
@@ -156,6 +158,41 @@ public final class BridgeRun {
         }
         gyroscope.close();
         check(SensorManager.listener == null, "let go");
+    }
+
+    /** All texts of the first pattern as escaped UTF-16: language, text, alternative. */
+    private static void texts(String bundle) throws Exception {
+        long session = Native.openFile(bundle);
+        check(Native.language(session, -1) == null && Native.patternText(session, 0, false, "xx") == null, "none");
+        check(Native.patternText(session, 99, false, "en") == null, "no such pattern");
+        String language;
+        for (int i = 0; (language = Native.language(session, i)) != null; i++) {
+            for (String text : new String[] {language, Native.patternText(session, 0, false, language),
+                    Native.patternText(session, 0, true, language)}) {
+                StringBuilder line = new StringBuilder();
+                for (int at = 0; text != null && at < text.length(); at++) line.append(String.format("%04x", (int) text.charAt(at)));
+                System.out.println(text == null ? "none" : line);
+            }
+        }
+        Native.close(session);
+    }
+
+    /** What is known of the lens after each frame, as a share of the frame's width. A session that is told begins with it. */
+    private static void focal(String bundle) throws Exception {
+        long session = opened(bundle);
+        Poses poses = new Poses(Native.patternCount(session));
+        for (int i = 0; i < frames.length; i++) {
+            Native.onCameraFrame(session, frames[i], i / 30.0, poses.bytes);
+            System.out.println(Native.focal(session));
+        }
+        double found = Native.focal(session);
+        Native.trim(session);
+        check(Native.focal(session) == 0, "no tracker");
+        Native.setCamera(session, 2 * width, 2 * height, null, found, false, false);
+        ByteBuffer matrix = ByteBuffer.allocateDirect(64).order(ByteOrder.nativeOrder());
+        Native.projection(session, 0.5, 50, matrix);
+        check(Math.abs(matrix.getFloat(0) - 2 * found) < 1e-6, "begins with it");
+        Native.close(session);
     }
 
     private static final int NV21 = 0;
@@ -259,9 +296,9 @@ public final class BridgeRun {
         throwsCode("android.camera", () -> Native.onCameraFrame(session, frames[0], 0, poses.bytes));
         throwsCode("android.camera", () -> Native.reason(session));
         throwsCode("android.camera", () -> Native.onTurn(session, 0, 0, 0, 90, false));
-        throwsCode("camera.size", () -> Native.setCamera(session, 0, 480, null, false, false));
-        throwsCode("camera.open", () -> Native.setCamera(session, width, height, "none.yml", false, false));
-        Native.setCamera(session, width, height, null, false, false);
+        throwsCode("camera.size", () -> Native.setCamera(session, 0, 480, null, 0, false, false));
+        throwsCode("camera.open", () -> Native.setCamera(session, width, height, "none.yml", 0, false, false));
+        Native.setCamera(session, width, height, null, 0, false, false);
         throwsCode("android.buffer", () -> Native.onCameraFrame(session, null, 0, poses.bytes));
         throwsCode("android.buffer", () -> Native.onCameraFrame(session, new byte[9], 0, poses.bytes));
         throwsCode("android.buffer", () -> Native.onCameraFrame(session, frames[0], 0, null));
@@ -273,6 +310,8 @@ public final class BridgeRun {
         throwsCode("android.buffer", () -> Native.projection(session, 0.1, 10, small));
         throwsCode("android.surface", () -> Native.onDrawFrame(session, frames[0], poses.bytes));
         throwsCode("android.surface", () -> Native.pick(session, 1, 1));
+        check(Native.focal(session) == 0, "no frames, no focal length");
+        throwsCode("android.surface", () -> Native.onDrawOrbit(session, 0, 0, 0, 1));
         throwsCode("android.index", () -> Native.patternName(session, 99));
         throwsCode("android.index", () -> Native.modelName(session, -1));
         GlContext.create(width, height);
@@ -302,7 +341,7 @@ public final class BridgeRun {
             throwsCode("android.closed", () -> Native.onDrawFrame(closed, frames[0], poses.bytes));
             throwsCode("android.closed", () -> Native.onSurfaceCreated(closed, null));
             throwsCode("android.closed", () -> Native.onSurfaceChanged(closed, 1, 1, 0, false));
-            throwsCode("android.closed", () -> Native.setCamera(closed, 4, 4, null, false, false));
+            throwsCode("android.closed", () -> Native.setCamera(closed, 4, 4, null, 0, false, false));
             throwsCode("android.closed", () -> Native.setGesture(closed, 1, 0, 0, 0));
             throwsCode("android.closed", () -> Native.patternCount(closed));
             throwsCode("android.closed", () -> Native.patternName(closed, 0));
@@ -311,6 +350,11 @@ public final class BridgeRun {
             throwsCode("android.closed", () -> Native.reset(closed));
             throwsCode("android.closed", () -> Native.onTurn(closed, 0, 0, 0, 0, true));
             throwsCode("android.closed", () -> Native.pick(closed, 0, 0));
+            throwsCode("android.closed", () -> Native.onDrawOrbit(closed, 0, 0, 0, 1));
+            throwsCode("android.closed", () -> Native.focal(closed));
+            throwsCode("android.closed", () -> Native.trim(closed));
+            throwsCode("android.closed", () -> Native.language(closed, 0));
+            throwsCode("android.closed", () -> Native.patternText(closed, 0, true, "en"));
             throwsCode("android.closed", () -> Native.gpuBytes(closed));
             throwsCode("android.closed", () -> Native.projection(closed, 1, 2, matrix));
         }
