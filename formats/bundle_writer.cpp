@@ -14,6 +14,7 @@
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/texture_format.hpp"
+#include "formats/validate.hpp"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>

@@ -13,9 +13,9 @@
 
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/triangle_tree.hpp"
-#include "bake/parallel.hpp"
 #include "bake/texture/texture_codec.hpp"
 #include "formats/base/colour.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/component.hpp"
 #include "modar/renderer.hpp"
 

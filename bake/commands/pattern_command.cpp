@@ -244,7 +244,7 @@ Result<NamedScore> score_file(const ScoreCommand& command, const std::string& pa
   TrackerRecordOptions loop;
   loop.jobs = command.jobs;
   const PatternSurface surface = surface_of(shaped.section, picture.width, picture.height);
-  auto score = bake_tracker_record(picture, loop, surface).and_then([&](const auto& record) {
+  auto score = make_tracker_record(picture, loop, surface).and_then([&](const auto& record) {
     return score_pattern(picture, record, command.jobs, shaped.section);
   });
   if (!score) {

@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "bake/parallel.hpp"
 #include "formats/base/colour.hpp"
+#include "formats/base/parallel.hpp"
 
 namespace modar {
 namespace {

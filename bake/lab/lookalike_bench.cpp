@@ -139,7 +139,7 @@ struct FamilyTally {
   Result<void> add(const FamilyPrints& prints, const GrayPicture& behind, std::uint64_t seed,
                    bool known_camera) {
     const GrayImage own = prints.own.view();
-    MODAR_ASSIGN(const auto record, bake_tracker_record(own, {}));
+    MODAR_ASSIGN(const auto record, make_tracker_record(own, {}));
     MODAR_ASSIGN(const auto bundle, bundle_of_record(own, record));
     Random random(seed + 17);
     const GrayPicture in_hand = held_print(own, random);
@@ -213,8 +213,8 @@ Result<std::vector<LookalikeRow>> bench_lookalikes(const PoseBenchOptions& optio
     const GrayPicture photo = edition_of(own, pictures[(p + 1) % pictures.size()].view());
     const GrayPicture words = language_of(own);
     const GrayPicture turned = mirror_of(own);
-    MODAR_ASSIGN(const auto record, bake_tracker_record(own, {}));
-    MODAR_ASSIGN(const auto other_record, bake_tracker_record(photo.view(), {}));
+    MODAR_ASSIGN(const auto record, make_tracker_record(own, {}));
+    MODAR_ASSIGN(const auto other_record, make_tracker_record(photo.view(), {}));
     MODAR_ASSIGN(const auto alone, bundle_of_record(own, record));
     const std::vector<GrayPicture> prints = {pictures[p], photo};
     const std::vector<std::vector<std::byte>> records = {record, other_record};

@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "bake/lab/heap.hpp"
-#include "bake/parallel.hpp"
 #include "bake/thread_clock.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
 
@@ -67,7 +67,7 @@ Result<Many> make_many(const PoseBenchOptions& options, const ProgressCallback& 
   if (progress) progress("baking", 0.0);
   parallel_rows(
       static_cast<std::uint32_t>(most), std::thread::hardware_concurrency(),
-      [&](std::uint32_t i) { baked[i] = bake_tracker_record(many.pictures[i].view(), {}); });
+      [&](std::uint32_t i) { baked[i] = make_tracker_record(many.pictures[i].view(), {}); });
   for (auto& one : baked) {
     MODAR_ASSIGN(auto record, std::move(one));
     many.records.push_back(std::move(record));

@@ -47,7 +47,7 @@ Result<Fixture> make_fixture(const std::vector<std::string>& paths, const PoseBe
     records.emplace_back();
     // Baking ours takes most of the time of a run of the paper's method alone.
     if (!options.ours) continue;
-    MODAR_ASSIGN(records.back(), bake_tracker_record(fixture.pictures.back().view(), {}));
+    MODAR_ASSIGN(records.back(), make_tracker_record(fixture.pictures.back().view(), {}));
   }
   const ParameterSetRecord* set = nullptr;
   const auto sets = paper_parameter_sets();

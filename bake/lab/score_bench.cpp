@@ -80,7 +80,7 @@ Result<std::vector<ScoreBenchRow>> bench_scores(const PoseBenchOptions& options,
   for (const std::string& path : options.patterns) {
     bool shrunk = false;
     MODAR_ASSIGN(const GrayPicture picture, load_pattern(path, shrunk));
-    MODAR_ASSIGN(const auto record, bake_tracker_record(picture.view(), {}));
+    MODAR_ASSIGN(const auto record, make_tracker_record(picture.view(), {}));
     MODAR_ASSIGN(const PatternScore score, score_pattern(picture.view(), record, setup.jobs));
     MODAR_ASSIGN(const auto bundle, bundle_of_record(picture.view(), record));
     setup.picture = picture.view();

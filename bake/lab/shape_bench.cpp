@@ -89,7 +89,7 @@ Result<ShapedPattern> bake_on(const ShapeRequest& shape, const PoseBenchOptions&
                  shape_section(shape, pattern.picture.width, pattern.picture.height, width_mm));
   }
   pattern.surface = surface_of(pattern.section, pattern.picture.width, pattern.picture.height);
-  MODAR_ASSIGN(pattern.record, bake_tracker_record(pattern.picture.view(), {}, pattern.surface));
+  MODAR_ASSIGN(pattern.record, make_tracker_record(pattern.picture.view(), {}, pattern.surface));
   MODAR_ASSIGN(pattern.bytes,
                bundle_of_record(pattern.picture.view(), pattern.record, pattern.section));
   return pattern;

@@ -116,7 +116,7 @@ Result<std::vector<std::byte>> bundle_of(const std::vector<GrayPicture>& picture
                                          std::uint32_t paper_set) {
   std::vector<std::vector<std::byte>> records;
   for (const GrayPicture& picture : pictures) {
-    MODAR_ASSIGN(records.emplace_back(), bake_tracker_record(picture.view(), bake));
+    MODAR_ASSIGN(records.emplace_back(), make_tracker_record(picture.view(), bake));
   }
   const ParameterSetRecord* set = nullptr;
   const auto sets = paper_parameter_sets();

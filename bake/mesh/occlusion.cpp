@@ -13,7 +13,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/mesh/triangle_tree.hpp"
-#include "bake/parallel.hpp"
+#include "formats/base/parallel.hpp"
 
 namespace modar {
 namespace {

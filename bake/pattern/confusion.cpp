@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include "bake/parallel.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
 

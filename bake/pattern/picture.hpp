@@ -12,14 +12,6 @@
 
 namespace modar {
 
-/// A gray picture that owns its pixels, row by row without padding.
-struct GrayPicture {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint8_t> pixels;
-  [[nodiscard]] GrayImage view() const { return {pixels.data(), width, height, width}; }
-};
-
 /// Rec. 601 luma, as cameras deliver it; transparent pixels show white paper.
 GrayPicture gray_of(const RgbaImage& image);
 /// Reads an image file as gray. Errors: those of read_image().

@@ -9,10 +9,10 @@
 
 #include <glm/vec2.hpp>
 
-#include "bake/pattern/view_render.hpp"
 #include "formats/base/error.hpp"
 #include "formats/pattern_shape.hpp"
 #include "modar/camera.hpp"
+#include "modar/pattern_views.hpp"
 #include "modar/pose.hpp"
 
 namespace modar {

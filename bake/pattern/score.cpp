@@ -8,14 +8,13 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "bake/parallel.hpp"
 #include "bake/pattern/gray_mat.hpp"
 #include "bake/pattern/shape.hpp"
 #include "bake/pattern/surface_scene.hpp"
 #include "bake/pattern/trial.hpp"
-#include "bake/pattern/view_kernel.hpp"
-#include "bake/pattern/view_render.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/bundle_view.hpp"
+#include "modar/pattern_views.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {

@@ -209,7 +209,7 @@ Result<Simulation> simulate(const std::string& path, const SimulateOptions& opti
   MODAR_ASSIGN(const ShapedPicture shaped, load_shaped(path, options.width_mm, options.shape));
   const GrayPicture& picture = shaped.picture;
   const PatternSurface surface = surface_of(shaped.section, picture.width, picture.height);
-  MODAR_ASSIGN(auto record, bake_tracker_record(picture.view(), {}, surface));
+  MODAR_ASSIGN(auto record, make_tracker_record(picture.view(), {}, surface));
   MODAR_ASSIGN(const auto bundle,
                bundle_of_record(picture.view(), std::move(record), shaped.section));
   MODAR_ASSIGN(auto backgrounds,

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "bake/pattern/view_render.hpp"
+#include "modar/pattern_views.hpp"
 
 namespace modar {
 namespace {

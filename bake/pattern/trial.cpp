@@ -9,14 +9,14 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/parallel.hpp"
-#include "bake/pattern/view_render.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/pattern_shape.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/features.hpp"
 #include "modar/mapped_file.hpp"
+#include "modar/pattern_views.hpp"
 #include "modar/pose_loop.hpp"
 
 namespace modar {
@@ -169,7 +169,7 @@ Result<TrialOutcome> try_setting(const TrialSetup& setup, const TrialSetting& se
 
 Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
                                                  const TrackerRecordOptions& options) {
-  MODAR_ASSIGN(auto record, bake_tracker_record(pattern, options));
+  MODAR_ASSIGN(auto record, make_tracker_record(pattern, options));
   return bundle_of_record(pattern, std::move(record));
 }
 

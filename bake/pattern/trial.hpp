@@ -20,7 +20,7 @@
 
 namespace modar {
 
-/// A bundle that holds that pattern's tracker record alone. Errors: those of bake_tracker_record().
+/// A bundle that holds that pattern's tracker record alone. Errors: those of make_tracker_record().
 Result<std::vector<std::byte>> bundle_of_pattern(const GrayImage& pattern,
                                                  const TrackerRecordOptions& options);
 /// The same with a record that is baked already. shape: its SectionType::kPatternShape section;

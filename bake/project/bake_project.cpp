@@ -16,7 +16,6 @@
 #include "bake/bundle/alike_patterns.hpp"
 #include "bake/bundle/link_bundles.hpp"
 #include "bake/json.hpp"
-#include "bake/parallel.hpp"
 #include "bake/project/file_digests.hpp"
 #include "bake/project/interrupts.hpp"
 #include "bake/project/part_cache.hpp"
@@ -24,6 +23,7 @@
 #include "bake/project/settings.hpp"
 #include "bake/terminal.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/content_summary.hpp"
 
 namespace modar {

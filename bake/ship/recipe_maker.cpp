@@ -7,10 +7,10 @@
 
 #include <zstd.h>
 
-#include "bake/parallel.hpp"
 #include "bake/ship/content_pieces.hpp"
 #include "bake/ship/limited_process.hpp"
 #include "bake/ship/mesh_encoder.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/transport/feature_text.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <iterator>
 #include <memory>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "modar/pose_loop.hpp"
@@ -9,7 +11,10 @@
 #include "runtime/capi/handles.hpp"
 
 struct modar_tracker {
+  const modar_bundle* bundle;
+  modar::PoseLoopOptions options;
   modar::Camera camera;
+  std::vector<std::vector<std::uint64_t>> own;  ///< records of added pictures
   std::unique_ptr<modar::PoseLoop> loop;
   modar::Hysteresis hysteresis;
   modar::PoseSmoother smoother;
@@ -70,7 +75,10 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
   }
   const std::size_t patterns = bundle->view.patterns().size();
   const double smooth_ms = std::clamp(asked.smooth_ms, 0.0, 1000.0);
-  return new modar_tracker{ours,
+  return new modar_tracker{bundle,
+                           how,
+                           ours,
+                           {},
                            std::move(*loop),
                            modar::Hysteresis(patterns),
                            modar::PoseSmoother(patterns, smooth_ms),
@@ -86,6 +94,30 @@ void modar_tracker_reset(modar_tracker* tracker) {
   tracker->hysteresis = modar::Hysteresis(tracker->poses.size());
   tracker->smoother = modar::PoseSmoother(tracker->poses.size(), tracker->smooth_ms);
   tracker->poses.assign(tracker->poses.size(), modar_pose{});
+}
+
+int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record, uint32_t* pattern,
+                              modar_error* error) {
+  if (tracker == nullptr || record == nullptr) {
+    return modar::hand_over(modar::missing(tracker == nullptr ? "tracker" : "record"), error);
+  }
+  auto own = tracker->own;
+  own.push_back(record->words);
+  std::vector<modar::OwnRecord> views;
+  for (const auto& words : own) views.push_back(std::as_bytes(std::span(words)));
+  // What was found of the lens stays.
+  modar::Camera camera = tracker->camera;
+  const modar::CameraEstimate& now = tracker->result.camera;
+  if (now.estimated) camera.fx = camera.fy = now.focal;
+  auto loop = modar::PoseLoop::create(tracker->bundle->view, camera, tracker->options, views);
+  if (!loop) return modar::hand_over(loop.error(), error);
+  tracker->camera = camera;
+  tracker->loop = std::move(*loop);
+  tracker->own = std::move(own);
+  if (pattern != nullptr) *pattern = static_cast<std::uint32_t>(tracker->poses.size());
+  tracker->poses.emplace_back();
+  modar_tracker_reset(tracker);
+  return MODAR_OK;
 }
 
 void modar_tracker_destroy(modar_tracker* tracker) {

@@ -21,6 +21,12 @@ struct modar_bundle {
   modar::BundleView view;
 };
 
+/// A tracker record of modar_record_create(), aligned.
+struct modar_record {
+  std::vector<std::uint64_t> words;
+  std::size_t size;
+};
+
 namespace modar {
 
 /// Cuts the text to what the array holds; at most a part of the last UTF-8 letter is lost.

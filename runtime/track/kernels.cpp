@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "formats/base/simd_level.hpp"
 #include "hwy/foreach_target.h"
 #include "hwy/highway.h"
 
@@ -384,27 +385,7 @@ constexpr Kernels table(const char* name) {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-#if HWY_ARCH_X86
-#include <cpuid.h>
-#endif
-
-// Highway's own dispatch needs its shared library; this needs none.
 namespace modar::tracker {
-
-#if HWY_ARCH_X86 && (HWY_TARGETS & HWY_SSE4) && (HWY_TARGETS & HWY_AVX2)
-namespace {
-
-/// Clang 14 does not know the name in __builtin_cpu_supports().
-bool has_f16c() {
-  unsigned a = 0;
-  unsigned b = 0;
-  unsigned c = 0;
-  unsigned d = 0;
-  return __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_F16C) != 0;
-}
-
-}  // namespace
-#endif
 
 std::span<const Kernels> all_kernels() {
 #if HWY_ARCH_X86 && (HWY_TARGETS & HWY_SSE4) && (HWY_TARGETS & HWY_AVX2)
@@ -416,15 +397,7 @@ std::span<const Kernels> all_kernels() {
   static constexpr Kernels kTables[] = {N_SSE4::table("sse4"), N_AVX2::table("avx2")};
   constexpr std::size_t kBaseline = 0;
 #endif
-  // What Highway compiles for: SSE4 with carry-less multiplication, AVX2 with FMA and BMI2.
-  static const std::size_t count = [] {
-    __builtin_cpu_init();
-    const bool sse4 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("pclmul") &&
-                      __builtin_cpu_supports("aes");
-    const bool avx2 = sse4 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                      __builtin_cpu_supports("bmi2") && has_f16c();
-    return kBaseline + (avx2 ? 2u : sse4 ? 1u : 0u);
-  }();
+  static const std::size_t count = kBaseline + static_cast<std::size_t>(x86_simd_level());
   return {kTables, count};
 #else
   static constexpr Kernels kTables[] = {HWY_STATIC_DISPATCH(table)("baseline")};

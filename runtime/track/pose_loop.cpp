@@ -69,7 +69,8 @@ PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
 PoseLoop::~PoseLoop() = default;
 
 Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, const Camera& camera,
-                                                   const PoseLoopOptions& options) {
+                                                   const PoseLoopOptions& options,
+                                                   std::span<const OwnRecord> own) {
   if (camera.width < 1 || camera.height < 1 || camera.width > 16384 || camera.height > 16384) {
     return fail(ExitCode::kInvalidInput, "tracker.frame-size", "", "the camera has no frame size",
                 "give a camera of 1 to 16384 pixels a side");
@@ -82,6 +83,10 @@ Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, con
     MODAR_ASSIGN(
         const TrackedPattern pattern,
         tracker::view_tracked_pattern(bytes, i, bundle.section(SectionType::kPatternShape, i)));
+    state->patterns.push_back(pattern);
+  }
+  for (std::uint32_t i = 0; i < own.size(); ++i) {
+    MODAR_ASSIGN(const TrackedPattern pattern, tracker::view_tracked_pattern(own[i], count + i));
     state->patterns.push_back(pattern);
   }
   if (state->patterns.empty()) {

@@ -10,9 +10,9 @@
 #include "bake/pattern/score.hpp"
 #include "bake/pattern/simulate.hpp"
 #include "bake/pattern/trial.hpp"
-#include "bake/pattern/view_kernel.hpp"
-#include "bake/pattern/view_render.hpp"
 #include "bake/texture/etc1/etc1_kernel.hpp"
+#include "modar/pattern_views.hpp"
+#include "runtime/record/view_kernel.hpp"
 #include "tests/track/synthetic.hpp"
 
 namespace modar {
@@ -31,7 +31,7 @@ TrackerRecordOptions quick_bake() {
 }
 
 PatternScore score_of(const cv::Mat& image, unsigned jobs = 1) {
-  const auto record = bake_tracker_record(test::gray(image), quick_bake());
+  const auto record = make_tracker_record(test::gray(image), quick_bake());
   EXPECT_TRUE(record) << to_line(record.error());
   if (!record) return {};
   const auto score = score_pattern(test::gray(image), *record, jobs);
@@ -257,7 +257,7 @@ TEST(Score, APatternBelowTheBestGradeIsAdvised) {
 
 TEST(Score, APictureWithoutFeaturesHasNoRecordToScore) {
   const cv::Mat blank(120, 120, CV_8UC1, cv::Scalar(128));
-  const auto record = bake_tracker_record(test::gray(blank), quick_bake());
+  const auto record = make_tracker_record(test::gray(blank), quick_bake());
   ASSERT_FALSE(record);
   EXPECT_EQ(record.error().code, "pattern.no-features");
   EXPECT_FALSE(score_pattern(test::gray(blank), {}, 1));

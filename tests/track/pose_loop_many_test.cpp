@@ -32,7 +32,7 @@ const std::vector<std::byte>& bundle_of_many() {
     options.jobs = 2;
     options.trial_views = 4;
     for (std::size_t i = 0; i < kMany; ++i) {
-      records.push_back(bake_tracker_record(gray(picture_of(i)), options).value());
+      records.push_back(make_tracker_record(gray(picture_of(i)), options).value());
     }
     return bundle_with(records);
   }();

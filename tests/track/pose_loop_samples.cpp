@@ -17,7 +17,7 @@ std::vector<std::byte> record_of(const cv::Mat& picture) {
   TrackerRecordOptions options;
   options.features = 1200;
   options.trial_views = 40;
-  auto baked = bake_tracker_record(gray(picture), options);
+  auto baked = make_tracker_record(gray(picture), options);
   EXPECT_TRUE(baked) << to_line(baked.error());
   return *baked;
 }

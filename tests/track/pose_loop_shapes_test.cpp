@@ -201,7 +201,7 @@ TEST(Shapes, ABoxIsFoundByItsSides) {
   TrackerRecordOptions options;
   options.features = 1200;
   options.trial_views = 12;
-  auto baked = bake_tracker_record(atlas, options, label.surface);
+  auto baked = make_tracker_record(atlas, options, label.surface);
   ASSERT_TRUE(baked) << to_line(baked.error());
   label.bundle = bundle_of_record(atlas, std::move(*baked), box.section).value();
   // The front's corners by OpenCV: 120 x 100 mm about the origin.

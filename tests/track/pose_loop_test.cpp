@@ -227,8 +227,8 @@ TEST(PoseLoop, BakesTheSameBytesTwice) {
   options.features = 200;
   options.trial_views = 8;
   const cv::Mat small = textured_picture(120, 96, 31);
-  const auto first = bake_tracker_record(test::gray(small), options);
-  const auto second = bake_tracker_record(test::gray(small), options);
+  const auto first = make_tracker_record(test::gray(small), options);
+  const auto second = make_tracker_record(test::gray(small), options);
   ASSERT_TRUE(first && second);
   EXPECT_EQ(*first, *second);
 }

@@ -17,7 +17,7 @@
 #include "bake/mesh/lod/chunk_decimate.hpp"
 #include "bake/mesh/lod/level_map.hpp"
 #include "bake/mesh/lod/surface_distance.hpp"
-#include "bake/parallel.hpp"
+#include "formats/base/parallel.hpp"
 
 namespace modar {
 namespace {

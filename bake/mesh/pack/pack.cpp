@@ -11,7 +11,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/parallel.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/transport/chunk_order.hpp"
 
 namespace modar {

@@ -11,7 +11,7 @@
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
-#include "bake/parallel.hpp"
+#include "formats/base/parallel.hpp"
 
 namespace modar {
 namespace {

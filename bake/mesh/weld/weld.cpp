@@ -18,7 +18,7 @@
 
 #include "bake/import/source_model.hpp"
 #include "bake/mesh/weld/triangulate.hpp"
-#include "bake/parallel.hpp"
+#include "formats/base/parallel.hpp"
 
 namespace modar {
 namespace {

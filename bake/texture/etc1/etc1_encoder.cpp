@@ -6,8 +6,8 @@
 #include <array>
 #include <cstdlib>
 
-#include "bake/parallel.hpp"
 #include "bake/texture/etc1/etc1_kernel.hpp"
+#include "formats/base/parallel.hpp"
 
 namespace modar {
 namespace {

@@ -43,6 +43,7 @@ typedef struct modar_bundle modar_bundle;
 typedef struct modar_tracker modar_tracker;
 typedef struct modar_renderer modar_renderer;
 typedef struct modar_context modar_context;
+typedef struct modar_record modar_record;
 
 enum {
   MODAR_OK = 0,
@@ -219,6 +220,27 @@ int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pos
 double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera);
 /* Why nothing is visible: "few matches", "lost by blur", ...; "visible" if something is. */
 const char* modar_tracker_reason(const modar_tracker* tracker);
+
+/* ---- pictures of one's own ---- */
+
+/* Makes a pattern of a flat picture that its user has taken, as `modar bake` does, to the same
+ * bytes: 8-bit gray, top row first, 32 to 1023 pixels a side (modar_shrink() makes it smaller; a
+ * longer side of 500 will do). It runs on any thread, and takes 0.4 s of an x86-64 server's time
+ * for 300,000 pixels. Returns NULL and an error: "pattern.loop-size", or "pattern.plain" and
+ * "pattern.no-features" for a picture with too little in it to be recognised. */
+MODAR_EXPERIMENTAL modar_record* modar_record_create(const uint8_t* gray, size_t stride, int width,
+                                                     int height, modar_error* error);
+/* Its bytes, to be kept for the next start. They belong to the record. */
+MODAR_EXPERIMENTAL const void* modar_record_bytes(const modar_record* record, size_t* size);
+/* Copies and checks such bytes. */
+MODAR_EXPERIMENTAL modar_record* modar_record_open(const void* bytes, size_t size,
+                                                   modar_error* error);
+MODAR_EXPERIMENTAL void modar_record_close(modar_record* record);
+/* Tracks the picture as well; the record is copied. `*pattern` becomes its number for
+ * modar_tracker_pose(), after those of the bundle. All patterns are searched anew. Its models are
+ * the caller's choice: a modar_scene with any model and place. */
+MODAR_EXPERIMENTAL int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record,
+                                                 uint32_t* pattern, modar_error* error);
 
 /* GL's projection matrix for the camera: maps pixels of the frame to pixels of a viewport that
  * shows it. */

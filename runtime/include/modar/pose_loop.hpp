@@ -5,7 +5,9 @@
 #error "modar's headers for C++ need C++20 (-std=c++20); <modar/modar.h> is C99"
 #endif
 
+#include <cstddef>
 #include <memory>
+#include <span>
 
 #include <glm/vec3.hpp>
 
@@ -43,14 +45,19 @@ struct PoseLoopOptions {
   bool estimate_camera = false;
 };
 
+/// A picture that is no pattern of the bundle, made by make_tracker_record(). Aligned to 8.
+using OwnRecord = std::span<const std::byte>;
+
 /// Reads the patterns' tracker records and shapes (kTrackerRecord, kPatternShape) from the bundle's
 /// mapped bytes, which must outlive it. Allocates nothing per frame once a TrackResult has grown.
 class PoseLoop {
  public:
+  /// own: further patterns, flat, with the numbers after the bundle's; their bytes must outlive it.
   /// Errors: kInvalidInput "tracker.no-patterns" if no pattern has a tracker record,
   /// "tracker.record"; kUnsupported "tracker.record-version".
   static Result<std::unique_ptr<PoseLoop>> create(const BundleView& bundle, const Camera& camera,
-                                                  const PoseLoopOptions& options = {});
+                                                  const PoseLoopOptions& options = {},
+                                                  std::span<const OwnRecord> own = {});
   PoseLoop(const PoseLoop&) = delete;
   PoseLoop& operator=(const PoseLoop&) = delete;
   ~PoseLoop();

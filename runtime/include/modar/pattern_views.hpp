@@ -1,5 +1,5 @@
 // Affine views of a picture, anti-aliased, and the features found in them. Integer and rational
-// arithmetic only, so that baked bytes are the same on every machine.
+// arithmetic only, so that tracker records are the same bytes on every machine.
 #pragma once
 
 #include <array>
@@ -7,9 +7,9 @@
 #include <functional>
 #include <vector>
 
-#include "bake/pattern/picture.hpp"
 #include "formats/base/turn.hpp"
 #include "formats/pattern_shape.hpp"
+#include "modar/image.hpp"
 #include "modar/tracker_features.hpp"
 
 namespace modar {
@@ -96,6 +96,11 @@ CurvedView render_surface_view(const std::vector<ViewLevel>& levels, const Patte
                                const std::function<GrayPicture(int width, int height)>& background);
 
 using TrackerCode = std::array<std::uint8_t, 32>;
+
+/// Hamming distances of a 256-bit code to `count` of the codes at `codes`: out[i] is that to
+/// codes[which[i]], or to codes[i] where `which` is null.
+void code_distances(const TrackerCode& code, const TrackerCode* codes, const std::uint32_t* which,
+                    std::size_t count, int* out);
 
 /// Picture coordinates of a point of a view.
 std::array<double, 2> to_picture(const AffineView& view, double x, double y);

@@ -1,10 +1,12 @@
 // Bilinear samples by one gather each, and Hamming distances, compiled for each SIMD level.
-#include "bake/pattern/view_kernel.hpp"
+#include "runtime/record/view_kernel.hpp"
+#include "modar/pattern_views.hpp"
 
 // Levels that gain little here.
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL)
+#define HWY_DISABLED_TARGETS \
+  (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "bake/pattern/view_kernel.cpp"
+#define HWY_TARGET_INCLUDE "runtime/record/view_kernel.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 
 #include <algorithm>
@@ -12,6 +14,8 @@
 #include <cstring>
 
 #include <hwy/highway.h>
+
+#include "formats/base/simd_level.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace modar {
@@ -65,8 +69,8 @@ inline V sums_of(const ViewSamples& from, V x, V y) {
   return sum;
 }
 
-void sample_all(const ViewSamples& from, const std::int32_t* x, const std::int32_t* y,
-                std::size_t count, std::uint8_t* out) {
+inline void sample_all(const ViewSamples& from, const std::int32_t* x, const std::int32_t* y,
+                       std::size_t count, std::uint8_t* out) {
   const Lanes d;
   const std::size_t step = hn::Lanes(d);
   // Quotients without a division: exact for sums below 2^30 and divisors below 2^6.
@@ -91,9 +95,9 @@ void sample_all(const ViewSamples& from, const std::int32_t* x, const std::int32
   }
 }
 
-void distances_to(const std::array<std::uint8_t, 32>& code,
-                  const std::array<std::uint8_t, 32>* codes, const std::uint32_t* which,
-                  std::size_t count, int* out) {
+inline void distances_to(const std::array<std::uint8_t, 32>& code,
+                         const std::array<std::uint8_t, 32>* codes, const std::uint32_t* which,
+                         std::size_t count, int* out) {
   std::uint64_t a[4];
   std::memcpy(a, code.data(), sizeof a);
   for (std::size_t i = 0; i < count; ++i) {
@@ -104,25 +108,45 @@ void distances_to(const std::array<std::uint8_t, 32>& code,
   }
 }
 
+inline ViewLoops loops() {
+  return {sample_all, distances_to};
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace modar
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace modar {
+namespace {
 
-HWY_EXPORT(sample_all);
-HWY_EXPORT(distances_to);
+const ViewLoops& best_loops() {
+#if HWY_ARCH_X86 && (HWY_TARGETS & HWY_SSE4) && (HWY_TARGETS & HWY_AVX2)
+#if HWY_STATIC_TARGET == HWY_SCALAR
+  static const ViewLoops kBaseline = N_SCALAR::loops();
+#else
+  static const ViewLoops kBaseline = N_SSE4::loops();
+#endif
+  static const ViewLoops kLevels[] = {kBaseline, N_SSE4::loops(), N_AVX2::loops()};
+  static const int level = x86_simd_level();
+  return kLevels[level];
+#else
+  static const ViewLoops kLoops = HWY_STATIC_DISPATCH(loops)();
+  return kLoops;
+#endif
+}
+
+}  // namespace
 
 void sample_pixels(const ViewSamples& samples, const std::int32_t* x, const std::int32_t* y,
                    std::size_t count, std::uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(sample_all)(samples, x, y, count, out);
+  best_loops().sample(samples, x, y, count, out);
 }
 
 void code_distances(const std::array<std::uint8_t, 32>& code,
                     const std::array<std::uint8_t, 32>* codes, const std::uint32_t* which,
                     std::size_t count, int* out) {
-  HWY_DYNAMIC_DISPATCH(distances_to)(code, codes, which, count, out);
+  best_loops().distances(code, codes, which, count, out);
 }
 
 }  // namespace modar

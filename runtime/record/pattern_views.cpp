@@ -1,11 +1,11 @@
 // Renders affine views by averaging samples over each pixel's footprint, and finds their features.
-#include "bake/pattern/view_render.hpp"
+#include "modar/pattern_views.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
-#include "bake/pattern/view_kernel.hpp"
+#include "runtime/record/view_kernel.hpp"
 
 namespace modar {
 namespace {

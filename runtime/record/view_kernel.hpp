@@ -1,5 +1,6 @@
-// The two loops that baking a pattern spends most of its time in, compiled for each SIMD level. All
-// sums are of integers, so that every level gives the same bytes.
+// The loop that a pattern's record takes most of its time in, compiled for each SIMD level, as is
+// code_distances(). All sums are of integers, so that every level gives the same bytes. Internal to
+// runtime/record.
 #pragma once
 
 #include <array>
@@ -27,10 +28,13 @@ struct ViewSamples {
 void sample_pixels(const ViewSamples& samples, const std::int32_t* x, const std::int32_t* y,
                    std::size_t count, std::uint8_t* out);
 
-/// Hamming distances of a 256-bit code to `count` of the codes at `codes`: out[i] is that to
-/// codes[which[i]], or to codes[i] where `which` is null.
-void code_distances(const std::array<std::uint8_t, 32>& code,
+/// Both loops as one SIMD level has them.
+struct ViewLoops {
+  void (*sample)(const ViewSamples& samples, const std::int32_t* x, const std::int32_t* y,
+                 std::size_t count, std::uint8_t* out);
+  void (*distances)(const std::array<std::uint8_t, 32>& code,
                     const std::array<std::uint8_t, 32>* codes, const std::uint32_t* which,
                     std::size_t count, int* out);
+};
 
 }  // namespace modar
