@@ -30,7 +30,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What is copied as it is; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 22> kPageFiles = {"app.js",
+constexpr std::array<std::string_view, 26> kPageFiles = {"app.js",
+                                                         "bundle.js",
                                                          "camera.js",
                                                          "engine-plain.js",
                                                          "engine-plain.wasm",
@@ -43,6 +44,7 @@ constexpr std::array<std::string_view, 22> kPageFiles = {"app.js",
                                                          "icon.svg",
                                                          "installed.js",
                                                          "modar-view.js",
+                                                         "modar-viewer.js",
                                                          "modar-worker-plain.js",
                                                          "modar-worker-simd.js",
                                                          "modar-worker.js",
@@ -51,7 +53,9 @@ constexpr std::array<std::string_view, 22> kPageFiles = {"app.js",
                                                          "room.svg",
                                                          "storage.js",
                                                          "style.css",
-                                                         "turntable.js"};
+                                                         "turntable.js",
+                                                         "viewer-parts.js",
+                                                         "viewer-words.js"};
 /// Beside them where the page updates itself.
 constexpr std::array<std::string_view, 4> kUpdateFiles = {"download.js", "engine-update.js",
                                                           "engine-update.wasm", "update-worker.js"};

@@ -16,6 +16,9 @@ FLAGS = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-ang
          "--use-fake-device-for-media-stream", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-default-apps", "--disable-sync", "--hide-scrollbars",
          "--force-color-profile=srgb", "--remote-debugging-pipe"]
+# An element of a page, or of the viewer in it.
+PART = """globalThis.part = (id) => document.getElementById(id)
+  ?? document.querySelector('modar-viewer').shadowRoot.getElementById(id)"""
 
 
 class Browser:
@@ -45,6 +48,7 @@ class Browser:
         self.session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network", "Accessibility"):
             self.call(domain + ".enable")
+        self.call("Page.addScriptToEvaluateOnNewDocument", source=PART)
 
     def _message(self):
         while b"\0" not in self.rest:

@@ -263,8 +263,8 @@ class Page(ProgramTest):
             if "turn" in after:  # also over frames that were dropped on the way
                 self.assertAlmostEqual(after["turn"][0], after["time"] - before["time"], 6)
         # Refused: everything else goes on.
-        self.browser.run("document.getElementById('close').click(), allowed = 'denied'")
-        self.browser.wait("!document.getElementById('video').srcObject", "the end")
+        self.browser.run("part('close').click(), allowed = 'denied'")
+        self.browser.wait("!part('video').srcObject", "the end")
         self.browser.run("told.length = 0")
         self.start()
         self.browser.wait("told.length > 4", "frames")
@@ -287,7 +287,7 @@ class Page(ProgramTest):
     def start(self, state="seen"):
         self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
         self.browser.run("performance.clearMarks(), document.getElementById('start').click()")
-        self.browser.wait(f"document.documentElement.dataset.state === '{state}'", f"state {state}")
+        self.browser.wait(f"document.getElementById('viewer').state === '{state}'", f"state {state}")
 
     def test_a_visit(self):
         self.browser.resize(390, 844, 2, True)
@@ -296,14 +296,14 @@ class Page(ProgramTest):
         self.keep("cover-portrait.png")
         self.assertEqual(self.browser.run("document.title"), "Pots & pans")
         self.start()
-        ms = [self.browser.run(f"performance.getEntriesByName('{each}')[0].startTime - performance.getEntriesByName('camera')[0].startTime")
+        ms = [self.browser.run(f"performance.getEntriesByName('modar: {each}')[0].startTime - performance.getEntriesByName('modar: camera')[0].startTime")
               for each in ("tracked", "seen")]
         print("from the camera to the first tracked frame {:.0f} ms, to the model {:.0f} ms".format(*ms))
         self.keep("stage-portrait.png")
-        self.assertEqual(self.browser.run("document.getElementById('label-name').textContent"), "The book of owls")
+        self.assertEqual(self.browser.run("part('label-name').textContent"), "The book of owls")
         # Long after the models were drawn: browsers have emptied their canvas by then. What the picture shows alone is kept.
         self.browser.run("""new Promise((shot) => { setTimeout(() => {
-          const picture = document.getElementById('picture');
+          const picture = part('picture');
           window.alone = picture.getContext('2d').getImageData(0, 0, picture.width, picture.height).data;
           document.getElementById('shoot').click();
           shot();
@@ -329,10 +329,10 @@ class Page(ProgramTest):
         self.keep("photo-portrait.png")
         self.browser.run("document.getElementById('photo').close()")
         self.browser.resize(844, 390, 2, True)
-        self.browser.wait("document.getElementById('models').width === 1688", "the turn")
+        self.browser.wait("part('models').width === 1688", "the turn")
         self.keep("stage-landscape.png")
-        self.browser.run("document.getElementById('close').click()")
-        self.browser.wait("!document.getElementById('cover').hidden && !document.getElementById('video').srcObject", "the end")
+        self.browser.run("part('close').click()")
+        self.browser.wait("!part('stage').open && !part('video').srcObject", "the end")
         self.keep("cover-landscape.png")
         self.assertEqual(self.browser.errors, [])
         own = (self.server.url, "blob:" + self.server.url, "data:", "about:")
@@ -360,22 +360,22 @@ class Page(ProgramTest):
         self.browser.resize(640, 480)
         self.browser.open(self.server.url)
         self.start()
-        self.assertEqual(self.browser.run("document.activeElement.id"), "models")
-        key = "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{}', bubbles: true, cancelable: true }}))"
+        self.assertEqual(self.browser.run("part('models').getRootNode().activeElement.id"), "models")
+        key = "part('models').dispatchEvent(new KeyboardEvent('keydown', {{ key: '{}', bubbles: true, cancelable: true }}))"
         self.assertFalse(self.browser.run(key.format("ArrowLeft")))  # taken
         self.assertTrue(self.browser.run(key.format("x")))
         self.assertFalse(self.browser.run(key.format("Escape")))
-        self.browser.wait("!document.getElementById('cover').hidden", "the end")
+        self.browser.wait("!part('stage').open", "the end")
 
     def test_a_lost_context_is_restored(self):
         self.browser.resize(640, 480)
         self.browser.open(self.server.url)
         self.start()
-        self.browser.run("globalThis.loser = document.getElementById('models').getContext('webgl2').getExtension('WEBGL_lose_context'), loser.loseContext()")
-        self.browser.wait("document.getElementById('models').getContext('webgl2').isContextLost()", "the loss")
+        self.browser.run("globalThis.loser = part('models').getContext('webgl2').getExtension('WEBGL_lose_context'), loser.loseContext()")
+        self.browser.wait("part('models').getContext('webgl2').isContextLost()", "the loss")
         self.browser.run("loser.restoreContext()")
         self.browser.wait(f"({DRAWN}) > 500", "models after the loss")
-        self.assertEqual(self.browser.run("document.documentElement.dataset.error ?? ''"), "")
+        self.assertEqual(self.browser.run("part('problem').dataset.kind ?? ''"), "")
 
     def around(self, address=""):
         self.browser.open(self.server.url + address)
@@ -383,19 +383,19 @@ class Page(ProgramTest):
         self.browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
         self.addCleanup(self.browser.call, "Emulation.setEmulatedMedia", features=[])
         self.browser.run("document.getElementById('look').click()")
-        self.browser.wait("document.documentElement.dataset.state === 'around'", "the turntable")
+        self.browser.wait("document.getElementById('viewer').state === 'around'", "the turntable")
 
     def test_a_look_without_a_camera(self):
         self.browser.resize(390, 844, 2, True)
         self.around()
-        self.assertTrue(self.browser.run("document.getElementById('video').srcObject === null"))
+        self.assertTrue(self.browser.run("part('video').srcObject === null"))
         picture = """(async () => {
           await new Promise(requestAnimationFrame);
-          const { width, height } = document.getElementById('models');
+          const { width, height } = part('models');
           const copy = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
           Object.assign(copy.canvas, { width, height });
-          document.getElementById('%s').click();
-          copy.drawImage(document.getElementById('models'), 0, 0);
+          part('%s').click();
+          copy.drawImage(part('models'), 0, 0);
           const { data } = copy.getImageData(0, 0, width, height);
           let [drawn, left] = [0, 0];
           for (let i = 3; i < data.length; i += 4) if (data[i] === 255) { ++drawn; left += i / 4 %% width < width / 2; }
@@ -411,13 +411,13 @@ class Page(ProgramTest):
             self.assertNotEqual(self.browser.run(picture % handle)[2], first[2], handle)
             self.assertEqual(self.browser.run(picture % "reset")[2], first[2], handle)
         self.assertGreater(self.browser.run(picture % "larger")[0], first[0])
-        label = self.browser.run("document.getElementById('label').textContent")
+        label = self.browser.run("part('label').textContent")
         self.assertIn("The book of owls", label)
         self.browser.resize(844, 390, 2, True)
         self.keep("around-landscape.png")
         self.assertEqual(self.browser.errors, [])
-        self.browser.run("document.getElementById('close').click()")
-        self.assertFalse(self.browser.run("document.getElementById('cover').hidden"))
+        self.browser.run("part('close').click()")
+        self.assertFalse(self.browser.run("part('stage').open"))
 
     def test_phones_have_a_link_to_their_own_viewer(self):
         room = """(async () => {
@@ -425,7 +425,7 @@ class Page(ProgramTest):
           for (const [name, viewer] of [['iPhone', true], ['Android', false], ['desk', false]]) {
             DOMTokenList.prototype.supports = () => viewer;
             Object.defineProperty(navigator, 'userAgent', { value: name, configurable: true });
-            document.getElementById('scene').dispatchEvent(new Event('change'));
+            part('scene').dispatchEvent(new Event('change'));
             await new Promise((resolve) => setTimeout(resolve, 300));
             const link = document.getElementById('room');
             links.push([link.checkVisibility(), link.href, link.children.length, link.title]);
@@ -513,7 +513,7 @@ class Page(ProgramTest):
           Object.assign(copy.canvas, { width, height });
           const read = (source) => { copy.drawImage(source, 0, 0, width, height); return copy.getImageData(0, 0, width, height).data; };
           const mean = (data) => data.reduce((sum, value, i) => sum + (i % 4 === 3 ? 0 : value), 0) / (0.75 * data.length);
-          const alone = read(document.getElementById('picture'));
+          const alone = read(part('picture'));
           const litAt = async (time) => {
             await new Promise((resolve) => { film.onseeked = resolve; film.currentTime = time; });
             let shot, tries = 0;
@@ -549,14 +549,14 @@ class Page(ProgramTest):
                          [640, 480])
         # Stripes two pixels wide, which a copy of 640 pixels would make gray.
         contrast = """(() => {
-          const canvas = document.getElementById('picture');
+          const canvas = part('picture');
           const copy = document.createElement('canvas').getContext('2d');
           Object.assign(copy.canvas, { width: 64, height: 8 });
           copy.drawImage(canvas, 100, 100, 64, 8, 0, 0, 64, 8);
           const row = [...copy.getImageData(0, 4, 64, 1).data].filter((_, i) => i % 4 === 1);
           return Math.max(...row) - Math.min(...row);
         })()"""
-        self.assertEqual(self.browser.run("document.getElementById('picture').width"), 1920)
+        self.assertEqual(self.browser.run("part('picture').width"), 1920)
         self.assertGreater(self.browser.run(contrast), 150)
         self.assertEqual(self.browser.errors, [])
 
@@ -597,11 +597,11 @@ class Page(ProgramTest):
         try:
             self.browser.open(self.server.url)
             self.start("error")
-            self.assertEqual(self.browser.run("document.documentElement.dataset.error"), "host")
-            words = self.browser.run("document.getElementById('problem').innerText")
+            self.assertEqual(self.browser.run("part('problem').dataset.kind"), "host")
+            words = self.browser.run("part('problem').innerText")
             for word in ("Instagram", "Safari", self.server.url):
                 self.assertIn(word, words)
-            self.assertTrue(self.browser.run("document.getElementById('copy').checkVisibility() && !document.getElementById('again').checkVisibility()"))
+            self.assertTrue(self.browser.run("part('copy').checkVisibility() && !part('again').checkVisibility()"))
             self.keep("within-an-app.png")
         finally:
             self.browser.camera("granted")
@@ -613,9 +613,9 @@ class Page(ProgramTest):
         self.start()
         hide = "Object.defineProperty(document, 'hidden', {{ value: {}, configurable: true }}), document.dispatchEvent(new Event('visibilitychange'))"
         self.browser.run(hide.format("true"))
-        self.assertTrue(self.browser.run("document.getElementById('video').srcObject === null"))
+        self.assertTrue(self.browser.run("part('video').srcObject === null"))
         self.browser.run(hide.format("false"))
-        self.browser.wait("document.getElementById('video').srcObject !== null", "the camera again")
+        self.browser.wait("part('video').srcObject !== null", "the camera again")
 
     def test_a_refused_camera_is_told(self):
         self.browser.resize(390, 844, 2, True)
@@ -623,13 +623,13 @@ class Page(ProgramTest):
         self.browser.camera("denied")
         try:
             self.start("error")
-            self.assertEqual(self.browser.run("document.documentElement.dataset.error"), "refused")
-            self.assertIn("settings", self.browser.run("document.getElementById('problem').textContent"))
+            self.assertEqual(self.browser.run("part('problem').dataset.kind"), "refused")
+            self.assertIn("settings", self.browser.run("part('problem').textContent"))
             self.keep("refused.png")
         finally:
             self.browser.camera("granted")
-        self.browser.run("document.getElementById('again').click()")
-        self.browser.wait("document.documentElement.dataset.state === 'seen'", "the second try")
+        self.browser.run("part('again').click()")
+        self.browser.wait("document.getElementById('viewer').state === 'seen'", "the second try")
 
     def test_webgl_2_and_1_draw_the_players_pictures(self):
         self.browser.resize(640, 480)
@@ -825,7 +825,7 @@ text.de = "Deutsch: {text}"
 
 # Pixels of the models' canvas that are not transparent.
 DRAWN = """(() => {
-  const canvas = document.getElementById('models');
+  const canvas = part('models');
   const copy = document.createElement('canvas');
   Object.assign(copy, { width: canvas.width, height: canvas.height });
   const context = copy.getContext('2d');

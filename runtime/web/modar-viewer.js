@@ -1,0 +1,636 @@
+// <modar-viewer src="vase.modar">: the models of a bundle before a visitor's camera, and on a turntable without one. `modar web`
+// makes its page of this element. Types: modar-viewer.d.ts.
+import { describe } from './bundle.js';
+import { Camera, hostApp, ownBrowser } from './camera.js';
+import { POSE, POSE_FLOATS } from './engine.js';
+import { allowMotion, load, ModarError } from './modar.js';
+import { View } from './modar-view.js';
+import { Turntable } from './turntable.js';
+import { build } from './viewer-parts.js';
+import { directionOf, fill, labelOf, showWords, wordsFor } from './viewer-words.js';
+
+/** Milliseconds without a sighting before the visitor is told why: shorter ones flicker. */
+const PATIENCE_MS = 900;
+/** Milliseconds of searching after which "go closer" is the likeliest advice. */
+const FAR_MS = 5000;
+/** Mean gray value below which a room is called dark. */
+const DARK = 35;
+const TURN_A_KEY = Math.PI / 18;
+const SIZE_A_KEY = 1.1;
+const SMALLEST = 0.2;
+const LARGEST = 5;
+/** Pictures that a hint has room for. */
+const MOST_PLATES = 4;
+
+const BY_NAME = {
+  NotAllowedError: 'refused', SecurityError: 'refused', NotFoundError: 'none', OverconstrainedError: 'none',
+  NotReadableError: 'busy', AbortError: 'busy',
+};
+const BY_CODE = {
+  'web.webgl': 'webgl', 'web.wasm': 'old', 'web.download': 'network', 'web.memory': 'memory',
+  'web.insecure': 'insecure', 'web.old': 'old', 'web.ended': 'ended', 'web.worker': 'other',
+};
+/** What the browser of another app may lack, and the phone's own has. */
+const OF_HOSTS = ['refused', 'none', 'busy', 'old'];
+/** What is wrong where no words could be loaded. */
+const NO_WORDS = ['The page could not be loaded', 'Check the network and load it again.'];
+
+function kindOf(error) {
+  const byCode = ({ code }) => BY_CODE[code] ?? (code.startsWith('gl.') ? 'webgl' : 'bundle');
+  const kind = error instanceof ModarError ? byCode(error) : BY_NAME[error?.name] ?? 'other';
+  return hostApp() && OF_HOSTS.includes(kind) ? 'host' : kind;
+}
+
+function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;  // else readers repeat it for each frame
+}
+
+const pictureOf = async ({ image }) => (typeof image === 'function' ? image() : image);
+
+/** A server that renders pages has no elements, and may import this all the same. */
+export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
+  static observedAttributes = ['src', 'poster', 'alt', 'lang'];
+
+  #root = build(this);
+  #words = null;
+  #wordsGiven = false;
+  /** Until words are there. */
+  #ready = null;
+  #state = 'start';
+  #srcObject = null;
+  /** {source, done}: what is or was loaded, and the promise of it. */
+  #loading = null;
+  #modar = null;
+  #view = null;
+  #patterns = null;
+  #patternsGiven = null;
+  #camera = new Camera();
+  #table = null;
+  #gesture = { turn: 0, size: 1, mirror: false };
+  #shown = -1;
+  #unseenSince = 0;
+
+  constructor() {
+    super();
+    this.#listen();
+  }
+
+  #$(id) {
+    return this.#root.getElementById(id);
+  }
+
+  connectedCallback() {
+    document.addEventListener('visibilitychange', this.#onVisibility);
+    addEventListener('resize', this.#onResize);
+    this.#ready ??= this.#loadWords();
+  }
+
+  disconnectedCallback() {
+    document.removeEventListener('visibilitychange', this.#onVisibility);
+    removeEventListener('resize', this.#onResize);
+    this.stop();
+    this.#unload();
+    this.#loading = null;
+  }
+
+  attributeChangedCallback(name) {
+    if (name === 'poster' || name === 'alt') {
+      const [poster, src] = [this.#$('poster'), this.getAttribute('poster')];
+      Object.assign(poster, { hidden: !src, alt: this.getAttribute('alt') ?? '' });
+      if (src) poster.src = src;
+    } else if (name === 'lang' && this.isConnected) {
+      this.#ready = this.#loadWords();
+    }
+  }
+
+  // ---- what pages set and read ----
+
+  get src() {
+    return this.getAttribute('src') ?? '';
+  }
+
+  set src(address) {
+    this.setAttribute('src', address);
+  }
+
+  get srcObject() {
+    return this.#srcObject;
+  }
+
+  set srcObject(source) {
+    this.#srcObject = source;
+  }
+
+  get state() {
+    return this.#state;
+  }
+
+  get modar() {
+    return this.#modar;
+  }
+
+  /** The track of the camera that is open. */
+  get camera() {
+    return this.#camera.track ?? null;
+  }
+
+  /** The canvases of picture and models, which lie over each other. */
+  get layers() {
+    return [this.#$('picture'), this.#$('models')];
+  }
+
+  get patterns() {
+    return this.#patterns ?? [];
+  }
+
+  /** null: as the bundle says. */
+  set patterns(patterns) {
+    this.#patternsGiven = patterns;
+    this.#usePatterns(patterns);
+  }
+
+  set words(words) {
+    this.#wordsGiven = true;
+    this.#ready = Promise.resolve();
+    this.#useWords(words, this.#language);
+  }
+
+  #setState(state) {
+    if (state === this.#state) return;
+    this.#state = state;
+    this.setAttribute('state', state);
+    this.dispatchEvent(new Event('statechange'));
+  }
+
+  // ---- words ----
+
+  get #language() {
+    return this.closest('[lang]')?.lang || navigator.language;
+  }
+
+  async #loadWords() {
+    if (this.#wordsGiven) return;
+    const { words, language } = await wordsFor(this.#language).catch(() => ({}));
+    if (words && !this.#wordsGiven) this.#useWords(words, language);
+  }
+
+  #useWords(words, language) {
+    this.#words = words;
+    Object.assign(this.#$('all'), { lang: language, dir: directionOf(language) });
+    showWords(this.#root, words);
+    this.#$('models').setAttribute('aria-roledescription', words.scene);
+    this.#showPatternNames();
+    this.#showLabel(this.#shown);
+  }
+
+  #say(key, values) {
+    return fill(this.#words?.[key] ?? '', values);
+  }
+
+  #labelOf(pattern) {
+    return labelOf(this.patterns[pattern], this.#language);
+  }
+
+  #usePatterns(patterns) {
+    this.#patterns = patterns;
+    this.#shown = -1;
+    const few = this.patterns.slice(0, MOST_PLATES);
+    this.#$('plates').replaceChildren(...few.map((pattern) => {
+      const picture = document.createElement('img');
+      Object.assign(picture, { width: pattern.width, height: pattern.height, alt: '', decoding: 'async' });
+      pictureOf(pattern).then((address) => { picture.src = address; });
+      return picture;
+    }));
+    this.#$('plates').classList.toggle('many', few.length > 1);
+    this.#showPatternNames();
+  }
+
+  #showPatternNames() {
+    const chosen = this.#$('scene').selectedIndex;
+    this.#$('scene').replaceChildren(...this.patterns.map((_, i) => new Option(this.#labelOf(i).name, i, false, i === chosen)));
+  }
+
+  // ---- the bundle ----
+
+  /** The bundle, once: begun before the visitor starts, and waited for then. */
+  load() {
+    const source = this.#srcObject ?? this.src;
+    if (this.#loading?.source === source) return this.#loading.done;
+    const before = this.#loading?.done.catch(() => {});
+    const done = Promise.resolve(before).then(async () => {
+      this.#unload();
+      try {
+        await this.#open(source);
+      } catch (error) {
+        if (this.#loading?.done === done) this.#loading = null;  // the next start tries again
+        throw error;
+      } finally {
+        this.#$('progress').textContent = '';
+      }
+      this.dispatchEvent(new Event('load'));
+    });
+    this.#loading = { source, done };
+    return done;
+  }
+
+  #unload() {
+    this.#modar?.close();
+    this.#modar = this.#view = null;
+  }
+
+  async #open(source) {
+    const opening = load(typeof source === 'function' ? await source() : source, {
+      onProgress: (loaded, total) => this.#tellProgress(this.#say('loading', { percent: Math.floor((100 * loaded) / total) }), loaded, total),
+    });
+    const creating = View.create(opening.then((opened) => opened.bytes), { picture: this.#$('picture'), models: this.#freshCanvas() });
+    creating.catch(() => {});  // told below, after what ails the bundle
+    const opened = await opening;
+    const { length } = opened.bytes;
+    this.#tellProgress(this.#say('preparing'), length, length);
+    try {
+      this.#view = await creating;
+    } catch (error) {
+      opened.close();
+      throw error;
+    }
+    this.#modar = opened;
+    if (!this.#patternsGiven) this.#usePatterns(describe(opened.bytes, opened.patterns));
+    opened.bytes = null;  // the engines have their own copies
+    opened.addEventListener('frame', ({ detail }) => this.#onFrame(detail));
+    opened.addEventListener('dropped', ({ detail }) => { if (this.#camera.stream) this.#view.show(detail.source, this.#gesture); });
+    opened.addEventListener('error', ({ detail }) => this.fail(detail));
+    for (const type of ['found', 'updated', 'lost']) {
+      opened.addEventListener(type, ({ detail }) => this.dispatchEvent(new CustomEvent(type, { detail })));
+    }
+  }
+
+  #tellProgress(text, loaded, total) {
+    this.#$('progress').textContent = text;
+    this.dispatchEvent(new ProgressEvent('progress', { lengthComputable: true, loaded, total }));
+  }
+
+  /** A canvas keeps its first context: another bundle's renderer gets a new one. */
+  #freshCanvas() {
+    const used = this.#$('models');
+    if (!used.dataset.used) {
+      used.dataset.used = 'yes';
+      return used;
+    }
+    const canvas = used.cloneNode(false);
+    used.replaceWith(canvas);
+    this.#listenToGestures(canvas);
+    return canvas;
+  }
+
+  // ---- start and stop ----
+
+  /** Opens the camera and shows it with its models. Call it in a click's handler. loaded: what is waited for beside the camera. */
+  async start(loaded = this.load()) {
+    loaded.catch(() => {});  // told below, after the camera's own troubles
+    this.#setBusy(true);
+    try {
+      await allowMotion();  // first: iOS asks for it within the click only
+      await this.#openCamera();
+      await Promise.all([loaded, this.#ready]);
+      await this.#follow();
+      this.#unseenSince = performance.now();
+      this.#$('reason').textContent = this.#lookWords;
+      this.#enter('looking');
+    } catch (error) {
+      this.fail(error);
+    } finally {
+      this.#setBusy(false);
+    }
+  }
+
+  /** Shows what stands on a pattern on a turntable, without a camera. */
+  async look(pattern = 0, loaded = this.load()) {
+    this.#setBusy(true);
+    try {
+      await Promise.all([loaded, this.#ready]);
+      this.#$('which').hidden = this.patterns.length < 2;
+      this.#enter('around');
+      this.#table = new Turntable(this.#view, this.#$('ground'));
+      await this.#showScene(pattern);
+    } catch (error) {
+      this.fail(error);
+    } finally {
+      this.#setBusy(false);
+    }
+  }
+
+  /** Back to the cover. */
+  stop() {
+    this.#closeCamera();
+    this.#table?.close();
+    this.#table = null;
+    this.#$('which').hidden = true;
+    if (this.#root.fullscreenElement) document.exitFullscreen();
+    this.#$('stage').close();
+    this.#$('label').hidden = true;
+    this.#setState('start');
+  }
+
+  /** Stops, and tells the visitor what is wrong and what helps. */
+  fail(error) {
+    this.stop();
+    const kind = kindOf(error);
+    const [title, cure] = this.#words?.errors[kind] ?? NO_WORDS;
+    const host = { app: hostApp(), browser: ownBrowser() };
+    this.#$('problem-title').textContent = fill(title, host);
+    this.#$('problem-cure').textContent = fill(cure, host);
+    const plain = ['refused', 'none', 'insecure'].includes(kind);
+    this.#$('problem-detail').textContent = kind === 'host' ? location.href : plain ? '' : String(error?.message ?? error);
+    this.#$('copy').hidden = kind !== 'host';
+    this.#$('again').hidden = kind === 'host';
+    // Models can be looked at wherever they can be drawn.
+    this.#$('look-instead').hidden = !this.#words || ['webgl', 'network', 'bundle', 'memory', 'other'].includes(kind);
+    this.#$('problem').dataset.kind = kind;
+    this.#setState('error');
+    if (!this.#$('problem').open) this.#$('problem').showModal();
+    this.dispatchEvent(new ErrorEvent('error', { error, message: String(error?.message ?? error) }));
+  }
+
+  /** Both layers in one picture. */
+  photograph(type) {
+    return this.#view.photograph(type);
+  }
+
+  #setBusy(busy) {
+    for (const id of ['start', 'look']) this.#$(id).disabled = busy;
+  }
+
+  #enter(state) {
+    this.#shown = -1;
+    this.#$('full').hidden = !document.fullscreenEnabled;
+    this.#setState(state);
+    this.#nameModels(this.#say('nothingSeen'));
+    if (!this.#$('stage').open) this.#$('stage').showModal();
+    this.#$('models').focus({ preventScroll: true });
+  }
+
+  /** For another browser. Where the clipboard is closed, the address is selected, to be copied by hand. */
+  async #copyAddress() {
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.#$('copy').textContent = this.#say('copied');
+    } catch {
+      getSelection().selectAllChildren(this.#$('problem-detail'));
+    }
+  }
+
+  // ---- the camera ----
+
+  async #openCamera() {
+    await this.#camera.open(this.#$('video'), () => this.fail(new ModarError({ code: 'web.ended', cause: 'the camera ended' })));
+    this.#gesture.mirror = this.#camera.mirrored;
+    performance.mark('modar: camera');
+    this.dispatchEvent(new Event('camerachange'));
+  }
+
+  /** Tracks in what the camera brings, with the tools that it has. */
+  async #follow() {
+    const { track } = this.#camera;
+    await this.#modar.start(this.#$('video'), { ...this.#camera.focal, extended: true });
+    this.#$('flip').hidden = (await this.#camera.list()).length < 2;
+    this.#$('torch').hidden = !track.getCapabilities?.().torch;
+    this.#$('torch').setAttribute('aria-pressed', 'false');
+  }
+
+  #closeCamera() {
+    this.#modar?.stop();
+    if (!this.#camera.stream) return;
+    this.#camera.close();
+    this.#$('video').srcObject = null;
+    this.dispatchEvent(new Event('camerachange'));
+  }
+
+  async #reopenCamera() {
+    this.#closeCamera();
+    try {
+      await this.#openCamera();
+      await this.#follow();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  #flip() {
+    this.#camera.flip();
+    return this.#reopenCamera();
+  }
+
+  async #toggleTorch() {
+    const lit = this.#$('torch').getAttribute('aria-pressed') !== 'true';
+    await this.#camera.track.applyConstraints({ advanced: [{ torch: lit }] });
+    this.#$('torch').setAttribute('aria-pressed', String(lit));
+  }
+
+  async #showCameras() {
+    const devices = await this.#camera.list();
+    const current = this.#camera.track.getSettings().deviceId;
+    this.#$('choose-list').replaceChildren(...devices.map((device, i) => {
+      const label = document.createElement('label');
+      const input = Object.assign(document.createElement('input'), { type: 'radio', name: 'camera', checked: device.deviceId === current });
+      input.addEventListener('change', () => {
+        this.#camera.choose(device.deviceId);
+        this.#$('choose').close();
+        this.#reopenCamera();
+      });
+      label.append(input, device.label || this.#say('camera', { number: i + 1 }));
+      return label;
+    }));
+    this.#$('choose').showModal();
+  }
+
+  /** A page that nobody looks at has no business with the camera. */
+  #onVisibility = () => {
+    if (!['looking', 'seen'].includes(this.#state)) return;
+    if (document.hidden) this.#closeCamera();
+    else this.#reopenCamera();
+  };
+
+  // ---- a look without a camera ----
+
+  #onResize = () => this.#table?.draw();
+
+  async #showScene(pattern) {
+    const picture = this.patterns[pattern];
+    this.#$('scene').value = pattern;
+    Object.assign(this.#$('ground'), { width: picture.width, height: picture.height, src: await pictureOf(picture) });
+    this.#table?.show(pattern, picture);
+    this.#shown = -1;
+    this.#showLabel(pattern);
+  }
+
+  // ---- frames ----
+
+  get #lookWords() {
+    return this.#say(this.patterns.length > 1 ? 'lookMany' : 'look');
+  }
+
+  #adviceFor({ reason, brightness }, unseenMs) {
+    if (brightness < DARK) return this.#say('dark');
+    if (unseenMs < PATIENCE_MS) return this.#$('reason').textContent;
+    if (reason === 'lost by blur') return this.#say('blurred');
+    if (reason === 'out of view') return this.#say('outside');
+    if (reason === 'failed verification') return this.#say('hold');
+    return unseenMs > FAR_MS ? `${this.#lookWords} ${this.#say('far')}` : this.#lookWords;
+  }
+
+  #nameModels(name) {
+    this.#$('models').setAttribute('aria-label', name);
+  }
+
+  #showLabel(pattern) {
+    if (pattern < 0) {
+      this.#$('label').hidden = true;
+      this.#nameModels(this.#say('nothingSeen'));
+    } else {
+      const { language, name, text, alt } = this.#labelOf(pattern);
+      this.#$('label-name').textContent = name;
+      this.#$('label-text').textContent = text;
+      Object.assign(this.#$('label'), { hidden: false, lang: language, dir: language ? directionOf(language) : '' });
+      const models = this.#modar.scenes.filter((scene) => scene.pattern === pattern).map(({ model }) => model);
+      this.#nameModels(this.#say('seen', { name: alt || models.join(', '), pattern: name }));
+    }
+    if (pattern === this.#shown) return;
+    this.#shown = pattern;
+    this.dispatchEvent(new CustomEvent('scenechange', { detail: { pattern } }));
+  }
+
+  #onFrame(frame) {
+    if (!this.#camera.stream) return;
+    if (this.#state === 'looking' && frame.reason === 'visible') performance.mark('modar: tracked');
+    try {
+      this.#view.draw(frame, this.#gesture);
+    } catch (error) {
+      this.fail(error);
+      return;
+    }
+    this.#camera.copied(frame.copyMs);
+    if (frame.foundFocal) this.#camera.keepFocal(frame.foundFocal, Math.max(frame.camera.width, frame.camera.height));
+    this.#tellSeen(frame);
+    this.dispatchEvent(new CustomEvent('frame', { detail: frame }));
+  }
+
+  #tellSeen(frame) {
+    const now = performance.now();
+    const first = this.#modar.patterns.findIndex((_, p) => frame.poses[p * POSE_FLOATS + POSE.shown] !== 0);
+    if (first >= 0) {
+      if (this.#state !== 'seen') performance.mark('modar: seen');
+      this.#unseenSince = now;
+      this.#setState('seen');
+      if (first !== this.#shown) this.#showLabel(first);
+    } else {
+      this.#setState('looking');
+      setText(this.#$('reason'), this.#adviceFor(frame, now - this.#unseenSince));
+      if (now - this.#unseenSince > PATIENCE_MS && this.#shown >= 0) this.#showLabel(-1);
+    }
+  }
+
+  // ---- gestures and keys ----
+
+  /** What a visitor's hand moves: models before the camera at the next frame, the turntable at once. */
+  #change(by) {
+    by(this.#table?.gesture ?? this.#gesture);
+    this.#table?.touched();
+  }
+
+  #turn(radians) {
+    this.#change((held) => { held.turn += radians; });
+  }
+
+  #resize(factor) {
+    this.#change((held) => { held.size = Math.min(LARGEST, Math.max(SMALLEST, held.size * factor)); });
+  }
+
+  /** Of the turntable alone: before the camera, the visitor walks. */
+  #tilt(radians) {
+    if (this.#table) this.#change((held) => { held.tilt += radians; });
+  }
+
+  #undo() {
+    Object.assign(this.#gesture, { turn: 0, size: 1 });
+    this.#table?.reset();
+  }
+
+  #keys = {
+    ArrowLeft: () => this.#turn(-TURN_A_KEY),
+    ArrowRight: () => this.#turn(TURN_A_KEY),
+    ArrowUp: () => this.#resize(SIZE_A_KEY),
+    ArrowDown: () => this.#resize(1 / SIZE_A_KEY),
+    PageUp: () => this.#tilt(TURN_A_KEY),
+    PageDown: () => this.#tilt(-TURN_A_KEY),
+    '+': () => this.#resize(SIZE_A_KEY),
+    '-': () => this.#resize(1 / SIZE_A_KEY),
+    0: () => this.#undo(),
+    Escape: () => this.stop(),
+  };
+
+  #listenToGestures(canvas) {
+    const fingers = new Map();
+    const spread = () => {
+      const [a, b] = [...fingers.values()];
+      return Math.hypot(a.x - b.x, a.y - b.y);
+    };
+    canvas.addEventListener('pointerdown', (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    });
+    canvas.addEventListener('pointermove', (event) => {
+      const finger = fingers.get(event.pointerId);
+      if (!finger) return;
+      const before = fingers.size === 2 ? spread() : 0;
+      // Across the whole canvas: one turn.
+      if (fingers.size === 1) {
+        this.#turn(((event.clientX - finger.x) / canvas.clientWidth) * 2 * Math.PI);
+        this.#tilt(((event.clientY - finger.y) / canvas.clientHeight) * Math.PI);
+      }
+      finger.x = event.clientX;
+      finger.y = event.clientY;
+      if (before > 0) this.#resize(spread() / before);
+    });
+    for (const type of ['pointerup', 'pointercancel']) {
+      canvas.addEventListener(type, ({ pointerId }) => fingers.delete(pointerId));
+    }
+    canvas.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      this.#resize(Math.exp(-event.deltaY / 500));
+    }, { passive: false });
+  }
+
+  #onKey(event) {
+    if (['button', 'select', 'a'].includes(event.target.localName) && event.key !== 'Escape') return;
+    if (event.ctrlKey || event.metaKey || event.altKey || !this.#keys[event.key]) return;
+    event.preventDefault();
+    this.#keys[event.key]();
+  }
+
+  #listen() {
+    const keys = this.#keys;
+    const clicks = {
+      start: () => this.start(), look: () => this.look(), close: () => this.stop(), flip: () => this.#flip(), torch: () => this.#toggleTorch(),
+      cameras: () => this.#showCameras(), 'choose-close': () => this.#$('choose').close(), copy: () => this.#copyAddress(),
+      'problem-close': () => this.#$('problem').close(),
+      full: () => (this.#root.fullscreenElement ? document.exitFullscreen() : this.#$('screen').requestFullscreen()),
+      // The same as keys and gestures, for those who do not drag, pinch or type.
+      'turn-left': keys.ArrowLeft, 'turn-right': keys.ArrowRight, larger: keys['+'], smaller: keys['-'], higher: keys.PageUp,
+      lower: keys.PageDown, reset: keys[0],
+      again: () => { this.#$('problem').close(); this.start(); },
+      'look-instead': () => { this.#$('problem').close(); this.look(); },
+    };
+    for (const [id, action] of Object.entries(clicks)) this.#$(id).addEventListener('click', action);
+    this.#$('scene').addEventListener('change', () => this.#showScene(Number(this.#$('scene').value)));
+    this.#$('problem').addEventListener('close', () => {
+      delete this.#$('problem').dataset.kind;
+      if (this.#state === 'error') this.#setState('start');
+    });
+    this.#$('stage').addEventListener('keydown', (event) => this.#onKey(event));
+    // A phone's gesture or button of going back.
+    this.#$('stage').addEventListener('close', () => { if (!this.#$('stage').open && !['start', 'error'].includes(this.#state)) this.stop(); });
+    this.#listenToGestures(this.#$('models'));
+  }
+}
+
+if (globalThis.customElements && !customElements.get('modar-viewer')) customElements.define('modar-viewer', ModarViewer);
