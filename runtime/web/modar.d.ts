@@ -79,7 +79,7 @@ export interface Frame {
   luma?: Uint8Array;
 }
 
-interface ModarEvents {
+export interface ModarEvents {
   found: CustomEvent<Sighting>;
   updated: CustomEvent<Sighting>;
   lost: CustomEvent<{ pattern: number; name: string; time: number; reason: string }>;

@@ -1,6 +1,7 @@
 // Brings what the page shows up to date with a release folder of `modar ship`, beside the page's life: all is checked
 // before it is used, and what is in use stays until the new is whole and stored.
 import load from './engine-update.js';
+import { textsOf, titleOf } from './bundle.js';
 import { Brought } from './download.js';
 import { address, cacheName, installedRelease, isNewer, openStore } from './installed.js';
 
@@ -63,21 +64,6 @@ function bmpOf(gray, width, height) {
   for (let level = 0; level < 256; ++level) file.fill(level, 54 + 4 * level, 57 + 4 * level);
   for (let y = 0; y < height; ++y) file.set(gray.subarray((height - 1 - y) * width, (height - y) * width), start + y * stride);
   return file;
-}
-
-const titleOf = (name) => name.replaceAll('_', ' ');
-
-/** Texts of modar.toml by pattern: {pattern: {language: {name, text}}}; as bake/web/site.cpp has it. */
-function textsOf(meta) {
-  const texts = {};
-  for (const { pattern, text } of meta.texts ?? []) {
-    for (const [language, words] of Object.entries(text)) {
-      texts[pattern] ??= {};
-      const before = texts[pattern][language]?.text;
-      texts[pattern][language] = { name: titleOf(pattern), text: before ? `${before} ${words}` : words };
-    }
-  }
-  return texts;
 }
 
 /** The open bundle's patterns, their pictures put beside it. */

@@ -30,16 +30,16 @@ button:disabled { opacity: .5; cursor: progress; }
 .quiet:hover { background: rgb(0 0 0 / .06); }
 select { background: var(--card); color: var(--ink); width: 100%; }
 .row { display: flex; flex-wrap: wrap; gap: .6rem; }
-.tool {
+.tool, ::slotted(.tool) {
   width: 3.2rem; height: 3.2rem; min-height: 0; padding: 0; justify-content: center; border: 0; border-radius: 50%;
-  background: rgb(20 18 16 / .55); color: #fff;
+  background: rgb(20 18 16 / .55); color: #fff; fill: none; stroke: currentColor; stroke-width: 1.6; stroke-linecap: round; stroke-linejoin: round;
 }
-.tool:hover { background: rgb(20 18 16 / .8); }
+.tool:hover, ::slotted(.tool:hover) { background: rgb(20 18 16 / .8); }
 .tool:focus-visible { outline-color: #fff; outline-offset: -.3rem; }
 .tool[aria-pressed="true"] { background: var(--card); color: var(--ink); }
-.tool svg { width: 1.55rem; height: 1.55rem; fill: none; stroke: currentColor; stroke-width: 1.6; stroke-linecap: round; stroke-linejoin: round; }
+.tool svg { width: 1.55rem; height: 1.55rem; }
 .tool .full { fill: currentColor; stroke: none; }
-@media (orientation: landscape) and (max-height: 36rem) { .tool { width: 2.9rem; height: 2.9rem; } }
+@media (orientation: landscape) and (max-height: 36rem) { .tool, ::slotted(.tool) { width: 2.9rem; height: 2.9rem; } }
 .dialog {
   border: 0; border-top: 3px solid var(--accent); background: var(--card); color: var(--ink); box-shadow: var(--shadow);
   padding: 1.5rem; width: min(30rem, calc(100vw - 2rem)); max-height: calc(100vh - 2rem);

@@ -101,6 +101,24 @@ def demo_clip(folder, frames=CLIP_FRAMES):
     return folder
 
 
+PROJECT = """
+[project]
+name = "demo"
+[bake]
+loop-views = 8
+score = false
+lods = 1
+parameters = ["none"]
+[[model]]
+file = "pottery.obj"
+[[pattern]]
+file = "cover.png"
+[[scene]]
+pattern = "cover"
+model = "pottery"
+"""
+
+
 class ProgramTest(unittest.TestCase):
     """A test with a folder of its own, removed afterwards."""
 
@@ -138,3 +156,14 @@ class ProgramTest(unittest.TestCase):
     def bake_demo(self, name="demo.modar"):
         """Pottery on the cover."""
         return pathlib.Path(shutil.copyfile(demo_files() / "demo.modar", self.folder / name))
+
+    def bake_project(self, texts):
+        """The same by modar.toml, with lines of the scene's texts."""
+        folder = self.folder / "project"
+        folder.mkdir(exist_ok=True)
+        for file in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png"), COVER):
+            shutil.copy(file, folder)
+        (folder / "modar.toml").write_text(PROJECT + texts)
+        done = self.modar("bake", "--quiet", cwd=folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return folder / "out" / "demo.modar"

@@ -7,9 +7,13 @@ import os
 import pathlib
 import shutil
 import subprocess
+import tempfile
 import threading
 import time
 
+FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
+WEBKIT = next(iter(sorted(pathlib.Path("/usr/lib").glob("*/webkit2gtk-4*/MiniBrowser"))), None)
+XVFB = shutil.which("Xvfb")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 # SwiftShader: the same pixels on every machine.
 FLAGS = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
@@ -131,6 +135,44 @@ class Browser:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+
+
+def engines(test, size="1280x900"):
+    """(name, start) of each browser that is installed; start(url) answers its process, the first of a group. On a screen of that size,
+    without which Firefox draws no WebGL."""
+    def starter(words, **environment):
+        def start(url):
+            home = tempfile.mkdtemp(prefix="modar-home-", dir=test.folder)  # which every engine writes to
+            own = {"HOME": home, "XDG_DATA_HOME": home + "/data", "XDG_CACHE_HOME": home + "/cache"}
+            return subprocess.Popen([*words, url], env={**os.environ, **own, **environment}, stdout=subprocess.DEVNULL,
+                                    stderr=subprocess.DEVNULL, start_new_session=True)
+        return start
+
+    if CHROMIUM:
+        flags = [flag for flag in FLAGS if "pipe" not in flag]
+        yield "chromium", starter([CHROMIUM, *flags, f"--user-data-dir={test.folder / 'profile-chromium'}", "--window-size=" + size.replace("x", ",")])
+    if not XVFB or not (FIREFOX or WEBKIT):
+        return
+    display = f":{40 + os.getpid() % 50}"
+    screen = subprocess.Popen([XVFB, display, "-screen", "0", size + "x24"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    test.addCleanup(screen.wait)
+    test.addCleanup(screen.kill)
+    time.sleep(1)
+    if FIREFOX:
+        (test.folder / "profile-firefox").mkdir()
+        yield "firefox", starter([FIREFOX, "--no-remote", "--profile", test.folder / "profile-firefox"], DISPLAY=display)
+    if WEBKIT:
+        yield "webkit", starter([WEBKIT], DISPLAY=display, WEBKIT_DISABLE_SANDBOX_THIS_IS_DANGEROUS="1")
+
+
+def axe_core(folder):
+    """The file of axe-core, by npm; None where there is no npm or network."""
+    npm = shutil.which("npm")
+    if npm is None:
+        return None
+    (folder / "package.json").write_text('{"private": true}')
+    done = subprocess.run([npm, "install", "--no-audit", "--no-fund", "--loglevel=error", "axe-core@4"], cwd=folder, capture_output=True)
+    return folder / "node_modules" / "axe-core" / "axe.min.js" if done.returncode == 0 else None
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):

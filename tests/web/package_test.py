@@ -67,7 +67,7 @@ class Package(unittest.TestCase):
         self.browser.errors.clear()
         self.browser.open(url)
         self.browser.wait("window.result !== undefined", "the end")
-        self.assertEqual(self.browser.run("window.result"), "cover,1,2,16")
+        self.assertEqual(self.browser.run("window.result"), "cover,1,2,16,around,Start the camera,cover")
         self.assertEqual(self.browser.errors, [])
         self.browser.open("about:blank")  # Vite's pages ask for their server when it is gone
 
@@ -81,18 +81,21 @@ class Package(unittest.TestCase):
         engines = {f"engine-{kind}.{end}" for kind in ("simd", "plain") for end in ("js", "wasm")}
         self.assertEqual(names, engines | {
             "package.json", "README.md", "LICENSE", "modar.js", "modar.d.ts", "modar-view.js", "modar-view.d.ts", "modar-worker.js",
-            "modar-worker-simd.js", "modar-worker-plain.js", "gyroscope.js", "engine.js"})
+            "modar-viewer.js", "modar-viewer.d.ts", "modar-worker-simd.js", "modar-worker-plain.js", "gyroscope.js", "engine.js",
+            "bundle.js", "camera.js", "storage.js", "turntable.js", "viewer-parts.js", "viewer-words.js", "words"})
         licence = (self.base / "node_modules" / "modar" / "LICENSE").read_text()
         for words in ("MIT License", "Mozilla Public License", "musl"):
             self.assertIn(words, licence)
 
     def test_strict_types_hold(self):
         self.tool("typescript", "bin/tsc", "-p", ".")
-        wrong = (HERE / "main.ts").read_text().replace("detail.view.length", "detail.vew.length")
-        (self.base / "main.ts").write_text(wrong)
         self.addCleanup(shutil.copy, HERE / "main.ts", self.base)
-        with self.assertRaises(AssertionError):
-            self.tool("typescript", "bin/tsc", "-p", ".")
+        right = (HERE / "main.ts").read_text()
+        for good, bad in (("detail.view.length", "detail.vew.length"), ("detail.inliers", "detail.outliers"), ("viewer.look()", "viewer.lok()")):
+            self.assertIn(good, right)
+            (self.base / "main.ts").write_text(right.replace(good, bad))
+            with self.assertRaises(AssertionError):
+                self.tool("typescript", "bin/tsc", "-p", ".")
 
     def test_vite_builds_it(self):
         for vite in VITES:
@@ -127,8 +130,9 @@ class Package(unittest.TestCase):
 
     def test_a_server_may_import_it(self):
         self.assertEqual(subprocess.run(
-            ["node", "--input-type=module", "-e", "const m = await import('modar'); const v = await import('modar/view'); console.log(typeof m.load, typeof v.View)"],
-            cwd=self.base, capture_output=True, text=True).stdout, "function function\n")
+            ["node", "--input-type=module", "-e", "const m = await import('modar'); const v = await import('modar/view'); const e = await import('modar/viewer'); "
+             "console.log(typeof m.load, typeof v.View, typeof e.ModarViewer)"],
+            cwd=self.base, capture_output=True, text=True).stdout, "function function function\n")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import unittest
 import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
-from browser import Browser, Server  # noqa: E402
+from browser import Browser, Server, axe_core  # noqa: E402
 from programs import (COVER, COVERED, POTTERY, QUICK, READINGS, ROOT, TURNED, TURNS, ProgramTest, covered_clip,  # noqa: E402
                       demo_clip, write_turns)
 
@@ -355,6 +355,59 @@ class Page(ProgramTest):
             for role, names in roles.items():
                 self.assertNotIn("", names, role)
         self.assertIn("A pot with two handles, standing on the picture The book of owls.", roles["application"])
+
+    def assert_accessible(self, what):
+        found = self.browser.run("""axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] })
+          .then(({ violations, passes }) => [passes.length, violations.map(({ id, nodes }) => id + ': ' + nodes.map(({ html }) => html).join(' | '))])""")
+        self.assertGreater(found[0], 10, what)
+        self.assertEqual(found[1], [], what)
+
+    def test_axe_core_finds_nothing(self):
+        axe = axe_core(self.folder)
+        if axe is None:
+            self.skipTest("npm cannot fetch axe-core")
+        click = lambda part: self.browser.run(f"part('{part}').click()")
+        self.browser.resize(390, 844, 2, True)
+        self.browser.open(self.server.url)
+        self.browser.run(axe.read_text() + "; 0")
+        self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
+        self.assert_accessible("cover")
+        click("about")
+        self.assert_accessible("notes")
+        click("notes-close")
+        self.start()
+        self.assert_accessible("seen")
+        click("shoot")
+        self.browser.wait("document.getElementById('photo').open", "a photo")
+        self.assert_accessible("photo")
+        click("photo-close")
+        click("cameras")
+        self.browser.wait("part('choose').open", "the cameras")
+        self.assert_accessible("cameras")
+        click("choose-close")
+        click("close")
+        click("look")
+        self.browser.wait("document.getElementById('viewer').state === 'around'", "the turntable")
+        self.assert_accessible("around")
+        self.browser.run("document.getElementById('viewer').fail(new DOMException('', 'NotFoundError'))")
+        self.assert_accessible("problem")
+
+    def test_browsers_that_make_no_style_sheets_show_the_same(self):
+        self.browser.resize(390, 844, 2, True)
+        look = """(() => { const style = (element) => { const { position, width, color, borderTopWidth } = getComputedStyle(element);
+          return [position, width, color, borderTopWidth]; };
+          return [part('tools'), part('close'), part('shoot'), part('about')].map(style); })()"""
+        looks = []
+        for old in (False, True):
+            if old:
+                script = self.browser.call("Page.addScriptToEvaluateOnNewDocument", source="delete CSSStyleSheet.prototype.replaceSync")
+            self.around()
+            self.browser.wait("[...part('tools').getRootNode().querySelectorAll('link')].every(({ sheet }) => sheet)", "styles")
+            looks.append(self.browser.run(look))
+        self.browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+        self.assertEqual(looks[0], looks[1])
+        self.assertEqual(looks[0][0][0], "absolute")
+        self.assertEqual(self.browser.errors, [])
 
     def test_keys_turn_and_resize(self):
         self.browser.resize(640, 480)
@@ -730,33 +783,6 @@ class Updates(ProgramTest):
     def check(self, done):
         self.assertEqual(done.returncode, 0, done.stderr)
 
-    def project(self, text):
-        """A bundle by modar.toml, with a text."""
-        folder = self.folder / "project"
-        folder.mkdir(exist_ok=True)
-        for file in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png"), COVER):
-            shutil.copy(file, folder)
-        (folder / "modar.toml").write_text(f"""
-[project]
-name = "demo"
-[bake]
-loop-views = 8
-score = false
-lods = 1
-parameters = ["none"]
-[[model]]
-file = "pottery.obj"
-[[pattern]]
-file = "cover.png"
-[[scene]]
-pattern = "cover"
-model = "pottery"
-text.en = "{text}"
-text.de = "Deutsch: {text}"
-""")
-        self.check(self.modar("bake", "--quiet", cwd=folder))
-        return folder / "out" / "demo.modar"
-
     def publish(self, bundle):
         # Later than 32 bits of seconds reach, which is where time_t ends in WebAssembly.
         self.check(self.modar("ship", "publish", bundle, "--to", self.release, "--key", self.folder / "museum.key",
@@ -784,13 +810,13 @@ text.de = "Deutsch: {text}"
         self.addCleanup(self.browser.close)
         # The site's own bundle is the release: nothing to bring.
         self.assertIsNone(self.visit("current"))
-        second = self.project("Printed in 1890.")
+        second = self.bake_project('text.en = "Printed in 1890."\nalt.en = "A pot"\n')
         self.publish(second)
         installed = self.visit("updated")
         sha = hashlib.sha256(second.read_bytes()).hexdigest()
         self.assertEqual(installed["sha"], sha)
         self.assertTrue(installed["hint"])
-        self.assertEqual(installed["texts"]["en"], {"name": "cover", "text": "Printed in 1890."})
+        self.assertEqual(installed["texts"]["en"], {"name": "cover", "text": "Printed in 1890.", "alt": "A pot"})
         # The next visit shows it, and has nothing to bring.
         self.assertEqual(self.visit("current")["sha"], sha)
         self.browser.wait("document.getElementById('caption').textContent === 'cover'", "the cover")
@@ -804,7 +830,7 @@ text.de = "Deutsch: {text}"
         self.assertEqual(self.visit("failed fetch.roll-back")["sha"], sha)
         (self.release / "latest").write_text(latest)
         # Forged: another document under the signature.
-        third = self.project("Printed in 1891.")
+        third = self.bake_project('text.en = "Printed in 1891."\n')
         self.publish(third)
         document = next(iter(sorted(self.release.glob("releases/*.json"), reverse=True)))
         good = document.read_bytes()

@@ -4,24 +4,18 @@ import hashlib
 import json
 import os
 import pathlib
-import shutil
-import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
 import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
-from browser import CHROMIUM, FLAGS, Quiet  # noqa: E402
+from browser import Quiet, engines  # noqa: E402
 from programs import ROOT, ProgramTest  # noqa: E402
 import http.server  # noqa: E402
 
 PAGE = ROOT / "build" / "web" / "web"
-FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
-WEBKIT = next(iter(sorted(pathlib.Path("/usr/lib").glob("*/webkit2gtk-4*/MiniBrowser"))), None)
-XVFB = shutil.which("Xvfb")
 
 # Each visit: what the server does, what the update says of it, the release that is installed afterwards (0: none).
 VISITS = [
@@ -162,37 +156,15 @@ class RudeUpdates(ProgramTest):
         (site / "site.json").write_text(json.dumps(told))
         return site, shas
 
-    def run_engine(self, words, url, environment=()):
-        # A home of its own, which every engine writes to.
-        home = tempfile.mkdtemp(prefix="modar-home-", dir=self.folder)
-        return subprocess.Popen([*words, url], env={**os.environ, "HOME": home, "XDG_DATA_HOME": home + "/data", "XDG_CACHE_HOME": home + "/cache",
-                                                    **dict(environment)}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-
-    def engines(self):
-        profile = lambda name: self.folder / f"profile-{name}"
-        if CHROMIUM:
-            flags = [flag for flag in FLAGS if "pipe" not in flag]
-            yield "chromium", [CHROMIUM, *flags, f"--user-data-dir={profile('chromium')}"], {}
-        if FIREFOX:
-            profile("firefox").mkdir()
-            yield "firefox", [FIREFOX, "--headless", "--no-remote", "--profile", profile("firefox")], {}
-        if WEBKIT and XVFB:
-            display = f":{40 + os.getpid() % 50}"
-            screen = subprocess.Popen([XVFB, display, "-screen", "0", "800x600x24"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            self.addCleanup(screen.wait)
-            self.addCleanup(screen.kill)
-            time.sleep(1)
-            yield "webkit", [WEBKIT], {"DISPLAY": display, "WEBKIT_DISABLE_SANDBOX_THIS_IS_DANGEROUS": "1"}
-
     def test_an_update_that_never_ends_stalls_or_lags_is_given_up(self):
         site, shas = self.make_site()
         names = []
-        for name, words, environment in self.engines():
+        for name, start in engines(self):
             with self.subTest(name):
                 names.append(name)
                 server = Server(site)
                 begun = time.monotonic()
-                process = self.run_engine(words, f"http://localhost:{server.server_port}/", environment.items())
+                process = start(f"http://localhost:{server.server_port}/")
                 try:
                     self.assertTrue(server.done.wait(240), f"{name}: only {server.results}")
                 finally:

@@ -1,6 +1,7 @@
 // A visitor of the package's: what a strict TypeScript project writes. tests/web/package_test.py builds and opens it.
 import { drawFrame, load, type Modar, projectionOf, type Sighting } from 'modar';
 import { View } from 'modar/view';
+import { ModarViewer } from 'modar/viewer';
 
 declare global {
   interface Window { result?: string }
@@ -14,6 +15,19 @@ async function pictureOf(address: string): Promise<ImageData> {
   Object.assign(context.canvas, { width: image.naturalWidth, height: image.naturalHeight });
   context.drawImage(image, 0, 0);
   return context.getImageData(0, 0, image.naturalWidth, image.naturalHeight);
+}
+
+/** The element as a page has it: its state, a word and a name that it shows. */
+async function lookAround(): Promise<string[]> {
+  const viewer = document.createElement('modar-viewer');
+  viewer.src = 'demo.modar';
+  viewer.addEventListener('found', ({ detail }) => console.assert(detail.inliers > 0));
+  viewer.addEventListener('error', ({ error }) => console.error(error));
+  document.body.append(viewer);
+  await viewer.look();
+  const part = (id: string): string => viewer.shadowRoot?.getElementById(id)?.textContent ?? '';
+  console.assert(viewer instanceof ModarViewer && viewer.layers[1].width > 0);
+  return [viewer.state, part('start'), part('label-name')];
 }
 
 async function main(): Promise<string> {
@@ -31,7 +45,7 @@ async function main(): Promise<string> {
   const view = await View.create(modar.bytes, { picture: picture!, models: models! });
   const size = drawFrame(picture!, { source: models!, camera });
   const projection = projectionOf(camera, 0.1, 10, size);
-  return [modar.patterns[0]?.name, poses[0], view.webgl, projection.length].join();
+  return [modar.patterns[0]?.name, poses[0], view.webgl, projection.length, ...await lookAround()].join();
 }
 
 main().then((text) => { window.result = text; }, (error: unknown) => { window.result = String(error); });

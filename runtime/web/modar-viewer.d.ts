@@ -1,0 +1,87 @@
+/**
+ * <modar-viewer src="vase.modar">: the models of a bundle before a visitor's camera, and on a turntable without one. Importing this
+ * module defines the element; on a server it does nothing.
+ *
+ * Attributes: src, the bundle's address; poster, a picture to show before the start, and alt, its description; lang, of words and
+ * texts (else that of the element around it); bare, for pages with a cover of their own: no poster and no buttons before the start.
+ * Slots: poster, in place of the picture; tools, for buttons of yours beside the viewer's (class "tool": as these look).
+ * CSS properties: --modar-paper, --modar-card, --modar-ink, --modar-accent (colours), --modar-font.
+ */
+import type { Frame, Modar, ModarEvents } from './modar.js';
+
+/** What is shown of a pattern. */
+export interface ViewerPattern {
+  name: string;
+  title: string;
+  /** By language; `alt` says what a visitor would see of the models. */
+  texts?: Record<string, { name: string; text: string; alt?: string }>;
+  /** The picture that the camera looks for: its address, now or when it is asked for. */
+  image: string | (() => string | Promise<string>);
+  /** Of the picture, pixels. */
+  width: number;
+  height: number;
+  /** Whether a turntable shows the picture below the models; true unless said otherwise. */
+  flat?: boolean;
+}
+
+export interface ModarViewerEventMap extends Omit<HTMLElementEventMap, 'error'>, Pick<ModarEvents, 'found' | 'updated' | 'lost'> {
+  /** While the bundle comes. */
+  progress: ProgressEvent;
+  /** The bundle is there, and drawn. */
+  load: Event;
+  /** `error` of it is a ModarError, or what getUserMedia() throws. The visitor has been told. */
+  error: ErrorEvent;
+  /** See ModarViewer.state. */
+  statechange: Event;
+  /** The camera was opened or closed. */
+  camerachange: Event;
+  /** Another pattern's models are shown; -1: none. */
+  scenechange: CustomEvent<{ pattern: number }>;
+  /** After picture and models were drawn, in the same task: copies of `layers` are whole now. */
+  frame: CustomEvent<Frame>;
+}
+
+export class ModarViewer extends HTMLElement {
+  src: string;
+  /** The bundle's bytes, or what brings them; goes before src. */
+  srcObject: ArrayBuffer | Uint8Array | string | (() => Promise<ArrayBuffer | Uint8Array | string>) | null;
+  /** Of the bundle's patterns; set it to show other texts and pictures than the bundle's own, null: these. */
+  get patterns(): ViewerPattern[];
+  set patterns(patterns: ViewerPattern[] | null);
+  /** Texts of the viewer in another language: a complete translation of words/en.json. */
+  set words(words: Record<string, unknown>);
+  /** start: the cover. looking: the camera, without models. seen: models. around: the turntable. error: the visitor is told why. */
+  readonly state: 'start' | 'looking' | 'seen' | 'around' | 'error';
+  /** The bundle that is loaded. */
+  readonly modar: Modar | null;
+  /** The camera that is open. */
+  readonly camera: MediaStreamTrack | null;
+  /** The camera's picture, and the models over it. */
+  readonly layers: [HTMLCanvasElement, HTMLCanvasElement];
+  /** Brings the bundle before the visitor starts; without it the first start does. */
+  load(): Promise<void>;
+  /** As the start button: call it in a click's handler. loaded: what is waited for beside the camera, load() unless said otherwise. */
+  start(loaded?: Promise<void>): Promise<void>;
+  /** What stands on a pattern, without a camera. */
+  look(pattern?: number, loaded?: Promise<void>): Promise<void>;
+  /** Back to the cover; closes the camera. */
+  stop(): void;
+  /** Stops, and tells the visitor of an error of yours. */
+  fail(error: unknown): void;
+  /** Picture and models in one; while one of them is shown. */
+  photograph(type?: 'image/jpeg' | 'image/png'): Promise<Blob>;
+  addEventListener<K extends keyof ModarViewerEventMap>(
+    type: K, listener: (this: ModarViewer, event: ModarViewerEventMap[K]) => unknown, options?: boolean | AddEventListenerOptions): void;
+  addEventListener(
+    type: string, listener: EventListenerOrEventListenerObject, options?: boolean | AddEventListenerOptions): void;
+  removeEventListener<K extends keyof ModarViewerEventMap>(
+    type: K, listener: (this: ModarViewer, event: ModarViewerEventMap[K]) => unknown, options?: boolean | EventListenerOptions): void;
+  removeEventListener(
+    type: string, listener: EventListenerOrEventListenerObject, options?: boolean | EventListenerOptions): void;
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'modar-viewer': ModarViewer;
+  }
+}
