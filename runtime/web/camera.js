@@ -4,9 +4,9 @@ import { store, stored } from './storage.js';
 
 /**
  * What is asked of a camera, best first. The picture is shown as it comes and tracked in a smaller copy; a phone that takes too
- * long to hand a large one over gets the next.
+ * long to hand a large one over gets the next. All are tracked at 640 x 360, so tracking goes on when one takes another's place.
  */
-const SIZES = [{ width: 1920, height: 1080 }, { width: 1280, height: 720 }, { width: 640, height: 480 }];
+const SIZES = [{ width: 1920, height: 1080 }, { width: 1280, height: 720 }, { width: 640, height: 360 }];
 /** Milliseconds that handing a frame over may take, of 33 between two of them, as the median of so many frames. */
 const MOST_COPY_MS = 12;
 const COPIES = 15;

@@ -625,6 +625,41 @@ class Page(ProgramTest):
         })()""")
         self.assertEqual(sizes, [1280, 640])
 
+    def test_models_stay_while_a_slow_camera_gives_less(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.browser.run("""(async () => {
+          const canvas = Object.assign(document.createElement('canvas'), { width: 1920, height: 1080 });
+          const frame = await createImageBitmap(await (await fetch('/clip/frame_00000.png')).blob());
+          const draw = () => {
+            canvas.getContext('2d').drawImage(frame, 0, 60, 640, 360, 0, 0, canvas.width, canvas.height);
+            requestAnimationFrame(draw);
+          };
+          draw();
+          navigator.mediaDevices.getUserMedia = async () => {
+            const stream = canvas.captureStream(30);
+            stream.getVideoTracks()[0].applyConstraints = async ({ width, height }) => Object.assign(canvas, { width: width.ideal, height: height.ideal });
+            return stream;
+          };
+          const { Camera } = await import('/camera.js');
+          const copied = Camera.prototype.copied;
+          Camera.prototype.copied = function () { return copied.call(this, globalThis.slow ? 50 : 1); };
+          globalThis.seen = { lost: 0, sizes: [], tracked: [] };
+          const viewer = document.getElementById('viewer');
+          viewer.addEventListener('lost', () => { seen.lost += 1; });
+          viewer.addEventListener('frame', ({ detail: { source, camera } }) => {
+            if (!globalThis.slow) return;
+            seen.sizes.push(source.displayWidth ?? source.width);
+            seen.tracked.push(`${camera.width} x ${camera.height}`);
+          });
+        })()""")
+        self.start()
+        self.browser.run("globalThis.slow = true")
+        self.browser.wait("seen.sizes.filter((size) => size === 640).length > 5", "the smallest pictures")
+        seen = self.browser.run("seen")
+        self.assertEqual(sorted(set(seen["sizes"])), [640, 1280, 1920])
+        self.assertEqual((seen["lost"], set(seen["tracked"])), (0, {"640 x 360"}))
+
     def test_the_main_camera_is_chosen_and_a_choice_kept(self):
         self.browser.open(self.server.url)
         phones = {  # as browsers name them: Android's with four, an iPhone's, one without names
