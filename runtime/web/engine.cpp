@@ -29,6 +29,15 @@ struct WebPose {
 };
 static_assert(sizeof(WebPose) == 41 * sizeof(float));
 
+/// Pictures of the visitor's own that a page tracks beside the bundle's.
+constexpr uint32_t kMostOwn = 8;
+
+/// What stands on one of them: what a scene of the bundle has, at its place.
+struct OwnPattern {
+  modar_record* record = nullptr;  ///< of the tracker; null where this instance draws
+  uint32_t scene = 0;
+};
+
 struct Engine {
   modar_error error = modar::sized<modar_error>();
   modar_bundle* bundle = nullptr;
@@ -36,7 +45,9 @@ struct Engine {
   modar_renderer* renderer = nullptr;
   modar_camera camera = modar::sized<modar_camera>();
   double focal_sigma = 0;    ///< 0 where it is not estimated
-  WebPose* poses = nullptr;  ///< one a pattern
+  WebPose* poses = nullptr;  ///< one a pattern, with room for kMostOwn more
+  OwnPattern own[kMostOwn];
+  uint32_t own_count = 0;
   modar_item* items = nullptr;
   char text[256];
 };
@@ -53,21 +64,29 @@ glm::mat4 with_gesture(const modar_scene& scene, float turn, float size) {
   return glm::translate(gesture, -foot) * place;
 }
 
+/// A scene on a pattern as the next item, if that is shown.
+void collect(const modar_scene& scene, uint32_t pattern, float turn, float size, size_t& count) {
+  const WebPose& pose = engine.poses[pattern];
+  if (pose.shown == 0.0f) return;
+  const glm::mat4 to_eye = glm::make_mat4(pose.view) * with_gesture(scene, turn, size);
+  modar_item& item = engine.items[count++];
+  item.model = scene.model;
+  std::memcpy(item.to_eye, glm::value_ptr(to_eye), sizeof item.to_eye);
+  item.scene = scene.number;
+  std::memcpy(item.world_to_eye, pose.view, sizeof item.world_to_eye);
+}
+
 /// Shown scenes as items; answers how many.
 size_t collect_items(float turn, float size) {
   size_t count = 0;
   auto scene = modar::sized<modar_scene>();
   for (uint32_t s = 0; modar_scene_at(engine.bundle, s, &scene) != 0; ++s) {
-    const WebPose& pose = engine.poses[scene.pattern];
-    if (pose.shown == 0.0f) continue;
-    const glm::mat4 to_eye = glm::make_mat4(pose.view) * with_gesture(scene, turn, size);
-    engine.items[count].model = scene.model;
-    std::memcpy(engine.items[count].to_eye, glm::value_ptr(to_eye),
-                sizeof engine.items[count].to_eye);
-    engine.items[count].scene = scene.number;
-    std::memcpy(engine.items[count].world_to_eye, pose.view,
-                sizeof engine.items[count].world_to_eye);
-    ++count;
+    collect(scene, scene.pattern, turn, size, count);
+  }
+  const uint32_t patterns = modar_pattern_count(engine.bundle);
+  for (uint32_t i = 0; i < engine.own_count; ++i) {
+    if (modar_scene_at(engine.bundle, engine.own[i].scene, &scene) == 0) continue;
+    collect(scene, patterns + i, turn, size, count);
   }
   return count;
 }
@@ -106,10 +125,10 @@ EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size) {
   if (engine.bundle == nullptr) return engine.error.status;
   const int damaged = modar_bundle_verify(engine.bundle, &engine.error);
   if (damaged != 0) return damaged;
-  engine.poses = new WebPose[modar_pattern_count(engine.bundle) + 1]();
-  const uint32_t scenes = modar_scene_count(engine.bundle);
-  engine.items = new modar_item[scenes + 1]();
-  for (uint32_t i = 0; i <= scenes; ++i) engine.items[i].size = sizeof(modar_item);
+  engine.poses = new WebPose[modar_pattern_count(engine.bundle) + kMostOwn]();
+  const uint32_t items = modar_scene_count(engine.bundle) + kMostOwn;
+  engine.items = new modar_item[items]();
+  for (uint32_t i = 0; i < items; ++i) engine.items[i].size = sizeof(modar_item);
   return 0;
 }
 
@@ -163,6 +182,39 @@ EMSCRIPTEN_KEEPALIVE double web_focal_sigma() {
   return engine.focal_sigma;
 }
 
+/// Gives a further pattern a scene's model; scene: an index. Its number is the patterns' before.
+EMSCRIPTEN_KEEPALIVE int web_stand(uint32_t scene) {
+  if (engine.own_count == kMostOwn) return 0;
+  engine.own[engine.own_count++].scene = scene;
+  return 1;
+}
+
+/// Takes a gray picture as a further pattern: tracked by the trackers of web_track() from then on.
+EMSCRIPTEN_KEEPALIVE int web_add_pattern(const uint8_t* gray, int width, int height) {
+  modar_record* const record =
+      modar_record_create(gray, static_cast<size_t>(width), width, height, &engine.error);
+  if (record == nullptr) return engine.error.status;
+  if (engine.tracker != nullptr) {
+    const int failed = modar_tracker_add_pattern(engine.tracker, record, nullptr, &engine.error);
+    if (failed != 0) {
+      modar_record_close(record);
+      return failed;
+    }
+  }
+  engine.own[engine.own_count++].record = record;
+  return 0;
+}
+
+/// Forgets all further patterns, and their tracker.
+EMSCRIPTEN_KEEPALIVE void web_forget_patterns() {
+  for (; engine.own_count > 0; --engine.own_count) {
+    modar_record_close(engine.own[engine.own_count - 1].record);
+    engine.own[engine.own_count - 1] = {};
+  }
+  modar_tracker_destroy(engine.tracker);
+  engine.tracker = nullptr;
+}
+
 /// A tracker for web_camera(), in place of the one before. estimate_camera: 1 to estimate the focal
 /// length from there. budget: millions of ARM instructions a frame, 0: no limit. extended: 1 to go
 /// on from a pattern's surroundings.
@@ -174,7 +226,11 @@ EMSCRIPTEN_KEEPALIVE int web_track(int estimate_camera, int budget, int extended
   options.estimate_camera = estimate_camera;
   engine.tracker =
       modar_tracker_create_with(engine.bundle, &engine.camera, &options, &engine.error);
-  return engine.tracker == nullptr ? engine.error.status : 0;
+  if (engine.tracker == nullptr) return engine.error.status;
+  for (uint32_t i = 0; i < engine.own_count; ++i) {
+    modar_tracker_add_pattern(engine.tracker, engine.own[i].record, nullptr, nullptr);
+  }
+  return 0;
 }
 EMSCRIPTEN_KEEPALIVE void web_reset() {
   modar_tracker_reset(engine.tracker);
@@ -192,7 +248,7 @@ EMSCRIPTEN_KEEPALIVE int web_step(const uint8_t* gray, size_t stride, double tim
   if (failed != 0) return failed;
   engine.focal_sigma = modar_tracker_camera(engine.tracker, &engine.camera);
   auto pose = modar::sized<modar_pose>();
-  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p) {
+  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p) {
     modar_tracker_pose(engine.tracker, p, &pose);
     WebPose& to = engine.poses[p];
     to.visible = static_cast<float>(pose.visible);
@@ -214,13 +270,15 @@ EMSCRIPTEN_KEEPALIVE const char* web_reason() {
   return modar_tracker_reason(engine.tracker);
 }
 
-/// Gray in place of RGBA, by the weights of BT.601, which sum to 1 << 16 here.
-EMSCRIPTEN_KEEPALIVE void web_gray_from_rgba(uint8_t* pixels, size_t count) {
-  for (size_t i = 0; i < count; ++i) {
-    const uint8_t* rgba = pixels + 4 * i;
-    pixels[i] =
-        static_cast<uint8_t>((19595 * rgba[0] + 38470 * rgba[1] + 7471 * rgba[2] + 32768) >> 16);
-  }
+/// Gray in place of RGBA.
+EMSCRIPTEN_KEEPALIVE void web_gray_from_rgba(uint8_t* pixels, int width, int height) {
+  auto picture = modar::sized<modar_picture>();
+  picture.format = MODAR_RGBA;
+  picture.width = width;
+  picture.height = height;
+  picture.planes[0] = pixels;
+  picture.strides[0] = 4 * static_cast<ptrdiff_t>(width);
+  modar_gray(&picture, pixels, nullptr);
 }
 /// A gray picture of `factor` times the size becomes width x height, in place.
 EMSCRIPTEN_KEEPALIVE void web_shrink(uint8_t* gray, size_t stride, int width, int height,

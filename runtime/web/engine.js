@@ -136,8 +136,27 @@ export class Engine {
   }
 
   /** The frame buffer's RGBA becomes gray, in place. */
-  grayFromRgba() {
-    this.#module._web_gray_from_rgba(this.frameAt, this.width * this.height);
+  grayFromRgba(width = this.width, height = this.height) {
+    this.#module._web_gray_from_rgba(this.frameAt, width, height);
+  }
+
+  /** Takes the picture in the frame buffer, gray, as a further pattern. */
+  addPattern(width, height, pattern) {
+    this.#check(this.#module._web_add_pattern(this.frameAt, width, height));
+    this.patterns.push(pattern);
+  }
+
+  /** A further pattern, as another engine's addPattern() has it, gets what stands in a scene. @returns false: there are too many */
+  stand(pattern, scene) {
+    if (!this.#module._web_stand(scene)) return false;
+    this.patterns.push(pattern);
+    return true;
+  }
+
+  /** Forgets all further patterns. @param {number} kept those of the bundle. Tracking begins anew */
+  forgetPatterns(kept) {
+    this.#module._web_forget_patterns();
+    this.patterns.length = kept;
   }
 
   /** The frame buffer's gray picture, `shrink` times the camera's size, becomes that size, in place; its stride is the width. */

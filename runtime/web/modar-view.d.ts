@@ -22,6 +22,13 @@ export class View {
   show(source: VideoFrame | HTMLCanvasElement, gesture?: Gesture): void;
   /** In the handler of the event `frame`, with its detail. */
   draw(frame: Frame, gesture?: Gesture): void;
+  /**
+   * A picture that Modar.addPattern() has added gets what stands in a scene of the bundle, at its place: call it once for each,
+   * in their order. @returns false: there are 8 already
+   */
+  stand(name: string, scene: number): boolean;
+  /** Forgets all of stand(). kept: patterns of the bundle. */
+  forgetPatterns(kept: number): void;
   /** The box of what stands on a pattern, in its space; null where nothing does. */
   bounds(pattern: number): { low: number[]; high: number[] } | null;
   /**

@@ -80,11 +80,22 @@ export class View {
     drawFrame(this.#picture, { source, camera }, gesture);
     if (this.#lost) return;
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
-    this.#engine.poses().set(poses);
+    const known = this.#engine.poses();
+    known.fill(0).set(poses.subarray(0, known.length));
     if (!this.#fixedLight) this.#look(source, camera, poses);
     const as = { ...gesture };
     this.#redraw = () => this.#engine.draw(width, height, as);
     this.#redraw();
+  }
+
+  /** @see modar-view.d.ts */
+  stand(name, scene) {
+    return this.#engine.stand({ name }, scene);
+  }
+
+  /** Forgets what stand() was told. */
+  forgetPatterns(kept) {
+    this.#engine.forgetPatterns(kept);
   }
 
   /** The box of what stands on a pattern, in its space: {low, high}, or null where nothing does. */

@@ -92,6 +92,18 @@ const answers = {
     if (engine.width) engine.setCamera(0, 0, 0);  // the next frame starts a new tracker
     return { type: 'ready' };
   },
+  /** A picture as a further pattern. */
+  add({ pixels, width, height, pattern }) {
+    engine.frameBuffer(pixels.byteLength).set(new Uint8Array(pixels));
+    engine.grayFromRgba(width, height);
+    engine.addPattern(width, height, pattern);
+    return { type: 'added' };
+  },
+  forget({ kept }) {
+    engine.forgetPatterns(kept);
+    engine.setCamera(0, 0, 0);  // the next frame starts a new tracker
+    return { type: 'forgotten' };
+  },
   frame: track,
 };
 

@@ -196,12 +196,33 @@ export function drawFrame(canvas, { source, camera }, { mirror = false } = {}) {
   return viewport;
 }
 
+/**
+ * Longer side of a picture that is added, pixels: trades the time until it is tracked, which grows with its area, for how near it
+ * may be looked at.
+ */
+const ADDED_SIDE = 512;
+
+/** A picture's pixels, for a pattern. @returns {pixels, width, height} */
+function pixelsOf(image) {
+  const [wide, high] = [image.naturalWidth ?? image.displayWidth ?? image.width, image.naturalHeight ?? image.displayHeight ?? image.height];
+  const scale = Math.min(1, ADDED_SIDE / Math.max(wide, high));
+  const [width, height] = [Math.round(wide * scale), Math.round(high * scale)];
+  const context = Object.assign(document.createElement('canvas'), { width, height }).getContext('2d', { willReadFrequently: true });
+  context.fillStyle = '#fff';  // paper, where the picture is transparent
+  context.fillRect(0, 0, width, height);
+  context.imageSmoothingQuality = 'high';
+  context.drawImage(image, 0, 0, width, height);
+  return { width, height, pixels: context.getImageData(0, 0, width, height).data.buffer };
+}
+
 export class Modar extends EventTarget {
   #tracker;
   #stopFrames = null;
   #waiting = null;
   #busy = false;
   #known = [];
+  /** Patterns of the bundle; null: no others were added. */
+  #ofBundle = null;
   #grabber = null;
   #runs = 0;
   #gyroscope = null;
@@ -227,6 +248,23 @@ export class Modar extends EventTarget {
       throw error;
     }
     return modar;
+  }
+
+  /** @see modar.d.ts */
+  async addPattern(image, { name = '', widthMm = 0 } = {}) {
+    const picture = pixelsOf(image);
+    const pattern = { name, widthMm };
+    await this.#tracker.ask({ type: 'add', ...picture, pattern }, [picture.pixels]);
+    this.#ofBundle ??= this.patterns.length;
+    this.#known.push(false);
+    return this.patterns.push(pattern) - 1;
+  }
+
+  /** @see modar.d.ts */
+  async forgetPatterns() {
+    if (this.#ofBundle === null) return;
+    await this.#tracker.ask({ type: 'forget', kept: this.#ofBundle });
+    this.patterns.length = this.#known.length = this.#ofBundle;
   }
 
   /** Tracks in the video, which is to play, until stop(). focal: in pixels of its longer side; 0: unknown. */
@@ -312,6 +350,7 @@ export class Modar extends EventTarget {
     let projection = null;
     for (let pattern = 0; pattern < this.patterns.length; ++pattern) {
       const pose = poses.subarray(pattern * POSE_FLOATS, (pattern + 1) * POSE_FLOATS);
+      if (pose.length === 0) break;  // added since the frame was taken
       const shown = pose[POSE.shown] !== 0;
       const { name } = this.patterns[pattern];
       if (shown) {

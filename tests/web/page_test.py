@@ -65,6 +65,35 @@ RECORD = """(async () => {
 })()"""
 
 
+# A picture that is none of the bundle's, and frames that show it; then it is forgotten.
+OWN = """(async () => {
+  const { load } = await import('/modar.js');
+  const modar = await load('/own/one.modar', { simd: %s });
+  await modar.start(document.createElement('video'));
+  modar.stop();
+  const image = new Image();
+  image.src = '/own/own.png';
+  await image.decode();
+  const began = performance.now();
+  const index = await modar.addPattern(image, { name: 'mine', widthMm: 90 });
+  const ms = performance.now() - began;
+  const blank = Object.assign(document.createElement('canvas'), { width: 90, height: 90 });
+  const refused = await modar.addPattern(blank).catch(({ code, cure }) => ({ code, cure }));
+  const frames = new Uint8Array(await (await fetch('/own/own.gray')).arrayBuffer());
+  const size = %d, seen = [];
+  const step = (i) => modar.step(frames.subarray(i * size, (i + 1) * size), %d, %d, i / 30);
+  for (let i = 0; i * size < frames.length; ++i) {
+    const { poses, reason } = await step(i);
+    seen.push({ reason, pose: Array.from(poses).slice(41), other: poses[0] });
+  }
+  const { patterns } = modar;
+  const known = structuredClone(patterns);
+  await modar.forgetPatterns();
+  const after = await step(0);
+  modar.close();
+  return { index, ms, refused, seen, known, left: patterns.length, numbers: after.poses.length, reason: after.reason };
+})()"""
+
 # Synthetic events at a gyroscope's clock: reading i of [time, rate...] as the browser would bring it.
 READ = """(async () => {
   const { allowMotion, Gyroscope } = await import('/gyroscope.js');
@@ -220,6 +249,34 @@ class Page(ProgramTest):
             done = self.browser.run(FEED % (simd, json.dumps(TURNS), "covered.gray", WIDTH, HEIGHT, WIDTH, HEIGHT))
             self.assert_same_poses(done["seen"], covered)
             self.assertGreaterEqual(sum(each["pose"][40] for each in done["seen"]), COVERED - 1)
+
+    def test_a_picture_of_ones_own_is_tracked_as_if_it_had_been_baked(self):
+        place = self.site / "own"
+        place.mkdir()
+        game, painting = (ROOT / "assets" / "patterns" / f"{name}.png" for name in ("game", "painting"))
+        own, clip = place / "own.png", self.folder / "clip"
+        subprocess.run(["ffmpeg", "-v", "error", "-i", painting, "-pix_fmt", "gray", own], check=True)
+        for bundle, patterns in ((place / "one.modar", [game]), (self.folder / "both.modar", [game, own])):
+            words = [word for pattern in patterns for word in ("--pattern", pattern)]
+            done = self.modar("bake", *words, "--no-score", "--parameters", "none", "-o", bundle, "--quiet")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        subprocess.run([sys.executable, ROOT / "assets" / "make_clip.py", "--pattern", own, "--frames", "6", "--size", f"{WIDTH}x{HEIGHT}",
+                        clip], check=True, capture_output=True)
+        subprocess.run(["ffmpeg", "-v", "error", "-pattern_type", "glob", "-i", clip / "*.png", "-pix_fmt", "gray", "-f", "rawvideo",
+                        place / "own.gray"], check=True)
+        done = self.run_program("modar-play", self.folder / "both.modar", "--input", f"grey:{WIDTH}x{HEIGHT}:{place / 'own.gray'}", "--json")
+        played = [line for line in map(json.loads, done.stdout.splitlines()) if "frame" in line]
+        self.assertGreaterEqual([len(line["visible"]) for line in played].count(1), 5)
+        self.browser.open(self.server.url)
+        for simd in ("true", "false"):
+            told = self.browser.run(OWN % (simd, WIDTH * HEIGHT, WIDTH, HEIGHT))
+            print(f"simd {simd}: a picture of one's own takes {told['ms']:.0f} ms")
+            self.assertEqual(told["index"], 1)
+            self.assertEqual(told["known"], [{"name": "game", "widthMm": 0}, {"name": "mine", "widthMm": 90}])
+            self.assertEqual(told["refused"]["code"], "pattern.no-features")
+            self.assertGreater(len(told["refused"]["cure"]), 20)
+            self.assert_same_poses(told["seen"], played)
+            self.assertEqual((told["left"], told["numbers"], told["reason"] == "visible"), (1, 41, False))
 
     def test_a_phones_turns_in_its_cameras_axes(self):
         # Held upright, screen to the visitor: the device's axes that point up and right, by how far the phone was turned
