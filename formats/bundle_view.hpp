@@ -8,6 +8,7 @@
 
 #include "formats/base/error.hpp"
 #include "formats/layout.hpp"
+#include "formats/scene_nodes.hpp"
 
 namespace modar {
 
@@ -65,6 +66,8 @@ struct BundleParts {
   Table<SceneRecord> scenes;
   Table<LightRecord> lights;
   Table<OcclusionRecord> occlusion;
+  Table<NodeRecord> nodes;
+  Table<ActionRecord> actions;
 };
 
 /// A validated bundle. Holds pointers into the caller's bytes, which must outlive it.
@@ -103,6 +106,8 @@ class BundleView {
 
   [[nodiscard]] Table<LightRecord> lights() const { return parts_.lights; }
   [[nodiscard]] Table<OcclusionRecord> occlusion() const { return parts_.occlusion; }
+  [[nodiscard]] Table<NodeRecord> nodes() const { return parts_.nodes; }
+  [[nodiscard]] Table<ActionRecord> actions() const { return parts_.actions; }
 
   [[nodiscard]] std::span<const std::byte> vertices() const { return parts_.vertices; }
   [[nodiscard]] std::span<const std::byte> indices() const { return parts_.indices; }

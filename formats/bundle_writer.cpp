@@ -53,6 +53,8 @@ std::uint16_t flags_of(SectionType type) {
     case SectionType::kContentSummary:
     case SectionType::kLights:
     case SectionType::kOcclusion:
+    case SectionType::kNodes:
+    case SectionType::kActions:
     case SectionType::kFeatureYml:
     case SectionType::kShadow:
       return 0;
@@ -208,6 +210,8 @@ void collect(const BundleContent& content, SectionList& list) {
   list.add_table(SectionType::kScenes, content.scenes);
   list.add_table(SectionType::kLights, content.lights);
   list.add_table(SectionType::kOcclusion, content.occlusion);
+  list.add_table(SectionType::kNodes, content.nodes);
+  list.add_table(SectionType::kActions, content.actions);
   for (std::uint32_t pattern = 0; pattern < content.features.size(); ++pattern) {
     for (const FeatureContent& features : content.features[pattern]) {
       list.add_features(pattern, features);
@@ -283,6 +287,8 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   }
   if (!content.lights.empty()) need_section(SectionType::kLights);
   if (!content.occlusion.empty()) need_section(SectionType::kOcclusion);
+  if (!content.nodes.empty()) need_section(SectionType::kNodes);
+  if (!content.actions.empty()) need_section(SectionType::kActions);
   return minor;
 }
 

@@ -11,6 +11,7 @@
 
 #include "formats/base/error.hpp"
 #include "formats/layout.hpp"
+#include "formats/scene_nodes.hpp"
 
 namespace modar {
 
@@ -52,6 +53,8 @@ struct BundleContent {
   std::vector<SceneRecord> scenes;
   std::vector<LightRecord> lights;
   std::vector<OcclusionRecord> occlusion;
+  std::vector<NodeRecord> nodes;
+  std::vector<ActionRecord> actions;
   std::vector<std::vector<FeatureContent>> features;  ///< one list a pattern
   std::vector<std::byte> vertices;
   std::vector<std::byte> indices;

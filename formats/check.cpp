@@ -636,6 +636,7 @@ void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes, boo
   check_texture_blocks(log, parts);
   check_patterns(log, parts);
   check_draw_orders(log, parts);
+  check_titles(log, parts);
 }
 
 }  // namespace

@@ -45,6 +45,9 @@ struct BufferHashes {
   SectionHash indices;
 };
 
+/// Labels have titles in the same languages (validate_nodes.cpp).
+void check_titles(FaultLog& log, const BundleParts& parts);
+
 /// Compares the content summary with the bundle, line by line. Does nothing where there is none.
 void check_summary(FaultLog& log, const BundleParts& parts);
 

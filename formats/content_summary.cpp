@@ -129,6 +129,8 @@ BundleParts parts_of(const BundleContent& content) {
   parts.scenes = table_of(content.scenes);
   parts.lights = table_of(content.lights);
   parts.occlusion = table_of(content.occlusion);
+  parts.nodes = table_of(content.nodes);
+  parts.actions = table_of(content.actions);
   return parts;
 }
 
@@ -165,6 +167,8 @@ void summarise(const BundleParts& parts, std::uint16_t minor,
   summarise_table(parts, "SceneRecord", parts.scenes, sink);
   summarise_table(parts, "LightRecord", parts.lights, sink);
   summarise_table(parts, "OcclusionRecord", parts.occlusion, sink);
+  summarise_table(parts, "NodeRecord", parts.nodes, sink);
+  summarise_table(parts, "ActionRecord", parts.actions, sink);
   std::uint32_t index = 0;
   for (const SectionEntry& entry : sections) {
     if (entry.type != static_cast<std::uint32_t>(SectionType::kContentSummary)) {

@@ -3,6 +3,7 @@
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
+#include "formats/scene_nodes.hpp"
 
 #include <cstring>
 #include <type_traits>
@@ -132,6 +133,20 @@ constexpr FieldInfo kLightRecord[] = {
     MODAR_FIELD(LightRecord, key),   MODAR_FIELD(LightRecord, reserved1)};
 constexpr FieldInfo kOcclusionRecord[] = {MODAR_FIELD(OcclusionRecord, layout),
                                           MODAR_FIELD(OcclusionRecord, offset)};
+constexpr FieldInfo kNodeRecord[] = {
+    MODAR_FIELD(NodeRecord, name),      MODAR_FIELD(NodeRecord, pattern),
+    MODAR_FIELD(NodeRecord, kind),      MODAR_FIELD(NodeRecord, subject),
+    MODAR_FIELD(NodeRecord, flags),     MODAR_FIELD(NodeRecord, group),
+    MODAR_FIELD(NodeRecord, place),     MODAR_FIELD(NodeRecord, rotation),
+    MODAR_FIELD(NodeRecord, half_size), MODAR_FIELD(NodeRecord, mark),
+    MODAR_FIELD(NodeRecord, reserved)};
+constexpr FieldInfo kActionRecord[] = {
+    MODAR_FIELD(ActionRecord, event),   MODAR_FIELD(ActionRecord, command),
+    MODAR_FIELD(ActionRecord, source),  MODAR_FIELD(ActionRecord, target),
+    MODAR_FIELD(ActionRecord, part),    MODAR_FIELD(ActionRecord, address),
+    MODAR_FIELD(ActionRecord, seconds), MODAR_FIELD(ActionRecord, duration),
+    MODAR_FIELD(ActionRecord, axis),    MODAR_FIELD(ActionRecord, degrees),
+    MODAR_FIELD(ActionRecord, reserved)};
 constexpr FieldInfo kColourGridHeader[] = {MODAR_FIELD(ColourGridHeader, columns),
                                            MODAR_FIELD(ColourGridHeader, rows),
                                            MODAR_FIELD(ColourGridHeader, reserved)};
@@ -199,6 +214,8 @@ constexpr RecordInfo kRecords[] = {
     MODAR_TABLE(SceneRecord),
     MODAR_TABLE(LightRecord),
     MODAR_TABLE(OcclusionRecord),
+    MODAR_TABLE(NodeRecord),
+    MODAR_TABLE(ActionRecord),
     {"FileHeader", nullptr, SectionType::kNames, sizeof(FileHeader), kFileHeader},
     {"SectionEntry", nullptr, SectionType::kNames, sizeof(SectionEntry), kSectionEntry},
     {"TableHeader", nullptr, SectionType::kNames, sizeof(TableHeader), kTableHeader},

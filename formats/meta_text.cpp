@@ -208,20 +208,32 @@ class JsonScan {
   std::optional<MetaFault> fault_;
 };
 
-/// {"pattern": P, "model": M, "text": {language: words}, "alt": {language: words}}.
-bool scan_text(JsonScan& scan) {
+std::optional<MetaText::Kind> kind_of(std::string_view key) {
+  if (key == "text") return MetaText::Kind::kText;
+  if (key == "alt") return MetaText::Kind::kAlt;
+  if (key == "title") return MetaText::Kind::kTitle;
+  return std::nullopt;
+}
+
+/// {"pattern": P, "model": M, "text": {language: words}, "alt": {language: words}}; of a node, N
+/// under "node" has to be there, and titles may be.
+bool scan_text(JsonScan& scan, bool of_node) {
   bool pattern = false;
+  bool node = false;
   bool words = false;
   const bool read = scan.object([&](std::string_view key) {
-    if (key == "pattern" || key == "model") {
+    const std::optional<MetaText::Kind> kind = kind_of(key);
+    if (key == "pattern" || key == (of_node ? "node" : "model")) {
       pattern = pattern || key == "pattern";
+      node = node || key == "node";
       return scan.string();
     }
-    if (key != "text" && key != "alt") return scan.value();
+    if (!kind || (*kind == MetaText::Kind::kTitle && !of_node)) return scan.value();
     words = true;
     return scan.object([&](std::string_view) { return scan.string(); });
   });
-  return read && ((pattern && words) || scan.refuse("a text names no pattern, or has no words"));
+  return read && ((pattern && words && node == of_node) ||
+                  scan.refuse("a text names no pattern, or has no words"));
 }
 
 /// A string's content with its escapes resolved.
@@ -252,29 +264,41 @@ std::string unescaped(std::string_view content) {
   return out;
 }
 
-/// The texts of one element of `texts`, whose pattern may follow them.
+/// The texts of one element of `texts` or `nodes`, whose pattern may follow them.
 bool visit_text(JsonScan& scan, const std::function<void(const MetaText&)>& visit) {
   std::string pattern;
+  std::string node;
   std::vector<MetaText> found;
   const bool read = scan.object([&](std::string_view key) {
     std::string_view content;
-    if (key == "pattern") {
+    if (key == "pattern" || key == "node") {
       if (!scan.string(&content)) return false;
-      pattern = unescaped(content);
+      (key == "node" ? node : pattern) = unescaped(content);
       return true;
     }
-    if (key != "text" && key != "alt") return scan.value();
+    const std::optional<MetaText::Kind> kind = kind_of(key);
+    if (!kind) return scan.value();
     return scan.object([&](std::string_view language) {
       if (!scan.string(&content)) return false;
-      found.push_back({"", key == "alt", unescaped(language), unescaped(content)});
+      found.push_back({"", "", *kind, unescaped(language), unescaped(content)});
       return true;
     });
   });
   for (MetaText& each : found) {
     each.pattern = pattern;
+    each.node = node;
     visit(each);
   }
   return read;
+}
+
+void visit_member(std::string_view text, std::string_view member,
+                  const std::function<void(const MetaText&)>& visit) {
+  JsonScan scan(text);
+  scan.object([&](std::string_view key) {
+    if (key != member) return scan.value();
+    return scan.array([&] { return visit_text(scan, visit); });
+  });
 }
 
 bool scan_member(JsonScan& scan, std::string_view key) {
@@ -284,7 +308,9 @@ bool scan_member(JsonScan& scan, std::string_view key) {
   if (key.find('\\') != std::string_view::npos) return scan.refuse("a member's name has an escape");
   if (key == "tool") return scan.string();
   if (key == "options") return any_object();
-  if (key == "texts") return scan.array([&] { return scan_text(scan); });
+  if (key == "texts" || key == "nodes") {
+    return scan.array([&] { return scan_text(scan, key == "nodes"); });
+  }
   if (key == "models" || key == "patterns" || key == "scenes") return scan.array(any_object);
   return scan.value();
 }
@@ -299,11 +325,11 @@ std::optional<MetaFault> check_meta_text(std::string_view text) {
 }
 
 void visit_meta_texts(std::string_view text, const std::function<void(const MetaText&)>& visit) {
-  JsonScan scan(text);
-  scan.object([&](std::string_view key) {
-    if (key != "texts") return scan.value();
-    return scan.array([&] { return visit_text(scan, visit); });
-  });
+  visit_member(text, "texts", visit);
+}
+
+void visit_node_texts(std::string_view text, const std::function<void(const MetaText&)>& visit) {
+  visit_member(text, "nodes", visit);
 }
 
 }  // namespace modar

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -23,10 +24,16 @@ struct MetaFault {
 /// text; allocates nothing.
 std::optional<MetaFault> check_meta_text(std::string_view text);
 
-/// A text of the member `texts`.
+/// A text of the member `texts`, or of `nodes`.
 struct MetaText {
+  enum class Kind : std::uint8_t {
+    kText,
+    kAlt,   ///< says what is seen, for screen readers
+    kTitle  ///< of a node
+  };
   std::string pattern;
-  bool alt = false;  ///< says what is seen, for screen readers
+  std::string node;  ///< of the member `nodes`
+  Kind kind = Kind::kText;
   std::string language;
   std::string words;
 };
@@ -34,5 +41,7 @@ struct MetaText {
 /// Hands out the texts of a meta text that keeps the rules, in its order; of another one, those
 /// before the fault.
 void visit_meta_texts(std::string_view text, const std::function<void(const MetaText&)>& visit);
+/// The same of the member `nodes`.
+void visit_node_texts(std::string_view text, const std::function<void(const MetaText&)>& visit);
 
 }  // namespace modar

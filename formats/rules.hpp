@@ -44,6 +44,9 @@ enum class Rule : std::uint8_t {
   kFeatures,
   kScene,
   kLightValues,
+  kNode,
+  kAction,
+  kActionLink,
   kSectionHash,
   kPadding,
   kMetaText,
@@ -79,6 +82,7 @@ enum class Rule : std::uint8_t {
   kDegenerateTriangles,
   kEmptyLevel,
   kNoContent,
+  kNodeText,
   kUnknownSection,
   kCount
 };

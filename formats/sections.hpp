@@ -2,7 +2,7 @@
 // number that is used twice does not compile. bundle.md is the normative text; tests hold both, and
 // the second reader, against each other.
 //
-// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 67-255; payloads 263-511, 515 and up.
+// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 67, 70-255; payloads 263-511, 515 and up.
 #pragma once
 
 #include <array>
@@ -41,6 +41,8 @@ enum SectionFlags : std::uint16_t {
   X(kScenes, 64, "scenes", "SceneRecord", 0, kSectionRequired, kNothing)                       \
   X(kLights, 65, "lights", "LightRecord", 2, 0, kNothing)                                      \
   X(kOcclusion, 66, "occlusion", "OcclusionRecord", 2, 0, kNothing)                            \
+  X(kNodes, 68, "nodes", "NodeRecord", 3, 0, kNothing)                                         \
+  X(kActions, 69, "actions", "ActionRecord", 3, 0, kNothing)                                   \
   X(kMappedFeatures, 256, "feature_twin", "FeatureHeader", 0, kSectionRequired, kPattern)      \
   X(kFeatureYml, 257, "feature_text", "", 0, 0, kPattern)                                      \
   X(kTrackerRecord, 258, "tracker_record", "TrackerRecordHeader", 0, 0, kPattern)              \
@@ -104,6 +106,10 @@ enum TextureFlags : std::uint32_t {
   kTextureCutOut = 4,  ///< with kTextureAlpha: something where alpha is 1/2 and more, else nothing
 };
 
+enum NodeFlags : std::uint32_t {
+  kNodeHidden = 1,  ///< until an action shows it
+};
+
 /// A bit of the `flags` of a record.
 struct FlagInfo {
   const char* record;
@@ -115,7 +121,7 @@ inline constexpr FlagInfo kFlags[] = {
     {"SectionEntry", kSectionRequired, 0},    {"SectionEntry", kSectionGpu, 0},
     {"MaterialRecord", kMaterialTwoSided, 0}, {"MaterialRecord", kMaterialOccluder, 2},
     {"TextureRecord", kTextureAlpha, 0},      {"TextureRecord", kTextureRepeat, 0},
-    {"TextureRecord", kTextureCutOut, 2},
+    {"TextureRecord", kTextureCutOut, 2},     {"NodeRecord", kNodeHidden, 0},
 };
 
 /// All flags that a record can have.

@@ -24,10 +24,10 @@ std::vector<std::byte> bytes_of(std::span<const std::byte> bytes) {
 bool has_member(SectionType type) {
   using enum SectionType;
   constexpr SectionType kMembers[] = {
-      kNames,     kMeta,    kContentSummary, kModels,         kChunks,     kLevels,
-      kMaterials, kLayouts, kTextures,       kTextureLevels,  kPatterns,   kParameterSets,
-      kScenes,    kLights,  kOcclusion,      kMappedFeatures, kFeatureYml, kShadow,
-      kVertices,  kIndices, kTextureData};
+      kNames,      kMeta,    kContentSummary, kModels,        kChunks,     kLevels,
+      kMaterials,  kLayouts, kTextures,       kTextureLevels, kPatterns,   kParameterSets,
+      kScenes,     kLights,  kOcclusion,      kNodes,         kActions,    kMappedFeatures,
+      kFeatureYml, kShadow,  kVertices,       kIndices,       kTextureData};
   return std::find(std::begin(kMembers), std::end(kMembers), type) != std::end(kMembers);
 }
 
@@ -88,6 +88,8 @@ BundleContent trim(const BundleView& bundle) {
   content.scenes = records_of(bundle.scenes());
   content.lights = records_of(bundle.lights());
   content.occlusion = records_of(bundle.occlusion());
+  content.nodes = records_of(bundle.nodes());
+  content.actions = records_of(bundle.actions());
   keep_features(bundle, content);
   copy_payloads(bundle, content);
   content.summary = content_summary_of(content);

@@ -264,6 +264,8 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   walkable &= find_table(log, parts, SectionType::kScenes, parts.scenes);
   walkable &= find_table(log, parts, SectionType::kLights, parts.lights);
   walkable &= find_table(log, parts, SectionType::kOcclusion, parts.occlusion);
+  walkable &= find_table(log, parts, SectionType::kNodes, parts.nodes);
+  walkable &= find_table(log, parts, SectionType::kActions, parts.actions);
   return walkable && !log.stop();
 }
 
@@ -883,7 +885,10 @@ void check_occlusion(const RecordCheck& check, const BundleParts& parts, std::ui
   if (good) {
     const LayoutRecord& layout = parts.layouts[record.layout];
     good = record.offset < layout.stride;
-    for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
+    // The layout itself may be wrong: what is told of it elsewhere ends no check of this record.
+    const std::size_t count =
+        std::min<std::size_t>(layout.attribute_count, std::size(layout.attributes));
+    for (std::size_t i = 0; i < count; ++i) {
       const AttributeRecord& other = layout.attributes[i];
       const std::uint32_t end = other.offset + component_bytes(other.type) * other.components;
       good = good && (record.offset < other.offset || record.offset >= end);
@@ -927,10 +932,10 @@ void validate_assets(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.lights.size() && !log.stop(); ++i) {
     check_light(RecordCheck(log, parts, "light", i), parts, i);
   }
-  if (!log.clean()) return;  // layouts may be anything then
   for (std::uint32_t i = 0; i < parts.occlusion.size() && !log.stop(); ++i) {
     check_occlusion(RecordCheck(log, parts, "occlusion", i), parts, i);
   }
+  if (!log.stop()) validate_nodes(log, parts);
 }
 
 Result<void> verify_sections(const BundleView& bundle) {

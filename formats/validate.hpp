@@ -27,6 +27,9 @@ void validate_models(FaultLog& log, const BundleParts& parts);
 /// Textures, patterns, parameter sets, features, scenes.
 void validate_assets(FaultLog& log, const BundleParts& parts);
 
+/// Nodes and actions (validate_nodes.cpp).
+void validate_nodes(FaultLog& log, const BundleParts& parts);
+
 /// The specification gives the section type a meaning.
 bool known_section_type(std::uint32_t type);
 

@@ -120,6 +120,10 @@ TABLES = {
     64: ("scenes", Record("pattern:I model:I scale:f offset:3f rotation:4f reserved:2I")),
     65: ("lights", Record("scene:I reserved0:I sky:27f direction:3f key:3f reserved1:I")),
     66: ("occlusion", Record("layout:I offset:I")),
+    68: ("nodes", Record("name:N pattern:I kind:I subject:I flags:I group:I place:3f rotation:4f half_size:2f mark:N "
+                         "reserved:6I")),
+    69: ("actions", Record("event:I command:I source:I target:I part:N address:N seconds:f duration:f axis:3f degrees:f "
+                           "reserved:2I")),
 }
 COLOURS = Record("columns:I rows:I reserved:2I")
 SHAPE = Record("kind:I face_count:I half_arc:d slope:d reserved:2I")
@@ -127,9 +131,9 @@ FACE = Record("place:4H corner:3f right:3f down:3f reserved:I")
 SHADOW = Record("width:I height:I low:2f high:2f reserved:2I")
 DRAW_ORDER = struct.Struct("<4f2I")
 KEYPOINT = struct.Struct("<5f2i")
-SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0}  # type: flags
+SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0, 68: 0, 69: 0}  # type: flags
 OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 514: 3}
-SINCE = {4: 1, 65: 2, 66: 2, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
+SINCE = {4: 1, 65: 2, 66: 2, 68: 3, 69: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
 
@@ -160,7 +164,7 @@ class Bundle:
         end = 64 + 48 * head["section_count"]
         need(head["section_count"] <= 65536 and end <= len(data), "BUNDLE_SECTION_COUNT", 12)
         need(xxh64(data[:56] + data[64:end]) == head["hash"], "BUNDLE_HEADER_HASH", 56)
-        self.strict = head["minor"] <= 2
+        self.strict = head["minor"] <= 3
         self.clean(head)
 
     def clean(self, record):
@@ -203,7 +207,7 @@ class Bundle:
     def check_minor(self):
         needed = max((SINCE.get(entry["type"], 0) for entry in self.sections), default=0)
         if any(row["flags"] & 2 for row in self.tables["materials"]) or any(row["flags"] & 4 for row in self.tables["textures"]):
-            needed = 2
+            needed = max(needed, 2)
         need(self.header["minor"] >= needed, "BUNDLE_MINOR", 10, f"1.{needed} is needed")
 
     def check_meta(self, text):
@@ -231,9 +235,14 @@ class Bundle:
         except (ValueError, RecursionError):
             good = False
         need(good, "META_TEXT", 0, "no JSON object")
-        lists = [meta.get(name, []) for name in ("models", "patterns", "scenes", "texts")]
+        lists = [meta.get(name, []) for name in ("models", "patterns", "scenes", "nodes", "texts")]
         need(all(isinstance(part, list) and all(isinstance(item, dict) for item in part) for part in lists) and
              isinstance(meta.get("tool", ""), str) and isinstance(meta.get("options", {}), dict), "META_TEXT", 0, "a member")
+        for item in meta.get("nodes", []):
+            told = [item[name] for name in ("title", "text", "alt") if name in item]
+            need(isinstance(item.get("pattern"), str) and isinstance(item.get("node"), str) and told and
+                 all(isinstance(words, dict) and all(isinstance(word, str) for word in words.values()) for words in told),
+                 "META_TEXT", 0, "nodes")
         for item in meta.get("texts", []):
             words = item.get("text")
             need(isinstance(item.get("pattern"), str) and isinstance(item.get("model", ""), str) and
@@ -254,12 +263,13 @@ class Bundle:
         rows = [record.decode(self.data, at + 16 + i * stride) for i in range(count)]
         for row in rows:
             self.clean(row)
-            if "name" in row:
-                row["name"] = self.name(row)
+            for field in ("name", "mark", "part", "address"):
+                if field in row:
+                    row[field] = self.name(row, field)
         return rows
 
-    def name(self, row):
-        begin, length = row["name"]
+    def name(self, row, field):
+        begin, length = row[field]
         need(length <= 1024 and begin + length <= len(self.names), "BUNDLE_NAME", row["at"])
         try:
             return self.names[begin:begin + length].decode("utf-8")

@@ -14,6 +14,7 @@ import sys
 from bundle_bytes import (COLOURS, DRAW_ORDER, FACE, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, SHAPE, Bundle, Fault, at_least,
                           digest, flags_known, follow, need)
 from bundle_models import check_models, check_tight, decode_level
+from bundle_nodes import check_nodes
 from bundle_summary import check_summary
 
 OF_ORB = ("max_features", "scale_factor", "level_count", "edge_threshold", "first_level", "wta_k", "harris",
@@ -251,6 +252,7 @@ def check(bundle, full):
     check_models(bundle)
     check_textures(bundle)
     check_patterns(bundle)
+    check_nodes(bundle)
     features = read_features(bundle)
     check_summary(bundle)
     for model in tables["models"]:

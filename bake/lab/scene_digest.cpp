@@ -87,6 +87,8 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
   add_table(digest, view, "SceneRecord", view.scenes());
   add_table(digest, view, "LightRecord", view.lights());
   add_table(digest, view, "OcclusionRecord", view.occlusion());
+  add_table(digest, view, "NodeRecord", view.nodes());
+  add_table(digest, view, "ActionRecord", view.actions());
   for (std::uint32_t m = 0; m < view.models().size(); ++m) {
     const ModelRecord& model = view.models()[m];
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {

@@ -225,11 +225,11 @@ size_t modar_pattern_text(const modar_bundle* bundle, uint32_t pattern, int kind
                           const char* language, char* text, size_t size) {
   if (pattern >= modar_pattern_count(bundle) || language == nullptr) return 0;
   const std::string_view name = bundle->view.name(bundle->view.patterns()[pattern].name);
+  const auto wanted =
+      kind == MODAR_ALT_TEXT ? modar::MetaText::Kind::kAlt : modar::MetaText::Kind::kText;
   std::string joined;
   modar::visit_meta_texts(bundle->view.meta(), [&](const modar::MetaText& each) {
-    if (each.pattern != name || each.language != language || each.alt != (kind == MODAR_ALT_TEXT)) {
-      return;
-    }
+    if (each.pattern != name || each.language != language || each.kind != wanted) return;
     if (!joined.empty()) joined += ' ';
     joined += each.words;
   });

@@ -22,6 +22,7 @@ using namespace modar::test;
 Bytes summarised_bundle() {
   BundleContent content = golden_content();
   add_looks(content);
+  add_nodes(content);
   content.summary = content_summary_of(content);
   return encode(content);
 }

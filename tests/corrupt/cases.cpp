@@ -193,6 +193,25 @@ constexpr CorruptCase kSectionCases[] = {
          record_of<LightRecord>(b, SectionType::kLights).sky[4] = -1.5f;
        });
      }},
+    {"BUNDLE_NODE",
+     [] {
+       return damaged(acting_content(), [](Bytes& b) {
+         record_of<NodeRecord>(b, SectionType::kNodes, 1).name =
+             record_of<NodeRecord>(b, SectionType::kNodes, 0).name;
+       });
+     }},
+    {"BUNDLE_ACTION",
+     [] {
+       return damaged(acting_content(), [](Bytes& b) {
+         record_of<ActionRecord>(b, SectionType::kActions, 2).target = 3;
+       });
+     }},
+    {"ACTION_LINK",
+     [] {
+       BundleContent content = acting_content();
+       content.actions[4].address = content.intern("http://museum.org/pot");
+       return encode(content);
+     }},
 };
 
 }  // namespace

@@ -196,6 +196,15 @@ constexpr CorruptCase kPayloadCases[] = {
        });
      }},
     {"BUNDLE_EMPTY", [] { return encode(BundleContent()); }},
+    {"NODE_TEXT",
+     [] {
+       return changed(acting_content(), [](auto& c) {
+         c.nodes[0] = c.nodes[2];
+         c.nodes[0].name = c.intern("foot");
+         c.nodes[0].group = 4;
+         c.actions.resize(1);
+       });
+     }},
     {"SECTION_UNKNOWN",
      [] {
        return changed(pattern_content(), [](auto& c) {

@@ -37,6 +37,7 @@ void expect_bytes(std::span<const std::byte> got, std::span<const std::byte> wan
 TEST(Bundle, RoundTripGivesTheSameContent) {
   BundleContent content = golden_content();
   add_looks(content);
+  add_nodes(content);
   const Bytes bytes = encode(content);
   const auto view = BundleView::open(bytes);
   ASSERT_TRUE(view) << to_line(view.error());
@@ -54,6 +55,8 @@ TEST(Bundle, RoundTripGivesTheSameContent) {
   expect_table(view->scenes(), content.scenes, "scenes");
   expect_table(view->lights(), content.lights, "lights");
   expect_table(view->occlusion(), content.occlusion, "occlusion");
+  expect_table(view->nodes(), content.nodes, "nodes");
+  expect_table(view->actions(), content.actions, "actions");
   expect_bytes(view->section(SectionType::kShadow, 1), content.shadows[1], "shadow");
   EXPECT_TRUE(view->section(SectionType::kShadow, 0).empty());
   expect_bytes(view->vertices(), content.vertices, "vertices");

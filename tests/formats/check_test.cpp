@@ -197,12 +197,33 @@ TEST(Check, LightsThatCannotBeAreFound) {
   EXPECT_EQ(said({1, 0, 0, 0, 0, 0, 0, 0, 0}, -0.25f).substr(0, 19), "error BUNDLE_NUMBER");
 }
 
+/// A wrong hash does not keep records from being held against what they refer to.
+TEST(Check, RecordsAreBoundedWhereAHashIsWrong) {
+  for (const bool node : {false, true}) {
+    Bytes bytes = encode(acting_content());
+    if (node) {
+      record_of<NodeRecord>(bytes, SectionType::kNodes).name.offset = 1u << 30;
+    } else {
+      record_of<OcclusionRecord>(bytes, SectionType::kOcclusion).offset = 1u << 30;
+    }
+    rehash(bytes);
+    bytes[entry_of(bytes, SectionType::kMeta).offset] ^= std::byte{1};
+    const auto issues = report(bytes);
+    EXPECT_TRUE(issues.front().starts_with("error SECTION_HASH")) << issues.front();
+    const std::string wanted =
+        node ? "error BUNDLE_NAME node 0" : "error BUNDLE_LAYOUT occlusion 0";
+    EXPECT_TRUE(std::any_of(issues.begin(), issues.end(), [&](const std::string& issue) {
+      return issue.starts_with(wanted);
+    })) << wanted;
+  }
+}
+
 TEST(Check, ANewerMinorVersionIsForDevicesOnly) {
   Bytes bytes = encode(lit_content());
   reinterpret_cast<FileHeader*>(bytes.data())->minor = kMinorVersion + 5;
   rehash(bytes);
   EXPECT_EQ(report(bytes).front(),
-            "error BUNDLE_MINOR header (byte 10): it states 1.7, this program knows up to 1.2 and "
+            "error BUNDLE_MINOR header (byte 10): it states 1.8, this program knows up to 1.3 and "
             "cannot judge what that added");
   EXPECT_EQ(first_error(bytes), "BUNDLE_MINOR header");
   EXPECT_EQ(first_error(bytes, {.release = {}, .accept_newer = true}), "");

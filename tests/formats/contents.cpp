@@ -430,6 +430,72 @@ void add_looks(BundleContent& content) {
   content.extra.push_back(order);
 }
 
+namespace {
+
+NodeRecord node_of(BundleContent& content, const char* name, std::uint32_t pattern, NodeKind kind) {
+  NodeRecord node{};
+  node.name = content.intern(name);
+  node.pattern = pattern;
+  node.kind = static_cast<std::uint32_t>(kind);
+  node.subject = kNone;
+  node.rotation[3] = 1;
+  return node;
+}
+
+ActionRecord action_of(ActionEvent event, std::uint32_t source, ActionCommand command,
+                       std::uint32_t target) {
+  ActionRecord action{};
+  action.event = static_cast<std::uint32_t>(event);
+  action.command = static_cast<std::uint32_t>(command);
+  action.source = source;
+  action.target = target;
+  return action;
+}
+
+}  // namespace
+
+void add_nodes(BundleContent& content) {
+  NodeRecord model = node_of(content, "pot", 0, NodeKind::kModel);
+  model.subject = 0;
+  model.group = 4;
+  NodeRecord picture = node_of(content, "map", 0, NodeKind::kPicture);
+  picture.subject = 0;
+  picture.flags = kNodeHidden;
+  picture.group = 4;
+  picture.place[2] = 0.25f;
+  for (float& part : picture.rotation) part = 0.5f;
+  picture.half_size[0] = 0.5f;
+  picture.half_size[1] = 0.25f;
+  NodeRecord label = node_of(content, "rim", 0, NodeKind::kLabel);
+  label.place[0] = -0.75f;
+  label.mark = content.intern("1");
+  content.nodes = {model, picture, label};
+  ActionRecord tap = action_of(ActionEvent::kTap, 0, ActionCommand::kNext, 1);
+  tap.part = content.intern("skin");
+  ActionRecord after = action_of(ActionEvent::kAfter, 0, ActionCommand::kTurn, 0);
+  after.seconds = 2.5f;
+  after.duration = 1.5f;
+  after.axis[2] = 1;
+  after.degrees = 90;
+  ActionRecord link = action_of(ActionEvent::kTap, 1, ActionCommand::kLink, kNone);
+  link.address = content.intern("https://museum.org/pot");
+  content.actions = {action_of(ActionEvent::kFound, 0, ActionCommand::kShow, 0),
+                     action_of(ActionEvent::kLost, 0, ActionCommand::kHide, 1),
+                     tap,
+                     after,
+                     link,
+                     action_of(ActionEvent::kTap, 1, ActionCommand::kText, 2),
+                     action_of(ActionEvent::kTap, 2, ActionCommand::kToggle, 1)};
+  content.meta = R"({"tool":"golden","nodes":[{"pattern":"box","node":"rim",)"
+                 R"("title":{"en":"The rim"},"text":{"en":"Chipped."}}]})";
+}
+
+BundleContent acting_content() {
+  BundleContent content = lit_content();
+  add_nodes(content);
+  return content;
+}
+
 BundleContent lit_content() {
   BundleContent content = golden_content();
   content.extra.clear();

@@ -309,6 +309,30 @@ json dump_occlusion(const BundleView& view) {
   return rows;
 }
 
+json dump_nodes(const BundleView& view) {
+  json rows = json::array();
+  for (std::uint32_t i = 0; i < view.nodes().size(); ++i) {
+    const NodeRecord& record = view.nodes()[i];
+    json out = {{"name", view.name(record.name)}, {"mark", view.name(record.mark)}};
+    GET(pattern), GET(kind), GET(subject), GET(flags), GET(group), GET(place), GET(rotation);
+    GET(half_size);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_actions(const BundleView& view) {
+  json rows = json::array();
+  for (std::uint32_t i = 0; i < view.actions().size(); ++i) {
+    const ActionRecord& record = view.actions()[i];
+    json out = {{"part", view.name(record.part)}, {"address", view.name(record.address)}};
+    GET(event), GET(command), GET(source), GET(target), GET(seconds), GET(duration), GET(axis);
+    GET(degrees);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
 json dump_sections_and_features(const BundleView& view, json& features) {
   json rows = json::array();
   features = json::array();
@@ -354,6 +378,8 @@ json dump(const BundleView& view) {
           {"scenes", dump_scenes(view)},
           {"lights", dump_lights(view)},
           {"occlusion", dump_occlusion(view)},
+          {"nodes", dump_nodes(view)},
+          {"actions", dump_actions(view)},
           {"features", features}};
 }
 

@@ -21,7 +21,8 @@ TEST(MetaText, JsonOfEveryKindIsGood) {
         "{\"tool\":\"\xC3\xA9 \xF0\x9F\x8F\xBA \xC2\x85 \x7F\"}",
         R"({"models":[{"file":5}],"patterns":[],"scenes":[{}],"options":{"lods":3}})",
         R"({"texts":[{"pattern":"p","model":"m","text":{"en":"A vase.","de":""},"more":1}]})",
-        R"({"texts":[{"text":{},"pattern":""}]})"}) {
+        R"({"texts":[{"text":{},"pattern":""}]})",
+        R"({"nodes":[{"pattern":"p","node":"n","title":{"en":"A rim"},"alt":{}}]})"}) {
     EXPECT_EQ(said(text), "") << text;
   }
 }
@@ -72,6 +73,8 @@ TEST(MetaText, KnownMembersHaveTheirTypes) {
   for (const char* text :
        {R"({"tool":1})", R"({"models":{}})", R"({"models":[1]})", R"({"patterns":"p"})",
         R"({"scenes":[[]]})", R"({"options":[]})", R"({"texts":{}})", R"({"texts":[5]})",
+        R"({"nodes":[{"pattern":"p","title":{}}]})", R"({"nodes":[{"pattern":"p","node":"n"}]})",
+        R"({"nodes":[{"pattern":"p","node":"n","title":{"en":1}}]})",
         R"({"texts":[{"pattern":"p"}]})", R"({"texts":[{"text":{}}]})",
         R"({"texts":[{"pattern":1,"text":{}}]})", R"({"texts":[{"pattern":"p","text":"A vase."}]})",
         R"({"texts":[{"pattern":"p","text":{"en":1890}}]})",

@@ -19,6 +19,7 @@
 #include "formats/field_table.hpp"
 #include "formats/layout.hpp"
 #include "formats/pattern_shape.hpp"
+#include "formats/scene_nodes.hpp"
 #include "formats/tracker_record.hpp"
 
 namespace {
@@ -138,6 +139,10 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(SceneRecord, F(pattern), F(model), F(scale), F(offset), F(rotation), F(reserved))
   MODAR_STRUCT(LightRecord, F(scene), F(reserved0), F(sky), F(direction), F(key), F(reserved1))
   MODAR_STRUCT(OcclusionRecord, F(layout), F(offset))
+  MODAR_STRUCT(NodeRecord, F(name), F(pattern), F(kind), F(subject), F(flags), F(group), F(place),
+               F(rotation), F(half_size), F(mark), F(reserved))
+  MODAR_STRUCT(ActionRecord, F(event), F(command), F(source), F(target), F(part), F(address),
+               F(seconds), F(duration), F(axis), F(degrees), F(reserved))
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
   MODAR_STRUCT(PatternShapeHeader, F(kind), F(face_count), F(half_arc), F(slope), F(reserved))
   MODAR_STRUCT(ShapeFaceRecord, F(place), F(corner), F(right), F(down), F(reserved))

@@ -31,8 +31,14 @@ BundleContent golden_content();
 /// hides, its first pattern on a cone and its second on two faces of a box.
 void add_looks(BundleContent& content);
 
+/// Adds what version 1.3 added to that: nodes of each kind, actions of each event and command.
+void add_nodes(BundleContent& content);
+
 /// A golden_content() with all that version 1.2 added, and no section of an unknown type.
 BundleContent lit_content();
+
+/// A lit_content() with nodes and actions.
+BundleContent acting_content();
 
 /// Encodes or ends the program: test contents are never wrong.
 Bytes encode(const BundleContent& content);

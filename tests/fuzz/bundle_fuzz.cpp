@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "formats/action_machine.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/colour_grid.hpp"
@@ -95,9 +96,34 @@ unsigned look(const BundleView& view, std::uint32_t pattern) {
   return touch(colours) + (light.known ? 1u : 0u);
 }
 
+/// Shows every pattern and taps every node, twice.
+unsigned act(const BundleView& view) {
+  ActionMachine machine(view);
+  std::vector<SceneEvent> events;
+  for (std::uint32_t p = 0; p < view.patterns().size(); ++p) {
+    events.push_back({SceneEvent::Kind::kSeen, p, kNone});
+  }
+  for (std::uint32_t n = 0; n < view.nodes().size(); ++n) {
+    events.push_back({SceneEvent::Kind::kTap, n, n});
+  }
+  unsigned sum = 0;
+  for (const double time : {1.0, 1e5}) {
+    for (const SceneCommand& command : machine.step(time, events)) {
+      if (command.action != kNone) sum += touch(view.name(view.actions()[command.action].address));
+    }
+  }
+  for (std::uint32_t n = 0; n < view.nodes().size(); ++n) {
+    const NodeTurn turn = machine.turn_of(n);
+    const float square = turn.x * turn.x + turn.y * turn.y + turn.z * turn.z + turn.w * turn.w;
+    if (!(square > 0.99f && square < 1.01f)) std::abort();
+    sum += touch(view.name(view.nodes()[n].name)) + (machine.shown(n) ? 1u : 0u);
+  }
+  return sum;
+}
+
 /// Uses every accessor of an opened bundle as a renderer or tracker would.
 unsigned walk(const BundleView& view) {
-  unsigned sum = touch(view.meta());
+  unsigned sum = touch(view.meta()) + act(view);
   for (std::uint32_t m = 0; m < view.models().size(); ++m) {
     const ModelRecord& model = view.models()[m];
     sum += touch(view.name(model.name));

@@ -1,0 +1,94 @@
+// Runs a bundle's actions: what was seen and tapped in, what the nodes look like and what the app
+// has to do out. *Nodes and actions* of bundle.md specifies it.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "formats/bundle_view.hpp"
+
+namespace modar {
+
+/// A pattern counts as lost when it was not seen for so long, seconds: a hand before the camera
+/// stops nothing.
+inline constexpr double kLostAfterSeconds = 1.0;
+
+/// What happened since the last step.
+struct SceneEvent {
+  enum class Kind : std::uint8_t {
+    kSeen,  ///< the pattern is on the screen
+    kTap    ///< the visitor tapped a node
+  };
+  Kind kind = Kind::kSeen;
+  std::uint32_t subject = 0;       ///< index of the pattern, or of the node
+  std::uint32_t material = kNone;  ///< of a tap on a model: the one that lies there, absolute
+};
+
+/// What the app has to do; the nodes' own state is asked with shown() and turn_of().
+struct SceneCommand {
+  ActionCommand command = ActionCommand::kText;  ///< kText or kLink
+  std::uint32_t node = kNone;                    ///< of kText: the label
+  std::uint32_t action = kNone;                  ///< index of the action; kNone: a label's own
+};
+
+/// A unit quaternion.
+struct NodeTurn {
+  float x = 0.0f;
+  float y = 0.0f;
+  float z = 0.0f;
+  float w = 1.0f;
+};
+
+class ActionMachine {
+ public:
+  /// bundle: opened; its bytes outlive the machine.
+  explicit ActionMachine(const BundleView& bundle);
+
+  /// To time_s, seconds, which must not fall: an earlier one counts as the last one. The answer
+  /// lives until the next step. Allocates nothing. Events of subjects that are not there do
+  /// nothing.
+  std::span<const SceneCommand> step(double time_s, std::span<const SceneEvent> events);
+
+  /// As at the start.
+  void reset();
+
+  /// node < bundle.nodes().size().
+  [[nodiscard]] bool shown(std::uint32_t node) const { return nodes_[node].shown; }
+  /// How actions have turned it, about its place, in pattern axes.
+  [[nodiscard]] NodeTurn turn_of(std::uint32_t node) const;
+  /// A turn is under way, or a delay of a pattern that is there: the nodes change though no frame
+  /// comes.
+  [[nodiscard]] bool waiting() const;
+
+ private:
+  struct Pattern {
+    bool present = false;
+    double seen = 0;   ///< time of the last sighting
+    double since = 0;  ///< time at which it was found
+  };
+  struct Node {
+    bool shown = true;
+    bool told = false;           ///< its words, in this step
+    NodeTurn base;               ///< where its last turn began
+    double start = 0;            ///< of that turn, seconds
+    std::uint32_t turn = kNone;  ///< the action of that turn
+  };
+
+  void fire(ActionEvent event, std::uint32_t source, std::uint32_t material);
+  void tap(const SceneEvent& event);
+  void perform(std::uint32_t action);
+  void show_next(std::uint32_t target);
+  [[nodiscard]] bool named(const ActionRecord& action, std::uint32_t material) const;
+  [[nodiscard]] double turned_share(const Node& node) const;
+
+  BundleView bundle_;
+  std::vector<Pattern> patterns_;
+  std::vector<Node> nodes_;
+  std::vector<bool>
+      fired_;  ///< one an action: in this step; of delays, since the pattern was found
+  std::vector<SceneCommand> commands_;  ///< capacity: all actions and all nodes
+  double now_ = 0;
+};
+
+}  // namespace modar

@@ -1,0 +1,67 @@
+// What stands on a pattern beside plain models, and what happens to it: named nodes (models,
+// planes, labels) and actions. action_machine.hpp runs them.
+#pragma once
+
+#include <cstdint>
+
+#include "formats/layout.hpp"
+
+namespace modar {
+
+/// Bounds the work of a frame and the memory of a machine: a device of 2012 steps through this many
+/// in less than 0.1 ms.
+inline constexpr std::uint32_t kMostNodes = 1024;
+inline constexpr std::uint32_t kMostActions = 256;
+inline constexpr float kMostSeconds = 86400.0f;  ///< a day: longer delays were never meant
+inline constexpr float kMostDegrees = 36000.0f;  ///< a hundred turns
+
+enum class NodeKind : std::uint32_t {
+  kModel = 1,    ///< a scene's model
+  kPicture = 2,  ///< a rectangle that shows a texture
+  kLabel = 3,    ///< a point with a mark, and words in the meta text
+};
+
+/// A named part of what stands on a pattern.
+struct NodeRecord {
+  NameRef name;  ///< not empty; no other node of the pattern has it
+  std::uint32_t pattern;
+  std::uint32_t kind;     ///< NodeKind
+  std::uint32_t subject;  ///< index of a model's scene, of a picture's texture; else kNone
+  std::uint32_t flags;    ///< NodeFlags
+  std::uint32_t group;    ///< nodes of a pattern with one group are variants; 0: none
+  float place[3];         ///< pattern units: a plane's middle, a label's point; of a model 0
+  float rotation[4];      ///< unit quaternion x, y, z, w: plane axes to pattern axes
+  float half_size[2];     ///< pattern units, of a plane; else 0
+  NameRef mark;           ///< a label's number or short word; else empty
+  std::uint32_t reserved[6];
+};
+static_assert(sizeof(NodeRecord) == 96);
+
+enum class ActionEvent : std::uint32_t { kFound = 1, kLost = 2, kTap = 3, kAfter = 4 };
+enum class ActionCommand : std::uint32_t {
+  kShow = 3,
+  kHide = 4,
+  kToggle = 5,
+  kText = 6,  ///< the words of a label are shown
+  kLink = 7,  ///< the visitor is asked whether to go there
+  kNext = 8,  ///< the next variant of the target's group takes the place of the one that is shown
+  kTurn = 10,
+};
+
+/// What is done when something happens.
+struct ActionRecord {
+  std::uint32_t event;    ///< ActionEvent
+  std::uint32_t command;  ///< ActionCommand
+  std::uint32_t source;   ///< of a tap the node, else the pattern
+  std::uint32_t target;   ///< node of the source's pattern; of a link kNone
+  NameRef part;           ///< of a tap on a model: the material that is tapped; empty: any
+  NameRef address;        ///< of a link: "https://..."; else empty
+  float seconds;          ///< of kAfter: the delay; else 0
+  float duration;         ///< of a turn: seconds that it takes; else 0
+  float axis[3];  ///< of a turn: unit length, pattern axes, through the node's place; else 0
+  float degrees;  ///< of a turn; else 0
+  std::uint32_t reserved[2];
+};
+static_assert(sizeof(ActionRecord) == 64);
+
+}  // namespace modar

@@ -1,0 +1,239 @@
+// Nodes and actions: what they refer to is there, and fits their kind.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "formats/check_rules.hpp"
+#include "formats/meta_text.hpp"
+#include "formats/validate.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::uint32_t kMostMarkBytes = 32;  // of a label: a number or a short word
+
+std::string_view text_of(const BundleParts& parts, NameRef ref) {
+  return {reinterpret_cast<const char*>(parts.names.data()) + ref.offset, ref.length};
+}
+
+template <std::size_t N>
+bool unit_length(const float (&parts)[N]) {
+  double square = 0.0;
+  for (const float part : parts) square += static_cast<double>(part) * static_cast<double>(part);
+  return std::fabs(square - 1.0) <= 1e-4;
+}
+
+template <std::size_t N>
+bool zero(const float (&parts)[N]) {
+  return std::all_of(std::begin(parts), std::end(parts), [](float part) { return part == 0.0f; });
+}
+
+/// The fields of its kind; those of others are 0.
+bool fits_kind(const BundleParts& parts, const NodeRecord& node) {
+  const bool no_size = zero(node.half_size);
+  switch (static_cast<NodeKind>(node.kind)) {
+    case NodeKind::kModel:
+      return node.subject < parts.scenes.size() &&
+             parts.scenes[node.subject].pattern == node.pattern && node.mark.length == 0 &&
+             no_size && zero(node.place) && node.rotation[3] == 1.0f;
+    case NodeKind::kPicture:
+      return node.subject < parts.textures.size() && node.mark.length == 0 &&
+             node.half_size[0] > 0.0f && node.half_size[1] > 0.0f;
+    case NodeKind::kLabel:
+      return node.subject == kNone && no_size && node.mark.length > 0 &&
+             node.mark.length <= kMostMarkBytes && node.rotation[3] == 1.0f;
+  }
+  return false;
+}
+
+/// No node before it has its name on its pattern, nor its scene.
+bool alone(const BundleParts& parts, std::uint32_t index) {
+  const NodeRecord& node = parts.nodes[index];
+  for (std::uint32_t i = 0; i < index; ++i) {
+    const NodeRecord& other = parts.nodes[i];
+    if (other.pattern != node.pattern) continue;
+    const bool scene = node.kind == static_cast<std::uint32_t>(NodeKind::kModel) &&
+                       other.kind == node.kind && other.subject == node.subject;
+    if (scene || text_of(parts, other.name) == text_of(parts, node.name)) return false;
+  }
+  return true;
+}
+
+void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_t index,
+                const FaultLog& log) {
+  const NodeRecord& node = parts.nodes[index];
+  const std::uint64_t before = log.errors();
+  check.name(node.name);
+  check.name(node.mark);
+  check.flags(node.flags, known_flags("NodeRecord"));
+  check.reserved(node.reserved, sizeof(node.reserved));
+  check.numbers(node.place, "place", -kMostSceneNumber, kMostSceneNumber);
+  check.numbers(node.rotation, "rotation");
+  check.numbers(node.half_size, "half_size", 0.0, kMostSceneNumber);
+  if (log.errors() != before) return;  // its name may be anywhere
+  const bool known = node.kind >= static_cast<std::uint32_t>(NodeKind::kModel) &&
+                     node.kind <= static_cast<std::uint32_t>(NodeKind::kLabel);
+  if (!known && !newer_minor(parts)) {
+    return check.fault(Rule::kEnum, &node.kind, "kind " + std::to_string(node.kind));
+  }
+  if (node.pattern >= parts.patterns.size() || (known && !fits_kind(parts, node))) {
+    check.fault(Rule::kNode, &node.pattern,
+                "pattern " + std::to_string(node.pattern) + ", subject " +
+                    std::to_string(node.subject) + " or a size does not fit kind " +
+                    std::to_string(node.kind));
+  }
+  if (!unit_length(node.rotation)) {
+    check.fault(Rule::kNode, node.rotation, "its rotation is no unit quaternion");
+  }
+  if (node.name.length == 0 || !alone(parts, index)) {
+    check.fault(Rule::kNode, &node.name, "its name is empty, or it is there twice");
+  }
+}
+
+bool known_action(const ActionRecord& action) {
+  using enum ActionCommand;
+  constexpr ActionCommand kCommands[] = {kShow, kHide, kToggle, kText, kLink, kNext, kTurn};
+  return action.event >= static_cast<std::uint32_t>(ActionEvent::kFound) &&
+         action.event <= static_cast<std::uint32_t>(ActionEvent::kAfter) &&
+         std::find(std::begin(kCommands), std::end(kCommands),
+                   static_cast<ActionCommand>(action.command)) != std::end(kCommands);
+}
+
+/// The pattern on which the action happens; kNone: its source is not there.
+std::uint32_t pattern_of(const BundleParts& parts, const ActionRecord& action) {
+  if (action.event != static_cast<std::uint32_t>(ActionEvent::kTap)) {
+    return action.source < parts.patterns.size() ? action.source : kNone;
+  }
+  return action.source < parts.nodes.size() ? parts.nodes[action.source].pattern : kNone;
+}
+
+bool kind_is(const NodeRecord& node, NodeKind kind) {
+  return node.kind == static_cast<std::uint32_t>(kind);
+}
+
+/// Whether its command can be done to its target.
+bool fits_command(const BundleParts& parts, const ActionRecord& action) {
+  const auto command = static_cast<ActionCommand>(action.command);
+  if (command == ActionCommand::kLink) return action.target == kNone;
+  if (action.target >= parts.nodes.size()) return false;
+  const NodeRecord& target = parts.nodes[action.target];
+  if (target.pattern != pattern_of(parts, action)) return false;
+  if (command == ActionCommand::kText) return kind_is(target, NodeKind::kLabel);
+  if (command == ActionCommand::kNext) return target.group != 0;
+  if (command == ActionCommand::kTurn) return !kind_is(target, NodeKind::kLabel);
+  return true;
+}
+
+/// Fields that its event or command does not use are 0.
+bool idle_fields_are_zero(const BundleParts& parts, const ActionRecord& action) {
+  const auto event = static_cast<ActionEvent>(action.event);
+  const bool turn = action.command == static_cast<std::uint32_t>(ActionCommand::kTurn);
+  const bool link = action.command == static_cast<std::uint32_t>(ActionCommand::kLink);
+  const bool part =
+      event == ActionEvent::kTap && kind_is(parts.nodes[action.source], NodeKind::kModel);
+  return (part || action.part.length == 0) && (link || action.address.length == 0) &&
+         (event == ActionEvent::kAfter || action.seconds == 0.0f) &&
+         (turn ? unit_length(action.axis)
+               : zero(action.axis) && action.duration == 0.0f && action.degrees == 0.0f);
+}
+
+bool https(std::string_view address) {
+  constexpr std::string_view kStart = "https://";
+  return address.starts_with(kStart) && address.size() > kStart.size() &&
+         address[kStart.size()] != '/' &&
+         address.find_first_of(" \"<>\\^`{|}") == std::string_view::npos;
+}
+
+void check_action(const RecordCheck& check, const BundleParts& parts, const ActionRecord& action,
+                  const FaultLog& log) {
+  const std::uint64_t before = log.errors();
+  check.name(action.part);
+  check.name(action.address);
+  check.reserved(action.reserved, sizeof(action.reserved));
+  check.number(action.seconds, "seconds", 0.0, static_cast<double>(kMostSeconds));
+  check.number(action.duration, "duration", 0.0, static_cast<double>(kMostSeconds));
+  check.numbers(action.axis, "axis", -2.0, 2.0);
+  check.number(action.degrees, "degrees", -static_cast<double>(kMostDegrees),
+               static_cast<double>(kMostDegrees));
+  if (log.errors() != before) return;
+  const bool placed = pattern_of(parts, action) != kNone;
+  if (!known_action(action)) {
+    if (newer_minor(parts) &&
+        (placed || action.event > static_cast<std::uint32_t>(ActionEvent::kAfter))) {
+      return;
+    }
+    return check.fault(
+        Rule::kEnum, &action.event,
+        "event " + std::to_string(action.event) + " or command " + std::to_string(action.command));
+  }
+  if (!placed || !fits_command(parts, action) || !idle_fields_are_zero(parts, action)) {
+    return check.fault(Rule::kAction, &action.source,
+                       "source " + std::to_string(action.source) + ", target " +
+                           std::to_string(action.target) + " or another field does not fit event " +
+                           std::to_string(action.event) + " and command " +
+                           std::to_string(action.command));
+  }
+  if (action.command == static_cast<std::uint32_t>(ActionCommand::kLink) &&
+      !https(text_of(parts, action.address))) {
+    check.fault(Rule::kActionLink, &action.address,
+                "it leads to '" + std::string(text_of(parts, action.address)) + "'");
+  }
+}
+
+}  // namespace
+
+void validate_nodes(FaultLog& log, const BundleParts& parts) {
+  if (parts.nodes.size() > kMostNodes || parts.actions.size() > kMostActions) {
+    return RecordCheck(log, parts, "nodes", 0)
+        .fault(Rule::kNode, parts.bytes.data(),
+               std::to_string(parts.nodes.size()) + " nodes and " +
+                   std::to_string(parts.actions.size()) + " actions are more than 1024 and 256");
+  }
+  // What refers to nodes that are wrong cannot be looked at.
+  const std::uint64_t before = log.errors();
+  for (std::uint32_t i = 0; i < parts.nodes.size() && log.errors() == before; ++i) {
+    check_node(RecordCheck(log, parts, "node", i), parts, i, log);
+  }
+  for (std::uint32_t i = 0; i < parts.actions.size() && log.errors() == before; ++i) {
+    check_action(RecordCheck(log, parts, "action", i), parts, parts.actions[i], log);
+  }
+}
+
+void check_titles(FaultLog& log, const BundleParts& parts) {
+  const SectionEntry* entry = find_section(parts.sections, SectionType::kMeta, kNone, 0);
+  if (entry == nullptr || parts.nodes.empty()) return;
+  const auto bytes = section_bytes(parts, *entry);
+  const auto is_label = [](const NodeRecord& node) { return kind_is(node, NodeKind::kLabel); };
+  // Pattern, label and language of each title.
+  std::set<std::array<std::string, 3>> titles;
+  std::set<std::string> languages;
+  visit_node_texts({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
+                   [&](const MetaText& each) {
+                     if (each.kind != MetaText::Kind::kTitle) return;
+                     titles.insert({each.pattern, each.node, each.language});
+                   });
+  const auto title_of = [&](const NodeRecord& node, const std::string& language) {
+    const NameRef pattern = parts.patterns[node.pattern].name;
+    return titles.contains(
+        {std::string(text_of(parts, pattern)), std::string(text_of(parts, node.name)), language});
+  };
+  for (const auto& title : titles) {
+    for (std::uint32_t i = 0; i < parts.nodes.size(); ++i) {
+      const NodeRecord& node = parts.nodes[i];
+      if (is_label(node) && title_of(node, title[2])) languages.insert(title[2]);
+    }
+  }
+  for (std::uint32_t i = 0; i < parts.nodes.size(); ++i) {
+    const NodeRecord& node = parts.nodes[i];
+    for (const std::string& language : languages) {
+      if (!is_label(node) || title_of(node, language)) continue;
+      log.add(Rule::kNodeText, offset_of(parts, &node), label(parts, "label", node.name),
+              "it has no title in '" + language + "'");
+    }
+  }
+}
+
+}  // namespace modar
