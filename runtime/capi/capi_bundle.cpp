@@ -19,6 +19,7 @@
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
 
+using modar::copy_name;
 using modar::hand_over;
 
 namespace {
@@ -35,16 +36,6 @@ modar_bundle* opened(modar::MappedFile file, std::span<const std::byte> bytes, m
     return nullptr;
   }
   return new modar_bundle{std::move(file), {}, *view};
-}
-
-/// strlcpy's contract.
-size_t copy_name(std::string_view name, char* text, size_t size) {
-  if (text != nullptr && size > 0) {
-    const size_t length = std::min(name.size(), size - 1);
-    std::memcpy(text, name.data(), length);
-    text[length] = '\0';
-  }
-  return name.size();
 }
 
 }  // namespace

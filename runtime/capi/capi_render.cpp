@@ -110,8 +110,11 @@ void take_items(modar_renderer& renderer, const modar_item* items, size_t count)
   count = modar::item_count(items, count);
   for (size_t i = 0; i < count; ++i) {
     const modar_item asked = modar::item_at(items, i);
-    if (asked.model >= renderer.view.models().size()) continue;
-    modar::DrawItem item{asked.model, glm::make_mat4(asked.to_eye), asked.scene - 1};
+    const bool picture = modar::is_picture(renderer.view, asked.node - 1);
+    if (!picture && asked.model >= renderer.view.models().size()) continue;
+    modar::DrawItem item{picture ? modar::kNone : asked.model, glm::make_mat4(asked.to_eye),
+                         asked.scene - 1};
+    item.node = asked.node - 1;
     const glm::mat4 world = glm::make_mat4(asked.world_to_eye);
     if (world != glm::mat4(0.0f)) item.world_to_eye = world;
     if (asked.opacity > 0.0f && asked.opacity < 1.0f) item.opacity = asked.opacity;
@@ -253,10 +256,15 @@ int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double fr
   for (size_t i = 0; i < count; ++i) {
     const modar_item asked = modar::item_at(items, i);
     ours.push_back({asked.model, glm::make_mat4(asked.to_eye), modar::kNone, {}});
+    ours.back().node = asked.node - 1;
   }
   const auto found = modar::pick(bundle->view, modar::camera_of(*camera), {frame_x, frame_y}, ours);
   if (!found) return 0;
-  modar::give({0, found->item, {found->point.x, found->point.y, found->point.z}, found->distance},
+  modar::give({0,
+               found->item,
+               {found->point.x, found->point.y, found->point.z},
+               found->distance,
+               found->material + 1},
               hit);
   return 1;
 }

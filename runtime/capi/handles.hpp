@@ -78,17 +78,29 @@ Struct grown(const Struct& theirs) {
   return ours;
 }
 
-/// An item of an array whose elements have the caller's size.
-inline modar_item item_at(const modar_item* items, std::size_t index) {
+/// An element of an array whose elements have the caller's size.
+template <class Struct>
+Struct item_at(const Struct* items, std::size_t index) {
   const auto* bytes = reinterpret_cast<const std::byte*>(items) + index * items->size;
-  modar_item ours{};
+  Struct ours{};
   std::memcpy(&ours, bytes, std::min(items->size, sizeof ours));
   return ours;
 }
 
-/// 0 for an array that is NULL or whose items have no size.
-inline std::size_t item_count(const modar_item* items, std::size_t count) {
+/// 0 for an array that is NULL or whose elements have no size.
+template <class Struct>
+std::size_t item_count(const Struct* items, std::size_t count) {
   return items == nullptr || items->size < sizeof items->size ? 0 : count;
+}
+
+/// strlcpy's contract.
+inline std::size_t copy_name(std::string_view name, char* text, std::size_t size) {
+  if (text != nullptr && size > 0) {
+    const std::size_t length = std::min(name.size(), size - 1);
+    std::memcpy(text, name.data(), length);
+    text[length] = '\0';
+  }
+  return name.size();
 }
 
 /// What a caller forgot.

@@ -9,9 +9,17 @@
 #include "modar/pose.hpp"
 
 namespace modar {
+namespace {
+
+constexpr std::size_t kMostTaps = 8;  // clicks in one frame's time
+
+}  // namespace
 
 Controls::Controls(const BundleView& bundle, bool outline, bool display)
-    : bundle_(bundle), outline_(outline), display_(display) {}
+    : bundle_(bundle), machine_(bundle), outline_(outline), display_(display) {
+  events_.reserve(bundle.patterns().size() + kMostTaps);
+  taps_.reserve(kMostTaps);
+}
 
 void Controls::apply(const UserAct& act) {
   constexpr float kStep = 1.1f;  // a key press resizes by 10 %; set by hand
@@ -59,12 +67,14 @@ void Controls::apply(const UserAct& act) {
       break;
     case Act::kClick:
       if (frozen_ && corner_count_ < corners_.size()) corners_[corner_count_++] = act.at;
+      if (!frozen_ && taps_.size() < kMostTaps) taps_.push_back(act.at);
       break;
   }
 }
 
 void Controls::load(const BundleView& bundle) {
   bundle_ = bundle;
+  machine_ = ActionMachine(bundle);
   if (model_ != kNone && model_ >= bundle.models().size()) model_ = kNone;
   if (only_pattern_ != kNone && only_pattern_ >= bundle.patterns().size()) only_pattern_ = kNone;
 }
@@ -77,23 +87,43 @@ void Controls::turn_model(int step) {
   model_ = next == places - 1 ? kNone : static_cast<std::uint32_t>(next);
 }
 
-void Controls::collect(std::span<const Hysteresis::State> states,
-                       std::vector<DrawItem>& items) const {
+std::span<const SceneCommand> Controls::act(std::span<const Hysteresis::State> states,
+                                            double time_s, const Camera& camera,
+                                            std::span<const DrawItem> items) {
+  events_.clear();
+  for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
+    if (!wants(pattern) || !states[pattern].shown) continue;
+    events_.push_back({SceneEvent::Kind::kSeen, pattern, kNone});
+  }
+  for (const glm::dvec2 tap : taps_) {
+    const auto hit = pick(bundle_, camera, tap, items);
+    if (!hit || items[hit->item].node == kNone) continue;
+    events_.push_back({SceneEvent::Kind::kTap, items[hit->item].node, hit->material});
+  }
+  taps_.clear();
+  return machine_.step(time_s, events_);
+}
+
+std::span<const SceneCommand> Controls::collect(std::span<const Hysteresis::State> states,
+                                                double time_s, const Camera& camera,
+                                                std::vector<DrawItem>& items) {
+  const auto commands = act(states, time_s, camera, items);
   items.clear();
   if (model_ != kNone) {
     for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
       if (wants(pattern)) add_standard(states[pattern], model_, items);
     }
-    return;
+    return commands;
   }
-  for (std::uint32_t i = 0; i < bundle_.scenes().size(); ++i) {
-    const SceneRecord& scene = bundle_.scenes()[i];
-    const Hysteresis::State& state = states[scene.pattern];
-    if (!wants(scene.pattern) || !state.shown) continue;
-    const glm::mat4 view = gl_view(state.pose, state.stretch);
-    const glm::mat4 place = view * scene_matrix(scene);
-    items.push_back({scene.model, glm::scale(place, glm::vec3(scale_)), i, view});
+  for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
+    const Hysteresis::State& state = states[pattern];
+    if (!wants(pattern) || !state.shown) continue;
+    add_items(bundle_, machine_, pattern, gl_view(state.pose, state.stretch), items);
   }
+  for (DrawItem& item : items) {
+    if (item.model != kNone) item.to_eye = glm::scale(item.to_eye, glm::vec3(scale_));
+  }
+  return commands;
 }
 
 void Controls::collect_spot(std::span<const Hysteresis::State> states,

@@ -8,7 +8,9 @@
 
 #include <glm/vec2.hpp>
 
+#include "formats/action_machine.hpp"
 #include "formats/bundle_view.hpp"
+#include "modar/camera.hpp"
 #include "modar/renderer.hpp"
 #include "modar/tracker.hpp"
 
@@ -42,9 +44,12 @@ class Controls {
   /// Another version of the bundle: choices that it has no longer fall back to its scenes.
   void load(const BundleView& bundle);
 
-  /// The models to draw: each shown pattern's scenes, or the model that the user chose for it.
-  /// states: one a pattern, as Hysteresis answers. Allocates nothing once `items` has its room.
-  void collect(std::span<const Hysteresis::State> states, std::vector<DrawItem>& items) const;
+  /// What to draw: each shown pattern's scenes and nodes, as its actions have left them, or the
+  /// model that the user chose for it. states: one a pattern, as Hysteresis answers. items: those
+  /// of the frame before, on which clicks fall. Answers what the actions ask for. Allocates nothing
+  /// once `items` has its room.
+  std::span<const SceneCommand> collect(std::span<const Hysteresis::State> states, double time_s,
+                                        const Camera& camera, std::vector<DrawItem>& items);
   /// The same where one pattern made on the spot is tracked: it bears the chosen model, else the
   /// first.
   void collect_spot(std::span<const Hysteresis::State> states, std::vector<DrawItem>& items) const;
@@ -70,7 +75,13 @@ class Controls {
   void add_standard(const Hysteresis::State& state, std::uint32_t model,
                     std::vector<DrawItem>& items) const;
 
+  std::span<const SceneCommand> act(std::span<const Hysteresis::State> states, double time_s,
+                                    const Camera& camera, std::span<const DrawItem> items);
+
   BundleView bundle_;
+  ActionMachine machine_;
+  std::vector<SceneEvent> events_;
+  std::vector<glm::dvec2> taps_;  ///< since the last frame: picture pixels
   bool quit_ = false;
   bool outline_;
   bool display_;

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <string>
 
+#include "formats/meta_text.hpp"
 #include "frame_report.hpp"
 #include "pipeline.hpp"
 #include "play.hpp"
@@ -81,7 +82,8 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
       smoother_(names_.size(), options.smooth_ms),
       controls_(bundle, options.outline, options.osd || options.window),
       progress_(!options.quiet) {
-  items_.reserve(std::max(bundle.scenes().size(), bundle.patterns().size()));
+  items_.reserve(
+      std::max(bundle.scenes().size() + bundle.nodes().size(), bundle.patterns().size()));
 }
 
 Result<void> Player::open(const PlayerSetup& setup) {
@@ -176,7 +178,8 @@ Result<void> Player::follow_live(const Job& job) {
   live_ = job.live;
   bundle_ = live_->view;
   controls_.load(bundle_);
-  items_.reserve(std::max(bundle_.scenes().size(), bundle_.patterns().size()));
+  items_.reserve(
+      std::max(bundle_.scenes().size() + bundle_.nodes().size(), bundle_.patterns().size()));
   std::vector<std::string> names = pattern_names(bundle_);
   if (!spot_ && names != names_) {
     hysteresis_ = Hysteresis(names.size(), options_.method != "paper");
@@ -216,7 +219,7 @@ FrameReport Player::begin_report(const Job& job) {
   if (spot_) {
     controls_.collect_spot(states, items_);
   } else {
-    controls_.collect(states, items_);
+    tell(controls_.collect(states, report.time_s, job.camera, items_));
   }
   for (const Hysteresis::State& state : states) {
     if (!state.shown) continue;
@@ -224,6 +227,27 @@ FrameReport Player::begin_report(const Job& job) {
     if (report.state == Shown::kHidden) report.state = Shown::kHeld;
   }
   return report;
+}
+
+/// The words of a label, or an address, on the terminal.
+void Player::tell(std::span<const SceneCommand> commands) {
+  for (const SceneCommand& command : commands) {
+    if (options_.quiet) return;
+    progress_.end();
+    if (command.command == ActionCommand::kLink) {
+      const std::string address(bundle_.name(bundle_.actions()[command.action].address));
+      std::fprintf(stderr, "modar-play: link: %s\n", address.c_str());
+      continue;
+    }
+    const NodeRecord& node = bundle_.nodes()[command.node];
+    const std::string_view pattern = bundle_.name(bundle_.patterns()[node.pattern].name);
+    const std::string_view name = bundle_.name(node.name);
+    visit_node_texts(bundle_.meta(), [&](const MetaText& each) {
+      if (each.pattern != pattern || each.node != name || each.kind == MetaText::Kind::kAlt) return;
+      std::fprintf(stderr, "modar-play: %s [%s]: %s\n", each.node.c_str(), each.language.c_str(),
+                   each.words.c_str());
+    });
+  }
 }
 
 /// A flat pattern's four corners, or the border of what is curved.

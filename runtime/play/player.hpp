@@ -71,6 +71,7 @@ class Player {
   Result<void> open_logs();
   FrameReport begin_report(const Job& job);
   void follow_spot(const Job& job);
+  void tell(std::span<const SceneCommand> commands);
   void outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                Colour colour) const;
   void draw(const Job& job, const FrameReport& report);

@@ -178,12 +178,13 @@ struct Depths {
 };
 
 /// Depth in front of the eye is -z; over a box it spans its centre's, plus or minus its reach.
-void add_box(const glm::dmat4& to_eye, const ChunkRecord& chunk, Depths& depths) {
+void add_box(const glm::dmat4& to_eye, const float (&least)[3], const float (&most)[3],
+             Depths& depths) {
   double centre = -to_eye[3][2];
   double reach = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = static_cast<double>(chunk.bounds_min[axis]);
-    const double high = static_cast<double>(chunk.bounds_max[axis]);
+    const double low = static_cast<double>(least[axis]);
+    const double high = static_cast<double>(most[axis]);
     centre -= to_eye[axis][2] * 0.5 * (low + high);
     reach += std::abs(to_eye[axis][2]) * 0.5 * (high - low);
   }
@@ -210,11 +211,13 @@ DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items
   constexpr double kMargin = 0.01;  // keeps what touches a plane inside it; set by hand
   Depths depths;
   for (const DrawItem& item : items) {
+    const glm::dmat4 to_eye(item.to_eye);
+    if (is_picture(bundle, item.node)) add_box(to_eye, {-1, -1, 0}, {1, 1, 0}, depths);
     if (item.model >= bundle.models().size()) continue;
     const ModelRecord& model = bundle.models()[item.model];
-    const glm::dmat4 to_eye(item.to_eye);
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      add_box(to_eye, bundle.chunks()[model.first_chunk + c], depths);
+      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+      add_box(to_eye, chunk.bounds_min, chunk.bounds_max, depths);
     }
   }
   if (!(depths.farthest > 0.0) || !std::isfinite(depths.farthest)) return {};

@@ -54,6 +54,14 @@ double meet_triangle(const Ray& ray, const std::array<glm::dvec3, 3>& corners) {
   return steps > 0.0 ? steps : kMiss;
 }
 
+/// Steps to the square [-1, 1] of the plane z = 0, or `nearest`.
+double meet_square(const Ray& ray, double nearest) {
+  const double steps = -ray.from.z / ray.step.z;
+  const glm::dvec3 at = ray.from + steps * ray.step;
+  const bool met = std::fabs(at.x) <= 1.0 && std::fabs(at.y) <= 1.0 && steps > 0.0;
+  return met ? std::min(nearest, steps) : nearest;
+}
+
 /// Steps to the chunk's nearest triangle, or `nearest`.
 double meet_chunk(const BundleView& bundle, const LayoutRecord& layout, const ChunkRecord& chunk,
                   const Ray& ray, double nearest) {
@@ -91,19 +99,24 @@ std::optional<Pick> pick(const BundleView& bundle, const Camera& camera, glm::dv
   double nearest = std::numeric_limits<double>::infinity();
   std::optional<Pick> found;
   for (std::size_t i = 0; i < items.size(); ++i) {
-    if (items[i].model >= bundle.models().size()) continue;
-    const ModelRecord& model = bundle.models()[items[i].model];
+    const bool picture = is_picture(bundle, items[i].node);
+    if (!picture && items[i].model >= bundle.models().size()) continue;
     const glm::dmat4 to_model = glm::inverse(glm::dmat4(items[i].to_eye));
     const Ray ray{glm::dvec3(to_model[3]), glm::dmat3(to_model) * direction};
-    double met = nearest;
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      met = meet_chunk(bundle, bundle.layouts()[model.layout],
-                       bundle.chunks()[model.first_chunk + c], ray, met);
+    const ModelRecord none{};
+    const ModelRecord& model = picture ? none : bundle.models()[items[i].model];
+    double met = picture ? meet_square(ray, nearest) : nearest;
+    std::uint32_t material = kNone;
+    for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
+      const double before = met;
+      const ChunkRecord& chunk = bundle.chunks()[c];
+      met = meet_chunk(bundle, bundle.layouts()[model.layout], chunk, ray, met);
+      if (met < before) material = chunk.material;
     }
     if (!(met < nearest)) continue;
     nearest = met;
     found = Pick{i, glm::vec3(ray.from + met * ray.step),
-                 static_cast<float>(met * glm::length(direction))};
+                 static_cast<float>(met * glm::length(direction)), material};
   }
   return found;
 }

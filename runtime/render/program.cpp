@@ -24,6 +24,10 @@ const char* shadow_fragment_source() {
   return kShadowFragmentSource;
 }
 
+const char* plane_fragment_source() {
+  return kPlaneFragmentSource;
+}
+
 ModelSources& model_sources() {
   static ModelSources sources = {kModelVertexSource, kModelFragmentSource};
   return sources;

@@ -58,6 +58,7 @@ const char* background_fragment_source();
 
 const char* shadow_vertex_source();
 const char* shadow_fragment_source();
+const char* plane_fragment_source();
 
 /// The models' shaders: shaders/model.vert and model.frag, unless a bench has put others in their
 /// place, which programs that are made from then on have.

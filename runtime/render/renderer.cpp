@@ -16,6 +16,7 @@
 #include "runtime/render/ground.hpp"
 #include "runtime/render/model_painter.hpp"
 #include "runtime/render/picture.hpp"
+#include "runtime/render/plane_painter.hpp"
 #include "runtime/render/program.hpp"
 #include "runtime/render/texture_store.hpp"
 
@@ -151,6 +152,7 @@ struct Renderer::State {
     MODAR_TRY(painter.create(textures, extensions, caps));
     MODAR_TRY(background.create());
     MODAR_TRY(ground.create(bundle));
+    MODAR_TRY(planes.create(bundle));
     gl.reset();
     return {};
   }
@@ -184,8 +186,10 @@ struct Renderer::State {
     }
     list.sort_by_state(bundle);
     if (options.plane_hides) ground.hide_below(bundle, projection, items, gl, stats);
+    planes.draw(bundle, projection, items, textures, false, gl, stats);
     painter.draw({list, items, projection, options, geometry, textures, gl, stats,
                   options.estimate_light ? &estimator : nullptr});
+    planes.draw(bundle, projection, items, textures, true, gl, stats);
   }
 
   /// Gives GPU memory to the nearest chunks first, at a coarser level where there is little. Drops
@@ -216,6 +220,7 @@ struct Renderer::State {
   ModelPainter painter;
   Background background;
   Ground ground;
+  PlanePainter planes;
   LightEstimator estimator;
   Target target;
   DrawList list;
@@ -239,6 +244,7 @@ Renderer::~Renderer() {
   state_->painter.release(state_->gl);
   state_->background.release(state_->gl);
   state_->ground.release(state_->gl);
+  state_->planes.release(state_->gl);
   state_->target.release(state_->gl);
 }
 

@@ -6,6 +6,7 @@
 #include "formats/base/bits.hpp"
 #include "formats/texture_format.hpp"
 #include "modar/mapped_file.hpp"
+#include "modar/renderer.hpp"
 
 namespace modar {
 namespace {
@@ -44,6 +45,9 @@ TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
   for (std::uint32_t i = 0; i < bundle.materials().size(); ++i) {
     const std::uint32_t texture = bundle.materials()[i].texture;
     if (texture != kNone) used_[texture] = true;
+  }
+  for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) {
+    if (is_picture(bundle, i)) used_[bundle.nodes()[i].subject] = true;
   }
 }
 

@@ -18,9 +18,9 @@ class TextureStore {
  public:
   TextureStore(const BundleView& bundle, const GlCaps& caps);
 
-  /// Uploads every texture that a material names. Levels larger than the context's limit are left
-  /// out; so are the finest ones while all together are larger than `budget` bytes (0: no limit).
-  /// Errors: kUnsupported "gl.texture-size" where no level is small enough.
+  /// Uploads every texture that a material or a picture names. Levels larger than the context's
+  /// limit are left out; so are the finest ones while all together are larger than `budget` bytes
+  /// (0: no limit). Errors: kUnsupported "gl.texture-size" where no level is small enough.
   Result<void> upload(std::uint64_t budget);
   void release(GlState& gl);
 

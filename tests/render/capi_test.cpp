@@ -436,6 +436,85 @@ TEST(CapiOrbit, GoesAroundWhatStandsOnAPattern) {
   modar_bundle_close(bundle);
 }
 
+TEST(CapiActions, RunABundlesNodes) {
+  const auto bytes = test::encode(test::acting_content());
+  modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
+  ASSERT_NE(bundle, nullptr);
+  ASSERT_EQ(modar_node_count(bundle), 3u);
+  auto node = sized<modar_node>();
+  ASSERT_EQ(modar_node_at(bundle, 2, &node), 1);
+  EXPECT_EQ(node.kind, MODAR_NODE_LABEL);
+  EXPECT_EQ(node.place[0], -0.75f);
+  EXPECT_EQ(modar_node_at(bundle, 3, &node), 0);
+  char text[64];
+  EXPECT_EQ(modar_node_name(bundle, 2, text, sizeof text), 3u);
+  EXPECT_EQ(modar_node_mark(bundle, 2, text, sizeof text), 1u);
+  EXPECT_EQ(modar_node_text(bundle, 2, MODAR_TITLE, "en", text, sizeof text), 7u);
+  EXPECT_STREQ(text, "The rim");
+  EXPECT_EQ(modar_node_text(bundle, 2, MODAR_TITLE, "de", text, sizeof text), 0u);
+  EXPECT_EQ(modar_action_address(bundle, 4, text, sizeof text), 22u);
+  EXPECT_STREQ(text, "https://museum.org/pot");
+
+  modar_actions* actions = modar_actions_create(bundle, nullptr);
+  ASSERT_NE(actions, nullptr);
+  const float view[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -4, 1};
+  Longer<modar_item> items[8] = {};
+  items[0].known.size = sizeof items[0];
+  const auto item = [&](std::size_t i) { return items[i].known; };
+  auto seen = sized<modar_event>();
+  // Found shows the pot; its first part, tapped, lets the map take its place.
+  EXPECT_EQ(modar_actions_step(actions, 0, &seen, 1), 0u);
+  EXPECT_EQ(modar_actions_items(actions, 0, view, &items[0].known, 8), 1u);
+  EXPECT_EQ(item(0).node, 1u);
+  EXPECT_EQ(item(0).scene, 1u);
+  EXPECT_EQ(item(0).size, sizeof items[0]);
+  EXPECT_EQ(modar_actions_waiting(actions), 1);
+  modar_event events[2] = {seen, seen};
+  events[1].kind = MODAR_TAP;
+  events[1].subject = 0;
+  events[1].material = 1;
+  EXPECT_EQ(modar_actions_step(actions, 0.1, events, 2), 0u);
+  EXPECT_EQ(modar_actions_items(actions, 0, view, &items[0].known, 8), 1u);
+  EXPECT_EQ(item(0).node, 2u);
+  EXPECT_EQ(item(0).to_eye[14], -3.75f);
+  EXPECT_EQ(modar_actions_shown(actions, 0), 0);
+  EXPECT_EQ(modar_actions_shown(actions, 1), 1);
+  events[1].subject = 1;
+  events[1].material = 0;
+  ASSERT_EQ(modar_actions_step(actions, 0.2, events, 2), 2u);
+  auto command = sized<modar_command>();
+  ASSERT_EQ(modar_actions_command(actions, 0, &command), 1);
+  EXPECT_EQ(command.kind, MODAR_OPEN_LINK);
+  EXPECT_EQ(command.action, 4u);
+  ASSERT_EQ(modar_actions_command(actions, 1, &command), 1);
+  EXPECT_EQ(command.kind, MODAR_SHOW_TEXT);
+  EXPECT_EQ(command.node, 2u);
+  EXPECT_EQ(modar_actions_command(actions, 2, &command), 0);
+
+  auto camera = sized<modar_camera>();
+  modar_camera_default(64, 64, &camera);
+  auto label = sized<modar_label>();
+  ASSERT_EQ(modar_label_project(actions, 2, &camera, view, nullptr, 0, &label), 1);
+  // 64 pixels of focal length, 0.75 to the left of the middle, four away.
+  EXPECT_FLOAT_EQ(label.x, 31.5f - 64 * 0.75f / 4);
+  EXPECT_FLOAT_EQ(label.y, 31.5f);
+  EXPECT_EQ(label.covered, 0);
+  modar_item before = sized<modar_item>();
+  before.node = 2;
+  for (const int i : {0, 5, 10, 15}) before.to_eye[i] = 1;
+  before.to_eye[14] = -2;
+  ASSERT_EQ(modar_label_project(actions, 2, &camera, view, &before, 1, &label), 1);
+  EXPECT_EQ(label.covered, 1);
+  before.to_eye[14] = -5;
+  ASSERT_EQ(modar_label_project(actions, 2, &camera, view, &before, 1, &label), 1);
+  EXPECT_EQ(label.covered, 0);
+  EXPECT_EQ(modar_label_project(actions, 0, &camera, view, nullptr, 0, &label), 0);
+  modar_actions_reset(actions);
+  EXPECT_EQ(modar_actions_shown(actions, 1), 0);
+  modar_actions_destroy(actions);
+  modar_bundle_close(bundle);
+}
+
 /// Draws through the C API.
 class CapiDrawTest : public GlTest {
  protected:

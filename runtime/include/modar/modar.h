@@ -110,6 +110,7 @@ MODAR_EXPERIMENTAL size_t modar_language(const modar_bundle* bundle, uint32_t in
 enum {
   MODAR_TEXT = 0,     /* what to show of a pattern's scene */
   MODAR_ALT_TEXT = 1, /* what is seen there, for screen readers */
+  MODAR_TITLE = 2,    /* of a node: its name for people */
 };
 /* A text of a pattern in a language; several are joined by a space. Copies and returns as the names
  * above, 0 where there is none. */
@@ -274,6 +275,8 @@ typedef struct modar_item {
   float world_to_eye[16]; /* pattern space, to which the light is fixed, to GL's eye space; zeros: a
                              level camera's world */
   float opacity; /* 0 or 1: as baked; between: what is behind shows through, as through glass */
+  uint32_t node; /* number of its node: its index + 1; 0: none. A picture is drawn in place of a
+                    model, and to_eye takes the square from -1 to 1 of its plane z = 0 */
 } modar_item;
 /* to_eye = view * place, world_to_eye = view; the rest stays. */
 void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose);
@@ -378,12 +381,108 @@ typedef struct modar_hit {
   size_t item;    /* index into the items */
   float point[3]; /* in the item's model space */
   float distance; /* from the eye, in eye space */
+  uint32_t material; /* number of the material there, for modar_event; 0: it is a picture */
 } modar_hit;
 /* Returns 1 and the hit, or 0. Reads the triangles from the bundle's bytes: meant for taps, not for
- * every frame. */
+ * every frame. Pictures are hit where they are seen through, too. */
 MODAR_EXPERIMENTAL int modar_pick(const modar_bundle* bundle, const modar_camera* camera,
                                   double frame_x, double frame_y, const modar_item* items,
                                   size_t count, modar_hit* hit);
+
+/* ---- nodes and actions: scenes that act ---- */
+
+/* A bundle may name what stands on its patterns, hide it at first, and say what happens when a
+ * pattern is found or something is tapped. An app that draws the scenes itself shows them all, and
+ * nothing happens. */
+enum {
+  MODAR_NODE_MODEL = 1,   /* the model of a scene */
+  MODAR_NODE_PICTURE = 2, /* a rectangle that shows a texture */
+  MODAR_NODE_LABEL = 3,   /* a point, a mark to draw there, a title and a text */
+};
+typedef struct modar_node {
+  size_t size;
+  uint32_t pattern;
+  int kind;
+  uint32_t scene; /* of a model: the number of its scene; else 0 */
+  float place[3]; /* pattern space */
+  int hidden;     /* 1: until an action shows it */
+} modar_node;
+MODAR_EXPERIMENTAL uint32_t modar_node_count(const modar_bundle* bundle);
+/* Returns 1 and the node, or 0 for an invalid index. */
+MODAR_EXPERIMENTAL int modar_node_at(const modar_bundle* bundle, uint32_t index, modar_node* node);
+/* Copy and return as modar_pattern_name(). The mark of a label is a number or a short word. */
+MODAR_EXPERIMENTAL size_t modar_node_name(const modar_bundle* bundle, uint32_t index, char* text,
+                                          size_t size);
+MODAR_EXPERIMENTAL size_t modar_node_mark(const modar_bundle* bundle, uint32_t index, char* text,
+                                          size_t size);
+/* kind: MODAR_TITLE, MODAR_TEXT or MODAR_ALT_TEXT; 0 where there is none in the language. */
+MODAR_EXPERIMENTAL size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind,
+                                          const char* language, char* text, size_t size);
+
+/* The state of a bundle's nodes, and what actions have done to them. */
+typedef struct modar_actions modar_actions;
+MODAR_EXPERIMENTAL modar_actions* modar_actions_create(const modar_bundle* bundle,
+                                                       modar_error* error);
+MODAR_EXPERIMENTAL void modar_actions_destroy(modar_actions* actions);
+/* As at the start: nothing was found. */
+MODAR_EXPERIMENTAL void modar_actions_reset(modar_actions* actions);
+
+enum {
+  MODAR_SEEN = 0, /* the pattern `subject` is on the screen: tell it in every step */
+  MODAR_TAP = 1,  /* the node `subject` was tapped */
+};
+typedef struct modar_event {
+  size_t size;
+  int kind;
+  uint32_t subject;  /* index of the pattern or node */
+  uint32_t material; /* of a tap on a model: as in modar_hit; else 0 */
+} modar_event;
+enum {
+  MODAR_SHOW_TEXT = 6, /* show the title and text of the label `node` */
+  MODAR_OPEN_LINK = 7, /* ask the visitor whether to open modar_action_address() of `action` */
+};
+typedef struct modar_command {
+  size_t size;
+  int kind;
+  uint32_t node;
+  uint32_t action; /* index, or 0xFFFFFFFF: a label that was tapped */
+} modar_command;
+/* One step, at least once a frame. time_s: seconds, which do not fall. The pattern counts as lost
+ * when it was not seen for more than a second. Returns how many commands there are for the app.
+ * Allocates nothing as long as there are no more events than patterns and nodes. */
+MODAR_EXPERIMENTAL size_t modar_actions_step(modar_actions* actions, double time_s,
+                                             const modar_event* events, size_t count);
+/* Of the last step: returns 1 and the command, or 0 for an invalid index. */
+MODAR_EXPERIMENTAL int modar_actions_command(const modar_actions* actions, size_t index,
+                                             modar_command* command);
+/* Copies and returns as modar_pattern_name(): begins with https://. */
+MODAR_EXPERIMENTAL size_t modar_action_address(const modar_bundle* bundle, uint32_t action,
+                                               char* text, size_t size);
+MODAR_EXPERIMENTAL int modar_actions_shown(const modar_actions* actions, uint32_t node);
+/* 1: step and draw on, even if no frame comes: something turns, or a delay runs. */
+MODAR_EXPERIMENTAL int modar_actions_waiting(const modar_actions* actions);
+
+/* What of a pattern is to be drawn: the models of its scenes and its pictures, without what is
+ * hidden, turned as actions say. view: modar_view() of its pose. items: `capacity` of them, the
+ * first with its size set; as many as the bundle has scenes and nodes are enough. Returns how many
+ * it filled. */
+MODAR_EXPERIMENTAL size_t modar_actions_items(modar_actions* actions, uint32_t pattern,
+                                              const float view[16], modar_item* items,
+                                              size_t capacity);
+
+/* Where a label is drawn: with a mark of constant size, faded where it is covered. */
+typedef struct modar_label {
+  size_t size;
+  float x, y;     /* pixel of the frame */
+  float distance; /* from the eye, in eye space */
+  int covered;    /* 1: an item lies before its point */
+} modar_label;
+/* Returns 1 and the label, or 0 if it is hidden, behind the camera, or no label. items: what was
+ * drawn; NULL: not looked at, which saves the time of modar_pick(). */
+MODAR_EXPERIMENTAL int modar_label_project(const modar_actions* actions, uint32_t node,
+                                           const modar_camera* camera, const float view[16],
+                                           const modar_item* items, size_t count,
+                                           modar_label* label);
 
 /* Draws the picture (NULL: the clear colour) and the items over it off-screen, in the picture's (or
  * camera's) aspect. projection NULL: that of `camera`, with depth limits that enclose the items. */

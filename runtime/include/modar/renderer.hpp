@@ -19,6 +19,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include "formats/action_machine.hpp"
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/camera.hpp"
@@ -37,6 +38,8 @@ struct DrawItem {
   /// the ceiling) to eye space; see gl_view(). Default: the world of a camera that is held level.
   glm::mat4 world_to_eye{1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
   float opacity = 1.0f;  ///< factor on that of its materials; below 1, what is behind shows through
+  std::uint32_t node = kNone;  ///< whose item it is. Of a picture: it is drawn in place of a model,
+                               ///< to_eye takes the square [-1,1] of z = 0 to eye space
 };
 
 /// Light in a space whose z points up to the ceiling. Linear; 1: a white surface in this light is
@@ -154,6 +157,14 @@ struct RenderOptions {
   float lod_pixels = 1.0f;  ///< largest error of a level of detail on the screen, in pixels
 };
 
+/// False for a node that does not exist.
+bool is_picture(const BundleView& bundle, std::uint32_t node);
+
+/// Appends what of a pattern's scenes and nodes is shown: models, then pictures, each turned as its
+/// actions say. view: pattern space to eye space. Allocates nothing once `items` has its room.
+void add_items(const BundleView& bundle, const ActionMachine& machine, std::uint32_t pattern,
+               const glm::mat4& view, std::vector<DrawItem>& items);
+
 /// Pattern-plane matrix of a scene: its offset, rotation and scale on the default placement (the
 /// model's largest side equals the pattern's largest side).
 glm::mat4 scene_matrix(const SceneRecord& scene);
@@ -168,15 +179,16 @@ DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items
 
 /// The first surface that a ray through a pixel hits.
 struct Pick {
-  std::size_t item = 0;   ///< index into the items
-  glm::vec3 point{0.0f};  ///< in the item's model space
-  float distance = 0.0f;  ///< from the eye, in eye space
+  std::size_t item = 0;            ///< index into the items
+  glm::vec3 point{0.0f};           ///< in the item's model space
+  float distance = 0.0f;           ///< from the eye, in eye space
+  std::uint32_t material = kNone;  ///< that lies there; kNone: a picture's
 };
 
 /// Casts a ray through a pixel of the frame (an ideal pinhole's, as models are drawn) against the
 /// finest level of the items' models, both sides of each triangle. Reads the triangles from the
-/// bundle's bytes: meant for taps, not for every frame. Empty if no model is hit or a model does
-/// not exist. camera: see validate().
+/// bundle's bytes: meant for taps, not for every frame. Pictures are hit where they are seen
+/// through, too. Empty if nothing is hit or a model does not exist. camera: see validate().
 std::optional<Pick> pick(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
                          std::span<const DrawItem> items);
 

@@ -1,0 +1,151 @@
+// Pictures that stand on a pattern: their texels as they are, hidden and hiding as what they are.
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "tests/render/scene.hpp"
+
+namespace modar {
+namespace {
+
+constexpr int kPlaneSide = 32;
+
+class PlaneTest : public GlTest {};
+
+/// All pixels of one gray: 4 bits of colour in both halves, and the least modifier.
+std::vector<std::byte> plain_block(int red, int green, int blue) {
+  const auto channel = [](int value) { return static_cast<std::byte>(value << 4 | value); };
+  return {channel(red), channel(green), channel(blue), std::byte{0},
+          std::byte{0}, std::byte{0},   std::byte{0},  std::byte{0}};
+}
+
+/// Two rows of four blocks would do; a texture of 4 x 4 is one block, of one colour.
+std::uint32_t add_flat(SceneMaker& maker, int red, int green, int blue, int alpha) {
+  std::vector<std::vector<std::byte>> twin;
+  if (alpha >= 0) twin = {plain_block(alpha, alpha, alpha)};
+  return maker.add_texture(4, {plain_block(red, green, blue)}, twin,
+                           alpha >= 0 ? std::uint32_t{kTextureAlpha} : 0u);
+}
+
+void add_picture(BundleContent& content, const char* name, std::uint32_t texture) {
+  NodeRecord node{};
+  node.name = content.intern(name);
+  node.kind = static_cast<std::uint32_t>(NodeKind::kPicture);
+  node.subject = texture;
+  node.rotation[3] = 1.0f;
+  node.half_size[0] = node.half_size[1] = 0.5f;
+  content.nodes.push_back(node);
+}
+
+void add_plane_pattern(BundleContent& content) {
+  PatternRecord pattern{};
+  pattern.name = content.intern("pattern");
+  pattern.width = pattern.height = 64;
+  pattern.half_width = pattern.half_height = 1.0f;
+  pattern.score = -1.0f;
+  content.patterns.push_back(pattern);
+  content.features.emplace_back();
+}
+
+/// Looks down onto the plane z = 0, of which the picture shows 2 x 2 units.
+Camera camera_on_plane() {
+  Camera camera = default_camera(kPlaneSide, kPlaneSide);
+  camera.fx = camera.fy = 2.0 * kPlaneSide;
+  return camera;
+}
+
+glm::mat4 over_plane(float z) {
+  return glm::translate(glm::mat4(1.0f), glm::vec3(0.0f, 0.0f, z - 4.0f));
+}
+
+DrawItem picture_at(std::uint32_t node, const glm::mat4& to_eye) {
+  DrawItem item{kNone, to_eye};
+  item.node = node;
+  return item;
+}
+
+Rgb texel_at(const std::vector<std::uint8_t>& pixels, int x, int y) {
+  const auto i = static_cast<std::size_t>(4 * (y * kPlaneSide + x));
+  return {pixels[i], pixels[i + 1], pixels[i + 2]};
+}
+
+TEST_F(PlaneTest, ShowsItsTexelsWhereItStands) {
+  SceneMaker maker;
+  add_plane_pattern(maker.content);
+  add_picture(maker.content, "solid", add_flat(maker, 12, 5, 2, -1));
+  add_picture(maker.content, "glass", add_flat(maker, 3, 9, 14, 8));
+  NodeRecord& solid = maker.content.nodes[0];
+  solid.half_size[1] = 0.25f;
+  solid.place[1] = 0.5f;
+  const MappedBundle bundle(maker.content);
+  auto renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_NE(renderer, nullptr);
+  ActionMachine machine(*bundle.view);
+  std::vector<DrawItem> items;
+  add_items(*bundle.view, machine, 0, over_plane(0), items);
+  ASSERT_EQ(items.size(), 2u);
+  const auto pixels = draw(*renderer, camera_on_plane(), items);
+  // By the tables of ETC1: 17 times the four bits, and 2 or 8 of its modifiers.
+  const Rgb opaque = texel_at(pixels, 16, 6);
+  EXPECT_NEAR(opaque[0], 12 * 17 + 2, 1);
+  EXPECT_NEAR(opaque[1], 5 * 17 + 2, 1);
+  EXPECT_NEAR(opaque[2], 2 * 17 + 2, 1);
+  // The solid one covers y from 0.25 to 0.75, the glass -0.5 to 0.5: rows 4 to 11 and 8 to 23.
+  EXPECT_EQ(texel_at(pixels, 16, 3), (Rgb{0, 0, 0}));
+  EXPECT_EQ(texel_at(pixels, 16, 4), opaque);
+  const double alpha = (8 * 17 + 2) / 255.0;
+  const Rgb both = texel_at(pixels, 16, 9);
+  const Rgb glass = texel_at(pixels, 16, 20);
+  const int colour[] = {3, 9, 14};
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(glass[c], alpha * (colour[c] * 17 + 2), 1.5) << c;
+    EXPECT_NEAR(both[c], glass[c] + (1 - alpha) * opaque[c], 2) << c;
+  }
+  EXPECT_EQ(texel_at(pixels, 16, 24), (Rgb{0, 0, 0}));
+  EXPECT_EQ(texel_at(pixels, 7, 16), (Rgb{0, 0, 0}));
+  EXPECT_EQ(renderer->stats().draw_calls, 2);
+}
+
+TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
+  SceneMaker maker;
+  add_plane_pattern(maker.content);
+  std::vector<Triangle> square(2);
+  square[0].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, -0.25, 0}, {0.25, 0.25, 0}};
+  square[1].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, 0.25, 0}, {-0.25, 0.25, 0}};
+  for (Triangle& triangle : square) triangle.colour = {0, 200, 0};
+  maker.add_plain_model(Layout::kHalfColoured, square);
+  add_picture(maker.content, "solid", add_flat(maker, 12, 0, 0, -1));
+  add_picture(maker.content, "glass", add_flat(maker, 12, 0, 0, 8));
+  const MappedBundle bundle(maker.content);
+  auto renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_NE(renderer, nullptr);
+  const DrawItem model{0, over_plane(0)};
+  for (const std::uint32_t node : {0u, 1u}) {
+    const DrawItem behind[] = {model, picture_at(node, over_plane(-0.5f))};
+    EXPECT_EQ(texel_at(draw(*renderer, camera_on_plane(), behind), 16, 16), (Rgb{0, 200, 0}))
+        << node;
+    const DrawItem before[] = {model, picture_at(node, over_plane(0.5f))};
+    const Rgb seen = texel_at(draw(*renderer, camera_on_plane(), before), 16, 16);
+    EXPECT_NEAR(seen[1], node == 0 ? 2 : 200 * (1 - 138 / 255.0) + 1, 2) << node;
+  }
+}
+
+TEST_F(PlaneTest, DepthRangeAndPickKnowIt) {
+  SceneMaker maker;
+  add_plane_pattern(maker.content);
+  add_picture(maker.content, "solid", add_flat(maker, 12, 5, 2, -1));
+  const MappedBundle bundle(maker.content);
+  const glm::mat4 flat = glm::scale(over_plane(1), glm::vec3(0.5f, 0.25f, 1.0f));
+  const DrawItem item = picture_at(0, flat);
+  const DepthRange range = depth_range(*bundle.view, {&item, 1});
+  EXPECT_NEAR(range.near_plane, 3 * 0.99, 1e-6);
+  EXPECT_NEAR(range.far_plane, 3 * 1.01, 1e-6);
+  const auto found = pick(*bundle.view, camera_on_plane(), {15.5, 15.5}, {&item, 1});
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->material, kNone);
+  EXPECT_NEAR(found->distance, 3, 1e-3);
+  // At z = 1 the picture shows 1.5 x 1.5 units: 0.25 of them are 5.3 pixels.
+  EXPECT_TRUE(pick(*bundle.view, camera_on_plane(), {15.5, 15.5 + 5}, {&item, 1}));
+  EXPECT_FALSE(pick(*bundle.view, camera_on_plane(), {15.5, 15.5 + 6}, {&item, 1}));
+}
+
+}  // namespace
+}  // namespace modar
