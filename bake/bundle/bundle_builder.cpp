@@ -14,6 +14,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/request_check.hpp"
+#include "bake/bundle/scene_nodes.hpp"
 #include "bake/bundle/scene_placement.hpp"
 #include "bake/bundle/scene_shadow.hpp"
 #include "bake/import/read_model.hpp"
@@ -434,6 +435,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
     content.scenes.push_back(place_scene(resolved, content, known.pattern, model));
     named.scenes.push_back(std::move(resolved));
   }
+  MODAR_TRY(add_nodes(named, content, report));
   MODAR_TRY(light_scenes(named.scenes, named, content, report));
   named.parameters = parameters_of(content);
   content.meta = bundle_meta(named, report, traced);

@@ -34,6 +34,12 @@ struct BakeTrace {
 /// Errors: those of the readers; kUsage "bake.scene-unknown", "scene.no-width".
 Result<void> check_inputs(const BakeRequest& request);
 
+/// Holds the names of nodes against each other: each has one of its own on its pattern, what
+/// actions name is there and can do what is asked, pictures can be read. check_inputs() does it,
+/// too. Errors: kUsage "node.same-name", "node.too-many", "action.unknown", "action.command",
+/// "action.part"; those of read_image().
+Result<void> check_nodes(const BakeRequest& request);
+
 /// Runs all stages, after name_assets() and check_inputs(). One model and one pattern without a
 /// scene make one by themselves. trace: filled where given.
 /// Errors: those of the stages; kUsage "bake.nothing", "bake.max-error-unit".

@@ -1,6 +1,7 @@
 // The bundle's meta text, written and read, and what `modar inspect` and `modar bake` print of a
 // bundle.
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/scene_nodes.hpp"
 #include "bake/bundle/scene_placement.hpp"
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 
 #include "bake/options/options.hpp"
 #include "formats/base/path.hpp"
+#include "formats/meta_text.hpp"
 #include "formats/pattern_shape.hpp"
 
 namespace modar {
@@ -262,11 +264,12 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
     if (!scene.light.empty()) stated.set("light", file_name(scene.light));
     scenes.push_back(std::move(stated));
   }
-  const Json meta = {{"tool", "modar " + request.tool_version},
-                     {"models", models},
-                     {"patterns", patterns},
-                     {"scenes", scenes},
-                     {"options", state_options(request)}};
+  Json meta = {{"tool", "modar " + request.tool_version},
+               {"models", models},
+               {"patterns", patterns},
+               {"scenes", scenes},
+               {"options", state_options(request)}};
+  if (Json nodes = node_texts(request); !nodes.is_null()) meta.set("nodes", std::move(nodes));
   return meta.dump();
 }
 
@@ -386,10 +389,111 @@ std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::u
 
 namespace {
 
+const char* node_kind(const NodeRecord& node) {
+  constexpr const char* kKinds[] = {"model", "picture", "label"};
+  return node.kind - 1 < std::size(kKinds) ? kKinds[node.kind - 1] : "unknown";
+}
+
+Json node_json(const BundleView& bundle, std::uint32_t index) {
+  const NodeRecord& node = bundle.nodes()[index];
+  const bool picture = node.kind == static_cast<std::uint32_t>(NodeKind::kPicture);
+  Json json = {{"name", bundle.name(node.name)},
+               {"pattern", bundle.name(bundle.patterns()[node.pattern].name)},
+               {"kind", node_kind(node)},
+               {"hidden", (node.flags & kNodeHidden) != 0},
+               {"group", node.group},
+               {"place", Json::list(node.place)},
+               {"rotation", Json::list(node.rotation)},
+               {"half_size", Json::list(node.half_size)}};
+  if (picture) json.set("texture", node.subject);
+  if (node.mark.length != 0) json.set("mark", bundle.name(node.mark));
+  const std::string_view pattern = bundle.name(bundle.patterns()[node.pattern].name);
+  Json words = Json::object();
+  visit_node_texts(bundle.meta(), [&](const MetaText& each) {
+    constexpr const char* kKeys[] = {"text", "alt", "title"};
+    if (each.pattern != pattern || each.node != bundle.name(node.name)) return;
+    const char* key = kKeys[static_cast<std::size_t>(each.kind)];
+    Json by_language = words.find(key).value_or(Json::object());
+    by_language.set(each.language, each.words);
+    words.set(key, std::move(by_language));
+  });
+  json.set("words", std::move(words));
+  return json;
+}
+
+/// "tap pot (lid): turn pot by 90 about x in 1.5s", as modar.toml has it.
+std::string action_words(const BundleView& bundle, const ActionRecord& action) {
+  constexpr const char* kCommands[] = {"",     "",     "",     "show", "hide", "toggle",
+                                       "text", "link", "next", "",     "turn"};
+  const auto number = [](float value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", static_cast<double>(value));
+    return std::string(text);
+  };
+  const auto node = [&](std::uint32_t index) {
+    return std::string(bundle.name(bundle.nodes()[index].name));
+  };
+  std::string words;
+  switch (static_cast<ActionEvent>(action.event)) {
+    case ActionEvent::kFound:
+      words = "found";
+      break;
+    case ActionEvent::kLost:
+      words = "lost";
+      break;
+    case ActionEvent::kTap:
+      words = "tap " + node(action.source);
+      if (action.part.length != 0) words += " (" + std::string(bundle.name(action.part)) + ")";
+      break;
+    case ActionEvent::kAfter:
+      words = "after " + number(action.seconds) + "s";
+  }
+  if (action.command >= std::size(kCommands)) return words;
+  words += std::string(": ") + kCommands[action.command] + " ";
+  if (action.address.length != 0) return words + std::string(bundle.name(action.address));
+  if (action.target < bundle.nodes().size()) words += node(action.target);
+  if (action.command != static_cast<std::uint32_t>(ActionCommand::kTurn)) return words;
+  words += " by " + number(action.degrees);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (action.axis[axis] == 1.0f && axis != 2) words += std::string(" about ") + "xyz"[axis];
+  }
+  return action.duration > 0.0f ? words + " in " + number(action.duration) + "s" : words;
+}
+
+/// The pattern on which an action happens; kNone of an event that a newer version has.
+std::uint32_t pattern_of(const BundleView& bundle, const ActionRecord& action) {
+  const bool tap = action.event == static_cast<std::uint32_t>(ActionEvent::kTap);
+  if (tap) return bundle.nodes()[action.source].pattern;
+  return action.source < bundle.patterns().size() ? action.source : kNone;
+}
+
+Json action_json(const BundleView& bundle, std::uint32_t index) {
+  const ActionRecord& action = bundle.actions()[index];
+  const std::uint32_t pattern = pattern_of(bundle, action);
+  return {
+      {"pattern", pattern == kNone ? Json() : Json(bundle.name(bundle.patterns()[pattern].name))},
+      {"words", action_words(bundle, action)}};
+}
+
+/// Labels and actions of a pattern.
+std::pair<int, int> acting_counts(const BundleView& bundle, std::uint32_t pattern) {
+  std::pair<int, int> counts;
+  for (std::uint32_t n = 0; n < bundle.nodes().size(); ++n) {
+    const NodeRecord& node = bundle.nodes()[n];
+    counts.first +=
+        node.pattern == pattern && node.kind == static_cast<std::uint32_t>(NodeKind::kLabel);
+  }
+  for (std::uint32_t a = 0; a < bundle.actions().size(); ++a) {
+    counts.second += pattern_of(bundle, bundle.actions()[a]) == pattern;
+  }
+  return counts;
+}
+
 Json scene_json(const BundleView& bundle, std::uint32_t index) {
   const SceneRecord& scene = bundle.scenes()[index];
   const std::optional<StatedPlacement> placement = stated_placement(bundle, index);
   const double height = scene_height_mm(bundle, scene);
+  const auto [labels, actions] = acting_counts(bundle, scene.pattern);
   return {{"pattern", bundle.name(bundle.patterns()[scene.pattern].name)},
           {"model", bundle.name(bundle.models()[scene.model].name)},
           {"scale", scene.scale},
@@ -397,7 +501,9 @@ Json scene_json(const BundleView& bundle, std::uint32_t index) {
           {"rotation", Json::list(scene.rotation)},
           {"up", placement ? Json(up_axis_name(placement->up)) : Json()},
           {"turn", placement ? Json::list(placement->turn) : Json()},
-          {"height_mm", height > 0 ? Json(height) : Json()}};
+          {"height_mm", height > 0 ? Json(height) : Json()},
+          {"labels", labels},
+          {"actions", actions}};
 }
 
 }  // namespace
@@ -419,12 +525,20 @@ Json bundle_json(const BundleView& bundle) {
   for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
     scenes.push_back(scene_json(bundle, s));
   }
+  Json nodes = Json::array();
+  for (std::uint32_t n = 0; n < bundle.nodes().size(); ++n) nodes.push_back(node_json(bundle, n));
+  Json actions = Json::array();
+  for (std::uint32_t a = 0; a < bundle.actions().size(); ++a) {
+    actions.push_back(action_json(bundle, a));
+  }
   return {{"format", {{"major", bundle.header().major}, {"minor", bundle.header().minor}}},
           {"bytes", bundle.bytes().size()},
           {"models", models},
           {"textures", textures},
           {"patterns", patterns},
-          {"scenes", scenes}};
+          {"scenes", scenes},
+          {"nodes", nodes},
+          {"actions", actions}};
 }
 
 }  // namespace modar

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/scene_nodes.hpp"
 #include "bake/bundle/scene_placement.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
@@ -60,6 +61,7 @@ class Linker {
     std::sort(content_.occlusion.begin(), content_.occlusion.end(),
               [](const auto& a, const auto& b) { return a.layout < b.layout; });
     Report quiet;
+    MODAR_TRY(add_nodes(resolved, content_, quiet));
     MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
     resolved.parameters = parameters_of(content_);
     Json meta = Json::parse(bundle_meta(resolved, {}, {}));

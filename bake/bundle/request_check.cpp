@@ -10,6 +10,7 @@
 #include <set>
 
 #include "bake/bundle/light_image.hpp"
+#include "bake/bundle/scene_nodes.hpp"
 #include "bake/import/read_model.hpp"
 #include "formats/base/nearest.hpp"
 #include "formats/base/path.hpp"
@@ -121,7 +122,7 @@ Result<void> check_inputs(const BakeRequest& request) {
     const std::string& light = known.scene.light;
     if (!light.empty() && lights.insert(light).second) MODAR_TRY(read_light(light));
   }
-  return {};
+  return check_nodes(request);
 }
 
 Result<void> require_shown(const BakeRequest& request) {

@@ -53,7 +53,7 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
   for (const ProjectScene& scene : project.scenes) {
     const SceneRequest& asked = scene.request;
     if ((scene.texts.empty() && scene.alts.empty()) || !holds(bundle.patterns(), asked.pattern) ||
-        !holds(bundle.models(), asked.model)) {
+        (!asked.model.empty() && !holds(bundle.models(), asked.model))) {
       continue;
     }
     sources.texts->push_back({asked.pattern, asked.model, scene.texts, scene.alts});
@@ -61,6 +61,11 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
   std::set<std::string> given;  // a light may be a pattern, too
   for (const PatternRequest& pattern : sources.request.patterns) given.insert(pattern.path);
   for (const ProjectScene& scene : project.scenes) {
+    for (NodeRequest node : scene.nodes) {
+      if (node.file.empty() || !holds(bundle.patterns(), node.place.pattern)) continue;
+      node.file = project.path(node.file);
+      sources.request.nodes.push_back(std::move(node));
+    }
     const std::string light = project.path(scene.request.light);
     if (scene.request.light.empty() || !given.insert(light).second) continue;
     PatternRequest picture;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "bake/texture/texture.hpp"
 #include "bake/up_axis.hpp"
 #include "formats/base/error.hpp"
+#include "formats/scene_nodes.hpp"
 
 namespace modar {
 
@@ -72,13 +74,49 @@ struct SceneRequest {
   std::array<double, 3> turn{};  ///< degrees about the pattern's x, y and z, in this order
   bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
   SceneOffset offset;
-  std::string light;  ///< picture of its room, see read_light(); empty: a neutral room
+  std::string light;    ///< picture of its room, see read_light(); empty: a neutral room
+  std::string name;     ///< what actions call it; empty: as the model
+  bool hidden = false;  ///< until an action shows it
+  std::string group;    ///< of variants that `next` cycles through; empty: none
+};
+
+/// Words by language: {"en", "The rim"}.
+using Words = std::map<std::string, std::string>;
+
+/// A picture or a label that stands on a pattern.
+struct NodeRequest {
+  NodeKind kind = NodeKind::kPicture;
+  std::string file;    ///< of a picture
+  SceneRequest place;  ///< pattern, name, hidden, group, offset; of a picture size, turn, centred
+  std::string mark;    ///< of a label: a number or a short word
+  Words titles;
+  Words texts;
+  Words alts;
+  std::string where;  ///< for messages: "modar.toml:12:1"
+};
+
+/// What is done on a pattern when something happens. Names are those of nodes, or of models.
+struct ActionRequest {
+  std::string pattern;
+  ActionEvent event = ActionEvent::kFound;
+  std::string source;  ///< of a tap
+  std::string part;    ///< of a tap on a model: a material; empty: any
+  double seconds = 0;  ///< of kAfter
+  ActionCommand command = ActionCommand::kShow;
+  std::string target;   ///< of all but a link
+  std::string address;  ///< of a link
+  int axis = 2;         ///< of a turn: 0 x, 1 y, 2 z of the pattern
+  double degrees = 0;   ///< of a turn
+  double duration = 0;  ///< of a turn: seconds
+  std::string where;    ///< for messages: "modar.toml:12:1"
 };
 
 struct BakeRequest {
   std::vector<ModelRequest> models;
   std::vector<PatternRequest> patterns;
   std::vector<SceneRequest> scenes;
+  std::vector<NodeRequest> nodes;
+  std::vector<ActionRequest> actions;
   std::optional<UpAxis> up;  ///< of all models, for scenes that name none; nothing: see find_up()
   std::string light;         ///< of scenes that name none
   TextureOptions textures;

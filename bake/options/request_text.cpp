@@ -237,6 +237,92 @@ tl::expected<bool, WrongValue> take_scene_part(std::string_view key, std::string
   return false;
 }
 
+namespace {
+
+/// "3s", "0.5s".
+bool parse_seconds(std::string_view text, double& seconds) {
+  return text.ends_with('s') && parse_number(text.substr(0, text.size() - 1), seconds) &&
+         seconds >= 0 && seconds <= static_cast<double>(kMostSeconds);
+}
+
+/// What stands behind a word, without it; empty where the text does not begin with the word.
+std::string_view behind(std::string_view text, std::string_view word) {
+  const bool begins =
+      text.size() > word.size() + 1 && text.starts_with(word) && text[word.size()] == ' ';
+  return begins ? text.substr(word.size() + 1) : std::string_view();
+}
+
+/// "NAME by 90 about x in 2s".
+bool parse_turn_command(std::string_view text, ActionRequest& action) {
+  const std::size_t by = text.rfind(" by ");
+  if (by == std::string_view::npos || by == 0) return false;
+  action.target = std::string(text.substr(0, by));
+  const std::vector<std::string_view> words = split(text.substr(by + 4), ' ');
+  constexpr std::string_view kAxes = "xyz";
+  bool good = parse_number(words[0], action.degrees) &&
+              std::fabs(action.degrees) <= static_cast<double>(kMostDegrees) &&
+              words.size() % 2 == 1;
+  for (std::size_t i = 1; good && i < words.size(); i += 2) {
+    const std::string_view value = words[i + 1];
+    if (words[i] == "about") {
+      const std::size_t axis = value.size() == 1 ? kAxes.find(value) : std::string_view::npos;
+      good = axis != std::string_view::npos;
+      action.axis = static_cast<int>(axis);
+    } else {
+      good = words[i] == "in" && parse_seconds(value, action.duration);
+    }
+  }
+  return good;
+}
+
+}  // namespace
+
+tl::expected<void, WrongValue> parse_event(std::string_view text, ActionRequest& action) {
+  const std::string_view node = behind(text, "tap");
+  const std::string_view delay = behind(text, "after");
+  if (text == "found" || text == "lost") {
+    action.event = text == "found" ? ActionEvent::kFound : ActionEvent::kLost;
+  } else if (!node.empty()) {
+    action.event = ActionEvent::kTap;
+    action.source = std::string(node);
+  } else if (parse_seconds(delay, action.seconds)) {
+    action.event = ActionEvent::kAfter;
+  } else {
+    return tl::unexpected(WrongValue{"there is no such event",
+                                     "write found, lost, tap NAME, or after 3s (at most a day)"});
+  }
+  return {};
+}
+
+tl::expected<void, WrongValue> parse_command(std::string_view text, ActionRequest& action) {
+  constexpr std::pair<std::string_view, ActionCommand> kCommands[] = {
+      {"show", ActionCommand::kShow},     {"hide", ActionCommand::kHide},
+      {"toggle", ActionCommand::kToggle}, {"text", ActionCommand::kText},
+      {"next", ActionCommand::kNext},     {"link", ActionCommand::kLink},
+      {"turn", ActionCommand::kTurn}};
+  for (const auto& [word, command] : kCommands) {
+    const std::string_view rest = behind(text, word);
+    if (rest.empty()) continue;
+    action.command = command;
+    if (command == ActionCommand::kLink) {
+      action.address = std::string(rest);
+      if (rest.starts_with("https://") && rest.size() > 8) return {};
+      return tl::unexpected(
+          WrongValue{"links lead to https addresses only", "write link https://museum.org/vase"});
+    }
+    if (command != ActionCommand::kTurn) {
+      action.target = std::string(rest);
+      return {};
+    }
+    if (parse_turn_command(rest, action)) return {};
+    return tl::unexpected(WrongValue{"the turn is not understood",
+                                     "write turn NAME by 90, or turn NAME by 90 about x in 2s"});
+  }
+  return tl::unexpected(
+      WrongValue{"there is no such command",
+                 "write show, hide, toggle, text, next or turn and a NAME, or link https://..."});
+}
+
 Result<SceneRequest> parse_scene(const std::string& text) {
   const std::vector<std::string_view> parts = split(text, ',');
   const std::size_t equals = parts[0].find('=');

@@ -41,6 +41,12 @@ tl::expected<SceneOffset, WrongValue> parse_offset(std::string_view text);
 tl::expected<bool, WrongValue> take_scene_part(std::string_view key, std::string_view value,
                                                SceneRequest& scene);
 
+/// "found", "lost", "tap NAME" or "after 3s"; then "show NAME", "hide NAME", "toggle NAME",
+/// "text NAME", "next NAME", "link https://...", "turn NAME by 90 [about x] [in 2s]", into the
+/// action.
+tl::expected<void, WrongValue> parse_event(std::string_view text, ActionRequest& action);
+tl::expected<void, WrongValue> parse_command(std::string_view text, ActionRequest& action);
+
 /// "PATTERN=MODEL[,scale=S|,height=120mm|,width=80mm][,up=y][,turn=90][,offset=X:Y:Z][,centred]
 /// [,light=FILE]". Errors: kUsage "cli.scene".
 Result<SceneRequest> parse_scene(const std::string& text);

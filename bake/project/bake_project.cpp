@@ -284,7 +284,31 @@ class ProjectBake {
     }
     for (const auto& [language, words] : scene.texts) text += "\n" + language + " " + words;
     for (const auto& [language, words] : scene.alts) text += "\nalt " + language + " " + words;
+    text += "\n" + request.name + (request.hidden ? " h " : " ") + request.group;
+    for (const NodeRequest& node : scene.nodes) text += node_text(node);
+    for (const ActionRequest& action : scene.actions) text += action_text(action);
     return text + "\n";
+  }
+
+  /// With what its file holds.
+  [[nodiscard]] std::string node_text(const NodeRequest& node) const {
+    ProjectScene placed;
+    placed.request = node.place;
+    placed.texts = node.texts;
+    placed.alts = node.alts;
+    std::string text = "\nnode " + node.mark + scene_text(placed);
+    if (!node.file.empty()) text += node.file + " " + digests_.of(project_.path(node.file));
+    for (const auto& [language, words] : node.titles) text += "\ntitle " + language + " " + words;
+    return text;
+  }
+
+  [[nodiscard]] static std::string action_text(const ActionRequest& action) {
+    char numbers[128];
+    std::snprintf(numbers, sizeof numbers, "\naction %u %u %d %.17g %.17g %.17g ",
+                  static_cast<unsigned>(action.event), static_cast<unsigned>(action.command),
+                  action.axis, action.seconds, action.degrees, action.duration);
+    return numbers + action.source + "\n" + action.part + "\n" + action.target + "\n" +
+           action.address;
   }
 
   void mark_wanted() {
@@ -311,6 +335,7 @@ class ProjectBake {
                                       [](const Target& target) { return target.fresh; })) {
       return digests_.learnt() ? write_state() : Result<void>();
     }
+    if (options_.only.empty()) MODAR_TRY(check_scenes());
     interrupts_ = std::make_unique<Interrupts>();
     bake(wanted);
     if (options_.only.empty()) {
@@ -321,6 +346,17 @@ class ProjectBake {
       MODAR_TRY(write_state());
     }
     interrupts_.reset();
+    return {};
+  }
+
+  /// What is wrong with a scene costs no bake.
+  Result<void> check_scenes() const {
+    for (const Target& target : targets_) {
+      if (target.fresh) continue;
+      BakeRequest described;
+      describe_scenes(target, described);
+      MODAR_TRY(check_nodes(described));
+    }
     return {};
   }
 
@@ -463,11 +499,7 @@ class ProjectBake {
     MODAR_TRY(apply_settings(settings_in(target), described));
     described.tool_version = options_.tool_version;
     if (!project_.light.empty()) described.light = project_.path(project_.light);
-    for (const ProjectScene* scene : target.scenes) {
-      described.scenes.push_back(scene->request);
-      std::string& light = described.scenes.back().light;
-      if (!light.empty()) light = project_.path(light);
-    }
+    describe_scenes(target, described);
     if (models.empty() && patterns.empty()) {
       return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
                   "it would contain neither a model nor a pattern", "name existing ones");
@@ -480,11 +512,27 @@ class ProjectBake {
     return write(target, content);
   }
 
+  void describe_scenes(const Target& target, BakeRequest& described) const {
+    for (const ProjectScene* scene : target.scenes) {
+      for (NodeRequest node : scene->nodes) {
+        if (!node.file.empty()) node.file = project_.path(node.file);
+        described.nodes.push_back(std::move(node));
+      }
+      described.actions.insert(described.actions.end(), scene->actions.begin(),
+                               scene->actions.end());
+      if (scene->request.model.empty()) continue;
+      described.scenes.push_back(scene->request);
+      std::string& light = described.scenes.back().light;
+      if (!light.empty()) light = project_.path(light);
+    }
+  }
+
   static void add_texts(const Target& target, BundleContent& content) {
     Json texts = Json::array();
     for (const ProjectScene* scene : target.scenes) {
       if (scene->texts.empty() && scene->alts.empty()) continue;
-      Json entry = {{"pattern", scene->request.pattern}, {"model", scene->request.model}};
+      Json entry = {{"pattern", scene->request.pattern}};
+      if (!scene->request.model.empty()) entry.set("model", scene->request.model);
       for (const auto& [key, words] : {std::pair("text", &scene->texts), {"alt", &scene->alts}}) {
         if (words->empty()) continue;
         Json by_language = Json::object();
@@ -637,8 +685,10 @@ class ProjectBake {
       }
     }
     for (const ProjectScene& scene : project_.scenes) {
-      if (options_.only.empty() && !scene.request.light.empty()) {
-        inputs.insert(project_.path(scene.request.light));
+      if (!options_.only.empty()) continue;
+      if (!scene.request.light.empty()) inputs.insert(project_.path(scene.request.light));
+      for (const NodeRequest& node : scene.nodes) {
+        if (!node.file.empty()) inputs.insert(project_.path(node.file));
       }
     }
     outcome.inputs.assign(inputs.begin(), inputs.end());

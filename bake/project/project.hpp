@@ -32,9 +32,11 @@ struct ProjectAsset {
 };
 
 struct ProjectScene {
-  SceneRequest request;                      ///< its light: relative to the project's folder
-  std::map<std::string, std::string> texts;  ///< by language: {"en", "A vase."}
-  std::map<std::string, std::string> alts;   ///< the same: what a screen reader says is seen
+  SceneRequest request;  ///< its light: relative to the project's folder; no model: nodes alone
+  Words texts;
+  Words alts;                          ///< what a screen reader says is seen
+  std::vector<NodeRequest> nodes;      ///< files: relative to the project's folder
+  std::vector<ActionRequest> actions;  ///< on anything that stands on the pattern
 };
 
 /// Which assets go into one file. Models of the patterns' scenes come along.

@@ -105,8 +105,21 @@ class TableReader {
     if (good) return {};
     return wrong(key, "a number, a text, or a list of numbers");
   }
+  /// The tables of an array within, [[name.key]].
+  [[nodiscard]] Result<std::vector<TableReader>> take_tables(const std::string& key) const {
+    std::vector<TableReader> list;
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) return list;
+    const std::string name = "[[" + name_.substr(2, name_.size() - 4) + "." + key + "]]";
+    const auto* array = node->as_array();
+    if (array == nullptr || !array->is_homogeneous<toml::table>()) {
+      return wrong(key, name + " above each of them");
+    }
+    for (const auto& element : *array) list.emplace_back(file_, *element.as_table(), name);
+    return list;
+  }
   /// Every key of a table within: {"en", "A vase."}.
-  Result<void> take(std::string_view key, std::map<std::string, std::string>& texts) const {
+  Result<void> take(std::string_view key, Words& texts) const {
     const toml::node* node = table_.get(key);
     if (node == nullptr) return {};
     const auto* within = node->as_table();
@@ -433,12 +446,17 @@ class ProjectReader {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
     for (const TableReader& reader : readers) {
       MODAR_TRY(reader.allow({"pattern", "model", "scale", "height", "width", "up", "turn",
-                              "offset", "centred", "light", "text", "alt"}));
+                              "offset", "centred", "light", "text", "alt", "name", "hidden",
+                              "group", "picture", "label", "action"}));
       ProjectScene scene;
       MODAR_TRY(reader.take("pattern", scene.request.pattern));
       MODAR_TRY(reader.take("model", scene.request.model));
       MODAR_TRY(known(reader, "pattern", scene.request.pattern, project_.patterns));
-      MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
+      MODAR_TRY(read_nodes(reader, scene));
+      if (reader.has("model") || scene.nodes.empty()) {
+        MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
+      }
+      MODAR_TRY(take_node(reader, scene.request));
       MODAR_TRY(read_placement(reader, scene.request));
       MODAR_TRY(reader.take("centred", scene.request.centred));
       scene.request.light = project_.light;
@@ -448,6 +466,92 @@ class ProjectReader {
       project_.scenes.push_back(std::move(scene));
     }
     if (readers.empty()) make_scenes();
+    return {};
+  }
+
+  /// What a scene's model, its pictures and labels have in common.
+  static Result<void> take_node(const TableReader& reader, SceneRequest& place) {
+    MODAR_TRY(reader.take("name", place.name));
+    if (printable(place.name) != place.name) return reader.wrong("name", "a name of letters");
+    MODAR_TRY(reader.take("hidden", place.hidden));
+    return reader.take("group", place.group);
+  }
+
+  Result<void> read_nodes(const TableReader& scene_reader, ProjectScene& scene) {
+    MODAR_ASSIGN(const auto pictures, scene_reader.take_tables("picture"));
+    for (const TableReader& reader : pictures) MODAR_TRY(read_picture(reader, scene));
+    MODAR_ASSIGN(const auto labels, scene_reader.take_tables("label"));
+    for (const TableReader& reader : labels) MODAR_TRY(read_label(reader, scene));
+    MODAR_ASSIGN(const auto actions, scene_reader.take_tables("action"));
+    for (const TableReader& reader : actions) MODAR_TRY(read_action(reader, scene));
+    return {};
+  }
+
+  Result<void> read_picture(const TableReader& reader, ProjectScene& scene) {
+    MODAR_TRY(reader.allow({"file", "name", "scale", "height", "width", "turn", "offset", "centred",
+                            "hidden", "group", "alt"}));
+    NodeRequest node;
+    node.where = reader.at("file");
+    node.place.pattern = scene.request.pattern;
+    MODAR_TRY(take_file(reader, "file", node.file));
+    if (node.file.empty()) return reader.wrong("file", "file = \"map.png\"");
+    MODAR_TRY(take_node(reader, node.place));
+    if (node.place.name.empty()) node.place.name = file_stem(node.file);
+    MODAR_TRY(read_placement(reader, node.place));
+    MODAR_TRY(reader.take("centred", node.place.centred));
+    MODAR_TRY(reader.take("alt", node.alts));
+    scene.nodes.push_back(std::move(node));
+    return {};
+  }
+
+  static Result<void> read_label(const TableReader& reader, ProjectScene& scene) {
+    constexpr std::size_t kMostMarkBytes = 32;
+    MODAR_TRY(reader.allow({"name", "mark", "offset", "hidden", "group", "title", "text"}));
+    NodeRequest node;
+    node.kind = NodeKind::kLabel;
+    node.where = reader.at("name");
+    node.place.pattern = scene.request.pattern;
+    MODAR_TRY(take_node(reader, node.place));
+    node.mark = std::to_string(
+        1 + std::count_if(scene.nodes.begin(), scene.nodes.end(),
+                          [](const NodeRequest& other) { return other.kind == NodeKind::kLabel; }));
+    MODAR_TRY(reader.take("mark", node.mark));
+    if (node.place.name.empty()) node.place.name = node.mark;
+    if (node.mark.empty() || node.mark.size() > kMostMarkBytes ||
+        printable(node.mark) != node.mark) {
+      return reader.wrong("mark", "a number or a short word");
+    }
+    MODAR_TRY(read_part(reader, "offset", node.place));
+    MODAR_TRY(reader.take("title", node.titles));
+    MODAR_TRY(reader.take("text", node.texts));
+    scene.nodes.push_back(std::move(node));
+    return {};
+  }
+
+  static Result<void> read_action(const TableReader& reader, ProjectScene& scene) {
+    MODAR_TRY(reader.allow({"on", "part", "do"}));
+    ActionRequest action;
+    action.pattern = scene.request.pattern;
+    action.where = reader.at("do");
+    std::string event;
+    std::string command;
+    MODAR_TRY(reader.take("on", event));
+    MODAR_TRY(reader.take("part", action.part));
+    MODAR_TRY(reader.take("do", command));
+    const auto wrong = [&](const char* key, const std::string& text, const WrongValue& why) {
+      return fail(ExitCode::kInvalidInput, "project.value", reader.at(key),
+                  std::string(key) + " = \"" + text + "\": " + why.cause, why.cure);
+    };
+    if (const auto read = parse_event(event, action); !read) {
+      return wrong("on", event, read.error());
+    }
+    if (const auto read = parse_command(command, action); !read) {
+      return wrong("do", command, read.error());
+    }
+    if (!action.part.empty() && action.event != ActionEvent::kTap) {
+      return reader.wrong("part", "a part beside on = \"tap MODEL\" only");
+    }
+    scene.actions.push_back(std::move(action));
     return {};
   }
 
@@ -472,14 +576,19 @@ class ProjectReader {
     return {};
   }
 
-  /// The picture of a room; relative to the project's folder, as models are.
+  /// The picture of a room.
   Result<void> take_light(const TableReader& reader, std::string& light) const {
-    MODAR_TRY(reader.take("light", light));
+    return take_file(reader, "light", light);
+  }
+
+  /// A file; relative to the project's folder, as models are.
+  Result<void> take_file(const TableReader& reader, const char* key, std::string& file) const {
+    MODAR_TRY(reader.take(key, file));
     std::error_code error;
-    if (!light.empty()) MODAR_TRY(keep_inside(reader, "light", light));
-    if (light.empty() || fs::is_regular_file(project_.path(light), error)) return {};
-    return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("light"),
-                "there is no file '" + light + "'", "correct the name, or remove the line");
+    if (!file.empty()) MODAR_TRY(keep_inside(reader, key, file));
+    if (file.empty() || fs::is_regular_file(project_.path(file), error)) return {};
+    return fail(ExitCode::kInvalidInput, "project.no-match", reader.at(key),
+                "there is no file '" + file + "'", "correct the name, or remove the line");
   }
 
   static Result<void> known(const TableReader& reader, const char* key, const std::string& name,

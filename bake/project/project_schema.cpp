@@ -7,7 +7,7 @@ namespace modar {
 namespace {
 
 /// What is no option of the bake.
-constexpr const char* kTables = R"({"$schema": "http://json-schema.org/draft-07/schema#",
+constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft-07/schema#",
  "title": "modar.toml: a project of ModAR",
  "type": "object", "additionalProperties": false,
  "properties": {
@@ -44,10 +44,59 @@ constexpr const char* kTables = R"({"$schema": "http://json-schema.org/draft-07/
     "shape": {"type": "string", "pattern": "^(cylinder|cone|box),",
       "description": "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or box,size=120x180x40mm,right=right.png"}}}},
   "scene": {"type": "array", "items": {"type": "object",
-    "description": "Which model stands on which pattern", "additionalProperties": false,
-    "required": ["pattern", "model"], "properties": {
+    "description": "Which model, pictures and labels stand on which pattern, and what they do",
+    "additionalProperties": false, "required": ["pattern"], "properties": {
     "pattern": {"type": "string"},
-    "model": {"type": "string"},
+    "model": {"type": "string", "description": "May be left out where pictures or labels are"},
+    "name": {"type": "string", "description": "What actions call it; without it, the model's"},
+    "hidden": {"type": "boolean", "default": false,
+      "description": "Not shown until an action shows it"},
+    "group": {"type": "string",
+      "description": "Variants: what has the same group, of which \"next\" shows one after the other"},
+    "picture": {"type": "array", "items": {"type": "object",
+      "description": "Pictures that lie or stand on the pattern", "additionalProperties": false,
+      "required": ["file"], "properties": {
+      "file": {"type": "string", "description": "PNG, JPEG, WebP or TIFF, relative to this file"},
+      "name": {"type": "string",
+        "description": "What actions call it; without it, the file's without extension"},
+      "scale": {"type": "number", "exclusiveMinimum": 0, "default": 1,
+        "description": "Its longer side, in longer sides of the pattern"},
+      "width": {"type": "string", "description": "Instead of a scale: \"80mm\""},
+      "height": {"type": "string", "description": "Instead of a scale: \"80mm\""},
+      "turn": {"type": ["number", "array"], "items": {"type": "number"}, "minItems": 3,
+        "maxItems": 3,
+        "description": "Degrees about the axis out of the pattern, or about its x, y and z: [90, 0, 0] stands"},
+      "offset": {"type": ["array", "string"], "items": {"type": "number"}, "minItems": 3,
+        "maxItems": 3, "description": "As of a model"},
+      "centred": {"type": "boolean", "default": false,
+        "description": "Its middle lies in the pattern's plane; else it stands on it"},
+      "hidden": {"type": "boolean", "default": false},
+      "group": {"type": "string"},
+      "alt": {"type": "object", "additionalProperties": {"type": "string"},
+        "description": "What is seen on it, by language"}}}},
+    "label": {"type": "array", "items": {"type": "object",
+      "description": "Points that say what is there", "additionalProperties": false,
+      "properties": {
+      "name": {"type": "string", "description": "What actions call it; without it, the mark"},
+      "mark": {"type": "string",
+        "description": "A number or a short word; without it, the labels are counted"},
+      "offset": {"type": ["array", "string"], "items": {"type": "number"}, "minItems": 3,
+        "maxItems": 3, "description": "Of the point, as of a model"},
+      "hidden": {"type": "boolean", "default": false},
+      "group": {"type": "string"},
+      "title": {"type": "object", "additionalProperties": {"type": "string"},
+        "description": "By language: title.en = \"The rim\""},
+      "text": {"type": "object", "additionalProperties": {"type": "string"},
+        "description": "By language"}}}},
+    "action": {"type": "array", "items": {"type": "object",
+      "description": "What happens on the pattern", "additionalProperties": false,
+      "required": ["on", "do"], "properties": {
+      "on": {"type": "string", "pattern": "^(found$|lost$|tap .|after [0-9.]+s$)",
+        "description": "found, lost, tap NAME, after 3s"},
+      "part": {"type": "string", "description": "Of a tapped model: the name of a material"},
+      "do": {"type": "string",
+        "pattern": "^((show|hide|toggle|text|next) .|turn .+ by |link https://)",
+        "description": "show, hide, toggle, text or next NAME; turn NAME by 90 about x in 2s; link https://..."}}}},
     "scale": {"type": "number", "exclusiveMinimum": 0, "default": 1,
       "description": "Largest side of the model, in largest sides of the pattern"},
     "height": {"type": "string",
@@ -87,7 +136,7 @@ constexpr const char* kTables = R"({"$schema": "http://json-schema.org/draft-07/
     "min-grade": {"enum": ["A", "B", "C", "D", "E"],
       "description": "Of each pattern, A the best: from where it is recognised"},
     "max-bytes": {"type": "integer", "minimum": 0, "description": "Of each file"}}}
-}})";
+}})json";
 
 /// What a value of modar.toml is.
 Json schema_of(const BakeOption& option) {

@@ -171,6 +171,27 @@ Result<Texture> bake_use(const TextureUse& use, const TextureOptions& options, R
 
 }  // namespace
 
+Result<std::uint32_t> add_picture(const std::string& path, const TextureOptions& options,
+                                  BundleContent& content, Report& report) {
+  MODAR_ASSIGN(const Texture baked, bake_texture(path, options, report));
+  const std::uint32_t added = append_texture(baked, content).texture;
+  for (std::uint32_t i = 0; i < added; ++i) {
+    const TextureRecord& other = content.textures[i];
+    const bool same = content.texture_data[i] == content.texture_data[added] &&
+                      other.width == content.textures[added].width &&
+                      other.source_width * content.textures[added].source_height ==
+                          other.source_height * content.textures[added].source_width &&
+                      other.flags == content.textures[added].flags &&
+                      other.level_count == content.textures[added].level_count;
+    if (!same) continue;
+    content.texture_levels.resize(content.textures[added].first_level);
+    content.textures.pop_back();
+    content.texture_data.pop_back();
+    return i;
+  }
+  return added;
+}
+
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,
                                                   BundleContent& content, Report& report) {

@@ -1,0 +1,165 @@
+"""Scenes that act: pictures, labels and actions from modar.toml to the bundle, and what is refused before the bake."""
+import json
+import shutil
+import subprocess
+import unittest
+
+from programs import ROOT, ProgramTest, picture
+
+HEAD = """[bake]
+loop-views = 8
+score = false
+lods = 1
+parameters = ["none"]
+occlusion = false
+shadows = false
+[[model]]
+file = "pot.obj"
+[[pattern]]
+file = "cover.png"
+width-mm = 144
+"""
+SCENE = """[[scene]]
+pattern = "cover"
+model = "pot"
+hidden = true
+text.en = "A pot."
+[[scene.picture]]
+file = "map.png"
+width = "72mm"
+offset = [10, 0, 0]
+group = "views"
+alt.en = "A map"
+[[scene.picture]]
+file = "map.png"
+name = "standing"
+scale = 0.25
+turn = [90, 0, 0]
+hidden = true
+group = "views"
+[[scene.label]]
+name = "rim"
+offset = [0, 36, 18]
+title.en = "The rim"
+title.de = "Der Rand"
+text.en = "Chipped."
+[[scene.action]]
+on = "found"
+do = "show pot"
+[[scene.action]]
+on = "tap pot"
+part = "wall"
+do = "turn pot by 90 about x in 1.5s"
+[[scene.action]]
+on = "tap rim"
+do = "next map"
+[[scene.action]]
+on = "after 2s"
+do = "link https://museum.org/pot"
+"""
+POT = "mtllib pot.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1\nusemtl wall\nf 1 2 3\nf 1 3 4\n"
+
+
+class Acting(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        (self.folder / "pot.obj").write_text(POT)
+        (self.folder / "pot.mtl").write_text("newmtl wall\nKd 1 1 1\n")
+        picture(self.folder / "cover.png", 144, 108)
+        shutil.copy(ROOT / "assets/models/bust.png", self.folder / "map.png")
+
+    def bake(self, scene=SCENE):
+        (self.folder / "modar.toml").write_text(HEAD + scene)
+        return self.modar("bake", "--quiet", cwd=self.folder)
+
+    def test_a_project_becomes_nodes_and_actions(self):
+        done = self.bake()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        bundle = next((self.folder / "out").glob("*.modar"))
+        read = json.loads(subprocess.run(["python3", ROOT / "scripts/read_bundle.py", bundle, "--json"], capture_output=True,
+                                         text=True, check=True).stdout)
+        pot, flat, standing, rim = read["nodes"]
+        self.assertEqual([pot["name"], pot["kind"], pot["subject"], pot["flags"]], ["pot", 1, 0, 1])
+        # The cover is two units wide and 144 mm: 72 mm are half of that; the map is as wide as high.
+        self.assertEqual([flat["name"], flat["kind"], flat["flags"], flat["half_size"]], ["map", 2, 0, [0.5, 0.5]])
+        self.assertAlmostEqual(flat["place"][0], 20 / 144, 6)
+        self.assertEqual(flat["place"][1:], [0, 0])
+        # A quarter of the cover's longer side; it stands: its middle is half of its height above the plane.
+        self.assertEqual([standing["flags"], standing["half_size"], standing["group"]], [1, [0.25, 0.25], flat["group"]])
+        self.assertEqual(standing["subject"], flat["subject"])
+        self.assertAlmostEqual(standing["place"][2], 0.25, 6)
+        for ours, theirs in zip(standing["rotation"], (0.5 ** 0.5, 0, 0, 0.5 ** 0.5)):
+            self.assertAlmostEqual(ours, theirs, 6)
+        self.assertEqual([rim["kind"], rim["mark"], rim["place"]], [3, "1", [0, 0.5, 0.25]])
+        found, turn, following, link = read["actions"]
+        self.assertEqual([found["event"], found["command"], found["source"], found["target"]], [1, 3, 0, 0])
+        self.assertEqual([turn["event"], turn["command"], turn["part"], turn["axis"], turn["degrees"], turn["duration"]],
+                         [3, 10, "wall", [1, 0, 0], 90, 1.5])
+        self.assertEqual([following["source"], following["command"], following["target"]], [3, 8, 1])
+        self.assertEqual([link["event"], link["seconds"], link["command"], link["address"]], [4, 2, 7, "https://museum.org/pot"])
+        self.assertEqual(json.loads(read["meta"])["nodes"], [
+            {"pattern": "cover", "node": "map", "alt": {"en": "A map"}},
+            {"pattern": "cover", "node": "rim", "title": {"de": "Der Rand", "en": "The rim"}, "text": {"en": "Chipped."}}])
+
+        told = json.loads(self.modar("inspect", bundle, "--json").stdout)
+        self.assertEqual([(node["name"], node["kind"], node["hidden"]) for node in told["nodes"]],
+                         [("pot", "model", True), ("map", "picture", False), ("standing", "picture", True), ("rim", "label", False)])
+        self.assertEqual([action["words"] for action in told["actions"]],
+                         ["found: show pot", "tap pot (wall): turn pot by 90 about x in 1.5s", "tap rim: next map",
+                          "after 2s: link https://museum.org/pot"])
+        self.assertEqual((told["scenes"][0]["labels"], told["scenes"][0]["actions"]), (1, 4))
+        checked = self.modar("check", bundle, "--source", self.folder / "modar.toml", "--json")
+        self.assertEqual(checked.returncode, 0, checked.stdout)
+        self.assertEqual([issue["id"] for issue in json.loads(checked.stdout)["issues"]], [])
+
+    def test_a_changed_picture_bakes_again_and_nothing_else(self):
+        self.assertEqual(self.bake().returncode, 0)
+        bundle = next((self.folder / "out").glob("*.modar"))
+        before = bundle.read_bytes()
+        again = json.loads(self.modar("bake", "--json", cwd=self.folder).stdout)
+        self.assertEqual({asset["state"] for asset in again["assets"]}, {"fresh"})
+        shutil.copy(ROOT / "assets/models/pottery.png", self.folder / "map.png")
+        changed = json.loads(self.modar("bake", "--json", cwd=self.folder).stdout)
+        self.assertEqual({asset["state"] for asset in changed["assets"]}, {"cached"})
+        self.assertNotEqual(bundle.read_bytes(), before)
+
+    def test_pictures_and_labels_need_no_model(self):
+        scene = '[[scene]]\npattern = "cover"\ntext.en = "A map."\n[[scene.picture]]\nfile = "map.png"\n'
+        done = self.bake(scene)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        bundle = next((self.folder / "out").glob("*.modar"))
+        told = json.loads(self.modar("inspect", bundle, "--json").stdout)
+        self.assertEqual((len(told["scenes"]), [node["name"] for node in told["nodes"]]), (0, ["map"]))
+
+    def test_what_is_wrong_is_told_with_its_line_before_the_bake(self):
+        for change, code, where in (
+                (('do = "show pot"', 'do = "show pott"'), "action.unknown", 'do = "show pott"'),
+                (('do = "show pot"', 'do = "text pot"'), "action.command", 'do = "text pot"'),
+                (('do = "show pot"', 'do = "next pot"'), "action.command", 'do = "next pot"'),
+                (('do = "show pot"', 'do = "turn rim by 9"'), "action.command", 'do = "turn rim'),
+                (('do = "show pot"', 'do = "sing"'), "project.value", 'do = "sing"'),
+                (('do = "show pot"', 'do = "turn pot by 90 around x"'), "project.value", 'do = "turn pot by 90 around'),
+                (('"link https:', '"link http:'), "project.value", 'do = "link'),
+                (('on = "found"', 'on = "fund"'), "project.value", 'on = "fund"'),
+                (('on = "found"', 'on = "found"\npart = "lid"'), "project.value", 'part = "lid"'),
+                (('on = "tap rim"', 'on = "tap rim"\npart = "lid"'), "action.part", 'do = "next map"'),
+                (('name = "standing"', 'name = "rim"'), "node.same-name", 'name = "rim"\noffset'),
+                (('name = "standing"', 'title.en = "x"'), "project.key", 'title.en = "x"'),
+                (('name = "rim"', 'mark = ""'), "project.value", 'mark = ""'),
+                (('"map.png"', '"mop.png"'), "project.no-match", 'file = "mop.png"')):
+            scene = SCENE.replace(*change, 1)
+            done = self.bake(scene)
+            line = (HEAD + scene)[:(HEAD + scene).index(where)].count("\n") + 1
+            self.assertIn(done.returncode, (1, 3), (change, done.stderr))
+            self.assertIn(code, done.stderr, change)
+            self.assertIn(f"modar.toml:{line}:", done.stderr, change)
+            self.assertFalse((self.folder / "out").exists() and list((self.folder / "out").glob("*.modar")), change)
+        # A part is known once its model is baked.
+        done = self.bake(SCENE.replace('part = "wall"', 'part = "wal"'))
+        self.assertIn("did you mean 'wall'?", done.stderr)
+        (self.folder / "map.png").write_bytes(b"no picture")
+        self.assertIn("image.decode", self.bake().stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
