@@ -50,18 +50,17 @@ select { background: var(--card); color: var(--ink); width: 100%; }
 `;
 
 export const STYLE = `
-:host { display: block; position: relative; aspect-ratio: 4 / 3; min-height: 14rem; overflow: hidden; }
+:host { display: grid; aspect-ratio: 4 / 3; }
 :host([bare]) { display: contents; }
 :host([bare]) #cover { display: none; }
 #all { display: contents; font: 1.0625rem/1.5 var(--serif); color: var(--ink); -webkit-text-size-adjust: 100%; }
 
 /* ---- before the start ---- */
-#cover { position: absolute; inset: 0; display: grid; align-items: end; justify-items: center; background: var(--paper); }
-#cover img, ::slotted([slot="poster"]) { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
-#begin {
-  position: relative; display: grid; gap: .6rem; margin: 1rem; padding: .8rem 1rem; max-width: 30rem; max-height: calc(100% - 2rem);
-  overflow-y: auto; background: var(--card); box-shadow: var(--shadow);
-}
+#cover { display: grid; grid-template-rows: minmax(9rem, 1fr) auto; background: var(--paper); }
+#frame { position: relative; margin: .8rem .8rem 0; }
+#poster, ::slotted([slot="poster"]) { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
+#begin { display: grid; gap: .6rem; padding: .8rem 1rem; justify-items: center; text-align: center; }
+#begin .row { justify-content: center; font-size: .9375rem; }
 #progress { color: var(--accent); }
 #progress:empty { display: none; }
 
@@ -129,7 +128,7 @@ const tool = (id, label, drawing, kind = '', more = '') =>
 
 const MARKUP = `<div id="all">
 <div id="cover">
-  <slot name="poster"><img id="poster" alt="" hidden></slot>
+  <div id="frame"><slot name="poster"><img id="poster" alt="" hidden></slot></div>
   <div id="begin">
     <p class="row"><button id="start" type="button" data-word="start"></button><button id="look" type="button" class="quiet" data-word="lookAround"></button></p>
     <p id="progress" role="status"></p>
