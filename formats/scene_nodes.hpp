@@ -37,6 +37,10 @@ struct NodeRecord {
 };
 static_assert(sizeof(NodeRecord) == 96);
 
+constexpr bool kind_is(const NodeRecord& node, NodeKind kind) {
+  return node.kind == static_cast<std::uint32_t>(kind);
+}
+
 enum class ActionEvent : std::uint32_t { kFound = 1, kLost = 2, kTap = 3, kAfter = 4 };
 enum class ActionCommand : std::uint32_t {
   kShow = 3,

@@ -110,10 +110,6 @@ std::uint32_t pattern_of(const BundleParts& parts, const ActionRecord& action) {
   return action.source < parts.nodes.size() ? parts.nodes[action.source].pattern : kNone;
 }
 
-bool kind_is(const NodeRecord& node, NodeKind kind) {
-  return node.kind == static_cast<std::uint32_t>(kind);
-}
-
 /// Whether its command can be done to its target.
 bool fits_command(const BundleParts& parts, const ActionRecord& action) {
   const auto command = static_cast<ActionCommand>(action.command);

@@ -7,10 +7,6 @@
 namespace modar {
 namespace {
 
-bool kind_is(const NodeRecord& node, NodeKind kind) {
-  return node.kind == static_cast<std::uint32_t>(kind);
-}
-
 /// A turn about the node's place.
 glm::mat4 turn_about(const NodeTurn& turn, const glm::vec3& place) {
   const glm::mat4 turned = glm::mat4_cast(glm::quat(turn.w, turn.x, turn.y, turn.z));
