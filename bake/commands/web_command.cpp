@@ -113,6 +113,8 @@ void add_web(CommandLine& program) {
             "Add USDZ and GLB files, which iPhones and Android phones show in the visitor's room");
   line.option("--link", &options.links, "Link at the foot of the cover: 'Imprint=https://...'",
               {.type = "TEXT=URL"});
+  line.option("--statement", &options.statement,
+              "Add an accessibility statement of this publisher, see below", {.type = "JSON"});
   line.option(
       "--release", &options.release,
       "Address of a folder of `modar ship publish`, from which the page updates its bundles",
@@ -137,7 +139,9 @@ void add_web(CommandLine& program) {
       "  modar web vase.modar -o site --release release --trust museum.key.pub\n"
       "\n"
       "texts.json: {\"cover\": {\"en\": {\"name\": \"The cover\", \"text\": \"Printed in "
-      "1890.\", \"alt\": \"A red vase\"}}}\n"));
+      "1890.\", \"alt\": \"A red vase\"}}}\n"
+      "statement.json: {\"publisher\": \"Museum of X\", \"date\": \"2026-11-26\", \"feedback\": "
+      "\"mailto:access@museum.org\", \"enforcement\": \"https://...\"}\n"));
   line.run([command] { return run_web(*command); });
 }
 

@@ -4,6 +4,13 @@
 
 namespace modar {
 
+bool is_link_address(std::string_view url) {
+  for (const char* scheme : {"https://", "http://", "mailto:", "tel:"}) {
+    if (url.starts_with(scheme)) return true;
+  }
+  return !url.empty() && url.find(':') == std::string_view::npos && url[0] != '/';
+}
+
 std::string title_of(std::string_view name) {
   std::string title(name);
   std::replace(title.begin(), title.end(), '_', ' ');

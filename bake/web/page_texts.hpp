@@ -10,6 +10,9 @@
 
 namespace modar {
 
+/// Whether a page may link to this: https, http, mailto, tel, or a file beside the page.
+bool is_link_address(std::string_view url);
+
 /// "red_vase" as people write it.
 std::string title_of(std::string_view name);
 

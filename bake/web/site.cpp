@@ -15,6 +15,7 @@
 #include "bake/process.hpp"
 #include "bake/web/hint.hpp"
 #include "bake/web/page_texts.hpp"
+#include "bake/web/statement.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "formats/base/html.hpp"
 #include "formats/bundle_view.hpp"
@@ -67,7 +68,8 @@ struct Draft {
   Json texts;
   std::size_t texts_used = 0;
   std::uint64_t hash = 14695981039346656037u;
-  std::vector<std::string> kept;  ///< what sw.js keeps: addresses of the files
+  std::vector<std::string> kept;      ///< what sw.js keeps: addresses of the files
+  Json undescribed = Json::object();  ///< {LANGUAGE: [titles of patterns without an `alt`]}
   Site site;
 };
 
@@ -205,6 +207,16 @@ Result<Json> texts_of(Draft& draft, const BundleView& bundle, const std::string&
   return given_texts(*given, draft.options.texts, pattern, draft.languages);
 }
 
+void note_undescribed(Draft& draft, const Json& texts, const std::string& title) {
+  for (const std::string& language : draft.languages) {
+    if (texts.find(language + "/alt")) continue;
+    const std::string name = texts.find(language + "/name").value_or(title).text().value_or("");
+    Json names = draft.undescribed.find(language).value_or(Json::array());
+    names.push_back(name);
+    draft.undescribed.set(language, names);
+  }
+}
+
 /// The picture that the tracker looks for, as a hint for visitors.
 Result<Json> put_hint(Draft& draft, const BundleView& bundle, std::uint32_t pattern,
                       const std::string& file) {
@@ -219,6 +231,7 @@ Result<Json> put_hint(Draft& draft, const BundleView& bundle, std::uint32_t patt
                {"flat", bundle.section(SectionType::kPatternShape, pattern).empty()}};
   MODAR_ASSIGN(const Json texts, texts_of(draft, bundle, name));
   if (!texts.is_null()) json.set("texts", texts);
+  note_undescribed(draft, texts, title_of(name));
   return json;
 }
 
@@ -303,10 +316,7 @@ Result<Json> links_of(const SiteOptions& options) {
   for (const std::string& link : options.links) {
     const std::size_t equals = link.find('=');
     const std::string url = equals == std::string::npos ? "" : link.substr(equals + 1);
-    const bool known = url.starts_with("https://") || url.starts_with("http://") ||
-                       url.starts_with("mailto:") || url.starts_with("tel:");
-    const bool beside = !url.empty() && url.find(':') == std::string::npos && url[0] != '/';
-    if (equals == 0 || (!known && !beside)) {
+    if (equals == 0 || !is_link_address(url)) {
       return fail(ExitCode::kUsage, "web.link", link, "this is no text with an address",
                   "write --link 'Imprint=https://museum.org/imprint'");
     }
@@ -351,6 +361,28 @@ Result<Json> release_of(const SiteOptions& options, const std::string& page) {
               {"epoch", options.release_epoch},
               {"version", options.release_version},
               {"stall", kStallSeconds}};
+}
+
+/// The accessibility statement in the page's languages, in English for one that has none:
+/// {LANGUAGE: {"text", "url", "lang"}}.
+Result<Json> put_statements(Draft& draft, const Publisher& publisher, const std::string& title) {
+  Json links = Json::object();
+  for (const std::string& language : draft.languages) {
+    const bool own = fs::exists(draft.page + "/statements/" + language + ".json");
+    const std::string written = own ? language : "en";
+    MODAR_ASSIGN(const std::string file, page_text(draft, "statements/" + written + ".json"));
+    const Json texts = Json::parse(file);
+    const Json names = draft.undescribed.find(language).value_or(Json::array());
+    std::vector<std::string> undescribed;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      undescribed.push_back(names.at(i)->text().value_or(""));
+    }
+    const std::string name = "accessibility-" + language + ".html";
+    MODAR_TRY(put(draft, name, statement_page(texts, written, title, publisher, undescribed)));
+    links.set(language,
+              {{"text", texts.find("title").value_or("")}, {"url", name}, {"lang", written}});
+  }
+  return links;
 }
 
 /// index.html, the manifest and, last of all, sw.js.
@@ -398,7 +430,7 @@ Result<std::string> find_page() {
 }
 
 Result<Site> write_site(const SiteOptions& options) {
-  Draft draft{options, options.page, {}, {}, 0, 14695981039346656037u, {}, {}};
+  Draft draft{options, options.page, {}, {}, 0, 14695981039346656037u, {}, Json::object(), {}};
   if (draft.page.empty()) {
     MODAR_ASSIGN(draft.page, find_page());
   }
@@ -406,6 +438,10 @@ Result<Site> write_site(const SiteOptions& options) {
   MODAR_TRY(read_texts(draft));
   MODAR_ASSIGN(const Json release, release_of(options, draft.page));
   MODAR_ASSIGN(const Json links, links_of(options));
+  Publisher publisher;
+  if (!options.statement.empty()) {
+    MODAR_ASSIGN(publisher, read_publisher(options.statement));
+  }
   MODAR_TRY(claim_output_folder(options.output, options.force));
   for (const char* folder : {"/bundles", "/patterns", "/words"}) {
     MODAR_TRY(make_output_folder(options.output + folder));
@@ -427,6 +463,10 @@ Result<Site> write_site(const SiteOptions& options) {
   Json site = {{"title", title}, {"languages", Json::list(draft.languages)}, {"bundles", bundles}};
   if (links.size() != 0) site.set("links", links);
   if (!release.is_null()) site.set("release", release);
+  if (!options.statement.empty()) {
+    MODAR_ASSIGN(const Json statements, put_statements(draft, publisher, title));
+    site.set("statements", statements);
+  }
   MODAR_TRY(put(draft, "site.json", site.dump()));
   MODAR_TRY(put_page(draft));
   MODAR_TRY(put_entry(draft, title));

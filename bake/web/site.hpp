@@ -20,6 +20,7 @@ struct SiteOptions {
   std::vector<std::string> links;  ///< "Imprint=https://...": at the foot of the cover
   std::string
       texts;  ///< JSON {PATTERN: {LANGUAGE: {"name", "text", "alt"}}}; empty: those of the bundles
+  std::string statement;  ///< JSON of a Publisher: add its accessibility statement; empty: none
   std::string release;  ///< address of a folder of `modar ship publish`, seen from the page; empty:
                         ///< no updates
   std::string trusted_key;  ///< file K.pub that its releases are verified with
@@ -44,8 +45,8 @@ Result<std::string> find_page();
 
 /// Writes the folder. The same bundles and options give the same bytes. sw.js comes last: what a
 /// visitor keeps changes when all else is there. Errors: those of the bundles; kInvalidInput
-/// "web.pattern", "web.texts", "key.public"; kUsage "web.trust"; kUsage "web.language",
-/// "web.twice", "web.link", "web.words"; kUnsupported "web.page"; kIo.
+/// "web.pattern", "web.texts", "web.statement", "key.public"; kUsage "web.trust"; kUsage
+/// "web.language", "web.twice", "web.link", "web.words"; kUnsupported "web.page"; kIo.
 Result<Site> write_site(const SiteOptions& options);
 
 }  // namespace modar

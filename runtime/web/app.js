@@ -38,6 +38,7 @@ async function useLanguage(language) {
   $('photo-image').alt = words.photoAlt;
   viewer.words = words;
   showPlates();
+  showLinks();
 }
 
 function showLanguages() {
@@ -54,8 +55,9 @@ function showLanguages() {
 }
 
 function showLinks() {
-  $('links').replaceChildren(...(site.links ?? []).map(({ text, url }) =>
-    Object.assign(document.createElement('a'), { textContent: text, href: url, rel: 'noopener' })));
+  const statement = site.statements?.[root.lang];
+  $('links').replaceChildren(...[statement, ...site.links ?? []].filter(Boolean).map(({ text, url, lang = '' }) =>
+    Object.assign(document.createElement('a'), { textContent: text, href: url, lang, rel: 'noopener' })));
 }
 
 // ---- the cover ----
@@ -144,7 +146,6 @@ async function prepare() {
   await chooseBundles();
   await useLanguage(chooseLanguage(site.languages));
   showLanguages();
-  showLinks();
   if (!navigator.connection?.saveData) loading = loadBundle().catch(() => {});  // the start button tells what is wrong
   update();
 }

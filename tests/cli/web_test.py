@@ -17,6 +17,12 @@ import urllib.request
 from programs import BIN, COVER, ROOT, ProgramTest
 
 PAGE = ROOT / "runtime" / "web"
+# What an accessibility statement says of the tests, and the tests that show it.
+PROOFS = {
+    "axe": ("page_test.py", "test_axe_core_finds_nothing"), "names": ("page_test.py", "test_everything_has_a_name"),
+    "keys": ("page_test.py", "test_keys_turn_and_resize"), "handles": ("page_test.py", "test_a_look_without_a_camera"),
+    "alone": ("page_test.py", "test_a_look_without_a_camera"), "languages": ("page_test.py", "test_a_language_is_chosen_and_kept"),
+    "reflow": ("page_test.py", "test_small_screens_scroll_one_way")}
 ENGINES = ("engine-plain.js", "engine-plain.wasm", "engine-simd.js", "engine-simd.wasm")
 
 
@@ -152,6 +158,52 @@ class Web(ProgramTest):
         self.assert_fails(self.web(bundle, "--words", self.folder / "none"), 2, "none")
         for link in ("Imprint", "=https://example.org", "Bad=javascript:alert(1)", "Bad=/etc/passwd"):
             self.assert_fails(self.web(bundle, "--link", link), 1, "--link 'Imprint=")
+
+    def test_an_accessibility_statement(self):
+        texts = self.folder / "texts.json"
+        texts.write_text(json.dumps({"cover": {"de": {"name": "Einband", "alt": "Eine Vase"}, "en": {"name": "The <cover>"}}}))
+        publisher = {"publisher": "Museum <of> X", "date": "2026-11-26", "feedback": "mailto:access@example.org", "enforcement": "https://example.org/?a=1&b"}
+        file = self.folder / "statement.json"
+        file.write_text(json.dumps(publisher))
+        words = ["--title", "Pots & pans", "--statement", file, "--texts", texts, "--words", self.folder / "more", "--languages", "de,en,cs"]
+        (self.folder / "more").mkdir()
+        shutil.copy(PAGE / "words" / "en.json", self.folder / "more" / "cs.json")
+        bundle = self.bake_demo()
+        self.assertEqual(self.web(bundle, *words).returncode, 0)
+        german, english, czech = (self.read(f"accessibility-{language}.html").decode() for language in ("de", "en", "cs"))
+        for page, said in ((german, "Stand der Vereinbarkeit mit den Anforderungen"), (english, "Compliance status"),
+                           (english, "The &lt;cover&gt;"), (english, "Museum &lt;of&gt; X is committed"), (english, "<time>2026-11-26</time>"),
+                           (english, '<a href="mailto:access@example.org">access@example.org</a>'),
+                           (english, '<a href="https://example.org/?a=1&amp;b">'), (english, '<a href="./?lang=en">Pots &amp; pans</a>'),
+                           (german, '<html lang="de">'), (czech, '<html lang="en">')):
+            self.assertIn(said, page)
+        self.assertNotIn("Einband", german)  # it has a description
+        self.assertNotRegex(german + english, r"\{\w+\}|<p></p>|<li></li>|<h2></h2>")
+        site = json.loads(self.read("site.json"))
+        self.assertEqual(site["statements"]["de"], {"text": "Erklärung zur Barrierefreiheit", "url": "accessibility-de.html", "lang": "de"})
+        self.assertEqual(site["statements"]["cs"]["lang"], "en")
+        self.assertIn("accessibility-de.html", self.read("sw.js").decode())
+        for part, bad in (("publisher", ""), ("date", "today"), ("feedback", "javascript:alert(1)"), ("enforcement", "/etc/passwd")):
+            file.write_text(json.dumps({**publisher, part: bad}))
+            self.assert_fails(self.web(bundle, *words), 3, "statement.json", f"'{part}'")
+        file.write_text("[]")
+        self.assert_fails(self.web(bundle, *words), 3, "'publisher'")
+
+    def test_statements_are_complete_and_say_what_tests_show(self):
+        def texts(value, path=""):
+            return {path: value} if isinstance(value, str) else {k: v for key in value for k, v in texts(value[key], f"{path}/{key}").items()}
+        english = texts(json.loads((PAGE / "statements" / "en.json").read_text()))
+        languages = {file.name for file in (PAGE / "words").glob("*.json")}
+        self.assertEqual({file.name for file in (PAGE / "statements").glob("*.json")}, languages)
+        for name in languages:
+            own = texts(json.loads((PAGE / "statements" / name).read_text()))
+            self.assertEqual(list(own), list(english), name)
+            for key, text in english.items():
+                self.assertEqual(sorted(re.findall(r"\{\w+\}", own[key])), sorted(re.findall(r"\{\w+\}", text)), f"{name}, {key}")
+        said = {key.rpartition("/")[2] for key in english if key.startswith("/preparation/")} - {"heading", "date", "method", "untested"}
+        self.assertEqual(said, set(PROOFS))
+        for file, test in PROOFS.values():
+            self.assertIn(f"def {test}(self)", (ROOT / "tests" / "web" / file).read_text())
 
     def test_what_it_refuses(self):
         bundle = self.bake_demo()

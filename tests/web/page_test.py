@@ -177,13 +177,17 @@ class Page(ProgramTest):
         texts = cls.base / "texts.json"
         texts.write_text(json.dumps({"cover": {"en": {"name": "The book of owls", "text": "A pot.", "alt": "A pot with two handles"},
                                                "de": {"name": "Das Buch der Eulen"}}}))
+        statement = cls.base / "statement.json"
+        statement.write_text(json.dumps({"publisher": "Museum of Pots", "date": "2026-11-26", "feedback": "mailto:access@example.org",
+                                         "enforcement": "https://example.org/theAddressOfABodyThatEnforcesWhatTheLawSaysOfAccessibility"}))
         words = cls.base / "words"
         words.mkdir()
         shutil.copy(PAGE / "words" / "en.json", words / "ar.json")  # any words: what is looked at is their direction
         for words in (["bake", "--model", POTTERY, "--pattern", COVER, "--scene", "cover=pottery,scale=0.5", "-o", bundle,
                        "--quiet", "--no-lods", *QUICK],
                       ["web", bundle, "-o", site, "--title", "Pots & pans", "--words", words, "--link", "Imprint=https://example.org/imprint",
-                       "--link", "Write to us=mailto:us@example.org", "--texts", texts, "--room", "--quiet"]):
+                       "--link", "Write to us=mailto:us@example.org", "--texts", texts, "--statement", statement, "--room",
+                       "--quiet"]):
             done = test.modar(*words)
             if done.returncode != 0:
                 raise AssertionError(done.stderr)
@@ -448,6 +452,18 @@ class Page(ProgramTest):
         self.assert_accessible("around")
         self.browser.run("document.getElementById('viewer').fail(new DOMException('', 'NotFoundError'))")
         self.assert_accessible("problem")
+        self.browser.open(self.server.url + "accessibility-de.html")
+        self.browser.run(axe.read_text() + "; 0")
+        self.assert_accessible("statement")
+        self.keep("statement.png")
+
+    def test_small_screens_scroll_one_way(self):
+        self.browser.resize(320, 256)
+        for page, shown in (("", "document.getElementById('start').textContent !== ''"), ("accessibility-de.html", "true")):
+            self.browser.open(self.server.url + page)
+            self.browser.wait(shown, page)
+            self.assertLessEqual(self.browser.run("document.scrollingElement.scrollWidth"), 320, page)
+            self.keep(f"small-{page or 'cover'}.png")
 
     def test_browsers_that_make_no_style_sheets_show_the_same(self):
         self.browser.resize(390, 844, 2, True)
@@ -593,7 +609,7 @@ class Page(ProgramTest):
         self.browser.wait("document.getElementById('start').textContent === 'Start the camera'", "English")
         self.browser.wait("caches.match('words/en.json').then(Boolean)", "what is kept again")
         links = self.browser.run("[...document.querySelectorAll('#links a')].map(({ href, textContent }) => [textContent, href])")
-        self.assertEqual(links, [["Imprint", "https://example.org/imprint"], ["Write to us", "mailto:us@example.org"]])
+        self.assertEqual(links, [["Accessibility statement", self.server.url + "accessibility-en.html"], ["Imprint", "https://example.org/imprint"], ["Write to us", "mailto:us@example.org"]])
 
     def test_a_film_shows_the_model(self):
         self.browser.resize(390, 844, 1, True)
