@@ -227,7 +227,8 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       } finally {
         this.#$('progress').textContent = '';
       }
-      this.dispatchEvent(new Event('load'));
+      if (this.#loading?.done !== done) this.#unload();  // another was chosen meanwhile, or the viewer was removed
+      else this.dispatchEvent(new Event('load'));
     });
     this.#loading = { source, done };
     return done;
@@ -292,6 +293,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       await allowMotion();  // first: iOS asks for it within the click only
       await this.#openCamera();
       await Promise.all([loaded, this.#ready]);
+      if (!this.isConnected) return this.stop();
       await this.#follow();
       this.#unseenSince = performance.now();
       this.#$('reason').textContent = this.#lookWords;
@@ -308,6 +310,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#setBusy(true);
     try {
       await Promise.all([loaded, this.#ready]);
+      if (!this.isConnected) return;
       this.#$('which').hidden = this.patterns.length < 2;
       this.#enter('around');
       this.#table = new Turntable(this.#view, this.#$('ground'));
@@ -334,6 +337,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   /** Stops, and tells the visitor what is wrong and what helps. */
   fail(error) {
     this.stop();
+    if (!this.isConnected) return;  // removed meanwhile: there is nobody to tell
     const kind = kindOf(error);
     const [title, cure] = this.#words?.errors[kind] ?? NO_WORDS;
     const host = { app: hostApp(), browser: ownBrowser() };

@@ -1,5 +1,6 @@
 """The page in Chromium with a fake camera: what a visitor sees, and that its poses are the player's."""
 import base64
+import gzip
 import hashlib
 import json
 import math
@@ -456,6 +457,16 @@ class Page(ProgramTest):
         self.browser.run(axe.read_text() + "; 0")
         self.assert_accessible("statement")
         self.keep("statement.png")
+
+    def test_page_and_engine_are_a_quarter_of_a_megabyte(self):
+        """What a first visitor's browser brings besides bundle, hint and words, compressed as servers do."""
+        self.around()
+        names = {urllib.parse.urlsplit(url).path.lstrip("/") or "index.html" for url in self.browser.requests if url.startswith(self.server.url)}
+        names = {name for name in names if not name.startswith(("bundles/", "patterns/", "words/")) and (self.site / name).is_file()}
+        self.assertIn("engine-simd.wasm", names)
+        size = sum(len(gzip.compress((self.site / name).read_bytes(), 9)) for name in names)
+        print(f"page and engine: {size} bytes gzipped, in {len(names)} files")
+        self.assertLess(size, 250_000)
 
     def test_small_screens_scroll_one_way(self):
         self.browser.resize(320, 256)

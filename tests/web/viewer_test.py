@@ -103,7 +103,7 @@ class Viewer(ProgramTest):
         self.assertEqual(facts["refused"], {"failure": {"name": "NotAllowedError", "message": "refused"}, "state": "error", "open": True,
                                             "title": facts["refused"]["title"]})
         self.assertIn("Kamera", facts["refused"]["title"])
-        self.assertEqual(facts["removed"], ["ended", "ended"])
+        self.assertEqual(facts["removed"], {"tracks": ["ended"] * 3, "state": "start", "loaded": False})
         events = facts["events"]
         for before, after in (("load", "found"), ("looking", "seen"), ("found", "lost"), ("lost", "around"), ("around", "error")):
             self.assertLess(events.index(before), events.index(after), events)

@@ -117,8 +117,13 @@ async function visit() {
   part('problem-close').click();
   camera.refuses = '';
   await viewer.start();
+  const place = viewer.parentElement;
   viewer.remove();
-  facts.removed = camera.opened.map(({ readyState }) => readyState);
+  place.append(viewer);
+  const [late, rest] = [viewer.start(), viewer.load()];
+  viewer.remove();
+  await Promise.all([late, rest]);
+  facts.removed = { tracks: camera.opened.map(({ readyState }) => readyState), state: viewer.state, loaded: viewer.modar !== null };
 }
 
 visit().catch((error) => facts.errors.push(error.stack)).then(() => fetch('facts', { method: 'POST', body: JSON.stringify(facts) }));
