@@ -12,6 +12,11 @@ const viewer = $('viewer');
 const SCOPE = new URL('./', location).href;
 
 const KEPT_LANGUAGE = 'modar-language';
+/** Pictures of the visitor's own. */
+const OWN_CACHE = `modar own ${SCOPE}`;
+
+/** The promise of what own-picture.js exports, once it is needed; and what the visitor has added. */
+let own = null;
 
 let site;
 let words;
@@ -37,6 +42,7 @@ async function useLanguage(language) {
   showWords(document, words);
   $('photo-image').alt = words.photoAlt;
   viewer.words = words;
+  own?.then((pictures) => { pictures.words = words; });
   showPlates();
   showLinks();
 }
@@ -172,6 +178,26 @@ const sceneViewer = (file) =>
   + '#Intent;scheme=https;package=com.google.android.googlequicksearchbox;action=android.intent.action.VIEW;'
   + `S.browser_fallback_url=${encodeURIComponent(location.href)};end;`;
 
+// ---- pictures of the visitor's own ----
+
+/** Loaded by those who add pictures. */
+function ownPictures() {
+  own ??= import('./own-picture.js').then(({ OwnPictures }) => Object.assign(new OwnPictures(viewer, OWN_CACHE), { words }));
+  return own;
+}
+
+async function addOwn() {
+  const [file] = $('own-file').files;
+  $('own-file').value = '';  // the same one again is a change, too
+  if (!file) return;
+  try {
+    await loadBundle();
+    await (await ownPictures()).open(file);
+  } catch (error) {
+    viewer.fail(error);
+  }
+}
+
 // ---- photos and films ----
 
 async function shoot() {
@@ -220,6 +246,8 @@ function listenToViewer() {
   viewer.addEventListener('progress', ({ loaded, total }) =>
     progress(loaded < total ? fill(words.loading, { percent: Math.floor((100 * loaded) / total) }) : words.preparing));
   for (const type of ['load', 'error']) viewer.addEventListener(type, () => progress(''));
+  viewer.addEventListener('load', async () => { if (await globalThis.caches?.has(OWN_CACHE)) (await ownPictures()).restore(); });
+  $('own').addEventListener('close', () => { if ($('own').returnValue === 'added') progress(words.ownAdded); });
   viewer.addEventListener('frame', () => recorder?.add());
   viewer.addEventListener('camerachange', () => {
     recorder?.stop();
@@ -251,6 +279,8 @@ function listen() {
     store(KEPT_LANGUAGE, $('language').value);
     useLanguage($('language').value).catch((error) => viewer.fail(error));
   });
+  $('own-open').addEventListener('click', () => $('own-file').click());
+  $('own-file').addEventListener('change', addOwn);
   $('photo').addEventListener('close', () => $('film').pause());
 }
 
@@ -260,6 +290,7 @@ function listen() {
 async function forget() {
   forgotten = true;
   forgetStored();
+  await globalThis.caches?.delete(OWN_CACHE);
   await keeping;
   const worker = await navigator.serviceWorker?.getRegistration(SCOPE);
   if (worker) await navigator.serviceWorker.ready;  // one that is still installing would write on

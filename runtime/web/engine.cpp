@@ -160,6 +160,12 @@ EMSCRIPTEN_KEEPALIVE double web_pattern_width_mm(uint32_t index) {
 /// does.
 EMSCRIPTEN_KEEPALIVE const float* web_bounds(uint32_t pattern) {
   static float bounds[6];
+  const uint32_t patterns = modar_pattern_count(engine.bundle);
+  if (pattern >= patterns) {  // as large as where its model stands in the bundle
+    auto scene = modar::sized<modar_scene>();
+    modar_scene_at(engine.bundle, engine.own[pattern - patterns].scene, &scene);
+    pattern = scene.pattern;
+  }
   return modar_pattern_bounds(engine.bundle, pattern, bounds, bounds + 3) != 0 ? bounds : nullptr;
 }
 /// Which models stand on which patterns. part: 0 pattern, 1 model.
@@ -189,10 +195,10 @@ EMSCRIPTEN_KEEPALIVE int web_stand(uint32_t scene) {
   return 1;
 }
 
-/// Takes a gray picture as a further pattern: tracked by the trackers of web_track() from then on.
-EMSCRIPTEN_KEEPALIVE int web_add_pattern(const uint8_t* gray, int width, int height) {
-  modar_record* const record =
-      modar_record_create(gray, static_cast<size_t>(width), width, height, &engine.error);
+/// Takes a record as a further pattern: tracked by the trackers of web_track() from then on.
+EMSCRIPTEN_KEEPALIVE int web_add_pattern(const void* bytes, size_t size) {
+  if (engine.own_count == kMostOwn) return MODAR_USAGE;
+  modar_record* const record = modar_record_open(bytes, size, &engine.error);
   if (record == nullptr) return engine.error.status;
   if (engine.tracker != nullptr) {
     const int failed = modar_tracker_add_pattern(engine.tracker, record, nullptr, &engine.error);

@@ -136,13 +136,14 @@ export class Engine {
   }
 
   /** The frame buffer's RGBA becomes gray, in place. */
-  grayFromRgba(width = this.width, height = this.height) {
-    this.#module._web_gray_from_rgba(this.frameAt, width, height);
+  grayFromRgba() {
+    this.#module._web_gray_from_rgba(this.frameAt, this.width, this.height);
   }
 
-  /** Takes the picture in the frame buffer, gray, as a further pattern. */
-  addPattern(width, height, pattern) {
-    this.#check(this.#module._web_add_pattern(this.frameAt, width, height));
+  /** Takes a record as a further pattern. @param {Uint8Array} record */
+  addPattern(record, pattern) {
+    this.frameBuffer(record.length).set(record);
+    this.#check(this.#module._web_add_pattern(this.frameAt, record.length));
     this.patterns.push(pattern);
   }
 

@@ -60,6 +60,13 @@ export class ModarViewer extends HTMLElement {
   readonly layers: [HTMLCanvasElement, HTMLCanvasElement];
   /** Brings the bundle before the visitor starts; without it the first start does. */
   load(): Promise<void>;
+  /**
+   * A flat picture that is none of the bundle's gets what stands in a scene of it (modar.scenes), from now on until the bundle is
+   * loaded anew: see Modar.addPattern(). @returns its index in patterns
+   */
+  addPattern(image: HTMLImageElement | HTMLCanvasElement | ImageBitmap, options?: {
+    name?: string; widthMm?: number; scene?: number;
+  }): Promise<number>;
   /** As the start button: call it in a click's handler. loaded: what is waited for beside the camera, load() unless said otherwise. */
   start(loaded?: Promise<void>): Promise<void>;
   /** What stands on a pattern, without a camera. */

@@ -234,6 +234,22 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     return done;
   }
 
+  /** @see modar-viewer.d.ts */
+  async addPattern(image, { name = '', widthMm = 0, scene = 0 } = {}) {
+    await this.load();
+    const model = this.#modar.scenes[scene]?.model;
+    if (model === undefined) throw new ModarError({ code: 'web.scene', cause: `the bundle has no scene ${scene}`, cure: 'count from 0 in modar.scenes' });
+    const pattern = await this.#modar.addPattern(image, { name, widthMm });
+    this.#view.stand(name, scene);
+    const [width, height] = [image.naturalWidth ?? image.width, image.naturalHeight ?? image.height];
+    const copy = Object.assign(document.createElement('canvas'), { width, height });
+    copy.getContext('2d').drawImage(image, 0, 0);
+    const address = URL.createObjectURL(await new Promise((resolve) => { copy.toBlob(resolve); }));
+    const texts = { [this.#language]: { name, text: '', alt: model } };
+    this.#usePatterns([...this.patterns, { name, title: name, texts, width, height, image: address }]);
+    return pattern;
+  }
+
   #unload() {
     this.#modar?.close();
     this.#modar = this.#view = null;

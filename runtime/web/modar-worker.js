@@ -92,11 +92,9 @@ const answers = {
     if (engine.width) engine.setCamera(0, 0, 0);  // the next frame starts a new tracker
     return { type: 'ready' };
   },
-  /** A picture as a further pattern. */
-  add({ pixels, width, height, pattern }) {
-    engine.frameBuffer(pixels.byteLength).set(new Uint8Array(pixels));
-    engine.grayFromRgba(width, height);
-    engine.addPattern(width, height, pattern);
+  /** A record of record-worker.js as a further pattern. */
+  add({ record, pattern }) {
+    engine.addPattern(record, pattern);
     return { type: 'added' };
   },
   forget({ kept }) {

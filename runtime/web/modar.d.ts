@@ -116,8 +116,8 @@ export class Modar extends EventTarget {
   stop(): void;
   /**
    * Tracks a flat picture that is none of the bundle's from now on, too: a photo of it that fills the image, taken from the front
-   * (8 at most). It stays on the device. What stands on it is the page's choice, or View.stand()'s. Takes a second in the worker,
-   * in which no frame is tracked. Errors: "pattern.plain" and "pattern.no-features" where there is too little in it to be
+   * (8 at most). It stays on the device. What stands on it is the page's choice, or View.stand()'s. Takes a second in a worker of
+   * its own. Errors: "pattern.plain" and "pattern.no-features" where there is too little in it to be
    * recognised, "pattern.loop-size".
    * @returns its index in patterns
    */

@@ -46,15 +46,22 @@ function openWorker(simd) {
     : new Worker(new URL('./modar-worker-plain.js', import.meta.url), { type: 'module' });
 }
 
+/** The same of the worker that makes records. */
+function openRecordWorker(simd) {
+  const stranded = strandedFile(`record-worker-${simd ? 'simd' : 'plain'}.js`);
+  if (stranded) return new Worker(stranded, { type: 'module' });
+  return simd ? new Worker(new URL('./record-worker-simd.js', import.meta.url), { type: 'module' })
+    : new Worker(new URL('./record-worker-plain.js', import.meta.url), { type: 'module' });
+}
+
 /** A worker whose answers are promises; frames wait for one another. */
-class Tracker {
+class Calls {
   #worker;
   #waiting = new Map();
   #calls = 0;
 
-  /** simd: false for the plain build of the engine. */
-  constructor(simd) {
-    this.#worker = openWorker(simd && hasSimd());
+  constructor(worker) {
+    this.#worker = worker;
     this.#worker.onmessage = ({ data }) => {
       const { resolve, reject } = this.#waiting.get(data.call);
       this.#waiting.delete(data.call);
@@ -201,6 +208,8 @@ export function drawFrame(canvas, { source, camera }, { mirror = false } = {}) {
  * may be looked at.
  */
 const ADDED_SIDE = 512;
+/** As engine.cpp has room for. */
+const MOST_ADDED = 8;
 
 /** A picture's pixels, for a pattern. @returns {pixels, width, height} */
 function pixelsOf(image) {
@@ -221,6 +230,8 @@ export class Modar extends EventTarget {
   #waiting = null;
   #busy = false;
   #known = [];
+  /** false: the plain builds of the engine. */
+  #simd;
   /** Patterns of the bundle; null: no others were added. */
   #ofBundle = null;
   #grabber = null;
@@ -233,7 +244,8 @@ export class Modar extends EventTarget {
   static async open(bundle, { simd = true, onProgress } = {}) {
     const given = typeof bundle === 'string' || bundle instanceof URL;
     const modar = new Modar();
-    modar.#tracker = new Tracker(simd);
+    modar.#simd = simd && hasSimd();
+    modar.#tracker = new Calls(openWorker(modar.#simd));
     // The engine is compiled while the bundle comes.
     const prepared = modar.#tracker.ask({ type: 'prepare' });
     prepared.catch(() => {});  // told below
@@ -252,10 +264,19 @@ export class Modar extends EventTarget {
 
   /** @see modar.d.ts */
   async addPattern(image, { name = '', widthMm = 0 } = {}) {
+    this.#ofBundle ??= this.patterns.length;
+    if (this.patterns.length - this.#ofBundle >= MOST_ADDED) {
+      throw new ModarError({ code: 'web.patterns', cause: `${MOST_ADDED} pictures were added already`, cure: 'forget them first' });
+    }
     const picture = pixelsOf(image);
     const pattern = { name, widthMm };
-    await this.#tracker.ask({ type: 'add', ...picture, pattern }, [picture.pixels]);
-    this.#ofBundle ??= this.patterns.length;
+    const maker = new Calls(openRecordWorker(this.#simd));
+    try {
+      const { record } = await maker.ask(picture, [picture.pixels]);
+      await this.#tracker.ask({ type: 'add', record, pattern }, [record.buffer]);
+    } finally {
+      maker.close();
+    }
     this.#known.push(false);
     return this.patterns.push(pattern) - 1;
   }

@@ -9,8 +9,8 @@ const SIMD = WebAssembly.validate(Uint8Array.of(
   0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11));
 
 async function keepAll() {
-  const other = SIMD ? 'engine-plain.' : 'engine-simd.';
-  const files = SITE.files.filter((file) => !file.startsWith(other));
+  const other = SIMD ? 'plain.' : 'simd.';
+  const files = SITE.files.filter((file) => !file.startsWith(`engine-${other}`) && !file.startsWith(`engine-record-${other}`));
   // Past the browser's own cache, where files of an older site may lie; but what has its hash in its address is the
   // same wherever it lies, and the page has just loaded it.
   const cacheOf = (file) => (file.includes('?v=') ? 'force-cache' : 'no-cache');

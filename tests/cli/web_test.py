@@ -23,7 +23,7 @@ PROOFS = {
     "keys": ("page_test.py", "test_keys_turn_and_resize"), "handles": ("page_test.py", "test_a_look_without_a_camera"),
     "alone": ("page_test.py", "test_a_look_without_a_camera"), "languages": ("page_test.py", "test_a_language_is_chosen_and_kept"),
     "reflow": ("page_test.py", "test_small_screens_scroll_one_way")}
-ENGINES = ("engine-plain.js", "engine-plain.wasm", "engine-simd.js", "engine-simd.wasm")
+ENGINES = tuple(f"engine-{name}.{kind}" for name in ("plain", "record-plain", "record-simd", "simd") for kind in ("js", "wasm"))
 
 
 class From(urllib.request.HTTPSHandler):

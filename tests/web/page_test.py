@@ -283,6 +283,83 @@ class Page(ProgramTest):
             self.assert_same_poses(told["seen"], played)
             self.assertEqual((told["left"], told["numbers"], told["reason"] == "visible"), (1, 41, False))
 
+    def drag(self, corner, x, y):
+        """The mouse, from a corner's handle in the dialog to a place of the photo, in shares of its sides."""
+        from_x, from_y, to_x, to_y = self.browser.run(f"""(() => {{
+          const middle = (element, u, v) => {{ const box = element.getBoundingClientRect(); return [box.left + u * box.width, box.top + v * box.height]; }};
+          const handle = document.getElementById('own-corners').children[{corner}];
+          return [...middle(handle, 0.5, 0.5), ...middle(document.getElementById('own-photo'), {x}, {y})];
+        }})()""")
+        for kind, at in (("mousePressed", (from_x, from_y)), ("mouseMoved", ((from_x + to_x) / 2, (from_y + to_y) / 2)),
+                         ("mouseMoved", (to_x, to_y)), ("mouseReleased", (to_x, to_y))):
+            self.browser.call("Input.dispatchMouseEvent", type=kind, x=at[0], y=at[1], button="left", clickCount=1,
+                              buttons=0 if kind == "mouseReleased" else 1)
+
+    def give(self, file):
+        root = self.browser.call("DOM.getDocument")["root"]["nodeId"]
+        node = self.browser.call("DOM.querySelector", nodeId=root, selector="#own-file")["nodeId"]
+        self.browser.call("DOM.setFileInputFiles", files=[str(file)], nodeId=node)
+
+    def test_a_visitors_own_picture_is_marked_kept_and_forgotten(self):
+        # The painting on a table, as a phone sees it from one side: four corners that the test knows.
+        photo, painting = self.folder / "photo.png", ROOT / "assets" / "patterns" / "painting.png"
+        corners = [(0.18, 0.22), (0.80, 0.14), (0.88, 0.86), (0.12, 0.78)]
+        order = [corners[i] for i in (0, 1, 3, 2)]  # as the filter names them
+        places = ":".join(f"x{i}={800 * x:.1f}:y{i}={600 * y:.1f}" for i, (x, y) in enumerate(order))
+        subprocess.run(["ffmpeg", "-v", "error", "-i", painting, "-vf",
+                        f"scale=800:600,format=rgba,perspective={places}:sense=destination:interpolation=cubic,format=rgb24", photo], check=True)
+        plain = self.folder / "plain.png"
+        subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "color=gray:s=320x240", "-frames:v", "1", plain], check=True)
+        self.browser.resize(390, 844, 2, True)
+        self.browser.open(self.server.url)
+        self.browser.run("""globalThis.added = [];
+          customElements.get('modar-viewer').prototype.addPattern = ((add) => async function (image, ...rest) {
+            added.push(image);
+            return add.call(this, image, ...rest);
+          })(customElements.get('modar-viewer').prototype.addPattern)""")
+        self.give(plain)
+        self.browser.wait("document.getElementById('own').open", "the dialog")
+        self.browser.run("document.getElementById('own-use').click()")
+        self.browser.wait("document.getElementById('own-problem').textContent.includes('too little')", "the refusal")
+        self.browser.run("document.getElementById('own-close').click()")
+        self.give(photo)
+        self.browser.wait("document.getElementById('own').open && document.getElementById('own-photo').width === 800", "the photo")
+        for i, (x, y) in enumerate(corners):
+            self.drag(i, x, y)
+        self.browser.run("document.getElementById('own-corners').children[0].dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft' }))")
+        self.keep("own.png")
+        points = self.browser.run("document.querySelector('#own-quad polygon').getAttribute('points')").split()
+        for at, (x, y) in zip((point.split(",") for point in points), corners):
+            self.assertLess(math.dist((float(at[0]), float(at[1])), (800 * x, 600 * y)), 4)
+        self.browser.run("document.getElementById('own-use').click()")
+        self.browser.wait("!document.getElementById('own').open", "the picture")
+        self.assertIn("Kept on this device", self.browser.run("document.getElementById('progress').textContent"))
+        # Laid flat it is the painting: the mean difference of both, at one size.
+        data = self.browser.run("added.at(-1).toDataURL().split(',')[1]")
+        flat = self.folder / "flat.png"
+        flat.write_bytes(base64.b64decode(data))
+        grays = [subprocess.run(["ffmpeg", "-v", "error", "-i", file, "-vf", "scale=160:120:flags=area,format=gray", "-f", "rawvideo", "-"],
+                                capture_output=True, check=True).stdout for file in (flat, painting)]
+        off = sum(abs(a - b) for a, b in zip(*grays)) / len(grays[0])
+        self.assertLess(off, 6, "gray values of 255")
+        viewer = "document.getElementById('viewer')"
+        self.assertEqual(self.browser.run(f"{viewer}.patterns.map(({{ title }}) => title)"), ["cover", "Your picture"])
+        # The model stands on it without a camera, too; the next visit has it again, until it is forgotten.
+        self.browser.run(f"{viewer}.look(1)")
+        self.browser.wait("part('ground').naturalWidth > 0", "the turntable")
+        lit = "(() => { const c = new OffscreenCanvas(200, 200).getContext('2d'); c.drawImage(part('models'), 0, 0, 200, 200);" \
+              " return c.getImageData(0, 0, 200, 200).data.filter((v, i) => i % 4 === 3 && v > 128).length; })()"
+        self.browser.wait(f"new Promise((done) => requestAnimationFrame(() => done({lit} > 400)))", "the model")
+        self.keep("own-around.png")
+        self.browser.open(self.server.url)
+        self.browser.wait(f"{viewer}.patterns.length === 2", "what was kept")
+        self.browser.run("document.getElementById('forget').click()")
+        self.browser.wait("caches.keys().then((names) => !names.some((name) => name.startsWith('modar own')))", "nothing kept")
+        self.browser.open(self.server.url)
+        self.browser.wait(f"{viewer}.modar", "the bundle")
+        self.assertEqual(self.browser.run(f"{viewer}.patterns.length"), 1)
+        self.assertEqual(self.browser.errors, [])
+
     def test_a_phones_turns_in_its_cameras_axes(self):
         # Held upright, screen to the visitor: the device's axes that point up and right, by how far the phone was turned
         # counterclockwise (its top is up, left, down, right).
@@ -437,6 +514,10 @@ class Page(ProgramTest):
         click("about")
         self.assert_accessible("notes")
         click("notes-close")
+        self.give(ROOT / "assets" / "patterns" / "painting.png")
+        self.browser.wait("document.getElementById('own').open", "a picture of one's own")
+        self.assert_accessible("own")
+        click("own-close")
         self.start()
         self.assert_accessible("seen")
         click("shoot")
