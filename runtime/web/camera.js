@@ -1,12 +1,9 @@
 // Which camera a page opens, how large, and where it can be opened at all.
-import { ModarError } from './engine.js';
+import { ModarError, shrinkOf } from './engine.js';
 import { store, stored } from './storage.js';
 
-/**
- * What is asked of a camera, best first. The picture is shown as it comes and tracked in a smaller copy; a phone that takes too
- * long to hand a large one over gets the next. All are tracked at 640 x 360, so tracking goes on when one takes another's place.
- */
-const SIZES = [{ width: 1920, height: 1080 }, { width: 1280, height: 720 }, { width: 640, height: 360 }];
+/** What is asked of a camera at first: the picture is shown as it comes, and tracked in a smaller copy. */
+const LARGEST = { width: 1920, height: 1080 };
 /** Milliseconds that handing a frame over may take, of 33 between two of them, as the median of so many frames. */
 const MOST_COPY_MS = 12;
 const COPIES = 15;
@@ -48,7 +45,7 @@ export class Camera {
   facing = 'environment';
   /** The visitor's own choice, for later visits, too. */
   #chosen = stored(KEPT_CAMERA);
-  #size = 0;
+  #size = LARGEST;
   #copies = [];
 
   get track() {
@@ -73,9 +70,8 @@ export class Camera {
   }
 
   async #take(deviceId) {
-    const size = SIZES[this.#size];
     // Cropped or enlarged pictures would be asked of cameras that have none of this size.
-    const wanted = { width: { ideal: size.width }, height: { ideal: size.height }, frameRate: { ideal: 30 }, resizeMode: { ideal: 'none' } };
+    const wanted = { width: { ideal: this.#size.width }, height: { ideal: this.#size.height }, frameRate: { ideal: 30 }, resizeMode: { ideal: 'none' } };
     const which = deviceId ? { deviceId: { exact: deviceId } } : { facingMode: { ideal: this.facing } };
     try {
       this.stream = await navigator.mediaDevices.getUserMedia({ video: { ...wanted, ...which }, audio: false });
@@ -116,15 +112,21 @@ export class Camera {
     this.choose('');
   }
 
-  /** Told of each frame how long it took to hand over: asks a slow phone's camera for less. */
+  /**
+   * Told of each frame how long it took to hand over: asks a slow phone's camera for less, a picture that has the same smaller copy,
+   * in which tracking goes on.
+   */
   async copied(milliseconds) {
     this.#copies.push(milliseconds);
-    if (this.#copies.length < COPIES || this.#size + 1 >= SIZES.length) return;
+    if (this.#copies.length < COPIES) return;
     const median = this.#copies.sort((a, b) => a - b)[COPIES >> 1];
     this.#copies = [];
-    if (median <= MOST_COPY_MS) return;
-    const { width, height } = SIZES[++this.#size];
-    await this.track?.applyConstraints({ width: { ideal: width }, height: { ideal: height }, frameRate: { ideal: 30 } }).catch(() => {});
+    const { width, height } = this.track?.getSettings() ?? {};
+    const shrink = shrinkOf(width, height);
+    if (median <= MOST_COPY_MS || !(shrink > 1)) return;
+    const less = (side) => Math.floor(side / shrink) * (shrink - 1);
+    this.#size = { width: less(width), height: less(height) };
+    await this.track.applyConstraints({ width: { ideal: less(width) }, height: { ideal: less(height) }, frameRate: { ideal: 30 } }).catch(() => {});
   }
 
   /** {focal, focalSide}: what was measured of this camera, or 0. */

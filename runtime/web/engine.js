@@ -11,6 +11,15 @@ export const POSE = {
   visible: 0, shown: 1, inliers: 2, fit: 3, rotation: 4, translation: 13, corners: 16, view: 24, extended: 40,
 };
 
+/**
+ * Frames are tracked with a longer side from this to twice it, pixels: features are found there as well as in larger ones,
+ * for a fraction of the time. What is shown stays as large as the camera gives it.
+ */
+const TRACKED_SIDE = 640;
+
+/** By how much the sides of a frame are divided before it is tracked. */
+export const shrinkOf = (width, height) => Math.max(1, Math.floor(Math.max(width, height) / TRACKED_SIDE));
+
 /** What went wrong: `code` is stable, `cure` says what to do. */
 export class ModarError extends Error {
   constructor({ code, where = '', cause, cure = '' }) {

@@ -6,7 +6,7 @@
 //   await modar.start(video);
 //
 // Types and words: modar.d.ts. The drawing of a bundle's own models is in modar-view.js.
-import { hasSimd, ModarError, POSE, POSE_FLOATS, strandedFile } from './engine.js';
+import { hasSimd, ModarError, POSE, POSE_FLOATS, shrinkOf, strandedFile } from './engine.js';
 import { allowMotion, Gyroscope } from './gyroscope.js';
 
 export { allowMotion, ModarError };
@@ -93,15 +93,6 @@ class Calls {
     this.#giveUp('it was closed');
   }
 }
-
-/**
- * Frames are tracked with a longer side from this to twice it, pixels: features are found there as well as in larger ones,
- * for a fraction of the time. What is shown stays as large as the camera gives it.
- */
-const TRACKED_SIDE = 640;
-
-/** By how much the sides of a frame are divided before it is tracked. */
-const shrinkOf = (width, height) => Math.max(1, Math.floor(Math.max(width, height) / TRACKED_SIDE));
 
 /** Takes frames from a video: VideoFrame where the browser has it, else canvases, the smaller of which is read back. */
 class FrameGrabber {
