@@ -313,7 +313,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       await this.#follow();
       this.#unseenSince = performance.now();
       this.#$('reason').textContent = this.#lookWords;
-      this.#enter('looking');
+      this.#enter('looking', -1);
     } catch (error) {
       this.fail(error);
     } finally {
@@ -328,9 +328,9 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       await Promise.all([loaded, this.#ready]);
       if (!this.isConnected) return;
       this.#$('which').hidden = this.patterns.length < 2;
-      this.#enter('around');
+      this.#enter('around', pattern);
       this.#table = new Turntable(this.#view, this.#$('ground'));
-      await this.#showScene(pattern);
+      await this.#turnScene(pattern);
     } catch (error) {
       this.fail(error);
     } finally {
@@ -347,6 +347,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     if (this.#root.fullscreenElement) document.exitFullscreen();
     this.#$('stage').close();
     this.#$('label').hidden = true;
+    this.#shown = -1;
     this.#setState('start');
   }
 
@@ -380,11 +381,13 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     for (const id of ['start', 'look']) this.#$(id).disabled = busy;
   }
 
-  #enter(state) {
-    this.#shown = -1;
+  #enter(state, pattern) {
     this.#$('full').hidden = !document.fullscreenEnabled;
     this.#setState(state);
-    this.#nameModels(this.#say('nothingSeen'));
+    const names = state === 'around' ? { stage: 'lookAround', close: 'back' } : { stage: 'stage', close: 'close' };
+    for (const [id, word] of Object.entries(names)) this.#$(id).dataset.label = word;
+    if (this.#words) showWords(this.#root, this.#words);
+    this.#showScene(pattern);
     if (!this.#$('stage').open) this.#$('stage').showModal();
     this.#$('models').focus({ preventScroll: true });
   }
@@ -474,13 +477,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
 
   #onResize = () => this.#table?.draw();
 
-  async #showScene(pattern) {
+  async #turnScene(pattern) {
     const picture = this.patterns[pattern];
     this.#$('scene').value = pattern;
     Object.assign(this.#$('ground'), { width: picture.width, height: picture.height, src: await pictureOf(picture) });
     this.#table?.show(pattern, picture);
-    this.#shown = -1;
-    this.#showLabel(pattern);
   }
 
   // ---- frames ----
@@ -514,8 +515,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       const models = this.#modar.scenes.filter((scene) => scene.pattern === pattern).map(({ model }) => model);
       this.#nameModels(this.#say('seen', { name: alt || models.join(', '), pattern: name }));
     }
-    if (pattern === this.#shown) return;
+  }
+
+  #showScene(pattern) {
     this.#shown = pattern;
+    this.#showLabel(pattern);
     this.dispatchEvent(new CustomEvent('scenechange', { detail: { pattern } }));
   }
 
@@ -541,11 +545,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       if (this.#state !== 'seen') performance.mark('modar: seen');
       this.#unseenSince = now;
       this.#setState('seen');
-      if (first !== this.#shown) this.#showLabel(first);
+      if (first !== this.#shown) this.#showScene(first);
     } else {
       this.#setState('looking');
       setText(this.#$('reason'), this.#adviceFor(frame, now - this.#unseenSince));
-      if (now - this.#unseenSince > PATIENCE_MS && this.#shown >= 0) this.#showLabel(-1);
+      if (now - this.#unseenSince > PATIENCE_MS && this.#shown >= 0) this.#showScene(-1);
     }
   }
 
@@ -641,7 +645,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       'look-instead': () => { this.#$('problem').close(); this.look(); },
     };
     for (const [id, action] of Object.entries(clicks)) this.#$(id).addEventListener('click', action);
-    this.#$('scene').addEventListener('change', () => this.#showScene(Number(this.#$('scene').value)));
+    this.#$('scene').addEventListener('change', () => {
+      const pattern = Number(this.#$('scene').value);
+      this.#showScene(pattern);
+      this.#turnScene(pattern);
+    });
     this.#$('problem').addEventListener('close', () => {
       delete this.#$('problem').dataset.kind;
       if (this.#state === 'error') this.#setState('start');

@@ -629,6 +629,8 @@ class Page(ProgramTest):
             self.assertNotEqual(self.browser.run(picture % handle)[2], first[2], handle)
             self.assertEqual(self.browser.run(picture % "reset")[2], first[2], handle)
         self.assertGreater(self.browser.run(picture % "larger")[0], first[0])
+        names = self.browser.run("['models', 'stage', 'close'].map((id) => part(id).getAttribute('aria-label'))")
+        self.assertEqual(names, ["A pot with two handles, standing on the picture The book of owls.", "View without a camera", "Back"])
         label = self.browser.run("part('label').textContent")
         self.assertIn("The book of owls", label)
         self.browser.resize(844, 390, 2, True)
