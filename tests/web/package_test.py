@@ -67,7 +67,7 @@ class Package(unittest.TestCase):
         self.browser.errors.clear()
         self.browser.open(url)
         self.browser.wait("window.result !== undefined", "the end")
-        self.assertEqual(self.browser.run("window.result"), "cover,1,2,16,around,Start the camera,cover")
+        self.assertEqual(self.browser.run("window.result"), "cover,1,2,16,around,Start the camera,cover,1")
         self.assertEqual(self.browser.errors, [])
         self.browser.open("about:blank")  # Vite's pages ask for their server when it is gone
 
@@ -78,11 +78,12 @@ class Package(unittest.TestCase):
 
     def test_it_holds_what_people_look_for(self):
         names = {file.name for file in (self.base / "node_modules" / "modar").iterdir()}
-        engines = {f"engine-{kind}.{end}" for kind in ("simd", "plain") for end in ("js", "wasm")}
+        engines = {f"engine-{kind}.{end}" for kind in ("simd", "plain", "record-simd", "record-plain") for end in ("js", "wasm")}
         self.assertEqual(names, engines | {
             "package.json", "README.md", "LICENSE", "modar.js", "modar.d.ts", "modar-view.js", "modar-view.d.ts", "modar-worker.js",
             "modar-viewer.js", "modar-viewer.d.ts", "modar-worker-simd.js", "modar-worker-plain.js", "gyroscope.js", "engine.js",
-            "bundle.js", "camera.js", "storage.js", "turntable.js", "viewer-parts.js", "viewer-words.js", "words"})
+            "bundle.js", "camera.js", "storage.js", "turntable.js", "viewer-parts.js", "viewer-words.js", "words",
+            "record-worker.js", "record-worker-simd.js", "record-worker-plain.js"})
         licence = (self.base / "node_modules" / "modar" / "LICENSE").read_text()
         for words in ("MIT License", "Mozilla Public License", "musl"):
             self.assertIn(words, licence)

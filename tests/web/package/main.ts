@@ -17,8 +17,8 @@ async function pictureOf(address: string): Promise<ImageData> {
   return context.getImageData(0, 0, image.naturalWidth, image.naturalHeight);
 }
 
-/** The element as a page has it: its state, a word and a name that it shows. */
-async function lookAround(): Promise<string[]> {
+/** The element as a page has it: its state, a word and a name that it shows, and the number of a picture that is added. */
+async function lookAround(): Promise<(string | number)[]> {
   const viewer = document.createElement('modar-viewer');
   viewer.src = 'demo.modar';
   viewer.addEventListener('found', ({ detail }) => console.assert(detail.inliers > 0));
@@ -27,7 +27,11 @@ async function lookAround(): Promise<string[]> {
   await viewer.look();
   const part = (id: string): string => viewer.shadowRoot?.getElementById(id)?.textContent ?? '';
   console.assert(viewer instanceof ModarViewer && viewer.layers[1].width > 0);
-  return [viewer.state, part('start'), part('label-name')];
+  const image = new Image();
+  image.src = 'frame.png';
+  await image.decode();
+  const own: number = await viewer.addPattern(image, { name: 'mine', scene: 0 });
+  return [viewer.state, part('start'), part('label-name'), own];
 }
 
 async function main(): Promise<string> {
