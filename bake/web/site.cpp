@@ -30,7 +30,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What is copied as it is; index.html, sw.js and the words are written with changes.
+/// What is copied as it is, or without comments; index.html, sw.js and the words are written with
+/// changes.
 constexpr std::array<std::string_view, 34> kPageFiles = {"app.js",
                                                          "bundle.js",
                                                          "camera.js",
@@ -112,6 +113,23 @@ Result<void> put(Draft& draft, const std::string& name, const std::string& text)
 Result<std::string> page_text(const Draft& draft, const std::string& name) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.page + "/" + name));
   return std::string(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
+}
+
+/// A script of ours without its lines of comments, a sixth of what a first visit brings of scripts.
+/// Comments behind code stay.
+std::string without_comments(std::string_view script) {
+  std::string out;
+  bool within = false;  // a comment of several lines
+  while (!script.empty()) {
+    const std::size_t end = std::min(script.find('\n'), script.size() - 1);
+    const std::string_view line = script.substr(0, end + 1);
+    script.remove_prefix(end + 1);
+    const std::string_view text = line.substr(std::min(line.find_first_not_of(' '), line.size()));
+    const bool opens = !within && text.starts_with("/*");
+    if (!within && !opens && !text.starts_with("//")) out += line;
+    within = (within || opens) && text.find("*/") == std::string_view::npos;
+  }
+  return out;
 }
 
 /// A name as part of an address: what is no letter, digit or dash becomes a dash.
@@ -306,9 +324,11 @@ Result<void> put_page(Draft& draft) {
     names.insert(names.end(), kUpdateFiles.begin(), kUpdateFiles.end());
   }
   for (const std::string_view name : names) {
-    MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.page + "/" + std::string(name)));
-    MODAR_TRY(put(draft, std::string(name), file.bytes()));
-    draft.site.page_bytes += file.bytes().size();
+    const bool ours = name.ends_with(".js") && !name.starts_with("engine-");
+    MODAR_ASSIGN(std::string content, page_text(draft, std::string(name)));
+    if (ours) content = without_comments(content);
+    MODAR_TRY(put(draft, std::string(name), content));
+    draft.site.page_bytes += content.size();
   }
   for (const std::string& language : draft.languages) {
     MODAR_ASSIGN(const std::string words, words_of(draft, language));

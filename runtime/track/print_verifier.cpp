@@ -21,8 +21,8 @@ constexpr float kShownContrast = 9.0f;
 constexpr int kOtherCells = 6;
 constexpr int kOtherShare = 8;
 constexpr int kAgainShare = 10;
-// Details compared per frame, all of them within 32: trades instructions, about 3 % of a tracked
-// frame by count of operations, for how soon another print is hidden, here within two seconds.
+// Details compared per frame, all of them within 32: trades instructions, about 7 % of a tracked
+// frame by count of instructions, for how soon another print is hidden, here within two seconds.
 constexpr int kDetailsOfFrame = 8;
 // Number of printed differences from which it is another print, and below which it is the pattern
 // again: trades other prints shown for true ones hidden. `modar-lab bench pose --lookalikes --only
