@@ -96,7 +96,7 @@ std::span<const SceneCommand> Controls::act(std::span<const Hysteresis::State> s
     events_.push_back({SceneEvent::Kind::kSeen, pattern, kNone});
   }
   for (const glm::dvec2 tap : taps_) {
-    const auto hit = pick(bundle_, camera, tap, items);
+    const auto hit = pick_click(bundle_, camera, tap, items);
     if (!hit || items[hit->item].node == kNone) continue;
     events_.push_back({SceneEvent::Kind::kTap, items[hit->item].node, hit->material});
   }

@@ -35,6 +35,10 @@ struct UserAct {
   glm::dvec2 at{0.0};  ///< of a click: picture pixels
 };
 
+/// pick() for clicks in a window, which a build of the device leaves out with it.
+std::optional<Pick> pick_click(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
+                               std::span<const DrawItem> items);
+
 class Controls {
  public:
   /// outline, display: what the command line says at the start.

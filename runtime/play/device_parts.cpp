@@ -96,6 +96,11 @@ Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& opt
   return left_out("method.unsupported", "--method paper", "the ModAR paper's method");
 }
 
+std::optional<Pick> pick_click(const BundleView& /*bundle*/, const Camera& /*camera*/,
+                               glm::dvec2 /*pixel*/, std::span<const DrawItem> /*items*/) {
+  return std::nullopt;
+}
+
 struct Window::State {};
 Window::Window(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Window::~Window() = default;
