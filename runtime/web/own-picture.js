@@ -31,6 +31,100 @@ export function isConvex(corners) {
   });
 }
 
+/** Longer side of the copy in which corners are looked for, pixels: a corner of it is three of the photo, which the visitor mends. */
+const LOOK_SIDE = 192;
+/** Sum of the differences in red, green and blue from which a pixel is none of the table's. */
+const OFF_TABLE = 48;
+
+/** 1 where a pixel has none of the colours of the photo's rim. */
+function offTable({ data, width, height }) {
+  const rim = [];
+  for (let x = 0; x < width; x += 4) rim.push(x, (height - 1) * width + x);
+  for (let y = 0; y < height; y += 4) rim.push(y * width, y * width + width - 1);
+  return Uint8Array.from({ length: width * height }, (_, i) => {
+    const near = rim.some((k) => Math.abs(data[4 * i] - data[4 * k]) + Math.abs(data[4 * i + 1] - data[4 * k + 1])
+      + Math.abs(data[4 * i + 2] - data[4 * k + 2]) < OFF_TABLE);
+    return near ? 0 : 1;
+  });
+}
+
+/** The pixels of one value of a mask that hang together with `start`, as [x, y]; they become `mark`. */
+function partFrom(start, mask, width, value, mark) {
+  const part = [];
+  for (const open = [start]; open.length > 0;) {
+    const at = open.pop();
+    if (mask[at] !== value) continue;
+    mask[at] = mark;
+    const x = at % width;
+    part.push([x, (at - x) / width]);
+    if (x > 0) open.push(at - 1);
+    if (x + 1 < width) open.push(at + 1);
+    open.push(at - width, at + width);
+  }
+  return part;
+}
+
+/** The largest thing on the table, with what of it has the table's colour. */
+function largestThing(mask, width) {
+  const [table, seen] = [2, 3];
+  for (let i = 0; i < mask.length; ++i) {
+    const onRim = i < width || i >= mask.length - width || i % width === 0 || i % width === width - 1;
+    if (onRim && mask[i] === 0) partFrom(i, mask, width, 0, table);
+  }
+  const things = mask.map((value) => (value === table ? 0 : 1));
+  let best = [];
+  for (let i = 0; i < things.length; ++i) {
+    const part = things[i] === 1 ? partFrom(i, things, width, 1, seen) : [];
+    if (part.length > best.length) best = part;
+  }
+  return best;
+}
+
+/** The line through the part's rim along a side, as [nx, ny, d]: least squares of the distances. */
+function lineAlong([ax, ay], [bx, by], rim) {
+  const length = Math.hypot(bx - ax, by - ay);
+  const [ux, uy] = [(bx - ax) / length, (by - ay) / length];
+  const near = rim.filter(([x, y]) => {
+    const along = ((x - ax) * ux + (y - ay) * uy) / length;
+    return along > 0.1 && along < 0.9 && Math.abs((x - ax) * uy - (y - ay) * ux) < 0.06 * length;
+  });
+  const mean = (i) => near.reduce((sum, point) => sum + point[i], 0) / near.length;
+  const [mx, my] = [mean(0), mean(1)];
+  let [xx, xy, yy] = [0, 0, 0];
+  for (const [x, y] of near) {
+    xx += (x - mx) ** 2;
+    xy += (x - mx) * (y - my);
+    yy += (y - my) ** 2;
+  }
+  const turn = 0.5 * Math.atan2(2 * xy, xx - yy);
+  const normal = [-Math.sin(turn), Math.cos(turn)];
+  return [...normal, normal[0] * mx + normal[1] * my];
+}
+
+const crossing = ([a, b, c], [d, e, f]) => [(c * e - b * f) / (a * e - b * d), (a * f - c * d) / (a * e - b * d)];
+
+/** The corners of one thing on a plain table, in a photo's pixels; null where there is no such thing. @param {HTMLCanvasElement} photo */
+export function findCorners(photo) {
+  const scale = LOOK_SIDE / Math.max(photo.width, photo.height);
+  const [width, height] = [Math.round(photo.width * scale), Math.round(photo.height * scale)];
+  const small = canvasOf(photo, width, height).getContext('2d').getImageData(0, 0, width, height);
+  const part = largestThing(offTable(small), width);
+  if (part.length < 0.05 * width * height) return null;
+  const inside = new Set(part.map(([x, y]) => y * width + x));
+  const rim = part.filter(([x, y]) => [[1, 0], [-1, 0], [0, 1], [0, -1]].some(([dx, dy]) => !inside.has((y + dy) * width + x + dx)));
+  const most = (value) => rim.reduce((best, point) => (value(point) > value(best) ? point : best));
+  const rough = [most(([x, y]) => -x - y), most(([x, y]) => x - y), most(([x, y]) => x + y), most(([x, y]) => y - x)];
+  const lines = rough.map((corner, i) => lineAlong(corner, rough[(i + 1) % 4], rim));
+  const corners = lines.map((line, i) => crossing(lines[(i + 3) % 4], line));
+  const area = 0.5 * Math.abs(corners.reduce((sum, [x, y], i) => {
+    const [nextX, nextY] = corners[(i + 1) % 4];
+    return sum + x * nextY - nextX * y;
+  }, 0));
+  // A thing of another shape fills its corners' quadrangle less, or more.
+  const fits = Math.abs(part.length / area - 1) < 0.1 && corners.flat().every(Number.isFinite) && isConvex(corners);
+  return fits ? corners.map(([x, y]) => [(x + 0.5) / scale, (y + 0.5) / scale]) : null;
+}
+
 /** The picture between four corners of a photo, as from the front: the mean of four places for each pixel. @param {ImageData} photo */
 export function flatten(photo, corners) {
   const length = (i, k) => Math.hypot(corners[i][0] - corners[k][0], corners[i][1] - corners[k][1]);
@@ -136,8 +230,8 @@ export class OwnPictures {
     Object.assign(canvas, { width, height });
     canvas.getContext('2d').drawImage(image, 0, 0, width, height);
     this.#photo = canvas.getContext('2d').getImageData(0, 0, width, height);
-    this.#corners = [[MARGIN, MARGIN], [1 - MARGIN, MARGIN], [1 - MARGIN, 1 - MARGIN], [MARGIN, 1 - MARGIN]]
-      .map(([x, y]) => [x * width, y * height]);
+    const inset = [[MARGIN, MARGIN], [1 - MARGIN, MARGIN], [1 - MARGIN, 1 - MARGIN], [MARGIN, 1 - MARGIN]];
+    this.#corners = findCorners(canvas) ?? inset.map(([x, y]) => [x * width, y * height]);
     this.#tell('');
     const { scenes } = this.#viewer.modar;
     this.#$('own-scene').replaceChildren(...scenes.map(({ model }, i) => new Option(model, i)));

@@ -283,6 +283,38 @@ class Page(ProgramTest):
             self.assert_same_poses(told["seen"], played)
             self.assertEqual((told["left"], told["numbers"], told["reason"] == "visible"), (1, 41, False))
 
+    def test_corners_are_found_on_a_plain_table(self):
+        painting = ROOT / "assets" / "patterns" / "painting.png"
+        for name, table, corners, wanted in (
+                ("table", "0xb8a890", [(0.18, 0.22), (0.80, 0.14), (0.88, 0.86), (0.12, 0.78)], True),
+                ("turned", "0x405040", [(0.30, 0.12), (0.86, 0.30), (0.70, 0.88), (0.14, 0.70)], True),
+                ("none", "0x405040", [], False)):
+            photo = self.site / f"{name}-photo.png"
+            size = "800x600"
+            if wanted:
+                order = [corners[i] for i in (0, 1, 3, 2)]
+                places = ":".join(f"x{i}={800 * x:.1f}:y{i}={600 * y:.1f}" for i, (x, y) in enumerate(order))
+                mask = f"color=white:s={size},format=gray,pad=iw+2:ih+2:1:1:black,scale=800:600,perspective={places}:sense=destination"
+                graph = (f"[1]scale=800:600,perspective={places}:sense=destination,format=rgb24[picture];{mask},format=gray[alpha];"
+                         "[picture][alpha]alphamerge[thing];[0][thing]overlay,noise=alls=6,format=rgb24")
+            else:
+                graph = "[0]noise=alls=6,format=rgb24"
+            subprocess.run(["ffmpeg", "-v", "error", "-y", "-f", "lavfi", "-i", f"color={table}:s={size}", "-i", painting, "-filter_complex", graph,
+                            "-frames:v", "1", photo], check=True)
+            self.browser.open(self.server.url)
+            found = self.browser.run("""(async () => {
+              const { findCorners } = await import('/own-picture.js');
+              const image = new Image();
+              image.src = '%s';
+              await image.decode();
+              const canvas = Object.assign(document.createElement('canvas'), { width: 800, height: 600 });
+              canvas.getContext('2d').drawImage(image, 0, 0);
+              return findCorners(canvas);
+            })()""" % photo.name)
+            self.assertEqual(found is not None, wanted, name)
+            for at, (x, y) in zip(found or [], corners):
+                self.assertLess(math.dist(at, (800 * x, 600 * y)), 8, (name, found))
+
     def drag(self, corner, x, y):
         """The mouse, from a corner's handle in the dialog to a place of the photo, in shares of its sides."""
         from_x, from_y, to_x, to_y = self.browser.run(f"""(() => {{
