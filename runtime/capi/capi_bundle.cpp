@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
 #include "formats/check.hpp"
@@ -166,7 +167,7 @@ int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scen
 
 int modar_pattern_bounds(const modar_bundle* bundle, uint32_t pattern, float low[3],
                          float high[3]) {
-  if (low == nullptr || high == nullptr) return 0;
+  if (bundle == nullptr || low == nullptr || high == nullptr) return 0;
   glm::vec3 least(std::numeric_limits<float>::max());
   glm::vec3 greatest(std::numeric_limits<float>::lowest());
   auto scene = modar::sized<modar_scene>();
@@ -177,6 +178,21 @@ int modar_pattern_bounds(const modar_bundle* bundle, uint32_t pattern, float low
     for (int corner = 0; corner < 8; ++corner) {
       const glm::vec4 at(box[corner & 1].x, box[corner >> 1 & 1].y, box[corner >> 2].z, 1.0f);
       const glm::vec3 placed(glm::make_mat4(scene.place) * at);
+      least = glm::min(least, placed);
+      greatest = glm::max(greatest, placed);
+    }
+  }
+  for (uint32_t n = 0; n < bundle->view.nodes().size(); ++n) {
+    const modar::NodeRecord& node = bundle->view.nodes()[n];
+    if (node.pattern != pattern || node.kind == static_cast<uint32_t>(modar::NodeKind::kModel)) {
+      continue;
+    }
+    const glm::quat rotation(node.rotation[3], node.rotation[0], node.rotation[1],
+                             node.rotation[2]);
+    for (int corner = 0; corner < 4; ++corner) {  // a label's are its point
+      const glm::vec3 at(corner % 2 == 0 ? -node.half_size[0] : node.half_size[0],
+                         corner / 2 == 0 ? -node.half_size[1] : node.half_size[1], 0.0f);
+      const glm::vec3 placed = glm::make_vec3(node.place) + rotation * at;
       least = glm::min(least, placed);
       greatest = glm::max(greatest, placed);
     }
@@ -204,11 +220,13 @@ int modar_pattern_picture(const modar_bundle* bundle, uint32_t index, int* width
 size_t modar_language(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
   if (bundle == nullptr) return 0;
   std::vector<std::string> languages;
-  modar::visit_meta_texts(bundle->view.meta(), [&](const modar::MetaText& each) {
+  const auto add = [&languages](const modar::MetaText& each) {
     if (std::find(languages.begin(), languages.end(), each.language) == languages.end()) {
       languages.push_back(each.language);
     }
-  });
+  };
+  modar::visit_meta_texts(bundle->view.meta(), add);
+  modar::visit_node_texts(bundle->view.meta(), add);
   return index < languages.size() ? copy_name(languages[index], text, size) : 0;
 }
 

@@ -49,14 +49,16 @@ struct Engine {
   OwnPattern own[kMostOwn];
   uint32_t own_count = 0;
   modar_item* items = nullptr;
-  char text[256];
+  size_t item_count = 0;  ///< that were drawn last
+  modar_actions* actions = nullptr;
+  modar_event* events = nullptr;  ///< one a pattern and one a tap
+  char text[4096];
 };
 Engine engine;
 
 /// The turn and the size that the visitor gave a model: about the place on the pattern where it
-/// stands.
-glm::mat4 with_gesture(const modar_scene& scene, float turn, float size) {
-  const glm::mat4 place = glm::make_mat4(scene.place);
+/// stands. place: model space to pattern space.
+glm::mat4 with_gesture(const glm::mat4& place, float turn, float size) {
   const glm::vec3 foot(place[3].x, place[3].y, 0.0f);
   glm::mat4 gesture = glm::translate(glm::mat4(1.0f), foot);
   gesture = glm::rotate(gesture, turn, glm::vec3(0.0f, 0.0f, 1.0f));
@@ -64,31 +66,52 @@ glm::mat4 with_gesture(const modar_scene& scene, float turn, float size) {
   return glm::translate(gesture, -foot) * place;
 }
 
-/// A scene on a pattern as the next item, if that is shown.
-void collect(const modar_scene& scene, uint32_t pattern, float turn, float size, size_t& count) {
+/// An item that has its place on a pattern is brought before the eye.
+void put(modar_item& item, uint32_t pattern, float turn, float size) {
   const WebPose& pose = engine.poses[pattern];
-  if (pose.shown == 0.0f) return;
-  const glm::mat4 to_eye = glm::make_mat4(pose.view) * with_gesture(scene, turn, size);
-  modar_item& item = engine.items[count++];
-  item.model = scene.model;
+  glm::mat4 place = glm::make_mat4(item.to_eye);
+  if (item.scene != 0) place = with_gesture(place, turn, size);
+  const glm::mat4 to_eye = glm::make_mat4(pose.view) * place;
   std::memcpy(item.to_eye, glm::value_ptr(to_eye), sizeof item.to_eye);
-  item.scene = scene.number;
   std::memcpy(item.world_to_eye, pose.view, sizeof item.world_to_eye);
 }
 
-/// Shown scenes as items; answers how many.
+/// What is shown of the patterns that are on the screen, as items; answers how many. Pictures
+/// belong to their patterns: a visitor turns and enlarges models alone.
 size_t collect_items(float turn, float size) {
+  const glm::mat4 still(1.0f);
   size_t count = 0;
-  auto scene = modar::sized<modar_scene>();
-  for (uint32_t s = 0; modar_scene_at(engine.bundle, s, &scene) != 0; ++s) {
-    collect(scene, scene.pattern, turn, size, count);
-  }
+  const size_t room = modar_scene_count(engine.bundle) + modar_node_count(engine.bundle);
   const uint32_t patterns = modar_pattern_count(engine.bundle);
-  for (uint32_t i = 0; i < engine.own_count; ++i) {
-    if (modar_scene_at(engine.bundle, engine.own[i].scene, &scene) == 0) continue;
-    collect(scene, patterns + i, turn, size, count);
+  for (uint32_t p = 0; p < patterns; ++p) {
+    if (engine.poses[p].shown == 0.0f) continue;
+    const size_t first = count;
+    count += modar_actions_items(engine.actions, p, glm::value_ptr(still), engine.items + first,
+                                 room - first);
+    for (size_t i = first; i < count; ++i) put(engine.items[i], p, turn, size);
   }
+  auto scene = modar::sized<modar_scene>();
+  for (uint32_t i = 0; i < engine.own_count; ++i) {
+    if (engine.poses[patterns + i].shown == 0.0f) continue;
+    if (modar_scene_at(engine.bundle, engine.own[i].scene, &scene) == 0) continue;
+    modar_item& item = engine.items[count++] = modar::sized<modar_item>();
+    item.model = scene.model;
+    item.scene = scene.number;
+    std::memcpy(item.to_eye, scene.place, sizeof item.to_eye);
+    put(item, patterns + i, turn, size);
+  }
+  engine.item_count = count;
   return count;
+}
+
+/// A canvas that a frame of web_camera() covers.
+modar_surface surface_of(int width, int height, int mirror) {
+  auto surface = modar::sized<modar_surface>();
+  surface.width = width;
+  surface.height = height;
+  surface.mirror = mirror;
+  surface.cover = 1;
+  return surface;
 }
 
 }  // namespace
@@ -126,10 +149,13 @@ EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size) {
   const int damaged = modar_bundle_verify(engine.bundle, &engine.error);
   if (damaged != 0) return damaged;
   engine.poses = new WebPose[modar_pattern_count(engine.bundle) + kMostOwn]();
-  const uint32_t items = modar_scene_count(engine.bundle) + kMostOwn;
+  const uint32_t items =
+      modar_scene_count(engine.bundle) + modar_node_count(engine.bundle) + kMostOwn;
   engine.items = new modar_item[items]();
   for (uint32_t i = 0; i < items; ++i) engine.items[i].size = sizeof(modar_item);
-  return 0;
+  engine.events = new modar_event[modar_pattern_count(engine.bundle) + 1]();
+  engine.actions = modar_actions_create(engine.bundle, &engine.error);
+  return engine.actions == nullptr ? engine.error.status : 0;
 }
 
 /// Of the last function that failed. field: 0 code, 1 where, 2 cause, 3 cure.
@@ -335,11 +361,7 @@ EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn
   glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
   glClear(GL_COLOR_BUFFER_BIT);
   const size_t count = collect_items(turn, size);
-  auto surface = modar::sized<modar_surface>();
-  surface.width = width;
-  surface.height = height;
-  surface.mirror = mirror;
-  surface.cover = 1;
+  const modar_surface surface = surface_of(width, height, mirror);
   modar_renderer_draw(engine.renderer, &surface, nullptr, &engine.camera, nullptr, engine.items,
                       count);
 }
@@ -354,6 +376,107 @@ EMSCRIPTEN_KEEPALIVE void web_look(const uint8_t* pixels, int width, int height)
   modar_renderer_observe(engine.renderer, &picture, &engine.camera, engine.items,
                          collect_items(0.0f, 1.0f));
 }
+/// Names, marks and words of nodes. kind: 0 text, 1 what is seen, 2 title, 3 name, 4 mark.
+EMSCRIPTEN_KEEPALIVE const char* web_node_text(uint32_t node, int kind, const char* language) {
+  size_t length = 0;
+  if (kind == 3) {
+    length = modar_node_name(engine.bundle, node, engine.text, sizeof engine.text);
+  } else if (kind == 4) {
+    length = modar_node_mark(engine.bundle, node, engine.text, sizeof engine.text);
+  } else {
+    length = modar_node_text(engine.bundle, node, kind, language, engine.text, sizeof engine.text);
+  }
+  if (length == 0) engine.text[0] = '\0';
+  return engine.text;
+}
+EMSCRIPTEN_KEEPALIVE const char* web_language(uint32_t index) {
+  if (modar_language(engine.bundle, index, engine.text, sizeof engine.text) == 0) return nullptr;
+  return engine.text;
+}
+EMSCRIPTEN_KEEPALIVE uint32_t web_node_count() {
+  return modar_node_count(engine.bundle);
+}
+/// part: 0 pattern, 1 kind.
+EMSCRIPTEN_KEEPALIVE uint32_t web_node(uint32_t index, int part) {
+  auto node = modar::sized<modar_node>();
+  modar_node_at(engine.bundle, index, &node);
+  return part == 0 ? node.pattern : static_cast<uint32_t>(node.kind);
+}
+EMSCRIPTEN_KEEPALIVE const char* web_address(uint32_t action) {
+  modar_action_address(engine.bundle, action, engine.text, sizeof engine.text);
+  return engine.text;
+}
+
+/// A step of the actions, for the poses in web_poses(). tapped: a node, or -1; material: number of
+/// what lies there, or 0. Answers how many commands web_command() has.
+EMSCRIPTEN_KEEPALIVE size_t web_act(double time_s, int tapped, uint32_t material) {
+  size_t count = 0;
+  engine.events[0].size = sizeof(modar_event);
+  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p) {
+    if (engine.poses[p].shown == 0.0f) continue;
+    engine.events[count++] = {sizeof(modar_event), MODAR_SEEN, p, 0};
+  }
+  if (tapped >= 0) {
+    engine.events[count++] = {sizeof(modar_event), MODAR_TAP, static_cast<uint32_t>(tapped),
+                              material};
+  }
+  return modar_actions_step(engine.actions, time_s, engine.events, count);
+}
+/// field: 0 kind, 1 node, 2 action.
+EMSCRIPTEN_KEEPALIVE uint32_t web_command(size_t index, int field) {
+  auto command = modar::sized<modar_command>();
+  modar_actions_command(engine.actions, index, &command);
+  return field == 0   ? static_cast<uint32_t>(command.kind)
+         : field == 1 ? command.node
+                      : command.action;
+}
+EMSCRIPTEN_KEEPALIVE int web_acting() {
+  return modar_actions_waiting(engine.actions);
+}
+EMSCRIPTEN_KEEPALIVE void web_forget_acts() {
+  modar_actions_reset(engine.actions);
+}
+
+/// What lies under a pixel of the canvas, among what was drawn last: node, and the number of the
+/// material there; nullptr where no node does.
+EMSCRIPTEN_KEEPALIVE const uint32_t* web_pick(int width, int height, int mirror, double x,
+                                              double y) {
+  static uint32_t found[2];
+  const modar_surface surface = surface_of(width, height, mirror);
+  modar_surface_to_frame(&surface, &engine.camera, x, y, &x, &y);
+  auto hit = modar::sized<modar_hit>();
+  if (modar_pick(engine.bundle, &engine.camera, x, y, engine.items, engine.item_count, &hit) == 0)
+    return nullptr;
+  if (engine.items[hit.item].node == 0) return nullptr;
+  found[0] = engine.items[hit.item].node - 1;
+  found[1] = hit.material;
+  return found;
+}
+
+/// Where a label is on the canvas: x, y and whether something lies before it (looked at where
+/// `look` is 1); nullptr where it is not shown.
+EMSCRIPTEN_KEEPALIVE const float* web_label(uint32_t node, int width, int height, int mirror,
+                                            int look) {
+  static float place[3];
+  const WebPose& pose = engine.poses[web_node(node, 0)];
+  auto label = modar::sized<modar_label>();
+  const modar_item* items = look != 0 ? engine.items : nullptr;
+  if (pose.shown == 0.0f ||
+      modar_label_project(engine.actions, node, &engine.camera, pose.view, items,
+                          look != 0 ? engine.item_count : 0, &label) == 0) {
+    return nullptr;
+  }
+  // The frame covers the canvas, its middle in the middle; pixels' centres are whole numbers.
+  const double scale = std::fmax(static_cast<double>(width) / engine.camera.width,
+                                 static_cast<double>(height) / engine.camera.height);
+  const double across = (static_cast<double>(label.x) + 0.5 - engine.camera.width / 2.0) * scale;
+  const double down = (static_cast<double>(label.y) + 0.5 - engine.camera.height / 2.0) * scale;
+  place[0] = static_cast<float>(width / 2.0 + (mirror != 0 ? -across : across));
+  place[1] = static_cast<float>(height / 2.0 + down);
+  place[2] = static_cast<float>(label.covered);
+  return place;
+}
+
 EMSCRIPTEN_KEEPALIVE double web_gpu_bytes() {
   return static_cast<double>(modar_renderer_gpu_bytes(engine.renderer));
 }

@@ -91,9 +91,64 @@ export class Engine {
     this.patterns = Array.from({ length: m._web_pattern_count() }, (_, i) => ({
       name: m.UTF8ToString(m._web_pattern_name(i)), widthMm: m._web_pattern_width_mm(i),
     }));
+    this.languages = [];
+    for (let i = 0, at; (at = m._web_language(i)) !== 0; ++i) this.languages.push(m.UTF8ToString(at));
+    this.nodes = Array.from({ length: m._web_node_count() }, (_, i) => ({
+      name: this.#nodeText(i, 3), pattern: m._web_node(i, 0), kind: ['model', 'picture', 'label'][m._web_node(i, 1) - 1] ?? '',
+      mark: this.#nodeText(i, 4),
+    }));
     this.scenes = Array.from({ length: m._web_scene_count() }, (_, i) => ({
       pattern: m._web_scene(i, 0), model: m.UTF8ToString(m._web_model_name(m._web_scene(i, 1))),
     }));
+  }
+
+  /** kind: 0 text, 1 what is seen, 2 title, 3 name, 4 mark. */
+  #nodeText(node, kind, language = '') {
+    const bytes = new TextEncoder().encode(`${language}\0`);
+    this.frameBuffer(bytes.length).set(bytes);
+    return this.#module.UTF8ToString(this.#module._web_node_text(node, kind, this.frameAt));
+  }
+
+  /** The words of a node: {title, text, alt}, '' where it has none in that language. */
+  wordsOf(node, language) {
+    const [text, alt, title] = [0, 1, 2].map((kind) => this.#nodeText(node, kind, language));
+    return { title, text, alt };
+  }
+
+  /**
+   * A step of the bundle's actions. time: seconds. tap: {node, material} or nothing.
+   * @returns what the page has to do: {text: node} or {link: address}
+   */
+  act(time, tap) {
+    const m = this.#module;
+    const count = m._web_act(time, tap?.node ?? -1, tap?.material ?? 0);
+    return Array.from({ length: count }, (_, i) => (m._web_command(i, 0) === 6 ? { text: m._web_command(i, 1) }
+      : { link: m.UTF8ToString(m._web_address(m._web_command(i, 2))) }));
+  }
+
+  /** Something turns, or a delay runs: act() and draw() again, though no frame comes. */
+  get acting() {
+    return this.#module._web_acting() !== 0;
+  }
+
+  forgetActs() {
+    this.#module._web_forget_acts();
+  }
+
+  /** The node under a pixel of the canvas: {node, material}, or null. */
+  pick(width, height, mirror, x, y) {
+    const at = this.#module._web_pick(width, height, mirror ? 1 : 0, x, y);
+    if (at === 0) return null;
+    const [node, material] = new Uint32Array(this.#module.HEAPU8.buffer, at, 2);
+    return { node, material };
+  }
+
+  /** Where a label is on the canvas, pixels: {x, y, covered}, or null. look: whether something may cover it. */
+  label(node, width, height, mirror, look) {
+    const at = this.#module._web_label(node, width, height, mirror ? 1 : 0, look ? 1 : 0);
+    if (at === 0) return null;
+    const [x, y, covered] = new Float32Array(this.#module.HEAPU8.buffer, at, 3);
+    return { x, y, covered: covered !== 0 };
   }
 
   /** The box of what stands on a pattern, in its space: {low, high}, or null where nothing does. */

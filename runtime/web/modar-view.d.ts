@@ -10,7 +10,21 @@ export interface Gesture {
   size?: number;
 }
 
-export class View {
+/** A named part of what stands on a pattern. */
+export interface SceneNode {
+  name: string;
+  /** Index. */
+  pattern: number;
+  kind: 'model' | 'picture' | 'label';
+  /** Of a label: a number or a short word. */
+  mark: string;
+}
+
+/**
+ * Scenes may act (nodes and actions of the bundle). Events: `text`, detail {node}: the words of a label are to be shown; `link`,
+ * detail {address}: the visitor is to be asked whether to open it; `drawn`: labels() has changed.
+ */
+export class View extends EventTarget {
   /**
    * bytes: the bundle, which may still be on its way. picture, models: laid over each other by the page, of one size.
    * fixedLight: the models' light does not follow the camera's picture. webgl1: for tests. Errors: ModarError.
@@ -36,6 +50,17 @@ export class View {
    * space to GL's eye space, column-major. focal: CSS pixels.
    */
   drawFrom(pattern: number, view: Float32Array, focal: number): void;
+  readonly nodes: SceneNode[];
+  /** Words of a node in the first of these languages that it has, else in any. */
+  wordsOf(node: number, languages?: string[]): { language: string; title: string; text: string; alt: string };
+  /** The visitor tapped the canvas of the models, CSS pixels from its top left. Answers the node there, or null. */
+  tap(x: number, y: number): number | null;
+  /** The visitor tapped a node, as by a label's own button. */
+  tapNode(node: number): void;
+  /** Actions begin anew. */
+  forgetActs(): void;
+  /** Labels on the screen, CSS pixels of the canvas; covered: something lies before its point. */
+  labels(): { node: number; x: number; y: number; covered: boolean }[];
   /** Both canvases in one picture. */
   photograph(type?: 'image/jpeg' | 'image/png'): Promise<Blob>;
   /** The version of WebGL that draws. */

@@ -5,6 +5,10 @@ import { drawFrame, fitCanvases } from './modar.js';
 
 /** Frames between looks at the room's light, and how wide the copy is that is looked at: reading a picture back is slow. */
 const LIGHT_EVERY = 4;
+/** Drawings between looks at whether a label is covered: one label a look, since that reads a model's triangles. */
+const COVER_EVERY = 6;
+/** Milliseconds without a frame after which what turns by itself is drawn without one. */
+const STILL_MS = 60;
 const LIGHT_WIDTH = 160;
 
 function openContext(canvas, webgl1) {
@@ -27,7 +31,11 @@ async function openEngine(simd) {
   return Engine.of(load, vectors ? 'simd' : 'plain');
 }
 
-export class View {
+/**
+ * Where a bundle's scenes act: `text` {node}: a label's words are to be shown; `link` {address}: the visitor is to be
+ * asked; `drawn`: labels() has changed.
+ */
+export class View extends EventTarget {
   #engine;
   #picture;
   #models;
@@ -37,6 +45,12 @@ export class View {
   #small = null;
   #framesSinceLook = LIGHT_EVERY;
   #redraw = () => {};
+  #mirror = false;
+  #taps = [];
+  #drawnAt = 0;
+  #handle = 0;
+  #covered = new Map();
+  #drawings = 0;
 
   /**
    * @param {Uint8Array | Promise<Uint8Array>} bytes the bundle, which may still be on its way
@@ -59,6 +73,95 @@ export class View {
     });
     models.addEventListener('webglcontextrestored', () => view.#restore(webgl1));
     return view;
+  }
+
+  /** What stands on patterns by name: {name, pattern, kind: 'model' | 'picture' | 'label', mark}. */
+  get nodes() {
+    return this.#engine.nodes;
+  }
+
+  /** A node's words in the first of these languages that it has, else in any: {language, title, text, alt}. */
+  wordsOf(node, languages = []) {
+    for (const language of [...languages, ...this.#engine.languages]) {
+      const words = this.#engine.wordsOf(node, language);
+      if (words.title || words.text || words.alt) return { language, ...words };
+    }
+    return { language: '', title: '', text: '', alt: '' };
+  }
+
+  /** The visitor tapped the canvas there, in CSS pixels from its top left: answers the node, or null. */
+  tap(x, y) {
+    if (this.nodes.length === 0) return null;
+    const { width, height, clientWidth } = this.#models;
+    const scale = width / clientWidth;
+    const found = this.#engine.pick(width, height, this.#mirror, x * scale, y * scale);
+    if (found) this.#tapped(found);
+    return found?.node ?? null;
+  }
+
+  /** The visitor tapped a node: a label's button. */
+  tapNode(node) {
+    this.#tapped({ node, material: 0 });
+  }
+
+  /** Actions begin anew, as if nothing had been found. */
+  forgetActs() {
+    this.#taps = [];
+    cancelAnimationFrame(this.#handle);
+    this.#handle = 0;
+    this.#engine.forgetActs();
+  }
+
+  /** The labels that are on the screen: [{node, x, y, covered}], CSS pixels of the canvas. */
+  labels() {
+    const { width, height, clientWidth } = this.#models;
+    const scale = clientWidth / width;
+    const all = this.nodes.map(({ kind }, node) => (kind === 'label' ? node : -1)).filter((node) => node >= 0);
+    const looked = this.#drawings % COVER_EVERY === 0 ? all[(this.#drawings / COVER_EVERY) % all.length] : -1;
+    return all.flatMap((node) => {
+      const place = this.#engine.label(node, width, height, this.#mirror, node === looked);
+      if (!place) return [];
+      if (node === looked) this.#covered.set(node, place.covered);
+      return [{ node, x: place.x * scale, y: place.y * scale, covered: this.#covered.get(node) ?? false }];
+    });
+  }
+
+  #tapped(tap) {
+    this.#taps.push(tap);
+    this.#handle ||= requestAnimationFrame(() => this.#goOn());
+  }
+
+  /** Acts and draws what was drawn last. */
+  #again() {
+    this.#act();
+    this.#redraw();
+    this.#drawn();
+  }
+
+  #act() {
+    if (this.nodes.length === 0) return;
+    const todo = this.#taps.length ? this.#taps.splice(0) : [null];
+    for (const tap of todo) {
+      for (const { text, link } of this.#engine.act(performance.now() / 1000, tap)) {
+        this.dispatchEvent(link ? new CustomEvent('link', { detail: { address: link } })
+          : new CustomEvent('text', { detail: { node: text } }));
+      }
+    }
+  }
+
+  #drawn() {
+    this.#drawnAt = performance.now();
+    if (this.nodes.length === 0) return;
+    ++this.#drawings;
+    this.dispatchEvent(new Event('drawn'));
+    if (this.#engine.acting) this.#handle ||= requestAnimationFrame(() => this.#goOn());
+  }
+
+  /** Frames of a camera come by themselves; without them, what turns or was tapped is drawn anyway. */
+  #goOn() {
+    this.#handle = 0;
+    if (performance.now() - this.#drawnAt > STILL_MS) this.#again();
+    else if (this.#taps.length || this.#engine.acting) this.#handle = requestAnimationFrame(() => this.#goOn());
   }
 
   #restore(webgl1) {
@@ -84,8 +187,9 @@ export class View {
     known.fill(0).set(poses.subarray(0, known.length));
     if (!this.#fixedLight) this.#look(source, camera, poses);
     const as = { ...gesture };
+    this.#mirror = as.mirror ?? false;
     this.#redraw = () => this.#engine.draw(width, height, as);
-    this.#redraw();
+    this.#again();
   }
 
   /** @see modar-view.d.ts */
@@ -114,8 +218,9 @@ export class View {
     const poses = this.#engine.poses().fill(0);
     poses[pattern * POSE_FLOATS + POSE.shown] = 1;
     poses.set(view, pattern * POSE_FLOATS + POSE.view);
+    this.#mirror = false;
     this.#redraw = () => this.#engine.draw(size.width, size.height);
-    this.#redraw();
+    this.#again();
   }
 
   /** As often as the player does, so that both show the same. */

@@ -37,6 +37,10 @@ export interface ModarViewerEventMap extends Omit<HTMLElementEventMap, 'error'>,
   camerachange: Event;
   /** Another pattern's models are shown; -1: none. */
   scenechange: CustomEvent<{ pattern: number }>;
+  /** A label was tapped, or an action shows its words: `pattern` is an index. preventDefault() if you show them yourself. */
+  text: CustomEvent<{ pattern: number; node: string; language: string; title: string; text: string }>;
+  /** An action would open another page. The viewer asks the visitor, unless you call preventDefault(). */
+  link: CustomEvent<{ address: string }>;
   /** After picture and models were drawn, in the same task: copies of `layers` are whole now. */
   frame: CustomEvent<Frame>;
 }

@@ -17,6 +17,8 @@ const FAR_MS = 5000;
 const DARK = 35;
 const TURN_A_KEY = Math.PI / 18;
 const SIZE_A_KEY = 1.1;
+/** How far a finger may slip that taps, CSS pixels. */
+const TAP_PIXELS = 6;
 const SMALLEST = 0.2;
 const LARGEST = 5;
 /** Pictures that a hint has room for. */
@@ -68,6 +70,8 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   #table = null;
   #gesture = { turn: 0, size: 1, mirror: false };
   #shown = -1;
+  /** The label has a node's words, not its pattern's. */
+  #noted = false;
   #unseenSince = 0;
 
   constructor() {
@@ -181,6 +185,8 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#$('models').setAttribute('aria-roledescription', words.scene);
     this.#showPatternNames();
     this.#showLabel(this.#shown);
+    this.#$('marks').replaceChildren();
+    if (this.#$('stage').open) this.#showMarks();
   }
 
   #say(key, values) {
@@ -273,6 +279,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#modar = opened;
     if (!this.#patternsGiven) this.#usePatterns(describe(opened.bytes, opened.patterns));
     opened.bytes = null;  // the engines have their own copies
+    this.#listenToScenes(this.#view);
     opened.addEventListener('frame', ({ detail }) => this.#onFrame(detail));
     opened.addEventListener('dropped', ({ detail }) => { if (this.#camera.stream) this.#view.show(detail.source, this.#gesture); });
     opened.addEventListener('error', ({ detail }) => this.fail(detail));
@@ -346,8 +353,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#$('which').hidden = true;
     if (this.#root.fullscreenElement) document.exitFullscreen();
     this.#$('stage').close();
+    if (this.#$('leave').open) this.#$('leave').close();
+    this.#view?.forgetActs();  // else what turns would be drawn on
     this.#$('label').hidden = true;
     this.#shown = -1;
+    this.#$('marks').replaceChildren();
     this.#setState('start');
   }
 
@@ -481,6 +491,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     const picture = this.patterns[pattern];
     this.#$('scene').value = pattern;
     Object.assign(this.#$('ground'), { width: picture.width, height: picture.height, src: await pictureOf(picture) });
+    this.#view.forgetActs();
     this.#table?.show(pattern, picture);
   }
 
@@ -503,17 +514,25 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#$('models').setAttribute('aria-label', name);
   }
 
+  /** What is said of a pattern's models and pictures, or of a label that was tapped. */
+  #fillLabel({ language, name, text }) {
+    this.#$('label-name').textContent = name;
+    this.#$('label-text').textContent = text;
+    Object.assign(this.#$('label'), { hidden: false, lang: language, dir: language ? directionOf(language) : '' });
+  }
+
   #showLabel(pattern) {
+    this.#noted = false;
     if (pattern < 0) {
       this.#$('label').hidden = true;
       this.#nameModels(this.#say('nothingSeen'));
     } else {
-      const { language, name, text, alt } = this.#labelOf(pattern);
-      this.#$('label-name').textContent = name;
-      this.#$('label-text').textContent = text;
-      Object.assign(this.#$('label'), { hidden: false, lang: language, dir: language ? directionOf(language) : '' });
+      const label = this.#labelOf(pattern);
+      this.#fillLabel(label);
       const models = this.#modar.scenes.filter((scene) => scene.pattern === pattern).map(({ model }) => model);
-      this.#nameModels(this.#say('seen', { name: alt || models.join(', '), pattern: name }));
+      const pictures = this.#view.nodes.map((node, i) => (node.pattern === pattern && node.kind === 'picture' ? this.#wordsOf(i).alt : ''));
+      const seen = [label.alt || models.join(', '), ...pictures].filter(Boolean).join('; ');
+      this.#nameModels(this.#say('seen', { name: seen, pattern: label.name }));
     }
   }
 
@@ -521,6 +540,69 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#shown = pattern;
     this.#showLabel(pattern);
     this.dispatchEvent(new CustomEvent('scenechange', { detail: { pattern } }));
+  }
+
+  // ---- labels that point, and what else a scene does ----
+
+  #wordsOf(node) {
+    const language = this.#language;
+    return this.#view.wordsOf(node, [language, language.split('-')[0]]);
+  }
+
+  #listenToScenes(view) {
+    view.addEventListener('drawn', () => this.#showMarks());
+    view.addEventListener('text', ({ detail: { node } }) => {
+      const { pattern, name, mark } = view.nodes[node];
+      const { language, title, text } = this.#wordsOf(node);
+      if (!this.#ask('text', { pattern, node: name, language, title, text })) return;
+      this.#fillLabel({ language, name: title || mark, text });
+      this.#noted = true;
+    });
+    view.addEventListener('link', ({ detail }) => {
+      if (!this.#ask('link', detail)) return;
+      this.#$('leave-address').textContent = this.#$('leave-open').href = detail.address;
+      if (!this.#$('leave').open) this.#$('leave').showModal();
+    });
+  }
+
+  /** Whether the page leaves it to the viewer. */
+  #ask(type, detail) {
+    return this.dispatchEvent(new CustomEvent(type, { detail, cancelable: true }));
+  }
+
+  /** A button for each label on the screen, in the order of the bundle. */
+  #showMarks() {
+    const marks = this.#$('marks');
+    const buttons = new Map([...marks.children].map((button) => [Number(button.dataset.node), button]));
+    for (const { node, x, y, covered } of this.#view?.labels() ?? []) {
+      const button = buttons.get(node) ?? this.#addMark(node);
+      buttons.delete(node);
+      button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      button.toggleAttribute('data-covered', covered);
+    }
+    for (const button of buttons.values()) button.remove();
+  }
+
+  #addMark(node) {
+    const { mark } = this.#view.nodes[node];
+    const { title, language } = this.#wordsOf(node);
+    const button = Object.assign(document.createElement('button'), { type: 'button', textContent: mark });
+    button.dataset.node = node;
+    if (title) {
+      Object.assign(button, { title, lang: language });
+      button.setAttribute('aria-label', `${mark}: ${title}`);
+    }
+    button.addEventListener('click', () => this.#view.tapNode(node));
+    const after = [...this.#$('marks').children].find((other) => Number(other.dataset.node) > node);
+    this.#$('marks').insertBefore(button, after ?? null);
+    return button;
+  }
+
+  /** What is tapped acts, and the label is the pattern's again. */
+  #tap(canvas, { clientX, clientY }) {
+    const { left, top } = canvas.getBoundingClientRect();
+    this.#view?.tap(clientX - left, clientY - top);
+    if (this.#noted) this.#showLabel(this.#shown);
   }
 
   #onFrame(frame) {
@@ -598,13 +680,17 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       const [a, b] = [...fingers.values()];
       return Math.hypot(a.x - b.x, a.y - b.y);
     };
+    let tap = null;  // where one finger came down that has not moved
     canvas.addEventListener('pointerdown', (event) => {
       canvas.setPointerCapture(event.pointerId);
       fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      tap = fingers.size === 1 ? { x: event.clientX, y: event.clientY } : null;
     });
     canvas.addEventListener('pointermove', (event) => {
       const finger = fingers.get(event.pointerId);
       if (!finger) return;
+      if (tap && Math.hypot(event.clientX - tap.x, event.clientY - tap.y) > TAP_PIXELS) tap = null;
+      if (tap) return;
       const before = fingers.size === 2 ? spread() : 0;
       // Across the whole canvas: one turn.
       if (fingers.size === 1) {
@@ -616,7 +702,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       if (before > 0) this.#resize(spread() / before);
     });
     for (const type of ['pointerup', 'pointercancel']) {
-      canvas.addEventListener(type, ({ pointerId }) => fingers.delete(pointerId));
+      canvas.addEventListener(type, (event) => {
+        fingers.delete(event.pointerId);
+        if (tap && type === 'pointerup') this.#tap(canvas, event);
+        tap = null;
+      });
     }
     canvas.addEventListener('wheel', (event) => {
       event.preventDefault();
@@ -636,7 +726,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     const clicks = {
       start: () => this.start(), look: () => this.look(), close: () => this.stop(), flip: () => this.#flip(), torch: () => this.#toggleTorch(),
       cameras: () => this.#showCameras(), 'choose-close': () => this.#$('choose').close(), copy: () => this.#copyAddress(),
-      'problem-close': () => this.#$('problem').close(),
+      'problem-close': () => this.#$('problem').close(), 'leave-open': () => this.#$('leave').close(), 'leave-close': () => this.#$('leave').close(),
       full: () => (this.#root.fullscreenElement ? document.exitFullscreen() : this.#$('screen').requestFullscreen()),
       // The same as keys and gestures, for those who do not drag, pinch or type.
       'turn-left': keys.ArrowLeft, 'turn-right': keys.ArrowRight, larger: keys['+'], smaller: keys['-'], higher: keys.PageUp,

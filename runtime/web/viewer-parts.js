@@ -95,6 +95,14 @@ export const STYLE = `
 #label { border-left: 3px solid var(--accent); max-height: 45%; overflow-y: auto; pointer-events: auto; user-select: text; -webkit-user-select: text; }
 #label p { margin-top: .3rem; font-size: 1rem; }
 #label p:empty { display: none; }
+/* Their points move with the picture, their size does not. */
+#marks { position: absolute; inset: 0; overflow: hidden; pointer-events: none; }
+#marks button {
+  position: absolute; left: 0; top: 0; min-width: 2.4rem; min-height: 2.4rem; padding: 0 .5rem; justify-content: center;
+  margin: -1.2rem 0 0 -1.2rem; border: 2px solid var(--card); border-radius: 1.2rem; background: var(--ink); color: var(--card);
+  font-size: 1rem; font-weight: 600; line-height: 1; pointer-events: auto; box-shadow: var(--shadow);
+}
+#marks button[data-covered] { opacity: .4; }
 #handles {
   position: absolute; inset-inline-end: calc(.6rem + env(safe-area-inset-right)); top: 50%; transform: translateY(-60%);
   display: flex; flex-direction: column; gap: .45rem;
@@ -119,6 +127,7 @@ export const STYLE = `
 #choose-list { display: grid; gap: .5rem; }
 #choose-list label { display: flex; gap: .7rem; align-items: center; min-height: 2.9rem; border-bottom: 1px solid var(--rule); cursor: pointer; }
 #choose-list input { width: 1.2rem; height: 1.2rem; accent-color: var(--accent); }
+#leave-address { overflow-wrap: anywhere; }
 #problem-detail:empty { display: none; }
 `;
 
@@ -140,6 +149,7 @@ const MARKUP = `<div id="all">
   <canvas id="picture" aria-hidden="true"></canvas>
   <img id="ground" alt="" hidden>
   <canvas id="models" role="application" tabindex="0" aria-describedby="keys"></canvas>
+  <div id="marks" role="group" data-label="labels"></div>
   <p id="keys" class="unseen" data-word="keys"></p>
   <p id="which" hidden><label class="unseen" for="scene" data-word="scene"></label><select id="scene"></select></p>
   <aside id="hint"><div id="plates" aria-hidden="true"></div><p id="reason" role="status"></p></aside>
@@ -167,6 +177,11 @@ const MARKUP = `<div id="all">
   <div id="choose-list"></div>
   <p class="small" data-word="keys"></p>
   <p class="row"><button id="choose-close" type="button" class="quiet" data-word="back"></button></p>
+</dialog>
+<dialog id="leave" class="dialog" aria-labelledby="leave-title">
+  <h2 id="leave-title" data-word="leave"></h2>
+  <p id="leave-address"></p>
+  <p class="row"><a id="leave-open" class="button" target="_blank" rel="noopener noreferrer" data-word="open"></a><button id="leave-close" type="button" class="quiet" data-word="back"></button></p>
 </dialog>
 <dialog id="problem" class="dialog" role="alertdialog" aria-labelledby="problem-title" aria-describedby="problem-cure">
   <h2 id="problem-title"></h2>

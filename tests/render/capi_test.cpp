@@ -436,6 +436,26 @@ TEST(CapiOrbit, GoesAroundWhatStandsOnAPattern) {
   modar_bundle_close(bundle);
 }
 
+TEST(CapiBounds, EnclosePicturesAndLabels) {
+  modar::BundleContent content = test::acting_content();
+  content.nodes[1].half_size[0] = 50;  // along y and z, as it is turned
+  content.nodes[1].half_size[1] = 25;
+  content.nodes[1].place[2] = 40;
+  content.nodes[2].place[0] = -75;
+  const auto bytes = test::encode(content);
+  modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
+  ASSERT_NE(bundle, nullptr);
+  float low[3];
+  float high[3];
+  ASSERT_EQ(modar_pattern_bounds(bundle, 0, low, high), 1);
+  EXPECT_EQ(low[0], -75);
+  EXPECT_NEAR(low[1], -50, 1e-4);
+  EXPECT_NEAR(high[1], 50, 1e-4);
+  EXPECT_NEAR(high[2], 65, 1e-4);
+  EXPECT_LT(high[0], 10);
+  modar_bundle_close(bundle);
+}
+
 TEST(CapiActions, RunABundlesNodes) {
   const auto bytes = test::encode(test::acting_content());
   modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);

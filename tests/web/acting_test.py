@@ -1,0 +1,253 @@
+"""A scene that acts, in Chromium with a fake camera: pictures, labels, taps and links as a visitor meets them."""
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
+from browser import Browser, Server  # noqa: E402
+from programs import COVER, POTTERY, ProgramTest, demo_clip  # noqa: E402
+
+WIDTH, HEIGHT, FRAMES = 640, 480, 6
+GREEN, BLUE = (16, 180, 60), (30, 60, 210)
+PROJECT = """[bake]
+loop-views = 8
+score = false
+lods = 1
+occlusion = false
+[[model]]
+file = "pottery.obj"
+[[pattern]]
+file = "cover.png"
+[[scene]]
+pattern = "cover"
+model = "pottery"
+scale = 0.5
+hidden = true
+group = "views"
+alt.en = "A pot"
+[[scene.picture]]
+file = "green.png"
+scale = 0.4
+hidden = true
+group = "views"
+alt.en = "A green sheet"
+[[scene.picture]]
+file = "blue.png"
+scale = 0.2
+offset = [0, 0.35, 0]
+[[scene.label]]
+name = "corner"
+mark = "A"
+offset = [0.2, -0.3, 0]
+title.en = "The corner"
+text.en = "It is bent."
+title.de = "Die Ecke"
+[[scene.label]]
+name = "behind"
+hidden = true
+[[scene.action]]
+on = "found"
+do = "show green"
+[[scene.action]]
+on = "tap green"
+do = "next green"
+[[scene.action]]
+on = "tap blue"
+do = "show behind"
+[[scene.action]]
+on = "tap blue"
+do = "link https://museum.org/blue"
+"""
+
+# The colour of the models' canvas at a point of the page, CSS pixels, just after something was drawn: browsers empty it then.
+PIXEL = """new Promise((resolve) => {
+  const canvas = part('models');
+  const copy = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+  Object.assign(copy.canvas, { width: canvas.width, height: canvas.height });
+  const scale = canvas.width / canvas.clientWidth;
+  const send = EventTarget.prototype.dispatchEvent;
+  EventTarget.prototype.dispatchEvent = function (event) {
+    if (event.type === 'drawn') {
+      EventTarget.prototype.dispatchEvent = send;
+      copy.drawImage(canvas, 0, 0);
+      resolve(Array.from(copy.getImageData(%f * scale, %f * scale, 1, 1).data));
+    }
+    return send.call(this, event);
+  };
+})"""
+# A click where nobody drags.
+CLICK = """(() => {
+  const canvas = part('models');
+  canvas.setPointerCapture = () => {};
+  for (const type of ['pointerdown', 'pointerup']) {
+    canvas.dispatchEvent(new PointerEvent(type, { pointerId: 1, clientX: %f, clientY: %f, bubbles: true }));
+  }
+})()"""
+MARKS = """[...part('marks').children].map((button) => {
+  const { left, right, top, bottom } = button.getBoundingClientRect();
+  return { text: button.textContent, name: button.getAttribute('aria-label'), x: (left + right) / 2, y: (top + bottom) / 2 };
+})"""
+
+
+def plain(path, colour, side=64):
+    rows = b"".join(b"\0" + bytes(colour) * side for _ in range(side))
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
+
+
+class Acting(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.base = pathlib.Path(tempfile.mkdtemp(prefix="modar-acting-"))
+        cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
+        test = cls("run_program")
+        test.folder = cls.base
+        project = cls.base / "project"
+        project.mkdir()
+        for file in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png"), COVER):
+            shutil.copy(file, project)
+        plain(project / "green.png", GREEN)
+        plain(project / "blue.png", BLUE)
+        (project / "modar.toml").write_text(PROJECT)
+        for words in (["bake", "--project", project / "modar.toml", "--quiet"],
+                      ["web", project / "out" / "project.modar", "-o", cls.base / "site", "--quiet"]):
+            done = test.modar(*words)
+            if done.returncode != 0:
+                raise AssertionError(done.stderr)
+        clip = demo_clip(cls.base / "small", FRAMES)
+        cls.video = cls.base / "camera.y4m"
+        # One frame: where things are on the screen stays.
+        subprocess.run(["ffmpeg", "-loglevel", "error", "-y", "-i", clip / "frame_00000.png", "-vf", f"scale={WIDTH}:{HEIGHT}",
+                        "-pix_fmt", "yuv420p", cls.video], check=True)
+        cls.server = Server(cls.base / "site")
+        cls.browser = Browser(cls.base / "profile", cls.video)
+        cls.addClassCleanup(cls.browser.close)
+        cls.browser.camera("granted")
+
+    def assert_colour(self, place, colour, what):
+        pixel = self.browser.run(PIXEL % tuple(place))
+        for got, wanted in zip(pixel, (*colour, 255)):
+            self.assertAlmostEqual(got, wanted, delta=8, msg=(what, pixel))  # ETC1 is not exact
+
+    def click(self, place):
+        self.browser.run(CLICK % tuple(place))
+
+    def test_a_visit(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
+        self.browser.run("""['text', 'link'].forEach((type) => document.getElementById('viewer').addEventListener(type, ({ detail }) => {
+          (globalThis.told ??= []).push(detail);
+        })), document.getElementById('start').click()""")
+        self.browser.wait("document.getElementById('viewer').state === 'seen'", "the picture")
+        self.browser.wait(f"({MARKS}).length === 1", "the label")
+        mark, = self.browser.run(MARKS)
+        self.assertEqual((mark["text"], mark["name"]), ("A", "A: The corner"))
+        application = "part('models').getAttribute('aria-label')"
+        self.assertEqual(self.browser.run(application), "A pot; A green sheet, standing on the picture cover.")
+        # The corner's place, told by the pose: the label is on it, the blue sheet and the green one where the bundle has them.
+        places = self.browser.run("""(async () => {
+          const { View } = await import('/modar-view.js');
+          const draw = View.prototype.draw;
+          const frame = await new Promise((resolve) => {
+            View.prototype.draw = function (detail, ...rest) { resolve(detail); return draw.call(this, detail, ...rest); };
+          });
+          View.prototype.draw = draw;
+          const view = frame.poses.slice(24, 40);
+          return [[0.4, -0.6], [0, 0.7], [0, 0]].map(([x, y]) => {
+            const at = [0, 1, 2].map((i) => view[i] * x + view[4 + i] * y + view[12 + i]);
+            const { focal, width, height } = frame.camera;
+            return [innerWidth / 2 - (focal * at[0]) / at[2] * innerWidth / width, innerHeight / 2 + (focal * at[1]) / at[2] * innerHeight / height];
+          });
+        })()""")
+        corner, blue, green = places
+        self.assertAlmostEqual(mark["x"], corner[0], delta=1.5)
+        self.assertAlmostEqual(mark["y"], corner[1], delta=1.5)
+        self.assert_colour(blue, BLUE, "the blue sheet")
+        self.assert_colour(green, GREEN, "found has shown the green sheet")
+        self.click(green)
+        self.browser.wait(f"{PIXEL % tuple(green)}.then(([r, g, b]) => g < r + 60)", "the pot in place of the green sheet")
+        self.click(green)
+        self.assertTrue(self.browser.run("part('label-name').textContent") == "cover", "the pot has no action")
+        self.browser.run("part('marks').firstChild.click()")
+        self.browser.wait("part('label-name').textContent === 'The corner'", "the label's words")
+        self.assertEqual(self.browser.run("part('label-text').textContent"), "It is bent.")
+        self.click(corner)  # beside everything: the picture's own label is back
+        self.assertEqual(self.browser.run("part('label-name').textContent"), "cover")
+        self.click(blue)
+        self.browser.wait("part('leave').open", "the question")
+        self.assertEqual(self.browser.run("part('leave-open').href"), "https://museum.org/blue")
+        self.assertEqual(self.browser.run("part('leave-open').rel"), "noopener noreferrer")
+        self.assertEqual(self.browser.run("told"), [
+            {"pattern": 0, "node": "corner", "language": "en", "title": "The corner", "text": "It is bent."},
+            {"address": "https://museum.org/blue"}])
+        self.browser.run("part('leave-close').click()")
+        self.browser.wait(f"({MARKS}).length === 2", "the hidden label")
+        self.assertEqual([each["text"] for each in self.browser.run(MARKS)], ["A", "2"])
+        self.browser.run("part('close').click()")
+        self.assertEqual(self.browser.run(MARKS), [])
+        self.assertEqual(self.browser.errors, [])
+
+    def test_without_a_camera(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url + "?lang=de")
+        self.browser.wait("document.getElementById('look').textContent !== ''", "the cover")
+        self.browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
+        self.addCleanup(self.browser.call, "Emulation.setEmulatedMedia", features=[])
+        self.browser.run("document.getElementById('look').click()")
+        self.browser.wait(f"({MARKS}).length === 1", "the label")
+        mark, = self.browser.run(MARKS)
+        self.assertEqual(mark["name"], "A: Die Ecke")
+        self.browser.run("part('marks').firstChild.click()")
+        self.browser.wait("part('label-name').textContent === 'Die Ecke'", "the label's words")
+        before = mark["x"]
+        self.browser.run("part('turn-left').click()")
+        self.assertNotAlmostEqual(self.browser.run(MARKS)[0]["x"], before, delta=3)
+        self.click((5, 240))
+        self.assertEqual(self.browser.run("part('label-name').textContent"), "cover")
+        # A page that shows the words itself.
+        self.browser.run("""document.getElementById('viewer').addEventListener('text', (event) => {
+          event.preventDefault();
+          globalThis.own = event.detail.title;
+        }), part('marks').firstChild.click()""")
+        self.browser.wait("globalThis.own === 'Die Ecke'", "the event")
+        self.assertEqual(self.browser.run("part('label-name').textContent"), "cover")
+        self.browser.run("part('close').click()")
+        self.assertEqual(self.browser.errors, [])
+
+    def test_a_picture_of_ones_own_gets_the_model_alone(self):
+        self.browser.open(self.server.url)
+        drawn, tapped, marks = self.browser.run("""(async () => {
+          const [{ View }, { viewFrom }, { bundles }] = await Promise.all(
+            [import('/modar-view.js'), import('/turntable.js'), (await fetch('/site.json')).json()]);
+          const [picture, models] = [0, 1].map(() => document.createElement('canvas'));
+          models.style.cssText = picture.style.cssText = 'position: fixed; left: 0; top: 0; width: 320px; height: 240px';
+          document.body.append(picture, models);
+          const view = await View.create(new Uint8Array(await (await fetch(bundles[0].file)).arrayBuffer()), { picture, models });
+          view.stand('mine', 0);
+          const poses = new Float32Array(82);
+          poses[41 + 1] = 1;
+          poses.set(viewFrom({ target: [0, 0, 0.3], turn: 0, tilt: 0.6, distance: 4 }), 41 + 24);
+          const source = Object.assign(document.createElement('canvas'), { width: 320, height: 240 });
+          source.getContext('2d');
+          view.draw({ source, camera: { width: 320, height: 240, focal: 320 }, poses });
+          const copy = Object.assign(document.createElement('canvas'), { width: models.width, height: models.height }).getContext('2d');
+          copy.drawImage(models, 0, 0);
+          const { data } = copy.getImageData(0, 0, models.width, models.height);
+          const drawn = data.filter((value, i) => i % 4 === 3 && value > 128).length / (data.length / 4);
+          return [drawn, view.tap(160, 120), view.labels()];
+        })()""")
+        self.assertGreater(drawn, 0.005)
+        self.assertLess(drawn, 0.3)
+        self.assertEqual((tapped, marks), (None, []))
+        self.assertEqual(self.browser.errors, [])
+
+
+if __name__ == "__main__":
+    unittest.main()
