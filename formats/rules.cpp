@@ -1,8 +1,11 @@
 // The constant part of every rule, the log of what broke them, and the text of ISSUES.md.
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
+#include <string>
 #include <string_view>
 
 #include "formats/check.hpp"
@@ -194,6 +197,38 @@ void FaultLog::add(Rule rule, std::uint64_t offset, std::string where, std::stri
                  kind.message + (": " + detail), kind.cure};
 }
 
+std::string rough_number_text(double value) {
+  if (value != value) return "nan";
+  std::string text = value < 0 ? "-" : "";
+  double left = value < 0 ? -value : value;
+  if (left > std::numeric_limits<double>::max()) return text + "inf";
+  if (left == 0) return "0";
+  constexpr int kDigits = 9;
+  constexpr double kOne = 1e8;  // of as many digits
+  int exponent = kDigits - 1;
+  for (; left >= 10 * kOne; left /= 10) ++exponent;
+  for (; left < kOne; left *= 10) --exponent;
+  std::string digits = std::to_string(static_cast<std::int64_t>(left + 0.5));
+  if (digits.size() > kDigits) ++exponent;  // 999999999.9
+  digits.erase(digits.find_last_not_of('0') + 1);
+  if (exponent < -4 || exponent >= kDigits) {
+    text += digits[0];
+    if (digits.size() > 1) text += '.' + digits.substr(1);
+    return text + (exponent < 0 ? "e-" : "e+") + (std::abs(exponent) < 10 ? "0" : "") +
+           std::to_string(std::abs(exponent));
+  }
+  if (exponent < 0)
+    return text + "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + digits;
+  const auto whole = static_cast<std::size_t>(exponent) + 1;
+  if (digits.size() <= whole) return text + digits + std::string(whole - digits.size(), '0');
+  return text + digits.substr(0, whole) + "." + digits.substr(whole);
+}
+
+#ifdef __EMSCRIPTEN__
+std::string number_text(double value) {
+  return rough_number_text(value);
+}
+#else
 /// Not std::to_chars: its floating-point tables take 130 KB, a quarter of the player. printf and
 /// strtod agree on the locale's decimal point, which becomes '.'.
 std::string number_text(double value) {
@@ -213,6 +248,7 @@ std::string number_text(double value) {
   }
   return answer;
 }
+#endif
 
 std::string issue_rows(std::span<const IssueKind> kinds) {
   std::string text;

@@ -28,6 +28,25 @@ TEST(NumberText, IsTheShortestThatReadsBack) {
   EXPECT_EQ(number_text(std::numeric_limits<double>::quiet_NaN()), "nan");
 }
 
+TEST(NumberText, PagesGetNineDigits) {
+  for (const double value : {0.0, 0.1, -2.5, 65535.0, 123456789.0, 0.00012}) {
+    EXPECT_EQ(rough_number_text(value), number_text(value));
+  }
+  EXPECT_EQ(rough_number_text(std::ldexp(1.0, -15)), "3.05175781e-05");
+  EXPECT_EQ(rough_number_text(9999999999.0), "1e+10");
+  EXPECT_EQ(rough_number_text(-std::numeric_limits<double>::infinity()), "-inf");
+  EXPECT_EQ(rough_number_text(std::numeric_limits<double>::quiet_NaN()), "nan");
+  std::mt19937_64 random(9);
+  for (int i = 0; i < 20000; ++i) {
+    const std::uint64_t bits = random();
+    double value = 0;
+    std::memcpy(&value, &bits, sizeof value);
+    if (!std::isnormal(value)) continue;
+    const double read = std::strtod(rough_number_text(value).c_str(), nullptr);
+    ASSERT_LE(std::abs(read / value - 1), 1e-8) << value;
+  }
+}
+
 TEST(NumberText, AnyDoubleReadsBack) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 20000; ++i) {
