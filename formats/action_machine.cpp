@@ -32,7 +32,7 @@ ActionMachine::ActionMachine(const BundleView& bundle)
       patterns_(bundle.patterns().size()),
       nodes_(bundle.nodes().size()),
       fired_(bundle.actions().size()) {
-  commands_.reserve(nodes_.size() + fired_.size());
+  commands_.reserve(2 * nodes_.size() + fired_.size());
   reset();
 }
 
@@ -42,6 +42,7 @@ void ActionMachine::reset() {
   for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
     nodes_[i] = Node();
     nodes_[i].shown = (bundle_.nodes()[i].flags & kNodeHidden) == 0;
+    nodes_[i].wanted = (bundle_.nodes()[i].flags & kNodePlays) != 0;
   }
   commands_.clear();
   now_ = 0;
@@ -52,6 +53,10 @@ std::span<const SceneCommand> ActionMachine::step(double time_s,
   now_ = time_s > now_ ? time_s : now_;
   commands_.clear();
   for (Node& node : nodes_) node.told = false;
+  for (const SceneEvent& event : events) {
+    if (event.kind != SceneEvent::Kind::kEnded || event.subject >= nodes_.size()) continue;
+    nodes_[event.subject].wanted = nodes_[event.subject].playing = false;
+  }
   for (std::uint32_t i = 0; i < fired_.size(); ++i) {
     if (bundle_.actions()[i].event != static_cast<std::uint32_t>(ActionEvent::kAfter)) {
       fired_[i] = false;
@@ -81,7 +86,19 @@ std::span<const SceneCommand> ActionMachine::step(double time_s,
   for (const SceneEvent& event : events) {
     if (event.kind == SceneEvent::Kind::kTap) tap(event);
   }
+  play();
   return commands_;
+}
+
+/// Tells which videos begin or stop.
+void ActionMachine::play() {
+  for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+    Node& node = nodes_[i];
+    const bool plays = node.wanted && node.shown && patterns_[bundle_.nodes()[i].pattern].present;
+    if (plays == node.playing) continue;
+    node.playing = plays;
+    commands_.push_back({plays ? ActionCommand::kPlay : ActionCommand::kPause, i, kNone});
+  }
 }
 
 void ActionMachine::tap(const SceneEvent& event) {
@@ -124,6 +141,12 @@ void ActionMachine::perform(std::uint32_t index) {
   const ActionRecord& action = bundle_.actions()[index];
   Node* target = action.target < nodes_.size() ? &nodes_[action.target] : nullptr;
   switch (static_cast<ActionCommand>(action.command)) {
+    case ActionCommand::kPlay:
+      target->wanted = true;
+      break;
+    case ActionCommand::kPause:
+      target->wanted = false;
+      break;
     case ActionCommand::kShow:
       target->shown = true;
       break;

@@ -18,7 +18,8 @@ inline constexpr double kLostAfterSeconds = 1.0;
 struct SceneEvent {
   enum class Kind : std::uint8_t {
     kSeen,  ///< the pattern is on the screen
-    kTap    ///< the visitor tapped a node
+    kTap,   ///< the visitor tapped a node
+    kEnded  ///< a video that does not loop is at its end
   };
   Kind kind = Kind::kSeen;
   std::uint32_t subject = 0;       ///< index of the pattern, or of the node
@@ -27,8 +28,8 @@ struct SceneEvent {
 
 /// What the app has to do; the nodes' own state is asked with shown() and turn_of().
 struct SceneCommand {
-  ActionCommand command = ActionCommand::kText;  ///< kText or kLink
-  std::uint32_t node = kNone;                    ///< of kText: the label
+  ActionCommand command = ActionCommand::kText;  ///< kPlay, kPause, kText or kLink
+  std::uint32_t node = kNone;                    ///< the video, the label
   std::uint32_t action = kNone;                  ///< index of the action; kNone: a label's own
 };
 
@@ -69,6 +70,8 @@ class ActionMachine {
   };
   struct Node {
     bool shown = true;
+    bool wanted = false;         ///< a video is to play while it can be seen
+    bool playing = false;        ///< as the app was told
     bool told = false;           ///< its words, in this step
     NodeTurn base;               ///< where its last turn began
     double start = 0;            ///< of that turn, seconds
@@ -77,6 +80,7 @@ class ActionMachine {
 
   void fire(ActionEvent event, std::uint32_t source, std::uint32_t material);
   void tap(const SceneEvent& event);
+  void play();
   void perform(std::uint32_t action);
   void show_next(std::uint32_t target);
   [[nodiscard]] bool named(const ActionRecord& action, std::uint32_t material) const;
@@ -87,7 +91,7 @@ class ActionMachine {
   std::vector<Node> nodes_;
   std::vector<bool>
       fired_;  ///< one an action: in this step; of delays, since the pattern was found
-  std::vector<SceneCommand> commands_;  ///< capacity: all actions and all nodes
+  std::vector<SceneCommand> commands_;  ///< capacity: all actions, each node twice
   double now_ = 0;
 };
 

@@ -46,6 +46,10 @@ std::span<const std::byte> BundleView::texture_data(std::uint32_t texture) const
   return section(SectionType::kTextureData, texture);
 }
 
+std::span<const std::byte> BundleView::media_data(std::uint32_t media) const {
+  return section(SectionType::kMediaData, media);
+}
+
 FeatureView BundleView::features(std::uint32_t pattern, std::uint32_t set_id) const {
   const std::span<const std::byte> bytes = section(SectionType::kMappedFeatures, pattern, set_id);
   if (bytes.empty()) return {};

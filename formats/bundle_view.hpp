@@ -68,6 +68,7 @@ struct BundleParts {
   Table<OcclusionRecord> occlusion;
   Table<NodeRecord> nodes;
   Table<ActionRecord> actions;
+  Table<MediaRecord> media;
 };
 
 /// A validated bundle. Holds pointers into the caller's bytes, which must outlive it.
@@ -108,6 +109,9 @@ class BundleView {
   [[nodiscard]] Table<OcclusionRecord> occlusion() const { return parts_.occlusion; }
   [[nodiscard]] Table<NodeRecord> nodes() const { return parts_.nodes; }
   [[nodiscard]] Table<ActionRecord> actions() const { return parts_.actions; }
+  [[nodiscard]] Table<MediaRecord> media() const { return parts_.media; }
+  /// The file of a media record.
+  [[nodiscard]] std::span<const std::byte> media_data(std::uint32_t media) const;
 
   [[nodiscard]] std::span<const std::byte> vertices() const { return parts_.vertices; }
   [[nodiscard]] std::span<const std::byte> indices() const { return parts_.indices; }

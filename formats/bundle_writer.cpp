@@ -55,6 +55,8 @@ std::uint16_t flags_of(SectionType type) {
     case SectionType::kOcclusion:
     case SectionType::kNodes:
     case SectionType::kActions:
+    case SectionType::kMedia:
+    case SectionType::kMediaData:
     case SectionType::kFeatureYml:
     case SectionType::kShadow:
       return 0;
@@ -212,6 +214,7 @@ void collect(const BundleContent& content, SectionList& list) {
   list.add_table(SectionType::kOcclusion, content.occlusion);
   list.add_table(SectionType::kNodes, content.nodes);
   list.add_table(SectionType::kActions, content.actions);
+  list.add_table(SectionType::kMedia, content.media);
   for (std::uint32_t pattern = 0; pattern < content.features.size(); ++pattern) {
     for (const FeatureContent& features : content.features[pattern]) {
       list.add_features(pattern, features);
@@ -219,6 +222,9 @@ void collect(const BundleContent& content, SectionList& list) {
   }
   for (std::uint32_t scene = 0; scene < content.shadows.size(); ++scene) {
     list.add_blob(SectionType::kShadow, scene, content.shadows[scene]);
+  }
+  for (std::uint32_t media = 0; media < content.media_data.size(); ++media) {
+    list.add_blob(SectionType::kMediaData, media, content.media_data[media]);
   }
   list.add_blob(SectionType::kVertices, kNone, content.vertices);
   list.add_blob(SectionType::kIndices, kNone, content.indices);
@@ -289,6 +295,7 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   if (!content.occlusion.empty()) need_section(SectionType::kOcclusion);
   if (!content.nodes.empty()) need_section(SectionType::kNodes);
   if (!content.actions.empty()) need_section(SectionType::kActions);
+  if (!content.media.empty()) need_section(SectionType::kMedia);
   return minor;
 }
 

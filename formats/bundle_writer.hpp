@@ -55,10 +55,12 @@ struct BundleContent {
   std::vector<OcclusionRecord> occlusion;
   std::vector<NodeRecord> nodes;
   std::vector<ActionRecord> actions;
+  std::vector<MediaRecord> media;
   std::vector<std::vector<FeatureContent>> features;  ///< one list a pattern
   std::vector<std::byte> vertices;
   std::vector<std::byte> indices;
   std::vector<std::vector<std::byte>> texture_data;  ///< one a texture
+  std::vector<std::vector<std::byte>> media_data;    ///< one a media record
   std::vector<std::vector<std::byte>> shadows;       ///< one a scene, empty: none
   std::vector<ExtraSection> extra;
 

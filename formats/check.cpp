@@ -637,6 +637,7 @@ void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes, boo
   check_patterns(log, parts);
   check_draw_orders(log, parts);
   check_titles(log, parts);
+  check_media_files(log, parts);
 }
 
 }  // namespace

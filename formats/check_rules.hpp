@@ -45,6 +45,9 @@ struct BufferHashes {
   SectionHash indices;
 };
 
+/// Media files are what their records say, and what every device plays (validate_nodes.cpp).
+void check_media_files(FaultLog& log, const BundleParts& parts);
+
 /// Labels have titles in the same languages (validate_nodes.cpp).
 void check_titles(FaultLog& log, const BundleParts& parts);
 

@@ -131,6 +131,7 @@ BundleParts parts_of(const BundleContent& content) {
   parts.occlusion = table_of(content.occlusion);
   parts.nodes = table_of(content.nodes);
   parts.actions = table_of(content.actions);
+  parts.media = table_of(content.media);
   return parts;
 }
 
@@ -169,6 +170,7 @@ void summarise(const BundleParts& parts, std::uint16_t minor,
   summarise_table(parts, "OcclusionRecord", parts.occlusion, sink);
   summarise_table(parts, "NodeRecord", parts.nodes, sink);
   summarise_table(parts, "ActionRecord", parts.actions, sink);
+  summarise_table(parts, "MediaRecord", parts.media, sink);
   std::uint32_t index = 0;
   for (const SectionEntry& entry : sections) {
     if (entry.type != static_cast<std::uint32_t>(SectionType::kContentSummary)) {

@@ -139,7 +139,13 @@ constexpr FieldInfo kNodeRecord[] = {
     MODAR_FIELD(NodeRecord, flags),     MODAR_FIELD(NodeRecord, group),
     MODAR_FIELD(NodeRecord, place),     MODAR_FIELD(NodeRecord, rotation),
     MODAR_FIELD(NodeRecord, half_size), MODAR_FIELD(NodeRecord, mark),
-    MODAR_FIELD(NodeRecord, reserved)};
+    MODAR_FIELD(NodeRecord, alpha),     MODAR_FIELD(NodeRecord, key),
+    MODAR_FIELD(NodeRecord, reach),     MODAR_FIELD(NodeRecord, reserved)};
+constexpr FieldInfo kMediaRecord[] = {
+    MODAR_FIELD(MediaRecord, name),   MODAR_FIELD(MediaRecord, kind),
+    MODAR_FIELD(MediaRecord, flags),  MODAR_FIELD(MediaRecord, width),
+    MODAR_FIELD(MediaRecord, height), MODAR_FIELD(MediaRecord, seconds),
+    MODAR_FIELD(MediaRecord, poster), MODAR_FIELD(MediaRecord, reserved)};
 constexpr FieldInfo kActionRecord[] = {
     MODAR_FIELD(ActionRecord, event),   MODAR_FIELD(ActionRecord, command),
     MODAR_FIELD(ActionRecord, source),  MODAR_FIELD(ActionRecord, target),
@@ -216,6 +222,7 @@ constexpr RecordInfo kRecords[] = {
     MODAR_TABLE(OcclusionRecord),
     MODAR_TABLE(NodeRecord),
     MODAR_TABLE(ActionRecord),
+    MODAR_TABLE(MediaRecord),
     {"FileHeader", nullptr, SectionType::kNames, sizeof(FileHeader), kFileHeader},
     {"SectionEntry", nullptr, SectionType::kNames, sizeof(SectionEntry), kSectionEntry},
     {"TableHeader", nullptr, SectionType::kNames, sizeof(TableHeader), kTableHeader},

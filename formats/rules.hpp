@@ -74,6 +74,7 @@ enum class Rule : std::uint8_t {
   kFeatureYml,
   kTrackerRecord,
   kContentSummary,
+  kMediaFile,
   kVertexPadding,
   kVertexOcclusion,
   kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV

@@ -19,21 +19,50 @@ enum class NodeKind : std::uint32_t {
   kModel = 1,    ///< a scene's model
   kPicture = 2,  ///< a rectangle that shows a texture
   kLabel = 3,    ///< a point with a mark, and words in the meta text
+  kVideo = 4,    ///< a rectangle that shows a video
 };
+
+/// Where a video is seen through.
+enum class VideoAlpha : std::uint32_t {
+  kOpaque = 0,
+  kBeside = 1,  ///< the right half of its pictures is the left half's alpha
+  kKey = 2,     ///< where it has a colour near the key
+};
+
+enum class MediaKind : std::uint32_t { kVideo = 1 };
+
+/// A file that apps decode. Its bytes are in the kMediaData section.
+struct MediaRecord {
+  NameRef name;
+  std::uint32_t kind;   ///< MediaKind
+  std::uint32_t flags;  ///< MediaFlags
+  std::uint32_t width;  ///< pixels
+  std::uint32_t height;
+  float seconds;
+  std::uint32_t poster;  ///< index of the texture that shows its first picture
+  std::uint32_t reserved[4];
+};
+static_assert(sizeof(MediaRecord) == 48);
+inline constexpr std::uint32_t kMostVideoWidth = 1280;  ///< of the tier `desktop`
+inline constexpr std::uint32_t kMostVideoHeight = 720;
 
 /// A named part of what stands on a pattern.
 struct NodeRecord {
   NameRef name;  ///< not empty; no other node of the pattern has it
   std::uint32_t pattern;
   std::uint32_t kind;     ///< NodeKind
-  std::uint32_t subject;  ///< index of a model's scene, of a picture's texture; else kNone
+  std::uint32_t subject;  ///< index of a model's scene, a picture's texture, a video's record; else
+                          ///< kNone
   std::uint32_t flags;    ///< NodeFlags
   std::uint32_t group;    ///< nodes of a pattern with one group are variants; 0: none
   float place[3];         ///< pattern units: a plane's middle, a label's point; of a model 0
   float rotation[4];      ///< unit quaternion x, y, z, w: plane axes to pattern axes
   float half_size[2];     ///< pattern units, of a plane; else 0
   NameRef mark;           ///< a label's number or short word; else empty
-  std::uint32_t reserved[6];
+  std::uint32_t alpha;    ///< VideoAlpha of a video; else 0
+  float key[3];           ///< red, green, blue of kKey, 0 to 1; else 0
+  float reach;            ///< of kKey: how far from the key a colour may be, 0 to 1; else 0
+  std::uint32_t reserved;
 };
 static_assert(sizeof(NodeRecord) == 96);
 
@@ -43,6 +72,8 @@ constexpr bool kind_is(const NodeRecord& node, NodeKind kind) {
 
 enum class ActionEvent : std::uint32_t { kFound = 1, kLost = 2, kTap = 3, kAfter = 4 };
 enum class ActionCommand : std::uint32_t {
+  kPlay = 1,
+  kPause = 2,
   kShow = 3,
   kHide = 4,
   kToggle = 5,

@@ -2,7 +2,7 @@
 // number that is used twice does not compile. bundle.md is the normative text; tests hold both, and
 // the second reader, against each other.
 //
-// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 67, 70-255; payloads 263-511, 515 and up.
+// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 67, 71-255; payloads 264-511, 515 and up.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 namespace modar {
 
 /// What the index in a section's `owner` counts; kNothing: it has none, and its variant is 0.
-enum class SectionOwner : std::uint8_t { kNothing, kPattern, kScene, kChunk, kTexture };
+enum class SectionOwner : std::uint8_t { kNothing, kPattern, kScene, kChunk, kTexture, kMedia };
 
 enum SectionFlags : std::uint16_t {
   kSectionRequired = 1,  ///< a reader that does not know the type must refuse the bundle
@@ -43,6 +43,7 @@ enum SectionFlags : std::uint16_t {
   X(kOcclusion, 66, "occlusion", "OcclusionRecord", 2, 0, kNothing)                            \
   X(kNodes, 68, "nodes", "NodeRecord", 3, 0, kNothing)                                         \
   X(kActions, 69, "actions", "ActionRecord", 3, 0, kNothing)                                   \
+  X(kMedia, 70, "media", "MediaRecord", 3, 0, kNothing)                                        \
   X(kMappedFeatures, 256, "feature_twin", "FeatureHeader", 0, kSectionRequired, kPattern)      \
   X(kFeatureYml, 257, "feature_text", "", 0, 0, kPattern)                                      \
   X(kTrackerRecord, 258, "tracker_record", "TrackerRecordHeader", 0, 0, kPattern)              \
@@ -50,6 +51,7 @@ enum SectionFlags : std::uint16_t {
   X(kShadow, 260, "shadow", "ShadowHeader", 2, 0, kScene)                                      \
   X(kPatternShape, 261, "pattern_shape", "PatternShapeHeader", 2, 0, kPattern)                 \
   X(kDrawOrder, 262, "draw_order", "DrawOrderRecord", 2, 0, kChunk)                            \
+  X(kMediaData, 263, "media_data", "", 3, 0, kMedia)                                           \
   X(kVertices, 512, "vertices", "", 0, kSectionRequired | kSectionGpu, kNothing)               \
   X(kIndices, 513, "indices", "", 0, kSectionRequired | kSectionGpu, kNothing)                 \
   X(kTextureData, 514, "texture_data", "", 0, kSectionRequired | kSectionGpu, kTexture)
@@ -108,6 +110,12 @@ enum TextureFlags : std::uint32_t {
 
 enum NodeFlags : std::uint32_t {
   kNodeHidden = 1,  ///< until an action shows it
+  kNodePlays = 2,   ///< a video plays from when its pattern is found
+  kNodeLoops = 4,   ///< a video begins again where it ends
+};
+
+enum MediaFlags : std::uint32_t {
+  kMediaSound = 1,  ///< it has a sound track
 };
 
 /// A bit of the `flags` of a record.
@@ -118,10 +126,17 @@ struct FlagInfo {
 };
 
 inline constexpr FlagInfo kFlags[] = {
-    {"SectionEntry", kSectionRequired, 0},    {"SectionEntry", kSectionGpu, 0},
-    {"MaterialRecord", kMaterialTwoSided, 0}, {"MaterialRecord", kMaterialOccluder, 2},
-    {"TextureRecord", kTextureAlpha, 0},      {"TextureRecord", kTextureRepeat, 0},
-    {"TextureRecord", kTextureCutOut, 2},     {"NodeRecord", kNodeHidden, 0},
+    {"SectionEntry", kSectionRequired, 0},
+    {"SectionEntry", kSectionGpu, 0},
+    {"MaterialRecord", kMaterialTwoSided, 0},
+    {"MaterialRecord", kMaterialOccluder, 2},
+    {"TextureRecord", kTextureAlpha, 0},
+    {"TextureRecord", kTextureRepeat, 0},
+    {"TextureRecord", kTextureCutOut, 2},
+    {"NodeRecord", kNodeHidden, 0},
+    {"NodeRecord", kNodePlays, 0},
+    {"NodeRecord", kNodeLoops, 0},
+    {"MediaRecord", kMediaSound, 0},
 };
 
 /// All flags that a record can have.

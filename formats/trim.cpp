@@ -24,10 +24,11 @@ std::vector<std::byte> bytes_of(std::span<const std::byte> bytes) {
 bool has_member(SectionType type) {
   using enum SectionType;
   constexpr SectionType kMembers[] = {
-      kNames,      kMeta,    kContentSummary, kModels,        kChunks,     kLevels,
-      kMaterials,  kLayouts, kTextures,       kTextureLevels, kPatterns,   kParameterSets,
-      kScenes,     kLights,  kOcclusion,      kNodes,         kActions,    kMappedFeatures,
-      kFeatureYml, kShadow,  kVertices,       kIndices,       kTextureData};
+      kNames,    kMeta,          kContentSummary, kModels,     kChunks,
+      kLevels,   kMaterials,     kLayouts,        kTextures,   kTextureLevels,
+      kPatterns, kParameterSets, kScenes,         kLights,     kOcclusion,
+      kNodes,    kActions,       kMappedFeatures, kFeatureYml, kShadow,
+      kVertices, kIndices,       kTextureData,    kMedia,      kMediaData};
   return std::find(std::begin(kMembers), std::end(kMembers), type) != std::end(kMembers);
 }
 
@@ -58,6 +59,9 @@ void copy_payloads(const BundleView& bundle, BundleContent& content) {
   content.indices = bytes_of(bundle.indices());
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
     content.texture_data.push_back(bytes_of(bundle.texture_data(t)));
+  }
+  for (std::uint32_t m = 0; m < bundle.media().size(); ++m) {
+    content.media_data.push_back(bytes_of(bundle.media_data(m)));
   }
   for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
     content.shadows.push_back(bytes_of(bundle.section(SectionType::kShadow, s)));
@@ -90,6 +94,7 @@ BundleContent trim(const BundleView& bundle) {
   content.occlusion = records_of(bundle.occlusion());
   content.nodes = records_of(bundle.nodes());
   content.actions = records_of(bundle.actions());
+  content.media = records_of(bundle.media());
   keep_features(bundle, content);
   copy_payloads(bundle, content);
   content.summary = content_summary_of(content);

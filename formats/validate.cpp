@@ -266,6 +266,7 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   walkable &= find_table(log, parts, SectionType::kOcclusion, parts.occlusion);
   walkable &= find_table(log, parts, SectionType::kNodes, parts.nodes);
   walkable &= find_table(log, parts, SectionType::kActions, parts.actions);
+  walkable &= find_table(log, parts, SectionType::kMedia, parts.media);
   return walkable && !log.stop();
 }
 
@@ -811,6 +812,11 @@ void check_owned_sections(FaultLog& log, const BundleParts& parts) {
       check_shadow(check, parts, entry);
     } else if (type == SectionType::kDrawOrder) {
       check_draw_order(check, parts, entry);
+    } else if (type == SectionType::kMediaData) {
+      if (entry.owner >= parts.media.size() || entry.variant != 0) {
+        check.fault(Rule::kSectionOwner, &entry.owner,
+                    "media " + std::to_string(entry.owner) + " is not there");
+      }
     } else if (type == SectionType::kTrackerRecord) {
       if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
         check.fault(Rule::kSectionOwner, &entry.owner,

@@ -8,6 +8,7 @@
 
 #include "formats/check_rules.hpp"
 #include "formats/meta_text.hpp"
+#include "formats/mp4.hpp"
 #include "formats/validate.hpp"
 
 namespace modar {
@@ -42,11 +43,45 @@ bool fits_kind(const BundleParts& parts, const NodeRecord& node) {
     case NodeKind::kPicture:
       return node.subject < parts.textures.size() && node.mark.length == 0 &&
              node.half_size[0] > 0.0f && node.half_size[1] > 0.0f;
+    case NodeKind::kVideo:
+      return node.subject < parts.media.size() && node.mark.length == 0 &&
+             node.half_size[0] > 0.0f && node.half_size[1] > 0.0f;
     case NodeKind::kLabel:
       return node.subject == kNone && no_size && node.mark.length > 0 &&
              node.mark.length <= kMostMarkBytes && node.rotation[3] == 1.0f;
   }
   return false;
+}
+
+/// What only a video has is 0 of others, and a key's numbers without a key.
+bool video_fields_fit(const NodeRecord& node) {
+  const bool video = node.kind == static_cast<std::uint32_t>(NodeKind::kVideo);
+  const bool key = node.alpha == static_cast<std::uint32_t>(VideoAlpha::kKey);
+  return (video || (node.alpha == 0 && (node.flags & (kNodePlays | kNodeLoops)) == 0)) &&
+         (key || (zero(node.key) && node.reach == 0.0f));
+}
+
+void check_media(const RecordCheck& check, const BundleParts& parts, std::uint32_t index,
+                 const FaultLog& log) {
+  const MediaRecord& media = parts.media[index];
+  const std::uint64_t before = log.errors();
+  check.name(media.name);
+  check.flags(media.flags, known_flags("MediaRecord"));
+  check.reserved(media.reserved, sizeof(media.reserved));
+  check.number(media.seconds, "seconds", 0.0, static_cast<double>(kMostSeconds));
+  if (log.errors() != before) return;
+  if (media.kind != static_cast<std::uint32_t>(MediaKind::kVideo)) {
+    if (newer_minor(parts)) return;
+    return check.fault(Rule::kEnum, &media.kind, "kind " + std::to_string(media.kind));
+  }
+  const bool sized = std::min(media.width, media.height) >= 1 && media.width <= kMostVideoWidth &&
+                     media.height <= kMostVideoHeight;
+  if (!sized || media.poster >= parts.textures.size() || !(media.seconds > 0.0f) ||
+      find_section(parts.sections, SectionType::kMediaData, index, 0) == nullptr) {
+    check.fault(Rule::kNode, &media.width,
+                "a video of " + std::to_string(media.width) + " x " + std::to_string(media.height) +
+                    " pixels has no data, duration or poster");
+  }
 }
 
 /// No node before it has its name on its pattern, nor its scene.
@@ -69,17 +104,23 @@ void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_
   check.name(node.name);
   check.name(node.mark);
   check.flags(node.flags, known_flags("NodeRecord"));
-  check.reserved(node.reserved, sizeof(node.reserved));
+  check.reserved(&node.reserved, sizeof(node.reserved));
+  check.numbers(node.key, "key", 0.0, 1.0);
+  check.number(node.reach, "reach", 0.0, 1.0);
   check.numbers(node.place, "place", -kMostSceneNumber, kMostSceneNumber);
   check.numbers(node.rotation, "rotation");
   check.numbers(node.half_size, "half_size", 0.0, kMostSceneNumber);
   if (log.errors() != before) return;  // its name may be anywhere
   const bool known = node.kind >= static_cast<std::uint32_t>(NodeKind::kModel) &&
-                     node.kind <= static_cast<std::uint32_t>(NodeKind::kLabel);
+                     node.kind <= static_cast<std::uint32_t>(NodeKind::kVideo) &&
+                     node.alpha <= static_cast<std::uint32_t>(VideoAlpha::kKey);
   if (!known && !newer_minor(parts)) {
-    return check.fault(Rule::kEnum, &node.kind, "kind " + std::to_string(node.kind));
+    return check.fault(
+        Rule::kEnum, &node.kind,
+        "kind " + std::to_string(node.kind) + ", alpha " + std::to_string(node.alpha));
   }
-  if (node.pattern >= parts.patterns.size() || (known && !fits_kind(parts, node))) {
+  if (node.pattern >= parts.patterns.size() ||
+      (known && !(fits_kind(parts, node) && video_fields_fit(node)))) {
     check.fault(Rule::kNode, &node.pattern,
                 "pattern " + std::to_string(node.pattern) + ", subject " +
                     std::to_string(node.subject) + " or a size does not fit kind " +
@@ -95,7 +136,8 @@ void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_
 
 bool known_action(const ActionRecord& action) {
   using enum ActionCommand;
-  constexpr ActionCommand kCommands[] = {kShow, kHide, kToggle, kText, kLink, kNext, kTurn};
+  constexpr ActionCommand kCommands[] = {kPlay, kPause, kShow, kHide, kToggle,
+                                         kText, kLink,  kNext, kTurn};
   return action.event >= static_cast<std::uint32_t>(ActionEvent::kFound) &&
          action.event <= static_cast<std::uint32_t>(ActionEvent::kAfter) &&
          std::find(std::begin(kCommands), std::end(kCommands),
@@ -117,6 +159,8 @@ bool fits_command(const BundleParts& parts, const ActionRecord& action) {
   if (action.target >= parts.nodes.size()) return false;
   const NodeRecord& target = parts.nodes[action.target];
   if (target.pattern != pattern_of(parts, action)) return false;
+  const bool plays = command == ActionCommand::kPlay || command == ActionCommand::kPause;
+  if (plays) return kind_is(target, NodeKind::kVideo);
   if (command == ActionCommand::kText) return kind_is(target, NodeKind::kLabel);
   if (command == ActionCommand::kNext) return target.group != 0;
   if (command == ActionCommand::kTurn) return !kind_is(target, NodeKind::kLabel);
@@ -182,19 +226,52 @@ void check_action(const RecordCheck& check, const BundleParts& parts, const Acti
 }  // namespace
 
 void validate_nodes(FaultLog& log, const BundleParts& parts) {
-  if (parts.nodes.size() > kMostNodes || parts.actions.size() > kMostActions) {
+  if (parts.nodes.size() > kMostNodes || parts.media.size() > kMostNodes ||
+      parts.actions.size() > kMostActions) {
     return RecordCheck(log, parts, "nodes", 0)
         .fault(Rule::kNode, parts.bytes.data(),
                std::to_string(parts.nodes.size()) + " nodes and " +
                    std::to_string(parts.actions.size()) + " actions are more than 1024 and 256");
   }
-  // What refers to nodes that are wrong cannot be looked at.
+  // What refers to records that are wrong cannot be looked at.
   const std::uint64_t before = log.errors();
+  for (std::uint32_t i = 0; i < parts.media.size() && log.errors() == before; ++i) {
+    check_media(RecordCheck(log, parts, "media", i), parts, i, log);
+  }
   for (std::uint32_t i = 0; i < parts.nodes.size() && log.errors() == before; ++i) {
     check_node(RecordCheck(log, parts, "node", i), parts, i, log);
   }
   for (std::uint32_t i = 0; i < parts.actions.size() && log.errors() == before; ++i) {
     check_action(RecordCheck(log, parts, "action", i), parts, parts.actions[i], log);
+  }
+}
+
+void check_media_files(FaultLog& log, const BundleParts& parts) {
+  constexpr double kRounding = 0.1;  // seconds: tracks end with a frame each
+  for (std::uint32_t i = 0; i < parts.media.size(); ++i) {
+    const MediaRecord& media = parts.media[i];
+    if (media.kind != static_cast<std::uint32_t>(MediaKind::kVideo)) continue;
+    const SectionEntry& entry = *find_section(parts.sections, SectionType::kMediaData, i, 0);
+    const std::string where = label(parts, "video", media.name);
+    Mp4Info info;
+    if (const auto fault = view_mp4(section_bytes(parts, entry), info)) {
+      log.add(Rule::kMediaFile, entry.offset + fault->offset, where, fault->cause);
+      continue;
+    }
+    const bool sound = (media.flags & kMediaSound) != 0;
+    const bool same = info.width == media.width && info.height == media.height &&
+                      std::fabs(info.seconds - static_cast<double>(media.seconds)) <= kRounding &&
+                      info.sound_tracks == (sound ? 1 : 0) && info.video_tracks == 1;
+    const bool plays = std::string_view(info.video_codec.data()) == "avc1" &&
+                       info.profile == kBaselineProfile && info.index_first &&
+                       (!sound || std::string_view(info.sound_codec.data()) == "mp4a");
+    if (same && plays) continue;
+    log.add(Rule::kMediaFile, entry.offset, where,
+            std::string(info.video_codec.data()) + " of profile " + std::to_string(info.profile) +
+                ", " + std::to_string(info.width) + " x " + std::to_string(info.height) + ", " +
+                number_text(info.seconds) + " s, " + std::to_string(info.sound_tracks) +
+                " sound tracks " + info.sound_codec.data() +
+                (info.index_first ? "" : ", its index at the end"));
   }
 }
 

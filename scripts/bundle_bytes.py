@@ -121,9 +121,10 @@ TABLES = {
     65: ("lights", Record("scene:I reserved0:I sky:27f direction:3f key:3f reserved1:I")),
     66: ("occlusion", Record("layout:I offset:I")),
     68: ("nodes", Record("name:N pattern:I kind:I subject:I flags:I group:I place:3f rotation:4f half_size:2f mark:N "
-                         "reserved:6I")),
+                         "alpha:I key:3f reach:f reserved:I")),
     69: ("actions", Record("event:I command:I source:I target:I part:N address:N seconds:f duration:f axis:3f degrees:f "
                            "reserved:2I")),
+    70: ("media", Record("name:N kind:I flags:I width:I height:I seconds:f poster:I reserved:4I")),
 }
 COLOURS = Record("columns:I rows:I reserved:2I")
 SHAPE = Record("kind:I face_count:I half_arc:d slope:d reserved:2I")
@@ -131,9 +132,9 @@ FACE = Record("place:4H corner:3f right:3f down:3f reserved:I")
 SHADOW = Record("width:I height:I low:2f high:2f reserved:2I")
 DRAW_ORDER = struct.Struct("<4f2I")
 KEYPOINT = struct.Struct("<5f2i")
-SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0, 68: 0, 69: 0}  # type: flags
-OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 514: 3}
-SINCE = {4: 1, 65: 2, 66: 2, 68: 3, 69: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
+SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0, 68: 0, 69: 0, 70: 0}  # type: flags
+OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 263: 0, 514: 3}
+SINCE = {4: 1, 65: 2, 66: 2, 68: 3, 69: 3, 70: 3, 263: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
 

@@ -4,9 +4,9 @@ import re
 
 from bundle_bytes import NONE, flags_known, need
 
-MODEL, PICTURE, LABEL = 1, 2, 3
+MODEL, PICTURE, LABEL, VIDEO = 1, 2, 3, 4
 FOUND, LOST, TAP, AFTER = 1, 2, 3, 4
-SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN = 3, 4, 5, 6, 7, 8, 10
+PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN = 1, 2, 3, 4, 5, 6, 7, 8, 10
 
 
 def unit(parts):
@@ -15,10 +15,11 @@ def unit(parts):
 
 def check_node(bundle, row, taken):
     at, kind = row["at"], row["kind"]
-    flags_known(bundle, row, 1)
+    flags_known(bundle, row, 7)
     need(max(map(abs, row["place"])) <= 1e9 and 0 <= min(row["half_size"]) and max(row["half_size"]) <= 1e9,
          "BUNDLE_NUMBER", at, "place or size")
-    known = kind in (MODEL, PICTURE, LABEL)
+    need(0 <= min(row["key"]) and max(row["key"]) <= 1 and 0 <= row["reach"] <= 1, "BUNDLE_NUMBER", at, "key")
+    known = kind in (MODEL, PICTURE, LABEL, VIDEO) and row["alpha"] <= 2
     need(known or not bundle.strict, "BUNDLE_ENUM", at, f"kind {kind}")
     scenes, subject = bundle.tables["scenes"], row["subject"]
     still = row["rotation"][3] == 1
@@ -26,9 +27,12 @@ def check_node(bundle, row, taken):
     sized = min(row["half_size"]) > 0
     fits = {MODEL: subject < len(scenes) and scenes[subject]["pattern"] == row["pattern"] and not any(row["place"]) and still,
             PICTURE: subject < len(bundle.tables["textures"]) and sized,
-            LABEL: subject == NONE and still and marked}
+            LABEL: subject == NONE and still and marked,
+            VIDEO: subject < len(bundle.tables["media"]) and sized}
+    keyed = row["alpha"] == 2 or not any([*row["key"], row["reach"]])
+    of_video = kind == VIDEO or (row["alpha"] == 0 and row["flags"] < 2)
     need(row["pattern"] < len(bundle.tables["patterns"]) and
-         (not known or (fits[kind] and (kind == LABEL or not row["mark"]) and (kind == PICTURE or not any(row["half_size"])))),
+         (not known or (fits[kind] and (kind == LABEL or not row["mark"]) and (kind in (PICTURE, VIDEO) or not any(row["half_size"])) and keyed and of_video)),
          "BUNDLE_NODE", at)
     keys = {(row["pattern"], row["name"])} | ({(subject,)} if kind == MODEL else set())
     need(unit(row["rotation"]) and row["name"] and not keys & taken, "BUNDLE_NODE", at)
@@ -42,7 +46,7 @@ def check_action(bundle, row):
     source = None
     if row["source"] < len(nodes if event == TAP else bundle.tables["patterns"]):
         source = nodes[row["source"]]["pattern"] if event == TAP else row["source"]
-    if event not in (FOUND, LOST, TAP, AFTER) or command not in (SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN):
+    if event not in (FOUND, LOST, TAP, AFTER) or command not in (PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN):
         need(not bundle.strict and (source is not None or event > AFTER), "BUNDLE_ENUM", at)
         return
     need(source is not None, "BUNDLE_ACTION", at, "source")
@@ -51,13 +55,84 @@ def check_action(bundle, row):
     else:
         need(row["target"] < len(nodes), "BUNDLE_ACTION", at, "target")
         target = nodes[row["target"]]
-        need(target["pattern"] == source and (command != TEXT or target["kind"] == LABEL) and
+        need(target["pattern"] == source and (command > PAUSE or target["kind"] == VIDEO) and (command != TEXT or target["kind"] == LABEL) and
              (command != NEXT or target["group"] > 0) and (command != TURN or target["kind"] != LABEL), "BUNDLE_ACTION", at)
     model = event == TAP and nodes[row["source"]]["kind"] == MODEL
     need((model or not row["part"]) and (command == LINK or not row["address"]) and (event == AFTER or not row["seconds"]) and
          (unit(row["axis"]) if command == TURN else not any([*row["axis"], row["duration"], row["degrees"]])),
          "BUNDLE_ACTION", at, "a field of another kind")
     need(command != LINK or re.fullmatch(r'https://[^/ "<>\\^`{|}][^ "<>\\^`{|}]*', row["address"]), "ACTION_LINK", at)
+
+
+def boxes(data, at, end):
+    """(type, begin, end) of the boxes between two bytes."""
+    while at < end:
+        need(at + 8 <= end, "MEDIA_FILE", at, "a header")
+        size, head = int.from_bytes(data[at:at + 4], "big"), 8
+        if size == 1:
+            size, head = int.from_bytes(data[at + 8:at + 16], "big"), 16
+        size = size or end - at
+        need(head <= size <= end - at, "MEDIA_FILE", at, "a box")
+        yield data[at + 4:at + 8], at + head, at + size
+        at += size
+
+
+def read_track(data, at, end, track):
+    for kind, begin, stop in boxes(data, at, end):
+        if kind in (b"mdia", b"minf", b"stbl"):
+            read_track(data, begin, stop, track)
+        elif kind == b"mdhd":
+            wide = data[begin] == 1
+            need(stop - begin >= (32 if wide else 20), "MEDIA_FILE", begin, "mdhd")
+            scale = int.from_bytes(data[begin + (20 if wide else 12):][:4], "big")
+            need(scale > 0, "MEDIA_FILE", begin, "mdhd")
+            track["seconds"] = int.from_bytes(data[begin + (24 if wide else 16):][:8 if wide else 4], "big") / scale
+        elif kind == b"hdlr":
+            track["handler"] = data[begin + 8:begin + 12]
+        elif kind == b"stsd":
+            need(stop - begin >= 16, "MEDIA_FILE", begin, "stsd")
+            track["codec"] = data[begin + 12:begin + 16]
+            if track["codec"] == b"avc1":
+                size = int.from_bytes(data[begin + 8:begin + 12], "big")
+                need(86 <= size <= stop - begin - 8, "MEDIA_FILE", begin, "avc1")
+                track["size"] = [int.from_bytes(data[begin + 40 + i:][:2], "big") for i in (0, 2)]
+                for inner, first, _ in boxes(data, begin + 8 + 86, begin + 8 + size):
+                    track.update(profile=data[first + 1] if inner == b"avcC" else track.get("profile"))
+
+
+def check_video(data, row):
+    order, tracks = [], []
+    for kind, begin, end in boxes(data, 0, len(data)):
+        order.append(kind)
+        if kind == b"moov":
+            for inner, first, last in boxes(data, begin, end):
+                if inner == b"trak":
+                    tracks.append({})
+                    read_track(data, first, last, tracks[-1])
+    video = [track for track in tracks if track.get("handler") == b"vide"]
+    sound = [track for track in tracks if track.get("handler") == b"soun"]
+    need(order[:1] == [b"ftyp"] and b"moov" in order and b"mdat" in order and order.index(b"moov") < order.index(b"mdat"),
+         "MEDIA_FILE", 0, "order")
+    need(len(video) == 1 and video[0].get("codec") == b"avc1" and video[0].get("profile") == 66 and
+         video[0]["size"] == [row["width"], row["height"]] and len(sound) == (row["flags"] & 1) and
+         all(track.get("codec") == b"mp4a" for track in sound) and
+         abs(max(track["seconds"] for track in video + sound) - row["seconds"]) <= 0.1, "MEDIA_FILE", 0, "what it is")
+
+
+def check_media(bundle):
+    media = bundle.tables["media"]
+    for (kind, owner, variant), _ in bundle.payload.items():
+        need(kind != 263 or (owner < len(media) and variant == 0), "BUNDLE_SECTION_OWNER", 0)
+    need(len(media) <= 1024, "BUNDLE_NODE", 0, "too many")
+    for index, row in enumerate(media):
+        flags_known(bundle, row, 1)
+        need(0 <= row["seconds"] <= 86400, "BUNDLE_NUMBER", row["at"])
+        need(row["kind"] == 1 or not bundle.strict, "BUNDLE_ENUM", row["at"])
+        if row["kind"] == 1:
+            data = bundle.payload.get((263, index, 0))
+            need(1 <= row["width"] <= 1280 and 1 <= row["height"] <= 720 and row["seconds"] > 0 and data is not None and
+                 row["poster"] < len(bundle.tables["textures"]), "BUNDLE_NODE", row["at"])
+            check_video(data, row)
 
 
 def check_titles(bundle):
@@ -73,6 +148,7 @@ def check_titles(bundle):
 
 def check_nodes(bundle):
     nodes, actions = bundle.tables["nodes"], bundle.tables["actions"]
+    check_media(bundle)
     need(len(nodes) <= 1024 and len(actions) <= 256, "BUNDLE_NODE", 0, "too many")
     taken = set()
     for row in nodes:

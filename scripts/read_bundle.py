@@ -273,7 +273,7 @@ def check(bundle, full):
 def scene_digest(bundle, decoded):
     """Of everything that is drawn or recognised: not of where it lies in the file or how it was made."""
     scene = {key: value for key, value in decoded.items() if key not in ("bytes", "meta", "sections")}
-    looks = {f"{kind} {owner}": digest(data) for (kind, owner, _), data in bundle.payload.items() if 258 <= kind <= 262}
+    looks = {f"{kind} {owner}": digest(data) for (kind, owner, _), data in bundle.payload.items() if 258 <= kind <= 263}
     scene.update(looks=looks, shades=bundle.shades)
     return digest(json.dumps(scene, sort_keys=True).encode())
 

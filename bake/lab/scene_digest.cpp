@@ -89,6 +89,7 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
   add_table(digest, view, "OcclusionRecord", view.occlusion());
   add_table(digest, view, "NodeRecord", view.nodes());
   add_table(digest, view, "ActionRecord", view.actions());
+  add_table(digest, view, "MediaRecord", view.media());
   for (std::uint32_t m = 0; m < view.models().size(); ++m) {
     const ModelRecord& model = view.models()[m];
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
@@ -105,7 +106,7 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
     if (type != SectionType::kMappedFeatures && type != SectionType::kFeatureYml &&
         type != SectionType::kTrackerRecord && type != SectionType::kShadow &&
         type != SectionType::kPatternColours && type != SectionType::kPatternShape &&
-        type != SectionType::kDrawOrder) {
+        type != SectionType::kDrawOrder && type != SectionType::kMediaData) {
       continue;
     }
     digest.add(&entry.type, sizeof entry.type);

@@ -171,6 +171,11 @@ constexpr CorruptCase kPayloadCases[] = {
          c.materials[0].diffuse[1] = 0.25f;
        });
      }},
+    {"MEDIA_FILE",
+     [] {
+       return changed(acting_content(),
+                      [](auto& c) { c.media_data[0] = small_mp4(640, 360, 12, false); });
+     }},
     {"VERTEX_OCCLUSION",
      [] { return changed(lit_content(), [](auto& c) { c.vertices[11] = std::byte{128}; }); }},
     {"VERTEX_PADDING", [] { return vertex_damage(6, std::byte{1}, std::byte{0}); }},
@@ -199,7 +204,7 @@ constexpr CorruptCase kPayloadCases[] = {
     {"NODE_TEXT",
      [] {
        return changed(acting_content(), [](auto& c) {
-         c.nodes[0] = c.nodes[2];
+         c.nodes[0] = c.nodes[2];  // a second label
          c.nodes[0].name = c.intern("foot");
          c.nodes[0].group = 4;
          c.actions.resize(1);

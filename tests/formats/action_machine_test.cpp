@@ -18,6 +18,7 @@ constexpr SceneEvent kSeen = {SceneEvent::Kind::kSeen, 0, kNone};
 constexpr std::uint32_t kPot = 0;
 constexpr std::uint32_t kMap = 1;
 constexpr std::uint32_t kRim = 2;
+constexpr std::uint32_t kTrailer = 3;
 
 SceneEvent tap(std::uint32_t node, std::uint32_t material = kNone) {
   return {SceneEvent::Kind::kTap, node, material};
@@ -131,6 +132,7 @@ TEST_F(ActionTest, WordsAndLinksAreCommandsOfTheApp) {
   add(ActionEvent::kTap, kPot, ActionCommand::kLink, kNone).address =
       content_.intern("https://museum.org/pot");
   add(ActionEvent::kFound, 0, ActionCommand::kText, kRim);
+  content_.nodes[kTrailer].flags = 0;
   machine();
   auto commands = machine_->step(0.0, std::vector{kSeen, tap(kPot)});
   ASSERT_EQ(commands.size(), 2u);
@@ -175,6 +177,40 @@ TEST_F(ActionTest, TurnsAddUp) {
   EXPECT_NEAR(both.y, -std::sqrt(0.75), 1e-6);
   EXPECT_NEAR(both.z, 0, 1e-6);
   EXPECT_NEAR(both.w, 0, 1e-6);
+}
+
+/// What the videos are told: "+3" plays, "-3" pauses.
+std::string told(std::span<const SceneCommand> commands) {
+  std::string text;
+  for (const SceneCommand& command : commands) {
+    text += (command.command == ActionCommand::kPlay ? "+" : "-") + std::to_string(command.node);
+  }
+  return text;
+}
+
+TEST_F(ActionTest, VideosPlayWhileTheyAreWantedAndSeen) {
+  add(ActionEvent::kTap, kRim, ActionCommand::kPause, kTrailer);
+  add(ActionEvent::kTap, kMap, ActionCommand::kPlay, kTrailer);
+  add(ActionEvent::kTap, kPot, ActionCommand::kToggle, kTrailer);
+  content_.nodes[kMap].flags = 0;
+  machine();
+  const auto step = [&](double time, const std::vector<SceneEvent>& events) {
+    return told(machine_->step(time, events));
+  };
+  EXPECT_EQ(step(0, {}), "");
+  EXPECT_EQ(step(1, {kSeen}), "+3");
+  EXPECT_EQ(step(1.1, {kSeen}), "");
+  EXPECT_EQ(step(2.1, {}), "");  // a second of grace
+  EXPECT_EQ(step(2.2, {}), "-3");
+  EXPECT_EQ(step(5, {kSeen}), "+3");  // it goes on
+  EXPECT_EQ(step(5.1, {kSeen, tap(kRim)}), "-3");
+  EXPECT_EQ(step(7, {}), "");
+  EXPECT_EQ(step(8, {kSeen}), "");  // paused by the visitor
+  EXPECT_EQ(step(8.1, {kSeen, tap(kMap)}), "+3");
+  EXPECT_EQ(step(8.2, {kSeen, tap(kPot)}), "-3");  // hidden
+  EXPECT_EQ(step(8.3, {kSeen, tap(kPot)}), "+3");
+  EXPECT_EQ(step(9, {kSeen, {SceneEvent::Kind::kEnded, kTrailer, kNone}}), "");
+  EXPECT_EQ(step(9.1, {kSeen, tap(kMap)}), "+3");
 }
 
 TEST_F(ActionTest, AStepAllocatesNothing) {

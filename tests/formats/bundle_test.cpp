@@ -57,6 +57,8 @@ TEST(Bundle, RoundTripGivesTheSameContent) {
   expect_table(view->occlusion(), content.occlusion, "occlusion");
   expect_table(view->nodes(), content.nodes, "nodes");
   expect_table(view->actions(), content.actions, "actions");
+  expect_table(view->media(), content.media, "media");
+  expect_bytes(view->media_data(0), content.media_data[0], "media data");
   expect_bytes(view->section(SectionType::kShadow, 1), content.shadows[1], "shadow");
   EXPECT_TRUE(view->section(SectionType::kShadow, 0).empty());
   expect_bytes(view->vertices(), content.vertices, "vertices");

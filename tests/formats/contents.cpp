@@ -454,6 +454,61 @@ ActionRecord action_of(ActionEvent event, std::uint32_t source, ActionCommand co
 
 }  // namespace
 
+namespace {
+
+/// Numbers of an MP4 file: the first byte is the greatest.
+void put_big(Bytes& out, std::uint64_t value, int bytes) {
+  for (int i = bytes - 1; i >= 0; --i) put(out, static_cast<std::uint8_t>(value >> (8 * i)));
+}
+
+Bytes box(const char* type, const std::vector<Bytes>& parts) {
+  Bytes out;
+  std::size_t size = 8;
+  for (const Bytes& part : parts) size += part.size();
+  put_big(out, size, 4);
+  for (int i = 0; i < 4; ++i) put(out, type[i]);
+  for (const Bytes& part : parts) out.insert(out.end(), part.begin(), part.end());
+  return out;
+}
+
+Bytes zeros(std::size_t count) {
+  return Bytes(count);
+}
+
+Bytes text_bytes(const char* text) {
+  Bytes out;
+  for (; *text != '\0'; ++text) put(out, *text);
+  return out;
+}
+
+}  // namespace
+
+Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds, bool index_first,
+                std::uint8_t profile) {
+  constexpr std::uint32_t kScale = 600;
+  Bytes times = zeros(12);
+  put_big(times, kScale, 4);
+  put_big(times, std::uint64_t{kScale} * seconds, 4);
+  put_big(times, 0, 4);
+  Bytes sides;
+  put_big(sides, width, 2);
+  put_big(sides, height, 2);
+  const Bytes settings = {std::byte{1}, std::byte{profile}, std::byte{0xC0}, std::byte{30}};
+  const Bytes codec = box("avc1", {zeros(24), sides, zeros(50), box("avcC", {settings})});
+  Bytes entries = zeros(4);
+  put_big(entries, 1, 4);
+  const Bytes media =
+      box("mdia", {box("mdhd", {times}), box("hdlr", {zeros(8), text_bytes("vide"), zeros(13)}),
+                   box("minf", {box("stbl", {box("stsd", {entries, codec})})})});
+  const Bytes index = box("moov", {box("trak", {media})});
+  const Bytes data = box("mdat", {zeros(16)});
+  Bytes file = box("ftyp", {text_bytes("isom"), zeros(4)});
+  for (const Bytes* part : {index_first ? &index : &data, index_first ? &data : &index}) {
+    file.insert(file.end(), part->begin(), part->end());
+  }
+  return file;
+}
+
 void add_nodes(BundleContent& content) {
   NodeRecord model = node_of(content, "pot", 0, NodeKind::kModel);
   model.subject = 0;
@@ -469,7 +524,23 @@ void add_nodes(BundleContent& content) {
   NodeRecord label = node_of(content, "rim", 0, NodeKind::kLabel);
   label.place[0] = -0.75f;
   label.mark = content.intern("1");
-  content.nodes = {model, picture, label};
+  NodeRecord video = node_of(content, "trailer", 0, NodeKind::kVideo);
+  video.subject = 0;
+  video.flags = kNodePlays | kNodeLoops;
+  video.half_size[0] = 1;
+  video.half_size[1] = 0.5625f;
+  video.alpha = static_cast<std::uint32_t>(VideoAlpha::kKey);
+  video.key[1] = 1;
+  video.reach = 0.25f;
+  content.nodes = {model, picture, label, video};
+  MediaRecord media{};
+  media.name = content.intern("trailer.mp4");
+  media.kind = static_cast<std::uint32_t>(MediaKind::kVideo);
+  media.width = 640;
+  media.height = 360;
+  media.seconds = 12;
+  content.media = {media};
+  content.media_data = {small_mp4(640, 360, 12)};
   ActionRecord tap = action_of(ActionEvent::kTap, 0, ActionCommand::kNext, 1);
   tap.part = content.intern("skin");
   ActionRecord after = action_of(ActionEvent::kAfter, 0, ActionCommand::kTurn, 0);
@@ -485,7 +556,8 @@ void add_nodes(BundleContent& content) {
                      after,
                      link,
                      action_of(ActionEvent::kTap, 1, ActionCommand::kText, 2),
-                     action_of(ActionEvent::kTap, 2, ActionCommand::kToggle, 1)};
+                     action_of(ActionEvent::kTap, 2, ActionCommand::kToggle, 1),
+                     action_of(ActionEvent::kTap, 3, ActionCommand::kPause, 3)};
   content.meta = R"({"tool":"golden","nodes":[{"pattern":"box","node":"rim",)"
                  R"("title":{"en":"The rim"},"text":{"en":"Chipped."}}]})";
 }

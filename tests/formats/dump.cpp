@@ -315,7 +315,18 @@ json dump_nodes(const BundleView& view) {
     const NodeRecord& record = view.nodes()[i];
     json out = {{"name", view.name(record.name)}, {"mark", view.name(record.mark)}};
     GET(pattern), GET(kind), GET(subject), GET(flags), GET(group), GET(place), GET(rotation);
-    GET(half_size);
+    GET(half_size), GET(alpha), GET(key), GET(reach);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_media(const BundleView& view) {
+  json rows = json::array();
+  for (std::uint32_t i = 0; i < view.media().size(); ++i) {
+    const MediaRecord& record = view.media()[i];
+    json out = {{"name", view.name(record.name)}};
+    GET(kind), GET(flags), GET(width), GET(height), GET(seconds), GET(poster);
     rows.push_back(out);
   }
   return rows;
@@ -380,6 +391,7 @@ json dump(const BundleView& view) {
           {"occlusion", dump_occlusion(view)},
           {"nodes", dump_nodes(view)},
           {"actions", dump_actions(view)},
+          {"media", dump_media(view)},
           {"features", features}};
 }
 

@@ -140,7 +140,9 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(LightRecord, F(scene), F(reserved0), F(sky), F(direction), F(key), F(reserved1))
   MODAR_STRUCT(OcclusionRecord, F(layout), F(offset))
   MODAR_STRUCT(NodeRecord, F(name), F(pattern), F(kind), F(subject), F(flags), F(group), F(place),
-               F(rotation), F(half_size), F(mark), F(reserved))
+               F(rotation), F(half_size), F(mark), F(alpha), F(key), F(reach), F(reserved))
+  MODAR_STRUCT(MediaRecord, F(name), F(kind), F(flags), F(width), F(height), F(seconds), F(poster),
+               F(reserved))
   MODAR_STRUCT(ActionRecord, F(event), F(command), F(source), F(target), F(part), F(address),
                F(seconds), F(duration), F(axis), F(degrees), F(reserved))
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
@@ -216,7 +218,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
     if (row.size() == 6 && std::isdigit(row[0][0]) != 0)
       rows[static_cast<unsigned>(std::stoul(row[0]))] = row;
   }
-  const char* const owners[] = {"NONE", "pattern", "scene", "chunk", "texture"};
+  const char* const owners[] = {"NONE", "pattern", "scene", "chunk", "texture", "media"};
   EXPECT_EQ(rows.size(), modar::kSections.size());
   for (const modar::SectionInfo& section : modar::kSections) {
     const auto& row = rows[static_cast<unsigned>(section.type)];

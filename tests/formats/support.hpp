@@ -31,6 +31,11 @@ BundleContent golden_content();
 /// hides, its first pattern on a cone and its second on two faces of a box.
 void add_looks(BundleContent& content);
 
+/// An MP4 file of so many pixels and seconds without a picture in it: boxes alone, with what they
+/// state. index_first: moov before mdat.
+Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds,
+                bool index_first = true, std::uint8_t profile = 66);
+
 /// Adds what version 1.3 added to that: nodes of each kind, actions of each event and command.
 void add_nodes(BundleContent& content);
 
