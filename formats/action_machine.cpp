@@ -38,7 +38,7 @@ ActionMachine::ActionMachine(const BundleView& bundle)
 
 void ActionMachine::reset() {
   std::fill(patterns_.begin(), patterns_.end(), Pattern());
-  std::fill(fired_.begin(), fired_.end(), false);
+  std::fill(fired_.begin(), fired_.end(), std::uint8_t{0});
   for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
     nodes_[i] = Node();
     nodes_[i].shown = (bundle_.nodes()[i].flags & kNodeHidden) == 0;
@@ -59,7 +59,7 @@ std::span<const SceneCommand> ActionMachine::step(double time_s,
   }
   for (std::uint32_t i = 0; i < fired_.size(); ++i) {
     if (bundle_.actions()[i].event != static_cast<std::uint32_t>(ActionEvent::kAfter)) {
-      fired_[i] = false;
+      fired_[i] = 0;
     }
   }
   for (std::uint32_t p = 0; p < patterns_.size(); ++p) {
@@ -77,7 +77,7 @@ std::span<const SceneCommand> ActionMachine::step(double time_s,
       for (std::uint32_t i = 0; i < fired_.size(); ++i) {
         const ActionRecord& action = bundle_.actions()[i];
         const bool delayed = action.event == static_cast<std::uint32_t>(ActionEvent::kAfter);
-        if (delayed && action.source == p) fired_[i] = false;
+        if (delayed && action.source == p) fired_[i] = 0;
       }
       fire(ActionEvent::kLost, p, kNone);
     }
@@ -131,8 +131,8 @@ void ActionMachine::fire(ActionEvent event, std::uint32_t source, std::uint32_t 
     if (action.event != static_cast<std::uint32_t>(event) || action.source != source) continue;
     const bool early = event == ActionEvent::kAfter &&
                        now_ - patterns_[source].since < static_cast<double>(action.seconds);
-    if (fired_[i] || early || !named(action, material)) continue;
-    fired_[i] = true;
+    if (fired_[i] != 0 || early || !named(action, material)) continue;
+    fired_[i] = 1;
     perform(i);
   }
 }
@@ -212,7 +212,7 @@ bool ActionMachine::waiting() const {
   if (std::any_of(nodes_.begin(), nodes_.end(), turns)) return true;
   for (std::uint32_t i = 0; i < fired_.size(); ++i) {
     const ActionRecord& action = bundle_.actions()[i];
-    if (action.event == static_cast<std::uint32_t>(ActionEvent::kAfter) && !fired_[i] &&
+    if (action.event == static_cast<std::uint32_t>(ActionEvent::kAfter) && fired_[i] == 0 &&
         patterns_[action.source].present) {
       return true;
     }

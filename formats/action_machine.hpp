@@ -89,8 +89,8 @@ class ActionMachine {
   BundleView bundle_;
   std::vector<Pattern> patterns_;
   std::vector<Node> nodes_;
-  std::vector<bool>
-      fired_;  ///< one an action: in this step; of delays, since the pattern was found
+  /// One an action: 1 in the step in which it fires; of delays, since the pattern was found.
+  std::vector<std::uint8_t> fired_;
   std::vector<SceneCommand> commands_;  ///< capacity: all actions, each node twice
   double now_ = 0;
 };

@@ -270,6 +270,35 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   return walkable && !log.stop();
 }
 
+void RecordCheck::fault(Rule rule, const void* field, std::string detail) const {
+  const auto offset = static_cast<const std::byte*>(field) - parts_.bytes.data();
+  log_.add(rule, static_cast<std::uint64_t>(offset), what_ + (" " + std::to_string(index_)),
+           std::move(detail));
+}
+
+void RecordCheck::fault(Rule rule, const void* field, const char* detail) const {
+  fault(rule, field, std::string(detail));
+}
+
+void RecordCheck::wrong_number(const void* field, const char* name, double value) const {
+  fault(Rule::kNumber, field, name + (" is " + number_text(value)));
+}
+
+void RecordCheck::reserved(const void* field, std::size_t bytes) const {
+  if (newer_minor(parts_)) return;
+  const auto* byte = static_cast<const std::byte*>(field);
+  for (std::size_t i = 0; i < bytes; ++i) {
+    if (byte[i] != std::byte{0}) {
+      return fault(Rule::kReserved, byte + i, "a reserved byte is not zero");
+    }
+  }
+}
+
+void RecordCheck::flags(const std::uint32_t& field, std::uint32_t known) const {
+  if ((field & ~known) == 0 || newer_minor(parts_)) return;
+  fault(Rule::kReserved, &field, "flags " + std::to_string(field) + " have unknown bits");
+}
+
 void RecordCheck::name(const NameRef& ref) const {
   const std::uint64_t end = std::uint64_t{ref.offset} + ref.length;
   const auto starts_character = [this](std::uint64_t at) {

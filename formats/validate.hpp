@@ -61,20 +61,18 @@ class RecordCheck {
   RecordCheck(FaultLog& log, const BundleParts& parts, const char* what, std::uint32_t index)
       : log_(log), parts_(parts), what_(what), index_(index) {}
 
+  // What tells of faults is not inline: the player has a hundred calls of it.
+
   /// `field` points into the record.
-  void fault(Rule rule, const void* field, std::string detail) const {
-    const auto offset = static_cast<const std::byte*>(field) - parts_.bytes.data();
-    log_.add(rule, static_cast<std::uint64_t>(offset), what_ + (" " + std::to_string(index_)),
-             std::move(detail));
-  }
+  void fault(Rule rule, const void* field, std::string detail) const;
+  void fault(Rule rule, const void* field, const char* detail) const;
 
   /// Finite and within [low, high].
   template <class T>
   void number(const T& field, const char* name, double low = -std::numeric_limits<T>::max(),
               double high = std::numeric_limits<T>::max()) const {
     const auto value = static_cast<double>(field);
-    if (value >= low && value <= high) return;
-    fault(Rule::kNumber, &field, name + (" is " + number_text(value)));
+    if (!(value >= low && value <= high)) wrong_number(&field, name, value);
   }
   template <class T, std::size_t N>
   void numbers(const T (&fields)[N], const char* name, double low = -std::numeric_limits<T>::max(),
@@ -86,20 +84,8 @@ class RecordCheck {
     if (field != 0.0) number(field, name, low, high);
   }
 
-  void reserved(const void* field, std::size_t bytes) const {
-    if (newer_minor(parts_)) return;
-    const auto* byte = static_cast<const std::byte*>(field);
-    for (std::size_t i = 0; i < bytes; ++i) {
-      if (byte[i] != std::byte{0}) {
-        return fault(Rule::kReserved, byte + i, "a reserved byte is not zero");
-      }
-    }
-  }
-
-  void flags(const std::uint32_t& field, std::uint32_t known) const {
-    if ((field & ~known) == 0 || newer_minor(parts_)) return;
-    fault(Rule::kReserved, &field, "flags " + std::to_string(field) + " have unknown bits");
-  }
+  void reserved(const void* field, std::size_t bytes) const;
+  void flags(const std::uint32_t& field, std::uint32_t known) const;
 
   /// The name lies inside the names section and starts and ends at characters.
   void name(const NameRef& ref) const;
@@ -109,6 +95,8 @@ class RecordCheck {
                            std::uint64_t expected, std::uint32_t size, const char* name) const;
 
  private:
+  void wrong_number(const void* field, const char* name, double value) const;
+
   FaultLog& log_;
   const BundleParts& parts_;
   const char* what_;

@@ -72,15 +72,13 @@ void check_media(const RecordCheck& check, const BundleParts& parts, std::uint32
   if (log.errors() != before) return;
   if (media.kind != static_cast<std::uint32_t>(MediaKind::kVideo)) {
     if (newer_minor(parts)) return;
-    return check.fault(Rule::kEnum, &media.kind, "kind " + std::to_string(media.kind));
+    return check.fault(Rule::kEnum, &media.kind, "its kind is not known");
   }
   const bool sized = std::min(media.width, media.height) >= 1 && media.width <= kMostVideoWidth &&
                      media.height <= kMostVideoHeight;
   if (!sized || media.poster >= parts.textures.size() || !(media.seconds > 0.0f) ||
       find_section(parts.sections, SectionType::kMediaData, index, 0) == nullptr) {
-    check.fault(Rule::kNode, &media.width,
-                "a video of " + std::to_string(media.width) + " x " + std::to_string(media.height) +
-                    " pixels has no data, duration or poster");
+    check.fault(Rule::kNode, &media.width, "it has no size, data, duration or poster");
   }
 }
 
@@ -115,16 +113,11 @@ void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_
                      node.kind <= static_cast<std::uint32_t>(NodeKind::kVideo) &&
                      node.alpha <= static_cast<std::uint32_t>(VideoAlpha::kKey);
   if (!known && !newer_minor(parts)) {
-    return check.fault(
-        Rule::kEnum, &node.kind,
-        "kind " + std::to_string(node.kind) + ", alpha " + std::to_string(node.alpha));
+    return check.fault(Rule::kEnum, &node.kind, "its kind or alpha is not known");
   }
   if (node.pattern >= parts.patterns.size() ||
       (known && !(fits_kind(parts, node) && video_fields_fit(node)))) {
-    check.fault(Rule::kNode, &node.pattern,
-                "pattern " + std::to_string(node.pattern) + ", subject " +
-                    std::to_string(node.subject) + " or a size does not fit kind " +
-                    std::to_string(node.kind));
+    check.fault(Rule::kNode, &node.pattern, "a field does not fit its kind");
   }
   if (!unit_length(node.rotation)) {
     check.fault(Rule::kNode, node.rotation, "its rotation is no unit quaternion");
@@ -205,21 +198,14 @@ void check_action(const RecordCheck& check, const BundleParts& parts, const Acti
         (placed || action.event > static_cast<std::uint32_t>(ActionEvent::kAfter))) {
       return;
     }
-    return check.fault(
-        Rule::kEnum, &action.event,
-        "event " + std::to_string(action.event) + " or command " + std::to_string(action.command));
+    return check.fault(Rule::kEnum, &action.event, "its event or command is not known");
   }
   if (!placed || !fits_command(parts, action) || !idle_fields_are_zero(parts, action)) {
-    return check.fault(Rule::kAction, &action.source,
-                       "source " + std::to_string(action.source) + ", target " +
-                           std::to_string(action.target) + " or another field does not fit event " +
-                           std::to_string(action.event) + " and command " +
-                           std::to_string(action.command));
+    return check.fault(Rule::kAction, &action.source, "a field does not fit event and command");
   }
   if (action.command == static_cast<std::uint32_t>(ActionCommand::kLink) &&
       !https(text_of(parts, action.address))) {
-    check.fault(Rule::kActionLink, &action.address,
-                "it leads to '" + std::string(text_of(parts, action.address)) + "'");
+    check.fault(Rule::kActionLink, &action.address, "it has no https:// and host, or a blank");
   }
 }
 
@@ -230,8 +216,7 @@ void validate_nodes(FaultLog& log, const BundleParts& parts) {
       parts.actions.size() > kMostActions) {
     return RecordCheck(log, parts, "nodes", 0)
         .fault(Rule::kNode, parts.bytes.data(),
-               std::to_string(parts.nodes.size()) + " nodes and " +
-                   std::to_string(parts.actions.size()) + " actions are more than 1024 and 256");
+               "there are more than 1024, or more than 256 actions");
   }
   // What refers to records that are wrong cannot be looked at.
   const std::uint64_t before = log.errors();

@@ -10,6 +10,9 @@
 static_assert(MODAR_NODE_MODEL == static_cast<int>(modar::NodeKind::kModel));
 static_assert(MODAR_NODE_PICTURE == static_cast<int>(modar::NodeKind::kPicture));
 static_assert(MODAR_NODE_LABEL == static_cast<int>(modar::NodeKind::kLabel));
+static_assert(MODAR_NODE_VIDEO == static_cast<int>(modar::NodeKind::kVideo));
+static_assert(MODAR_PLAY == static_cast<int>(modar::ActionCommand::kPlay));
+static_assert(MODAR_PAUSE == static_cast<int>(modar::ActionCommand::kPause));
 static_assert(MODAR_SHOW_TEXT == static_cast<int>(modar::ActionCommand::kText));
 static_assert(MODAR_OPEN_LINK == static_cast<int>(modar::ActionCommand::kLink));
 
@@ -61,13 +64,28 @@ int modar_node_at(const modar_bundle* bundle, uint32_t index, modar_node* node) 
   const modar::NodeRecord& record = bundle->view.nodes()[index];
   const bool model = record.kind == static_cast<uint32_t>(modar::NodeKind::kModel);
   const float* place = model ? bundle->view.scenes()[record.subject].offset : record.place;
-  modar::give({0,
-               record.pattern,
-               static_cast<int>(record.kind),
-               model ? record.subject + 1 : 0,
-               {place[0], place[1], place[2]},
-               (record.flags & modar::kNodeHidden) != 0 ? 1 : 0},
-              node);
+  modar::give(
+      {0,
+       record.pattern,
+       static_cast<int>(record.kind),
+       model ? record.subject + 1 : 0,
+       {place[0], place[1], place[2]},
+       (record.flags & modar::kNodeHidden) != 0 ? 1 : 0,
+       record.kind == static_cast<uint32_t>(modar::NodeKind::kVideo) ? record.subject + 1 : 0,
+       (record.flags & modar::kNodeLoops) != 0 ? 1 : 0},
+      node);
+  return 1;
+}
+
+int modar_media_at(const modar_bundle* bundle, uint32_t index, modar_media* media) {
+  if (bundle == nullptr || index >= bundle->view.media().size() || media == nullptr) return 0;
+  const modar::MediaRecord& record = bundle->view.media()[index];
+  const std::span<const std::byte> bytes = bundle->view.media_data(index);
+  modar::give(
+      {0, static_cast<int>(record.width), static_cast<int>(record.height),
+       static_cast<double>(record.seconds), (record.flags & modar::kMediaSound) != 0 ? 1 : 0,
+       reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()},
+      media);
   return 1;
 }
 
@@ -109,7 +127,7 @@ modar_actions* modar_actions_create(const modar_bundle* bundle, modar_error* err
   }
   auto made = std::make_unique<modar_actions>(
       modar_actions{bundle->view, modar::ActionMachine(bundle->view), {}, {}, {}});
-  made->events.reserve(bundle->view.patterns().size() + bundle->view.nodes().size());
+  made->events.reserve(bundle->view.patterns().size() + 2 * bundle->view.nodes().size());
   made->items.reserve(bundle->view.scenes().size() + bundle->view.nodes().size());
   return made.release();
 }
@@ -131,9 +149,11 @@ size_t modar_actions_step(modar_actions* actions, double time_s, const modar_eve
   count = modar::item_count(events, count);
   for (size_t i = 0; i < count; ++i) {
     const modar_event event = modar::item_at(events, i);
-    actions->events.push_back(
-        {event.kind == MODAR_TAP ? modar::SceneEvent::Kind::kTap : modar::SceneEvent::Kind::kSeen,
-         event.subject, event.material - 1});
+    using Kind = modar::SceneEvent::Kind;
+    const Kind kind = event.kind == MODAR_TAP     ? Kind::kTap
+                      : event.kind == MODAR_ENDED ? Kind::kEnded
+                                                  : Kind::kSeen;
+    actions->events.push_back({kind, event.subject, event.material - 1});
   }
   actions->commands = actions->machine.step(time_s, actions->events);
   return actions->commands.size();

@@ -300,6 +300,10 @@ void modar_renderer_set_options(modar_renderer* renderer, const modar_render_opt
   renderer->renderer->set_options(ours);
 }
 
+void modar_renderer_set_video(modar_renderer* renderer, uint32_t node, uint32_t texture) {
+  if (renderer != nullptr) renderer->renderer->set_video(node, texture);
+}
+
 uint64_t modar_renderer_gpu_bytes(const modar_renderer* renderer) {
   if (renderer == nullptr) return 0;
   const modar::GpuMemory memory = renderer->renderer->gpu_memory();

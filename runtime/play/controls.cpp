@@ -3,22 +3,16 @@
 #include "controls.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <glm/ext/matrix_transform.hpp>
 
 #include "modar/pose.hpp"
 
 namespace modar {
-namespace {
-
-constexpr std::size_t kMostTaps = 8;  // clicks in one frame's time
-
-}  // namespace
-
 Controls::Controls(const BundleView& bundle, bool outline, bool display)
     : bundle_(bundle), machine_(bundle), outline_(outline), display_(display) {
-  events_.reserve(bundle.patterns().size() + kMostTaps);
-  taps_.reserve(kMostTaps);
+  events_.reserve(bundle.patterns().size() + taps_.size());
 }
 
 void Controls::apply(const UserAct& act) {
@@ -67,7 +61,7 @@ void Controls::apply(const UserAct& act) {
       break;
     case Act::kClick:
       if (frozen_ && corner_count_ < corners_.size()) corners_[corner_count_++] = act.at;
-      if (!frozen_ && taps_.size() < kMostTaps) taps_.push_back(act.at);
+      if (!frozen_ && tap_count_ < taps_.size()) taps_[tap_count_++] = act.at;
       break;
   }
 }
@@ -88,26 +82,19 @@ void Controls::turn_model(int step) {
 }
 
 std::span<const SceneCommand> Controls::act(std::span<const Hysteresis::State> states,
-                                            double time_s, const Camera& camera,
-                                            std::span<const DrawItem> items) {
-  events_.clear();
+                                            double time_s, std::span<const SceneEvent> taps) {
+  events_.assign(taps.begin(), taps.end());
   for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
     if (!wants(pattern) || !states[pattern].shown) continue;
     events_.push_back({SceneEvent::Kind::kSeen, pattern, kNone});
   }
-  for (const glm::dvec2 tap : taps_) {
-    const auto hit = pick_click(bundle_, camera, tap, items);
-    if (!hit || items[hit->item].node == kNone) continue;
-    events_.push_back({SceneEvent::Kind::kTap, items[hit->item].node, hit->material});
-  }
-  taps_.clear();
   return machine_.step(time_s, events_);
 }
 
 std::span<const SceneCommand> Controls::collect(std::span<const Hysteresis::State> states,
-                                                double time_s, const Camera& camera,
+                                                double time_s, std::span<const SceneEvent> taps,
                                                 std::vector<DrawItem>& items) {
-  const auto commands = act(states, time_s, camera, items);
+  const auto commands = act(states, time_s, taps);
   items.clear();
   if (model_ != kNone) {
     for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
@@ -145,6 +132,10 @@ void Controls::add_standard(const Hysteresis::State& state, std::uint32_t model,
   const glm::mat4 view = gl_view(state.pose, state.stretch);
   const glm::mat4 place = view * scene_matrix(standard);
   items.push_back({model, glm::scale(place, glm::vec3(scale_)), kNone, view});
+}
+
+std::span<const glm::dvec2> Controls::take_taps() {
+  return {taps_.data(), std::exchange(tap_count_, 0)};
 }
 
 bool Controls::take_corners(std::array<glm::dvec2, 4>& corners) {

@@ -10,7 +10,6 @@
 
 #include "formats/action_machine.hpp"
 #include "formats/bundle_view.hpp"
-#include "modar/camera.hpp"
 #include "modar/renderer.hpp"
 #include "modar/tracker.hpp"
 
@@ -35,10 +34,6 @@ struct UserAct {
   glm::dvec2 at{0.0};  ///< of a click: picture pixels
 };
 
-/// pick() for clicks in a window, which a build of the device leaves out with it.
-std::optional<Pick> pick_click(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
-                               std::span<const DrawItem> items);
-
 class Controls {
  public:
   /// outline, display: what the command line says at the start.
@@ -53,7 +48,10 @@ class Controls {
   /// of the frame before, on which clicks fall. Answers what the actions ask for. Allocates nothing
   /// once `items` has its room.
   std::span<const SceneCommand> collect(std::span<const Hysteresis::State> states, double time_s,
-                                        const Camera& camera, std::vector<DrawItem>& items);
+                                        std::span<const SceneEvent> taps,
+                                        std::vector<DrawItem>& items);
+  /// Clicks since the last call, picture pixels; they live until the next one that is applied.
+  std::span<const glm::dvec2> take_taps();
   /// The same where one pattern made on the spot is tracked: it bears the chosen model, else the
   /// first.
   void collect_spot(std::span<const Hysteresis::State> states, std::vector<DrawItem>& items) const;
@@ -80,12 +78,13 @@ class Controls {
                     std::vector<DrawItem>& items) const;
 
   std::span<const SceneCommand> act(std::span<const Hysteresis::State> states, double time_s,
-                                    const Camera& camera, std::span<const DrawItem> items);
+                                    std::span<const SceneEvent> taps);
 
   BundleView bundle_;
   ActionMachine machine_;
   std::vector<SceneEvent> events_;
-  std::vector<glm::dvec2> taps_;  ///< since the last frame: picture pixels
+  std::array<glm::dvec2, 8> taps_{};  ///< in one frame's time
+  std::size_t tap_count_ = 0;
   bool quit_ = false;
   bool outline_;
   bool display_;

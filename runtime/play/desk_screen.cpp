@@ -201,9 +201,4 @@ Result<void> draw_text_bar(const Canvas& canvas, const std::string& text) {
   return {};
 }
 
-std::optional<Pick> pick_click(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
-                               std::span<const DrawItem> items) {
-  return pick(bundle, camera, pixel, items);
-}
-
 }  // namespace modar

@@ -10,6 +10,7 @@
 #include "overlay.hpp"
 #include "raw_source.hpp"
 #include "screen.hpp"
+#include "taps.hpp"
 #include "vision.hpp"
 
 namespace modar {
@@ -54,6 +55,13 @@ class PpmFolder final : public FrameSink {
 
 }  // namespace
 
+std::optional<SceneEvent> tap_at(const BundleView& /*bundle*/, const Camera& /*camera*/,
+                                 glm::dvec2 /*pixel*/, std::span<const DrawItem> /*items*/) {
+  return std::nullopt;  // there is no window to click into
+}
+
+void print_command(const BundleView& /*bundle*/, const SceneCommand& /*command*/) {}
+
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
   if (is_raw_input(input)) return open_raw_source(input);
   return left_out("input.unsupported", input, "videos, pictures and cameras");
@@ -94,11 +102,6 @@ Result<Camera> read_camera_file(const std::string& path) {
 Result<TrackStep> open_vision(const BundleView& bundle, const VisionOptions& options) {
   if (options.ours) return our_vision(bundle, options);
   return left_out("method.unsupported", "--method paper", "the ModAR paper's method");
-}
-
-std::optional<Pick> pick_click(const BundleView& /*bundle*/, const Camera& /*camera*/,
-                               glm::dvec2 /*pixel*/, std::span<const DrawItem> /*items*/) {
-  return std::nullopt;
 }
 
 struct Window::State {};

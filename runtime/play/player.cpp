@@ -8,11 +8,11 @@
 #include <cstdio>
 #include <string>
 
-#include "formats/meta_text.hpp"
 #include "frame_report.hpp"
 #include "pipeline.hpp"
 #include "play.hpp"
 #include "raw_source.hpp"
+#include "taps.hpp"
 #include "vision.hpp"
 
 namespace modar {
@@ -219,7 +219,7 @@ FrameReport Player::begin_report(const Job& job) {
   if (spot_) {
     controls_.collect_spot(states, items_);
   } else {
-    tell(controls_.collect(states, report.time_s, job.camera, items_));
+    collect(states, job, report.time_s);
   }
   for (const Hysteresis::State& state : states) {
     if (!state.shown) continue;
@@ -229,24 +229,17 @@ FrameReport Player::begin_report(const Job& job) {
   return report;
 }
 
-/// The words of a label, or an address, on the terminal.
-void Player::tell(std::span<const SceneCommand> commands) {
-  for (const SceneCommand& command : commands) {
-    if (options_.quiet) return;
+/// What stands on the patterns as the actions have left it; clicks fall on what was drawn before.
+void Player::collect(std::span<const Hysteresis::State> states, const Job& job, double time_s) {
+  taps_.clear();
+  for (const glm::dvec2 click : controls_.take_taps()) {
+    const auto tap = tap_at(bundle_, job.camera, click, items_);
+    if (tap) taps_.push_back(*tap);
+  }
+  for (const SceneCommand& command : controls_.collect(states, time_s, taps_, items_)) {
+    if (options_.quiet) break;
     progress_.end();
-    if (command.command == ActionCommand::kLink) {
-      const std::string address(bundle_.name(bundle_.actions()[command.action].address));
-      std::fprintf(stderr, "modar-play: link: %s\n", address.c_str());
-      continue;
-    }
-    const NodeRecord& node = bundle_.nodes()[command.node];
-    const std::string_view pattern = bundle_.name(bundle_.patterns()[node.pattern].name);
-    const std::string_view name = bundle_.name(node.name);
-    visit_node_texts(bundle_.meta(), [&](const MetaText& each) {
-      if (each.pattern != pattern || each.node != name || each.kind == MetaText::Kind::kAlt) return;
-      std::fprintf(stderr, "modar-play: %s [%s]: %s\n", each.node.c_str(), each.language.c_str(),
-                   each.words.c_str());
-    });
+    print_command(bundle_, command);
   }
 }
 

@@ -71,7 +71,7 @@ class Player {
   Result<void> open_logs();
   FrameReport begin_report(const Job& job);
   void follow_spot(const Job& job);
-  void tell(std::span<const SceneCommand> commands);
+  void collect(std::span<const Hysteresis::State> states, const Job& job, double time_s);
   void outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                Colour colour) const;
   void draw(const Job& job, const FrameReport& report);
@@ -96,6 +96,7 @@ class Player {
   PoseSmoother smoother_;
   std::vector<Detection> drawn_;  ///< what is seen, at smoothed poses
   Controls controls_;
+  std::vector<SceneEvent> taps_;
   Progress progress_;
   RateMeter rate_;
   RunStats stats_;

@@ -83,6 +83,21 @@ struct Page {
 
 }  // namespace
 
+void draw_clip_vertices(std::span<const ClipVertex> vertices, GLenum mode, GLuint buffer,
+                        GlState& gl, RenderStats& stats) {
+  gl.bind_array_buffer(buffer);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size_bytes()), vertices.data(),
+               GL_STREAM_DRAW);
+  constexpr GLsizei kStride = sizeof(ClipVertex);
+  gl.set_attribute(kAttributePosition, {buffer, 4, GL_FLOAT, GL_FALSE, kStride, 0});
+  gl.set_attribute(kAttributeUv,
+                   {buffer, 2, GL_FLOAT, GL_FALSE, kStride, offsetof(ClipVertex, uv)});
+  gl.enable_attributes(1u << kAttributePosition | 1u << kAttributeUv);
+  glDrawArrays(mode, 0, static_cast<GLsizei>(vertices.size()));
+  ++stats.draw_calls;
+  stats.bytes_uploaded += vertices.size_bytes();
+}
+
 Result<void> Ground::create(const BundleView& bundle) {
   if (bundle.scenes().empty()) return {};
   glGenBuffers(1, &buffer_);
@@ -155,19 +170,10 @@ void Ground::add_rectangle(const glm::mat4& matrix, const Rectangle& plane,
 
 void Ground::draw_rectangles(float depth, GlState& gl, RenderStats& stats) {
   if (vertices_.empty()) return;
-  const std::size_t bytes = vertices_.size() * sizeof vertices_[0];
   gl.use_program(program_);
   gl.set_culling(false);
-  gl.bind_array_buffer(buffer_);
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(bytes), vertices_.data(), GL_STREAM_DRAW);
-  constexpr GLsizei kStride = sizeof(Vertex);
-  gl.set_attribute(kAttributePosition, {buffer_, 4, GL_FLOAT, GL_FALSE, kStride, 0});
-  gl.set_attribute(kAttributeUv, {buffer_, 2, GL_FLOAT, GL_FALSE, kStride, offsetof(Vertex, uv)});
-  gl.enable_attributes(1u << kAttributePosition | 1u << kAttributeUv);
   glUniform1f(depth_, depth);
-  glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(vertices_.size()));
-  ++stats.draw_calls;
-  stats.bytes_uploaded += bytes;
+  draw_clip_vertices(vertices_, GL_TRIANGLES, buffer_, gl, stats);
 }
 
 void Ground::draw_shadows(const BundleView& bundle, const glm::mat4& projection,

@@ -17,6 +17,16 @@
 
 namespace modar {
 
+/// A corner in clip space, and where its texel lies.
+struct ClipVertex {
+  glm::vec4 place;
+  glm::vec2 uv;
+};
+
+/// Draws vertices by the program in use, through a buffer of their own.
+void draw_clip_vertices(std::span<const ClipVertex> vertices, GLenum mode, GLuint buffer,
+                        GlState& gl, RenderStats& stats);
+
 class Ground {
  public:
   /// Shadows lie side by side in few textures, so that one call draws those of many models. Errors:
@@ -32,11 +42,6 @@ class Ground {
                   std::span<const DrawItem> items, GlState& gl, RenderStats& stats);
 
  private:
-  /// A corner in clip space, and where its texel lies.
-  struct Vertex {
-    glm::vec4 place;
-    glm::vec2 uv;
-  };
   struct Rectangle {
     glm::vec2 low{0.0f};
     glm::vec2 high{0.0f};
@@ -59,7 +64,7 @@ class Ground {
 
   std::vector<Shadow> shadows_;  ///< one a scene
   std::vector<ShadowPage> pages_;
-  std::vector<Vertex> vertices_;
+  std::vector<ClipVertex> vertices_;
   GLuint buffer_ = 0;
   GLuint program_ = 0;
   GLint depth_ = -1;

@@ -1,9 +1,8 @@
 #include "runtime/render/plane_painter.hpp"
 
 #include <algorithm>
-#include <cstddef>
-#include <utility>
 
+#include "runtime/render/ground.hpp"
 #include "runtime/render/program.hpp"
 
 namespace modar {
@@ -13,16 +12,37 @@ Result<void> PlanePainter::create(const BundleView& bundle) {
   for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) pictures += is_picture(bundle, i);
   if (pictures == 0) return {};
   planes_.reserve(pictures);
+  videos_.resize(bundle.nodes().size());
   glGenBuffers(1, &buffer_);
-  for (std::size_t twin = 0; twin < programs_.size(); ++twin) {
-    MODAR_ASSIGN(programs_[twin], link_program(twin == 0 ? "" : "#define ALPHA_TWIN\n",
-                                               shadow_vertex_source(), plane_fragment_source()));
-    glUseProgram(programs_[twin]);
-    glUniform1i(glGetUniformLocation(programs_[twin], "u_texture"), 0);
-    glUniform1i(glGetUniformLocation(programs_[twin], "u_alpha"), 1);
-    glUniform1f(glGetUniformLocation(programs_[twin], "u_depth"), 1.0f);
+  constexpr const char* kDefines[] = {"", "#define ALPHA_TWIN\n", "#define BESIDE\n",
+                                      "#define KEY\n"};
+  for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) {
+    if (!is_picture(bundle, i)) continue;
+    const Program kind = program_of(bundle, i);
+    if (programs_[kind] != 0) continue;
+    MODAR_ASSIGN(const GLuint program,
+                 link_program(kDefines[kind], shadow_vertex_source(), plane_fragment_source()));
+    programs_[kind] = program;
+    glUseProgram(program);
+    glUniform1i(glGetUniformLocation(program, "u_texture"), 0);
+    glUniform1i(glGetUniformLocation(program, "u_alpha"), 1);
+    glUniform1f(glGetUniformLocation(program, "u_depth"), 1.0f);
+    if (kind == kKey) key_ = glGetUniformLocation(program, "u_key");
   }
   return {};
+}
+
+PlanePainter::Program PlanePainter::program_of(const BundleView& bundle, std::uint32_t node) {
+  switch (static_cast<VideoAlpha>(bundle.nodes()[node].alpha)) {
+    case VideoAlpha::kBeside:
+      return kBeside;
+    case VideoAlpha::kKey:
+      return kKey;
+    case VideoAlpha::kOpaque:
+      break;
+  }
+  const TextureRecord& texture = bundle.textures()[picture_texture(bundle, node)];
+  return (texture.flags & kTextureAlpha) != 0 ? kTwin : kOpaque;
 }
 
 void PlanePainter::release(GlState& gl) {
@@ -39,45 +59,43 @@ void PlanePainter::draw(const BundleView& bundle, const glm::mat4& projection,
   planes_.clear();
   for (std::uint32_t i = 0; i < items.size() && planes_.size() < planes_.capacity(); ++i) {
     if (!is_picture(bundle, items[i].node)) continue;
-    const std::uint32_t texture = bundle.nodes()[items[i].node].subject;
-    if ((textures.alpha(texture) != 0) != see_through) continue;
-    planes_.push_back({-items[i].to_eye[3].z, i, texture});
+    const Program program = program_of(bundle, items[i].node);
+    if ((program != kOpaque) != see_through) continue;
+    // From far to near; those of one depth, as on one pattern, in the order of the items.
+    const Plane plane{-items[i].to_eye[3].z, i, program};
+    auto place = planes_.end();
+    while (place != planes_.begin() && (place - 1)->depth < plane.depth) --place;
+    planes_.insert(place, plane);
   }
-  // From far to near; those of one depth, as on one pattern, in the order of the items.
-  std::sort(planes_.begin(), planes_.end(), [](const Plane& a, const Plane& b) {
-    return a.depth != b.depth ? a.depth > b.depth : a.item < b.item;
-  });
   for (const Plane& plane : planes_) {
-    gl.use_program(programs_[see_through ? 1 : 0]);
+    const std::uint32_t node = items[plane.item].node;
+    const std::uint32_t texture = picture_texture(bundle, node);
+    gl.use_program(programs_[plane.program]);
     gl.set_culling(false);
     gl.set_depth_test(true);
     gl.set_depth_writes(!see_through);
     gl.set_colour_writes(true);
     gl.set_blending(see_through);
-    gl.bind_texture(0, textures.colour(plane.texture));
-    if (see_through) gl.bind_texture(1, textures.alpha(plane.texture));
+    gl.bind_texture(0, videos_[node] != 0 ? videos_[node] : textures.colour(texture));
+    if (plane.program == kTwin) gl.bind_texture(1, textures.alpha(texture));
+    if (plane.program == kKey) {
+      const NodeRecord& record = bundle.nodes()[node];
+      glUniform4f(key_, record.key[0], record.key[1], record.key[2], record.reach);
+    }
     draw_plane(projection * items[plane.item].to_eye, gl, stats);
   }
   gl.set_depth_writes(true);
 }
 
 void PlanePainter::draw_plane(const glm::mat4& to_clip, GlState& gl, RenderStats& stats) {
-  std::array<Vertex, 4> corners;
+  std::array<ClipVertex, 4> corners;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const glm::vec2 uv(i % 2, i / 2);
     // The first row of a texture is the top one.
     corners[i] = {to_clip * glm::vec4(2.0f * uv.x - 1.0f, 1.0f - 2.0f * uv.y, 0.0f, 1.0f), uv};
   }
-  gl.bind_array_buffer(buffer_);
-  glBufferData(GL_ARRAY_BUFFER, sizeof corners, corners.data(), GL_STREAM_DRAW);
-  constexpr GLsizei kStride = sizeof(Vertex);
-  gl.set_attribute(kAttributePosition, {buffer_, 4, GL_FLOAT, GL_FALSE, kStride, 0});
-  gl.set_attribute(kAttributeUv, {buffer_, 2, GL_FLOAT, GL_FALSE, kStride, offsetof(Vertex, uv)});
-  gl.enable_attributes(1u << kAttributePosition | 1u << kAttributeUv);
-  glDrawArrays(GL_TRIANGLE_STRIP, 0, static_cast<GLsizei>(corners.size()));
-  ++stats.draw_calls;
+  draw_clip_vertices(corners, GL_TRIANGLE_STRIP, buffer_, gl, stats);
   stats.triangles += 2;
-  stats.bytes_uploaded += sizeof corners;
 }
 
 }  // namespace modar

@@ -8,8 +8,6 @@
 #include <vector>
 
 #include <glm/mat4x4.hpp>
-#include <glm/vec2.hpp>
-#include <glm/vec4.hpp>
 
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
@@ -19,11 +17,22 @@
 
 namespace modar {
 
+/// The texture of a picture, or of a video's poster. node: is_picture().
+inline std::uint32_t picture_texture(const BundleView& bundle, std::uint32_t node) {
+  const NodeRecord& record = bundle.nodes()[node];
+  const bool video = record.kind == static_cast<std::uint32_t>(NodeKind::kVideo);
+  return video ? bundle.media()[record.subject].poster : record.subject;
+}
+
 class PlanePainter {
  public:
   /// Nothing where the bundle has no picture. Errors: kUnsupported "gl.shader", "gl.program".
   Result<void> create(const BundleView& bundle);
   void release(GlState& gl);
+  /// See Renderer::set_video().
+  void set_video(std::uint32_t node, GLuint texture) {
+    if (node < videos_.size()) videos_[node] = texture;
+  }
 
   /// Draws the pictures among the items that hide all that is behind them, which comes before the
   /// models, or the others, which come after them, from far to near.
@@ -31,21 +40,21 @@ class PlanePainter {
             const TextureStore& textures, bool see_through, GlState& gl, RenderStats& stats);
 
  private:
-  /// A corner in clip space, and where its texel lies.
-  struct Vertex {
-    glm::vec4 place;
-    glm::vec2 uv;
-  };
   struct Plane {
     float depth = 0.0f;  ///< of the middle, before the eye
     std::uint32_t item = 0;
-    std::uint32_t texture = 0;
+    std::size_t program = 0;
   };
 
+  enum Program : std::size_t { kOpaque, kTwin, kBeside, kKey, kPrograms };
+
+  [[nodiscard]] static Program program_of(const BundleView& bundle, std::uint32_t node);
   void draw_plane(const glm::mat4& to_clip, GlState& gl, RenderStats& stats);
 
   std::vector<Plane> planes_;
-  std::array<GLuint, 2> programs_{};  ///< without an alpha twin, with one
+  std::vector<GLuint> videos_;  ///< one a node: what it shows; 0: its poster, or no video
+  std::array<GLuint, kPrograms> programs_{};
+  GLint key_ = -1;
   GLuint buffer_ = 0;
 };
 

@@ -376,6 +376,10 @@ void Renderer::blit_to_window(int window_width, int window_height) {
   s.gl.bind_texture(0, 0);
 }
 
+void Renderer::set_video(std::uint32_t node, std::uint32_t texture) {
+  state_->planes.set_video(node, texture);
+}
+
 void Renderer::set_options(const RenderOptions& options) {
   // The state that later frames build on: what was uploaded before left the app's behind.
   if (options.exclusive_context && !state_->options.exclusive_context) state_->gl.reset();

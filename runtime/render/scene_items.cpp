@@ -35,7 +35,8 @@ std::uint32_t node_of_scene(const BundleView& bundle, std::uint32_t scene) {
 }  // namespace
 
 bool is_picture(const BundleView& bundle, std::uint32_t node) {
-  return node < bundle.nodes().size() && kind_is(bundle.nodes()[node], NodeKind::kPicture);
+  return node < bundle.nodes().size() && (kind_is(bundle.nodes()[node], NodeKind::kPicture) ||
+                                          kind_is(bundle.nodes()[node], NodeKind::kVideo));
 }
 
 void add_items(const BundleView& bundle, const ActionMachine& machine, std::uint32_t pattern,

@@ -6,7 +6,7 @@
 #include "formats/base/bits.hpp"
 #include "formats/texture_format.hpp"
 #include "modar/mapped_file.hpp"
-#include "modar/renderer.hpp"
+#include "runtime/render/plane_painter.hpp"
 
 namespace modar {
 namespace {
@@ -47,7 +47,7 @@ TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
     if (texture != kNone) used_[texture] = true;
   }
   for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) {
-    if (is_picture(bundle, i)) used_[bundle.nodes()[i].subject] = true;
+    if (is_picture(bundle, i)) used_[picture_texture(bundle, i)] = true;
   }
 }
 

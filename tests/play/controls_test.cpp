@@ -60,7 +60,7 @@ class ControlsTest : public testing::Test {
 
   std::vector<std::uint32_t> models(Controls& controls) {
     std::vector<DrawItem> items;
-    controls.collect(states_, 0.0, default_camera(64, 48), items);
+    controls.collect(states_, 0.0, {}, items);
     std::vector<std::uint32_t> models;
     for (const DrawItem& item : items) models.push_back(item.model);
     return models;
@@ -108,15 +108,15 @@ TEST_F(ControlsTest, OnePatternAtATimeAndThenAllAgain) {
 TEST_F(ControlsTest, SizeChangesTheModelAndNotItsPlace) {
   Controls controls(view_, false, false);
   std::vector<DrawItem> before;
-  controls.collect(states_, 0.0, default_camera(64, 48), before);
+  controls.collect(states_, 0.0, {}, before);
   controls.apply({Act::kLarger, {}});
   std::vector<DrawItem> after;
-  controls.collect(states_, 0.0, default_camera(64, 48), after);
+  controls.collect(states_, 0.0, {}, after);
   EXPECT_FLOAT_EQ(after[1].to_eye[0][0], before[1].to_eye[0][0] * 1.1f);
   EXPECT_EQ(after[1].to_eye[3], before[1].to_eye[3]);
   controls.apply({Act::kSmaller, {}});
   for (int i = 0; i < 200; ++i) controls.apply({Act::kSmaller, {}});
-  controls.collect(states_, 0.0, default_camera(64, 48), after);
+  controls.collect(states_, 0.0, {}, after);
   EXPECT_GT(after[1].to_eye[0][0], 0.01f) << "it never vanishes";
 }
 

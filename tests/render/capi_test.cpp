@@ -460,12 +460,23 @@ TEST(CapiActions, RunABundlesNodes) {
   const auto bytes = test::encode(test::acting_content());
   modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
   ASSERT_NE(bundle, nullptr);
-  ASSERT_EQ(modar_node_count(bundle), 3u);
+  ASSERT_EQ(modar_node_count(bundle), 4u);
   auto node = sized<modar_node>();
   ASSERT_EQ(modar_node_at(bundle, 2, &node), 1);
   EXPECT_EQ(node.kind, MODAR_NODE_LABEL);
   EXPECT_EQ(node.place[0], -0.75f);
-  EXPECT_EQ(modar_node_at(bundle, 3, &node), 0);
+  ASSERT_EQ(modar_node_at(bundle, 3, &node), 1);
+  EXPECT_EQ(node.kind, MODAR_NODE_VIDEO);
+  EXPECT_EQ(node.media, 1u);
+  EXPECT_EQ(node.loops, 1);
+  EXPECT_EQ(modar_node_at(bundle, 4, &node), 0);
+  auto media = sized<modar_media>();
+  ASSERT_EQ(modar_media_at(bundle, 0, &media), 1);
+  EXPECT_EQ(media.width, 640);
+  EXPECT_EQ(media.seconds, 12.0);
+  ASSERT_GT(media.byte_count, 8u);
+  EXPECT_EQ(std::memcmp(media.bytes + 4, "ftyp", 4), 0);
+  EXPECT_EQ(modar_media_at(bundle, 1, &media), 0);
   char text[64];
   EXPECT_EQ(modar_node_name(bundle, 2, text, sizeof text), 3u);
   EXPECT_EQ(modar_node_mark(bundle, 2, text, sizeof text), 1u);
@@ -482,9 +493,15 @@ TEST(CapiActions, RunABundlesNodes) {
   items[0].known.size = sizeof items[0];
   const auto item = [&](std::size_t i) { return items[i].known; };
   auto seen = sized<modar_event>();
-  // Found shows the pot; its first part, tapped, lets the map take its place.
-  EXPECT_EQ(modar_actions_step(actions, 0, &seen, 1), 0u);
-  EXPECT_EQ(modar_actions_items(actions, 0, view, &items[0].known, 8), 1u);
+  auto command = sized<modar_command>();
+  // Found shows the pot and plays the video; the pot's first part, tapped, lets the map take its
+  // place.
+  ASSERT_EQ(modar_actions_step(actions, 0, &seen, 1), 1u);
+  ASSERT_EQ(modar_actions_command(actions, 0, &command), 1);
+  EXPECT_EQ(command.kind, MODAR_PLAY);
+  EXPECT_EQ(command.node, 3u);
+  EXPECT_EQ(modar_actions_items(actions, 0, view, &items[0].known, 8), 2u);
+  EXPECT_EQ(item(1).node, 4u);
   EXPECT_EQ(item(0).node, 1u);
   EXPECT_EQ(item(0).scene, 1u);
   EXPECT_EQ(item(0).size, sizeof items[0]);
@@ -494,7 +511,7 @@ TEST(CapiActions, RunABundlesNodes) {
   events[1].subject = 0;
   events[1].material = 1;
   EXPECT_EQ(modar_actions_step(actions, 0.1, events, 2), 0u);
-  EXPECT_EQ(modar_actions_items(actions, 0, view, &items[0].known, 8), 1u);
+  EXPECT_EQ(modar_actions_items(actions, 0, view, &items[0].known, 8), 2u);
   EXPECT_EQ(item(0).node, 2u);
   EXPECT_EQ(item(0).to_eye[14], -3.75f);
   EXPECT_EQ(modar_actions_shown(actions, 0), 0);
@@ -502,7 +519,6 @@ TEST(CapiActions, RunABundlesNodes) {
   events[1].subject = 1;
   events[1].material = 0;
   ASSERT_EQ(modar_actions_step(actions, 0.2, events, 2), 2u);
-  auto command = sized<modar_command>();
   ASSERT_EQ(modar_actions_command(actions, 0, &command), 1);
   EXPECT_EQ(command.kind, MODAR_OPEN_LINK);
   EXPECT_EQ(command.action, 4u);

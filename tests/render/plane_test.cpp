@@ -1,4 +1,5 @@
 // Pictures that stand on a pattern: their texels as they are, hidden and hiding as what they are.
+#include <GLES2/gl2.h>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/render/scene.hpp"
@@ -125,6 +126,69 @@ TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
     const DrawItem before[] = {model, picture_at(node, over_plane(0.5f))};
     const Rgb seen = texel_at(draw(*renderer, camera_on_plane(), before), 16, 16);
     EXPECT_NEAR(seen[1], node == 0 ? 2 : 200 * (1 - 138 / 255.0) + 1, 2) << node;
+  }
+}
+
+/// A texture of two texels, side by side.
+GLuint two_texels(const Rgb& left, const Rgb& right) {
+  const std::uint8_t texels[] = {left[0], left[1], left[2], 255, right[0], right[1], right[2], 255};
+  GLuint texture = 0;
+  glGenTextures(1, &texture);
+  glBindTexture(GL_TEXTURE_2D, texture);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, 2, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels);
+  for (const GLenum filter : std::array<GLenum, 2>{GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) {
+    glTexParameteri(GL_TEXTURE_2D, filter, GL_NEAREST);
+  }
+  for (const GLenum wrap : std::array<GLenum, 2>{GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) {
+    glTexParameteri(GL_TEXTURE_2D, wrap, GL_CLAMP_TO_EDGE);
+  }
+  return texture;
+}
+
+TEST_F(PlaneTest, AVideoShowsItsPosterThenTheAppsTexture) {
+  struct {
+    VideoAlpha alpha;
+    Rgb left;   ///< what is seen of the texture's left texel at the left, over black
+    Rgb right;  ///< the same at the right
+  } const kCases[] = {{VideoAlpha::kOpaque, {200, 100, 50}, {10, 128, 20}},
+                      {VideoAlpha::kBeside, {100, 50, 25}, {100, 50, 25}},
+                      {VideoAlpha::kKey, {0, 0, 0}, {10, 128, 20}}};
+  for (const auto& wanted : kCases) {
+    SceneMaker maker;
+    add_plane_pattern(maker.content);
+    const std::uint32_t poster = add_flat(maker, 12, 12, 12, -1);
+    add_picture(maker.content, "film", 0);
+    NodeRecord& node = maker.content.nodes[0];
+    node.kind = static_cast<std::uint32_t>(NodeKind::kVideo);
+    node.alpha = static_cast<std::uint32_t>(wanted.alpha);
+    if (wanted.alpha == VideoAlpha::kKey) {
+      for (std::size_t c = 0; c < 3; ++c) node.key[c] = static_cast<float>(kCases[0].left[c]) / 255;
+      node.reach = 0.25f;
+    }
+    MediaRecord media{};
+    media.kind = static_cast<std::uint32_t>(MediaKind::kVideo);
+    media.width = media.height = 2;
+    media.seconds = 1.0f;
+    media.poster = poster;
+    maker.content.media = {media};
+    maker.content.media_data = {std::vector<std::byte>(1)};
+    const MappedBundle bundle(maker.content);
+    auto renderer = make_renderer(*bundle.view, probe_gl_caps());
+    ASSERT_NE(renderer, nullptr);
+    const DrawItem item = picture_at(0, glm::scale(over_plane(0), glm::vec3(0.5f, 0.5f, 1.0f)));
+    if (wanted.alpha == VideoAlpha::kOpaque) {
+      const auto first = draw(*renderer, camera_on_plane(), {&item, 1});
+      EXPECT_NEAR(texel_at(first, 12, 16)[0], 12 * 17 + 2, 1);
+    }
+    const GLuint texture = two_texels(kCases[0].left, kCases[0].right);
+    renderer->set_video(0, texture);
+    renderer->set_video(7, texture);  // no such node
+    const auto pixels = draw(*renderer, camera_on_plane(), {&item, 1});
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(texel_at(pixels, 12, 16)[c], wanted.left[c], 1.5) << c;
+      EXPECT_NEAR(texel_at(pixels, 20, 16)[c], wanted.right[c], 1.5) << c;
+    }
+    glDeleteTextures(1, &texture);
   }
 }
 

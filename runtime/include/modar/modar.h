@@ -398,6 +398,7 @@ enum {
   MODAR_NODE_MODEL = 1,   /* the model of a scene */
   MODAR_NODE_PICTURE = 2, /* a rectangle that shows a texture */
   MODAR_NODE_LABEL = 3,   /* a point, a mark to draw there, a title and a text */
+  MODAR_NODE_VIDEO = 4,   /* a rectangle that shows a video */
 };
 typedef struct modar_node {
   size_t size;
@@ -406,6 +407,8 @@ typedef struct modar_node {
   uint32_t scene; /* of a model: the number of its scene; else 0 */
   float place[3]; /* pattern space */
   int hidden;     /* 1: until an action shows it */
+  uint32_t media; /* of a video: number of its file, its index + 1; else 0 */
+  int loops;      /* 1: a video begins again where it ends */
 } modar_node;
 MODAR_EXPERIMENTAL uint32_t modar_node_count(const modar_bundle* bundle);
 /* Returns 1 and the node, or 0 for an invalid index. */
@@ -419,6 +422,24 @@ MODAR_EXPERIMENTAL size_t modar_node_mark(const modar_bundle* bundle, uint32_t i
 MODAR_EXPERIMENTAL size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind,
                                           const char* language, char* text, size_t size);
 
+/* A file for the app to decode: H.264 baseline and AAC in MP4, the index in front. */
+typedef struct modar_media {
+  size_t size;
+  int width; /* pixels */
+  int height;
+  double seconds;
+  int sound;            /* 1: it has a sound track */
+  const uint8_t* bytes; /* in the bundle */
+  size_t byte_count;
+} modar_media;
+/* Returns 1 and the file, or 0 for an invalid index. */
+MODAR_EXPERIMENTAL int modar_media_at(const modar_bundle* bundle, uint32_t index,
+                                      modar_media* media);
+/* What a video shows from now on: a 2D texture of the renderer's context, its first row on top, at
+ * most linear in its filter, which outlives its use here; 0: its poster. */
+MODAR_EXPERIMENTAL void modar_renderer_set_video(modar_renderer* renderer, uint32_t node,
+                                                 uint32_t texture);
+
 /* The state of a bundle's nodes, and what actions have done to them. */
 typedef struct modar_actions modar_actions;
 MODAR_EXPERIMENTAL modar_actions* modar_actions_create(const modar_bundle* bundle,
@@ -430,6 +451,7 @@ MODAR_EXPERIMENTAL void modar_actions_reset(modar_actions* actions);
 enum {
   MODAR_SEEN = 0, /* the pattern `subject` is on the screen: tell it in every step */
   MODAR_TAP = 1,  /* the node `subject` was tapped */
+  MODAR_ENDED = 2, /* the video `subject`, which does not loop, is at its end */
 };
 typedef struct modar_event {
   size_t size;
@@ -438,6 +460,8 @@ typedef struct modar_event {
   uint32_t material; /* of a tap on a model: as in modar_hit; else 0 */
 } modar_event;
 enum {
+  MODAR_PLAY = 1,      /* play the video `node`, from where it was, or from its beginning after its end */
+  MODAR_PAUSE = 2,     /* pause it */
   MODAR_SHOW_TEXT = 6, /* show the title and text of the label `node` */
   MODAR_OPEN_LINK = 7, /* ask the visitor whether to open modar_action_address() of `action` */
 };

@@ -157,7 +157,7 @@ struct RenderOptions {
   float lod_pixels = 1.0f;  ///< largest error of a level of detail on the screen, in pixels
 };
 
-/// False for a node that does not exist.
+/// A rectangle: a picture or a video. False for a node that does not exist.
 bool is_picture(const BundleView& bundle, std::uint32_t node);
 
 /// Appends what of a pattern's scenes and nodes is shown: models, then pictures, each turned as its
@@ -244,6 +244,10 @@ class Renderer {
   void read_pixels(std::span<std::uint8_t> rgba);
   /// Copies the off-screen picture to the bound framebuffer, for example that of a window.
   void blit_to_window(int window_width, int window_height);
+
+  /// What a video shows from now on: a 2D texture of this context, its first row on top, which
+  /// outlives its use here; 0: its poster. node: any number.
+  void set_video(std::uint32_t node, std::uint32_t texture);
 
   void set_options(const RenderOptions& options);
   [[nodiscard]] const RenderStats& stats() const;
