@@ -95,7 +95,7 @@ DOORS = {
     "bake/memory": ("array.hpp", "memory_limit.hpp"),
     "bake/image": ("image.hpp", "resample.hpp"),
     "bake/import": ("read_model.hpp", "source_model.hpp", "gltf/tinygltf_library.hpp"),
-    "bake/video": ("video.hpp",),
+    "bake/video": ("video.hpp", "encode_video.hpp"),
     "bake/mesh": ("weld/weld.hpp", "lod/mesh_levels.hpp", "pack/pack.hpp", "pack/chunk.hpp", "pack/vertex_codec.hpp", "tri_mesh.hpp",
                   "lod/reduce.hpp", "draw_order.hpp", "occlusion.hpp", "repeating.hpp", "topology/mesh_topology.hpp",
                   "triangle_tree.hpp", "upright.hpp"),

@@ -390,7 +390,7 @@ std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::u
 namespace {
 
 const char* node_kind(const NodeRecord& node) {
-  constexpr const char* kKinds[] = {"model", "picture", "label"};
+  constexpr const char* kKinds[] = {"model", "picture", "label", "video"};
   return node.kind - 1 < std::size(kKinds) ? kKinds[node.kind - 1] : "unknown";
 }
 
@@ -406,6 +406,7 @@ Json node_json(const BundleView& bundle, std::uint32_t index) {
                {"rotation", Json::list(node.rotation)},
                {"half_size", Json::list(node.half_size)}};
   if (picture) json.set("texture", node.subject);
+  if (node.kind == static_cast<std::uint32_t>(NodeKind::kVideo)) json.set("media", node.subject);
   if (node.mark.length != 0) json.set("mark", bundle.name(node.mark));
   const std::string_view pattern = bundle.name(bundle.patterns()[node.pattern].name);
   Json words = Json::object();
@@ -423,8 +424,8 @@ Json node_json(const BundleView& bundle, std::uint32_t index) {
 
 /// "tap pot (lid): turn pot by 90 about x in 1.5s", as modar.toml has it.
 std::string action_words(const BundleView& bundle, const ActionRecord& action) {
-  constexpr const char* kCommands[] = {"",     "",     "",     "show", "hide", "toggle",
-                                       "text", "link", "next", "",     "turn"};
+  constexpr const char* kCommands[] = {"",     "play", "pause", "show", "hide", "toggle",
+                                       "text", "link", "next",  "",     "turn"};
   const auto number = [](float value) {
     char text[32];
     std::snprintf(text, sizeof text, "%.6g", static_cast<double>(value));
@@ -531,6 +532,17 @@ Json bundle_json(const BundleView& bundle) {
   for (std::uint32_t a = 0; a < bundle.actions().size(); ++a) {
     actions.push_back(action_json(bundle, a));
   }
+  Json media = Json::array();
+  for (std::uint32_t m = 0; m < bundle.media().size(); ++m) {
+    const MediaRecord& record = bundle.media()[m];
+    media.push_back({{"name", bundle.name(record.name)},
+                     {"width", record.width},
+                     {"height", record.height},
+                     {"seconds", record.seconds},
+                     {"sound", (record.flags & kMediaSound) != 0},
+                     {"poster", record.poster},
+                     {"bytes", bundle.media_data(m).size()}});
+  }
   return {{"format", {{"major", bundle.header().major}, {"minor", bundle.header().minor}}},
           {"bytes", bundle.bytes().size()},
           {"models", models},
@@ -538,7 +550,8 @@ Json bundle_json(const BundleView& bundle) {
           {"patterns", patterns},
           {"scenes", scenes},
           {"nodes", nodes},
-          {"actions", actions}};
+          {"actions", actions},
+          {"media", media}};
 }
 
 }  // namespace modar

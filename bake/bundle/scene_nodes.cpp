@@ -10,8 +10,11 @@
 
 #include "bake/bundle/scene_placement.hpp"
 #include "bake/image/image.hpp"
+#include "bake/process.hpp"
 #include "bake/texture/texture_stage.hpp"
+#include "bake/video/encode_video.hpp"
 #include "formats/base/nearest.hpp"
+#include "formats/base/path.hpp"
 
 namespace modar {
 namespace {
@@ -79,6 +82,11 @@ tl::unexpected<Error> cannot(const ActionRequest& action, const std::string& cau
 /// Whether its target can do what an action asks for.
 Result<void> check_command(const ActionRequest& action, const Known& target) {
   const bool label = target.kind == NodeKind::kLabel;
+  const bool play =
+      action.command == ActionCommand::kPlay || action.command == ActionCommand::kPause;
+  if (play && target.kind != NodeKind::kVideo) {
+    return cannot(action, "is no video", "name one, [[scene.video]]");
+  }
   if (action.command == ActionCommand::kText && !label) {
     return cannot(action, "has no words to show", "name a label, [[scene.label]]");
   }
@@ -213,11 +221,49 @@ class NodeMaker {
     for (std::size_t i = 0; i < 3; ++i) {
       node.place[i] = static_cast<float>(request.place.offset.value[i] * (sides ? 2.0 : mm));
     }
-    if (request.kind != NodeKind::kPicture) return {};
+    if (request.kind == NodeKind::kLabel) return {};
+    if (request.kind == NodeKind::kVideo) {
+      MODAR_TRY(add_video(request, node));
+      const MediaRecord& media = content_.media[node.subject];
+      // Beside it is its alpha.
+      const double width = media.width / (request.alpha == VideoAlpha::kBeside ? 2.0 : 1.0);
+      size_picture(request.place, mm, width, media.height, node);
+      return {};
+    }
     MODAR_ASSIGN(node.subject, add_picture(request.file, request_.textures, content_, report_));
     const TextureRecord& texture = content_.textures[node.subject];
     size_picture(request.place, mm, static_cast<double>(texture.source_width),
                  static_cast<double>(texture.source_height), node);
+    return {};
+  }
+
+  Result<void> add_video(const NodeRequest& request, NodeRecord& node) {
+    node.flags |= (request.plays ? kNodePlays : 0u) | (request.loops ? kNodeLoops : 0u);
+    node.alpha = static_cast<std::uint32_t>(request.alpha);
+    if (request.alpha == VideoAlpha::kKey) {
+      std::copy(request.key.begin(), request.key.end(), node.key);
+      node.reach = request.reach;
+    }
+    const VideoSize most =
+        request_.tier == "desktop" ? VideoSize{kMostVideoWidth, kMostVideoHeight} : VideoSize();
+    MODAR_ASSIGN(EncodedVideo video, encode_video(request.file, most));
+    const auto known =
+        std::find(content_.media_data.begin(), content_.media_data.end(), video.bytes);
+    node.subject = static_cast<std::uint32_t>(known - content_.media_data.begin());
+    if (known != content_.media_data.end()) return {};
+    const TemporaryFolder folder;
+    const std::string png = folder.path() + "/" + file_stem(request.file) + ".png";
+    MODAR_TRY(write_poster(request.file, png));
+    MediaRecord media{};
+    media.name = content_.intern(file_name(request.file));
+    media.kind = static_cast<std::uint32_t>(MediaKind::kVideo);
+    media.flags = video.info.sound_tracks > 0 ? kMediaSound : 0u;
+    media.width = video.info.width;
+    media.height = video.info.height;
+    media.seconds = static_cast<float>(video.info.seconds);
+    MODAR_ASSIGN(media.poster, add_picture(png, request_.textures, content_, report_));
+    content_.media.push_back(media);
+    content_.media_data.push_back(std::move(video.bytes));
     return {};
   }
 
@@ -302,9 +348,9 @@ Result<void> check_nodes(const BakeRequest& request) {
   MODAR_TRY(asked_nodes(request));
   std::set<std::string> read;
   for (const NodeRequest& node : request.nodes) {
-    if (node.kind == NodeKind::kPicture && read.insert(node.file).second) {
-      MODAR_TRY(read_image(node.file));
-    }
+    if (node.file.empty() || !read.insert(node.file).second) continue;
+    if (node.kind == NodeKind::kPicture) MODAR_TRY(read_image(node.file));
+    if (node.kind == NodeKind::kVideo) MODAR_TRY(check_video(node.file));
   }
   return {};
 }

@@ -83,12 +83,17 @@ struct SceneRequest {
 /// Words by language: {"en", "The rim"}.
 using Words = std::map<std::string, std::string>;
 
-/// A picture or a label that stands on a pattern.
+/// A picture, a video or a label that stands on a pattern.
 struct NodeRequest {
   NodeKind kind = NodeKind::kPicture;
-  std::string file;    ///< of a picture
-  SceneRequest place;  ///< pattern, name, hidden, group, offset; of a picture size, turn, centred
-  std::string mark;    ///< of a label: a number or a short word
+  std::string file;    ///< of a picture or video
+  SceneRequest place;  ///< pattern, name, hidden, group, offset; but for labels size, turn, centred
+  bool plays = true;   ///< a video, from when its pattern is found
+  bool loops = false;  ///< a video
+  VideoAlpha alpha = VideoAlpha::kOpaque;
+  std::array<float, 3> key{};  ///< of VideoAlpha::kKey
+  float reach = 0;             ///< the same
+  std::string mark;            ///< of a label: a number or a short word
   Words titles;
   Words texts;
   Words alts;

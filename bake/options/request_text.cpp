@@ -294,8 +294,32 @@ tl::expected<void, WrongValue> parse_event(std::string_view text, ActionRequest&
   return {};
 }
 
+tl::expected<void, WrongValue> parse_alpha(std::string_view text, NodeRequest& node) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  if (text == "none" || text == "beside") {
+    node.alpha = text == "none" ? VideoAlpha::kOpaque : VideoAlpha::kBeside;
+    return {};
+  }
+  bool good = text.size() == 7 && text[0] == '#';
+  for (std::size_t i = 0; good && i < 3; ++i) {
+    const std::size_t high = kDigits.find(text[1 + 2 * i]);
+    const std::size_t low = kDigits.find(text[2 + 2 * i]);
+    good = high != std::string_view::npos && low != std::string_view::npos;
+    node.key[i] = static_cast<float>(16 * high + low) / 255.0f;
+  }
+  if (!good) {
+    return tl::unexpected(WrongValue{"this is no kind of alpha",
+                                     "write none, beside (the right half is the alpha of the left "
+                                     "one) or a colour that is not seen, \"#00ff00\""});
+  }
+  node.alpha = VideoAlpha::kKey;
+  node.reach = 0.4f;  // keyed studio green varies by so much; set by hand
+  return {};
+}
+
 tl::expected<void, WrongValue> parse_command(std::string_view text, ActionRequest& action) {
   constexpr std::pair<std::string_view, ActionCommand> kCommands[] = {
+      {"play", ActionCommand::kPlay},     {"pause", ActionCommand::kPause},
       {"show", ActionCommand::kShow},     {"hide", ActionCommand::kHide},
       {"toggle", ActionCommand::kToggle}, {"text", ActionCommand::kText},
       {"next", ActionCommand::kNext},     {"link", ActionCommand::kLink},
@@ -320,7 +344,8 @@ tl::expected<void, WrongValue> parse_command(std::string_view text, ActionReques
   }
   return tl::unexpected(
       WrongValue{"there is no such command",
-                 "write show, hide, toggle, text, next or turn and a NAME, or link https://..."});
+                 "write play, pause, show, hide, toggle, text, next or turn and a NAME, or link "
+                 "https://..."});
 }
 
 Result<SceneRequest> parse_scene(const std::string& text) {

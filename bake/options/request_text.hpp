@@ -42,10 +42,13 @@ tl::expected<bool, WrongValue> take_scene_part(std::string_view key, std::string
                                                SceneRequest& scene);
 
 /// "found", "lost", "tap NAME" or "after 3s"; then "show NAME", "hide NAME", "toggle NAME",
-/// "text NAME", "next NAME", "link https://...", "turn NAME by 90 [about x] [in 2s]", into the
-/// action.
+/// "text NAME", "next NAME", "play NAME", "pause NAME", "link https://...", "turn NAME by 90 [about
+/// x] [in 2s]", into the action.
 tl::expected<void, WrongValue> parse_event(std::string_view text, ActionRequest& action);
 tl::expected<void, WrongValue> parse_command(std::string_view text, ActionRequest& action);
+
+/// Where a video is seen through, into the node: "none", "beside" or a colour, "#00ff00".
+tl::expected<void, WrongValue> parse_alpha(std::string_view text, NodeRequest& node);
 
 /// "PATTERN=MODEL[,scale=S|,height=120mm|,width=80mm][,up=y][,turn=90][,offset=X:Y:Z][,centred]
 /// [,light=FILE]". Errors: kUsage "cli.scene".

@@ -296,7 +296,9 @@ class ProjectBake {
     placed.request = node.place;
     placed.texts = node.texts;
     placed.alts = node.alts;
-    std::string text = "\nnode " + node.mark + scene_text(placed);
+    std::string text = "\nnode " + node.mark + scene_text(placed) + (node.plays ? "p" : "") +
+                       (node.loops ? "l" : "") + std::to_string(static_cast<unsigned>(node.alpha));
+    for (const float part : node.key) text += " " + std::to_string(part);
     if (!node.file.empty()) text += node.file + " " + digests_.of(project_.path(node.file));
     for (const auto& [language, words] : node.titles) text += "\ntitle " + language + " " + words;
     return text;

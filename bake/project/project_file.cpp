@@ -447,7 +447,7 @@ class ProjectReader {
     for (const TableReader& reader : readers) {
       MODAR_TRY(reader.allow({"pattern", "model", "scale", "height", "width", "up", "turn",
                               "offset", "centred", "light", "text", "alt", "name", "hidden",
-                              "group", "picture", "label", "action"}));
+                              "group", "picture", "video", "label", "action"}));
       ProjectScene scene;
       MODAR_TRY(reader.take("pattern", scene.request.pattern));
       MODAR_TRY(reader.take("model", scene.request.model));
@@ -480,6 +480,8 @@ class ProjectReader {
   Result<void> read_nodes(const TableReader& scene_reader, ProjectScene& scene) {
     MODAR_ASSIGN(const auto pictures, scene_reader.take_tables("picture"));
     for (const TableReader& reader : pictures) MODAR_TRY(read_picture(reader, scene));
+    MODAR_ASSIGN(const auto videos, scene_reader.take_tables("video"));
+    for (const TableReader& reader : videos) MODAR_TRY(read_video(reader, scene));
     MODAR_ASSIGN(const auto labels, scene_reader.take_tables("label"));
     for (const TableReader& reader : labels) MODAR_TRY(read_label(reader, scene));
     MODAR_ASSIGN(const auto actions, scene_reader.take_tables("action"));
@@ -490,7 +492,27 @@ class ProjectReader {
   Result<void> read_picture(const TableReader& reader, ProjectScene& scene) {
     MODAR_TRY(reader.allow({"file", "name", "scale", "height", "width", "turn", "offset", "centred",
                             "hidden", "group", "alt"}));
+    return read_plane(reader, {}, scene);
+  }
+
+  Result<void> read_video(const TableReader& reader, ProjectScene& scene) {
+    MODAR_TRY(reader.allow({"file", "name", "scale", "height", "width", "turn", "offset", "centred",
+                            "hidden", "group", "alt", "play", "loop", "alpha"}));
     NodeRequest node;
+    node.kind = NodeKind::kVideo;
+    MODAR_TRY(reader.take("play", node.plays));
+    MODAR_TRY(reader.take("loop", node.loops));
+    std::string alpha = "none";
+    MODAR_TRY(reader.take("alpha", alpha));
+    if (const auto read = parse_alpha(alpha, node); !read) {
+      return fail(ExitCode::kInvalidInput, "project.value", reader.at("alpha"),
+                  "alpha = \"" + alpha + "\": " + read.error().cause, read.error().cure);
+    }
+    return read_plane(reader, std::move(node), scene);
+  }
+
+  /// What pictures and videos have in common.
+  Result<void> read_plane(const TableReader& reader, NodeRequest node, ProjectScene& scene) {
     node.where = reader.at("file");
     node.place.pattern = scene.request.pattern;
     MODAR_TRY(take_file(reader, "file", node.file));

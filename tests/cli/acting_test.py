@@ -131,10 +131,46 @@ class Acting(ProgramTest):
         told = json.loads(self.modar("inspect", bundle, "--json").stdout)
         self.assertEqual((len(told["scenes"]), [node["name"] for node in told["nodes"]]), (0, ["map"]))
 
+    def film(self, name, *words):
+        subprocess.run(["ffmpeg", "-loglevel", "error", "-y", "-f", "lavfi", "-i", "testsrc=s=1280x960:d=1:r=10", "-f", "lavfi", "-i",
+                        "sine=d=1", *words, self.folder / name], check=True)
+
+    def test_a_video_becomes_what_every_phone_plays(self):
+        self.film("film.avi", "-c:v", "mpeg4", "-c:a", "mp2")
+        scene = ('[[scene]]\npattern = "cover"\n[[scene.video]]\nfile = "film.avi"\nwidth = "72mm"\nloop = true\nalpha = "#00ff00"\n'
+                 '[[scene.action]]\non = "tap film"\ndo = "pause film"\n')
+        self.assertEqual(self.bake(scene).returncode, 0)
+        bundle = next((self.folder / "out").glob("*.modar"))
+        told = json.loads(self.modar("inspect", bundle, "--json").stdout)
+        (media,), (node,), (action,) = told["media"], told["nodes"], told["actions"]
+        self.assertEqual((media["name"], media["width"], media["height"], media["sound"]), ("film.avi", 640, 480, True))
+        self.assertAlmostEqual(media["seconds"], 1, delta=0.1)
+        self.assertEqual((node["kind"], node["media"], action["words"]), ("video", 0, "tap film: pause film"))
+        for side, wanted in zip(node["half_size"], (0.5, 0.375)):
+            self.assertAlmostEqual(side, wanted, 6)
+        self.assertEqual((told["textures"][0]["source_width"], told["textures"][0]["source_height"]), (1280, 960))
+        self.assertEqual(json.loads(self.modar("check", bundle, "--json").stdout)["issues"], [])
+        # What FFmpeg says of the file in the bundle.
+        at = bundle.read_bytes().index(b"ftyp") - 4
+        (self.folder / "taken.mp4").write_bytes(bundle.read_bytes()[at:at + media["bytes"]])
+        said = json.loads(subprocess.run(["ffprobe", "-loglevel", "error", "-show_streams", "-of", "json", self.folder / "taken.mp4"],
+                                         capture_output=True, text=True, check=True).stdout)["streams"]
+        self.assertEqual([(each["codec_name"], each.get("profile")) for each in said],
+                         [("h264", "Constrained Baseline"), ("aac", "LC")])
+        # It is fit already: as it is, and the same bundle again but for the poster and names.
+        shutil.move(self.folder / "taken.mp4", self.folder / "film.mp4")
+        before = bundle.read_bytes()[at:at + media["bytes"]]
+        self.assertEqual(self.bake(scene.replace("film.avi", "film.mp4")).returncode, 0)
+        self.assertIn(before, bundle.read_bytes())
+        (self.folder / "film.mp4").write_bytes(b"no film")
+        done = self.bake(scene.replace("film.avi", "film.mp4"))
+        self.assertIn("video.decode", done.stderr)
+
     def test_what_is_wrong_is_told_with_its_line_before_the_bake(self):
         for change, code, where in (
                 (('do = "show pot"', 'do = "show pott"'), "action.unknown", 'do = "show pott"'),
                 (('do = "show pot"', 'do = "text pot"'), "action.command", 'do = "text pot"'),
+                (('do = "show pot"', 'do = "play pot"'), "action.command", 'do = "play pot"'),
                 (('do = "show pot"', 'do = "next pot"'), "action.command", 'do = "next pot"'),
                 (('do = "show pot"', 'do = "turn rim by 9"'), "action.command", 'do = "turn rim'),
                 (('do = "show pot"', 'do = "sing"'), "project.value", 'do = "sing"'),
