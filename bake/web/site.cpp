@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 
 /// What is copied as it is, or without comments; index.html, sw.js and the words are written with
 /// changes.
-constexpr std::array<std::string_view, 34> kPageFiles = {"app.js",
+constexpr std::array<std::string_view, 35> kPageFiles = {"app.js",
                                                          "bundle.js",
                                                          "camera.js",
                                                          "engine-plain.js",
@@ -64,6 +64,7 @@ constexpr std::array<std::string_view, 34> kPageFiles = {"app.js",
                                                          "storage.js",
                                                          "style.css",
                                                          "turntable.js",
+                                                         "videos.js",
                                                          "viewer-parts.js",
                                                          "viewer-words.js"};
 /// Beside them where the page updates itself.

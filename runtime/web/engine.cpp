@@ -396,30 +396,48 @@ EMSCRIPTEN_KEEPALIVE const char* web_language(uint32_t index) {
 EMSCRIPTEN_KEEPALIVE uint32_t web_node_count() {
   return modar_node_count(engine.bundle);
 }
-/// part: 0 pattern, 1 kind.
+/// part: 0 pattern, 1 kind, 2 whether a video loops, 3 number of its file.
 EMSCRIPTEN_KEEPALIVE uint32_t web_node(uint32_t index, int part) {
   auto node = modar::sized<modar_node>();
   modar_node_at(engine.bundle, index, &node);
-  return part == 0 ? node.pattern : static_cast<uint32_t>(node.kind);
+  const uint32_t parts[] = {node.pattern, static_cast<uint32_t>(node.kind),
+                            static_cast<uint32_t>(node.loops), node.media};
+  return parts[part];
+}
+/// The bytes of a video's file, and how many they are.
+EMSCRIPTEN_KEEPALIVE const uint8_t* web_media(uint32_t node) {
+  auto media = modar::sized<modar_media>();
+  modar_media_at(engine.bundle, web_node(node, 3) - 1, &media);
+  return media.bytes;
+}
+EMSCRIPTEN_KEEPALIVE size_t web_media_size(uint32_t node) {
+  auto media = modar::sized<modar_media>();
+  modar_media_at(engine.bundle, web_node(node, 3) - 1, &media);
+  return media.byte_count;
+}
+/// A new texture that a video shows from now on; the page fills it.
+EMSCRIPTEN_KEEPALIVE GLuint web_video_texture(uint32_t node) {
+  GLuint texture = 0;
+  glGenTextures(1, &texture);
+  modar_renderer_set_video(engine.renderer, node, texture);
+  return texture;
 }
 EMSCRIPTEN_KEEPALIVE const char* web_address(uint32_t action) {
   modar_action_address(engine.bundle, action, engine.text, sizeof engine.text);
   return engine.text;
 }
 
-/// A step of the actions, for the poses in web_poses(). tapped: a node, or -1; material: number of
-/// what lies there, or 0. Answers how many commands web_command() has.
-EMSCRIPTEN_KEEPALIVE size_t web_act(double time_s, int tapped, uint32_t material) {
+/// A step of the actions, for the poses in web_poses(). kind: MODAR_TAP or MODAR_ENDED of a node,
+/// or -1; material: number of what was tapped there, or 0. Answers how many commands web_command()
+/// has.
+EMSCRIPTEN_KEEPALIVE size_t web_act(double time_s, int kind, uint32_t node, uint32_t material) {
   size_t count = 0;
   engine.events[0].size = sizeof(modar_event);
   for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p) {
     if (engine.poses[p].shown == 0.0f) continue;
     engine.events[count++] = {sizeof(modar_event), MODAR_SEEN, p, 0};
   }
-  if (tapped >= 0) {
-    engine.events[count++] = {sizeof(modar_event), MODAR_TAP, static_cast<uint32_t>(tapped),
-                              material};
-  }
+  if (kind >= 0) engine.events[count++] = {sizeof(modar_event), kind, node, material};
   return modar_actions_step(engine.actions, time_s, engine.events, count);
 }
 /// field: 0 kind, 1 node, 2 action.

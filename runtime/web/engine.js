@@ -94,8 +94,8 @@ export class Engine {
     this.languages = [];
     for (let i = 0, at; (at = m._web_language(i)) !== 0; ++i) this.languages.push(m.UTF8ToString(at));
     this.nodes = Array.from({ length: m._web_node_count() }, (_, i) => ({
-      name: this.#nodeText(i, 3), pattern: m._web_node(i, 0), kind: ['model', 'picture', 'label'][m._web_node(i, 1) - 1] ?? '',
-      mark: this.#nodeText(i, 4),
+      name: this.#nodeText(i, 3), pattern: m._web_node(i, 0), kind: ['model', 'picture', 'label', 'video'][m._web_node(i, 1) - 1] ?? '',
+      mark: this.#nodeText(i, 4), loops: m._web_node(i, 2) !== 0,
     }));
     this.scenes = Array.from({ length: m._web_scene_count() }, (_, i) => ({
       pattern: m._web_scene(i, 0), model: m.UTF8ToString(m._web_model_name(m._web_scene(i, 1))),
@@ -116,14 +116,28 @@ export class Engine {
   }
 
   /**
-   * A step of the bundle's actions. time: seconds. tap: {node, material} or nothing.
-   * @returns what the page has to do: {text: node} or {link: address}
+   * A step of the bundle's actions. time: seconds. event: {node, material} that was tapped, {node, ended: true} of a video, or
+   * nothing. @returns what the page has to do: {play: node}, {pause: node}, {text: node} or {link: address}
    */
-  act(time, tap) {
+  act(time, event) {
     const m = this.#module;
-    const count = m._web_act(time, tap?.node ?? -1, tap?.material ?? 0);
-    return Array.from({ length: count }, (_, i) => (m._web_command(i, 0) === 6 ? { text: m._web_command(i, 1) }
-      : { link: m.UTF8ToString(m._web_address(m._web_command(i, 2))) }));
+    const count = m._web_act(time, event ? (event.ended ? 2 : 1) : -1, event?.node ?? 0, event?.material ?? 0);
+    return Array.from({ length: count }, (_, i) => {
+      const [kind, node, action] = [0, 1, 2].map((field) => m._web_command(i, field));
+      if (kind === 7) return { link: m.UTF8ToString(m._web_address(action)) };
+      return { [{ 1: 'play', 2: 'pause', 6: 'text' }[kind]]: node };
+    });
+  }
+
+  /** The file of a video node. */
+  mediaOf(node) {
+    const at = this.#module._web_media(node);
+    return this.#module.HEAPU8.slice(at, at + this.#module._web_media_size(node));
+  }
+
+  /** A new texture that a video node shows from now on, as WebGL knows it. */
+  videoTexture(node) {
+    return this.#module.GL.textures[this.#module._web_video_texture(node)];
   }
 
   /** Something turns, or a delay runs: act() and draw() again, though no frame comes. */

@@ -15,7 +15,7 @@ export interface SceneNode {
   name: string;
   /** Index. */
   pattern: number;
-  kind: 'model' | 'picture' | 'label';
+  kind: 'model' | 'picture' | 'label' | 'video';
   /** Of a label: a number or a short word. */
   mark: string;
 }
@@ -57,8 +57,12 @@ export class View extends EventTarget {
   tap(x: number, y: number): number | null;
   /** The visitor tapped a node, as by a label's own button. */
   tapNode(node: number): void;
-  /** Actions begin anew. */
+  /** Actions begin anew, and videos stop. */
   forgetActs(): void;
+  /** Videos are silent until this is true; to be set by a visitor's own click. */
+  sound: boolean;
+  /** While this is true, videos pause. */
+  held: boolean;
   /** Labels on the screen, CSS pixels of the canvas; covered: something lies before its point. */
   labels(): { node: number; x: number; y: number; covered: boolean }[];
   /** Both canvases in one picture. */

@@ -2,6 +2,7 @@
 // task, so picture and models never part.
 import { Engine, hasSimd, ModarError, POSE, POSE_FLOATS } from './engine.js';
 import { drawFrame, fitCanvases } from './modar.js';
+import { Videos } from './videos.js';
 
 /** Frames between looks at the room's light, and how wide the copy is that is looked at: reading a picture back is slow. */
 const LIGHT_EVERY = 4;
@@ -46,6 +47,7 @@ export class View extends EventTarget {
   #framesSinceLook = LIGHT_EVERY;
   #redraw = () => {};
   #mirror = false;
+  #videos;
   #taps = [];
   #drawnAt = 0;
   #handle = 0;
@@ -67,6 +69,7 @@ export class View extends EventTarget {
     view.#engine.open(await bytes);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
     view.#engine.upload(false, fixedLight);
+    view.#videos = new Videos(view.#engine, () => view.#soon());
     models.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();  // without this it is never restored
       view.#lost = true;
@@ -75,7 +78,7 @@ export class View extends EventTarget {
     return view;
   }
 
-  /** What stands on patterns by name: {name, pattern, kind: 'model' | 'picture' | 'label', mark}. */
+  /** What stands on patterns by name: {name, pattern, kind: 'model' | 'picture' | 'label' | 'video', mark}. */
   get nodes() {
     return this.#engine.nodes;
   }
@@ -104,12 +107,31 @@ export class View extends EventTarget {
     this.#tapped({ node, material: 0 });
   }
 
-  /** Actions begin anew, as if nothing had been found. */
+  /** Actions begin anew, as if nothing had been found; videos stop. */
   forgetActs() {
     this.#taps = [];
     cancelAnimationFrame(this.#handle);
     this.#handle = 0;
     this.#engine.forgetActs();
+    this.#videos.close();
+  }
+
+  /** Videos are silent until this is true; to be set by a visitor's own click. */
+  set sound(on) {
+    this.#videos.sound = on;
+  }
+
+  get sound() {
+    return this.#videos.sound;
+  }
+
+  /** While this is true, videos pause. */
+  set held(on) {
+    this.#videos.held = on;
+  }
+
+  get held() {
+    return this.#videos.held;
   }
 
   /** The labels that are on the screen: [{node, x, y, covered}], CSS pixels of the canvas. */
@@ -128,7 +150,12 @@ export class View extends EventTarget {
 
   #tapped(tap) {
     this.#taps.push(tap);
-    this.#handle ||= requestAnimationFrame(() => this.#goOn());
+    this.#soon();
+  }
+
+  /** Without a frame of a camera, what is new is drawn soon. */
+  #soon() {
+    this.#handle ||= requestAnimationFrame(() => this.#goOn(true));
   }
 
   /** Acts and draws what was drawn last. */
@@ -140,13 +167,16 @@ export class View extends EventTarget {
 
   #act() {
     if (this.nodes.length === 0) return;
-    const todo = this.#taps.length ? this.#taps.splice(0) : [null];
-    for (const tap of todo) {
-      for (const { text, link } of this.#engine.act(performance.now() / 1000, tap)) {
-        this.dispatchEvent(link ? new CustomEvent('link', { detail: { address: link } })
-          : new CustomEvent('text', { detail: { node: text } }));
+    const happened = [...this.#taps.splice(0), ...this.#videos.ended.splice(0).map((node) => ({ node, ended: true }))];
+    for (const event of happened.length ? happened : [null]) {
+      for (const todo of this.#engine.act(performance.now() / 1000, event)) {
+        if ('play' in todo) this.#videos.play(todo.play);
+        else if ('pause' in todo) this.#videos.pause(todo.pause);
+        else if ('link' in todo) this.dispatchEvent(new CustomEvent('link', { detail: { address: todo.link } }));
+        else this.dispatchEvent(new CustomEvent('text', { detail: { node: todo.text } }));
       }
     }
+    if (!this.#lost) this.#videos.upload(this.#gl.context);
   }
 
   #drawn() {
@@ -157,17 +187,18 @@ export class View extends EventTarget {
     if (this.#engine.acting) this.#handle ||= requestAnimationFrame(() => this.#goOn());
   }
 
-  /** Frames of a camera come by themselves; without them, what turns or was tapped is drawn anyway. */
-  #goOn() {
+  /** Frames of a camera come by themselves; without them, what turns, plays or was tapped is drawn anyway. */
+  #goOn(fresh = false) {
     this.#handle = 0;
     if (performance.now() - this.#drawnAt > STILL_MS) this.#again();
-    else if (this.#taps.length || this.#engine.acting) this.#handle = requestAnimationFrame(() => this.#goOn());
+    else if (fresh || this.#taps.length || this.#engine.acting) this.#handle = requestAnimationFrame(() => this.#goOn(fresh));
   }
 
   #restore(webgl1) {
     this.#gl = openContext(this.#models, webgl1);
     this.#engine.useContext(this.#gl.context, this.#gl.version);
     this.#engine.upload(true);
+    this.#videos.forget();
     this.#lost = false;
   }
 

@@ -530,7 +530,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       const label = this.#labelOf(pattern);
       this.#fillLabel(label);
       const models = this.#modar.scenes.filter((scene) => scene.pattern === pattern).map(({ model }) => model);
-      const pictures = this.#view.nodes.map((node, i) => (node.pattern === pattern && node.kind === 'picture' ? this.#wordsOf(i).alt : ''));
+      const pictures = this.#view.nodes.map((node, i) => (node.pattern === pattern && ['picture', 'video'].includes(node.kind) ? this.#wordsOf(i).alt : ''));
       const seen = [label.alt || models.join(', '), ...pictures].filter(Boolean).join('; ');
       this.#nameModels(this.#say('seen', { name: seen, pattern: label.name }));
     }
@@ -549,7 +549,18 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     return this.#view.wordsOf(node, [language, language.split('-')[0]]);
   }
 
+  /** Sound comes by a visitor's own click only, and videos can be paused. */
+  #press(id, set) {
+    const on = this.#$(id).getAttribute('aria-pressed') !== 'true';
+    this.#$(id).setAttribute('aria-pressed', String(on));
+    set(on);
+  }
+
   #listenToScenes(view) {
+    for (const id of ['sound', 'hold']) {
+      this.#$(id).hidden = !view.nodes.some(({ kind }) => kind === 'video');
+      this.#$(id).setAttribute('aria-pressed', 'false');
+    }
     view.addEventListener('drawn', () => this.#showMarks());
     view.addEventListener('text', ({ detail: { node } }) => {
       const { pattern, name, mark } = view.nodes[node];
@@ -727,6 +738,8 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       start: () => this.start(), look: () => this.look(), close: () => this.stop(), flip: () => this.#flip(), torch: () => this.#toggleTorch(),
       cameras: () => this.#showCameras(), 'choose-close': () => this.#$('choose').close(), copy: () => this.#copyAddress(),
       'problem-close': () => this.#$('problem').close(), 'leave-open': () => this.#$('leave').close(), 'leave-close': () => this.#$('leave').close(),
+      sound: () => this.#press('sound', (on) => { this.#view.sound = on; }),
+      hold: () => this.#press('hold', (on) => { this.#view.held = on; }),
       full: () => (this.#root.fullscreenElement ? document.exitFullscreen() : this.#$('screen').requestFullscreen()),
       // The same as keys and gestures, for those who do not drag, pinch or type.
       'turn-left': keys.ArrowLeft, 'turn-right': keys.ArrowRight, larger: keys['+'], smaller: keys['-'], higher: keys.PageUp,

@@ -167,6 +167,8 @@ const MARKUP = `<div id="all">
     ${tool('close', 'close', '<path d="M5 5l14 14M19 5L5 19"/>')}
     ${tool('flip', 'flip', '<path d="M4 9a8.5 8.5 0 0 1 15-2m1-4v4.5h-4.5M20 15a8.5 8.5 0 0 1-15 2m-1 4v-4.5h4.5"/>', 'camera', 'hidden')}
     <slot name="tools"></slot>
+    ${tool('sound', 'sound', '<path d="M4 9.5h3.5L12 5.5v13l-4.5-4H4zM15.5 9a4.2 4.2 0 0 1 0 6M18 6.5a7.8 7.8 0 0 1 0 11"/>', '', 'aria-pressed="false" hidden')}
+    ${tool('hold', 'hold', '<path d="M8.5 5.5v13M15.5 5.5v13"/>', '', 'aria-pressed="false" hidden')}
     ${tool('torch', 'torch', '<path d="M13 2.5L6 13.5h5l-1 8 7-11h-5z"/>', 'camera', 'aria-pressed="false" hidden')}
     ${tool('cameras', 'cameras', '<path d="M3 7.5h4l2-2.5h6l2 2.5h4v11.5H3z"/><circle cx="12" cy="13" r="3.6"/>', 'camera')}
     ${tool('full', 'full', '<path d="M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5"/>', '', 'hidden')}

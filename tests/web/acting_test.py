@@ -40,6 +40,12 @@ alt.en = "A green sheet"
 file = "blue.png"
 scale = 0.2
 offset = [0, 0.35, 0]
+[[scene.video]]
+file = "film.mp4"
+scale = 0.15
+offset = [-0.1, -0.4, 0]
+loop = true
+alt.en = "A film"
 [[scene.label]]
 name = "corner"
 mark = "A"
@@ -114,6 +120,10 @@ class Acting(ProgramTest):
             shutil.copy(file, project)
         plain(project / "green.png", GREEN)
         plain(project / "blue.png", BLUE)
+        # Another colour each second.
+        subprocess.run(["ffmpeg", "-loglevel", "error", "-f", "lavfi", "-i",
+                        "nullsrc=s=64x64:d=4:r=10,geq=r='60+40*floor(T)':g=120:b='220-40*floor(T)'", "-f", "lavfi", "-i", "sine=d=4",
+                        "-pix_fmt", "yuv420p", project / "film.mp4"], check=True)
         (project / "modar.toml").write_text(PROJECT)
         for words in (["bake", "--project", project / "modar.toml", "--quiet"],
                       ["web", project / "out" / "project.modar", "-o", cls.base / "site", "--quiet"]):
@@ -150,7 +160,7 @@ class Acting(ProgramTest):
         mark, = self.browser.run(MARKS)
         self.assertEqual((mark["text"], mark["name"]), ("A", "A: The corner"))
         application = "part('models').getAttribute('aria-label')"
-        self.assertEqual(self.browser.run(application), "A pot; A green sheet, standing on the picture cover.")
+        self.assertEqual(self.browser.run(application), "A pot; A green sheet; A film, standing on the picture cover.")
         # The corner's place, told by the pose: the label is on it, the blue sheet and the green one where the bundle has them.
         places = self.browser.run("""(async () => {
           const { View } = await import('/modar-view.js');
@@ -192,6 +202,56 @@ class Acting(ProgramTest):
         self.assertEqual([each["text"] for each in self.browser.run(MARKS)], ["A", "2"])
         self.browser.run("part('close').click()")
         self.assertEqual(self.browser.run(MARKS), [])
+        self.assertEqual(self.browser.errors, [])
+
+    def test_a_video_plays_where_it_stands(self):
+        self.browser.resize(640, 480)
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
+        self.browser.run("""(() => {
+          globalThis.films = [];
+          const create = document.createElement;
+          document.createElement = function (name) {
+            const made = create.call(this, name);
+            if (name === 'video') films.push(made);
+            return made;
+          };
+          document.getElementById('start').click();
+        })()""")
+        self.browser.wait("globalThis.films?.[0]?.currentTime > 0.2", "the film")
+        self.assertEqual(self.browser.run("[films.length, films[0].muted, films[0].loop, films[0].videoWidth]"), [1, True, True, 64])
+        began = self.browser.run("""(async () => {
+          const { View } = await import('/modar-view.js');
+          const draw = View.prototype.draw;
+          const frame = await new Promise((resolve) => {
+            View.prototype.draw = function (detail, ...rest) { resolve(detail); return draw.call(this, detail, ...rest); };
+          });
+          View.prototype.draw = draw;
+          const view = frame.poses.slice(24, 40);
+          const at = [0, 1, 2].map((i) => view[i] * -0.2 + view[4 + i] * -0.8 + view[12 + i]);
+          const { focal, width, height } = frame.camera;
+          return [innerWidth / 2 - (focal * at[0]) / at[2] * innerWidth / width, innerHeight / 2 + (focal * at[1]) / at[2] * innerHeight / height];
+        })()""")
+        press = "part('{}').click()".format
+        for _ in range(2):
+            self.browser.run(press("hold"))
+            self.browser.wait("films[0].paused", "the pause")
+            shown = self.browser.run("""(async () => {
+              await new Promise((resolve) => { setTimeout(resolve, 300); });
+              const copy = document.createElement('canvas').getContext('2d');
+              copy.drawImage(films[0], 0, 0);
+              return Array.from(copy.getImageData(32, 32, 1, 1).data);
+            })()""")
+            pixel = self.browser.run(PIXEL % tuple(began))
+            for got, wanted in zip(pixel, shown):
+                self.assertAlmostEqual(got, wanted, delta=2, msg=(pixel, shown))
+            time = self.browser.run("films[0].currentTime")
+            self.browser.run(press("hold"))
+            self.browser.wait(f"!films[0].paused && Math.abs(films[0].currentTime - {time}) > 1", "going on")
+        self.browser.run(press("sound"))
+        self.assertEqual(self.browser.run("[films[0].muted, part('sound').getAttribute('aria-pressed')]"), [False, "true"])
+        self.browser.run(press("close"))
+        self.assertTrue(self.browser.run("films[0].paused"))
         self.assertEqual(self.browser.errors, [])
 
     def test_without_a_camera(self):
