@@ -378,9 +378,9 @@ void modar_surface_to_frame(const modar_surface* surface, const modar_camera* ca
 /* The nearest surface of the items under a pixel of the frame. */
 typedef struct modar_hit {
   size_t size;
-  size_t item;    /* index into the items */
-  float point[3]; /* in the item's model space */
-  float distance; /* from the eye, in eye space */
+  size_t item;       /* index into the items */
+  float point[3];    /* in the item's model space */
+  float distance;    /* from the eye, in eye space */
   uint32_t material; /* number of the material there, for modar_event; 0: it is a picture */
 } modar_hit;
 /* Returns 1 and the hit, or 0. Reads the triangles from the bundle's bytes: meant for taps, not for
@@ -449,8 +449,8 @@ MODAR_EXPERIMENTAL void modar_actions_destroy(modar_actions* actions);
 MODAR_EXPERIMENTAL void modar_actions_reset(modar_actions* actions);
 
 enum {
-  MODAR_SEEN = 0, /* the pattern `subject` is on the screen: tell it in every step */
-  MODAR_TAP = 1,  /* the node `subject` was tapped */
+  MODAR_SEEN = 0,  /* the pattern `subject` is on the screen: tell it in every step */
+  MODAR_TAP = 1,   /* the node `subject` was tapped */
   MODAR_ENDED = 2, /* the video `subject`, which does not loop, is at its end */
 };
 typedef struct modar_event {
@@ -460,7 +460,8 @@ typedef struct modar_event {
   uint32_t material; /* of a tap on a model: as in modar_hit; else 0 */
 } modar_event;
 enum {
-  MODAR_PLAY = 1,      /* play the video `node`, from where it was, or from its beginning after its end */
+  MODAR_PLAY =
+      1, /* play the video `node`, from where it was, or from its beginning after its end */
   MODAR_PAUSE = 2,     /* pause it */
   MODAR_SHOW_TEXT = 6, /* show the title and text of the label `node` */
   MODAR_OPEN_LINK = 7, /* ask the visitor whether to open modar_action_address() of `action` */
