@@ -19,17 +19,31 @@ class Table {
   Table() = default;
   Table(const std::byte* first, std::uint32_t count, std::uint32_t stride)
       : first_(first), count_(count), stride_(stride) {}
-  [[nodiscard]] std::uint32_t size() const { return count_; }
-  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] std::uint32_t size() const { return count_ + more_count_; }
+  [[nodiscard]] bool empty() const { return size() == 0; }
   /// index < size(); the record lives as long as the mapped bytes.
   [[nodiscard]] const T& operator[](std::uint32_t index) const {
-    return *reinterpret_cast<const T*>(first_ + std::size_t{index} * stride_);
+    const std::byte* at = index < count_ ? first_ + std::size_t{index} * stride_
+                                         : more_ + std::size_t{index - count_} * more_stride_;
+    return *reinterpret_cast<const T*>(at);
   }
+
+  /// Continues with the records of another section.
+  void append(const Table& more) {
+    more_ = more.first_;
+    more_count_ = more.count_;
+    more_stride_ = more.stride_;
+  }
+  /// Without what was appended.
+  [[nodiscard]] Table own() const { return {first_, count_, stride_}; }
 
  private:
   const std::byte* first_ = nullptr;
+  const std::byte* more_ = nullptr;
   std::uint32_t count_ = 0;
+  std::uint32_t more_count_ = 0;
   std::uint32_t stride_ = sizeof(T);
+  std::uint32_t more_stride_ = sizeof(T);
 };
 
 /// The byte of a layout's vertices that holds occlusion, or kNone.
@@ -39,6 +53,13 @@ inline std::uint32_t occlusion_byte(const Table<OcclusionRecord>& records, std::
   }
   return kNone;
 }
+
+/// Chunks that are drawn together: those of a model, or those of one of its stand-ins.
+struct ChunkGroup {
+  std::uint32_t model = 0;
+  std::uint32_t first_chunk = 0;
+  std::uint32_t chunk_count = 0;
+};
 
 /// One pattern under one parameter set, as mapped arrays.
 struct FeatureView {
@@ -55,8 +76,9 @@ struct BundleParts {
   std::span<const std::byte> vertices;
   std::span<const std::byte> indices;
   Table<ModelRecord> models;
-  Table<ChunkRecord> chunks;
+  Table<ChunkRecord> chunks;  ///< of models, then of stand-ins; levels alike
   Table<LevelRecord> levels;
+  Table<StandInRecord> stand_ins;
   Table<MaterialRecord> materials;
   Table<LayoutRecord> layouts;
   Table<TextureRecord> textures;
@@ -69,6 +91,16 @@ struct BundleParts {
   Table<NodeRecord> nodes;
   Table<ActionRecord> actions;
   Table<MediaRecord> media;
+
+  /// Groups in the order of their chunks, which follow each other: all models, then all stand-ins.
+  [[nodiscard]] std::uint32_t chunk_groups() const { return models.size() + stand_ins.size(); }
+  [[nodiscard]] ChunkGroup chunk_group(std::uint32_t index) const {
+    if (index < models.size()) {
+      return {index, models[index].first_chunk, models[index].chunk_count};
+    }
+    const StandInRecord& stand_in = stand_ins[index - models.size()];
+    return {stand_in.model, stand_in.first_chunk, stand_in.chunk_count};
+  }
 };
 
 /// A validated bundle. Holds pointers into the caller's bytes, which must outlive it.
@@ -95,8 +127,15 @@ class BundleView {
   [[nodiscard]] std::string_view name(NameRef ref) const;
   [[nodiscard]] std::string_view meta() const;
   [[nodiscard]] Table<ModelRecord> models() const { return parts_.models; }
+  /// Of models, and behind them, from chunks().own().size() on, of stand-ins. Levels alike.
   [[nodiscard]] Table<ChunkRecord> chunks() const { return parts_.chunks; }
   [[nodiscard]] Table<LevelRecord> levels() const { return parts_.levels; }
+  /// Sorted by model, those of one model from fine to coarse.
+  [[nodiscard]] Table<StandInRecord> stand_ins() const { return parts_.stand_ins; }
+  [[nodiscard]] std::uint32_t chunk_groups() const { return parts_.chunk_groups(); }
+  [[nodiscard]] ChunkGroup chunk_group(std::uint32_t index) const {
+    return parts_.chunk_group(index);
+  }
   [[nodiscard]] Table<MaterialRecord> materials() const { return parts_.materials; }
   [[nodiscard]] Table<LayoutRecord> layouts() const { return parts_.layouts; }
   [[nodiscard]] Table<TextureRecord> textures() const { return parts_.textures; }

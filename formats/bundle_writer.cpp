@@ -57,6 +57,9 @@ std::uint16_t flags_of(SectionType type) {
     case SectionType::kActions:
     case SectionType::kMedia:
     case SectionType::kMediaData:
+    case SectionType::kStandIns:
+    case SectionType::kStandInChunks:
+    case SectionType::kStandInLevels:
     case SectionType::kFeatureYml:
     case SectionType::kShadow:
       return 0;
@@ -74,7 +77,7 @@ class SectionList {
  public:
   /// At most `capacity` headers of each kind: pieces point at them, so they must not move.
   explicit SectionList(std::size_t capacity) {
-    table_headers_.reserve(16);
+    table_headers_.reserve(kSections.size());
     feature_headers_.reserve(capacity);
   }
 
@@ -99,6 +102,21 @@ class SectionList {
     if (records.empty()) return;
     table_headers_.push_back({static_cast<std::uint32_t>(records.size()), sizeof(T), 0});
     add(type, kNone, 0, {bytes_of(table_headers_.back()), std::as_bytes(std::span(records))});
+  }
+
+  /// Numbers chunks and levels of stand-ins behind those of models.
+  void add_stand_ins(const BundleContent& content) {
+    stand_ins_ = content.stand_ins;
+    stand_in_chunks_ = content.stand_in_chunks;
+    for (StandInRecord& stand_in : stand_ins_) {
+      stand_in.first_chunk += static_cast<std::uint32_t>(content.chunks.size());
+    }
+    for (ChunkRecord& chunk : stand_in_chunks_) {
+      chunk.first_level += static_cast<std::uint32_t>(content.levels.size());
+    }
+    add_table(SectionType::kStandIns, stand_ins_);
+    add_table(SectionType::kStandInChunks, stand_in_chunks_);
+    add_table(SectionType::kStandInLevels, content.stand_in_levels);
   }
 
   void add_features(std::uint32_t pattern, const FeatureContent& features) {
@@ -179,6 +197,8 @@ class SectionList {
   std::vector<Section> sections_;
   std::vector<TableHeader> table_headers_;
   std::vector<FeatureHeader> feature_headers_;
+  std::vector<StandInRecord> stand_ins_;
+  std::vector<ChunkRecord> stand_in_chunks_;
   std::uint64_t file_size_ = 0;
 };
 
@@ -215,6 +235,7 @@ void collect(const BundleContent& content, SectionList& list) {
   list.add_table(SectionType::kNodes, content.nodes);
   list.add_table(SectionType::kActions, content.actions);
   list.add_table(SectionType::kMedia, content.media);
+  list.add_stand_ins(content);
   for (std::uint32_t pattern = 0; pattern < content.features.size(); ++pattern) {
     for (const FeatureContent& features : content.features[pattern]) {
       list.add_features(pattern, features);
@@ -296,6 +317,7 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   if (!content.nodes.empty()) need_section(SectionType::kNodes);
   if (!content.actions.empty()) need_section(SectionType::kActions);
   if (!content.media.empty()) need_section(SectionType::kMedia);
+  if (!content.stand_ins.empty()) need_section(SectionType::kStandIns);
   return minor;
 }
 

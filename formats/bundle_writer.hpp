@@ -56,6 +56,11 @@ struct BundleContent {
   std::vector<NodeRecord> nodes;
   std::vector<ActionRecord> actions;
   std::vector<MediaRecord> media;
+  /// Their first_chunk counts in stand_in_chunks, first_level of these in stand_in_levels: the
+  /// writer adds the number of chunks and levels of models, which is known last.
+  std::vector<StandInRecord> stand_ins;
+  std::vector<ChunkRecord> stand_in_chunks;
+  std::vector<LevelRecord> stand_in_levels;
   std::vector<std::vector<FeatureContent>> features;  ///< one list a pattern
   std::vector<std::byte> vertices;
   std::vector<std::byte> indices;

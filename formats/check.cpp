@@ -232,14 +232,14 @@ bool has_integer_positions(const LayoutRecord& layout) {
   return false;
 }
 
-/// Does a chunk stand on the grid that the first chunk of its model has?
-void check_grid(FaultLog& log, const BundleParts& parts, const ModelRecord& model,
+/// Does a chunk stand on the grid that the first chunk of its group has?
+void check_grid(FaultLog& log, const BundleParts& parts, const ChunkGroup& group,
                 const ChunkRecord& chunk, const std::string& where) {
-  if (!has_integer_positions(parts.layouts[model.layout])) return;
+  if (!has_integer_positions(parts.layouts[parts.models[group.model].layout])) return;
   const float step = chunk.position_step;
   int exponent = 0;
   bool good =
-      step == parts.chunks[model.first_chunk].position_step && std::frexp(step, &exponent) == 0.5f;
+      step == parts.chunks[group.first_chunk].position_step && std::frexp(step, &exponent) == 0.5f;
   for (const float offset : chunk.position_offset) good = good && std::fmod(offset, step) == 0.0f;
   if (good) return;
   log.add(Rule::kChunkGrid, offset_of(parts, chunk.position_offset), where,
@@ -314,12 +314,12 @@ class StrideCursor {
   explicit StrideCursor(const BundleParts& parts) : parts_(parts) {}
   /// Levels are asked for in rising order, then from 0 again.
   std::uint32_t operator()(std::uint32_t level) {
-    if (level == 0) model_ = end_ = 0;
-    while (level >= end_ && model_ < parts_.models.size()) {
-      const ModelRecord& model = parts_.models[model_++];
-      stride_ = parts_.layouts[model.layout].stride;
-      if (model.chunk_count == 0) continue;
-      const ChunkRecord& last = parts_.chunks[model.first_chunk + model.chunk_count - 1];
+    if (level == 0) group_ = end_ = 0;
+    while (level >= end_ && group_ < parts_.chunk_groups()) {
+      const ChunkGroup group = parts_.chunk_group(group_++);
+      stride_ = parts_.layouts[parts_.models[group.model].layout].stride;
+      if (group.chunk_count == 0) continue;
+      const ChunkRecord& last = parts_.chunks[group.first_chunk + group.chunk_count - 1];
       end_ = last.first_level + last.level_count;
     }
     return stride_;
@@ -327,10 +327,32 @@ class StrideCursor {
 
  private:
   const BundleParts& parts_;
-  std::uint32_t model_ = 0;
+  std::uint32_t group_ = 0;
   std::uint32_t end_ = 0;
   std::uint32_t stride_ = 0;
 };
+
+/// From fine to coarse.
+void check_stand_in_order(FaultLog& log, const BundleParts& parts, std::uint32_t group) {
+  const ChunkGroup finer = parts.chunk_group(group - 1);
+  const ChunkGroup coarser = parts.chunk_group(group);
+  if (finer.model != coarser.model) return;
+  const auto level = [&](const ChunkGroup& of, std::uint32_t c) -> const LevelRecord& {
+    return parts.levels[parts.chunks[of.first_chunk + c].first_level];
+  };
+  const auto indices = [&](const ChunkGroup& of) {
+    std::uint64_t count = 0;
+    for (std::uint32_t c = 0; c < of.chunk_count; ++c) count += level(of, c).index_count;
+    return count;
+  };
+  if (level(finer, 0).error <= level(coarser, 0).error && indices(finer) >= indices(coarser)) {
+    return;
+  }
+  log.add(Rule::kLevelOrder, offset_of(parts, &level(coarser, 0)), group_label(parts, group),
+          "error " + number_text(wide(level(coarser, 0).error)) + " and " +
+              std::to_string(indices(coarser)) + " indices do not follow " +
+              number_text(wide(level(finer, 0).error)) + " and " + std::to_string(indices(finer)));
+}
 
 void check_model_records(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.materials.size(); ++i) {
@@ -341,13 +363,17 @@ void check_model_records(FaultLog& log, const BundleParts& parts) {
     check_placement(log, parts, model);
     check_errors(log, parts, model);
     check_counts(log, parts, model);
-    for (std::uint32_t j = 0; j < model.chunk_count; ++j) {
-      const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];
-      const std::string where = label(parts, "model", model.name) + ", chunk " + std::to_string(j);
+  }
+  for (std::uint32_t i = 0; i < parts.chunk_groups(); ++i) {
+    const ChunkGroup group = parts.chunk_group(i);
+    for (std::uint32_t j = 0; j < group.chunk_count; ++j) {
+      const ChunkRecord& chunk = parts.chunks[group.first_chunk + j];
+      const std::string where = group_label(parts, i) + ", chunk " + std::to_string(j);
       check_chunk(log, parts, chunk, where);
-      check_grid(log, parts, model, chunk, where);
-      check_levels(log, parts, chunk, where);
+      check_grid(log, parts, group, chunk, where);
+      if (i < parts.models.size()) check_levels(log, parts, chunk, where);
     }
+    if (i > parts.models.size()) check_stand_in_order(log, parts, i);
   }
   StrideCursor stride(parts);
   check_referenced(log, parts, Rule::kUnreferencedVertices, parts.vertices, [&](std::uint32_t i) {

@@ -378,17 +378,16 @@ class GeometryCheck {
 
 void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashes) {
   GeometryCheck check(log, parts);
-  for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
-    const ModelRecord& model = parts.models[i];
+  for (std::uint32_t i = 0; i < parts.chunk_groups(); ++i) {
+    const ChunkGroup group = parts.chunk_group(i);
+    const ModelRecord& model = parts.models[group.model];
     const LayoutRecord& layout = parts.layouts[model.layout];
     const std::uint32_t used = occlusion_byte(parts.occlusion, model.layout);
     const VertexScan scan(layout, used);
     check.start_model(used);
-    for (std::uint32_t j = 0; j < model.chunk_count; ++j) {
-      const ChunkRecord& chunk = parts.chunks[model.first_chunk + j];
-      const auto where = [&] {
-        return label(parts, "model", model.name) + ", chunk " + std::to_string(j);
-      };
+    for (std::uint32_t j = 0; j < group.chunk_count; ++j) {
+      const ChunkRecord& chunk = parts.chunks[group.first_chunk + j];
+      const auto where = [&] { return group_label(parts, i) + ", chunk " + std::to_string(j); };
       for (std::uint32_t k = 0; k < chunk.level_count; ++k) {
         const LevelRecord& level = parts.levels[chunk.first_level + k];
         check.check_level(layout, scan, chunk, level,

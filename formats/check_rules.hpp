@@ -80,4 +80,17 @@ inline std::string label(const BundleParts& parts, const char* what, NameRef nam
          "'";
 }
 
+/// "model 'spider'", "model 'spider', stand-in 2": whose chunks a group is.
+inline std::string group_label(const BundleParts& parts, std::uint32_t group) {
+  const std::uint32_t model = parts.chunk_group(group).model;
+  std::string text = label(parts, "model", parts.models[model].name);
+  if (group < parts.models.size()) return text;
+  std::uint32_t number = 0;
+  while (group > parts.models.size() + number &&
+         parts.chunk_group(group - number - 1).model == model) {
+    ++number;
+  }
+  return text + ", stand-in " + std::to_string(number);
+}
+
 }  // namespace modar

@@ -153,6 +153,9 @@ constexpr FieldInfo kActionRecord[] = {
     MODAR_FIELD(ActionRecord, seconds), MODAR_FIELD(ActionRecord, duration),
     MODAR_FIELD(ActionRecord, axis),    MODAR_FIELD(ActionRecord, degrees),
     MODAR_FIELD(ActionRecord, reserved)};
+constexpr FieldInfo kStandInRecord[] = {
+    MODAR_FIELD(StandInRecord, model), MODAR_FIELD(StandInRecord, first_chunk),
+    MODAR_FIELD(StandInRecord, chunk_count), MODAR_FIELD(StandInRecord, reserved)};
 constexpr FieldInfo kColourGridHeader[] = {MODAR_FIELD(ColourGridHeader, columns),
                                            MODAR_FIELD(ColourGridHeader, rows),
                                            MODAR_FIELD(ColourGridHeader, reserved)};
@@ -223,6 +226,7 @@ constexpr RecordInfo kRecords[] = {
     MODAR_TABLE(NodeRecord),
     MODAR_TABLE(ActionRecord),
     MODAR_TABLE(MediaRecord),
+    MODAR_TABLE(StandInRecord),
     {"FileHeader", nullptr, SectionType::kNames, sizeof(FileHeader), kFileHeader},
     {"SectionEntry", nullptr, SectionType::kNames, sizeof(SectionEntry), kSectionEntry},
     {"TableHeader", nullptr, SectionType::kNames, sizeof(TableHeader), kTableHeader},

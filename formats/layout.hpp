@@ -139,10 +139,21 @@ struct LevelRecord {
   std::uint64_t index_offset;   ///< bytes into kIndices
   std::uint32_t vertex_count;   ///< every index is below it; at most kMaxChunkVertices
   std::uint32_t index_count;    ///< a multiple of 3
-  float error;                  ///< model space: at least the greatest distance from level 0
+  float error;  ///< model space: at least the greatest distance from level 0, both ways
   std::uint32_t reserved;
 };
 static_assert(sizeof(LevelRecord) == 32);
+
+/// A whole model once more, as one coarse level: drawn in place of all chunks of the model, never
+/// beside one of them. Its chunks and levels are in tables of their own, which older readers skip;
+/// their numbers continue those of the models' chunks and levels.
+struct StandInRecord {
+  std::uint32_t model;  ///< index into kModels; those of one model from fine to coarse
+  std::uint32_t first_chunk;
+  std::uint32_t chunk_count;  ///< each has one level, and all state the error of the whole
+  std::uint32_t reserved;
+};
+static_assert(sizeof(StandInRecord) == 16);
 
 struct MaterialRecord {
   NameRef name;

@@ -34,6 +34,7 @@ enum class Rule : std::uint8_t {
   kName,
   kModelRange,
   kChunkRange,
+  kStandIn,
   kLevelRange,
   kMaterialRange,
   kLayout,

@@ -2,7 +2,7 @@
 // number that is used twice does not compile. bundle.md is the normative text; tests hold both, and
 // the second reader, against each other.
 //
-// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 67, 71-255; payloads 264-511, 515 and up.
+// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 73-255; payloads 264-511, 515 and up.
 #pragma once
 
 #include <array>
@@ -41,9 +41,12 @@ enum SectionFlags : std::uint16_t {
   X(kScenes, 64, "scenes", "SceneRecord", 0, kSectionRequired, kNothing)                       \
   X(kLights, 65, "lights", "LightRecord", 2, 0, kNothing)                                      \
   X(kOcclusion, 66, "occlusion", "OcclusionRecord", 2, 0, kNothing)                            \
+  X(kStandIns, 67, "stand_ins", "StandInRecord", 3, 0, kNothing)                               \
   X(kNodes, 68, "nodes", "NodeRecord", 3, 0, kNothing)                                         \
   X(kActions, 69, "actions", "ActionRecord", 3, 0, kNothing)                                   \
   X(kMedia, 70, "media", "MediaRecord", 3, 0, kNothing)                                        \
+  X(kStandInChunks, 71, "stand_in_chunks", "ChunkRecord", 3, 0, kNothing)                      \
+  X(kStandInLevels, 72, "stand_in_levels", "LevelRecord", 3, 0, kNothing)                      \
   X(kMappedFeatures, 256, "feature_twin", "FeatureHeader", 0, kSectionRequired, kPattern)      \
   X(kFeatureYml, 257, "feature_text", "", 0, 0, kPattern)                                      \
   X(kTrackerRecord, 258, "tracker_record", "TrackerRecordHeader", 0, 0, kPattern)              \
@@ -88,11 +91,11 @@ constexpr const SectionInfo* section_info(std::uint32_t type) {
   return nullptr;
 }
 
-/// The table of a record.
+/// The table of a record; of several, that with the least number.
 constexpr const SectionInfo& section_of_record(std::string_view record) {
   const SectionInfo* found = nullptr;
-  for (const SectionInfo& section : kSections) {
-    if (record == section.record) found = &section;
+  for (std::size_t i = kSections.size(); i-- > 0;) {
+    if (record == kSections[i].record) found = &kSections[i];
   }
   return *found;  // does not compile where there is none
 }

@@ -28,7 +28,7 @@ bool has_member(SectionType type) {
       kLevels,   kMaterials,     kLayouts,        kTextures,   kTextureLevels,
       kPatterns, kParameterSets, kScenes,         kLights,     kOcclusion,
       kNodes,    kActions,       kMappedFeatures, kFeatureYml, kShadow,
-      kVertices, kIndices,       kTextureData,    kMedia,      kMediaData};
+      kVertices, kIndices,       kTextureData,    kMedia,      kMediaData, kStandIns, kStandInChunks, kStandInLevels};
   return std::find(std::begin(kMembers), std::end(kMembers), type) != std::end(kMembers);
 }
 
@@ -51,6 +51,21 @@ void keep_features(const BundleView& bundle, BundleContent& content) {
   }
   for (const ParameterSetRecord& set : records_of(bundle.parameter_sets())) {
     if (used.contains(set.id)) content.parameter_sets.push_back(set);
+  }
+}
+
+/// Behind content.chunks and content.levels.
+void copy_stand_ins(const BundleView& bundle, BundleContent& content) {
+  content.stand_ins = records_of(bundle.stand_ins());
+  const auto chunks = static_cast<std::uint32_t>(content.chunks.size());
+  const auto levels = static_cast<std::uint32_t>(content.levels.size());
+  for (StandInRecord& stand_in : content.stand_ins) stand_in.first_chunk -= chunks;
+  for (std::uint32_t c = chunks; c < bundle.chunks().size(); ++c) {
+    content.stand_in_chunks.push_back(bundle.chunks()[c]);
+    content.stand_in_chunks.back().first_level -= levels;
+  }
+  for (std::uint32_t l = levels; l < bundle.levels().size(); ++l) {
+    content.stand_in_levels.push_back(bundle.levels()[l]);
   }
 }
 
@@ -82,8 +97,8 @@ BundleContent trim(const BundleView& bundle) {
   content.names.assign(reinterpret_cast<const char*>(names.data()), names.size());
   content.meta = bundle.meta();
   content.models = records_of(bundle.models());
-  content.chunks = records_of(bundle.chunks());
-  content.levels = records_of(bundle.levels());
+  content.chunks = records_of(bundle.chunks().own());
+  content.levels = records_of(bundle.levels().own());
   content.materials = records_of(bundle.materials());
   content.layouts = records_of(bundle.layouts());
   content.textures = records_of(bundle.textures());
@@ -95,6 +110,7 @@ BundleContent trim(const BundleView& bundle) {
   content.nodes = records_of(bundle.nodes());
   content.actions = records_of(bundle.actions());
   content.media = records_of(bundle.media());
+  copy_stand_ins(bundle, content);
   keep_features(bundle, content);
   copy_payloads(bundle, content);
   content.summary = content_summary_of(content);

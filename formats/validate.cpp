@@ -267,6 +267,13 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   walkable &= find_table(log, parts, SectionType::kNodes, parts.nodes);
   walkable &= find_table(log, parts, SectionType::kActions, parts.actions);
   walkable &= find_table(log, parts, SectionType::kMedia, parts.media);
+  walkable &= find_table(log, parts, SectionType::kStandIns, parts.stand_ins);
+  Table<ChunkRecord> chunks;
+  walkable &= find_table(log, parts, SectionType::kStandInChunks, chunks);
+  parts.chunks.append(chunks);
+  Table<LevelRecord> levels;
+  walkable &= find_table(log, parts, SectionType::kStandInLevels, levels);
+  parts.levels.append(levels);
   return walkable && !log.stop();
 }
 
@@ -497,23 +504,102 @@ void check_model(const RecordCheck& check, const BundleParts& parts, const Model
   }
 }
 
-/// Chunks of one model and their levels; `next_level` runs over the levels of the whole bundle.
-void check_chunks(FaultLog& log, const BundleParts& parts, const ModelRecord& model,
-                  std::uint64_t& next_level) {
+/// Where ranges have to begin that follow each other.
+struct NextPlaces {
+  std::uint64_t chunk = 0;
+  std::uint64_t level = 0;
+};
+
+/// Chunks of a model, or of one of its stand-ins, and their levels, which lie in the first `levels`
+/// of the table.
+void check_chunks(FaultLog& log, const BundleParts& parts, const ChunkGroup& group,
+                  std::uint32_t levels, std::uint64_t& next_level) {
+  const ModelRecord& model = parts.models[group.model];
   const std::uint32_t stride =
       model.layout < parts.layouts.size() ? parts.layouts[model.layout].stride : 0;
-  for (std::uint32_t i = 0; i < model.chunk_count && !log.stop(); ++i) {
-    const std::uint32_t index = model.first_chunk + i;
+  for (std::uint32_t i = 0; i < group.chunk_count && !log.stop(); ++i) {
+    const std::uint32_t index = group.first_chunk + i;
     const ChunkRecord& chunk = parts.chunks[index];
     const RecordCheck check(log, parts, "chunk", index);
     check_chunk(check, model, chunk);
     const bool found = check.range(Rule::kChunkRange, chunk.first_level, chunk.level_count,
-                                   next_level, parts.levels.size(), "level");
+                                   next_level, levels, "level");
     next_level += chunk.level_count;
     for (std::uint32_t j = 0; found && j < chunk.level_count && !log.stop(); ++j) {
       const std::uint32_t level = chunk.first_level + j;
       check_level(RecordCheck(log, parts, "level", level), parts, parts.levels[level], stride);
     }
+  }
+}
+
+/// Ranges follow each other without gap or overlap: each chunk has one model and each level one
+/// chunk, and the time taken does not exceed the size of the tables.
+void check_groups(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
+  const std::uint64_t faults = log.errors();
+  const std::uint32_t chunks = parts.chunks.own().size();
+  const std::uint32_t levels = parts.levels.own().size();
+  for (std::uint32_t i = 0; i < parts.models.size() && !log.stop(); ++i) {
+    const ModelRecord& model = parts.models[i];
+    const RecordCheck check(log, parts, "model", i);
+    check_model(check, parts, model);
+    const bool found = check.range(Rule::kModelRange, model.first_chunk, model.chunk_count,
+                                   next.chunk, chunks, "chunk");
+    next.chunk += model.chunk_count;
+    if (found) check_chunks(log, parts, parts.chunk_group(i), levels, next.level);
+  }
+  if (log.errors() != faults) return;
+  if (next.chunk != chunks) {
+    log.add(Rule::kModelRange, 0, "chunks",
+            std::to_string(chunks - next.chunk) + " chunks belong to no model");
+  } else if (next.level != levels) {
+    log.add(Rule::kChunkRange, 0, "levels",
+            std::to_string(levels - next.level) + " levels belong to no chunk");
+  }
+}
+
+/// One level a chunk, and one error for all: a stand-in is drawn as a whole.
+void check_stand_in(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
+  const StandInRecord& stand_in = parts.stand_ins[index];
+  bool good = stand_in.chunk_count > 0;
+  for (std::uint32_t c = 0; good && c < stand_in.chunk_count; ++c) {
+    const ChunkRecord& first = parts.chunks[stand_in.first_chunk];
+    const ChunkRecord& chunk = parts.chunks[stand_in.first_chunk + c];
+    good = chunk.level_count == 1 &&
+           parts.levels[chunk.first_level].error == parts.levels[first.first_level].error;
+  }
+  if (!good) {
+    check.fault(Rule::kStandIn, &stand_in.first_chunk,
+                "it has no chunks, or not one level of one error in each");
+  }
+}
+
+void check_stand_ins(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
+  const std::uint64_t faults = log.errors();
+  std::uint32_t last = 0;
+  for (std::uint32_t i = 0; i < parts.stand_ins.size() && !log.stop(); ++i) {
+    const StandInRecord& stand_in = parts.stand_ins[i];
+    const RecordCheck check(log, parts, "stand-in", i);
+    check.reserved(&stand_in.reserved, sizeof(stand_in.reserved));
+    if (stand_in.model >= parts.models.size() || stand_in.model < last) {
+      return check.fault(
+          Rule::kStandIn, &stand_in.model,
+          "model " + std::to_string(stand_in.model) + " is not there or out of order");
+    }
+    last = stand_in.model;
+    if (!check.range(Rule::kStandIn, stand_in.first_chunk, stand_in.chunk_count, next.chunk,
+                     parts.chunks.size(), "chunk")) {
+      return;
+    }
+    next.chunk += stand_in.chunk_count;
+    check_chunks(log, parts, parts.chunk_group(parts.models.size() + i), parts.levels.size(),
+                 next.level);
+    if (log.errors() == faults) check_stand_in(check, parts, i);
+  }
+  if (log.errors() == faults &&
+      (next.chunk != parts.chunks.size() || next.level != parts.levels.size())) {
+    log.add(Rule::kStandIn, 0, "stand-ins",
+            std::to_string(parts.chunks.size() - next.chunk) + " chunks and " +
+                std::to_string(parts.levels.size() - next.level) + " levels belong to none");
   }
 }
 
@@ -526,20 +612,13 @@ void validate_models(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.materials.size() && !log.stop(); ++i) {
     check_material(RecordCheck(log, parts, "material", i), parts, parts.materials[i]);
   }
-  // Ranges have to follow each other without gap or overlap: each chunk has one model and each
-  // level one chunk, and the time taken does not exceed the size of the tables.
-  std::uint64_t next_chunk = 0;
-  std::uint64_t next_level = 0;
-  for (std::uint32_t i = 0; i < parts.models.size() && !log.stop(); ++i) {
-    const ModelRecord& model = parts.models[i];
-    const RecordCheck check(log, parts, "model", i);
-    check_model(check, parts, model);
-    const bool found = check.range(Rule::kModelRange, model.first_chunk, model.chunk_count,
-                                   next_chunk, parts.chunks.size(), "chunk");
-    next_chunk += model.chunk_count;
-    if (found) check_chunks(log, parts, model, next_level);
-  }
-  if (!log.clean()) return;
+  // Hashes that are wrong are faults before these.
+  const std::uint64_t faults = log.errors();
+  NextPlaces next;
+  check_groups(log, parts, next);
+  if (log.errors() != faults) return;
+  check_stand_ins(log, parts, next);
+  if (log.errors() != faults) return;
   // Levels that shared indices could make a small file cost any time to draw or check.
   std::uint64_t index_bytes = 0;
   for (std::uint32_t i = 0; i < parts.levels.size(); ++i) {
@@ -549,13 +628,6 @@ void validate_models(FaultLog& log, const BundleParts& parts) {
     log.add(Rule::kLevelRange, 0, "levels",
             "levels use " + std::to_string(index_bytes) + " bytes of indices where " +
                 std::to_string(parts.indices.size()) + " are: some are shared");
-  }
-  if (next_chunk != parts.chunks.size()) {
-    log.add(Rule::kModelRange, 0, "chunks",
-            std::to_string(parts.chunks.size() - next_chunk) + " chunks belong to no model");
-  } else if (next_level != parts.levels.size()) {
-    log.add(Rule::kChunkRange, 0, "levels",
-            std::to_string(parts.levels.size() - next_level) + " levels belong to no chunk");
   }
 }
 
@@ -788,7 +860,7 @@ void check_shape(const RecordCheck& check, const BundleParts& parts, const Secti
 /// What a walk needs to stay in its bytes: check_bundle() sees whether it is a tree.
 void check_draw_order(const RecordCheck& check, const BundleParts& parts,
                       const SectionEntry& entry) {
-  if (entry.owner >= parts.chunks.size() || entry.variant != 0) {
+  if (entry.owner >= parts.chunks.own().size() || entry.variant != 0) {
     return check.fault(Rule::kSectionOwner, &entry.owner,
                        "chunk " + std::to_string(entry.owner) + " is not there");
   }

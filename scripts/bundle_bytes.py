@@ -91,6 +91,9 @@ ENTRY = Record("type:I version:H flags:H owner:I variant:I offset:Q size:Q hash:
 TABLE = Record("count:I stride:I reserved:Q")
 FEATURES = Record("count:I descriptor_bytes:I keypoints_offset:Q descriptors_offset:Q reserved:Q")
 ATTRIBUTE = Record("semantic:B type:B components:B normalised:B offset:H reserved:H")
+CHUNK = Record("bounds_min:3f bounds_max:3f cone_axis:3f cone_cutoff:f position_offset:3f position_step:f "
+               "uv_offset:2f uv_scale:2f material:I first_level:I level_count:I reserved:I")
+LEVEL = Record("vertex_offset:Q index_offset:Q vertex_count:I index_count:I error:f reserved:I")
 TABLES = {
     16: ("models", Record(
         "name:N center:3d scale:d diagonal:d unit_metres:d position_error_max:d "
@@ -98,11 +101,8 @@ TABLES = {
         "uv_error_rms_texels:f vertex_count:Q triangle_count:Q source_vertex_count:Q "
         "source_face_count:Q layout:I first_chunk:I chunk_count:I first_material:I "
         "material_count:I level_count:I reserved:4I")),
-    17: ("chunks", Record(
-        "bounds_min:3f bounds_max:3f cone_axis:3f cone_cutoff:f position_offset:3f position_step:f "
-        "uv_offset:2f uv_scale:2f material:I first_level:I level_count:I reserved:I")),
-    18: ("levels", Record("vertex_offset:Q index_offset:Q vertex_count:I index_count:I error:f "
-                          "reserved:I")),
+    17: ("chunks", CHUNK),
+    18: ("levels", LEVEL),
     19: ("materials", Record("name:N ambient:3f diffuse:3f specular:3f emission:3f shininess:f "
                              "opacity:f texture:I flags:I reserved:2I")),
     20: ("layouts", Record("stride:H attribute_count:H reserved:I attributes:64B")),
@@ -125,6 +125,9 @@ TABLES = {
     69: ("actions", Record("event:I command:I source:I target:I part:N address:N seconds:f duration:f axis:3f degrees:f "
                            "reserved:2I")),
     70: ("media", Record("name:N kind:I flags:I width:I height:I seconds:f poster:I reserved:4I")),
+    67: ("stand_ins", Record("model:I first_chunk:I chunk_count:I reserved:I")),
+    71: ("stand_in_chunks", CHUNK),
+    72: ("stand_in_levels", LEVEL),
 }
 COLOURS = Record("columns:I rows:I reserved:2I")
 SHAPE = Record("kind:I face_count:I half_arc:d slope:d reserved:2I")
@@ -132,9 +135,9 @@ FACE = Record("place:4H corner:3f right:3f down:3f reserved:I")
 SHADOW = Record("width:I height:I low:2f high:2f reserved:2I")
 DRAW_ORDER = struct.Struct("<4f2I")
 KEYPOINT = struct.Struct("<5f2i")
-SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, 65: 0, 66: 0, 68: 0, 69: 0, 70: 0}  # type: flags
+SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, **{kind: 0 for kind in range(65, 73)}}  # type: flags
 OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 263: 0, 514: 3}
-SINCE = {4: 1, 65: 2, 66: 2, 68: 3, 69: 3, 70: 3, 263: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
+SINCE = {4: 1, 65: 2, 66: 2, 67: 3, 68: 3, 69: 3, 70: 3, 71: 3, 72: 3, 263: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
 
@@ -278,13 +281,13 @@ class Bundle:
             raise Fault("BUNDLE_NAME", row["at"], "cut inside a character") from None
 
 
-def follow(rows, first, count, size, rule):
-    """Ranges follow each other and cover the table."""
-    end = 0
+def follow(rows, first, count, size, rule, before=0):
+    """Ranges follow each other and cover the table, whose first record has the number `before`."""
+    end = before
     for row in rows:
-        need(row[first] == end and end + row[count] <= size, rule, row["at"], first)
+        need(row[first] == end and end + row[count] <= before + size, rule, row["at"], first)
         end += row[count]
-    need(end == size, rule, 0, f"{size - end} records without an owner")
+    need(end == before + size, rule, 0, f"{before + size - end} records without an owner")
 
 
 def flags_known(bundle, row, known):

@@ -65,8 +65,38 @@ def check_models(bundle):
            "BUNDLE_CHUNK_RANGE")
     for row in tables["models"]:
         check_model(bundle, row)
-    used = sum(2 * level["index_count"] for level in tables["levels"])
+    check_stand_ins(bundle)
+    used = sum(2 * level["index_count"] for level in tables["levels"] + tables["stand_in_levels"])
     need(used <= len(bundle.indices), "BUNDLE_LEVEL_RANGE", 0, "indices are shared")
+
+
+def check_stand_ins(bundle):
+    """Whole models as one level each, from fine to coarse; their chunks and levels count on from those of models."""
+    tables, before = bundle.tables, {}
+    chunks, levels = tables["stand_in_chunks"], tables["stand_in_levels"]
+    follow(tables["stand_ins"], "first_chunk", "chunk_count", len(chunks), "BUNDLE_STAND_IN", len(tables["chunks"]))
+    follow(chunks, "first_level", "level_count", len(levels), "BUNDLE_STAND_IN", len(tables["levels"]))
+    models = [row["model"] for row in tables["stand_ins"]]
+    need(models == sorted(models) and all(m < len(tables["models"]) for m in models), "BUNDLE_STAND_IN", 0, "models")
+    for row in tables["stand_ins"]:
+        model = tables["models"][row["model"]]
+        materials = range(model["first_material"], model["first_material"] + model["material_count"])
+        mine = stand_in_chunks(tables, row)
+        mine_levels = [levels[chunk["first_level"] - len(tables["levels"])] for chunk in mine]
+        need(mine and all(chunk["level_count"] == 1 for chunk in mine) and
+             len({level["error"] for level in mine_levels}) == 1, "BUNDLE_STAND_IN", row["at"], "its levels")
+        for chunk, level in zip(mine, mine_levels):
+            check_chunk(chunk, materials)
+            check_level(bundle, model, level)
+        now = (-mine_levels[0]["error"], sum(level["index_count"] for level in mine_levels))
+        last = before.get(row["model"], now)
+        need(now[0] <= last[0] and now[1] <= last[1], "LEVEL_ORDER", row["at"], "stand-ins")
+        before[row["model"]] = now
+        check_grid(bundle, model, mine)
+
+
+def stand_in_chunks(tables, row):
+    return tables["stand_in_chunks"][row["first_chunk"] - len(tables["chunks"]):][:row["chunk_count"]]
 
 
 def check_model(bundle, model):

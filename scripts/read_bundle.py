@@ -13,7 +13,7 @@ import sys
 
 from bundle_bytes import (COLOURS, DRAW_ORDER, FACE, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, SHAPE, Bundle, Fault, at_least,
                           digest, flags_known, follow, need)
-from bundle_models import check_models, check_tight, decode_level
+from bundle_models import check_models, check_tight, decode_level, stand_in_chunks
 from bundle_nodes import check_nodes
 from bundle_summary import check_summary
 
@@ -261,6 +261,12 @@ def check(bundle, full):
             for level in tables["levels"][chunk["first_level"]:][:chunk["level_count"]]:
                 level.update(decode_level(bundle, layout, chunk, level, full))
             check_tight(chunk, tables["levels"][chunk["first_level"]:][:chunk["level_count"]])
+    for row in tables["stand_ins"]:
+        layout = tables["layouts"][tables["models"][row["model"]]["layout"]]
+        for chunk in stand_in_chunks(tables, row):
+            level = tables["stand_in_levels"][chunk["first_level"] - len(tables["levels"])]
+            level.update(decode_level(bundle, layout, chunk, level, full))
+            check_tight(chunk, [level])
     for row in (row for rows in [bundle.sections, *tables.values()] for row in rows):
         del row["at"], row["dirty"]
     for section in bundle.sections:

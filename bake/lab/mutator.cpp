@@ -117,10 +117,11 @@ void add_geometry(Collector& out, const BundleView& bundle) {
   const auto place = [&bundle](std::span<const std::byte> part) {
     return static_cast<std::uint64_t>(part.data() - bundle.bytes().data());
   };
-  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const ModelRecord& model = bundle.models()[m];
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+  for (std::uint32_t g = 0; g < bundle.chunk_groups(); ++g) {
+    const ChunkGroup group = bundle.chunk_group(g);
+    const ModelRecord& model = bundle.models()[group.model];
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         add_level(out, bundle.layouts()[model.layout], bundle.levels()[chunk.first_level + l],
                   occlusion_byte(bundle.occlusion(), model.layout), place(bundle.vertices()),
@@ -161,8 +162,9 @@ void add_shadow(Collector& out, const SectionEntry& entry) {
 }
 
 void add_section(Collector& out, const BundleView& bundle, const SectionEntry& entry) {
+  const SectionInfo* info = section_info(entry.type);
   for (const RecordInfo& record : record_infos()) {
-    if (record.table == nullptr || static_cast<std::uint32_t>(record.section) != entry.type)
+    if (record.table == nullptr || info == nullptr || info->record != std::string_view(record.name))
       continue;
     const auto& header =
         *reinterpret_cast<const TableHeader*>(bundle.bytes().data() + entry.offset);
@@ -305,11 +307,11 @@ std::vector<ItemArray> item_arrays(const BundleView& bundle) {
   const auto place = [&bundle](const void* part) {
     return static_cast<std::uint64_t>(static_cast<const std::byte*>(part) - bundle.bytes().data());
   };
-  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const ModelRecord& model = bundle.models()[m];
-    const std::uint16_t stride = bundle.layouts()[model.layout].stride;
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+  for (std::uint32_t g = 0; g < bundle.chunk_groups(); ++g) {
+    const ChunkGroup group = bundle.chunk_group(g);
+    const std::uint16_t stride = bundle.layouts()[bundle.models()[group.model].layout].stride;
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         const LevelRecord& level = bundle.levels()[chunk.first_level + l];
         add("vertices", place(bundle.vertices().data()) + level.vertex_offset, stride,

@@ -90,10 +90,12 @@ std::uint64_t scene_digest(std::span<const std::byte> bytes) {
   add_table(digest, view, "NodeRecord", view.nodes());
   add_table(digest, view, "ActionRecord", view.actions());
   add_table(digest, view, "MediaRecord", view.media());
-  for (std::uint32_t m = 0; m < view.models().size(); ++m) {
-    const ModelRecord& model = view.models()[m];
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = view.chunks()[model.first_chunk + c];
+  add_table(digest, view, "StandInRecord", view.stand_ins());
+  for (std::uint32_t g = 0; g < view.chunk_groups(); ++g) {
+    const ChunkGroup group = view.chunk_group(g);
+    const ModelRecord& model = view.models()[group.model];
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = view.chunks()[group.first_chunk + c];
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         add_level(digest, view, view.layouts()[model.layout], view.levels()[chunk.first_level + l],
                   occlusion_byte(view.occlusion(), model.layout));

@@ -79,11 +79,11 @@ LayoutRecord travelling_layout(const BundleView& bundle, const ModelRecord& mode
 
 std::vector<ChunkPlace> chunk_places(const BundleView& bundle) {
   std::vector<ChunkPlace> places;
-  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const ModelRecord& model = bundle.models()[m];
-    const LayoutRecord layout = travelling_layout(bundle, model);
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+  for (std::uint32_t g = 0; g < bundle.chunk_groups(); ++g) {
+    const ChunkGroup group = bundle.chunk_group(g);
+    const LayoutRecord layout = travelling_layout(bundle, bundle.models()[group.model]);
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
       const LevelRecord& level = bundle.levels()[chunk.first_level];
       if (level.index_count == 0) continue;
       const auto bytes = bundle.indices().subspan(level.index_offset, 2ull * level.index_count);

@@ -23,6 +23,7 @@ Bytes summarised_bundle() {
   BundleContent content = golden_content();
   add_looks(content);
   add_nodes(content);
+  add_stand_ins(content);
   content.summary = content_summary_of(content);
   return encode(content);
 }

@@ -131,6 +131,14 @@ constexpr CorruptCase kSectionCases[] = {
          record_of<ChunkRecord>(b, SectionType::kChunks, 1).bounds_min[1] = 2;
        });
      }},
+    {"BUNDLE_STAND_IN",
+     [] {
+       BundleContent content = scene_content();
+       add_stand_ins(content);
+       return damaged(content, [](Bytes& b) {
+         record_of<StandInRecord>(b, SectionType::kStandIns, 1).model = 3;
+       });
+     }},
     {"BUNDLE_LEVEL_RANGE",
      [] {
        return damaged(model_content(), [](Bytes& b) {

@@ -82,6 +82,49 @@ TEST(Bundle, RoundTripGivesTheSameContent) {
   expect_bytes(view->section(static_cast<SectionType>(100), 7, 9), content.extra[0].bytes, "extra");
 }
 
+TEST(Bundle, StandInsCountOnFromTheModels) {
+  BundleContent content = lit_content();
+  EXPECT_EQ(minor_version_of(content), 2);
+  add_stand_ins(content);
+  const Bytes bytes = encode(content);
+  const auto view = BundleView::open(bytes);
+  ASSERT_TRUE(view) << to_line(view.error());
+  EXPECT_EQ(view->header().minor, 3);
+  expect_table(view->chunks().own(), content.chunks, "chunks");
+  expect_table(view->levels().own(), content.levels, "levels");
+  ASSERT_EQ(view->chunks().size(), 6u + 4u);
+  ASSERT_EQ(view->levels().size(), 9u + 4u);
+  ASSERT_EQ(view->chunk_groups(), 3u + 3u);
+  const std::uint32_t models[] = {0, 0, 2};
+  const std::uint32_t first[] = {6, 8, 9};
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const ChunkGroup group = view->chunk_group(3 + i);
+    EXPECT_EQ(group.model, models[i]);
+    EXPECT_EQ(group.first_chunk, first[i]);
+    EXPECT_EQ(group.chunk_count, i == 0 ? 2u : 1u);
+    EXPECT_EQ(view->chunks()[group.first_chunk].first_level, first[i] + 3);
+  }
+  EXPECT_EQ(view->levels()[12].error, 0.25f);
+  EXPECT_EQ(view->levels()[8].error, content.levels[8].error);
+}
+
+/// A reader that knows none of the three sections: to ours, they are of unknown types.
+TEST(Bundle, AReaderWithoutStandInsDrawsTheModels) {
+  BundleContent content = lit_content();
+  add_stand_ins(content);
+  Bytes bytes = encode(content);
+  for (const std::uint32_t type : {69u, 68u, 67u}) {
+    entry_of(bytes, static_cast<SectionType>(type)).type = type + 100;
+  }
+  rehash(bytes);
+  const auto view = BundleView::open(bytes);
+  ASSERT_TRUE(view) << to_line(view.error());
+  expect_table(view->models(), content.models, "models");
+  expect_table(view->chunks(), content.chunks, "chunks");
+  expect_table(view->levels(), content.levels, "levels");
+  EXPECT_EQ(report(bytes).back(), "good");  // with a warning of indices that no level has
+}
+
 TEST(Bundle, SectionsAreAlignedForMapping) {
   const Bytes bytes = encode(golden_content());
   const auto view = BundleView::open(bytes);

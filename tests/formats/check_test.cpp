@@ -121,6 +121,48 @@ std::string said_of(Damage damage) {
   return report(bytes).front();
 }
 
+TEST(Check, StandInsAreWholeAndInOrder) {
+  const auto said = [](auto damage) {
+    BundleContent content = lit_content();
+    add_stand_ins(content);
+    Bytes bytes = encode(content);
+    damage(bytes);
+    rehash(bytes);
+    const std::string line = report(bytes).front();
+    return line.substr(0, line.find(' ', line.find(' ') + 1));
+  };
+  const auto stand_in = [](Bytes& b, std::uint32_t i) -> StandInRecord& {
+    return record_of<StandInRecord>(b, SectionType::kStandIns, i);
+  };
+  const auto level = [](Bytes& b, std::uint32_t i) -> LevelRecord& {
+    return record_of<LevelRecord>(b, SectionType::kStandInLevels, i);
+  };
+  const std::string wrong = "error BUNDLE_STAND_IN";
+  EXPECT_EQ(said([](Bytes&) {}), "good");
+  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 2).model = 3; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 0).model = 1; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 0).first_chunk = 5; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 2).chunk_count = 2; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 1).first_chunk = 0xFFFFFFFFu; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { level(b, 0).error = 0.25f; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 1).reserved = 1; }), "error BUNDLE_RESERVED");
+  EXPECT_EQ(said([&](Bytes& b) { level(b, 2).error = 0.0625f; }), "error LEVEL_ORDER");
+  EXPECT_EQ(said([&](Bytes& b) { level(b, 3).vertex_count = 60000; }), "error BUNDLE_LEVEL_RANGE");
+  EXPECT_EQ(said([](Bytes& b) {
+              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 1).first_level = 2;
+            }),
+            "error BUNDLE_CHUNK_RANGE");
+  EXPECT_EQ(said([](Bytes& b) {
+              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 1).level_count = 2;
+              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 2).first_level = 12;
+            }),
+            wrong);
+  EXPECT_EQ(said([](Bytes& b) {
+              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 3).bounds_max[2] = 0.5f;
+            }),
+            "error CHUNK_LOOSE");
+}
+
 TEST(Check, NumbersOfTheWorldHaveBounds) {
   EXPECT_EQ(said_of([](Bytes&) {}), "good");
   const auto bad = [](auto damage) {

@@ -568,6 +568,42 @@ BundleContent acting_content() {
   return content;
 }
 
+namespace {
+
+/// One chunk of `triangles` over a model's vertices, as the last stand-in's.
+void add_stand_in_chunk(BundleContent& content, const ModelRecord& model, bool upper,
+                        std::size_t triangles, float error) {
+  ChunkRecord chunk = content.chunks[model.first_chunk + (upper ? 0u : 1u)];
+  chunk.first_level = static_cast<std::uint32_t>(content.stand_in_levels.size());
+  chunk.level_count = 1;
+  LevelRecord level = content.levels[content.chunks[model.first_chunk].first_level];
+  level.index_offset = content.indices.size();
+  level.index_count = static_cast<std::uint32_t>(3 * triangles);
+  level.error = error;
+  for (const std::uint16_t index : std::span(upper ? kUpper : kLower).first(3 * triangles)) {
+    put(content.indices, index);
+  }
+  content.stand_in_chunks.push_back(chunk);
+  content.stand_in_levels.push_back(level);
+  ++content.stand_ins.back().chunk_count;
+}
+
+}  // namespace
+
+void add_stand_ins(BundleContent& content) {
+  const auto add = [&content](std::uint32_t model) {
+    content.stand_ins.push_back(
+        {model, static_cast<std::uint32_t>(content.stand_in_chunks.size()), 0, 0});
+  };
+  add(0);
+  add_stand_in_chunk(content, content.models[0], true, 4, 0.125f);
+  add_stand_in_chunk(content, content.models[0], false, 4, 0.125f);
+  add(0);
+  add_stand_in_chunk(content, content.models[0], true, 3, 0.5f);
+  add(2);
+  add_stand_in_chunk(content, content.models[2], false, 4, 0.25f);
+}
+
 BundleContent lit_content() {
   BundleContent content = golden_content();
   content.extra.clear();

@@ -152,9 +152,20 @@ json dump_models(const BundleView& view) {
   return rows;
 }
 
-json dump_chunks(const BundleView& view) {
+json dump_stand_ins(const BundleView& view) {
   json rows = json::array();
-  for (std::uint32_t i = 0; i < view.chunks().size(); ++i) {
+  for (std::uint32_t i = 0; i < view.stand_ins().size(); ++i) {
+    const StandInRecord& record = view.stand_ins()[i];
+    json out;
+    GET(model), GET(first_chunk), GET(chunk_count);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_chunks(const BundleView& view, std::uint32_t first, std::uint32_t end) {
+  json rows = json::array();
+  for (std::uint32_t i = first; i < end; ++i) {
     const ChunkRecord& record = view.chunks()[i];
     json out;
     GET(bounds_min), GET(bounds_max), GET(cone_axis), GET(cone_cutoff), GET(position_offset);
@@ -165,12 +176,13 @@ json dump_chunks(const BundleView& view) {
   return rows;
 }
 
-json dump_levels(const BundleView& view) {
+json dump_levels(const BundleView& view, std::uint32_t first, std::uint32_t end) {
   json rows = json::array();
-  for (std::uint32_t m = 0; m < view.models().size(); ++m) {
-    const ModelRecord& model = view.models()[m];
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = view.chunks()[model.first_chunk + c];
+  for (std::uint32_t g = first; g < end; ++g) {
+    const ChunkGroup group = view.chunk_group(g);
+    const ModelRecord& model = view.models()[group.model];
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = view.chunks()[group.first_chunk + c];
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         const LevelRecord& record = view.levels()[chunk.first_level + l];
         json out;
@@ -373,13 +385,18 @@ json dump_sections_and_features(const BundleView& view, json& features) {
 json dump(const BundleView& view) {
   json features;
   const json sections = dump_sections_and_features(view, features);
+  const std::uint32_t models = view.models().size();
+  const std::uint32_t chunks = view.chunks().own().size();
   return {{"format", {{"major", view.header().major}, {"minor", view.header().minor}}},
           {"bytes", view.bytes().size()},
           {"meta", view.meta()},
           {"sections", sections},
           {"models", dump_models(view)},
-          {"chunks", dump_chunks(view)},
-          {"levels", dump_levels(view)},
+          {"chunks", dump_chunks(view, 0, chunks)},
+          {"levels", dump_levels(view, 0, models)},
+          {"stand_ins", dump_stand_ins(view)},
+          {"stand_in_chunks", dump_chunks(view, chunks, view.chunks().size())},
+          {"stand_in_levels", dump_levels(view, models, view.chunk_groups())},
           {"materials", dump_materials(view)},
           {"layouts", dump_layouts(view)},
           {"textures", dump_textures(view)},

@@ -75,6 +75,23 @@ TEST_P(Golden, BothReadersDecodeTheSame) {
   EXPECT_EQ(ours, theirs) << nlohmann::json::diff(ours, theirs).dump(1);
 }
 
+TEST(SecondReader, DecodesStandInsAsOursDoes) {
+  BundleContent content = lit_content();
+  add_stand_ins(content);
+  content.summary = content_summary_of(content);
+  const Bytes bytes = encode(content);
+  EXPECT_EQ(report(bytes), std::vector<std::string>{"good"});
+  const std::string path = std::string(::testing::TempDir()) + "stand_ins.modar";
+  ASSERT_TRUE(save_bundle(content, path));
+  const Answer answer = second_reader(quoted(path) + " --json");
+  std::remove(path.c_str());
+  ASSERT_EQ(answer.exit, 0) << answer.text;
+  const auto ours = dump(*BundleView::open(bytes));
+  EXPECT_EQ(ours["stand_in_levels"].size(), 4u);
+  const auto theirs = nlohmann::json::parse(answer.text, nullptr, false);
+  EXPECT_EQ(ours, theirs) << nlohmann::json::diff(ours, theirs).dump(1);
+}
+
 TEST(GoldenFiles, FullOutputHasEveryValue) {
   const Answer answer =
       second_reader(quoted(source_path("tests/golden/v1_0.modar")) + " --json --full");

@@ -145,6 +145,7 @@ std::map<std::string, Struct> compiled() {
                F(reserved))
   MODAR_STRUCT(ActionRecord, F(event), F(command), F(source), F(target), F(part), F(address),
                F(seconds), F(duration), F(axis), F(degrees), F(reserved))
+  MODAR_STRUCT(StandInRecord, F(model), F(first_chunk), F(chunk_count), F(reserved))
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
   MODAR_STRUCT(PatternShapeHeader, F(kind), F(face_count), F(half_arc), F(slope), F(reserved))
   MODAR_STRUCT(ShapeFaceRecord, F(place), F(corner), F(right), F(down), F(reserved))

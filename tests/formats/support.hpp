@@ -38,6 +38,9 @@ Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds
 
 /// Adds what version 1.3 added to that: nodes of each kind, actions of each event and command.
 void add_nodes(BundleContent& content);
+/// Adds what version 1.3 added to a content of three octahedra: two stand-ins of the first, of
+/// which one has two chunks, and one of the third.
+void add_stand_ins(BundleContent& content);
 
 /// A golden_content() with all that version 1.2 added, and no section of an unknown type.
 BundleContent lit_content();

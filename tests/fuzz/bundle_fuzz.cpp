@@ -127,10 +127,15 @@ unsigned walk(const BundleView& view) {
   for (std::uint32_t m = 0; m < view.models().size(); ++m) {
     const ModelRecord& model = view.models()[m];
     sum += touch(view.name(model.name));
-    const std::uint32_t stride = view.layouts()[model.layout].stride;
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = view.chunks()[model.first_chunk + c];
       sum += walk_order(view, model.first_chunk + c);
+    }
+  }
+  for (std::uint32_t g = 0; g < view.chunk_groups(); ++g) {
+    const ChunkGroup group = view.chunk_group(g);
+    const std::uint32_t stride = view.layouts()[view.models()[group.model].layout].stride;
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = view.chunks()[group.first_chunk + c];
       sum += touch(view.name(view.materials()[chunk.material].name));
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         const LevelRecord& level = view.levels()[chunk.first_level + l];
