@@ -48,6 +48,11 @@ float eye_distance(const ModelView& view, const ChunkRecord& chunk);
 std::uint32_t choose_level(const ModelView& view, const ChunkRecord& chunk,
                            const Table<LevelRecord>& levels, float pixels);
 
+/// The coarsest stand-in of a model whose error is at most `pixels` on the screen, as a chunk group
+/// of the bundle; kNone: there is none.
+std::uint32_t choose_stand_in(const BundleView& bundle, const ModelView& view, std::uint32_t model,
+                              float pixels);
+
 struct DrawCommand {
   std::uint32_t item = 0;
   std::uint32_t chunk = 0;  ///< of the bundle
@@ -70,8 +75,8 @@ struct ChunkSetup {
 
 class DrawList {
  public:
-  /// Collects what is visible. setups: one a chunk of the bundle. Keeps its memory from call to
-  /// call.
+  /// Collects what is visible: of each item its model's chunks, or a stand-in where that is less to
+  /// draw. setups: one a chunk of the bundle. Keeps its memory from call to call.
   void build(const BundleView& bundle, std::span<const ChunkSetup> setups,
              const glm::mat4& projection, int height, std::span<const DrawItem> items,
              float lod_pixels);
@@ -86,6 +91,18 @@ class DrawList {
   [[nodiscard]] int culled() const { return culled_; }
 
  private:
+  /// What a frame asks for.
+  struct Request {
+    const BundleView& bundle;
+    std::span<const ChunkSetup> setups;
+    std::span<const DrawItem> items;
+    float lod_pixels = 0.0f;
+  };
+  void add_item(const Request& request, std::uint32_t item);
+  int add_group(const Request& request, std::uint32_t item, std::uint32_t group);
+  [[nodiscard]] std::uint64_t cost(const BundleView& bundle, std::size_t begin,
+                                   std::size_t end) const;
+
   std::vector<DrawCommand> commands_;
   std::vector<ModelView> views_;  ///< one an item
   int culled_ = 0;

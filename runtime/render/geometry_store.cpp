@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "formats/vertex_scan.hpp"
 #include "modar/mapped_file.hpp"
@@ -42,12 +43,12 @@ void GeometryStore::collect_ranges() {
   level_vertices_.assign(levels.size(), 0);
   vertex_ranges_.assign(levels.size(), Range{});
   // A level's layout is its model's. Levels that no model has are never drawn.
-  for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
-    const ModelRecord& model = bundle_.models()[m];
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle_.chunks()[model.first_chunk + c];
+  for (std::uint32_t g = 0; g < bundle_.chunk_groups(); ++g) {
+    const ChunkGroup group = bundle_.chunk_group(g);
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle_.chunks()[group.first_chunk + c];
       for (std::uint32_t i = 0; i < chunk.level_count; ++i) {
-        vertex_ranges_[chunk.first_level + i].layout = model.layout;
+        vertex_ranges_[chunk.first_level + i].layout = bundle_.models()[group.model].layout;
       }
     }
   }
@@ -94,6 +95,7 @@ void GeometryStore::merge_vertex_ranges() {
     vertex_total_ += range.gpu_size;
   }
   vertex_ranges_ = std::move(merged);
+  counted_.assign(vertex_ranges_.size(), 0);
   for (Range& range : index_ranges_) range.gpu_offset = range.source;
 }
 
@@ -163,6 +165,19 @@ void GeometryStore::fill(const Range& range, GLenum target, std::uint64_t offset
                     rewritten.data());
     offset += bytes;
   }
+}
+
+bool GeometryStore::fits(std::span<const std::uint32_t> levels) {
+  ++counts_;
+  std::uint64_t bytes = 0;
+  for (const std::uint32_t level : levels) {
+    const std::uint32_t range = level_vertices_[level];
+    if (std::exchange(counted_[range], counts_) != counts_) {
+      bytes += vertex_ranges_[range].gpu_size;
+    }
+    bytes += index_ranges_[level].gpu_size;
+  }
+  return bytes <= budget_;
 }
 
 bool GeometryStore::use(std::uint32_t level, GlState& gl, LevelPlace& place) {

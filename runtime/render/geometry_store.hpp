@@ -45,6 +45,9 @@ class GeometryStore {
   /// frame uses already. Uploads and evicts where need be.
   bool use(std::uint32_t level, GlState& gl, LevelPlace& place);
 
+  /// True if the budget holds all these levels at once.
+  [[nodiscard]] bool fits(std::span<const std::uint32_t> levels);
+
   [[nodiscard]] bool streams() const { return streams_; }
   [[nodiscard]] std::uint64_t resident_bytes() const { return resident_bytes_; }
   [[nodiscard]] std::uint64_t total_bytes() const { return vertex_total_ + index_total_; }
@@ -77,7 +80,9 @@ class GeometryStore {
   std::vector<Range> vertex_ranges_;
   std::vector<Range> index_ranges_;            ///< one a level
   std::vector<std::uint32_t> level_vertices_;  ///< level to vertex range
-  std::vector<std::byte> scratch_;             ///< rewritten vertices on their way
+  std::vector<std::uint32_t> counted_;         ///< of each vertex range: when fits() last saw it
+  std::uint32_t counts_ = 0;
+  std::vector<std::byte> scratch_;  ///< rewritten vertices on their way
   std::uint64_t budget_ = 0;
   std::uint64_t vertex_total_ = 0;
   std::uint64_t index_total_ = 0;

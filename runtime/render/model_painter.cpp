@@ -129,10 +129,11 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
                                   const GlCaps& caps) {
   extensions_ = extensions;
   slot_count_ = std::min(kMostSlots, (caps.max_vertex_uniform_vectors - kFixedUniformVectors) / 4);
-  for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
-    const ModelRecord& model = bundle_.models()[m];
+  for (std::uint32_t g = 0; g < bundle_.chunk_groups(); ++g) {
+    const ChunkGroup group = bundle_.chunk_group(g);
+    const ModelRecord& model = bundle_.models()[group.model];
     const VertexFormat& format = formats_[model.layout];
-    for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
+    for (std::uint32_t c = group.first_chunk; c < group.first_chunk + group.chunk_count; ++c) {
       const MaterialRecord& material = bundle_.materials()[bundle_.chunks()[c].material];
       ProgramKey key;
       key.normal = format.normal;

@@ -23,6 +23,10 @@
 namespace modar {
 namespace {
 
+/// How often the error that is allowed on the screen is doubled where memory is short: 32 times as
+/// much is still the model's form. Set by hand.
+constexpr int kCoarser = 5;
+
 std::vector<VertexFormat> vertex_formats(const BundleView& bundle, const GlCaps& caps) {
   std::vector<VertexFormat> formats;
   for (std::uint32_t i = 0; i < bundle.layouts().size(); ++i) {
@@ -178,7 +182,7 @@ struct Renderer::State {
       ground.draw_shadows(bundle, projection, items, gl, stats);
     }
     const DebugGroup group(extensions, "models");
-    list.build(bundle, painter.setups(), projection, height, items, options.lod_pixels);
+    build_list(projection, height, items);
     stats.chunks_culled = list.culled();
     if (geometry.streams()) {
       list.sort_by_distance();
@@ -190,6 +194,25 @@ struct Renderer::State {
     painter.draw({list, items, projection, options, geometry, textures, gl, stats,
                   options.estimate_light ? &estimator : nullptr});
     planes.draw(bundle, projection, items, textures, true, gl, stats);
+  }
+
+  /// Where memory is short, stand-ins take the place of models that are too large for it, as long
+  /// as they are not that coarse that holes would be better.
+  void build_list(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
+    float pixels = options.lod_pixels;
+    list.build(bundle, painter.setups(), projection, height, items, pixels);
+    if (!geometry.streams() || bundle.stand_ins().empty()) return;
+    for (int i = 0; !list_fits(); ++i) {
+      pixels = i < kCoarser ? 2.0f * pixels : options.lod_pixels;
+      list.build(bundle, painter.setups(), projection, height, items, pixels);
+      if (i == kCoarser) return;
+    }
+  }
+
+  bool list_fits() {
+    levels.clear();
+    for (const DrawCommand& command : list.commands()) levels.push_back(command.level);
+    return geometry.fits(levels);
   }
 
   /// Gives GPU memory to the nearest chunks first, at a coarser level where there is little. Drops
@@ -224,6 +247,7 @@ struct Renderer::State {
   LightEstimator estimator;
   Target target;
   DrawList list;
+  std::vector<std::uint32_t> levels;  ///< of the list
   RenderOptions options;
   RenderStats stats;
   std::uint64_t uploaded_before = 0;
