@@ -115,6 +115,27 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
   content.models.push_back(record);
 }
 
+/// Appends a stand-in of the last model.
+void merge_stand_in(PackedMesh packed, BundleContent& content) {
+  content.stand_ins.push_back({static_cast<std::uint32_t>(content.models.size() - 1),
+                               static_cast<std::uint32_t>(content.stand_in_chunks.size()),
+                               static_cast<std::uint32_t>(packed.chunks.size()), 0});
+  const auto first_level = static_cast<std::uint32_t>(content.stand_in_levels.size());
+  for (ChunkRecord chunk : packed.chunks) {
+    chunk.material += content.models.back().first_material;
+    chunk.first_level += first_level;
+    content.stand_in_chunks.push_back(chunk);
+  }
+  for (LevelRecord level : packed.levels) {
+    level.vertex_offset += content.vertices.size();
+    level.index_offset += content.indices.size();
+    content.stand_in_levels.push_back(level);
+  }
+  append_bytes(std::move(packed.vertices), content.vertices);
+  append_bytes(std::move(packed.indices), content.indices);
+  content.indices.resize((content.indices.size() + 3) / 4 * 4);
+}
+
 bool blended(const MaterialRecord& material, const BundleContent& content) {
   if ((material.flags & kMaterialOccluder) != 0) return false;
   if (material.opacity < 1.0f || material.texture == kNone) return material.opacity < 1.0f;
@@ -263,9 +284,38 @@ void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, PositionK
       {"model.positions", DiagnosticSeverity::kInfo, packed.name, 0, text, cure});
 }
 
+/// A model in its bytes.
+struct ShapedModel {
+  PackedMesh model;
+  std::vector<PackedMesh> stand_ins;
+};
+
+/// Packs stand-ins, each with the error of the whole.
+Result<std::vector<PackedMesh>> pack_stand_ins(const ChunkedMesh& mesh,
+                                               const StandInOptions& options,
+                                               const std::vector<std::uint32_t>& texture_sides,
+                                               const PackOptions& pack_options, Report& report) {
+  MODAR_ASSIGN(const std::vector<StandIn> made, make_stand_ins(mesh, options, report));
+  if (!made.empty()) {
+    double& greatest = report.levels.back().position_error_max;
+    greatest = std::max(greatest, made.back().error * mesh.mesh.placement.scale);
+  }
+  std::vector<PackedMesh> all;
+  Report quiet;
+  double shown = 0;  // never falls, and is never below the truth
+  for (const StandIn& stand_in : made) {
+    MODAR_ASSIGN(PackedMesh packed, pack(stand_in.mesh, texture_sides, pack_options, quiet));
+    shown = std::max({shown, stand_in.error, stand_in.shading});
+    const float error = std::nextafter(static_cast<float>(shown), 4.0f);
+    for (LevelRecord& level : packed.levels) level.error = error;
+    all.push_back(std::move(packed));
+  }
+  return all;
+}
+
 /// Splits and packs a model as finely as was asked.
-Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
-                               const BakeRequest& request, Report& report) {
+Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
+                                const BakeRequest& request, Report& report) {
   const Result<double> max_error = max_error_of(request, mesh);
   if (!max_error) return tl::unexpected(max_error.error());
   const Result<PositionPlan> plan = plan_positions(mesh, {request.positions, *max_error});
@@ -280,6 +330,8 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   level_options.positions = plan->kind;
   level_options.jobs = request.jobs;
   level_options.texture_sides = texture_sides;
+  const StandInPlan stand_ins = plan_stand_ins(*chunked, level_options);
+  if (stand_ins.count > 0) level_options.most_halvings = stand_ins.first_halving - 1;
   if (auto made = make_levels(*chunked, level_options, report); !made) {
     return tl::unexpected(made.error());
   }
@@ -291,9 +343,12 @@ Result<PackedMesh> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& t
   pack_options.unit_metres = request.unit_metres;
   pack_options.positions = plan->kind;
   pack_options.jobs = request.jobs;
-  MODAR_ASSIGN(PackedMesh packed, pack(*chunked, texture_sides, pack_options, report));
-  tell_positions(*chunked, packed, plan->kind, request, report);
-  return packed;
+  ShapedModel shaped;
+  MODAR_ASSIGN(shaped.stand_ins, pack_stand_ins(*chunked, {stand_ins, plan->kind}, texture_sides,
+                                                pack_options, report));
+  MODAR_ASSIGN(shaped.model, pack(*chunked, texture_sides, pack_options, report));
+  tell_positions(*chunked, shaped.model, plan->kind, request, report);
+  return shaped;
 }
 
 Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& outcomes,
@@ -315,9 +370,9 @@ Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& ou
     seen_through.push_back(blended(material, content));
   }
   cut_crossing(welded.mesh, seen_through);
-  Result<PackedMesh> packed = shape_model(std::move(welded.mesh), sides, request, report);
-  if (!packed) return tl::unexpected(packed.error());
-  merge_model(std::move(*packed), textures, content);
+  MODAR_ASSIGN(ShapedModel shaped, shape_model(std::move(welded.mesh), sides, request, report));
+  merge_model(std::move(shaped.model), textures, content);
+  for (PackedMesh& packed : shaped.stand_ins) merge_stand_in(std::move(packed), content);
   add_draw_orders(content);
   return {};
 }

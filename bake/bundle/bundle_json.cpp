@@ -70,17 +70,20 @@ const char* layout_name(const LayoutRecord& layout) {
   return "none";
 }
 
-std::uint64_t model_bytes(const BundleView& bundle, const ModelRecord& model) {
+std::uint64_t model_bytes(const BundleView& bundle, std::uint32_t index) {
   // Levels may share vertices: ranges are counted once. Levels are written in ascending order.
   std::uint64_t bytes = 0;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;
-  const std::uint64_t stride = bundle.layouts()[model.layout].stride;
-  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-    const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
-    for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
-      const LevelRecord& level = bundle.levels()[chunk.first_level + l];
-      bytes += 2ull * level.index_count;
-      ranges.emplace_back(level.vertex_offset, level.vertex_offset + stride * level.vertex_count);
+  const std::uint64_t stride = bundle.layouts()[bundle.models()[index].layout].stride;
+  for (std::uint32_t g = 0; g < bundle.chunk_groups(); ++g) {
+    const ChunkGroup group = bundle.chunk_group(g);
+    for (std::uint32_t c = 0; group.model == index && c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        const LevelRecord& level = bundle.levels()[chunk.first_level + l];
+        bytes += 2ull * level.index_count;
+        ranges.emplace_back(level.vertex_offset, level.vertex_offset + stride * level.vertex_count);
+      }
     }
   }
   std::sort(ranges.begin(), ranges.end());
@@ -92,9 +95,35 @@ std::uint64_t model_bytes(const BundleView& bundle, const ModelRecord& model) {
   return bytes;
 }
 
+/// The whole model at each level, finest first: chunks that have no such level at their coarsest,
+/// then its stand-ins.
+Json level_list(const BundleView& bundle, std::uint32_t index) {
+  const ModelRecord& model = bundle.models()[index];
+  Json list = Json::array();
+  const auto add = [&](const ChunkGroup& group, std::uint32_t depth) {
+    std::uint64_t triangles = 0;
+    float error = 0.0f;
+    for (std::uint32_t c = group.first_chunk; c < group.first_chunk + group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[c];
+      const LevelRecord& level =
+          bundle.levels()[chunk.first_level + std::min(depth, chunk.level_count - 1)];
+      triangles += level.index_count / 3;
+      error = std::max(error, level.error);
+    }
+    list.push_back({{"triangles", triangles},
+                    {"chunks", group.chunk_count},
+                    {"position_error_max", static_cast<double>(error) * model.scale}});
+  };
+  for (std::uint32_t l = 0; l < model.level_count; ++l) add(bundle.chunk_group(index), l);
+  for (std::uint32_t g = bundle.models().size(); g < bundle.chunk_groups(); ++g) {
+    if (bundle.chunk_group(g).model == index) add(bundle.chunk_group(g), 0);
+  }
+  return list;
+}
+
 Json model_json(const BundleView& bundle, std::uint32_t index) {
   const ModelRecord& model = bundle.models()[index];
-  const std::uint64_t bytes = model_bytes(bundle, model);
+  const std::uint64_t bytes = model_bytes(bundle, index);
   std::uint64_t indices = 0;
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
@@ -109,6 +138,8 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
   const std::optional<MeshTopology> topology = stated_topology(bundle, index);
   const std::optional<LevelFigures> levels = stated_levels(bundle, index);
   const std::optional<Upright> upright = stated_upright(bundle, index);
+  Json level_figures = levels ? level_json(*levels) : Json();
+  if (levels) level_figures.set("list", level_list(bundle, index));
   return {{"name", bundle.name(model.name)},
           {"vertices", model.vertex_count},
           {"triangles", model.triangle_count},
@@ -133,7 +164,7 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
           {"uv_error_rms_texels", model.uv_error_rms_texels},
           {"up", upright ? upright_json(*upright) : Json()},
           {"topology", topology ? topology_json(*topology) : Json()},
-          {"levels", levels ? level_json(*levels) : Json()}};
+          {"levels", std::move(level_figures)}};
 }
 
 const char* severity_name(DiagnosticSeverity severity) {

@@ -129,7 +129,7 @@ class Linker {
   }
 
   void add_chunks(const BundleView& part, const ModelRecord& model, std::uint32_t first_material) {
-    for (std::uint32_t c = 0; c < part.chunks().size(); ++c) {
+    for (std::uint32_t c = 0; c < part.chunks().own().size(); ++c) {
       add_extra(part, SectionType::kDrawOrder, c,
                 static_cast<std::uint32_t>(content_.chunks.size()));
       ChunkRecord chunk = part.chunks()[c];
@@ -137,15 +137,37 @@ class Linker {
       chunk.first_level += static_cast<std::uint32_t>(content_.levels.size());
       content_.chunks.push_back(chunk);
     }
+    add_stand_ins(part, model, first_material);
+    const std::uint32_t own = part.levels().own().size();
     for (std::uint32_t l = 0; l < part.levels().size(); ++l) {
       LevelRecord level = part.levels()[l];
       level.vertex_offset += content_.vertices.size();
       level.index_offset += content_.indices.size();
-      content_.levels.push_back(level);
+      (l < own ? content_.levels : content_.stand_in_levels).push_back(level);
     }
     content_.vertices.insert(content_.vertices.end(), part.vertices().begin(),
                              part.vertices().end());
     content_.indices.insert(content_.indices.end(), part.indices().begin(), part.indices().end());
+  }
+
+  /// All but their levels, which are added with those of the model.
+  void add_stand_ins(const BundleView& part, const ModelRecord& model,
+                     std::uint32_t first_material) {
+    const std::uint32_t chunks = part.chunks().own().size();
+    const std::uint32_t levels = part.levels().own().size();
+    for (std::uint32_t s = 0; s < part.stand_ins().size(); ++s) {
+      StandInRecord record = part.stand_ins()[s];
+      record.model = static_cast<std::uint32_t>(content_.models.size());
+      record.first_chunk += static_cast<std::uint32_t>(content_.stand_in_chunks.size()) - chunks;
+      content_.stand_ins.push_back(record);
+    }
+    const auto first_level = static_cast<std::uint32_t>(content_.stand_in_levels.size());
+    for (std::uint32_t c = chunks; c < part.chunks().size(); ++c) {
+      ChunkRecord chunk = part.chunks()[c];
+      chunk.material = chunk.material - model.first_material + first_material;
+      chunk.first_level += first_level - levels;
+      content_.stand_in_chunks.push_back(chunk);
+    }
   }
 
   void add_model(const LinkPart& linked) {

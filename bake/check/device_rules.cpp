@@ -27,7 +27,7 @@ class DeviceCheck {
 
   bool run() {
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
-    for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) check_model(bundle_.models()[m]);
+    for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) check_model(m);
     check_uniforms();
     check_memory();
     return good_;
@@ -76,7 +76,8 @@ class DeviceCheck {
     }
   }
 
-  void check_model(const ModelRecord& model) {
+  void check_model(std::uint32_t index) {
+    const ModelRecord& model = bundle_.models()[index];
     const LayoutRecord& layout = bundle_.layouts()[model.layout];
     const std::string where = label("model", model.name);
     if (layout.attribute_count > device_.max_vertex_attributes) {
@@ -84,7 +85,7 @@ class DeviceCheck {
            std::to_string(layout.attribute_count) + " attributes, at most " +
                std::to_string(device_.max_vertex_attributes));
     }
-    most_coarse_bytes_ = std::max(most_coarse_bytes_, coarse_bytes(model, layout));
+    most_coarse_bytes_ = std::max(most_coarse_bytes_, coarse_bytes(index));
     std::uint64_t half_bytes = 0;
     for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
       const AttributeRecord& attribute = layout.attributes[a];
@@ -99,16 +100,23 @@ class DeviceCheck {
              " vertices");
   }
 
-  /// Vertices and indices of the coarsest level of each chunk.
-  [[nodiscard]] std::uint64_t coarse_bytes(const ModelRecord& model,
-                                           const LayoutRecord& layout) const {
-    std::uint64_t bytes = 0;
-    for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle_.chunks()[c];
-      const LevelRecord& level = bundle_.levels()[chunk.first_level + chunk.level_count - 1];
-      bytes += std::uint64_t{level.vertex_count} * layout.stride + 2ull * level.index_count;
+  /// Vertices and indices of the coarsest level of each chunk; of a model's stand-in that needs
+  /// least, where it has any.
+  [[nodiscard]] std::uint64_t coarse_bytes(std::uint32_t model) const {
+    const std::uint64_t stride = bundle_.layouts()[bundle_.models()[model].layout].stride;
+    std::uint64_t least = ~std::uint64_t{0};
+    for (std::uint32_t g = 0; g < bundle_.chunk_groups(); ++g) {
+      const ChunkGroup group = bundle_.chunk_group(g);
+      if (group.model != model) continue;
+      std::uint64_t bytes = 0;
+      for (std::uint32_t c = group.first_chunk; c < group.first_chunk + group.chunk_count; ++c) {
+        const ChunkRecord& chunk = bundle_.chunks()[c];
+        const LevelRecord& level = bundle_.levels()[chunk.first_level + chunk.level_count - 1];
+        bytes += std::uint64_t{level.vertex_count} * stride + 2ull * level.index_count;
+      }
+      least = std::min(least, bytes);
     }
-    return bytes;
+    return least;
   }
 
   void check_uniforms() {

@@ -247,7 +247,64 @@ class SourceCheck {
         }
       }
     }
-    return true;
+    return same_stand_ins(model, *other);
+  }
+
+  /// Chunks and levels of stand-ins, of a model and of it baked again.
+  using StandInChunks = std::vector<std::pair<const ChunkRecord*, const LevelRecord*>>;
+
+  [[nodiscard]] StandInChunks stand_in_chunks(const ModelRecord& model) const {
+    StandInChunks found;
+    for (std::uint32_t g = bundle_.models().size(); g < bundle_.chunk_groups(); ++g) {
+      const ChunkGroup group = bundle_.chunk_group(g);
+      if (&bundle_.models()[group.model] != &model) continue;
+      for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+        const ChunkRecord& chunk = bundle_.chunks()[group.first_chunk + c];
+        found.emplace_back(&chunk, &bundle_.levels()[chunk.first_level]);
+      }
+    }
+    return found;
+  }
+
+  [[nodiscard]] StandInChunks stand_in_chunks_again(const ModelRecord& model) const {
+    StandInChunks found;
+    for (const StandInRecord& stand_in : again_->stand_ins) {
+      if (&again_->models[stand_in.model] != &model) continue;
+      for (std::uint32_t c = 0; c < stand_in.chunk_count; ++c) {
+        const ChunkRecord& chunk = again_->stand_in_chunks[stand_in.first_chunk + c];
+        found.emplace_back(&chunk, &again_->stand_in_levels[chunk.first_level]);
+      }
+    }
+    return found;
+  }
+
+  [[nodiscard]] bool same_stand_ins(const ModelRecord& model, const ModelRecord& other) const {
+    const StandInChunks ours = stand_in_chunks(model);
+    const StandInChunks theirs = stand_in_chunks_again(other);
+    const std::uint64_t stride = bundle_.layouts()[model.layout].stride;
+    return std::equal(
+        ours.begin(), ours.end(), theirs.begin(), theirs.end(), [&](const auto& a, const auto& b) {
+          return std::memcmp(a.first, b.first, offsetof(ChunkRecord, material)) == 0 &&
+                 a.second->error == b.second->error && same_level(*a.second, *b.second, stride);
+        });
+  }
+
+  /// Those that are in the order of those baked again, byte by byte.
+  void check_stand_ins(const ModelRecord& model, const ModelRecord& other, double slack) {
+    const StandInChunks ours = stand_in_chunks(model);
+    const StandInChunks theirs = stand_in_chunks_again(other);
+    for (std::size_t i = 0; i < std::min(ours.size(), theirs.size()); ++i) {
+      const std::string fault =
+          level_difference({&bundle_.layouts()[model.layout], ours[i].first, ours[i].second,
+                            bundle_.vertices(), bundle_.indices()},
+                           {&again_->layouts[other.layout], theirs[i].first, theirs[i].second,
+                            again_->vertices, again_->indices},
+                           slack);
+      if (fault.empty()) continue;
+      tell(WorkstationRule::kSourceSurface,
+           label("model", model.name) + ", chunk " + std::to_string(i) + " of its stand-ins",
+           ours[i].second, fault);
+    }
   }
 
   Result<void> check_model(const ModelRecord& model, const std::string& path,
@@ -307,6 +364,7 @@ class SourceCheck {
              ours.level, fault);
       }
     }
+    check_stand_ins(model, *other, slack);
     if (same) check_figures(model, *other);
   }
 

@@ -92,16 +92,17 @@ constexpr std::uint32_t kMostHalvings = 16;
 /// little early where a chunk's border is in the way.
 constexpr double kNearlyHalved = 1.3;
 
-/// The model of a bundle, each chunk at its first level of at most so many halvings, or its
-/// coarsest; error: the greatest that these levels state.
-LevelSurface level_of(const BundleView& bundle, std::uint32_t halvings, double& error) {
+/// A group of chunks, each at its first level of at most so many halvings, or its coarsest; error:
+/// the greatest that these levels state.
+LevelSurface level_of_group(const BundleView& bundle, const ChunkGroup& group,
+                            std::uint32_t halvings, double& error) {
   LevelSurface surface;
   const ModelRecord& model = bundle.models()[0];
   const VertexDecoder decoder(bundle.layouts()[model.layout]);
   const glm::dvec3 center(model.center[0], model.center[1], model.center[2]);
   error = 0;
-  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-    const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+  for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+    const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
     const LevelRecord* level = &bundle.levels()[chunk.first_level];
     const double most = kNearlyHalved * level->index_count / std::exp2(halvings);
     for (std::uint32_t l = 1; l < chunk.level_count && level->index_count > most; ++l) ++level;
@@ -118,6 +119,19 @@ LevelSurface level_of(const BundleView& bundle, std::uint32_t halvings, double& 
       surface.triangles.push_back(
           {base + indices[i], base + indices[i + 1], base + indices[i + 2]});
     }
+  }
+  return surface;
+}
+
+/// The model of a bundle at so many halvings: its chunks, or its first stand-in of so few
+/// triangles, or its coarsest.
+LevelSurface level_of(const BundleView& bundle, std::uint32_t halvings, double& error) {
+  LevelSurface surface = level_of_group(bundle, bundle.chunk_group(0), halvings, error);
+  const double most =
+      kNearlyHalved * static_cast<double>(bundle.models()[0].triangle_count) / std::exp2(halvings);
+  for (std::uint32_t g = 1; g < bundle.chunk_groups(); ++g) {
+    if (static_cast<double>(surface.triangles.size()) <= most) break;
+    surface = level_of_group(bundle, bundle.chunk_group(g), 0, error);
   }
   return surface;
 }

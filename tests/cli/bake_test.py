@@ -177,6 +177,12 @@ class Bake(ProgramTest):
         self.assertLess(two["levels"]["position_error_max"], more["levels"]["position_error_max"])
         self.assertGreater(two["levels"]["uv_shift_max_texels"], 0)
         self.assertLessEqual(two["levels"]["uv_shift_max_texels"], more["levels"]["uv_shift_max_texels"])
+        # One by one, finest first, the last ones as off as the whole.
+        listed = more["levels"]["list"]
+        triangles = [level["triangles"] for level in listed]
+        self.assertEqual(triangles, sorted(triangles, reverse=True))
+        self.assertEqual((triangles[0], listed[0]["chunks"], listed[0]["position_error_max"]), (more["triangles"], more["chunks"], 0))
+        self.assertGreaterEqual(listed[-1]["position_error_max"], more["levels"]["position_error_max"] * (1 - 1e-6))
         self.assertLess(plain["bytes"], two["bytes"])
         self.assertLess(two["bytes"], more["bytes"])
         self.assertEqual(plain["bytes_per_triangle"], more["bytes_per_triangle"])

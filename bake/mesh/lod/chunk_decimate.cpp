@@ -14,6 +14,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/import/source_model.hpp"
+#include "bake/mesh/lod/quadric.hpp"
 #include "bake/mesh/triangle_tree.hpp"
 
 namespace modar {
@@ -116,43 +117,9 @@ class RemovedVertexMap {
   std::vector<std::uint16_t> detached_;
 };
 
-/// Square of the cosine of 60 degrees: no triangle may turn farther in one collapse. Set by hand.
-constexpr double kLeastTurn = 0.25;
 /// Weight of the texture's slide beside the surface's own error in the price of a collapse. Set by
 /// hand.
 constexpr double kShiftWeight = 0.25;
-/// Weight of the squared length of a rim's edge in the quadrics, beside the areas of triangles:
-/// keeps the outline. Set by hand.
-constexpr double kRimWeight = 1.0;
-
-/// Sum of the squared distances from planes, each weighted by its triangle's area (Garland and
-/// Heckbert): p^T A p + 2 b p + c.
-struct Quadric {
-  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
-  glm::dvec3 b{0.0};
-  double c = 0;
-  double area = 0;
-
-  /// normal: of unit length.
-  static Quadric of_plane(const glm::dvec3& normal, const glm::dvec3& point, double area) {
-    const glm::dvec3 n = normal * area;
-    const double d = -glm::dot(normal, point);
-    return {n.x * normal.x, n.y * normal.y, n.z * normal.z,
-            n.x * normal.y, n.x * normal.z, n.y * normal.z,
-            n * d,          area * d * d,   area};
-  }
-  void operator+=(const Quadric& q) {
-    xx += q.xx, yy += q.yy, zz += q.zz, xy += q.xy, xz += q.xz, yz += q.yz;
-    b += q.b;
-    c += q.c;
-    area += q.area;
-  }
-  [[nodiscard]] double at(const glm::dvec3& p) const {
-    return p.x * (xx * p.x + 2 * (xy * p.y + xz * p.z + b.x)) +
-           p.y * (yy * p.y + 2 * (yz * p.z + b.y)) + p.z * (zz * p.z + 2 * b.z) + c;
-  }
-};
-
 /// Vertices by price, cheapest first; in the order in which they came where prices differ by less
 /// than a sixteenth. On a scan of 1.1 million triangles levels are as near as by a heap: rms within
 /// 1 %.

@@ -28,15 +28,16 @@ constexpr std::uint32_t kWidestFan = 32;
 
 }  // namespace
 
-LevelSurface::LevelSurface(std::span<const glm::dvec3> positions,
-                           std::span<const std::uint16_t> indices)
+template <class Index>
+BasicLevelSurface<Index>::BasicLevelSurface(std::span<const glm::dvec3> positions,
+                                            std::span<const Index> indices)
     : positions_(positions),
       indices_(indices),
       begins_(positions.size() + 2, 0),
       corners_(indices.size()),
       ends_(indices.size()),
       opposites_(indices.size(), kNoIndex) {
-  for (const std::uint16_t v : indices) ++begins_[v + std::size_t{2}];
+  for (const Index v : indices) ++begins_[v + std::size_t{2}];
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
   for (std::uint32_t t = 0; t < indices.size(); t += 3) {
     for (std::uint32_t k = 0; k < 3; ++k) {
@@ -48,15 +49,16 @@ LevelSurface::LevelSurface(std::span<const glm::dvec3> positions,
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
     for (std::uint32_t i = begins_[v]; i < begins_[v + 1]; ++i) {
       if (ends_[i] < v) continue;
-      const std::uint32_t back = edge(ends_[i], static_cast<std::uint16_t>(v));
-      if (back == kNoIndex || edge(static_cast<std::uint16_t>(v), ends_[i]) == kNoIndex) continue;
+      const std::uint32_t back = edge(ends_[i], static_cast<Index>(v));
+      if (back == kNoIndex || edge(static_cast<Index>(v), ends_[i]) == kNoIndex) continue;
       opposites_[corners_[i]] = back;
       opposites_[back] = corners_[i];
     }
   }
 }
 
-std::uint32_t LevelSurface::edge(std::uint16_t from, std::uint16_t to) const {
+template <class Index>
+std::uint32_t BasicLevelSurface<Index>::edge(Index from, Index to) const {
   std::uint32_t found = kNoIndex;
   for (std::uint32_t i = begins_[from]; i < begins_[from + std::size_t{1}]; ++i) {
     if (ends_[i] != to) continue;
@@ -66,13 +68,15 @@ std::uint32_t LevelSurface::edge(std::uint16_t from, std::uint16_t to) const {
   return found;
 }
 
-bool LevelSurface::has_edge(std::uint16_t from, std::uint16_t to) const {
+template <class Index>
+bool BasicLevelSurface<Index>::has_edge(Index from, Index to) const {
   const auto begin = ends_.begin() + begins_[from];
   const auto end = ends_.begin() + begins_[from + std::size_t{1}];
   return std::find(begin, end, to) != end;
 }
 
-std::uint32_t LevelSurface::find(std::uint16_t a, std::uint16_t b, std::uint16_t c) const {
+template <class Index>
+std::uint32_t BasicLevelSurface<Index>::find(Index a, Index b, Index c) const {
   for (std::uint32_t i = begins_[a]; i < begins_[a + std::size_t{1}]; ++i) {
     if (ends_[i] != b) continue;
     if (indices_[next_corner(next_corner(corners_[i]))] == c) return corners_[i] / 3;
@@ -80,7 +84,8 @@ std::uint32_t LevelSurface::find(std::uint16_t a, std::uint16_t b, std::uint16_t
   return kNoIndex;
 }
 
-std::vector<std::uint32_t> LevelSurface::triangles_of_vertices() const {
+template <class Index>
+std::vector<std::uint32_t> BasicLevelSurface<Index>::triangles_of_vertices() const {
   std::vector<std::uint32_t> result(positions_.size(), kNoIndex);
   for (std::size_t c = 0; c < indices_.size(); ++c) {
     result[indices_[c]] = static_cast<std::uint32_t>(c / 3);
@@ -88,7 +93,8 @@ std::vector<std::uint32_t> LevelSurface::triangles_of_vertices() const {
   return result;
 }
 
-std::uint32_t LevelSurface::walk(const glm::dvec3& point, std::uint32_t start) const {
+template <class Index>
+std::uint32_t BasicLevelSurface<Index>::walk(const glm::dvec3& point, std::uint32_t start) const {
   std::uint32_t at = start;
   std::uint32_t before = kNoIndex;
   for (int steps = 0; steps < kMostWalked; ++steps) {
@@ -116,13 +122,15 @@ std::uint32_t LevelSurface::walk(const glm::dvec3& point, std::uint32_t start) c
   return at;
 }
 
-NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t start) const {
+template <class Index>
+NearTriangle BasicLevelSurface<Index>::nearest_around(const glm::dvec3& point,
+                                                      std::uint32_t start) const {
   NearTriangle best{distance_square(point, triangle(start)), start};
-  std::span<const std::uint16_t> seen;
+  std::span<const Index> seen;
   for (int steps = 0; steps < kMostWalked; ++steps) {
     const std::uint32_t at = best.triangle;
-    const std::span<const std::uint16_t> around = indices_.subspan(3 * std::size_t{at}, 3);
-    for (const std::uint16_t v : around) {
+    const std::span<const Index> around = indices_.subspan(3 * std::size_t{at}, 3);
+    for (const Index v : around) {
       if (begins_[v + std::size_t{1}] - begins_[v] > kWidestFan) continue;
       if (std::find(seen.begin(), seen.end(), v) != seen.end()) continue;
       for (std::uint32_t i = begins_[v]; i < begins_[v + std::size_t{1}]; ++i) {
@@ -137,8 +145,9 @@ NearTriangle LevelSurface::nearest_around(const glm::dvec3& point, std::uint32_t
   return best;
 }
 
-NearTriangle LevelSurface::nearest(const glm::dvec3& point, double enough,
-                                   const NearTriangle& near) {
+template <class Index>
+NearTriangle BasicLevelSurface<Index>::nearest(const glm::dvec3& point, double enough,
+                                               const NearTriangle& near) {
   if (boxes_.empty()) make_boxes();
   NearTriangle found = near;
   for (const Box& box : boxes_) {
@@ -153,7 +162,8 @@ NearTriangle LevelSurface::nearest(const glm::dvec3& point, double enough,
   return found;
 }
 
-void LevelSurface::make_boxes() {
+template <class Index>
+void BasicLevelSurface<Index>::make_boxes() {
   std::vector<glm::dvec3> centres;
   centres.reserve(triangles());
   glm::dvec3 low(std::numeric_limits<double>::infinity());
@@ -194,5 +204,8 @@ void LevelSurface::make_boxes() {
     }
   }
 }
+
+template class BasicLevelSurface<std::uint16_t>;
+template class BasicLevelSurface<std::uint32_t>;
 
 }  // namespace modar

@@ -1,5 +1,5 @@
-// The triangles of one level of a chunk: which are adjacent, which is near a point. Internal to
-// lod.
+// The triangles of one level of a chunk or a mesh: which are adjacent, which is near a point.
+// Internal to lod.
 #pragma once
 
 #include <array>
@@ -26,25 +26,26 @@ struct NearTriangle {
   std::uint32_t triangle = 0;
 };
 
-/// Triangles over some positions. A corner (3 t + i) stands for the edge from it to the next one.
-class LevelSurface {
+/// Triangles over some positions, Index: a number of these. A corner (3 t + i) stands for the edge
+/// from it to the next one.
+template <class Index>
+class BasicLevelSurface {
  public:
   /// Of at least one triangle. Both spans are the caller's and must outlive it.
-  LevelSurface(std::span<const glm::dvec3> positions, std::span<const std::uint16_t> indices);
+  BasicLevelSurface(std::span<const glm::dvec3> positions, std::span<const Index> indices);
 
-  [[nodiscard]] std::span<const std::uint16_t> indices() const { return indices_; }
+  [[nodiscard]] std::span<const Index> indices() const { return indices_; }
   [[nodiscard]] std::uint32_t triangles() const {
     return static_cast<std::uint32_t>(indices_.size() / 3);
   }
   [[nodiscard]] std::size_t vertices() const { return positions_.size(); }
-  [[nodiscard]] const glm::dvec3& position(std::uint16_t vertex) const {
-    return positions_[vertex];
-  }
-  [[nodiscard]] const std::uint16_t* corners(std::uint32_t t) const {
+  [[nodiscard]] std::span<const glm::dvec3> positions() const { return positions_; }
+  [[nodiscard]] const glm::dvec3& position(Index vertex) const { return positions_[vertex]; }
+  [[nodiscard]] const Index* corners(std::uint32_t t) const {
     return &indices_[3 * std::size_t{t}];
   }
   [[nodiscard]] std::array<glm::dvec3, 3> triangle(std::uint32_t t) const {
-    const std::uint16_t* at = corners(t);
+    const Index* at = corners(t);
     return {positions_[at[0]], positions_[at[1]], positions_[at[2]]};
   }
   /// The corner of the same edge in the triangle beyond it; kNoIndex at a border, and where more
@@ -56,17 +57,17 @@ class LevelSurface {
     return corner == kNoIndex ? kNoIndex : corner / 3;
   }
   /// The corners at a vertex.
-  [[nodiscard]] std::span<const std::uint32_t> corners_at(std::uint16_t vertex) const {
+  [[nodiscard]] std::span<const std::uint32_t> corners_at(Index vertex) const {
     return {corners_.data() + begins_[vertex], corners_.data() + begins_[vertex + std::size_t{1}]};
   }
   /// The only corner whose edge goes from a vertex to another; kNoIndex where there is none or
   /// several.
-  [[nodiscard]] std::uint32_t edge(std::uint16_t from, std::uint16_t to) const;
-  [[nodiscard]] bool has_edge(std::uint16_t from, std::uint16_t to) const;
+  [[nodiscard]] std::uint32_t edge(Index from, Index to) const;
+  [[nodiscard]] bool has_edge(Index from, Index to) const;
   /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
   [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
   /// A triangle of these vertices, in this order, from whichever it begins; kNoIndex: none.
-  [[nodiscard]] std::uint32_t find(std::uint16_t a, std::uint16_t b, std::uint16_t c) const;
+  [[nodiscard]] std::uint32_t find(Index a, Index b, Index c) const;
   /// A triangle near a point, by a walk from triangle to triangle.
   [[nodiscard]] std::uint32_t walk(const glm::dvec3& point, std::uint32_t start) const;
   /// The nearest one as far as those around it tell: the same walk, by distances.
@@ -77,10 +78,10 @@ class LevelSurface {
 
  private:
   std::span<const glm::dvec3> positions_;
-  std::span<const std::uint16_t> indices_;
+  std::span<const Index> indices_;
   std::vector<std::uint32_t> begins_;   ///< of each vertex: where its corners begin in corners_
   std::vector<std::uint32_t> corners_;  ///< by vertex
-  std::vector<std::uint16_t> ends_;     ///< of each of these: the vertex that its edge goes to
+  std::vector<Index> ends_;             ///< of each of these: the vertex that its edge goes to
   std::vector<std::uint32_t> opposites_;
   /// A box of space: the triangles whose centres are in a cell of a grid.
   struct Box {
@@ -93,5 +94,8 @@ class LevelSurface {
   std::vector<Box> boxes_;  ///< those with triangles, made for the first search
   std::vector<std::uint32_t> boxed_;
 };
+
+using LevelSurface = BasicLevelSurface<std::uint16_t>;  ///< of a chunk
+using MeshSurface = BasicLevelSurface<std::uint32_t>;   ///< of a whole mesh
 
 }  // namespace modar

@@ -44,20 +44,9 @@ constexpr double kMaxSlide = 0.01;
 constexpr float kSteepest = 8;
 /// A price (see CollapseSequence) below what half floats tell apart.
 constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor);
-/// Of the error of the level before: a level that is off by no more may stand for the finest where
-/// coarser ones are measured, which adds its error to theirs. At 0.3 and 0.4, levels of a scan of
-/// 1.1 million triangles are made in 0.96 and 0.91 of the time and state 2 and 5 % more on average;
-/// at 0.2, in 1.03 of it and 1 % less.
-constexpr double kNegligible = 0.25;
 /// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
 /// a flat chunk may lose more than its share. Set by hand.
 constexpr std::uint32_t kFurther = 2;
-/// Of the width of a band of other shading times the difference of its normals: the error of
-/// position that is as bad to see. Set by hand: the default bake of a bent sheet of 128 triangles
-/// looks like that without levels, 500 pixels across (colour off by 3.3; 4.3 with the levels that
-/// positions alone allow). Levels of ten scans stay as they are: it is a quarter of their errors at
-/// most.
-constexpr double kShading = 0.25;
 /// About so many vertices of a chunk are looked at for it. All of them would make levels of a scan
 /// of 1.1 million triangles 1.06 times as dear, these cost nothing that can be measured.
 constexpr std::size_t kShaded = 2000;
@@ -305,12 +294,6 @@ std::size_t triangles_after(const CollapseSequence& sequence, std::size_t all,
   return collapses == 0 ? all : sequence.triangles[collapses - 1];
 }
 
-std::size_t triangles_in(const ChunkedMesh& mesh) {
-  std::size_t count = 0;
-  for (const Chunk& chunk : mesh.chunks) count += chunk.indices.size() / 3;
-  return count;
-}
-
 /// The cut that leaves the model `target` triangles or a few less: one for all chunks, so that
 /// triangles are where they matter. Nothing where so few cannot be reached.
 std::optional<Cut> cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequences,
@@ -343,16 +326,6 @@ std::optional<Cut> cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSe
     (fits({cut.price, middle}) ? cut.share : less) = middle;
   }
   return cut;
-}
-
-/// How often the model's triangles are halved at each coarser level.
-std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions& options) {
-  std::vector<std::uint32_t> halvings;
-  for (std::uint32_t at = 0; halvings.size() + 1 < options.levels;) {
-    at += triangles >> (at + 1) > options.many_triangles ? 2u : 1u;
-    halvings.push_back(at);
-  }
-  return halvings;
 }
 
 /// The cuts of all levels up to the last that can be reached, and one that is not much worse.
@@ -521,6 +494,22 @@ Result<void> LevelOptions::validate() const {
   if (levels >= 1 && levels <= kMaxLevels) return {};
   return fail(ExitCode::kUsage, "levels.count", "", "a chunk has 1 to 12 levels of detail",
               "choose a number in that range");
+}
+
+std::size_t triangles_in(const ChunkedMesh& mesh) {
+  std::size_t count = 0;
+  for (const Chunk& chunk : mesh.chunks) count += chunk.indices.size() / 3;
+  return count;
+}
+
+std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions& options) {
+  std::vector<std::uint32_t> halvings;
+  for (std::uint32_t at = 0; halvings.size() + 1 < options.levels;) {
+    at += triangles >> (at + 1) > options.many_triangles ? 2u : 1u;
+    if (at > options.most_halvings) break;
+    halvings.push_back(at);
+  }
+  return halvings;
 }
 
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report) {

@@ -1,4 +1,4 @@
-// Levels of detail of a chunked mesh.
+// Levels of detail of a chunked mesh: of its chunks, and of the whole.
 #pragma once
 
 #include <cstddef>
@@ -17,12 +17,27 @@ struct LevelOptions {
   /// A level of more triangles than this is a quarter of the level before it, not a half: no phone
   /// draws a million, and each level takes bytes and has to be measured.
   std::size_t many_triangles = 1'000'000;
+  /// Coarser levels are none of the chunks' (see plan_stand_ins()).
+  std::uint32_t most_halvings = 0xFFFFFFFFu;
   /// Pixels of each material's texture along a side, 0 where it has none; may be empty.
   std::vector<std::uint32_t> texture_sides;
   [[nodiscard]] Result<void> validate() const;
 };
 
 inline constexpr std::uint32_t kMaxLevels = 12;
+
+/// Of the width of a band of other shading times the difference of its normals: the error of
+/// position that is as bad to see. Set by hand: the default bake of a bent sheet of 128 triangles
+/// looks like that without levels, 500 pixels across (colour off by 3.3; 4.3 with the levels that
+/// positions alone allow). Levels of ten scans stay as they are: it is a quarter of their errors at
+/// most.
+inline constexpr double kShading = 0.25;
+
+/// Triangles of level 0.
+std::size_t triangles_in(const ChunkedMesh& mesh);
+
+/// How often the triangles of a model of so many are halved at each coarser level.
+std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions& options);
 
 /// Gives chunks coarser levels over their own vertices. Each level of the model has about half of
 /// the triangles of the one before (see many_triangles), shared out among the chunks so that the
@@ -41,5 +56,35 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
 
 /// Takes out the levels that are hardly nearer to the finest than the next coarser one is.
 void drop_alike_levels(ChunkedMesh& mesh);
+
+/// A whole mesh as one coarse level, with vertices and chunks of its own.
+struct StandIn {
+  ChunkedMesh mesh;    ///< its chunks have no coarser levels
+  double error = 0;    ///< model space: bounds the distance from level 0, and of level 0 from it
+  double shading = 0;  ///< as ChunkLevel's
+};
+
+/// Which levels of a mesh are stand-ins: the chunks have those before.
+struct StandInPlan {
+  /// Of the mesh's triangles, at the first one; 0: there is none, chunks have all levels.
+  std::uint32_t first_halving = 0;
+  std::uint32_t count = 0;
+};
+
+/// Meshes of one chunk have borders that nothing else meets, small ones need no coarser levels.
+/// options: of the chunks' levels, with which stand-ins are counted.
+StandInPlan plan_stand_ins(const ChunkedMesh& mesh, const LevelOptions& options);
+
+struct StandInOptions {
+  StandInPlan plan;
+  PositionKind positions = PositionKind::kHalf;  ///< whose decoded positions the errors are of
+};
+
+/// Makes the stand-ins of a mesh whose chunks have their levels, the finest first, each with half
+/// of the triangles of the one before. Borders of chunks mean nothing to them, those of materials
+/// and uv islands are kept as long as anything else costs less. Fewer than planned where a mesh is
+/// in too many pieces. Vertices carry the normals, uvs, colours and occlusion of level 0.
+Result<std::vector<StandIn>> make_stand_ins(const ChunkedMesh& mesh, const StandInOptions& options,
+                                            Report& report);
 
 }  // namespace modar

@@ -18,6 +18,10 @@ namespace {
 /// that was found needs no look at what lies between them. Set by hand: more loosens the bound.
 constexpr double kQuick = 1.15;
 
+/// How often a triangle is quartered before it is cut along those of the other surface. Set by
+/// hand.
+constexpr int kQuartered = 4;
+
 /// Model space: narrower parts are not cut off. Far above double rounding, far below half floats.
 constexpr double kSliver = 1e-9;
 /// Pieces of one triangle; the rest is bounded as it is, less tightly. Set by hand against endless
@@ -108,22 +112,23 @@ double corner_reach(const std::array<glm::dvec3, 3>& t) {
   return 0.5 * std::sqrt(squares[0] * squares[1] * squares[2] / glm::dot(across, across));
 }
 
+template <class Index>
 class Bounder {
  public:
-  Bounder(LevelSurface& to, double least, double found)
+  Bounder(BasicLevelSurface<Index>& to, double least, double found)
       : to_(to), limit_(std::max(kDistanceFloor, least)), bound_(least) {
     raise_lower(found);
   }
 
   /// Finds the distance of the farthest of some points, whose squared distances are at most these:
   /// from the triangles in `nearby`.
-  void probe(std::vector<std::pair<double, std::uint16_t>> points,
+  void probe(const BasicLevelSurface<Index>& from, std::vector<std::pair<double, Index>> points,
              std::span<const std::uint32_t> nearby) {
     std::make_heap(points.begin(), points.end());
     while (!points.empty() && points.front().first > std::max(lower_ * lower_, limit_square())) {
       const auto [square, v] = points.front();
       const NearTriangle near = {square, nearby[v]};
-      raise_lower(std::sqrt(to_.nearest(to_.position(v), lower_ * lower_, near).square));
+      raise_lower(std::sqrt(to_.nearest(from.position(v), lower_ * lower_, near).square));
       std::pop_heap(points.begin(), points.end());
       points.pop_back();
     }
@@ -165,6 +170,30 @@ class Bounder {
     if (distance > quick_limit()) return false;
     bound_ = std::max(bound_, distance);
     return true;
+  }
+
+  /// Raises the bound to hold for a triangle that may be larger than those of the other surface,
+  /// where quarters of it, and of these, are each near enough to one triangle: the distance from it
+  /// is convex, so corners tell. near: a triangle that is probably near.
+  bool cover_by_quarters(const std::array<glm::dvec3, 3>& t, std::uint32_t near, int depth = 0) {
+    const std::uint32_t at = to_.walk((t[0] + t[1] + t[2]) / 3.0, near);
+    const std::array<glm::dvec3, 3> other = to_.triangle(at);
+    const double most = quick_limit() * quick_limit();
+    double square = 0;
+    for (std::size_t i = 0; i < 3 && square <= most; ++i) {
+      square = std::max(square, distance_square(t[i], other));
+    }
+    if (square <= most) {
+      bound_ = std::max(bound_, std::sqrt(square));
+      return true;
+    }
+    if (depth == kQuartered) return false;
+    const std::array<glm::dvec3, 3> m = {0.5 * (t[0] + t[1]), 0.5 * (t[1] + t[2]),
+                                         0.5 * (t[2] + t[0])};
+    return cover_by_quarters(m, at, depth + 1) &&
+           cover_by_quarters({t[0], m[0], m[2]}, at, depth + 1) &&
+           cover_by_quarters({m[0], t[1], m[1]}, at, depth + 1) &&
+           cover_by_quarters({m[2], m[1], t[2]}, at, depth + 1);
   }
 
   [[nodiscard]] double bound() const { return bound_; }
@@ -354,7 +383,7 @@ class Bounder {
   }
   [[nodiscard]] double limit_square() const { return limit_ * limit_; }
 
-  LevelSurface& to_;
+  BasicLevelSurface<Index>& to_;
   double lower_ = 0;  ///< a distance that was found
   double limit_;      ///< pieces within it need no closer look
   double bound_;
@@ -364,17 +393,19 @@ class Bounder {
 
 }  // namespace
 
-double surface_distance(const LevelSurface& from, LevelSurface& to,
+template <class Index>
+double surface_distance(const BasicLevelSurface<Index>& from, BasicLevelSurface<Index>& to,
                         std::span<const std::uint32_t> nearby, double least, double found,
                         std::span<const std::uint8_t> settled) {
-  Bounder bounder(to, least, found);
+  Bounder<Index> bounder(to, least, found);
+  const bool same_positions = from.positions().data() == to.positions().data();
   std::vector<std::uint32_t> left;
-  std::vector<std::pair<double, std::uint16_t>> probes;
+  std::vector<std::pair<double, Index>> probes;
   std::vector<double> squares(nearby.size(), -1.0);
   for (std::uint32_t t = 0; t < from.triangles(); ++t) {
     if (!settled.empty() && settled[t] != 0) continue;
-    const std::uint16_t* v = from.corners(t);
-    if (to.find(v[0], v[1], v[2]) != kNoIndex) continue;
+    const Index* v = from.corners(t);
+    if (same_positions && to.find(v[0], v[1], v[2]) != kNoIndex) continue;
     left.push_back(t);
     for (std::size_t k = 0; k < 3; ++k) {
       if (nearby[v[k]] == kNoIndex || squares[v[k]] >= 0) continue;
@@ -382,12 +413,16 @@ double surface_distance(const LevelSurface& from, LevelSurface& to,
       probes.emplace_back(squares[v[k]], v[k]);
     }
   }
-  bounder.probe(std::move(probes), nearby);
+  bounder.probe(from, std::move(probes), nearby);
   for (const std::uint32_t t : left) {
-    const std::uint16_t* v = from.corners(t);
+    const Index* v = from.corners(t);
     const std::array<glm::dvec3, 3> corners = from.triangle(t);
     const std::array<std::uint32_t, 3> near = {nearby[v[0]], nearby[v[1]], nearby[v[2]]};
     if (bounder.cover_by_corners(corners, near, {squares[v[0]], squares[v[1]], squares[v[2]]})) {
+      continue;
+    }
+    // Of levels over the same positions, most triangles are as large as those of the other.
+    if (!same_positions && near[0] != kNoIndex && bounder.cover_by_quarters(corners, near[0])) {
       continue;
     }
     Piece whole;
@@ -396,5 +431,12 @@ double surface_distance(const LevelSurface& from, LevelSurface& to,
   }
   return bounder.bound();
 }
+
+template double surface_distance(const BasicLevelSurface<std::uint16_t>&,
+                                 BasicLevelSurface<std::uint16_t>&, std::span<const std::uint32_t>,
+                                 double, double, std::span<const std::uint8_t>);
+template double surface_distance(const BasicLevelSurface<std::uint32_t>&,
+                                 BasicLevelSurface<std::uint32_t>&, std::span<const std::uint32_t>,
+                                 double, double, std::span<const std::uint8_t>);
 
 }  // namespace modar

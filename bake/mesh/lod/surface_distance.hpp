@@ -10,14 +10,15 @@ namespace modar {
 
 /// An upper bound on the distance of any point of one surface from the other. It exceeds the true
 /// distance by no more than half of it (or kDistanceFloor, or `least`, where that is more), and is
-/// never below `least`. Both are triangles over the same positions; the measure is one-sided: from
-/// points of `from` to the surface `to`. nearby: for each vertex a triangle of `to` that is
-/// probably near, kNoIndex where unknown; wrong ones only slow the search down. Branch and bound as
-/// in Tang, Lee, Kim, "Interactive Hausdorff distance computation for general polygonal models",
-/// 2009, walking from triangle to triangle before it searches the tree. found: a distance between
-/// them that is known, from which on the bound may be loose as well. settled: 1 for each triangle
-/// of `from` that needs no look; may be empty.
-double surface_distance(const LevelSurface& from, LevelSurface& to,
+/// never below `least`. The measure is one-sided: from points of `from` to the surface `to`.
+/// Triangles of both over the same positions are not looked at. nearby: for each vertex a triangle
+/// of `to` that is probably near, kNoIndex where unknown; wrong ones only slow the search down.
+/// Branch and bound as in Tang, Lee, Kim, "Interactive Hausdorff distance computation for general
+/// polygonal models", 2009, walking from triangle to triangle before it searches the tree. found: a
+/// distance between them that is known, from which on the bound may be loose as well. settled: 1
+/// for each triangle of `from` that needs no look; may be empty.
+template <class Index>
+double surface_distance(const BasicLevelSurface<Index>& from, BasicLevelSurface<Index>& to,
                         std::span<const std::uint32_t> nearby, double least, double found = 0,
                         std::span<const std::uint8_t> settled = {});
 
@@ -27,5 +28,11 @@ inline constexpr double kSlack = 1.5;
 
 /// Smaller distances are not told apart: half of the rounding error of half floats in [-1,1].
 inline constexpr double kDistanceFloor = 0x1p-13;
+
+/// Of the error of the level before: a level that is off by no more may stand for the finest where
+/// coarser ones are measured, which adds its error to theirs. At 0.3 and 0.4, levels of a scan of
+/// 1.1 million triangles are made in 0.96 and 0.91 of the time and state 2 and 5 % more on average;
+/// at 0.2, in 1.03 of it and 1 % less.
+inline constexpr double kNegligible = 0.25;
 
 }  // namespace modar

@@ -1,0 +1,479 @@
+// Prices edges, collapses them, and carries looks and shades along.
+#include "bake/mesh/lod/mesh_collapse.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tuple>
+
+#include <glm/geometric.hpp>
+
+#include "bake/mesh/triangle_tree.hpp"
+
+namespace modar {
+namespace {
+
+/// Weight of the square of what the picture slides by, beside that of the surface's own error. Set
+/// by hand.
+constexpr double kSlideWeight = 1.0;
+/// Of an edge's length: the least point of its quadrics is no farther from its middle. Where planes
+/// are nearly parallel it may be anywhere. Set by hand.
+constexpr double kFarthest = 1.5;
+std::array<glm::dvec3, 3> corners_of(const CollapseMesh& mesh, const CollapseFace& face) {
+  return {mesh.places[face.places[0]], mesh.places[face.places[1]], mesh.places[face.places[2]]};
+}
+
+std::uint32_t root_of(std::vector<std::pair<std::uint32_t, std::uint32_t>>& joined,
+                      std::uint32_t id) {
+  for (const auto& [member, root] : joined) {
+    if (member == id) return root;
+  }
+  return id;
+}
+
+}  // namespace
+
+bool MeshCollapser::Candidate::operator<(const Candidate& other) const {
+  return std::tie(price, to, from) > std::tie(other.price, other.to, other.from);
+}
+
+MeshCollapser::MeshCollapser(CollapseMesh mesh)
+    : mesh_(std::move(mesh)),
+      alive_(mesh_.faces.size(), 1),
+      alive_count_(mesh_.faces.size()),
+      first_(mesh_.places.size(), kNoIndex),
+      quadrics_(mesh_.places.size()),
+      borders_(mesh_.places.size(), 0),
+      versions_(mesh_.places.size(), 0),
+      parents_(mesh_.places.size()),
+      several_(mesh_.places.size(), 0),
+      marks_(mesh_.places.size(), 0) {
+  std::iota(parents_.begin(), parents_.end(), 0u);
+  link_faces();
+  forget();
+}
+
+void MeshCollapser::link_faces() {
+  next_.resize(3 * mesh_.faces.size());
+  for (std::uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t corner = 3 * f + k;
+      next_[corner] = std::exchange(first_[mesh_.faces[f].places[k]], corner);
+    }
+  }
+  for (std::uint32_t place = 0; place < mesh_.places.size(); ++place) {
+    several_[place] = has_several_looks(place) ? 1 : 0;
+  }
+}
+
+void MeshCollapser::forget() {
+  queue_ = {};
+  std::fill(quadrics_.begin(), quadrics_.end(), Quadric());
+  for (std::uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+    if (alive_[f] == 0) continue;
+    const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
+    const glm::dvec3 cross = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const double twice = glm::length(cross);
+    if (twice > 0) {
+      const Quadric plane = Quadric::of_plane(cross / twice, t[0], 0.5 * twice);
+      for (const std::uint32_t place : mesh_.faces[f].places) quadrics_[place] += plane;
+    }
+    for (std::uint32_t k = 0; k < 3; ++k) add_border(f, k);
+  }
+}
+
+/// A plane through an edge of one triangle, across it.
+void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k) {
+  const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
+  const std::uint32_t v = at[k];
+  const std::uint32_t w = at[(k + 1) % 3];
+  std::size_t count = 0;
+  around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) { count += a == w || b == w; });
+  if (count != 1) return;
+  borders_[v] = borders_[w] = 1;
+  const glm::dvec3 edge = mesh_.places[w] - mesh_.places[v];
+  const glm::dvec3 third = mesh_.places[at[(k + 2) % 3]] - mesh_.places[v];
+  const glm::dvec3 across = glm::cross(glm::cross(edge, third), edge);
+  const double length = glm::length(across);
+  if (!(length > 0)) return;
+  const Quadric plane =
+      Quadric::of_plane(across / length, mesh_.places[v], kRimWeight * glm::dot(edge, edge));
+  quadrics_[v] += plane;
+  quadrics_[w] += plane;
+}
+
+/// Calls back with each triangle at a place, and the two places that follow it there.
+template <class Callback>
+void MeshCollapser::around(std::uint32_t place, const Callback& callback) {
+  std::uint32_t* link = &first_[place];
+  while (*link != kNoIndex) {
+    const std::uint32_t corner = *link;
+    const std::uint32_t f = corner / 3;
+    if (alive_[f] == 0) {
+      *link = next_[corner];
+      continue;
+    }
+    const auto& places = mesh_.faces[f].places;
+    callback(f, places[(corner + 1) % 3], places[(corner + 2) % 3]);
+    link = &next_[corner];
+  }
+}
+
+std::uint32_t MeshCollapser::place_of(std::uint32_t place) {
+  std::uint32_t root = place;
+  while (parents_[root] != root) root = parents_[root];
+  while (parents_[place] != root) place = std::exchange(parents_[place], root);
+  return root;
+}
+
+std::vector<CollapseFace> MeshCollapser::faces() const {
+  std::vector<CollapseFace> left;
+  left.reserve(alive_count_);
+  for (std::size_t f = 0; f < mesh_.faces.size(); ++f) {
+    if (alive_[f] != 0) left.push_back(mesh_.faces[f]);
+  }
+  return left;
+}
+
+bool MeshCollapser::reduce_to(std::size_t triangles) {
+  bool collapsed = true;
+  while (alive_count_ > triangles) {
+    if (queue_.empty()) {
+      // What was not legal before may be so now.
+      if (!collapsed) return false;
+      collapsed = false;
+      fill_queue();
+      continue;
+    }
+    const Candidate best = queue_.top();
+    queue_.pop();
+    if (best.to_version != versions_[best.to] || best.from_version != versions_[best.from]) {
+      continue;
+    }
+    if (const float price = loss_of(best.to, best.from); price > 0) {
+      if (price <= best.price) {
+        drop(best.to);
+        collapsed = true;
+      } else {
+        queue_.push({price, best.to, best.from, best.to_version, best.from_version});
+      }
+      continue;
+    }
+    const glm::dvec3 point = target_of(best.to, best.from).point;
+    if (folds(best.to, best.from) || turns(best.to, best.from, point)) continue;
+    collapse(best.to, best.from, point);
+    collapsed = true;
+  }
+  return true;
+}
+
+void MeshCollapser::fill_queue() {
+  for (std::uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+    if (alive_[f] == 0) continue;
+    const auto at = mesh_.faces[f].places;
+    // From one of its two triangles; at a border and where they are turned, from any.
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = at[k];
+      const std::uint32_t b = at[(k + 1) % 3];
+      if (a < b || (borders_[a] != 0 && borders_[b] != 0)) push(a, b);
+    }
+  }
+}
+
+void MeshCollapser::push(std::uint32_t a, std::uint32_t b) {
+  const std::uint32_t to = std::min(a, b);
+  const std::uint32_t from = std::max(a, b);
+  const auto price = static_cast<float>(target_of(to, from).price);
+  queue_.push({price, to, from, versions_[to], versions_[from]});
+}
+
+void MeshCollapser::push_around(std::uint32_t place) {
+  ring_.clear();
+  ++mark_;
+  around(place, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
+    for (const std::uint32_t other : {a, b}) {
+      if (std::exchange(marks_[other], mark_) != mark_) ring_.push_back(other);
+    }
+  });
+  for (const std::uint32_t other : ring_) push(place, other);
+}
+
+bool MeshCollapser::has_several_looks(std::uint32_t place) {
+  std::uint32_t seen = kNoIndex;
+  bool several = false;
+  for (std::uint32_t corner = first_[place]; corner != kNoIndex; corner = next_[corner]) {
+    if (alive_[corner / 3] == 0) continue;
+    const std::uint32_t look = mesh_.faces[corner / 3].looks[corner % 3];
+    several = several || (seen != kNoIndex && look != seen);
+    seen = look;
+  }
+  return several;
+}
+
+MeshCollapser::Target MeshCollapser::target_of(std::uint32_t a, std::uint32_t b) {
+  Quadric sum = quadrics_[a];
+  sum += quadrics_[b];
+  const glm::dvec3& pa = mesh_.places[a];
+  const glm::dvec3& pb = mesh_.places[b];
+  const glm::dvec3 middle = 0.5 * (pa + pb);
+  std::array<glm::dvec3, 4> points = {pa, pb, middle};
+  std::size_t count = 3;
+  if (sum.least(points[3])) {
+    const glm::dvec3 off = points[3] - middle;
+    const glm::dvec3 edge = pb - pa;
+    if (glm::dot(off, off) <= kFarthest * kFarthest * glm::dot(edge, edge)) count = 4;
+  }
+  const bool slides = several_[a] != 0 || several_[b] != 0;
+  if (slides) collect(a, b);
+  Target best;
+  best.price = std::numeric_limits<double>::infinity();
+  for (std::size_t i = count; i-- > 0;) {
+    double price = std::max(0.0, sum.at(points[i]));
+    if (slides && price < best.price) price += kSlideWeight * slide_at(points[i]);
+    if (price < best.price) best = {points[i], price};
+    // No other has a lower one.
+    if (i == 3 && !slides) break;
+  }
+  if (sum.area > 0) best.price /= std::sqrt(sum.area);
+  return best;
+}
+
+/// The triangles at two places, with the looks and shades there that become one: those that a
+/// triangle between the places has at both.
+void MeshCollapser::collect(std::uint32_t a, std::uint32_t b) {
+  near_.clear();
+  for (const std::uint32_t place : {a, b}) {
+    around(place, [&](std::uint32_t f, std::uint32_t, std::uint32_t) {
+      const auto& at = mesh_.faces[f].places;
+      NearFace near{f, {}};
+      for (std::size_t k = 0; k < 3; ++k) near.at[k] = at[k] == a || at[k] == b;
+      if (place == b && (at[0] == a || at[1] == a || at[2] == a)) return;
+      near_.push_back(near);
+    });
+  }
+  join(&CollapseFace::looks, looks_);
+  join(&CollapseFace::shades, shades_);
+}
+
+void MeshCollapser::join(std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined) {
+  joined.clear();
+  const auto known = [&](std::uint32_t id) {
+    const bool is = std::any_of(joined.begin(), joined.end(),
+                                [&](const auto& each) { return each.first == id; });
+    if (!is) joined.emplace_back(id, id);
+  };
+  for (const NearFace& near : near_) {
+    const auto& ids = mesh_.faces[near.face].*member;
+    std::uint32_t before = kNoIndex;
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!near.at[k]) continue;
+      known(ids[k]);
+      if (before != kNoIndex) {
+        const std::uint32_t low = std::min(root_of(joined, before), root_of(joined, ids[k]));
+        const std::uint32_t high = std::max(root_of(joined, before), root_of(joined, ids[k]));
+        for (auto& each : joined) each.second = each.second == high ? low : each.second;
+      }
+      before = ids[k];
+    }
+  }
+}
+
+/// Squares of what the pictures slide by at a point, by the areas of the triangles of each look: it
+/// is beyond them by so much. Of collect().
+double MeshCollapser::slide_at(const glm::dvec3& point) {
+  double sum = 0;
+  for (const auto& [look, root] : looks_) {
+    if (look != root) continue;
+    double square = std::numeric_limits<double>::infinity();
+    double area = 0;
+    for (const NearFace& near : near_) {
+      const CollapseFace& face = mesh_.faces[near.face];
+      bool has = false;
+      for (std::size_t k = 0; k < 3; ++k) {
+        has = has || (near.at[k] && root_of(looks_, face.looks[k]) == root);
+      }
+      if (!has) continue;
+      const std::array<glm::dvec3, 3> t = corners_of(mesh_, face);
+      square = std::min(square, distance_square(point, t, square));
+      area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
+    }
+    sum += area * square;
+  }
+  return sum;
+}
+
+/// What it costs that a piece of one or two triangles goes as a whole, as all of it is at one edge:
+/// it is off by its length. 0: there is more.
+float MeshCollapser::loss_of(std::uint32_t a, std::uint32_t b) {
+  double area = 0;
+  double square = 0;
+  bool more = false;
+  for (const std::uint32_t place : {a, b}) {
+    around(place, [&](std::uint32_t f, std::uint32_t c, std::uint32_t d) {
+      const std::uint32_t other = place == a ? b : a;
+      more = more || (c != other && d != other);
+      if (more || place == b) return;
+      const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
+      area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
+      for (std::size_t k = 0; k < 3; ++k) {
+        const glm::dvec3 side = t[(k + 1) % 3] - t[k];
+        square = std::max(square, glm::dot(side, side));
+      }
+    });
+  }
+  constexpr float kLeast = std::numeric_limits<float>::min();
+  return more ? 0.0f : std::max(kLeast, static_cast<float>(std::sqrt(area) * square));
+}
+
+void MeshCollapser::drop(std::uint32_t place) {
+  around(place, [&](std::uint32_t f, std::uint32_t, std::uint32_t) {
+    alive_[f] = 0;
+    --alive_count_;
+  });
+}
+
+/// Have two places other common neighbours than those of the triangles between them? Then the
+/// surface would fold onto itself.
+bool MeshCollapser::folds(std::uint32_t a, std::uint32_t b) {
+  ++mark_;
+  ring_.clear();
+  around(a, [&](std::uint32_t, std::uint32_t c, std::uint32_t d) {
+    marks_[c] = marks_[d] = mark_;
+    if (c != b && d != b) return;
+    const std::uint32_t third = c == b ? d : c;
+    if (std::find(ring_.begin(), ring_.end(), third) == ring_.end()) ring_.push_back(third);
+  });
+  std::size_t common = 0;
+  marks_[b] = 0;
+  around(b, [&](std::uint32_t, std::uint32_t c, std::uint32_t d) {
+    for (const std::uint32_t other : {c, d}) {
+      if (marks_[other] != mark_) continue;
+      marks_[other] = 0;
+      ++common;
+    }
+  });
+  return ring_.empty() || common != ring_.size();
+}
+
+/// Would a triangle that stays turn too far, or lose its area?
+bool MeshCollapser::turns(std::uint32_t a, std::uint32_t b, const glm::dvec3& point) {
+  bool found = false;
+  for (const std::uint32_t place : {a, b}) {
+    const glm::dvec3& from = mesh_.places[place];
+    around(place, [&](std::uint32_t, std::uint32_t c, std::uint32_t d) {
+      if (found || c == a || d == a || c == b || d == b) return;
+      const glm::dvec3& pc = mesh_.places[c];
+      const glm::dvec3& pd = mesh_.places[d];
+      const glm::dvec3 before = glm::cross(pc - from, pd - from);
+      const glm::dvec3 after = glm::cross(pc - point, pd - point);
+      const double dot = glm::dot(before, after);
+      found =
+          !(dot > 0) || dot * dot < kLeastTurn * glm::dot(before, before) * glm::dot(after, after);
+    });
+  }
+  return found;
+}
+
+void MeshCollapser::collapse(std::uint32_t to, std::uint32_t from, const glm::dvec3& point) {
+  collect(to, from);
+  carry_looks(point);
+  carry_shades(point);
+  for (const NearFace& near : near_) {
+    CollapseFace& face = mesh_.faces[near.face];
+    if (near.at[0] + near.at[1] + near.at[2] > 1) {
+      alive_[near.face] = 0;
+      --alive_count_;
+      continue;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!near.at[k]) continue;
+      face.places[k] = to;
+      face.looks[k] = root_of(looks_, face.looks[k]);
+      face.shades[k] = root_of(shades_, face.shades[k]);
+    }
+  }
+  std::uint32_t* end = &first_[to];
+  while (*end != kNoIndex) end = &next_[*end];
+  *end = std::exchange(first_[from], kNoIndex);
+  mesh_.places[to] = point;
+  quadrics_[to] += quadrics_[from];
+  borders_[to] |= borders_[from];
+  if ((several_[to] | several_[from]) != 0) several_[to] = has_several_looks(to) ? 1 : 0;
+  parents_[from] = to;
+  ++versions_[to];
+  ++versions_[from];
+  push_around(to);
+}
+
+namespace {
+
+/// The nearest point of some triangles, and which one it is on.
+struct Nearest {
+  ClosestPoint closest{std::numeric_limits<double>::infinity(), 0, 0};
+  const CollapseFace* face = nullptr;
+
+  void consider(const CollapseMesh& mesh, const CollapseFace& other, const glm::dvec3& point) {
+    const ClosestPoint found = closest_point(point, corners_of(mesh, other));
+    if (found.square < closest.square) *this = {found, &other};
+  }
+  [[nodiscard]] std::array<double, 3> weights() const {
+    return {1 - closest.b - closest.c, closest.b, closest.c};
+  }
+};
+
+}  // namespace
+
+void MeshCollapser::carry_looks(const glm::dvec3& point) {
+  std::vector<std::pair<std::uint32_t, CornerLook>> made;
+  for (const auto& [look, root] : looks_) {
+    if (look != root) continue;
+    Nearest nearest;
+    for (const NearFace& near : near_) {
+      const CollapseFace& face = mesh_.faces[near.face];
+      bool has = false;
+      for (std::size_t k = 0; k < 3; ++k) {
+        has = has || (near.at[k] && root_of(looks_, face.looks[k]) == root);
+      }
+      if (has) nearest.consider(mesh_, face, point);
+    }
+    CornerLook sum;
+    const std::array<double, 3> weights = nearest.weights();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const CornerLook& corner = mesh_.looks[nearest.face->looks[k]];
+      sum.uv += weights[k] * corner.uv;
+      sum.colour += static_cast<float>(weights[k]) * corner.colour;
+    }
+    made.emplace_back(root, sum);
+  }
+  for (const auto& [root, look] : made) mesh_.looks[root] = look;
+}
+
+void MeshCollapser::carry_shades(const glm::dvec3& point) {
+  std::vector<std::pair<std::uint32_t, CornerShade>> made;
+  for (const auto& [shade, root] : shades_) {
+    if (shade != root) continue;
+    Nearest nearest;
+    for (const NearFace& near : near_) {
+      const CollapseFace& face = mesh_.faces[near.face];
+      bool has = false;
+      for (std::size_t k = 0; k < 3; ++k) {
+        has = has || (near.at[k] && root_of(shades_, face.shades[k]) == root);
+      }
+      if (has) nearest.consider(mesh_, face, point);
+    }
+    CornerShade sum;
+    const std::array<double, 3> weights = nearest.weights();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const CornerShade& corner = mesh_.shades[nearest.face->shades[k]];
+      sum.normal += static_cast<float>(weights[k]) * corner.normal;
+      sum.occlusion += static_cast<float>(weights[k]) * corner.occlusion;
+    }
+    const float length = glm::length(sum.normal);
+    sum.normal = length > 0 ? sum.normal / length : mesh_.shades[root].normal;
+    made.emplace_back(root, sum);
+  }
+  for (const auto& [root, shade] : made) mesh_.shades[root] = shade;
+}
+
+}  // namespace modar

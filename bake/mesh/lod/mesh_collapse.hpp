@@ -1,0 +1,135 @@
+// Collapses the edges of a whole mesh, chunks and seams or not. Internal to lod.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <queue>
+#include <utility>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "bake/import/source_model.hpp"
+#include "bake/mesh/lod/quadric.hpp"
+
+namespace modar {
+
+/// What a picture shows at a corner of a triangle: corners at one place share it inside a uv island
+/// of one material.
+struct CornerLook {
+  glm::dvec2 uv{0.0};
+  glm::vec4 colour{0.0f};
+};
+
+/// How a corner is shaded: corners at one place share it where the surface is smooth.
+struct CornerShade {
+  glm::vec3 normal{0.0f};
+  float occlusion = 0.0f;
+};
+
+/// A triangle whose corners are at places, and have looks and shades.
+struct CollapseFace {
+  std::array<std::uint32_t, 3> places{};
+  std::array<std::uint32_t, 3> looks{};
+  std::array<std::uint32_t, 3> shades{};
+  std::uint32_t material = 0;
+};
+
+/// A mesh as collapses see it. A look, and a shade, belongs to one place.
+struct CollapseMesh {
+  std::vector<glm::dvec3> places;
+  std::vector<CornerLook> looks;
+  std::vector<CornerShade> shades;
+  std::vector<CollapseFace> faces;
+};
+
+/// Edge collapses, cheapest first, each to the point where the quadrics of its two ends are least.
+/// Every look and shade goes on to the point of its own island or smooth part that is nearest; what
+/// the picture slides by is part of the price, so seams and borders of materials stay where they
+/// are as long as anything else is cheaper, and hold nothing up for ever. Pieces of two triangles
+/// go as a whole when their size is the cheapest.
+class MeshCollapser {
+ public:
+  explicit MeshCollapser(CollapseMesh mesh);
+
+  /// Collapses until at most so many triangles are left. False: there is no way to so few.
+  bool reduce_to(std::size_t triangles);
+
+  /// Prices by what the mesh is now, no longer by what it was at first: keeps the shape of coarse
+  /// levels better, and costs a look at all that is left.
+  void forget();
+
+  [[nodiscard]] std::size_t triangles() const { return alive_count_; }
+  /// The triangles that are left, in the order in which they came.
+  [[nodiscard]] std::vector<CollapseFace> faces() const;
+  [[nodiscard]] const CollapseMesh& mesh() const { return mesh_; }
+  /// The place that a place has become.
+  std::uint32_t place_of(std::uint32_t place);
+
+ private:
+  /// A collapse of `from` into `to`, as it was when it was priced.
+  struct Candidate {
+    float price = 0;
+    std::uint32_t to = 0;
+    std::uint32_t from = 0;
+    std::uint32_t to_version = 0;
+    std::uint32_t from_version = 0;
+    bool operator<(const Candidate& other) const;  ///< dearer first, as a heap has it
+  };
+  /// Where two ends go, and at which price.
+  struct Target {
+    glm::dvec3 point{0.0};
+    double price = 0;
+  };
+  /// Looks or shades of two places, and that which each becomes.
+  using Joined = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+  template <class Callback>
+  void around(std::uint32_t place, const Callback& callback);
+  void link_faces();
+  void add_border(std::uint32_t f, std::uint32_t k);
+  void fill_queue();
+  void push(std::uint32_t a, std::uint32_t b);
+  void push_around(std::uint32_t place);
+  [[nodiscard]] Target target_of(std::uint32_t a, std::uint32_t b);
+  double slide_at(const glm::dvec3& point);
+  bool has_several_looks(std::uint32_t place);
+  float loss_of(std::uint32_t a, std::uint32_t b);
+  void drop(std::uint32_t place);
+  bool folds(std::uint32_t a, std::uint32_t b);
+  bool turns(std::uint32_t a, std::uint32_t b, const glm::dvec3& point);
+  void collapse(std::uint32_t to, std::uint32_t from, const glm::dvec3& point);
+  void collect(std::uint32_t a, std::uint32_t b);
+  void join(std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined);
+  void carry_looks(const glm::dvec3& point);
+  void carry_shades(const glm::dvec3& point);
+
+  /// A triangle at one of two places, and which of its corners are there.
+  struct NearFace {
+    std::uint32_t face = 0;
+    std::array<bool, 3> at{};
+  };
+
+  CollapseMesh mesh_;
+  std::vector<std::uint8_t> alive_;  // of each face
+  std::size_t alive_count_ = 0;
+  std::vector<std::uint32_t> first_;   // of each place: its first corner
+  std::vector<std::uint32_t> next_;    // of each corner: the place's next one
+  std::vector<Quadric> quadrics_;      // of each place
+  std::vector<std::uint8_t> borders_;  // of each place: 1 on an edge of one triangle
+  std::vector<std::uint32_t> versions_;
+  std::vector<std::uint32_t> parents_;  // of each place: what it went to, or itself
+  std::vector<std::uint8_t> several_;   // of each place: 1 where it has several looks
+  std::vector<std::uint32_t> marks_;
+  std::uint32_t mark_ = 0;
+  std::priority_queue<Candidate> queue_;
+  std::vector<NearFace> near_;
+  Joined looks_;
+  Joined shades_;
+  std::vector<std::uint32_t> ring_;
+};
+
+}  // namespace modar

@@ -1,0 +1,62 @@
+// Sums of squared distances from planes, by which collapses are priced. Internal to lod.
+#pragma once
+
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+namespace modar {
+
+/// Square of the cosine of 60 degrees: no triangle may turn farther in one collapse. Set by hand.
+inline constexpr double kLeastTurn = 0.25;
+/// Weight of the squared length of a rim's edge in the quadrics, beside the areas of triangles:
+/// keeps the outline. Set by hand.
+inline constexpr double kRimWeight = 1.0;
+
+/// Sum of the squared distances from planes, each weighted by its triangle's area (Garland and
+/// Heckbert, "Surface simplification using quadric error metrics", 1997): p^T A p + 2 b p + c.
+struct Quadric {
+  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
+  glm::dvec3 b{0.0};
+  double c = 0;
+  double area = 0;
+
+  /// normal: of unit length.
+  static Quadric of_plane(const glm::dvec3& normal, const glm::dvec3& point, double area) {
+    const glm::dvec3 n = normal * area;
+    const double d = -glm::dot(normal, point);
+    return {n.x * normal.x, n.y * normal.y, n.z * normal.z,
+            n.x * normal.y, n.x * normal.z, n.y * normal.z,
+            n * d,          area * d * d,   area};
+  }
+  void operator+=(const Quadric& q) {
+    xx += q.xx, yy += q.yy, zz += q.zz, xy += q.xy, xz += q.xz, yz += q.yz;
+    b += q.b;
+    c += q.c;
+    area += q.area;
+  }
+  [[nodiscard]] double at(const glm::dvec3& p) const {
+    return p.x * (xx * p.x + 2 * (xy * p.y + xz * p.z + b.x)) +
+           p.y * (yy * p.y + 2 * (yz * p.z + b.y)) + p.z * (zz * p.z + 2 * b.z) + c;
+  }
+  /// The point where it is least; false where the planes are so nearly parallel to a line that
+  /// rounding decides.
+  [[nodiscard]] bool least(glm::dvec3& p) const {
+    /// Of the trace, as a cube.
+    constexpr double kSingular = 1e-8;
+    const double m00 = yy * zz - yz * yz;
+    const double m01 = xz * yz - xy * zz;
+    const double m02 = xy * yz - xz * yy;
+    const double determinant = xx * m00 + xy * m01 + xz * m02;
+    const double trace = xx + yy + zz;
+    if (!(determinant > kSingular * trace * trace * trace)) return false;
+    const double m11 = xx * zz - xz * xz;
+    const double m12 = xy * xz - xx * yz;
+    const double m22 = xx * yy - xy * xy;
+    p = glm::dvec3(m00 * b.x + m01 * b.y + m02 * b.z, m01 * b.x + m11 * b.y + m12 * b.z,
+                   m02 * b.x + m12 * b.y + m22 * b.z) /
+        -determinant;
+    return true;
+  }
+};
+
+}  // namespace modar
