@@ -20,7 +20,7 @@ constexpr double kQuick = 1.15;
 
 /// How often a triangle is quartered before it is cut along those of the other surface. Set by
 /// hand.
-constexpr int kQuartered = 4;
+constexpr int kQuartered = 3;
 
 /// Model space: narrower parts are not cut off. Far above double rounding, far below half floats.
 constexpr double kSliver = 1e-9;
@@ -174,8 +174,9 @@ class Bounder {
 
   /// Raises the bound to hold for a triangle that may be larger than those of the other surface,
   /// where quarters of it, and of these, are each near enough to one triangle: the distance from it
-  /// is convex, so corners tell. near: a triangle that is probably near.
-  bool cover_by_quarters(const std::array<glm::dvec3, 3>& t, std::uint32_t near, int depth = 0) {
+  /// is convex, so corners tell. The smallest are cut along the other surface. near: a triangle
+  /// that is probably near.
+  void cover_by_quarters(const std::array<glm::dvec3, 3>& t, std::uint32_t near, int depth = 0) {
     const std::uint32_t at = to_.walk((t[0] + t[1] + t[2]) / 3.0, near);
     const std::array<glm::dvec3, 3> other = to_.triangle(at);
     const double most = quick_limit() * quick_limit();
@@ -185,15 +186,19 @@ class Bounder {
     }
     if (square <= most) {
       bound_ = std::max(bound_, std::sqrt(square));
-      return true;
+      return;
     }
-    if (depth == kQuartered) return false;
+    if (depth == kQuartered) {
+      Piece whole;
+      for (const glm::dvec3& corner : t) whole.add(corner);
+      return cover(whole, {at, kNoIndex, kNoIndex});
+    }
     const std::array<glm::dvec3, 3> m = {0.5 * (t[0] + t[1]), 0.5 * (t[1] + t[2]),
                                          0.5 * (t[2] + t[0])};
-    return cover_by_quarters(m, at, depth + 1) &&
-           cover_by_quarters({t[0], m[0], m[2]}, at, depth + 1) &&
-           cover_by_quarters({m[0], t[1], m[1]}, at, depth + 1) &&
-           cover_by_quarters({m[2], m[1], t[2]}, at, depth + 1);
+    cover_by_quarters(m, at, depth + 1);
+    cover_by_quarters({t[0], m[0], m[2]}, at, depth + 1);
+    cover_by_quarters({m[0], t[1], m[1]}, at, depth + 1);
+    cover_by_quarters({m[2], m[1], t[2]}, at, depth + 1);
   }
 
   [[nodiscard]] double bound() const { return bound_; }
@@ -422,7 +427,8 @@ double surface_distance(const BasicLevelSurface<Index>& from, BasicLevelSurface<
       continue;
     }
     // Of levels over the same positions, most triangles are as large as those of the other.
-    if (!same_positions && near[0] != kNoIndex && bounder.cover_by_quarters(corners, near[0])) {
+    if (!same_positions && from.triangles() < to.triangles() && near[0] != kNoIndex) {
+      bounder.cover_by_quarters(corners, near[0]);
       continue;
     }
     Piece whole;
