@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace modar {
 namespace {
+
+constexpr double kPi = 3.14159265358979323846;  // older NDKs have no <numbers>
 
 /// First b, then a.
 NodeTurn combined(const NodeTurn& a, const NodeTurn& b) {
@@ -20,7 +21,7 @@ NodeTurn combined(const NodeTurn& a, const NodeTurn& b) {
 }
 
 NodeTurn about(const float (&axis)[3], double degrees) {
-  const double half = degrees * std::numbers::pi / 360.0;
+  const double half = degrees * kPi / 360.0;
   const auto sine = static_cast<float>(std::sin(half));
   return {sine * axis[0], sine * axis[1], sine * axis[2], static_cast<float>(std::cos(half))};
 }

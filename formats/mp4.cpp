@@ -20,7 +20,7 @@ std::uint64_t big_endian(Bytes bytes, std::size_t at, std::size_t count) {
 }
 
 /// A track while its boxes are read.
-struct Track {
+struct Mp4Track {
   char handler[5] = "";
   char codec[5] = "";
   std::uint8_t profile = 0;
@@ -49,7 +49,7 @@ class Mp4Reader {
   }
 
   /// Each box inside `within`, which they fill.
-  bool boxes(Bytes within, int depth, Track* track) {
+  bool boxes(Bytes within, int depth, Mp4Track* track) {
     if (depth > kMostDepth) return refuse(within, "boxes are too deep in each other");
     while (!within.empty()) {
       if (++count_ > kMostBoxes) return refuse(within, "there are too many boxes");
@@ -74,7 +74,7 @@ class Mp4Reader {
     return true;
   }
 
-  bool box(const char* type, Bytes body, int depth, Track* track) {
+  bool box(const char* type, Bytes body, int depth, Mp4Track* track) {
     const auto is = [type](const char* other) { return std::memcmp(type, other, 4) == 0; };
     if (depth == 0) return file_box(type, body);
     if (is("trak"))
@@ -108,7 +108,7 @@ class Mp4Reader {
   }
 
   bool read_track(Bytes body, int depth) {
-    Track track;
+    Mp4Track track;
     if (!boxes(body, depth + 1, &track)) return false;
     const bool video = std::memcmp(track.handler, "vide", 4) == 0;
     if (!video && std::memcmp(track.handler, "soun", 4) != 0) return true;
@@ -127,7 +127,7 @@ class Mp4Reader {
     return true;
   }
 
-  bool read_times(Bytes body, Track& track) {
+  bool read_times(Bytes body, Mp4Track& track) {
     const bool wide = !body.empty() && body[0] == std::byte{1};
     if (body.size() < (wide ? 32u : 20u)) return refuse(body, "a track's times (mdhd) are cut off");
     const std::uint64_t scale = big_endian(body, wide ? 20 : 12, 4);
@@ -138,7 +138,7 @@ class Mp4Reader {
   }
 
   /// The first sample description.
-  bool read_codec(Bytes body, int depth, Track& track) {
+  bool read_codec(Bytes body, int depth, Mp4Track& track) {
     if (body.size() < 16) return refuse(body, "a track's codec (stsd) is cut off");
     const Bytes entry = body.subspan(8);
     const std::uint64_t size = big_endian(entry, 0, 4);

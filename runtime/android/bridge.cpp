@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -43,18 +44,20 @@ struct Gesture {
 /// A bundle with what was made of it. The camera's thread tracks while GL's thread draws.
 struct Session {
   std::mutex tracking;  ///< holds tracker
-  std::mutex drawing;   ///< holds renderer, surfaces, items, gesture
+  std::mutex drawing;   ///< holds renderer, surfaces, actions, events, items, gesture
   // Both guards to write, either to read:
   modar_bundle* bundle = nullptr;                      ///< null once it is closed
   modar_camera camera = modar::sized<modar_camera>();  ///< width 0: not known yet
-  std::vector<modar_scene> scenes;
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
   modar_surface surface = modar::sized<modar_surface>();
   modar_surface drawn_surface =
       modar::sized<modar_surface>();                         ///< how the items lie on the screen,
   modar_camera drawn_camera = modar::sized<modar_camera>();  ///< width 0: nothing drawn yet
+  modar_actions* actions = nullptr;
+  std::vector<modar_event> events;  ///< taps since the last frame, then what is seen in it
   std::vector<modar_item> items;
+  std::size_t item_count = 0;  ///< that were drawn last
   Gesture gesture;
 };
 
@@ -130,11 +133,9 @@ jlong opened(JNIEnv* env, modar_bundle* bundle, const modar_error& error) {
   }
   auto session = std::make_shared<Session>();
   session->bundle = bundle;
-  session->scenes.resize(modar_scene_count(bundle), modar::sized<modar_scene>());
-  for (std::uint32_t i = 0; i < session->scenes.size(); ++i) {
-    modar_scene_at(bundle, i, &session->scenes[i]);
-  }
-  session->items.reserve(session->scenes.size());
+  session->actions = modar_actions_create(bundle, nullptr);
+  session->items.resize(modar_scene_count(bundle) + modar_node_count(bundle) + 1,
+                        modar::sized<modar_item>());
   return sessions().add(std::move(session));
 }
 
@@ -313,28 +314,54 @@ void apply(const Gesture& gesture, float place[16]) {
   }
 }
 
-/// What stands on the patterns that are shown.
+/// Runs the bundle's actions. What they ask for beside what is drawn, this app does not do yet.
+void act(Session& session, const float* poses) {
+  for (std::uint32_t p = 0; p < modar_pattern_count(session.bundle); ++p) {
+    if (poses[p * kPoseFloats + 1] == 0) continue;
+    session.events.push_back(modar::sized<modar_event>());
+    session.events.back().subject = p;
+  }
+  const std::chrono::duration<double> now = std::chrono::steady_clock::now().time_since_epoch();
+  modar_actions_step(session.actions, now.count(), session.events.data(), session.events.size());
+  session.events.clear();
+}
+
+/// Of a view, which has the stretch in it.
+modar_pose pose_of(const float* view) {
+  auto pose = modar::sized<modar_pose>();
+  for (int row = 0; row < 3; ++row, ++view) {
+    const float sign = row == 0 ? 1.0f : -1.0f;  // GL's camera has y up and z backward
+    for (int column = 0; column < 3; ++column) {
+      pose.rotation[3 * row + column] = sign * view[4 * column];
+    }
+    pose.translation[row] = sign * view[12];
+  }
+  return pose;
+}
+
+/// What stands on the patterns that are shown. Gestures move models; pictures belong to their
+/// patterns.
 void place_items(Session& session, const float* poses) {
-  session.items.clear();
+  constexpr float kStill[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  session.item_count = 0;
   const Gesture& gesture = session.gesture;
   const bool moved = gesture.scale != 1 || gesture.turn != 0 || gesture.x != 0 || gesture.y != 0;
-  for (const modar_scene& each : session.scenes) {
-    const float* from = poses + each.pattern * kPoseFloats;
+  for (std::uint32_t p = 0; p < modar_pattern_count(session.bundle); ++p) {
+    const float* from = poses + p * kPoseFloats;
     if (from[1] == 0) continue;
-    // Of the view, which has the stretch in it.
-    auto pose = modar::sized<modar_pose>();
-    for (int row = 0; row < 3; ++row) {
-      const float* view = from + kView + row;
-      const float sign = row == 0 ? 1.0f : -1.0f;  // GL's camera has y up and z backward
-      for (int column = 0; column < 3; ++column) {
-        pose.rotation[3 * row + column] = sign * view[4 * column];
-      }
-      pose.translation[row] = sign * view[12];
+    modar_item* items = session.items.data() + session.item_count;
+    const std::size_t count = modar_actions_items(session.actions, p, kStill, items,
+                                                  session.items.size() - session.item_count);
+    const modar_pose pose = pose_of(from + kView);
+    for (std::size_t i = 0; i < count; ++i) {
+      auto scene = modar::sized<modar_scene>();
+      scene.model = items[i].model;
+      scene.number = items[i].scene;
+      std::memcpy(scene.place, items[i].to_eye, sizeof scene.place);
+      if (moved && scene.number != 0) apply(gesture, scene.place);
+      modar_item_place(&items[i], &scene, &pose);
     }
-    modar_scene scene = each;
-    if (moved) apply(gesture, scene.place);
-    session.items.push_back(modar::sized<modar_item>());
-    modar_item_place(&session.items.back(), &scene, &pose);
+    session.item_count += count;
   }
 }
 
@@ -343,10 +370,11 @@ void draw_items(Session& session, const modar_surface& surface, const modar_came
   session.drawn_surface = surface;
   session.drawn_camera = camera;
   modar_renderer_draw(session.renderer, &surface, picture, &camera, nullptr, session.items.data(),
-                      session.items.size());
+                      session.item_count);
 }
 
 void draw(Session& session, const modar_picture* picture, const float* poses) {
+  act(session, poses);
   place_items(session, poses);
   draw_items(session, session.surface, session.camera, picture);
 }
@@ -360,12 +388,13 @@ void draw_orbit(Session& session, std::uint32_t pattern, double turn, double til
   camera.height = surface.height;
   auto pose = modar::sized<modar_pose>();
   if (modar_orbit(session.bundle, pattern, turn, tilt, zoom, &camera, &pose) == 0) return;
-  session.items.clear();
-  for (const modar_scene& scene : session.scenes) {
-    if (scene.pattern != pattern) continue;
-    session.items.push_back(modar::sized<modar_item>());
-    modar_item_place(&session.items.back(), &scene, &pose);
-  }
+  std::vector<float> poses(modar_pattern_count(session.bundle) * kPoseFloats, 0.0f);
+  poses[pattern * kPoseFloats + 1] = 1;
+  modar_view(&pose, poses.data() + pattern * kPoseFloats + kView);
+  const Gesture before = std::exchange(session.gesture, {});  // of the camera's view
+  act(session, poses.data());
+  place_items(session, poses.data());
+  session.gesture = before;
   draw_items(session, surface, camera, nullptr);
 }
 
@@ -429,6 +458,7 @@ MODAR_NATIVE(void, close)(JNIEnv*, jclass, jlong number) {
   const std::scoped_lock both(session->tracking, session->drawing);
   modar_tracker_destroy(std::exchange(session->tracker, nullptr));
   modar_renderer_destroy(std::exchange(session->renderer, nullptr));
+  modar_actions_destroy(std::exchange(session->actions, nullptr));
   modar_bundle_close(std::exchange(session->bundle, nullptr));
 }
 
@@ -685,10 +715,14 @@ MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) 
                          &frame_x, &frame_y);
   auto hit = modar::sized<modar_hit>();
   if (modar_pick(session->bundle, &session->drawn_camera, frame_x, frame_y, session->items.data(),
-                 session->items.size(), &hit) == 0) {
+                 session->item_count, &hit) == 0) {
     return -1;
   }
-  return static_cast<jint>(session->items[hit.item].model);
+  const modar_item& item = session->items[hit.item];
+  if (item.node != 0) {
+    session->events.push_back({sizeof(modar_event), MODAR_TAP, item.node - 1, hit.material});
+  }
+  return static_cast<jint>(item.model);
 }
 
 MODAR_NATIVE(jlong, gpuBytes)(JNIEnv* env, jclass, jlong number) {
