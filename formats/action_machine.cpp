@@ -33,7 +33,7 @@ ActionMachine::ActionMachine(const BundleView& bundle)
       patterns_(bundle.patterns().size()),
       nodes_(bundle.nodes().size()),
       fired_(bundle.actions().size()) {
-  commands_.reserve(2 * nodes_.size() + fired_.size());
+  commands_.resize(2 * nodes_.size() + fired_.size());
   reset();
 }
 
@@ -45,14 +45,14 @@ void ActionMachine::reset() {
     nodes_[i].shown = (bundle_.nodes()[i].flags & kNodeHidden) == 0;
     nodes_[i].wanted = (bundle_.nodes()[i].flags & kNodePlays) != 0;
   }
-  commands_.clear();
+  command_count_ = 0;
   now_ = 0;
 }
 
 std::span<const SceneCommand> ActionMachine::step(double time_s,
                                                   std::span<const SceneEvent> events) {
   now_ = time_s > now_ ? time_s : now_;
-  commands_.clear();
+  command_count_ = 0;
   for (Node& node : nodes_) node.told = false;
   for (const SceneEvent& event : events) {
     if (event.kind != SceneEvent::Kind::kEnded || event.subject >= nodes_.size()) continue;
@@ -88,7 +88,7 @@ std::span<const SceneCommand> ActionMachine::step(double time_s,
     if (event.kind == SceneEvent::Kind::kTap) tap(event);
   }
   play();
-  return commands_;
+  return {commands_.data(), command_count_};
 }
 
 /// Tells which videos begin or stop.
@@ -98,7 +98,7 @@ void ActionMachine::play() {
     const bool plays = node.wanted && node.shown && patterns_[bundle_.nodes()[i].pattern].present;
     if (plays == node.playing) continue;
     node.playing = plays;
-    commands_.push_back({plays ? ActionCommand::kPlay : ActionCommand::kPause, i, kNone});
+    commands_[command_count_++] = {plays ? ActionCommand::kPlay : ActionCommand::kPause, i, kNone};
   }
 }
 
@@ -116,7 +116,7 @@ void ActionMachine::tap(const SceneEvent& event) {
   if (own) return fire(ActionEvent::kTap, event.subject, event.material);
   if (record.kind != static_cast<std::uint32_t>(NodeKind::kLabel) || node.told) return;
   node.told = true;
-  commands_.push_back({ActionCommand::kText, event.subject, kNone});
+  commands_[command_count_++] = {ActionCommand::kText, event.subject, kNone};
 }
 
 bool ActionMachine::named(const ActionRecord& action, std::uint32_t material) const {
@@ -168,11 +168,11 @@ void ActionMachine::perform(std::uint32_t index) {
       target->turn = index;
       break;
     case ActionCommand::kText:
-      if (!target->told) commands_.push_back({ActionCommand::kText, action.target, index});
+      if (!target->told) commands_[command_count_++] = {ActionCommand::kText, action.target, index};
       target->told = true;
       break;
     case ActionCommand::kLink:
-      commands_.push_back({ActionCommand::kLink, kNone, index});
+      commands_[command_count_++] = {ActionCommand::kLink, kNone, index};
       break;
   }
 }

@@ -2,6 +2,7 @@
 // has to do out. *Nodes and actions* of bundle.md specifies it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -91,7 +92,8 @@ class ActionMachine {
   std::vector<Node> nodes_;
   /// One an action: 1 in the step in which it fires; of delays, since the pattern was found.
   std::vector<std::uint8_t> fired_;
-  std::vector<SceneCommand> commands_;  ///< capacity: all actions, each node twice
+  std::vector<SceneCommand> commands_;  ///< room for all actions, each node twice
+  std::size_t command_count_ = 0;
   double now_ = 0;
 };
 

@@ -287,7 +287,9 @@ void RecordCheck::fault(Rule rule, const void* field, const char* detail) const 
   fault(rule, field, std::string(detail));
 }
 
-void RecordCheck::wrong_number(const void* field, const char* name, double value) const {
+void RecordCheck::check_number(const void* field, const char* name, double value, double low,
+                               double high) const {
+  if (value >= low && value <= high) return;
   fault(Rule::kNumber, field, name + (" is " + number_text(value)));
 }
 

@@ -71,8 +71,7 @@ class RecordCheck {
   template <class T>
   void number(const T& field, const char* name, double low = -std::numeric_limits<T>::max(),
               double high = std::numeric_limits<T>::max()) const {
-    const auto value = static_cast<double>(field);
-    if (!(value >= low && value <= high)) wrong_number(&field, name, value);
+    check_number(&field, name, static_cast<double>(field), low, high);
   }
   template <class T, std::size_t N>
   void numbers(const T (&fields)[N], const char* name, double low = -std::numeric_limits<T>::max(),
@@ -95,7 +94,8 @@ class RecordCheck {
                            std::uint64_t expected, std::uint32_t size, const char* name) const;
 
  private:
-  void wrong_number(const void* field, const char* name, double value) const;
+  void check_number(const void* field, const char* name, double value, double low,
+                    double high) const;
 
   FaultLog& log_;
   const BundleParts& parts_;

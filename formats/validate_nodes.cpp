@@ -106,7 +106,6 @@ void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_
   check.numbers(node.key, "key", 0.0, 1.0);
   check.number(node.reach, "reach", 0.0, 1.0);
   check.numbers(node.place, "place", -kMostSceneNumber, kMostSceneNumber);
-  check.numbers(node.rotation, "rotation");
   check.numbers(node.half_size, "half_size", 0.0, kMostSceneNumber);
   if (log.errors() != before) return;  // its name may be anywhere
   const bool known = node.kind >= static_cast<std::uint32_t>(NodeKind::kModel) &&
@@ -188,7 +187,6 @@ void check_action(const RecordCheck& check, const BundleParts& parts, const Acti
   check.reserved(action.reserved, sizeof(action.reserved));
   check.number(action.seconds, "seconds", 0.0, static_cast<double>(kMostSeconds));
   check.number(action.duration, "duration", 0.0, static_cast<double>(kMostSeconds));
-  check.numbers(action.axis, "axis", -2.0, 2.0);
   check.number(action.degrees, "degrees", -static_cast<double>(kMostDegrees),
                static_cast<double>(kMostDegrees));
   if (log.errors() != before) return;

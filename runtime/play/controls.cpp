@@ -11,8 +11,11 @@
 
 namespace modar {
 Controls::Controls(const BundleView& bundle, bool outline, bool display)
-    : bundle_(bundle), machine_(bundle), outline_(outline), display_(display) {
-  events_.reserve(bundle.patterns().size() + taps_.size());
+    : bundle_(bundle),
+      machine_(std::make_unique<ActionMachine>(bundle)),
+      outline_(outline),
+      display_(display) {
+  events_.resize(bundle.patterns().size() + taps_.size());
 }
 
 void Controls::apply(const UserAct& act) {
@@ -68,7 +71,7 @@ void Controls::apply(const UserAct& act) {
 
 void Controls::load(const BundleView& bundle) {
   bundle_ = bundle;
-  machine_ = ActionMachine(bundle);
+  machine_ = std::make_unique<ActionMachine>(bundle);
   if (model_ != kNone && model_ >= bundle.models().size()) model_ = kNone;
   if (only_pattern_ != kNone && only_pattern_ >= bundle.patterns().size()) only_pattern_ = kNone;
 }
@@ -83,12 +86,17 @@ void Controls::turn_model(int step) {
 
 std::span<const SceneCommand> Controls::act(std::span<const Hysteresis::State> states,
                                             double time_s, std::span<const SceneEvent> taps) {
-  events_.assign(taps.begin(), taps.end());
+  // As many as controls take in a frame, and each pattern.
+  events_.resize(taps_.size() + states.size());
+  std::size_t count = 0;
+  for (const SceneEvent& tap : taps.first(std::min(taps.size(), taps_.size()))) {
+    events_[count++] = tap;
+  }
   for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
     if (!wants(pattern) || !states[pattern].shown) continue;
-    events_.push_back({SceneEvent::Kind::kSeen, pattern, kNone});
+    events_[count++] = {SceneEvent::Kind::kSeen, pattern, kNone};
   }
-  return machine_.step(time_s, events_);
+  return machine_->step(time_s, {events_.data(), count});
 }
 
 std::span<const SceneCommand> Controls::collect(std::span<const Hysteresis::State> states,
@@ -105,7 +113,7 @@ std::span<const SceneCommand> Controls::collect(std::span<const Hysteresis::Stat
   for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
     const Hysteresis::State& state = states[pattern];
     if (!wants(pattern) || !state.shown) continue;
-    add_items(bundle_, machine_, pattern, gl_view(state.pose, state.stretch), items);
+    add_items(bundle_, *machine_, pattern, gl_view(state.pose, state.stretch), items);
   }
   for (DrawItem& item : items) {
     if (item.model != kNone) item.to_eye = glm::scale(item.to_eye, glm::vec3(scale_));

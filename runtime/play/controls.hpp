@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -81,7 +82,7 @@ class Controls {
                                     std::span<const SceneEvent> taps);
 
   BundleView bundle_;
-  ActionMachine machine_;
+  std::unique_ptr<ActionMachine> machine_;
   std::vector<SceneEvent> events_;
   std::array<glm::dvec2, 8> taps_{};  ///< in one frame's time
   std::size_t tap_count_ = 0;

@@ -11,7 +11,7 @@ Result<void> PlanePainter::create(const BundleView& bundle) {
   std::size_t pictures = 0;
   for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) pictures += is_picture(bundle, i);
   if (pictures == 0) return {};
-  planes_.reserve(pictures);
+  planes_.resize(pictures);
   videos_.resize(bundle.nodes().size());
   glGenBuffers(1, &buffer_);
   constexpr const char* kDefines[] = {"", "#define ALPHA_TWIN\n", "#define BESIDE\n",
@@ -56,18 +56,21 @@ void PlanePainter::draw(const BundleView& bundle, const glm::mat4& projection,
                         std::span<const DrawItem> items, const TextureStore& textures,
                         bool see_through, GlState& gl, RenderStats& stats) {
   if (buffer_ == 0) return;
-  planes_.clear();
-  for (std::uint32_t i = 0; i < items.size() && planes_.size() < planes_.capacity(); ++i) {
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < items.size() && count < planes_.size(); ++i) {
     if (!is_picture(bundle, items[i].node)) continue;
     const Program program = program_of(bundle, items[i].node);
     if ((program != kOpaque) != see_through) continue;
     // From far to near; those of one depth, as on one pattern, in the order of the items.
     const Plane plane{-items[i].to_eye[3].z, i, program};
-    auto place = planes_.end();
-    while (place != planes_.begin() && (place - 1)->depth < plane.depth) --place;
-    planes_.insert(place, plane);
+    std::size_t place = count++;
+    for (; place > 0 && planes_[place - 1].depth < plane.depth; --place) {
+      planes_[place] = planes_[place - 1];
+    }
+    planes_[place] = plane;
   }
-  for (const Plane& plane : planes_) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Plane& plane = planes_[i];
     const std::uint32_t node = items[plane.item].node;
     const std::uint32_t texture = picture_texture(bundle, node);
     gl.use_program(programs_[plane.program]);
