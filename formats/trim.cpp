@@ -24,11 +24,11 @@ std::vector<std::byte> bytes_of(std::span<const std::byte> bytes) {
 bool has_member(SectionType type) {
   using enum SectionType;
   constexpr SectionType kMembers[] = {
-      kNames,    kMeta,          kContentSummary, kModels,     kChunks,
-      kLevels,   kMaterials,     kLayouts,        kTextures,   kTextureLevels,
-      kPatterns, kParameterSets, kScenes,         kLights,     kOcclusion,
-      kNodes,    kActions,       kMappedFeatures, kFeatureYml, kShadow,
-      kVertices, kIndices,       kTextureData,    kMedia,      kMediaData, kStandIns, kStandInChunks, kStandInLevels};
+      kNames,      kMeta,     kContentSummary, kModels,        kChunks,      kLevels,
+      kMaterials,  kLayouts,  kTextures,       kTextureLevels, kPatterns,    kParameterSets,
+      kScenes,     kLights,   kOcclusion,      kNodes,         kActions,     kMappedFeatures,
+      kFeatureYml, kShadow,   kVertices,       kIndices,       kTextureData, kMedia,
+      kMediaData,  kStandIns, kStandInChunks,  kStandInLevels};
   return std::find(std::begin(kMembers), std::end(kMembers), type) != std::end(kMembers);
 }
 

@@ -113,7 +113,7 @@ TEST(Bundle, AReaderWithoutStandInsDrawsTheModels) {
   BundleContent content = lit_content();
   add_stand_ins(content);
   Bytes bytes = encode(content);
-  for (const std::uint32_t type : {69u, 68u, 67u}) {
+  for (const std::uint32_t type : {72u, 71u, 67u}) {
     entry_of(bytes, static_cast<SectionType>(type)).type = type + 100;
   }
   rehash(bytes);
