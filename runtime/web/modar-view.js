@@ -2,7 +2,6 @@
 // task, so picture and models never part.
 import { Engine, hasSimd, ModarError, POSE, POSE_FLOATS } from './engine.js';
 import { drawFrame, fitCanvases } from './modar.js';
-import { Videos } from './videos.js';
 
 /** Frames between looks at the room's light, and how wide the copy is that is looked at: reading a picture back is slow. */
 const LIGHT_EVERY = 4;
@@ -47,7 +46,8 @@ export class View extends EventTarget {
   #framesSinceLook = LIGHT_EVERY;
   #redraw = () => {};
   #mirror = false;
-  #videos;
+  /** Of videos.js, which is loaded where a bundle has some. */
+  #videos = { sound: false, held: false, ended: [], play() {}, pause() {}, upload() {}, close() {}, forget() {} };
   #taps = [];
   #drawnAt = 0;
   #handle = 0;
@@ -69,7 +69,10 @@ export class View extends EventTarget {
     view.#engine.open(await bytes);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
     view.#engine.upload(false, fixedLight);
-    view.#videos = new Videos(view.#engine, () => view.#soon());
+    if (view.nodes.some(({ kind }) => kind === 'video')) {
+      const { Videos } = await import('./videos.js');
+      view.#videos = new Videos(view.#engine, () => view.#soon());
+    }
     models.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();  // without this it is never restored
       view.#lost = true;
