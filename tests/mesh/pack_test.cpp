@@ -209,6 +209,27 @@ TEST(Pack, BoxesAndConesAreConservative) {
   }
 }
 
+/// A sliver whose two near corners round to one reaches out of all else and is left out.
+TEST(Pack, BoxesEndWhereTheTrianglesDo) {
+  const PackedMesh mesh = packed(chunked(
+      welded(parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1e-6 0\nv 1.5 1.5 0\nf 1 2 3\nf 2 5 4\n")),
+      65535));
+  ASSERT_EQ(mesh.record.triangle_count, 1u);
+  ASSERT_EQ(mesh.chunks.size(), 1u);
+  glm::vec3 low(9.0f);
+  glm::vec3 high(-9.0f);
+  for_each_triangle(mesh, [&](const ChunkRecord&, const std::array<glm::vec3, 3>& p) {
+    for (const glm::vec3& q : p) {
+      low = glm::min(low, q);
+      high = glm::max(high, q);
+    }
+  });
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(mesh.chunks[0].bounds_min[i], low[i]);
+    EXPECT_EQ(mesh.chunks[0].bounds_max[i], high[i]);
+  }
+}
+
 TEST(Pack, RepeatedTexturesFoldAndStayExact) {
   const std::string shifted =
       "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 100.25 -7.5\nvt 102.75 -7.5\nvt 102.75 -6.25\nf 1/1 2/2 3/3\n";

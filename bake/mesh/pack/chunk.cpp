@@ -311,12 +311,12 @@ glm::dvec3 face_normal(std::span<const glm::vec3> positions, std::span<const std
 ChunkBounds chunk_bounds(std::span<const glm::vec3> positions,
                          std::span<const std::uint16_t> indices) {
   ChunkBounds bounds;
-  if (positions.empty()) return bounds;
-  bounds.low = positions[0];
-  bounds.high = positions[0];
-  for (const glm::vec3& p : positions) {
-    bounds.low = glm::min(bounds.low, p);
-    bounds.high = glm::max(bounds.high, p);
+  if (indices.empty()) return bounds;
+  bounds.low = positions[indices[0]];
+  bounds.high = positions[indices[0]];
+  for (const std::uint16_t v : indices) {
+    bounds.low = glm::min(bounds.low, positions[v]);
+    bounds.high = glm::max(bounds.high, positions[v]);
   }
   glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < indices.size(); i += 3) sum += face_normal(positions, indices, i);

@@ -62,19 +62,9 @@ struct PackedChunk {
   PackErrors errors;
 };
 
-/// Triangles of all levels: the box and the cone must hold for each.
-std::vector<std::uint16_t> all_indices(const Chunk& chunk) {
-  std::vector<std::uint16_t> indices = chunk.indices;
-  for (const ChunkLevel& level : chunk.coarser) {
-    indices.insert(indices.end(), level.indices.begin(), level.indices.end());
-  }
-  return indices;
-}
-
 ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
-                         const std::vector<glm::vec3>& decoded) {
+                         const ChunkBounds& bounds) {
   ChunkRecord record{};
-  const ChunkBounds bounds = chunk_bounds(decoded, all_indices(chunk));
   for (int i = 0; i < 3; ++i) {
     record.bounds_min[i] = bounds.low[i];
     record.bounds_max[i] = bounds.high[i];
@@ -104,7 +94,7 @@ class ChunkPacker {
     bytes_.assign(chunk.vertices.size() * stride_, std::byte{0});
     packer_.pack(chunk, grid, uv, texture_side, bytes_.data(), decoded_);
     out.errors = packer_.errors();
-    out.record = chunk_record(chunk, grid, uv, decoded_);
+    out.record = chunk_record(chunk, grid, uv, chunk_bounds(decoded_, lasting_of_all(chunk)));
     std::vector<std::uint16_t>& finest = out.levels.emplace_back(lasting_triangles(chunk.indices));
     out.collapsed = (chunk.indices.size() - finest.size()) / 3;
     out.level_errors.push_back(0.0);
@@ -139,6 +129,18 @@ class ChunkPacker {
       lasting.insert(lasting.end(), t, t + 3);
     }
     return lasting;
+  }
+
+  /// The triangles of all levels that are written: the box and the cone hold for each, and the box
+  /// for nothing else.
+  [[nodiscard]] std::vector<std::uint16_t> lasting_of_all(const Chunk& chunk) const {
+    std::vector<std::uint16_t> all = lasting_triangles(chunk.indices);
+    for (const ChunkLevel& level : chunk.coarser) {
+      const std::vector<std::uint16_t> coarse = lasting_triangles(level.indices);
+      if (coarse.empty()) break;
+      all.insert(all.end(), coarse.begin(), coarse.end());
+    }
+    return all;
   }
 
   VertexPacker packer_;
