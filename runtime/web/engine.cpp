@@ -52,6 +52,7 @@ struct Engine {
   size_t item_count = 0;  ///< that were drawn last
   modar_actions* actions = nullptr;
   modar_event* events = nullptr;  ///< one a pattern and one a tap
+  GLuint* videos = nullptr;       ///< a node's texture for its video; 0: none
   char text[4096];
 };
 Engine engine;
@@ -154,6 +155,7 @@ EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size) {
   engine.items = new modar_item[items]();
   for (uint32_t i = 0; i < items; ++i) engine.items[i].size = sizeof(modar_item);
   engine.events = new modar_event[modar_pattern_count(engine.bundle) + 1]();
+  engine.videos = new GLuint[modar_node_count(engine.bundle)]();
   engine.actions = modar_actions_create(engine.bundle, &engine.error);
   return engine.actions == nullptr ? engine.error.status : 0;
 }
@@ -417,10 +419,9 @@ EMSCRIPTEN_KEEPALIVE size_t web_media_size(uint32_t node) {
 }
 /// A new texture that a video shows from now on; the page fills it.
 EMSCRIPTEN_KEEPALIVE GLuint web_video_texture(uint32_t node) {
-  GLuint texture = 0;
-  glGenTextures(1, &texture);
-  modar_renderer_set_video(engine.renderer, node, texture);
-  return texture;
+  glGenTextures(1, &engine.videos[node]);
+  modar_renderer_set_video(engine.renderer, node, engine.videos[node]);
+  return engine.videos[node];
 }
 EMSCRIPTEN_KEEPALIVE const char* web_address(uint32_t action) {
   modar_action_address(engine.bundle, action, engine.text, sizeof engine.text);
@@ -451,8 +452,15 @@ EMSCRIPTEN_KEEPALIVE uint32_t web_command(size_t index, int field) {
 EMSCRIPTEN_KEEPALIVE int web_acting() {
   return modar_actions_waiting(engine.actions);
 }
+/// Videos show their posters again.
 EMSCRIPTEN_KEEPALIVE void web_forget_acts() {
   modar_actions_reset(engine.actions);
+  for (uint32_t node = 0; node < modar_node_count(engine.bundle); ++node) {
+    if (engine.videos[node] == 0) continue;
+    modar_renderer_set_video(engine.renderer, node, 0);
+    glDeleteTextures(1, &engine.videos[node]);
+    engine.videos[node] = 0;
+  }
 }
 
 /// What lies under a pixel of the canvas, among what was drawn last: node, and the number of the

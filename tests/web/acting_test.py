@@ -216,6 +216,15 @@ class Acting(ProgramTest):
             if (name === 'video') films.push(made);
             return made;
           };
+          for (const { prototype } of [WebGLRenderingContext, WebGL2RenderingContext]) {
+            const upload = prototype.texImage2D;
+            prototype.texImage2D = function (...given) {
+              upload.apply(this, given);
+              if (!films.includes(given.at(-1))) return;
+              const texture = this.getParameter(this.TEXTURE_BINDING_2D);
+              globalThis.filmTextureIsThere = () => this.isTexture(texture);
+            };
+          }
           document.getElementById('start').click();
         })()""")
         self.browser.wait("globalThis.films?.[0]?.currentTime > 0.2", "the film")
@@ -250,8 +259,9 @@ class Acting(ProgramTest):
             self.browser.wait(f"!films[0].paused && Math.abs(films[0].currentTime - {time}) > 1", "going on")
         self.browser.run(press("sound"))
         self.assertEqual(self.browser.run("[films[0].muted, part('sound').getAttribute('aria-pressed')]"), [False, "true"])
+        self.assertTrue(self.browser.run("filmTextureIsThere()"))
         self.browser.run(press("close"))
-        self.assertTrue(self.browser.run("films[0].paused"))
+        self.assertEqual(self.browser.run("[films[0].paused, filmTextureIsThere()]"), [True, False])
         self.assertEqual(self.browser.errors, [])
 
     def test_without_a_camera(self):
