@@ -479,13 +479,7 @@ class Decimator {
     const glm::dvec3& to = position(u);
     around(v, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) {
       if (found || a == u || b == u) return;
-      const glm::dvec3& pa = position(a);
-      const glm::dvec3& pb = position(b);
-      const glm::dvec3 before = glm::cross(pa - from, pb - from);
-      const glm::dvec3 after = glm::cross(pa - to, pb - to);
-      const double dot = glm::dot(before, after);
-      found =
-          !(dot > 0) || dot * dot < kLeastTurn * glm::dot(before, before) * glm::dot(after, after);
+      found = turns_too_far(position(a), position(b), from, to);
     });
     return found;
   }

@@ -363,13 +363,7 @@ bool MeshCollapser::turns(std::uint32_t a, std::uint32_t b, const glm::dvec3& po
     const glm::dvec3& from = mesh_.places[place];
     around(place, [&](std::uint32_t, std::uint32_t c, std::uint32_t d) {
       if (found || c == a || d == a || c == b || d == b) return;
-      const glm::dvec3& pc = mesh_.places[c];
-      const glm::dvec3& pd = mesh_.places[d];
-      const glm::dvec3 before = glm::cross(pc - from, pd - from);
-      const glm::dvec3 after = glm::cross(pc - point, pd - point);
-      const double dot = glm::dot(before, after);
-      found =
-          !(dot > 0) || dot * dot < kLeastTurn * glm::dot(before, before) * glm::dot(after, after);
+      found = turns_too_far(mesh_.places[c], mesh_.places[d], from, point);
     });
   }
   return found;

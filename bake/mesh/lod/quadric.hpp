@@ -8,6 +8,16 @@ namespace modar {
 
 /// Square of the cosine of 60 degrees: no triangle may turn farther in one collapse. Set by hand.
 inline constexpr double kLeastTurn = 0.25;
+
+/// Does the triangle a, b and `from` turn too far, or lose its area, when `from` goes to `to`?
+inline bool turns_too_far(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& from,
+                          const glm::dvec3& to) {
+  const glm::dvec3 before = glm::cross(a - from, b - from);
+  const glm::dvec3 after = glm::cross(a - to, b - to);
+  const double dot = glm::dot(before, after);
+  return !(dot > 0) || dot * dot < kLeastTurn * glm::dot(before, before) * glm::dot(after, after);
+}
+
 /// Weight of the squared length of a rim's edge in the quadrics, beside the areas of triangles:
 /// keeps the outline. Set by hand.
 inline constexpr double kRimWeight = 1.0;

@@ -94,8 +94,8 @@ class ChunkPacker {
     bytes_.assign(chunk.vertices.size() * stride_, std::byte{0});
     packer_.pack(chunk, grid, uv, texture_side, bytes_.data(), decoded_);
     out.errors = packer_.errors();
-    out.record = chunk_record(chunk, grid, uv, chunk_bounds(decoded_, lasting_of_all(chunk)));
     std::vector<std::uint16_t>& finest = out.levels.emplace_back(lasting_triangles(chunk.indices));
+    out.record = chunk_record(chunk, grid, uv, chunk_bounds(decoded_, with_coarser(finest, chunk)));
     out.collapsed = (chunk.indices.size() - finest.size()) / 3;
     out.level_errors.push_back(0.0);
     const auto order = orderer_.order(bytes_, stride_, finest);
@@ -133,8 +133,8 @@ class ChunkPacker {
 
   /// The triangles of all levels that are written: the box and the cone hold for each, and the box
   /// for nothing else.
-  [[nodiscard]] std::vector<std::uint16_t> lasting_of_all(const Chunk& chunk) const {
-    std::vector<std::uint16_t> all = lasting_triangles(chunk.indices);
+  [[nodiscard]] std::vector<std::uint16_t> with_coarser(std::vector<std::uint16_t> all,
+                                                        const Chunk& chunk) const {
     for (const ChunkLevel& level : chunk.coarser) {
       const std::vector<std::uint16_t> coarse = lasting_triangles(level.indices);
       if (coarse.empty()) break;
