@@ -29,24 +29,12 @@ glm::mat4 from_above() {
   return glm::translate(glm::mat4(1.0f), glm::vec3(0.0f, 0.0f, -4.0f));
 }
 
-Camera camera_above() {
-  Camera camera = default_camera(kSide, kSide);
-  camera.fx = camera.fy = 2.0 * kSide;
-  return camera;
-}
-
 int red(const std::vector<std::uint8_t>& pixels, int x, int y) {
   return pixels[static_cast<std::size_t>(4 * (y * kSide + x))];
 }
 
 void add_pattern_and_scene(BundleContent& content) {
-  PatternRecord pattern{};
-  pattern.name = content.intern("pattern");
-  pattern.width = pattern.height = 64;
-  pattern.half_width = pattern.half_height = 1.0f;
-  pattern.score = -1.0f;
-  content.patterns.push_back(pattern);
-  content.features.emplace_back();
+  add_square_pattern(content);
   SceneRecord scene{};
   scene.scale = 1.0f;
   scene.rotation[3] = 1.0f;
@@ -77,7 +65,7 @@ TEST_F(ContactTest, OcclusionDimsTheLightFromAllAround) {
       options.light->sky[0] = glm::vec3(0.8f);
       renderer->set_options(options);
       const DrawItem item{0, from_above()};
-      const auto pixels = draw(*renderer, camera_above(), {&item, 1});
+      const auto pixels = draw(*renderer, camera_above(kSide), {&item, 1});
       // ES 3 reads 63 as 63 / 127: the middle of both, within both.
       const double light = 0.8 * share;
       EXPECT_NEAR(red(pixels, 16, 16), 200 * (1.05 * std::sqrt(light) - 0.05 * light), 2)
@@ -107,7 +95,7 @@ TEST_F(ContactTest, AShadowDarkensThePictureInItsRectangle) {
   const std::vector<std::uint8_t> white(3 * kSide * kSide, 200);
   const RgbImage background{white.data(), kSide, kSide, 3 * kSide};
   const DrawItem item{0, from_above(), 0, from_above()};
-  const auto pixels = draw(*renderer, camera_above(), {&item, 1}, background);
+  const auto pixels = draw(*renderer, camera_above(kSide), {&item, 1}, background);
   // 2 units are 32 pixels: the rectangle spans columns and rows 8 to 24.
   EXPECT_EQ(red(pixels, 4, 16), 200);
   EXPECT_NEAR(red(pixels, 9, 9), 200 * std::sqrt(64.0 / 255), 2);
@@ -115,7 +103,7 @@ TEST_F(ContactTest, AShadowDarkensThePictureInItsRectangle) {
   EXPECT_EQ(red(pixels, 16, 16), 10) << "the model stands on its shadow";
   // An item of no scene has none.
   const DrawItem alone{0, from_above()};
-  EXPECT_EQ(red(draw(*renderer, camera_above(), {&alone, 1}, background), 9, 9), 200);
+  EXPECT_EQ(red(draw(*renderer, camera_above(kSide), {&alone, 1}, background), 9, 9), 200);
 }
 
 TEST_F(ContactTest, AShadowGoesWithItsModelAndStaysInThePlane) {
@@ -133,7 +121,7 @@ TEST_F(ContactTest, AShadowGoesWithItsModelAndStaysInThePlane) {
   glm::mat4 moved = glm::translate(from_above(), glm::vec3(0.5f, 0.0f, 1.0f));
   moved = glm::scale(moved, glm::vec3(2.0f));
   const DrawItem item{0, moved, 0, from_above()};
-  const auto pixels = draw(*renderer, camera_above(), {&item, 1}, background);
+  const auto pixels = draw(*renderer, camera_above(kSide), {&item, 1}, background);
   // From column 16 to 32, from row 8 to 24: as large as at no height.
   const int dark = static_cast<int>(std::lround(200 * std::sqrt(64.0 / 255)));
   EXPECT_EQ(red(pixels, 14, 16), 200);
@@ -178,12 +166,14 @@ TEST_F(ContactTest, LightFollowsWhatTheCameraShowsOfThePattern) {
   const auto shade = [](double light) { return 200 * (1.05 * std::sqrt(light) - 0.05 * light); };
   options.estimate_light = false;
   renderer->set_options(options);
-  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}, background), 16, 16), shade(0.8), 2);
+  EXPECT_NEAR(red(draw(*renderer, camera_above(kSide), {&item, 1}, background), 16, 16), shade(0.8),
+              2);
   options.estimate_light = true;
   renderer->set_options(options);
-  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}, background), 16, 16), shade(0.36), 4);
+  EXPECT_NEAR(red(draw(*renderer, camera_above(kSide), {&item, 1}, background), 16, 16),
+              shade(0.36), 4);
   // Without a picture, what was seen last holds.
-  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}), 16, 16), shade(0.36), 4);
+  EXPECT_NEAR(red(draw(*renderer, camera_above(kSide), {&item, 1}), 16, 16), shade(0.36), 4);
   // An app that draws the picture itself shows a copy of a quarter of its size.
   const std::unique_ptr<Renderer> other = make_renderer(*bundle.view, probe_gl_caps());
   ASSERT_TRUE(other);
@@ -192,15 +182,15 @@ TEST_F(ContactTest, LightFollowsWhatTheCameraShowsOfThePattern) {
   copy.width = copy.height = kSide / 4;
   copy.planes[0] = dim.data();
   copy.strides[0] = 3 * copy.width;
-  EXPECT_NEAR(red(draw(*other, camera_above(), {&item, 1}), 16, 16), shade(0.8), 2);
-  other->observe(copy, gl_projection(camera_above(), 0.1, 100.0), {&item, 1});
-  EXPECT_NEAR(red(draw(*other, camera_above(), {&item, 1}), 16, 16), shade(0.36), 4);
+  EXPECT_NEAR(red(draw(*other, camera_above(kSide), {&item, 1}), 16, 16), shade(0.8), 2);
+  other->observe(copy, gl_projection(camera_above(kSide), 0.1, 100.0), {&item, 1});
+  EXPECT_NEAR(red(draw(*other, camera_above(kSide), {&item, 1}), 16, 16), shade(0.36), 4);
   // Light that changes is followed within a second.
   const std::vector<std::uint8_t> bright(3 * kSide * kSide, 188);  // sRGB of 1/2
   const RgbImage lit{bright.data(), kSide, kSide, 3 * kSide};
-  draw(*renderer, camera_above(), {&item, 1}, lit);
-  for (int frame = 0; frame < 40; ++frame) draw(*renderer, camera_above(), {&item, 1}, lit);
-  EXPECT_NEAR(red(draw(*renderer, camera_above(), {&item, 1}, lit), 16, 16), shade(1.0), 4);
+  draw(*renderer, camera_above(kSide), {&item, 1}, lit);
+  for (int frame = 0; frame < 40; ++frame) draw(*renderer, camera_above(kSide), {&item, 1}, lit);
+  EXPECT_NEAR(red(draw(*renderer, camera_above(kSide), {&item, 1}, lit), 16, 16), shade(1.0), 4);
 }
 
 TEST_F(ContactTest, AnOccluderShowsThePictureAndHidesTheModel) {
@@ -216,7 +206,7 @@ TEST_F(ContactTest, AnOccluderShowsThePictureAndHidesTheModel) {
   const glm::mat4 nearer = glm::translate(from_above(), glm::vec3(0.0f, 0.0f, 0.5f));
   const std::vector<DrawItem> items = {{0, from_above()}, {1, nearer}};
   for (int frame = 0; frame < 2; ++frame) {  // the masks of the first are not left behind
-    const auto pixels = draw(*renderer, camera_above(), items, background);
+    const auto pixels = draw(*renderer, camera_above(kSide), items, background);
     EXPECT_EQ(red(pixels, 16, 16), 120);
     EXPECT_EQ(red(pixels, 7, 16), 10);
     EXPECT_EQ(red(pixels, 1, 16), 120);
@@ -237,7 +227,7 @@ TEST_F(ContactTest, ThePlaneHidesWhatLiesUnderIt) {
     for (const float height : {-0.3f, 0.3f}) {
       const DrawItem item{0, glm::translate(from_above(), glm::vec3(0.0f, 0.0f, height)), 0,
                           from_above()};
-      const auto pixels = draw(*renderer, camera_above(), {&item, 1});
+      const auto pixels = draw(*renderer, camera_above(kSide), {&item, 1});
       EXPECT_EQ(red(pixels, 16, 16), hides && height < 0 ? 0 : 10) << hides << height;
     }
   }
@@ -258,7 +248,7 @@ TEST_F(ContactTest, GlassHidesNothingThatIsDrawnAfterIt) {
   const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
   ASSERT_TRUE(renderer);
   const DrawItem item{0, from_above()};
-  const auto pixels = draw(*renderer, camera_above(), {&item, 1});
+  const auto pixels = draw(*renderer, camera_above(kSide), {&item, 1});
   EXPECT_NEAR(pixels[4 * (16 * kSide + 16) + 1], 100, 2);
 }
 

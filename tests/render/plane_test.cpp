@@ -36,23 +36,6 @@ void add_picture(BundleContent& content, const char* name, std::uint32_t texture
   content.nodes.push_back(node);
 }
 
-void add_plane_pattern(BundleContent& content) {
-  PatternRecord pattern{};
-  pattern.name = content.intern("pattern");
-  pattern.width = pattern.height = 64;
-  pattern.half_width = pattern.half_height = 1.0f;
-  pattern.score = -1.0f;
-  content.patterns.push_back(pattern);
-  content.features.emplace_back();
-}
-
-/// Looks down onto the plane z = 0, of which the picture shows 2 x 2 units.
-Camera camera_on_plane() {
-  Camera camera = default_camera(kPlaneSide, kPlaneSide);
-  camera.fx = camera.fy = 2.0 * kPlaneSide;
-  return camera;
-}
-
 glm::mat4 over_plane(float z) {
   return glm::translate(glm::mat4(1.0f), glm::vec3(0.0f, 0.0f, z - 4.0f));
 }
@@ -70,7 +53,7 @@ Rgb texel_at(const std::vector<std::uint8_t>& pixels, int x, int y) {
 
 TEST_F(PlaneTest, ShowsItsTexelsWhereItStands) {
   SceneMaker maker;
-  add_plane_pattern(maker.content);
+  add_square_pattern(maker.content);
   add_picture(maker.content, "solid", add_flat(maker, 12, 5, 2, -1));
   add_picture(maker.content, "glass", add_flat(maker, 3, 9, 14, 8));
   NodeRecord& solid = maker.content.nodes[0];
@@ -83,7 +66,7 @@ TEST_F(PlaneTest, ShowsItsTexelsWhereItStands) {
   std::vector<DrawItem> items;
   add_items(*bundle.view, machine, 0, over_plane(0), items);
   ASSERT_EQ(items.size(), 2u);
-  const auto pixels = draw(*renderer, camera_on_plane(), items);
+  const auto pixels = draw(*renderer, camera_above(kPlaneSide), items);
   // By the tables of ETC1: 17 times the four bits, and 2 or 8 of its modifiers.
   const Rgb opaque = texel_at(pixels, 16, 6);
   EXPECT_NEAR(opaque[0], 12 * 17 + 2, 1);
@@ -107,7 +90,7 @@ TEST_F(PlaneTest, ShowsItsTexelsWhereItStands) {
 
 TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
   SceneMaker maker;
-  add_plane_pattern(maker.content);
+  add_square_pattern(maker.content);
   std::vector<Triangle> square(2);
   square[0].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, -0.25, 0}, {0.25, 0.25, 0}};
   square[1].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, 0.25, 0}, {-0.25, 0.25, 0}};
@@ -121,10 +104,10 @@ TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
   const DrawItem model{0, over_plane(0)};
   for (const std::uint32_t node : {0u, 1u}) {
     const DrawItem behind[] = {model, picture_at(node, over_plane(-0.5f))};
-    EXPECT_EQ(texel_at(draw(*renderer, camera_on_plane(), behind), 16, 16), (Rgb{0, 200, 0}))
+    EXPECT_EQ(texel_at(draw(*renderer, camera_above(kPlaneSide), behind), 16, 16), (Rgb{0, 200, 0}))
         << node;
     const DrawItem before[] = {model, picture_at(node, over_plane(0.5f))};
-    const Rgb seen = texel_at(draw(*renderer, camera_on_plane(), before), 16, 16);
+    const Rgb seen = texel_at(draw(*renderer, camera_above(kPlaneSide), before), 16, 16);
     EXPECT_NEAR(seen[1], node == 0 ? 2 : 200 * (1 - 138 / 255.0) + 1, 2) << node;
   }
 }
@@ -155,7 +138,7 @@ TEST_F(PlaneTest, AVideoShowsItsPosterThenTheAppsTexture) {
                       {VideoAlpha::kKey, {0, 0, 0}, {10, 128, 20}}};
   for (const auto& wanted : kCases) {
     SceneMaker maker;
-    add_plane_pattern(maker.content);
+    add_square_pattern(maker.content);
     const std::uint32_t poster = add_flat(maker, 12, 12, 12, -1);
     add_picture(maker.content, "film", 0);
     NodeRecord& node = maker.content.nodes[0];
@@ -177,13 +160,13 @@ TEST_F(PlaneTest, AVideoShowsItsPosterThenTheAppsTexture) {
     ASSERT_NE(renderer, nullptr);
     const DrawItem item = picture_at(0, glm::scale(over_plane(0), glm::vec3(0.5f, 0.5f, 1.0f)));
     if (wanted.alpha == VideoAlpha::kOpaque) {
-      const auto first = draw(*renderer, camera_on_plane(), {&item, 1});
+      const auto first = draw(*renderer, camera_above(kPlaneSide), {&item, 1});
       EXPECT_NEAR(texel_at(first, 12, 16)[0], 12 * 17 + 2, 1);
     }
     const GLuint texture = two_texels(kCases[0].left, kCases[0].right);
     renderer->set_video(0, texture);
     renderer->set_video(7, texture);  // no such node
-    const auto pixels = draw(*renderer, camera_on_plane(), {&item, 1});
+    const auto pixels = draw(*renderer, camera_above(kPlaneSide), {&item, 1});
     for (std::size_t c = 0; c < 3; ++c) {
       EXPECT_NEAR(texel_at(pixels, 12, 16)[c], wanted.left[c], 1.5) << c;
       EXPECT_NEAR(texel_at(pixels, 20, 16)[c], wanted.right[c], 1.5) << c;
@@ -194,7 +177,7 @@ TEST_F(PlaneTest, AVideoShowsItsPosterThenTheAppsTexture) {
 
 TEST_F(PlaneTest, DepthRangeAndPickKnowIt) {
   SceneMaker maker;
-  add_plane_pattern(maker.content);
+  add_square_pattern(maker.content);
   add_picture(maker.content, "solid", add_flat(maker, 12, 5, 2, -1));
   const MappedBundle bundle(maker.content);
   const glm::mat4 flat = glm::scale(over_plane(1), glm::vec3(0.5f, 0.25f, 1.0f));
@@ -202,13 +185,13 @@ TEST_F(PlaneTest, DepthRangeAndPickKnowIt) {
   const DepthRange range = depth_range(*bundle.view, {&item, 1});
   EXPECT_NEAR(range.near_plane, 3 * 0.99, 1e-6);
   EXPECT_NEAR(range.far_plane, 3 * 1.01, 1e-6);
-  const auto found = pick(*bundle.view, camera_on_plane(), {15.5, 15.5}, {&item, 1});
+  const auto found = pick(*bundle.view, camera_above(kPlaneSide), {15.5, 15.5}, {&item, 1});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->material, kNone);
   EXPECT_NEAR(found->distance, 3, 1e-3);
   // At z = 1 the picture shows 1.5 x 1.5 units: 0.25 of them are 5.3 pixels.
-  EXPECT_TRUE(pick(*bundle.view, camera_on_plane(), {15.5, 15.5 + 5}, {&item, 1}));
-  EXPECT_FALSE(pick(*bundle.view, camera_on_plane(), {15.5, 15.5 + 6}, {&item, 1}));
+  EXPECT_TRUE(pick(*bundle.view, camera_above(kPlaneSide), {15.5, 15.5 + 5}, {&item, 1}));
+  EXPECT_FALSE(pick(*bundle.view, camera_above(kPlaneSide), {15.5, 15.5 + 6}, {&item, 1}));
 }
 
 }  // namespace

@@ -279,6 +279,22 @@ RenderOptions flat_light() {
   return options;
 }
 
+void add_square_pattern(BundleContent& content) {
+  PatternRecord pattern{};
+  pattern.name = content.intern("pattern");
+  pattern.width = pattern.height = 64;
+  pattern.half_width = pattern.half_height = 1.0f;
+  pattern.score = -1.0f;
+  content.patterns.push_back(pattern);
+  content.features.emplace_back();
+}
+
+Camera camera_above(int side) {
+  Camera camera = default_camera(side, side);
+  camera.fx = camera.fy = 2.0 * side;
+  return camera;
+}
+
 std::unique_ptr<GlContext> GlTest::context_;
 std::string GlTest::why_none_;
 

@@ -86,6 +86,11 @@ MaterialRecord flat_material();
 /// Light that leaves flat_material() colours as they are.
 RenderOptions flat_light();
 
+/// Adds a pattern of 2 x 2 units, without features.
+void add_square_pattern(BundleContent& content);
+/// Of side x side pixels; 4 units above a plane it shows 2 x 2 units of it.
+Camera camera_above(int side);
+
 /// Each test of the suite draws in one context; skipped where EGL has none.
 class GlTest : public ::testing::Test {
  protected:
