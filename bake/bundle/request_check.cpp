@@ -56,13 +56,9 @@ Result<std::uint32_t> find_by_name(const std::vector<std::string>& names, const 
                                    const char* what) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found != names.end()) return static_cast<std::uint32_t>(found - names.begin());
-  std::string known;
-  for (const std::string& one : names) known += (known.empty() ? "" : ", ") + one;
-  const std::string_view nearest = nearest_name(name, names);
   return fail(ExitCode::kUsage, "bake.scene-unknown", name,
               std::string("the scene names a ") + what + " that is not baked",
-              nearest.empty() ? "name one of: " + (known.empty() ? "(none)" : known)
-                              : "did you mean '" + std::string(nearest) + "'?");
+              cure_of_name(name, names));
 }
 
 Result<void> check_model(const std::string& path) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -64,13 +65,9 @@ Result<Known*> find_node(std::vector<Known>& known, const ActionRequest& action,
     found = &node;
   }
   if (found != nullptr) return found;
-  const std::string_view nearest = nearest_name(name, names);
-  std::string list;
-  for (const std::string& each : names) list += (list.empty() ? "" : ", ") + each;
   return fail(ExitCode::kUsage, "action.unknown", action.where,
               "nothing on '" + action.pattern + "' is named '" + name + "'",
-              nearest.empty() ? "name one of: " + (list.empty() ? "(none)" : list)
-                              : "did you mean '" + std::string(nearest) + "'?");
+              cure_of_name(name, names));
 }
 
 tl::unexpected<Error> cannot(const ActionRequest& action, const std::string& cause,
@@ -244,18 +241,30 @@ class NodeMaker {
       std::copy(request.key.begin(), request.key.end(), node.key);
       node.reach = request.reach;
     }
+    const auto known = media_of_file_.find(request.file);
+    if (known != media_of_file_.end()) {
+      node.subject = known->second;
+      return {};
+    }
+    MODAR_ASSIGN(node.subject, add_media(request.file));
+    media_of_file_.emplace(request.file, node.subject);
+    return {};
+  }
+
+  /// The index of a video file's media: of those whose bytes are the same, where there are some.
+  Result<std::uint32_t> add_media(const std::string& file) {
     const VideoSize most =
         request_.tier == "desktop" ? VideoSize{kMostVideoWidth, kMostVideoHeight} : VideoSize();
-    MODAR_ASSIGN(EncodedVideo video, encode_video(request.file, most));
-    const auto known =
+    MODAR_ASSIGN(EncodedVideo video, encode_video(file, most));
+    const auto same =
         std::find(content_.media_data.begin(), content_.media_data.end(), video.bytes);
-    node.subject = static_cast<std::uint32_t>(known - content_.media_data.begin());
-    if (known != content_.media_data.end()) return {};
+    const auto index = static_cast<std::uint32_t>(same - content_.media_data.begin());
+    if (same != content_.media_data.end()) return index;
     const TemporaryFolder folder;
-    const std::string png = folder.path() + "/" + file_stem(request.file) + ".png";
-    MODAR_TRY(write_poster(request.file, png));
+    const std::string png = folder.path() + "/" + file_stem(file) + ".png";
+    MODAR_TRY(write_poster(file, png));
     MediaRecord media{};
-    media.name = content_.intern(file_name(request.file));
+    media.name = content_.intern(file_name(file));
     media.kind = static_cast<std::uint32_t>(MediaKind::kVideo);
     media.flags = video.info.sound_tracks > 0 ? kMediaSound : 0u;
     media.width = video.info.width;
@@ -264,7 +273,7 @@ class NodeMaker {
     MODAR_ASSIGN(media.poster, add_picture(png, request_.textures, content_, report_));
     content_.media.push_back(media);
     content_.media_data.push_back(std::move(video.bytes));
-    return {};
+    return index;
   }
 
   /// mm: units of the plane in a millimetre. width, height: pixels.
@@ -326,13 +335,9 @@ class NodeMaker {
       names.push_back(content_.names.substr(name.offset, name.length));
     }
     if (std::find(names.begin(), names.end(), action.part) != names.end()) return {};
-    const std::string_view nearest = nearest_name(action.part, names);
-    std::string list;
-    for (const std::string& each : names) list += (list.empty() ? "" : ", ") + each;
-    return fail(
-        ExitCode::kUsage, "action.part", action.where,
-        "the model '" + action.source + "' has no material '" + action.part + "'",
-        nearest.empty() ? "name one of: " + list : "did you mean '" + std::string(nearest) + "'?");
+    return fail(ExitCode::kUsage, "action.part", action.where,
+                "the model '" + action.source + "' has no material '" + action.part + "'",
+                cure_of_name(action.part, names));
   }
 
   const BakeRequest& request_;
@@ -340,6 +345,7 @@ class NodeMaker {
   Report& report_;
   std::vector<Known> known_;
   std::vector<std::pair<std::string, std::string>> groups_;
+  std::map<std::string, std::uint32_t> media_of_file_;  // a file is encoded once
 };
 
 }  // namespace

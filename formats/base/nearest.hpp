@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -37,6 +38,16 @@ std::string_view nearest_name(std::string_view word, const Names& names) {
     nearest = name;
   }
   return nearest;
+}
+
+/// The cure of an error about a name that is none of these.
+template <class Names>
+std::string cure_of_name(std::string_view word, const Names& names) {
+  const std::string_view nearest = nearest_name(word, names);
+  if (!nearest.empty()) return "did you mean '" + std::string(nearest) + "'?";
+  std::string list;
+  for (const std::string_view name : names) list += (list.empty() ? "" : ", ") + std::string(name);
+  return "name one of: " + (list.empty() ? "(none)" : list);
 }
 
 }  // namespace modar

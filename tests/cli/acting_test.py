@@ -162,6 +162,11 @@ class Acting(ProgramTest):
         before = bundle.read_bytes()[at:at + media["bytes"]]
         self.assertEqual(self.bake(scene.replace("film.avi", "film.mp4")).returncode, 0)
         self.assertIn(before, bundle.read_bytes())
+        # Twice on the pattern, once in the bundle.
+        twice = '[[scene.video]]\nfile = "film.mp4"\nname = "other"\nwidth = "20mm"\n'
+        self.assertEqual(self.bake(scene.replace("film.avi", "film.mp4") + twice).returncode, 0)
+        told = json.loads(self.modar("inspect", bundle, "--json").stdout)
+        self.assertEqual((len(told["media"]), [node["media"] for node in told["nodes"]]), (1, [0, 0]))
         (self.folder / "film.mp4").write_bytes(b"no film")
         done = self.bake(scene.replace("film.avi", "film.mp4"))
         self.assertIn("video.decode", done.stderr)
