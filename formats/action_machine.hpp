@@ -20,7 +20,7 @@ struct SceneEvent {
   enum class Kind : std::uint8_t {
     kSeen,  ///< the pattern is on the screen
     kTap,   ///< the visitor tapped a node
-    kEnded  ///< a video that does not loop is at its end
+    kEnded  ///< a video or sound that does not loop is at its end
   };
   Kind kind = Kind::kSeen;
   std::uint32_t subject = 0;       ///< index of the pattern, or of the node
@@ -30,7 +30,7 @@ struct SceneEvent {
 /// What the app has to do; the nodes' own state is asked with shown() and turn_of().
 struct SceneCommand {
   ActionCommand command = ActionCommand::kText;  ///< kPlay, kPause, kText or kLink
-  std::uint32_t node = kNone;                    ///< the video, the label
+  std::uint32_t node = kNone;                    ///< the video or sound, the label
   std::uint32_t action = kNone;                  ///< index of the action; kNone: a label's own
 };
 
@@ -71,7 +71,7 @@ class ActionMachine {
   };
   struct Node {
     bool shown = true;
-    bool wanted = false;         ///< a video is to play while it can be seen
+    bool wanted = false;         ///< a video or sound is to play while its pattern is there
     bool playing = false;        ///< as the app was told
     bool told = false;           ///< its words, in this step
     NodeTurn base;               ///< where its last turn began

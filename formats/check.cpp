@@ -662,7 +662,7 @@ void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes, boo
   check_texture_blocks(log, parts);
   check_patterns(log, parts);
   check_draw_orders(log, parts);
-  check_titles(log, parts);
+  check_node_texts(log, parts);
   check_media_files(log, parts);
 }
 

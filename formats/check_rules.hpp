@@ -48,8 +48,9 @@ struct BufferHashes {
 /// Media files are what their records say, and what every device plays (validate_nodes.cpp).
 void check_media_files(FaultLog& log, const BundleParts& parts);
 
-/// Labels have titles in the same languages (validate_nodes.cpp).
-void check_titles(FaultLog& log, const BundleParts& parts);
+/// Labels have titles and sounds captions, in the same languages each, and captions keep their
+/// grammar (validate_nodes.cpp).
+void check_node_texts(FaultLog& log, const BundleParts& parts);
 
 /// Compares the content summary with the bundle, line by line. Does nothing where there is none.
 void check_summary(FaultLog& log, const BundleParts& parts);

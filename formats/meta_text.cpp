@@ -212,11 +212,12 @@ std::optional<MetaText::Kind> kind_of(std::string_view key) {
   if (key == "text") return MetaText::Kind::kText;
   if (key == "alt") return MetaText::Kind::kAlt;
   if (key == "title") return MetaText::Kind::kTitle;
+  if (key == "captions") return MetaText::Kind::kCaptions;
   return std::nullopt;
 }
 
 /// {"pattern": P, "model": M, "text": {language: words}, "alt": {language: words}}; of a node, N
-/// under "node" has to be there, and titles may be.
+/// under "node" has to be there, and titles and captions may be.
 bool scan_text(JsonScan& scan, bool of_node) {
   bool pattern = false;
   bool node = false;
@@ -228,7 +229,7 @@ bool scan_text(JsonScan& scan, bool of_node) {
       node = node || key == "node";
       return scan.string();
     }
-    if (!kind || (*kind == MetaText::Kind::kTitle && !of_node)) return scan.value();
+    if (!kind || (*kind >= MetaText::Kind::kTitle && !of_node)) return scan.value();
     words = true;
     return scan.object([&](std::string_view) { return scan.string(); });
   });

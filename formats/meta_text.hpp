@@ -28,8 +28,9 @@ std::optional<MetaFault> check_meta_text(std::string_view text);
 struct MetaText {
   enum class Kind : std::uint8_t {
     kText,
-    kAlt,   ///< says what is seen, for screen readers
-    kTitle  ///< of a node
+    kAlt,      ///< says what is seen, for screen readers
+    kTitle,    ///< of a node
+    kCaptions  ///< of a node: what is heard, as a WebVTT file; see captions.hpp
   };
   std::string pattern;
   std::string node;  ///< of the member `nodes`

@@ -76,6 +76,7 @@ enum class Rule : std::uint8_t {
   kTrackerRecord,
   kContentSummary,
   kMediaFile,
+  kCaptions,
   kVertexPadding,
   kVertexOcclusion,
   kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV
@@ -85,6 +86,8 @@ enum class Rule : std::uint8_t {
   kEmptyLevel,
   kNoContent,
   kNodeText,
+  kCaptionsMissing,
+  kMediaFlashes,
   kUnknownSection,
   kCount
 };

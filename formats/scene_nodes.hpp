@@ -1,5 +1,5 @@
 // What stands on a pattern beside plain models, and what happens to it: named nodes (models,
-// planes, labels) and actions. action_machine.hpp runs them.
+// planes, labels, sounds) and actions. action_machine.hpp runs them.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +20,7 @@ enum class NodeKind : std::uint32_t {
   kPicture = 2,  ///< a rectangle that shows a texture
   kLabel = 3,    ///< a point with a mark, and words in the meta text
   kVideo = 4,    ///< a rectangle that shows a video
+  kSound = 5,    ///< is heard, not seen
 };
 
 /// Where a video is seen through.
@@ -29,17 +30,17 @@ enum class VideoAlpha : std::uint32_t {
   kKey = 2,     ///< where it has a colour near the key
 };
 
-enum class MediaKind : std::uint32_t { kVideo = 1 };
+enum class MediaKind : std::uint32_t { kVideo = 1, kSound = 2 };
 
 /// A file that apps decode. Its bytes are in the kMediaData section.
 struct MediaRecord {
   NameRef name;
   std::uint32_t kind;   ///< MediaKind
   std::uint32_t flags;  ///< MediaFlags
-  std::uint32_t width;  ///< pixels
+  std::uint32_t width;  ///< pixels; of a sound 0
   std::uint32_t height;
   float seconds;
-  std::uint32_t poster;  ///< index of the texture that shows its first picture
+  std::uint32_t poster;  ///< index of the texture that shows its first picture; of a sound kNone
   std::uint32_t reserved[4];
 };
 static_assert(sizeof(MediaRecord) == 48);
@@ -51,8 +52,8 @@ struct NodeRecord {
   NameRef name;  ///< not empty; no other node of the pattern has it
   std::uint32_t pattern;
   std::uint32_t kind;     ///< NodeKind
-  std::uint32_t subject;  ///< index of a model's scene, a picture's texture, a video's record; else
-                          ///< kNone
+  std::uint32_t subject;  ///< index of a model's scene, a picture's texture, the record of a video
+                          ///< or sound; else kNone
   std::uint32_t flags;    ///< NodeFlags
   std::uint32_t group;    ///< nodes of a pattern with one group are variants; 0: none
   float place[3];         ///< pattern units: a plane's middle, a label's point; of a model 0
@@ -68,6 +69,11 @@ static_assert(sizeof(NodeRecord) == 96);
 
 constexpr bool kind_is(const NodeRecord& node, NodeKind kind) {
   return node.kind == static_cast<std::uint32_t>(kind);
+}
+
+/// Has a file that is played.
+constexpr bool plays_media(const NodeRecord& node) {
+  return kind_is(node, NodeKind::kVideo) || kind_is(node, NodeKind::kSound);
 }
 
 enum class ActionEvent : std::uint32_t { kFound = 1, kLost = 2, kTap = 3, kAfter = 4 };

@@ -113,12 +113,13 @@ enum TextureFlags : std::uint32_t {
 
 enum NodeFlags : std::uint32_t {
   kNodeHidden = 1,  ///< until an action shows it
-  kNodePlays = 2,   ///< a video plays from when its pattern is found
-  kNodeLoops = 4,   ///< a video begins again where it ends
+  kNodePlays = 2,   ///< a video or sound plays from when its pattern is found
+  kNodeLoops = 4,   ///< a video or sound begins again where it ends
 };
 
 enum MediaFlags : std::uint32_t {
-  kMediaSound = 1,  ///< it has a sound track
+  kMediaSound = 1,    ///< it has a sound track
+  kMediaFlashes = 2,  ///< a quarter of it flashes more than three times in a second (WCAG 2.3.1)
 };
 
 /// A bit of the `flags` of a record.
@@ -140,6 +141,7 @@ inline constexpr FlagInfo kFlags[] = {
     {"NodeRecord", kNodePlays, 0},
     {"NodeRecord", kNodeLoops, 0},
     {"MediaRecord", kMediaSound, 0},
+    {"MediaRecord", kMediaFlashes, 0},
 };
 
 /// All flags that a record can have.

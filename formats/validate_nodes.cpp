@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <string>
 #include <string_view>
 
+#include "formats/captions.hpp"
 #include "formats/check_rules.hpp"
 #include "formats/meta_text.hpp"
 #include "formats/mp4.hpp"
@@ -32,6 +34,11 @@ bool zero(const float (&parts)[N]) {
   return std::all_of(std::begin(parts), std::end(parts), [](float part) { return part == 0.0f; });
 }
 
+bool plays(const BundleParts& parts, const NodeRecord& node, MediaKind kind) {
+  return node.subject < parts.media.size() &&
+         parts.media[node.subject].kind == static_cast<std::uint32_t>(kind);
+}
+
 /// The fields of its kind; those of others are 0.
 bool fits_kind(const BundleParts& parts, const NodeRecord& node) {
   const bool no_size = zero(node.half_size);
@@ -44,8 +51,12 @@ bool fits_kind(const BundleParts& parts, const NodeRecord& node) {
       return node.subject < parts.textures.size() && node.mark.length == 0 &&
              node.half_size[0] > 0.0f && node.half_size[1] > 0.0f;
     case NodeKind::kVideo:
-      return node.subject < parts.media.size() && node.mark.length == 0 &&
+      return plays(parts, node, MediaKind::kVideo) && node.mark.length == 0 &&
              node.half_size[0] > 0.0f && node.half_size[1] > 0.0f;
+    case NodeKind::kSound:
+      return plays(parts, node, MediaKind::kSound) && node.mark.length == 0 && no_size &&
+             zero(node.place) && node.rotation[3] == 1.0f && node.group == 0 &&
+             (node.flags & kNodeHidden) == 0;
     case NodeKind::kLabel:
       return node.subject == kNone && no_size && node.mark.length > 0 &&
              node.mark.length <= kMostMarkBytes && node.rotation[3] == 1.0f;
@@ -53,11 +64,11 @@ bool fits_kind(const BundleParts& parts, const NodeRecord& node) {
   return false;
 }
 
-/// What only a video has is 0 of others, and a key's numbers without a key.
+/// What only a video or sound has is 0 of others, and a key's numbers without a key.
 bool video_fields_fit(const NodeRecord& node) {
-  const bool video = node.kind == static_cast<std::uint32_t>(NodeKind::kVideo);
   const bool key = node.alpha == static_cast<std::uint32_t>(VideoAlpha::kKey);
-  return (video || (node.alpha == 0 && (node.flags & (kNodePlays | kNodeLoops)) == 0)) &&
+  return (kind_is(node, NodeKind::kVideo) || node.alpha == 0) &&
+         (plays_media(node) || (node.flags & (kNodePlays | kNodeLoops)) == 0) &&
          (key || (zero(node.key) && node.reach == 0.0f));
 }
 
@@ -70,15 +81,19 @@ void check_media(const RecordCheck& check, const BundleParts& parts, std::uint32
   check.reserved(media.reserved, sizeof(media.reserved));
   check.number(media.seconds, "seconds", 0.0, static_cast<double>(kMostSeconds));
   if (log.errors() != before) return;
-  if (media.kind != static_cast<std::uint32_t>(MediaKind::kVideo)) {
+  const bool video = media.kind == static_cast<std::uint32_t>(MediaKind::kVideo);
+  if (!video && media.kind != static_cast<std::uint32_t>(MediaKind::kSound)) {
     if (newer_minor(parts)) return;
     return check.fault(Rule::kEnum, &media.kind, "its kind is not known");
   }
-  const bool sized = std::min(media.width, media.height) >= 1 && media.width <= kMostVideoWidth &&
-                     media.height <= kMostVideoHeight;
-  if (!sized || media.poster >= parts.textures.size() || !(media.seconds > 0.0f) ||
+  const bool seen = std::min(media.width, media.height) >= 1 && media.width <= kMostVideoWidth &&
+                    media.height <= kMostVideoHeight && media.poster < parts.textures.size();
+  const bool heard =
+      media.width == 0 && media.height == 0 && media.poster == kNone && media.flags == kMediaSound;
+  if (!(video ? seen : heard) || !(media.seconds > 0.0f) ||
       find_section(parts.sections, SectionType::kMediaData, index, 0) == nullptr) {
-    check.fault(Rule::kNode, &media.width, "it has no size, data, duration or poster");
+    check.fault(Rule::kNode, &media.width,
+                "its size, data, duration or poster does not fit its kind");
   }
 }
 
@@ -109,7 +124,7 @@ void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_
   check.numbers(node.half_size, "half_size", 0.0, kMostSceneNumber);
   if (log.errors() != before) return;  // its name may be anywhere
   const bool known = node.kind >= static_cast<std::uint32_t>(NodeKind::kModel) &&
-                     node.kind <= static_cast<std::uint32_t>(NodeKind::kVideo) &&
+                     node.kind <= static_cast<std::uint32_t>(NodeKind::kSound) &&
                      node.alpha <= static_cast<std::uint32_t>(VideoAlpha::kKey);
   if (!known && !newer_minor(parts)) {
     return check.fault(Rule::kEnum, &node.kind, "its kind or alpha is not known");
@@ -151,8 +166,8 @@ bool fits_command(const BundleParts& parts, const ActionRecord& action) {
   if (action.target >= parts.nodes.size()) return false;
   const NodeRecord& target = parts.nodes[action.target];
   if (target.pattern != pattern_of(parts, action)) return false;
-  const bool plays = command == ActionCommand::kPlay || command == ActionCommand::kPause;
-  if (plays) return kind_is(target, NodeKind::kVideo);
+  const bool play = command == ActionCommand::kPlay || command == ActionCommand::kPause;
+  if (play || kind_is(target, NodeKind::kSound)) return play && plays_media(target);
   if (command == ActionCommand::kText) return kind_is(target, NodeKind::kLabel);
   if (command == ActionCommand::kNext) return target.group != 0;
   if (command == ActionCommand::kTurn) return !kind_is(target, NodeKind::kLabel);
@@ -233,9 +248,14 @@ void check_media_files(FaultLog& log, const BundleParts& parts) {
   constexpr double kRounding = 0.1;  // seconds: tracks end with a frame each
   for (std::uint32_t i = 0; i < parts.media.size(); ++i) {
     const MediaRecord& media = parts.media[i];
-    if (media.kind != static_cast<std::uint32_t>(MediaKind::kVideo)) continue;
+    const bool video = media.kind == static_cast<std::uint32_t>(MediaKind::kVideo);
+    if (!video && media.kind != static_cast<std::uint32_t>(MediaKind::kSound)) continue;
     const SectionEntry& entry = *find_section(parts.sections, SectionType::kMediaData, i, 0);
-    const std::string where = label(parts, "video", media.name);
+    const std::string where = label(parts, video ? "video" : "sound", media.name);
+    if ((media.flags & kMediaFlashes) != 0) {
+      log.add(Rule::kMediaFlashes, offset_of(parts, &media), where,
+              "it flashes more than three times in a second");
+    }
     Mp4Info info;
     if (const auto fault = view_mp4(section_bytes(parts, entry), info)) {
       log.add(Rule::kMediaFile, entry.offset + fault->offset, where, fault->cause);
@@ -244,11 +264,12 @@ void check_media_files(FaultLog& log, const BundleParts& parts) {
     const bool sound = (media.flags & kMediaSound) != 0;
     const bool same = info.width == media.width && info.height == media.height &&
                       std::fabs(info.seconds - static_cast<double>(media.seconds)) <= kRounding &&
-                      info.sound_tracks == (sound ? 1 : 0) && info.video_tracks == 1;
-    const bool plays = std::string_view(info.video_codec.data()) == "avc1" &&
-                       info.profile == kBaselineProfile && info.index_first &&
-                       (!sound || std::string_view(info.sound_codec.data()) == "mp4a");
-    if (same && plays) continue;
+                      info.sound_tracks == (sound ? 1 : 0) && info.video_tracks == (video ? 1 : 0);
+    const bool fit = (!video || (std::string_view(info.video_codec.data()) == "avc1" &&
+                                 info.profile == kBaselineProfile)) &&
+                     info.index_first &&
+                     (!sound || std::string_view(info.sound_codec.data()) == "mp4a");
+    if (same && fit) continue;
     log.add(Rule::kMediaFile, entry.offset, where,
             std::string(info.video_codec.data()) + " of profile " + std::to_string(info.profile) +
                 ", " + std::to_string(info.width) + " x " + std::to_string(info.height) + ", " +
@@ -258,38 +279,75 @@ void check_media_files(FaultLog& log, const BundleParts& parts) {
   }
 }
 
-void check_titles(FaultLog& log, const BundleParts& parts) {
-  const SectionEntry* entry = find_section(parts.sections, SectionType::kMeta, kNone, 0);
-  if (entry == nullptr || parts.nodes.empty()) return;
-  const auto bytes = section_bytes(parts, *entry);
-  const auto is_label = [](const NodeRecord& node) { return kind_is(node, NodeKind::kLabel); };
-  // Pattern, label and language of each title.
-  std::set<std::array<std::string, 3>> titles;
-  std::set<std::string> languages;
-  visit_node_texts({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                   [&](const MetaText& each) {
-                     if (each.kind != MetaText::Kind::kTitle) return;
-                     titles.insert({each.pattern, each.node, each.language});
-                   });
-  const auto title_of = [&](const NodeRecord& node, const std::string& language) {
+namespace {
+
+/// Pattern, node and language of the texts of a kind.
+using NodeTexts = std::set<std::array<std::string, 3>>;
+
+NodeTexts texts_of(std::string_view meta, MetaText::Kind kind) {
+  NodeTexts texts;
+  visit_node_texts(meta, [&](const MetaText& each) {
+    if (each.kind == kind) texts.insert({each.pattern, each.node, each.language});
+  });
+  return texts;
+}
+
+/// Says which of the nodes that `asked` picks lack a text in a language in which another has one,
+/// and, if `needed`, which have none at all.
+void check_languages(FaultLog& log, const BundleParts& parts, const NodeTexts& texts,
+                     const std::function<bool(const NodeRecord&)>& asked, Rule rule,
+                     const char* what, bool needed) {
+  const auto has = [&](const NodeRecord& node, const std::string& language) {
     const NameRef pattern = parts.patterns[node.pattern].name;
-    return titles.contains(
+    return texts.contains(
         {std::string(text_of(parts, pattern)), std::string(text_of(parts, node.name)), language});
   };
-  for (const auto& title : titles) {
+  std::set<std::string> languages;
+  for (const auto& text : texts) {
     for (std::uint32_t i = 0; i < parts.nodes.size(); ++i) {
-      const NodeRecord& node = parts.nodes[i];
-      if (is_label(node) && title_of(node, title[2])) languages.insert(title[2]);
+      if (asked(parts.nodes[i]) && has(parts.nodes[i], text[2])) languages.insert(text[2]);
     }
   }
   for (std::uint32_t i = 0; i < parts.nodes.size(); ++i) {
     const NodeRecord& node = parts.nodes[i];
+    if (!asked(node)) continue;
+    const std::string where = label(parts, what, node.name);
+    const char* text = rule == Rule::kNodeText ? "title" : "captions";
+    if (needed && languages.empty()) {
+      log.add(rule, offset_of(parts, &node), where, std::string("it has no ") + text);
+    }
     for (const std::string& language : languages) {
-      if (!is_label(node) || title_of(node, language)) continue;
-      log.add(Rule::kNodeText, offset_of(parts, &node), label(parts, "label", node.name),
-              "it has no title in '" + language + "'");
+      if (has(node, language)) continue;
+      log.add(rule, offset_of(parts, &node), where,
+              std::string("it has no ") + text + " in '" + language + "'");
     }
   }
+}
+
+}  // namespace
+
+void check_node_texts(FaultLog& log, const BundleParts& parts) {
+  const SectionEntry* entry = find_section(parts.sections, SectionType::kMeta, kNone, 0);
+  if (parts.nodes.empty()) return;
+  const auto bytes = entry == nullptr ? std::span<const std::byte>() : section_bytes(parts, *entry);
+  const std::string_view meta(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  check_languages(
+      log, parts, texts_of(meta, MetaText::Kind::kTitle),
+      [](const NodeRecord& node) { return kind_is(node, NodeKind::kLabel); }, Rule::kNodeText,
+      "label", false);
+  const auto sounds = [&parts](const NodeRecord& node) {
+    return plays_media(node) && (parts.media[node.subject].flags & kMediaSound) != 0;
+  };
+  check_languages(log, parts, texts_of(meta, MetaText::Kind::kCaptions), sounds,
+                  Rule::kCaptionsMissing, "sound of", true);
+  visit_node_texts(meta, [&](const MetaText& each) {
+    if (each.kind != MetaText::Kind::kCaptions) return;
+    if (const auto fault = check_captions(each.words)) {
+      log.add(Rule::kCaptions, entry->offset,
+              "captions of '" + each.node + "' in '" + each.language + "'",
+              "line " + std::to_string(fault->line) + ": " + fault->cause);
+    }
+  });
 }
 
 }  // namespace modar

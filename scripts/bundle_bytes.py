@@ -243,7 +243,7 @@ class Bundle:
         need(all(isinstance(part, list) and all(isinstance(item, dict) for item in part) for part in lists) and
              isinstance(meta.get("tool", ""), str) and isinstance(meta.get("options", {}), dict), "META_TEXT", 0, "a member")
         for item in meta.get("nodes", []):
-            told = [item[name] for name in ("title", "text", "alt") if name in item]
+            told = [item[name] for name in ("title", "text", "alt", "captions") if name in item]
             need(isinstance(item.get("pattern"), str) and isinstance(item.get("node"), str) and told and
                  all(isinstance(words, dict) and all(isinstance(word, str) for word in words.values()) for words in told),
                  "META_TEXT", 0, "nodes")

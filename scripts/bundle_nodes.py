@@ -4,7 +4,7 @@ import re
 
 from bundle_bytes import NONE, flags_known, need
 
-MODEL, PICTURE, LABEL, VIDEO = 1, 2, 3, 4
+MODEL, PICTURE, LABEL, VIDEO, SOUND = 1, 2, 3, 4, 5
 FOUND, LOST, TAP, AFTER = 1, 2, 3, 4
 PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN = 1, 2, 3, 4, 5, 6, 7, 8, 10
 
@@ -19,20 +19,22 @@ def check_node(bundle, row, taken):
     need(max(map(abs, row["place"])) <= 1e9 and 0 <= min(row["half_size"]) and max(row["half_size"]) <= 1e9,
          "BUNDLE_NUMBER", at, "place or size")
     need(0 <= min(row["key"]) and max(row["key"]) <= 1 and 0 <= row["reach"] <= 1, "BUNDLE_NUMBER", at, "key")
-    known = kind in (MODEL, PICTURE, LABEL, VIDEO) and row["alpha"] <= 2
+    known = kind in (MODEL, PICTURE, LABEL, VIDEO, SOUND) and row["alpha"] <= 2
     need(known or not bundle.strict, "BUNDLE_ENUM", at, f"kind {kind}")
     scenes, subject = bundle.tables["scenes"], row["subject"]
+    media = bundle.tables["media"][subject]["kind"] if subject < len(bundle.tables["media"]) else 0
     still = row["rotation"][3] == 1
     marked = 0 < len(row["mark"].encode()) <= 32
     sized = min(row["half_size"]) > 0
     fits = {MODEL: subject < len(scenes) and scenes[subject]["pattern"] == row["pattern"] and not any(row["place"]) and still,
             PICTURE: subject < len(bundle.tables["textures"]) and sized,
             LABEL: subject == NONE and still and marked,
-            VIDEO: subject < len(bundle.tables["media"]) and sized}
+            VIDEO: media == 1 and sized,
+            SOUND: media == 2 and still and not any(row["place"]) and not row["group"] and not row["flags"] & 1}
     keyed = row["alpha"] == 2 or not any([*row["key"], row["reach"]])
-    of_video = kind == VIDEO or (row["alpha"] == 0 and row["flags"] < 2)
+    of_media = (kind == VIDEO or row["alpha"] == 0) and (kind in (VIDEO, SOUND) or row["flags"] < 2)
     need(row["pattern"] < len(bundle.tables["patterns"]) and
-         (not known or (fits[kind] and (kind == LABEL or not row["mark"]) and (kind in (PICTURE, VIDEO) or not any(row["half_size"])) and keyed and of_video)),
+         (not known or (fits[kind] and (kind == LABEL or not row["mark"]) and (kind in (PICTURE, VIDEO) or not any(row["half_size"])) and keyed and of_media)),
          "BUNDLE_NODE", at)
     keys = {(row["pattern"], row["name"])} | ({(subject,)} if kind == MODEL else set())
     need(unit(row["rotation"]) and row["name"] and not keys & taken, "BUNDLE_NODE", at)
@@ -55,7 +57,8 @@ def check_action(bundle, row):
     else:
         need(row["target"] < len(nodes), "BUNDLE_ACTION", at, "target")
         target = nodes[row["target"]]
-        need(target["pattern"] == source and (command > PAUSE or target["kind"] == VIDEO) and (command != TEXT or target["kind"] == LABEL) and
+        need(target["pattern"] == source and (command > PAUSE or target["kind"] in (VIDEO, SOUND)) and
+             (command <= PAUSE or target["kind"] != SOUND) and (command != TEXT or target["kind"] == LABEL) and
              (command != NEXT or target["group"] > 0) and (command != TURN or target["kind"] != LABEL), "BUNDLE_ACTION", at)
     model = event == TAP and nodes[row["source"]]["kind"] == MODEL
     need((model or not row["part"]) and (command == LINK or not row["address"]) and (event == AFTER or not row["seconds"]) and
@@ -100,7 +103,7 @@ def read_track(data, at, end, track):
                     track.update(profile=data[first + 1] if inner == b"avcC" else track.get("profile"))
 
 
-def check_video(data, row):
+def check_file(data, row):
     order, tracks = [], []
     for kind, begin, end in boxes(data, 0, len(data)):
         order.append(kind)
@@ -113,8 +116,9 @@ def check_video(data, row):
     sound = [track for track in tracks if track.get("handler") == b"soun"]
     need(order[:1] == [b"ftyp"] and b"moov" in order and b"mdat" in order and order.index(b"moov") < order.index(b"mdat"),
          "MEDIA_FILE", 0, "order")
-    need(len(video) == 1 and video[0].get("codec") == b"avc1" and video[0].get("profile") == 66 and
-         video[0]["size"] == [row["width"], row["height"]] and len(sound) == (row["flags"] & 1) and
+    seen = len(video) == 1 and video[0].get("codec") == b"avc1" and video[0].get("profile") == 66 and \
+        video[0]["size"] == [row["width"], row["height"]]
+    need((seen if row["kind"] == 1 else not video) and len(sound) == (row["flags"] & 1) and
          all(track.get("codec") == b"mp4a" for track in sound) and
          abs(max(track["seconds"] for track in video + sound) - row["seconds"]) <= 0.1, "MEDIA_FILE", 0, "what it is")
 
@@ -125,25 +129,54 @@ def check_media(bundle):
         need(kind != 263 or (owner < len(media) and variant == 0), "BUNDLE_SECTION_OWNER", 0)
     need(len(media) <= 1024, "BUNDLE_NODE", 0, "too many")
     for index, row in enumerate(media):
-        flags_known(bundle, row, 1)
+        flags_known(bundle, row, 3)
         need(0 <= row["seconds"] <= 86400, "BUNDLE_NUMBER", row["at"])
-        need(row["kind"] == 1 or not bundle.strict, "BUNDLE_ENUM", row["at"])
-        if row["kind"] == 1:
-            data = bundle.payload.get((263, index, 0))
-            need(1 <= row["width"] <= 1280 and 1 <= row["height"] <= 720 and row["seconds"] > 0 and data is not None and
-                 row["poster"] < len(bundle.tables["textures"]), "BUNDLE_NODE", row["at"])
-            check_video(data, row)
+        need(row["kind"] in (1, 2) or not bundle.strict, "BUNDLE_ENUM", row["at"])
+        if row["kind"] not in (1, 2):
+            continue
+        data = bundle.payload.get((263, index, 0))
+        seen = 1 <= row["width"] <= 1280 and 1 <= row["height"] <= 720 and row["poster"] < len(bundle.tables["textures"])
+        heard = (row["width"], row["height"], row["poster"], row["flags"]) == (0, 0, NONE, 1)
+        need((seen if row["kind"] == 1 else heard) and row["seconds"] > 0 and data is not None, "BUNDLE_NODE", row["at"])
+        check_file(data, row)
+        if row["flags"] & 2:
+            bundle.warnings.append("MEDIA_FLASHES")
 
 
-def check_titles(bundle):
-    """Each label has a title in every language in which one has."""
-    titles = {}
-    for told in json.loads(bundle.payload.get((2, NONE, 0), b"{}")).get("nodes", []):
-        titles.setdefault((told["pattern"], told["node"]), set()).update(told.get("title", {}))
-    labels = [titles.get((bundle.tables["patterns"][row["pattern"]]["name"], row["name"]), set())
-              for row in bundle.tables["nodes"] if row["kind"] == LABEL]
+TIME = r"(?:(\d\d):)?([0-5]\d):([0-5]\d)\.(\d{3})"
+
+
+def check_captions(text):
+    need(len(text.encode()) <= 1 << 18 and "\r" not in text, "CAPTIONS", 0)
+    head, *cues = re.split(r"\n\n", text[:-1] if text.endswith("\n") else text)
+    need(head == "WEBVTT" and cues, "CAPTIONS", 0, "its first line")
+    last = 0
+    for cue in cues:
+        times, *words = cue.split("\n")
+        found = re.fullmatch(TIME + " --> " + TIME + "( .*)?", times)
+        need(found and words and all(words) and "-->" not in "".join(words), "CAPTIONS", 0, cue)
+        begin, end = (((int(h or 0) * 60 + int(m)) * 60 + int(s)) * 1000 + int(ms) for h, m, s, ms in (found.groups()[:4], found.groups()[4:8]))
+        need(last <= begin < end, "CAPTIONS", 0, times)
+        last = begin
+
+
+def check_texts(bundle):
+    """Each label has a title, and what is heard has captions, in every language in which one has."""
+    told = json.loads(bundle.payload.get((2, NONE, 0), b"{}")).get("nodes", [])
+
+    def languages(key, row):
+        name = bundle.tables["patterns"][row["pattern"]]["name"]
+        return set().union(*(each.get(key, {}) for each in told if (each["pattern"], each["node"]) == (name, row["name"])))
+    media = bundle.tables["media"]
+    labels = [languages("title", row) for row in bundle.tables["nodes"] if row["kind"] == LABEL]
+    heard = [languages("captions", row) for row in bundle.tables["nodes"] if row["kind"] in (VIDEO, SOUND) and media[row["subject"]]["flags"] & 1]
     if any(has != set().union(*labels) for has in labels):
         bundle.warnings.append("NODE_TEXT")
+    if any(has != set().union(*heard) or not has for has in heard):
+        bundle.warnings.append("CAPTIONS_MISSING")
+    for each in told:
+        for text in each.get("captions", {}).values():
+            check_captions(text)
 
 
 def check_nodes(bundle):
@@ -155,4 +188,4 @@ def check_nodes(bundle):
         check_node(bundle, row, taken)
     for row in actions:
         check_action(bundle, row)
-    check_titles(bundle)
+    check_texts(bundle)

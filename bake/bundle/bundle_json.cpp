@@ -421,7 +421,7 @@ std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::u
 namespace {
 
 const char* node_kind(const NodeRecord& node) {
-  constexpr const char* kKinds[] = {"model", "picture", "label", "video"};
+  constexpr const char* kKinds[] = {"model", "picture", "label", "video", "sound"};
   return node.kind - 1 < std::size(kKinds) ? kKinds[node.kind - 1] : "unknown";
 }
 
@@ -437,12 +437,12 @@ Json node_json(const BundleView& bundle, std::uint32_t index) {
                {"rotation", Json::list(node.rotation)},
                {"half_size", Json::list(node.half_size)}};
   if (picture) json.set("texture", node.subject);
-  if (node.kind == static_cast<std::uint32_t>(NodeKind::kVideo)) json.set("media", node.subject);
+  if (plays_media(node)) json.set("media", node.subject);
   if (node.mark.length != 0) json.set("mark", bundle.name(node.mark));
   const std::string_view pattern = bundle.name(bundle.patterns()[node.pattern].name);
   Json words = Json::object();
   visit_node_texts(bundle.meta(), [&](const MetaText& each) {
-    constexpr const char* kKeys[] = {"text", "alt", "title"};
+    constexpr const char* kKeys[] = {"text", "alt", "title", "captions"};
     if (each.pattern != pattern || each.node != bundle.name(node.name)) return;
     const char* key = kKeys[static_cast<std::size_t>(each.kind)];
     Json by_language = words.find(key).value_or(Json::object());
@@ -566,12 +566,15 @@ Json bundle_json(const BundleView& bundle) {
   Json media = Json::array();
   for (std::uint32_t m = 0; m < bundle.media().size(); ++m) {
     const MediaRecord& record = bundle.media()[m];
+    const bool video = record.kind == static_cast<std::uint32_t>(MediaKind::kVideo);
     media.push_back({{"name", bundle.name(record.name)},
+                     {"kind", video ? "video" : "sound"},
                      {"width", record.width},
                      {"height", record.height},
                      {"seconds", record.seconds},
                      {"sound", (record.flags & kMediaSound) != 0},
-                     {"poster", record.poster},
+                     {"flashes", (record.flags & kMediaFlashes) != 0},
+                     {"poster", video ? Json(record.poster) : Json()},
                      {"bytes", bundle.media_data(m).size()}});
   }
   return {{"format", {{"major", bundle.header().major}, {"minor", bundle.header().minor}}},

@@ -81,8 +81,11 @@ Result<void> check_command(const ActionRequest& action, const Known& target) {
   const bool label = target.kind == NodeKind::kLabel;
   const bool play =
       action.command == ActionCommand::kPlay || action.command == ActionCommand::kPause;
-  if (play && target.kind != NodeKind::kVideo) {
-    return cannot(action, "is no video", "name one, [[scene.video]]");
+  if (play && target.kind != NodeKind::kVideo && target.kind != NodeKind::kSound) {
+    return cannot(action, "is no video or sound", "name one, [[scene.video]] or [[scene.sound]]");
+  }
+  if (!play && target.kind == NodeKind::kSound) {
+    return cannot(action, "is a sound, which only plays and pauses", "write play or pause");
   }
   if (action.command == ActionCommand::kText && !label) {
     return cannot(action, "has no words to show", "name a label, [[scene.label]]");
@@ -203,6 +206,7 @@ class NodeMaker {
 
   /// Place, and a picture's texture, size and turn.
   Result<void> place_node(const NodeRequest& request, NodeRecord& node) {
+    if (request.kind == NodeKind::kSound) return add_player(request, node);
     const PatternRecord& pattern = content_.patterns[node.pattern];
     if (needs_width(request.place) && !(pattern.width_mm > 0)) {
       Error error = no_width(request.place).value();
@@ -220,7 +224,8 @@ class NodeMaker {
     }
     if (request.kind == NodeKind::kLabel) return {};
     if (request.kind == NodeKind::kVideo) {
-      MODAR_TRY(add_video(request, node));
+      MODAR_TRY(add_player(request, node));
+      set_alpha(request, node);
       const MediaRecord& media = content_.media[node.subject];
       // Beside it is its alpha.
       const double width = media.width / (request.alpha == VideoAlpha::kBeside ? 2.0 : 1.0);
@@ -234,46 +239,61 @@ class NodeMaker {
     return {};
   }
 
-  Result<void> add_video(const NodeRequest& request, NodeRecord& node) {
-    node.flags |= (request.plays ? kNodePlays : 0u) | (request.loops ? kNodeLoops : 0u);
+  static void set_alpha(const NodeRequest& request, NodeRecord& node) {
     node.alpha = static_cast<std::uint32_t>(request.alpha);
-    if (request.alpha == VideoAlpha::kKey) {
-      std::copy(request.key.begin(), request.key.end(), node.key);
-      node.reach = request.reach;
-    }
-    const auto known = media_of_file_.find(request.file);
+    if (request.alpha != VideoAlpha::kKey) return;
+    std::copy(request.key.begin(), request.key.end(), node.key);
+    node.reach = request.reach;
+  }
+
+  /// Of a video or sound: its media, and when it plays.
+  Result<void> add_player(const NodeRequest& request, NodeRecord& node) {
+    node.flags |= (request.plays ? kNodePlays : 0u) | (request.loops ? kNodeLoops : 0u);
+    const std::pair key(request.kind, request.file);
+    const auto known = media_of_file_.find(key);
     if (known != media_of_file_.end()) {
       node.subject = known->second;
       return {};
     }
-    MODAR_ASSIGN(node.subject, add_media(request.file));
-    media_of_file_.emplace(request.file, node.subject);
+    MODAR_ASSIGN(node.subject, add_media(request));
+    media_of_file_.emplace(key, node.subject);
     return {};
   }
 
-  /// The index of a video file's media: of those whose bytes are the same, where there are some.
-  Result<std::uint32_t> add_media(const std::string& file) {
+  /// The index of a file's media: of those whose bytes are the same, where there are some.
+  Result<std::uint32_t> add_media(const NodeRequest& request) {
     const VideoSize most =
         request_.tier == "desktop" ? VideoSize{kMostVideoWidth, kMostVideoHeight} : VideoSize();
-    MODAR_ASSIGN(EncodedVideo video, encode_video(file, most));
+    const bool video = request.kind == NodeKind::kVideo;
+    MODAR_ASSIGN(EncodedMedia encoded,
+                 video ? encode_video(request.file, most) : encode_sound(request.file));
     const auto same =
-        std::find(content_.media_data.begin(), content_.media_data.end(), video.bytes);
+        std::find(content_.media_data.begin(), content_.media_data.end(), encoded.bytes);
     const auto index = static_cast<std::uint32_t>(same - content_.media_data.begin());
     if (same != content_.media_data.end()) return index;
+    MediaRecord media{};
+    media.name = content_.intern(file_name(request.file));
+    media.kind = static_cast<std::uint32_t>(video ? MediaKind::kVideo : MediaKind::kSound);
+    media.flags = encoded.info.sound_tracks > 0 ? kMediaSound : 0u;
+    media.width = encoded.info.width;
+    media.height = encoded.info.height;
+    media.seconds = static_cast<float>(encoded.info.seconds);
+    media.poster = kNone;
+    if (video) MODAR_TRY(look_at_video(request.file, media));
+    content_.media.push_back(media);
+    content_.media_data.push_back(std::move(encoded.bytes));
+    return index;
+  }
+
+  /// Its poster, and whether it flashes.
+  Result<void> look_at_video(const std::string& file, MediaRecord& media) {
     const TemporaryFolder folder;
     const std::string png = folder.path() + "/" + file_stem(file) + ".png";
     MODAR_TRY(write_poster(file, png));
-    MediaRecord media{};
-    media.name = content_.intern(file_name(file));
-    media.kind = static_cast<std::uint32_t>(MediaKind::kVideo);
-    media.flags = video.info.sound_tracks > 0 ? kMediaSound : 0u;
-    media.width = video.info.width;
-    media.height = video.info.height;
-    media.seconds = static_cast<float>(video.info.seconds);
     MODAR_ASSIGN(media.poster, add_picture(png, request_.textures, content_, report_));
-    content_.media.push_back(media);
-    content_.media_data.push_back(std::move(video.bytes));
-    return index;
+    MODAR_ASSIGN(const bool dangerous, flashes(file));
+    if (dangerous) media.flags |= kMediaFlashes;
+    return {};
   }
 
   /// mm: units of the plane in a millimetre. width, height: pixels.
@@ -345,7 +365,8 @@ class NodeMaker {
   Report& report_;
   std::vector<Known> known_;
   std::vector<std::pair<std::string, std::string>> groups_;
-  std::map<std::string, std::uint32_t> media_of_file_;  // a file is encoded once
+  // A file is encoded once.
+  std::map<std::pair<NodeKind, std::string>, std::uint32_t> media_of_file_;
 };
 
 }  // namespace
@@ -357,6 +378,7 @@ Result<void> check_nodes(const BakeRequest& request) {
     if (node.file.empty() || !read.insert(node.file).second) continue;
     if (node.kind == NodeKind::kPicture) MODAR_TRY(read_image(node.file));
     if (node.kind == NodeKind::kVideo) MODAR_TRY(check_video(node.file));
+    if (node.kind == NodeKind::kSound) MODAR_TRY(check_sound(node.file));
   }
   return {};
 }
@@ -370,8 +392,10 @@ Json node_texts(const BakeRequest& request) {
   for (const NodeRequest& node : request.nodes) {
     Json entry = {{"pattern", node.place.pattern}, {"node", node.place.name}};
     bool told = false;
-    for (const auto& [key, words] :
-         {std::pair("title", &node.titles), {"text", &node.texts}, {"alt", &node.alts}}) {
+    for (const auto& [key, words] : {std::pair("title", &node.titles),
+                                     {"text", &node.texts},
+                                     {"alt", &node.alts},
+                                     {"captions", &node.captions}}) {
       if (words->empty()) continue;
       Json by_language = Json::object();
       for (const auto& [language, text] : *words) by_language.set(language, text);

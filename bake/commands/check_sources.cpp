@@ -61,10 +61,9 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
   std::set<std::string> given;  // a light may be a pattern, too
   for (const PatternRequest& pattern : sources.request.patterns) given.insert(pattern.path);
   for (const ProjectScene& scene : project.scenes) {
-    for (NodeRequest node : scene.nodes) {
+    for (const NodeRequest& node : scene.nodes) {
       if (node.file.empty() || !holds(bundle.patterns(), node.place.pattern)) continue;
-      node.file = project.path(node.file);
-      sources.request.nodes.push_back(std::move(node));
+      sources.request.nodes.push_back(project.located(node));
     }
     const std::string light = project.path(scene.request.light);
     if (scene.request.light.empty() || !given.insert(light).second) continue;

@@ -450,12 +450,10 @@ std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
   }
   std::string bundles;
   for (const BundleOutcome& bundle : planned.bundles) bundles += " " + ninja_quoted(bundle.path);
-  std::set<std::string> lights;  // and pictures
+  std::set<std::string> lights;  // and what nodes have
   for (const ProjectScene& scene : project.scenes) {
     if (!scene.request.light.empty()) lights.insert(project.path(scene.request.light));
-    for (const NodeRequest& node : scene.nodes) {
-      if (!node.file.empty()) lights.insert(project.path(node.file));
-    }
+    for (const NodeRequest& node : scene.nodes) add_files(project.located(node), lights);
   }
   text += "build" + bundles + ": bundles" + stamps + " | build.ninja";
   for (const std::string& light : lights) text += " " + ninja_quoted(light);

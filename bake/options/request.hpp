@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -83,13 +84,13 @@ struct SceneRequest {
 /// Words by language: {"en", "The rim"}.
 using Words = std::map<std::string, std::string>;
 
-/// A picture, a video or a label that stands on a pattern.
+/// A picture, a video or a label that stands on a pattern, or a sound.
 struct NodeRequest {
   NodeKind kind = NodeKind::kPicture;
-  std::string file;    ///< of a picture or video
+  std::string file;    ///< of a picture, video or sound
   SceneRequest place;  ///< pattern, name, hidden, group, offset; but for labels size, turn, centred
-  bool plays = true;   ///< a video, from when its pattern is found
-  bool loops = false;  ///< a video
+  bool plays = true;   ///< a video or sound, from when its pattern is found
+  bool loops = false;  ///< the same
   VideoAlpha alpha = VideoAlpha::kOpaque;
   std::array<float, 3> key{};  ///< of VideoAlpha::kKey
   float reach = 0;             ///< the same
@@ -97,8 +98,15 @@ struct NodeRequest {
   Words titles;
   Words texts;
   Words alts;
+  Words captions;     ///< of a video or sound; in a project the files, for the bake what is in them
   std::string where;  ///< for messages: "modar.toml:12:1"
 };
+
+/// The files that a project's node has.
+inline void add_files(const NodeRequest& node, std::set<std::string>& files) {
+  if (!node.file.empty()) files.insert(node.file);
+  for (const auto& [language, file] : node.captions) files.insert(file);
+}
 
 /// What is done on a pattern when something happens. Names are those of nodes, or of models.
 struct ActionRequest {

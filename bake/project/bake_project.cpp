@@ -22,6 +22,7 @@
 #include "bake/project/project.hpp"
 #include "bake/project/settings.hpp"
 #include "bake/terminal.hpp"
+#include "bake/video/encode_video.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "formats/base/parallel.hpp"
 #include "formats/content_summary.hpp"
@@ -301,6 +302,9 @@ class ProjectBake {
     for (const float part : node.key) text += " " + std::to_string(part);
     if (!node.file.empty()) text += node.file + " " + digests_.of(project_.path(node.file));
     for (const auto& [language, words] : node.titles) text += "\ntitle " + language + " " + words;
+    for (const auto& [language, file] : node.captions) {
+      text += "\ncaptions " + language + " " + digests_.of(project_.path(file));
+    }
     return text;
   }
 
@@ -356,7 +360,7 @@ class ProjectBake {
     for (const Target& target : targets_) {
       if (target.fresh) continue;
       BakeRequest described;
-      describe_scenes(target, described);
+      MODAR_TRY(describe_scenes(target, described));
       MODAR_TRY(check_nodes(described));
     }
     return {};
@@ -501,7 +505,7 @@ class ProjectBake {
     MODAR_TRY(apply_settings(settings_in(target), described));
     described.tool_version = options_.tool_version;
     if (!project_.light.empty()) described.light = project_.path(project_.light);
-    describe_scenes(target, described);
+    MODAR_TRY(describe_scenes(target, described));
     if (models.empty() && patterns.empty()) {
       return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
                   "it would contain neither a model nor a pattern", "name existing ones");
@@ -514,10 +518,13 @@ class ProjectBake {
     return write(target, content);
   }
 
-  void describe_scenes(const Target& target, BakeRequest& described) const {
+  Result<void> describe_scenes(const Target& target, BakeRequest& described) const {
     for (const ProjectScene* scene : target.scenes) {
-      for (NodeRequest node : scene->nodes) {
-        if (!node.file.empty()) node.file = project_.path(node.file);
+      for (const NodeRequest& asked : scene->nodes) {
+        NodeRequest node = project_.located(asked);
+        for (auto& [language, captions] : node.captions) {
+          MODAR_ASSIGN(captions, read_captions(captions));
+        }
         described.nodes.push_back(std::move(node));
       }
       described.actions.insert(described.actions.end(), scene->actions.begin(),
@@ -527,6 +534,7 @@ class ProjectBake {
       std::string& light = described.scenes.back().light;
       if (!light.empty()) light = project_.path(light);
     }
+    return {};
   }
 
   static void add_texts(const Target& target, BundleContent& content) {
@@ -689,9 +697,7 @@ class ProjectBake {
     for (const ProjectScene& scene : project_.scenes) {
       if (!options_.only.empty()) continue;
       if (!scene.request.light.empty()) inputs.insert(project_.path(scene.request.light));
-      for (const NodeRequest& node : scene.nodes) {
-        if (!node.file.empty()) inputs.insert(project_.path(node.file));
-      }
+      for (const NodeRequest& node : scene.nodes) add_files(project_.located(node), inputs);
     }
     outcome.inputs.assign(inputs.begin(), inputs.end());
     outcome.diagnostics.insert(outcome.diagnostics.end(), notes_.begin(), notes_.end());

@@ -79,6 +79,8 @@ struct Project {
   ProjectGates gates;
 
   /// A path of the project as the current folder sees it.
+  /// A node whose files are named from where we are.
+  [[nodiscard]] NodeRequest located(NodeRequest node) const;
   [[nodiscard]] std::string path(const std::string& relative) const {
     return relative.starts_with('/') ? relative : folder + relative;
   }

@@ -445,9 +445,9 @@ class ProjectReader {
   Result<void> read_scenes() {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
     for (const TableReader& reader : readers) {
-      MODAR_TRY(reader.allow({"pattern", "model", "scale", "height", "width", "up", "turn",
-                              "offset", "centred", "light", "text", "alt", "name", "hidden",
-                              "group", "picture", "video", "label", "action"}));
+      MODAR_TRY(reader.allow({"pattern", "model",   "scale", "height", "width", "up",    "turn",
+                              "offset",  "centred", "light", "text",   "alt",   "name",  "hidden",
+                              "group",   "picture", "video", "sound",  "label", "action"}));
       ProjectScene scene;
       MODAR_TRY(reader.take("pattern", scene.request.pattern));
       MODAR_TRY(reader.take("model", scene.request.model));
@@ -482,6 +482,8 @@ class ProjectReader {
     for (const TableReader& reader : pictures) MODAR_TRY(read_picture(reader, scene));
     MODAR_ASSIGN(const auto videos, scene_reader.take_tables("video"));
     for (const TableReader& reader : videos) MODAR_TRY(read_video(reader, scene));
+    MODAR_ASSIGN(const auto sounds, scene_reader.take_tables("sound"));
+    for (const TableReader& reader : sounds) MODAR_TRY(read_sound(reader, scene));
     MODAR_ASSIGN(const auto labels, scene_reader.take_tables("label"));
     for (const TableReader& reader : labels) MODAR_TRY(read_label(reader, scene));
     MODAR_ASSIGN(const auto actions, scene_reader.take_tables("action"));
@@ -497,11 +499,10 @@ class ProjectReader {
 
   Result<void> read_video(const TableReader& reader, ProjectScene& scene) {
     MODAR_TRY(reader.allow({"file", "name", "scale", "height", "width", "turn", "offset", "centred",
-                            "hidden", "group", "alt", "play", "loop", "alpha"}));
+                            "hidden", "group", "alt", "play", "loop", "alpha", "captions"}));
     NodeRequest node;
     node.kind = NodeKind::kVideo;
-    MODAR_TRY(reader.take("play", node.plays));
-    MODAR_TRY(reader.take("loop", node.loops));
+    MODAR_TRY(take_playing(reader, node));
     std::string alpha = "none";
     MODAR_TRY(reader.take("alpha", alpha));
     if (const auto read = parse_alpha(alpha, node); !read) {
@@ -511,14 +512,42 @@ class ProjectReader {
     return read_plane(reader, std::move(node), scene);
   }
 
-  /// What pictures and videos have in common.
-  Result<void> read_plane(const TableReader& reader, NodeRequest node, ProjectScene& scene) {
+  Result<void> read_sound(const TableReader& reader, ProjectScene& scene) {
+    MODAR_TRY(reader.allow({"file", "name", "play", "loop", "captions"}));
+    NodeRequest node;
+    node.kind = NodeKind::kSound;
+    MODAR_TRY(take_playing(reader, node));
+    MODAR_TRY(take_node_file(reader, scene, node));
+    scene.nodes.push_back(std::move(node));
+    return {};
+  }
+
+  /// What videos and sounds have in common.
+  Result<void> take_playing(const TableReader& reader, NodeRequest& node) const {
+    MODAR_TRY(reader.take("play", node.plays));
+    MODAR_TRY(reader.take("loop", node.loops));
+    MODAR_TRY(reader.take("captions", node.captions));
+    for (auto& [language, file] : node.captions) {
+      MODAR_TRY(have_file(reader, "captions", file));
+    }
+    return {};
+  }
+
+  /// What all that have a file have in common.
+  Result<void> take_node_file(const TableReader& reader, const ProjectScene& scene,
+                              NodeRequest& node) {
     node.where = reader.at("file");
     node.place.pattern = scene.request.pattern;
     MODAR_TRY(take_file(reader, "file", node.file));
     if (node.file.empty()) return reader.wrong("file", "file = \"map.png\"");
     MODAR_TRY(take_node(reader, node.place));
     if (node.place.name.empty()) node.place.name = file_stem(node.file);
+    return {};
+  }
+
+  /// What pictures and videos have in common.
+  Result<void> read_plane(const TableReader& reader, NodeRequest node, ProjectScene& scene) {
+    MODAR_TRY(take_node_file(reader, scene, node));
     MODAR_TRY(read_placement(reader, node.place));
     MODAR_TRY(reader.take("centred", node.place.centred));
     MODAR_TRY(reader.take("alt", node.alts));
@@ -606,6 +635,11 @@ class ProjectReader {
   /// A file; relative to the project's folder, as models are.
   Result<void> take_file(const TableReader& reader, const char* key, std::string& file) const {
     MODAR_TRY(reader.take(key, file));
+    return have_file(reader, key, file);
+  }
+
+  Result<void> have_file(const TableReader& reader, const char* key,
+                         const std::string& file) const {
     std::error_code error;
     if (!file.empty()) MODAR_TRY(keep_inside(reader, key, file));
     if (file.empty() || fs::is_regular_file(project_.path(file), error)) return {};
@@ -682,6 +716,12 @@ class ProjectReader {
 };
 
 }  // namespace
+
+NodeRequest Project::located(NodeRequest node) const {
+  if (!node.file.empty()) node.file = path(node.file);
+  for (auto& [language, name] : node.captions) name = path(name);
+  return node;
+}
 
 bool Project::may_use(const std::string& name) const {
   if (outside) return true;

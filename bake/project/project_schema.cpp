@@ -44,7 +44,7 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
     "shape": {"type": "string", "pattern": "^(cylinder|cone|box),",
       "description": "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or box,size=120x180x40mm,right=right.png"}}}},
   "scene": {"type": "array", "items": {"type": "object",
-    "description": "Which model, pictures and labels stand on which pattern, and what they do",
+    "description": "Which model, pictures, videos and labels stand on which pattern, what is heard, and what they do",
     "additionalProperties": false, "required": ["pattern"], "properties": {
     "pattern": {"type": "string"},
     "model": {"type": "string", "description": "May be left out where pictures or labels are"},
@@ -56,48 +56,17 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
     "picture": {"type": "array", "items": {"type": "object",
       "description": "Pictures that lie or stand on the pattern", "additionalProperties": false,
       "required": ["file"], "properties": {
-      "file": {"type": "string", "description": "PNG, JPEG, WebP or TIFF, relative to this file"},
-      "name": {"type": "string",
-        "description": "What actions call it; without it, the file's without extension"},
-      "scale": {"type": "number", "exclusiveMinimum": 0, "default": 1,
-        "description": "Its longer side, in longer sides of the pattern"},
-      "width": {"type": "string", "description": "Instead of a scale: \"80mm\""},
-      "height": {"type": "string", "description": "Instead of a scale: \"80mm\""},
-      "turn": {"type": ["number", "array"], "items": {"type": "number"}, "minItems": 3,
-        "maxItems": 3,
-        "description": "Degrees about the axis out of the pattern, or about its x, y and z: [90, 0, 0] stands"},
-      "offset": {"type": ["array", "string"], "items": {"type": "number"}, "minItems": 3,
-        "maxItems": 3, "description": "As of a model"},
-      "centred": {"type": "boolean", "default": false,
-        "description": "Its middle lies in the pattern's plane; else it stands on it"},
-      "hidden": {"type": "boolean", "default": false},
-      "group": {"type": "string"},
-      "alt": {"type": "object", "additionalProperties": {"type": "string"},
-        "description": "What is seen on it, by language"}}}},
+      "file": {"type": "string", "description": "PNG, JPEG, WebP or TIFF, relative to this file"}}}},
     "video": {"type": "array", "items": {"type": "object",
       "description": "Videos that lie or stand on the pattern; FFmpeg makes them H.264 in MP4, 854 x 480 at most (tier desktop: 1280 x 720)",
       "additionalProperties": false, "required": ["file"], "properties": {
-      "file": {"type": "string", "description": "What FFmpeg reads, relative to this file"},
-      "name": {"type": "string",
-        "description": "What actions call it; without it, the file's without extension"},
-      "scale": {"type": "number", "exclusiveMinimum": 0, "default": 1,
-        "description": "Its longer side, in longer sides of the pattern"},
-      "width": {"type": "string", "description": "Instead of a scale: \"80mm\""},
-      "height": {"type": "string", "description": "Instead of a scale: \"80mm\""},
-      "turn": {"type": ["number", "array"], "items": {"type": "number"}, "minItems": 3,
-        "maxItems": 3, "description": "As of a picture"},
-      "offset": {"type": ["array", "string"], "items": {"type": "number"}, "minItems": 3,
-        "maxItems": 3, "description": "As of a model"},
-      "centred": {"type": "boolean", "default": false},
-      "hidden": {"type": "boolean", "default": false},
-      "group": {"type": "string"},
-      "play": {"type": "boolean", "default": true,
-        "description": "From when the pattern is found; else an action plays it"},
-      "loop": {"type": "boolean", "default": false, "description": "It begins again where it ends"},
       "alpha": {"type": "string", "pattern": "^(none|beside|#[0-9a-f]{6})$", "default": "none",
-        "description": "beside: the right half of its pictures is the alpha of the left one; a colour: it is not seen"},
-      "alt": {"type": "object", "additionalProperties": {"type": "string"},
-        "description": "What is seen on it, by language"}}}},
+        "description": "beside: the right half of its pictures is the alpha of the left one; a colour: it is not seen"}}}},
+    "sound": {"type": "array", "items": {"type": "object",
+      "description": "What is heard; FFmpeg makes it AAC in MP4", "additionalProperties": false,
+      "required": ["file"], "properties": {
+      "name": {"type": "string",
+        "description": "What actions call it; without it, the file's without extension"}}}},
     "label": {"type": "array", "items": {"type": "object",
       "description": "Points that say what is there", "additionalProperties": false,
       "properties": {
@@ -162,6 +131,56 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
     "max-bytes": {"type": "integer", "minimum": 0, "description": "Of each file"}}}
 }})json";
 
+/// What pictures and videos have in common.
+constexpr const char* kPlane = R"json({
+  "name": {"type": "string",
+    "description": "What actions call it; without it, the file's without extension"},
+  "scale": {"type": "number", "exclusiveMinimum": 0, "default": 1,
+    "description": "Its longer side, in longer sides of the pattern"},
+  "width": {"type": "string", "description": "Instead of a scale: \"80mm\""},
+  "height": {"type": "string", "description": "Instead of a scale: \"80mm\""},
+  "turn": {"type": ["number", "array"], "items": {"type": "number"}, "minItems": 3, "maxItems": 3,
+    "description": "Degrees about the axis out of the pattern, or about its x, y and z: [90, 0, 0] stands"},
+  "offset": {"type": ["array", "string"], "items": {"type": "number"}, "minItems": 3,
+    "maxItems": 3, "description": "As of a model"},
+  "centred": {"type": "boolean", "default": false,
+    "description": "Its middle lies in the pattern's plane; else it stands on it"},
+  "hidden": {"type": "boolean", "default": false},
+  "group": {"type": "string"},
+  "alt": {"type": "object", "additionalProperties": {"type": "string"},
+    "description": "What is seen on it, by language"}
+})json";
+
+/// What videos and sounds have in common.
+constexpr const char* kPlayed = R"json({
+  "file": {"type": "string", "description": "What FFmpeg reads, relative to this file"},
+  "play": {"type": "boolean", "default": true,
+    "description": "From when the pattern is found; else an action plays it"},
+  "loop": {"type": "boolean", "default": false, "description": "It begins again where it ends"},
+  "captions": {"type": "object", "additionalProperties": {"type": "string"},
+    "description": "Files of what is heard, WebVTT or SubRip, by language: captions.en = \"film.en.vtt\""}
+})json";
+
+/// An object whose member at "a/b", which is there, has another value.
+Json with(Json object, const std::string& path, Json value) {
+  const std::size_t slash = path.find('/');
+  const std::string key = path.substr(0, slash);
+  if (slash != std::string::npos) {
+    value = with(*object.find(key), path.substr(slash + 1), std::move(value));
+  }
+  object.set(key, std::move(value));
+  return object;
+}
+
+/// A scene whose tables of a name have more properties.
+Json with_properties(Json scene, const std::string& table, const char* more) {
+  const std::string path = "items/properties/" + table + "/items/properties";
+  Json properties = *scene.find(path);
+  const Json added = Json::parse(more);
+  for (const std::string& key : added.keys()) properties.set(key, *added.find(key));
+  return with(std::move(scene), path, std::move(properties));
+}
+
 /// What a value of modar.toml is.
 Json schema_of(const BakeOption& option) {
   Json schema = Json::object();
@@ -216,6 +235,10 @@ Json with_options(Json table, const std::string& name) {
 std::string project_schema() {
   Json schema = Json::parse(kTables);
   Json tables = *schema.find("properties");
+  Json scene = *tables.find("scene");
+  for (const char* table : {"picture", "video"}) scene = with_properties(scene, table, kPlane);
+  for (const char* table : {"video", "sound"}) scene = with_properties(scene, table, kPlayed);
+  tables.set("scene", std::move(scene));
   for (const std::string& name : tables.keys()) {
     tables.set(name, with_options(*tables.find(name), name));
   }

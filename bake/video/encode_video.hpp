@@ -1,5 +1,5 @@
-// Videos made fit for phones: H.264 baseline and AAC in MP4, the index in front, through FFmpeg's
-// program.
+// Videos, sounds and captions made fit for phones, through FFmpeg's program: H.264 baseline and AAC
+// in MP4, the index in front, and WebVTT.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,8 @@ struct VideoSize {
   std::uint32_t height = 480;
 };
 
-struct EncodedVideo {
+/// A video, or a sound, which has no pictures.
+struct EncodedMedia {
   std::vector<std::byte> bytes;
   Mp4Info info;
 };
@@ -26,10 +27,21 @@ struct EncodedVideo {
 /// A file that is fit already, as it is; else encoded anew, with its sides and sound, deterministic
 /// for one version of FFmpeg. Errors: kIo "io.open"; kUnsupported "video.ffmpeg" where the program
 /// or its encoder libx264 is missing; kInvalidInput "video.decode" for what it reads no video from.
-Result<EncodedVideo> encode_video(const std::string& path, const VideoSize& most);
+Result<EncodedMedia> encode_video(const std::string& path, const VideoSize& most);
+/// The same of the first sound track of a file, without its pictures.
+Result<EncodedMedia> encode_sound(const std::string& path);
 
 /// Whether FFmpeg finds a video there: cheap, before long work. Errors as above.
 Result<void> check_video(const std::string& path);
+Result<void> check_sound(const std::string& path);
+
+/// Whether a quarter of a video flashes more than three times in a second, as WCAG 2.3.1 counts.
+/// Errors as above.
+Result<bool> flashes(const std::string& path);
+
+/// A WebVTT file as it is if it keeps the rules of captions.hpp; else what FFmpeg reads, SubRip for
+/// one, as such. Errors: kIo "io.open"; kInvalidInput "captions.read".
+Result<std::string> read_captions(const std::string& path);
 
 /// Writes the first picture of a video as a PNG file. Errors as above.
 Result<void> write_poster(const std::string& path, const std::string& png);

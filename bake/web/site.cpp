@@ -64,7 +64,7 @@ constexpr std::array<std::string_view, 35> kPageFiles = {"app.js",
                                                          "storage.js",
                                                          "style.css",
                                                          "turntable.js",
-                                                         "videos.js",
+                                                         "media.js",
                                                          "viewer-parts.js",
                                                          "viewer-words.js"};
 /// Beside them where the page updates itself.

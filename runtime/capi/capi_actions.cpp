@@ -11,6 +11,7 @@ static_assert(MODAR_NODE_MODEL == static_cast<int>(modar::NodeKind::kModel));
 static_assert(MODAR_NODE_PICTURE == static_cast<int>(modar::NodeKind::kPicture));
 static_assert(MODAR_NODE_LABEL == static_cast<int>(modar::NodeKind::kLabel));
 static_assert(MODAR_NODE_VIDEO == static_cast<int>(modar::NodeKind::kVideo));
+static_assert(MODAR_NODE_SOUND == static_cast<int>(modar::NodeKind::kSound));
 static_assert(MODAR_PLAY == static_cast<int>(modar::ActionCommand::kPlay));
 static_assert(MODAR_PAUSE == static_cast<int>(modar::ActionCommand::kPause));
 static_assert(MODAR_SHOW_TEXT == static_cast<int>(modar::ActionCommand::kText));
@@ -38,6 +39,8 @@ std::optional<modar::MetaText::Kind> kind_of(int kind) {
       return modar::MetaText::Kind::kAlt;
     case MODAR_TITLE:
       return modar::MetaText::Kind::kTitle;
+    case MODAR_CAPTIONS:
+      return modar::MetaText::Kind::kCaptions;
     default:
       return std::nullopt;
   }
@@ -64,16 +67,15 @@ int modar_node_at(const modar_bundle* bundle, uint32_t index, modar_node* node) 
   const modar::NodeRecord& record = bundle->view.nodes()[index];
   const bool model = record.kind == static_cast<uint32_t>(modar::NodeKind::kModel);
   const float* place = model ? bundle->view.scenes()[record.subject].offset : record.place;
-  modar::give(
-      {0,
-       record.pattern,
-       static_cast<int>(record.kind),
-       model ? record.subject + 1 : 0,
-       {place[0], place[1], place[2]},
-       (record.flags & modar::kNodeHidden) != 0 ? 1 : 0,
-       record.kind == static_cast<uint32_t>(modar::NodeKind::kVideo) ? record.subject + 1 : 0,
-       (record.flags & modar::kNodeLoops) != 0 ? 1 : 0},
-      node);
+  modar::give({0,
+               record.pattern,
+               static_cast<int>(record.kind),
+               model ? record.subject + 1 : 0,
+               {place[0], place[1], place[2]},
+               (record.flags & modar::kNodeHidden) != 0 ? 1 : 0,
+               modar::plays_media(record) ? record.subject + 1 : 0,
+               (record.flags & modar::kNodeLoops) != 0 ? 1 : 0},
+              node);
   return 1;
 }
 

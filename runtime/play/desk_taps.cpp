@@ -23,7 +23,8 @@ void print_command(const BundleView& bundle, const SceneCommand& command) {
   const std::string_view pattern = bundle.name(bundle.patterns()[node.pattern].name);
   const std::string_view name = bundle.name(node.name);
   visit_node_texts(bundle.meta(), [&](const MetaText& each) {
-    if (each.pattern != pattern || each.node != name || each.kind == MetaText::Kind::kAlt) return;
+    const bool shown = each.kind == MetaText::Kind::kTitle || each.kind == MetaText::Kind::kText;
+    if (each.pattern != pattern || each.node != name || !shown) return;
     std::fprintf(stderr, "modar-play: %s [%s]: %s\n", each.node.c_str(), each.language.c_str(),
                  each.words.c_str());
   });

@@ -391,6 +391,17 @@ EMSCRIPTEN_KEEPALIVE const char* web_node_text(uint32_t node, int kind, const ch
   if (length == 0) engine.text[0] = '\0';
   return engine.text;
 }
+/// Of a video or sound: a WebVTT file, "" where there is none in the language.
+EMSCRIPTEN_KEEPALIVE const char* web_captions(uint32_t node, const char* language) {
+  static char* captions = nullptr;
+  const size_t length = modar_node_text(engine.bundle, node, MODAR_CAPTIONS, language, nullptr, 0);
+  std::free(captions);
+  captions = static_cast<char*>(std::malloc(length + 1));
+  if (captions == nullptr) return "";
+  captions[0] = '\0';
+  modar_node_text(engine.bundle, node, MODAR_CAPTIONS, language, captions, length + 1);
+  return captions;
+}
 EMSCRIPTEN_KEEPALIVE const char* web_language(uint32_t index) {
   if (modar_language(engine.bundle, index, engine.text, sizeof engine.text) == 0) return nullptr;
   return engine.text;
@@ -398,7 +409,7 @@ EMSCRIPTEN_KEEPALIVE const char* web_language(uint32_t index) {
 EMSCRIPTEN_KEEPALIVE uint32_t web_node_count() {
   return modar_node_count(engine.bundle);
 }
-/// part: 0 pattern, 1 kind, 2 whether a video loops, 3 number of its file.
+/// part: 0 pattern, 1 kind, 2 whether a video or sound loops, 3 number of its file.
 EMSCRIPTEN_KEEPALIVE uint32_t web_node(uint32_t index, int part) {
   auto node = modar::sized<modar_node>();
   modar_node_at(engine.bundle, index, &node);
@@ -406,7 +417,7 @@ EMSCRIPTEN_KEEPALIVE uint32_t web_node(uint32_t index, int part) {
                             static_cast<uint32_t>(node.loops), node.media};
   return parts[part];
 }
-/// The bytes of a video's file, and how many they are.
+/// The bytes of a video's or sound's file, and how many they are.
 EMSCRIPTEN_KEEPALIVE const uint8_t* web_media(uint32_t node) {
   auto media = modar::sized<modar_media>();
   modar_media_at(engine.bundle, web_node(node, 3) - 1, &media);

@@ -94,7 +94,7 @@ export class Engine {
     this.languages = [];
     for (let i = 0, at; (at = m._web_language(i)) !== 0; ++i) this.languages.push(m.UTF8ToString(at));
     this.nodes = Array.from({ length: m._web_node_count() }, (_, i) => ({
-      name: this.#nodeText(i, 3), pattern: m._web_node(i, 0), kind: ['model', 'picture', 'label', 'video'][m._web_node(i, 1) - 1] ?? '',
+      name: this.#nodeText(i, 3), pattern: m._web_node(i, 0), kind: ['model', 'picture', 'label', 'video', 'sound'][m._web_node(i, 1) - 1] ?? '',
       mark: this.#nodeText(i, 4), loops: m._web_node(i, 2) !== 0,
     }));
     this.scenes = Array.from({ length: m._web_scene_count() }, (_, i) => ({
@@ -102,11 +102,21 @@ export class Engine {
     }));
   }
 
+  /** Where the engine reads a short text. */
+  #given(text) {
+    const bytes = new TextEncoder().encode(`${text}\0`);
+    this.frameBuffer(bytes.length).set(bytes);
+    return this.frameAt;
+  }
+
   /** kind: 0 text, 1 what is seen, 2 title, 3 name, 4 mark. */
   #nodeText(node, kind, language = '') {
-    const bytes = new TextEncoder().encode(`${language}\0`);
-    this.frameBuffer(bytes.length).set(bytes);
-    return this.#module.UTF8ToString(this.#module._web_node_text(node, kind, this.frameAt));
+    return this.#module.UTF8ToString(this.#module._web_node_text(node, kind, this.#given(language)));
+  }
+
+  /** A WebVTT file of what is heard of a video or sound; '' where it has none in that language. */
+  captionsOf(node, language) {
+    return this.#module.UTF8ToString(this.#module._web_captions(node, this.#given(language)));
   }
 
   /** The words of a node: {title, text, alt}, '' where it has none in that language. */
@@ -116,7 +126,7 @@ export class Engine {
   }
 
   /**
-   * A step of the bundle's actions. time: seconds. event: {node, material} that was tapped, {node, ended: true} of a video, or
+   * A step of the bundle's actions. time: seconds. event: {node, material} that was tapped, {node, ended: true} of a video or sound, or
    * nothing. @returns what the page has to do: {play: node}, {pause: node}, {text: node} or {link: address}
    */
   act(time, event) {
@@ -129,7 +139,7 @@ export class Engine {
     });
   }
 
-  /** The file of a video node. */
+  /** The file of a video or sound. */
   mediaOf(node) {
     const at = this.#module._web_media(node);
     return this.#module.HEAPU8.slice(at, at + this.#module._web_media_size(node));

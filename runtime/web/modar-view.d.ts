@@ -15,14 +15,15 @@ export interface SceneNode {
   name: string;
   /** Index. */
   pattern: number;
-  kind: 'model' | 'picture' | 'label' | 'video';
+  kind: 'model' | 'picture' | 'label' | 'video' | 'sound';
   /** Of a label: a number or a short word. */
   mark: string;
 }
 
 /**
  * Scenes may act (nodes and actions of the bundle). Events: `text`, detail {node}: the words of a label are to be shown; `link`,
- * detail {address}: the visitor is to be asked whether to open it; `drawn`: labels() has changed.
+ * detail {address}: the visitor is to be asked whether to open it; `caption`, detail {node, text, language}: the words that are
+ * heard now of a video or sound, '' for none; `drawn`: labels() has changed.
  */
 export class View extends EventTarget {
   /**
@@ -57,11 +58,17 @@ export class View extends EventTarget {
   tap(x: number, y: number): number | null;
   /** The visitor tapped a node, as by a label's own button. */
   tapNode(node: number): void;
-  /** Actions begin anew, and videos stop. */
+  /** Actions begin anew, and videos and sounds stop. */
   forgetActs(): void;
-  /** Videos are silent until this is true; to be set by a visitor's own click. */
+  /** For captions, of what plays from now on: the first of these that a video or sound has, else any. */
+  set languages(languages: string[]);
+  /** Of a video or sound: a WebVTT file of what is heard, and its words alone; null where there is none. */
+  captionsOf(node: number): { language: string; captions: string; transcript: string } | null;
+  /** 0 to 1; iPhones know their own alone. */
+  set volume(volume: number);
+  /** Videos and sounds are silent until this is true: set it on a visitor's click. A tap on what plays a sound sets it, too. */
   sound: boolean;
-  /** While this is true, videos pause. */
+  /** While this is true, videos and sounds pause. */
   held: boolean;
   /** Labels on the screen, CSS pixels of the canvas; covered: something lies before its point. */
   labels(): { node: number; x: number; y: number; covered: boolean }[];

@@ -33,7 +33,7 @@ async function openEngine(simd) {
 
 /**
  * Where a bundle's scenes act: `text` {node}: a label's words are to be shown; `link` {address}: the visitor is to be
- * asked; `drawn`: labels() has changed.
+ * asked; `caption` {node, text, language}: words that are heard now; `drawn`: labels() has changed.
  */
 export class View extends EventTarget {
   #engine;
@@ -46,8 +46,8 @@ export class View extends EventTarget {
   #framesSinceLook = LIGHT_EVERY;
   #redraw = () => {};
   #mirror = false;
-  /** Of videos.js, which is loaded where a bundle has some. */
-  #videos = { sound: false, held: false, ended: [], play() {}, pause() {}, upload() {}, close() {}, forget() {} };
+  /** Of media.js, which is loaded where a bundle has videos or sounds. */
+  #media = { sound: false, held: false, ended: [], captionsOf: () => null, pause() {}, upload() {}, close() {}, forget() {} };
   #taps = [];
   #drawnAt = 0;
   #handle = 0;
@@ -69,9 +69,9 @@ export class View extends EventTarget {
     view.#engine.open(await bytes);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
     view.#engine.upload(false, fixedLight);
-    if (view.nodes.some(({ kind }) => kind === 'video')) {
-      const { Videos } = await import('./videos.js');
-      view.#videos = new Videos(view.#engine, () => view.#soon());
+    if (view.nodes.some(({ kind }) => kind === 'video' || kind === 'sound')) {
+      const { Media } = await import('./media.js');
+      view.#media = new Media(view.#engine, () => view.#soon(), (node, text, language) => view.#tell('caption', { node, text, language }));
     }
     models.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();  // without this it is never restored
@@ -81,7 +81,7 @@ export class View extends EventTarget {
     return view;
   }
 
-  /** What stands on patterns by name: {name, pattern, kind: 'model' | 'picture' | 'label' | 'video', mark}. */
+  /** What stands on patterns by name: {name, pattern, kind: 'model' | 'picture' | 'label' | 'video' | 'sound', mark}. */
   get nodes() {
     return this.#engine.nodes;
   }
@@ -110,31 +110,46 @@ export class View extends EventTarget {
     this.#tapped({ node, material: 0 });
   }
 
-  /** Actions begin anew, as if nothing had been found; videos stop. */
+  /** Actions begin anew, as if nothing had been found; videos and sounds stop. */
   forgetActs() {
     this.#taps = [];
     cancelAnimationFrame(this.#handle);
     this.#handle = 0;
     this.#engine.forgetActs();
-    this.#videos.close();
+    this.#media.close();
   }
 
-  /** Videos are silent until this is true; to be set by a visitor's own click. */
+  /** For captions of what plays from now on. */
+  set languages(languages) {
+    this.#media.languages = languages;
+  }
+
+  /** Of a video or sound: {language, captions (a WebVTT file), transcript}, or null. */
+  captionsOf(node) {
+    return this.#media.captionsOf(node);
+  }
+
+  /** 0 to 1. */
+  set volume(volume) {
+    this.#media.volume = volume;
+  }
+
+  /** Videos and sounds are silent until this is true: set by a visitor's click, or where one taps what plays a sound. */
   set sound(on) {
-    this.#videos.sound = on;
+    this.#media.sound = on;
   }
 
   get sound() {
-    return this.#videos.sound;
+    return this.#media.sound;
   }
 
-  /** While this is true, videos pause. */
+  /** While this is true, videos and sounds pause. */
   set held(on) {
-    this.#videos.held = on;
+    this.#media.held = on;
   }
 
   get held() {
-    return this.#videos.held;
+    return this.#media.held;
   }
 
   /** The labels that are on the screen: [{node, x, y, covered}], CSS pixels of the canvas. */
@@ -170,16 +185,20 @@ export class View extends EventTarget {
 
   #act() {
     if (this.nodes.length === 0) return;
-    const happened = [...this.#taps.splice(0), ...this.#videos.ended.splice(0).map((node) => ({ node, ended: true }))];
+    const happened = [...this.#taps.splice(0), ...this.#media.ended.splice(0).map((node) => ({ node, ended: true }))];
     for (const event of happened.length ? happened : [null]) {
       for (const todo of this.#engine.act(performance.now() / 1000, event)) {
-        if ('play' in todo) this.#videos.play(todo.play);
-        else if ('pause' in todo) this.#videos.pause(todo.pause);
-        else if ('link' in todo) this.dispatchEvent(new CustomEvent('link', { detail: { address: todo.link } }));
-        else this.dispatchEvent(new CustomEvent('text', { detail: { node: todo.text } }));
+        if ('play' in todo) this.#media.play(todo.play, event !== null && !event.ended);
+        else if ('pause' in todo) this.#media.pause(todo.pause);
+        else if ('link' in todo) this.#tell('link', { address: todo.link });
+        else this.#tell('text', { node: todo.text });
       }
     }
-    if (!this.#lost) this.#videos.upload(this.#gl.context);
+    if (!this.#lost) this.#media.upload(this.#gl.context);
+  }
+
+  #tell(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 
   #drawn() {
@@ -201,7 +220,7 @@ export class View extends EventTarget {
     this.#gl = openContext(this.#models, webgl1);
     this.#engine.useContext(this.#gl.context, this.#gl.version);
     this.#engine.upload(true);
-    this.#videos.forget();
+    this.#media.forget();
     this.#lost = false;
   }
 

@@ -72,6 +72,8 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   #shown = -1;
   /** The label has a node's words, not its pattern's. */
   #noted = false;
+  /** What is heard now, by node. */
+  #cues = new Map();
   #unseenSince = 0;
 
   constructor() {
@@ -184,6 +186,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     showWords(this.#root, words);
     this.#$('models').setAttribute('aria-roledescription', words.scene);
     this.#showPatternNames();
+    if (this.#view) this.#useLanguages();
     this.#showLabel(this.#shown);
     this.#$('marks').replaceChildren();
     if (this.#$('stage').open) this.#showMarks();
@@ -530,6 +533,9 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       const label = this.#labelOf(pattern);
       this.#fillLabel(label);
       const models = this.#modar.scenes.filter((scene) => scene.pattern === pattern).map(({ model }) => model);
+      const heard = this.#view.nodes.map((node, i) => (node.pattern === pattern && this.#view.captionsOf(i)?.transcript) || '').filter(Boolean);
+      this.#$('heard').hidden = heard.length === 0;
+      this.#$('heard-text').textContent = heard.join('\n\n');
       const pictures = this.#view.nodes.map((node, i) => (node.pattern === pattern && ['picture', 'video'].includes(node.kind) ? this.#wordsOf(i).alt : ''));
       const seen = [label.alt || models.join(', '), ...pictures].filter(Boolean).join('; ');
       this.#nameModels(this.#say('seen', { name: seen, pattern: label.name }));
@@ -545,11 +551,18 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   // ---- labels that point, and what else a scene does ----
 
   #wordsOf(node) {
-    const language = this.#language;
-    return this.#view.wordsOf(node, [language, language.split('-')[0]]);
+    return this.#view.wordsOf(node, this.#languages);
   }
 
-  /** Sound comes by a visitor's own click only, and videos can be paused. */
+  get #languages() {
+    return [this.#language, this.#language.split('-')[0]];
+  }
+
+  #useLanguages() {
+    this.#view.languages = this.#languages;
+  }
+
+  /** Sound comes by a visitor's own click or tap only, and what plays can be paused. */
   #press(id, set) {
     const on = this.#$(id).getAttribute('aria-pressed') !== 'true';
     this.#$(id).setAttribute('aria-pressed', String(on));
@@ -557,16 +570,19 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   }
 
   #listenToScenes(view) {
-    for (const id of ['sound', 'hold']) {
-      this.#$(id).hidden = !view.nodes.some(({ kind }) => kind === 'video');
-      this.#$(id).setAttribute('aria-pressed', 'false');
-    }
+    this.#$('media').hidden = !view.nodes.some(({ kind }) => kind === 'video' || kind === 'sound');
+    this.#$('captions').hidden = !view.nodes.some((_, node) => view.captionsOf(node));
+    this.#$('pause').setAttribute('aria-pressed', 'false');
+    this.#useLanguages();
+    this.#cues.clear();
     view.addEventListener('drawn', () => this.#showMarks());
+    view.addEventListener('caption', ({ detail }) => this.#caption(detail));
     view.addEventListener('text', ({ detail: { node } }) => {
       const { pattern, name, mark } = view.nodes[node];
       const { language, title, text } = this.#wordsOf(node);
       if (!this.#ask('text', { pattern, node: name, language, title, text })) return;
       this.#fillLabel({ language, name: title || mark, text });
+      this.#$('heard').hidden = true;
       this.#noted = true;
     });
     view.addEventListener('link', ({ detail }) => {
@@ -574,6 +590,22 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       this.#$('leave-address').textContent = this.#$('leave-open').href = detail.address;
       if (!this.#$('leave').open) this.#$('leave').showModal();
     });
+  }
+
+  /** Those of what plays at once stand below each other. */
+  #caption({ node, text, language }) {
+    this.#cues.delete(node);
+    if (text) this.#cues.set(node, text);
+    const shown = this.#$('captions').getAttribute('aria-pressed') === 'true';
+    Object.assign(this.#$('cue'), { textContent: shown ? [...this.#cues.values()].join('\n') : '', lang: language, dir: 'auto' });
+  }
+
+  /** Pressed as it is: a tap on what plays a sound turns it on. */
+  #showSound() {
+    const { sound } = this.#view;
+    if (this.#$('volume').hidden !== sound) return;
+    this.#$('sound').setAttribute('aria-pressed', String(sound));
+    this.#$('volume').hidden = !sound;
   }
 
   /** Whether the page leaves it to the viewer. */
@@ -592,6 +624,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       button.toggleAttribute('data-covered', covered);
     }
     for (const button of buttons.values()) button.remove();
+    if (this.#view) this.#showSound();
   }
 
   #addMark(node) {
@@ -726,7 +759,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   }
 
   #onKey(event) {
-    if (['button', 'select', 'a'].includes(event.target.localName) && event.key !== 'Escape') return;
+    if (['button', 'select', 'a', 'input', 'summary'].includes(event.target.localName) && event.key !== 'Escape') return;
     if (event.ctrlKey || event.metaKey || event.altKey || !this.#keys[event.key]) return;
     event.preventDefault();
     this.#keys[event.key]();
@@ -738,8 +771,9 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       start: () => this.start(), look: () => this.look(), close: () => this.stop(), flip: () => this.#flip(), torch: () => this.#toggleTorch(),
       cameras: () => this.#showCameras(), 'choose-close': () => this.#$('choose').close(), copy: () => this.#copyAddress(),
       'problem-close': () => this.#$('problem').close(), 'leave-open': () => this.#$('leave').close(), 'leave-close': () => this.#$('leave').close(),
-      sound: () => this.#press('sound', (on) => { this.#view.sound = on; }),
-      hold: () => this.#press('hold', (on) => { this.#view.held = on; }),
+      sound: () => { this.#view.sound = !this.#view.sound; this.#showSound(); },
+      pause: () => this.#press('pause', (on) => { this.#view.held = on; }),
+      captions: () => this.#press('captions', () => this.#caption({ node: -1, language: this.#$('cue').lang })),
       full: () => (this.#root.fullscreenElement ? document.exitFullscreen() : this.#$('screen').requestFullscreen()),
       // The same as keys and gestures, for those who do not drag, pinch or type.
       'turn-left': keys.ArrowLeft, 'turn-right': keys.ArrowRight, larger: keys['+'], smaller: keys['-'], higher: keys.PageUp,
@@ -748,6 +782,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       'look-instead': () => { this.#$('problem').close(); this.look(); },
     };
     for (const [id, action] of Object.entries(clicks)) this.#$(id).addEventListener('click', action);
+    this.#$('volume').addEventListener('input', () => { this.#view.volume = this.#$('volume').valueAsNumber; });
     this.#$('scene').addEventListener('change', () => {
       const pattern = Number(this.#$('scene').value);
       this.#showScene(pattern);

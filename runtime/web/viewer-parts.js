@@ -82,19 +82,24 @@ export const STYLE = `
 :host([state="around"]) #picture, :host([state="around"]) #hint { display: none; }
 :host([state="around"]) #tools { background: none; }
 :host([state="around"]) .camera, :host(:not([state="around"])) .around { display: none; }
-#hint, #label {
-  position: absolute; background: var(--card); color: var(--ink); box-shadow: var(--shadow); pointer-events: none;
-  left: calc(1rem + env(safe-area-inset-left)); bottom: calc(6.2rem + env(safe-area-inset-bottom));
-  max-width: min(23rem, calc(100% - 2rem)); padding: .8rem 1rem;
+/* Captions above the label, the hint in the label's place. */
+#said {
+  position: absolute; display: grid; gap: .6rem; align-items: end; justify-items: start; pointer-events: none;
+  left: calc(1rem + env(safe-area-inset-left)); bottom: calc(6.2rem + env(safe-area-inset-bottom)); width: min(23rem, calc(100% - 2rem));
 }
+#hint, #label { grid-area: 2 / 1; background: var(--card); color: var(--ink); box-shadow: var(--shadow); padding: .8rem 1rem; }
+#cue { grid-area: 1 / 1; padding: .3rem .6rem; background: rgb(0 0 0 / .8); color: #fff; white-space: pre-line; }
+#cue:empty { display: none; }
 #hint { display: flex; gap: .9rem; align-items: center; transition: opacity .25s; }
 :host([state="seen"]) #hint { opacity: 0; }
 #plates { display: flex; gap: .35rem; flex: none; }
 #plates img { display: block; background: var(--card); border: 1px solid var(--rule); width: auto; height: 4.2rem; max-width: 6rem; padding: .2rem; object-fit: contain; }
 #plates.many img { height: 2.9rem; max-width: 3rem; }
-#label { border-left: 3px solid var(--accent); max-height: 45%; overflow-y: auto; pointer-events: auto; user-select: text; -webkit-user-select: text; }
+#label { border-left: 3px solid var(--accent); max-height: 45vh; overflow-y: auto; pointer-events: auto; user-select: text; -webkit-user-select: text; }
 #label p { margin-top: .3rem; font-size: 1rem; }
 #label p:empty { display: none; }
+#heard { margin-top: .3rem; white-space: pre-line; }
+#heard summary { cursor: pointer; min-height: 1.5rem; }
 /* Their points move with the picture, their size does not. */
 #marks { position: absolute; inset: 0; overflow: hidden; pointer-events: none; }
 #marks button {
@@ -107,7 +112,10 @@ export const STYLE = `
   position: absolute; inset-inline-end: calc(.6rem + env(safe-area-inset-right)); top: 50%; transform: translateY(-60%);
   display: flex; flex-direction: column; gap: .45rem;
 }
-#handles button { width: 2.6rem; height: 2.6rem; }
+#media { position: absolute; inset-inline-start: calc(.6rem + env(safe-area-inset-left)); top: calc(4.6rem + env(safe-area-inset-top)); display: grid; gap: .45rem; }
+#volume { width: 7rem; height: 2.6rem; accent-color: var(--card); }
+#handles button, #media button { width: 2.6rem; height: 2.6rem; }
+#media .row { gap: .3rem; }
 #tools {
   position: absolute; left: 0; right: 0; bottom: 0; display: flex; gap: .7rem; justify-content: center; align-items: center;
   padding: .9rem 1rem calc(1rem + env(safe-area-inset-bottom)); background: linear-gradient(transparent, rgb(0 0 0 / .45));
@@ -119,8 +127,9 @@ export const STYLE = `
   }
   #handles { inset-inline-end: auto; left: calc(.6rem + env(safe-area-inset-left)); top: .6rem; transform: none; flex-flow: row wrap; max-width: 60%; }
   :host([state="around"]) #which { top: 4rem; }
-  #hint, #label { bottom: calc(1rem + env(safe-area-inset-bottom)); max-width: min(20rem, 55%); }
-  #label { max-height: calc(100% - 2rem); }
+  #said { bottom: calc(1rem + env(safe-area-inset-bottom)); width: min(20rem, 55%); }
+  #label { max-height: 70vh; }
+  #media { top: auto; bottom: 1rem; inset-inline-start: auto; inset-inline-end: calc(5.4rem + env(safe-area-inset-right)); }
 }
 
 /* ---- dialogs ---- */
@@ -152,8 +161,15 @@ const MARKUP = `<div id="all">
   <div id="marks" role="group" data-label="labels"></div>
   <p id="keys" class="unseen" data-word="keys"></p>
   <p id="which" hidden><label class="unseen" for="scene" data-word="scene"></label><select id="scene"></select></p>
-  <aside id="hint"><div id="plates" aria-hidden="true"></div><p id="reason" role="status"></p></aside>
-  <article id="label" hidden aria-live="polite"><h2 id="label-name"></h2><p id="label-text"></p></article>
+  <div id="said"><p id="cue"></p>
+    <aside id="hint"><div id="plates" aria-hidden="true"></div><p id="reason" role="status"></p></aside>
+    <article id="label" hidden aria-live="polite"><h2 id="label-name"></h2><p id="label-text"></p><details id="heard" hidden><summary data-word="transcript"></summary><p id="heard-text"></p></details></article></div>
+  <div id="media" role="toolbar" data-label="media" aria-orientation="vertical" hidden>
+    <div class="row">${tool('sound', 'sound', '<path d="M4 9.5h3.5L12 5.5v13l-4.5-4H4zM15.5 9a4.2 4.2 0 0 1 0 6M18 6.5a7.8 7.8 0 0 1 0 11"/>', '', 'aria-pressed="false"')}
+    <input id="volume" type="range" max="1" step=".1" value="1" data-label="volume" hidden></div>
+    ${tool('pause', 'pause', '<path d="M8.5 5.5v13M15.5 5.5v13"/>', '', 'aria-pressed="false"')}
+    ${tool('captions', 'captions', '<path d="M3.5 5.5h17v13h-17zM11 10.5a2.2 2.2 0 1 0 0 3M17 10.5a2.2 2.2 0 1 0 0 3"/>', '', 'aria-pressed="true"')}
+  </div>
   <div id="handles" role="toolbar" data-label="handles" aria-orientation="vertical">
     ${tool('turn-left', 'turnLeft', '<path d="M5 12a7 7 0 1 0 2.5-5.4M5 4v4.5h4.5"/>')}
     ${tool('turn-right', 'turnRight', '<path d="M19 12a7 7 0 1 1-2.5-5.4M19 4v4.5h-4.5"/>')}
@@ -167,8 +183,6 @@ const MARKUP = `<div id="all">
     ${tool('close', 'close', '<path d="M5 5l14 14M19 5L5 19"/>')}
     ${tool('flip', 'flip', '<path d="M4 9a8.5 8.5 0 0 1 15-2m1-4v4.5h-4.5M20 15a8.5 8.5 0 0 1-15 2m-1 4v-4.5h4.5"/>', 'camera', 'hidden')}
     <slot name="tools"></slot>
-    ${tool('sound', 'sound', '<path d="M4 9.5h3.5L12 5.5v13l-4.5-4H4zM15.5 9a4.2 4.2 0 0 1 0 6M18 6.5a7.8 7.8 0 0 1 0 11"/>', '', 'aria-pressed="false" hidden')}
-    ${tool('hold', 'hold', '<path d="M8.5 5.5v13M15.5 5.5v13"/>', '', 'aria-pressed="false" hidden')}
     ${tool('torch', 'torch', '<path d="M13 2.5L6 13.5h5l-1 8 7-11h-5z"/>', 'camera', 'aria-pressed="false" hidden')}
     ${tool('cameras', 'cameras', '<path d="M3 7.5h4l2-2.5h6l2 2.5h4v11.5H3z"/><circle cx="12" cy="13" r="3.6"/>', 'camera')}
     ${tool('full', 'full', '<path d="M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5"/>', '', 'hidden')}

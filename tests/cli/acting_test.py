@@ -149,7 +149,8 @@ class Acting(ProgramTest):
         for side, wanted in zip(node["half_size"], (0.5, 0.375)):
             self.assertAlmostEqual(side, wanted, 6)
         self.assertEqual((told["textures"][0]["source_width"], told["textures"][0]["source_height"]), (1280, 960))
-        self.assertEqual(json.loads(self.modar("check", bundle, "--json").stdout)["issues"], [])
+        issue, = json.loads(self.modar("check", bundle, "--json").stdout)["issues"]
+        self.assertEqual((issue["id"], issue["severity"], issue["where"]), ("CAPTIONS_MISSING", "warning", "sound of 'film'"))
         # What FFmpeg says of the file in the bundle.
         at = bundle.read_bytes().index(b"ftyp") - 4
         (self.folder / "taken.mp4").write_bytes(bundle.read_bytes()[at:at + media["bytes"]])
@@ -170,6 +171,58 @@ class Acting(ProgramTest):
         (self.folder / "film.mp4").write_bytes(b"no film")
         done = self.bake(scene.replace("film.avi", "film.mp4"))
         self.assertIn("video.decode", done.stderr)
+
+    def test_a_sound_with_captions(self):
+        subprocess.run(["ffmpeg", "-loglevel", "error", "-f", "lavfi", "-i", "sine=d=2:r=44100", self.folder / "voice.wav"], check=True)
+        (self.folder / "voice.srt").write_text("1\n00:00:00,500 --> 00:00:01,250\n<i>This</i> pot\nis old.\n\n"
+                                               "2\n00:00:01,500 --> 00:00:02,000\n[bell]\n")
+        (self.folder / "voice.vtt").write_text("WEBVTT\n\n00:00.500 --> 00:01.250 align:start\nAlter Topf & Krug\n")
+        scene = ('[[scene]]\npattern = "cover"\n[[scene.sound]]\nfile = "voice.wav"\nplay = false\ncaptions.en = "voice.srt"\n'
+                 'captions.de = "voice.vtt"\n[[scene.label]]\n[[scene.action]]\non = "tap 1"\ndo = "play voice"\n')
+        self.assertEqual(self.bake(scene).returncode, 0)
+        bundle = next((self.folder / "out").glob("*.modar"))
+        told = json.loads(self.modar("inspect", bundle, "--json").stdout)
+        (media,), (node, _), (action,) = told["media"], told["nodes"], told["actions"]
+        self.assertEqual((media["name"], media["kind"], media["width"], media["sound"], media["poster"]), ("voice.wav", "sound", 0, True, None))
+        self.assertEqual((node["name"], node["kind"], node["media"], action["words"]), ("voice", "sound", 0, "tap 1: play voice"))
+        self.assertEqual(node["words"]["captions"], {
+            "en": "WEBVTT\n\n00:00.500 --> 00:01.250\n<i>This</i> pot\nis old.\n\n00:01.500 --> 00:02.000\n[bell]\n",
+            "de": "WEBVTT\n\n00:00.500 --> 00:01.250 align:start\nAlter Topf & Krug\n"})
+        self.assertEqual(json.loads(self.modar("check", bundle, "--json").stdout)["issues"], [])
+        at = bundle.read_bytes().index(b"ftyp") - 4
+        (self.folder / "taken.mp4").write_bytes(bundle.read_bytes()[at:at + media["bytes"]])
+        stream, = json.loads(subprocess.run(["ffprobe", "-loglevel", "error", "-show_streams", "-of", "json", self.folder / "taken.mp4"],
+                                            capture_output=True, text=True, check=True).stdout)["streams"]
+        self.assertEqual((stream["codec_name"], stream["profile"]), ("aac", "LC"))
+        self.assertAlmostEqual(float(stream["duration"]), 2, delta=0.1)
+        # Changed captions are baked again; a second language of one sound alone is told.
+        (self.folder / "voice.vtt").write_text("WEBVTT\n\n00:00.500 --> 00:01.250\nEin alter Topf\n")
+        self.assertEqual(self.bake(scene).returncode, 0)
+        self.assertIn("Ein alter Topf", self.modar("inspect", bundle, "--json").stdout)
+        other = '[[scene.sound]]\nfile = "voice.wav"\nname = "other"\ncaptions.en = "voice.srt"\n'
+        self.assertEqual(self.bake(scene + other).returncode, 0)
+        issue, = json.loads(self.modar("check", bundle, "--json").stdout)["issues"]
+        self.assertEqual((issue["id"], issue["where"]), ("CAPTIONS_MISSING", "sound of 'other'"))
+        self.assertIn("in 'de'", issue["message"])
+        for text in ("WEBVTT\n\nwords\n", "\x00\x01", ""):
+            (self.folder / "voice.vtt").write_text(text)
+            done = self.bake(scene)
+            self.assertEqual((done.returncode, "captions.read" in done.stderr), (3, True), (text, done.stderr))
+        (self.folder / "voice.wav").write_bytes(b"no sound")
+        self.assertIn("FFmpeg reads no sound", self.bake(scene.replace('captions.de = "voice.vtt"\n', "")).stderr)
+
+    def test_what_flashes_is_told(self):
+        scene = '[[scene]]\npattern = "cover"\n[[scene.video]]\nfile = "flash.mp4"\n'
+        # Changes a second, and the share of the width that changes: WCAG allows three flashes, and any on less than a quarter.
+        for changes, share, dangerous in ((6, 1, False), (8, 1, True), (12, 0.2, False), (12, 0.3, True)):
+            luma = f"lum='if(mod(floor(T*{changes}+0.01),2)*lt(X,W*{share}),200,30)':cb=128:cr=128"
+            subprocess.run(["ffmpeg", "-loglevel", "error", "-y", "-f", "lavfi", "-i", f"nullsrc=s=320x180:d=2:r=30,geq={luma}",
+                            "-pix_fmt", "yuv420p", self.folder / "flash.mp4"], check=True)
+            self.assertEqual(self.bake(scene).returncode, 0)
+            bundle = next((self.folder / "out").glob("*.modar"))
+            self.assertEqual(json.loads(self.modar("inspect", bundle, "--json").stdout)["media"][0]["flashes"], dangerous, (changes, share))
+            issues = [issue["id"] for issue in json.loads(self.modar("check", bundle, "--json").stdout)["issues"]]
+            self.assertEqual(issues, ["MEDIA_FLASHES"] if dangerous else [], (changes, share))
 
     def test_what_is_wrong_is_told_with_its_line_before_the_bake(self):
         for change, code, where in (

@@ -145,7 +145,10 @@ class Web(ProgramTest):
         english = json.loads((PAGE / "words" / "en.json").read_text())
         shown = lambda text: sorted(re.findall(r"\{\w+\}", text))
         for file in (PAGE / "words").glob("*.json"):
-            words = json.loads(file.read_text())
+            twice = []  # of two members with one name the last one is read
+            words = json.loads(file.read_text(), object_pairs_hook=lambda pairs: twice.extend(
+                {key for key, _ in pairs if [k for k, _ in pairs].count(key) > 1}) or dict(pairs))
+            self.assertEqual(twice, [], file.name)
             self.assertEqual(list(words), list(english), file.name)
             self.assertEqual(list(words["errors"]), list(english["errors"]), file.name)
             for key, text in english.items():

@@ -176,6 +176,11 @@ constexpr CorruptCase kPayloadCases[] = {
        return changed(acting_content(),
                       [](auto& c) { c.media_data[0] = small_mp4(640, 360, 12, false); });
      }},
+    {"CAPTIONS",
+     [] {
+       return changed(acting_content(),
+                      [](auto& c) { c.meta.replace(c.meta.find("00:02.000"), 9, "00:00.400"); });
+     }},
     {"VERTEX_OCCLUSION",
      [] { return changed(lit_content(), [](auto& c) { c.vertices[11] = std::byte{128}; }); }},
     {"VERTEX_PADDING", [] { return vertex_damage(6, std::byte{1}, std::byte{0}); }},
@@ -210,6 +215,13 @@ constexpr CorruptCase kPayloadCases[] = {
          c.actions.resize(1);
        });
      }},
+    {"CAPTIONS_MISSING",
+     [] {
+       return changed(acting_content(),
+                      [](auto& c) { c.meta.replace(c.meta.find("captions"), 8, "alt"); });
+     }},
+    {"MEDIA_FLASHES",
+     [] { return changed(acting_content(), [](auto& c) { c.media[0].flags |= kMediaFlashes; }); }},
     {"SECTION_UNKNOWN",
      [] {
        return changed(pattern_content(), [](auto& c) {

@@ -483,22 +483,20 @@ Bytes text_bytes(const char* text) {
 
 }  // namespace
 
-Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds, bool index_first,
-                std::uint8_t profile) {
-  constexpr std::uint32_t kScale = 600;
+namespace {
+
+constexpr std::uint32_t kTimeScale = 600;
+
+/// An MP4 file of one track without samples.
+Bytes one_track(const char* handler, const Bytes& codec, std::uint32_t seconds, bool index_first) {
   Bytes times = zeros(12);
-  put_big(times, kScale, 4);
-  put_big(times, std::uint64_t{kScale} * seconds, 4);
+  put_big(times, kTimeScale, 4);
+  put_big(times, std::uint64_t{kTimeScale} * seconds, 4);
   put_big(times, 0, 4);
-  Bytes sides;
-  put_big(sides, width, 2);
-  put_big(sides, height, 2);
-  const Bytes settings = {std::byte{1}, std::byte{profile}, std::byte{0xC0}, std::byte{30}};
-  const Bytes codec = box("avc1", {zeros(24), sides, zeros(50), box("avcC", {settings})});
   Bytes entries = zeros(4);
   put_big(entries, 1, 4);
   const Bytes media =
-      box("mdia", {box("mdhd", {times}), box("hdlr", {zeros(8), text_bytes("vide"), zeros(13)}),
+      box("mdia", {box("mdhd", {times}), box("hdlr", {zeros(8), text_bytes(handler), zeros(13)}),
                    box("minf", {box("stbl", {box("stsd", {entries, codec})})})});
   const Bytes index = box("moov", {box("trak", {media})});
   const Bytes data = box("mdat", {zeros(16)});
@@ -507,6 +505,22 @@ Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds
     file.insert(file.end(), part->begin(), part->end());
   }
   return file;
+}
+
+}  // namespace
+
+Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds, bool index_first,
+                std::uint8_t profile) {
+  Bytes sides;
+  put_big(sides, width, 2);
+  put_big(sides, height, 2);
+  const Bytes settings = {std::byte{1}, std::byte{profile}, std::byte{0xC0}, std::byte{30}};
+  return one_track("vide", box("avc1", {zeros(24), sides, zeros(50), box("avcC", {settings})}),
+                   seconds, index_first);
+}
+
+Bytes small_sound(std::uint32_t seconds) {
+  return one_track("soun", box("mp4a", {zeros(28)}), seconds, true);
 }
 
 void add_nodes(BundleContent& content) {
@@ -532,15 +546,23 @@ void add_nodes(BundleContent& content) {
   video.alpha = static_cast<std::uint32_t>(VideoAlpha::kKey);
   video.key[1] = 1;
   video.reach = 0.25f;
-  content.nodes = {model, picture, label, video};
+  NodeRecord sound = node_of(content, "voice", 0, NodeKind::kSound);
+  sound.subject = 1;
+  content.nodes = {model, picture, label, video, sound};
   MediaRecord media{};
   media.name = content.intern("trailer.mp4");
   media.kind = static_cast<std::uint32_t>(MediaKind::kVideo);
   media.width = 640;
   media.height = 360;
   media.seconds = 12;
-  content.media = {media};
-  content.media_data = {small_mp4(640, 360, 12)};
+  MediaRecord voice{};
+  voice.name = content.intern("voice.m4a");
+  voice.kind = static_cast<std::uint32_t>(MediaKind::kSound);
+  voice.flags = kMediaSound;
+  voice.seconds = 3;
+  voice.poster = kNone;
+  content.media = {media, voice};
+  content.media_data = {small_mp4(640, 360, 12), small_sound(3)};
   ActionRecord tap = action_of(ActionEvent::kTap, 0, ActionCommand::kNext, 1);
   tap.part = content.intern("skin");
   ActionRecord after = action_of(ActionEvent::kAfter, 0, ActionCommand::kTurn, 0);
@@ -557,9 +579,12 @@ void add_nodes(BundleContent& content) {
                      link,
                      action_of(ActionEvent::kTap, 1, ActionCommand::kText, 2),
                      action_of(ActionEvent::kTap, 2, ActionCommand::kToggle, 1),
-                     action_of(ActionEvent::kTap, 3, ActionCommand::kPause, 3)};
+                     action_of(ActionEvent::kTap, 3, ActionCommand::kPause, 3),
+                     action_of(ActionEvent::kTap, 2, ActionCommand::kPlay, 4)};
   content.meta = R"({"tool":"golden","nodes":[{"pattern":"box","node":"rim",)"
-                 R"("title":{"en":"The rim"},"text":{"en":"Chipped."}}]})";
+                 R"("title":{"en":"The rim"},"text":{"en":"Chipped."}},)"
+                 R"({"pattern":"box","node":"voice","captions":)"
+                 R"({"en":"WEBVTT\n\n00:00.500 --> 00:02.000\nA pot.\n"}}]})";
 }
 
 BundleContent acting_content() {

@@ -35,6 +35,8 @@ void add_looks(BundleContent& content);
 /// state. index_first: moov before mdat.
 Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds,
                 bool index_first = true, std::uint8_t profile = 66);
+/// The same with a track of AAC alone.
+Bytes small_sound(std::uint32_t seconds);
 
 /// Adds what version 1.3 added to that: nodes of each kind, actions of each event and command.
 void add_nodes(BundleContent& content);

@@ -1,4 +1,5 @@
 """A scene that acts, in Chromium with a fake camera: pictures, labels, taps and links as a visitor meets them."""
+import os
 import pathlib
 import shutil
 import struct
@@ -13,6 +14,7 @@ from browser import Browser, Server  # noqa: E402
 from programs import COVER, POTTERY, ProgramTest, demo_clip  # noqa: E402
 
 WIDTH, HEIGHT, FRAMES = 640, 480, 6
+KEEP = os.environ.get("MODAR_WEB_PICTURES")
 GREEN, BLUE = (16, 180, 60), (30, 60, 210)
 PROJECT = """[bake]
 loop-views = 8
@@ -46,6 +48,11 @@ scale = 0.15
 offset = [-0.1, -0.4, 0]
 loop = true
 alt.en = "A film"
+[[scene.sound]]
+file = "voice.wav"
+play = false
+captions.en = "voice.vtt"
+captions.de = "stimme.vtt"
 [[scene.label]]
 name = "corner"
 mark = "A"
@@ -65,6 +72,12 @@ do = "next green"
 [[scene.action]]
 on = "tap blue"
 do = "show behind"
+[[scene.action]]
+on = "tap corner"
+do = "play voice"
+[[scene.action]]
+on = "tap corner"
+do = "text corner"
 [[scene.action]]
 on = "tap blue"
 do = "link https://museum.org/blue"
@@ -124,6 +137,10 @@ class Acting(ProgramTest):
         subprocess.run(["ffmpeg", "-loglevel", "error", "-f", "lavfi", "-i",
                         "nullsrc=s=64x64:d=4:r=10,geq=r='60+40*floor(T)':g=120:b='220-40*floor(T)'", "-f", "lavfi", "-i", "sine=d=4",
                         "-pix_fmt", "yuv420p", project / "film.mp4"], check=True)
+        subprocess.run(["ffmpeg", "-loglevel", "error", "-f", "lavfi", "-i", "sine=d=3", project / "voice.wav"], check=True)
+        (project / "voice.vtt").write_text("WEBVTT\n\n00:00.200 --> 00:01.200\nA <i>pot</i> &amp; its lid\n\n"
+                                           "00:01.300 --> 00:02.900\nof clay\n")
+        (project / "stimme.vtt").write_text("WEBVTT\n\n00:00.200 --> 00:02.900\nEin Topf\n")
         (project / "modar.toml").write_text(PROJECT)
         for words in (["bake", "--project", project / "modar.toml", "--quiet"],
                       ["web", project / "out" / "project.modar", "-o", cls.base / "site", "--quiet"]):
@@ -144,6 +161,10 @@ class Acting(ProgramTest):
         pixel = self.browser.run(PIXEL % tuple(place))
         for got, wanted in zip(pixel, (*colour, 255)):
             self.assertAlmostEqual(got, wanted, delta=8, msg=(what, pixel))  # ETC1 is not exact
+
+    def keep(self, name):
+        if KEEP:
+            self.browser.screenshot(pathlib.Path(KEEP) / name)
 
     def click(self, place):
         self.browser.run(CLICK % tuple(place))
@@ -243,7 +264,7 @@ class Acting(ProgramTest):
         })()""")
         press = "part('{}').click()".format
         for _ in range(2):
-            self.browser.run(press("hold"))
+            self.browser.run(press("pause"))
             self.browser.wait("films[0].paused", "the pause")
             shown = self.browser.run("""(async () => {
               await new Promise((resolve) => { setTimeout(resolve, 300); });
@@ -255,13 +276,75 @@ class Acting(ProgramTest):
             for got, wanted in zip(pixel, shown):
                 self.assertAlmostEqual(got, wanted, delta=2, msg=(pixel, shown))
             time = self.browser.run("films[0].currentTime")
-            self.browser.run(press("hold"))
+            self.browser.run(press("pause"))
             self.browser.wait(f"!films[0].paused && Math.abs(films[0].currentTime - {time}) > 1", "going on")
         self.browser.run(press("sound"))
         self.assertEqual(self.browser.run("[films[0].muted, part('sound').getAttribute('aria-pressed')]"), [False, "true"])
         self.assertTrue(self.browser.run("filmTextureIsThere()"))
         self.browser.run(press("close"))
         self.assertEqual(self.browser.run("[films[0].paused, filmTextureIsThere()]"), [True, False])
+        self.assertEqual(self.browser.errors, [])
+
+    def test_a_sound_with_captions_and_transcript(self):
+        """The times of captions are the file's, what sounds is what the browser's own meter measures."""
+        self.browser.resize(390, 844)
+        self.addCleanup(self.browser.resize, 640, 480)
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
+        self.browser.run("""(() => {
+          globalThis.voices = [];
+          globalThis.said = [];
+          const create = document.createElement;
+          document.createElement = function (name) {
+            const made = create.call(this, name);
+            if (name === 'audio') voices.push(made);
+            return made;
+          };
+          new MutationObserver(() => said.push([part('cue').textContent, voices[0]?.currentTime])).observe(part('cue'), { childList: true });
+          document.getElementById('start').click();
+        })()""")
+        self.browser.wait(f"({MARKS}).length === 1", "the label")
+        self.assertEqual(self.browser.run("[voices.length, part('sound').getAttribute('aria-pressed'), part('volume').hidden]"), [0, "false", True])
+        self.assertEqual(self.browser.run("[part('heard').hidden, part('heard-text').textContent]"), [False, "A pot & its lid\nof clay"])
+        self.keep("acting-transcript.png")
+        self.browser.run("part('marks').firstChild.click()")
+        self.browser.wait("part('cue').textContent === 'A pot & its lid'", "the first words")
+        self.keep("acting-captions.png")
+        self.assertEqual(self.browser.run("[part('heard').hidden, part('label-name').textContent]"), [True, "The corner"])
+        # The visitor asked for it: it is heard, and can be made quieter or silent.
+        self.assertEqual(self.browser.run("[voices[0].muted, part('sound').getAttribute('aria-pressed'), part('volume').hidden]"), [False, "true", False])
+        loud = self.browser.run("""(async () => {
+          const context = new AudioContext();
+          const meter = context.createAnalyser();
+          context.createMediaStreamSource(voices[0].captureStream()).connect(meter);
+          await context.resume();
+          const samples = new Float32Array(meter.fftSize);
+          for (let i = 0; i < 100; ++i) {
+            await new Promise((resolve) => { setTimeout(resolve, 20); });
+            meter.getFloatTimeDomainData(samples);
+            const loudest = Math.max(...samples.map(Math.abs));
+            if (loudest > 0.01) return loudest;
+          }
+          return 0;
+        })()""")
+        self.assertGreater(loud, 0.05)
+        self.browser.run("Object.assign(part('volume'), { value: 0.3 }).dispatchEvent(new Event('input'))")
+        self.assertAlmostEqual(self.browser.run("voices[0].volume"), 0.3, 6)
+        self.browser.wait("voices[0].ended && part('cue').textContent === ''", "the end")
+        said = [[text, time] for text, time in self.browser.run("said") if text]
+        self.assertEqual([text for text, _ in said], ["A pot & its lid", "of clay"])
+        for (_, time), wanted in zip(said, (0.2, 1.3)):
+            self.assertTrue(wanted <= time < wanted + 0.4, said)
+        self.browser.run("part('captions').click()")
+        self.browser.run("part('marks').firstChild.click()")  # again, from the beginning
+        self.browser.wait("!voices[0].ended && voices[0].currentTime > 0.4", "the sound again")
+        self.assertEqual(self.browser.run("part('cue').textContent"), "")
+        self.browser.run("part('captions').click()")
+        self.assertEqual(self.browser.run("part('cue').textContent"), "A pot & its lid")
+        self.browser.run("part('sound').click()")
+        self.assertEqual(self.browser.run("[voices[0].muted, part('volume').hidden]"), [True, True])
+        self.browser.run("part('close').click()")
+        self.assertEqual(self.browser.run("[voices[0].paused, part('cue').textContent]"), [True, ""])
         self.assertEqual(self.browser.errors, [])
 
     def test_without_a_camera(self):
@@ -274,6 +357,7 @@ class Acting(ProgramTest):
         self.browser.wait(f"({MARKS}).length === 1", "the label")
         mark, = self.browser.run(MARKS)
         self.assertEqual(mark["name"], "A: Die Ecke")
+        self.assertEqual(self.browser.run("part('heard-text').textContent"), "Ein Topf")
         self.browser.run("part('marks').firstChild.click()")
         self.browser.wait("part('label-name').textContent === 'Die Ecke'", "the label's words")
         before = mark["x"]

@@ -111,6 +111,7 @@ enum {
   MODAR_TEXT = 0,     /* what to show of a pattern's scene */
   MODAR_ALT_TEXT = 1, /* what is seen there, for screen readers */
   MODAR_TITLE = 2,    /* of a node: its name for people */
+  MODAR_CAPTIONS = 3, /* of a video or sound: what is heard, as a WebVTT file */
 };
 /* A text of a pattern in a language; several are joined by a space. Copies and returns as the names
  * above, 0 where there is none. */
@@ -399,6 +400,7 @@ enum {
   MODAR_NODE_PICTURE = 2, /* a rectangle that shows a texture */
   MODAR_NODE_LABEL = 3,   /* a point, a mark to draw there, a title and a text */
   MODAR_NODE_VIDEO = 4,   /* a rectangle that shows a video */
+  MODAR_NODE_SOUND = 5,   /* is heard, not seen */
 };
 typedef struct modar_node {
   size_t size;
@@ -407,8 +409,8 @@ typedef struct modar_node {
   uint32_t scene; /* of a model: the number of its scene; else 0 */
   float place[3]; /* pattern space */
   int hidden;     /* 1: until an action shows it */
-  uint32_t media; /* of a video: number of its file, its index + 1; else 0 */
-  int loops;      /* 1: a video begins again where it ends */
+  uint32_t media; /* of a video or sound: number of its file, its index + 1; else 0 */
+  int loops;      /* 1: it begins again where it ends */
 } modar_node;
 MODAR_EXPERIMENTAL uint32_t modar_node_count(const modar_bundle* bundle);
 /* Returns 1 and the node, or 0 for an invalid index. */
@@ -418,14 +420,15 @@ MODAR_EXPERIMENTAL size_t modar_node_name(const modar_bundle* bundle, uint32_t i
                                           size_t size);
 MODAR_EXPERIMENTAL size_t modar_node_mark(const modar_bundle* bundle, uint32_t index, char* text,
                                           size_t size);
-/* kind: MODAR_TITLE, MODAR_TEXT or MODAR_ALT_TEXT; 0 where there is none in the language. */
+/* kind: MODAR_TITLE, MODAR_TEXT, MODAR_ALT_TEXT or MODAR_CAPTIONS; 0 where there is none in the language. */
 MODAR_EXPERIMENTAL size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind,
                                           const char* language, char* text, size_t size);
 
-/* A file for the app to decode: H.264 baseline and AAC in MP4, the index in front. */
+/* A file for the app to decode: H.264 baseline and AAC, of a sound AAC alone, in MP4, the index in
+ * front. */
 typedef struct modar_media {
   size_t size;
-  int width; /* pixels */
+  int width; /* pixels; of a sound 0 */
   int height;
   double seconds;
   int sound;            /* 1: it has a sound track */
@@ -451,7 +454,7 @@ MODAR_EXPERIMENTAL void modar_actions_reset(modar_actions* actions);
 enum {
   MODAR_SEEN = 0,  /* the pattern `subject` is on the screen: tell it in every step */
   MODAR_TAP = 1,   /* the node `subject` was tapped */
-  MODAR_ENDED = 2, /* the video `subject`, which does not loop, is at its end */
+  MODAR_ENDED = 2, /* the video or sound `subject`, which does not loop, is at its end */
 };
 typedef struct modar_event {
   size_t size;
@@ -461,7 +464,7 @@ typedef struct modar_event {
 } modar_event;
 enum {
   MODAR_PLAY =
-      1, /* play the video `node`, from where it was, or from its beginning after its end */
+      1, /* play the video or sound `node`, from where it was, or from its beginning after its end */
   MODAR_PAUSE = 2,     /* pause it */
   MODAR_SHOW_TEXT = 6, /* show the title and text of the label `node` */
   MODAR_OPEN_LINK = 7, /* ask the visitor whether to open modar_action_address() of `action` */
