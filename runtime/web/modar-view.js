@@ -185,7 +185,7 @@ export class View extends EventTarget {
 
   #act() {
     if (this.nodes.length === 0) return;
-    const happened = [...this.#taps.splice(0), ...this.#media.ended.splice(0).map((node) => ({ node, ended: true }))];
+    const happened = [...this.#media.ended.splice(0).map((node) => ({ node, ended: true })), ...this.#taps.splice(0)];
     for (const event of happened.length ? happened : [null]) {
       for (const todo of this.#engine.act(performance.now() / 1000, event)) {
         if ('play' in todo) this.#media.play(todo.play, event !== null && !event.ended);
