@@ -46,7 +46,7 @@ THIRD_PARTIES = {
     "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),
     "bake/lab/tinyobj_library": (r"bake/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),
     "curl/": (r"runtime/fetch/curl_downloader\.cpp",),
-    "httplib.h": (r"bake/web/(http_reader|serve)\.cpp",),
+    "httplib.h": (r"bake/web/(http_reader|serve)\.cpp", r"bake/studio/server\.cpp"),
     "openssl/": (r"bake/web/serve\.cpp",),
     "qrencode.h": (r"bake/web/serve\.cpp",),
     "SDL": (r"runtime/play/desk_.*\.cpp", r"tests/.*"),
@@ -86,7 +86,7 @@ def standard_header(name):
 
 # Rooms of the workstation from the bottom up: each includes those before it, and of its own rank itself only.
 BAKE_ROOMS = (("bake", "bake/memory"), ("bake/image",), ("bake/import", "bake/video"), ("bake/mesh",),
-              ("bake/texture", "bake/pattern"), ("bake/options",), ("bake/bundle", "bake/export", "bake/ship"), ("bake/web",), ("bake/check",), ("bake/page", "bake/project"), ("bake/commands",), ("bake/lab",))
+              ("bake/texture", "bake/pattern"), ("bake/options",), ("bake/bundle", "bake/export", "bake/ship"), ("bake/web",), ("bake/check",), ("bake/page", "bake/project"), ("bake/studio",), ("bake/commands",), ("bake/lab",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
 # The doors of the rooms: the headers that other rooms may include. Those of bake/memory and below are for all. The lab measures
 # what lies inside, and may include everything below it; what it alone includes is no door.
@@ -109,7 +109,8 @@ DOORS = {
     "bake/check": ("verdict.hpp", "source_check.hpp", "visual_check.hpp", "pose_check.hpp", "text_check.hpp", "device_rules.hpp",
                    "device_file.hpp", "yml_rule.hpp", "reproduce.hpp"),
     "bake/page": ("report_page.hpp",),
-    "bake/project": ("project.hpp",),
+    "bake/project": ("project.hpp", "project_edit.hpp"),
+    "bake/studio": ("studio.hpp",),
     "bake/commands": ("command_line.hpp",),
     "bake/lab": (),
     # Of the runtime, apps and rooms come through runtime/include and runtime/fetch/include.

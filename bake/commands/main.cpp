@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
     modar::CommandLine program("Bake models and pictures for augmented reality on old phones",
                                std::string("modar ") + MODAR_VERSION);
     program.group("Commands to start with");
+    modar::add_studio(program);
     modar::add_pattern(program);
     modar::add_bake(program);
     modar::add_check(program);

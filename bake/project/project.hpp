@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -29,6 +30,8 @@ struct ProjectAsset {
   double width_mm = 0.0;  ///< of a pattern; 0: what the file or its shape states, or unknown
   ShapeRequest shape;     ///< of a pattern
   Settings settings;      ///< of its own, above those of [bake] and of the tier
+  std::size_t table = 0;  ///< which [[model]] or [[pattern]] of the file names it
+  std::string where;      ///< of that table: "modar.toml:12:1"
 };
 
 struct ProjectScene {
@@ -37,6 +40,8 @@ struct ProjectScene {
   Words alts;                          ///< what a screen reader says is seen
   std::vector<NodeRequest> nodes;      ///< files: relative to the project's folder
   std::vector<ActionRequest> actions;  ///< on anything that stands on the pattern
+  std::optional<std::size_t> table;    ///< which [[scene]] of the file; nothing: it has none
+  std::string where;                   ///< of that table: "modar.toml:12:1"
 };
 
 /// Which assets go into one file. Models of the patterns' scenes come along.
@@ -94,6 +99,15 @@ struct Project {
 /// path that leads outside the project's folder, by links too, unless `outside` allows it: whoever
 /// bakes a stranger's project gives it the files of its folder alone).
 Result<Project> read_project(const std::string& path, bool outside = false);
+/// The same of a text that is to become the file `path`.
+Result<Project> read_project_text(const std::string& text, const std::string& path);
+
+/// A project that is being written: what can be read of it, and what is wrong with the rest.
+struct ProjectDraft {
+  Project project;              ///< tables with errors are left out, or lack what is wrong
+  std::vector<Error> problems;  ///< those of read_project(), one a table at most for each kind
+};
+ProjectDraft read_draft(const std::string& text, const std::string& path);
 
 struct InitialProject {
   std::string text;

@@ -147,6 +147,8 @@ class TableReader {
     return {};
   }
 
+  [[nodiscard]] std::string where() const { return place(file_, table_.source()); }
+
   [[nodiscard]] std::string at(std::string_view key) const {
     const toml::node* node = table_.get(key);
     return place(file_, node != nullptr ? node->source() : table_.source());
@@ -290,9 +292,17 @@ Result<std::optional<TableReader>> table(const std::string& file, const toml::ta
   return TableReader(file, *node->as_table(), "[" + name + "]");
 }
 
+Error no_toml(const std::string& path, const toml::parse_error& error) {
+  return {ExitCode::kInvalidInput, "project.toml", place(path, error.source()),
+          std::string(error.description()), "correct the line; see toml.io"};
+}
+
 class ProjectReader {
  public:
-  ProjectReader(const std::string& file, const toml::table& root, bool outside) : root_(root) {
+  /// problems: receives what is wrong, and the rest is read; nullptr: the first error ends it.
+  ProjectReader(const std::string& file, const toml::table& root, bool outside,
+                std::vector<Error>* problems = nullptr)
+      : root_(root), problems_(problems) {
     project_.file = file;
     project_.outside = outside;
     const fs::path folder = fs::path(file).parent_path();
@@ -300,30 +310,36 @@ class ProjectReader {
   }
 
   Result<Project> run() {
-    MODAR_TRY(
-        TableReader(project_.file, root_, "the file")
-            .allow({"project", "bake", "tier", "model", "pattern", "scene", "bundle", "gates"}));
-    MODAR_TRY(read_project_table());
-    MODAR_TRY(read_bake());
-    MODAR_TRY(read_assets("model", false, project_.models));
-    MODAR_TRY(read_assets("pattern", true, project_.patterns));
-    MODAR_TRY(read_scenes());
-    MODAR_TRY(read_bundles());
-    MODAR_TRY(read_gates());
     const TableReader whole(project_.file, root_, "the file");
+    MODAR_TRY(told(
+        whole.allow({"project", "bake", "tier", "model", "pattern", "scene", "bundle", "gates"})));
+    MODAR_TRY(told(read_project_table()));
+    MODAR_TRY(told(read_bake()));
+    MODAR_TRY(told(read_assets("model", false, project_.models)));
+    MODAR_TRY(told(read_assets("pattern", true, project_.patterns)));
+    MODAR_TRY(told(read_scenes()));
+    MODAR_TRY(told(read_bundles()));
+    MODAR_TRY(told(read_gates()));
     for (const std::string& path : {project_.out, std::string(kCacheFolder)}) {  // may be links
-      MODAR_TRY(keep_inside(whole, "project", path));
+      MODAR_TRY(told(keep_inside(whole, "project", path)));
     }
     if (project_.models.empty() && project_.patterns.empty()) {
-      return fail(ExitCode::kInvalidInput, "project.empty", project_.file,
-                  "it lists neither a model nor a pattern",
-                  "add [[model]] file = \"vase.glb\" and [[pattern]] file = \"cover.png\", or "
-                  "write it again with `modar init --force`");
+      MODAR_TRY(told(fail(ExitCode::kInvalidInput, "project.empty", project_.file,
+                          "it lists neither a model nor a pattern",
+                          "add [[model]] file = \"vase.glb\" and [[pattern]] file = \"cover.png\", "
+                          "or write it again with `modar init --force`")));
     }
     return std::move(project_);
   }
 
  private:
+  /// Nothing where a draft is read, which notes the error.
+  Result<void> told(Result<void> done) {
+    if (done || problems_ == nullptr) return done;
+    problems_->push_back(std::move(done.error()));
+    return {};
+  }
+
   Result<void> read_project_table() {
     name_ = fs::absolute(project_.file).lexically_normal().parent_path().filename().string();
     MODAR_ASSIGN(const auto reader, table(project_.file, root_, "project"));
@@ -384,9 +400,11 @@ class ProjectReader {
         keys_with_settings({"file", "name"}, pattern ? OptionPart::kPattern : OptionPart::kModel);
     if (pattern) keys.insert(keys.end(), {"width-mm", "shape"});
     std::set<std::string> seen;
-    for (const TableReader& reader : readers) {
-      MODAR_TRY(reader.allow(keys));
-      MODAR_TRY(add_assets(reader, pattern, seen, assets));
+    for (std::size_t i = 0; i < readers.size(); ++i) {
+      MODAR_TRY(told(readers[i].allow(keys)));
+      const std::size_t before = assets.size();
+      MODAR_TRY(told(add_assets(readers[i], pattern, seen, assets)));
+      for (std::size_t added = before; added < assets.size(); ++added) assets[added].table = i;
     }
     return {};
   }
@@ -400,6 +418,7 @@ class ProjectReader {
       return reader.wrong("file", "file = \"NAME\", where * matches any characters");
     ProjectAsset asset;
     asset.pattern = pattern;
+    asset.where = reader.where();
     MODAR_TRY(reader.take("name", asset.name));
     if (printable(asset.name) != asset.name) return reader.wrong("name", "a name of letters");
     MODAR_TRY(reader.take("width-mm", asset.width_mm, 0));
@@ -444,28 +463,34 @@ class ProjectReader {
 
   Result<void> read_scenes() {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
-    for (const TableReader& reader : readers) {
-      MODAR_TRY(reader.allow({"pattern", "model",   "scale", "height", "width", "up",    "turn",
-                              "offset",  "centred", "light", "text",   "alt",   "name",  "hidden",
-                              "group",   "picture", "video", "sound",  "label", "action"}));
-      ProjectScene scene;
-      MODAR_TRY(reader.take("pattern", scene.request.pattern));
-      MODAR_TRY(reader.take("model", scene.request.model));
-      MODAR_TRY(known(reader, "pattern", scene.request.pattern, project_.patterns));
-      MODAR_TRY(read_nodes(reader, scene));
-      if (reader.has("model") || scene.nodes.empty()) {
-        MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
-      }
-      MODAR_TRY(take_node(reader, scene.request));
-      MODAR_TRY(read_placement(reader, scene.request));
-      MODAR_TRY(reader.take("centred", scene.request.centred));
-      scene.request.light = project_.light;
-      MODAR_TRY(take_light(reader, scene.request.light));
-      MODAR_TRY(reader.take("text", scene.texts));
-      MODAR_TRY(reader.take("alt", scene.alts));
-      project_.scenes.push_back(std::move(scene));
-    }
+    for (std::size_t i = 0; i < readers.size(); ++i) MODAR_TRY(told(read_scene(readers[i], i)));
     if (readers.empty()) make_scenes();
+    return {};
+  }
+
+  Result<void> read_scene(const TableReader& reader, std::size_t table) {
+    MODAR_TRY(
+        told(reader.allow({"pattern", "model",   "scale", "height", "width", "up",    "turn",
+                           "offset",  "centred", "light", "text",   "alt",   "name",  "hidden",
+                           "group",   "picture", "video", "sound",  "label", "action"})));
+    ProjectScene scene;
+    scene.table = table;
+    scene.where = reader.where();
+    MODAR_TRY(reader.take("pattern", scene.request.pattern));
+    MODAR_TRY(reader.take("model", scene.request.model));
+    MODAR_TRY(known(reader, "pattern", scene.request.pattern, project_.patterns));
+    MODAR_TRY(read_nodes(reader, scene));
+    if (reader.has("model") || scene.nodes.empty()) {
+      MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
+    }
+    MODAR_TRY(take_node(reader, scene.request));
+    MODAR_TRY(read_placement(reader, scene.request));
+    MODAR_TRY(reader.take("centred", scene.request.centred));
+    scene.request.light = project_.light;
+    MODAR_TRY(take_light(reader, scene.request.light));
+    MODAR_TRY(reader.take("text", scene.texts));
+    MODAR_TRY(reader.take("alt", scene.alts));
+    project_.scenes.push_back(std::move(scene));
     return {};
   }
 
@@ -711,6 +736,7 @@ class ProjectReader {
   }
 
   const toml::table& root_;
+  std::vector<Error>* problems_;
   Project project_;
   std::string name_;  // of the only bundle
 };
@@ -741,11 +767,24 @@ Result<Project> read_project(const std::string& path, bool outside) {
                 "with --model and --pattern");
   }
   const toml::parse_result parsed = toml::parse_file(path);
-  if (!parsed) {
-    return fail(ExitCode::kInvalidInput, "project.toml", place(path, parsed.error().source()),
-                std::string(parsed.error().description()), "correct the line; see toml.io");
-  }
+  if (!parsed) return tl::unexpected(no_toml(path, parsed.error()));
   return ProjectReader(path, parsed.table(), outside).run();
+}
+
+Result<Project> read_project_text(const std::string& text, const std::string& path) {
+  const toml::parse_result parsed = toml::parse(text, path);
+  if (!parsed) return tl::unexpected(no_toml(path, parsed.error()));
+  return ProjectReader(path, parsed.table(), false).run();
+}
+
+ProjectDraft read_draft(const std::string& text, const std::string& path) {
+  ProjectDraft draft;
+  const toml::parse_result parsed = toml::parse(text, path);
+  if (!parsed) draft.problems.push_back(no_toml(path, parsed.error()));
+  const toml::table nothing;
+  auto read = ProjectReader(path, parsed ? parsed.table() : nothing, false, &draft.problems).run();
+  if (read) draft.project = std::move(*read);
+  return draft;
 }
 
 }  // namespace modar

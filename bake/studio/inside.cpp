@@ -1,0 +1,78 @@
+#include "bake/studio/inside.hpp"
+
+#include <filesystem>
+
+#include "bake/output.hpp"
+#include "formats/base/utf8.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLongestName = 1000;  // bytes; systems take 4096 with the folder's own
+constexpr std::size_t kLongestPart = 200;  // bytes; systems take 255, and we append "-2" and ".tmp"
+
+tl::unexpected<Error> bad_name(std::string_view name, const char* cause) {
+  return fail(ExitCode::kUsage, "studio.name", printable(name), cause,
+              "rename the file, and drop it again");
+}
+
+bool is_readable(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t size = utf8_character(text);
+    if (size == 0) return false;
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
+/// Whether `path`, all links followed, lies in the folder.
+bool lies_in(const fs::path& path, const std::string& folder) {
+  std::error_code error;
+  const fs::path root = fs::canonical(folder, error);
+  if (error) return false;
+  const fs::path whole = fs::weakly_canonical(path, error);
+  const fs::path below = whole.lexically_relative(root);
+  return !error && !below.empty() && *below.begin() != "..";
+}
+
+}  // namespace
+
+Result<void> check_name(std::string_view name) {
+  if (name.empty() || name.size() > kLongestName) return bad_name(name, "the name is too long");
+  if (!is_readable(name) || name.find('\\') != std::string_view::npos) {
+    return bad_name(name, "the name has characters that are none of a file name");
+  }
+  for (std::size_t begin = 0; begin <= name.size();) {
+    const std::size_t end = std::min(name.find('/', begin), name.size());
+    const std::string_view part = name.substr(begin, end - begin);
+    if (part.empty() || part.starts_with('.')) {
+      return bad_name(name, "the name leads to hidden or other folders");
+    }
+    if (part.size() > kLongestPart) return bad_name(name, "the name is too long");
+    begin = end + 1;
+  }
+  return {};
+}
+
+Result<std::string> file_inside(const std::string& folder, std::string_view name) {
+  MODAR_TRY(check_name(name));
+  const fs::path path = fs::path(folder) / name;
+  std::error_code error;
+  if (fs::is_regular_file(path, error) && lies_in(path, folder)) return path.string();
+  return fail(ExitCode::kUsage, "studio.unknown", std::string(name),
+              "there is no such file in the project's folder", "reload the page");
+}
+
+Result<std::string> place_inside(const std::string& folder, std::string_view name) {
+  MODAR_TRY(check_name(name));
+  const fs::path path = fs::path(folder) / name;
+  if (!lies_in(path.parent_path() / "x", folder)) {
+    return bad_name(name, "a link on the way leads out of the project's folder");
+  }
+  MODAR_TRY(make_output_folder(path.parent_path().string()));
+  return path.string();
+}
+
+}  // namespace modar

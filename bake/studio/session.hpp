@@ -1,0 +1,48 @@
+// A project that is open in a studio: what its verbs share.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "bake/project/project.hpp"
+#include "bake/studio/call.hpp"
+#include "bake/studio/events.hpp"
+#include "bake/studio/project_text.hpp"
+#include "formats/base/error.hpp"
+
+namespace modar {
+
+inline constexpr const char* kStudioFolder = ".modar/studio";  ///< in the project's; may be removed
+
+struct Session {
+  Session(const std::string& project_folder, std::string version)
+      : folder(project_folder),
+        own(project_folder + "/" + kStudioFolder),
+        file(project_folder + "/" + kProjectFile),
+        tool_version(std::move(version)),
+        text(file) {}
+
+  const std::string folder;        ///< canonical
+  const std::string own;           ///< of what the studio itself keeps
+  const std::string file;          ///< modar.toml
+  const std::string tool_version;  ///< for bundles
+  ProjectText text;
+  Events events;
+  std::function<void()> quit;  ///< ends the studio
+};
+
+/// The project as the page sees it: GET api/project.
+Result<Json> project_view(Session& session);
+
+/// A file of the project's folder, from its path relative to it.
+inline std::string path_in(const Session& session, const std::string& file) {
+  return session.folder + "/" + file;
+}
+
+/// Answers a request; publishes what it changes.
+Answer answer_call(Session& session, const Call& call);
+
+}  // namespace modar

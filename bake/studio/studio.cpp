@@ -1,0 +1,103 @@
+// The studio from its start to its end.
+#include "bake/studio/studio.hpp"
+
+#include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <thread>
+
+#include "bake/output.hpp"
+#include "bake/process.hpp"
+#include "bake/studio/server.hpp"
+#include "bake/studio/session.hpp"
+#include "bake/web/site.hpp"
+#include "formats/base/folder_lock.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The page as it was installed with the programs, or as it lies beside the build.
+Result<std::string> find_studio_page() {
+  const fs::path programs = program_folder();
+  for (const fs::path& folder :
+       {programs / "../share/modar/studio", programs / "../../../bake/studio/page"}) {
+    if (fs::exists(folder / "index.html")) return folder.lexically_normal().string();
+  }
+  return fail(ExitCode::kUnsupported, "studio.page", programs.string(),
+              "the studio's page does not lie beside the programs", "install the package again");
+}
+
+/// While one exists, SIGINT and SIGTERM call `ended` in place of ending the process.
+class Signals {
+ public:
+  explicit Signals(std::function<void()> ended) {
+    ::sigemptyset(&signals_);
+    ::sigaddset(&signals_, SIGINT);
+    ::sigaddset(&signals_, SIGTERM);
+    ::sigaddset(&signals_, SIGHUP);
+    ::pthread_sigmask(SIG_BLOCK, &signals_, &before_);
+    thread_ = std::thread([this, ended = std::move(ended)] {
+      int signal = 0;
+      if (::sigwait(&signals_, &signal) == 0 && !over_) ended();
+    });
+  }
+  Signals(const Signals&) = delete;
+  Signals& operator=(const Signals&) = delete;
+  ~Signals() {
+    over_ = true;
+    ::pthread_kill(thread_.native_handle(), SIGTERM);
+    thread_.join();
+    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+
+ private:
+  sigset_t signals_{};
+  sigset_t before_{};
+  std::atomic<bool> over_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+Result<void> run_studio(const StudioOptions& options,
+                        const std::function<void(const StudioAddress&)>& ready) {
+  MODAR_ASSIGN(const std::string page, find_studio_page());
+  MODAR_TRY(make_output_folder(options.folder));
+  std::error_code error;
+  const std::string folder = fs::canonical(options.folder, error).string();
+  Session session(folder, options.tool_version);
+  MODAR_TRY(make_output_folder(session.own));
+  if (fs::canonical(session.own, error) != fs::path(session.own)) {
+    return fail(ExitCode::kUsage, "studio.folder", session.own,
+                "it is a link that leads out of the project's folder", "remove the link");
+  }
+  MODAR_ASSIGN(const FolderLock lock,
+               FolderLock::take(session.own + "/lock", {ExitCode::kIo, "studio.locked", folder,
+                                                        "another studio has this folder open",
+                                                        "use its page, or end it first"}));
+  const auto engine = find_page();
+  StudioServer* running = nullptr;
+  const Signals signals([&running] {
+    if (running != nullptr) running->stop();
+  });
+  MODAR_ASSIGN(
+      const auto server,
+      StudioServer::open(
+          {options.port, page, engine ? *engine : "", session.own},
+          [&session](const Call& call) { return answer_call(session, call); }, session.events));
+  running = server.get();
+  session.quit = [&session, &server] {
+    session.events.publish("quit", Json::object());
+    std::thread([&server] { server->stop(); }).detach();
+  };
+  ready({server->address(), server->opening_address()});
+  server->serve();
+  return {};
+}
+
+}  // namespace modar
