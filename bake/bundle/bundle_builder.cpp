@@ -451,7 +451,9 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
     ExtraSection colours;
     colours.type = static_cast<std::uint32_t>(SectionType::kPatternColours);
     colours.owner = static_cast<std::uint32_t>(content.patterns.size());
-    MODAR_ASSIGN(colours.bytes, pattern_colours(request.path));
+    MODAR_ASSIGN(const RgbaImage picture,
+                 read_pattern_picture(request.path, request.width_mm, request.shape));
+    colours.bytes = pattern_colours(picture);
     content.extra.push_back(std::move(colours));
   }
   content.patterns.push_back(record);

@@ -273,7 +273,7 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
   Json patterns = Json::array();
   for (const PatternRequest& pattern : request.patterns) {
     Json stated = {{"file", file_name(pattern.path)}, {"width_mm", pattern.width_mm}};
-    if (!pattern.shape.flat()) stated.set("shape", pattern.shape.text);
+    if (!pattern.shape.text.empty()) stated.set("shape", pattern.shape.text);
     if (pattern.name != file_stem(pattern.path)) stated.set("name", pattern.name);
     if (patterns.size() < trace.ranges.size() && trace.ranges[patterns.size()]) {
       const ScoreRange& range = *trace.ranges[patterns.size()];

@@ -84,7 +84,7 @@ void read_widths(const Json& document, BakeRequest& request) {
     for (PatternRequest& pattern : request.patterns) {
       if (file_name(pattern.path) != file) continue;
       if (pattern.width_mm == 0 && width > 0) pattern.width_mm = width;
-      if (pattern.shape.flat() && shape) pattern.shape = *shape;
+      if (pattern.shape.text.empty() && shape) pattern.shape = *shape;
     }
   }
 }

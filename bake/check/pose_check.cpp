@@ -224,8 +224,8 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
            "its picture is needed to render views of it");
       continue;
     }
-    bool shrunk = false;
-    MODAR_ASSIGN(GrayPicture picture, load_pattern(path->path, shrunk));
+    MODAR_ASSIGN(ShapedPicture shaped, load_shaped(path->path, path->width_mm, path->shape));
+    GrayPicture picture = std::move(shaped.picture);
     PatternSurface surface;
     const auto shape = bundle.section(SectionType::kPatternShape, p);
     if (!shape.empty()) {

@@ -234,28 +234,17 @@ void print_failure(const Error& error, ExitCode& answer) {
   if (answer == ExitCode::kOk) answer = error.exit;
 }
 
-Result<NamedScore> score_file(const ScoreCommand& command, const std::string& path) {
+Result<NamedScore> score_named(const ScoreCommand& command, const std::string& path) {
   ShapeRequest told;
   if (!command.shape.empty()) {
     MODAR_ASSIGN(told, parse_shape(command.shape));
   }
-  MODAR_ASSIGN(const ShapedPicture shaped, load_shaped(path, 0, told));
-  const GrayImage picture = shaped.picture.view();
-  TrackerRecordOptions loop;
-  loop.jobs = command.jobs;
-  const PatternSurface surface = surface_of(shaped.section, picture.width, picture.height);
-  auto score = make_tracker_record(picture, loop, surface).and_then([&](const auto& record) {
-    return score_pattern(picture, record, command.jobs, shaped.section);
-  });
-  if (!score) {
-    score.error().where = path;
-    return tl::unexpected(score.error());
-  }
+  MODAR_ASSIGN(ScoredPicture scored, score_file(path, 0, told, command.jobs));
   if (!command.overlay_folder.empty()) {
     MODAR_ASSIGN(const std::string out, picture_of(path, command.overlay_folder));
-    MODAR_TRY(write_png(score_overlay(picture, *score), out));
+    MODAR_TRY(write_png(score_overlay(scored.shaped.picture.view(), scored.score), out));
   }
-  return NamedScore{file_stem(path), std::move(*score), shaped.width_mm};
+  return NamedScore{file_stem(path), std::move(scored.score), scored.shaped.width_mm};
 }
 
 Result<ExitCode> run_score(ScoreCommand& command) {
@@ -269,7 +258,7 @@ Result<ExitCode> run_score(ScoreCommand& command) {
   ExitCode answer = ExitCode::kOk;
   Json list = Json::array();
   for (const std::string& path : command.patterns) {
-    const auto one = score_file(command, path);
+    const auto one = score_named(command, path);
     if (!one) {
       print_failure(one.error(), answer);
       list.push_back(failure_json(path, one.error()));

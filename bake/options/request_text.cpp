@@ -439,7 +439,15 @@ bool looks_like_length(std::string_view tail) {
 tl::unexpected<Error> shape_error(const std::string& text, const std::string& cause) {
   return fail(ExitCode::kUsage, "cli.shape", "shape=" + text, cause,
               "write cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or "
-              "box,size=120x180x40mm,right=FILE,back=FILE,left=FILE,top=FILE,bottom=FILE");
+              "box,size=120x180x40mm,right=FILE,back=FILE,left=FILE,top=FILE,bottom=FILE, or flat; "
+              "behind each corners=X:Y:X:Y:X:Y:X:Y,height=297mm where the file is a photo of it");
+}
+
+/// Corners within a shape, whose own parts stand between commas.
+std::string commas_for_colons(std::string_view text) {
+  std::string out(text);
+  std::replace(out.begin(), out.end(), ':', ',');
+  return out;
 }
 
 }  // namespace
@@ -454,31 +462,44 @@ Result<ShapeRequest> parse_shape(const std::string& text) {
     shape.kind = ShapeRequest::Kind::kCone;
   } else if (parts[0] == "box") {
     shape.kind = ShapeRequest::Kind::kBox;
-  } else {
+  } else if (parts[0] != "flat") {
     return shape_error(text, "there is no shape '" + std::string(parts[0]) + "'");
   }
   constexpr std::string_view kSides[] = {"right", "back", "left", "top", "bottom"};
   const bool cone = shape.kind == ShapeRequest::Kind::kCone;
   const bool box = shape.kind == ShapeRequest::Kind::kBox;
+  const bool round = !box && !shape.flat();
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::string_view part = parts[i];
     const std::string_view value = part.substr(part.find('=') + 1);
     bool good = false;
-    if (box && part.starts_with("size=")) {
+    if (part.starts_with("corners=")) {
+      auto corners = parse_corners(commas_for_colons(value));
+      good = corners.has_value();
+      if (good) {
+        RectifyOptions cut;
+        cut.corners = *corners;
+        if (const auto valid = cut.validate(); !valid)
+          return shape_error(text, valid.error().cause);
+        shape.corners = *corners;
+      }
+    } else if (part.starts_with("height=")) {
+      good = parse_length(value, shape.height_mm);
+    } else if (box && part.starts_with("size=")) {
       good = parse_box(value, shape.box_mm);
     } else if (box) {
       const auto* side =
           std::find(std::begin(kSides), std::end(kSides), part.substr(0, part.find('=')));
       good = side != std::end(kSides) && !value.empty();
       if (good) shape.sides[static_cast<std::size_t>(side - std::begin(kSides))] = value;
-    } else if (!cone && part.starts_with("diameter=")) {
+    } else if (round && !cone && part.starts_with("diameter=")) {
       good = parse_length(value, shape.top_mm);
       shape.bottom_mm = shape.top_mm;
     } else if (cone && part.starts_with("top=")) {
       good = parse_length(value, shape.top_mm);
     } else if (cone && part.starts_with("bottom=")) {
       good = parse_length(value, shape.bottom_mm);
-    } else if (part.starts_with("arc=")) {
+    } else if (round && part.starts_with("arc=")) {
       good = parse_number(value, shape.arc_deg) && shape.arc_deg > 0 && shape.arc_deg <= 360;
     }
     if (!good) return shape_error(text, "'" + std::string(part) + "' is not understood");
@@ -487,6 +508,9 @@ Result<ShapeRequest> parse_shape(const std::string& text) {
     return shape_error(text, "a cone needs its diameters at the top and at the bottom");
   }
   if (box && shape.box_mm[0] <= 0) return shape_error(text, "a box needs its size");
+  if (shape.height_mm > 0 && !shape.corners) {
+    return shape_error(text, "a height needs corners=, whose picture has it");
+  }
   return shape;
 }
 

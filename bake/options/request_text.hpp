@@ -66,7 +66,8 @@ Result<std::array<PixelPoint, 4>> parse_corners(const std::string& text);
 Result<PatternRequest> parse_pattern(const std::string& text);
 
 /// "cylinder,diameter=66mm,arc=120", "cone,top=80mm,bottom=60mm,arc=100"; arc in degrees, left out
-/// where the width tells it; "box,size=120x180x40mm,right=FILE,top=FILE": width, height and depth.
+/// where the width tells it; "box,size=120x180x40mm,right=FILE,top=FILE": width, height and depth;
+/// "flat,corners=X:Y:X:Y:X:Y:X:Y,height=297mm", which any may have: the file is a photo of it.
 /// Errors: kUsage "cli.shape".
 Result<ShapeRequest> parse_shape(const std::string& text);
 

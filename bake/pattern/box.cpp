@@ -80,7 +80,12 @@ Result<ShapedPicture> load_box(const std::string& path, const ShapeRequest& requ
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (i > 0 && request.sides[i - 1].empty()) continue;
     const std::string file = i == 0 ? path : (folder / request.sides[i - 1]).string();
-    MODAR_ASSIGN(pictures[i], load_gray(file));
+    if (i == 0) {
+      MODAR_ASSIGN(const RgbaImage front, read_pattern_picture(path, w, request));
+      pictures[0] = gray_of(front);
+    } else {
+      MODAR_ASSIGN(pictures[i], load_gray(file));
+    }
     if (fits(pictures[i], widths[i], heights[i])) continue;
     return fail(ExitCode::kUsage, "pattern.shape", file,
                 "the picture is " + std::to_string(pictures[i].width) + "x" +
@@ -128,6 +133,21 @@ ShapedPicture assemble_box(const std::array<GrayPicture, 6>& pictures,
   return out;
 }
 
+Result<RgbaImage> read_pattern_picture(const std::string& path, double width_mm,
+                                       const ShapeRequest& request) {
+  if (!request.corners) return read_image(path);
+  MODAR_ASSIGN(const Photo photo, read_photo(path));
+  RectifyOptions options;
+  options.corners = *request.corners;
+  options.width_mm = width_mm;
+  options.height_mm = request.height_mm;
+  options.focal_px = photo.focal_px;
+  auto cut = rectify(photo.image, options);
+  if (cut) return std::move(cut->image);
+  cut.error().where = path;
+  return tl::unexpected(std::move(cut.error()));
+}
+
 std::vector<std::string> files_of(const std::string& path, const ShapeRequest& request) {
   std::vector<std::string> files;
   for (const std::string& side : request.sides) {
@@ -140,14 +160,21 @@ Result<ShapedPicture> load_shaped(const std::string& path, double width_mm,
                                   const ShapeRequest& request) {
   if (request.kind == ShapeRequest::Kind::kBox) return load_box(path, request);
   ShapedPicture out;
-  MODAR_ASSIGN(out.picture, load_pattern(path, out.shrunk));
+  if (request.corners) {
+    MODAR_ASSIGN(const RgbaImage cut, read_pattern_picture(path, width_mm, request));
+    out.picture = gray_of(cut);
+  } else {
+    MODAR_ASSIGN(out.picture, load_pattern(path, out.shrunk));
+  }
   ShapeRequest told = request;
   if (request.flat() && is_target_file(path)) {
     MODAR_ASSIGN(told, target_shape(path));
   }
-  // Diameter and arc tell the width: what the file states may be a program's default.
+  // Diameter and arc tell the width: what the file states may be a program's default. A photo's
+  // is not that of the picture in it.
   const bool told_width = told.top_mm > 0 && told.arc_deg > 0;
-  out.width_mm = width_mm > 0 ? width_mm : told_width ? 0 : png_width_mm(path);
+  const bool stated = !told_width && !request.corners;
+  out.width_mm = width_mm > 0 ? width_mm : stated ? png_width_mm(path) : 0;
   MODAR_ASSIGN(out.section,
                shape_section(told, out.picture.width, out.picture.height, out.width_mm));
   return out;

@@ -71,8 +71,7 @@ Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
   }
 }
 
-Result<std::vector<std::byte>> pattern_colours(const std::string& path) {
-  MODAR_ASSIGN(const RgbaImage image, read_image(path));
+std::vector<std::byte> pattern_colours(const RgbaImage& image) {
   // Sums of rows first: each pixel is read once.
   std::array<std::array<double, 4>, kColourCells * kColourCells> sums{};
   std::array<double, 256> linear{};

@@ -21,8 +21,8 @@ Result<GrayPicture> load_gray(const std::string& path);
 /// kUnsupported "pattern.mind", and those of load_target().
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
 /// The SectionType::kPatternColours section of a picture: the mean colours of eight by eight cells,
-/// in linear light, transparent pixels as white paper. Errors: those of read_image().
-Result<std::vector<std::byte>> pattern_colours(const std::string& path);
+/// in linear light, transparent pixels as white paper.
+std::vector<std::byte> pattern_colours(const RgbaImage& image);
 /// The PNG and JPEG files of a folder sorted by name, or the file itself. Errors: kIo
 /// "pictures.folder" where there is none.
 Result<std::vector<std::string>> pictures_of(const std::string& path);

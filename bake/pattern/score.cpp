@@ -719,4 +719,24 @@ RgbaImage score_overlay(const GrayImage& pattern, const PatternScore& score) {
   return image;
 }
 
+Result<ScoredPicture> score_file(const std::string& path, double width_mm,
+                                 const ShapeRequest& request, unsigned jobs) {
+  ScoredPicture out;
+  MODAR_ASSIGN(out.shaped, load_shaped(path, width_mm, request));
+  const GrayImage picture = out.shaped.picture.view();
+  TrackerRecordOptions loop;
+  loop.jobs = jobs;
+  const PatternSurface surface = surface_of(out.shaped.section, picture.width, picture.height);
+  auto scored = make_tracker_record(picture, loop, surface).and_then([&](auto&& record) {
+    out.record = std::move(record);
+    return score_pattern(picture, out.record, jobs, out.shaped.section);
+  });
+  if (!scored) {
+    scored.error().where = path;
+    return tl::unexpected(std::move(scored.error()));
+  }
+  out.score = std::move(*scored);
+  return out;
+}
+
 }  // namespace modar

@@ -51,6 +51,17 @@ struct PatternScore {
 Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std::byte> record,
                                    unsigned jobs, const std::vector<std::byte>& shape = {});
 
+/// A picture with its score, as the device has it.
+struct ScoredPicture {
+  ShapedPicture shaped;
+  std::vector<std::byte> record;  ///< its tracker record
+  PatternScore score;
+};
+/// The same of a pattern's file. width_mm: 0: what the file or the shape states. Errors: also those
+/// of load_shaped().
+Result<ScoredPicture> score_file(const std::string& path, double width_mm,
+                                 const ShapeRequest& request, unsigned jobs);
+
 /// What the grade follows from: farthest distance, tilt (over 70 degrees) and half-covered views
 /// (at half weight) as factors.
 double range_value(const ScoreRange& range);

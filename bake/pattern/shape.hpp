@@ -5,10 +5,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "bake/pattern/picture.hpp"
+#include "bake/pattern/plane_aspect.hpp"
 #include "formats/base/error.hpp"
 #include "formats/pattern_shape.hpp"
 
@@ -25,9 +27,19 @@ struct ShapeRequest {
   /// Of a box: right, back, left, top and bottom, relative to the folder of the pattern's picture,
   /// which is its front; empty: plain.
   std::array<std::string, 5> sides;
-  std::string text;  ///< as it was written: "cylinder,diameter=66mm,arc=120"
+  /// Of the picture in the photo that the pattern's file is (of a box, its front): top-left,
+  /// top-right, bottom-right, bottom-left. Nothing: the file is the picture.
+  std::optional<std::array<PixelPoint, 4>> corners;
+  double height_mm = 0;  ///< of what the corners cut out; 0: as the perspective tells
+  std::string text;  ///< as it was written: "cylinder,diameter=66mm,arc=120"; empty: nothing was
   [[nodiscard]] bool flat() const { return kind == Kind::kFlat; }
 };
+
+/// A pattern's picture in colour: what its corners cut out of the photo, as `modar pattern rectify`
+/// does, or the file as it is. width_mm: of the picture, 0: not told. Errors: those of read_photo()
+/// and rectify().
+Result<RgbaImage> read_pattern_picture(const std::string& path, double width_mm,
+                               const ShapeRequest& request);
 
 /// The SectionType::kPatternShape section of a picture of that size; empty where the request is
 /// flat. Not of boxes. width_mm: of the picture, along the surface; 0: filled in where the

@@ -166,7 +166,8 @@ class ProjectBake {
 
   /// The width and the shape of a pattern.
   [[nodiscard]] static std::string size_of(const ProjectAsset& asset) {
-    return std::to_string(asset.width_mm) + (asset.shape.flat() ? "" : " " + asset.shape.text);
+    return std::to_string(asset.width_mm) +
+           (asset.shape.text.empty() ? "" : " " + asset.shape.text);
   }
 
   [[nodiscard]] std::string key_of(const Task& task) const {
@@ -232,9 +233,14 @@ class ProjectBake {
 
   void plan(Target& target) {
     target.link = link_of(target);
-    const auto last = last_bundles_.find(target.path);
+    const auto last = last_bundles_.find(relative(target));
     target.fresh = !target.link.empty() && last != last_bundles_.end() &&
                    last->second == target.link + " " + stamp_of(target.path);
+  }
+
+  /// Its path as the state has it, from wherever the bake is run.
+  [[nodiscard]] std::string relative(const Target& target) const {
+    return target.path.substr(project_.folder.size());
   }
 
   /// Empty where the key of an asset is not known yet.
@@ -632,7 +638,7 @@ class ProjectBake {
     if (!file) return;
     const Json json =
         Json::parse({reinterpret_cast<const char*>(file->bytes().data()), file->bytes().size()});
-    digests_.read(json.find("digests").value_or(Json()));
+    digests_.read(json.find("digests").value_or(Json()), project_.folder);
     const Json assets = json.find("assets").value_or(Json());
     for (std::size_t i = 0; i < assets.size(); ++i) {
       const Json one = *assets.at(i);
@@ -667,12 +673,12 @@ class ProjectBake {
     Json bundles = Json::array();
     for (const Target& target : targets_) {
       if (!target.fresh && written_.count(target.path) == 0) continue;
-      bundles.push_back(Json::array({target.path, target.link + " " + stamp_of(target.path)}));
+      bundles.push_back(Json::array({relative(target), target.link + " " + stamp_of(target.path)}));
     }
     std::error_code error;
     const std::string path = project_.path(kState);
     fs::create_directories(fs::path(path).parent_path(), error);
-    return write_file(path, std::string_view(Json({{"digests", digests_.json()},
+    return write_file(path, std::string_view(Json({{"digests", digests_.json(project_.folder)},
                                                    {"assets", std::move(assets)},
                                                    {"bundles", std::move(bundles)}})
                                                  .dump()));

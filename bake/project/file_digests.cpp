@@ -63,17 +63,18 @@ std::string FileDigests::of(const std::string& path) {
   return (known_[path] = std::move(look)).digest;
 }
 
-Json FileDigests::json() const {
+Json FileDigests::json(const std::string& folder) const {
   const std::lock_guard lock(mutex_);
   Json list = Json::array();
   for (const auto& [path, look] : known_) {
-    if (look.settled)
-      list.push_back(Json::array({path, look.size, look.time, look.inode, look.digest}));
+    if (!look.settled) continue;
+    const std::string name = path.starts_with(folder) ? path.substr(folder.size()) : path;
+    list.push_back(Json::array({name, look.size, look.time, look.inode, look.digest}));
   }
   return list;
 }
 
-void FileDigests::read(const Json& json) {
+void FileDigests::read(const Json& json, const std::string& folder) {
   for (std::size_t i = 0; i < json.size(); ++i) {
     const Json one = json.at(i).value_or(Json());
     const auto path = one.at(0).value_or(Json()).text();
@@ -82,7 +83,8 @@ void FileDigests::read(const Json& json) {
     const auto inode = one.at(3).value_or(Json()).count();
     const auto digest = one.at(4).value_or(Json()).text();
     if (!path || !size || !time || !inode || !digest) continue;
-    known_[*path] = {*size, static_cast<std::int64_t>(*time), *inode, *digest, true};
+    known_[path->starts_with('/') ? *path : folder + *path] = {
+        *size, static_cast<std::int64_t>(*time), *inode, *digest, true};
   }
 }
 

@@ -102,15 +102,11 @@ std::string left_out_words(const Found& found) {
 }
 
 /// A TOML text in quotes, of a file name that a glob matches as it is.
-std::string quoted(const std::string& text, bool as_glob) {
+std::string quoted(const std::string& text, bool glob) {
   std::string out = "\"";
-  for (const char c : text) {
+  for (const char c : glob ? as_glob(text) : text) {
     if (c == '"' || c == '\\') out += '\\';
-    if (as_glob && (c == '*' || c == '?' || c == '[')) {
-      out += std::string("[") + c + "]";
-    } else {
-      out += c;
-    }
+    out += c;
   }
   return out + "\"";
 }
@@ -236,6 +232,24 @@ std::string scenes(const Found& found, const std::vector<std::string>& models,
 }
 
 }  // namespace
+
+Result<FoundAssets> find_assets(const std::string& folder) {
+  MODAR_ASSIGN(const Found found, look_through(folder));
+  FoundAssets assets;
+  for (const fs::path& model : found.models) assets.models.push_back(model.string());
+  for (const fs::path& picture : found.pictures) assets.pictures.push_back(picture.string());
+  std::sort(assets.models.begin(), assets.models.end());
+  std::sort(assets.pictures.begin(), assets.pictures.end());
+  return assets;
+}
+
+std::string as_glob(const std::string& file) {
+  std::string glob = file.starts_with('!') ? "./" : "";  // else it would leave the file out
+  for (const char c : file) {
+    glob += c == '*' || c == '?' || c == '[' ? std::string("[") + c + "]" : std::string(1, c);
+  }
+  return glob;
+}
 
 Result<InitialProject> initial_project(const std::string& folder) {
   MODAR_ASSIGN(const Found found, look_through(folder));

@@ -31,7 +31,8 @@ struct ProjectAsset {
   ShapeRequest shape;     ///< of a pattern
   Settings settings;      ///< of its own, above those of [bake] and of the tier
   std::size_t table = 0;  ///< which [[model]] or [[pattern]] of the file names it
-  std::string where;      ///< of that table: "modar.toml:12:1"
+  std::vector<std::string> globs;  ///< of that table
+  std::string where;               ///< of that table: "modar.toml:12:1"
 };
 
 struct ProjectScene {
@@ -108,6 +109,17 @@ struct ProjectDraft {
   std::vector<Error> problems;  ///< those of read_project(), one a table at most for each kind
 };
 ProjectDraft read_draft(const std::string& text, const std::string& path);
+
+/// Files below a folder, relative to it, in byte order; hidden ones and `out` left out.
+struct FoundAssets {
+  std::vector<std::string> models;
+  std::vector<std::string> pictures;  ///< without those that a material of any model names
+};
+/// Errors: kIo "io.folder".
+Result<FoundAssets> find_assets(const std::string& folder);
+
+/// The glob that matches this file alone.
+std::string as_glob(const std::string& file);
 
 struct InitialProject {
   std::string text;

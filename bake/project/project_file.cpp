@@ -18,6 +18,7 @@
 #include "bake/project/settings.hpp"
 #include "formats/base/nearest.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/shortest_number.hpp"
 
 namespace modar {
 namespace {
@@ -105,6 +106,12 @@ class TableReader {
     if (good) return {};
     return wrong(key, "a number, a text, or a list of numbers");
   }
+  /// Numbers, in lists of any depth, in their order: "212:80:905:131".
+  Result<void> take_numbers(std::string_view key, std::string& text) const {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr || add_numbers(*node, text)) return {};
+    return wrong(key, "a list of numbers");
+  }
   /// The tables of an array within, [[name.key]].
   [[nodiscard]] Result<std::vector<TableReader>> take_tables(const std::string& key) const {
     std::vector<TableReader> list;
@@ -171,6 +178,18 @@ class TableReader {
     if (!got) return wrong(key, expected);
     value = *got;
     return {};
+  }
+
+  static bool add_numbers(const toml::node& node, std::string& text) {
+    const auto* list = node.as_array();
+    if (list == nullptr) {
+      const auto number = node.value<double>();
+      if (number) text += (text.empty() ? "" : ":") + shortest_text(*number);
+      return number.has_value();
+    }
+    bool good = true;
+    for (const auto& element : *list) good &= add_numbers(element, text);
+    return good;
   }
 
   Result<void> take_setting(const BakeOption& option, std::string& value) const {
@@ -398,7 +417,7 @@ class ProjectReader {
     MODAR_ASSIGN(const auto readers, tables(project_.file, root_, kind));
     Keys keys =
         keys_with_settings({"file", "name"}, pattern ? OptionPart::kPattern : OptionPart::kModel);
-    if (pattern) keys.insert(keys.end(), {"width-mm", "shape"});
+    if (pattern) keys.insert(keys.end(), {"width-mm", "height-mm", "corners", "shape"});
     std::set<std::string> seen;
     for (std::size_t i = 0; i < readers.size(); ++i) {
       MODAR_TRY(told(readers[i].allow(keys)));
@@ -406,6 +425,28 @@ class ProjectReader {
       MODAR_TRY(told(add_assets(readers[i], pattern, seen, assets)));
       for (std::size_t added = before; added < assets.size(); ++added) assets[added].table = i;
     }
+    return {};
+  }
+
+  /// shape, corners and height-mm together are what --pattern has in one text.
+  static Result<void> take_shape(const TableReader& reader, ShapeRequest& shape) {
+    std::string text;
+    MODAR_TRY(reader.take("shape", text));
+    if (!text.empty() && !parse_shape(text)) {
+      return reader.wrong("shape", "shape = \"cylinder,diameter=66mm,arc=120\"");
+    }
+    std::string corners;
+    MODAR_TRY(reader.take_numbers("corners", corners));
+    double height = 0;
+    MODAR_TRY(reader.take("height-mm", height, 0));
+    if (text.empty() && (!corners.empty() || height > 0)) text = "flat";
+    if (!corners.empty()) text += ",corners=" + corners;
+    if (height > 0) text += ",height=" + shortest_text(height) + "mm";
+    if (text.empty()) return {};
+    auto parsed = parse_shape(text);
+    if (!parsed && corners.empty()) return reader.wrong("height-mm", "it beside corners = [...]");
+    if (!parsed) return reader.wrong("corners", "[[212, 80], [905, 131], [870, 640], [190, 602]]");
+    shape = std::move(*parsed);
     return {};
   }
 
@@ -417,18 +458,13 @@ class ProjectReader {
     if (globs.empty())
       return reader.wrong("file", "file = \"NAME\", where * matches any characters");
     ProjectAsset asset;
+    asset.globs = globs;
     asset.pattern = pattern;
     asset.where = reader.where();
     MODAR_TRY(reader.take("name", asset.name));
     if (printable(asset.name) != asset.name) return reader.wrong("name", "a name of letters");
     MODAR_TRY(reader.take("width-mm", asset.width_mm, 0));
-    std::string shape;
-    MODAR_TRY(reader.take("shape", shape));
-    if (!shape.empty()) {
-      auto parsed = parse_shape(shape);
-      if (!parsed) return reader.wrong("shape", "shape = \"cylinder,diameter=66mm,arc=120\"");
-      asset.shape = std::move(*parsed);
-    }
+    MODAR_TRY(take_shape(reader, asset.shape));
     MODAR_TRY(reader.take_settings(asset.settings));
     const std::string name = asset.name;
     std::set<std::string> left_out;

@@ -56,15 +56,11 @@ TEST(PatternColours, AreMeansInLinearLight) {
     p[2] = i < 128 ? 0 : 255;
   }
   image.pixels[3] = 0;  // the first pixel is paper
-  const std::string path = temporary("colours.png");
-  const RemoveAtEnd remove{path};
-  ASSERT_TRUE(write_png(image, path));
-  const auto section = pattern_colours(path);
-  ASSERT_TRUE(section) << to_line(section.error());
-  ASSERT_EQ(section->size(), 16u + 8 * 8 * 6);
+  const auto section = pattern_colours(image);
+  ASSERT_EQ(section.size(), 16u + 8 * 8 * 6);
   const auto value = [&](std::size_t cell, std::size_t channel) {
     std::uint16_t code = 0;
-    std::memcpy(&code, section->data() + 16 + 6 * cell + 2 * channel, 2);
+    std::memcpy(&code, section.data() + 16 + 6 * cell + 2 * channel, 2);
     return code / 65535.0;
   };
   EXPECT_NEAR(value(9, 0), 0.25, 0.002);
