@@ -15,6 +15,8 @@
 #include <tuple>
 #include <vector>
 
+#include "bake/json.hpp"
+
 namespace modar {
 
 namespace {
@@ -37,8 +39,11 @@ std::string time_left(double done, double elapsed_s) {
   return text;
 }
 
-ProgressBar::ProgressBar(bool quiet)
-    : active_(!quiet), terminal_(isatty(STDERR_FILENO) == 1), start_(Clock::now()) {}
+ProgressBar::ProgressBar(bool quiet, bool as_json)
+    : active_(!quiet || as_json),
+      json_(as_json),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      start_(Clock::now()) {}
 
 ProgressBar::~ProgressBar() {
   clear();
@@ -52,7 +57,9 @@ void ProgressBar::show(const std::string& name, double done) {
     stage_ = stage;
     start_ = Clock::now();
     next_words_s_ = kEstimateAfter;
+    percent_ = -1;
   }
+  if (json_) return print_json(done);
   const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
   const std::string left = time_left(done, elapsed);
   const int percent = static_cast<int>(done * 100 + 0.5);
@@ -70,6 +77,16 @@ void ProgressBar::show(const std::string& name, double done) {
                left.c_str());
   std::fflush(stderr);
   drawn_ = true;
+}
+
+void ProgressBar::print_json(double done) {
+  const int percent = static_cast<int>(done * 100);
+  if (percent == percent_) return;
+  percent_ = percent;
+  std::string line = Json{{"stage", stage_}, {"done", done}}.dump();
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::fprintf(stderr, "%s\n", line.c_str());
+  std::fflush(stderr);
 }
 
 void ProgressBar::clear() {

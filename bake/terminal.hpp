@@ -13,10 +13,10 @@ namespace modar {
 
 /// Shows what a command is at. On a terminal one line that is overwritten; elsewhere a line a
 /// stage. A stage that has run for 5 seconds gets an estimate of what is left, from the part that
-/// is done.
+/// is done. as_json: a line {"stage", "done"} for each percent, for programs.
 class ProgressBar {
  public:
-  explicit ProgressBar(bool quiet);
+  explicit ProgressBar(bool quiet, bool as_json = false);
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
@@ -28,8 +28,12 @@ class ProgressBar {
  private:
   using Clock = std::chrono::steady_clock;
 
+  void print_json(double done);
+
   bool active_;
+  bool json_;
   bool terminal_;
+  int percent_ = -1;  ///< that was printed last as JSON
   bool drawn_ = false;
   std::string stage_;
   Clock::time_point start_;

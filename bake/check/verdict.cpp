@@ -5,6 +5,11 @@
 #include <cstddef>
 #include <iterator>
 
+#include "bake/check/device_rules.hpp"
+#include "bake/check/yml_rule.hpp"
+#include "formats/bundle_view.hpp"
+#include "modar/mapped_file.hpp"
+
 namespace modar {
 namespace {
 
@@ -127,6 +132,17 @@ std::map<std::string, std::size_t> Verdict::left_out() const {
     if (count > kMaxRepeats) more[id] = count - kMaxRepeats;
   }
   return more;
+}
+
+bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
+                 const IssueSink& sink) {
+  expect_reading(bytes);
+  bool sound = check_bundle(bytes, sink, {.release = forget_read});
+  // The text twin needs OpenCV's parser, so this rule stands outside of formats/.
+  if (sound) sound = check_yml_twins(bytes, sink);
+  if (!sound || device == nullptr) return sound;
+  if (const auto bundle = BundleView::open(bytes)) check_device(*bundle, *device, sink);
+  return sound;
 }
 
 }  // namespace modar

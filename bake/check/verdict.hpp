@@ -12,6 +12,7 @@
 
 #include "formats/base/error.hpp"
 #include "formats/check.hpp"
+#include "modar/device_profile.hpp"
 
 namespace modar {
 
@@ -72,6 +73,12 @@ class Verdict {
   std::size_t errors_ = 0;
   std::size_t warnings_ = 0;
 };
+
+/// All rules on a bundle's bytes, and those of a device where one is named: what `modar check` runs
+/// without sources. Gives back what it has read of a mapping. Answers true if the bytes are sound;
+/// what a device lacks is told to the sink alone.
+bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
+                 const IssueSink& sink);
 
 /// Every kind of issue that `modar check` knows: those of formats/, then those of the workstation.
 std::vector<const IssueKind*> all_issue_kinds();

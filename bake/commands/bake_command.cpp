@@ -32,6 +32,7 @@ struct BakeCommand {
   bool quiet = false;
   bool notes = false;
   bool json = false;
+  bool progress_json = false;
   // Options as text, before they are parsed into the request.
   std::vector<std::string> models;
   std::vector<std::string> patterns;
@@ -183,7 +184,7 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
   if (command.models.empty() && command.patterns.empty()) {
     return run_project(command.project,
                        {command.request.jobs, command.request.memory_bytes, command.quiet,
-                        command.json, command.notes},
+                        command.json, command.notes, command.progress_json},
                        words);
   }
   MODAR_TRY(refuse_project_options(command));
@@ -196,7 +197,7 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
     MODAR_ASSIGN(auto started, MemoryLimit::start(folder.string(), command.request.memory_bytes));
     limit = std::move(started);
   }
-  ProgressBar bar(command.quiet);
+  ProgressBar bar(command.quiet, command.progress_json);
   Report report;
   report.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
 
@@ -269,6 +270,8 @@ void add_run_options(CommandLine& line, BakeCommand& command) {
   line.flag("--quiet", command.quiet, "No progress, summary or diagnostics on stderr");
   line.flag("--notes", command.notes, "Show every note, not just the first of each kind");
   line.flag("--json", command.json, "Print contents, stages and diagnostics as JSON");
+  line.flag("--progress-json", command.progress_json,
+            "Print progress as lines of JSON on stderr, for programs");
 }
 
 }  // namespace

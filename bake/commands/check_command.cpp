@@ -5,9 +5,7 @@
 #include <string>
 
 #include "bake/check/device_file.hpp"
-#include "bake/check/device_rules.hpp"
 #include "bake/check/verdict.hpp"
-#include "bake/check/yml_rule.hpp"
 #include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/device_profile.hpp"
@@ -101,15 +99,11 @@ int run_check(const CheckCommand& command) {
   if (!file) return print_error(file.error());
 
   const IssueSink sink = [&verdict](const Issue& issue) { verdict.add(issue); };
-  expect_reading(file->bytes());
-  bool sound = check_bundle(file->bytes(), sink, {.release = forget_read});
-  // The text twin needs OpenCV's parser, so this rule stands outside of formats/.
-  if (sound) sound = check_yml_twins(file->bytes(), sink);
+  const bool sound = check_whole(file->bytes(), *device, sink);
   CheckExtras extras;
   if (*device != nullptr) extras.device = (*device)->name;
   if (sound) {
     const Result<BundleView> bundle = BundleView::open(file->bytes());
-    if (*device != nullptr) check_device(*bundle, **device, sink);
     if (!command.sources.empty()) {
       if (auto done = check_against_sources(*bundle, command, sink, extras); !done) {
         return print_error(done.error());

@@ -43,9 +43,10 @@ namespace {
 
 using State = AssetOutcome::State;
 
-constexpr const char* kProjectWords[] = {
-    "--project", "--cache", "--cache-key", "--outside", "--asset", "--depfile", "--dry-run",
-    "--explain", "--jobs",  "--memory",    "--quiet",   "--json",  "--watch",   "--notes"};
+constexpr const char* kProjectWords[] = {"--project", "--cache",   "--cache-key",    "--outside",
+                                         "--asset",   "--depfile", "--dry-run",      "--explain",
+                                         "--jobs",    "--memory",  "--quiet",        "--json",
+                                         "--watch",   "--notes",   "--progress-json"};
 
 /// What of the bake stands on the command line would be ignored beside a project file.
 Result<void> refuse_other_options(const std::vector<std::string>& words) {
@@ -251,7 +252,7 @@ Result<ProjectOutcome> bake_once(const ProjectCommand& command, const std::strin
     limit = std::move(started);
     options.memory_limited = true;
   }
-  ProgressBar bar(common.quiet);
+  ProgressBar bar(common.quiet, common.progress_json);
   auto baked = bake_project(project, options,
                             [&](const std::string& stage, double done) { bar.show(stage, done); });
   bar.clear();

@@ -33,6 +33,7 @@ struct CommonOptions {
   bool quiet = false;
   bool json = false;
   bool notes = false;
+  bool progress_json = false;
 };
 
 /// How each scene's model stands, on stderr: whoever set nothing sees here what was chosen.
