@@ -8,7 +8,9 @@
 
 #include "bake/image/image.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/studio/look.hpp"
 #include "bake/studio/session.hpp"
+#include "bake/studio/upload.hpp"
 #include "modar/device_profile.hpp"
 
 namespace modar {
@@ -23,7 +25,15 @@ std::string lower(std::string text) {
   return text;
 }
 
-const char* kind_of(const std::string& file) {
+std::uint64_t bytes_of(const std::string& path) {
+  std::error_code error;
+  const auto bytes = fs::file_size(path, error);
+  return error ? 0 : bytes;
+}
+
+}  // namespace
+
+const char* file_kind(const std::string& file) {
   const std::string extension = lower(fs::path(file).extension().string());
   for (const char* photo : {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"}) {
     if (extension == photo) return "photo";
@@ -34,11 +44,7 @@ const char* kind_of(const std::string& file) {
   return is_model_file(file) ? "model" : "other";
 }
 
-std::uint64_t bytes_of(const std::string& path) {
-  std::error_code error;
-  const auto bytes = fs::file_size(path, error);
-  return error ? 0 : bytes;
-}
+namespace {
 
 Json settings_json(const Settings& settings) {
   Json json = Json::object();
@@ -104,8 +110,15 @@ Json pattern_json(const Session& session, const ProjectAsset& asset,
   Json json = asset_json(session, asset, sizes);
   const ShapeRequest& shape = asset.shape;
   json.set("kind", shape_word(shape.kind));
-  json.set("corners", nullptr);
-  json.set("height_mm", nullptr);
+  Json corners;
+  if (shape.corners) {
+    corners = Json::array();
+    for (const PixelPoint& corner : *shape.corners) {
+      corners.push_back(Json::array({corner.x, corner.y}));
+    }
+  }
+  json.set("corners", corners);
+  json.set("height_mm", some(shape.height_mm));
   json.set("width_mm", some(asset.width_mm));
   json.set("top_mm", some(shape.top_mm));
   json.set("bottom_mm", some(shape.bottom_mm));
@@ -172,13 +185,29 @@ Json files_json(const Session& session, const Project& project,
   for (const std::string& file : files) {
     json.push_back({{"file", file},
                     {"bytes", bytes_of(path_in(session, file))},
-                    {"kind", kind_of(file)},
+                    {"kind", file_kind(file)},
                     {"used", used.count(file) != 0}});
   }
   return json;
 }
 
-Json bundle_json(const Session& session, const Project& project) {
+Json baked_scenes_of(Session& session) {
+  const std::lock_guard lock(session.mutex);
+  return session.baked_scenes;
+}
+
+/// Whether `modar bake` would write a bundle anew.
+bool is_stale(const Session& session, const Project& project, bool wrong) {
+  if (wrong) return true;
+  ProjectOptions options;
+  options.dry_run = true;
+  options.tool_version = session.tool_version;
+  const auto planned = bake_project(project, options, {});
+  return !planned || std::any_of(planned->bundles.begin(), planned->bundles.end(),
+                                 [](const BundleOutcome& bundle) { return !bundle.fresh; });
+}
+
+Json bundle_json(Session& session, const Project& project, bool wrong) {
   if (project.bundles.empty() || project.tiers.empty()) return {};
   const std::string& tier = project.tiers.front().name;
   const std::string path = project.out + "/" + project.bundles.front().name +
@@ -187,7 +216,24 @@ Json bundle_json(const Session& session, const Project& project) {
   return {{"path", path},
           {"bytes", bytes},
           {"baked", bytes != 0},
+          {"stale", bytes != 0 && is_stale(session, project, wrong)},
+          {"scenes", baked_scenes_of(session)},
           {"count", project.bundles.size() * project.tiers.size()}};
+}
+
+BakedFacts facts_of(const Session& session, const Project& project) {
+  if (project.bundles.empty() || project.tiers.empty()) return {};
+  const std::string& tier = project.tiers.front().name;
+  return baked_facts(path_in(session, project.out + "/" + project.bundles.front().name +
+                                          (tier.empty() ? "" : "-" + tier) + ".modar"));
+}
+
+/// Members of what is known of a name; null where nothing is.
+void add_facts(Json& json, const std::map<std::string, Json>& facts, const std::string& name,
+               std::initializer_list<const char*> keys) {
+  const auto found = facts.find(name);
+  const Json own = found == facts.end() ? Json() : found->second;
+  for (const char* key : keys) json.set(key, own.find(key).value_or(Json()));
 }
 
 Json languages_json(const Project& project) {
@@ -211,19 +257,27 @@ Result<Json> project_view(Session& session) {
   if (state.revision.empty()) {
     std::array<std::size_t, 2> counts{};
     for (const std::string& file : files) {
-      counts[0] += kind_of(file) == std::string_view("model") ? 1U : 0U;
-      counts[1] += kind_of(file) == std::string_view("photo") ? 1U : 0U;
+      counts[0] += file_kind(file) == std::string_view("model") ? 1U : 0U;
+      counts[1] += file_kind(file) == std::string_view("photo") ? 1U : 0U;
     }
     if (counts[0] + counts[1] != 0) init = {{"models", counts[0]}, {"pictures", counts[1]}};
   }
   Json models = Json::array();
   Json patterns = Json::array();
   Json scenes = Json::array();
+  const BakedFacts facts = facts_of(session, project);
+  const auto model_sizes = table_sizes(project.models);
+  const auto pattern_sizes = table_sizes(project.patterns);
   for (const ProjectAsset& model : project.models) {
-    models.push_back(asset_json(session, model, table_sizes(project.models)));
+    Json json = asset_json(session, model, model_sizes);
+    json.set("missing", Json::list(missing_of(session, model.file)));
+    add_facts(json, facts.models, model.name, {"triangles", "size", "up"});
+    models.push_back(std::move(json));
   }
   for (const ProjectAsset& pattern : project.patterns) {
-    patterns.push_back(pattern_json(session, pattern, table_sizes(project.patterns)));
+    Json json = pattern_json(session, pattern, pattern_sizes);
+    add_facts(json, facts.patterns, pattern.name, {"grade", "score", "range_cm"});
+    patterns.push_back(std::move(json));
   }
   for (const ProjectScene& scene : project.scenes) scenes.push_back(scene_json(scene));
   Json problems = Json::array();
@@ -235,7 +289,7 @@ Result<Json> project_view(Session& session) {
               {"name", project.bundles.empty() ? "" : project.bundles.front().name},
               {"version", session.tool_version},
               {"init", init},
-              {"bundle", bundle_json(session, project)},
+              {"bundle", bundle_json(session, project, problems.size() > 0)},
               {"models", models},
               {"patterns", patterns},
               {"scenes", scenes},

@@ -10,6 +10,8 @@
 #include "bake/project/project.hpp"
 #include "bake/studio/call.hpp"
 #include "bake/studio/events.hpp"
+#include "bake/studio/jobs.hpp"
+#include "bake/studio/pictures.hpp"
 #include "bake/studio/project_text.hpp"
 #include "formats/base/error.hpp"
 
@@ -31,6 +33,11 @@ struct Session {
   const std::string tool_version;  ///< for bundles
   ProjectText text;
   Events events;
+  PictureCaches pictures;
+  std::mutex mutex;   ///< of what follows up to `jobs`
+  Json baked_scenes;  ///< "scenes" of the view when the last bake began; null: unknown
+  std::string phone;  ///< JSON of the phone's address and its code; empty: it is not served
+  Jobs jobs;
   std::function<void()> quit;  ///< ends the studio
 };
 
@@ -41,6 +48,9 @@ Result<Json> project_view(Session& session);
 inline std::string path_in(const Session& session, const std::string& file) {
   return session.folder + "/" + file;
 }
+
+/// "photo", "model", "video" or "other", by the name.
+const char* file_kind(const std::string& file);
 
 /// Answers a request; publishes what it changes.
 Answer answer_call(Session& session, const Call& call);
