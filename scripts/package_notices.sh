@@ -19,6 +19,7 @@ ninja -C "$build" -t inputs modar modar-play modar-fetch modar-lab modar_media m
     "$out/inputs" -
   grep -E '^/usr/.*\.a$' "$out/inputs" || true
   [ ! -d "$root/build/web/web" ] || echo /usr/bin/em++
+  [ ! -f "$build/studio/mithril.js" ] || echo /usr/lib/nodejs/mithril/mithril.js
 } | xargs -r realpath -e | sort -u >"$out/files"
 # The C library and the compiler's own come from the system that runs the binaries, or by their exception need no notice.
 xargs -r dpkg -S <"$out/files" 2>/dev/null | sed 's/: .*//; s/, .*//; s/:.*//' | sort -u |

@@ -21,15 +21,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The page as it was installed with the programs, or as it lies beside the build.
+/// The page as it was installed with the programs, or as it was built with them.
 Result<std::string> find_studio_page() {
   const fs::path programs = program_folder();
-  for (const fs::path& folder :
-       {programs / "../share/modar/studio", programs / "../../../bake/studio/page"}) {
+  for (const fs::path& folder : {programs / "../share/modar/studio", programs / "../studio"}) {
     if (fs::exists(folder / "index.html")) return folder.lexically_normal().string();
   }
   return fail(ExitCode::kUnsupported, "studio.page", programs.string(),
-              "the studio's page does not lie beside the programs", "install the package again");
+              "the studio's page does not lie beside the programs",
+              "install the package again; from the source: scripts/setup.sh web, and build again");
 }
 
 /// While one exists, SIGINT and SIGTERM call `ended` in place of ending the process.

@@ -51,6 +51,10 @@ export class View extends EventTarget {
    * space to GL's eye space, column-major. focal: CSS pixels.
    */
   drawFrom(pattern: number, view: Float32Array, focal: number): void;
+  /** The same of several patterns, each with a view of its own. */
+  drawEach(views: [pattern: number, view: Float32Array][], focal: number): void;
+  /** Those of the bundle, then those of stand(). */
+  readonly patterns: { name: string; widthMm?: number }[];
   readonly nodes: SceneNode[];
   /** Words of a node in the first of these languages that it has, else in any. */
   wordsOf(node: number, languages?: string[]): { language: string; title: string; text: string; alt: string };

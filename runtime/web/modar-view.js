@@ -81,6 +81,11 @@ export class View extends EventTarget {
     return view;
   }
 
+  /** Those of the bundle, then those of stand(): {name, widthMm}. */
+  get patterns() {
+    return this.#engine.patterns;
+  }
+
   /** What stands on patterns by name: {name, pattern, kind: 'model' | 'picture' | 'label' | 'video' | 'sound', mark}. */
   get nodes() {
     return this.#engine.nodes;
@@ -265,12 +270,19 @@ export class View extends EventTarget {
    * view: pattern space to GL's eye space, column-major. focal: CSS pixels
    */
   drawFrom(pattern, view, focal) {
+    this.drawEach([[pattern, view]], focal);
+  }
+
+  /** The same of several patterns, each with a view of its own: [[pattern, view]]. */
+  drawEach(views, focal) {
     const size = fitCanvases(this.#models, this.#picture);
     if (this.#lost) return;
     this.#engine.setCamera(size.width, size.height, (focal * size.width) / this.#models.clientWidth);
     const poses = this.#engine.poses().fill(0);
-    poses[pattern * POSE_FLOATS + POSE.shown] = 1;
-    poses.set(view, pattern * POSE_FLOATS + POSE.view);
+    for (const [pattern, view] of views) {
+      poses[pattern * POSE_FLOATS + POSE.shown] = 1;
+      poses.set(view, pattern * POSE_FLOATS + POSE.view);
+    }
     this.#mirror = false;
     this.#redraw = () => this.#engine.draw(size.width, size.height);
     this.#again();

@@ -1,0 +1,253 @@
+// Step 2: where the picture is in the photo, how large it is in the world, and how well a phone will know it.
+import { ask, askJson, Newest, thumb } from './api.js';
+import { Corners } from './corners.js';
+import { unsure } from './files.js';
+import { button, choice, finding, grade, head, icon, LengthField, name, NumberField } from './parts.js';
+import { rail } from './rail.js';
+import { addScene, loadScore, setPattern, state, tellError } from './state.js';
+import { number, t } from './words.js';
+
+const m = window.m;
+/** The photo on the stage and the preview: longer side, pixels. */
+const STAGE_PX = 2000;
+const PREVIEW_PX = 360;
+/** Millimetres, the shorter side first. */
+const PAPERS = { a4: [210, 297], a5: [148, 210], postcard: [105, 148] };
+const SIDES = ['right', 'left', 'top', 'bottom', 'back'];
+const KINDS = [['flat', 'flat'], ['cylinder', 'label'], ['cone', 'cup'], ['box', 'box']];
+
+const near = (a, b) => Math.abs(a - b) < 0.6;  // millimetres
+
+/** Upright sizes of photos by file, for those that the project does not state. */
+const photoSizes = new Map();
+
+// ---- what is seen at once ----
+
+/** The picture as the phone will know it, made anew while a corner is dragged. Attributes: pattern, score, handle(preview). */
+class Preview {
+  oninit({ attrs }) {
+    this.newest = new Newest((corners) => this.fetch(corners));
+    this.size = null;
+    attrs.handle(this);
+  }
+
+  oncreate({ dom, attrs }) {
+    this.dom = dom;
+    this.attrs = attrs;
+    this.show(attrs.pattern.corners);
+  }
+
+  onupdate({ attrs }) {
+    const lookOf = ({ corners, width_mm: width, height_mm: height }) => JSON.stringify([corners, width, height]);
+    const changed = lookOf(this.attrs.pattern) !== lookOf(attrs.pattern);
+    this.attrs = attrs;
+    if (changed) this.show(attrs.pattern.corners);
+  }
+
+  /** moving: what was known of the picture no longer holds. */
+  show(corners, moving = false) {
+    this.dom.classList.toggle('moving', moving);
+    this.newest.ask(corners);
+  }
+
+  async fetch(corners) {
+    const { pattern } = this.attrs;
+    const began = performance.now();
+    try {
+      const sides = { ...(pattern.width_mm && { width_mm: pattern.width_mm }), ...(pattern.height_mm && { height_mm: pattern.height_mm }) };
+      const answer = await (corners ? ask('POST', 'rectify', { file: pattern.file, corners, ...sides, size: PREVIEW_PX }) : fetch(thumb(pattern.file, PREVIEW_PX)));
+      const image = await createImageBitmap(await answer.blob());
+      const canvas = this.dom.querySelector('canvas');
+      Object.assign(canvas, { width: image.width, height: image.height });
+      canvas.getContext('2d').drawImage(image, 0, 0);
+      Object.assign(canvas.dataset, { shown: JSON.stringify(corners), ms: String(Math.round(performance.now() - began)) });
+      this.size = [image.width, image.height];
+      image.close();
+      this.dom.classList.remove('impossible');
+    } catch (error) {
+      if (error.status === 0) tellError(error);
+      this.dom.classList.add('impossible');  // corners that are no quadrilateral: the last picture stays, pale
+    }
+  }
+
+  view({ attrs: { pattern, score } }) {
+    const most = score && Math.max(score.width, score.height);
+    return m('div.preview', m('canvas', { role: 'img', 'aria-label': t('preview', { name: pattern.name }) }),
+      score && m('svg', { viewBox: `0 0 ${score.width} ${score.height}`, preserveAspectRatio: 'none', 'aria-hidden': 'true' },
+        score.features.map(([x, y, held], i) => m('circle', { key: i, cx: x, cy: y, r: (0.004 + 0.008 * (held / score.views)) * most, class: 2 * held >= score.views ? 'held' : 'weak' }))));
+  }
+}
+
+// ---- how good it is ----
+
+const distance = (cm) => (cm >= 100 ? `${number(Number((cm / 100).toFixed(1)))} m` : `${number(Number(cm.toFixed(cm < 10 ? 1 : 0)))} cm`);
+
+function reach({ range_cm: range, range_widths: widths }) {
+  if (range) return t('range', { near: distance(range[0]), far: distance(range[1]) });
+  return widths ? t('rangeWidths', { near: Number(widths[0].toFixed(1)), far: Number(widths[1].toFixed(1)) }) : '';
+}
+
+function verdict(pattern) {
+  const score = state.scores.get(pattern.name);
+  if (!score) loadScore(pattern.name);
+  if (!score || score.pending) return m('p.small', { 'aria-busy': 'true' }, t('judging'));
+  if (score.failed) return finding({ text: score.failed, cure: score.cure });
+  return m('div.verdict', m('p', grade(score.grade), m('b', t(`grade.${score.grade}`))), m('p.small', reach(score)));
+}
+
+function advice(pattern) {
+  const { advice: some = [], rivals = [] } = state.scores.get(pattern.name) ?? {};
+  return m('div.advice', unsure.has(pattern.name) && finding({ text: t('unsure'), cure: t('unsureCure') }),
+    rivals.map(({ pattern: other, words }) => finding({ text: words || t('rival', { name: other }) }, m('a', { href: `#/picture/${encodeURIComponent(other)}` }, name(other)))),
+    some.map(({ text }) => finding({ text, severity: 'note' })));
+}
+
+// ---- the screen ----
+
+/** Attributes: pattern. What is chosen and not yet complete is kept here: a paper, a shape without its sizes. */
+export class Picture {
+  oninit() {
+    this.paper = this.kind = null;
+    this.shape = {};
+    this.features = true;
+  }
+
+  /** The width and height of a sheet that lies as the picture does. */
+  sheet(paper) {
+    const [short, long] = PAPERS[paper];
+    const [width, height] = this.preview?.size ?? [1, 1];
+    return width > height ? [long, short] : [short, long];
+  }
+
+  paperOf({ width_mm: width, height_mm: height }) {
+    if (!width) return 'later';
+    return Object.keys(PAPERS).find((paper) => [PAPERS[paper], [...PAPERS[paper]].reverse()].some(([w, h]) => near(w, width) && near(h, height ?? 0))) ?? 'other';
+  }
+
+  choosePaper(pattern, paper) {
+    this.paper = paper === 'other' ? paper : null;
+    if (paper === 'later') setPattern(pattern.name, { ...(pattern.width_mm && { 'width-mm': null }), ...(pattern.height_mm && { 'height-mm': null }) });
+    if (!(paper in PAPERS)) return;
+    const [width, height] = this.sheet(paper);
+    setPattern(pattern.name, { 'width-mm': width, 'height-mm': height });
+  }
+
+  sizes(pattern) {
+    const paper = this.paper ?? this.paperOf(pattern);
+    const set = (key) => (mm) => setPattern(pattern.name, { [key]: mm === null ? null : Number(mm.toFixed(1)) });
+    return [choice('paper', t('howLarge'), [['a4', t('a4')], ['a5', t('a5')], ['postcard', t('postcard')], ['other', t('measured')], ['later', t('later')]], paper,
+      (value) => this.choosePaper(pattern, value)),
+    paper === 'other' && m('div.fields', m(LengthField, { id: 'width', label: t('width'), value: pattern.width_mm, least: 1, empty: true, choose: true, onvalue: set('width-mm') }),
+      m(LengthField, { id: 'height', label: t('heightIfKnown'), value: pattern.height_mm, least: 1, empty: true, onvalue: set('height-mm') })),
+    paper === 'later' && m('p.small', t('laterWords'))];
+  }
+
+  chooseKind(pattern, kind) {
+    this.kind = kind === pattern.kind ? null : kind;
+    this.shape = {};
+    if (kind !== 'flat' || pattern.kind === 'flat') return;
+    this.kind = null;
+    setPattern(pattern.name, { shape: null });
+  }
+
+  /** Sizes as the project has them, or as they were typed so far; complete ones are written. */
+  shapeOf(pattern, kind) {
+    const { top_mm: top, bottom_mm: bottom, arc_deg: arc, box_mm: box, sides } = pattern.kind === kind ? pattern : {};
+    return { top, bottom, arc, width: box?.[0], height: box?.[1], depth: box?.[2], ...sides, ...this.shape };
+  }
+
+  setShape(pattern, kind, values) {
+    Object.assign(this.shape, values);
+    const { top, bottom, arc, width, height, depth, ...sides } = this.shapeOf(pattern, kind);
+    const mm = (value) => `${Number(value.toFixed(2))}mm`;
+    const words = kind === 'cylinder' ? top && arc && [`diameter=${mm(top)}`, `arc=${arc}`]
+      : kind === 'cone' ? top && bottom && arc && [`top=${mm(top)}`, `bottom=${mm(bottom)}`, `arc=${arc}`]
+        : width && height && depth && [`size=${[width, height].map((value) => Number(value.toFixed(2))).join('x')}x${mm(depth)}`, ...SIDES.filter((side) => sides[side]).map((side) => `${side}=${sides[side]}`)];
+    if (!words) return;
+    setPattern(pattern.name, { shape: [kind, ...words].join(',') }).then(() => {
+      this.kind = null;
+      this.shape = {};
+    });
+  }
+
+  boxSide(pattern, shape, side) {
+    return m('div.field', m('label', { for: `side-${side}` }, t(`side.${side}`)), m('select', {
+      id: `side-${side}`, onchange: (event) => this.setShape(pattern, 'box', { [side]: event.target.value || undefined }),
+    }, m('option', { value: '' }, t('none')), state.project.patterns.filter((other) => other !== pattern).map((other) =>
+      m('option', { value: other.file, selected: shape[side] === other.file }, other.name))));
+  }
+
+  shapeFields(pattern, kind) {
+    const shape = this.shapeOf(pattern, kind);
+    const size = (key, label, choose = false) => m(LengthField, { id: key, label, value: shape[key], least: 1, choose, onvalue: (mm) => this.setShape(pattern, kind, { [key]: mm }) });
+    if (kind === 'box') {
+      return [m('div.fields', size('width', t('width'), true), size('height', t('height')), size('depth', t('depth'))),
+        m('details', m('summary', t('sides')), m('div.fields', SIDES.map((side) => this.boxSide(pattern, shape, side))))];
+    }
+    return [m('div.fields', size('top', t(kind === 'cone' ? 'diameterTop' : 'diameter'), true), kind === 'cone' && size('bottom', t('diameterBottom')),
+      m(NumberField, { id: 'arc', label: t('arc'), value: shape.arc, unit: '°', least: 1, most: 360, step: 5, onvalue: (arc) => this.setShape(pattern, kind, { arc }) })),
+    m('p.small', t('arcWords'))];
+  }
+
+  shapes(pattern) {
+    const kind = this.kind ?? pattern.kind;
+    return [choice('shape', t('whatShape'), KINDS.map(([value, shape]) => [value, t(`shape.${value}`), shape]), kind, (value) => this.chooseKind(pattern, value), { kind: '.tiles' }),
+      kind === 'flat' ? this.sizes(pattern) : this.shapeFields(pattern, kind)];
+  }
+
+  /** A frontal file becomes a photo: its corners are looked for, and are the photo's own where none stand out. */
+  async cutOut(pattern) {
+    try {
+      const { corners } = await askJson('POST', 'corners', { file: pattern.file });
+      await setPattern(pattern.name, { corners });
+    } catch (error) {
+      if (!error.corners) tellError(error);
+      else await setPattern(pattern.name, { corners: error.corners });
+    }
+  }
+
+  photoSize(pattern) {
+    if (pattern.photo) return pattern.photo;
+    const known = photoSizes.get(pattern.file);
+    if (known === undefined) {
+      photoSizes.set(pattern.file, null);
+      askJson('GET', `photo?pattern=${encodeURIComponent(pattern.name)}`).then(({ width, height }) => {
+        photoSizes.set(pattern.file, [width, height]);
+        m.redraw();
+      }).catch(tellError);
+    }
+    return known ?? null;
+  }
+
+  stage(pattern) {
+    const size = pattern.corners && this.photoSize(pattern);
+    if (pattern.corners && !size) return null;
+    if (size) {
+      return [m(Corners, { photo: thumb(pattern.file, STAGE_PX), size, corners: pattern.corners, onmove: (corners) => this.preview.show(corners, true),
+        onset: (corners) => {
+          unsure.delete(pattern.name);
+          setPattern(pattern.name, { corners });
+        } }), m('p.hint', { id: 'corner-help' }, t('cornersHelp'))];
+    }
+    return [m('div.frontal', m('img', { src: thumb(pattern.file, STAGE_PX), alt: pattern.name })),
+      m('p.hint', t('frontal'), ' ', button(t('cutOut'), () => this.cutOut(pattern), { kind: '.link' }))];
+  }
+
+  /** The step after this one, with the model on the picture where there is but one. */
+  onward(pattern) {
+    const { models, scenes } = state.project;
+    if (models.length === 1 && !scenes.some((scene) => scene.pattern === pattern.name)) addScene(pattern.name, models[0].name);
+  }
+
+  view({ attrs: { pattern } }) {
+    const score = state.scores.get(pattern.name);
+    return m('div.work', rail('picture', pattern), m('section.stage', { 'aria-label': t('photo') }, this.stage(pattern)),
+      m('aside.panel', m('div.fill', head(name(pattern.name)),
+        m('div.seen', m(Preview, { pattern, score: this.features && score?.features ? score : null, handle: (preview) => { this.preview = preview; } }),
+          m('div', verdict(pattern), m('label.check', m('input', { type: 'checkbox', checked: this.features, onchange: (event) => { this.features = event.target.checked; } }), t('showFeatures')))),
+        this.shapes(pattern), advice(pattern)),
+      m('div.foot', state.project.models.length
+        ? m('a.button.primary', { href: `#/scene/${encodeURIComponent(pattern.name)}`, onclick: () => this.onward(pattern) }, m('span', t('toScene')), icon('next'))
+        : m('a.button.primary', { href: '#/files' }, m('span', t('toModel')), icon('next')))));
+  }
+}

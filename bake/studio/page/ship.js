@@ -1,0 +1,100 @@
+// Step 5: what the bundle weighs, whether it is good, and the forms in which it leaves this machine.
+import { ask, askJson } from './api.js';
+import { button, finding, head, icon, meter, name, percent } from './parts.js';
+import { state, tellError } from './state.js';
+import { bytes, t } from './words.js';
+
+const m = window.m;
+const KINDS = ['page', 'zip', 'apk', 'release'];
+/** Parts that are named one by one; the others are one line. */
+const NAMED_PARTS = 6;
+
+export class Ship {
+  oninit() {
+    this.title = state.project.name;
+    this.passPhrase = '';
+    this.asked = -1;
+    this.check = this.sizes = this.devices = null;
+    /** What cannot be made here, by kind: {text, cure}. */
+    this.refused = new Map();
+    this.making = null;
+  }
+
+  /** Of each bake anew. */
+  async ask() {
+    if (this.asked === state.baked || !state.project.bundle.baked) return;
+    this.asked = state.baked;
+    const each = async (key) => {
+      try {
+        this[key] = await askJson('GET', key);
+      } catch (error) {
+        tellError(error);
+      }
+      m.redraw();
+    };
+    await Promise.all(['check', 'sizes', 'devices'].map(each));
+  }
+
+  async make(kind) {
+    this.refused.delete(kind);
+    state.exported.delete(kind);
+    this.making = kind;
+    try {
+      await ask('POST', 'export', { kind, title: this.title, ...(kind === 'release' && this.passPhrase ? { pass_phrase: this.passPhrase } : {}) });
+    } catch (error) {
+      this.making = null;
+      this.refused.set(kind, { text: error.message, cure: error.package ? t('install', { packages: [error.package].flat().join(' ') }) : error.cure });
+    }
+    m.redraw();
+  }
+
+  // ---- what it is ----
+
+  verdict() {
+    const { check } = this;
+    if (!check) return m('section', m('h2', t('verdict')), m('p.small', { 'aria-busy': 'true' }, t('judging')));
+    const words = check.good ? (check.warnings ? t('goodBut', { n: check.warnings }) : t('good')) : t('notGood', { n: check.errors });
+    return m('section.judged', m('h2', t('verdict')), m(`p.verdict-words${check.good ? '.good' : '.not-good'}`, icon(check.good ? 'check' : 'bad'), words),
+      check.findings.map(({ severity, text, cure, place }) => finding({ severity, text, cure }, place && m('p', m('a', { href: `#/${place.view}${place.name ? `/${encodeURIComponent(place.name)}` : ''}` }, t('goThere'))))));
+  }
+
+  weights() {
+    if (!this.sizes) return null;
+    const parts = [...this.sizes.parts].sort((a, b) => b.bytes - a.bytes);
+    const rest = parts.slice(NAMED_PARTS).reduce((sum, part) => sum + part.bytes, 0);
+    const shown = [...parts.slice(0, NAMED_PARTS), ...(rest ? [{ kind: 'rest', name: '', bytes: rest }] : [])];
+    return m('section', m('h2', t('weighs', { size: bytes(this.sizes.bytes) })), m('table.weights', m('thead.unseen', m('tr', m('th', t('part')), m('th', t('size')), m('th', t('share')))), m('tbody', shown.map((part, i) => m('tr', { key: i },
+      m('th', { scope: 'row' }, t(`part.${part.kind}`), part.name ? [' ', name(part.name)] : ''), m('td', bytes(part.bytes)),
+      m('td', m('meter', { min: 0, max: 1, value: part.bytes / this.sizes.bytes, 'aria-label': percent(part.bytes / this.sizes.bytes) })))))));
+  }
+
+  phones() {
+    if (!this.devices) return null;
+    return m('section', m('h2', t('devices')), m('ul.devices', this.devices.map((device) => m('li', { key: device.name, class: device.fits ? 'fits' : 'fails' },
+      icon(device.fits ? 'check' : 'bad'), m('span', device.title || device.name, m('span.unseen', ` ${t(device.fits ? 'fits' : 'fitsNot')}`),
+        !device.fits && m('small', { dir: 'auto' }, (device.findings ?? []).map(({ text }) => text).join(' ')))))));
+  }
+
+  // ---- how it leaves ----
+
+  way(kind) {
+    const done = state.exported.get(kind);
+    if (done && this.making === kind) this.making = null;
+    const refused = this.refused.get(kind) ?? (state.failure?.kind === kind ? { text: state.failure.error, cure: state.failure.cure } : null);
+    if (refused && this.making === kind) this.making = null;
+    const busy = this.making === kind;
+    return m('li.way-out', { key: kind }, m('div', m('h2', t(`ship.${kind}`)), m('p.small', t(`ship.${kind}Words`))),
+      kind === 'release' && m('div.field', m('label', { for: 'pass' }, t('passPhrase')), m('input', { id: 'pass', type: 'password', autocomplete: 'off', value: this.passPhrase, oninput: (event) => { this.passPhrase = event.target.value; } })),
+      button(t(`ship.${kind}Make`), () => this.make(kind), { kind: kind === 'page' ? '.primary' : '.quiet', disabled: this.making !== null }),
+      busy && m('p', { role: 'status' }, meter(state.progress?.done ?? 0, t('preparing'))),
+      refused && finding({ ...refused, severity: 'error' }),
+      done && m('p.made', { role: 'status' }, icon('check'), m('span', t('made'), ' ', m('code', name(done.path)), done.url && [' ', m('a', { href: done.url, target: '_blank', rel: 'noopener' }, t(kind === 'page' ? 'look' : 'download'))])));
+  }
+
+  view() {
+    this.ask();
+    return m('div.screen.ship', head(t('ship'), t('shipLead')),
+      m('div.columns', m('section.out', m('div.field', m('label', { for: 'page-title' }, t('pageTitle')), m('input', { id: 'page-title', type: 'text', dir: 'auto', value: this.title, oninput: (event) => { this.title = event.target.value; } })),
+        m('ul', KINDS.map((kind) => this.way(kind)))), m('div.facts', this.verdict(), this.weights(), this.phones())));
+  }
+}

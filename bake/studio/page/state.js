@@ -1,0 +1,186 @@
+// The project as the server has it, and every change of it: one place, so that undo, the file on disk and what is shown agree.
+import { ask, askJson, pathOf, Refused } from './api.js';
+
+/** Milliseconds without a change after which the bundle is baked anew: trades an answer soon against bakes that are thrown away. */
+const BAKE_AFTER_MS = 300;
+
+export const state = {
+  project: null,
+  /** The work that runs: {kind, stage, done (0 to 1), eta_s}; null: none. */
+  progress: null,
+  /** Why the last bake or export failed: {kind, error, cure}. */
+  failure: null,
+  /** Counts bakes: the stage loads the bundle anew. */
+  baked: 0,
+  /** Answers of api/score by pattern. */
+  scores: new Map(),
+  /** The last exports by kind: {path, url}. */
+  exported: new Map(),
+  gone: false,
+  /** Messages that go away: {text, cure, bad}. */
+  notice: null,
+};
+
+let queue = Promise.resolve();
+let bakeTimer = 0;
+
+const redraw = () => window.m.redraw();
+
+export function tell(text, { cure = '', bad = false } = {}) {
+  state.notice = { text, cure, bad };
+  redraw();
+}
+
+/** An error in words. What was given up by the page itself says nothing. */
+export function tellError(error) {
+  if (error.name === 'AbortError') return;
+  if (error instanceof Refused && error.status === 0) state.gone = true;
+  else tell(error.message, { cure: error.cure, bad: true });
+  redraw();
+}
+
+export const patternOf = (name) => state.project?.patterns.find((pattern) => pattern.name === name);
+export const modelOf = (name) => state.project?.models.find((model) => model.name === name);
+export const scenesOf = (pattern) => state.project?.scenes.filter((scene) => scene.pattern === pattern && scene.model) ?? [];
+export const missingFiles = () => state.project?.models.flatMap((model) => model.missing.map((file) => ({ model, file }))) ?? [];
+
+/** What has to be seen to stand on something: a model that has all its files, on a picture. */
+export const isBakeable = () => (state.project?.scenes.length ?? 0) > 0;
+
+/** What a picture's grade follows from. */
+const lookOf = ({ file, corners, width_mm: width, height_mm: height, kind, arc_deg: arc, top_mm: top, bottom_mm: bottom, box_mm: box }) =>
+  JSON.stringify([file, corners, width, height, kind, arc, top, bottom, box]);
+
+function take(project) {
+  const before = state.project;
+  state.project = project;
+  for (const pattern of project.patterns) {
+    const known = before?.patterns.find(({ name }) => name === pattern.name);
+    if (!known || lookOf(known) !== lookOf(pattern)) state.scores.delete(pattern.name);
+  }
+  if (project.bundle.stale && !project.baking && !state.failure && isBakeable()) bakeSoon();
+  redraw();
+}
+
+export async function load() {
+  take(await askJson('GET', 'project'));
+}
+
+/** Changes wait for one another: each names the revision that the one before has made. */
+function queued(work) {
+  const done = queue.then(work);
+  queue = done.catch(() => {});
+  return done;
+}
+
+const sameScene = (before, after, each) => each.table !== 'scene' || each.index === undefined ||
+  ['pattern', 'model'].every((key) => before.scenes[each.index]?.[key] === after.scenes[each.index]?.[key]);
+
+/** Several edits are one step of undo. Where the file has changed meanwhile, they are made again if they still mean the same. */
+export function edit(...edits) {
+  return queued(async () => {
+    const before = state.project;
+    try {
+      state.failure = null;
+      take(await askJson('POST', 'edit', { revision: before.revision, edits }));
+    } catch (error) {
+      if (error.status !== 409) throw error;
+      await load();
+      if (!edits.every((each) => sameScene(before, state.project, each))) throw error;
+      take(await askJson('POST', 'edit', { revision: state.project.revision, edits }));
+    }
+  }).catch(tellError);
+}
+
+/** Keys of a table as modar.toml has them; null takes one out. */
+const changes = (which, values) => Object.entries(values).map(([key, value]) =>
+  (value === null ? { op: 'remove', ...which, key } : { op: 'set', ...which, key, value }));
+
+/** A scene that modar.toml does not name, but has by the names of its files, has no index. */
+const whichScene = ({ index, pattern, model }) => ({ table: 'scene', ...(index === null ? { pattern, model } : { index }) });
+
+export const setScene = (scene, values) => edit(...changes(whichScene(scene), values));
+export const setPattern = (name, values) => edit(...changes({ table: 'pattern', name }, values));
+export const addScene = (pattern, model) => edit({ op: 'add', table: 'scene', value: { pattern, model } });
+export const deleteScene = (scene) => edit({ op: 'delete', ...whichScene(scene) });
+export const deleteAsset = (table, name) => edit({ op: 'delete', table, name });
+export const begin = () => queued(async () => take(await askJson('POST', 'init', {}))).catch(tellError);
+
+export const undo = () => queued(async () => take(await askJson('POST', 'undo', {}))).catch(tellError);
+export const redo = () => queued(async () => take(await askJson('POST', 'redo', {}))).catch(tellError);
+
+/** Sends files one after the other: {name, blob}. Answers what the server said of each. */
+export async function addFiles(files, onProgress) {
+  const told = [];
+  for (const [i, { name, blob }] of files.entries()) {
+    onProgress(i, files.length, name);
+    try {
+      const answer = await queued(() => askJson('PUT', `files/${pathOf(name)}`, blob));
+      told.push({ name, ...answer });
+    } catch (error) {
+      if (error.status === 0) throw error;
+      told.push({ name, problems: [{ text: error.message, cure: error.cure }] });
+    }
+  }
+  onProgress(files.length, files.length, '');
+  await load();
+  return told;
+}
+
+export function bakeSoon(wait = BAKE_AFTER_MS) {
+  clearTimeout(bakeTimer);
+  bakeTimer = setTimeout(async () => {
+    try {
+      await ask('POST', 'bake', {});
+    } catch (error) {
+      if (error.status !== 409) tellError(error);  // one runs: what has changed meanwhile is baked after it
+    }
+  }, wait);
+}
+
+export async function cancel() {
+  await ask('DELETE', 'job').catch(tellError);
+}
+
+export async function loadScore(name) {
+  if (state.scores.get(name)?.pending) return;
+  state.scores.set(name, { pending: true });
+  try {
+    const score = await askJson('GET', `score?pattern=${encodeURIComponent(name)}`);
+    state.scores.set(name, score);
+  } catch (error) {
+    state.scores.set(name, { failed: error.message, cure: error.cure });
+  }
+  redraw();
+}
+
+/** What happens on the server, as it happens. */
+export function listen() {
+  const events = new EventSource('api/events');
+  const on = (type, act) => events.addEventListener(type, ({ data }) => {
+    act(data ? JSON.parse(data) : {});
+    redraw();
+  });
+  on('progress', (progress) => { state.progress = progress; });
+  on('project', ({ revision }) => { if (revision !== state.project?.revision) queued(load).catch(tellError); });
+  on('baked', ({ findings = [], errors = [] }) => {
+    Object.assign(state, { progress: null, failure: errors.length ? { kind: 'bake', ...errors[0] } : null, findings });
+    ++state.baked;
+    queued(load).catch(tellError);
+  });
+  on('failed', (failure) => Object.assign(state, { progress: null, failure }));
+  on('cancelled', () => { state.progress = null; });
+  on('exported', ({ kind, path, url }) => {
+    state.progress = null;
+    state.exported.set(kind, { path, url });
+  });
+  on('phone', ({ url }) => { state.phone = url; });
+  events.onerror = () => {
+    state.gone = true;
+    redraw();
+  };
+  events.onopen = () => {  // also after a while without the server, when much may have changed
+    state.gone = false;
+    queued(load).catch(tellError);
+  };
+}
