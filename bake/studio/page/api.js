@@ -11,7 +11,7 @@ export class Refused extends Error {
 /** The path of a file, folders kept. */
 export const pathOf = (name) => name.split('/').map(encodeURIComponent).join('/');
 
-export const thumb = (file, size, turn = 0) => `api/thumb/${pathOf(file)}?size=${size}${turn ? `&turn=${turn}` : ''}`;
+export const thumb = (file, size) => `api/thumb/${pathOf(file)}?size=${size}`;
 
 /** Answers the response. body: JSON, or a Blob as it is. Errors: Refused; an AbortError. */
 export async function ask(method, path, body, { signal } = {}) {

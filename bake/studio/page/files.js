@@ -2,6 +2,7 @@
 import { askJson, thumb } from './api.js';
 import { button, finding, grade, head, icon, meter, name } from './parts.js';
 import { addFiles, addScene, begin, missingFiles, patternOf, scenesOf, setPattern, state, tell, tellError } from './state.js';
+import { modelViews } from './thumbs.js';
 import { length, number, t } from './words.js';
 
 const m = window.m;
@@ -100,8 +101,8 @@ const noThumb = (event) => {
   event.target.hidden = true;
 };
 
-/** A model's eight views side by side, which a card turns. */
-const modelThumb = (model) => m('span.thumb.turning', icon('model'), m('img', { src: thumb(model.file, 160, 8), alt: '', loading: 'lazy', onerror: noThumb }));
+/** A model's views side by side, which a card turns, once they have been drawn. */
+const modelThumb = (model) => m('span.thumb.turning', icon('model'), modelViews(model.name) && m('img', { src: modelViews(model.name), alt: '' }));
 const pictureThumb = (pattern) => m('span.thumb', icon('picture'), m('img', { src: thumb(pattern.file, 320), alt: '', loading: 'lazy', onerror: noThumb }));
 
 function pictureCard(pattern) {

@@ -8,9 +8,9 @@ import { addScene, loadScore, setPattern, state, tellError } from './state.js';
 import { number, t } from './words.js';
 
 const m = window.m;
-/** The photo on the stage and the preview: longer side, pixels. */
+/** The photo on the stage and the preview, at rest and while a corner is dragged: longer side, pixels. The last trades sharpness for speed. */
 const STAGE_PX = 2000;
-const PREVIEW_PX = 360;
+const PREVIEW_PX = [360, 224];
 /** Millimetres, the shorter side first. */
 const PAPERS = { a4: [210, 297], a5: [148, 210], postcard: [105, 148] };
 const SIDES = ['right', 'left', 'top', 'bottom', 'back'];
@@ -26,7 +26,7 @@ const photoSizes = new Map();
 /** The picture as the phone will know it, made anew while a corner is dragged. Attributes: pattern, score, handle(preview). */
 class Preview {
   oninit({ attrs }) {
-    this.newest = new Newest((corners) => this.fetch(corners));
+    this.newest = new Newest((wanted) => this.fetch(wanted));
     this.size = null;
     attrs.handle(this);
   }
@@ -47,15 +47,15 @@ class Preview {
   /** moving: what was known of the picture no longer holds. */
   show(corners, moving = false) {
     this.dom.classList.toggle('moving', moving);
-    this.newest.ask(corners);
+    this.newest.ask({ corners, size: PREVIEW_PX[moving ? 1 : 0] });
   }
 
-  async fetch(corners) {
+  async fetch({ corners, size }) {
     const { pattern } = this.attrs;
     const began = performance.now();
     try {
       const sides = { ...(pattern.width_mm && { width_mm: pattern.width_mm }), ...(pattern.height_mm && { height_mm: pattern.height_mm }) };
-      const answer = await (corners ? ask('POST', 'rectify', { file: pattern.file, corners, ...sides, size: PREVIEW_PX }) : fetch(thumb(pattern.file, PREVIEW_PX)));
+      const answer = await (corners ? ask('POST', 'rectify', { file: pattern.file, corners, ...sides, size }) : fetch(thumb(pattern.file, size)));
       const image = await createImageBitmap(await answer.blob());
       const canvas = this.dom.querySelector('canvas');
       Object.assign(canvas, { width: image.width, height: image.height });
@@ -82,7 +82,8 @@ class Preview {
 
 const distance = (cm) => (cm >= 100 ? `${number(Number((cm / 100).toFixed(1)))} m` : `${number(Number(cm.toFixed(cm < 10 ? 1 : 0)))} cm`);
 
-function reach({ range_cm: range, range_widths: widths }) {
+function reach({ range_cm: known, range_widths: widths }, width) {
+  const range = known ?? (width && widths?.map((each) => (each * width) / 10));
   if (range) return t('range', { near: distance(range[0]), far: distance(range[1]) });
   return widths ? t('rangeWidths', { near: Number(widths[0].toFixed(1)), far: Number(widths[1].toFixed(1)) }) : '';
 }
@@ -92,14 +93,14 @@ function verdict(pattern) {
   if (!score) loadScore(pattern.name);
   if (!score || score.pending) return m('p.small', { 'aria-busy': 'true' }, t('judging'));
   if (score.failed) return finding({ text: score.failed, cure: score.cure });
-  return m('div.verdict', m('p', grade(score.grade), m('b', t(`grade.${score.grade}`))), m('p.small', reach(score)));
+  return m('div.verdict', m('p', grade(score.grade), m('b', t(`grade.${score.grade}`))), m('p.small', reach(score, pattern.width_mm)));
 }
 
 function advice(pattern) {
   const { advice: some = [], rivals = [] } = state.scores.get(pattern.name) ?? {};
   return m('div.advice', unsure.has(pattern.name) && finding({ text: t('unsure'), cure: t('unsureCure') }),
     rivals.map(({ pattern: other, words }) => finding({ text: words || t('rival', { name: other }) }, m('a', { href: `#/picture/${encodeURIComponent(other)}` }, name(other)))),
-    some.map(({ text }) => finding({ text, severity: 'note' })));
+    some.filter(({ text }) => text).map(({ text }) => finding({ text, severity: 'note' })));
 }
 
 // ---- the screen ----

@@ -1,10 +1,10 @@
 // Step 3: models on a picture, moved by hand or by numbers, and the words beside them.
-import { ask, thumb } from './api.js';
 import { boxOf, halfOf, isInMm, placed, rotation, multiply, turning, turnOf, unitOf, wrapped } from './placing.js';
 import { button, choice, finding, head, icon, LengthField, name, NumberField, tool } from './parts.js';
 import { rail } from './rail.js';
 import { EYES, HANDLES, Stage } from './stage.js';
-import { addScene, deleteScene, modelOf, scenesOf, setScene, state, tellError } from './state.js';
+import { addScene, deleteScene, modelOf, scenesOf, bundleBytes, setScene, state, tellError } from './state.js';
+import { modelViews } from './thumbs.js';
 import { languageName, length, number, t } from './words.js';
 
 const m = window.m;
@@ -13,15 +13,6 @@ const AXES = ['y', 'z', 'x', '-y', '-z', '-x'];
 
 const rounded = (value, digits = 4) => Number(value.toPrecision(digits));
 const degrees = (value) => Number(wrapped(value).toFixed(1)) + 0;
-
-/** The bundle that is shown, once for all pictures: {baked, bytes}. */
-let bundle = null;
-
-async function bundleBytes() {
-  const { baked } = state;
-  if (bundle?.baked !== baked) bundle = { baked, bytes: ask('GET', 'bundle').then((answer) => answer.arrayBuffer()).then((buffer) => new Uint8Array(buffer)) };
-  return bundle.bytes;
-}
 
 /** Keys of modar.toml that a change of a handle sets. */
 function valuesOf(scene, change, unit) {
@@ -89,8 +80,8 @@ export class Scene {
 
   scenes() {
     return scenesOf(this.attrs.pattern.name).map((scene, i) => {
-      const model = modelOf(scene.model);
-      return { ...scene, key: `${i} ${scene.model}`, model, half: halfOf(model), matrix: placed(scene, model, this.unit).matrix, modelName: scene.model };
+      const asset = modelOf(scene.model);
+      return { ...scene, key: `${i} ${scene.model}`, asset, half: halfOf(asset), matrix: placed(scene, asset, this.unit).matrix };
     });
   }
 
@@ -158,7 +149,7 @@ export class Scene {
   }
 
   upField(scene) {
-    const found = modelOf(scene.modelName)?.up;
+    const found = scene.asset?.up;
     return m('div.field', m('label', { for: 'up' }, t('up')), m('select', { id: 'up', onchange: (event) => setScene(scene, { up: event.target.value || null }) },
       m('option', { value: '', selected: !scene.up }, found ? t('upFound', { axis: found.toUpperCase() }) : t('upAuto')),
       AXES.map((axis) => m('option', { value: axis, selected: scene.up === axis }, axis.toUpperCase()))));
@@ -166,7 +157,7 @@ export class Scene {
 
   /** The axis that is up after one more press: all six in turn, first the one that files mean most often. null: the found one. */
   nextSide(scene) {
-    const found = modelOf(scene.modelName)?.up ?? AXES[0];
+    const found = scene.asset?.up ?? AXES[0];
     const sides = [found, ...AXES.filter((axis) => axis !== found)];
     const next = sides[(sides.indexOf(scene.up ?? found) + 1) % sides.length];
     return next === found ? null : next;
@@ -202,8 +193,8 @@ export class Scene {
     });
     return m('section', m('h2', t('onPicture')), m('ul.standing', scenes.map((scene) => m('li', { key: scene.key, class: scene.key === this.selected ? 'chosen' : '' },
       m('button.plain', { type: 'button', 'aria-pressed': String(scene.key === this.selected), onclick: () => this.select(scene.key) },
-        m('span.thumb.little', icon('model'), m('img', { src: thumb(scene.model?.file ?? '', 96), alt: '', onerror: (event) => { event.target.hidden = true; } })), name(scene.name || scene.modelName)),
-      tool(t('takeOff', { name: scene.modelName }), 'trash', () => deleteScene(scene))))),
+        m('span.thumb.little.turning', icon('model'), modelViews(scene.model) && m('img', { src: modelViews(scene.model), alt: '' })), name(scene.name || scene.model)),
+      tool(t('takeOff', { name: scene.model }), 'trash', () => deleteScene(scene))))),
     all.length === 1 && !scenes.length && button(t('standOn', { name: all[0].name }), () => add(all[0].name), { kind: '.primary', shape: 'add' }),
     (all.length > 1 || scenes.length > 0) && m('div.field.add', m('label.unseen', { for: 'add' }, t('addModel')), m('select', { id: 'add', value: '', onchange: (event) => {
       if (event.target.value) add(event.target.value);

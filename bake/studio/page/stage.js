@@ -117,7 +117,7 @@ export class Stage {
     for (const canvas of Object.values(layers)) canvas.remove();
   }
 
-  /** scenes: {key, index, pattern, model (of the project), matrix}. picture: {width, height, flat}. */
+  /** scenes: the project's, each with {key, asset (the model), half, matrix}. picture: {width, height, flat}. */
   show({ pattern, scenes, selected, picture, tilting, unit }) {
     const first = this.pattern !== pattern || !this.#ground;
     Object.assign(this, { pattern, scenes, selected, tilting, unit });
@@ -216,7 +216,7 @@ export class Stage {
   #pairs() {
     const rest = [...this.scenes];
     return this.#bakedNow.map((was, number) => ({ was, number })).filter(({ was }) => was.pattern === this.pattern.name).map(({ was, number }) => {
-      const at = rest.findIndex((scene) => scene.model?.name === was.model);
+      const at = rest.findIndex((scene) => scene.model === was.model);
       return { number, was, now: at < 0 ? null : rest.splice(at, 1)[0] };
     });
   }
@@ -227,7 +227,7 @@ export class Stage {
     const pairs = this.#pairs();
     this.#layers.models.hidden = pattern < 0 || !pairs.length;
     if (this.#layers.models.hidden) return;
-    const moved = pairs.map(({ now, was }) => now && multiply(this.#matrixOf(now), inverse(placed(was, now.model, this.unit).matrix)));
+    const moved = pairs.map(({ now, was }) => now && multiply(this.#matrixOf(now), inverse(placed(was, now.asset, this.unit).matrix)));
     if (moved.every((matrix) => matrix && near(matrix, IDENTITY))) {
       this.#view.drawFrom(pattern, view, focal);
       return;

@@ -23,6 +23,8 @@ export const state = {
 
 let queue = Promise.resolve();
 let bakeTimer = 0;
+/** The person has cancelled: nothing is baked until something changes. */
+let halted = false;
 
 const redraw = () => window.m.redraw();
 
@@ -58,7 +60,7 @@ function take(project) {
     const known = before?.patterns.find(({ name }) => name === pattern.name);
     if (!known || lookOf(known) !== lookOf(pattern)) state.scores.delete(pattern.name);
   }
-  if (project.bundle.stale && !project.baking && !state.failure && isBakeable()) bakeSoon();
+  if ((project.bundle.stale || !project.bundle.baked) && !state.failure && !halted && isBakeable()) bakeSoon();
   redraw();
 }
 
@@ -82,6 +84,7 @@ export function edit(...edits) {
     const before = state.project;
     try {
       state.failure = null;
+      halted = false;
       take(await askJson('POST', 'edit', { revision: before.revision, edits }));
     } catch (error) {
       if (error.status !== 409) throw error;
@@ -127,18 +130,28 @@ export async function addFiles(files, onProgress) {
   return told;
 }
 
-export function bakeSoon(wait = BAKE_AFTER_MS) {
-  clearTimeout(bakeTimer);
-  bakeTimer = setTimeout(async () => {
-    try {
+/** What runs already is ended where it makes what is no longer wanted, and waited for where it is something else: it ends with an event. */
+async function bake() {
+  try {
+    if (state.progress?.kind === 'bake') await ask('DELETE', 'job');
+    else if (!state.progress) {
+      state.progress = { kind: 'bake', stage: '', done: 0 };
+      redraw();
       await ask('POST', 'bake', {});
-    } catch (error) {
-      if (error.status !== 409) tellError(error);  // one runs: what has changed meanwhile is baked after it
     }
-  }, wait);
+  } catch (error) {
+    state.progress = null;
+    if (error.status !== 409) tellError(error);
+  }
+}
+
+function bakeSoon() {
+  clearTimeout(bakeTimer);
+  bakeTimer = setTimeout(bake, BAKE_AFTER_MS);
 }
 
 export async function cancel() {
+  halted = true;
   await ask('DELETE', 'job').catch(tellError);
 }
 
@@ -152,6 +165,15 @@ export async function loadScore(name) {
     state.scores.set(name, { failed: error.message, cure: error.cure });
   }
   redraw();
+}
+
+/** The bundle that was baked last, once for all that draws it: {baked, bytes}. */
+let bundle = null;
+
+export function bundleBytes() {
+  const { baked } = state;
+  if (bundle?.baked !== baked) bundle = { baked, bytes: ask('GET', 'bundle').then((answer) => answer.arrayBuffer()).then((buffer) => new Uint8Array(buffer)) };
+  return bundle.bytes;
 }
 
 /** What happens on the server, as it happens. */
@@ -169,10 +191,14 @@ export function listen() {
     queued(load).catch(tellError);
   });
   on('failed', (failure) => Object.assign(state, { progress: null, failure }));
-  on('cancelled', () => { state.progress = null; });
+  on('cancelled', () => {
+    state.progress = null;
+    queued(load).catch(tellError);
+  });
   on('exported', ({ kind, path, url }) => {
     state.progress = null;
     state.exported.set(kind, { path, url });
+    queued(load).catch(tellError);  // what has changed meanwhile is baked now
   });
   on('phone', ({ url }) => { state.phone = url; });
   events.onerror = () => {
