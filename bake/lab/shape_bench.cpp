@@ -23,18 +23,9 @@ struct BenchShape {
 };
 
 std::vector<BenchShape> bench_shapes_of() {
-  ShapeRequest cylinder;
-  cylinder.kind = ShapeRequest::Kind::kCylinder;
-  cylinder.top_mm = cylinder.bottom_mm = 66;
-  cylinder.arc_deg = 120;
-  cylinder.text = "cylinder";
+  ShapeRequest cylinder{ShapeRequest::Kind::kCylinder, 66, 66, 120, {}, {}, "cylinder"};
   // Of a picture as high as it is wide, the side leans by 8 degrees.
-  ShapeRequest cone;
-  cone.kind = ShapeRequest::Kind::kCone;
-  cone.top_mm = 76;
-  cone.bottom_mm = 56;
-  cone.arc_deg = 120;
-  cone.text = "cone";
+  ShapeRequest cone{ShapeRequest::Kind::kCone, 76, 56, 120, {}, {}, "cone"};
   ShapeRequest box;
   box.kind = ShapeRequest::Kind::kBox;
   box.box_mm = {120, 150, 80};

@@ -27,11 +27,11 @@ struct ShapeRequest {
   /// Of a box: right, back, left, top and bottom, relative to the folder of the pattern's picture,
   /// which is its front; empty: plain.
   std::array<std::string, 5> sides;
+  std::string text;  ///< as it was written: "cylinder,diameter=66mm,arc=120"; empty: nothing was
   /// Of the picture in the photo that the pattern's file is (of a box, its front): top-left,
   /// top-right, bottom-right, bottom-left. Nothing: the file is the picture.
   std::optional<std::array<PixelPoint, 4>> corners;
   double height_mm = 0;  ///< of what the corners cut out; 0: as the perspective tells
-  std::string text;  ///< as it was written: "cylinder,diameter=66mm,arc=120"; empty: nothing was
   [[nodiscard]] bool flat() const { return kind == Kind::kFlat; }
 };
 
