@@ -30,7 +30,7 @@ struct ShapeRequest {
   std::string text;  ///< as it was written: "cylinder,diameter=66mm,arc=120"; empty: nothing was
   /// Of the picture in the photo that the pattern's file is (of a box, its front): top-left,
   /// top-right, bottom-right, bottom-left. Nothing: the file is the picture.
-  std::optional<std::array<PixelPoint, 4>> corners;
+  std::optional<std::array<PixelPoint, 4>> corners = std::nullopt;
   double height_mm = 0;  ///< of what the corners cut out; 0: as the perspective tells
   [[nodiscard]] bool flat() const { return kind == Kind::kFlat; }
 };
