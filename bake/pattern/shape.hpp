@@ -39,7 +39,7 @@ struct ShapeRequest {
 /// does, or the file as it is. width_mm: of the picture, 0: not told. Errors: those of read_photo()
 /// and rectify().
 Result<RgbaImage> read_pattern_picture(const std::string& path, double width_mm,
-                               const ShapeRequest& request);
+                                       const ShapeRequest& request);
 
 /// The SectionType::kPatternShape section of a picture of that size; empty where the request is
 /// flat. Not of boxes. width_mm: of the picture, along the surface; 0: filled in where the

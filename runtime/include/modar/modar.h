@@ -420,7 +420,8 @@ MODAR_EXPERIMENTAL size_t modar_node_name(const modar_bundle* bundle, uint32_t i
                                           size_t size);
 MODAR_EXPERIMENTAL size_t modar_node_mark(const modar_bundle* bundle, uint32_t index, char* text,
                                           size_t size);
-/* kind: MODAR_TITLE, MODAR_TEXT, MODAR_ALT_TEXT or MODAR_CAPTIONS; 0 where there is none in the language. */
+/* kind: MODAR_TITLE, MODAR_TEXT, MODAR_ALT_TEXT or MODAR_CAPTIONS; 0 where there is none in the
+ * language. */
 MODAR_EXPERIMENTAL size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind,
                                           const char* language, char* text, size_t size);
 
@@ -463,9 +464,9 @@ typedef struct modar_event {
   uint32_t material; /* of a tap on a model: as in modar_hit; else 0 */
 } modar_event;
 enum {
-  MODAR_PLAY =
-      1, /* play the video or sound `node`, from where it was, or from its beginning after its end */
-  MODAR_PAUSE = 2,     /* pause it */
+  MODAR_PLAY = 1,  /* play the video or sound `node`, from where it was, or from its beginning after
+                      its end */
+  MODAR_PAUSE = 2, /* pause it */
   MODAR_SHOW_TEXT = 6, /* show the title and text of the label `node` */
   MODAR_OPEN_LINK = 7, /* ask the visitor whether to open modar_action_address() of `action` */
 };
