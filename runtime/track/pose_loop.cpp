@@ -340,6 +340,7 @@ void PoseLoop::State::accept(TrackResult& result) {
     const DetectionCandidate& candidate = candidates.patterns[i];
     const Track before = track;
     Detection detection;
+    if (calibration != nullptr) calibration->forget_plane(i);
     bool here = candidate.reason == Reason::kVisible &&
                 start_track(patterns[i], track, candidate, detection);
     if (here && before.verified && before.frames_since_lost < kRemembered &&

@@ -169,7 +169,7 @@ bool SelfCalibration::apply() {
     const auto plane =
         split_map(pattern, camera_, map_of_pose(pattern, before, track.pose), alone[1][1]);
     if (!track.tracked || track.homography_only || !plane) {
-      pattern.shape = alone;
+      forget_plane(i);
       track.measured = false;
       continue;
     }

@@ -32,6 +32,10 @@ class SelfCalibration {
   /// Measures a tracked flat pattern's free homography: what it says of the camera, and what a pose
   /// leaves of it, since no camera explains the pictures of a stabilised or distorting one.
   void measure(std::size_t i, Detection& detection);
+  /// A pattern is found anew, by the aspect alone: forgets what its last track's pose left of it.
+  void forget_plane(std::size_t i) {
+    if (patterns_[i].surface.flat()) patterns_[i].shape = {1.0, 0.0, 0.0, aspect(i)};
+  }
   /// Poses as others use them, in place of those by which the loop splits its maps.
   void place_pictures(TrackResult& result) const;
   [[nodiscard]] CameraEstimate estimate() const { return estimator_.estimate(); }

@@ -103,6 +103,34 @@ TEST(UnknownCamera, TheDefaultIsTheLongerSide) {
   EXPECT_EQ(default_camera(640, 480).fy, 640);
 }
 
+// Frames that do not follow each other: what a pose left of one says nothing of the next.
+TEST(UnknownCamera, APrintFoundAnewStartsWithItsOwnShape) {
+  const Camera lens = lens_of(640, 480, 416);
+  static const std::vector<std::byte> bundle = bundle_with({record()});
+  PoseLoopOptions options;
+  options.estimate_camera = true;
+  options.track = false;
+  auto loop = PoseLoop::create(BundleView::open(bundle).value(), default_camera(640, 480), options);
+  ASSERT_TRUE(loop) << to_line(loop.error());
+  const GrayPicture printed = copy_of(picture());
+  const GrayPicture background = clutter(640, 480, 77);
+  Random random(4);
+  TrackResult seen;
+  int shown = 0;
+  for (int i = 0; i < 24; ++i) {
+    const Pose pose = pose_of(look_at(2.0, i % 6 < 3 ? 50 : 40, i % 6 < 3 ? 20 : 200, 10 + 7 * i));
+    SceneFrame scene =
+        render_still(printed.view(), lens, pose, background, SceneBand{}, random, 0.65, {});
+    expose(scene.picture, {}, random, scene.picture);
+    ASSERT_TRUE((*loop)->step(scene.picture.view(), seen));
+    for (const Detection& one : seen.visible) {
+      ++shown;
+      EXPECT_LT(worst_corner(one, scene), 2.0) << "frame " << i;
+    }
+  }
+  EXPECT_GE(shown, 20);
+}
+
 TEST(UnknownCamera, CornersLieRightFromTheFirstFrameOn) {
   for (const double focal : {0.65, 0.85, 1.25}) {
     for (const double aspect : {0.94, 1.08}) {
