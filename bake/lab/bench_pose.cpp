@@ -57,7 +57,11 @@ void add_band(const PoseBenchRow& own, const PoseBenchRow* reference, const std:
     add("error_px", [](const PoseBenchRow& row) { return row.error_px; });
     if (own.shown_px > 0) {
       add("shown_error_px", [](const PoseBenchRow& row) { return row.shown_px; });
+      add("beside_pct", [&](const PoseBenchRow& row) { return percent(row.beside, with(row)); });
     }
+  }
+  if (own.sequence) {
+    add("held_wrong_frames", [](const PoseBenchRow& row) { return 1.0 * row.held_wrong; });
   }
   if (own.sequence) add("jitter_px", [](const PoseBenchRow& row) { return row.jitter_px; });
   add("cpu_ms", [](const PoseBenchRow& row) { return row.ms; });

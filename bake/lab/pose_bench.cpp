@@ -253,7 +253,9 @@ std::vector<SceneBand> pose_bands() {
           {"half covered", 0.5, 3.0, 0, 45, 0.5, 0.5, true},
           {"mixed", 0.25, 5.0, 0, 65, 0, 0.5, true},
           {"none", 0.4, 4.0, 0, 45, 0, 0, false},
-          {"70 % covered", 0.5, 3.0, 0, 45, 0.7, 0.7, true}};
+          {"70 % covered", 0.5, 3.0, 0, 45, 0.7, 0.7, true},
+          {"tilt 75-80", 0.5, 3.0, 75, 80, 0, 0, true},
+          {"area 0.02-0.05", 0.02, 0.05, 0, 45, 0, 0, true}};
 }
 
 Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& options,

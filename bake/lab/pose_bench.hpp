@@ -53,6 +53,7 @@ struct PoseBenchRow : PoseFigures {
   bool sequence = false;               ///< frames followed each other and were tracked
   bool detailed = false;               ///< P@5 and P@15 are printed, too
   double shown_px = 0;                 ///< of curved patterns: see bench_shapes(); 0: not measured
+  int beside = 0;                      ///< of curved patterns: frames that show a pose so far off
   double ms = 0;                       ///< thread-CPU milliseconds of a frame, mean
   double stages_ms[4] = {0, 0, 0, 0};  ///< wall time: detect, describe, match, homography
   IntRange features;                   ///< of a frame

@@ -228,7 +228,7 @@ void PoseTally::add(const TrackResult& result, const FrameTruth& truth) {
     figures_.false_found += result.visible.empty() ? 0 : 1;
   }
   if (!truth.pattern || result.visible.empty()) {
-    have_last_ = false;
+    cut();
     return;
   }
   ++figures_.recognised;
@@ -242,6 +242,8 @@ void PoseTally::add(const TrackResult& result, const FrameTruth& truth) {
   const bool right = is_right(seen, truth);
   figures_.within_15 += error < 15 ? 1 : 0;
   figures_.worst_px = std::max(figures_.worst_px, error);
+  wrong_ = right ? 0 : wrong_ + 1;
+  figures_.held_wrong = std::max(figures_.held_wrong, wrong_);
   if (right) {
     ++figures_.right;
     errors_.push_back(error);

@@ -71,6 +71,7 @@ struct PoseFigures {
   double worst_px = 0;      ///< greatest error of a recognition
   double error_px = 0;      ///< median over the right ones
   double jitter_px = 0;     ///< rms change of the corners' error from frame to frame
+  int held_wrong = 0;       ///< most frames in a row that show a pose that is not right
 };
 
 /// Sums up the tracker's answers.
@@ -78,7 +79,10 @@ class PoseTally {
  public:
   void add(const TrackResult& result, const FrameTruth& truth);
   /// The next frame does not follow the last one: no jitter between them.
-  void cut() { have_last_ = false; }
+  void cut() {
+    have_last_ = false;
+    wrong_ = 0;
+  }
   [[nodiscard]] PoseFigures figures();
 
  private:
@@ -86,6 +90,7 @@ class PoseTally {
   std::vector<double> errors_;
   double change_ = 0.0;
   int changes_ = 0;
+  int wrong_ = 0;  ///< frames in a row, up to the last
   bool have_last_ = false;
   std::array<glm::dvec2, 4> last_{};
 };
