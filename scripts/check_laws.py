@@ -117,6 +117,7 @@ DOORS = {
     "runtime/platform": ("command_line.hpp", "extension_list.hpp", "lap_clock.hpp", "semaphore.hpp"),
     "runtime/track": (),
     "runtime/record": (),
+    "runtime/arrive": (),
     "runtime/render": (),
     "runtime/paper": (),
     "runtime/play": (),

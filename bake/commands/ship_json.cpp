@@ -19,6 +19,10 @@ const char* form_name(PieceForm form) {
       return "derived-text";
     case PieceForm::kLevel:
       return "level";
+    case PieceForm::kTrackerRecord:
+      return "tracker-record";
+    case PieceForm::kCoded:
+      return "coded";
   }
   return "";
 }

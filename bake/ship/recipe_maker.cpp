@@ -12,6 +12,8 @@
 #include "bake/ship/mesh_encoder.hpp"
 #include "formats/base/parallel.hpp"
 #include "formats/transport/feature_text.hpp"
+#include "formats/transport/stages.hpp"
+#include "modar/packed_record.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
 
@@ -126,6 +128,7 @@ class RecipeMaker {
     draft_meshes();
     draft_levels();
     draft_texts();
+    draft_records();
     draft_rest();
     parallel_rows(static_cast<std::uint32_t>(drafts_.size()), options_.jobs,
                   [&](std::uint32_t i) { pack(drafts_[i]); });
@@ -253,6 +256,22 @@ class RecipeMaker {
     }
   }
 
+  /// Tracker records of which the picture and the features' places tell the rest.
+  void draft_records() {
+    for (const SectionEntry& entry : bundle_.sections()) {
+      if (entry.type != static_cast<std::uint32_t>(SectionType::kTrackerRecord)) continue;
+      auto packed = pack_tracker_record(at(entry.offset, entry.size));
+      if (!packed) continue;
+      Draft draft;
+      draft.record.form = static_cast<std::uint8_t>(PieceForm::kTrackerRecord);
+      draft.record.offset = entry.offset;
+      draft.record.raw_size = static_cast<std::uint32_t>(entry.size);
+      draft.stored = *std::move(packed);
+      cover(entry.offset, entry.size);
+      drafts_.push_back(std::move(draft));
+    }
+  }
+
   /// All other bytes, section by section; those between sections are zero.
   void draft_rest() {
     std::uint64_t payload = bundle_.bytes().size();
@@ -347,28 +366,24 @@ class RecipeMaker {
   Result<PublishedBundle> finish() {
     PublishedBundle out;
     RecipeHeader header{};
-    std::copy(kRecipeMagic.begin(), kRecipeMagic.end(), header.magic);
-    header.version = kRecipeVersion;
-    header.piece_count = static_cast<std::uint32_t>(drafts_.size());
     header.bundle_size = bundle_.bytes().size();
     const BundleHash hash = bundle_hash(bundle_.bytes());
     std::copy(hash.begin(), hash.end(), header.bundle_hash);
-    const auto append = [&](std::span<const std::byte> bytes) {
-      out.recipe.insert(out.recipe.end(), bytes.begin(), bytes.end());
-    };
-    append(std::as_bytes(std::span(&header, 1)));
+    std::vector<PieceRecord> pieces;
     for (Draft& draft : drafts_) {
       const auto stored = draft.stored.empty()
                               ? at(draft.record.second_offset, draft.record.second_size)
                               : std::span<const std::byte>(draft.stored);
       const auto form = static_cast<PieceForm>(draft.record.form);
-      const bool proven = form == PieceForm::kMesh || form == PieceForm::kLevel;  // by the encoder
+      const bool proven = form == PieceForm::kMesh || form == PieceForm::kLevel ||
+                          form == PieceForm::kTrackerRecord;  // by the encoder
       if (!proven && !decode_piece(draft.record, stored)) {
         return fail(ExitCode::kInternal, "ship.piece",
                     "byte " + std::to_string(draft.record.offset),
                     "a piece does not decode to its original bytes", "report this as a bug");
       }
-      append(std::as_bytes(std::span(&draft.record, 1)));
+      draft.record.stage = static_cast<std::uint8_t>(stage_of(draft.record));
+      pieces.push_back(draft.record);
       FormTotals& totals = out.forms[form];
       ++totals.pieces;
       totals.raw_bytes += draft.record.raw_size;
@@ -377,6 +392,7 @@ class RecipeMaker {
         out.objects.emplace(std::to_array(draft.record.id), std::move(draft.stored));
       }
     }
+    out.recipe = recipe_bytes(header, pieces);
     out.recipe_object = zstd(out.recipe);
     out.recipe_id = object_id(out.recipe_object);
     out.download_size = out.recipe_object.size();
@@ -384,8 +400,26 @@ class RecipeMaker {
     return out;
   }
 
+  /// The earliest that some of the piece's bytes are needed for.
+  [[nodiscard]] Stage stage_of(const PieceRecord& piece) const {
+    Stage stage = Stage::kRefine;
+    const auto meets = [](const StageRange& range, std::uint64_t offset, std::uint64_t size) {
+      return offset < range.offset + range.size && range.offset < offset + size;
+    };
+    const bool mesh = static_cast<PieceForm>(piece.form) == PieceForm::kMesh;
+    const std::uint64_t second = mesh ? piece.second_size : 0;
+    for (const StageRange& range : stages_) {
+      if (meets(range, piece.offset, piece.raw_size - second) ||
+          (mesh && meets(range, piece.second_offset, second))) {
+        stage = std::min(stage, range.stage);
+      }
+    }
+    return stage;
+  }
+
   const BundleView& bundle_;
   const RecipeOptions& options_;
+  const std::vector<StageRange> stages_ = stage_ranges(bundle_);
   std::vector<Draft> drafts_;
   std::vector<Covered> covered_;
 };

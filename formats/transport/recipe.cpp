@@ -1,8 +1,11 @@
 #include "formats/transport/recipe.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <string>
+
+#include "formats/transport/coded_bytes.hpp"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -24,9 +27,12 @@ bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t limit) {
 }
 
 /// What is wrong with a piece, or nullptr.
-const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
+const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size, std::uint32_t version) {
   const auto form = static_cast<PieceForm>(piece.form);
-  if (form < PieceForm::kStored || form > PieceForm::kLevel) return "its form is unknown";
+  const PieceForm last = version == 1 ? PieceForm::kLevel : PieceForm::kCoded;
+  if (form < PieceForm::kStored || form > last) return "its form is unknown";
+  const Stage most = version == 1 ? Stage::kAny : Stage::kRefine;
+  if (static_cast<Stage>(piece.stage) > most) return "its stage is unknown";
   if (!is_zero(piece.reserved)) return "its reserved bytes are not zero";
   if (piece.raw_size == 0 || piece.raw_size > kMaxPieceBytes ||
       piece.stored_size > kMaxPieceBytes) {
@@ -36,8 +42,11 @@ const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
   if (!two_parts && (piece.second_offset != 0 || piece.second_size != 0)) {
     return "it has a second part that its form does not know";
   }
-  if (form != PieceForm::kMesh && form != PieceForm::kLevel && piece.index_base != 0)
+  if (form == PieceForm::kCoded) {
+    if (piece.index_base == 0 || piece.index_base > kMostCodedStride) return "it has no stride";
+  } else if (form != PieceForm::kMesh && form != PieceForm::kLevel && piece.index_base != 0) {
     return "it has no indices to shift";
+  }
   if (!fits(piece.second_offset, piece.second_size, bundle_size)) return "it leaves the bundle";
   if (form == PieceForm::kFeatureText) {
     if (piece.stored_size != 0 || !is_zero(piece.id)) return "a derived piece has nothing stored";
@@ -57,7 +66,31 @@ const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size) {
   return fits(piece.offset, first, bundle_size) ? nullptr : "it leaves the bundle";
 }
 
+/// recipe: a header at least.
+std::uint64_t table_hash(std::span<const std::byte> recipe) {
+  RecipeHeader header{};
+  std::vector<std::byte> hashed(recipe.begin(), recipe.end());
+  std::memcpy(&header, recipe.data(), sizeof header);
+  header.table_hash = 0;
+  std::memcpy(hashed.data(), &header, sizeof header);
+  return raw_hash(hashed);
+}
+
 }  // namespace
+
+std::vector<std::byte> recipe_bytes(RecipeHeader header, std::span<const PieceRecord> pieces) {
+  std::copy(kRecipeMagic.begin(), kRecipeMagic.end(), header.magic);
+  header.version = kRecipeVersion;
+  header.piece_count = static_cast<std::uint32_t>(pieces.size());
+  std::vector<std::byte> bytes(sizeof header + pieces.size_bytes());
+  std::memcpy(bytes.data(), &header, sizeof header);
+  if (!pieces.empty()) {
+    std::memcpy(bytes.data() + sizeof header, pieces.data(), pieces.size_bytes());
+  }
+  header.table_hash = table_hash(bytes);
+  std::memcpy(bytes.data(), &header, sizeof header);
+  return bytes;
+}
 
 Result<RecipeView> open_recipe(std::span<const std::byte> bytes) {
   RecipeView view;
@@ -68,23 +101,27 @@ Result<RecipeView> open_recipe(std::span<const std::byte> bytes) {
   if (!std::equal(kRecipeMagic.begin(), kRecipeMagic.end(), view.header.magic)) {
     return broken("recipe.magic", 0, "it does not begin as a recipe does");
   }
-  if (view.header.version != kRecipeVersion) {
+  if (view.header.version < 1 || view.header.version > kRecipeVersion) {
     return fail(ExitCode::kUnsupported, "recipe.version", "recipe, byte 8",
-                "it is of version " + std::to_string(view.header.version) + ", not 1",
+                "it is of version " + std::to_string(view.header.version) + ", not 1 or 2",
                 "use a newer modar-fetch");
   }
-  if (view.header.reserved != 0 || view.header.bundle_size > kMaxBundleBytes ||
-      view.header.piece_count > kMaxPieces) {
+  if ((view.header.version == 1 && view.header.table_hash != 0) ||
+      view.header.bundle_size > kMaxBundleBytes || view.header.piece_count > kMaxPieces) {
     return broken("recipe.header", 12, "its header is out of range");
   }
   if (bytes.size() !=
       sizeof view.header + std::size_t{view.header.piece_count} * sizeof(PieceRecord)) {
     return broken("recipe.truncated", bytes.size(), "its pieces do not add up to its size");
   }
+  if (view.header.version > 1 && view.header.table_hash != table_hash(bytes)) {
+    return broken("recipe.hash", offsetof(RecipeHeader, table_hash), "its bytes are damaged");
+  }
   view.pieces = {reinterpret_cast<const PieceRecord*>(bytes.data() + sizeof view.header),
                  view.header.piece_count};
   for (std::size_t i = 0; i < view.pieces.size(); ++i) {
-    if (const char* fault = fault_of(view.pieces[i], view.header.bundle_size)) {
+    if (const char* fault =
+            fault_of(view.pieces[i], view.header.bundle_size, view.header.version)) {
       return broken("recipe.piece", sizeof view.header + i * sizeof(PieceRecord), fault);
     }
   }

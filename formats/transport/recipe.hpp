@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "formats/base/error.hpp"
 
@@ -12,7 +13,7 @@ namespace modar {
 
 inline constexpr std::array<std::uint8_t, 8> kRecipeMagic = {0x89, 'M',  'O',  'R',
                                                              0x0D, 0x0A, 0x1A, 0x0A};
-inline constexpr std::uint32_t kRecipeVersion = 1;
+inline constexpr std::uint32_t kRecipeVersion = 2;
 inline constexpr std::uint32_t kMaxPieces = 1u << 20;
 inline constexpr std::uint32_t kMaxPieceBytes = 16u << 20;  ///< raw or stored
 inline constexpr std::uint64_t kMaxBundleBytes = 1ull << 40;
@@ -28,8 +29,18 @@ enum class PieceForm : std::uint8_t {
   kZstd = 2,        ///< a zstd frame of them
   kZstdHalves = 3,  ///< ETC1: a zstd frame of the blocks' first four bytes, then of their last four
   kMesh = 4,        ///< a mesh object (modar/piece.hpp)
-  kFeatureText = 5,  ///< nothing stored: the text of the mapped features at second_offset
-  kLevel = 6,        ///< a coarser level's indices: zstd of meshoptimizer's index codec
+  kFeatureText = 5,    ///< nothing stored: the text of the mapped features at second_offset
+  kLevel = 6,          ///< a coarser level's indices: zstd of meshoptimizer's index codec
+  kTrackerRecord = 7,  ///< since version 2: a packed tracker record (modar/packed_record.hpp)
+  kCoded = 8,          ///< since version 2: bytes by encode_bytes(), index_base as their stride
+};
+
+/// What a part of a bundle is needed for, in the order of need.
+enum class Stage : std::uint8_t {
+  kAny = 0,   ///< not said: recipes of version 1
+  kFind = 1,  ///< tables and patterns: pictures are recognised
+  kShow = 2,  ///< each model as coarse as the bundle has it, textures up to kShownSide
+  kRefine = 3,
 };
 
 struct RecipeHeader {
@@ -38,7 +49,7 @@ struct RecipeHeader {
   std::uint32_t piece_count;
   std::uint64_t bundle_size;
   std::uint8_t bundle_hash[32];
-  std::uint64_t reserved;
+  std::uint64_t table_hash;  ///< XXH64 of the recipe with 0 here; 0 in version 1
 };
 static_assert(sizeof(RecipeHeader) == 64);
 
@@ -53,9 +64,10 @@ struct PieceRecord {
   std::uint32_t stored_size;    ///< bytes; 0 for kFeatureText
   std::uint32_t
       second_size;  ///< bytes: kMesh: of the indices; kFeatureText: of the features; else 0
-  std::uint16_t index_base;  ///< kMesh, kLevel: added to each index; else 0
+  std::uint16_t index_base;  ///< kMesh, kLevel: added to each index; kCoded: the stride; else 0
   std::uint8_t form;         ///< PieceForm
-  std::uint8_t reserved[9];
+  std::uint8_t stage;        ///< Stage, since version 2
+  std::uint8_t reserved[8];
 };
 static_assert(sizeof(PieceRecord) == 64);
 
@@ -65,6 +77,9 @@ struct RecipeView {
   RecipeHeader header{};
   std::span<const PieceRecord> pieces;
 };
+
+/// A recipe of kRecipeVersion. header: its magic, version, count and hash are filled in.
+std::vector<std::byte> recipe_bytes(RecipeHeader header, std::span<const PieceRecord> pieces);
 
 /// bytes: 8-byte aligned. Errors: kInvalidInput "recipe.*".
 Result<RecipeView> open_recipe(std::span<const std::byte> bytes);

@@ -9,6 +9,7 @@
 #include "formats/transport/chunk_order.hpp"
 #include "formats/transport/feature_text.hpp"
 #include "formats/transport/vertex_streams.hpp"
+#include "modar/arriving_bundle.hpp"
 
 namespace modar {
 namespace {
@@ -77,7 +78,9 @@ Result<std::vector<std::byte>> raw_bytes(const PieceRecord& piece,
                                          std::span<const std::byte> stored) {
   switch (static_cast<PieceForm>(piece.form)) {
     case PieceForm::kStored:
-      return std::vector<std::byte>(stored.begin(), stored.end());
+    case PieceForm::kTrackerRecord:
+    case PieceForm::kCoded:
+      return decode_own_piece(piece, stored);
     case PieceForm::kZstd:
       return unpack_zstd(stored, piece.raw_size);
     case PieceForm::kZstdHalves:

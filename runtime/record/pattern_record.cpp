@@ -4,29 +4,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 #include <numeric>
 #include <queue>
 #include <utility>
 
 #include "formats/base/parallel.hpp"
-#include "formats/tracker_record.hpp"
 #include "modar/pattern_views.hpp"
 #include "modar/tracker_features.hpp"
+#include "runtime/record/record_parts.hpp"
 
 namespace modar {
 namespace {
 
 using std::numbers::pi;
 
-constexpr int kLargestSide = 1023;  // of TrackerFeatureRecord's 16-bit positions in 64ths
-
-// Candidates: every third of an octave over two octaves. In the study of this tracker's design
-// baked scales took ORB-2000 from 63 to 68 % right at area 0.25-0.4, baked tilted views to 78 %,
-// and at 60 to 70 degrees from 6 to 48 %.
-constexpr double kScaleStep = 1.2599210498948732;
-constexpr int kScales = 7;
 // Natural logarithms of the smallest and largest scale of the trial views, 0.3 and the root of 2:
 // areas from 0.1. Of larger ones, to 4, a frame's coarser levels show what smaller views do, and
 // views up to 2 took two fifths of the trials' time.
@@ -34,8 +26,6 @@ constexpr double kLogSmallest = -1.2039728043259361;
 constexpr double kLogLargest = 0.34657359027997265;
 // Degrees of the steepest trial view: a tilt of 4.4, just beyond the steepest baked one of 4.1.
 constexpr double kSteepest = 77.0;
-// Pixels around a rendered pattern: half a descriptor's patch and the detector's border.
-constexpr int kMargin = 24;
 // View pixels between a trial's feature and the candidate that it repeats. Detection scatters by a
 // pixel or two; a wider radius lets neighbouring corners vouch for each other. Set by hand.
 constexpr int kNear = 3;
@@ -45,14 +35,6 @@ constexpr int kRepeats = 64;
 // Matches of a view at which one more counts half: what pulls the choice towards hard views. The
 // pose needs about 8 and half a dozen spare; higher values favour easy views. Set by hand.
 constexpr double kEnough = 24.0;
-
-struct Candidate {
-  double x = 0;  // pattern pixels
-  double y = 0;
-  std::array<double, 4> warp{};
-  std::array<std::uint8_t, 32> code{};
-  std::uint8_t dark = 0;
-};
 
 /// A trial's feature that a candidate repeats, and how well (0 to 1].
 struct Hit {
@@ -82,16 +64,14 @@ bool on_one_face(const PatternSurface& surface, double x, double y, double reach
       });
 }
 
-std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const AffineView& view,
-                                     const PatternSurface& surface) {
+std::vector<RecordFeature> candidates_of(const std::vector<ViewLevel>& levels,
+                                         const AffineView& view, const PatternSurface& surface) {
   constexpr double kReach = 10.0;  // view pixels around a corner that tell most of its code
   const double scale =
       std::sqrt(std::abs(view.linear[0] * view.linear[3] - view.linear[1] * view.linear[2]));
-  std::vector<Candidate> candidates;
+  std::vector<RecordFeature> candidates;
   const GrayPicture picture = render_view(levels, view, nullptr);
-  DetectOptions detection = generous_detection();
-  detection.levels = 1;  // coarser ones repeat what views of a smaller scale show
-  const auto extractor = FeatureExtractor::create(picture.width, picture.height, detection);
+  const auto extractor = FeatureExtractor::create(picture.width, picture.height, baked_detection());
   extractor->set_frame(picture.view());
   for (const TrackerFeature& feature : extractor->features()) {
     const auto place =
@@ -100,40 +80,18 @@ std::vector<Candidate> candidates_of(const std::vector<ViewLevel>& levels, const
         !on_one_face(surface, place[0], place[1], kReach / scale)) {
       continue;
     }
-    Candidate candidate;
-    candidate.x = place[0];
-    candidate.y = place[1];
-    const double c = static_cast<double>(feature.cosine);
-    const double s = static_cast<double>(feature.sine);
-    const auto& a = view.linear;
-    candidate.warp = {c * a[0] + s * a[2], c * a[1] + s * a[3], c * a[2] - s * a[0],
-                      c * a[3] - s * a[1]};
-    candidate.code = feature.code;
-    candidate.dark = feature.dark;
-    candidates.push_back(candidate);
+    candidates.push_back(record_feature(view, feature, place));
   }
   return candidates;
 }
 
-std::vector<Candidate> find_candidates(const std::vector<ViewLevel>& levels,
-                                       const PatternSurface& surface, unsigned jobs) {
-  std::vector<AffineView> views;
-  Random random(1);
-  double scale = 1.0;
-  for (int k = 0; k < kScales; ++k, scale /= kScaleStep) {
-    // Directions get denser with the tilt (Yu & Morel, "ASIFT", 2011).
-    for (const auto& [tilt, turns] : {std::pair{1.0, 2}, {1.5, 4}, {2.1, 6}, {2.9, 8}, {4.1, 11}}) {
-      for (int i = 0; i < turns; ++i) {
-        views.push_back(make_view(levels[0].width, levels[0].height, scale, tilt,
-                                  turn_of(pi * i / turns), turn_of(random.uniform(0.0, 2 * pi)),
-                                  kMargin));
-      }
-    }
-  }
-  std::vector<std::vector<Candidate>> found(views.size());
+std::vector<RecordFeature> find_candidates(const std::vector<ViewLevel>& levels,
+                                           const PatternSurface& surface, unsigned jobs) {
+  const std::vector<AffineView> views = baked_views(levels[0].width, levels[0].height);
+  std::vector<std::vector<RecordFeature>> found(views.size());
   parallel_rows(static_cast<std::uint32_t>(views.size()), jobs,
                 [&](std::uint32_t i) { found[i] = candidates_of(levels, views[i], surface); });
-  std::vector<Candidate> candidates;
+  std::vector<RecordFeature> candidates;
   for (const auto& some : found) candidates.insert(candidates.end(), some.begin(), some.end());
   return candidates;
 }
@@ -157,22 +115,23 @@ void expose_trial(Random& random, GrayPicture& picture) {
   }
 }
 
-/// Candidates by squares of the pattern, so that a trial's feature is compared with near ones only.
+/// RecordFeatures by squares of the pattern, so that a trial's feature is compared with near ones
+/// only.
 class Grid {
  public:
-  Grid(const GrayImage& pattern, const std::vector<Candidate>& candidates)
+  Grid(const GrayImage& pattern, const std::vector<RecordFeature>& candidates)
       : columns_(pattern.width / kSquare + 1),
         rows_(pattern.height / kSquare + 1),
         starts_(static_cast<std::size_t>(2 * columns_ * rows_) + 1),
         entries_(candidates.size()) {
-    const auto cell = [this](const Candidate& candidate) {
+    const auto cell = [this](const RecordFeature& candidate) {
       return index(square(candidate.x), square(candidate.y), candidate.dark);
     };
-    for (const Candidate& candidate : candidates) ++starts_[cell(candidate) + 1];
+    for (const RecordFeature& candidate : candidates) ++starts_[cell(candidate) + 1];
     std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
     std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
     for (std::uint32_t i = 0; i < candidates.size(); ++i) {
-      const Candidate& candidate = candidates[i];
+      const RecordFeature& candidate = candidates[i];
       entries_[next[cell(candidate)]++] = {static_cast<float>(candidate.x),
                                            static_cast<float>(candidate.y), i};
       codes_.push_back(candidate.code);
@@ -320,7 +279,8 @@ TrialView run_surface_trial(const std::vector<ViewLevel>& levels, const PatternS
 }
 
 Trials run_trials(const std::vector<ViewLevel>& levels, const PatternSurface& surface,
-                  const std::vector<Candidate>& candidates, std::uint32_t count, unsigned jobs) {
+                  const std::vector<RecordFeature>& candidates, std::uint32_t count,
+                  unsigned jobs) {
   const Grid grid(levels[0].view(), candidates);
   std::vector<TrialView> views(count);
   parallel_rows(count, jobs, [&](std::uint32_t i) {
@@ -379,80 +339,6 @@ std::vector<std::uint32_t> choose(const Trials& trials, std::uint32_t count, dou
   return chosen;
 }
 
-/// Bright ones first, each group filled up to whole blocks; returns the number of bright ones.
-std::uint32_t group_by_polarity(const std::vector<Candidate>& candidates,
-                                std::vector<std::uint32_t>& chosen) {
-  std::vector<std::uint32_t> ordered;
-  std::uint32_t bright = 0;
-  for (int dark = 0; dark < 2; ++dark) {
-    for (const std::uint32_t i : chosen) {
-      if (candidates[i].dark == dark) ordered.push_back(i);
-    }
-    while (!ordered.empty() && ordered.size() % kTrackerBlockCodes != 0)
-      ordered.push_back(ordered.back());
-    if (dark == 0) bright = static_cast<std::uint32_t>(ordered.size());
-  }
-  chosen = std::move(ordered);
-  return bright;
-}
-
-TrackerFeatureRecord feature_record(const Candidate& candidate) {
-  TrackerFeatureRecord record{};
-  record.x = static_cast<std::uint16_t>(std::lround((candidate.x + 0.5) * 64));
-  record.y = static_cast<std::uint16_t>(std::lround((candidate.y + 0.5) * 64));
-  for (std::size_t k = 0; k < 4; ++k) {
-    record.warp[k] = static_cast<std::int16_t>(std::lround(candidate.warp[k] * 4096));
-  }
-  return record;
-}
-
-template <class T>
-void put(std::vector<std::byte>& bytes, std::uint64_t offset, const T& value) {
-  std::memcpy(bytes.data() + offset, &value, sizeof value);
-}
-
-std::vector<std::byte> assemble(const std::vector<ViewLevel>& levels,
-                                const std::vector<Candidate>& candidates,
-                                std::vector<std::uint32_t> chosen,
-                                const std::vector<TrackerPatchRecord>& patches) {
-  TrackerRecordHeader header{};
-  header.describer_version = kFeatureExtractorVersion;
-  header.bright_count = group_by_polarity(candidates, chosen);
-  header.feature_count = static_cast<std::uint32_t>(chosen.size());
-  header.patch_count = static_cast<std::uint32_t>(patches.size());
-  header.width = static_cast<std::uint32_t>(levels[0].width);
-  header.height = static_cast<std::uint32_t>(levels[0].height);
-  header.level_count = static_cast<std::uint32_t>(levels.size());
-  header.codes_offset = sizeof header;
-  header.features_offset = header.codes_offset + chosen.size() * kTrackerCodeBytes;
-  header.patches_offset = header.features_offset + chosen.size() * sizeof(TrackerFeatureRecord);
-  header.pixels_offset = header.patches_offset + patches.size() * sizeof(TrackerPatchRecord);
-  std::vector<std::byte> bytes(header.pixels_offset);
-  put(bytes, 0, header);
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const Candidate& candidate = candidates[chosen[i]];
-    const std::size_t block = i / kTrackerBlockCodes;
-    for (std::size_t k = 0; k < kTrackerCodeBytes; ++k) {
-      put(bytes,
-          header.codes_offset + (block * kTrackerCodeBytes + k) * kTrackerBlockCodes +
-              i % kTrackerBlockCodes,
-          candidate.code[k]);
-    }
-    put(bytes, header.features_offset + i * sizeof(TrackerFeatureRecord),
-        feature_record(candidate));
-  }
-  for (std::size_t i = 0; i < patches.size(); ++i) {
-    put(bytes, header.patches_offset + i * sizeof(TrackerPatchRecord), patches[i]);
-  }
-  for (const ViewLevel& level : levels) {
-    const auto pixels = std::as_bytes(std::span(level.pixels));
-    bytes.insert(bytes.end(), pixels.begin(), pixels.end());
-  }
-  return bytes;
-}
-
-constexpr int kPatchHalf = 4;  // a patch is 9x9 pixels of its level, as the tracker samples it
-constexpr int kPatchBorder = kPatchHalf + 2;
 // Gray values a pixel of rms gradient that a patch needs in every direction: the tracker assumes a
 // noise of about 3. A lower limit lets flat patches in, which slide. Set by hand.
 constexpr double kWeakestPatch = 3.0;
@@ -463,31 +349,11 @@ struct PatchPlace {
   double score = 0;
 };
 
-/// Shi & Tomasi, "Good features to track" (1994), as a root mean square gradient.
-double patch_score(const GrayPicture& picture, int x, int y) {
-  double xx = 0;
-  double xy = 0;
-  double yy = 0;
-  const std::uint8_t* pixels = picture.pixels.data();
-  for (int v = y - kPatchHalf; v <= y + kPatchHalf; ++v) {
-    for (int u = x - kPatchHalf; u <= x + kPatchHalf; ++u) {
-      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(v) * picture.width + u;
-      const double gx = 0.5 * (pixels[at + 1] - pixels[at - 1]);
-      const double gy = 0.5 * (pixels[at + picture.width] - pixels[at - picture.width]);
-      xx += gx * gx;
-      xy += gx * gy;
-      yy += gy * gy;
-    }
-  }
-  const double least = 0.5 * (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy));
-  return std::sqrt(std::max(0.0, least) / ((2 * kPatchHalf + 1) * (2 * kPatchHalf + 1)));
-}
-
 std::vector<PatchPlace> patch_places(const GrayPicture& picture, const PatternSurface& surface,
                                      double scale) {
   std::vector<PatchPlace> places;
-  for (int y = kPatchBorder; y < picture.height - kPatchBorder; y += 2) {
-    for (int x = kPatchBorder; x < picture.width - kPatchBorder; x += 2) {
+  for (int y = kPatchBorder; y < picture.height - kPatchBorder; y += kPatchStep) {
+    for (int x = kPatchBorder; x < picture.width - kPatchBorder; x += kPatchStep) {
       if (!on_one_face(surface, (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5,
                        (kPatchBorder + 0.5) * scale)) {
         continue;
@@ -527,14 +393,10 @@ std::vector<TrackerPatchRecord> choose_patches(const std::vector<ViewLevel>& lev
   std::vector<TrackerPatchRecord> patches;
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const GrayPicture& picture = levels[level];
-    const double scale = static_cast<double>(1u << level);
+    const auto scale = static_cast<double>(1u << level);
     for (const PatchPlace& place : spread_patches(patch_places(picture, surface, scale), count,
                                                   std::max(picture.width, picture.height))) {
-      TrackerPatchRecord record{};
-      record.x = static_cast<std::uint16_t>(std::lround((place.x + 0.5) * scale * 64));
-      record.y = static_cast<std::uint16_t>(std::lround((place.y + 0.5) * scale * 64));
-      record.level = static_cast<std::uint16_t>(level);
-      record.score = static_cast<std::uint16_t>(std::min(place.score * 64, 65535.0));
+      const TrackerPatchRecord record = patch_record(place.x, place.y, level, place.score);
       patches.push_back(record);
     }
   }
@@ -557,14 +419,14 @@ Result<std::vector<std::byte>> make_tracker_record(const GrayImage& pattern,
                                                    const PatternSurface& surface,
                                                    double* repeated) {
   MODAR_TRY(options.validate());
-  if (pattern.width < 32 || pattern.height < 32 || pattern.width > kLargestSide ||
-      pattern.height > kLargestSide) {
+  if (pattern.width < kSmallestSide || pattern.height < kSmallestSide ||
+      pattern.width > kLargestSide || pattern.height > kLargestSide) {
     return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
                 "the picture is smaller than 32 or larger than 1023 pixels on a side",
                 "give another size");
   }
   const std::vector<ViewLevel> levels = view_levels(pattern);
-  const std::vector<Candidate> candidates = find_candidates(levels, surface, options.jobs);
+  const std::vector<RecordFeature> candidates = find_candidates(levels, surface, options.jobs);
   const Trials trials = run_trials(levels, surface, candidates, options.trial_views, options.jobs);
   double matches = 0;
   const std::vector<std::uint32_t> chosen = choose(trials, options.features, matches);
@@ -574,8 +436,10 @@ Result<std::vector<std::byte>> make_tracker_record(const GrayImage& pattern,
                 "fewer than 8 features of the picture are found again in other views",
                 "take a picture with more texture");
   }
-  return assemble(levels, candidates, chosen,
-                  choose_patches(levels, surface, options.patches_per_level));
+  std::vector<RecordFeature> features;
+  for (const std::uint32_t i : chosen) features.push_back(candidates[i]);
+  return assemble_record({levels.begin(), levels.end()}, features,
+                         choose_patches(levels, surface, options.patches_per_level));
 }
 
 }  // namespace modar

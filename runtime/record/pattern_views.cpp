@@ -241,8 +241,11 @@ GrayPicture made_clutter(Random& random, int width, int height) {
   return picture;
 }
 
-GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& view,
-                        const GrayPicture* background) {
+namespace {
+
+/// background: of the part's size, or null.
+GrayPicture render(const std::vector<ViewLevel>& levels, const AffineView& view,
+                   const ViewPart& part, const GrayPicture* background) {
   const auto& a = view.linear;
   const double determinant = a[0] * a[3] - a[1] * a[2];
   const std::array<double, 4> inverse = {a[3] / determinant, -a[1] / determinant,
@@ -263,19 +266,22 @@ GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& 
   const std::int64_t step_x = std::llround(inverse[0] / factor * kFine);
   const std::int64_t step_y = std::llround(inverse[2] / factor * kFine);
   GrayPicture out;
-  out.width = view.width;
-  out.height = view.height;
+  out.width = part.width;
+  out.height = part.height;
   const auto width = static_cast<std::size_t>(out.width);
   out.pixels.resize(width * static_cast<std::size_t>(out.height));
   std::vector<std::int32_t> xs(width);
   std::vector<std::int32_t> ys(width);
   for (int y = 0; y < out.height; ++y) {
     const double u = -view.offset[0];
-    const double v = y - view.offset[1];
+    const double v = part.top + y - view.offset[1];
+    // From the view's first pixel on, so that parts of it have its very pixels.
     std::int64_t px =
-        std::llround(((inverse[0] * u + inverse[1] * v + 0.5) / factor - 0.5) * kFine);
+        std::llround(((inverse[0] * u + inverse[1] * v + 0.5) / factor - 0.5) * kFine) +
+        part.left * step_x;
     std::int64_t py =
-        std::llround(((inverse[2] * u + inverse[3] * v + 0.5) / factor - 0.5) * kFine);
+        std::llround(((inverse[2] * u + inverse[3] * v + 0.5) / factor - 0.5) * kFine) +
+        part.left * step_y;
     for (std::size_t x = 0; x < width; ++x, px += step_x, py += step_y) {
       xs[x] = static_cast<std::int32_t>(px >> 16);
       ys[x] = static_cast<std::int32_t>(py >> 16);
@@ -285,6 +291,18 @@ GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& 
                 out.pixels.data() + first);
   }
   return out;
+}
+
+}  // namespace
+
+GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& view,
+                        const GrayPicture* background) {
+  return render(levels, view, {0, 0, view.width, view.height}, background);
+}
+
+GrayPicture render_part(const std::vector<ViewLevel>& levels, const AffineView& view,
+                        const ViewPart& part) {
+  return render(levels, view, part, nullptr);
 }
 
 namespace {

@@ -29,6 +29,7 @@ void read_piece(std::span<const std::byte> stored, PieceForm form, std::uint32_t
   piece.form = static_cast<std::uint8_t>(form);
   piece.raw_size = raw_size;
   piece.stored_size = static_cast<std::uint32_t>(stored.size());
+  piece.index_base = form == PieceForm::kCoded ? 6 : 0;
   piece.second_size = form == PieceForm::kMesh ? raw_size / 4 * 2 : 0;
   const auto raw = decode_piece(piece, stored);
   if (!raw) return test::need_told(raw.error());
@@ -51,8 +52,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   read_mesh(bytes);
   const std::uint32_t count = size < 4 ? 3 : 3u * (static_cast<std::uint32_t>(data[3]) + 1);
   (void)decode_level(bytes, count);
-  for (const PieceForm form : {PieceForm::kStored, PieceForm::kZstd, PieceForm::kZstdHalves,
-                               PieceForm::kMesh, PieceForm::kFeatureText, PieceForm::kLevel}) {
+  for (const PieceForm form :
+       {PieceForm::kStored, PieceForm::kZstd, PieceForm::kZstdHalves, PieceForm::kMesh,
+        PieceForm::kFeatureText, PieceForm::kLevel, PieceForm::kTrackerRecord, PieceForm::kCoded}) {
     read_piece(bytes, form, 64 * count);
   }
   return 0;

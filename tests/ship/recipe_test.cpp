@@ -83,13 +83,17 @@ TEST(Recipe, FieldsOutOfRangeAreRefused) {
     auto* header = reinterpret_cast<RecipeHeader*>(bytes.data());
     auto* piece = reinterpret_cast<PieceRecord*>(bytes.data() + sizeof(RecipeHeader));
     change(*header, *piece);
+    header->table_hash = 0;  // so that the hash is not what refuses it
+    if (header->version == 2) header->table_hash = raw_hash(bytes);
     return !open_recipe(bytes);
   };
+  EXPECT_FALSE(refused([](RecipeHeader&, PieceRecord&) {}));
   EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { h.magic[0] = 0; }));
-  EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { h.version = 2; }));
+  EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { h.version = 0; }));
+  EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { h.version = 3; }));
+  EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { h.version = 1; })) << "it has stages";
   EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { ++h.piece_count; }));
   EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { h.bundle_size = 100; }));
-  EXPECT_TRUE(refused([](RecipeHeader& h, PieceRecord&) { h.reserved = 1; }));
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.form = 0; }));
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.form = 77; }));
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.raw_size = 0; }));
@@ -100,7 +104,21 @@ TEST(Recipe, FieldsOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.second_size = 6; }));
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.stored_size = 0; }));
   EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.index_base = 1; }));
-  EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.reserved[8] = 1; }));
+  EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.reserved[7] = 1; }));
+  EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.stage = 4; }));
+  EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.form = 8; })) << "without a stride";
+  EXPECT_FALSE(refused([](RecipeHeader&, PieceRecord& p) { p.form = 8, p.index_base = 256; }));
+  EXPECT_TRUE(refused([](RecipeHeader&, PieceRecord& p) { p.form = 8, p.index_base = 257; }));
+}
+
+TEST(Recipe, EveryDamagedByteIsRefused) {
+  auto recipe = published(bundle_bytes(), 1).recipe;
+  ASSERT_TRUE(open_recipe(recipe));
+  for (std::byte& byte : recipe) {
+    byte ^= std::byte{4};
+    EXPECT_FALSE(open_recipe(recipe)) << &byte - recipe.data();
+    byte ^= std::byte{4};
+  }
 }
 
 TEST(Recipe, ABitOfAPieceIsABitTooMany) {

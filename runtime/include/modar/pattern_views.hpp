@@ -77,6 +77,17 @@ GrayPicture made_clutter(Random& random, int width, int height);
 GrayPicture render_view(const std::vector<ViewLevel>& levels, const AffineView& view,
                         const GrayPicture* background);
 
+/// Some pixels of a view.
+struct ViewPart {
+  int left = 0;
+  int top = 0;
+  int width = 0;
+  int height = 0;
+};
+/// The same pixels as render_view() without a background has there.
+GrayPicture render_part(const std::vector<ViewLevel>& levels, const AffineView& view,
+                        const ViewPart& part);
+
 /// What a camera far away sees of a curved pattern, and which place of the picture each pixel
 /// shows.
 struct CurvedView {

@@ -1,0 +1,111 @@
+#include "bake/web/packed_bundle.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "formats/transport/coded_bytes.hpp"
+#include "formats/transport/recipe.hpp"
+#include "formats/transport/stages.hpp"
+#include "modar/packed_record.hpp"
+#include "modar/release.hpp"
+
+namespace modar {
+namespace {
+
+/// Of a piece, at most: what a damaged one costs to fetch again, against what a coder learns within
+/// one. Set by hand.
+constexpr std::uint64_t kMostRaw = 256 << 10;
+/// Coded bytes of a bundle, at most: a phone decodes 0.4 MB a second, and a fast network brings
+/// more than that. What follows in the order of need travels as it is.
+constexpr std::uint64_t kMostCoded = 4 << 20;
+
+struct Piece {
+  PieceRecord record{};
+  std::vector<std::byte> stored;
+};
+
+class Packer {
+ public:
+  explicit Packer(const BundleView& bundle) : bundle_(bundle) {}
+
+  std::vector<std::byte> pack() {
+    for (const StageRange& range : stage_ranges(bundle_)) {
+      if (!add_record(range)) add_bytes(range);
+    }
+    RecipeHeader header{};
+    header.bundle_size = bundle_.bytes().size();
+    const BundleHash hash = bundle_hash(bundle_.bytes());
+    std::copy(hash.begin(), hash.end(), header.bundle_hash);
+    std::vector<PieceRecord> records;
+    for (const Piece& piece : pieces_) records.push_back(piece.record);
+    std::vector<std::byte> out = recipe_bytes(header, records);
+    for (const Piece& piece : pieces_) {
+      out.insert(out.end(), piece.stored.begin(), piece.stored.end());
+    }
+    return out;
+  }
+
+ private:
+  void add(const StageRange& range, std::uint64_t offset, std::uint64_t size, PieceForm form,
+           std::vector<std::byte> stored) {
+    Piece piece;
+    const ObjectId id = object_id(stored);
+    std::copy(id.begin(), id.end(), piece.record.id);
+    piece.record.raw_hash = raw_hash(bundle_.bytes().subspan(offset, size));
+    piece.record.offset = offset;
+    piece.record.raw_size = static_cast<std::uint32_t>(size);
+    piece.record.stored_size = static_cast<std::uint32_t>(stored.size());
+    piece.record.form = static_cast<std::uint8_t>(form);
+    piece.record.stage = static_cast<std::uint8_t>(range.stage);
+    if (form == PieceForm::kCoded) {
+      piece.record.index_base = static_cast<std::uint16_t>(range.stride);
+    }
+    piece.stored = std::move(stored);
+    pieces_.push_back(std::move(piece));
+  }
+
+  /// A whole tracker record, packed.
+  bool add_record(const StageRange& range) {
+    const auto record = [&](const SectionEntry& entry) {
+      return entry.type == static_cast<std::uint32_t>(SectionType::kTrackerRecord) &&
+             entry.offset == range.offset && entry.size == range.size;
+    };
+    const auto sections = bundle_.sections();
+    if (std::none_of(sections.begin(), sections.end(), record)) return false;
+    auto packed = pack_tracker_record(bundle_.bytes().subspan(range.offset, range.size));
+    if (!packed) return false;
+    add(range, range.offset, range.size, PieceForm::kTrackerRecord, *std::move(packed));
+    return true;
+  }
+
+  void add_bytes(const StageRange& range) {
+    const std::uint64_t most = kMostRaw / range.stride * range.stride;
+    for (std::uint64_t at = 0; at < range.size; at += most) {
+      const std::uint64_t size = std::min(most, range.size - at);
+      const auto raw = bundle_.bytes().subspan(range.offset + at, size);
+      if (coded_ + size <= kMostCoded) {
+        coded_ += size;
+        auto coded = encode_bytes(raw, range.stride);
+        if (coded.size() < size) {
+          add(range, range.offset + at, size, PieceForm::kCoded, std::move(coded));
+          continue;
+        }
+      }
+      add(range, range.offset + at, size, PieceForm::kStored, {raw.begin(), raw.end()});
+    }
+  }
+
+  const BundleView& bundle_;
+  std::vector<Piece> pieces_;
+  std::uint64_t coded_ = 0;
+};
+
+}  // namespace
+
+std::vector<std::byte> pack_bundle(const BundleView& bundle) {
+  return Packer(bundle).pack();
+}
+
+}  // namespace modar

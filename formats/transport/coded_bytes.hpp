@@ -1,0 +1,28 @@
+// Bytes and gray pictures as ContextCoder's decisions: what first visits bring (PieceForm::kCoded,
+// kTrackerRecord). formats/shipping.md is the normative text.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace modar {
+
+/// Bytes from one record to the next, at most: those of a vertex.
+inline constexpr std::uint32_t kMostCodedStride = 256;
+
+/// stride: bytes of a record, 1 to kMostCodedStride: what stands a record before predicts.
+std::vector<std::byte> encode_bytes(std::span<const std::byte> raw, std::uint32_t stride);
+/// Nothing where the coded bytes end too early. Other damage makes other bytes: see
+/// PieceRecord::raw_hash.
+std::optional<std::vector<std::byte>> decode_bytes(std::span<const std::byte> coded,
+                                                   std::size_t raw_size, std::uint32_t stride);
+
+/// Of a gray picture without padding, of width x height pixels.
+std::vector<std::byte> encode_picture(std::span<const std::uint8_t> pixels, std::uint32_t width);
+std::optional<std::vector<std::uint8_t>> decode_picture(std::span<const std::byte> coded,
+                                                        std::uint32_t width, std::uint32_t height);
+
+}  // namespace modar

@@ -1,0 +1,176 @@
+#include "formats/transport/stages.hpp"
+
+#include <algorithm>
+
+namespace modar {
+namespace {
+
+constexpr std::uint32_t kBlockBytes = 8;     // of ETC1
+constexpr std::uint32_t kTriangleBytes = 6;  // three u16 indices
+
+Stage stage_of(SectionType type) {
+  switch (type) {
+    case SectionType::kMappedFeatures:
+    case SectionType::kTrackerRecord:
+    case SectionType::kPatternColours:
+    case SectionType::kPatternShape:
+    // Opening a bundle reads these.
+    case SectionType::kShadow:
+    case SectionType::kDrawOrder:
+      return Stage::kFind;
+    default:
+      return Stage::kRefine;
+  }
+}
+
+/// The coarsest stand-in of a model as a number of a chunk group; kNone where it has none.
+std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model) {
+  for (std::uint32_t i = bundle.stand_ins().size(); i-- > 0;) {
+    if (bundle.stand_ins()[i].model == model) return bundle.models().size() + i;
+  }
+  return kNone;
+}
+
+/// The first level of a texture that is shown at Stage::kShow, counted from its finest.
+std::uint32_t first_shown(const BundleView& bundle, const TextureRecord& texture) {
+  std::uint32_t level = 0;
+  for (; level + 1 < texture.level_count; ++level) {
+    const TextureLevelRecord& record = bundle.texture_levels()[texture.first_level + level];
+    if (std::max<std::uint32_t>(record.width, record.height) <= kShownSide) break;
+  }
+  return level;
+}
+
+class Planner {
+ public:
+  explicit Planner(const BundleView& bundle) : bundle_(bundle) {}
+
+  std::vector<StageRange> plan() {
+    std::uint64_t tables = bundle_.bytes().size();
+    for (const SectionEntry& entry : bundle_.sections()) {
+      if (entry.type >= kFirstPayload) tables = std::min(tables, entry.offset);
+    }
+    add({0, tables, Stage::kFind, kBlockBytes});
+    for (const SectionEntry& entry : bundle_.sections()) {
+      if (entry.type >= kFirstPayload) plan_section(entry);
+    }
+    std::stable_sort(ranges_.begin(), ranges_.end(),
+                     [](const StageRange& a, const StageRange& b) { return a.stage < b.stage; });
+    return std::move(ranges_);
+  }
+
+ private:
+  void add(const StageRange& range) {
+    if (range.size > 0) ranges_.push_back(range);
+  }
+
+  void plan_section(const SectionEntry& entry) {
+    const auto type = static_cast<SectionType>(entry.type);
+    const std::uint32_t layouts = bundle_.layouts().size();
+    if (type == SectionType::kVertices) {
+      plan_geometry(entry, layouts > 0 ? bundle_.layouts()[0].stride : 4u, false);
+    } else if (type == SectionType::kIndices) {
+      plan_geometry(entry, kTriangleBytes, true);
+    } else if (type == SectionType::kTextureData) {
+      plan_texture(entry);
+    } else {
+      add({entry.offset, entry.size, stage_of(type), kBlockBytes});
+    }
+  }
+
+  /// What is shown of the section, then the rest.
+  void split(const SectionEntry& entry, std::uint32_t stride, std::vector<StageRange> shown) {
+    std::sort(shown.begin(), shown.end(),
+              [](const StageRange& a, const StageRange& b) { return a.offset < b.offset; });
+    std::vector<StageRange> rest;
+    std::uint64_t at = 0;
+    std::uint64_t from = 0;
+    const auto close = [&](std::uint64_t next) {
+      if (at > from) add({entry.offset + from, at - from, Stage::kShow, stride});
+      if (next > at) rest.push_back({entry.offset + at, next - at, Stage::kRefine, stride});
+      from = next;
+    };
+    for (const StageRange& range : shown) {
+      if (range.offset > at) close(range.offset);
+      at = std::max(at, range.offset + range.size);
+    }
+    close(entry.size);
+    for (const StageRange& range : rest) add(range);
+  }
+
+  /// Of each model its coarsest stand-in, or all of it where it has none.
+  void plan_geometry(const SectionEntry& entry, std::uint32_t stride, bool indices) {
+    std::vector<StageRange> shown;
+    for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
+      const std::uint32_t stand_in = coarsest_stand_in(bundle_, m);
+      const ChunkGroup group = bundle_.chunk_group(stand_in == kNone ? m : stand_in);
+      const std::uint32_t vertex = bundle_.layouts()[bundle_.models()[m].layout].stride;
+      for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+        const ChunkRecord& chunk = bundle_.chunks()[group.first_chunk + c];
+        for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+          const LevelRecord& level = bundle_.levels()[chunk.first_level + l];
+          shown.push_back(
+              {indices ? level.index_offset : level.vertex_offset,
+               indices ? 2ull * level.index_count : std::uint64_t{level.vertex_count} * vertex});
+        }
+      }
+    }
+    split(entry, stride, std::move(shown));
+  }
+
+  /// Levels from small to large, those that are shown together.
+  void plan_texture(const SectionEntry& entry) {
+    const TextureRecord& texture = bundle_.textures()[entry.owner];
+    const std::uint32_t first = first_shown(bundle_, texture);
+    std::vector<StageRange> shown;
+    for (std::uint32_t l = first; l < texture.level_count; ++l) {
+      const TextureLevelRecord& level = bundle_.texture_levels()[texture.first_level + l];
+      shown.push_back({level.offset, level.size});
+      if (level.alpha_offset != kNoOffset) shown.push_back({level.alpha_offset, level.size});
+    }
+    split(entry, kBlockBytes, std::move(shown));
+  }
+
+  const BundleView& bundle_;
+  std::vector<StageRange> ranges_;
+};
+
+/// The record of a table, in the bytes that it is a view of.
+template <class Record>
+Record& writable(std::span<std::byte> bytes, const BundleView& bundle, const Record& record) {
+  const auto* at = reinterpret_cast<const std::byte*>(&record);
+  return *reinterpret_cast<Record*>(bytes.data() + (at - bundle.bytes().data()));
+}
+
+}  // namespace
+
+std::vector<StageRange> stage_ranges(const BundleView& bundle) {
+  return Planner(bundle).plan();
+}
+
+void show_coarsest(std::span<std::byte> bytes, const BundleView& bundle) {
+  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
+    const std::uint32_t first = first_shown(bundle, bundle.textures()[t]);
+    TextureRecord& texture = writable(bytes, bundle, bundle.textures()[t]);
+    texture.first_level += first;
+    texture.level_count -= first;
+    texture.width = bundle.texture_levels()[texture.first_level].width;
+    texture.height = bundle.texture_levels()[texture.first_level].height;
+  }
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
+    if (stand_in == kNone) continue;
+    // As exact as can be, and cheaper than chunks of their finest levels: chosen from everywhere.
+    const ChunkGroup coarse = bundle.chunk_group(stand_in);
+    for (std::uint32_t c = 0; c < coarse.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[coarse.first_chunk + c];
+      writable(bytes, bundle, bundle.levels()[chunk.first_level]).error = 0.0f;
+    }
+    const ChunkGroup fine = bundle.chunk_group(m);
+    for (std::uint32_t c = 0; c < fine.chunk_count; ++c) {
+      writable(bytes, bundle, bundle.chunks()[fine.first_chunk + c]).level_count = 1;
+    }
+  }
+}
+
+}  // namespace modar

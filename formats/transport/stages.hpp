@@ -1,0 +1,39 @@
+// The order in which a bundle is needed: what finds its pictures, what shows something, the rest.
+// Web, device and publisher share it. formats/shipping.md is the normative text.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "formats/bundle_view.hpp"
+#include "formats/transport/recipe.hpp"
+
+namespace modar {
+
+/// Longer side of the finest texture level of Stage::kShow, texels: what a model that fills a third
+/// of a phone's screen shows, for a sixteenth of the bytes of 1024. Set by hand.
+inline constexpr std::uint32_t kShownSide = 256;
+
+/// Types of sections from here on are payloads; what lies before them are tables and small text.
+inline constexpr std::uint32_t kFirstPayload = 256;
+
+/// Bytes of a bundle that are needed together.
+struct StageRange {
+  std::uint64_t offset = 0;  ///< in the bundle
+  std::uint64_t size = 0;
+  Stage stage = Stage::kRefine;
+  std::uint32_t stride = 1;  ///< of what lies there: vertices, triangles, blocks
+};
+
+/// All of a bundle but the zeros between sections, in the order of need. It reads tables only.
+std::vector<StageRange> stage_ranges(const BundleView& bundle);
+
+/// Changes the tables of a bundle of which the last stage is missing, so that renderers made of it
+/// draw nothing of that: stand-ins in place of all chunks, textures from kShownSide on. bytes:
+/// those that `bundle` is a view of. The caller keeps a copy of the tables for when the rest is
+/// there.
+void show_coarsest(std::span<std::byte> bytes, const BundleView& bundle);
+
+}  // namespace modar

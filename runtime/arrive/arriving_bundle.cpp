@@ -1,0 +1,118 @@
+#include "modar/arriving_bundle.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+#include "formats/bundle_view.hpp"
+#include "formats/transport/coded_bytes.hpp"
+#include "formats/transport/stages.hpp"
+#include "modar/packed_record.hpp"
+
+namespace modar {
+namespace {
+
+constexpr const char* kCure = "fetch it again, or make the packed bundle again";
+
+Result<std::vector<std::byte>> own_bytes(const PieceRecord& piece,
+                                         std::span<const std::byte> stored) {
+  switch (static_cast<PieceForm>(piece.form)) {
+    case PieceForm::kStored:
+      return std::vector<std::byte>(stored.begin(), stored.end());
+    case PieceForm::kTrackerRecord:
+      return unpack_tracker_record(stored);
+    case PieceForm::kCoded: {
+      auto raw = decode_bytes(stored, piece.raw_size, std::max<std::uint32_t>(piece.index_base, 1));
+      if (raw) return *std::move(raw);
+      return fail(ExitCode::kInvalidInput, "piece.coded", "piece", "it ends too early", kCure);
+    }
+    default:
+      return fail(ExitCode::kUnsupported, "piece.form", "piece", "its form needs a library",
+                  "use modar-fetch");
+  }
+}
+
+bool needs_no_library(PieceForm form) {
+  return form == PieceForm::kStored || form == PieceForm::kTrackerRecord ||
+         form == PieceForm::kCoded;
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> decode_own_piece(const PieceRecord& piece,
+                                                std::span<const std::byte> stored) {
+  MODAR_ASSIGN(auto raw, own_bytes(piece, stored));
+  if (raw.size() != piece.raw_size || raw_hash(raw) != piece.raw_hash) {
+    return fail(ExitCode::kInvalidInput, "piece.hash", "piece",
+                "it decodes to different bytes than were published", kCure);
+  }
+  return raw;
+}
+
+Result<std::size_t> packed_recipe_size(std::span<const std::byte> start) {
+  RecipeHeader header{};
+  if (start.size() < sizeof header) {
+    return fail(ExitCode::kInvalidInput, "recipe.magic", "packed bundle", "it ends in its header",
+                kCure);
+  }
+  std::memcpy(&header, start.data(), sizeof header);
+  if (!std::equal(kRecipeMagic.begin(), kRecipeMagic.end(), header.magic)) {
+    return fail(ExitCode::kInvalidInput, "recipe.magic", "packed bundle",
+                "it does not begin as one does", kCure);
+  }
+  if (header.version != kRecipeVersion) {
+    return fail(ExitCode::kUnsupported, "recipe.version", "packed bundle", "its version is unknown",
+                "load the page again");
+  }
+  if (header.piece_count > kMaxPieces) {
+    return fail(ExitCode::kInvalidInput, "recipe.header", "packed bundle", "it has too many pieces",
+                kCure);
+  }
+  return sizeof header + std::size_t{header.piece_count} * sizeof(PieceRecord);
+}
+
+Result<RecipeView> open_packed(std::span<const std::byte> bytes) {
+  MODAR_ASSIGN(const RecipeView recipe, open_recipe(bytes));
+  std::uint8_t last = static_cast<std::uint8_t>(Stage::kFind);
+  for (const PieceRecord& piece : recipe.pieces) {
+    if (piece.stage < last || !needs_no_library(static_cast<PieceForm>(piece.form))) {
+      return fail(ExitCode::kInvalidInput, "recipe.order", "packed bundle",
+                  "its pieces are not in the order of need, or of forms for modar-fetch", kCure);
+    }
+    last = piece.stage;
+  }
+  return recipe;
+}
+
+std::unique_ptr<ArrivingBundle> ArrivingBundle::create(std::uint64_t bundle_size) {
+  auto bundle = std::make_unique<ArrivingBundle>();
+  bundle->size_ = static_cast<std::size_t>(bundle_size);
+  if (bundle->size_ != bundle_size || bundle_size == 0) return nullptr;
+  bundle->bytes_.reset(static_cast<std::byte*>(std::calloc(bundle->size_, 1)));
+  return bundle->bytes_ == nullptr ? nullptr : std::move(bundle);
+}
+
+bool ArrivingBundle::put(std::uint64_t offset, std::span<const std::byte> raw) {
+  if (offset > size_ || raw.size() > size_ - offset) return false;
+  if (!raw.empty()) std::memcpy(bytes_.get() + offset, raw.data(), raw.size());
+  return true;
+}
+
+Result<void> ArrivingBundle::show_coarsest() {
+  MODAR_ASSIGN(const BundleView view, BundleView::open(bytes()));
+  std::uint64_t end = size_;
+  for (const SectionEntry& entry : view.sections()) {
+    if (entry.type >= kFirstPayload) end = std::min(end, entry.offset);
+  }
+  tables_.assign(bytes_.get(), bytes_.get() + end);
+  modar::show_coarsest(bytes(), view);
+  return {};
+}
+
+void ArrivingBundle::show_all() {
+  if (!tables_.empty()) std::memcpy(bytes_.get(), tables_.data(), tables_.size());
+  tables_.clear();
+}
+
+}  // namespace modar
