@@ -401,8 +401,8 @@ class RecipeMaker {
   }
 
   /// The earliest that some of the piece's bytes are needed for.
-  [[nodiscard]] Stage stage_of(const PieceRecord& piece) const {
-    Stage stage = Stage::kRefine;
+  [[nodiscard]] LoadStage stage_of(const PieceRecord& piece) const {
+    LoadStage stage = LoadStage::kRefine;
     const auto meets = [](const StageRange& range, std::uint64_t offset, std::uint64_t size) {
       return offset < range.offset + range.size && range.offset < offset + size;
     };

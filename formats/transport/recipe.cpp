@@ -31,8 +31,8 @@ const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size, std::u
   const auto form = static_cast<PieceForm>(piece.form);
   const PieceForm last = version == 1 ? PieceForm::kLevel : PieceForm::kCoded;
   if (form < PieceForm::kStored || form > last) return "its form is unknown";
-  const Stage most = version == 1 ? Stage::kAny : Stage::kRefine;
-  if (static_cast<Stage>(piece.stage) > most) return "its stage is unknown";
+  const LoadStage most = version == 1 ? LoadStage::kAny : LoadStage::kRefine;
+  if (static_cast<LoadStage>(piece.stage) > most) return "its stage is unknown";
   if (!is_zero(piece.reserved)) return "its reserved bytes are not zero";
   if (piece.raw_size == 0 || piece.raw_size > kMaxPieceBytes ||
       piece.stored_size > kMaxPieceBytes) {

@@ -36,7 +36,7 @@ enum class PieceForm : std::uint8_t {
 };
 
 /// What a part of a bundle is needed for, in the order of need.
-enum class Stage : std::uint8_t {
+enum class LoadStage : std::uint8_t {
   kAny = 0,   ///< not said: recipes of version 1
   kFind = 1,  ///< tables and patterns: pictures are recognised
   kShow = 2,  ///< each model as coarse as the bundle has it, textures up to kShownSide
@@ -66,7 +66,7 @@ struct PieceRecord {
       second_size;  ///< bytes: kMesh: of the indices; kFeatureText: of the features; else 0
   std::uint16_t index_base;  ///< kMesh, kLevel: added to each index; kCoded: the stride; else 0
   std::uint8_t form;         ///< PieceForm
-  std::uint8_t stage;        ///< Stage, since version 2
+  std::uint8_t stage;        /// LoadStage, since version 2
   std::uint8_t reserved[8];
 };
 static_assert(sizeof(PieceRecord) == 64);

@@ -8,7 +8,7 @@ namespace {
 constexpr std::uint32_t kBlockBytes = 8;     // of ETC1
 constexpr std::uint32_t kTriangleBytes = 6;  // three u16 indices
 
-Stage stage_of(SectionType type) {
+LoadStage stage_of(SectionType type) {
   switch (type) {
     case SectionType::kMappedFeatures:
     case SectionType::kTrackerRecord:
@@ -17,9 +17,9 @@ Stage stage_of(SectionType type) {
     // Opening a bundle reads these.
     case SectionType::kShadow:
     case SectionType::kDrawOrder:
-      return Stage::kFind;
+      return LoadStage::kFind;
     default:
-      return Stage::kRefine;
+      return LoadStage::kRefine;
   }
 }
 
@@ -31,7 +31,7 @@ std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model) {
   return kNone;
 }
 
-/// The first level of a texture that is shown at Stage::kShow, counted from its finest.
+/// The first level of a texture that is shown at LoadStage::kShow, counted from its finest.
 std::uint32_t first_shown(const BundleView& bundle, const TextureRecord& texture) {
   std::uint32_t level = 0;
   for (; level + 1 < texture.level_count; ++level) {
@@ -50,7 +50,7 @@ class Planner {
     for (const SectionEntry& entry : bundle_.sections()) {
       if (entry.type >= kFirstPayload) tables = std::min(tables, entry.offset);
     }
-    add({0, tables, Stage::kFind, kBlockBytes});
+    add({0, tables, LoadStage::kFind, kBlockBytes});
     for (const SectionEntry& entry : bundle_.sections()) {
       if (entry.type >= kFirstPayload) plan_section(entry);
     }
@@ -86,8 +86,8 @@ class Planner {
     std::uint64_t at = 0;
     std::uint64_t from = 0;
     const auto close = [&](std::uint64_t next) {
-      if (at > from) add({entry.offset + from, at - from, Stage::kShow, stride});
-      if (next > at) rest.push_back({entry.offset + at, next - at, Stage::kRefine, stride});
+      if (at > from) add({entry.offset + from, at - from, LoadStage::kShow, stride});
+      if (next > at) rest.push_back({entry.offset + at, next - at, LoadStage::kRefine, stride});
       from = next;
     };
     for (const StageRange& range : shown) {

@@ -12,8 +12,8 @@
 
 namespace modar {
 
-/// Longer side of the finest texture level of Stage::kShow, texels: what a model that fills a third
-/// of a phone's screen shows, for a sixteenth of the bytes of 1024. Set by hand.
+/// Longer side of the finest texture level of LoadStage::kShow, texels: what a model that fills a
+/// third of a phone's screen shows, for a sixteenth of the bytes of 1024. Set by hand.
 inline constexpr std::uint32_t kShownSide = 256;
 
 /// Types of sections from here on are payloads; what lies before them are tables and small text.
@@ -23,7 +23,7 @@ inline constexpr std::uint32_t kFirstPayload = 256;
 struct StageRange {
   std::uint64_t offset = 0;  ///< in the bundle
   std::uint64_t size = 0;
-  Stage stage = Stage::kRefine;
+  LoadStage stage = LoadStage::kRefine;
   std::uint32_t stride = 1;  ///< of what lies there: vertices, triangles, blocks
 };
 

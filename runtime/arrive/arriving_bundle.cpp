@@ -74,7 +74,7 @@ Result<std::size_t> packed_recipe_size(std::span<const std::byte> start) {
 
 Result<RecipeView> open_packed(std::span<const std::byte> bytes) {
   MODAR_ASSIGN(const RecipeView recipe, open_recipe(bytes));
-  std::uint8_t last = static_cast<std::uint8_t>(Stage::kFind);
+  std::uint8_t last = static_cast<std::uint8_t>(LoadStage::kFind);
   for (const PieceRecord& piece : recipe.pieces) {
     if (piece.stage < last || !needs_no_library(static_cast<PieceForm>(piece.form))) {
       return fail(ExitCode::kInvalidInput, "recipe.order", "packed bundle",

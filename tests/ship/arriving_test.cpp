@@ -168,14 +168,14 @@ TEST(Stages, CoverEverySectionOnceInTheOrderOfNeed) {
   const auto bundle = BundleView::open(bytes);
   ASSERT_TRUE(bundle);
   std::vector<int> covered(bytes.size());
-  Stage last = Stage::kFind;
+  LoadStage last = LoadStage::kFind;
   for (const StageRange& range : stage_ranges(*bundle)) {
     EXPECT_LE(last, range.stage);
     last = range.stage;
     ASSERT_LE(range.offset + range.size, bytes.size());
     for (std::uint64_t i = 0; i < range.size; ++i) ++covered[range.offset + i];
   }
-  EXPECT_EQ(last, Stage::kRefine) << "chunks that a stand-in is drawn for";
+  EXPECT_EQ(last, LoadStage::kRefine) << "chunks that a stand-in is drawn for";
   for (const SectionEntry& entry : bundle->sections()) {
     for (std::uint64_t i = 0; i < entry.size; ++i) {
       ASSERT_EQ(covered[entry.offset + i], 1) << entry.type << " byte " << i;
@@ -187,7 +187,7 @@ TEST(Stages, CoverEverySectionOnceInTheOrderOfNeed) {
 }
 
 /// What arrives of a packed bundle up to a stage.
-std::unique_ptr<ArrivingBundle> arrived(const Bytes& packed, Stage until) {
+std::unique_ptr<ArrivingBundle> arrived(const Bytes& packed, LoadStage until) {
   const auto size = packed_recipe_size(packed);
   EXPECT_TRUE(size);
   const auto recipe = open_packed(std::span(packed).first(*size));
@@ -197,7 +197,7 @@ std::unique_ptr<ArrivingBundle> arrived(const Bytes& packed, Stage until) {
   for (const PieceRecord& piece : recipe->pieces) {
     const auto stored = std::span(packed).subspan(at, piece.stored_size);
     at += piece.stored_size;
-    if (static_cast<Stage>(piece.stage) > until) continue;
+    if (static_cast<LoadStage>(piece.stage) > until) continue;
     const auto raw = decode_own_piece(piece, stored);
     EXPECT_TRUE(raw);
     EXPECT_TRUE(bundle->put(piece.offset, *raw));
@@ -214,12 +214,12 @@ TEST(Arriving, AllPiecesMakeTheBundle) {
   const Bytes bytes = staged_bundle();
   const Bytes packed = pack_bundle(BundleView::open(bytes).value());
   EXPECT_EQ(pack_bundle(BundleView::open(bytes).value()), packed);
-  EXPECT_EQ(copy(*arrived(packed, Stage::kRefine)), bytes);
+  EXPECT_EQ(copy(*arrived(packed, LoadStage::kRefine)), bytes);
 }
 
 TEST(Arriving, TheFirstStageOpensAndHasTheRecord) {
   const Bytes bytes = staged_bundle();
-  const auto first = arrived(pack_bundle(BundleView::open(bytes).value()), Stage::kFind);
+  const auto first = arrived(pack_bundle(BundleView::open(bytes).value()), LoadStage::kFind);
   const auto bundle = BundleView::open(first->bytes());
   ASSERT_TRUE(bundle) << bundle.error().cause;
   const auto record = bundle->section(SectionType::kTrackerRecord, 0);
@@ -231,7 +231,7 @@ TEST(Arriving, TheFirstStageOpensAndHasTheRecord) {
 TEST(Arriving, WhatIsShownFirstIsThere) {
   const Bytes bytes = staged_bundle();
   const auto whole = BundleView::open(bytes).value();
-  const auto some = arrived(pack_bundle(whole), Stage::kShow);
+  const auto some = arrived(pack_bundle(whole), LoadStage::kShow);
   const Bytes before = copy(*some);
   const auto bundle = BundleView::open(some->bytes());
   ASSERT_TRUE(bundle) << bundle.error().cause;
