@@ -29,7 +29,6 @@ void read_piece(std::span<const std::byte> stored, PieceForm form, std::uint32_t
   piece.form = static_cast<std::uint8_t>(form);
   piece.raw_size = raw_size;
   piece.stored_size = static_cast<std::uint32_t>(stored.size());
-  piece.index_base = form == PieceForm::kCoded ? 6 : 0;
   piece.second_size = form == PieceForm::kMesh ? raw_size / 4 * 2 : 0;
   const auto raw = decode_piece(piece, stored);
   if (!raw) return test::need_told(raw.error());
