@@ -24,7 +24,7 @@ endfunction()
 
 read_dependencies(workstation -e${binary}/modar)
 set(CPACK_DEBIAN_WORKSTATION_PACKAGE_DEPENDS "${workstation_Depends}")
-set(CPACK_DEBIAN_WORKSTATION_PACKAGE_RECOMMENDS "modar-player, libgl1-mesa-dri")
+set(CPACK_DEBIAN_WORKSTATION_PACKAGE_RECOMMENDS "modar-player, libgl1-mesa-dri, xdg-utils")
 set(CPACK_DEBIAN_WORKSTATION_PACKAGE_SUGGESTS "ninja-build")
 
 read_dependencies(player -e${binary}/modar-play -e${binary}/modar-fetch

@@ -35,10 +35,12 @@ void show(const StudioCommand& command, const StudioAddress& address) {
     std::printf("%s\n", address.page.c_str());
     std::fflush(stdout);
   }
-  std::fprintf(stderr, "%s%s; Ctrl-C here, or Quit in the page, ends it\n",
-               command.options.folder.c_str(),
+  const char* end =
+      address.elsewhere ? "it was open already" : "Ctrl-C here, or Quit in the page, ends it";
+  std::fprintf(stderr, "%s%s; %s\n", command.options.folder.c_str(),
                opened ? ": the studio is open in your browser"
-                      : ": open the address in a browser on this machine, and show it to nobody");
+                      : ": open the address in a browser on this machine, and show it to nobody",
+               end);
 }
 
 Result<ExitCode> run(StudioCommand& command) {

@@ -124,6 +124,9 @@ void add_web(CommandLine& program) {
   line.group("Files and server", Shown::kInFull);
   line.option("--page", &options.page,
               "Files of the page (default: those installed or built with modar)", {.type = "DIR"});
+  line.flag(
+      "--live", options.live,
+      "Open pages reload themselves when the folder is written again: to try what you change");
   line.flag("--force", options.force, "Write into a folder that contains other files");
   line.option(
       "--bind", &command->bind,

@@ -139,6 +139,11 @@ RgbaImage ModelCamera::model(std::uint32_t index) {
   return standing(index, upright(state_->bundle, index));
 }
 
+RgbaImage ModelCamera::turned(std::uint32_t index, double degrees) {
+  return standing(index, glm::angleAxis(glm::radians(degrees), glm::dvec3(0, 0, 1)) *
+                             upright(state_->bundle, index));
+}
+
 RgbaImage ModelCamera::standing(std::uint32_t index, const glm::dquat& rotation) {
   Camera& camera = state_->camera;
   camera.fx = camera.fy = model_focal(state_->bundle, index, rotation, camera.width, camera.height);

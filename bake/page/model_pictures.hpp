@@ -26,6 +26,8 @@ class ModelCamera {
 
   /// A model alone, turned as in its first scene, or as the bundle states that it stands.
   RgbaImage model(std::uint32_t index);
+  /// The same, turned further about the axis that points up.
+  RgbaImage turned(std::uint32_t index, double degrees);
   /// A model alone, with its axes turned so.
   RgbaImage standing(std::uint32_t index, const glm::dquat& rotation);
   /// A scene's model on its pattern, seen as somebody at a table sees it.

@@ -67,6 +67,7 @@ std::string from_code_page_437(std::string_view name) {
 }
 
 bool is_left_out(const std::string& name) {
+  if (name.find("../") != std::string::npos) return false;  // refused, not passed over
   return name.starts_with("__MACOSX/") || file_name(name).starts_with('.') ||
          name.find("/.") != std::string::npos;
 }

@@ -93,14 +93,17 @@ void tell_lines(std::string& text, std::string& kept,
 }
 
 void read_both(Pipe& output, Pipe& errors, Ran& ran,
-               const std::function<void(const std::string&)>& told) {
+               const std::function<void(const std::string&)>& told,
+               const std::function<void(const std::string&)>& printed) {
   std::string lines;
+  std::string ignored;
   std::array<pollfd, 2> both = {pollfd{output.reader(), POLLIN, 0},
                                 pollfd{errors.reader(), POLLIN, 0}};
   while (both[0].fd >= 0 || both[1].fd >= 0) {
     if (::poll(both.data(), both.size(), -1) < 0 && errno != EINTR) return;
     if (both[0].fd >= 0 && both[0].revents != 0) {
       if (!output.read(ran.output)) both[0].fd = -1;
+      if (printed) tell_lines(ran.output, ignored, printed);
       if (ran.output.size() > kMostOutput) ran.output.resize(kMostOutput);
     }
     if (both[1].fd >= 0 && both[1].revents != 0) {
@@ -114,7 +117,8 @@ void read_both(Pipe& output, Pipe& errors, Ran& ran,
 }  // namespace
 
 Ran Job::run(const std::vector<std::string>& words, const std::string& folder,
-             const std::function<void(const std::string&)>& told) {
+             const std::function<void(const std::string&)>& told,
+             const std::function<void(const std::string&)>& printed) {
   Ran ran;
   Pipe output;
   Pipe errors;
@@ -126,7 +130,7 @@ Ran Job::run(const std::vector<std::string>& words, const std::string& folder,
   }
   output.close_writer();
   errors.close_writer();
-  read_both(output, errors, ran, told);
+  read_both(output, errors, ran, told, printed);
   int status = 0;
   // Not reaped while cancel() may signal it.
   siginfo_t ended{};

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -32,8 +33,10 @@ class Job {
   /// Runs a program in `folder` to its end. told: receives each line of stderr. Its files are its
   /// own to write: a job that is cancelled sends SIGTERM, which commands of ours obey between
   /// files.
+  /// printed: the same of stdout.
   Ran run(const std::vector<std::string>& words, const std::string& folder,
-          const std::function<void(const std::string&)>& told);
+          const std::function<void(const std::string&)>& told,
+          const std::function<void(const std::string&)>& printed = {});
   [[nodiscard]] bool cancelled() const { return cancelled_; }
   void cancel();
 

@@ -7,6 +7,7 @@
 #include "bake/process.hpp"
 #include "bake/studio/archive.hpp"
 #include "bake/studio/inside.hpp"
+#include "bake/studio/phone.hpp"
 #include "bake/studio/session.hpp"
 #include "formats/base/path.hpp"
 
@@ -113,6 +114,7 @@ void bake(Session& session, Job& job, Json scenes) {
                                    {"assets", outcome.find("assets").value_or(Json::array())},
                                    {"findings", outcome.find("findings").value_or(Json::array())},
                                    {"errors", std::move(errors)}});
+  refresh_phone(session);
 }
 
 /// What a kind of export runs, and what it leaves.

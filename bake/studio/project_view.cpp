@@ -236,6 +236,17 @@ void add_facts(Json& json, const std::map<std::string, Json>& facts, const std::
   for (const char* key : keys) json.set(key, own.find(key).value_or(Json()));
 }
 
+Json phone_of(Session& session) {
+  const std::lock_guard lock(session.mutex);
+  return session.phone;
+}
+
+Json devices_json() {
+  Json names = Json::array();
+  for (const DeviceProfile& device : device_profiles()) names.push_back(device.name);
+  return names;
+}
+
 Json languages_json(const Project& project) {
   std::set<std::string> languages;
   for (const ProjectScene& scene : project.scenes) {
@@ -298,7 +309,10 @@ Result<Json> project_view(Session& session) {
               {"problems", problems},
               {"undo", state.undo},
               {"redo", state.redo},
-              {"languages", languages_json(project)}};
+              {"languages", languages_json(project)},
+              {"baking", session.jobs.busy()},
+              {"phone", phone_of(session)},
+              {"devices", devices_json()}};
 }
 
 }  // namespace modar

@@ -227,6 +227,15 @@ struct StudioServer::Parts {
            same_text(std::string_view(request.path).substr(0, start.size()), start);
   }
 
+  /// A new address for it.
+  std::string open_once() {
+    const auto word = make_secret();
+    if (!word) return "http://" + host + "/" + secret + "/";
+    const std::lock_guard lock(mutex);
+    openings.insert(*word);
+    return "http://" + host + "/open-" + *word;
+  }
+
   /// Leads to the page, once.
   bool opens(const httplib::Request& request, httplib::Response& response) {
     const std::lock_guard lock(mutex);
@@ -269,6 +278,9 @@ struct StudioServer::Parts {
   void get(const httplib::Request& request, httplib::Response& response) {
     const Call call = call_of(request);
     if (call.path == "api/events") return listen(request, response);
+    if (call.path == "api/opening") {
+      return response.set_content(open_once(), "text/plain");
+    }
     if (call.path.starts_with("api/")) return send(handler(call), response);
     std::string folder = options.page;
     std::string name = call.path.empty() ? "index.html" : call.path;
@@ -385,6 +397,18 @@ struct StudioServer::Parts {
   }
 };
 
+Result<std::string> ask_opening(const std::string& address) {
+  constexpr std::string_view kScheme = "http://";
+  const std::size_t path = address.find('/', kScheme.size());
+  httplib::Client client(address.substr(0, path));
+  client.set_connection_timeout(kSilentSeconds);
+  client.set_read_timeout(kSilentSeconds);
+  const auto answer = client.Get((address.substr(path) + "api/opening").c_str());
+  if (answer && answer->status == 200) return answer->body;
+  return fail(ExitCode::kIo, "studio.locked", "", "another studio has this folder open",
+              "use its page, or end it first");
+}
+
 StudioServer::StudioServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 StudioServer::~StudioServer() = default;
 
@@ -415,11 +439,7 @@ std::string StudioServer::address() const {
 }
 
 std::string StudioServer::opening_address() {
-  const auto secret = make_secret();
-  if (!secret) return address();
-  const std::lock_guard lock(parts_->mutex);
-  parts_->openings.insert(*secret);
-  return "http://" + parts_->host + "/open-" + *secret;
+  return parts_->open_once();
 }
 
 void StudioServer::serve() {

@@ -22,6 +22,10 @@ struct ServerOptions {
   std::string incoming;  ///< folder in which uploads are kept while they arrive
 };
 
+/// An address that leads once to the page of a studio that answers at `address`, its own page's.
+/// Errors: kIo "studio.locked" where none answers.
+Result<std::string> ask_opening(const std::string& address);
+
 /// Serves on 127.0.0.1. A request is answered if its address has the secret, its Host is this
 /// server's, and its Origin, where it names one, too: neither another site's page, nor one whose
 /// name was made to lead here, nor another user of the machine gets further. A connection serves

@@ -34,10 +34,12 @@ struct Session {
   ProjectText text;
   Events events;
   PictureCaches pictures;
-  std::mutex mutex;   ///< of what follows up to `jobs`
-  Json baked_scenes;  ///< "scenes" of the view when the last bake began; null: unknown
-  std::string phone;  ///< JSON of the phone's address and its code; empty: it is not served
+  std::mutex mutex;    ///< of what follows up to `jobs`
+  Json baked_scenes;   ///< "scenes" of the view when the last bake began; null: unknown
+  Json phone;          ///< its address and its code; null: none is served
+  std::mutex drawing;  ///< held while models are drawn for their thumbs
   Jobs jobs;
+  Jobs phone_server;
   std::function<void()> quit;  ///< ends the studio
 };
 

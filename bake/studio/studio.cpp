@@ -1,18 +1,23 @@
 // The studio from its start to its end.
 #include "bake/studio/studio.hpp"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "bake/output.hpp"
 #include "bake/process.hpp"
 #include "bake/studio/server.hpp"
 #include "bake/studio/session.hpp"
+#include "bake/studio/watcher.hpp"
 #include "bake/web/site.hpp"
 #include "formats/base/folder_lock.hpp"
 
@@ -62,6 +67,49 @@ class Signals {
   std::thread thread_;
 };
 
+/// What processes that were killed have left of what they were writing.
+void clear_leftovers(const Session& session) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(session.folder, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool ours = name.starts_with(std::string(kProjectFile) + ".") && name.ends_with(".tmp");
+    if (ours) fs::remove(entry.path(), error);
+  }
+  for (const auto& entry : fs::directory_iterator(session.own, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool ours = name.starts_with("incoming-") || name.starts_with("unpacked-");
+    if (ours) fs::remove_all(entry.path(), error);
+  }
+}
+
+/// A file that only its owner may read: where the studio answers, for one that is started later.
+Result<void> write_private(const std::string& path, const std::string& text) {
+  ::unlink(path.c_str());
+  const int descriptor =
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
+  const bool written = descriptor >= 0 && ::write(descriptor, text.data(), text.size()) ==
+                                              static_cast<ssize_t>(text.size());
+  if (descriptor >= 0) ::close(descriptor);
+  if (written) return {};
+  return fail(ExitCode::kIo, "io.write", path, std::strerror(errno), "make room on the disk");
+}
+
+/// Whoever starts a studio again wants its page.
+Result<void> show_other(const Session& session, const Error& busy,
+                        const std::function<void(const StudioAddress&)>& ready) {
+  std::string address;
+  std::ifstream(session.own + "/address") >> address;
+  if (busy.code != "studio.locked" || address.empty()) return tl::unexpected(busy);
+  MODAR_ASSIGN(const std::string opening, ask_opening(address));
+  ready({address, opening, true});
+  return {};
+}
+
+void tell_project(Session& session) {
+  const auto state = session.text.read();
+  session.events.publish("project", {{"revision", state ? state->revision : ""}});
+}
+
 }  // namespace
 
 Result<void> run_studio(const StudioOptions& options,
@@ -76,10 +124,11 @@ Result<void> run_studio(const StudioOptions& options,
     return fail(ExitCode::kUsage, "studio.folder", session.own,
                 "it is a link that leads out of the project's folder", "remove the link");
   }
-  MODAR_ASSIGN(const FolderLock lock,
-               FolderLock::take(session.own + "/lock", {ExitCode::kIo, "studio.locked", folder,
-                                                        "another studio has this folder open",
-                                                        "use its page, or end it first"}));
+  const auto lock = FolderLock::take(session.own + "/lock", {ExitCode::kIo, "studio.locked", folder,
+                                                             "another studio has this folder open",
+                                                             "use its page, or end it first"});
+  if (!lock) return show_other(session, lock.error(), ready);
+  clear_leftovers(session);
   const auto engine = find_page();
   StudioServer* running = nullptr;
   const Signals signals([&running] {
@@ -95,8 +144,15 @@ Result<void> run_studio(const StudioOptions& options,
     session.events.publish("quit", Json::object());
     std::thread([&server] { server->stop(); }).detach();
   };
-  ready({server->address(), server->opening_address()});
-  server->serve();
+  MODAR_TRY(write_private(session.own + "/address", server->address()));
+  {
+    const Watcher watcher(folder, [&session] { tell_project(session); });
+    ready({server->address(), server->opening_address()});
+    server->serve();
+  }
+  session.jobs.end();
+  session.phone_server.end();
+  fs::remove(session.own + "/address", error);
   return {};
 }
 

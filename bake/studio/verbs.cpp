@@ -4,6 +4,7 @@
 #include "bake/studio/inside.hpp"
 #include "bake/studio/look.hpp"
 #include "bake/studio/make.hpp"
+#include "bake/studio/phone.hpp"
 #include "bake/studio/session.hpp"
 #include "bake/studio/upload.hpp"
 
@@ -54,6 +55,9 @@ Answer answer_get(Session& session, const Call& call) {
   if (call.path == "api/sizes") return get_sizes(session);
   if (call.path == "api/devices") return get_devices(session);
   if (call.path.starts_with("api/export/")) return send_file(session, call.path.substr(11));
+  if (call.path.starts_with("api/thumb/") && !call.asked("turn").empty()) {
+    return get_turntable(session, call);
+  }
   if (call.path.starts_with("api/thumb/")) return get_thumb(session, call);
   if (call.path == "api/photo") return get_photo(session, call);
   if (call.path == "api/picture") return get_picture(session, call);
@@ -74,6 +78,7 @@ Answer answer_post(Session& session, const Call& call) {
   if (call.path == "api/redo") return changed(session, session.text.redo());
   if (call.path == "api/init") return init(session);
   if (call.path == "api/bake") return post_bake(session);
+  if (call.path == "api/phone") return post_phone(session);
   if (call.path == "api/export") return post_export(session, body);
   if (call.path == "api/corners") return post_corners(session, body);
   if (call.path == "api/rectify") return post_rectify(session, body);
@@ -90,6 +95,7 @@ Answer answer_call(Session& session, const Call& call) {
   if (call.method == "GET") return answer_get(session, call);
   if (call.method == "POST") return answer_post(session, call);
   if (call.method == "DELETE" && call.path == "api/job") return cancel_job(session);
+  if (call.method == "DELETE" && call.path == "api/phone") return end_phone(session);
   if (call.method == "PUT" && call.path.starts_with("api/files/")) {
     return take_upload(session, call);
   }

@@ -105,6 +105,13 @@ std::vector<std::string> addresses_of(const ServeOptions& options) {
   return {options.bind};
 }
 
+using Code = std::unique_ptr<QRcode, decltype(&QRcode_free)>;
+
+/// Null where the text is too long.
+Code encode_qr(const std::string& text) {
+  return {QRcode_encodeString(text.c_str(), 0, QR_ECLEVEL_L, QR_MODE_8, 1), QRcode_free};
+}
+
 tl::unexpected<Error> no_server(int port, const char* cause) {
   return fail(ExitCode::kIo, "web.port", "port " + std::to_string(port), cause,
               "name another port: --port");
@@ -148,9 +155,25 @@ Result<void> serve_site(const ServeOptions& options,
   return {};
 }
 
+std::string qr_svg(const std::string& text) {
+  const Code code = encode_qr(text);
+  if (code == nullptr) return {};
+  constexpr int kMargin = 4;  // modules, as the standard asks for
+  const std::string side = std::to_string(code->width + 2 * kMargin);
+  std::string path;
+  for (int y = 0; y < code->width; ++y) {
+    for (int x = 0; x < code->width; ++x) {
+      if ((code->data[y * code->width + x] & 1) == 0) continue;
+      path += "M" + std::to_string(x + kMargin) + " " + std::to_string(y + kMargin) + "h1v1h-1z";
+    }
+  }
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + side + " " + side +
+         "\" shape-rendering=\"crispEdges\"><path fill=\"#fff\" d=\"M0 0h" + side + "v" + side +
+         "H0z\"/><path fill=\"#000\" d=\"" + path + "\"/></svg>";
+}
+
 std::string qr_code(const std::string& text) {
-  const std::unique_ptr<QRcode, decltype(&QRcode_free)> code(
-      QRcode_encodeString(text.c_str(), 0, QR_ECLEVEL_L, QR_MODE_8, 1), QRcode_free);
+  const Code code = encode_qr(text);
   if (code == nullptr) return {};
   constexpr int kQuiet =
       2;  // modules of light around it: cameras read 2 as well as the standard's 4

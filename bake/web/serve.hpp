@@ -26,5 +26,7 @@ Result<void> serve_site(const ServeOptions& options,
 
 /// The text as a QR code of block letters, two modules a letter; empty where it is too long.
 std::string qr_code(const std::string& text);
+/// The same as an SVG picture, dark on light, with the margin that readers want.
+std::string qr_svg(const std::string& text);
 
 }  // namespace modar

@@ -415,6 +415,30 @@ Result<Json> put_statements(Draft& draft, const Publisher& publisher, const std:
   return links;
 }
 
+/// What a page that follows its maker looks at, and does when something was written.
+constexpr std::string_view kLive =
+    R"js(const seen = async () => (await fetch('live.json', { cache: 'no-store' })).text();
+let first;
+setInterval(async () => {
+  const now = await seen().catch(() => first);
+  first ??= now;
+  if (now === first) return;
+  for (const worker of await navigator.serviceWorker?.getRegistrations() ?? []) await worker.unregister();
+  for (const name of await globalThis.caches?.keys() ?? []) await caches.delete(name);
+  location.reload();
+}, 1000);
+)js";
+
+/// Puts it into the page.
+Result<void> add_live(Draft& draft, std::string& html) {
+  constexpr std::string_view kEnd = "</head>";
+  const std::size_t at = html.find(kEnd);
+  if (at != std::string::npos) {
+    html.insert(at, "<script type=\"module\" src=\"live.js\"></script>\n");
+  }
+  return put_online(draft, "live.js", std::as_bytes(std::span(kLive)));
+}
+
 /// index.html, the manifest and, last of all, sw.js.
 Result<void> put_entry(Draft& draft, const std::string& title) {
   MODAR_ASSIGN(std::string html, page_text(draft, "index.html"));
@@ -427,6 +451,7 @@ Result<void> put_entry(Draft& draft, const std::string& title) {
     const std::string origin = origin_of(draft.options.release);
     if (!origin.empty()) html.insert(at + kConnect.size(), " " + escape_html(origin));
   }
+  if (draft.options.live) MODAR_TRY(add_live(draft, html));
   MODAR_TRY(put(draft, "index.html", html));
   const auto icon = [](const char* file, const char* sizes, const char* type) {
     return Json{{"src", file}, {"sizes", sizes}, {"type", type}};
@@ -444,7 +469,10 @@ Result<void> put_entry(Draft& draft, const std::string& title) {
   add_to_hash(draft.hash, std::as_bytes(std::span(worker)));
   const Json kept = {{"hash", std::to_string(draft.hash)}, {"files", Json::list(draft.kept)}};
   draft.site.page_bytes += html.size() + worker.size();
-  return put(draft, "sw.js", "const SITE = " + kept.dump() + ";\n" + worker);
+  MODAR_TRY(put(draft, "sw.js", "const SITE = " + kept.dump() + ";\n" + worker));
+  if (!draft.options.live) return {};
+  const std::string state = Json({{"hash", std::to_string(draft.hash)}}).dump();
+  return put_online(draft, "live.json", std::as_bytes(std::span(state)));
 }
 
 }  // namespace

@@ -27,6 +27,7 @@ struct SiteOptions {
   /// The newest release when the page is made: visitors' browsers believe none before it. 0: none.
   std::uint64_t release_epoch = 0;
   std::uint64_t release_version = 0;
+  bool live = false;   ///< open pages show what is written later, a second after it
   std::string page;    ///< folder that the preset `web` built; empty: find_page()
   std::string output;  ///< folder, made if absent; see claim_output_folder()
   bool force = false;  ///< write into a folder of other files as well

@@ -40,7 +40,7 @@ class Document(ProgramTest):
             return re.findall(r"^  ((?:-\w,)?--[\w-]+|[a-z]+)\b", text, re.MULTILINE)
 
         first = [name for name in listed("--help") if not name.startswith("-")]
-        self.assertEqual(sorted(first), ["bake", "check", "init", "pattern", "report", "web"])
+        self.assertEqual(sorted(first), ["bake", "check", "init", "pattern", "report", "studio", "web"])
         every = [name for name in listed("help", "all") if not name.startswith("-")]
         self.assertEqual(every, [name for name in listed("--help-all") if not name.startswith("-")])
         self.assertTrue(set(first) < set(every))
