@@ -89,10 +89,18 @@ void add_to_hash(std::uint64_t& hash, std::span<const std::byte> bytes) {
     hash = (hash ^ static_cast<std::uint64_t>(byte)) * 1099511628211u;
 }
 
+/// Whether a file has these bytes already.
+bool holds(const std::string& path, std::span<const std::byte> bytes) {
+  const auto file = MappedFile::open(path);
+  return file && std::equal(file->bytes().begin(), file->bytes().end(), bytes.begin(), bytes.end());
+}
+
 /// A file that the service worker does not keep.
 Result<void> put_online(Draft& draft, const std::string& name, std::span<const std::byte> bytes) {
   const std::string path = draft.options.output + "/" + name;
-  MODAR_TRY(write_file(path, bytes));
+  // A phone waits for the page to be written again: most of its files stay, and syncing each to the
+  // disk takes longer than all else.
+  if (!draft.options.live || !holds(path, bytes)) MODAR_TRY(write_file(path, bytes));
   add_to_hash(draft.hash, std::as_bytes(std::span(name)));
   add_to_hash(draft.hash, bytes);
   draft.site.files.push_back(name);
@@ -426,7 +434,7 @@ setInterval(async () => {
   for (const worker of await navigator.serviceWorker?.getRegistrations() ?? []) await worker.unregister();
   for (const name of await globalThis.caches?.keys() ?? []) await caches.delete(name);
   location.reload();
-}, 1000);
+}, 500);
 )js";
 
 /// Puts it into the page.
