@@ -21,6 +21,7 @@ NOT_RUN = (
     (r"^modar web |^npm install ", "needs the page's engine; web_test.py, page_test.py"),
     (r"^modar-play .* --input camera", "needs a camera; v4l2_test.cpp"),
     (r"^modar bake --watch", "runs until Ctrl-C; project_test.py"),
+    (r"^modar studio ", "serves until Ctrl-C; tests/studio"),
     (r"^modar plan .*srun", "needs Slurm; scripts/slurm/try.sh, project_test.py"),
     (r"^modar-fetch http", "needs a network; ship_network_test.py"),
     (r"^modar calibrate ", "needs a filmed pattern; calibrate_test.cpp"),
