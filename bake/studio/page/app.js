@@ -1,11 +1,11 @@
 // The studio: a bar of steps, and the step that the address names: #/scene/cover.
 import { ask } from './api.js';
 import { Files, filesOf, receive } from './files.js';
-import { button, icon, meter, tool } from './parts.js';
+import { icon, meter, percent, tool } from './parts.js';
 import { Picture } from './picture.js';
 import { Scene } from './scene.js';
 import { Ship } from './ship.js';
-import { cancel, isBakeable, listen, load, missingFiles, redo, state, tell, tellError, undo } from './state.js';
+import { cancel, isBakeable, listen, load, missingFiles, redo, state, tellError, undo } from './state.js';
 import { Try } from './try.js';
 import { bytes, firstLanguage, LANGUAGES, languageName, t, useLanguage } from './words.js';
 
@@ -55,7 +55,7 @@ function status() {
   const { progress, failure, project } = state;
   if (state.gone) return m('span.status.bad', icon('bad'), t('gone'));
   if (progress) {
-    return m('span.status', meter(progress.done, t('preparing')), m('span', t('preparingShare', { n: Math.round(100 * progress.done) })), tool(t('cancel'), 'close', cancel));
+    return m('span.status', meter(progress.done, t('preparing')), m('span', percent(progress.done)), tool(t('cancel'), 'close', cancel));
   }
   if (failure) return m('a.status.bad', { href: addressOf('ship') }, icon('bad'), t('notPrepared'));
   if (!project.bundle.baked) return null;

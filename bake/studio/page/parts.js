@@ -2,6 +2,8 @@
 import { inUnit, number, settings, t, UNITS } from './words.js';
 
 const m = window.m;
+/** Milliseconds after the last step of a number until it counts. */
+const STEPS_REST_MS = 350;
 
 const SHAPES = {
   picture: 'M4 5h16v14H4z M4 16l5-5 4 4 3-3 4 4 M15.5 9.5h.01',
@@ -56,12 +58,17 @@ export function numberIn(text) {
  * Attributes: id, label, value (null: empty), unit, step, least, most, digits, empty (whether it may be), onvalue.
  */
 export const NumberField = {
-  oninit({ state }) { state.draft = null; },
+  oninit({ state }) {
+    state.draft = null;
+    state.timer = 0;
+  },
+  onremove({ state }) { clearTimeout(state.timer); },
   view({ attrs, state }) {
     const { id, label, value, unit, step = 1, least = -Infinity, most = Infinity, digits = 2, empty = false, onvalue } = attrs;
     const shown = state.draft ?? (value === null || value === undefined ? '' : String(Number(value.toFixed(digits))));
     const within = (wanted) => Math.min(most, Math.max(least, Number(wanted.toFixed(digits))));
     const finish = () => {
+      clearTimeout(state.timer);
       if (state.draft === null) return;
       const typed = numberIn(state.draft);
       state.draft = null;
@@ -75,8 +82,9 @@ export const NumberField = {
       else if (way) {
         event.preventDefault();
         const from = numberIn(state.draft ?? '') ?? value ?? 0;
-        state.draft = null;
-        onvalue(within(from + way * step * (event.shiftKey ? 10 : 1)));
+        state.draft = String(within(from + way * step * (event.shiftKey ? 10 : 1)));
+        clearTimeout(state.timer);
+        state.timer = setTimeout(finish, STEPS_REST_MS);
       } else event.redraw = false;
     };
     return m('div.field', m('label', { for: id }, label), m('span.number',

@@ -4,7 +4,7 @@ import { Corners } from './corners.js';
 import { unsure } from './files.js';
 import { button, choice, finding, grade, head, icon, LengthField, name, NumberField } from './parts.js';
 import { rail } from './rail.js';
-import { addScene, loadScore, setPattern, state, tellError } from './state.js';
+import { addScene, deleteAsset, loadScore, setPattern, state, tellError } from './state.js';
 import { number, t } from './words.js';
 
 const m = window.m;
@@ -246,7 +246,7 @@ export class Picture {
       m('aside.panel', m('div.fill', head(name(pattern.name)),
         m('div.seen', m(Preview, { pattern, score: this.features && score?.features ? score : null, handle: (preview) => { this.preview = preview; } }),
           m('div', verdict(pattern), m('label.check', m('input', { type: 'checkbox', checked: this.features, onchange: (event) => { this.features = event.target.checked; } }), t('showFeatures')))),
-        this.shapes(pattern), advice(pattern)),
+        this.shapes(pattern), advice(pattern), m('p', button(t('remove'), () => deleteAsset('pattern', pattern.name), { kind: '.link.small' }))),
       m('div.foot', state.project.models.length
         ? m('a.button.primary', { href: `#/scene/${encodeURIComponent(pattern.name)}`, onclick: () => this.onward(pattern) }, m('span', t('toScene')), icon('next'))
         : m('a.button.primary', { href: '#/files' }, m('span', t('toModel')), icon('next')))));

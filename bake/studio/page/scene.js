@@ -1,6 +1,6 @@
 // Step 3: models on a picture, moved by hand or by numbers, and the words beside them.
 import { boxOf, halfOf, isInMm, placed, rotation, multiply, turning, turnOf, unitOf, wrapped } from './placing.js';
-import { button, choice, finding, head, icon, LengthField, name, NumberField, tool } from './parts.js';
+import { button, finding, head, icon, LengthField, name, NumberField, tool } from './parts.js';
 import { rail } from './rail.js';
 import { EYES, HANDLES, Stage } from './stage.js';
 import { addScene, deleteScene, modelOf, scenesOf, bundleBytes, setScene, state, tellError } from './state.js';
@@ -45,7 +45,7 @@ export class Scene {
   oncreate({ dom, attrs }) {
     this.attrs = attrs;
     this.stage = new Stage(dom.querySelector('.stage3d'), {
-      select: (scene) => this.select(scene.key), change: (scene, change) => setScene(scene, valuesOf(scene, change, this.unit)), words: (change) => this.wordsOf(change),
+      select: (scene) => this.select(scene.key), change: (scene, change) => setScene(scene, (now) => valuesOf(now, change, this.unit)), words: (change) => this.wordsOf(change),
       failed: (error) => {
         this.failure = error;
         m.redraw();
@@ -126,7 +126,7 @@ export class Scene {
 
   offsetFields(scene) {
     const inMm = isInMm(scene, this.unit);
-    const set = (axis) => (value) => setScene(scene, { offset: scene.offset.map((old, i) => (i === axis ? Number(value.toFixed(4)) : old)) });
+    const set = (axis) => (value) => setScene(scene, (now) => ({ offset: now.offset.map((old, i) => (i === axis ? Number(value.toFixed(4)) : old)) }));
     return ['right', 'up', 'lift'].map((key, axis) => (inMm
       ? m(LengthField, { key, id: `offset-${key}`, label: t(`offset.${key}`), value: scene.offset[axis], onvalue: set(axis), choose: axis === 0 })
       : m(NumberField, { key, id: `offset-${key}`, label: t(`offset.${key}`), value: 100 * scene.offset[axis], unit: '%', onvalue: (value) => set(axis)(value / 100) })));
@@ -145,7 +145,7 @@ export class Scene {
   turnField(scene, axis) {
     const key = ['tiltX', 'tiltY', 'turn'][axis];
     return m(NumberField, { key, id: `turn-${axis}`, label: t(key), value: scene.turn[axis], unit: '°', digits: 1,
-      onvalue: (value) => setScene(scene, turnValues(scene.turn.map((old, i) => (i === axis ? value : old)))) });
+      onvalue: (value) => setScene(scene, (now) => turnValues(now.turn.map((old, i) => (i === axis ? value : old)))) });
   }
 
   upField(scene) {

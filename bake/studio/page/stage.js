@@ -8,6 +8,8 @@ const FIELD = (40 * Math.PI) / 180;
 /** Where the eye stands: {turn, tilt}, radians. */
 export const EYES = { phone: { turn: -0.32, tilt: 0.66 }, above: { turn: 0, tilt: Math.PI / 2 }, side: { turn: 0, tilt: 0.035 } };
 const TILTS = [0.02, Math.PI / 2];
+/** Milliseconds after the last key until a change counts as made. */
+const KEYS_REST_MS = 400;
 const GLIDE_MS = 260;
 const MARGIN = 1.12;
 /** Scenes that the engine draws one by one, see kMostOwn of runtime/web/engine.cpp; further ones are drawn where they were baked. */
@@ -51,6 +53,7 @@ export class Stage {
   #pointers = new Map();
   #drag = null;
   #keyed = null;
+  #timer = 0;
   #bakedNow = [];
   #ground = null;
   /** Numbers of the scenes that the engine draws one by one, as text, and how many they are. */
@@ -72,7 +75,6 @@ export class Stage {
       this.zoom(Math.exp(-event.deltaY / 600));
     }, { passive: false });
     dom.addEventListener('keydown', (event) => this.#key(event));
-    dom.addEventListener('keyup', () => this.#restKeys());
     dom.addEventListener('focusout', () => this.#restKeys());
   }
 
@@ -485,6 +487,8 @@ export class Stage {
     const scene = this.scenes.find(({ key }) => key === this.selected);
     if (this.#drag?.kind !== handle || !this.#keyed) this.#drag = { kind: handle, scene, box: boxOf(scene.matrix, scene.half), change: null };
     this.#keyed = handle;
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.#restKeys(), KEYS_REST_MS);
     this.#set(this.#keyChange(handle, way, event.shiftKey ? 1 : 0, this.#drag.change));
   }
 
@@ -501,6 +505,7 @@ export class Stage {
   }
 
   #restKeys() {
+    clearTimeout(this.#timer);
     if (!this.#keyed) return;
     this.#keyed = null;
     if (this.#drag?.change) this.#commit();

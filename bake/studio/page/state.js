@@ -78,19 +78,27 @@ function queued(work) {
 const sameScene = (before, after, each) => each.table !== 'scene' || each.index === undefined ||
   ['pattern', 'model'].every((key) => before.scenes[each.index]?.[key] === after.scenes[each.index]?.[key]);
 
-/** Several edits are one step of undo. Where the file has changed meanwhile, they are made again if they still mean the same. */
-export function edit(...edits) {
+/**
+ * Several edits are one step of undo; a function answers those that a project needs. Where the file has changed meanwhile, they are made
+ * again if they still mean the same.
+ */
+export function edit(...wanted) {
+  const send = () => {
+    const { project } = state;
+    const edits = wanted.flatMap((each) => (typeof each === 'function' ? each(project) : [each]));
+    return askJson('POST', 'edit', { revision: project.revision, edits });
+  };
   return queued(async () => {
     const before = state.project;
+    state.failure = null;
+    halted = false;
     try {
-      state.failure = null;
-      halted = false;
-      take(await askJson('POST', 'edit', { revision: before.revision, edits }));
+      take(await send());
     } catch (error) {
       if (error.status !== 409) throw error;
       await load();
-      if (!edits.every((each) => sameScene(before, state.project, each))) throw error;
-      take(await askJson('POST', 'edit', { revision: state.project.revision, edits }));
+      if (!wanted.every((each) => sameScene(before, state.project, each))) throw error;
+      take(await send());
     }
   }).catch(tellError);
 }
@@ -102,7 +110,12 @@ const changes = (which, values) => Object.entries(values).map(([key, value]) =>
 /** A scene that modar.toml does not name, but has by the names of its files, has no index. */
 const whichScene = ({ index, pattern, model }) => ({ table: 'scene', ...(index === null ? { pattern, model } : { index }) });
 
-export const setScene = (scene, values) => edit(...changes(whichScene(scene), values));
+/** values: keys, or a function that answers them for the scene as it is when its turn comes: changes add up, however fast they follow. */
+export const setScene = (scene, values) => edit((project) => {
+  const same = (each) => each.pattern === scene.pattern && each.model === scene.model;
+  const now = project.scenes.find((each) => same(each) && each.index === scene.index) ?? project.scenes.find(same);
+  return now ? changes(whichScene(now), typeof values === 'function' ? values(now) : values) : [];
+});
 export const setPattern = (name, values) => edit(...changes({ table: 'pattern', name }, values));
 export const addScene = (pattern, model) => edit({ op: 'add', table: 'scene', value: { pattern, model } });
 export const deleteScene = (scene) => edit({ op: 'delete', ...whichScene(scene) });
