@@ -87,5 +87,6 @@ class Hand(Browser):
 
     def settle(self):
         """Until what moves by itself has moved, and the server has done what it was asked for."""
-        self.wait("!document.querySelector('[aria-busy]') && !document.querySelector('.status progress, .sending')", "a rest")
+        self.wait("!document.querySelector('[aria-busy]') && !document.querySelector('.status progress, .sending') && (!document.querySelector('.stage3d')"
+                  " || document.querySelector('.layers canvas'))", "a rest")
         self.run("Promise.all(document.getAnimations().map((each) => each.finished.catch(() => 0))).then(() => 0)")

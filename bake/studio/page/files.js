@@ -114,7 +114,7 @@ function pictureCard(pattern) {
 
 function modelCard(model) {
   const scene = state.project.scenes.find((each) => each.model === model.name && patternOf(each.pattern));
-  const content = [modelThumb(model), m('span.about', m('b', name(model.name)), m('small', t('triangles', { n: model.triangles ?? 0 })))];
+  const content = [modelThumb(model), m('span.about', m('b', name(model.name)), m('small', model.triangles ? t('triangles', { n: model.triangles }) : ''))];
   const lacking = model.missing.length > 0 && m('div.lacking', finding({ text: t('missing', { files: model.missing.join(', ') }), cure: t('missingCure') }), chooser(t('chooseIt'), { kind: '.quiet.small' }));
   return m('li', { key: model.name }, scene ? m('a.card', { href: `#/scene/${encodeURIComponent(scene.pattern)}` }, content) : m('div.card', content), lacking);
 }

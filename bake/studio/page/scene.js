@@ -110,7 +110,7 @@ export class Scene {
         } }),
       m('div.layers', { 'aria-hidden': 'true' }),
       m('svg.guides', { 'aria-hidden': 'true' }, ['box', 'snap', 'ring', 'stem', 'tilt0', 'tilt1'].map((line) => m('path', { key: line, 'data-line': line }))),
-      HANDLES.map((kind) => m('button.handle', { key: kind, type: 'button', 'data-handle': kind, title: t(`handle.${kind}`), 'aria-label': t(`handle.${kind}`), class: kind }, icon(kind.startsWith('tilt') ? 'turn' : kind))),
+      HANDLES.map((kind) => m('button.handle', { key: kind, type: 'button', hidden: true, 'data-handle': kind, title: t(`handle.${kind}`), 'aria-label': t(`handle.${kind}`), class: kind }, icon(kind.startsWith('tilt') ? 'turn' : kind))),
       m('output.tip', { hidden: true })),
     m('div.views.over', { role: 'group', 'aria-label': t('views') }, Object.keys(EYES).map((eye) => button(t(`view.${eye}`), () => this.stage.look(eye), { kind: '.quiet.small' }))),
     !scenes.length && m('p.hint', t('standFirst')), this.waiting(scenes));
