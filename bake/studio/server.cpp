@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <filesystem>
@@ -206,6 +207,9 @@ struct StudioServer::Parts {
   std::string secret;
   std::string host;  // "127.0.0.1:PORT"
   std::atomic<int> listeners{0};
+  std::atomic<bool> stopped{false};
+  std::atomic<bool> serving{false};  ///< serve() has begun
+  std::atomic<bool> over{false};     ///< and has ended
   std::mutex mutex;
   std::set<std::string> openings;  // unused ones
 
@@ -443,11 +447,18 @@ std::string StudioServer::opening_address() {
 }
 
 void StudioServer::serve() {
-  parts_->server.listen_after_bind();
+  parts_->serving = true;
+  if (!parts_->stopped) parts_->server.listen_after_bind();
+  parts_->over = true;
 }
 
 void StudioServer::stop() {
+  parts_->stopped = true;
   parts_->events->close();
+  // A server that is about to listen would not hear it.
+  while (parts_->serving && !parts_->over && !parts_->server.is_running()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
   parts_->server.stop();
 }
 

@@ -130,9 +130,11 @@ Result<void> run_studio(const StudioOptions& options,
   if (!lock) return show_other(session, lock.error(), ready);
   clear_leftovers(session);
   const auto engine = find_page();
-  StudioServer* running = nullptr;
-  const Signals signals([&running] {
-    if (running != nullptr) running->stop();
+  std::atomic<bool> ended{false};
+  std::atomic<StudioServer*> running{nullptr};
+  const Signals signals([&running, &ended] {
+    ended = true;
+    if (StudioServer* server = running) server->stop();
   });
   MODAR_ASSIGN(
       const auto server,
@@ -148,6 +150,7 @@ Result<void> run_studio(const StudioOptions& options,
   {
     const Watcher watcher(folder, [&session] { tell_project(session); });
     ready({server->address(), server->opening_address()});
+    if (ended) server->stop();
     server->serve();
   }
   session.jobs.end();
