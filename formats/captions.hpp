@@ -8,7 +8,7 @@
 
 namespace modar {
 
-/// Of one language of one node. An hour of speech takes 60,000 bytes.
+/// Of one language of one node. An hour of speech, 9,000 words in 900 cues, takes 85,000 bytes.
 inline constexpr std::size_t kMostCaptionBytes = std::size_t{1} << 18;
 
 /// Where captions break their grammar, and how.

@@ -14,9 +14,10 @@
 namespace modar {
 namespace {
 
-constexpr int kColumns = 32;  // cells of which a quarter is counted; finer ones cost time alone
+constexpr int kColumns = 32;  // cells of which a quarter is counted, to a column: 3 %
 constexpr int kRows = 18;
 constexpr int kCells = kColumns * kRows;
+// Videos of more are thinned: flashes above 15 a second may be missed.
 constexpr int kFramesASecond = 30;
 constexpr float kChange = 0.1f;  // WCAG's
 constexpr float kBright = 0.8f;
