@@ -191,6 +191,7 @@ async function addOwn() {
   $('own-file').value = '';  // the same one again is a change, too
   if (!file) return;
   try {
+    await prepared;
     await loadBundle();
     await (await ownPictures()).open(file);
   } catch (error) {
@@ -312,4 +313,5 @@ function keep() {
 
 adopt(document, BASE);
 listen();
-prepare().catch(tellUnprepared).then(() => loading).then(keep);
+const prepared = prepare();
+prepared.catch(tellUnprepared).then(() => loading).then(keep);
