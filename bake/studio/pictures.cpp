@@ -260,9 +260,7 @@ Result<Json> rivals_of(Session& session, const std::string& name) {
     rivals.push_back(
         {{"pattern", other.asset.name},
          {"times", times},
-         {"views", 2 * confusion.views},
-         {"words", "in " + std::to_string(times) + " of " + std::to_string(2 * confusion.views) +
-                       " views one was taken for the other"}});
+         {"views", 2 * confusion.views}});
   }
   return Json{{"pattern", name}, {"rivals", std::move(rivals)}};
 }

@@ -107,6 +107,17 @@ class Server(StudioTest):
         self.assertEqual((score["grade"], score["score"]), (told["grade"], told["score"]))
         self.assertLess(score["range_cm"][0], score["range_cm"][1])
 
+    def test_advice_has_words_in_every_language(self):
+        picture(self.folder / "strip.png", width=400, height=60)
+        causes = json.loads(self.modar("pattern", "score", "strip.png", "--json").stdout)[0]["causes"]
+        words = {language: json.loads((ROOT / f"bake/studio/page/words/{language}.json").read_text()) for language in ("en", "de")}
+        self.assertEqual(words["en"].keys(), words["de"].keys())
+        self.assertEqual({key for key in words["en"] if key.startswith("advice.")}, {f"advice.{one['id']}" for one in causes})
+        given = [one for one in causes if one["advice"]]
+        self.assertGreater(len(given), 1)
+        for one in given:
+            self.assertEqual(words["en"][f"advice.{one['id']}"].rstrip(".").lower(), one["advice"])
+
     def test_alike_pictures_are_rivals(self):
         for name in ("one", "two"):
             picture(self.folder / f"{name}.png")

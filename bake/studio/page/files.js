@@ -145,7 +145,7 @@ export const Files = {
     const all = [...problems, ...wrong.map(({ error, cure, file, line }) => ({ text: error, cure, file, line }))];
     const busy = sending && m('p.sending', { role: 'status' }, meter(sending.done / sending.total, t('sending')), sending.done < sending.total ? [t('sendingFile', { n: sending.total, done: sending.done + 1 }), ' ', name(sending.name)] : t('looking'));
     const told = all.length > 0 && m('section.problems', { 'aria-label': t('problems') }, all.map((problem) => finding({
-      text: `${problem.file ? `${problem.file}${problem.line ? `:${problem.line}` : ''}: ` : ''}${problem.text}`, cure: problem.cure })));
+      text: `${problem.file ? `${problem.file}${problem.line ? `:${problem.line}` : ''}: ` : ''}${problem.text}`, cure: problem.cure, lang: 'en' })));
     if (init) return m('div.screen.narrow', found(init), told);
     if (!models.length && !patterns.length) return m('div.screen.narrow', welcome(), busy, told);
     return m('div.screen', m('div.top', head(t('files'), t('filesLead')), m('p.row', chooser(t('addFiles'), { kind: '.quiet', shape: 'add' }), whatNext())), busy, told,

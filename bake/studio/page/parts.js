@@ -106,9 +106,9 @@ export const LengthField = {
   },
 };
 
-/** What a person reads of something that is not well: {text, cure, severity}. */
-export const finding = ({ text, cure, severity = 'warning' }, ...more) => m(`div.finding.${severity}`, icon(severity === 'note' ? 'check' : severity === 'error' ? 'bad' : 'warn'),
-  m('div', m('p', { dir: 'auto' }, text), cure && m('p.cure', { dir: 'auto' }, cure), more));
+/** What a person reads of something that is not well: {text, cure, severity}; lang: of what the server said, its language. */
+export const finding = ({ text, cure, severity = 'warning', lang }, ...more) => m(`div.finding.${severity}`, icon(severity === 'note' ? 'check' : severity === 'error' ? 'bad' : 'warn'),
+  m('div', m('p', { dir: 'auto', lang }, text), cure && m('p.cure', { dir: 'auto', lang }, cure), more));
 
 export const grade = (letter) => letter && m('span.grade', { class: `grade-${letter}`, 'aria-label': t('gradeOf', { grade: letter }), role: 'img' }, letter);
 

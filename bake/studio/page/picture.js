@@ -92,15 +92,15 @@ function verdict(pattern) {
   const score = state.scores.get(pattern.name);
   if (!score) loadScore(pattern.name);
   if (!score || score.pending) return m('p.small', { 'aria-busy': 'true' }, t('judging'));
-  if (score.failed) return finding({ text: score.failed, cure: score.cure });
+  if (score.failed) return finding({ text: score.failed, cure: score.cure, lang: 'en' });
   return m('div.verdict', m('p', grade(score.grade), m('b', t(`grade.${score.grade}`))), m('p.small', reach(score, pattern.width_mm)));
 }
 
 function advice(pattern) {
   const { advice: some = [], rivals = [] } = state.scores.get(pattern.name) ?? {};
   return m('div.advice', unsure.has(pattern.name) && finding({ text: t('unsure'), cure: t('unsureCure') }),
-    rivals.map(({ pattern: other, words }) => finding({ text: words || t('rival', { name: other }) }, m('a', { href: `#/picture/${encodeURIComponent(other)}` }, name(other)))),
-    some.filter(({ text }) => text).map(({ text }) => finding({ text, severity: 'note' })));
+    rivals.map(({ pattern: other, times, views }) => finding({ text: t('rival', { name: other, times, views }) }, m('a', { href: `#/picture/${encodeURIComponent(other)}` }, name(other)))),
+    some.filter(({ text }) => text).map(({ id }) => finding({ text: t(`advice.${id}`), severity: 'note' })));
 }
 
 // ---- the screen ----

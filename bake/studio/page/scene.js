@@ -117,8 +117,8 @@ export class Scene {
   }
 
   waiting(scenes) {
-    if (this.failure) return m('div.hint', finding({ text: this.failure.reason ?? this.failure.message, cure: this.failure.cure, severity: 'error' }));
-    if (state.failure?.kind === 'bake') return m('div.hint', finding({ text: state.failure.error, cure: state.failure.cure, severity: 'error' }));
+    if (this.failure) return m('div.hint', finding({ text: this.failure.reason ?? this.failure.message, cure: this.failure.cure, severity: 'error', lang: 'en' }));
+    if (state.failure?.kind === 'bake') return m('div.hint', finding({ text: state.failure.error, cure: state.failure.cure, severity: 'error', lang: 'en' }));
     return scenes.length > 0 && !state.project.bundle.baked && m('p.hint', { 'aria-busy': 'true' }, t('preparingModel'));
   }
 

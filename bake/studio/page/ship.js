@@ -55,7 +55,7 @@ export class Ship {
     if (!check) return m('section', m('h2', t('verdict')), m('p.small', { 'aria-busy': 'true' }, t('judging')));
     const words = check.good ? (check.warnings ? t('goodBut', { n: check.warnings }) : t('good')) : t('notGood', { n: check.errors });
     return m('section.judged', m('h2', t('verdict')), m(`p.verdict-words${check.good ? '.good' : '.not-good'}`, icon(check.good ? 'check' : 'bad'), words),
-      check.findings.map(({ severity, text, cure, place }) => finding({ severity, text, cure }, place && m('p', m('a', { href: `#/${place.view}${place.name ? `/${encodeURIComponent(place.name)}` : ''}` }, t('goThere'))))));
+      check.findings.map(({ severity, text, cure, place }) => finding({ severity, text, cure, lang: 'en' }, place && m('p', m('a', { href: `#/${place.view}${place.name ? `/${encodeURIComponent(place.name)}` : ''}` }, t('goThere'))))));
   }
 
   weights() {
@@ -87,7 +87,7 @@ export class Ship {
       kind === 'release' && m('div.field', m('label', { for: 'pass' }, t('passPhrase')), m('input', { id: 'pass', type: 'password', autocomplete: 'off', value: this.passPhrase, oninput: (event) => { this.passPhrase = event.target.value; } })),
       button(t(`ship.${kind}Make`), () => this.make(kind), { kind: kind === 'page' ? '.primary' : '.quiet', disabled: this.making !== null }),
       busy && m('p', { role: 'status' }, meter(state.progress?.done ?? 0, t('preparing'))),
-      refused && finding({ ...refused, severity: 'error' }),
+      refused && finding({ ...refused, severity: 'error', lang: 'en' }),
       done && m('p.made', { role: 'status' }, icon('check'), m('span', t('made'), ' ', m('code', name(done.path)), done.url && [' ', m('a', { href: done.url, target: '_blank', rel: 'noopener' }, t(kind === 'page' ? 'look' : 'download'))])));
   }
 
