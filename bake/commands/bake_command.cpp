@@ -15,6 +15,7 @@
 #include "bake/commands/bake_options.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/project_command.hpp"
+#include "bake/image/image.hpp"
 #include "bake/memory/memory_limit.hpp"
 #include "bake/options/request_text.hpp"
 #include "bake/output.hpp"
@@ -33,13 +34,29 @@ struct BakeCommand {
   bool notes = false;
   bool json = false;
   bool progress_json = false;
-  // Options as text, before they are parsed into the request.
+  // Arguments as text, before they are parsed into the request.
+  std::vector<std::string> files;
   std::vector<std::string> models;
   std::vector<std::string> patterns;
   std::vector<std::string> scenes;
   OptionTexts texts;
   ProjectCommand project;
 };
+
+/// Sorts the files that no option names into pictures, by their endings, and models.
+Result<void> sort_files(BakeCommand& command) {
+  for (std::string& text : command.files) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(text, ignored)) {
+      return fail(ExitCode::kUsage, "bake.folder", text, "a folder is baked as a project",
+                  "run `modar init` and `modar bake` in it");
+    }
+    MODAR_ASSIGN(const PatternRequest picture, parse_pattern(text));
+    (is_picture_file(picture.path) ? command.patterns : command.models).push_back(std::move(text));
+  }
+  command.files.clear();
+  return {};
+}
 
 /// Of a bake by --model and --pattern.
 Result<void> refuse_project_options(const BakeCommand& command) {
@@ -181,6 +198,7 @@ Result<void> try_outputs(const BakeCommand& command) {
 }
 
 Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& words) {
+  MODAR_TRY(sort_files(command));
   if (command.models.empty() && command.patterns.empty()) {
     return run_project(command.project,
                        {command.request.jobs, command.request.memory_bytes, command.quiet,
@@ -230,6 +248,8 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
 
 void add_input_options(CommandLine& line, BakeCommand& command) {
   line.group("Input and output");
+  line.option("files", &command.files, "Models and pictures: short for --model and --pattern",
+              {.type = "FILE"});
   line.option("--model", &command.models,
               "OBJ, glTF, GLB, PLY or STL files; NAME=FILE gives the model another name",
               {.type = "[NAME=]FILE"});
@@ -294,8 +314,9 @@ void add_bake(CommandLine& program) {
   add_bake_options(line, OptionGroup::kPatterns, request, command->texts);
   add_run_options(line, *command);
   line.footer(
-      example("  modar bake --model spider.obj --pattern box.png:210mm"
-              " --scene box=spider,up=y,scale=0.8 -o spider.modar\n"
+      example("  modar bake spider.obj box.png:210mm -o spider.modar\n"
+              "  modar bake spider.obj vase.glb box.png:210mm --scene box=spider,up=y,scale=0.8"
+              " --scene box=vase,offset=0:40:0 -o both.modar\n"
               "  modar init && modar bake    # a whole folder; later only what changed\n"));
   line.run([command, &program] { return run_bake(*command, program.words()); });
 }

@@ -216,7 +216,7 @@ const CLI::Option* option_in(const CLI::App& app, const std::string& message) {
   std::size_t longest = 0;
   for (const CLI::Option* option : app.get_options()) {
     std::vector<std::string> names = option->get_lnames();
-    for (const std::string& name : option->get_snames()) names.push_back(name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
     if (option->get_positional()) names.push_back(option->get_name(true));
     for (const std::string& name : names) {
       if (name.size() <= longest || message.find(name) == std::string::npos) continue;

@@ -33,6 +33,9 @@ Result<RgbaImage> read_image(const std::string& path);
 /// The same from a file's bytes; `name` is what errors call it.
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name);
 
+/// Whether a file's name ends as those of the formats do that read_image() reads, in either case.
+bool is_picture_file(const std::string& path);
+
 /// A picture that a camera took.
 struct Photo {
   RgbaImage image;

@@ -1,7 +1,9 @@
 // Which library decodes an image file, and what is done with its pixels afterwards.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string_view>
 
@@ -166,6 +168,14 @@ bool is_opaque(const RgbaImage& image) {
     if (image.pixels[i] != 255) return false;
   }
   return true;
+}
+
+bool is_picture_file(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  constexpr std::array kEndings = {".png"sv, ".jpg"sv,  ".jpeg"sv, ".webp"sv,
+                                   ".tif"sv, ".tiff"sv, ".bmp"sv,  ".tga"sv};
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name) {

@@ -14,6 +14,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "bake/image/image.hpp"
 #include "bake/pattern/gray_mat.hpp"
 #include "bake/pattern/trial.hpp"
 #include "bake/video/video.hpp"
@@ -160,15 +161,6 @@ PlanePoints PatternFinder::find(const GrayImage& frame) const {
   return points.plane.size() >= kFewestPoints ? points : PlanePoints{};
 }
 
-bool is_picture(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](char letter) {
-    return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
-  });
-  return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".bmp" ||
-         ending == ".tif" || ending == ".tiff";
-}
-
 /// Passes frames of the video to `add`, evenly spread, about kVideoFrames of them.
 template <class Add>
 Result<void> read_video(const std::string& path, Add&& add) {
@@ -243,7 +235,7 @@ Result<PlaneViews> collect_views(const CalibrateOptions& options, const NamedPat
   ViewCollector collector(options, pattern, views);
   double done = 0;
   for (const std::string& path : options.inputs) {
-    if (is_picture(path)) {
+    if (is_picture_file(path)) {
       MODAR_ASSIGN(const GrayPicture picture, load_gray(path));
       collector.add(path, picture.view());
     } else {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "bake/image/image.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/input.hpp"
 #include "bake/mesh/upright.hpp"
@@ -67,14 +68,12 @@ Result<Found> look_through(const std::string& folder) {
     const fs::path relative = it->path().lexically_relative(folder);
     const std::string extension = lower(relative.extension().string());
     if (is_model_file(relative.string())) found.models.push_back(relative);
-    if (one_of(extension, {".fbx",  ".dae",  ".blend", ".3ds", ".usdz", ".usd", ".max", ".c4d",
-                           ".ma",   ".mb",   ".skp",   ".stp", ".step", ".las", ".e57", ".gif",
-                           ".heic", ".avif", ".bmp",   ".psd", ".svg",  ".pdf"})) {
+    if (one_of(extension, {".fbx", ".dae", ".blend", ".3ds",  ".usdz", ".usd",  ".max",
+                           ".c4d", ".ma",  ".mb",    ".skp",  ".stp",  ".step", ".las",
+                           ".e57", ".gif", ".heic",  ".avif", ".psd",  ".svg",  ".pdf"})) {
       found.left_out.push_back(relative);
     }
-    if (one_of(extension, {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"})) {
-      found.pictures.push_back(relative);
-    }
+    if (is_picture_file(relative.string())) found.pictures.push_back(relative);
     if (one_of(extension, {".mtl", ".gltf"})) found.material_text += text_of(it->path()) + "\n";
   }
   std::sort(found.models.begin(), found.models.end());

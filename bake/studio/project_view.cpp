@@ -35,9 +35,7 @@ std::uint64_t bytes_of(const std::string& path) {
 
 const char* file_kind(const std::string& file) {
   const std::string extension = lower(fs::path(file).extension().string());
-  for (const char* photo : {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"}) {
-    if (extension == photo) return "photo";
-  }
+  if (is_picture_file(file)) return "photo";
   for (const char* video : {".mp4", ".mov", ".webm", ".mkv", ".avi", ".m4v"}) {
     if (extension == video) return "video";
   }

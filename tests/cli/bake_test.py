@@ -15,6 +15,12 @@ class Bake(ProgramTest):
         self.assertEqual([s["pattern"] + "=" + s["model"] for s in report["scenes"]], ["cover=pottery"])
         self.assertEqual(self.modar("check", bundle).returncode, 0)
 
+    def test_files_are_told_apart_without_options(self):
+        done = self.modar("bake", f"{COVER}:210mm", POTTERY, "-o", "bare.modar", *QUICK)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.modar("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "-o", "named.modar", *QUICK)
+        self.assertEqual((self.folder / "bare.modar").read_bytes(), (self.folder / "named.modar").read_bytes())
+
     def test_counts_are_those_of_the_file(self):
         lines = POTTERY.read_text().splitlines()
         vertices = sum(line.startswith("v ") for line in lines)
@@ -312,6 +318,7 @@ class BadInput(ProgramTest):
     def test_a_file_that_is_not_there(self):
         self.assert_fails(self.bake("--model", "none.obj"), 2, "none.obj")
         self.assert_fails(self.bake("--pattern", "none.png"), 2, "none.png")
+        self.assert_fails(self.bake("none.obj", "none.png"), 2, "none.obj")
         self.assert_nothing_written()
 
     def test_a_file_that_is_something_else(self):
@@ -322,7 +329,8 @@ class BadInput(ProgramTest):
         (self.folder / "m.stl").write_text("solid\n")
         self.assert_fails(self.bake("--model", "m.stl"), 3, "m.stl", "no triangle")
         (self.folder / "m.fbx").write_text("Kaydara FBX Binary")
-        self.assert_fails(self.bake("--model", "m.fbx"), 5, ".fbx", "assimp export 'm.fbx' 'm.glb'")
+        self.assert_fails(self.bake("m.fbx"), 5, ".fbx", "assimp export 'm.fbx' 'm.glb'")
+        self.assert_fails(self.bake(self.folder), 1, "a folder is baked as a project", "modar init")
         self.assert_nothing_written()
 
     def test_a_scene_of_unknown_names(self):
