@@ -1,9 +1,12 @@
 // What commands read from files that others may have made.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <system_error>
+
+#include "formats/base/error.hpp"
 
 namespace modar {
 
@@ -12,5 +15,9 @@ inline bool is_regular_file(const std::string& path) {
   std::error_code error;
   return std::filesystem::is_regular_file(path, error);
 }
+
+/// The bytes of a regular file of at most `most` bytes; no more are read. Errors: kIo "io.open",
+/// kInvalidInput "io.too-large".
+Result<std::string> read_file(const std::string& path, std::size_t most);
 
 }  // namespace modar

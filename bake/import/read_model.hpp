@@ -61,7 +61,7 @@ Result<SourceModel> parse_ply(std::string_view bytes, const std::string& label);
 /// uv set that the base colour texture names, first vertex colours; base colour, emission,
 /// roughness and opacity of materials; Draco-compressed primitives. Images inside the file become
 /// temporary files that live as long as the model's materials. Whatever is left out (points, lines,
-/// skins, morph targets) becomes a diagnostic. Errors: kIo "gltf.open", kInvalidInput "gltf.read",
+/// skins, morph targets) becomes a diagnostic. Errors: kIo "io.open", kInvalidInput "gltf.read",
 /// "gltf.no-faces", "gltf.accessor" (data outside of its buffer, an index beyond its vertices);
 /// kUnsupported "gltf.version" (glTF 1.0), "gltf.extension" (required extensions that are not read,
 /// by name).

@@ -1,7 +1,6 @@
 // Writes the first modar.toml from what lies in a folder.
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -43,10 +42,11 @@ bool left_out(const fs::path& name) {
   return name.string().starts_with('.') || name == "out";
 }
 
+/// A larger one embeds its pictures, and names none. What it would name becomes a pattern too many.
+constexpr std::size_t kMostMaterialBytes = std::size_t{64} << 20;
+
 std::string text_of(const fs::path& path) {
-  if (!is_regular_file(path.string())) return {};
-  std::ifstream file(path, std::ios::binary);
-  return lower(std::string(std::istreambuf_iterator<char>(file), {}));
+  return lower(read_file(path.string(), kMostMaterialBytes).value_or(""));
 }
 
 Result<Found> look_through(const std::string& folder) {

@@ -1,22 +1,10 @@
-#include <fstream>
-#include <sstream>
-
+#include "formats/captions.hpp"
+#include "bake/input.hpp"
 #include "bake/process.hpp"
 #include "bake/video/encode_video.hpp"
-#include "formats/captions.hpp"
 
 namespace modar {
 namespace {
-
-Result<std::string> read_text(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  if (file) text << file.rdbuf();
-  if (!file || file.bad()) {
-    return fail(ExitCode::kIo, "io.open", path, "it cannot be read", "correct the name");
-  }
-  return text.str();
-}
 
 tl::unexpected<Error> no_captions(const std::string& path, const std::string& cause) {
   return fail(ExitCode::kInvalidInput, "captions.read", path, cause,
@@ -27,8 +15,9 @@ tl::unexpected<Error> no_captions(const std::string& path, const std::string& ca
 }  // namespace
 
 Result<std::string> read_captions(const std::string& path) {
-  MODAR_ASSIGN(std::string text, read_text(path));
-  if (!check_captions(text)) return text;
+  const Result<std::string> as_it_is = read_file(path, kMostCaptionBytes);
+  if (!as_it_is && as_it_is.error().exit == ExitCode::kIo) return as_it_is;
+  if (as_it_is && !check_captions(*as_it_is)) return as_it_is;
   const TemporaryFolder folder;
   const std::string out = folder.path() + "/out.vtt";
   const int read = run_process({{"ffmpeg", "-loglevel", "quiet", "-nostdin", "-i", path, "-map",
@@ -36,7 +25,7 @@ Result<std::string> read_captions(const std::string& path) {
                                 {},
                                 ""});
   if (read != 0) return no_captions(path, "FFmpeg reads no captions from it");
-  MODAR_ASSIGN(text, read_text(out));
+  MODAR_ASSIGN(std::string text, read_file(out, kMostCaptionBytes));
   if (const auto fault = check_captions(text)) {
     return no_captions(path, "as WebVTT, line " + std::to_string(fault->line) +
                                  " of it is wrong: " + fault->cause);

@@ -198,7 +198,7 @@ TEST_F(Gltf, BrokenFilesAreErrors) {
                     one_triangle()));
   EXPECT_FALSE(read(kOneTriangle + mesh + R"("nodes":[],"scenes":[{"nodes":[]}])", one_triangle()));
   EXPECT_FALSE(read("this is no JSON", ""));
-  EXPECT_EQ(read_gltf("/no/such.glb").error().code, "gltf.open");
+  EXPECT_EQ(read_gltf("/no/such.glb").error().code, "io.open");
 }
 
 TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -259,14 +258,8 @@ class SceneReader {
   LeftOut left_out_;
 };
 
-/// Reads a whole file; false where it cannot be read.
-bool read_bytes(const std::string& path, std::string& bytes) {
-  if (!is_regular_file(path)) return false;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return false;
-  bytes.assign(std::istreambuf_iterator<char>(file), {});
-  return !file.bad();
-}
+/// More has no GLB, whose header states its length in 32 bits, and no buffer that fits beside one.
+constexpr std::size_t kMaxFileBytes = 0xFFFFFFFF;
 
 /// Extensions that are read in full.
 constexpr const char* kKnownExtensions[] = {
@@ -352,22 +345,19 @@ std::string plain_path(const std::string& path, void*) {
 
 bool read_buffer(std::vector<unsigned char>* bytes, std::string* error, const std::string& path,
                  void*) {
-  std::string read;
-  if (!read_bytes(path, read)) {
-    *error += "cannot read " + path;
+  const Result<std::string> read = read_file(path, kMaxFileBytes);
+  if (!read) {
+    *error += "cannot read " + path + ": " + read.error().cause;
     return false;
   }
-  bytes->assign(read.begin(), read.end());
+  bytes->assign(read->begin(), read->end());
   return true;
 }
 
 }  // namespace
 
 Result<SourceModel> read_gltf(const std::string& path) {
-  std::string bytes;
-  if (!read_bytes(path, bytes)) {
-    return fail(ExitCode::kIo, "gltf.open", path, "the file cannot be read", "check its name");
-  }
+  MODAR_ASSIGN(std::string bytes, read_file(path, kMaxFileBytes));
   const std::string parent = std::filesystem::path(path).parent_path().string();
   const std::string folder = (parent.empty() ? "." : parent) + "/";
   MODAR_ASSIGN(bytes, decode_meshopt_views(std::move(bytes), folder, path));

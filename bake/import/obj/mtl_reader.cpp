@@ -5,7 +5,6 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -331,7 +330,7 @@ namespace {
 
 // Material libraries: names with blanks, several files, none at all.
 
-constexpr std::uintmax_t kMaxMtlBytes = 64u << 20;
+constexpr std::size_t kMaxMtlBytes = 64u << 20;
 
 /// Words of an mtllib line; "\ " is a blank inside a name.
 std::vector<std::string> split_names(const std::string& text) {
@@ -348,18 +347,6 @@ std::vector<std::string> split_names(const std::string& text) {
   }
   if (!name.empty()) names.push_back(std::move(name));
   return names;
-}
-
-std::string read_text(const std::string& path) {
-  if (!is_regular_file(path)) return {};
-  std::ifstream in(path, std::ios::binary);
-  std::string text;
-  char buffer[65536];
-  while (in.read(buffer, sizeof buffer), in.gcount() > 0) {
-    text.append(buffer, static_cast<std::size_t>(in.gcount()));
-    if (text.size() > kMaxMtlBytes) return {};
-  }
-  return text;
 }
 
 /// Mean of a picture's colours, sRGB, 0 to 1; nothing where it cannot be read.
@@ -476,8 +463,8 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label,
     if (std::find(read.begin(), read.end(), path) != read.end()) continue;
     read.push_back(path);
     model.files.push_back(path);
-    for (SourceMaterial& m :
-         parse_mtl(read_text(path), folder_of(path), name_of(path), diagnostics, &model.files)) {
+    for (SourceMaterial& m : parse_mtl(read_file(path, kMaxMtlBytes).value_or(""), folder_of(path),
+                                       name_of(path), diagnostics, &model.files)) {
       std::string name = m.name;
       defined.try_emplace(std::move(name), std::move(m));
     }
