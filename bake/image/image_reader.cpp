@@ -2,9 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string_view>
 
 #include "bake/image/decoders.hpp"
@@ -17,27 +15,6 @@ using std::string_view_literals::operator""sv;
 
 /// A file of more bytes than this is no image within our limits.
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 31;
-
-Result<std::vector<std::byte>> read_bytes(const std::string& path) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
-      is_regular_file(path) ? std::fopen(path.c_str(), "rb") : nullptr, &std::fclose);
-  const auto error = [&path] {
-    return fail(ExitCode::kIo, "io.open", path, "the image cannot be opened or read",
-                "check its name and permissions");
-  };
-  if (!file) return error();
-  std::vector<std::byte> bytes;
-  std::vector<std::byte> part(std::size_t{1} << 20);
-  while (const std::size_t count = std::fread(part.data(), 1, part.size(), file.get())) {
-    bytes.insert(bytes.end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(count));
-    if (bytes.size() > kMaxFileBytes) {
-      return fail(ExitCode::kInvalidInput, "image.too-large", path, "the file is over 2 GiB",
-                  "scale the image down");
-    }
-  }
-  if (std::ferror(file.get()) != 0) return error();
-  return bytes;
-}
 
 bool starts_with(std::span<const std::byte> bytes, std::string_view text, std::size_t at = 0) {
   return at <= bytes.size() && text.size() <= bytes.size() - at &&
@@ -184,13 +161,13 @@ Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::stri
 }
 
 Result<RgbaImage> read_image(const std::string& path) {
-  MODAR_ASSIGN(const std::vector<std::byte> bytes, read_bytes(path));
-  return decode_image(bytes, path);
+  MODAR_ASSIGN(const std::string file, read_file(path, kMaxFileBytes));
+  return decode_image(std::as_bytes(std::span(file)), path);
 }
 
 Result<Photo> read_photo(const std::string& path) {
-  MODAR_ASSIGN(const std::vector<std::byte> bytes, read_bytes(path));
-  MODAR_ASSIGN(StoredImage stored, decode_stored(bytes, path));
+  MODAR_ASSIGN(const std::string file, read_file(path, kMaxFileBytes));
+  MODAR_ASSIGN(StoredImage stored, decode_stored(std::as_bytes(std::span(file)), path));
   const double focal = focal_px(stored);
   return Photo{upright(std::move(stored)), focal};
 }
@@ -202,8 +179,8 @@ Result<LinearImage> decode_linear_image(std::span<const std::byte> bytes, const 
 }
 
 Result<LinearImage> read_linear_image(const std::string& path) {
-  MODAR_ASSIGN(const std::vector<std::byte> bytes, read_bytes(path));
-  return decode_linear_image(bytes, path);
+  MODAR_ASSIGN(const std::string file, read_file(path, kMaxFileBytes));
+  return decode_linear_image(std::as_bytes(std::span(file)), path);
 }
 
 }  // namespace modar
