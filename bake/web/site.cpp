@@ -30,8 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What is copied as it is, or shortened; index.html, sw.js and the words are written with
-/// changes.
+/// What is copied as it is; index.html, sw.js and the words are written with changes.
 constexpr std::array<std::string_view, 35> kPageFiles = {"app.js",
                                                          "bundle.js",
                                                          "camera.js",
@@ -122,24 +121,6 @@ Result<void> put(Draft& draft, const std::string& name, const std::string& text)
 Result<std::string> page_text(const Draft& draft, const std::string& name) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.page + "/" + name));
   return std::string(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
-}
-
-/// A script of ours without its lines of comments and its indentation, a fifth of what a first
-/// visit brings of scripts. Comments behind code stay; no text of ours depends on blanks at the
-/// start of a line.
-std::string shortened(std::string_view script) {
-  std::string out;
-  bool within = false;  // a comment of several lines
-  while (!script.empty()) {
-    const std::size_t end = std::min(script.find('\n'), script.size() - 1);
-    const std::string_view line = script.substr(0, end + 1);
-    script.remove_prefix(end + 1);
-    const std::string_view text = line.substr(std::min(line.find_first_not_of(' '), line.size()));
-    const bool opens = !within && text.starts_with("/*");
-    if (!within && !opens && !text.starts_with("//") && text != "\n") out += text;
-    within = (within || opens) && text.find("*/") == std::string_view::npos;
-  }
-  return out;
 }
 
 /// A name as part of an address: what is no letter, digit or dash becomes a dash.
@@ -334,9 +315,7 @@ Result<void> put_page(Draft& draft) {
     names.insert(names.end(), kUpdateFiles.begin(), kUpdateFiles.end());
   }
   for (const std::string_view name : names) {
-    const bool ours = name.ends_with(".js") && !name.starts_with("engine-");
-    MODAR_ASSIGN(std::string content, page_text(draft, std::string(name)));
-    if (ours) content = shortened(content);
+    MODAR_ASSIGN(const std::string content, page_text(draft, std::string(name)));
     MODAR_TRY(put(draft, std::string(name), content));
     draft.site.page_bytes += content.size();
   }

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import shutil
 import struct
 import subprocess
@@ -580,6 +581,14 @@ class Page(ProgramTest):
         size = sum(len(gzip.compress((self.site / name).read_bytes(), 9)) for name in names)
         print(f"page and engine: {size} bytes gzipped, in {len(names)} files")
         self.assertLess(size, 250_000)
+
+    def test_scripts_are_short_and_say_what_is_wrong(self):
+        for script in ("app.js", "engine.js", "modar-view.js", "viewer-parts.js"):
+            source, short = (ROOT / "runtime" / "web" / script).read_text(), (self.site / script).read_text()
+            self.assertLess(len(short), 0.9 * len(source), script)
+            self.assertNotRegex(short, r"(?m)^\s*(//|/\*|  )", script)
+            told = re.findall(r"(?:code|cause|cure): '([^']+)'", source)
+            self.assertEqual([text for text in told if text not in short], [], script)
 
     def test_small_screens_scroll_one_way(self):
         self.browser.resize(320, 256)
