@@ -84,9 +84,8 @@ void SelfCalibration::measure(std::size_t i, Detection& detection) {
   if (--track.frames_to_measure > 0 && track.measured) return;
   track.frames_to_measure = kMeasureEvery;
   CameraEstimator::View view{i, {}, {}, track.pose};
-  if (!(track.measured ? measure_again(i, view) : measure_first(i, view))) return;
-  // Corners beyond what covers a print would say more of the camera than they know.
-  const bool open = detection.inliers >= kFlatRatio * detection.matches;
+  bool open = detection.inliers >= kFlatRatio * detection.matches;
+  if (!(track.measured ? measure_again(i, view) : measure_first(i, view, open))) return;
   if (open && estimator_.is_new(i, view.pixels)) estimator_.add(view);
   const std::array<glm::dvec2, 4> before = detection.corners;
   frames_.locate(patterns_[i], track, detection);
@@ -109,7 +108,9 @@ bool SelfCalibration::view_plane(const TrackedPattern& plane, const Pose& pose,
 }
 
 /// From where a pose, or a map, was found.
-bool SelfCalibration::measure_first(std::size_t i, CameraEstimator::View& view) {
+/// open: whether nothing covers it; corners beyond what does would say more of the camera than they
+/// know.
+bool SelfCalibration::measure_first(std::size_t i, CameraEstimator::View& view, bool& open) {
   Track& track = tracks_[i];
   TrackedPattern plane = patterns_[i];
   Pose pose = track.pose;
@@ -127,6 +128,7 @@ bool SelfCalibration::measure_first(std::size_t i, CameraEstimator::View& view) 
   }
   track.pose = split.pose;
   patterns_[i].shape = split.shape;
+  open = fit.inlier_ratio() >= kFlatRatio;
   return true;
 }
 

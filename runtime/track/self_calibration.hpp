@@ -44,7 +44,7 @@ class SelfCalibration {
  private:
   bool view_plane(const TrackedPattern& plane, const Pose& pose, CameraEstimator::View& view,
                   PlaneSplit& split) const;
-  bool measure_first(std::size_t i, CameraEstimator::View& view);
+  bool measure_first(std::size_t i, CameraEstimator::View& view, bool& open);
   bool measure_again(std::size_t i, CameraEstimator::View& view);
 
   Camera& camera_;

@@ -129,6 +129,9 @@ TEST(UnknownCamera, APrintFoundAnewStartsWithItsOwnShape) {
     }
   }
   EXPECT_GE(shown, 20);
+  // And each that nothing covers says something of the camera.
+  EXPECT_TRUE(seen.camera.estimated);
+  EXPECT_NEAR(seen.camera.focal, lens.fx, 0.1 * lens.fx);
 }
 
 TEST(UnknownCamera, CornersLieRightFromTheFirstFrameOn) {
