@@ -102,8 +102,16 @@ constexpr const SectionInfo& section_of_record(std::string_view record) {
 
 enum MaterialFlags : std::uint32_t {
   kMaterialTwoSided = 1,
-  kMaterialOccluder = 2,  ///< hides what is behind it and shows the camera's picture
+  kMaterialOccluder = 2,            ///< hides what is behind it and shows the camera's picture
+  kMaterialMetalness = 0xFF00,      ///< a share in 255ths, see material_share()
+  kMaterialReflectance = 0xFF0000,  ///< likewise
 };
+
+/// A share, 0 to 1, that eight of a material's flags hold: kMaterialMetalness or
+/// kMaterialReflectance.
+constexpr float material_share(std::uint32_t flags, MaterialFlags which) {
+  return static_cast<float>(flags & which) / static_cast<float>(which);
+}
 
 enum TextureFlags : std::uint32_t {
   kTextureAlpha = 1,   ///< each level has a second ETC1 image whose luminance is alpha
@@ -134,6 +142,8 @@ inline constexpr FlagInfo kFlags[] = {
     {"SectionEntry", kSectionGpu, 0},
     {"MaterialRecord", kMaterialTwoSided, 0},
     {"MaterialRecord", kMaterialOccluder, 2},
+    {"MaterialRecord", kMaterialMetalness, 3},
+    {"MaterialRecord", kMaterialReflectance, 3},
     {"TextureRecord", kTextureAlpha, 0},
     {"TextureRecord", kTextureRepeat, 0},
     {"TextureRecord", kTextureCutOut, 2},

@@ -2,7 +2,7 @@
 // light comes in its model's space, so that normals are taken as they are. Where a call draws several
 // items, a slot is three rows of the affine matrix from attribute space to eye space, and the scale
 // and offset of uv; light comes in eye space.
-// Defines: NORMAL_XYZ or NORMAL_OCT; TEXTURED; COLOURED; SHINY (adds a highlight or emission);
+// Defines: NORMAL_XYZ or NORMAL_OCT; TEXTURED; COLOURED; SHINY (adds a highlight, what it mirrors, emission);
 // SLOT_STREAM with SLOT_COUNT (a vertex chooses its slot), or SLOT_ATTRIBUTES (rows step once an
 // instance), or neither: one item, whose matrix keeps angles.
 //
@@ -51,7 +51,11 @@ varying vec3 v_light;
 #ifdef SHINY
 // In linear light, the exponent in w.
 uniform vec4 u_specular;
+// w: metalness.
 uniform vec4 u_emission;
+// Of what is mirrored: factors on the linear and quadratic parts of the sky, the share straight on
+// and what is added to it at a grazing angle.
+uniform vec4 u_mirror;
 // The mean colour that light is multiplied with, linear: a highlight is added to it.
 uniform vec4 u_albedo;
 varying vec3 v_shine;
@@ -82,6 +86,16 @@ vec3 model_normal() { return a_normal.xyz; }
 // is off by 6.6 of 255 at most and by 1.5 in the mean, over all colours and light of 0.02 to 1.5
 // (1.05 and -0.05 have the least greatest error; the root alone: 9.5 and 2.1).
 vec3 encode(vec3 light) { return 1.05 * sqrt(light) - 0.05 * light; }
+
+// The sky's light along n; band: factors on its linear and quadratic parts.
+vec3 sky_along(vec3 n, vec2 band) {
+  vec4 line = vec4(band.x * n, 1.0);
+  vec4 square = band.y * n.xyzz * n.yzzx;
+  square.z += (1.0 - band.y) / 3.0;
+  return max(vec3(dot(u_sky[0], line), dot(u_sky[1], line), dot(u_sky[2], line)) +
+                 vec3(dot(u_sky[3], square), dot(u_sky[4], square), dot(u_sky[5], square)) +
+                 u_sky[6].rgb * (band.y * (n.x * n.x - n.y * n.y)), 0.0);
+}
 
 void main() {
 #ifdef SLOT_ATTRIBUTES
@@ -121,25 +135,28 @@ void main() {
   vec3 n = normalize(model_normal());
 #endif
   if (u_diffuse.w > 0.5) n = faceforward(n, ray, n);
-  vec4 line = vec4(n, 1.0);
-  vec4 square = n.xyzz * n.yzzx;
-  vec3 sky = vec3(dot(u_sky[0], line), dot(u_sky[1], line), dot(u_sky[2], line)) +
-             vec3(dot(u_sky[3], square), dot(u_sky[4], square), dot(u_sky[5], square)) +
-             u_sky[6].rgb * (n.x * n.x - n.y * n.y);
+  vec3 sky = sky_along(n, vec2(1.0));
 #ifdef NORMAL_XYZ
   sky *= a_normal.w;
 #endif
-  vec3 light = max(sky, 0.0) + u_key_colour.rgb * max(dot(n, u_key.xyz), 0.0);
+  vec3 light = sky + u_key_colour.rgb * max(dot(n, u_key.xyz), 0.0);
 #else
   // Nothing tells which way the surface looks: its colours are what is seen.
   vec3 light = vec3(u_key_colour.w);
 #endif
-  v_light = u_diffuse.rgb * encode(light);
 #ifdef SHINY
   vec3 added = u_emission.rgb;
 #if defined(NORMAL_XYZ) || defined(NORMAL_OCT)
-  vec3 halfway = normalize(u_key.xyz - normalize(ray));
+  ray = normalize(ray);
+  vec3 mirrored = sky_along(reflect(ray, n), u_mirror.xy);
+#ifdef NORMAL_XYZ
+  mirrored *= 0.5 + 0.5 * a_normal.w;
+#endif
+  // Schlick's approximation of Fresnel's equations.
+  added += mirrored * (u_mirror.z + u_mirror.w * pow(1.0 - min(abs(dot(n, ray)), 0.999), 5.0));
+  vec3 halfway = normalize(u_key.xyz - ray);
   added += u_specular.rgb * pow(max(dot(n, halfway), 0.0001), u_specular.w);
+  light = mix(light, mirrored, u_emission.w);
 #endif
   vec3 lit = u_albedo.rgb * light;
 #ifdef COLOURED
@@ -147,6 +164,7 @@ void main() {
 #endif
   v_shine = encode(lit + added) - encode(lit);
 #endif
+  v_light = u_diffuse.rgb * encode(light);
 #ifdef TEXTURED
   v_uv = a_uv * uv_map.xy + uv_map.zw;
 #endif

@@ -120,16 +120,20 @@ class Canvas {
     return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 1.0) * 255.0));
   }
 
-  /// What a white surface of that normal gets from all around.
-  [[nodiscard]] glm::dvec3 sky(const glm::dvec3& n) const {
+  /// What a white surface of that normal gets from all around, with factors on the parts that are
+  /// linear and quadratic in it.
+  [[nodiscard]] glm::dvec3 sky(const glm::dvec3& n, double linear, double quadratic) const {
     const double x = n.x;
     const double y = n.y;
     const double z = n.z;
     const std::array<double, 9> terms = {
         1, y, z, x, x * y, y * z, 3 * z * z - 1, z * x, x * x - y * y};
     glm::dvec3 sum(0.0);
-    for (std::size_t i = 0; i < terms.size(); ++i) sum += terms[i] * glm::dvec3(light_.sky[i]);
-    return sum;
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      const double factor = i == 0 ? 1.0 : (i < 4 ? linear : quadratic);
+      sum += factor * terms[i] * glm::dvec3(light_.sky[i]);
+    }
+    return glm::max(sum, 0.0) * static_cast<double>(options_.ambient_strength);
   }
 
   [[nodiscard]] Lit shade(std::uint32_t v, std::uint32_t material) const {
@@ -144,11 +148,16 @@ class Canvas {
                              ? std::pow(std::max(glm::dot(world, halfway), 1e-4),
                                         static_cast<double>(std::min(m.shininess, kMostShininess)))
                              : 0.0;
+    const glm::dvec3 ray = glm::normalize(to_world_ * eye);
+    const glm::dvec4 factors(mirror_factors(m.shininess, m.reflectance, m.metalness));
+    const glm::dvec3 mirrored = sky(glm::reflect(ray, world), factors.x, factors.y);
+    const double edge = std::pow(1 - std::min(std::fabs(glm::dot(world, ray)), 1.0), 5.0);
     Lit lit;
-    lit.light = glm::max(sky(world), 0.0) * static_cast<double>(options_.ambient_strength) +
-                key * std::max(glm::dot(world, to_key), 0.0);
+    lit.light = sky(world, 1, 1) + key * std::max(glm::dot(world, to_key), 0.0);
+    lit.light = glm::mix(lit.light, mirrored, static_cast<double>(m.metalness));
     lit.added = srgb_to_linear(glm::dvec3(m.emission)) +
-                srgb_to_linear(glm::dvec3(m.specular)) * key * shine;
+                srgb_to_linear(glm::dvec3(m.specular)) * key * shine +
+                mirrored * (factors.z + factors.w * edge);
     lit.diffuse = glm::dvec3(m.diffuse);
     if (!mesh_.uvs.empty()) lit.uv = mesh_.uvs[v];
     if (!mesh_.colours.empty()) lit.colour = glm::dvec4(mesh_.colours[v]) / 255.0;

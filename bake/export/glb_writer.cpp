@@ -107,7 +107,7 @@ void GlbBuilder::add_materials(const ModelRecord& model) {
     tinygltf::Material material;
     material.name = std::string(bundle_.name(source.name));
     auto& pbr = material.pbrMetallicRoughness;
-    pbr.metallicFactor = 0.0;
+    pbr.metallicFactor = static_cast<double>(material_share(source.flags, kMaterialMetalness));
     pbr.roughnessFactor = roughness_of(source.shininess);
     material.emissiveFactor.assign(3, 0.0);
     for (std::size_t i = 0; i < 3; ++i) {

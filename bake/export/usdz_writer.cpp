@@ -224,8 +224,9 @@ Result<void> Description::add_material(std::uint32_t index, bool coloured) {
   }
   std::string roughness = "float inputs:roughness = ";
   append(roughness, roughness_of(source.shininess));
-  surface += line(roughness) + line("float inputs:metallic = 0") + line(opacity) +
-             line("token outputs:surface");
+  std::string metallic = "float inputs:metallic = ";
+  append(metallic, static_cast<double>(material_share(source.flags, kMaterialMetalness)));
+  surface += line(roughness) + line(metallic) + line(opacity) + line("token outputs:surface");
   material_text_ += "        def Material \"m" + std::to_string(index) +
                     "\"\n        {\n            token outputs:surface.connect = <" + path +
                     "/Surface.outputs:surface>\n" +

@@ -24,6 +24,8 @@ struct SourceMaterial {
   glm::vec3 specular{0.0f};
   glm::vec3 emission{0.0f};
   float shininess = 0.0f;
+  float reflectance = 0.0f;  ///< part of the light that it mirrors straight on, 0 to 1
+  float metalness = 0.0f;    ///< 1: mirrors its colour's part, and scatters nothing
   float opacity = 1.0f;
   std::string diffuse_map;
   std::string alpha_map;

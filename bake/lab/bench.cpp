@@ -128,6 +128,7 @@ BenchResult bench_light_rows(const BenchOptions& command) {
   options.models = command.inputs;
   options.pattern = command.pose.patterns;
   options.folder = command.output;
+  options.light = command.light;
   options.jobs = command.model.jobs;
   options.progress = [&bar](double done) { bar.show("drawing", done); };
   return bench_light(options);

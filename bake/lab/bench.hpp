@@ -46,6 +46,7 @@ struct BenchOptions {
   std::vector<std::string> inputs;
   unsigned crop = 0;   ///< etc1: side of the centre crop in pixels, 0: whole images
   std::string output;  ///< light: folder for pictures; empty: none are written
+  std::string light;   ///< light: a panorama; empty: a room that is made
   std::string device;  ///< render: profile that masks the context; empty: none
   PoseBenchRequest pose;
   ModelBenchRequest model;

@@ -88,6 +88,8 @@ void add_bench(CommandLine& program) {
   line.option("--crop", &bench->crop, "etc1: side of the centre crop, in pixels");
   line.option("-o,--output", &bench->output, "light: existing folder for the pictures",
               {.type = "FOLDER"});
+  line.option("--light", &bench->light,
+              "light: panorama of the room of the gloss, metal and clay (default: a made one)");
   line.option("--device", &bench->device, "render: draw as this device would (assets/devices)");
   line.option("--obj", &bench->model.obj, "model: measure this OBJ instead of a generated one");
   line.flag("--big", bench->model.big, "model: 14.6 million triangles, takes minutes");

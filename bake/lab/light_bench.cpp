@@ -41,12 +41,13 @@ constexpr double kChange = 0.01;
 struct Subject {
   std::string path;
   UpAxis up = UpAxis::kZ;
+  std::string light;  ///< a panorama; empty: the neutral room
 };
 
 Subject subject_of(const std::string& argument) {
   const std::string suffix = ",up=y";
-  if (!argument.ends_with(suffix)) return {argument, UpAxis::kZ};
-  return {argument.substr(0, argument.size() - suffix.size()), UpAxis::kY};
+  if (!argument.ends_with(suffix)) return {argument, UpAxis::kZ, {}};
+  return {argument.substr(0, argument.size() - suffix.size()), UpAxis::kY, {}};
 }
 
 /// A bundle of all subjects on the pattern; scene i is subject i's.
@@ -63,6 +64,7 @@ Result<std::vector<std::byte>> bake_scenes(const std::vector<Subject>& subjects,
     scene.model = file_stem(subject.path);
     scene.size.value = kScale;
     scene.up = subject.up;
+    scene.light = subject.light;
     request.scenes.push_back(scene);
   }
   Report report;
@@ -146,14 +148,19 @@ class LightStage {
     return {};
   }
 
-  Result<Pictures> shoot(std::uint32_t index, const std::string& path) {
+  Result<Pictures> shoot(std::uint32_t index, const Subject& subject) {
     Report quiet;
-    MODAR_ASSIGN(SourceModel source, read_model(path, options_.jobs));
+    MODAR_ASSIGN(SourceModel source, read_model(subject.path, options_.jobs));
     MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
     MODAR_ASSIGN(const std::vector<SoftTexture> textures, load_textures(mesh, options_.jobs));
     const SceneRecord& record = bundle_.scenes()[index];
-    const TracedScene scene{mesh, textures, glm::dmat4(scene_matrix(record)),
-                            scene_light(bundle_, index), ground_};
+    TracedScene scene{mesh, textures, glm::dmat4(scene_matrix(record)), scene_light(bundle_, index),
+                      ground_};
+    LinearImage room;
+    if (!subject.light.empty()) {
+      MODAR_ASSIGN(room, read_linear_image(subject.light));
+      scene.room = &room;
+    }
     const glm::dmat4 view = view_of(scene);
     const PathTracer tracer(scene);
     const TracedPicture ground = tracer.draw_ground(camera_, view, options_.samples, options_.jobs);
@@ -375,7 +382,12 @@ Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options) {
   for (const std::string& argument : options.models) subjects.push_back(subject_of(argument));
   if (options.made) {
     MODAR_ASSIGN(const auto made, make_light_subjects(folder.path()));
-    for (const std::string& path : made) subjects.push_back({path, UpAxis::kZ});
+    for (const std::string& path : made) subjects.push_back({path, UpAxis::kZ, {}});
+    MODAR_ASSIGN(const auto reflecting, make_reflecting_subjects(folder.path()));
+    const std::string& room = options.light.empty() ? reflecting[0] : options.light;
+    for (std::size_t i = 1; i < reflecting.size(); ++i) {
+      subjects.push_back({reflecting[i], UpAxis::kZ, room});
+    }
   }
   MODAR_ASSIGN(const std::vector<std::byte> bytes, bake_scenes(subjects, options));
   MODAR_ASSIGN(const BundleView bundle, BundleView::open(bytes));
@@ -384,7 +396,7 @@ Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options) {
   Rows rows;
   std::vector<RgbaImage> sheet;
   for (std::uint32_t i = 0; i < subjects.size(); ++i) {
-    MODAR_ASSIGN(const Pictures pictures, stage.shoot(i, subjects[i].path));
+    MODAR_ASSIGN(const Pictures pictures, stage.shoot(i, subjects[i]));
     const std::string name = file_stem(subjects[i].path);
     rows.add(name, pictures);
     sheet.push_back(

@@ -19,7 +19,8 @@ struct LightBenchOptions {
   std::vector<std::string> models;
   std::string pattern;  ///< the picture that all of them stand on
   std::string folder;   ///< for the pictures; empty: none are written
-  bool made = true;     ///< a cut-out plant and a glass besides, which are made here
+  bool made = true;     ///< a cut-out plant, a glass, and black gloss, metal and clay besides
+  std::string light;    ///< panorama of the room of the last three; empty: one that is made
   int width = 320;      ///< of a picture, pixels
   int height = 240;
   int samples = 64;  ///< paths a pixel of the reference
@@ -45,6 +46,10 @@ Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options);
 /// GL; kIo.
 Result<std::vector<BenchRow>> bench_before_after(const std::vector<std::string>& inputs,
                                                  const std::string& folder);
+
+/// Writes room.hdr, a panorama, and gloss.obj, metal.obj and clay.obj, a vase each, into a folder
+/// that exists, and answers their paths in this order. z is up. Errors: kIo "io.write".
+Result<std::vector<std::string>> make_reflecting_subjects(const std::string& folder);
 
 /// Pictures of one height, side by side, or of one width, one below the other.
 RgbaImage joined(const std::vector<RgbaImage>& images, bool across);

@@ -23,7 +23,8 @@ constexpr double kFullTurn = 6.283185307179586;
 /// The text of an OBJ file as it grows.
 class ObjText {
  public:
-  explicit ObjText(const std::string& materials) : text_("mtllib " + materials + "\n") {}
+  explicit ObjText(const std::string& materials)
+      : text_(materials.empty() ? "" : "mtllib " + materials + "\n") {}
 
   void material(const std::string& name) { text_ += "usemtl " + name + "\n"; }
 
@@ -64,6 +65,19 @@ class ObjText {
     vertex(x, y, high);
     vertex(-x, -y, high);
     face({first + 4, first + 7, first + 6, first + 5}, true, true);
+  }
+
+  /// A vase with flutes beside a ball: convex, hollow and creased.
+  void vase() {
+    std::vector<glm::dvec2> rings;
+    for (int i = 0; i <= 64; ++i) {
+      const double t = i / 64.0;
+      rings.emplace_back(0.32 + 0.22 * std::sin(5.2 * t) + 0.03 * std::sin(60 * t), 1.6 * t);
+    }
+    for (int i = 0; i <= 16; ++i) {
+      rings.emplace_back(0.02 + (rings[64].x - 0.05) * (1 - i / 16.0), 1.6 - 0.04 * i);
+    }
+    lathe(rings);
   }
 
   [[nodiscard]] const std::string& text() const { return text_; }
@@ -138,11 +152,70 @@ RgbaImage leaves() {
   return image;
 }
 
+/// A room of 6 by 8 by 3 metres as seen from a table in it, as a panorama in Radiance's format: a
+/// window, two ceiling lamps and a standing one, gray walls with a dark cupboard, a wooden floor.
+std::string room_panorama() {
+  constexpr int kRows = 128;
+  std::string text = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 128 +X 256\n";
+  const glm::dvec3 low(-2.5, -5, -0.8);
+  const glm::dvec3 high(3.5, 3, 2.2);
+  const auto inside = [](double x, double y, const glm::dvec4& box) {
+    return x > box.x && x < box.z && y > box.y && y < box.w;
+  };
+  const auto radiance = [&](const glm::dvec3& d) {
+    const glm::dvec3 far = glm::max(low / d, high / d);
+    const double t = std::min({far.x, far.y, far.z});
+    const glm::dvec3 p = t * d;
+    if (t == far.z) {
+      if (d.z < 0) return glm::dvec3(0.9, 0.7, 0.5);
+      const bool lamp =
+          inside(p.x, p.y, {-1.5, -2.5, -0.9, -0.9}) || inside(p.x, p.y, {1.4, -2.5, 2.0, -0.9});
+      return lamp ? glm::dvec3(14, 13, 11) : glm::dvec3(0.9);
+    }
+    if (t == far.x && d.x < 0 && inside(p.y, p.z, {-1.8, -0.1, 0.8, 1.6}))
+      return glm::dvec3(7, 8, 9.5);
+    if (t == far.y && d.y > 0 && inside(p.x, p.z, {0.8, -0.8, 2.6, 1.2})) return glm::dvec3(0.06);
+    if (t == far.x && d.x > 0 && inside(p.y, p.z, {-0.2, 0.2, 0.5, 0.9}))
+      return glm::dvec3(20, 14, 8);
+    return (0.7 + 0.1 * p.z) * glm::dvec3(0.97, 0.95, 0.9);
+  };
+  for (int row = 0; row < kRows; ++row) {
+    const double polar = kFullTurn / 2 * (row + 0.5) / kRows;
+    for (int column = 0; column < 2 * kRows; ++column) {
+      const double azimuth = kFullTurn * ((column + 0.5) / (2 * kRows) - 0.5);
+      const glm::dvec3 light = radiance({std::sin(polar) * std::sin(azimuth),
+                                         std::sin(polar) * std::cos(azimuth), std::cos(polar)});
+      int exponent = 0;
+      std::frexp(std::max({light.r, light.g, light.b}), &exponent);
+      for (int c = 0; c < 3; ++c)
+        text += static_cast<char>(static_cast<int>(std::ldexp(light[c], 8 - exponent)));
+      text += static_cast<char>(exponent + 128);
+    }
+  }
+  return text;
+}
+
 Result<void> write_text(const std::filesystem::path& path, const std::string& text) {
   return write_file(path.string(), std::as_bytes(std::span(text)));
 }
 
 }  // namespace
+
+Result<std::vector<std::string>> make_reflecting_subjects(const std::string& folder) {
+  const std::filesystem::path in(folder);
+  MODAR_TRY(write_text(in / "room.hdr", room_panorama()));
+  MODAR_TRY(write_text(in / "gloss.mtl", "newmtl black\nKd 0.12 0.12 0.13\nPr 0.3\nPm 0\n"));
+  MODAR_TRY(write_text(in / "metal.mtl", "newmtl brass\nKd 0.92 0.80 0.56\nPr 0.4\nPm 1\n"));
+  std::vector<std::string> paths = {(in / "room.hdr").string()};
+  for (const std::string name : {"gloss", "metal", "clay"}) {
+    ObjText text(name == "clay" ? "" : name + ".mtl");
+    if (name != "clay") text.material(name == "gloss" ? "black" : "brass");
+    text.vase();
+    paths.push_back((in / (name + ".obj")).string());
+    MODAR_TRY(write_text(paths.back(), text.text()));
+  }
+  return paths;
+}
 
 Result<std::vector<std::string>> make_light_subjects(const std::string& folder) {
   const std::filesystem::path in(folder);

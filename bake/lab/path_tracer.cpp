@@ -13,6 +13,7 @@
 #include <glm/matrix.hpp>
 
 #include "bake/mesh/triangle_tree.hpp"
+#include "formats/base/colour.hpp"
 #include "formats/base/parallel.hpp"
 
 namespace modar {
@@ -65,6 +66,8 @@ struct Surface {
   glm::dvec3 albedo{0.0};
   glm::dvec3 emission{0.0};
   glm::dvec3 specular{0.0};
+  double reflectance = 0;
+  double metalness = 0;
   double shininess = 0;
   double alpha = 1;
   bool back = false;  ///< of a material with one side
@@ -113,12 +116,12 @@ class PathTracer::Scene {
     }
     if (!triangles.empty()) tree_.emplace(positions_, std::move(triangles));
     to_key_ = glm::normalize(glm::dvec3(scene.light.direction));
-    constexpr int kSteps = 4096;
-    for (int i = 0; i < kSteps; ++i) {
-      const glm::dvec2 u((i + 0.5) / kSteps, glm::fract(i * 0.6180339887498949));
-      given_ += sky(cosine_direction(u)) / static_cast<double>(kSteps);
+    key_ = scene.room != nullptr ? glm::dvec3(0.0) : glm::dvec3(scene.light.key);
+    if (scene.room != nullptr) {
+      room_gain_ = light_upward() / sky_upward();
+      weigh_room();
     }
-    given_ += glm::dvec3(scene.light.key) * std::max(to_key_.z, 0.0);
+    given_ = sky_upward() + key_ * std::max(to_key_.z, 0.0);
   }
 
   /// What a path from the camera brings. touched: whether the model is in its way.
@@ -131,16 +134,13 @@ class PathTracer::Scene {
       if (!met) return sum + through * sky(ray.direction);
       const Surface& s = *met;
       sum += through * (s.emission + from_key(s, ray.direction, first, numbers));
-      through *= s.albedo;
+      glm::dvec3 next;
+      through *= scatter(s, ray.direction, first, numbers, next);
       const double most = std::max({through.x, through.y, through.z});
       if (bounce > 2) {
         if (numbers.next() >= most) break;
         through /= most;
       }
-      glm::dvec3 next =
-          frame_of(s.normal) * cosine_direction(numbers.pair(PathNumbers::kBounce, first));
-      const double side = glm::dot(next, s.flat);
-      if (side < 0) next -= 2 * side * s.flat;
       ray = {s.point + kLift * s.flat, next};
     }
     return sum;
@@ -153,8 +153,129 @@ class PathTracer::Scene {
   }
 
  private:
+  /// The direction in which a path goes on, and its weight: scattered, or mirrored by a facet.
+  glm::dvec3 scatter(const Surface& s, const glm::dvec3& direction, bool first,
+                     PathNumbers& numbers, glm::dvec3& next) const {
+    const auto fresnel = [&](double cosine) {
+      const glm::dvec3 straight = glm::mix(glm::dvec3(s.reflectance), s.albedo, s.metalness);
+      return straight + (1.0 - straight) * std::pow(1 - std::clamp(cosine, 0.0, 1.0), 5.0);
+    };
+    const glm::dvec2 u = numbers.pair(PathNumbers::kBounce, first);
+    const glm::dmat3 frame = frame_of(s.normal);
+    const double around = scene_.room != nullptr ? 0.5 : 0.0;  // paths that seek bright parts of it
+    if (s.reflectance + s.metalness + around == 0) {
+      next = frame * cosine_direction(u);
+      const double side = glm::dot(next, s.flat);
+      if (side < 0) next -= 2 * side * s.flat;
+      return s.albedo;
+    }
+    const double sight = std::max(-glm::dot(s.normal, direction), 1e-4);
+    const glm::dvec3 scattered = s.albedo * (1 - s.metalness) * (1.0 - fresnel(sight));
+    const double mirror = s.reflectance + s.metalness > 0 ? luminance_of(fresnel(sight)) : 0.0;
+    const double share = mirror / (mirror + luminance_of(scattered) + 1e-6);
+    // GGX: Walter et al., "Microfacet Models for Refraction through Rough Surfaces", 2007.
+    const double square = 2.0 / (s.shininess + 2.0);  // of alpha
+    const double choice = numbers.next();
+    if (choice < around) {
+      next = room_direction(u);
+    } else if (choice < around + (1 - around) * share) {
+      const double cosine = std::sqrt((1 - u.x) / (1 + (square - 1) * u.x));
+      const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+      next = glm::reflect(direction, frame * glm::dvec3(sine * std::cos(kTurn * u.y),
+                                                        sine * std::sin(kTurn * u.y), cosine));
+    } else {
+      next = frame * cosine_direction(u);
+    }
+    const double out = glm::dot(next, s.normal);
+    if (out <= 1e-6 || glm::dot(next, s.flat) <= 0) return glm::dvec3(0.0);
+    const glm::dvec3 facet = glm::normalize(next - direction);
+    const double cosine = glm::dot(facet, s.normal);
+    const double on_facet = std::max(-glm::dot(direction, facet), 1e-6);
+    const double bottom = cosine * cosine * (square - 1) + 1;
+    const double facets = 2 * square / (kTurn * bottom * bottom);
+    const auto unshadowed = [&](double c) {
+      return 2 * c / (c + std::sqrt(square + (1 - square) * c * c));
+    };
+    glm::dvec3 given = scattered * (2 * out / kTurn);
+    if (mirror > 0) {
+      given += fresnel(on_facet) * (facets * unshadowed(sight) * unshadowed(out) / (4 * sight));
+    }
+    const double own = share * facets * cosine / (4 * on_facet) + (1 - share) * 2 * out / kTurn;
+    return given / ((1 - around) * own + around * (around > 0 ? room_density(next) : 0.0));
+  }
+
+  static double luminance_of(const glm::dvec3& rgb) { return luminance(rgb.r, rgb.g, rgb.b); }
+
+  /// What the sky gives a white surface that looks up.
+  [[nodiscard]] glm::dvec3 sky_upward() const {
+    constexpr int kSteps = 4096;
+    glm::dvec3 sum(0.0);
+    for (int i = 0; i < kSteps; ++i) {
+      const glm::dvec2 u((i + 0.5) / kSteps, glm::fract(i * 0.6180339887498949));
+      sum += sky(cosine_direction(u)) / static_cast<double>(kSteps);
+    }
+    return sum;
+  }
+
+  /// What the light's coefficients and key light give it.
+  [[nodiscard]] glm::dvec3 light_upward() const {
+    const auto& c = scene_.light.sky;
+    return glm::dvec3(c[0] + c[2] + 2.0f * c[6]) +
+           glm::dvec3(scene_.light.key) * std::max(to_key_.z, 0.0);
+  }
+
+  /// Directions are as likely as the panorama is bright there.
+  void weigh_room() {
+    const LinearImage& image = *scene_.room;
+    double sum = 0;
+    for (std::uint32_t y = 0; y < image.height; ++y) {
+      const double size = std::sin(kTurn / 2 * (y + 0.5) / image.height) * kTurn / image.width *
+                          (kTurn / 2 / image.height);
+      for (std::uint32_t x = 0; x < image.width; ++x) {
+        sum += size * luminance_of(pixel(x, y));
+        room_sums_.push_back(sum);
+      }
+    }
+  }
+
+  [[nodiscard]] glm::dvec3 room_direction(const glm::dvec2& u) const {
+    const auto found =
+        std::upper_bound(room_sums_.begin(), room_sums_.end() - 1, u.x * room_sums_.back());
+    const auto index = static_cast<std::size_t>(found - room_sums_.begin());
+    const double before = index > 0 ? room_sums_[index - 1] : 0.0;
+    const double part =
+        std::clamp((u.x * room_sums_.back() - before) / (*found - before), 0.0, 1.0);
+    const std::size_t width = scene_.room->width;
+    const double azimuth =
+        kTurn * ((static_cast<double>(index % width) + part) / static_cast<double>(width) - 0.5);
+    const double polar =
+        kTurn / 2 * (static_cast<double>(index / width) + u.y) / scene_.room->height;
+    return {std::sin(polar) * std::sin(azimuth), std::sin(polar) * std::cos(azimuth),
+            std::cos(polar)};
+  }
+
+  [[nodiscard]] double room_density(const glm::dvec3& d) const {
+    return luminance_of(room(d)) / room_sums_.back();
+  }
+
+  [[nodiscard]] glm::dvec3 pixel(std::uint32_t x, std::uint32_t y) const {
+    const float* p = &scene_.room->pixels[4 * (std::size_t{y} * scene_.room->width + x)];
+    return room_gain_ * glm::dvec3(p[0], p[1], p[2]);
+  }
+
+  /// The panorama's radiance, its pixels as they are.
+  [[nodiscard]] glm::dvec3 room(const glm::dvec3& d) const {
+    const LinearImage& image = *scene_.room;
+    const double across = glm::fract(std::atan2(d.x, d.y) / kTurn + 0.5);
+    const double down = std::acos(std::clamp(d.z, -1.0, 1.0)) / (kTurn / 2);
+    const auto x = std::min(static_cast<std::uint32_t>(across * image.width), image.width - 1);
+    const auto y = std::min(static_cast<std::uint32_t>(down * image.height), image.height - 1);
+    return pixel(x, y);
+  }
+
   /// Radiance of the room. A band of degree l of the coefficients is weakened to 1, 2/3 and 1/4.
   [[nodiscard]] glm::dvec3 sky(const glm::dvec3& d) const {
+    if (scene_.room != nullptr) return room(d);
     const auto& c = scene_.light.sky;
     const glm::dvec3 linear =
         glm::dvec3(c[1]) * d.y + glm::dvec3(c[2]) * d.z + glm::dvec3(c[3]) * d.x;
@@ -233,6 +354,8 @@ class PathTracer::Scene {
     s.emission = srgb_to_linear(glm::dvec3(m.emission));
     s.specular = m.shininess > 0 ? srgb_to_linear(glm::dvec3(m.specular)) : glm::dvec3(0.0);
     s.shininess = static_cast<double>(m.shininess);
+    s.reflectance = static_cast<double>(m.reflectance);
+    s.metalness = static_cast<double>(m.metalness);
     return s;
   }
 
@@ -244,14 +367,15 @@ class PathTracer::Scene {
     const glm::dvec3 to_light = glm::normalize(frame_of(to_key_) * spot);
     const double cosine = glm::dot(s.normal, to_light);
     if (cosine <= 0 || glm::dot(s.flat, to_light) <= 0) return glm::dvec3(0.0);
+    if (key_ == glm::dvec3(0.0)) return glm::dvec3(0.0);
     bool touched = false;
     if (meet({s.point + kLift * s.flat, to_light}, false, numbers, touched)) return glm::dvec3(0.0);
-    glm::dvec3 given = s.albedo * cosine;
+    glm::dvec3 given = s.albedo * (cosine * (1 - s.metalness));
     if (first && s.shininess > 0) {
       const glm::dvec3 halfway = glm::normalize(to_light - direction);
       given += s.specular * std::pow(std::max(glm::dot(s.normal, halfway), 0.0), s.shininess);
     }
-    return given * glm::dvec3(scene_.light.key);
+    return given * key_;
   }
 
   const TracedScene& scene_;
@@ -260,7 +384,10 @@ class PathTracer::Scene {
   std::vector<bool> two_sided_;        ///< of each triangle
   std::optional<TriangleTree> tree_;
   glm::dvec3 to_key_{0, 0, 1};
-  glm::dvec3 given_{0.0};  ///< irradiance over pi of the open ground
+  glm::dvec3 key_{0.0};  ///< where paths see no panorama
+  glm::dvec3 room_gain_{1.0};
+  std::vector<double> room_sums_;  ///< of the panorama's light, pixel by pixel
+  glm::dvec3 given_{0.0};          ///< irradiance over pi of the open ground
 };
 
 PathTracer::PathTracer(const TracedScene& scene) : scene_(std::make_unique<Scene>(scene)) {}

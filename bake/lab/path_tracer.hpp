@@ -11,6 +11,7 @@
 
 #include "bake/check/reference_renderer.hpp"
 #include "bake/image/image.hpp"
+#include "bake/image/resample.hpp"
 #include "bake/mesh/tri_mesh.hpp"
 #include "modar/camera.hpp"
 #include "modar/renderer.hpp"
@@ -31,6 +32,9 @@ struct TracedScene {
   glm::dmat4 place{1.0};                     ///< mesh space to the pattern's world (z up)
   RoomLight light;
   TracedGround ground;
+  /// The room as a panorama (see read_light()): what paths see in place of the light, with as much
+  /// light on a white surface that looks up. Null: the light itself.
+  const LinearImage* room = nullptr;
 };
 
 /// Linear light, top row first.
@@ -43,8 +47,9 @@ struct TracedPicture {
 };
 
 /// Follows paths of up to six bounces with cosine-weighted directions: diffuse surfaces, the key
-/// light as a disc with shadow rays, Blinn and Phong's highlight of it where the camera looks, and
-/// alpha as the share of rays that a surface stops. The sky's radiance is that whose irradiance the
+/// light as a disc with shadow rays, Blinn and Phong's highlight of it where the camera looks,
+/// reflection of what is around by the GGX distribution with Schlick's Fresnel term, and alpha as
+/// the share of rays that a surface stops. The sky's radiance is that whose irradiance the
 /// coefficients are, without what is negative. Scene and what it refers to outlive the tracer.
 class PathTracer {
  public:

@@ -356,8 +356,9 @@ void move_uvs(const Plan& plan, TriMesh& mesh) {
 
 bool differ_in_picture_only(const SourceMaterial& a, const SourceMaterial& b) {
   return a.ambient == b.ambient && a.diffuse == b.diffuse && a.specular == b.specular &&
-         a.emission == b.emission && a.shininess == b.shininess && a.opacity == b.opacity &&
-         a.two_sided == b.two_sided && a.occluder() == b.occluder();
+         a.emission == b.emission && a.shininess == b.shininess && a.reflectance == b.reflectance &&
+         a.metalness == b.metalness && a.opacity == b.opacity && a.two_sided == b.two_sided &&
+         a.occluder() == b.occluder();
 }
 
 /// The materials once the parts lie on pages, and those of the triangles.

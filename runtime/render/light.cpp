@@ -2,6 +2,7 @@
 #include "runtime/render/light.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -32,6 +33,19 @@ RoomLight neutral_room() {
   room.direction = {-0.47f, -0.33f, 0.82f};
   room.key = {0.520f, 0.505f, 0.480f};
   return room;
+}
+
+glm::vec4 mirror_factors(float shininess, float reflectance, float metalness) {
+  // The sky's polynomials are weakened to 2/3 and 1/4 of its radiance; a lobe of exponent n / 4
+  // about the mirrored ray blurs bands by exp(-l^2 / (2 n / 4)). Ramamoorthi and Hanrahan, "A
+  // Signal-Processing Framework for Inverse Rendering", 2001. Less than 4: what is so rough mirrors
+  // wider lobes towards its normal.
+  const float blur = 2.0f / std::max(shininess, 4.0f);
+  const float roughness = std::sqrt(std::sqrt(2.0f / (shininess + 2.0f)));
+  const float share = reflectance * (1.0f - metalness);
+  return {
+      1.5f * std::exp(-blur), 4.0f * std::exp(-4.0f * blur), share,
+      std::max(1.0f - roughness - share, 0.0f) * (reflectance > 0.0f ? 1.0f - metalness : 0.0f)};
 }
 
 RoomLight light_of_record(const LightRecord& record) {

@@ -68,6 +68,10 @@ bool glows(const MaterialRecord& material) {
   return !dark(material.emission);
 }
 
+bool mirrors(const MaterialRecord& material) {
+  return (material.flags & (kMaterialReflectance | kMaterialMetalness)) != 0;
+}
+
 bool equal_layout(const LayoutRecord& a, const LayoutRecord& b) {
   return std::memcmp(&a, &b, sizeof a) == 0;
 }
@@ -142,7 +146,7 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       key.alpha_twin = key.textured && textures.alpha(material.texture) != 0;
       key.cut_out = key.alpha_twin && material.opacity >= 1.0f &&
                     (bundle_.textures()[material.texture].flags & kTextureCutOut) != 0;
-      key.shiny = shines(material) || glows(material);
+      key.shiny = shines(material) || glows(material) || mirrors(material);
       MODAR_ASSIGN(const std::uint32_t program, program_of(key));
       setups_[c].program = program;
       setups_[c].material = equal_material_[bundle_.chunks()[c].material];
@@ -266,7 +270,12 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const 
     glm::vec4 specular = linear_colour(record.specular, shining ? 1.0f : 0.0f, 0.0f) * key;
     specular.w = shining ? std::min(record.shininess, kMostShininess) : 1.0f;
     set_vector(program.specular, specular, job.stats);
-    set_vector(program.emission, linear_colour(record.emission, 1.0f, 0.0f), job.stats);
+    const float metalness = material_share(record.flags, kMaterialMetalness);
+    set_vector(program.emission, linear_colour(record.emission, 1.0f, metalness), job.stats);
+    set_vector(program.mirror,
+               mirror_factors(record.shininess, material_share(record.flags, kMaterialReflectance),
+                              metalness),
+               job.stats);
     glm::vec4 albedo = linear_colour(record.diffuse, 1.0f, 0.0f);
     if (program.key.textured) {
       const Rgb8 mean = job.textures.mean(record.texture);

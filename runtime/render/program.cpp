@@ -133,6 +133,7 @@ Result<ModelProgram> make_model_program(const ProgramKey& key) {
   program.diffuse = place("u_diffuse");
   program.specular = place("u_specular");
   program.emission = place("u_emission");
+  program.mirror = place("u_mirror");
   program.albedo = place("u_albedo");
   program.opacity = place("u_opacity");
   glUseProgram(program.id);

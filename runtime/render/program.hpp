@@ -21,7 +21,7 @@ struct ProgramKey {
   bool alpha_twin = false;
   bool cut_out = false;  ///< drawn where the twin's alpha is 1/2 and more, and opaque there
   bool coloured = false;
-  bool shiny = false;  ///< has a highlight or emission
+  bool shiny = false;  ///< has a highlight or emission, or mirrors
   int slot_count = 1;  ///< of kStream
   bool operator==(const ProgramKey&) const = default;
 };
@@ -41,12 +41,13 @@ struct ModelProgram {
   GLint diffuse = -1;
   GLint specular = -1;
   GLint emission = -1;
+  GLint mirror = -1;
   GLint albedo = -1;
   GLint opacity = -1;
 };
 
 /// Vertex uniform vectors that a model program needs beside its slots.
-inline constexpr int kFixedUniformVectors = 4 + 7 + 2 + 4;
+inline constexpr int kFixedUniformVectors = 4 + 7 + 2 + 5;
 
 /// Links sources under "#version 100" and `defines` (each a line). Attribute locations are those of
 /// AttributeSlot by name. Errors: kUnsupported "gl.shader", "gl.program" with the driver's log.

@@ -15,6 +15,7 @@
 
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
+#include "bake/import/reflection.hpp"
 #include "formats/base/atomic_file.hpp"
 
 namespace modar {
@@ -140,7 +141,7 @@ class MaterialReader {
       m.emission[i] = channel(source.emissiveFactor, i, 0.0);
     }
     m.two_sided = source.doubleSided;
-    set_highlight(pbr, m);
+    set_reflection_of(pbr, m);
     set_pictures(source, m);
     m.opacity *= 1 - kClear * transmission_of(source);
     m.ambient = m.diffuse;
@@ -185,12 +186,7 @@ class MaterialReader {
     int left_out = 0;
   };
 
-  /// The highlight of Blinn and Phong that is as wide as the roughness makes it, and as bright in
-  /// its middle: (n + 2) / 8 of what is reflected straight on. Faint ones are left out: they cost a
-  /// phone as much as bright ones.
-  void set_highlight(const tinygltf::PbrMetallicRoughness& pbr, SourceMaterial& m) {
-    constexpr double kDielectric = 0.04;  // of all that is no metal: glTF 2.0, appendix B
-    constexpr double kFaint = 0.05;       // of white; set by hand: duller ones are hardly seen
+  void set_reflection_of(const tinygltf::PbrMetallicRoughness& pbr, SourceMaterial& m) {
     double roughness = pbr.roughnessFactor;
     double metalness = pbr.metallicFactor;
     if (const std::string map = image_path(pbr.metallicRoughnessTexture.index); !map.empty()) {
@@ -206,20 +202,9 @@ class MaterialReader {
       metalness *= found->second.metalness;
       ++averaged_;
     }
-    roughness = std::clamp(roughness, 0.05, 1.0);
-    const double exponent = std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0);
-    double brightest = 0;
-    for (int i = 0; i < 3; ++i) {
-      const double base = factor(pbr.baseColorFactor, static_cast<std::size_t>(i), 1.0);
-      const double straight = kDielectric + std::clamp(metalness, 0.0, 1.0) * (base - kDielectric);
-      const double middle = std::clamp(straight * (exponent + 2) / 8, 0.0, 1.0);
-      m.specular[i] = static_cast<float>(stored_light(middle));
-      brightest = std::max(brightest, middle);
-    }
-    m.shininess = static_cast<float>(exponent);
-    if (brightest >= kFaint && exponent >= 1) return;
-    m.specular = glm::vec3(0.0f);
-    m.shininess = 0;
+    glm::dvec3 base(0.0);
+    for (int i = 0; i < 3; ++i) base[i] = factor(pbr.baseColorFactor, std::size_t(i), 1.0);
+    set_reflection(roughness, metalness, base, pbr.baseColorTexture.index >= 0, m);
   }
 
   void set_pictures(const tinygltf::Material& source, SourceMaterial& m) {

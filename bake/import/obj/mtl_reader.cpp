@@ -14,7 +14,9 @@
 #include "bake/image/image.hpp"
 #include "bake/import/obj/number_parser.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/import/reflection.hpp"
 #include "bake/input.hpp"
+#include "formats/base/colour.hpp"
 
 namespace modar {
 namespace {
@@ -273,23 +275,59 @@ void take_opacity(float opacity, MtlContext& context, SourceMaterial& material) 
   material.opacity = std::min(opacity, 1.0f);
 }
 
-void take_property(std::string_view key, std::string_view text, MtlContext& context, bool& has_d,
-                   SourceMaterial& material) {
+/// What a material's statements say together. Pr and Pm are the roughness and metalness that
+/// Blender and others write; without them, what has a highlight reflects as all dielectrics do, or
+/// as much as Ks says where the illumination model has reflection (illum 3 and 5).
+struct MtlStatements {
+  bool has_d = false;
+  bool physical = false;
+  float roughness = 1.0f;
+  float metalness = 0.0f;
+  float illum = 2.0f;
+
+  void finish(SourceMaterial& m) const {
+    const auto light = [](const glm::vec3& stored) {
+      glm::dvec3 linear(0.0);
+      for (int i = 0; i < 3; ++i) linear[i] = linear_of_srgb(static_cast<double>(stored[i]));
+      return linear;
+    };
+    const glm::dvec3 base = light(m.diffuse);
+    if (physical) {
+      set_reflection(static_cast<double>(roughness), static_cast<double>(metalness), base,
+                     !m.diffuse_map.empty(), m);
+    } else if (m.specular != glm::vec3(0.0f) && m.shininess > 0) {
+      const glm::dvec3 shine = light(m.specular);
+      const double most = std::clamp(1 - luminance(base.r, base.g, base.b), 0.0, 1.0);
+      const bool reflects = illum == 3.0f || illum == 5.0f;
+      m.reflectance =
+          static_cast<float>(reflects ? std::clamp(luminance(shine.r, shine.g, shine.b), 0.0, most)
+                                      : kDielectricReflectance);
+    }
+  }
+};
+
+void take_property(std::string_view key, std::string_view text, MtlContext& context,
+                   MtlStatements& stated, SourceMaterial& material) {
   std::array<float, 3> v{};
   if (key == "ka") take_colour(text, material.ambient);
   if (key == "kd") take_colour(text, material.diffuse);
   if (key == "ks") take_colour(text, material.specular);
   if (key == "ke") take_colour(text, material.emission);
   if (key == "ns" && take_numbers(text, v) > 0) material.shininess = std::max(v[0], 0.0f);
+  if (key == "illum" && take_numbers(text, v) > 0) stated.illum = v[0];
+  if ((key == "pr" || key == "pm") && take_numbers(text, v) > 0) {
+    (key == "pr" ? stated.roughness : stated.metalness) = v[0];
+    stated.physical = true;
+  }
   if (key == "d") {
     if (text.starts_with("-halo")) text.remove_prefix(5);
     if (take_numbers(text, v) > 0) {
       take_opacity(v[0], context, material);
-      has_d = true;
+      stated.has_d = true;
     }
   }
   // d is unambiguous, so it wins wherever it stands.
-  if (key == "tr" && !has_d && take_numbers(text, v) > 0) {
+  if (key == "tr" && !stated.has_d && take_numbers(text, v) > 0) {
     take_opacity(1.0f - v[0], context, material);
   }
   if (key == "map_kd") take_map(text, context, material.diffuse_map);
@@ -305,7 +343,7 @@ std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& 
   std::vector<SourceMaterial> materials;
   MtlContext context{folder, label, diagnostics, missing};
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  bool has_d = false;
+  MtlStatements stated;
   std::size_t at = 0;
   std::uint64_t next_line = 1;
   while (at < text.size()) {
@@ -317,13 +355,15 @@ std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& 
     std::string_view value = std::string_view(statement).substr(key_end);
     while (!value.empty() && is_blank(value.front())) value.remove_prefix(1);
     if (key == "newmtl") {
+      if (!materials.empty()) stated.finish(materials.back());
+      stated = {};
       materials.emplace_back();
       materials.back().name = std::string(value);
-      has_d = false;
     } else if (!materials.empty()) {
-      take_property(key, value, context, has_d, materials.back());
+      take_property(key, value, context, stated, materials.back());
     }
   }
+  if (!materials.empty()) stated.finish(materials.back());
   return materials;
 }
 namespace {

@@ -27,8 +27,10 @@ MaterialRecord material_record(const SourceMaterial& source) {
   m.shininess = source.shininess;
   m.opacity = source.opacity;
   m.texture = kNone;
-  m.flags =
-      (source.two_sided ? kMaterialTwoSided : 0u) | (source.occluder() ? kMaterialOccluder : 0u);
+  const auto in_255ths = [](float share) { return static_cast<std::uint32_t>(share * 255 + 0.5f); };
+  m.flags = (source.two_sided ? kMaterialTwoSided : 0u) |
+            (source.occluder() ? kMaterialOccluder : 0u) | in_255ths(source.metalness) << 8 |
+            in_255ths(source.reflectance) << 16;
   return m;
 }
 

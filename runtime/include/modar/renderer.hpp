@@ -58,6 +58,11 @@ struct RoomLight {
 /// eye on pictures.
 inline constexpr float kMostShininess = 40.0f;
 
+/// What a surface mirrors of RoomLight::sky along the mirrored ray: factors on its linear and its
+/// quadratic part, as the surface blurs them; the share straight on, and what is added to it times
+/// (1 - cosine)^5 of the angle of sight. Metal mirrors by its colour beside this.
+glm::vec4 mirror_factors(float shininess, float reflectance, float metalness);
+
 /// A neutral room, lit from above: the default light.
 RoomLight neutral_room();
 RoomLight light_of_record(const LightRecord& record);

@@ -1,0 +1,41 @@
+// From roughness and metalness to a highlight and what is mirrored.
+#include "bake/import/reflection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/base/colour.hpp"
+
+namespace modar {
+namespace {
+
+/// Of white: duller highlights are hardly seen, and cost a phone as much as bright ones. By hand.
+constexpr double kFaint = 0.05;
+/// Luminance below which a surface is seen by what it mirrors: less than dielectrics reflect.
+constexpr double kDark = kDielectricReflectance;
+/// Less metal is hardly seen. By hand.
+constexpr double kSomeMetal = 0.1;
+
+}  // namespace
+
+void set_reflection(double roughness, double metalness, const glm::dvec3& base, bool pictured,
+                    SourceMaterial& material) {
+  roughness = std::clamp(roughness, 0.05, 1.0);
+  metalness = std::clamp(metalness, 0.0, 1.0);
+  const double exponent = std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0);
+  double brightest = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double straight = kDielectricReflectance + metalness * (base[i] - kDielectricReflectance);
+    const double middle = std::clamp(straight * (exponent + 2) / 8, 0.0, 1.0);
+    material.specular[i] = static_cast<float>(srgb_of_linear(middle));
+    brightest = std::max(brightest, middle);
+  }
+  const bool dark = !pictured && luminance(base.r, base.g, base.b) < kDark;
+  const bool shows = (brightest >= kFaint && exponent >= 1) || metalness >= kSomeMetal || dark;
+  if (!shows) material.specular = glm::vec3(0.0f);
+  material.shininess = shows ? static_cast<float>(std::max(exponent, 1.0)) : 0.0f;
+  material.reflectance = shows ? static_cast<float>(kDielectricReflectance) : 0.0f;
+  material.metalness = shows ? static_cast<float>(metalness) : 0.0f;
+}
+
+}  // namespace modar
