@@ -1,6 +1,7 @@
 // The door of this room: model files to SourceModel.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -24,6 +25,11 @@ Result<void> require_model_format(const std::string& path);
 struct ReadOptions {
   unsigned jobs = 1;  ///< threads; the result does not depend on it
 };
+
+/// An OBJ text is parsed in blocks of so many bytes, each by one thread. Small enough for a block
+/// and what it parses to to stay in a core's second-level cache, and for little memory to be
+/// touched for small files: of 2^16 to 2^18 the fastest, by a tenth on scans of 10 MB.
+inline constexpr std::uint64_t kObjBlockBytes = std::uint64_t{1} << 17;
 
 /// Reads an OBJ file and the MTL files it names. Positions are parsed in double with correct
 /// rounding. Oddities become diagnostics with their line; an error is returned only where nothing

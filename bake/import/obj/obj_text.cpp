@@ -9,14 +9,11 @@
 
 #include "bake/import/obj/number_parser.hpp"
 #include "bake/import/obj/obj_block.hpp"
+#include "bake/import/read_model.hpp"
 
 namespace modar {
 namespace {
 
-/// Small enough for the text and what it parses to to stay in a core's second-level cache, and for
-/// little memory to be touched for small files: of 2^16 to 2^18 the fastest, by a tenth on scans of
-/// 10 MB.
-constexpr std::uint64_t kBlockBytes = std::uint64_t{1} << 17;
 constexpr std::uint64_t kMaxStatement = std::uint64_t{1} << 30;  ///< bytes; the format has no limit
 /// Bytes looked at ahead of a block to see whether its first line continues another: "\\\r\n".
 constexpr std::uint64_t kContext = 3;
@@ -50,12 +47,12 @@ std::int64_t ByteSource::read(std::uint64_t offset, std::size_t count, char* out
 }
 
 std::uint64_t BlockLoader::count() const {
-  return (source_.size() - start_ + kBlockBytes - 1) / kBlockBytes;
+  return (source_.size() - start_ + kObjBlockBytes - 1) / kObjBlockBytes;
 }
 
 LoadResult BlockLoader::load(std::uint64_t index, BlockText& block) const {
-  const std::uint64_t begin = start_ + index * kBlockBytes;
-  const std::uint64_t end = std::min(begin + kBlockBytes, source_.size());
+  const std::uint64_t begin = start_ + index * kObjBlockBytes;
+  const std::uint64_t end = std::min(begin + kObjBlockBytes, source_.size());
   const std::uint64_t from = index == 0 ? begin : begin - kContext;
   const std::size_t size = static_cast<std::size_t>(end - from);
   std::string& text = block.buffer;
