@@ -48,8 +48,8 @@ class Bridge(ProgramTest):
                                    FAKES / "org" / "modar" / "BridgeRun.java", FAKES / "fake" / "GlContext.java"])
         cls.clip = make_clip(cls.shared / "clip")
 
-    def bridge(self, word, bundle, *more, clip=None):
-        done = run_java([self.classes], "org.modar.BridgeRun", word, bundle, clip or self.clip, WIDTH, HEIGHT, *more)
+    def bridge(self, word, bundle, *more, clip=None, size=(WIDTH, HEIGHT)):
+        done = run_java([self.classes], "org.modar.BridgeRun", word, bundle, clip or self.clip, *size, *more)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         # -Xcheck:jni prints what it dislikes: references that stay, exceptions that nobody looked at.
         self.assertNotIn("WARNING", done.stdout + done.stderr)
@@ -167,8 +167,11 @@ class Bridge(ProgramTest):
         self.assertIn("closed", self.bridge("close", self.bake_demo()))
 
     def test_nothing_grows(self):
-        frames = 10000 if SOAK else 100
-        heap, resident, references = map(int, self.bridge("soak", self.bake_demo(), frames).split())
+        frames, size = 10000 if SOAK else 100, (WIDTH // 2, HEIGHT // 2)
+        small = self.folder / "small.nv21"  # what grows does so by the frame, not by the pixel
+        subprocess.run(["ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "nv21", "-s", f"{WIDTH}x{HEIGHT}", "-i", self.clip, "-vf",
+                        "scale=iw/2:ih/2:flags=area", "-pix_fmt", "nv21", "-f", "rawvideo", small], check=True)
+        heap, resident, references = map(int, self.bridge("soak", self.bake_demo(), frames, clip=small, size=size).split())
         print(f"the second half of {frames} frames: heap {heap:+} bytes, resident {resident:+} kB, JNI references {references:+}")
         self.assertEqual(references, 0, "JNI references")
         self.assertLess(heap, 100_000, "bytes of Java's heap")
