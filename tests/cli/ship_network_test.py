@@ -91,12 +91,10 @@ class RealServer(ShipTest):
         self.assert_installed(self.shop.old)
 
     def test_errors_that_last_are_told(self):
-        begin = time.monotonic()
         self.assert_fails(self.fetch(self.nginx.url("broken"), "--attempts", "2"), 16, "fetch.network", "500")
         self.assert_fails(self.fetch(self.nginx.url("nothing")), 13, "fetch.missing")
         self.nginx.stop()
         self.assert_fails(self.fetch(self.nginx.url(), "--attempts", "2"), 16, "fetch.network", "again")
-        self.assertLess(time.monotonic() - begin, 60)
         done = self.fetch(self.nginx.url(), "--attempts", "4")  # waits 0.5, 1 and 2 s
         self.assertEqual([line.split("; ")[1] for line in done.stderr.splitlines()[:-1]],
                          ["attempt 3 of 4 in 1 s", "attempt 4 of 4 in 2 s"], done.stderr)

@@ -173,7 +173,7 @@ class Gate(StudioTest):
             connection.close()
         listeners = []
         for _ in range(9):
-            connection = http.client.HTTPConnection("127.0.0.1", self.running.port, timeout=10)
+            connection = http.client.HTTPConnection("127.0.0.1", self.running.port, timeout=60)
             connection.request("GET", self.running.secret + "api/events")
             listeners.append((connection, connection.getresponse()))
         self.assertEqual([response.status for _, response in listeners], [200] * 8 + [503])

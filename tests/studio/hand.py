@@ -23,7 +23,7 @@ class Hand(Browser):
             self.choosers.append(message["params"]["backendNodeId"])
         super()._note(message)
 
-    def wait(self, condition, what, seconds=60):
+    def wait(self, condition, what, seconds=90):
         super().wait(f"!!({condition})", what, seconds)
 
     def prefer(self, **features):
@@ -80,7 +80,7 @@ class Hand(Browser):
 
     def choose(self, files):
         """What a file chooser that has opened is told."""
-        end = time.monotonic() + 20
+        end = time.monotonic() + 90
         while not self.choosers and time.monotonic() < end:
             self.run("0")
         self.call("DOM.setFileInputFiles", files=[str(file) for file in files], backendNodeId=self.choosers.pop())

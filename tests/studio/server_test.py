@@ -83,7 +83,7 @@ class Server(StudioTest):
         studio = self.fill()
         events = Events(studio)
         (self.folder / "modar.toml").write_text(QUICK + SCENE + "# mine\n")
-        name, told, _ = events.until({"project"}, 10)
+        name, told, _ = events.until({"project"}, 90)
         self.assertEqual(told["revision"], studio.project()["revision"])
         events.close()
 

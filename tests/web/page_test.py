@@ -1007,7 +1007,7 @@ class Page(ProgramTest):
               const [r, g, b] = mixed(models);
               const frame = mixed(picture);
               resolve(g > 200 && r < 50 && b < 50 && picture.width === width && frame[3] === 255 && Math.max(...frame.slice(0, 3)) > 20);
-            }))""", f"the cube at {size}", 30)
+            }))""", f"the cube at {size}")
         self.assertEqual(self.browser.errors, [])
 
 
