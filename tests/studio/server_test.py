@@ -19,8 +19,9 @@ SCENE = '[[model]]\nfile = "pottery.obj"\n\n[[pattern]]\nfile = "cover.png"\nwid
 
 class Server(StudioTest):
     def fill(self, text=QUICK + SCENE):
-        for source in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png"), COVER):
+        for source in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png")):
             shutil.copy(source, self.folder)
+        picture(self.folder / "cover.png")
         (self.folder / "modar.toml").write_text(text)
         return self.studio()
 
@@ -89,16 +90,17 @@ class Server(StudioTest):
 
     def test_corners_previews_thumbs_and_grades(self):
         studio = self.fill()
-        found = self.good(studio.post("api/corners", {"file": "cover.png"}))
+        shutil.copy(COVER, self.folder / "photo.png")
+        found = self.good(studio.post("api/corners", {"file": "photo.png"}))
         self.assertEqual((found["reason"], found["sure"], found["width"]), ("fills", False, 348))
         for _ in range(2):
             start = time.monotonic()
-            preview = studio.post("api/rectify", {"file": "cover.png", "corners": [[10, 10], [300, 20], [290, 400], [12, 410]], "width_mm": 100,
+            preview = studio.post("api/rectify", {"file": "photo.png", "corners": [[10, 10], [300, 20], [290, 400], [12, 410]], "width_mm": 100,
                                                   "height_mm": 125, "size": 360})
             took = time.monotonic() - start
         self.assertEqual((preview.status, preview.headers["Content-Type"], preview.headers["X-Aspect"][:3]), (200, "image/jpeg", "0.8"))
         print(f"second preview {1000 * took:.0f} ms")
-        self.assertEqual(studio.post("api/rectify", {"file": "cover.png", "corners": [[0, 0], [9, 9], [1, 2], [3, 3]]}).json["code"], "rectify.corners")
+        self.assertEqual(studio.post("api/rectify", {"file": "photo.png", "corners": [[0, 0], [9, 9], [1, 2], [3, 3]]}).json["code"], "rectify.corners")
         self.assertEqual(studio.post("api/rectify", {"file": "../x", "corners": []}).status, 422)
         self.assertEqual(studio.get("api/thumb/cover.png?size=64").body[:2], b"\xff\xd8")
         self.assertEqual(studio.get("api/thumb/cover.png?size=999999999999").status, 200)
@@ -120,10 +122,8 @@ class Server(StudioTest):
 
     def test_alike_pictures_are_rivals(self):
         for name in ("one", "two"):
-            picture(self.folder / f"{name}.png")
-        data = (self.folder / "two.png").read_bytes()
-        picture(self.folder / "other.png", mirrored=True)
-        self.assertTrue(data)
+            picture(self.folder / f"{name}.png", 144, 108)
+        picture(self.folder / "other.png", 144, 108, mirrored=True)
         (self.folder / "modar.toml").write_text('[[pattern]]\nfile = "*.png"\n')
         rivals = self.good(self.studio().get("api/rivals?pattern=one"))["rivals"]
         self.assertEqual(rivals[0]["pattern"], "two")
