@@ -157,11 +157,11 @@ class ProgramTest(unittest.TestCase):
         """Pottery on the cover."""
         return pathlib.Path(shutil.copyfile(demo_files() / "demo.modar", self.folder / name))
 
-    def bake_project(self, texts):
-        """The same by modar.toml, with lines of the scene's texts."""
+    def bake_project(self, texts, cover=COVER):
+        """The same by modar.toml, with lines of the scene's texts; or on another file that is named cover.png."""
         folder = self.folder / "project"
         folder.mkdir(exist_ok=True)
-        for file in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png"), COVER):
+        for file in (POTTERY, POTTERY.with_suffix(".mtl"), POTTERY.with_suffix(".png"), cover):
             shutil.copy(file, folder)
         (folder / "modar.toml").write_text(PROJECT + texts)
         done = self.modar("bake", "--quiet", cwd=folder)

@@ -18,7 +18,7 @@ import urllib.parse
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Server, axe_core  # noqa: E402
 from programs import (COVER, COVERED, POTTERY, QUICK, READINGS, ROOT, TURNED, TURNS, ProgramTest, covered_clip,  # noqa: E402
-                      demo_clip, write_turns)
+                      demo_clip, picture, write_turns)
 
 PAGE = ROOT / "build" / "web" / "web"
 WIDTH, HEIGHT, FRAMES = 640, 480, 6
@@ -1050,7 +1050,9 @@ class Updates(ProgramTest):
         return self.browser.run(self.INSTALLED)
 
     def test_releases_come_whole_or_not_at_all(self):
-        first = self.bake_demo()
+        self.cover = self.folder / "cover.png"
+        picture(self.cover)
+        first = self.bake_project("", self.cover).rename(self.folder / "demo.modar")
         site = self.folder / "site"
         self.release = site / "release"
         self.check(self.modar("ship", "keygen", "--out", self.folder / "museum.key"))
@@ -1062,7 +1064,7 @@ class Updates(ProgramTest):
         self.addCleanup(self.browser.close)
         # The site's own bundle is the release: nothing to bring.
         self.assertIsNone(self.visit("current"))
-        second = self.bake_project('text.en = "Printed in 1890."\nalt.en = "A pot"\n')
+        second = self.bake_project('text.en = "Printed in 1890."\nalt.en = "A pot"\n', self.cover)
         self.publish(second)
         installed = self.visit("updated")
         sha = hashlib.sha256(second.read_bytes()).hexdigest()
@@ -1082,7 +1084,7 @@ class Updates(ProgramTest):
         self.assertEqual(self.visit("failed fetch.roll-back")["sha"], sha)
         (self.release / "latest").write_text(latest)
         # Forged: another document under the signature.
-        third = self.bake_project('text.en = "Printed in 1891."\n')
+        third = self.bake_project('text.en = "Printed in 1891."\n', self.cover)
         self.publish(third)
         document = next(iter(sorted(self.release.glob("releases/*.json"), reverse=True)))
         good = document.read_bytes()
