@@ -348,12 +348,19 @@ void ModelPainter::draw(const PaintJob& job) {
     };
     std::size_t end = i + 1;
     while (end < pieces_.size() && same_state(pieces_[i], pieces_[end])) ++end;
+    if (pieces_[i].blended) draw_behind(job, pieces_[i]);
     draw_group(job, std::span(pieces_).subspan(i, end - i));
     i = end;
   }
-  // Clearing obeys the masks.
-  job.gl.set_depth_writes(true);
-  job.gl.set_colour_writes(true);
+}
+
+/// The pictures that a blended piece lies before, by its box's middle.
+void ModelPainter::draw_behind(const PaintJob& job, const Piece& piece) {
+  const ChunkRecord& chunk = bundle_.chunks()[piece.chunk];
+  const glm::vec3 middle =
+      0.5f * (glm::make_vec3(chunk.bounds_min) + glm::make_vec3(chunk.bounds_max));
+  const glm::vec3 point(job.items[piece.item].to_eye * glm::vec4(middle, 1.0f));
+  job.planes.draw(job.pictures, &point);
 }
 
 void ModelPainter::make_pieces(const PaintJob& job) {

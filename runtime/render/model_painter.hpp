@@ -15,6 +15,7 @@
 #include "runtime/render/geometry_store.hpp"
 #include "runtime/render/gl.hpp"
 #include "runtime/render/light.hpp"
+#include "runtime/render/plane_painter.hpp"
 #include "runtime/render/program.hpp"
 #include "runtime/render/texture_store.hpp"
 #include "runtime/render/vertex_format.hpp"
@@ -35,6 +36,8 @@ struct PaintJob {
   const TextureStore& textures;
   GlState& gl;
   RenderStats& stats;
+  PlanePainter& planes;  ///< seen through, to draw before the blended chunks that lie before them
+  const PlanePainter::Job& pictures;
   const LightEstimator* estimator = nullptr;  ///< null: light is as stated
 };
 
@@ -96,6 +99,7 @@ class ModelPainter {
   ProgramState* program(std::uint32_t index, SlotKind slots, GlState& gl);
   [[nodiscard]] bool same_decoding(std::uint32_t a, std::uint32_t b) const;
 
+  void draw_behind(const PaintJob& job, const Piece& piece);
   void make_pieces(const PaintJob& job);
   [[nodiscard]] bool continues(const Piece& piece, const DrawCommand& next) const;
   void draw_group(const PaintJob& job, std::span<Piece> group);

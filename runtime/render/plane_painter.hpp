@@ -34,10 +34,21 @@ class PlanePainter {
     if (node < videos_.size()) videos_[node] = texture;
   }
 
-  /// Draws the pictures among the items that hide all that is behind them, which comes before the
-  /// models, or the others, which come after them, from far to near.
-  void draw(const BundleView& bundle, const glm::mat4& projection, std::span<const DrawItem> items,
-            const TextureStore& textures, bool see_through, GlState& gl, RenderStats& stats);
+  /// What drawing needs of a frame.
+  struct Job {
+    const BundleView& bundle;
+    const glm::mat4& projection;
+    std::span<const DrawItem> items;
+    const TextureStore& textures;
+    GlState& gl;
+    RenderStats& stats;
+  };
+  /// Chooses the pictures among the items that hide all that is behind them, which are drawn before
+  /// the models, or the others, which are drawn among what else is seen through.
+  void choose(const Job& job, bool see_through);
+  /// Draws those that were chosen and not drawn yet, from far to near: up to the last one that has
+  /// a point between itself and the eye. point: in eye space; null: all.
+  void draw(const Job& job, const glm::vec3* point);
 
  private:
   struct Plane {
@@ -49,9 +60,11 @@ class PlanePainter {
   enum Program : std::size_t { kOpaque, kTwin, kBeside, kKey, kPrograms };
 
   [[nodiscard]] static Program program_of(const BundleView& bundle, std::uint32_t node);
-  void draw_plane(const glm::mat4& to_clip, GlState& gl, RenderStats& stats);
+  void draw_plane(const Job& job, const Plane& plane);
 
   std::vector<Plane> planes_;
+  std::size_t drawn_ = 0;
+  std::size_t chosen_ = 0;
   std::vector<GLuint> videos_;  ///< one a node: what it shows; 0: its poster, or no video
   std::array<GLuint, kPrograms> programs_{};
   GLint key_ = -1;

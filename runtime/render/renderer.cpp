@@ -190,10 +190,15 @@ struct Renderer::State {
     }
     list.sort_by_state(bundle);
     if (options.plane_hides) ground.hide_below(bundle, projection, items, gl, stats);
-    planes.draw(bundle, projection, items, textures, false, gl, stats);
-    painter.draw({list, items, projection, options, geometry, textures, gl, stats,
+    const PlanePainter::Job pictures{bundle, projection, items, textures, gl, stats};
+    planes.choose(pictures, false);
+    planes.draw(pictures, nullptr);
+    planes.choose(pictures, true);
+    painter.draw({list, items, projection, options, geometry, textures, gl, stats, planes, pictures,
                   options.estimate_light ? &estimator : nullptr});
-    planes.draw(bundle, projection, items, textures, true, gl, stats);
+    planes.draw(pictures, nullptr);
+    gl.set_depth_writes(true);  // clearing obeys the masks
+    gl.set_colour_writes(true);
   }
 
   /// Where memory is short, stand-ins take the place of models that are too large for it, as long

@@ -112,6 +112,35 @@ TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
   }
 }
 
+TEST_F(PlaneTest, WhatIsSeenThroughIsDrawnFromFarToNear) {
+  SceneMaker maker;
+  add_square_pattern(maker.content);
+  std::vector<Triangle> square(2);
+  square[0].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, -0.25, 0}, {0.25, 0.25, 0}};
+  square[1].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, 0.25, 0}, {-0.25, 0.25, 0}};
+  for (Triangle& triangle : square) triangle.colour = {0, 200, 0};
+  maker.add_plain_model(Layout::kHalfColoured, square);
+  add_picture(maker.content, "glass", add_flat(maker, 12, 0, 0, 8));
+  const MappedBundle bundle(maker.content);
+  auto renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_NE(renderer, nullptr);
+  DrawItem model{0, over_plane(0)};
+  model.opacity = 0.5f;
+  const double alpha = (8 * 17 + 2) / 255.0;
+  const double red = alpha * (12 * 17 + 2);
+  struct {
+    float z;
+    double red;
+    double green;
+  } const kCases[] = {{-0.5f, 0.5 * red, 100}, {0.5f, red, 100 * (1 - alpha)}};
+  for (const auto& wanted : kCases) {
+    const DrawItem items[] = {model, picture_at(0, over_plane(wanted.z))};
+    const Rgb seen = texel_at(draw(*renderer, camera_above(kPlaneSide), items), 16, 16);
+    EXPECT_NEAR(seen[0], wanted.red, 2) << wanted.z;
+    EXPECT_NEAR(seen[1], wanted.green, 2.5) << wanted.z;
+  }
+}
+
 /// A texture of two texels, side by side.
 GLuint two_texels(const Rgb& left, const Rgb& right) {
   const std::uint8_t texels[] = {left[0], left[1], left[2], 255, right[0], right[1], right[2], 255};
