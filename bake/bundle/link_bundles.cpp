@@ -37,7 +37,7 @@ tl::unexpected<Error> no_part(const LinkPart& part, const std::string& what) {
 class Linker {
  public:
   Result<BundleContent> run(std::span<const LinkPart> models, std::span<const LinkPart> patterns,
-                            const BakeRequest& described) {
+                            const BakeRequest& described, const MediaSource& media) {
     for (const LinkPart& part : models) {
       if (part.bundle.models().size() != 1) return no_part(part, "model");
       add_model(part);
@@ -61,7 +61,7 @@ class Linker {
     std::sort(content_.occlusion.begin(), content_.occlusion.end(),
               [](const auto& a, const auto& b) { return a.layout < b.layout; });
     Report quiet;
-    MODAR_TRY(add_nodes(resolved, content_, quiet));
+    MODAR_TRY(add_nodes(resolved, content_, quiet, media));
     MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
     resolved.parameters = parameters_of(content_);
     Json meta = Json::parse(bundle_meta(resolved, {}, {}));
@@ -238,9 +238,9 @@ class Linker {
 }  // namespace
 
 Result<BundleContent> link_bundles(std::span<const LinkPart> models,
-                                   std::span<const LinkPart> patterns,
-                                   const BakeRequest& described) {
-  return Linker().run(models, patterns, described);
+                                   std::span<const LinkPart> patterns, const BakeRequest& described,
+                                   const MediaSource& media) {
+  return Linker().run(models, patterns, described, media);
 }
 
 }  // namespace modar

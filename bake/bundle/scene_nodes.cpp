@@ -162,8 +162,9 @@ std::uint32_t index_of(const BundleContent& content, const std::vector<Record>& 
 
 class NodeMaker {
  public:
-  NodeMaker(const BakeRequest& request, BundleContent& content, Report& report)
-      : request_(request), content_(content), report_(report) {}
+  NodeMaker(const BakeRequest& request, BundleContent& content, Report& report,
+            const MediaSource& source)
+      : request_(request), content_(content), report_(report), source_(source) {}
 
   Result<void> run() {
     MODAR_ASSIGN(known_, asked_nodes(request_));
@@ -262,38 +263,18 @@ class NodeMaker {
 
   /// The index of a file's media: of those whose bytes are the same, where there are some.
   Result<std::uint32_t> add_media(const NodeRequest& request) {
-    const VideoSize most =
-        request_.tier == "desktop" ? VideoSize{kMostVideoWidth, kMostVideoHeight} : VideoSize();
-    const bool video = request.kind == NodeKind::kVideo;
-    MODAR_ASSIGN(EncodedMedia encoded,
-                 video ? encode_video(request.file, most) : encode_sound(request.file));
+    MODAR_ASSIGN(const BundleContent part,
+                 source_ ? source_(request) : bake_media(request, request_, report_));
     const auto same =
-        std::find(content_.media_data.begin(), content_.media_data.end(), encoded.bytes);
+        std::find(content_.media_data.begin(), content_.media_data.end(), part.media_data[0]);
     const auto index = static_cast<std::uint32_t>(same - content_.media_data.begin());
     if (same != content_.media_data.end()) return index;
-    MediaRecord media{};
-    media.name = content_.intern(file_name(request.file));
-    media.kind = static_cast<std::uint32_t>(video ? MediaKind::kVideo : MediaKind::kSound);
-    media.flags = encoded.info.sound_tracks > 0 ? kMediaSound : 0u;
-    media.width = encoded.info.width;
-    media.height = encoded.info.height;
-    media.seconds = static_cast<float>(encoded.info.seconds);
-    media.poster = kNone;
-    if (video) MODAR_TRY(look_at_video(request.file, media));
+    MediaRecord media = part.media[0];
+    media.name = content_.intern(part.names.substr(media.name.offset, media.name.length));
+    if (!part.textures.empty()) media.poster = adopt_picture(part, content_);
     content_.media.push_back(media);
-    content_.media_data.push_back(std::move(encoded.bytes));
+    content_.media_data.push_back(part.media_data[0]);
     return index;
-  }
-
-  /// Its poster, and whether it flashes.
-  Result<void> look_at_video(const std::string& file, MediaRecord& media) {
-    const TemporaryFolder folder;
-    const std::string png = folder.path() + "/" + file_stem(file) + ".png";
-    MODAR_TRY(write_poster(file, png));
-    MODAR_ASSIGN(media.poster, add_picture(png, request_.textures, content_, report_));
-    MODAR_ASSIGN(const bool dangerous, flashes(file));
-    if (dangerous) media.flags |= kMediaFlashes;
-    return {};
   }
 
   /// mm: units of the plane in a millimetre. width, height: pixels.
@@ -363,6 +344,7 @@ class NodeMaker {
   const BakeRequest& request_;
   BundleContent& content_;
   Report& report_;
+  const MediaSource& source_;
   std::vector<Known> known_;
   std::vector<std::pair<std::string, std::string>> groups_;
   // A file is encoded once.
@@ -383,8 +365,59 @@ Result<void> check_nodes(const BakeRequest& request) {
   return {};
 }
 
-Result<void> add_nodes(const BakeRequest& request, BundleContent& content, Report& report) {
-  return NodeMaker(request, content, report).run();
+Result<BundleContent> bake_media(const NodeRequest& node, const BakeRequest& request,
+                                 Report& report) {
+  const VideoSize most =
+      request.tier == "desktop" ? VideoSize{kMostVideoWidth, kMostVideoHeight} : VideoSize();
+  const bool video = node.kind == NodeKind::kVideo;
+  MODAR_ASSIGN(EncodedMedia encoded,
+               video ? encode_video(node.file, most) : encode_sound(node.file));
+  BundleContent part;
+  MediaRecord media{};
+  media.name = part.intern(file_name(node.file));
+  media.kind = static_cast<std::uint32_t>(video ? MediaKind::kVideo : MediaKind::kSound);
+  media.flags = encoded.info.sound_tracks > 0 ? kMediaSound : 0u;
+  media.width = encoded.info.width;
+  media.height = encoded.info.height;
+  media.seconds = static_cast<float>(encoded.info.seconds);
+  media.poster = kNone;
+  if (video) {
+    const TemporaryFolder folder;
+    const std::string png = folder.path() + "/" + file_stem(node.file) + ".png";
+    MODAR_TRY(write_poster(node.file, png));
+    MODAR_ASSIGN(media.poster, add_picture(png, request.textures, part, report));
+    MODAR_ASSIGN(const bool dangerous, flashes(node.file));
+    if (dangerous) media.flags |= kMediaFlashes;
+  }
+  part.media.push_back(media);
+  part.media_data.push_back(std::move(encoded.bytes));
+  return part;
+}
+
+BundleContent media_content(const BundleView& part) {
+  const auto bytes = [](std::span<const std::byte> data) {
+    return std::vector<std::byte>(data.begin(), data.end());
+  };
+  BundleContent content;
+  MediaRecord media = part.media()[0];
+  media.name = content.intern(part.name(media.name));
+  content.media.push_back(media);
+  content.media_data.push_back(bytes(part.media_data(0)));
+  for (std::uint32_t i = 0; i < part.textures().size(); ++i) {
+    TextureRecord texture = part.textures()[i];
+    texture.name = content.intern(part.name(texture.name));
+    content.textures.push_back(texture);
+    content.texture_data.push_back(bytes(part.texture_data(i)));
+  }
+  for (std::uint32_t i = 0; i < part.texture_levels().size(); ++i) {
+    content.texture_levels.push_back(part.texture_levels()[i]);
+  }
+  return content;
+}
+
+Result<void> add_nodes(const BakeRequest& request, BundleContent& content, Report& report,
+                       const MediaSource& source) {
+  return NodeMaker(request, content, report, source).run();
 }
 
 Json node_texts(const BakeRequest& request) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/bundle/link_bundles.hpp"
 #include "bake/json.hpp"
 #include "bake/options/request.hpp"
 #include "bake/report.hpp"
@@ -14,8 +15,10 @@ namespace modar {
 /// Adds nodes, actions and the textures of pictures. content: has the request's patterns, models
 /// and scenes, which are content.scenes in this order. Errors: those of check_nodes() and of
 /// bake_texture(); kUsage "scene.no-width" where a length is asked for and the pattern's width is
-/// unknown, "action.part" for a part that is none of the model's materials.
-Result<void> add_nodes(const BakeRequest& request, BundleContent& content, Report& report);
+/// unknown, "action.part" for a part that is none of the model's materials; those of `source`.
+/// source: empty: bake_media().
+Result<void> add_nodes(const BakeRequest& request, BundleContent& content, Report& report,
+                       const MediaSource& source = {});
 
 /// The member `nodes` of the meta text; null where no node has words.
 Json node_texts(const BakeRequest& request);

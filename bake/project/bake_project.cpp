@@ -516,12 +516,36 @@ class ProjectBake {
       return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
                   "it would contain neither a model nor a pattern", "name existing ones");
     }
-    MODAR_ASSIGN(BundleContent content, link_bundles(models, patterns, described));
+    const auto media = [&](const NodeRequest& node) { return media_of(node, target, described); };
+    MODAR_ASSIGN(BundleContent content, link_bundles(models, patterns, described, media));
     add_texts(target, content);
     MODAR_TRY(hold_gates(target, content));
     note_budget(target, described, content);
     for (Diagnostic& alike : alike_patterns(content)) notes_.push_back(std::move(alike));
     return write(target, content);
+  }
+
+  /// A video or sound is encoded once, whatever bundle it goes into: the cache has it by its bytes
+  /// and the settings that concern it, as it has models.
+  Result<BundleContent> media_of(const NodeRequest& node, const Target& target,
+                                 const BakeRequest& described) {
+    const std::string name = fs::path(node.file).filename().string();
+    const std::string digest = digests_.of(node.file);
+    const std::string key = digest_of("media\n" + program_ + "\n" + name + "\n" + digest + "\n" +
+                                      std::to_string(static_cast<unsigned>(node.kind)) + "\n" +
+                                      joined(settings_of(settings_in(target), OptionPart::kModel)));
+    std::string reason;
+    if (const auto part = cache_.read(key, name, reason)) {
+      if (part->bundle.media().size() == 1) return media_content(part->bundle);
+    }
+    Report report;
+    MODAR_ASSIGN(BundleContent content, bake_media(node, described, report));
+    if (digests_.of(node.file) != digest) {
+      return fail(ExitCode::kIo, "project.changing", node.file, "it changed during the bake",
+                  "bake again");
+    }
+    MODAR_TRY(cache_.write(key, name, content, {{}, std::move(report.diagnostics)}));
+    return content;
   }
 
   Result<void> describe_scenes(const Target& target, BakeRequest& described) const {

@@ -169,12 +169,9 @@ Result<Texture> bake_use(const TextureUse& use, const TextureOptions& options, R
   return bake_texture(RgbaImage{1, 1, {128, 128, 128, 255}}, use.path, options, report);
 }
 
-}  // namespace
-
-Result<std::uint32_t> add_picture(const std::string& path, const TextureOptions& options,
-                                  BundleContent& content, Report& report) {
-  MODAR_ASSIGN(const Texture baked, bake_texture(path, options, report));
-  const std::uint32_t added = append_texture(baked, content).texture;
+/// Drops the last texture where another is the same; answers which one there is.
+std::uint32_t merge_last(BundleContent& content) {
+  const auto added = static_cast<std::uint32_t>(content.textures.size()) - 1;
   for (std::uint32_t i = 0; i < added; ++i) {
     const TextureRecord& other = content.textures[i];
     const bool same = content.texture_data[i] == content.texture_data[added] &&
@@ -190,6 +187,26 @@ Result<std::uint32_t> add_picture(const std::string& path, const TextureOptions&
     return i;
   }
   return added;
+}
+
+}  // namespace
+
+Result<std::uint32_t> add_picture(const std::string& path, const TextureOptions& options,
+                                  BundleContent& content, Report& report) {
+  MODAR_ASSIGN(const Texture baked, bake_texture(path, options, report));
+  append_texture(baked, content);
+  return merge_last(content);
+}
+
+std::uint32_t adopt_picture(const BundleContent& part, BundleContent& content) {
+  TextureRecord record = part.textures[0];
+  const auto levels = part.texture_levels.begin() + static_cast<std::ptrdiff_t>(record.first_level);
+  record.name = content.intern(part.names.substr(record.name.offset, record.name.length));
+  record.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
+  content.texture_levels.insert(content.texture_levels.end(), levels, levels + record.level_count);
+  content.textures.push_back(record);
+  content.texture_data.push_back(part.texture_data[0]);
+  return merge_last(content);
 }
 
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,

@@ -82,6 +82,9 @@ Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,
                                                   BundleContent& content, Report& report);
 
+/// The first texture of a part, where `content` has not the same bytes already; answers its index.
+std::uint32_t adopt_picture(const BundleContent& part, BundleContent& content);
+
 /// Bakes a whole picture as a texture of the bundle, whatever it shows. Answers its index; that of
 /// a texture that has the same bytes already. Errors: those of bake_texture().
 Result<std::uint32_t> add_picture(const std::string& path, const TextureOptions& options,

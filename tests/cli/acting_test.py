@@ -1,5 +1,6 @@
 """Scenes that act: pictures, labels and actions from modar.toml to the bundle, and what is refused before the bake."""
 import json
+import os
 import shutil
 import subprocess
 import unittest
@@ -163,6 +164,31 @@ class Acting(ProgramTest):
         before = bundle.read_bytes()[at:at + media["bytes"]]
         self.assertEqual(self.bake(scene.replace("film.avi", "film.mp4")).returncode, 0)
         self.assertIn(before, bundle.read_bytes())
+        # Encoded once: what is baked anew with the same film asks FFmpeg for nothing.
+        self.film("other.avi", "-c:v", "mpeg4", "-c:a", "mp2")
+        (self.folder / "tools").mkdir()
+        (self.folder / "tools/ffmpeg").write_text(f'#!/bin/sh\necho "$@" >>{self.folder}/asked\nexec {shutil.which("ffmpeg")} "$@"\n')
+        (self.folder / "tools/ffmpeg").chmod(0o755)
+        path = {**os.environ, "PATH": f"{self.folder}/tools:{os.environ['PATH']}"}
+
+        other = scene.replace('"film.avi"', '"other.avi"\nname = "film"')
+
+        def encoded(*options):
+            (self.folder / "asked").unlink(missing_ok=True)
+            done = self.modar("bake", "--quiet", *options, cwd=self.folder, env=path)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return (self.folder / "asked").read_text().count("libx264") if (self.folder / "asked").exists() else 0
+        (self.folder / "modar.toml").write_text(HEAD + other)
+        self.assertEqual(encoded(), 1)
+        first = bundle.read_bytes()
+        (self.folder / "modar.toml").write_text(HEAD + other.replace("72mm", "60mm"))
+        self.assertEqual(encoded(), 0)
+        (self.folder / "modar.toml").write_text(HEAD + other)
+        self.assertEqual(encoded(), 0)
+        self.assertEqual(bundle.read_bytes(), first)
+        shutil.rmtree(self.folder / ".modar")
+        self.assertEqual(encoded(), 1)
+        self.assertEqual(bundle.read_bytes(), first)
         # Twice on the pattern, once in the bundle.
         twice = '[[scene.video]]\nfile = "film.mp4"\nname = "other"\nwidth = "20mm"\n'
         self.assertEqual(self.bake(scene.replace("film.avi", "film.mp4") + twice).returncode, 0)
