@@ -1,6 +1,9 @@
 #include "formats/captions.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
+#include <utility>
 
 namespace modar {
 namespace {
@@ -73,7 +76,73 @@ const char* check_times(std::string_view line, std::int64_t& last) {
   return nullptr;
 }
 
+/// Appends a line without its tags, <i> for one, and with the characters that WebVTT escapes.
+void add_plain(std::string_view line, std::string& text) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kEscapes = {
+      {{"&amp;", "&"},
+       {"&lt;", "<"},
+       {"&gt;", ">"},
+       {"&nbsp;", " "},
+       {"&lrm;", ""},
+       {"&rlm;", ""}}};
+  while (!line.empty()) {
+    const std::size_t tag_end = line[0] == '<' ? line.find('>') : std::string_view::npos;
+    if (tag_end != std::string_view::npos) {
+      line.remove_prefix(tag_end + 1);
+      continue;
+    }
+    bool escaped = false;
+    for (const auto& [escape, meaning] : kEscapes) {
+      if (escaped || !take(line, escape)) continue;
+      text += meaning;
+      escaped = true;
+    }
+    if (escaped) continue;
+    text += line[0];
+    line.remove_prefix(1);
+  }
+}
+
+/// The words of the cues that `wanted` says yes to, given their times in milliseconds.
+template <class Wanted>
+std::string words_of(std::string_view captions, char between_lines, const Wanted& wanted) {
+  Lines lines(captions);
+  lines.next();
+  std::string words;
+  while (!lines.at_end()) {
+    lines.next();
+    if (lines.at_end()) break;
+    std::string_view times = lines.next();
+    const std::int64_t begin = take_time(times);
+    times.remove_prefix(std::min(times.size(), kArrow.size() + 2));
+    const bool shown = wanted(begin, take_time(times));
+    char before = '\n';
+    while (!lines.at_end()) {
+      Lines ahead = lines;
+      const std::string_view line = ahead.next();
+      if (line.empty()) break;
+      lines = ahead;
+      if (!shown) continue;
+      if (!words.empty()) words += before;
+      before = between_lines;
+      add_plain(line, words);
+    }
+  }
+  return words;
+}
+
 }  // namespace
+
+std::string words_at(std::string_view captions, double seconds) {
+  const auto now = static_cast<std::int64_t>(seconds * 1000.0 + 0.5);
+  return words_of(captions, '\n', [now](std::int64_t begin, std::int64_t end) {
+    return begin <= now && now < end;
+  });
+}
+
+std::string transcript(std::string_view captions) {
+  return words_of(captions, ' ', [](std::int64_t, std::int64_t) { return true; });
+}
 
 std::optional<CaptionFault> check_captions(std::string_view text) {
   if (text.size() > kMostCaptionBytes) return CaptionFault{1, "there are more than 262144 bytes"};

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace modar {
@@ -19,5 +20,11 @@ struct CaptionFault {
 
 /// Holds a text against *Captions* of bundle.md. Nothing: it keeps the rules. Allocates nothing.
 std::optional<CaptionFault> check_captions(std::string_view text);
+
+/// What is heard at a time of a text that keeps the rules: the lines of each cue of then, without
+/// markup; empty between cues.
+std::string words_at(std::string_view captions, double seconds);
+/// All that is heard, a line a cue, without times and markup.
+std::string transcript(std::string_view captions);
 
 }  // namespace modar

@@ -15,6 +15,7 @@
 #include "bake/check/device_rules.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/image/image.hpp"
+#include "bake/page/acting.hpp"
 #include "bake/page/model_pictures.hpp"
 #include "bake/page/treemap.hpp"
 #include "bake/pattern/pattern.hpp"
@@ -123,6 +124,7 @@ class Page {
     if (!camera) no_pictures_ = camera.error().cause;
     head();
     MODAR_TRY(scenes());
+    html_ += acting_section(bundle_);
     MODAR_TRY(models());
     MODAR_TRY(textures());
     MODAR_TRY(patterns());

@@ -221,6 +221,11 @@ class Acting(ProgramTest):
                                             capture_output=True, text=True, check=True).stdout)["streams"]
         self.assertEqual((stream["codec_name"], stream["profile"]), ("aac", "LC"))
         self.assertAlmostEqual(float(stream["duration"]), 2, delta=0.1)
+        done = self.modar("report", bundle, "-o", "report.html", "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        page = (self.folder / "report.html").read_text(encoding="utf-8")
+        for words in ("This pot is old.\n[bell]", "Alter Topf &amp; Krug", "tap 1: play voice", "<td>sound</td><td>2.0 s</td>"):
+            self.assertIn(words, page)
         # Changed captions are baked again; a second language of one sound alone is told.
         (self.folder / "voice.vtt").write_text("WEBVTT\n\n00:00.500 --> 00:01.250\nEin alter Topf\n")
         self.assertEqual(self.bake(scene).returncode, 0)
@@ -249,6 +254,9 @@ class Acting(ProgramTest):
             self.assertEqual(json.loads(self.modar("inspect", bundle, "--json").stdout)["media"][0]["flashes"], dangerous, (changes, share))
             issues = [issue["id"] for issue in json.loads(self.modar("check", bundle, "--json").stdout)["issues"]]
             self.assertEqual(issues, ["MEDIA_FLASHES"] if dangerous else [], (changes, share))
+            self.modar("report", bundle, "-o", "report.html", "--quiet")
+            page = (self.folder / "report.html").read_text(encoding="utf-8")
+            self.assertEqual("more than three a second" in page, dangerous, (changes, share))
 
     def test_what_is_wrong_is_told_with_its_line_before_the_bake(self):
         for change, code, where in (

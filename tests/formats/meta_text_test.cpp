@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "formats/captions.hpp"
+
 namespace {
 
 using modar::check_meta_text;
@@ -81,6 +83,20 @@ TEST(MetaText, KnownMembersHaveTheirTypes) {
         R"({"texts":[{"pattern":"p","model":null,"text":{}}]})", R"({"\u0074exts":5})"}) {
     EXPECT_NE(said(text), "") << text;
   }
+}
+
+TEST(Captions, AreWordsAtATimeAndATranscript) {
+  const std::string text =
+      "WEBVTT\n\n00:00.500 --> 00:01.250 align:start\n<i>This</i> pot\nis old.\n\n"
+      "00:01.000 --> 00:02.000\n[bell] &lt;&amp;&gt; 1 < 2\n\n01:00:00.000 --> 01:00:01.000\nEnd";
+  ASSERT_FALSE(modar::check_captions(text));
+  EXPECT_EQ(modar::words_at(text, 0.499), "");
+  EXPECT_EQ(modar::words_at(text, 0.5), "This pot\nis old.");
+  EXPECT_EQ(modar::words_at(text, 1.2), "This pot\nis old.\n[bell] <&> 1 < 2");
+  EXPECT_EQ(modar::words_at(text, 1.25), "[bell] <&> 1 < 2");
+  EXPECT_EQ(modar::words_at(text, 3600.999), "End");
+  EXPECT_EQ(modar::words_at(text, 3601.0), "");
+  EXPECT_EQ(modar::transcript(text), "This pot is old.\n[bell] <&> 1 < 2\nEnd");
 }
 
 }  // namespace
