@@ -94,6 +94,11 @@ Result<bool> VideoReader::next() {
   }
 }
 
+double VideoReader::time_s() const {
+  const double ms = state_->capture.get(cv::CAP_PROP_POS_MSEC);
+  return std::isfinite(ms) ? ms / 1000.0 : 0.0;
+}
+
 BgrPicture VideoReader::picture() const {
   const cv::Mat& picture = state_->picture;
   return {picture.data, picture.cols, picture.rows, picture.step[0]};

@@ -11,16 +11,14 @@
 
 namespace modar {
 Controls::Controls(const BundleView& bundle, bool outline, bool display)
-    : bundle_(bundle),
-      machine_(std::make_unique<ActionMachine>(bundle)),
-      outline_(outline),
-      display_(display) {
-  events_.resize(bundle.patterns().size() + taps_.size());
+    : outline_(outline), display_(display) {
+  load(bundle);
 }
 
 void Controls::apply(const UserAct& act) {
   constexpr float kStep = 1.1f;  // a key press resizes by 10 %; set by hand
   constexpr float kMost = 20;    // and by so much at most
+  constexpr float kVolume = 0.1f;
   switch (act.act) {
     case Act::kQuit:
       // While corners are taken, it means that none are wanted.
@@ -62,6 +60,18 @@ void Controls::apply(const UserAct& act) {
       frozen_ = !frozen_;
       corner_count_ = 0;
       break;
+    case Act::kSound:
+      sound_ = true;
+      break;
+    case Act::kCaptions:
+      captions_ = !captions_;
+      break;
+    case Act::kLouder:
+      volume_ = std::min(1.0f, volume_ + kVolume);
+      break;
+    case Act::kQuieter:
+      volume_ = std::max(0.0f, volume_ - kVolume);
+      break;
     case Act::kClick:
       if (frozen_ && corner_count_ < corners_.size()) corners_[corner_count_++] = act.at;
       if (!frozen_ && tap_count_ < taps_.size()) taps_[tap_count_++] = act.at;
@@ -72,6 +82,8 @@ void Controls::apply(const UserAct& act) {
 void Controls::load(const BundleView& bundle) {
   bundle_ = bundle;
   machine_ = std::make_unique<ActionMachine>(bundle);
+  // Each pattern, what was tapped, and each node that ends.
+  events_.reserve(bundle.patterns().size() + taps_.size() + bundle.nodes().size());
   if (model_ != kNone && model_ >= bundle.models().size()) model_ = kNone;
   if (only_pattern_ != kNone && only_pattern_ >= bundle.patterns().size()) only_pattern_ = kNone;
 }
@@ -85,24 +97,19 @@ void Controls::turn_model(int step) {
 }
 
 std::span<const SceneCommand> Controls::act(std::span<const Hysteresis::State> states,
-                                            double time_s, std::span<const SceneEvent> taps) {
-  // As many as controls take in a frame, and each pattern.
-  events_.resize(taps_.size() + states.size());
-  std::size_t count = 0;
-  for (const SceneEvent& tap : taps.first(std::min(taps.size(), taps_.size()))) {
-    events_[count++] = tap;
-  }
+                                            double time_s, std::span<const SceneEvent> events) {
+  events_.assign(events.begin(), events.end());
   for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
     if (!wants(pattern) || !states[pattern].shown) continue;
-    events_[count++] = {SceneEvent::Kind::kSeen, pattern, kNone};
+    events_.push_back({SceneEvent::Kind::kSeen, pattern, kNone});
   }
-  return machine_->step(time_s, {events_.data(), count});
+  return machine_->step(time_s, events_);
 }
 
 std::span<const SceneCommand> Controls::collect(std::span<const Hysteresis::State> states,
-                                                double time_s, std::span<const SceneEvent> taps,
+                                                double time_s, std::span<const SceneEvent> events,
                                                 std::vector<DrawItem>& items) {
-  const auto commands = act(states, time_s, taps);
+  const auto commands = act(states, time_s, events);
   items.clear();
   if (model_ != kNone) {
     for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -26,7 +27,11 @@ enum class Act : std::uint8_t {
   kDisplay,  ///< the on-screen display, on or off
   kOutline,  ///< outlines of patterns, on or off
   kPause,
-  kFreeze,  ///< hold the frame and take four corners of a new pattern
+  kFreeze,    ///< hold the frame and take four corners of a new pattern
+  kSound,     ///< of videos and sounds, on or off
+  kCaptions,  ///< on or off
+  kLouder,
+  kQuieter,
   kClick,
 };
 
@@ -45,11 +50,11 @@ class Controls {
   void load(const BundleView& bundle);
 
   /// What to draw: each shown pattern's scenes and nodes, as its actions have left them, or the
-  /// model that the user chose for it. states: one a pattern, as Hysteresis answers. items: those
-  /// of the frame before, on which clicks fall. Answers what the actions ask for. Allocates nothing
-  /// once `items` has its room.
+  /// model that the user chose for it. events: taps, and what ended. states: one a pattern, as
+  /// Hysteresis answers. items: those of the frame before, on which clicks fall. Answers what the
+  /// actions ask for. Allocates nothing once `items` has its room.
   std::span<const SceneCommand> collect(std::span<const Hysteresis::State> states, double time_s,
-                                        std::span<const SceneEvent> taps,
+                                        std::span<const SceneEvent> events,
                                         std::vector<DrawItem>& items);
   /// Clicks since the last call, picture pixels; they live until the next one that is applied.
   std::span<const glm::dvec2> take_taps();
@@ -64,6 +69,10 @@ class Controls {
   [[nodiscard]] bool quit() const { return quit_; }
   [[nodiscard]] bool outline() const { return outline_; }
   [[nodiscard]] bool display() const { return display_; }
+  [[nodiscard]] bool captions() const { return captions_; }
+  [[nodiscard]] float volume() const { return volume_; }  ///< 0 to 1
+  /// True once after the user asked for sound, or for none.
+  bool take_sound() { return std::exchange(sound_, false); }
   /// The picture stands still: paused, or frozen for corners.
   [[nodiscard]] bool holds() const { return paused_ || frozen_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
@@ -79,7 +88,7 @@ class Controls {
                     std::vector<DrawItem>& items) const;
 
   std::span<const SceneCommand> act(std::span<const Hysteresis::State> states, double time_s,
-                                    std::span<const SceneEvent> taps);
+                                    std::span<const SceneEvent> events);
 
   BundleView bundle_;
   std::unique_ptr<ActionMachine> machine_;
@@ -89,6 +98,9 @@ class Controls {
   bool quit_ = false;
   bool outline_;
   bool display_;
+  bool captions_ = true;
+  bool sound_ = false;
+  float volume_ = 1;
   bool paused_ = false;
   bool frozen_ = false;
   std::uint32_t model_ = kNone;         ///< kNone: as the scenes say

@@ -1,5 +1,6 @@
 // The library that is loaded for pictures and videos: OpenCV and FFmpeg, which throw: caught here.
 #include <dirent.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "desk_media.hpp"
+#include "desk_sound_reader.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/video_reader.hpp"
@@ -134,6 +136,115 @@ Result<std::unique_ptr<FrameSource>> open_folder(const std::string& folder) {
                 "give one with PNG, JPEG, BMP, PPM, TIFF or WebP files");
   }
   return std::make_unique<PictureSource>(std::move(paths));
+}
+
+/// Bytes under a path, as OpenCV wants them.
+class MemoryFile {
+ public:
+  explicit MemoryFile(std::span<const std::byte> bytes)
+      : descriptor_(memfd_create("clip", MFD_CLOEXEC)) {
+    while (!bytes.empty()) {
+      const ssize_t written = write(descriptor_, bytes.data(), bytes.size());
+      if (written <= 0) return;
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    }
+    whole_ = true;
+  }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  ~MemoryFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  [[nodiscard]] bool whole() const { return whole_; }
+  [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+ private:
+  int descriptor_;
+  bool whole_ = false;
+};
+
+class VideoClip final : public ClipReader {
+ public:
+  VideoClip(std::span<const std::byte> file, std::string name)
+      : file_(file), name_(std::move(name)) {}
+
+  Result<void> open() {
+    if (!file_.whole()) {
+      return fail(ExitCode::kIo, "input.open", name_, "there is no memory for the video",
+                  "free some");
+    }
+    MODAR_TRY(restart());
+    MODAR_ASSIGN(const bool any, decode());
+    return any ? Result<void>() : damaged(name_, "the video has no picture");
+  }
+
+  Result<bool> seek(double seconds) override {
+    // Times of files are rounded: a picture whose time comes within this begins now, seconds.
+    constexpr double kSlack = 1e-4;
+    const bool back = pictures_ > 0 && seconds + kSlack < begins_;
+    if (back) {
+      MODAR_TRY(restart());
+      MODAR_TRY(decode());
+    }
+    bool another = back || pictures_ == 0;
+    while (more_ && next_begins_ <= seconds + kSlack) {
+      show_next();
+      another = true;
+      MODAR_TRY(decode());
+    }
+    if (pictures_ > 0) return another;
+    show_next();  // what begins later than the file stands for it until then
+    MODAR_TRY(decode());
+    return true;
+  }
+
+  [[nodiscard]] RgbImage picture() const override {
+    return {shown_.data, shown_.cols, shown_.rows, static_cast<std::ptrdiff_t>(shown_.step[0])};
+  }
+
+ private:
+  Result<void> restart() {
+    MODAR_ASSIGN(VideoReader reader, VideoReader::open_file(file_.path()));
+    reader_ = std::make_unique<VideoReader>(std::move(reader));
+    pictures_ = 0;
+    return {};
+  }
+
+  /// The picture after the shown one, for its time.
+  Result<bool> decode() {
+    MODAR_ASSIGN(more_, reader_->next());
+    if (more_) next_begins_ = reader_->time_s();
+    return more_;
+  }
+
+  void show_next() {
+    const BgrPicture picture = reader_->picture();
+    const cv::Mat bgr(picture.height, picture.width, CV_8UC3,
+                      const_cast<std::uint8_t*>(picture.pixels), picture.stride);
+    cv::cvtColor(bgr, shown_, cv::COLOR_BGR2RGB);
+    begins_ = next_begins_;
+    ++pictures_;
+  }
+
+  MemoryFile file_;
+  std::string name_;
+  std::unique_ptr<VideoReader> reader_;
+  cv::Mat shown_;
+  std::uint64_t pictures_ = 0;  ///< shown since the file began
+  double begins_ = 0;           ///< the shown one, seconds
+  double next_begins_ = 0;
+  bool more_ = false;
+};
+
+Result<std::unique_ptr<ClipReader>> open_clip(std::span<const std::byte> file,
+                                              const std::string& name) {
+  try {
+    auto clip = std::make_unique<VideoClip>(file, name);
+    MODAR_TRY(clip->open());
+    return clip;
+  } catch (const std::exception& error) {
+    return damaged(name, std::string("OpenCV: ") + error.what());
+  }
 }
 
 Result<std::unique_ptr<FrameSource>> open_camera(int number, const std::string& name) {
@@ -270,7 +381,7 @@ Result<std::vector<std::uint8_t>> encode_png(const std::uint8_t* pixels, int wid
 }  // namespace modar
 
 extern "C" const modar::Media* modar_media() {
-  static const modar::Media media = {modar::open_path, modar::open_camera, modar::open_movie,
-                                     modar::encode_png};
+  static const modar::Media media = {modar::open_path,  modar::open_camera, modar::open_movie,
+                                     modar::encode_png, modar::open_clip,   modar::open_sound};
   return &media;
 }

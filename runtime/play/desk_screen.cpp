@@ -77,6 +77,18 @@ bool act_of(SDL_Keycode key, Act& act) {
     case SDLK_f:
       act = Act::kFreeze;
       return true;
+    case SDLK_s:
+      act = Act::kSound;
+      return true;
+    case SDLK_c:
+      act = Act::kCaptions;
+      return true;
+    case SDLK_9:
+      act = Act::kQuieter;
+      return true;
+    case SDLK_0:
+      act = Act::kLouder;
+      return true;
     default:
       return false;
   }
@@ -177,6 +189,10 @@ Result<void> Window::renew() {
   if (state_->context == nullptr) return no_window();
   SDL_GL_SetSwapInterval(1);
   return {};
+}
+
+void Window::set_title(const std::string& title) {
+  SDL_SetWindowTitle(state_->window, title.c_str());
 }
 
 void Window::swap() {

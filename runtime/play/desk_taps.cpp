@@ -13,6 +13,18 @@ std::optional<SceneEvent> tap_at(const BundleView& bundle, const Camera& camera,
   return SceneEvent{SceneEvent::Kind::kTap, items[hit->item].node, hit->material};
 }
 
+void log_command(const BundleView& bundle, const SceneCommand& command,
+                 std::vector<std::string>& log) {
+  if (command.command == ActionCommand::kLink) {
+    log.push_back("link " + std::string(bundle.name(bundle.actions()[command.action].address)));
+    return;
+  }
+  const char* verb = command.command == ActionCommand::kPlay    ? "play "
+                     : command.command == ActionCommand::kPause ? "pause "
+                                                                : "text ";
+  log.push_back(verb + std::string(bundle.name(bundle.nodes()[command.node].name)));
+}
+
 void print_command(const BundleView& bundle, const SceneCommand& command) {
   if (command.command == ActionCommand::kLink) {
     const std::string address(bundle.name(bundle.actions()[command.action].address));

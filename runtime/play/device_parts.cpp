@@ -9,6 +9,7 @@
 #include "modar/camera_yml.hpp"
 #include "overlay.hpp"
 #include "raw_source.hpp"
+#include "scene_media.hpp"
 #include "screen.hpp"
 #include "taps.hpp"
 #include "vision.hpp"
@@ -59,6 +60,14 @@ std::optional<SceneEvent> tap_at(const BundleView& /*bundle*/, const Camera& /*c
                                  glm::dvec2 /*pixel*/, std::span<const DrawItem> /*items*/) {
   return std::nullopt;  // there is no window to click into
 }
+
+std::unique_ptr<SceneMedia> open_scene_media(const BundleView& /*bundle*/,
+                                             const SceneMediaSetup& /*setup*/) {
+  return nullptr;
+}
+
+void log_command(const BundleView& /*bundle*/, const SceneCommand& /*command*/,
+                 std::vector<std::string>& /*log*/) {}
 
 void print_command(const BundleView& /*bundle*/, const SceneCommand& /*command*/) {}
 
@@ -123,6 +132,7 @@ int Window::height() const {
 bool Window::take_loss() {
   return false;
 }
+void Window::set_title(const std::string& /*title*/) {}
 Result<void> Window::renew() {
   return left_out("window.unsupported", "--window", "the window");
 }

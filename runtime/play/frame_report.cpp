@@ -207,6 +207,16 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
   writer.String(to_string(report.reason));
   writer.Key("state");
   writer.String(to_string(report.state));
+  if (!report.commands.empty()) {
+    writer.Key("commands");
+    writer.StartArray();
+    for (const std::string& each : report.commands) text(writer, each);
+    writer.EndArray();
+  }
+  if (!report.caption.empty()) {
+    writer.Key("caption");
+    text(writer, report.caption);
+  }
   camera(writer, report.camera);
   times(writer, report.ms);
   writer.EndObject();

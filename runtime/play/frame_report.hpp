@@ -54,6 +54,8 @@ struct FrameReport {
   Shown state = Shown::kHidden;
   CameraReport camera;
   StageTimes ms{};
+  std::vector<std::string> commands;  ///< what the bundle's actions asked for: log_command()
+  std::string_view caption;           ///< what is heard; lives as long as the frame's step
 
   double& at(Stage stage) { return ms[static_cast<std::size_t>(stage)]; }
   [[nodiscard]] double at(Stage stage) const { return ms[static_cast<std::size_t>(stage)]; }
@@ -107,6 +109,7 @@ bool draws_in_software(std::string_view gl_renderer);
 
 /// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches,fit,agreeing,
 /// likeness}],reason,state,camera:{focal_px,sigma_px,source},ms}; sigma_px of an estimated camera;
+/// commands where the bundle's actions ask for some, caption where something is heard;
 /// of an extended pose also extended, position_sigma, rotation_sigma. Rotation row by row; numbers
 /// that are not finite become null. No newline at the end. pattern_names: by the bundle's pattern
 /// index. homographies: adds each pattern's `homography`, row by row, from its unit square (0, 0

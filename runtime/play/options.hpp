@@ -42,6 +42,7 @@ struct PlayOptions {
   bool outline = false;
   bool no_light_estimate = false;
   bool osd = false;
+  bool sound = false;  ///< what sounds is heard from the start
   bool quiet = false;
   bool verify = false;  ///< hash the whole bundle before playing it
   bool help = false;

@@ -90,8 +90,14 @@ Result<void> Player::open(const PlayerSetup& setup) {
   setup_ = setup;
   MODAR_ASSIGN(auto screen, Screen::open(bundle_, options_));
   screen_ = std::move(screen);
+  open_media();
   MODAR_TRY(open_sinks());
   return open_logs();
+}
+
+/// What is heard fits only frames that come at their own time.
+void Player::open_media() {
+  media_ = open_scene_media(bundle_, {setup_.source.live || options_.realtime, options_.sound});
 }
 
 Result<void> Player::open_sinks() {
@@ -134,6 +140,7 @@ Result<bool> Player::show(const Job& job) {
   follow_spot(job);
   FrameReport report = begin_report(job);
   const std::int64_t before = now_ns();
+  if (media_) MODAR_TRY(media_->show(*screen_));
   draw(job, report);
   const bool painted = screen_->has_window() && controls_.display();
   if (painted || !sinks_.empty()) screen_->picture();
@@ -178,6 +185,7 @@ Result<void> Player::follow_live(const Job& job) {
   live_ = job.live;
   bundle_ = live_->view;
   controls_.load(bundle_);
+  open_media();
   items_.reserve(
       std::max(bundle_.scenes().size() + bundle_.nodes().size(), bundle_.patterns().size()));
   std::vector<std::string> names = pattern_names(bundle_);
@@ -219,7 +227,7 @@ FrameReport Player::begin_report(const Job& job) {
   if (spot_) {
     controls_.collect_spot(states, items_);
   } else {
-    collect(states, job, report.time_s);
+    collect(states, job, report);
   }
   for (const Hysteresis::State& state : states) {
     if (!state.shown) continue;
@@ -230,17 +238,43 @@ FrameReport Player::begin_report(const Job& job) {
 }
 
 /// What stands on the patterns as the actions have left it; clicks fall on what was drawn before.
-void Player::collect(std::span<const Hysteresis::State> states, const Job& job, double time_s) {
-  taps_.clear();
+void Player::collect(std::span<const Hysteresis::State> states, const Job& job,
+                     FrameReport& report) {
+  events_.clear();
   for (const glm::dvec2 click : controls_.take_taps()) {
     const auto tap = tap_at(bundle_, job.camera, click, items_);
-    if (tap) taps_.push_back(*tap);
+    if (tap) events_.push_back(*tap);
   }
-  for (const SceneCommand& command : controls_.collect(states, time_s, taps_, items_)) {
-    if (options_.quiet) break;
+  if (media_) {
+    const auto ended = media_->advance(report.time_s);
+    events_.insert(events_.end(), ended.begin(), ended.end());
+  }
+  const auto commands = controls_.collect(states, report.time_s, events_, items_);
+  for (const SceneCommand& command : commands) {
+    log_command(bundle_, command, report.commands);
+    if (options_.quiet) continue;
     progress_.end();
     print_command(bundle_, command);
   }
+  if (media_) play_media(commands, report);
+}
+
+/// A caption is printed when it begins, stands in the window's title while it is heard, and in the
+/// frame's line.
+void Player::play_media(std::span<const SceneCommand> commands, FrameReport& report) {
+  const bool tapped = std::any_of(events_.begin(), events_.end(), [](const SceneEvent& event) {
+    return event.kind == SceneEvent::Kind::kTap;
+  });
+  if (controls_.take_sound()) media_->set_sound(!media_->sound());
+  media_->set_volume(controls_.volume());
+  media_->obey(commands, tapped);
+  report.caption = controls_.captions() ? media_->caption() : std::string_view();
+  if (report.caption == caption_) return;
+  caption_ = report.caption;
+  screen_->set_title(caption_.empty() ? "modar-play" : caption_);
+  if (options_.quiet || caption_.empty()) return;
+  progress_.end();
+  std::fprintf(stderr, "modar-play: %s\n", caption_.c_str());
 }
 
 /// A flat pattern's four corners, or the border of what is curved.
@@ -333,6 +367,8 @@ bool Player::idle() {
 /// Stays with one frame while the user pauses or clicks corners; the window answers meanwhile.
 Result<void> Player::hold(const Job& job) {
   constexpr std::chrono::milliseconds kLook(20);
+  if (!controls_.holds()) return {};
+  if (media_) media_->hold(true);
   while (controls_.holds() && !controls_.quit() && !was_interrupted()) {
     if (controls_.frozen()) {
       MODAR_TRY(show_frozen(job));
@@ -341,6 +377,7 @@ Result<void> Player::hold(const Job& job) {
     std::array<glm::dvec2, 4> corners{};
     if (controls_.take_corners(corners)) make_pattern(job, corners);
   }
+  if (media_) media_->hold(false);
   return {};
 }
 

@@ -17,6 +17,7 @@
 #include "overlay.hpp"
 #include "pipeline.hpp"
 #include "recording.hpp"
+#include "scene_media.hpp"
 #include "screen.hpp"
 #include "spot_pattern.hpp"
 
@@ -71,7 +72,9 @@ class Player {
   Result<void> open_logs();
   FrameReport begin_report(const Job& job);
   void follow_spot(const Job& job);
-  void collect(std::span<const Hysteresis::State> states, const Job& job, double time_s);
+  void collect(std::span<const Hysteresis::State> states, const Job& job, FrameReport& report);
+  void open_media();
+  void play_media(std::span<const SceneCommand> commands, FrameReport& report);
   void outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                Colour colour) const;
   void draw(const Job& job, const FrameReport& report);
@@ -96,11 +99,13 @@ class Player {
   PoseSmoother smoother_;
   std::vector<Detection> drawn_;  ///< what is seen, at smoothed poses
   Controls controls_;
-  std::vector<SceneEvent> taps_;
+  std::vector<SceneEvent> events_;  ///< taps, and what ended
   Progress progress_;
   RateMeter rate_;
   RunStats stats_;
   std::unique_ptr<Screen> screen_;
+  std::unique_ptr<SceneMedia> media_;  ///< null: the bundle has none, or this build plays none
+  std::string caption_;                ///< as it was told last
   std::vector<std::unique_ptr<FrameSink>> sinks_;
   std::unique_ptr<Recorder> recorder_;
   std::optional<GoldenCheck> golden_;

@@ -1,6 +1,10 @@
 // Opens the context, draws, reads back.
 #include "screen.hpp"
 
+#include <algorithm>
+
+#include <GLES2/gl2.h>
+
 namespace modar {
 namespace {
 
@@ -38,6 +42,8 @@ Result<void> Screen::load(const BundleView& bundle) {
   if (width_ > 0) MODAR_TRY(renderer->resize(width_, height_));
   renderer_ = std::move(renderer);
   bundle_ = bundle;
+  for (const Video& video : videos_) glDeleteTextures(1, &video.texture);
+  videos_.clear();
   return {};
 }
 
@@ -56,6 +62,7 @@ Result<void> Screen::resize(int width, int height) {
     MODAR_TRY(window_->renew());
     MODAR_TRY(read_caps());
     MODAR_TRY(renderer_->restore(caps_));
+    videos_.clear();
   }
   if (width == width_ && height == height_) return {};
   MODAR_TRY(renderer_->resize(width, height));
@@ -75,6 +82,37 @@ void Screen::draw(const CameraPicture& background, const Camera& camera,
   }
   renderer_->render(background, projection, items);
   stats_ = renderer_->stats();
+}
+
+bool Screen::has_video(std::uint32_t node) const {
+  return std::any_of(videos_.begin(), videos_.end(),
+                     [node](const Video& video) { return video.node == node; });
+}
+
+void Screen::show_video(std::uint32_t node, const RgbImage& image) {
+  GLint bound = 0;  // the renderer goes on from the state that it left
+  glGetIntegerv(GL_TEXTURE_BINDING_2D, &bound);
+  auto video = std::find_if(videos_.begin(), videos_.end(),
+                            [node](const Video& each) { return each.node == node; });
+  if (video == videos_.end()) {
+    video = videos_.insert(videos_.end(), Video{node, 0});
+    glGenTextures(1, &video->texture);
+    glBindTexture(GL_TEXTURE_2D, video->texture);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    renderer_->set_video(node, video->texture);
+  }
+  glBindTexture(GL_TEXTURE_2D, video->texture);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB, image.width, image.height, 0, GL_RGB, GL_UNSIGNED_BYTE,
+               image.pixels);
+  glBindTexture(GL_TEXTURE_2D, static_cast<GLuint>(bound));
+}
+
+void Screen::set_title(const std::string& title) {
+  if (window_) window_->set_title(title);
 }
 
 RgbaView Screen::picture() {

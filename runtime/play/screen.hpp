@@ -45,6 +45,7 @@ class Window {
   Result<void> renew();
   /// Brings what was drawn to the display.
   void swap();
+  void set_title(const std::string& title);
 
  private:
   struct State;
@@ -71,6 +72,10 @@ class Screen {
   void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items);
   /// The same over the canvas as it was painted on.
   void draw_on_canvas(const Camera& camera, std::span<const DrawItem> items);
+  /// What a video's node shows from now on, instead of its poster. The pixels are copied.
+  void show_video(std::uint32_t node, const RgbImage& image);
+  /// False before the first picture, and after the context that had it is gone.
+  [[nodiscard]] bool has_video(std::uint32_t node) const;
   /// Reads the picture back. The canvas of the same pixels may be painted on.
   RgbaView picture();
   Canvas canvas();
@@ -79,6 +84,8 @@ class Screen {
   void present();
   void present_canvas();
   [[nodiscard]] bool has_window() const { return window_ != nullptr; }
+  /// The window's title. Nothing without one.
+  void set_title(const std::string& title);
   /// Nothing without a window.
   std::span<const UserAct> acts(std::chrono::milliseconds limit);
 
@@ -101,6 +108,12 @@ class Screen {
   RenderStats stats_;
   std::vector<std::uint8_t> rgba_;
   std::vector<std::uint8_t> rgb_;  ///< of the canvas, on its way to the window
+  /// Of a video's node.
+  struct Video {
+    std::uint32_t node = 0;
+    unsigned texture = 0;
+  };
+  std::vector<Video> videos_;
   int width_ = 0;
   int height_ = 0;
 };

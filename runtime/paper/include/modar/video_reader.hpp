@@ -35,6 +35,8 @@ class VideoReader {
   /// Decodes the next frame. False at the end. Errors: kInvalidInput "input.damaged" where not even
   /// one frame can be decoded, or a camera stops.
   Result<bool> next();
+  /// When the frame is shown, seconds from the first one's time on a file's own clock.
+  [[nodiscard]] double time_s() const;
   /// The frame, valid until the following next().
   [[nodiscard]] BgrPicture picture() const;
   /// The same frame in gray.
