@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -314,16 +313,27 @@ void apply(const Gesture& gesture, float place[16]) {
   }
 }
 
-/// Runs the bundle's actions. What they ask for beside what is drawn, this app does not do yet.
-void act(Session& session, const float* poses) {
+/// Runs the bundle's actions; answers how many commands they give.
+std::size_t act(Session& session, double time_s, const float* poses) {
   for (std::uint32_t p = 0; p < modar_pattern_count(session.bundle); ++p) {
     if (poses[p * kPoseFloats + 1] == 0) continue;
     session.events.push_back(modar::sized<modar_event>());
     session.events.back().subject = p;
   }
-  const std::chrono::duration<double> now = std::chrono::steady_clock::now().time_since_epoch();
-  modar_actions_step(session.actions, now.count(), session.events.data(), session.events.size());
+  const std::size_t commands =
+      modar_actions_step(session.actions, time_s, session.events.data(), session.events.size());
   session.events.clear();
+  return commands;
+}
+
+/// A text by strlcpy's contract, or null. copy(text, size): answers its length.
+template <class Copy>
+jstring text_or_null(JNIEnv* env, const Copy& copy) {
+  const std::size_t size = copy(nullptr, std::size_t{0});
+  if (size == 0) return nullptr;
+  std::string text(size + 1, '\0');
+  copy(text.data(), text.size());
+  return java_text(env, text.c_str());
 }
 
 /// Of a view, which has the stretch in it.
@@ -374,7 +384,6 @@ void draw_items(Session& session, const modar_surface& surface, const modar_came
 }
 
 void draw(Session& session, const modar_picture* picture, const float* poses) {
-  act(session, poses);
   place_items(session, poses);
   draw_items(session, session.surface, session.camera, picture);
 }
@@ -392,7 +401,6 @@ void draw_orbit(Session& session, std::uint32_t pattern, double turn, double til
   poses[pattern * kPoseFloats + 1] = 1;
   modar_view(&pose, poses.data() + pattern * kPoseFloats + kView);
   const Gesture before = std::exchange(session.gesture, {});  // of the camera's view
-  act(session, poses.data());
   place_items(session, poses.data());
   session.gesture = before;
   draw_items(session, surface, camera, nullptr);
@@ -499,12 +507,9 @@ MODAR_NATIVE(jstring, patternText)
   if (!session || pattern < 0) return nullptr;
   const auto index = static_cast<std::uint32_t>(pattern);
   const int kind = alternative != 0 ? MODAR_ALT_TEXT : MODAR_TEXT;
-  const std::size_t size =
-      modar_pattern_text(session->bundle, index, kind, tag.c_str(), nullptr, 0);
-  if (size == 0) return nullptr;
-  std::string text(size + 1, '\0');
-  modar_pattern_text(session->bundle, index, kind, tag.c_str(), text.data(), text.size());
-  return java_text(env, text.c_str());
+  return text_or_null(env, [&](char* text, std::size_t size) {
+    return modar_pattern_text(session->bundle, index, kind, tag.c_str(), text, size);
+  });
 }
 
 MODAR_NATIVE(void, setCamera)
@@ -631,7 +636,9 @@ MODAR_NATIVE(void, onSurfaceCreated)
   if (session->renderer == nullptr) return throw_error(env, error);
   auto options = modar::sized<modar_render_options>();
   modar_render_options_default(&options);
-  options.exclusive = 1;  // GLSurfaceView's context is the app's alone
+  // GLSurfaceView's context is the app's alone; pictures of videos are copied in it.
+  auto media = modar::sized<modar_media>();
+  options.exclusive = modar_media_at(session->bundle, 0, &media) != 0 ? 0 : 1;
   modar_renderer_set_options(session->renderer, &options);
 }
 
@@ -723,6 +730,111 @@ MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) 
     session->events.push_back({sizeof(modar_event), MODAR_TAP, item.node - 1, hit.material});
   }
   return static_cast<jint>(item.model);
+}
+
+MODAR_NATIVE(jintArray, act)
+(JNIEnv* env, jclass, jlong number, jdouble time_s, jobject poses) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return nullptr;
+  const float* const from = pose_floats(env, *session, poses);
+  if (from == nullptr) return nullptr;
+  const std::size_t count = act(*session, time_s, from);
+  if (count == 0) return nullptr;
+  std::vector<jint> words;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto command = modar::sized<modar_command>();
+    modar_actions_command(session->actions, i, &command);
+    for (const std::uint32_t word :
+         {static_cast<std::uint32_t>(command.kind), command.node, command.action}) {
+      words.push_back(static_cast<jint>(word));
+    }
+  }
+  const auto size = static_cast<jsize>(words.size());
+  const jintArray commands = env->NewIntArray(size);
+  if (commands != nullptr) env->SetIntArrayRegion(commands, 0, size, words.data());
+  return commands;
+}
+
+MODAR_NATIVE(void, ended)(JNIEnv* env, jclass, jlong number, jint node) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  session->events.push_back(
+      {sizeof(modar_event), MODAR_ENDED, static_cast<std::uint32_t>(node), 0});
+}
+
+MODAR_NATIVE(void, resetActions)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  session->events.clear();
+  modar_actions_reset(session->actions);
+}
+
+MODAR_NATIVE(jintArray, node)(JNIEnv* env, jclass, jlong number, jint index) {
+  const Use session(env, number, &Session::tracking);
+  auto node = modar::sized<modar_node>();
+  if (!session || modar_node_at(session->bundle, static_cast<std::uint32_t>(index), &node) == 0) {
+    return nullptr;
+  }
+  auto media = modar::sized<modar_media>();
+  if (node.media != 0) modar_media_at(session->bundle, node.media - 1, &media);
+  const std::array<jint, 6> words = {node.kind,    static_cast<jint>(node.pattern),
+                                     node.loops,   media.width,
+                                     media.height, media.sound};
+  const jintArray array = env->NewIntArray(static_cast<jsize>(words.size()));
+  if (array != nullptr) {
+    env->SetIntArrayRegion(array, 0, static_cast<jsize>(words.size()), words.data());
+  }
+  return array;
+}
+
+MODAR_NATIVE(jobject, media)(JNIEnv* env, jclass, jlong number, jint index) {
+  const Use session(env, number, &Session::tracking);
+  auto node = modar::sized<modar_node>();
+  auto media = modar::sized<modar_media>();
+  if (!session || modar_node_at(session->bundle, static_cast<std::uint32_t>(index), &node) == 0 ||
+      node.media == 0 || modar_media_at(session->bundle, node.media - 1, &media) == 0) {
+    return nullptr;
+  }
+  // Java's buffers know no constants; what gets this one reads it.
+  return env->NewDirectByteBuffer(const_cast<std::uint8_t*>(media.bytes),
+                                  static_cast<jlong>(media.byte_count));
+}
+
+MODAR_NATIVE(jstring, nodeText)
+(JNIEnv* env, jclass, jlong number, jint index, jboolean title, jstring language) {
+  const std::string tag = text_of(env, language);
+  const Use session(env, number, &Session::tracking);
+  if (!session) return nullptr;
+  return text_or_null(env, [&](char* text, std::size_t size) {
+    return modar_node_text(session->bundle, static_cast<std::uint32_t>(index),
+                           title != 0 ? MODAR_TITLE : MODAR_TEXT, tag.c_str(), text, size);
+  });
+}
+
+MODAR_NATIVE(jstring, caption)
+(JNIEnv* env, jclass, jlong number, jint index, jstring language, jdouble seconds) {
+  const std::string tag = text_of(env, language);
+  const Use session(env, number, &Session::tracking);
+  if (!session) return nullptr;
+  return text_or_null(env, [&](char* text, std::size_t size) {
+    return modar_node_caption(session->bundle, static_cast<std::uint32_t>(index), tag.c_str(),
+                              seconds, text, size);
+  });
+}
+
+MODAR_NATIVE(jstring, address)(JNIEnv* env, jclass, jlong number, jint action) {
+  const Use session(env, number, &Session::tracking);
+  if (!session) return nullptr;
+  return text_or_null(env, [&](char* text, std::size_t size) {
+    return modar_action_address(session->bundle, static_cast<std::uint32_t>(action), text, size);
+  });
+}
+
+MODAR_NATIVE(void, setVideo)(JNIEnv* env, jclass, jlong number, jint node, jint texture) {
+  const Use session(env, number, &Session::drawing);
+  if (!session || session->renderer == nullptr) return;
+  modar_renderer_set_video(session->renderer, static_cast<std::uint32_t>(node),
+                           static_cast<std::uint32_t>(texture));
 }
 
 MODAR_NATIVE(jlong, gpuBytes)(JNIEnv* env, jclass, jlong number) {

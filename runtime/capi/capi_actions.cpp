@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "formats/captions.hpp"
 #include "formats/meta_text.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
@@ -101,9 +102,10 @@ size_t modar_node_mark(const modar_bundle* bundle, uint32_t index, char* text, s
   return modar::copy_name(bundle->view.name(bundle->view.nodes()[index].mark), text, size);
 }
 
-size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind, const char* language,
-                       char* text, size_t size) {
-  if (index >= modar_node_count(bundle) || language == nullptr) return 0;
+namespace {
+
+/// Of a node that exists; empty: it has none.
+std::string words_of(const modar_bundle* bundle, uint32_t index, int kind, const char* language) {
   const modar::NodeRecord& node = bundle->view.nodes()[index];
   const std::string_view pattern = bundle->view.name(bundle->view.patterns()[node.pattern].name);
   const std::string_view name = bundle->view.name(node.name);
@@ -114,6 +116,24 @@ size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind, con
       words = each.words;
     }
   });
+  return words;
+}
+
+}  // namespace
+
+size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind, const char* language,
+                       char* text, size_t size) {
+  if (index >= modar_node_count(bundle) || language == nullptr) return 0;
+  const std::string words = words_of(bundle, index, kind, language);
+  return words.empty() ? 0 : modar::copy_name(words, text, size);
+}
+
+size_t modar_node_caption(const modar_bundle* bundle, uint32_t index, const char* language,
+                          double seconds, char* text, size_t size) {
+  if (index >= modar_node_count(bundle) || language == nullptr) return 0;
+  const std::string captions = words_of(bundle, index, MODAR_CAPTIONS, language);
+  const std::string words =
+      seconds < 0 ? modar::transcript(captions) : modar::words_at(captions, seconds);
   return words.empty() ? 0 : modar::copy_name(words, text, size);
 }
 

@@ -10,13 +10,14 @@ import tempfile
 import unittest
 
 from machine import (APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest, bake_with_texts, compile_java, have, make_clip,
-                     make_covered_clip, make_long_clip, run_java, write_fakes)
+                     make_covered_clip, make_long_clip, nv21_of, run_java, write_fakes)
 
+from film_project import FILM_FPS, FILM_FRAMES, bake_film, make_frames  # noqa: E402
 from programs import COVERED, READINGS, SEEN, TURNED, TURNS, write_turns  # noqa: E402
 
-BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope"]
+BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope", "Media", "VideoCopy"]
 SENSORS = ["hardware/Sensor", "hardware/SensorEvent", "hardware/SensorEventListener", "hardware/SensorManager", "os/Handler",
-           "os/Looper", "os/Message"]
+           "os/Looper", "os/Message", "media/MediaPlayer", "graphics/SurfaceTexture", "view/Surface", "opengl/GLES20", "opengl/GLES11Ext"]
 FLOATS = 40
 
 
@@ -141,6 +142,28 @@ class Bridge(ProgramTest):
                 rgb[channel::3] = upright[channel::4]
             wanted = decoded[i * WIDTH * HEIGHT * 3:(i + 1) * WIDTH * HEIGHT * 3]
             self.assertEqual(rgb, wanted, f"frame {i}: off by {max(abs(a - b) for a, b in zip(rgb, wanted))}")
+
+    def test_scenes_act_as_the_players_do(self):
+        bundle, frames, work = bake_film(self), make_frames(self.folder), self.folder / "work"
+        work.mkdir()
+        clip = nv21_of(frames)
+        lines = [json.loads(line) for line in self.bridge("acts", bundle, work, int(1000 * FILM_FRAMES / FILM_FPS), clip=clip).splitlines()]
+        wanted = [json.loads(line) for line in self.play(bundle, "--json", "--quiet", clip=clip).stdout.splitlines()][:-1]
+        self.assertEqual(len(lines), len(wanted))
+        words, numbers = {"play": 1, "pause": 2, "text": 6, "link": 7}, {"play": 0, "pause": 0, "text": 1, "link": -1}
+        told, coloured = 0, 0
+        for line, player in zip(lines, wanted):
+            verbs = [each.split(" ")[0] for each in player.get("commands", [])]
+            self.assertEqual(line["commands"], [[words[verb], numbers[verb]] for verb in verbs], line)
+            self.assertEqual(line["told"].split(), [{"play": "start"}.get(verb, verb) for verb in verbs if verb in ("play", "pause")], line)
+            self.assertEqual(line["caption"], player.get("caption", ""), line)
+            told += len(verbs)
+            if line["at"] > 0 and "pixel" in line:
+                for got, colour in zip(line["pixel"], (int(line["at"] / 10), 200, 60)):
+                    self.assertAlmostEqual(got, colour, delta=2, msg=line)
+                coloured += 1
+        self.assertEqual(told, 6)
+        self.assertGreater(coloured, 10)
 
     def test_texts_are_the_projects(self):
         told = [bytes.fromhex(line).decode("utf-16-be") for line in self.bridge("texts", bake_with_texts(self, "texts.modar")).split()]

@@ -2,6 +2,7 @@
 // the player draws into, too: Mesa rounds otherwise in a pbuffer, whose rows go the other way.
 #include <array>
 #include <cstdlib>
+#include <string>
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
@@ -76,4 +77,134 @@ FAKE_GL(void, clear)(JNIEnv*, jclass, jfloat gray) {
 
 FAKE_GL(jstring, string)(JNIEnv* env, jclass, jint name) {
   return env->NewStringUTF(reinterpret_cast<const char*>(glGetString(static_cast<GLenum>(name))));
+}
+
+// --- android.opengl.GLES20: what the copy of a video's pictures needs ---
+
+#define GLES20(type, name) extern "C" JNIEXPORT type JNICALL Java_android_opengl_GLES20_##name
+
+namespace {
+
+std::string text_of(JNIEnv* env, jstring text) {
+  const char* letters = env->GetStringUTFChars(text, nullptr);
+  std::string copy(letters);
+  env->ReleaseStringUTFChars(text, letters);
+  return copy;
+}
+
+GLenum word(jint value) {
+  return static_cast<GLenum>(value);
+}
+
+void give(JNIEnv* env, jintArray names, jint offset, GLuint name) {
+  const auto value = static_cast<jint>(name);
+  env->SetIntArrayRegion(names, offset, 1, &value);
+}
+
+}  // namespace
+
+GLES20(jint, glCreateProgram)(JNIEnv*, jclass) {
+  return static_cast<jint>(glCreateProgram());
+}
+GLES20(jint, glCreateShader)(JNIEnv*, jclass, jint kind) {
+  return static_cast<jint>(glCreateShader(word(kind)));
+}
+GLES20(void, source)(JNIEnv* env, jclass, jint shader, jstring text) {
+  const std::string copy = text_of(env, text);
+  const char* letters = copy.c_str();
+  glShaderSource(word(shader), 1, &letters, nullptr);
+}
+GLES20(void, glCompileShader)(JNIEnv*, jclass, jint shader) {
+  glCompileShader(word(shader));
+  GLint good = 0;
+  glGetShaderiv(word(shader), GL_COMPILE_STATUS, &good);
+  if (good == 0) std::abort();
+}
+GLES20(void, glAttachShader)(JNIEnv*, jclass, jint program, jint shader) {
+  glAttachShader(word(program), word(shader));
+}
+GLES20(void, glDeleteShader)(JNIEnv*, jclass, jint shader) {
+  glDeleteShader(word(shader));
+}
+GLES20(void, glBindAttribLocation)(JNIEnv* env, jclass, jint program, jint index, jstring name) {
+  glBindAttribLocation(word(program), word(index), text_of(env, name).c_str());
+}
+GLES20(void, glLinkProgram)(JNIEnv*, jclass, jint program) {
+  glLinkProgram(word(program));
+}
+GLES20(void, glUseProgram)(JNIEnv*, jclass, jint program) {
+  glUseProgram(word(program));
+}
+GLES20(jint, glGetUniformLocation)(JNIEnv* env, jclass, jint program, jstring name) {
+  return glGetUniformLocation(word(program), text_of(env, name).c_str());
+}
+GLES20(void, glUniformMatrix4fv)
+(JNIEnv* env, jclass, jint at, jint count, jboolean turned, jfloatArray values, jint offset) {
+  std::array<jfloat, 16> matrix{};
+  env->GetFloatArrayRegion(values, offset, 16, matrix.data());
+  glUniformMatrix4fv(at, count, turned, matrix.data());
+}
+GLES20(void, glGenTextures)(JNIEnv* env, jclass, jint, jintArray names, jint offset) {
+  GLuint name = 0;
+  glGenTextures(1, &name);
+  give(env, names, offset, name);
+}
+GLES20(void, glGenFramebuffers)(JNIEnv* env, jclass, jint, jintArray names, jint offset) {
+  GLuint name = 0;
+  glGenFramebuffers(1, &name);
+  give(env, names, offset, name);
+}
+GLES20(void, glBindTexture)(JNIEnv*, jclass, jint target, jint name) {
+  glBindTexture(word(target), word(name));
+}
+GLES20(void, glTexParameteri)(JNIEnv*, jclass, jint target, jint name, jint value) {
+  glTexParameteri(word(target), word(name), value);
+}
+GLES20(void, glTexImage2D)
+(JNIEnv* env, jclass, jint target, jint level, jint inside, jint width, jint height, jint border,
+ jint format, jint type, jobject pixels) {
+  const void* bytes = pixels == nullptr ? nullptr : env->GetDirectBufferAddress(pixels);
+  glTexImage2D(word(target), level, inside, width, height, border, word(format), word(type), bytes);
+}
+GLES20(void, glGetIntegerv)(JNIEnv* env, jclass, jint name, jintArray values, jint offset) {
+  GLint value = 0;
+  glGetIntegerv(word(name), &value);
+  give(env, values, offset, word(value));
+}
+GLES20(void, glBindFramebuffer)(JNIEnv*, jclass, jint target, jint name) {
+  glBindFramebuffer(word(target), word(name));
+}
+GLES20(void, glFramebufferTexture2D)
+(JNIEnv*, jclass, jint target, jint at, jint kind, jint texture, jint level) {
+  glFramebufferTexture2D(word(target), word(at), word(kind), word(texture), level);
+}
+GLES20(void, glViewport)(JNIEnv*, jclass, jint x, jint y, jint width, jint height) {
+  glViewport(x, y, width, height);
+}
+GLES20(void, glDisable)(JNIEnv*, jclass, jint what) {
+  glDisable(word(what));
+}
+GLES20(void, glColorMask)(JNIEnv*, jclass, jboolean r, jboolean g, jboolean b, jboolean a) {
+  glColorMask(r, g, b, a);
+}
+GLES20(void, glActiveTexture)(JNIEnv*, jclass, jint unit) {
+  glActiveTexture(word(unit));
+}
+GLES20(void, glBindBuffer)(JNIEnv*, jclass, jint target, jint name) {
+  glBindBuffer(word(target), word(name));
+}
+GLES20(void, glEnableVertexAttribArray)(JNIEnv*, jclass, jint index) {
+  glEnableVertexAttribArray(word(index));
+}
+GLES20(void, glDisableVertexAttribArray)(JNIEnv*, jclass, jint index) {
+  glDisableVertexAttribArray(word(index));
+}
+GLES20(void, glVertexAttribPointer)
+(JNIEnv* env, jclass, jint index, jint size, jint type, jboolean normal, jint stride,
+ jobject values) {
+  glVertexAttribPointer(word(index), size, word(type), normal, stride,
+                        env->GetDirectBufferAddress(values));
+}
+GLES20(void, glDrawArrays)(JNIEnv*, jclass, jint mode, jint first, jint count) {
+  glDrawArrays(word(mode), first, count);
 }

@@ -425,6 +425,13 @@ MODAR_EXPERIMENTAL size_t modar_node_mark(const modar_bundle* bundle, uint32_t i
 MODAR_EXPERIMENTAL size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind,
                                           const char* language, char* text, size_t size);
 
+/* What is heard of a node in a language as plain lines: at a time of its video or sound, seconds
+ * (empty: nothing), or with a time below 0 all of it. Copies and returns as modar_pattern_name().
+ */
+MODAR_EXPERIMENTAL size_t modar_node_caption(const modar_bundle* bundle, uint32_t index,
+                                             const char* language, double seconds, char* text,
+                                             size_t size);
+
 /* A file for the app to decode: H.264 baseline and AAC, of a sound AAC alone, in MP4, the index in
  * front. */
 typedef struct modar_media {

@@ -2,10 +2,15 @@ package org.modar;
 
 import android.Manifest;
 import android.app.Activity;
+import android.app.AlertDialog;
 import android.content.ActivityNotFoundException;
+import android.content.DialogInterface;
+import android.content.Intent;
 import android.content.pm.PackageManager;
 import android.content.res.Configuration;
 import android.graphics.Bitmap;
+import android.media.AudioManager;
+import android.net.Uri;
 import android.opengl.GLSurfaceView;
 import android.os.Build;
 import android.os.Bundle;
@@ -37,6 +42,11 @@ public final class MainActivity extends Activity implements Handler.Callback {
     private static final int DAMAGED = 3;
     private static final int FETCHED = 4;
     private static final int SAVED = 5;
+    private static final int TOLD = 6;
+    private static final int ASKED = 7;
+    /** How often captions follow what is heard. */
+    private static final int CAPTION_MS = 100;
+    private static final int CAPTION = 8;
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
@@ -58,6 +68,13 @@ public final class MainActivity extends Activity implements Handler.Callback {
     private long session;
     private String[] patterns = {};
     private Texts texts;
+    /** Null: the bundle plays nothing. */
+    private Media media;
+    /** The words of a label that an action showed, while its pattern is seen. */
+    private String told;
+    private int toldOn;
+    private String heard = "";
+    private TextView caption;
     /** A look without the camera; null: with it. */
     private Orbit orbit;
     /** An error stays on the screen until something works again; null: advice. */
@@ -85,6 +102,8 @@ public final class MainActivity extends Activity implements Handler.Callback {
         status = (TextView) findViewById(R.id.status);
         hint = (ImageView) findViewById(R.id.hint);
         info = findViewById(R.id.info);
+        caption = (TextView) findViewById(R.id.caption);
+        setVolumeControlStream(AudioManager.STREAM_MUSIC);
         label(R.id.picture, "picture");
         label(R.id.share, "share");
         label(R.id.around, "around");
@@ -128,6 +147,16 @@ public final class MainActivity extends Activity implements Handler.Callback {
             case DAMAGED:
                 drop((Bundles.Source) message.obj);
                 break;
+            case TOLD:
+                show(message.arg1);
+                break;
+            case ASKED:
+                askToLeave((String) message.obj);
+                break;
+            case CAPTION:
+                followSound();
+                main.sendEmptyMessageDelayed(CAPTION, CAPTION_MS);
+                break;
             case SAVED:
                 showIf(findViewById(R.id.share), true);
                 notice(words.get("saved"));
@@ -157,12 +186,16 @@ public final class MainActivity extends Activity implements Handler.Callback {
             startCamera();
         }
         main.sendEmptyMessage(TICK);
+        if (media != null) media.hold(false);
+        if (media != null) main.sendEmptyMessage(CAPTION);
     }
 
     @Override
     protected void onPause() {
         resumed = false;
         main.removeMessages(TICK);
+        main.removeMessages(CAPTION);
+        if (media != null) media.hold(true);
         stopCamera();
         view.onPause();
         closeCamera();
@@ -319,7 +352,21 @@ public final class MainActivity extends Activity implements Handler.Callback {
         hint.setImageBitmap(bundles.hint(from));
         diagnostics.bundle = from.name + " (" + from.origin + ")";
         diagnostics.release = Fetch.AVAILABLE ? Fetch.version(bundles.store.getPath()) : "none";
-        stage.show(opened, bundles.lens());
+        media = new Media(opened, getCacheDir(), new Runnable() {
+            @Override
+            public void run() {
+                view.requestRender();
+            }
+        });
+        if (media.isEmpty()) media = null;
+        told = null;
+        showIf(findViewById(R.id.sound), media != null);
+        showIf(findViewById(R.id.pause), media != null);
+        label(R.id.sound, "sound");
+        label(R.id.pause, "pause");
+        main.removeMessages(CAPTION);
+        if (media != null && resumed) main.sendEmptyMessage(CAPTION);
+        stage.show(opened, bundles.lens(), media);
         gestures = new Gestures();
         move();
         from.session = opened;
@@ -349,7 +396,8 @@ public final class MainActivity extends Activity implements Handler.Callback {
         stopCamera();
         closeCamera();
         session = 0;
-        stage.show(0, null);
+        media = null;
+        stage.show(0, null, null);
         showNext();
         if (session == 0) trouble = words.get("bundle", damaged.damage);
         follow();
@@ -432,11 +480,77 @@ public final class MainActivity extends Activity implements Handler.Callback {
         if (text == null) {
             int seen = stage.seen();
             looking = seen < 0;
-            text = looking ? advice() : texts.shown(seen);
+            text = looking ? advice() : shownOn(seen);
             describe(seen);
         }
         say(text);
         showIf(hint, looking);
+    }
+
+    /** A label's words, or the pattern's; and what would be heard there, while nothing is. */
+    private String shownOn(int seen) {
+        if (told != null && toldOn == seen) return told;
+        told = null;
+        String text = texts.shown(seen);
+        try {
+            String all = media == null || texts.language == null || !heard.isEmpty() ? "" : media.transcript(seen, texts.language);
+            return text.isEmpty() || all.isEmpty() ? text + all : text + "\n" + all;
+        } catch (ModarException gone) {
+            return text;
+        }
+    }
+
+    /** Captions are shown whether there is sound or not. */
+    private void followSound() {
+        if (media == null || texts.language == null) return;
+        try {
+            String now = media.caption(texts.language);
+            if (now.equals(heard)) return;
+            heard = now;
+            caption.setText(now);
+            showIf(caption, !now.isEmpty());
+        } catch (ModarException gone) {
+            diagnostics.error(gone.getMessage());
+        }
+    }
+
+    /** From GL's thread: an action shows a label's words. */
+    void tell(int node) {
+        main.obtainMessage(TOLD, node, 0).sendToTarget();
+    }
+
+    private void show(int node) {
+        if (texts.language == null) return;
+        try {
+            String title = Native.nodeText(session, node, true, texts.language);
+            String text = Native.nodeText(session, node, false, texts.language);
+            told = title == null ? text : text == null ? title : title + "\n" + text;
+            toldOn = Native.node(session, node)[Native.PATTERN];
+            follow();
+        } catch (ModarException gone) {
+            diagnostics.error(gone.getMessage());
+        }
+    }
+
+    /** From GL's thread: an action wants to leave the app. */
+    void ask(String address) {
+        main.obtainMessage(ASKED, address).sendToTarget();
+    }
+
+    /** Nothing leaves the app unasked, and only to where connections are encrypted. */
+    private void askToLeave(final String address) {
+        if (address == null || !address.startsWith("https://")) return;
+        new AlertDialog.Builder(this).setMessage(words.get("leave", address)).setNegativeButton(words.get("stay"), null)
+                .setPositiveButton(words.get("open"), new DialogInterface.OnClickListener() {
+            @Override
+            public void onClick(DialogInterface dialog, int which) {
+                try {
+                    startActivity(new Intent(Intent.ACTION_VIEW, Uri.parse(address)));
+                } catch (ActivityNotFoundException none) {
+                    diagnostics.error(none.getMessage());
+                }
+            }
+        }).show();
     }
 
     /** What is seen, for those who do not see it. */
@@ -556,7 +670,9 @@ public final class MainActivity extends Activity implements Handler.Callback {
             return;
         }
         try {
+            told = null;
             int model = session == 0 ? -1 : Native.pick(session, x, y);
+            stage.tapped();
             if (model < 0) return;
             String name = Native.modelName(session, model);
             notice(texts.model(name));
@@ -583,6 +699,14 @@ public final class MainActivity extends Activity implements Handler.Callback {
                 } else {
                     showNext();
                 }
+                break;
+            case R.id.sound:
+                media.setSound(!media.sound());
+                label(R.id.sound, media.sound() ? "silence" : "sound");
+                break;
+            case R.id.pause:
+                media.hold(!media.held());
+                label(R.id.pause, media.held() ? "play" : "pause");
                 break;
             case R.id.update:
                 startUpdate();

@@ -132,6 +132,54 @@ public final class Native {
     /** The model drawn last under a touch (pixels from the surface's top left), or -1; by onDrawOrbit() as well. */
     public static native int pick(long session, float x, float y) throws ModarException;
 
+    // Scenes that act: commands of act().
+    public static final int PLAY = 1;
+    public static final int PAUSE = 2;
+    public static final int TEXT = 6;
+    public static final int LINK = 7;
+    // Words of node(), and two of its kinds.
+    public static final int KIND = 0;
+    public static final int PATTERN = 1;
+    public static final int LOOPS = 2;
+    public static final int WIDTH = 3;
+    public static final int HEIGHT = 4;
+    public static final int HAS_SOUND = 5;
+    public static final int VIDEO = 4;
+    public static final int SOUND = 5;
+
+    /**
+     * Runs the bundle's actions, before a frame is drawn. What was tapped since the last time is what pick() hit.
+     *
+     * @param timeS seconds, rising
+     * @param poses the frame's: what is shown there is on the screen
+     * @return three words a command: what to do, the node, the action; null: nothing
+     */
+    public static native int[] act(long session, double timeS, ByteBuffer poses) throws ModarException;
+
+    /** A video or sound that does not loop came to its end. */
+    public static native void ended(long session, int node) throws ModarException;
+
+    /** Nodes as at the start: before another clock. */
+    public static native void resetActions(long session) throws ModarException;
+
+    /** What stands on a pattern, by index from 0 on: six words; null: no more. */
+    public static native int[] node(long session, int index) throws ModarException;
+
+    /** The MP4 file of a video or sound: in the bundle, until close(). Read only. */
+    public static native ByteBuffer media(long session, int node) throws ModarException;
+
+    /** The title or the text of a label, or null. */
+    public static native String nodeText(long session, int node, boolean title, String language) throws ModarException;
+
+    /** What is heard of a node at a time, seconds, or with a time below 0 all of it; null: nothing. */
+    public static native String caption(long session, int node, String language, double seconds) throws ModarException;
+
+    /** Of an action that opens a link: begins with https://. */
+    public static native String address(long session, int action) throws ModarException;
+
+    /** What a video shows from now on: a 2D texture of the context, its first row on top; 0: its poster. On GL's thread. */
+    public static native void setVideo(long session, int node, int texture) throws ModarException;
+
     /** GL memory that the bundle takes. */
     public static native long gpuBytes(long session) throws ModarException;
 }

@@ -24,6 +24,10 @@ final class Stage implements GLSurfaceView.Renderer {
     volatile double focal;
     /** A look without the camera; null: with it. */
     private volatile Orbit orbit;
+    private volatile boolean tapped;
+    /** A camera has another clock: what acts begins anew. */
+    private volatile boolean wantsReset;
+    private volatile Media media;
     private volatile boolean wantsPicture;
     private volatile int displayDegrees;
     private volatile int sensorDegrees;
@@ -31,6 +35,7 @@ final class Stage implements GLSurfaceView.Renderer {
 
     // GL's thread alone:
     private Frame shown;
+    private Poses lookedAt;
     private long prepared;
     private int width;
     private int height;
@@ -44,8 +49,10 @@ final class Stage implements GLSurfaceView.Renderer {
     }
 
     /** The bundle to show; the camera is stopped. The one before is closed by GL's thread, which holds its buffers. */
-    void show(long opened, String lens) {
+    void show(long opened, String lens, Media plays) {
         final long before = session;
+        final Media played = media;
+        media = plays;
         cameraFile = lens;
         session = opened;
         seen = -1;
@@ -53,6 +60,7 @@ final class Stage implements GLSurfaceView.Renderer {
         view.queueEvent(new Runnable() {
             @Override
             public void run() {
+                if (played != null) played.close();
                 Native.close(before);
             }
         });
@@ -69,8 +77,15 @@ final class Stage implements GLSurfaceView.Renderer {
         return now != null ? now.pattern : seen;
     }
 
+    /** What pick() hit is told to the actions of the next frame. */
+    void tapped() {
+        tapped = true;
+        view.requestRender();
+    }
+
     /** With the camera stopped. around: what to look at, or null for the camera's picture again. */
     void look(Orbit around) {
+        if (around != orbit) wantsReset = true;
         orbit = around;
         seen = -1;
         view.requestRender();
@@ -165,8 +180,12 @@ final class Stage implements GLSurfaceView.Renderer {
                 GLES20.glClear(GLES20.GL_COLOR_BUFFER_BIT | GLES20.GL_DEPTH_BUFFER_BIT);
             }
             if (around != null) {
+                if (lookedAt == null || lookedAt.patterns <= around.pattern) lookedAt = new Poses(Native.patternCount(session));
+                lookedAt.show(around.pattern);
+                act(System.nanoTime() * 1e-9, lookedAt);
                 Native.onDrawOrbit(session, around.pattern, around.turn, around.tilt, around.zoom);
             } else if (shown != null) {
+                act(shown.timeS, shown.poses);
                 shown.draw(session);
             } else {
                 return;
@@ -184,12 +203,32 @@ final class Stage implements GLSurfaceView.Renderer {
         }
     }
 
+    /** What the bundle's actions ask for, and the newest pictures of its videos. */
+    private void act(double timeS, Poses poses) throws ModarException {
+        Media plays = media;
+        if (wantsReset) Native.resetActions(session);
+        wantsReset = false;
+        if (plays != null) plays.tellEnded();
+        boolean asked = tapped;
+        tapped = false;
+        int[] commands = Native.act(session, timeS, poses.bytes);
+        if (commands != null) {
+            if (plays != null) plays.obey(commands, asked);
+            for (int i = 0; i < commands.length; i += 3) {
+                if (commands[i] == Native.TEXT) screen.tell(commands[i + 1]);
+                if (commands[i] == Native.LINK) screen.ask(Native.address(session, commands[i + 2]));
+            }
+        }
+        if (plays != null) plays.upload();
+    }
+
     /** A new context, a new bundle, a turned phone. */
     private void prepare() throws ModarException {
         long now = session;
         if (now == 0) return;
         if (prepared != now) {
             Native.onSurfaceCreated(now, profile);
+            if (media != null) media.renew();
             diagnostics.gpuBytes = Native.gpuBytes(now);
             prepared = now;
             turned = -1;

@@ -10,6 +10,8 @@ final class Texts {
     private final Properties own;
     private final String[] shown;
     private final String[] alternative;
+    /** Of the bundle's, that of the phone or the nearest; null: it has none. */
+    final String language;
 
     Texts(Properties own, long session, String[] patterns, Locale locale) throws ModarException {
         this.own = own;
@@ -17,7 +19,7 @@ final class Texts {
         for (String each = Native.language(session, 0); each != null; each = Native.language(session, languages.size())) {
             languages.add(each);
         }
-        String language = Words.best(languages, locale);
+        language = Words.best(languages, locale);
         shown = new String[patterns.length];
         alternative = new String[patterns.length];
         for (int i = 0; i < patterns.length && language != null; i++) {

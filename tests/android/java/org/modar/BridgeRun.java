@@ -37,8 +37,61 @@ public final class BridgeRun {
             case "close": closeWhileBusy(words[1]); break;
             case "texts": texts(words[1]); break;
             case "focal": focal(words[1]); break;
+            case "acts": acts(words[1], words[5], Integer.parseInt(words[6])); break;
             default: soak(words[1], Integer.parseInt(words[5]));
         }
+    }
+
+    /**
+     * The frames as a camera of 30 a second gives them, with the app's own players: commands of each frame, what the fake
+     * decoder was told, and the middle of each picture.
+     */
+    private static void acts(String bundle, String out, int lasts) throws Exception {
+        long session = opened(bundle);
+        GlContext.create(width, height);
+        Native.onSurfaceCreated(session, "mali400");
+        Native.onSurfaceChanged(session, width, height, 0, false);
+        Media media = new Media(session, new java.io.File(out), () -> {});
+        android.media.MediaPlayer.lasts = lasts;
+        Poses poses = new Poses(1);
+        ByteBuffer rgba = ByteBuffer.allocateDirect(4 * width * height);
+        for (int i = 0; i < frames.length; i++) {
+            Native.onCameraFrame(session, frames[i], i / 30.0, poses.bytes);
+            if (i > 0) android.media.MediaPlayer.pass(1000 / 30.0);
+            media.tellEnded();
+            int[] commands = Native.act(session, i / 30.0, poses.bytes);
+            StringBuilder line = new StringBuilder("{\"frame\": " + i + ", \"commands\": [");
+            for (int k = 0; commands != null && k < commands.length; k += 3) {
+                line.append(k == 0 ? "" : ", ").append("[" + commands[k] + ", " + commands[k + 1] + "]");
+                if (commands[k] == Native.LINK) check(Native.address(session, commands[k + 2]).startsWith("https://"), "an address");
+            }
+            if (commands != null) media.obey(commands, false);
+            media.upload();
+            Native.onDrawFrame(session, frames[i], poses.bytes);
+            GlContext.read(rgba);
+            line.append("], \"told\": \"" + android.media.MediaPlayer.log.toString().trim() + "\", \"caption\": \"" + media.caption("en"));
+            android.media.MediaPlayer.log.setLength(0);
+            line.append("\", \"at\": " + (android.media.MediaPlayer.all.isEmpty() ? -1 : android.media.MediaPlayer.all.get(0).at));
+            if (poses.visible(0) && poses.shown(0)) {
+                // A little from the pattern's middle to its top left corner: the fake's pictures have their colour there.
+                double px = 0, py = 0;
+                for (int k = 0; k < 4; k++) {
+                    double share = 0.25 * 0.85 + (k == 0 ? 0.15 : 0);
+                    px += share * poses.get(0, Poses.CORNERS + 2 * k);
+                    py += share * poses.get(0, Poses.CORNERS + 2 * k + 1);
+                }
+                int from = 4 * ((height - 1 - (int) py) * width + (int) px);
+                line.append(", \"pixel\": [" + (rgba.get(from) & 255) + ", " + (rgba.get(from + 1) & 255) + ", " + (rgba.get(from + 2) & 255) + "]");
+            }
+            System.out.println(line + "}");
+        }
+        check(android.media.MediaPlayer.all.get(0).bytes > 1000 && android.media.MediaPlayer.all.get(0).volume == 0, "a silent film");
+        media.setSound(true);
+        check(android.media.MediaPlayer.all.get(0).volume == 1, "sound");
+        check(media.transcript(0, "en").equals("One & only"), "a transcript");
+        media.close();
+        check(android.media.MediaPlayer.all.isEmpty() && new java.io.File(out).list().length == 0, "all is given back");
+        Native.close(session);
     }
 
     private static long opened(String bundle) throws Exception {
