@@ -583,7 +583,7 @@ class Page(ProgramTest):
         self.assertLess(size, 250_000)
 
     def test_scripts_are_short_and_say_what_is_wrong(self):
-        for script in ("app.js", "engine.js", "modar-view.js", "viewer-parts.js"):
+        for script in ("engine.js", "modar-view.js", "modar-viewer.js"):
             source, short = (ROOT / "runtime" / "web" / script).read_text(), (self.site / script).read_text()
             self.assertLess(len(short), 0.9 * len(source), script)
             self.assertNotRegex(short, r"(?m)^\s*(//|/\*|  )", script)
