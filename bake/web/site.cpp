@@ -14,6 +14,7 @@
 #include "bake/output.hpp"
 #include "bake/process.hpp"
 #include "bake/web/hint.hpp"
+#include "bake/web/packed_bundle.hpp"
 #include "bake/web/page_texts.hpp"
 #include "bake/web/statement.hpp"
 #include "formats/base/atomic_file.hpp"
@@ -31,9 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What is copied as it is; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 35> kPageFiles = {"app.js",
-                                                         "bundle.js",
-                                                         "camera.js",
+constexpr std::array<std::string_view, 24> kPageFiles = {"app.js",
                                                          "engine-plain.js",
                                                          "engine-plain.wasm",
                                                          "engine-record-plain.js",
@@ -43,29 +42,25 @@ constexpr std::array<std::string_view, 35> kPageFiles = {"app.js",
                                                          "engine-simd.js",
                                                          "engine-simd.wasm",
                                                          "engine.js",
-                                                         "gyroscope.js",
                                                          "icon-180.png",
                                                          "icon-512.png",
                                                          "icon.svg",
                                                          "installed.js",
-                                                         "modar-view.js",
-                                                         "modar-viewer.js",
+                                                         "media.js",
                                                          "modar-worker-plain.js",
                                                          "modar-worker-simd.js",
-                                                         "modar-worker.js",
-                                                         "modar.js",
                                                          "own-picture.js",
                                                          "record-worker-plain.js",
                                                          "record-worker-simd.js",
                                                          "record-worker.js",
-                                                         "recorder.js",
                                                          "room.svg",
-                                                         "storage.js",
                                                          "style.css",
-                                                         "turntable.js",
-                                                         "media.js",
-                                                         "viewer-parts.js",
                                                          "viewer-words.js"};
+/// Modules that app.js contains, for pages of one's own beside this one.
+constexpr std::array<std::string_view, 12> kModules = {
+    "arrival.js",    "bundle.js",       "camera.js",       "gyroscope.js",
+    "modar-view.js", "modar-worker.js", "modar-viewer.js", "modar.js",
+    "recorder.js",   "storage.js",      "turntable.js",    "viewer-parts.js"};
 /// Beside them where the page updates itself.
 constexpr std::array<std::string_view, 4> kUpdateFiles = {"download.js", "engine-update.js",
                                                           "engine-update.wasm", "update-worker.js"};
@@ -266,6 +261,25 @@ Result<void> put_room(Draft& draft, const BundleView& bundle, std::uint32_t patt
   return {};
 }
 
+/// The bundle, for pages of one's own, and packed, as this page loads it; answers the address that
+/// it loads. A page that is written again after each bake stays with the bundle, which packing
+/// would make it wait for. stem: of the files' names.
+Result<std::string> put_bytes(Draft& draft, const std::string& stem,
+                              const std::vector<std::byte>& bytes, const std::string& version) {
+  const std::string raw = stem + ".modar";
+  draft.site.bundle_bytes += bytes.size();
+  if (draft.options.live) {
+    MODAR_TRY(put(draft, raw, bytes, version));
+    return raw + version;
+  }
+  MODAR_TRY(put_online(draft, raw, bytes));
+  MODAR_ASSIGN(const BundleView bundle, BundleView::open(bytes));
+  const std::vector<std::byte> packed = pack_bundle(bundle);
+  draft.site.packed_bytes += packed.size();
+  MODAR_TRY(put(draft, stem + ".packed", packed, version));
+  return stem + ".packed" + version;
+}
+
 Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::string>& names) {
   const auto named = [&](Error error) {
     error.where = path + (error.where.empty() ? "" : ", " + error.where);
@@ -289,9 +303,7 @@ Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::
   MODAR_ASSIGN(const std::vector<std::byte> trimmed, encode_bundle(trim(*bundle)));
   // An address of these bytes alone: page and service worker may share what a cache holds of it.
   const std::string version = "?v=" + to_hex(bundle_hash(trimmed)).substr(0, 16);
-  const std::string to = "bundles/" + name + ".modar";
-  MODAR_TRY(put(draft, to, trimmed, version));
-  draft.site.bundle_bytes += trimmed.size();
+  MODAR_ASSIGN(const std::string to, put_bytes(draft, "bundles/" + name, trimmed, version));
   draft.site.trimmed_bytes += file.bytes().size() - std::min(file.bytes().size(), trimmed.size());
   Json patterns = Json::array();
   const std::vector<GlbImage> images =
@@ -303,8 +315,7 @@ Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::
     patterns.push_back(pattern);
   }
   return Json{{"title", title_of(stem)},
-              {"file", to + version},
-              {"bytes", trimmed.size()},
+              {"file", to},
               {"hash", to_hex(bundle_hash(file.bytes()))},
               {"patterns", patterns}};
 }
@@ -318,6 +329,10 @@ Result<void> put_page(Draft& draft) {
     MODAR_ASSIGN(const std::string content, page_text(draft, std::string(name)));
     MODAR_TRY(put(draft, std::string(name), content));
     draft.site.page_bytes += content.size();
+  }
+  for (const std::string_view name : kModules) {
+    MODAR_ASSIGN(const std::string content, page_text(draft, std::string(name)));
+    MODAR_TRY(put_online(draft, std::string(name), std::as_bytes(std::span(content))));
   }
   for (const std::string& language : draft.languages) {
     MODAR_ASSIGN(const std::string words, words_of(draft, language));

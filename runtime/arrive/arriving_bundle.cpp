@@ -38,6 +38,20 @@ bool needs_no_library(PieceForm form) {
          form == PieceForm::kCoded;
 }
 
+/// Zeros; untouched where they are zeros already, so that pages without pieces take no memory.
+std::byte* zeros(std::size_t size) {
+#ifdef __EMSCRIPTEN__
+  // Its calloc() writes them.
+  auto* bytes = static_cast<std::byte*>(std::malloc(size));
+  for (std::size_t i = 0; bytes != nullptr && i < size; ++i) {
+    if (bytes[i] != std::byte{0}) bytes[i] = std::byte{0};
+  }
+  return bytes;
+#else
+  return static_cast<std::byte*>(std::calloc(size, 1));
+#endif
+}
+
 }  // namespace
 
 Result<std::vector<std::byte>> decode_own_piece(const PieceRecord& piece,
@@ -89,7 +103,7 @@ std::unique_ptr<ArrivingBundle> ArrivingBundle::create(std::uint64_t bundle_size
   auto bundle = std::make_unique<ArrivingBundle>();
   bundle->size_ = static_cast<std::size_t>(bundle_size);
   if (bundle->size_ != bundle_size || bundle_size == 0) return nullptr;
-  bundle->bytes_.reset(static_cast<std::byte*>(std::calloc(bundle->size_, 1)));
+  bundle->bytes_.reset(zeros(bundle->size_));
   return bundle->bytes_ == nullptr ? nullptr : std::move(bundle);
 }
 

@@ -150,9 +150,9 @@ async function prepare() {
   document.title = site.title;
   $('title').textContent = site.title;
   await chooseBundles();
+  if (!navigator.connection?.saveData) loading = loadBundle().catch(() => {});  // the start button tells what is wrong
   await useLanguage(chooseLanguage(site.languages));
   showLanguages();
-  if (!navigator.connection?.saveData) loading = loadBundle().catch(() => {});  // the start button tells what is wrong
   update();
 }
 
@@ -246,7 +246,7 @@ function listenToViewer() {
   const progress = (text) => { $('progress').textContent = text; };
   viewer.addEventListener('progress', ({ loaded, total }) =>
     progress(loaded < total ? fill(words.loading, { percent: Math.floor((100 * loaded) / total) }) : words.preparing));
-  for (const type of ['load', 'error']) viewer.addEventListener(type, () => progress(''));
+  for (const type of ['whole', 'error']) viewer.addEventListener(type, () => progress(''));
   viewer.addEventListener('load', async () => { if (await globalThis.caches?.has(OWN_CACHE)) (await ownPictures()).restore(); });
   $('own').addEventListener('close', () => { if ($('own').returnValue === 'added') progress(words.ownAdded); });
   viewer.addEventListener('frame', () => recorder?.add());
@@ -314,4 +314,4 @@ function keep() {
 adopt(document, BASE);
 listen();
 const prepared = prepare();
-prepared.catch(tellUnprepared).then(() => loading).then(keep);
+prepared.catch(tellUnprepared).then(() => loading).then(() => viewer.whole).catch(() => {}).then(keep);

@@ -79,22 +79,24 @@ function drawPicture(record, colours, { width, height }) {
   return context.canvas.toDataURL('image/jpeg', 0.85);
 }
 
-function describePattern(bytes, name, index) {
+function describePattern(bytesOf, name, index) {
+  const bytes = bytesOf();
   const record = sectionOf(bytes, TRACKER_RECORD, index);
   const size = record ? { width: viewOf(record).getUint32(16, true), height: viewOf(record).getUint32(20, true) } : { width: 1, height: 1 };
   let image = null;
   return {
     name, title: titleOf(name), flat: !sectionOf(bytes, PATTERN_SHAPE, index), ...size,
-    image: () => (image ??= record ? drawPicture(record, sectionOf(bytes, PATTERN_COLOURS, index), size) : 'data:,'),
+    image: () => (image ??= record
+      ? drawPicture(sectionOf(bytesOf(), TRACKER_RECORD, index), sectionOf(bytesOf(), PATTERN_COLOURS, index), size) : 'data:,'),
   };
 }
 
 /**
  * Of each pattern of the engine's what a site has in its site.json: {name, title, texts, image, width, height, flat}; image() answers
- * the address of a picture.
+ * the address of a picture. bytesOf: answers the bundle, or what has come of it.
  */
-export function describe(bytes, patterns) {
-  const meta = sectionOf(bytes, META);
+export function describe(bytesOf, patterns) {
+  const meta = sectionOf(bytesOf(), META);
   const texts = textsOf(meta ? JSON.parse(new TextDecoder().decode(meta)) : {});
-  return patterns.map(({ name }, index) => ({ ...describePattern(bytes, name, index), texts: texts[name] }));
+  return patterns.map(({ name }, index) => ({ ...describePattern(bytesOf, name, index), texts: texts[name] }));
 }

@@ -3,7 +3,7 @@ import { ModarError, shrinkOf } from './engine.js';
 import { store, stored } from './storage.js';
 
 /** What is asked of a camera at first: the picture is shown as it comes, and tracked in a smaller copy. */
-const LARGEST = { width: 1920, height: 1080 };
+const LARGEST_PICTURE = { width: 1920, height: 1080 };
 /** Milliseconds that handing a frame over may take, of 33 between two of them, as the median of so many frames. */
 const MOST_COPY_MS = 12;
 const COPIES = 15;
@@ -45,7 +45,7 @@ export class Camera {
   facing = 'environment';
   /** The visitor's own choice, for later visits, too. */
   #chosen = stored(KEPT_CAMERA);
-  #size = LARGEST;
+  #size = LARGEST_PICTURE;
   #copies = [];
 
   get track() {

@@ -1,16 +1,22 @@
 // The engine of the page: modar.h for JavaScript, which reads numbers and texts but no structs.
 // A worker tracks with one instance of this module, the page draws with another. An instance holds
 // one bundle. Built by the preset `web` only.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <GLES2/gl2.h>
 #include <emscripten.h>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
+#include "modar/arriving_bundle.hpp"
 #include "modar/modar.h"
 
 namespace {
@@ -51,8 +57,11 @@ struct Engine {
   modar_item* items = nullptr;
   size_t item_count = 0;  ///< that were drawn last
   modar_actions* actions = nullptr;
-  modar_event* events = nullptr;  ///< one a pattern and one a tap
-  GLuint* videos = nullptr;       ///< a node's texture for its video; 0: none
+  modar_event* events = nullptr;                    ///< one a pattern and one a tap
+  GLuint* videos = nullptr;                         ///< a node's texture for its video; 0: none
+  std::unique_ptr<modar::ArrivingBundle> arriving;  ///< of web_arrive()
+  modar::RecipeView recipe;                         ///< of web_recipe()
+  std::vector<std::byte> piece;                     ///< raw, of web_piece()
   char text[4096];
 };
 Engine engine;
@@ -105,6 +114,20 @@ size_t collect_items(float turn, float size) {
   return count;
 }
 
+/// For web_error(); answers its status.
+int failed(const modar::Error& error) {
+  const auto write = [](auto& field, const std::string& text) {
+    const std::size_t length = std::min(text.size(), sizeof field - 1);
+    std::memcpy(field, text.data(), length);
+    field[length] = '\0';
+  };
+  write(engine.error.code, error.code);
+  write(engine.error.where, error.where);
+  write(engine.error.cause, error.cause);
+  write(engine.error.cure, error.cure);
+  return engine.error.status = static_cast<int>(error.exit);
+}
+
 /// A canvas that a frame of web_camera() covers.
 modar_surface surface_of(int width, int height, int mirror) {
   auto surface = modar::sized<modar_surface>();
@@ -143,11 +166,49 @@ EMSCRIPTEN_KEEPALIVE void web_free(void* memory) {
   std::free(memory);
 }
 
-/// Opens the bundle; its bytes, of web_reserve(), stay in use. 0, or the status of an error.
-EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size) {
+/// Takes the recipe of a packed bundle, whose bytes, of web_reserve(), stay in use.
+EMSCRIPTEN_KEEPALIVE int web_recipe(const void* bytes, size_t size) {
+  const auto recipe = modar::open_packed({static_cast<const std::byte*>(bytes), size});
+  if (!recipe) return failed(recipe.error());
+  engine.recipe = *recipe;
+  return 0;
+}
+/// The raw bytes of a piece of the recipe, until the next one; null for one that is damaged.
+/// stored: as long as the recipe says.
+EMSCRIPTEN_KEEPALIVE const void* web_piece(uint32_t index, const void* stored) {
+  const modar::PieceRecord& piece = engine.recipe.pieces[index];
+  auto raw =
+      modar::decode_own_piece(piece, {static_cast<const std::byte*>(stored), piece.stored_size});
+  if (!raw) {
+    failed(raw.error());
+    return nullptr;
+  }
+  engine.piece = *std::move(raw);
+  return engine.piece.data();
+}
+/// Memory for a bundle that comes in pieces, which JavaScript puts into it; null where there is
+/// none.
+EMSCRIPTEN_KEEPALIVE void* web_arrive(size_t size) {
+  engine.arriving = modar::ArrivingBundle::create(size);
+  return engine.arriving == nullptr ? nullptr : engine.arriving->bytes().data();
+}
+/// What web_upload() uploads of a bundle that arrives: 0: the coarsest of everything; 1: all of it,
+/// which is verified.
+EMSCRIPTEN_KEEPALIVE int web_show(int all) {
+  if (all == 0) {
+    const auto shown = engine.arriving->show_coarsest();
+    return shown ? 0 : failed(shown.error());
+  }
+  engine.arriving->show_all();
+  return modar_bundle_verify(engine.bundle, &engine.error);
+}
+
+/// Opens the bundle; its bytes, of web_reserve() or web_arrive(), stay in use. whole: 0 where no
+/// more is there than what opening it needs. 0, or the status of an error.
+EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size, int whole) {
   engine.bundle = modar_bundle_open_bytes(bytes, size, &engine.error);
   if (engine.bundle == nullptr) return engine.error.status;
-  const int damaged = modar_bundle_verify(engine.bundle, &engine.error);
+  const int damaged = whole != 0 ? modar_bundle_verify(engine.bundle, &engine.error) : 0;
   if (damaged != 0) return damaged;
   engine.poses = new WebPose[modar_pattern_count(engine.bundle) + kMostOwn]();
   const uint32_t items =
@@ -341,11 +402,12 @@ EMSCRIPTEN_KEEPALIVE double web_brightness(const uint8_t* gray, size_t stride) {
   return count == 0 ? 0 : sum / count;
 }
 
-/// Uploads the models into the current context. lost: 1 where that context is new after a loss.
-/// fixed: 1 where light does not follow web_look().
+/// Uploads the models into the current context, in place of what was there. lost: 1 where that
+/// context is new after a loss. fixed: 1 where light does not follow web_look().
 EMSCRIPTEN_KEEPALIVE int web_upload(int lost, int fixed) {
   if (lost != 0 && engine.renderer != nullptr)
     return modar_renderer_restore(engine.renderer, &engine.error);
+  modar_renderer_destroy(engine.renderer);
   engine.renderer = modar_renderer_create(engine.bundle, nullptr, 0, &engine.error);
   if (engine.renderer == nullptr) return engine.error.status;
   auto options = modar::sized<modar_render_options>();

@@ -54,6 +54,8 @@ export function strandedFile(name) {
 
 export class Engine {
   #module;
+  /** Where it lies in the heap. */
+  #bundle = { at: 0, size: 0 };
 
   constructor(module, kind) {
     this.#module = module;
@@ -74,8 +76,10 @@ export class Engine {
   }
 
   #reserve(bytes) {
-    const address = this.#module._web_reserve(bytes);
-    if (address !== 0) return address;
+    return this.#module._web_reserve(bytes) || this.#missing(bytes);
+  }
+
+  #missing(bytes) {
     throw new ModarError({
       code: 'web.memory', cause: `this browser gives no ${Math.ceil(bytes / 1e6)} MB of memory`,
       cure: 'close other pages, or bake the bundle smaller (--max-texture, --device)',
@@ -84,10 +88,50 @@ export class Engine {
 
   /** Copies the bundle in and verifies it. @param {Uint8Array} bytes */
   open(bytes) {
-    const address = this.#reserve(bytes.length);
-    this.#module.HEAPU8.set(bytes, address);
-    this.#check(this.#module._web_open(address, bytes.length));
+    this.#bundle = { at: this.#reserve(bytes.length), size: bytes.length };
+    this.put(0, bytes);
+    this.#open(true);
+  }
+
+  /** Makes room for a bundle of that many bytes, opens it with what is put there first, and takes the rest by put(). */
+  arrive(size, pieces) {
+    this.#bundle = { at: this.#module._web_arrive(size) || this.#missing(size), size };
+    for (const { offset, bytes } of pieces) this.put(offset, bytes);
+    this.#open(false);
+  }
+
+  put(offset, bytes) {
+    this.#module.HEAPU8.set(bytes, this.#bundle.at + offset);
+  }
+
+  /** What upload() uploads from now on of a bundle that arrives: the coarsest of everything, or all of it, which is verified. */
+  show(all) {
+    this.#check(this.#module._web_show(all ? 1 : 0));
+  }
+
+  /** The bundle, a view until the heap grows. */
+  get bytes() {
+    return this.#module.HEAPU8.subarray(this.#bundle.at, this.#bundle.at + this.#bundle.size);
+  }
+
+  /** Takes the recipe of a packed bundle, for decode(). */
+  recipe(bytes) {
+    const at = this.#reserve(bytes.length);
+    this.#module.HEAPU8.set(bytes, at);
+    this.#check(this.#module._web_recipe(at, bytes.length));
+  }
+
+  /** The raw bytes of a piece, verified. */
+  decode(index, stored, size) {
+    this.frameBuffer(stored.length).set(stored);
+    const at = this.#module._web_piece(index, this.frameAt);
+    if (at === 0) this.#check(1);
+    return this.#module.HEAPU8.slice(at, at + size);
+  }
+
+  #open(whole) {
     const m = this.#module;
+    this.#check(m._web_open(this.#bundle.at, this.#bundle.size, whole ? 1 : 0));
     this.patterns = Array.from({ length: m._web_pattern_count() }, (_, i) => ({
       name: m.UTF8ToString(m._web_pattern_name(i)), widthMm: m._web_pattern_width_mm(i),
     }));

@@ -1,5 +1,5 @@
 /** Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. */
-import type { Frame } from './modar.js';
+import type { Frame, Modar } from './modar.js';
 
 /** How the models of all patterns are changed. */
 export interface Gesture {
@@ -23,14 +23,15 @@ export interface SceneNode {
 /**
  * Scenes may act (nodes and actions of the bundle). Events: `text`, detail {node}: the words of a label are to be shown; `link`,
  * detail {address}: the visitor is to be asked whether to open it; `caption`, detail {node, text, language}: the words that are
- * heard now of a video or sound, '' for none; `drawn`: labels() has changed.
+ * heard now of a video or sound, '' for none; `drawn`: labels() has changed; `refined`: of a packed bundle, first the coarsest of everything
+ * can be drawn, then all.
  */
 export class View extends EventTarget {
   /**
-   * bytes: the bundle, which may still be on its way. picture, models: laid over each other by the page, of one size.
+   * bundle: its bytes, or what load() answers, which also takes packed bundles; both may still be on their way. picture, models: laid over each other by the page, of one size.
    * fixedLight: the models' light does not follow the camera's picture. webgl1: for tests. Errors: ModarError.
    */
-  static create(bytes: Uint8Array | Promise<Uint8Array>, options: {
+  static create(bundle: Modar | Uint8Array | Promise<Modar | Uint8Array>, options: {
     picture: HTMLCanvasElement; models: HTMLCanvasElement; simd?: boolean; webgl1?: boolean; fixedLight?: boolean;
   }): Promise<View>;
   /** The picture alone, of a frame that nothing is known of. */
@@ -53,6 +54,8 @@ export class View extends EventTarget {
   drawFrom(pattern: number, view: Float32Array, focal: number): void;
   /** The same of several patterns, each with a view of its own. */
   drawEach(views: [pattern: number, view: Float32Array][], focal: number): void;
+  /** Resolved when all of the bundle is there, and drawn: a packed one comes on after create(), and videos and actions that need it wait. */
+  readonly whole: Promise<void>;
   /** Those of the bundle, then those of stand(). */
   readonly patterns: { name: string; widthMm?: number }[];
   readonly nodes: SceneNode[];

@@ -1,5 +1,6 @@
 // Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. Both change in the same
 // task, so picture and models never part.
+import { STAGE } from './arrival.js';
 import { Engine, hasSimd, ModarError, POSE, POSE_FLOATS } from './engine.js';
 import { drawFrame, fitCanvases } from './modar.js';
 
@@ -33,7 +34,8 @@ async function openEngine(simd) {
 
 /**
  * Where a bundle's scenes act: `text` {node}: a label's words are to be shown; `link` {address}: the visitor is to be
- * asked; `caption` {node, text, language}: words that are heard now; `drawn`: labels() has changed.
+ * asked; `caption` {node, text, language}: words that are heard now; `drawn`: labels() has changed. `refined`: of a packed bundle
+ * more can be drawn than before.
  */
 export class View extends EventTarget {
   #engine;
@@ -41,6 +43,13 @@ export class View extends EventTarget {
   #models;
   #gl;
   #lost = false;
+  /** Until there is something to draw. */
+  #empty = true;
+  /** Of a packed bundle: all of it is there, and drawn. */
+  whole = Promise.resolve();
+  #complete = false;
+  /** More came while the context was lost. */
+  #stale = false;
   #fixedLight = false;
   #small = null;
   #framesSinceLook = LIGHT_EVERY;
@@ -55,30 +64,79 @@ export class View extends EventTarget {
   #drawings = 0;
 
   /**
-   * @param {Uint8Array | Promise<Uint8Array>} bytes the bundle, which may still be on its way
+   * @param {Modar | Uint8Array | Promise<Modar | Uint8Array>} bundle which may still be on its way
    * @param canvases {picture, models}: laid over each other by the page; fixedLight: the models' light does not follow the
    * camera's picture
    */
-  static async create(bytes, { picture, models, simd = true, webgl1 = false, fixedLight = false }) {
+  static async create(bundle, { picture, models, simd = true, webgl1 = false, fixedLight = false }) {
     const view = new View();
     view.#fixedLight = fixedLight;
     view.#picture = picture;
     view.#models = models;
     view.#gl = openContext(models, webgl1);
     view.#engine = await openEngine(simd);
-    view.#engine.open(await bytes);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
-    view.#engine.upload(false, fixedLight);
-    if (view.nodes.some(({ kind }) => kind === 'video' || kind === 'sound')) {
-      const { Media } = await import('./media.js');
-      view.#media = new Media(view.#engine, () => view.#soon(), (node, text, language) => view.#tell('caption', { node, text, language }));
+    const given = await bundle;
+    if (given.arrival) {
+      view.#engine.arrive(given.arrival.size, given.arrival.found.splice(0));
+    } else {
+      view.#engine.open(given.bytes ?? given);
+      await view.#finish();
     }
     models.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();  // without this it is never restored
       view.#lost = true;
     });
     models.addEventListener('webglcontextrestored', () => view.#restore(webgl1));
+    if (given.arrival) {
+      view.whole = view.#refine(given.arrival);
+      view.whole.catch(() => {});  // told to those who wait for it
+    }
     return view;
+  }
+
+  /** First the coarsest of everything, then all. */
+  async #refine(arrival) {
+    const put = (offset, bytes) => this.#engine.put(offset, bytes);
+    for (const stage of [STAGE.show, STAGE.refine]) {
+      await arrival.bring(stage, put);
+      this.#engine.show(stage === STAGE.refine);
+      if (stage === STAGE.refine) await this.#finish();
+      else {
+        this.#upload();
+        performance.mark('modar: coarse');
+      }
+      this.dispatchEvent(new Event('refined'));
+      this.#soon();
+    }
+  }
+
+  #upload() {
+    this.#empty = false;
+    this.#stale = this.#lost;
+    if (!this.#lost) this.#engine.upload(false, this.#fixedLight);  // else #restore() will
+  }
+
+  async #finish() {
+    this.#upload();
+    if (this.#plays) {
+      const { Media } = await import('./media.js');
+      const { sound, held } = this.#media;
+      this.#media = new Media(this.#engine, () => this.#soon(), (node, text, language) => this.#tell('caption', { node, text, language }));
+      Object.assign(this.#media, { sound, held });
+    }
+    this.#complete = true;
+    performance.mark('modar: whole');
+  }
+
+  /** The bundle has videos or sounds. */
+  get #plays() {
+    return this.nodes.some(({ kind }) => kind === 'video' || kind === 'sound');
+  }
+
+  /** Of the bundle, until the next call: what has come of it. */
+  get bytes() {
+    return this.#engine.bytes;
   }
 
   /** Those of the bundle, then those of stand(): {name, widthMm}. */
@@ -189,7 +247,7 @@ export class View extends EventTarget {
   }
 
   #act() {
-    if (this.nodes.length === 0) return;
+    if (this.nodes.length === 0 || (this.#plays && !this.#complete)) return;  // what plays has to be there
     const happened = [...this.#media.ended.splice(0).map((node) => ({ node, ended: true })), ...this.#taps.splice(0)];
     for (const event of happened.length ? happened : [null]) {
       for (const todo of this.#engine.act(performance.now() / 1000, event)) {
@@ -223,10 +281,12 @@ export class View extends EventTarget {
 
   #restore(webgl1) {
     this.#gl = openContext(this.#models, webgl1);
-    this.#engine.useContext(this.#gl.context, this.#gl.version);
-    this.#engine.upload(true);
-    this.#media.forget();
     this.#lost = false;
+    this.#engine.useContext(this.#gl.context, this.#gl.version);
+    if (this.#empty) return;
+    this.#engine.upload(!this.#stale, this.#fixedLight);
+    this.#stale = false;
+    this.#media.forget();
   }
 
   /** The picture alone, of a frame that nothing is known of. */
@@ -239,7 +299,7 @@ export class View extends EventTarget {
   draw({ source, camera, poses }, gesture = {}) {
     const { width, height } = fitCanvases(this.#models, this.#picture);
     drawFrame(this.#picture, { source, camera }, gesture);
-    if (this.#lost) return;
+    if (this.#lost || this.#empty) return;
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
     const known = this.#engine.poses();
     known.fill(0).set(poses.subarray(0, known.length));
@@ -276,7 +336,8 @@ export class View extends EventTarget {
   /** The same of several patterns, each with a view of its own: [[pattern, view]]. */
   drawEach(views, focal) {
     const size = fitCanvases(this.#models, this.#picture);
-    if (this.#lost) return;
+    this.#redraw = () => this.drawEach(views, focal);  // what is shown may have come meanwhile
+    if (this.#lost || this.#empty) return;
     this.#engine.setCamera(size.width, size.height, (focal * size.width) / this.#models.clientWidth);
     const poses = this.#engine.poses().fill(0);
     for (const [pattern, view] of views) {

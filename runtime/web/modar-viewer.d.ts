@@ -27,8 +27,10 @@ export interface ViewerPattern {
 export interface ModarViewerEventMap extends Omit<HTMLElementEventMap, 'error'>, Pick<ModarEvents, 'found' | 'updated' | 'lost'> {
   /** While the bundle comes. */
   progress: ProgressEvent;
-  /** The bundle is there, and drawn. */
+  /** The bundle's patterns can be found: all of a raw bundle is there, of a packed one the rest comes meanwhile. */
   load: Event;
+  /** All of the bundle is there, and drawn. */
+  whole: Event;
   /** `error` of it is a ModarError, or what getUserMedia() throws. The visitor has been told. */
   error: ErrorEvent;
   /** See ModarViewer.state. */
@@ -56,13 +58,15 @@ export class ModarViewer extends HTMLElement {
   set words(words: Record<string, unknown>);
   /** start: the cover. looking: the camera, without models. seen: models. around: the turntable. error: the visitor is told why. */
   readonly state: 'start' | 'looking' | 'seen' | 'around' | 'error';
+  /** Resolved when all of the bundle that is loaded is there, and drawn. */
+  readonly whole: Promise<void>;
   /** The bundle that is loaded. */
   readonly modar: Modar | null;
   /** The camera that is open. */
   readonly camera: MediaStreamTrack | null;
   /** The camera's picture, and the models over it. */
   readonly layers: [HTMLCanvasElement, HTMLCanvasElement];
-  /** Brings the bundle before the visitor starts; without it the first start does. */
+  /** Brings the bundle before the visitor starts, until its patterns can be found; without it the first start does. */
   load(): Promise<void>;
   /**
    * A flat picture that is none of the bundle's gets what stands in a scene of it (modar.scenes), from now on until the bundle is

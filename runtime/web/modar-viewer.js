@@ -135,6 +135,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     return this.#modar;
   }
 
+  /** Of a packed bundle: resolved when all of it is there, and drawn. */
+  get whole() {
+    return this.#view?.whole ?? Promise.resolve();
+  }
+
   /** The track of the camera that is open. */
   get camera() {
     return this.#camera.track ?? null;
@@ -232,9 +237,8 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
         await this.#open(source);
       } catch (error) {
         if (this.#loading?.done === done) this.#loading = null;  // the next start tries again
+        this.#showProgress('', 1);
         throw error;
-      } finally {
-        this.#$('progress').textContent = '';
       }
       if (this.#loading?.done !== done) this.#unload();  // another was chosen meanwhile, or the viewer was removed
       else this.dispatchEvent(new Event('load'));
@@ -266,23 +270,23 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
 
   async #open(source) {
     const opening = load(typeof source === 'function' ? await source() : source, {
-      onProgress: (loaded, total) => this.#tellProgress(this.#say('loading', { percent: Math.floor((100 * loaded) / total) }), loaded, total),
+      onProgress: (loaded, total) => this.#tellProgress(loaded, total),
     });
-    const creating = View.create(opening.then((opened) => opened.bytes), { picture: this.#$('picture'), models: this.#freshCanvas() });
+    const creating = View.create(opening, { picture: this.#$('picture'), models: this.#freshCanvas() });
     creating.catch(() => {});  // told below, after what ails the bundle
     const opened = await opening;
-    const { length } = opened.bytes;
-    this.#tellProgress(this.#say('preparing'), length, length);
+    let view;
     try {
-      this.#view = await creating;
+      view = this.#view = await creating;
     } catch (error) {
       opened.close();
       throw error;
     }
     this.#modar = opened;
-    if (!this.#patternsGiven) this.#usePatterns(describe(opened.bytes, opened.patterns));
+    if (!this.#patternsGiven) this.#usePatterns(describe(() => view.bytes, opened.patterns));
     opened.bytes = null;  // the engines have their own copies
-    this.#listenToScenes(this.#view);
+    this.#listenToScenes(view);
+    this.#followRest(view);
     opened.addEventListener('frame', ({ detail }) => this.#onFrame(detail));
     opened.addEventListener('dropped', ({ detail }) => { if (this.#camera.stream) this.#view.show(detail.source, this.#gesture); });
     opened.addEventListener('error', ({ detail }) => this.fail(detail));
@@ -291,9 +295,31 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     }
   }
 
-  #tellProgress(text, loaded, total) {
-    this.#$('progress').textContent = text;
+  /** While the rest comes, what is there can be used. */
+  async #followRest(view) {
+    const wrong = await view.whole.catch((error) => error);
+    if (view !== this.#view) return;
+    this.#showProgress('', 1);
+    if (wrong) {
+      this.#loading = null;  // the next start tries again
+      if (this.#state !== 'start') this.fail(wrong);  // else that start tells
+      return;
+    }
+    this.#showMedia(view);
+    if (!this.#noted) this.#showLabel(this.#shown);
+    this.dispatchEvent(new Event('whole'));
+  }
+
+  #tellProgress(loaded, total) {
+    this.#showProgress(loaded < total ? this.#say('loading', { percent: Math.floor((100 * loaded) / total) }) : this.#say('preparing'), loaded / total);
     this.dispatchEvent(new ProgressEvent('progress', { lengthComputable: true, loaded, total }));
+  }
+
+  /** On the cover in words, on the stage as a bar. */
+  #showProgress(text, share) {
+    setText(this.#$('progress'), text);
+    Object.assign(this.#$('rest'), { hidden: share >= 1, value: share });
+    this.#$('rest').setAttribute('aria-label', text);
   }
 
   /** A canvas keeps its first context: another bundle's renderer gets a new one. */
@@ -569,12 +595,16 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     set(on);
   }
 
-  #listenToScenes(view) {
+  #showMedia(view) {
     this.#$('media').hidden = !view.nodes.some(({ kind }) => kind === 'video' || kind === 'sound');
     this.#$('captions').hidden = !view.nodes.some((_, node) => view.captionsOf(node));
     this.#$('pause').setAttribute('aria-pressed', 'false');
     this.#useLanguages();
     this.#cues.clear();
+  }
+
+  #listenToScenes(view) {
+    this.#showMedia(view);
     view.addEventListener('drawn', () => this.#showMarks());
     view.addEventListener('caption', ({ detail }) => this.#caption(detail));
     view.addEventListener('text', ({ detail: { node } }) => {

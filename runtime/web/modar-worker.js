@@ -82,9 +82,19 @@ const answers = {
     engine = await loading;
     return { type: 'prepared' };
   },
-  open({ bytes }) {
-    engine.open(new Uint8Array(bytes));
+  /** A bundle, or as much of one as finds its patterns: arrival.js. */
+  open({ bytes, size, found }) {
+    if (bytes) engine.open(new Uint8Array(bytes));
+    else engine.arrive(size, found);
     return { type: 'opened', patterns: engine.patterns, scenes: engine.scenes, kind: engine.kind };
+  },
+  async recipe({ bytes }) {
+    engine ??= await loading;
+    engine.recipe(bytes);
+    return { type: 'ready' };
+  },
+  piece({ index, stored, size }) {
+    return { type: 'decoded', bytes: engine.decode(index, stored, size) };
   },
   camera(options) {
     camera = options;
@@ -108,7 +118,7 @@ const answers = {
 async function answer({ data }) {
   try {
     const told = await answers[data.type](data);
-    self.postMessage({ ...told, call: data.call });
+    self.postMessage({ ...told, call: data.call }, told.bytes ? [told.bytes.buffer] : []);
   } catch (error) {
     data.frame?.close();
     const told = error instanceof ModarError ? error.plain() : { code: 'web.worker', cause: String(error.message ?? error) };

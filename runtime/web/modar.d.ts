@@ -93,7 +93,7 @@ export interface ModarEvents {
 export class Modar extends EventTarget {
   readonly patterns: Pattern[];
   readonly scenes: Scene[];
-  /** Of the bundle, for View.create(). */
+  /** Of a raw bundle; empty for a packed one, of which View.create() takes the Modar. */
   readonly bytes: Uint8Array;
   /** Which build of the engine runs. */
   readonly kind: 'simd' | 'plain';
@@ -143,7 +143,11 @@ export class Modar extends EventTarget {
     type: string, listener: EventListenerOrEventListenerObject | null, options?: boolean | EventListenerOptions): void;
 }
 
-/** Opens a bundle: its address, or its bytes. Errors: ModarError. */
+/**
+ * Opens a bundle, raw (.modar) or packed (.packed, of `modar web`): its address, or its bytes. Of a packed one as much is brought as finds
+ * its patterns; View.create() brings the rest. A download that breaks off goes on where it did, and damaged pieces are brought again.
+ * Errors: ModarError.
+ */
 export function load(bundle: string | URL | ArrayBuffer | Uint8Array, options?: {
   /** false: the build without SIMD, which sees the same. */
   simd?: boolean;

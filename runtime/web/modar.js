@@ -6,37 +6,11 @@
 //   await modar.start(video);
 //
 // Types and words: modar.d.ts. The drawing of a bundle's own models is in modar-view.js.
+import { Arrival, isPacked, Source } from './arrival.js';
 import { hasSimd, ModarError, POSE, POSE_FLOATS, shrinkOf, strandedFile } from './engine.js';
 import { allowMotion, Gyroscope } from './gyroscope.js';
 
 export { allowMotion, ModarError };
-
-async function fetchBundle(address, onProgress) {
-  const failed = (cause) => new ModarError({
-    code: 'web.download', where: String(address), cause, cure: 'check the network and load the page again',
-  });
-  let response;
-  try {
-    response = await fetch(address);
-  } catch {
-    throw failed('the bundle could not be loaded');
-  }
-  if (!response.ok) throw failed(`the server answered ${response.status}`);
-  const total = Number(response.headers.get('content-length')) || 0;
-  const parts = [];
-  let got = 0;
-  try {
-    const reader = response.body.getReader();
-    for (let part = await reader.read(); !part.done; part = await reader.read()) {
-      parts.push(part.value);
-      got += part.value.length;
-      onProgress?.(got, Math.max(total, got));
-    }
-  } catch {
-    throw failed(`the network broke off after ${got} bytes`);
-  }
-  return new Uint8Array(await new Blob(parts).arrayBuffer());
-}
 
 /** Bundlers follow an address that is written out in the call. */
 function openWorker(simd) {
@@ -230,21 +204,35 @@ export class Modar extends EventTarget {
   #gyroscope = null;
   /** When the last frame was taken that was tracked; undefined: unknown. */
   #trackedAt;
+  /** @see modar.d.ts */
+  bytes = new Uint8Array();
+  /** Of a packed bundle: what brings it. */
+  arrival = null;
 
   /** @see load */
   static async open(bundle, { simd = true, onProgress } = {}) {
-    const given = typeof bundle === 'string' || bundle instanceof URL;
     const modar = new Modar();
     modar.#simd = simd && hasSimd();
     modar.#tracker = new Calls(openWorker(modar.#simd));
     // The engine is compiled while the bundle comes.
     const prepared = modar.#tracker.ask({ type: 'prepare' });
     prepared.catch(() => {});  // told below
+    const source = new Source(bundle, onProgress);
     try {
-      modar.bytes = given ? await fetchBundle(bundle, onProgress) : new Uint8Array(bundle);
+      const start = await source.take(8, false);
+      let opening;
+      if (isPacked(start)) {
+        modar.arrival = new Arrival(source, new Calls(openWorker(modar.#simd)));
+        await modar.arrival.begin(start);
+        opening = [{ size: modar.arrival.size, found: modar.arrival.found }];
+      } else {
+        modar.bytes = new Uint8Array(await new Blob([start, await source.take(Infinity, false)]).arrayBuffer());
+        const copy = modar.bytes.slice().buffer;
+        opening = [{ bytes: copy }, [copy]];
+        source.close();
+      }
       await prepared;
-      const copy = modar.bytes.slice().buffer;
-      const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', bytes: copy }, [copy]);
+      const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', ...opening[0] }, opening[1]);
       Object.assign(modar, { patterns, scenes, kind });
     } catch (error) {
       modar.close();
@@ -304,6 +292,7 @@ export class Modar extends EventTarget {
 
   close() {
     this.stop();
+    this.arrival?.close();
     this.#tracker.close();
   }
 

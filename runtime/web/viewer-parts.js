@@ -101,6 +101,7 @@ export const STYLE = `
 #heard { margin-top: .3rem; white-space: pre-line; }
 #heard summary { cursor: pointer; min-height: 1.5rem; }
 /* Their points move with the picture, their size does not. */
+#rest { position: absolute; top: 0; left: 0; width: 100%; height: .3rem; accent-color: var(--accent); }
 #marks { position: absolute; inset: 0; overflow: hidden; pointer-events: none; }
 #marks button {
   position: absolute; left: 0; top: 0; min-width: 2.4rem; min-height: 2.4rem; padding: 0 .5rem; justify-content: center;
@@ -158,6 +159,7 @@ const MARKUP = `<div id="all">
   <canvas id="picture" aria-hidden="true"></canvas>
   <img id="ground" alt="" hidden>
   <canvas id="models" role="application" tabindex="0" aria-describedby="keys"></canvas>
+  <progress id="rest" hidden></progress>
   <div id="marks" role="group" data-label="labels"></div>
   <p id="keys" class="unseen" data-word="keys"></p>
   <p id="which" hidden><label class="unseen" for="scene" data-word="scene"></label><select id="scene"></select></p>

@@ -48,6 +48,7 @@ class Browser:
         self.answers = os.fdopen(answers_out, "rb", buffering=0)
         self.rest, self.calls, self.session = b"", 0, None
         self.errors, self.told, self.requests = [], [], []
+        self.line = None  # of throttle()
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
         self.session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network", "Accessibility"):
@@ -75,16 +76,23 @@ class Browser:
             self.errors.append(params["entry"]["text"] + " " + params["entry"].get("url", ""))
         elif method == "Network.requestWillBeSent":
             self.requests.append(params["request"]["url"])
+        elif method == "Target.attachedToTarget" and self.line:  # a worker, which waits
+            for command, words in (("Network.enable", {}), ("Network.emulateNetworkConditions", self.line), ("Runtime.runIfWaitingForDebugger", {})):
+                self._send(params["sessionId"], command, words)
 
-    def call(self, method, **params):
+    def _send(self, session, method, params):
         self.calls += 1
         message = {"id": self.calls, "method": method, "params": params}
-        if self.session:
-            message["sessionId"] = self.session
+        if session:
+            message["sessionId"] = session
         self.commands.write(json.dumps(message).encode() + b"\0")
+        return self.calls
+
+    def call(self, method, **params):
+        own = self._send(self.session, method, params)
         while True:
             answer = self._message()
-            if answer.get("id") == self.calls:
+            if answer.get("id") == own:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']['message']}")
                 return answer["result"]
@@ -118,6 +126,12 @@ class Browser:
         session, self.session = self.session, None
         self.call("Browser.setPermission", permission={"name": "camera"}, setting=setting)
         self.session = session
+
+    def throttle(self, bytes_a_second, latency_ms):
+        """The page's line, and that of its workers, from now on."""
+        self.line = {"offline": False, "latency": latency_ms, "downloadThroughput": bytes_a_second, "uploadThroughput": bytes_a_second}
+        self.call("Network.emulateNetworkConditions", **self.line)
+        self.call("Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True)
 
     def screenshot(self, path):
         pathlib.Path(path).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))

@@ -27,7 +27,7 @@ KEEP = os.environ.get("MODAR_WEB_PICTURES")
 
 FEED = """(async () => {
   const { load } = await import('/modar.js');
-  const modar = await load('/bundles/demo.modar', { simd: %s });
+  const modar = await load('/bundles/demo.packed', { simd: %s });
   const turns = %s;
   await modar.start(document.createElement('video'), { extended: turns.length > 0 });
   modar.stop();
@@ -968,7 +968,7 @@ class Page(ProgramTest):
         self.browser.wait("navigator.serviceWorker.ready.then(() => true)", "the service worker")
         brought = [path for path, _ in server.http.answered if path.startswith("/bundles/")]
         self.assertEqual(len(brought), 1, server.http.answered)
-        kept = "caches.keys().then(async (names) => (await caches.match('bundles/demo.modar', { ignoreSearch: true }))?.ok)"
+        kept = "caches.keys().then(async (names) => (await caches.match('bundles/demo.packed', { ignoreSearch: true }))?.ok)"
         self.assertTrue(self.browser.run(kept))
 
     def test_the_package_installs_and_three_js_draws_on_a_picture(self):

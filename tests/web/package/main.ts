@@ -46,7 +46,7 @@ async function main(): Promise<string> {
   let { poses } = await modar.step(new Uint8Array(gray), width, height, 0);
   for (let i = 1; i < 10 && poses[0] === 0; ++i) ({ poses } = await modar.step(new Uint8Array(gray), width, height, i / 30));
   const [picture, models] = ['picture', 'models'].map((id) => document.getElementById(id) as HTMLCanvasElement);
-  const view = await View.create(modar.bytes, { picture: picture!, models: models! });
+  const view = await View.create(modar, { picture: picture!, models: models! });
   const size = drawFrame(picture!, { source: models!, camera });
   const projection = projectionOf(camera, 0.1, 10, size);
   return [modar.patterns[0]?.name, poses[0], view.webgl, projection.length, ...await lookAround()].join();

@@ -1,0 +1,216 @@
+// A bundle on its way: a raw one comes whole, a packed one (formats/shipping.md) piece by piece, in the order of need.
+import { ModarError } from './engine.js';
+
+/** Times that something is asked for again, and seconds before the second time: a phone's connection breaks now and then. Set by hand. */
+const TRIES = 3;
+const WAIT_S = 1;
+/** As formats/transport/recipe.hpp has them. */
+const MAGIC = [0x89, 0x4d, 0x4f, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
+const RECIPE_BYTES = 64, PIECE_BYTES = 64;
+/** What pieces are needed for: to find patterns, to show each model as coarse as there is, all else. */
+export const STAGE = { find: 1, show: 2, refine: 3 };
+
+const pause = (seconds) => new Promise((resolve) => { setTimeout(resolve, 1000 * seconds); });
+
+/** A file's bytes from first to last: after a connection that broke, from where it did. */
+export class Source {
+  #bundle;
+  /** Its bytes were given, not its address. */
+  #given;
+  #abort = new AbortController();
+  #onProgress;
+  #reader = null;
+  /** Came, and was not taken. */
+  #chunk = new Uint8Array();
+  #taken = 0;
+  total = 0;
+  /** While it is true, what does not come is waited for. */
+  patient = false;
+
+  /** bundle: an address, or bytes. */
+  constructor(bundle, onProgress) {
+    this.#given = typeof bundle !== 'string' && !(bundle instanceof URL);
+    this.#bundle = this.#given ? new Uint8Array(bundle) : bundle;
+    this.#onProgress = onProgress;
+  }
+
+  #failed(cause) {
+    return new ModarError({ code: 'web.download', where: this.#given ? '' : String(this.#bundle), cause, cure: 'check the network and load the page again' });
+  }
+
+  /** A reader of all from a place on. again: past what the browser has kept of it. */
+  async #open(from, again) {
+    if (this.#given) {
+      this.total = this.#bundle.length;
+      return { reader: { read: async () => ({ done: true }), cancel: async () => {} }, chunk: this.#bundle.subarray(from) };
+    }
+    const { signal } = this.#abort;
+    const headers = from > 0 ? { Range: `bytes=${from}-` } : {};
+    const response = await fetch(this.#bundle, { signal, headers, cache: again ? 'no-store' : 'default' })
+      .catch(() => { throw this.#failed('the bundle could not be loaded'); });
+    if (!response.ok) throw Object.assign(this.#failed(`the server answered ${response.status}`), { final: response.status < 500 });
+    this.total ||= from + (Number(response.headers.get('content-length')) || 0);
+    const reader = response.body.getReader();
+    // A host without ranges begins at the first byte.
+    for (let skip = response.status === 206 ? 0 : from; skip > 0;) {
+      const { done, value } = await reader.read();
+      if (done) throw this.#failed('it ends too early');
+      if (value.length > skip) return { reader, chunk: value.subarray(skip) };
+      skip -= value.length;
+    }
+    return { reader, chunk: new Uint8Array() };
+  }
+
+  async #read() {
+    if (!this.#reader) {
+      const { reader, chunk } = await this.#open(this.#taken, this.#taken > 0);
+      this.#reader = reader;
+      if (chunk.length) return chunk;
+    }
+    const { done, value } = await this.#reader.read();
+    return done ? null : value;
+  }
+
+  /** Gives up, or waits before the next try. */
+  async #breathe(tries, error) {
+    this.#reader?.cancel().catch(() => {});
+    this.#reader = null;
+    if (this.#abort.signal.aborted || error.final || (tries >= TRIES && !this.patient)) throw error;
+    await pause(WAIT_S * 2 ** Math.min(tries - 1, 5));
+  }
+
+  /** The next bytes, so many or to the end; whole: it is an error where they are fewer. */
+  async take(count, whole = true) {
+    const parts = [];
+    let size = 0;
+    for (let tries = 0; size < count;) {
+      if (this.#chunk.length === 0) {
+        let error = null;
+        const chunk = await this.#read().catch((cause) => {
+          error = cause instanceof ModarError ? cause : this.#failed(`the network broke off after ${this.#taken} bytes`);
+        });
+        if (!error && chunk === null && !whole) break;
+        if (!chunk) {
+          await this.#breathe(++tries, error ?? this.#failed(`it ends after ${this.#taken} bytes`));
+          continue;
+        }
+        tries = 0;
+        this.#chunk = chunk;
+      }
+      const part = this.#chunk.subarray(0, count - size);
+      this.#chunk = this.#chunk.subarray(part.length);
+      parts.push(part);
+      size += part.length;
+      this.#taken += part.length;
+      this.#onProgress?.(this.#taken, Math.max(this.total, this.#taken));
+    }
+    if (parts.length === 1) return parts[0].slice();
+    return new Uint8Array(await new Blob(parts).arrayBuffer());
+  }
+
+  /** Bytes that came before, once more. */
+  async again(from, count) {
+    const other = new Source(this.#bundle);
+    other.#abort = this.#abort;
+    other.#taken = from;
+    try {
+      return await other.take(count);
+    } finally {
+      other.#reader?.cancel().catch(() => {});
+    }
+  }
+
+  close() {
+    this.#abort.abort();
+  }
+}
+
+export const isPacked = (start) => MAGIC.every((byte, i) => start[i] === byte);
+
+export class Arrival {
+  #source;
+  /** Calls of a worker that decodes. */
+  #decoder;
+  /** Of the recipe: {index, at, stored, offset, size, stage}. */
+  #pieces = [];
+  #next = 0;
+  /** Raw, of the first stage: [{offset, bytes}], until a view has taken them. */
+  found = [];
+  /** Of the bundle, bytes. */
+  size = 0;
+
+  constructor(source, decoder) {
+    this.#source = source;
+    this.#decoder = decoder;
+  }
+
+  /** Brings the recipe and what patterns are found with. start: of the file. */
+  async begin(start) {
+    const header = new Uint8Array(RECIPE_BYTES);
+    header.set(start);
+    header.set(await this.#source.take(RECIPE_BYTES - start.length), start.length);
+    const count = new DataView(header.buffer).getUint32(12, true);
+    let recipe = new Uint8Array(RECIPE_BYTES + PIECE_BYTES * count);
+    recipe.set(header);
+    recipe.set(await this.#source.take(PIECE_BYTES * count), RECIPE_BYTES);
+    await this.#tried(() => this.#decoder.ask({ type: 'recipe', bytes: recipe }),
+      async () => { recipe = await this.#source.again(0, recipe.length); });
+    this.#read(new DataView(recipe.buffer));
+    await this.bring(STAGE.find, (offset, bytes) => this.found.push({ offset, bytes }));
+  }
+
+  #read(view) {
+    const long = (at) => Number(view.getBigUint64(at, true));
+    this.size = long(16);
+    let at = view.byteLength;
+    for (let record = RECIPE_BYTES; record < view.byteLength; record += PIECE_BYTES) {
+      const stored = view.getUint32(record + 44, true);
+      this.#pieces.push({
+        index: this.#pieces.length, at, stored, offset: long(record + 24), size: view.getUint32(record + 40, true), stage: view.getUint8(record + 55),
+      });
+      at += stored;
+    }
+    this.#source.total = at;
+  }
+
+  /** What is refused comes again, a few times. */
+  async #tried(decode, bring) {
+    for (let tries = 1; ; ++tries) {
+      try {
+        return await decode();
+      } catch (error) {
+        if (tries === TRIES || error.code === 'web.worker' || error.code === 'web.memory') throw error;
+        await bring();
+      }
+    }
+  }
+
+  async #decode({ index, at, stored, offset, size }, bytes, take) {
+    let copy = bytes;
+    const answer = await this.#tried(() => this.#decoder.ask({ type: 'piece', index, stored: copy, size }),
+      async () => { copy = await this.#source.again(at, stored); });
+    take(offset, answer.bytes);
+  }
+
+  /** Brings the pieces of a stage; one is decoded while the next one comes. take(offset, bytes) */
+  async bring(stage, take) {
+    let before;
+    for (; this.#pieces[this.#next]?.stage <= stage; ++this.#next) {
+      const piece = this.#pieces[this.#next];
+      const bytes = await this.#source.take(piece.stored);
+      await before;
+      before = this.#decode(piece, bytes, take);
+      before.catch(() => {});  // told below
+    }
+    await before;
+    if (stage === STAGE.show) this.#source.patient = true;  // a visitor sees something, and waits for no more
+    if (this.#next < this.#pieces.length) return;
+    await this.#source.take(1, false).catch(() => {});  // to its end: then the browser keeps it
+    this.close();
+  }
+
+  close() {
+    this.#source.close();
+    this.#decoder.close();
+  }
+}

@@ -1,0 +1,195 @@
+"""Packed bundles in a browser: drawn as the raw ones are, refined on the way, and put together from damaged downloads."""
+import functools
+import http.server
+import json
+import pathlib
+import shutil
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import urllib.parse
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
+from browser import Browser, Quiet  # noqa: E402
+from programs import COVER, POTTERY, QUICK, ProgramTest  # noqa: E402
+
+HEADER, PIECE = 64, 64
+# {before, coarse, whole: hashes of what is drawn; events; error}
+DRAW = """(async () => {
+  const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
+  const canvas = () => {
+    const made = document.createElement('canvas');
+    Object.assign(made.style, { position: 'absolute', width: '640px', height: '480px' });
+    document.body.append(made);
+    return made;
+  };
+  const hash = async (view) => {
+    view.drawFrom(0, Float32Array.of(1, 0, 0, 0, 0, 0.8, -0.6, 0, 0, 0.6, 0.8, 0, 0, 0, -1.6, 1), 300);
+    const bytes = await (await view.photograph('image/png')).arrayBuffer();
+    return [...new Uint8Array(await crypto.subtle.digest('SHA-1', bytes))].join();
+  };
+  const got = [], drawn = {};
+  let modar;
+  try {
+    modar = await load(%s, { simd: %s, onProgress: (...progress) => got.push(progress) });
+    const view = await View.create(modar, { simd: modar.kind === 'simd', picture: canvas(), models: canvas() });
+    drawn.patterns = view.patterns.map(({ name }) => name);
+    const coarse = new Promise((resolve) => view.addEventListener('refined', () => resolve(hash(view)), { once: true }));
+    view.addEventListener('refined', () => { drawn.refined = (drawn.refined ?? 0) + 1; });
+    drawn.first = await hash(view);
+    drawn.lost = %s && await new Promise((resolve) => {
+      const { models } = { models: document.querySelectorAll('canvas')[1] };
+      const context = models.getContext('webgl2').getExtension('WEBGL_lose_context');
+      models.addEventListener('webglcontextrestored', () => resolve(true));
+      models.addEventListener('webglcontextlost', () => setTimeout(() => context.restoreContext(), 50));
+      context.loseContext();
+    });
+    if (modar.arrival) drawn.coarse = await coarse;
+    await view.whole;
+    drawn.whole = await hash(view);
+  } catch (error) {
+    drawn.error = error.code ?? String(error);
+  }
+  drawn.progress = got.at(-1);
+  modar?.close();
+  document.body.replaceChildren();
+  return drawn;
+})()"""
+
+
+def pieces_of(packed):
+    """[(first byte, bytes, stage)] by the specification: formats/shipping.md."""
+    count, at = int.from_bytes(packed[12:16], "little"), 0
+    pieces, at = [], HEADER + PIECE * count
+    for i in range(count):
+        record = packed[HEADER + PIECE * i:HEADER + PIECE * (i + 1)]
+        size = int.from_bytes(record[44:48], "little")
+        pieces.append((at, size, record[55]))
+        at += size
+    assert at == len(packed)
+    return pieces
+
+
+def flipped(data, at):
+    return data[:at] + bytes([data[at] ^ 0x10]) + data[at + 1:]
+
+
+class Host(Quiet):
+    """Answers of /KIND/demo.packed are damaged in that way: each, or the first alone."""
+
+    def do_GET(self):
+        kind, _, name = urllib.parse.urlsplit(self.path).path.lstrip("/").partition("/")
+        if name != "demo.packed":
+            return super().do_GET()
+        whole = self.server.packed
+        asked = self.server.asked.setdefault(kind, [])
+        ranged = self.headers.get("Range")
+        asked.append(ranged)
+        first = len(asked) == 1
+        (a, a_size, _), (b, b_size, _) = self.server.swapped
+        damage = {
+            "flipped": lambda: flipped(whole, a + a_size // 2) if first else whole,
+            "recipe": lambda: flipped(whole, HEADER + 30) if first else whole,
+            "version": lambda: flipped(whole, 9),
+            "swapped": lambda: whole[:a] + whole[b:b + b_size] + whole[a:a + a_size] + whole[b + b_size:] if first else whole,
+            "forged": lambda: flipped(whole, b + b_size // 2),
+        }
+        body = damage.get(kind, lambda: whole)()
+        start = int(ranged[6:-1]) if ranged and kind != "rangeless" else 0
+        part = body[start:]
+        cut = {"torn": len(whole) // 3, "rangeless": len(whole) // 2 if first else None, "closing": len(whole) // 4,
+               "short": len(whole) // 2 if first else None}.get(kind)
+        self.send_response(206 if start else 200)
+        self.send_header("Content-Type", "application/octet-stream")
+        self.send_header("Content-Length", str(len(part) if kind != "short" or cut is None else cut))
+        self.send_header("Cache-Control", "no-store")
+        if start:
+            self.send_header("Content-Range", f"bytes {start}-{len(body) - 1}/{len(body)}")
+        self.end_headers()
+        try:
+            self.wfile.write(part[:cut])
+            if cut:
+                time.sleep(0.3)  # a browser drops what it has not handed on yet
+        except OSError:
+            pass  # the page has what it wants
+        self.close_connection = True
+
+
+class Arrival(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.base = pathlib.Path(tempfile.mkdtemp(prefix="modar-arrival-"))
+        cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
+        test = cls("run_program")
+        test.folder = cls.base
+        bundle, site = cls.base / "demo.modar", cls.base / "site"
+        for words in (["bake", "--model", POTTERY, "--pattern", COVER, "--scene", "cover=pottery,scale=0.5", "-o", bundle, "--quiet", *QUICK],
+                      ["web", bundle, "-o", site, "--quiet"]):
+            done = test.modar(*words)
+            if done.returncode != 0:
+                raise AssertionError(done.stderr)
+        cls.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Host, directory=str(site)))
+        cls.http.packed, cls.http.asked = (site / "bundles" / "demo.packed").read_bytes(), {}
+        cls.raw = (site / "bundles" / "demo.modar").stat().st_size
+        pieces = pieces_of(cls.http.packed)
+        cls.pieces = pieces
+        cls.http.swapped = pieces[-2:]
+        threading.Thread(target=cls.http.serve_forever, daemon=True).start()
+        cls.addClassCleanup(cls.http.server_close)
+        cls.addClassCleanup(cls.http.shutdown)
+        cls.browser = Browser(cls.base / "profile", cls.base / "none.y4m")
+        cls.addClassCleanup(cls.browser.close)
+        cls.browser.open(f"http://localhost:{cls.http.server_port}/site.json")
+        cls.wanted = cls.draw("'/bundles/demo.modar'")
+
+    @classmethod
+    def draw(cls, source, lose=False, simd=True):
+        return cls.browser.run(DRAW % (source, json.dumps(simd), json.dumps(lose)))
+
+    def test_it_is_drawn_as_the_raw_bundle_is(self):
+        self.assertNotIn("error", self.wanted)
+        self.assertEqual(self.wanted["first"], self.wanted["whole"])
+        drawn = self.draw("'/right/demo.packed'")
+        print(f"raw {self.raw} bytes, packed {len(self.http.packed)}, the patterns {sum(size for _, size, stage in self.pieces if stage == 1)}")
+        self.assertEqual({**drawn, "coarse": 0, "first": 0},
+                         {"coarse": 0, "first": 0, "refined": 2, "whole": self.wanted["whole"], "patterns": ["cover"], "lost": False,
+                          "progress": [len(self.http.packed)] * 2})
+        # First nothing, then something that is not all.
+        self.assertEqual(len({drawn["first"], drawn["coarse"], drawn["whole"]}), 3)
+        self.assertEqual(self.http.asked["right"], [None])
+        self.assertLess(len(self.http.packed), 0.65 * self.raw)
+        # Whatever unpacks it, its hashes hold: those of the pieces, then those of the sections.
+        self.assertEqual(self.draw("'/plain/demo.packed'", simd=False)["whole"], self.wanted["whole"])
+
+    def test_bytes_in_hand_and_lost_contexts(self):
+        bytes_of = "await (await fetch('/bundles/demo.packed')).arrayBuffer()"
+        for lose in (False, True):
+            drawn = self.draw(bytes_of, lose)
+            self.assertEqual((drawn.get("whole"), drawn["lost"]), (self.wanted["whole"], lose), drawn)
+        self.assertIn(self.draw(f"new Uint8Array({bytes_of}).fill(7, 99999, 100200)").get("error", "").split(".")[0], ("piece", "record"))
+
+    def test_damaged_downloads_are_mended(self):
+        for kind in ("flipped", "recipe", "swapped", "torn", "short", "rangeless", "closing"):
+            with self.subTest(kind):
+                drawn = self.draw(f"'/{kind}/demo.packed'")
+                self.assertEqual((drawn.get("whole"), drawn.get("error")), (self.wanted["whole"], None))
+                asked = self.http.asked[kind]
+                self.assertGreater(len(asked), 1)
+                if kind == "flipped":  # that piece alone
+                    self.assertEqual(asked[1], f"bytes={self.http.swapped[0][0]}-")
+
+    def test_what_stays_damaged_is_refused(self):
+        for kind, code in (("forged", "piece."), ("version", "recipe.version"), ("none", "web.download")):
+            with self.subTest(kind):
+                if kind == "none":
+                    drawn = self.draw("'/none.packed'")
+                else:
+                    drawn = self.draw(f"'/{kind}/demo.packed'")
+                self.assertTrue(drawn.get("error", "").startswith(code), drawn)
+                self.assertNotIn("whole", drawn)
+
+
+if __name__ == "__main__":
+    unittest.main()
