@@ -31,7 +31,9 @@ void set_reflection(double roughness, double metalness, const glm::dvec3& base, 
     brightest = std::max(brightest, middle);
   }
   const bool dark = !pictured && luminance(base.r, base.g, base.b) < kDark;
-  const bool shows = (brightest >= kFaint && exponent >= 1) || metalness >= kSomeMetal || dark;
+  // Rougher metal spreads its light as wide as what scatters it; so do files that state nothing,
+  // which glTF calls metal of roughness 1.
+  const bool shows = (exponent >= 1 && (brightest >= kFaint || metalness >= kSomeMetal)) || dark;
   if (!shows) material.specular = glm::vec3(0.0f);
   material.shininess = shows ? static_cast<float>(std::max(exponent, 1.0)) : 0.0f;
   material.reflectance = shows ? static_cast<float>(kDielectricReflectance) : 0.0f;

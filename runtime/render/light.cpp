@@ -36,15 +36,14 @@ RoomLight neutral_room() {
 }
 
 glm::vec4 mirror_factors(float shininess, float reflectance, float metalness) {
-  // The sky's polynomials are weakened to 2/3 and 1/4 of its radiance; a lobe of exponent n / 4
-  // about the mirrored ray blurs bands by exp(-l^2 / (2 n / 4)). Ramamoorthi and Hanrahan, "A
-  // Signal-Processing Framework for Inverse Rendering", 2001. Less than 4: what is so rough mirrors
-  // wider lobes towards its normal.
-  const float blur = 2.0f / std::max(shininess, 4.0f);
+  // The sky's polynomials are weakened to 2/3 and 1/4 of its radiance; a lobe cos^s with s = n / 4
+  // about the mirrored ray weakens them by (s + 1) / (s + 2) and s / (s + 3). Less than 4: what is
+  // so rough mirrors wider lobes towards its normal.
+  const float n = std::max(shininess, 4.0f);
   const float roughness = std::sqrt(std::sqrt(2.0f / (shininess + 2.0f)));
   const float share = reflectance * (1.0f - metalness);
   return {
-      1.5f * std::exp(-blur), 4.0f * std::exp(-4.0f * blur), share,
+      1.5f * (n + 4.0f) / (n + 8.0f), 4.0f * n / (n + 12.0f), share,
       std::max(1.0f - roughness - share, 0.0f) * (reflectance > 0.0f ? 1.0f - metalness : 0.0f)};
 }
 

@@ -252,7 +252,11 @@ TEST(SpecTable, FlagsAreTheSpecifiedOnes) {
   }
   std::map<std::string, std::uint32_t> known;
   for (const modar::FlagInfo& info : modar::kFlags) {
-    const std::string bit = "bit " + std::to_string(std::countr_zero(info.flag));
+    const int lowest = std::countr_zero(info.flag);
+    const int highest = 31 - std::countl_zero(info.flag);
+    const std::string bit =
+        lowest == highest ? "bit " + std::to_string(lowest)
+                          : "bits " + std::to_string(lowest) + " to " + std::to_string(highest);
     const auto at = flags[info.record].find(bit);
     ASSERT_NE(at, std::string::npos) << info.record << " " << bit;
     const std::string since = " (since 1." + std::to_string(info.since);
@@ -265,6 +269,11 @@ TEST(SpecTable, FlagsAreTheSpecifiedOnes) {
     std::uint32_t bits = 0;
     for (std::size_t at = 0; (at = line.find("bit ", at)) != std::string::npos; at += 4) {
       if (std::isdigit(line[at + 4]) != 0) bits |= 1U << (line[at + 4] - '0');
+    }
+    for (std::size_t at = 0; (at = line.find("bits ", at)) != std::string::npos; at += 5) {
+      const int first = std::atoi(line.c_str() + at + 5);
+      const int last = std::atoi(line.c_str() + line.find(" to ", at) + 4);
+      bits |= (2U << last) - (1U << first);
     }
     // "with bit 0" repeats one.
     EXPECT_EQ(bits, known[name]) << name;

@@ -187,9 +187,37 @@ std::uint8_t lit_channel(std::uint8_t colour, double light) {
   return static_cast<std::uint8_t>(std::lround(std::min(255.0, colour * factor)));
 }
 
+/// A material beside the colour of its vertices.
+struct Finish {
+  double colour = 1;  ///< as stored
+  double shininess = 0;
+  double reflectance = 0;
+  double metalness = 0;
+};
+
+double seen_along(const RoomLight& light, const glm::dvec3& towards, double shininess, int c);
+
+/// White of that finish: what it scatters, and what it mirrors by Schlick's approximation of
+/// Fresnel's equations, weakened at the edges as it is rough.
+std::uint8_t mirroring_channel(const Finish& finish, const RoomLight& light, const glm::dvec3& n,
+                               const glm::dvec3& ray, std::size_t c) {
+  const auto factor = [](double x) { return 1.05 * std::sqrt(x) - 0.05 * x; };
+  const double albedo = std::pow((finish.colour + 0.055) / 1.055, 2.4);
+  const double seen =
+      std::max(0.0, seen_along(light, glm::reflect(ray, n), finish.shininess, static_cast<int>(c)));
+  const double share = finish.reflectance * (1 - finish.metalness);
+  const double smooth = 1 - std::pow(2 / (finish.shininess + 2), 0.25);
+  const double edge =
+      share > 0 ? (smooth - share) * std::pow(1 - std::abs(glm::dot(n, ray)), 5) : 0.0;
+  const double body = glm::mix(light_on(light, n, c), seen, finish.metalness);
+  const double all = finish.colour * factor(body) + factor(albedo * body + seen * (share + edge)) -
+                     factor(albedo * body);
+  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(all, 0.0, 1.0)));
+}
+
 /// Draws triangles of normals of their own in a turned, stretched view and a turned world.
 void expect_lit(Renderer& renderer, const std::vector<Triangle>& triangles, const RoomLight& light,
-                const glm::dvec3& stretch, int most) {
+                const glm::dvec3& stretch, int most, const Finish* finish = nullptr) {
   glm::dmat4 view = glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -2.5));
   view = glm::rotate(view, 0.4, glm::dvec3(1.0, 0.0, 0.0));
   view = glm::scale(view, stretch);
@@ -206,9 +234,12 @@ void expect_lit(Renderer& renderer, const std::vector<Triangle>& triangles, cons
     glm::dvec3 n = glm::normalize(normals * triangle.normal);
     const glm::dvec3 middle =
         (triangle.corners[0] + triangle.corners[1] + triangle.corners[2]) / 3.0;
-    if (glm::dot(n, glm::dvec3(view * glm::dvec4(middle, 1.0))) > 0) n = -n;
+    const glm::dvec3 ray = glm::normalize(glm::dvec3(view * glm::dvec4(middle, 1.0)));
+    if (glm::dot(n, ray) > 0) n = -n;
     for (std::size_t c = 0; c < 3; ++c) {
-      triangle.colour[c] = lit_channel(triangle.colour[c], light_on(light, to_world * n, c));
+      triangle.colour[c] = finish != nullptr
+                               ? mirroring_channel(*finish, light, to_world * n, to_world * ray, c)
+                               : lit_channel(triangle.colour[c], light_on(light, to_world * n, c));
     }
   }
   const auto eye = to_eye_space(triangles, view, true);
@@ -216,29 +247,34 @@ void expect_lit(Renderer& renderer, const std::vector<Triangle>& triangles, cons
   expect_picture(pixels, cast_rays(camera, eye), expected, most);
 }
 
-TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
-  // A fan of small tilted squares, none so steep that corners of one disagree on which side they
-  // show.
-  for (const Layout layout : {Layout::kHalfLit, Layout::kOctLit, Layout::kI16OctLit}) {
-    std::vector<Triangle> triangles;
-    std::mt19937 random(11);
-    for (int i = 0; i < 36; ++i) {
-      const double x = on_half_grid((i % 6 - 2.5) / 3.0);
-      const double y = on_half_grid((i / 6 - 2.5) / 3.0);
-      glm::dvec3 normal(static_cast<double>(random() % 200) / 100.0 - 1.0,
-                        static_cast<double>(random() % 200) / 100.0 - 1.0, 3.0);
-      normal = glm::normalize(normal);
-      const double s = on_half_grid(0.12);
-      for (const bool upper : {false, true}) {
-        Triangle triangle;
-        triangle.normal = normal;
-        triangle.colour = {200, 100, 50};
-        triangle.corners = {glm::dvec3(x - s, y - s, 0), {x + s, y + s, 0}, {x - s, y + s, 0}};
-        if (!upper)
-          triangle.corners = {glm::dvec3(x - s, y - s, 0), {x + s, y - s, 0}, {x + s, y + s, 0}};
-        triangles.push_back(triangle);
-      }
+/// Squares of twice `half` that are tilted the more the less `height` is, none so steep that
+/// corners of one disagree on which side they show.
+std::vector<Triangle> tilted_squares(double height, double half) {
+  std::vector<Triangle> triangles;
+  std::mt19937 random(11);
+  for (int i = 0; i < 36; ++i) {
+    const double x = on_half_grid((i % 6 - 2.5) / 3.0);
+    const double y = on_half_grid((i / 6 - 2.5) / 3.0);
+    glm::dvec3 normal(static_cast<double>(random() % 200) / 100.0 - 1.0,
+                      static_cast<double>(random() % 200) / 100.0 - 1.0, height);
+    normal = glm::normalize(normal);
+    const double s = on_half_grid(half);
+    for (const bool upper : {false, true}) {
+      Triangle triangle;
+      triangle.normal = normal;
+      triangle.colour = {200, 100, 50};
+      triangle.corners = {glm::dvec3(x - s, y - s, 0), {x + s, y + s, 0}, {x - s, y + s, 0}};
+      if (!upper)
+        triangle.corners = {glm::dvec3(x - s, y - s, 0), {x + s, y - s, 0}, {x + s, y + s, 0}};
+      triangles.push_back(triangle);
     }
+  }
+  return triangles;
+}
+
+TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
+  for (const Layout layout : {Layout::kHalfLit, Layout::kOctLit, Layout::kI16OctLit}) {
+    const std::vector<Triangle> triangles = tilted_squares(3.0, 0.12);
     SceneMaker maker;
     maker.add_plain_model(layout, triangles);
     const MappedBundle bundle(maker.content);
@@ -253,6 +289,71 @@ TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
     for (const glm::dvec3& stretch :
          {glm::dvec3(1, 1, 2.5), glm::dvec3(0.9), glm::dvec3(-1, 1, 1)}) {
       expect_lit(*renderer, triangles, *options.light, stretch, layout == Layout::kHalfLit ? 3 : 5);
+    }
+  }
+}
+
+/// What a lobe of cosines to the power of a quarter of `shininess` about `towards` sees of the room
+/// whose irradiance the coefficients are: a sum over the sphere.
+double seen_along(const RoomLight& light, const glm::dvec3& towards, double shininess, int c) {
+  constexpr int kSteps = 24;
+  double sum = 0;
+  double weights = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double z = 1 - 2 * (i + 0.5) / kSteps;
+    for (int j = 0; j < 2 * kSteps; ++j) {
+      const double turn = M_PI * (j + 0.5) / kSteps;
+      const double side = std::sqrt(1 - z * z);
+      const double x = side * std::cos(turn);
+      const double y = side * std::sin(turn);
+      // A cosine lobe keeps 2/3 of what is linear in the direction and 1/4 of what is quadratic.
+      const double terms[9] = {1,
+                               1.5 * y,
+                               1.5 * z,
+                               1.5 * x,
+                               4 * x * y,
+                               4 * y * z,
+                               4 * (3 * z * z - 1),
+                               4 * z * x,
+                               4 * (x * x - y * y)};
+      double radiance = 0;
+      for (std::size_t k = 0; k < 9; ++k)
+        radiance += terms[k] * static_cast<double>(light.sky[k][c]);
+      const double cosine = glm::dot(towards, glm::dvec3(x, y, z));
+      const double weight = cosine > 0 ? std::pow(cosine, shininess / 4) : 0.0;
+      sum += weight * radiance;
+      weights += weight;
+    }
+  }
+  return sum / weights;
+}
+
+TEST_F(GeometryTest, BlackPlasticAndMetalMirrorTheRoom) {
+  std::vector<Triangle> triangles = tilted_squares(1.5, 0.08);
+  for (Triangle& triangle : triangles) triangle.colour = {255, 255, 255};
+  RenderOptions options = flat_light();
+  options.light->key = glm::vec3(0.0f);
+  for (std::size_t k = 0; k < 9; ++k) options.light->sky[k] = 0.5f * room_of_all_terms()[k];
+  const struct {
+    float colour;
+    std::uint32_t flags;
+    double reflectance, metalness;
+  } cases[] = {{0.1f, 51u << 16, 0.2, 0.0}, {0.8f, 0xFFu << 8, 0.0, 1.0}};
+  for (const auto& expected : cases) {
+    SceneMaker maker;
+    maker.add_plain_model(Layout::kHalfLit, triangles);
+    MaterialRecord& material = maker.content.materials[0];
+    std::fill_n(material.diffuse, 3, expected.colour);
+    material.shininess = 30.0f;
+    material.flags |= expected.flags;
+    const MappedBundle bundle(maker.content);
+    const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+    ASSERT_TRUE(renderer);
+    renderer->set_options(options);
+    const Finish finish = {static_cast<double>(expected.colour), 30.0, expected.reflectance,
+                           expected.metalness};
+    for (const glm::dvec3& stretch : {glm::dvec3(0.9), glm::dvec3(1, 1, 1.5)}) {
+      expect_lit(*renderer, triangles, *options.light, stretch, 10, &finish);
     }
   }
 }
