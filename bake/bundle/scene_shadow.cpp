@@ -88,9 +88,9 @@ class Casters {
     const std::set<std::uint32_t> used(materials_.begin(), materials_.end());
     for (const std::uint32_t m : used)
       masks_[m] = alpha_mask(content, content.materials[m].texture);
-    std::vector<TriangleTree::Triangle> triangles;
+    std::vector<RayTree::Triangle> triangles;
     for (std::uint32_t i = 0; i < corners_.size(); i += 3) triangles.push_back({i, i + 1, i + 2});
-    if (!triangles.empty()) tree_.emplace(corners_, std::move(triangles));
+    if (!triangles.empty()) tree_.emplace(corners_, triangles);
   }
 
   [[nodiscard]] const std::vector<glm::dvec3>& corners() const { return corners_; }
@@ -110,7 +110,7 @@ class Casters {
   }
 
  private:
-  [[nodiscard]] double alpha(const TriangleTree::Hit& hit) const {
+  [[nodiscard]] double alpha(const RayHit& hit) const {
     const std::uint32_t first = hit.triangle[0];
     const std::uint32_t material = materials_[first / 3];
     const AlphaMask& mask = masks_[material];
@@ -127,7 +127,7 @@ class Casters {
   std::vector<std::uint32_t> materials_;  ///< of each triangle
   std::vector<double> opacities_;         ///< of each material
   std::vector<AlphaMask> masks_;
-  std::optional<TriangleTree> tree_;
+  std::optional<RayTree> tree_;
 };
 
 void Casters::place(const BundleContent& content, const SceneRecord& scene) {

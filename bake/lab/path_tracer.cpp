@@ -92,7 +92,7 @@ class PathTracer::Scene {
   explicit Scene(const TracedScene& scene)
       : scene_(scene), turn_(glm::transpose(glm::inverse(glm::dmat3(scene.place)))) {
     // Corners of their own, so that what a ray meets tells its triangle.
-    std::vector<TriangleTree::Triangle> triangles;
+    std::vector<RayTree::Triangle> triangles;
     two_sided_.resize(scene.mesh.triangles.size());
     std::map<std::array<std::array<double, 3>, 3>, std::uint32_t> known;
     for (std::uint32_t t = 0; t < scene.mesh.triangles.size(); ++t) {
@@ -114,7 +114,7 @@ class PathTracer::Scene {
         two_sided_[twin->second] = true;
       }
     }
-    if (!triangles.empty()) tree_.emplace(positions_, std::move(triangles));
+    if (!triangles.empty()) tree_.emplace(positions_, triangles);
     to_key_ = glm::normalize(glm::dvec3(scene.light.direction));
     key_ = scene.room != nullptr ? glm::dvec3(0.0) : glm::dvec3(scene.light.key);
     if (scene.room != nullptr) {
@@ -319,7 +319,7 @@ class PathTracer::Scene {
     return s;
   }
 
-  [[nodiscard]] Surface surface(const TriangleTree::Hit& hit, const Ray& ray, double level) const {
+  [[nodiscard]] Surface surface(const RayHit& hit, const Ray& ray, double level) const {
     const TriMesh& mesh = scene_.mesh;
     const std::uint32_t triangle = hit.triangle[0] / 3;
     const auto& [p, q, r] = mesh.triangles[triangle];
@@ -382,7 +382,7 @@ class PathTracer::Scene {
   glm::dmat3 turn_;
   std::vector<glm::dvec3> positions_;  ///< three a triangle, in the world
   std::vector<bool> two_sided_;        ///< of each triangle
-  std::optional<TriangleTree> tree_;
+  std::optional<RayTree> tree_;
   glm::dvec3 to_key_{0, 0, 1};
   glm::dvec3 key_{0.0};  ///< where paths see no panorama
   glm::dvec3 room_gain_{1.0};

@@ -1,5 +1,4 @@
-// A tree of boxes over triangles: which triangle is nearest to a point, which does a ray meet
-// first?
+// Trees of boxes over triangles: which triangle is nearest to a point, which does a ray meet first?
 #pragma once
 
 #include <array>
@@ -42,18 +41,6 @@ class TriangleTree {
   /// answer: neighbouring points ask for it again.
   double nearest(const glm::dvec3& point, double enough = 0,
                  double best = std::numeric_limits<double>::infinity());
-  /// What a ray meets first.
-  struct Hit {
-    double distance = 0;  ///< in lengths of the direction
-    Triangle triangle{};
-    double b = 0;  ///< weights of the second and the third corner
-    double c = 0;
-  };
-  /// The first triangle, from either side, that the ray meets between two distances. Changes
-  /// nothing: any number of threads may ask.
-  [[nodiscard]] std::optional<Hit> first_hit(const glm::dvec3& origin, const glm::dvec3& direction,
-                                             double from, double to) const;
-
   /// The triangle that nearest() answered last.
   [[nodiscard]] const Triangle& last_triangle() const { return triangles_[last_]; }
 
@@ -78,6 +65,80 @@ class TriangleTree {
   std::vector<Triangle> triangles_;
   std::vector<Node> nodes_;
   std::uint32_t last_ = 0;
+};
+
+/// What a ray meets first.
+struct RayHit {
+  double distance = 0;  ///< in lengths of the direction
+  std::array<std::uint32_t, 3> triangle{};
+  double b = 0;  ///< weights of the second and the third corner
+  double c = 0;
+};
+
+/// Nodes of four boxes in single precision, which a ray tries at once; triangles are met in double
+/// precision, so that the boxes decide how long a ray takes and never what it meets.
+class RayTree {
+ public:
+  using Triangle = std::array<std::uint32_t, 3>;  ///< of positions
+
+  /// Every index below positions.size(); no triangle: rays meet nothing. Keeps copies of corners:
+  /// 88 bytes a triangle, and some 60 of nodes.
+  RayTree(std::span<const glm::dvec3> positions, std::span<const Triangle> triangles);
+
+  /// The first triangle, from either side, that the ray meets between two distances. Changes
+  /// nothing: any number of threads may ask.
+  [[nodiscard]] std::optional<RayHit> first_hit(const glm::dvec3& origin,
+                                                const glm::dvec3& direction, double from,
+                                                double to) const;
+
+ private:
+  using Four [[gnu::vector_size(16)]] = float;
+  struct Node {
+    std::array<Four, 3> low;
+    std::array<Four, 3> high;
+    std::array<std::uint32_t, 4> first{};  // leaf: triangle; else the child's node
+    std::array<std::uint32_t, 4> count{};  // of triangles; 0: an inner node
+  };
+  /// The first corner and the sides from it.
+  struct Facet {
+    glm::dvec3 corner;
+    glm::dvec3 ab;
+    glm::dvec3 ac;
+    Triangle triangle;
+  };
+  struct Box {
+    glm::dvec3 low;
+    glm::dvec3 high;
+  };
+  struct Item {
+    Box box;
+    glm::dvec3 centre;  // twice
+    std::uint32_t triangle = 0;
+  };
+  struct Part {
+    std::span<Item> items;
+    Box box;
+  };
+  struct BinAxis {
+    int axis = 0;
+    double low = 0;
+    double scale = 0;  // bins a length
+    [[nodiscard]] int of(const Item& item) const;
+  };
+  static Four four(float value);
+  static Box box_of(std::span<const Item> items);
+  static int best_bin(std::span<const Item> items, const BinAxis& bins);
+  static std::size_t halve(std::span<Item> items, int depth);
+  static std::size_t quarter(std::array<Part, 4>& parts, int depth);
+  static bool meet(const Facet& facet, const glm::dvec3& origin, const glm::dvec3& direction,
+                   double from, double to, std::optional<RayHit>& hit);
+  void add_leaf(std::uint32_t node, std::size_t child, std::span<const Item> items);
+  void build(std::uint32_t node, const Part& part, int depth);
+
+  std::span<const Triangle> source_;
+  std::span<const glm::dvec3> positions_;
+  std::vector<Node> nodes_;
+  std::vector<Facet> facets_;
 };
 
 }  // namespace modar

@@ -66,16 +66,16 @@ TEST(TriangleTree, FindsWhatTryingAllFinds) {
   }
 }
 
-TEST(TriangleTree, RaysMeetWhatTryingAllMeets) {
+TEST(RayTree, RaysMeetWhatTryingAllMeets) {
   std::mt19937 random(5);
   std::vector<glm::dvec3> positions;
-  std::vector<TriangleTree::Triangle> triangles;
+  std::vector<RayTree::Triangle> triangles;
   for (std::uint32_t t = 0; t < 200; ++t) {
     const glm::dvec3 at = draw(random);
     for (int corner = 0; corner < 3; ++corner) positions.push_back(at + 0.3 * draw(random));
     triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   }
-  const TriangleTree tree(positions, triangles);
+  const RayTree tree(positions, triangles);
   int hits = 0;
   for (int trial = 0; trial < 500; ++trial) {
     const glm::dvec3 origin = 1.5 * draw(random);
