@@ -204,7 +204,9 @@ void ChunkOrderer::number_by_first_use(std::span<std::uint16_t> indices) {
     indices[i] = static_cast<std::uint16_t>(new_of_old_[v]);
   }
   for (std::uint32_t v = 0; v < distinct_; ++v) {
-    if (new_of_old_[v] == kNoVertex) old_of_new_.push_back(vertex_of_rank_[v]);
+    if (new_of_old_[v] != kNoVertex) continue;
+    new_of_old_[v] = static_cast<std::uint32_t>(old_of_new_.size());
+    old_of_new_.push_back(vertex_of_rank_[v]);
   }
 }
 

@@ -23,7 +23,7 @@ class ChunkOrderer {
   /// until the next call.
   std::span<const std::uint16_t> order(std::span<const std::byte> vertices, std::uint32_t stride,
                                        std::span<std::uint16_t> indices);
-  /// The new number of a vertex that a triangle of the last call used, by its old one.
+  /// The new number of a vertex of the last call, by its old one.
   [[nodiscard]] std::uint16_t place(std::uint16_t vertex) const {
     return static_cast<std::uint16_t>(new_of_old_[rank_[vertex]]);
   }

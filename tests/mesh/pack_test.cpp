@@ -209,6 +209,23 @@ TEST(Pack, BoxesAndConesAreConservative) {
   }
 }
 
+TEST(Pack, NoTriangleIsRoundedToALine) {
+  // The middle one's two near corners differ in their normals alone once they are halves.
+  const PackedMesh mesh =
+      packed(chunked(welded(parse("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv 0.50001 0.5 0\nv 0.50002 0.5 0\n"
+                                  "vn 0 0 1\nvn 0.6 0 0.8\nf 1//1 2//1 3//1\nf 1//1 4//1 5//2\n"
+                                  "f 1//1 3//1 4//1\n")),
+                     65535));
+  EXPECT_EQ(mesh.record.triangle_count, 2u);
+  const auto* const indices = reinterpret_cast<const std::uint16_t*>(mesh.indices.data());
+  for (std::size_t i = 0; i < mesh.indices.size() / 2; i += 3) {
+    const glm::vec3 a = position_at(mesh, indices[i]);
+    const glm::vec3 b = position_at(mesh, indices[i + 1]);
+    const glm::vec3 c = position_at(mesh, indices[i + 2]);
+    EXPECT_FALSE(a == b || b == c || c == a);
+  }
+}
+
 /// A sliver whose two near corners round to one reaches out of all else and is left out.
 TEST(Pack, BoxesEndWhereTheTrianglesDo) {
   const PackedMesh mesh = packed(chunked(

@@ -39,21 +39,6 @@ namespace {
 /// Chunks per thread between two joins: more balance load better and hold more memory. Set by hand.
 constexpr unsigned kWave = 4;
 
-/// Coarse triangles in packed vertex numbers. Those with two vertices merged into one are left out:
-/// they have no area.
-std::vector<std::uint16_t> coarse_triangles(const std::vector<std::uint16_t>& indices,
-                                            const ChunkOrderer& places) {
-  std::vector<std::uint16_t> coarse;
-  coarse.reserve(indices.size());
-  for (std::size_t i = 0; i < indices.size(); i += 3) {
-    const std::array<std::uint16_t, 3> t = {places.place(indices[i]), places.place(indices[i + 1]),
-                                            places.place(indices[i + 2])};
-    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-    coarse.insert(coarse.end(), t.begin(), t.end());
-  }
-  return coarse;
-}
-
 /// One chunk in its final bytes, before its place in the buffers is known.
 struct PackedChunk {
   std::vector<std::byte> vertices;                 ///< in their final order
@@ -106,8 +91,9 @@ class ChunkPacker {
       std::memcpy(out.vertices.data() + v * stride_, bytes_.data() + order[v] * stride_, stride_);
     }
     for (const ChunkLevel& level : chunk.coarser) {
-      std::vector<std::uint16_t> coarse = coarse_triangles(level.indices, orderer_);
+      std::vector<std::uint16_t> coarse = lasting_triangles(level.indices);
       if (coarse.empty()) break;
+      for (std::uint16_t& index : coarse) index = orderer_.place(index);
       level_orderer_.order(coarse, static_cast<std::uint32_t>(order.size()));
       out.levels.push_back(std::move(coarse));
       out.level_errors.push_back(std::max({out.level_errors.back(), level.error, level.shading}));
@@ -116,12 +102,11 @@ class ChunkPacker {
   }
 
  private:
-  /// Without those of which two corners have become the same vertex: they have no area.
+  /// Without those of which two corners lie at one place as stored: they have no area.
   [[nodiscard]] std::vector<std::uint16_t> lasting_triangles(
       const std::vector<std::uint16_t>& indices) const {
     const auto same = [this](std::uint16_t a, std::uint16_t b) {
-      return std::memcmp(bytes_.data() + std::size_t{a} * stride_,
-                         bytes_.data() + std::size_t{b} * stride_, stride_) == 0;
+      return decoded_[a] == decoded_[b];
     };
     std::vector<std::uint16_t> lasting;
     lasting.reserve(indices.size());
