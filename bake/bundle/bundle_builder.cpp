@@ -276,9 +276,10 @@ void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, PositionK
         text, sizeof text,
         "half floats (%u bytes a vertex) move vertices by up to %.3g, %.0f %% of the mean "
         "edge; 16-bit integers (%u bytes) would by %.3g at most",
-        packed.layout.stride, error, 100 * error / edge, packed.layout.stride - 4u,
+        packed.layout.stride, error, 100 * error / edge,
+        packed.layout.stride - (packed.occlusion_byte == kNone ? 4u : 0u),
         step * std::sqrt(0.75) * mesh.mesh.placement.scale);
-    cure = "bake with --positions int16, which leaves ambient occlusion out";
+    cure = "bake with --positions int16";
   }
   report.diagnostics.push_back(
       {"model.positions", DiagnosticSeverity::kInfo, packed.name, 0, text, cure});
@@ -336,7 +337,7 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
     return tl::unexpected(made.error());
   }
   drop_alike_levels(*chunked);
-  if (request.occlusion && plan->kind != PositionKind::kInt16) {
+  if (request.occlusion) {
     chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
   }
   PackOptions pack_options;

@@ -37,7 +37,7 @@ constexpr IssueKind kKinds[] = {
      "split it, or ship it compressed with smaller textures"},
     {"DEVICE_HALF_FLOAT", Severity::kWarning,
      "The device has no half-float vertices: the player converts them on upload",
-     "none needed if these attributes may take twice the memory"},
+     "bake with --positions int16, unless these attributes may take twice the memory"},
     {"DEVICE_ETC1", Severity::kWarning,
      "The device has no ETC1 textures: the player decodes them on upload",
      "none needed if textures may take six times the memory"},

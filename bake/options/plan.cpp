@@ -32,6 +32,9 @@ Result<void> plan_for_device(const std::string& device, BakeRequest& request) {
   const auto side = static_cast<std::uint32_t>(profile->max_texture_size);
   request.textures.max_side = std::min(request.textures.max_side, side);
   lower_budget(std::uint64_t{profile->gpu_memory_mib} * 1024 * 1024 / 2, request);
+  const bool reads_half =
+      profile->es_version >= 30 || profile->has_extension("GL_OES_vertex_half_float");
+  if (!reads_half && !request.positions) request.positions = PositionKind::kInt16;
   request.device = device;
   return {};
 }

@@ -141,7 +141,7 @@ struct BakeRequest {
   std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
   /// Of detail a chunk at most, the finest counted: halving ends before for all but huge chunks.
   std::uint32_t levels = kMaxLevels;
-  bool occlusion = true;  ///< measure and store it; not beside int16 positions
+  bool occlusion = true;  ///< measure and store it
   AtlasMode atlas = AtlasMode::kWhereItPays;
   bool topology = false;           ///< measure and state each model's
   std::uint64_t memory_bytes = 0;  ///< see MemoryLimit; 0: any; the bytes do not depend on it
@@ -156,7 +156,8 @@ struct BakeRequest {
 };
 
 /// Lowers texture sizes and their budget to what a device profile allows: half of its GPU memory,
-/// so that as much is left for vertices, camera picture and framebuffers. Errors: kUsage
+/// so that as much is left for vertices, camera picture and framebuffers. Where its driver reads no
+/// half floats, positions are 16-bit integers unless the request says otherwise. Errors: kUsage
 /// "device.unknown" that lists the names.
 Result<void> plan_for_device(const std::string& device, BakeRequest& request);
 

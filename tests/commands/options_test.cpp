@@ -132,5 +132,17 @@ TEST(Options, SizesOfDevicesAndTiersHoldWhateverTheOrder) {
   EXPECT_EQ(request.textures.max_side, 512U);
 }
 
+TEST(Options, DevicesWithoutHalfFloatsGetIntegers) {
+  BakeRequest without;
+  ASSERT_TRUE(apply_settings({{"device", "mali400"}}, without));
+  EXPECT_EQ(without.positions, PositionKind::kInt16);
+  BakeRequest with;
+  ASSERT_TRUE(apply_settings({{"device", "ace2"}}, with));
+  EXPECT_EQ(with.positions, std::nullopt);
+  BakeRequest asked;
+  ASSERT_TRUE(apply_settings({{"positions", "half"}, {"device", "mali400"}}, asked));
+  EXPECT_EQ(asked.positions, PositionKind::kHalf);
+}
+
 }  // namespace
 }  // namespace modar

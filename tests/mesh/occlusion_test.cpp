@@ -104,6 +104,19 @@ TEST(Occlusion, IsPackedBehindTheNormal) {
   for (std::size_t at = 11; at < with.vertices.size(); at += with.layout.stride) {
     EXPECT_EQ(with.vertices[at], std::byte{77});
   }
+  Report report;
+  PackOptions integers;
+  integers.positions = PositionKind::kInt16;
+  const Result<PackedMesh> finer =
+      pack(mesh, std::vector<std::uint32_t>(mesh.mesh.materials.size(), 1024), integers, report);
+  ASSERT_TRUE(finer);
+  EXPECT_EQ(finer->layout.stride, 12u);
+  ASSERT_EQ(finer->occlusion_byte, 11u);
+  for (std::size_t at = 8; at < finer->vertices.size(); at += finer->layout.stride) {
+    // The plane looks up or down.
+    EXPECT_EQ(std::abs(static_cast<int>(static_cast<std::int8_t>(finer->vertices[at + 2]))), 127);
+    EXPECT_EQ(finer->vertices[at + 3], std::byte{77});
+  }
 }
 
 }  // namespace

@@ -201,18 +201,20 @@ LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& 
     a.offset = offset;
   };
   offsets = VertexOffsets{};
-  if (kind != PositionKind::kInt16) {
-    const bool half = kind == PositionKind::kHalf;
-    offsets.normal = half ? 8 : 12;
-    offsets.stride = static_cast<std::uint16_t>(offsets.normal + 4);
-    if (!mesh.occlusion.empty()) offsets.occlusion = static_cast<std::uint16_t>(offsets.normal + 3);
-    add(Semantic::kPosition, half ? ComponentType::kHalf : ComponentType::kF32, 3, false, 0);
-    add(Semantic::kNormal, ComponentType::kI8, 3, true, offsets.normal);
-  } else {
+  constexpr ComponentType kTypes[] = {ComponentType::kHalf, ComponentType::kI16,
+                                      ComponentType::kF32};
+  add(Semantic::kPosition, kTypes[static_cast<std::size_t>(kind)], 3, false, 0);
+  if (kind == PositionKind::kInt16 && mesh.occlusion.empty()) {
+    offsets.normal_components = 2;
     offsets.normal = 6;
     offsets.stride = 8;
-    add(Semantic::kPosition, ComponentType::kI16, 3, false, 0);
     add(Semantic::kNormalOct, ComponentType::kI8, 2, true, offsets.normal);
+  } else {
+    // A byte is left behind it, for occlusion.
+    offsets.normal = kind == PositionKind::kFloat ? 12 : 8;
+    offsets.stride = static_cast<std::uint16_t>(offsets.normal + 4);
+    if (!mesh.occlusion.empty()) offsets.occlusion = static_cast<std::uint16_t>(offsets.normal + 3);
+    add(Semantic::kNormal, ComponentType::kI8, 3, true, offsets.normal);
   }
   if (!mesh.uvs.empty()) {
     offsets.uv = offsets.stride;
@@ -287,11 +289,11 @@ void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange
       glm::vec3& at = decoded[first + i];
       if (kind_ == PositionKind::kInt16) {
         at = put_int16(p, grid, bytes);
-        normals[i] = put_oct(n, bytes + offsets_.normal);
       } else {
         at = kind_ == PositionKind::kHalf ? put_half(p, bytes) : put_float(p, bytes);
-        normals[i] = put_normal(n, bytes + offsets_.normal);
       }
+      std::byte* const normal = bytes + offsets_.normal;
+      normals[i] = offsets_.normal_components == 2 ? put_oct(n, normal) : put_normal(n, normal);
       if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
       if (offsets_.occlusion != 0) bytes[offsets_.occlusion] = std::byte{mesh_.occlusion[v]};
       if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);

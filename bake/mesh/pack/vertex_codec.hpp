@@ -63,6 +63,7 @@ glm::dvec3 decoded_position(const glm::dvec3& position, PositionKind kind, const
 /// Byte offsets of the attributes; 0 where there is none but the position.
 struct VertexOffsets {
   std::uint16_t normal = 0;
+  std::uint16_t normal_components = 3;  ///< 2: octahedral
   std::uint16_t uv = 0;
   std::uint16_t colour = 0;
   std::uint16_t occlusion = 0;
@@ -70,8 +71,9 @@ struct VertexOffsets {
 };
 
 /// Half floats: 3 halves, 2 bytes of padding, 3 x i8 normal, 1 of occlusion (or padding). 16-bit
-/// integers: 3 of them and an octahedral normal of 2 x i8. Floats: 3 of them, 3 x i8 normal, 1 of
-/// occlusion (or padding). Then, where the mesh has them, uv as 2 x u16 and colour as 4 x u8.
+/// integers: the same, or without occlusion 3 of them and an octahedral normal of 2 x i8. Floats: 3
+/// of them, 3 x i8 normal, 1 of occlusion (or padding). Then, where the mesh has them, uv as 2 x
+/// u16 and colour as 4 x u8.
 LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets);
 
 /// uv = shift + offset + scale * attribute; shift holds whole numbers, which are not stored.
