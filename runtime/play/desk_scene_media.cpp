@@ -51,6 +51,34 @@ std::string captions_of(const BundleView& bundle, const NodeRecord& node) {
   return captions;
 }
 
+std::string words_of(const BundleView& bundle, const SceneCommand& command) {
+  if (command.command == ActionCommand::kLink) {
+    return "link " + std::string(bundle.name(bundle.actions()[command.action].address));
+  }
+  const char* verb = command.command == ActionCommand::kPlay    ? "play "
+                     : command.command == ActionCommand::kPause ? "pause "
+                                                                : "text ";
+  return verb + std::string(bundle.name(bundle.nodes()[command.node].name));
+}
+
+/// A label's words in all languages, or the address of a link.
+void tell(const BundleView& bundle, const SceneCommand& command, std::string& told) {
+  if (command.command == ActionCommand::kLink) {
+    told += "modar-play: link: ";
+    told += bundle.name(bundle.actions()[command.action].address);
+    told += '\n';
+  }
+  if (command.command != ActionCommand::kText) return;
+  const NodeRecord& node = bundle.nodes()[command.node];
+  const std::string_view pattern = bundle.name(bundle.patterns()[node.pattern].name);
+  const std::string_view name = bundle.name(node.name);
+  visit_node_texts(bundle.meta(), [&](const MetaText& each) {
+    const bool shown = each.kind == MetaText::Kind::kTitle || each.kind == MetaText::Kind::kText;
+    if (each.pattern != pattern || each.node != name || !shown) return;
+    told += "modar-play: " + each.node + " [" + each.language + "]: " + each.words + "\n";
+  });
+}
+
 /// One sound on its way to the device.
 class Speaker {
  public:
@@ -122,7 +150,7 @@ struct Clip {
 class DeskSceneMedia final : public SceneMedia {
  public:
   DeskSceneMedia(const BundleView& bundle, const SceneMediaSetup& setup)
-      : setup_(setup), sound_(setup.sound) {
+      : bundle_(bundle), setup_(setup), sound_(setup.sound) {
     for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) {
       const NodeRecord& node = bundle.nodes()[i];
       if (!plays_media(node)) continue;
@@ -135,7 +163,6 @@ class DeskSceneMedia final : public SceneMedia {
       clip.loops = (node.flags & kNodeLoops) != 0;
       clips_.push_back(std::move(clip));
     }
-    ended_.reserve(clips_.size());
   }
 
   ~DeskSceneMedia() override {
@@ -143,10 +170,9 @@ class DeskSceneMedia final : public SceneMedia {
     if (audio_) SDL_QuitSubSystem(SDL_INIT_AUDIO);
   }
 
-  std::span<const SceneEvent> advance(double time_s) override {
+  void advance(double time_s, std::vector<SceneEvent>& events) override {
     const double passed = std::max(0.0, time_s - time_s_);
     time_s_ = std::max(time_s_, time_s);
-    ended_.clear();
     for (Clip& clip : clips_) {
       const auto length = static_cast<double>(clip.record->seconds);
       if (!clip.playing) continue;
@@ -160,26 +186,34 @@ class DeskSceneMedia final : public SceneMedia {
       clip.position = length;
       clip.playing = false;
       clip.at_end = true;
-      ended_.push_back({SceneEvent::Kind::kEnded, clip.node, kNone});
+      events.push_back({SceneEvent::Kind::kEnded, clip.node, kNone});
     }
-    return ended_;
   }
 
-  void obey(std::span<const SceneCommand> commands, bool tapped) override {
+  const SceneLog& obey(std::span<const SceneCommand> commands, std::span<const SceneEvent> events,
+                       Controls& controls) override {
+    log_.commands.clear();
+    log_.told.clear();
+    const bool tapped = std::any_of(events.begin(), events.end(), [](const SceneEvent& event) {
+      return event.kind == SceneEvent::Kind::kTap;
+    });
     for (const SceneCommand& command : commands) {
-      const bool plays = command.command == ActionCommand::kPlay;
-      if (!plays && command.command != ActionCommand::kPause) continue;
-      for (Clip& clip : clips_) {
-        if (clip.node == command.node) start(clip, plays);
-      }
-      // Who asked for it by a click hears it, unless sound was turned off.
-      if (plays && tapped && !asked_) set_sound(true);
+      log_.commands.push_back(words_of(bundle_, command));
+      tell(bundle_, command, log_.told);
+      play(command, tapped);
     }
-    caption_.clear();
+    if (controls.take_sound()) set_sound(!sound_);
+    volume_ = controls.volume();
+    std::string caption;
     for (Clip& clip : clips_) {
-      if (clip.playing) add_caption(words_at(clip.captions, clip.position));
+      if (clip.playing && controls.captions()) {
+        add_line(words_at(clip.captions, clip.position), caption);
+      }
       listen(clip);
     }
+    if (caption != log_.caption && !caption.empty()) log_.told += "modar-play: " + caption + "\n";
+    log_.caption = std::move(caption);
+    return log_;
   }
 
   Result<void> show(Screen& screen) override {
@@ -194,27 +228,33 @@ class DeskSceneMedia final : public SceneMedia {
       if (another || !screen.has_video(clip.node))
         screen.show_video(clip.node, clip.pictures->picture());
     }
+    if (title_ != log_.caption)
+      screen.set_title(log_.caption.empty() ? "modar-play" : log_.caption);
+    title_ = log_.caption;
     return {};
   }
-
-  [[nodiscard]] std::string_view caption() const override { return caption_; }
 
   void hold(bool on) override {
     held_ = on;
     for (Clip& clip : clips_) listen(clip);
   }
 
-  void set_sound(bool on) override {
+ private:
+  void set_sound(bool on) {
     asked_ = true;
     sound_ = on;
-    for (Clip& clip : clips_) listen(clip);
   }
 
-  [[nodiscard]] bool sound() const override { return sound_; }
+  void play(const SceneCommand& command, bool tapped) {
+    const bool plays = command.command == ActionCommand::kPlay;
+    if (!plays && command.command != ActionCommand::kPause) return;
+    for (Clip& clip : clips_) {
+      if (clip.node == command.node) start(clip, plays);
+    }
+    // Who asked for it by a click hears it, unless sound was turned off.
+    if (plays && tapped && !asked_) set_sound(true);
+  }
 
-  void set_volume(float volume) override { volume_ = volume; }
-
- private:
   static void start(Clip& clip, bool plays) {
     if (plays && clip.at_end) {
       clip.position = 0;
@@ -224,10 +264,10 @@ class DeskSceneMedia final : public SceneMedia {
     clip.playing = plays;
   }
 
-  void add_caption(std::string_view words) {
+  static void add_line(std::string_view words, std::string& caption) {
     if (words.empty()) return;
-    if (!caption_.empty()) caption_ += '\n';
-    caption_ += words;
+    if (!caption.empty()) caption += '\n';
+    caption += words;
   }
 
   /// Sound follows what its clip does.
@@ -261,10 +301,11 @@ class DeskSceneMedia final : public SceneMedia {
     clip.speaker = std::move(speaker);
   }
 
+  BundleView bundle_;
   SceneMediaSetup setup_;
   std::vector<Clip> clips_;
-  std::vector<SceneEvent> ended_;
-  std::string caption_;
+  SceneLog log_;
+  std::string title_;  ///< the caption in the window's title
   double time_s_ = 0;
   float volume_ = 1;
   bool sound_;
@@ -277,7 +318,10 @@ class DeskSceneMedia final : public SceneMedia {
 
 std::unique_ptr<SceneMedia> open_scene_media(const BundleView& bundle,
                                              const SceneMediaSetup& setup) {
-  if (bundle.media().size() == 0) return nullptr;
+  if (setup.sound && !setup.audible) {
+    std::fputs("modar-play: --sound: a file is heard with --realtime only\n", stderr);
+  }
+  if (bundle.nodes().empty()) return nullptr;
   return std::make_unique<DeskSceneMedia>(bundle, setup);
 }
 

@@ -66,11 +66,6 @@ std::unique_ptr<SceneMedia> open_scene_media(const BundleView& /*bundle*/,
   return nullptr;
 }
 
-void log_command(const BundleView& /*bundle*/, const SceneCommand& /*command*/,
-                 std::vector<std::string>& /*log*/) {}
-
-void print_command(const BundleView& /*bundle*/, const SceneCommand& /*command*/) {}
-
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
   if (is_raw_input(input)) return open_raw_source(input);
   return left_out("input.unsupported", input, "videos, pictures and cameras");

@@ -166,6 +166,19 @@ void times(Writer& writer, const StageTimes& ms) {
   writer.EndObject();
 }
 
+void scene(Writer& writer, const SceneLog& log) {
+  if (!log.commands.empty()) {
+    writer.Key("commands");
+    writer.StartArray();
+    for (const std::string& each : log.commands) text(writer, each);
+    writer.EndArray();
+  }
+  if (!log.caption.empty()) {
+    writer.Key("caption");
+    text(writer, log.caption);
+  }
+}
+
 }  // namespace
 
 bool draws_in_software(std::string_view gl_renderer) {
@@ -207,16 +220,7 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
   writer.String(to_string(report.reason));
   writer.Key("state");
   writer.String(to_string(report.state));
-  if (!report.commands.empty()) {
-    writer.Key("commands");
-    writer.StartArray();
-    for (const std::string& each : report.commands) text(writer, each);
-    writer.EndArray();
-  }
-  if (!report.caption.empty()) {
-    writer.Key("caption");
-    text(writer, report.caption);
-  }
+  if (report.scene != nullptr) scene(writer, *report.scene);
   camera(writer, report.camera);
   times(writer, report.ms);
   writer.EndObject();

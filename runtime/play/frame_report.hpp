@@ -46,6 +46,14 @@ struct CameraReport {
   bool given = false;  ///< by somebody; else estimated or, by the ModAR paper's method, assumed
 };
 
+/// What the bundle's actions asked for in one frame, and what is heard in it.
+struct SceneLog {
+  /// "play NODE", "pause NODE", "text NODE" or "link ADDRESS", as the actions asked for it.
+  std::vector<std::string> commands;
+  std::string caption;  ///< what is heard, in one language; lines end with a line feed but the last
+  std::string told;     ///< lines for the user: labels' words, addresses, captions that begin
+};
+
 struct FrameReport {
   std::uint64_t frame = 0;
   double time_s = 0;
@@ -54,8 +62,7 @@ struct FrameReport {
   Shown state = Shown::kHidden;
   CameraReport camera;
   StageTimes ms{};
-  std::vector<std::string> commands;  ///< what the bundle's actions asked for: log_command()
-  std::string_view caption;           ///< what is heard; lives as long as the frame's step
+  const SceneLog* scene = nullptr;  ///< of the frame; null: nothing acts
 
   double& at(Stage stage) { return ms[static_cast<std::size_t>(stage)]; }
   [[nodiscard]] double at(Stage stage) const { return ms[static_cast<std::size_t>(stage)]; }

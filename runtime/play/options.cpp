@@ -134,9 +134,6 @@ Result<void> validate(const PlayOptions& options) {
       !(options.golden.empty() && options.record.empty() && options.turntable == 0)) {
     return usage("usage.conflict", "--live", "recordings and turntables are of one bundle");
   }
-  if (options.sound && !options.realtime && !options.input.starts_with("camera")) {
-    return usage("usage.conflict", "--sound", "a file is heard with --realtime only");
-  }
   if (!options.gyro.empty() && !options.extended) {
     return usage("usage.conflict", "--gyro", "it helps --extended, which is not given");
   }
@@ -195,8 +192,8 @@ Input and output:
   --report FOLDER     write overlay.mp4, contact_sheet.png, frames.jsonl and index.html
   --window            show a window; its keys: Q or Escape quits, space pauses, M or the arrows
                       switch the model, P the pattern, + and - its size, O the outline, D the
-                      display; S turns sound on and off, 9 and 0 its volume, C captions; F freezes the picture, and four clicks on the corners of
-                      something flat make it the pattern
+                      display; S sound, 9 and 0 its volume, C captions; F freezes the picture, and
+                      four clicks on the corners of something flat make it the pattern
   --json              print one JSON line per frame and a summary to standard output
 
 Tracking:
@@ -228,8 +225,7 @@ Display:
 Running:
   --live              reload the bundle when its file is replaced (see modar bake --watch)
   --realtime          play a file at its own speed, dropping frames
-  --sound             with a camera or --realtime: let videos and sounds be heard from the start;
-                      without it a window is silent until a click or S asks for sound
+  --sound             with a camera or --realtime: let videos and sounds be heard from the start
   --force             write into a folder of --out or --report that contains other files
   --verify            check every byte of the bundle first, not just its tables
   --quiet             no progress or summary

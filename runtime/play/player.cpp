@@ -245,36 +245,13 @@ void Player::collect(std::span<const Hysteresis::State> states, const Job& job,
     const auto tap = tap_at(bundle_, job.camera, click, items_);
     if (tap) events_.push_back(*tap);
   }
-  if (media_) {
-    const auto ended = media_->advance(report.time_s);
-    events_.insert(events_.end(), ended.begin(), ended.end());
-  }
+  if (media_) media_->advance(report.time_s, events_);
   const auto commands = controls_.collect(states, report.time_s, events_, items_);
-  for (const SceneCommand& command : commands) {
-    log_command(bundle_, command, report.commands);
-    if (options_.quiet) continue;
-    progress_.end();
-    print_command(bundle_, command);
-  }
-  if (media_) play_media(commands, report);
-}
-
-/// A caption is printed when it begins, stands in the window's title while it is heard, and in the
-/// frame's line.
-void Player::play_media(std::span<const SceneCommand> commands, FrameReport& report) {
-  const bool tapped = std::any_of(events_.begin(), events_.end(), [](const SceneEvent& event) {
-    return event.kind == SceneEvent::Kind::kTap;
-  });
-  if (controls_.take_sound()) media_->set_sound(!media_->sound());
-  media_->set_volume(controls_.volume());
-  media_->obey(commands, tapped);
-  report.caption = controls_.captions() ? media_->caption() : std::string_view();
-  if (report.caption == caption_) return;
-  caption_ = report.caption;
-  screen_->set_title(caption_.empty() ? "modar-play" : caption_);
-  if (options_.quiet || caption_.empty()) return;
+  if (!media_) return;
+  report.scene = &media_->obey(commands, events_, controls_);
+  if (options_.quiet || report.scene->told.empty()) return;
   progress_.end();
-  std::fprintf(stderr, "modar-play: %s\n", caption_.c_str());
+  std::fputs(report.scene->told.c_str(), stderr);
 }
 
 /// A flat pattern's four corners, or the border of what is curved.

@@ -74,7 +74,6 @@ class Player {
   void follow_spot(const Job& job);
   void collect(std::span<const Hysteresis::State> states, const Job& job, FrameReport& report);
   void open_media();
-  void play_media(std::span<const SceneCommand> commands, FrameReport& report);
   void outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                Colour colour) const;
   void draw(const Job& job, const FrameReport& report);
@@ -105,7 +104,6 @@ class Player {
   RunStats stats_;
   std::unique_ptr<Screen> screen_;
   std::unique_ptr<SceneMedia> media_;  ///< null: the bundle has none, or this build plays none
-  std::string caption_;                ///< as it was told last
   std::vector<std::unique_ptr<FrameSink>> sinks_;
   std::unique_ptr<Recorder> recorder_;
   std::optional<GoldenCheck> golden_;

@@ -1,13 +1,15 @@
-// The videos and sounds of a bundle, as its actions start and pause them. Desks only: the build of
-// the device decodes nothing.
+// What a bundle's actions ask for beside what is drawn: its videos and sounds, and words for the
+// user. Desks only: the build of the device decodes and tells nothing.
 #pragma once
 
 #include <memory>
 #include <span>
-#include <string_view>
+#include <vector>
 
+#include "controls.hpp"
 #include "formats/action_machine.hpp"
 #include "formats/bundle_view.hpp"
+#include "frame_report.hpp"
 #include "screen.hpp"
 
 namespace modar {
@@ -20,22 +22,17 @@ class SceneMedia {
   SceneMedia& operator=(const SceneMedia&) = delete;
   virtual ~SceneMedia() = default;
 
-  /// To a frame's time, seconds. Answers what came to its end (SceneEvent::kEnded), for the
-  /// actions' step of that frame; valid until the next call.
-  virtual std::span<const SceneEvent> advance(double time_s) = 0;
-  /// What that step asked for. tapped: a click of the user was among its events, who may hear it.
-  virtual void obey(std::span<const SceneCommand> commands, bool tapped) = 0;
-  /// Brings the pictures of now to the screen. Errors: those of the library of media.
+  /// To a frame's time, seconds: appends what came to its end for the actions' step of that frame.
+  virtual void advance(double time_s, std::vector<SceneEvent>& events) = 0;
+  /// What that step asked for, of these events, and what the user asks of sounds and captions.
+  /// Answers the frame's log, which lives until the next call.
+  virtual const SceneLog& obey(std::span<const SceneCommand> commands,
+                               std::span<const SceneEvent> events, Controls& controls) = 0;
+  /// Brings the pictures and the caption of now to the screen. Errors: those of the library of
+  /// media.
   virtual Result<void> show(Screen& screen) = 0;
-  /// What is heard now, in one language; lines end with a line feed but the last.
-  [[nodiscard]] virtual std::string_view caption() const = 0;
   /// The user's pause: nothing sounds. Time does not go on by itself.
   virtual void hold(bool on) = 0;
-  /// What sounds, on or off; it is off at first. Nothing without setup.audible.
-  virtual void set_sound(bool on) = 0;
-  [[nodiscard]] virtual bool sound() const = 0;
-  /// 0 to 1.
-  virtual void set_volume(float volume) = 0;
 };
 
 struct SceneMediaSetup {
@@ -43,8 +40,8 @@ struct SceneMediaSetup {
   bool sound = false;    ///< from the start
 };
 
-/// Null where the bundle has no videos and sounds, and in the build of the device. The bundle's
-/// bytes outlive it.
+/// Null where the bundle has no nodes, and in the build of the device. The bundle's bytes outlive
+/// it.
 std::unique_ptr<SceneMedia> open_scene_media(const BundleView& bundle,
                                              const SceneMediaSetup& setup);
 

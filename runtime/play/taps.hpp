@@ -4,8 +4,6 @@
 
 #include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "formats/action_machine.hpp"
 #include "modar/renderer.hpp"
@@ -15,12 +13,5 @@ namespace modar {
 /// The tap on what lies under a pixel of the picture, if a node does.
 std::optional<SceneEvent> tap_at(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
                                  std::span<const DrawItem> items);
-
-/// Appends "play NODE", "pause NODE", "text NODE" or "link ADDRESS".
-void log_command(const BundleView& bundle, const SceneCommand& command,
-                 std::vector<std::string>& log);
-
-/// Prints a label's words, or the address of a link, to stderr.
-void print_command(const BundleView& bundle, const SceneCommand& command);
 
 }  // namespace modar
