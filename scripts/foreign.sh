@@ -2,7 +2,8 @@
 # Builds the pose loop for another processor and proves that it sees there, to the last bit, what it sees here, with an
 # estimated camera (the default) and with a given one. For ARM, the device's player too, with Debian's cross compilers, and
 # its size; ARM runs under qemu, wasm (SIMD of 128 bits) in node. Not part of CI.
-#   scripts/foreign.sh armhf|arm64|wasm BUNDLE VIDEO   e.g. armhf build/box.modar box.mp4; 60 frames of it
+#   scripts/foreign.sh armhf|arm64|wasm BUNDLE VIDEO [PACKED]   e.g. armhf build/box.modar box.mp4; 60 frames of it. PACKED:
+#                                                      of modar web, which ARM unpacks to the same bytes
 #   scripts/foreign.sh memory BUNDLE                   tracks and draws BUNDLE here within 256 MB of addresses, by the
 #                                                      device's code and a driver that draws nothing: memory a stage
 #   scripts/foreign.sh budget [MODAR [BIG_BUNDLE]]     instructions on ARMv7, beside tests/bench/arm_budget.csv; fails
@@ -11,7 +12,7 @@
 # Needs ffmpeg (not for the budget) and: g++-arm-linux-gnueabihf or g++-aarch64-linux-gnu with qemu-user,
 # dpkg --add-architecture and apt-get update; for wasm emscripten and node.
 set -eu
-arch=${1:-} bundle=${2:-} video=${3:-}
+arch=${1:-} bundle=${2:-} video=${3:-} packed=${4:-}
 case $arch in
   budget) triple=arm-linux-gnueabihf ;;
   armhf) triple=arm-linux-gnueabihf run="qemu-arm build/armhf/bits-there" ;;
@@ -31,6 +32,7 @@ elif [ ! -f "$bundle" ] || { [ "$arch" != memory ] && [ ! -f "$video" ]; }; then
 fi
 [ -z "$bundle" ] || bundle=$(realpath "$bundle")
 [ ! -f "$video" ] || video=$(realpath "$video")
+[ -z "$packed" ] || packed=$(realpath "$packed")
 cd "$(dirname "$0")/.."
 build=$PWD/build/$arch
 mkdir -p "$build"
@@ -80,6 +82,23 @@ tests_there() {
     $google/src/gtest_main.cc "$build/gtest.o" "$build/runtime/libmodar_runtime.a" \
     "$build/formats/libmodar_formats.a" -pthread -o "$build/runtime-tests"
   MODAR_SOURCE_DIR=$PWD ${run% *} "$build/runtime-tests" --gtest_brief=1
+}
+
+unpacker() { # COMPILER BUILD OUT FLAG...
+  compiler=$1 of=$2 out=$3
+  shift 3
+  "$compiler" -O2 -std=c++20 -I. -Iruntime/include "$@" tests/ship/unpack_probe.cpp "$of/runtime/libmodar_runtime.a" \
+    "$of/formats/libmodar_formats.a" -pthread -o "$out"
+}
+
+# A packed bundle here and there.
+unpack_there() {
+  unpacker g++ build/device "$build/unpack-here"
+  unpacker "$triple-g++" "$build" "$build/unpack-there" -static -idirafter /usr/include
+  here=$("$build/unpack-here" "$1")
+  there=$(${run% *} "$build/unpack-there" "$1")
+  [ "$here" = "$there" ]
+  echo "unpacked: $there, the same bytes"
 }
 
 there_in_wasm() { # what the loop needs, without EGL
@@ -158,6 +177,7 @@ cmake --preset device > /dev/null
 cmake --build --preset device --target modar_runtime modar_formats
 probe g++ build/device "$build/bits-here"
 if [ "$arch" = wasm ]; then there_in_wasm; else there_on_arm && tests_there; fi
+[ -z "$packed" ] || [ "$arch" = wasm ] || unpack_there "$packed"
 frames=$build/frames.grey
 ffmpeg -loglevel error -y -i "$video" -frames:v 60 -pix_fmt gray -f rawvideo "$frames"
 size=$(ffprobe -loglevel error -select_streams v:0 -show_entries stream=width,height -of csv=p=0:s=x "$video" | tr x ' ')

@@ -8,6 +8,7 @@
 #include "formats/transport/coded_bytes.hpp"
 #include "formats/transport/recipe.hpp"
 #include "formats/transport/stages.hpp"
+#include "modar/arriving_bundle.hpp"
 #include "modar/packed_record.hpp"
 #include "modar/release.hpp"
 
@@ -106,6 +107,18 @@ class Packer {
 
 std::vector<std::byte> pack_bundle(const BundleView& bundle) {
   return Packer(bundle).pack();
+}
+
+std::size_t shown_bytes(std::span<const std::byte> packed) {
+  const auto size = packed_recipe_size(packed);
+  if (!size) return 0;
+  const auto recipe = open_packed(packed.first(std::min(*size, packed.size())));
+  if (!recipe) return 0;
+  std::size_t bytes = *size;
+  for (const PieceRecord& piece : recipe->pieces) {
+    if (piece.stage < static_cast<std::uint8_t>(LoadStage::kRefine)) bytes += piece.stored_size;
+  }
+  return bytes;
 }
 
 }  // namespace modar

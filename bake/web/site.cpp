@@ -276,8 +276,10 @@ Result<std::string> put_bytes(Draft& draft, const std::string& stem,
   MODAR_ASSIGN(const BundleView bundle, BundleView::open(bytes));
   const std::vector<std::byte> packed = pack_bundle(bundle);
   draft.site.packed_bytes += packed.size();
-  MODAR_TRY(put(draft, stem + ".packed", packed, version));
-  return stem + ".packed" + version;
+  // The page asks for what shows something first, where the host has ranges.
+  const std::string query = version + "&first=" + std::to_string(shown_bytes(packed));
+  MODAR_TRY(put(draft, stem + ".packed", packed, query));
+  return stem + ".packed" + query;
 }
 
 Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::string>& names) {

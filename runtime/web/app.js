@@ -1,10 +1,14 @@
 // The page around <modar-viewer>: a cover, languages, photos and films to share, what is kept on the device.
+import { Camera } from './camera.js';
 import { forgetInstalled, installedBundles, installedFile } from './installed.js';
 import './modar-viewer.js';
+import { View } from './modar-view.js';
 import { canRecord, Recorder } from './recorder.js';
 import { forgetStored, store, stored } from './storage.js';
 import { adopt, BASE } from './viewer-parts.js';
 import { directionOf, fetchJson, fill, labelOf, showWords } from './viewer-words.js';
+
+export { Camera, Recorder, View };  // as this page has them
 
 const $ = (id) => document.getElementById(id);
 const root = document.documentElement;

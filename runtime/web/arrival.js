@@ -23,6 +23,8 @@ export class Source {
   /** Came, and was not taken. */
   #chunk = new Uint8Array();
   #taken = 0;
+  /** Where an address says so (?first=...): bytes that are asked for alone, since the rest can wait until they are there. */
+  #first = 0;
   total = 0;
   /** While it is true, what does not come is waited for. */
   patient = false;
@@ -31,6 +33,7 @@ export class Source {
   constructor(bundle, onProgress) {
     this.#given = typeof bundle !== 'string' && !(bundle instanceof URL);
     this.#bundle = this.#given ? new Uint8Array(bundle) : bundle;
+    this.#first = this.#given ? 0 : Number(/[?&]first=(\d+)/.exec(bundle)?.[1] ?? 0);
     this.#onProgress = onProgress;
   }
 
@@ -45,7 +48,8 @@ export class Source {
       return { reader: { read: async () => ({ done: true }), cancel: async () => {} }, chunk: this.#bundle.subarray(from) };
     }
     const { signal } = this.#abort;
-    const headers = from > 0 ? { Range: `bytes=${from}-` } : {};
+    const last = from < this.#first ? this.#first - 1 : '';
+    const headers = from > 0 || last ? { Range: `bytes=${from}-${last}` } : {};
     const response = await fetch(this.#bundle, { signal, headers, cache: again ? 'no-store' : 'default' })
       .catch(() => { throw this.#failed('the bundle could not be loaded'); });
     if (!response.ok) throw Object.assign(this.#failed(`the server answered ${response.status}`), { final: response.status < 500 });
@@ -63,7 +67,7 @@ export class Source {
 
   async #read() {
     if (!this.#reader) {
-      const { reader, chunk } = await this.#open(this.#taken, this.#taken > 0);
+      const { reader, chunk } = await this.#open(this.#taken, this.#taken > 0 && this.#taken !== this.#first);
       this.#reader = reader;
       if (chunk.length) return chunk;
     }
@@ -89,6 +93,10 @@ export class Source {
         const chunk = await this.#read().catch((cause) => {
           error = cause instanceof ModarError ? cause : this.#failed(`the network broke off after ${this.#taken} bytes`);
         });
+        if (!error && chunk === null && this.#taken === this.#first && this.#first > 0) {
+          this.#reader = null;  // now the rest
+          continue;
+        }
         if (!error && chunk === null && !whole) break;
         if (!chunk) {
           await this.#breathe(++tries, error ?? this.#failed(`it ends after ${this.#taken} bytes`));

@@ -17,8 +17,8 @@ const EXPORT = /^export (?:\{[^}]*\};\n)?/gm;
 // No text of ours depends on blanks at the start of a line: those of styles in templates go, too.
 const read = (file) => readFileSync(file, 'utf8').replace(/^ +/gm, '');
 
-/** A module after those that it imports, each once. shared: names of SHARED that they use. */
-function joined(file, seen, shared) {
+/** A module after those that it imports, each once. shared: names of SHARED that they use. entry: what it exports stays. */
+function joined(file, seen, shared, entry = false) {
   if (seen.has(file)) return '';
   seen.add(file);
   const text = read(file);
@@ -27,13 +27,13 @@ function joined(file, seen, shared) {
     for (const name of names.split(',')) shared.add(name.trim());
     return '';
   });
-  return before.join('') + text.replace(IMPORT, '').replace(EXPORT, '');
+  return before.join('') + text.replace(IMPORT, '').replace(entry ? '' : EXPORT, '');
 }
 
 /** One script of them. Their names must differ: terser refuses two of one name. */
 function bundle(file) {
   const shared = new Set();
-  const text = joined(file, new Set(), shared);
+  const text = joined(file, new Set(), shared, true);
   return `import { ${[...shared].join(', ')} } from './${SHARED}';\n${text}`;
 }
 

@@ -17,6 +17,7 @@ import gzip
 import http.server
 import json
 import pathlib
+import re
 import shutil
 import statistics
 import subprocess
@@ -24,6 +25,7 @@ import sys
 import tempfile
 import threading
 import time
+import zlib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "web"))
 from browser import Browser, Quiet  # noqa: E402
@@ -44,8 +46,9 @@ class Zipped(Quiet):
         path = pathlib.Path(self.translate_path(self.path))
         path = path / "index.html" if path.is_dir() else path
         if path.suffix not in (".html", ".js", ".wasm", ".json", ".css", ".svg") or not path.is_file():
-            return super().do_GET()
+            return self.part(path) if path.is_file() else super().do_GET()
         body = zipped(path)
+        self.server.sent += len(body)
         self.send_response(200)
         for name, value in (("Content-Type", self.guess_type(path)), ("Content-Encoding", "gzip"), ("Content-Length", str(len(body))),
                             ("Cache-Control", "max-age=600")):
@@ -57,6 +60,24 @@ class Zipped(Quiet):
             pass  # the visit has ended
 
 
+    def part(self, path):
+        """A file by ranges."""
+        whole, asked = path.read_bytes(), re.fullmatch(r"bytes=(\d+)-(\d*)", self.headers.get("Range") or "")
+        first, last = (int(asked[1]), int(asked[2] or len(whole) - 1)) if asked else (0, len(whole) - 1)
+        body = whole[first:last + 1]
+        self.server.sent += len(body)
+        self.send_response(206 if asked else 200)
+        for name, value in (("Content-Type", self.guess_type(path)), ("Content-Length", str(len(body))), ("Cache-Control", "max-age=600"),
+                            ("ETag", f'"{zlib.crc32(whole)}"'), ("Accept-Ranges", "bytes"),
+                            *((("Content-Range", f"bytes {first}-{first + len(body) - 1}/{len(whole)}"),) if asked else ())):
+            self.send_header(name, value)
+        self.end_headers()
+        try:
+            self.wfile.write(body)
+        except OSError:
+            pass
+
+
 @functools.cache
 def zipped(path):
     return gzip.compress(path.read_bytes(), 9)
@@ -64,6 +85,7 @@ def zipped(path):
 
 def serve(folder):
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Zipped, directory=str(folder)))
+    server.sent = 0
     threading.Thread(target=server.serve_forever, daemon=True).start()
     return server
 
@@ -103,6 +125,7 @@ def visit(site, video, bits, last, waits):
             marks = browser.run(MARKS)
         if "seen" in marks:
             marks["shown"] = max(marks["seen"], marks.get("coarse", 0))
+            marks["sent_kb"] = server.sent / 1000
         time.sleep(2)  # garbage is collected
         browser.call("HeapProfiler.collectGarbage")
         return marks, resident_bytes(browser.process.pid)

@@ -184,7 +184,7 @@ class Acting(ProgramTest):
         self.assertEqual(self.browser.run(application), "A pot; A green sheet; A film, standing on the picture cover.")
         # The corner's place, told by the pose: the label is on it, the blue sheet and the green one where the bundle has them.
         places = self.browser.run("""(async () => {
-          const { View } = await import('/modar-view.js');
+          const { View } = await import('/app.js');
           const draw = View.prototype.draw;
           const frame = await new Promise((resolve) => {
             View.prototype.draw = function (detail, ...rest) { resolve(detail); return draw.call(this, detail, ...rest); };
@@ -251,7 +251,7 @@ class Acting(ProgramTest):
         self.browser.wait("globalThis.films?.[0]?.currentTime > 0.2", "the film")
         self.assertEqual(self.browser.run("[films.length, films[0].muted, films[0].loop, films[0].videoWidth]"), [1, True, True, 64])
         began = self.browser.run("""(async () => {
-          const { View } = await import('/modar-view.js');
+          const { View } = await import('/app.js');
           const draw = View.prototype.draw;
           const frame = await new Promise((resolve) => {
             View.prototype.draw = function (detail, ...rest) { resolve(detail); return draw.call(this, detail, ...rest); };
@@ -383,7 +383,7 @@ class Acting(ProgramTest):
           const [picture, models] = [0, 1].map(() => document.createElement('canvas'));
           models.style.cssText = picture.style.cssText = 'position: fixed; left: 0; top: 0; width: 320px; height: 240px';
           document.body.append(picture, models);
-          const view = await View.create(new Uint8Array(await (await fetch(bundles[0].file)).arrayBuffer()), { picture, models });
+          const view = await View.create(new Uint8Array(await (await fetch(bundles[0].file.replace(/[.]packed.*/, '.modar'))).arrayBuffer()), { picture, models });
           view.stand('mine', 0);
           const poses = new Float32Array(82);
           poses[41 + 1] = 1;

@@ -97,16 +97,18 @@ class Host(Quiet):
             "forged": lambda: flipped(whole, b + b_size // 2),
         }
         body = damage.get(kind, lambda: whole)()
-        start = int(ranged[6:-1]) if ranged and kind != "rangeless" else 0
-        part = body[start:]
+        start, end = ranged[6:].split("-") if ranged and kind != "rangeless" else (0, "")
+        start, end = int(start), int(end or len(body) - 1)
+        part = body[start:end + 1]
+        ranged = ranged if kind != "rangeless" else None
         cut = {"torn": len(whole) // 3, "rangeless": len(whole) // 2 if first else None, "closing": len(whole) // 4,
                "short": len(whole) // 2 if first else None}.get(kind)
-        self.send_response(206 if start else 200)
+        self.send_response(206 if ranged else 200)
         self.send_header("Content-Type", "application/octet-stream")
         self.send_header("Content-Length", str(len(part) if kind != "short" or cut is None else cut))
         self.send_header("Cache-Control", "no-store")
-        if start:
-            self.send_header("Content-Range", f"bytes {start}-{len(body) - 1}/{len(body)}")
+        if ranged:
+            self.send_header("Content-Range", f"bytes {start}-{end}/{len(body)}")
         self.end_headers()
         try:
             self.wfile.write(part[:cut])
@@ -162,6 +164,16 @@ class Arrival(ProgramTest):
         self.assertLess(len(self.http.packed), 0.65 * self.raw)
         # Whatever unpacks it, its hashes hold: those of the pieces, then those of the sections.
         self.assertEqual(self.draw("'/plain/demo.packed'", simd=False)["whole"], self.wanted["whole"])
+
+    def test_what_shows_something_is_asked_for_first(self):
+        address = json.loads((self.base / "site" / "site.json").read_text())["bundles"][0]["file"]
+        first = int(address.rpartition("&first=")[2])
+        self.assertEqual(first, next(at for at, _, stage in self.pieces if stage == 3))
+        for kind, asked in (("staged", [f"bytes=0-{first - 1}", f"bytes={first}-"]), ("rangeless", [f"bytes=0-{first - 1}"])):
+            self.http.asked[kind] = ["before"] if kind == "rangeless" else []  # its first answer is cut short
+            drawn = self.draw(f"'/{kind}/demo.packed?first={first}'")
+            self.assertEqual((drawn.get("whole"), drawn["refined"]), (self.wanted["whole"], 2))
+            self.assertEqual(self.http.asked.pop(kind)[-len(asked):], asked)
 
     def test_bytes_in_hand_and_lost_contexts(self):
         bytes_of = "await (await fetch('/bundles/demo.packed')).arrayBuffer()"

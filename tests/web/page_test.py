@@ -152,7 +152,7 @@ LARGE = """(async () => {
     globalThis.asked = video;
     return canvas.captureStream(30);
   };
-  const { View } = await import('/modar-view.js');
+  const { View } = await import('/app.js');
   const shown = View.prototype.draw;
   View.prototype.draw = function (detail, ...rest) {
     globalThis.tracked = [detail.camera.width, detail.camera.height];
@@ -754,8 +754,8 @@ class Page(ProgramTest):
         press = "document.getElementById('record').click()"
         self.browser.run("""(async () => {
           // A page on a loaded machine asks its camera for less, and tracking starts anew.
-          (await import('/camera.js')).Camera.prototype.copied = () => {};
-          const { Recorder } = await import('/recorder.js');
+          (await import('/app.js')).Camera.prototype.copied = () => {};
+          const { Recorder } = await import('/app.js');
           const add = Recorder.prototype.add;
           Recorder.prototype.add = function () { (globalThis.added ??= []).push(performance.now()); return add.call(this); };
         })()""")
@@ -824,7 +824,7 @@ class Page(ProgramTest):
     def test_a_slow_camera_is_asked_for_less(self):
         self.browser.open(self.server.url)
         sizes = self.browser.run("""(async () => {
-          const { Camera } = await import('/camera.js');
+          const { Camera } = await import('/app.js');
           const asked = [];
           for (const first of [[1920, 1080], [1080, 1920], [1600, 1200], [640, 480]]) {
             const camera = new Camera();
@@ -858,7 +858,7 @@ class Page(ProgramTest):
             track.applyConstraints = async ({ width, height }) => Object.assign(canvas, { width: width.ideal, height: height.ideal });
             return stream;
           };
-          const { Camera } = await import('/camera.js');
+          const { Camera } = await import('/app.js');
           const copied = Camera.prototype.copied;
           Camera.prototype.copied = function () { return copied.call(this, globalThis.slow ? 50 : 1); };
           globalThis.seen = { lost: 0, sizes: [], tracked: [] };
