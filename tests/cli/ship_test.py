@@ -1,9 +1,12 @@
 """`modar ship` and `modar-fetch` over folders: releases, keys, what is refused, what is reused."""
+import base64
+import hashlib
 import json
 import os
 import pathlib
 import shutil
 import stat
+import struct
 import subprocess
 import time
 import unittest
@@ -318,16 +321,30 @@ class Keys(ShipTest):
         self.assertEqual(signed.returncode, 0, signed.stderr)
         self.assert_fails(self.fetch(trust=f"{theirs}.pub", store=self.folder / "third"), 3, "signature.text")
 
-    @unittest.skipUnless(soak(), "scrypt needs 1 GiB and seconds; soak runs it")
     def test_an_encrypted_key_wants_its_pass_phrase(self):
+        """Encrypted here, as minisign does with 16 MiB of scrypt."""
         phrase, wrong = self.folder / "phrase", self.folder / "wrong"
         phrase.write_text("open sesame\n")
         wrong.write_text("open barley\n")
+        comment, text = self.shop.key.read_text().splitlines()[:2]
+        plain, salt = base64.b64decode(text), bytes(range(32))
+        stream = hashlib.scrypt(b"open sesame", salt=salt, n=1 << 14, r=8, p=1, maxmem=1 << 26, dklen=len(plain) - 54)
+        secret = bytes(a ^ b for a, b in zip(plain[54:], stream))
         key = self.folder / "k"
+        key.write_text(f"{comment}\n" + base64.b64encode(plain[:2] + b"Sc" + plain[4:6] + salt + struct.pack("<QQ", 1 << 19, 1 << 24) + secret).decode() + "\n")
+        key.chmod(0o600)
+        publish = ["ship", "publish", self.shop.old, "--to", self.site, "--key", key]
+        self.assert_fails(self.modar(*publish, "--pass-phrase-file", wrong), 3, "key.pass-phrase")
+        self.assertEqual(self.modar(*publish, "--pass-phrase-file", phrase, "--quiet").returncode, 0)
+        self.fetch_json()
+
+    @unittest.skipUnless(soak(), "scrypt needs 1 GiB and seconds; soak runs it")
+    def test_a_key_is_made_with_a_pass_phrase(self):
+        phrase, key = self.folder / "phrase", self.folder / "k"
+        phrase.write_text("open sesame\n")
         done = self.modar("ship", "keygen", "--out", key, "--pass-phrase-file", phrase)
         self.assertEqual(done.returncode, 0, done.stderr)
         publish = ["ship", "publish", self.shop.old, "--to", self.site, "--key", key]
-        self.assert_fails(self.modar(*publish, "--pass-phrase-file", wrong), 3, "key.pass-phrase")
         self.assertEqual(self.modar(*publish, "--pass-phrase-file", phrase, "--quiet").returncode, 0)
         self.fetch_json(trust=f"{key}.pub")
 
