@@ -12,7 +12,7 @@ import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Quiet, engines  # noqa: E402
-from programs import ROOT, ProgramTest  # noqa: E402
+from programs import ROOT, ProgramTest, picture  # noqa: E402
 import http.server  # noqa: E402
 
 PAGE = ROOT / "build" / "web" / "web"
@@ -137,12 +137,13 @@ class RudeUpdates(ProgramTest):
         """Made when release 2 was the newest; release 3 has come since."""
         site = self.folder / "site"
         self.check(self.modar("ship", "keygen", "--out", self.folder / "museum.key"))
-        bundle = self.bake_demo()
+        bundle, cover = self.bake_demo(), self.folder / "cover.png"
+        picture(cover)
         shas = {}
         for number in (1, 2, 3):
             other = self.folder / str(number) / "demo.modar"
             other.parent.mkdir()
-            self.check(self.modar("bake", "--model", ROOT / "assets/models/pottery.obj", "--pattern", f"{ROOT}/assets/patterns/cover.png",
+            self.check(self.modar("bake", "--model", ROOT / "assets/models/pottery.obj", "--pattern", cover,
                                   "--scene", f"cover=pottery,scale=0.{number}", "--loop-views", 8, "--no-score", "--lods", 1,
                                   "--parameters", "none", "-o", other, "--quiet"))
             shas[number] = hashlib.sha256(other.read_bytes()).hexdigest()
