@@ -68,13 +68,13 @@ class Server(StudioTest):
         self.assertIn("pottery.obj", told["errors"][0]["where"])
 
     def test_a_bake_can_be_cancelled_and_never_blocks_the_page(self):
-        studio = self.fill(QUICK.replace("loop-views = 8", "loop-views = 200") + SCENE)
+        studio = self.fill(QUICK.replace("loop-views = 8", "loop-views = 1000") + SCENE)
         events = Events(studio)
         self.assertEqual(studio.post("api/bake", {}).status, 202)
         self.assertEqual(studio.post("api/bake", {}).json["code"], "studio.busy")
         self.assertTrue(studio.project()["baking"])
         self.good(studio.ask("DELETE", "api/job"))
-        name, _, _ = events.until({"cancelled", "baked", "failed"}, 20)
+        name, _, _ = events.until({"cancelled", "baked", "failed"}, 90)
         events.close()
         self.assertEqual(name, "cancelled")
         self.assertEqual([path for path in self.folder.rglob("*.tmp")], [])
