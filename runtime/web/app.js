@@ -248,7 +248,7 @@ function offer(file) {
 
 function listenToViewer() {
   const progress = (text) => { $('progress').textContent = text; };
-  viewer.addEventListener('progress', ({ loaded, total }) =>
+  viewer.addEventListener('progress', ({ loaded, total }) => words &&
     progress(loaded < total ? fill(words.loading, { percent: Math.floor((100 * loaded) / total) }) : words.preparing));
   for (const type of ['whole', 'error']) viewer.addEventListener(type, () => progress(''));
   viewer.addEventListener('load', async () => { if (await globalThis.caches?.has(OWN_CACHE)) (await ownPictures()).restore(); });

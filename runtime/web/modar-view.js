@@ -77,12 +77,13 @@ export class View extends EventTarget {
     view.#engine = await openEngine(simd);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
     const given = await bundle;
-    if (given.arrival) {
-      view.#engine.arrive(given.arrival.size, given.arrival.found.splice(0));
-    } else {
-      view.#engine.open(given.bytes ?? given);
-      await view.#finish();
+    if (given.arrival) view.#engine.arrive(given.arrival.size, given.arrival.found.splice(0));
+    else view.#engine.open(given.bytes ?? given);
+    if (view.#plays) {
+      const { Media } = await import('./media.js');
+      view.#media = new Media(view.#engine, () => view.#soon(), (node, text, language) => view.#tell('caption', { node, text, language }));
     }
+    if (!given.arrival) view.#finish();
     models.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();  // without this it is never restored
       view.#lost = true;
@@ -101,7 +102,7 @@ export class View extends EventTarget {
     for (const stage of [STAGE.show, STAGE.refine]) {
       await arrival.bring(stage, put);
       this.#engine.show(stage === STAGE.refine);
-      if (stage === STAGE.refine) await this.#finish();
+      if (stage === STAGE.refine) this.#finish();
       else {
         this.#upload();
         performance.mark('modar: coarse');
@@ -117,14 +118,8 @@ export class View extends EventTarget {
     if (!this.#lost) this.#engine.upload(false, this.#fixedLight);  // else #restore() will
   }
 
-  async #finish() {
+  #finish() {
     this.#upload();
-    if (this.#plays) {
-      const { Media } = await import('./media.js');
-      const { sound, held } = this.#media;
-      this.#media = new Media(this.#engine, () => this.#soon(), (node, text, language) => this.#tell('caption', { node, text, language }));
-      Object.assign(this.#media, { sound, held });
-    }
     this.#complete = true;
     performance.mark('modar: whole');
   }

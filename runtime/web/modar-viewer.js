@@ -305,8 +305,6 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       if (this.#state !== 'start') this.fail(wrong);  // else that start tells
       return;
     }
-    this.#showMedia(view);
-    if (!this.#noted) this.#showLabel(this.#shown);
     this.dispatchEvent(new Event('whole'));
   }
 
@@ -595,16 +593,12 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     set(on);
   }
 
-  #showMedia(view) {
+  #listenToScenes(view) {
     this.#$('media').hidden = !view.nodes.some(({ kind }) => kind === 'video' || kind === 'sound');
     this.#$('captions').hidden = !view.nodes.some((_, node) => view.captionsOf(node));
     this.#$('pause').setAttribute('aria-pressed', 'false');
     this.#useLanguages();
     this.#cues.clear();
-  }
-
-  #listenToScenes(view) {
-    this.#showMedia(view);
     view.addEventListener('drawn', () => this.#showMarks());
     view.addEventListener('caption', ({ detail }) => this.#caption(detail));
     view.addEventListener('text', ({ detail: { node } }) => {
