@@ -160,6 +160,7 @@ bool FrameTracker::update_pose(const TrackedPattern& pattern, Track& track, Patc
   if (!track.has_motion) track.inlier_ratio = ratio;
   track.doubts = ratio < kDoubtful * track.inlier_ratio ? track.doubts + 1 : 0;
   if (track.doubts > kMaxDoubts) return false;
+  track.restless = fit.restless() ? track.restless + 1 : 0;
   if (track.doubts == 0) track.inlier_ratio = 0.8 * track.inlier_ratio + 0.2 * ratio;
   track.surprise = distance(pattern, predicted, pose);
   track.previous = track.pose;

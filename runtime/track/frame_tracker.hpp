@@ -25,6 +25,7 @@ struct Track {
   double correlation = 0;   ///< of the patches, in the sharp frames before
   double surprise = 1e9;    ///< pixels by which the last prediction missed the pattern's centre
   int doubts = 0;           ///< frames in a row whose fit contradicts the frames before: not shown
+  int restless = 0;         ///< frames in a row whose patches contradict each other
   int frames_since_lost = kRecentFrames;
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
   Reason shown_reason = Reason::kVisible;    ///< why it is tracked and not shown, if it is not

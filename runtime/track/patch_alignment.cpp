@@ -610,6 +610,20 @@ double step_pose(const TrackedPattern& pattern, const FrameView& frame, const Pa
   return moved;
 }
 
+/// See PatchFit::unrest; each patch counts as two pixels at most.
+double unrest_of(std::span<const PatchLinearisation> patches) {
+  constexpr float kMost = 2.0f;
+  double sum = 0.0;
+  int count = 0;
+  for (const PatchLinearisation& patch : patches) {
+    if (patch.equations.correlation < kInlierCorrelation) continue;
+    const glm::vec2 d = displacement(patch.equations);
+    sum += static_cast<double>(std::min(kMost * kMost, glm::dot(d, d)));
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : 0.0;
+}
+
 /// The normal equations of a pose and of its pattern's shape, lower triangle.
 struct PlaneEquations {
   double jtj[8][8] = {};
@@ -758,6 +772,10 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
     // The fit is that of the pose before the step, which lies near enough to be judged by it.
     moved = step_pose(pattern, frame, view, tukey, precise, pose, fit);
     if (moved < (precise ? kPreciselyConverged : kConverged)) break;
+  }
+  if (precise && frame.blur == nullptr && pattern.surface.flat() &&
+      fit.inlier_ratio() < kLittleShown) {
+    fit.unrest = unrest_of(frame.patches.last_linearisations());
   }
   return fit;
 }

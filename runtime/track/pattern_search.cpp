@@ -30,6 +30,8 @@ constexpr double kVouchedRms = 3.0;  // the same of features that speak for a pl
 constexpr double kDoubtfulRms = 1.5;
 constexpr double kWrongRms = 3.0;
 constexpr int kDoubtPenalty = 8;
+// Divides the score of a place whose patches contradict each other: any other is better.
+constexpr int kRestlessShare = 8;
 // The same, of two mirror images: both are tried up to it.
 constexpr double kMirrorRms = 1.5;
 // Inlier ratio of patches from which nothing hides the pattern, so that further hypotheses are not
@@ -82,8 +84,9 @@ bool covers(const TrackedPattern& pattern, const FeatureMatch& place, const Feat
 }  // namespace
 
 PatternSearch::PatternSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
-                             const DetectOptions& options)
+                             const DetectOptions& options, bool known_camera)
     : camera_(camera),
+      known_camera_(known_camera),
       kernels_(kernels(options.simd)),
       patterns_(patterns),
       matcher_(camera, kernels_, static_cast<std::size_t>(options.max_features),
@@ -341,10 +344,13 @@ PatternSearch::PoseCandidate PatternSearch::evaluate_start(const TrackedPattern&
   out.complete = out.finest && fit.inlier_ratio() >= kComplete;
   out.few = fit.inliers * 5 < fit.visible;
   out.close = fit.close >= kClosePatches;
+  out.restless = known_camera_ && fit.restless();
   // Of two places that show as many cells, the finest level's patches tell the better one.
   out.score = static_cast<int>(out.finest ? 0.5 * out.percent +
                                                 100.0 * (fit.inlier_ratio() + fit.correlation)
                                           : out.percent + 50.0 * fit.correlation);
+  // Only where there is nothing else.
+  if (out.restless) out.score = out.score / kRestlessShare;
   return out;
 }
 
@@ -363,7 +369,7 @@ PatternSearch::PoseCandidate PatternSearch::refine_start(const TrackedPattern& p
     if (after > kDoubtfulRms * before + 1.0) now.score -= kDoubtPenalty;
     if (after > kWrongRms * (before + 1.0)) now.score = 0;
     if (radius == SearchRadius::kNear || now.score > best.score) best = now;
-    if (best.finest) break;
+    if (best.finest && !best.restless) break;
   }
   return best;
 }
@@ -402,6 +408,7 @@ void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& fra
   DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   candidate.reason = Reason::kVisible;
   candidate.pose = one.pose;
+  candidate.restless = one.restless;
   candidate.inliers = hypotheses_[hypothesis_].inliers;
 }
 
@@ -440,15 +447,15 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
   std::array<glm::dvec2, 4> corners;
   const auto pose = nearest_pose(pattern, camera_, map);
   if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) return;
-  candidate = {Reason::kVisible, *pose, true, map, candidate.matches, hypothesis.inliers};
+  candidate = {Reason::kVisible, *pose, true, map, false, candidate.matches, hypothesis.inliers};
 }
 
 // ---- Of a copy of the frame, in slices or on a thread of its own ----
 
 FrameSearch::FrameSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
-                         const DetectOptions& options)
+                         const DetectOptions& options, bool known_camera)
     : extractor(FeatureExtractor::create(camera.width, camera.height, options)),
-      search(camera, patterns, options),
+      search(camera, patterns, options, known_camera),
       pixels(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)),
       priorities(patterns.size(), SearchPriority::kNone) {
   frame = {pixels.data(), camera.width, camera.height, camera.width};
@@ -486,8 +493,8 @@ bool SlicedDetector::advance(std::int64_t work, DetectionCandidates& candidates,
 }
 
 AsyncDetector::AsyncDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
-                             const DetectOptions& options)
-    : job_(camera, patterns, options) {
+                             const DetectOptions& options, bool known_camera)
+    : job_(camera, patterns, options, known_camera) {
   thread_ = std::thread([this] { work(); });
 }
 

@@ -34,6 +34,7 @@ struct DetectionCandidate {
   Pose pose;                     ///< if kVisible
   bool homography_only = false;  ///< no pose explains the frame, but `map` does; `pose` is nearest
   PlaneMap map;                  ///< if homography_only
+  bool restless = false;         ///< see PatchFit::restless()
   int matches = 0;
   int inliers = 0;
 };
@@ -49,9 +50,10 @@ struct DetectionCandidates {
 class PatternSearch {
  public:
   /// The patterns must outlive it. With more than a few of them, prepare() or the first run()
-  /// builds the index.
+  /// builds the index. known_camera: what a guessed one does not explain looks as if patches
+  /// contradicted each other, and hides nothing.
   PatternSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
-                const DetectOptions& options);
+                const DetectOptions& options, bool known_camera);
   /// extractor: holds the frame. priorities: one per pattern. Allocates nothing after the first
   /// call.
   void run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
@@ -97,6 +99,7 @@ class PatternSearch {
     bool complete = false;    ///< nearly all
     bool few = false;         ///< less than a fifth of them
     bool close = false;       ///< kClosePatches closely
+    bool restless = false;    ///< they contradict each other
   };
   [[nodiscard]] PoseCandidate evaluate_start(const TrackedPattern& pattern, const FrameView& frame,
                                              SearchRadius radius, const Pose& start) const;
@@ -115,6 +118,7 @@ class PatternSearch {
                 DetectionCandidate& candidate) const;
 
   const Camera& camera_;
+  const bool known_camera_;
   const Kernels& kernels_;
   std::span<const TrackedPattern> patterns_;
   PatchCache patches_;
@@ -149,7 +153,7 @@ class PatternSearch {
 /// A search of its own copy of a frame.
 struct FrameSearch {
   FrameSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
-              const DetectOptions& options);
+              const DetectOptions& options, bool known_camera);
   void set(const GrayImage& caller_frame, std::span<const SearchPriority> caller_priorities);
 
   std::unique_ptr<FeatureExtractor> extractor;
@@ -165,8 +169,8 @@ class SlicedDetector {
  public:
   /// The patterns must outlive it.
   SlicedDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
-                 const DetectOptions& options)
-      : job_(camera, patterns, options) {}
+                 const DetectOptions& options, bool known_camera)
+      : job_(camera, patterns, options, known_camera) {}
   /// False while it searches, and before the first search.
   [[nodiscard]] bool idle() const { return prepared_ && !busy_; }
   /// Starts a search; only if idle().
@@ -191,7 +195,7 @@ class AsyncDetector {
  public:
   /// The patterns must outlive it.
   AsyncDetector(const Camera& camera, std::span<const TrackedPattern> patterns,
-                const DetectOptions& options);
+                const DetectOptions& options, bool known_camera);
   AsyncDetector(const AsyncDetector&) = delete;
   AsyncDetector& operator=(const AsyncDetector&) = delete;
   /// Waits for a running search to end.

@@ -33,6 +33,9 @@ constexpr double kSlippingSurprise = 2.5;
 constexpr int kSurePatches = 30;
 constexpr int kSurePercent = 95;
 constexpr int kRemembered = 10;
+// Frames in a row whose patches contradict each other (PatchFit::restless()) until a pattern is
+// searched for anew; a wrong pose is shown no longer.
+constexpr int kMostRestless = 2;
 
 }  // namespace
 
@@ -193,6 +196,10 @@ void PoseLoop::State::track_all(TrackResult& result) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kLostByBlur;
     }
+    if (track.tracked && calibration == nullptr && track.restless > kMostRestless) {
+      track.tracked = track.has_motion = false;
+      track.last_reason = Reason::kFailedVerification;
+    }
     if (track.tracked && track.doubts > 0) {
       track.shown_reason = Reason::kLostByBlur;
     } else if (track.tracked) {
@@ -266,6 +273,7 @@ bool PoseLoop::State::switch_pattern(std::size_t from, std::size_t to, Detection
 /// Starts a track; false if the candidate is not visible in the current frame.
 bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
                                   const DetectionCandidate& candidate, Detection& detection) const {
+  if (candidate.restless) return false;
   Track next;
   next.pose = candidate.pose;
   next.homography_only = candidate.homography_only;
@@ -283,7 +291,7 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
                   tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) >=
                       (fit.close >= tracker::kClosePatches ? tracker::kClosePatchesPercent
                                                            : tracker::kMinPercent);
-    if (!here) return false;
+    if (!here || (calibration == nullptr && fit.restless())) return false;
   }
   if (!frame_tracker.locate(pattern, next, detection)) return false;
   next.tracked = true;

@@ -18,12 +18,13 @@ SearchScheduler::SearchScheduler(const Camera& camera, std::span<const TrackedPa
     : options_(options), camera_(camera), patterns_(patterns.begin(), patterns.end()) {
   priorities_.resize(patterns_.size());
   candidates_.patterns.resize(patterns_.size());
+  const bool known = !options.estimate_camera;
   if (options.async_search) {
-    async_ = std::make_unique<AsyncDetector>(camera_, patterns_, options.detect);
+    async_ = std::make_unique<AsyncDetector>(camera_, patterns_, options.detect, known);
   } else if (options.budget > 0) {
-    sliced_ = std::make_unique<SlicedDetector>(camera_, patterns_, options.detect);
+    sliced_ = std::make_unique<SlicedDetector>(camera_, patterns_, options.detect, known);
   } else {
-    search_ = std::make_unique<PatternSearch>(camera_, patterns_, options.detect);
+    search_ = std::make_unique<PatternSearch>(camera_, patterns_, options.detect, known);
   }
 }
 

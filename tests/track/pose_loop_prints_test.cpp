@@ -230,6 +230,29 @@ TEST(Prints, WhereMostIsCoveredTheRestIsFoundAndFlat) {
   EXPECT_GE(right, 6);
 }
 
+// Patches on what covers a print fit by chance, and held its pose up to 87 pixels beside its place.
+TEST(Prints, WhereMostIsCoveredNoneIsShownBesideItsPlace) {
+  const Camera camera = default_camera(kWidth, kHeight);
+  PoseLoopOptions options;
+  options.track = false;
+  auto loop = PoseLoop::create(BundleView::open(alone()).value(), camera, options);
+  ASSERT_TRUE(loop) << to_line(loop.error());
+  SceneBand band;
+  band.area_low = 0.5;
+  band.area_high = 3.0;
+  band.covered_low = band.covered_high = 0.7;
+  TrackResult seen;
+  // Frames that such poses were shown in, 18 to 178 pixels beside.
+  for (const std::uint32_t seed : {23u, 97u, 190u, 268u, 302u, 316u, 342u, 373u}) {
+    Random random(seed);
+    const Pose pose = draw_pose(band, gray(picture()), camera, random);
+    const SceneFrame scene = render_scene(gray(picture()), camera, pose,
+                                          clutter(kWidth, kHeight, 300 + seed % 8), band, random);
+    ASSERT_TRUE((*loop)->step(scene.picture.view(), seen));
+    for (const Detection& one : seen.visible) EXPECT_LT(worst_corner(one, scene), 5.0) << seed;
+  }
+}
+
 TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
   const auto pattern = tracker::view_tracked_pattern(record(), 0);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
