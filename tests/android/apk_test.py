@@ -11,8 +11,9 @@ import unittest
 import zipfile
 import zlib
 
-from machine import COVER, FAKES, HEIGHT, ROOT, WIDTH, ProgramTest, bake_with_texts, compile_java, have, make_clip, make_covered_clip, run_java, write_fakes
+from machine import COVER, FAKES, HEIGHT, ROOT, WIDTH, ProgramTest, bake_with_texts, compile_java, have, make_clip, make_covered_clip, nv21_of, run_java, write_fakes
 
+from film_project import bake_film, make_frames  # noqa: E402
 from programs import POTTERY, QUICK  # noqa: E402
 from servers import NGINX, Nginx  # noqa: E402
 
@@ -194,6 +195,12 @@ class Apk(ProgramTest):
         if os.environ.get("MODAR_KEEP"):
             for each in ("last.rgba", "last.rgba.around"):
                 shutil.copy(self.folder / each, os.environ["MODAR_KEEP"])
+
+    def test_a_scene_acts_on_the_screen(self):
+        bundle, frames, home = bake_film(self), make_frames(self.folder), self.folder / "home"
+        home.mkdir()
+        apk, _ = self.made("film", bundle)
+        self.run_app(apk, nv21_of(frames), home, "scene")
 
     def fill(self, store):
         """A store that takes a few files and is full then, in the middle of a release; None where the machine gives none."""

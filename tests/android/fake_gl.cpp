@@ -96,6 +96,11 @@ GLenum word(jint value) {
   return static_cast<GLenum>(value);
 }
 
+/// Decoders' textures are plain ones here.
+GLenum target_of(jint value) {
+  return value == GL_TEXTURE_EXTERNAL_OES ? GL_TEXTURE_2D : word(value);
+}
+
 void give(JNIEnv* env, jintArray names, jint offset, GLuint name) {
   const auto value = static_cast<jint>(name);
   env->SetIntArrayRegion(names, offset, 1, &value);
@@ -155,10 +160,10 @@ GLES20(void, glGenFramebuffers)(JNIEnv* env, jclass, jint, jintArray names, jint
   give(env, names, offset, name);
 }
 GLES20(void, glBindTexture)(JNIEnv*, jclass, jint target, jint name) {
-  glBindTexture(word(target), word(name));
+  glBindTexture(target_of(target), word(name));
 }
 GLES20(void, glTexParameteri)(JNIEnv*, jclass, jint target, jint name, jint value) {
-  glTexParameteri(word(target), word(name), value);
+  glTexParameteri(target_of(target), word(name), value);
 }
 GLES20(void, glTexImage2D)
 (JNIEnv* env, jclass, jint target, jint level, jint inside, jint width, jint height, jint border,

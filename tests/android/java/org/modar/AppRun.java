@@ -38,6 +38,11 @@ public final class AppRun {
         Activity.numbers = R.id.class;
         Stage.searchApart = false;
 
+        if (words[7].equals("scene")) {
+            scene();
+            System.out.println("the day is over");
+            return;
+        }
         if (words.length > 8) {
             network(Paths.get(words[8]));
             System.out.println("the day is over");
@@ -207,6 +212,44 @@ public final class AppRun {
             if (Math.abs((before[i] & 0xFF) - (after[i] & 0xFF)) > 30) far++;
         }
         return (double) far / before.length;
+    }
+
+    private static android.media.MediaPlayer film() {
+        return android.media.MediaPlayer.all.get(0);
+    }
+
+    /** A scene that acts, as the screen shows it: frames with the cover first, then without it. */
+    private static void scene() throws Exception {
+        android.media.MediaPlayer.lasts = 2000;
+        start();
+        for (int i = 0; i < 4; i++) check(deliver(i), "frame " + i);
+        check(app.findViewById(R.id.sound).getVisibility() == android.view.View.VISIBLE, "a button for sound");
+        check(film().isPlaying() && film().volume == 0, "a silent film");
+        android.media.MediaPlayer.pass(200);
+        Handler.pump();
+        check(((TextView) app.findViewById(R.id.caption)).text.equals("One & only"), "the caption");
+        click(R.id.sound);
+        check(film().volume == 1, "sound");
+        click(R.id.pause);
+        check(!film().isPlaying(), "the visitor's pause");
+        click(R.id.pause);
+        check(film().isPlaying(), "going on");
+        Thread.sleep(300);
+        check(deliver(4), "a frame later");
+        check(status().equals("A note"), "a label's words");
+        // Held for a frame or two, then a second of grace.
+        for (int i = 0; i < 4; i++) check(deliver(clip.length / size / 2 + i), "a frame without the cover");
+        check(film().isPlaying(), "grace");
+        Thread.sleep(1200);
+        check(deliver(clip.length / size / 2 + 4), "a frame more");
+        check(!film().isPlaying(), "a film that waits");
+        Handler.pump();
+        check(android.app.AlertDialog.shown.asks.contains("https://museum.org/cover") && Context.started == null, "a question");
+        android.app.AlertDialog.shown.yes.onClick(null, 0);
+        check(Context.started.action.equals("android.intent.action.VIEW") && Context.started.data.path.equals("https://museum.org/cover"),
+                "the link");
+        app.onPause();
+        app.onDestroy();
     }
 
     private static void fingers() {
