@@ -258,9 +258,7 @@ Result<Json> rivals_of(Session& session, const std::string& name) {
     const int times = confusion.recognised[1] + confusion.recognised[2];
     if (times == 0) continue;
     rivals.push_back(
-        {{"pattern", other.asset.name},
-         {"times", times},
-         {"views", 2 * confusion.views}});
+        {{"pattern", other.asset.name}, {"times", times}, {"views", 2 * confusion.views}});
   }
   return Json{{"pattern", name}, {"rivals", std::move(rivals)}};
 }
