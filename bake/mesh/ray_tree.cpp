@@ -14,12 +14,12 @@ namespace {
 /// Triangles of a leaf. On a bust, 2 and 8 take 1.1 times as long.
 constexpr std::size_t kRayLeaf = 4;
 /// Places at which a split is tried.
-constexpr int kBins = 16;
+constexpr int kSplitBins = 16;
 /// Nodes in a row whose parts may be uneven: then they are halves, so that the stack has an end.
 constexpr int kUneven = 20;
-constexpr std::size_t kStack = 3 * (kUneven + 32) + 1;
+constexpr std::size_t kRayStack = 3 * (kUneven + 32) + 1;
 /// Of the model's side: boxes are so much larger than single precision rounds.
-constexpr double kSlack = 1e-6;
+constexpr double kBoxSlack = 1e-6;
 
 double half_area(const glm::dvec3& low, const glm::dvec3& high) {
   const glm::dvec3 s = high - low;
@@ -59,7 +59,7 @@ RayTree::Box RayTree::box_of(std::span<const Item> items) {
 }
 
 int RayTree::BinAxis::of(const Item& item) const {
-  return std::min(kBins - 1, static_cast<int>((item.centre[axis] - low) * scale));
+  return std::min(kSplitBins - 1, static_cast<int>((item.centre[axis] - low) * scale));
 }
 
 /// Of equal bins along an axis, the first behind the split that the surface area heuristic likes
@@ -67,9 +67,9 @@ int RayTree::BinAxis::of(const Item& item) const {
 int RayTree::best_bin(std::span<const Item> items, const BinAxis& bins) {
   constexpr double kFar = std::numeric_limits<double>::max();
   const Box none{glm::dvec3(kFar), glm::dvec3(-kFar)};
-  std::array<Box, kBins> boxes;
+  std::array<Box, kSplitBins> boxes;
   boxes.fill(none);
-  std::array<std::size_t, kBins> counts{};
+  std::array<std::size_t, kSplitBins> counts{};
   const auto add = [](Box& to, const Box& box) {
     to = {glm::min(to.low, box.low), glm::max(to.high, box.high)};
   };
@@ -78,10 +78,10 @@ int RayTree::best_bin(std::span<const Item> items, const BinAxis& bins) {
     add(boxes[bin], item.box);
     ++counts[bin];
   }
-  std::array<double, kBins> behind{};  // cost of the bins from each on
+  std::array<double, kSplitBins> behind{};  // cost of the bins from each on
   Box box = none;
   std::size_t count = 0;
-  for (std::size_t i = kBins; i-- > 1;) {
+  for (std::size_t i = kSplitBins; i-- > 1;) {
     add(box, boxes[i]);
     count += counts[i];
     behind[i] = count == 0 ? 0 : half_area(box.low, box.high) * static_cast<double>(count);
@@ -90,7 +90,7 @@ int RayTree::best_bin(std::span<const Item> items, const BinAxis& bins) {
   count = 0;
   double least = kFar;
   int best = 0;
-  for (std::size_t i = 1; i < kBins; ++i) {
+  for (std::size_t i = 1; i < kSplitBins; ++i) {
     add(box, boxes[i - 1]);
     count += counts[i - 1];
     if (count == 0 || count == items.size()) continue;
@@ -112,7 +112,7 @@ std::size_t RayTree::halve(std::span<Item> items, int depth) {
   }
   const glm::dvec3 side = high - low;
   const int axis = side.x >= side.y && side.x >= side.z ? 0 : (side.y >= side.z ? 1 : 2);
-  const BinAxis bins{axis, low[axis], kBins / side[axis]};
+  const BinAxis bins{axis, low[axis], kSplitBins / side[axis]};
   const int from = depth < kUneven && std::isfinite(bins.scale) ? best_bin(items, bins) : 0;
   if (from > 0) {
     const auto second = std::partition(items.begin(), items.end(),
@@ -163,7 +163,7 @@ void RayTree::build(std::uint32_t node, const Part& part, int depth) {
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const Box& box = parts[i].box;
     const double slack =
-        i < count ? kSlack * (1 + std::max(glm::length(box.low), glm::length(box.high))) : 0.0;
+        i < count ? kBoxSlack * (1 + std::max(glm::length(box.low), glm::length(box.high))) : 0.0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<int>(axis);
       // No ray enters what is no number.
@@ -230,7 +230,7 @@ std::optional<RayHit> RayTree::first_hit(const glm::dvec3& origin, const glm::dv
   };
   constexpr float kRound = 1e-5f;  // more than distances in single precision are off by
   std::optional<RayHit> best;
-  std::array<Entry, kStack> stack;
+  std::array<Entry, kRayStack> stack;
   std::size_t size = 0;
   stack[size++] = {0, 0, 0.0f};
   const float least = static_cast<float>(from) * (1 - kRound);
