@@ -105,7 +105,6 @@ Result<void> parse_device_profile(std::string_view json, const std::string& wher
   }
   profile.name = file.name;
   profile.title = file.title;
-  profile.source = file.source;
   profile.extensions = file.extensions;
   return {};
 }

@@ -12,7 +12,6 @@ namespace modar {
 struct DeviceProfile {
   std::string_view name;  ///< for `--device`
   std::string_view title;
-  std::string_view source;      ///< where the figures come from
   std::string_view extensions;  ///< names, each with a space before and after
   int es_version;               ///< 20: OpenGL ES 2.0; 30 and up has instancing in its core
   int max_texture_size;         ///< pixels
