@@ -6,7 +6,7 @@ const TRIES = 3;
 const WAIT_S = 1;
 /** As formats/transport/recipe.hpp has them. */
 const MAGIC = [0x89, 0x4d, 0x4f, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
-const RECIPE_BYTES = 64, PIECE_BYTES = 64;
+const RECIPE_BYTES = 64, PIECE_BYTES = 64, MOST_PIECES = 1 << 20;
 /** What pieces are needed for: to find patterns, to show each model as coarse as there is, all else. */
 export const STAGE = { find: 1, show: 2, refine: 3 };
 
@@ -157,7 +157,7 @@ export class Arrival {
     const header = new Uint8Array(RECIPE_BYTES);
     header.set(start);
     header.set(await this.#source.take(RECIPE_BYTES - start.length), start.length);
-    const count = new DataView(header.buffer).getUint32(12, true);
+    const count = Math.min(new DataView(header.buffer).getUint32(12, true), MOST_PIECES);  // more is refused below, for its length
     let recipe = new Uint8Array(RECIPE_BYTES + PIECE_BYTES * count);
     recipe.set(header);
     recipe.set(await this.#source.take(PIECE_BYTES * count), RECIPE_BYTES);

@@ -93,6 +93,7 @@ class Host(Quiet):
             "flipped": lambda: flipped(whole, a + a_size // 2) if first else whole,
             "recipe": lambda: flipped(whole, HEADER + 30) if first else whole,
             "version": lambda: flipped(whole, 9),
+            "count": lambda: whole[:12] + b"\xff\xff\xff\xff" + whole[16:],
             "swapped": lambda: whole[:a] + whole[b:b + b_size] + whole[a:a + a_size] + whole[b + b_size:] if first else whole,
             "forged": lambda: flipped(whole, b + b_size // 2),
         }
@@ -193,7 +194,7 @@ class Arrival(ProgramTest):
                     self.assertEqual(asked[1], f"bytes={self.http.swapped[0][0]}-")
 
     def test_what_stays_damaged_is_refused(self):
-        for kind, code in (("forged", "piece."), ("version", "recipe.version"), ("none", "web.download")):
+        for kind, code in (("forged", "piece."), ("version", "recipe.version"), ("count", "web.download"), ("none", "web.download")):
             with self.subTest(kind):
                 if kind == "none":
                     drawn = self.draw("'/none.packed'")
