@@ -182,9 +182,9 @@ void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run, bo
 
 void add_project_options(CommandLine& line, ProjectCommand& command) {
   line.group("Projects (without --model and --pattern)");
-  line.flag("--explain", command.explain, "Explain why each asset is rebuilt");
   line.flag("--watch", command.watch, "Rebuild whenever a file is saved, until Ctrl-C");
   line.group("Projects (without --model and --pattern)", Shown::kInFull);
+  line.flag("--explain", command.explain, "Explain why each asset is rebuilt");
   line.option("--project", &command.file,
               "Project file to bake (default: modar.toml in the current folder)", {.type = "FILE"});
   line.flag("--dry-run", command.dry_run, "List what would be rebuilt, and build nothing",
