@@ -28,6 +28,7 @@ NOT_RUN = (
     (r"^modar pattern (simulate|confusion) ", "takes a minute; pattern_test.py"),
     (r"^export ANDROID_NDK=|^scripts/apk\.sh ", "needs an NDK; apk_test.py uses a compiler in its place"),
     (r"^adb |^for phone in |^  adb |^done$", "needs a phone"),
+    (r"tests/bench/media_page\.py", "takes minutes, and a browser"),
     (r"^modar-lab bench (pose|wild|extended|light|model|render|lod|etc1) ", "takes minutes; the tests of bake/lab"),
 )
 
@@ -71,8 +72,9 @@ class Readme(ProgramTest):
         # Patterns are tried in fewer views, and not scored: that is what takes the time.
         modar = self.folder / "tools" / "modar"
         modar.parent.mkdir()
-        modar.write_text(f'#!/bin/sh\n[ "$1 $2" != "bake --model" ] || set -- "$@" --loop-views 4 --no-score --parameters orb-500\n'
-                         f'exec {BIN}/modar "$@"\n')
+        modar.write_text('#!/bin/sh\ncase "$1 $2" in\n'
+                         '"bake --model" | "bake "*.glb) set -- "$@" --loop-views 4 --no-score --parameters orb-500 ;;\n'
+                         f'esac\nexec {BIN}/modar "$@"\n')
         modar.chmod(0o755)
         self.run_lines(["modar bake --model vase.obj --pattern cover.png -o vase.modar", "cp vase.modar old.modar",
                         "modar inspect vase.modar --extract parts", "cp parts/vase.glb vase.glb"])
