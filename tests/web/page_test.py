@@ -643,6 +643,7 @@ class Page(ProgramTest):
         self.addCleanup(self.browser.call, "Emulation.setEmulatedMedia", features=[])
         self.browser.run("document.getElementById('look').click()")
         self.browser.wait("document.getElementById('viewer').state === 'around'", "the turntable")
+        self.browser.run("document.getElementById('viewer').whole")
 
     def test_a_look_without_a_camera(self):
         self.browser.resize(390, 844, 2, True)
