@@ -17,7 +17,6 @@ struct DeviceFile {
 
   std::string name;
   std::string title;
-  std::string source;  ///< where the figures come from
   std::string extensions;
   DeviceProfile profile{};
 };

@@ -86,7 +86,8 @@ Result<void> parse_device_profile(std::string_view json, const std::string& wher
   DeviceProfile& profile = file.profile;
   reader.text("name", file.name);
   reader.text("title", file.title);
-  reader.text("source", file.source);
+  std::string source;  // for those who read the file
+  reader.text("source", source);
   reader.names("extensions", file.extensions);
   reader.number("es_version", profile.es_version);
   reader.number("max_texture_size", profile.max_texture_size);

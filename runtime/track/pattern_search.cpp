@@ -30,7 +30,8 @@ constexpr double kVouchedRms = 3.0;  // the same of features that speak for a pl
 constexpr double kDoubtfulRms = 1.5;
 constexpr double kWrongRms = 3.0;
 constexpr int kDoubtPenalty = 8;
-// Divides the score of a place whose patches contradict each other: any other is better.
+// Divides the score of a place whose patches contradict each other, so that nearly any other is
+// better. By hand: as kDoubtPenalty.
 constexpr int kRestlessShare = 8;
 // The same, of two mirror images: both are tried up to it.
 constexpr double kMirrorRms = 1.5;

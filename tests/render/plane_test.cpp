@@ -88,14 +88,18 @@ TEST_F(PlaneTest, ShowsItsTexelsWhereItStands) {
   EXPECT_EQ(renderer->stats().draw_calls, 2);
 }
 
-TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
-  SceneMaker maker;
-  add_square_pattern(maker.content);
+void add_green_square(SceneMaker& maker) {
   std::vector<Triangle> square(2);
   square[0].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, -0.25, 0}, {0.25, 0.25, 0}};
   square[1].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, 0.25, 0}, {-0.25, 0.25, 0}};
   for (Triangle& triangle : square) triangle.colour = {0, 200, 0};
   maker.add_plain_model(Layout::kHalfColoured, square);
+}
+
+TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
+  SceneMaker maker;
+  add_square_pattern(maker.content);
+  add_green_square(maker);
   add_picture(maker.content, "solid", add_flat(maker, 12, 0, 0, -1));
   add_picture(maker.content, "glass", add_flat(maker, 12, 0, 0, 8));
   const MappedBundle bundle(maker.content);
@@ -115,11 +119,7 @@ TEST_F(PlaneTest, ModelsHideItAndAreHidden) {
 TEST_F(PlaneTest, WhatIsSeenThroughIsDrawnFromFarToNear) {
   SceneMaker maker;
   add_square_pattern(maker.content);
-  std::vector<Triangle> square(2);
-  square[0].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, -0.25, 0}, {0.25, 0.25, 0}};
-  square[1].corners = {glm::dvec3(-0.25, -0.25, 0), {0.25, 0.25, 0}, {-0.25, 0.25, 0}};
-  for (Triangle& triangle : square) triangle.colour = {0, 200, 0};
-  maker.add_plain_model(Layout::kHalfColoured, square);
+  add_green_square(maker);
   add_picture(maker.content, "glass", add_flat(maker, 12, 0, 0, 8));
   const MappedBundle bundle(maker.content);
   auto renderer = make_renderer(*bundle.view, probe_gl_caps());
