@@ -1,19 +1,22 @@
 #!/usr/bin/env bash
 # Builds with ASan + UBSan and runs the tests under CTest.
 #   scripts/test.sh           installs the build's packages only; names what it skips
-#   scripts/test.sh --all     installs every oracle and tool, runs the long tests in full, and finds uses of variables after
-#                             their scope as well; names what is still skipped (CI runs this, in a bare Debian 12)
+#   scripts/test.sh --all     installs every oracle and tool, runs slow tests, too, and finds uses of variables after their
+#                             scope as well; names what is still skipped (CI runs this, in a bare Debian 12)
+#   scripts/test.sh --soak    runs the tests with the label soak at full length: a million mutations, 10,000 frames (minutes)
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 packages=()
+tests=()
 scopes=OFF
 export MODAR_SOAK=0
 case ${1:-} in
   "") ;;
   --all) packages=(test web); scopes=ON; MODAR_SOAK=1 ;;
-  -h | --help) sed -n '2,5s/^# \{0,1\}//p' "$0"; exit 0 ;;
+  --soak) packages=(test); MODAR_SOAK=full; tests=(-L soak) ;;
+  -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "test.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
 esac
 
@@ -29,7 +32,7 @@ cmake --build --preset device -- -j "$jobs"
 
 log=build/dev/Testing/Temporary/LastTest.log
 status=0
-ctest --preset dev -j "$jobs" --no-tests=error || status=$?
+ctest --preset dev -j "$jobs" --no-tests=error "${tests[@]}" || status=$?
 echo
 echo "Skipped (see scripts/packages-test.txt and CONTRIBUTING.md):"
 { cat build/dev/skipped.txt

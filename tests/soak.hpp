@@ -1,4 +1,4 @@
-// Whether long tests run in full.
+// Whether soak tests run at full length.
 #pragma once
 
 #include <cstdlib>
@@ -6,10 +6,10 @@
 
 namespace modar::testing {
 
-/// True under `scripts/test.sh --all`, which sets MODAR_SOAK=1; the plain run sets it to 0.
+/// True under `scripts/test.sh --soak`, which sets MODAR_SOAK=full; `--all` sets it to 1, the plain run to 0.
 inline bool soak() {
   const char* named = std::getenv("MODAR_SOAK");
-  return named != nullptr && std::string_view(named) == "1";
+  return named != nullptr && std::string_view(named) == "full";
 }
 
 }  // namespace modar::testing

@@ -190,7 +190,7 @@ class Bridge(ProgramTest):
         self.assertIn("closed", self.bridge("close", self.bake_demo()))
 
     def test_nothing_grows(self):
-        frames, size = 10000 if SOAK else 100, (WIDTH // 2, HEIGHT // 2)
+        frames, size = 10000 if SOAK else 1000, (WIDTH // 2, HEIGHT // 2)
         small = self.folder / "small.nv21"  # what grows does so by the frame, not by the pixel
         subprocess.run(["ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "nv21", "-s", f"{WIDTH}x{HEIGHT}", "-i", self.clip, "-vf",
                         "scale=iw/2:ih/2:flags=area", "-pix_fmt", "nv21", "-f", "rawvideo", small], check=True)

@@ -14,7 +14,7 @@ JNI = os.environ.get("MODAR_JNI", str(BIN.parent / "runtime" / "android"))
 FAKE_GL = os.environ.get("MODAR_FAKE_GL", str(BIN.parent / "tests" / "android"))
 APP = ROOT / "runtime" / "android" / "java"
 FAKES = pathlib.Path(__file__).resolve().parent / "java"
-SOAK = os.environ.get("MODAR_SOAK", "0") == "1"
+SOAK = os.environ.get("MODAR_SOAK") == "full"
 WIDTH, HEIGHT, FRAMES = CLIP_WIDTH, CLIP_HEIGHT, 10
 
 

@@ -53,7 +53,7 @@ TEST(Check, GoodBundlesAreGood) {
   EXPECT_EQ(golden[1], "good");
 }
 
-/// Every bit under `scripts/test.sh --all`, two or three of each byte otherwise.
+/// Every bit under `scripts/test.sh --soak`, two or three of each byte otherwise.
 TEST(Check, NoFlippedBitGoesUnseen) {
   const std::size_t step = modar::testing::soak() ? 1 : 3;
   const IssueSink ignore = [](const Issue&) {};

@@ -1,5 +1,5 @@
 // Documents, recipes and pieces, mutated at random: errors or other values, never a crash. A
-// hundred thousand of them; a million under MODAR_SOAK=1.
+// hundred thousand of them; a million under MODAR_SOAK=full.
 #include <gtest/gtest.h>
 
 #include <cstring>
