@@ -271,8 +271,8 @@ std::string turntable_line(const TurntableReport& report) {
   writer.StartObject();
   writer.Key("frame");
   writer.Uint64(report.frame);
-  writer.Key("model");
-  text(writer, report.model);
+  writer.Key(report.pattern ? "pattern" : "model");
+  text(writer, report.name);
   writer.Key("angle_deg");
   number(writer, report.angle_deg);
   writer.Key("triangles");

@@ -129,10 +129,12 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
 /// medians, camera: of the last frame.
 std::string summary_line(const RunStats& stats);
 
-/// {frame,model,angle_deg,triangles,draw_calls,ms:{render}}: a picture of the turntable.
+/// {frame,model,angle_deg,triangles,draw_calls,ms:{render}}: a picture of the turntable. `pattern`
+/// in place of `model` in a bundle of pictures and videos alone.
 struct TurntableReport {
   std::uint64_t frame = 0;
-  std::string_view model;
+  std::string_view name;
+  bool pattern = false;
   double angle_deg = 0;
   std::uint64_t triangles = 0;
   int draw_calls = 0;

@@ -219,7 +219,8 @@ Display:
   --osd               draw state, reason and inliers on the pictures
   --device NAME       simulate a device by masking OpenGL ES features that it lacks
   --gpu-budget SIZE   GPU memory limit, nearest and visible models first (64M, 1G)
-  --turntable N       render N pictures of each model turning, without a pattern
+  --turntable N       render N pictures of each model turning (without models: of pictures
+                      and videos), without a camera
   --size WxH          size of the turntable's pictures (default: 640x480)
 
 Running:

@@ -7,7 +7,8 @@
 
 namespace modar {
 
-/// Draws options.turntable pictures of each model turning, and writes them to --out.
+/// Draws options.turntable pictures of each model turning, or of what else stands on patterns in a
+/// bundle without models, and writes them to --out. Errors: "play.no-models".
 Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle);
 
 /// One line to standard output at once. Errors: kIo "out.write".

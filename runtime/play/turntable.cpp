@@ -1,4 +1,5 @@
-// Pictures of each model turning: the renderer without the AR half.
+// Pictures of each model turning, or of pictures and videos where there is no model: the renderer
+// without the AR half.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -75,13 +76,57 @@ DrawItem on_turntable(const Stand& stand, std::uint32_t model, const glm::mat4& 
   return {model, plane * scene_matrix(stand.record), stand.scene, plane};
 }
 
+/// What turns about the origin of its own world.
+struct Subject {
+  std::string_view name;
+  double radius = 0;            ///< of the ball round the origin that holds it
+  std::vector<DrawItem> items;  ///< with to_eye and world_to_eye for an eye at the origin
+};
+
+Subject model_subject(const BundleView& bundle, std::uint32_t model) {
+  const Stand stand = stand_of(bundle, model);
+  return {bundle.name(bundle.models()[model].name),
+          radius_of(bundle, model) * static_cast<double>(stand.record.scale),
+          {on_turntable(stand, model, glm::mat4(1.0f))}};
+}
+
+/// The pictures of a pattern as they stand there at first, videos with their posters.
+Subject pattern_subject(const BundleView& bundle, std::uint32_t pattern) {
+  Subject subject{bundle.name(bundle.patterns()[pattern].name), 0, {}};
+  add_items(bundle, ActionMachine(bundle), pattern, glm::mat4(1.0f), subject.items);
+  for (const DrawItem& item : subject.items) {
+    for (const float x : {-1.0f, 1.0f}) {
+      for (const float y : {-1.0f, 1.0f}) {
+        const glm::vec3 corner(item.to_eye * glm::vec4(x, y, 0.0f, 1.0f));
+        subject.radius = std::max(subject.radius, static_cast<double>(glm::length(corner)));
+      }
+    }
+  }
+  return subject;
+}
+
+std::vector<Subject> subjects_of(const BundleView& bundle) {
+  std::vector<Subject> subjects;
+  for (std::uint32_t i = 0; i < bundle.models().size(); ++i) {
+    subjects.push_back(model_subject(bundle, i));
+  }
+  if (!subjects.empty()) return subjects;
+  for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
+    Subject subject = pattern_subject(bundle, i);
+    if (!subject.items.empty()) subjects.push_back(std::move(subject));
+  }
+  return subjects;
+}
+
 }  // namespace
 
 Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle) {
   constexpr double kFps = 30;
-  if (bundle.models().empty()) {
+  const std::vector<Subject> subjects = subjects_of(bundle);
+  if (subjects.empty()) {
     return fail(ExitCode::kInvalidInput, "play.no-models", options.bundle,
-                "the bundle holds no model", "bake it with --model FILE");
+                "the bundle holds no model, and no picture or video that is shown at first",
+                "bake it with --model FILE");
   }
   MODAR_ASSIGN(std::unique_ptr<Screen> screen, Screen::open(bundle, options));
   MODAR_ASSIGN(std::unique_ptr<FrameSink> sink, open_frame_sink(options.out, kFps));
@@ -89,16 +134,19 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
 
   const Camera camera = default_camera(options.width, options.height);
   TurntableReport turn;
+  turn.pattern = bundle.models().empty();
   FrameReport report;
-  for (std::uint32_t model = 0; model < bundle.models().size(); ++model) {
-    const Stand stand = stand_of(bundle, model);
-    const double radius = radius_of(bundle, model) * static_cast<double>(stand.record.scale);
-    const double distance = distance_of(camera, radius);
-    turn.model = bundle.name(bundle.models()[model].name);
+  for (const Subject& subject : subjects) {
+    const double distance = distance_of(camera, subject.radius);
+    turn.name = subject.name;
     for (int i = 0; i < options.turntable; ++i) {
       turn.angle_deg = 360.0 * i / options.turntable;
-      const std::array<DrawItem, 1> items = {
-          on_turntable(stand, model, turned(turn.angle_deg, distance))};
+      const glm::mat4 view = turned(turn.angle_deg, distance);
+      std::vector<DrawItem> items = subject.items;
+      for (DrawItem& item : items) {
+        item.to_eye = view * item.to_eye;
+        item.world_to_eye = view * item.world_to_eye;
+      }
       const std::int64_t before = now_ns();
       screen->draw({}, camera, items);
       const RgbaView picture = screen->picture();

@@ -2,6 +2,7 @@
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import threading
 import time
 import unittest
 
+from film_project import PROJECT, bake_film
 from programs import BIN, COVER, QUICK, ROOT, ProgramTest, demo_clip
 
 BUST = ROOT / "assets" / "models" / "bust.obj"
@@ -226,6 +228,21 @@ class Play(ProgramTest):
         self.assertEqual([line["angle_deg"] for line in lines_of(done)], [0.0, 120.0, 240.0])
         pictures = [path.read_bytes() for path in sorted((self.folder / "turn").iterdir())]
         self.assertEqual(len(set(pictures)), 3)
+
+    def test_a_film_alone_turns_with_its_poster(self):
+        done = self.play(bake_film(self), "--turntable", "3", "--out", "turn", "--size", "96x64", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([(line["pattern"], line["angle_deg"]) for line in lines_of(done)], [("cover", 0.0), ("cover", 120.0), ("cover", 240.0)])
+        for path in sorted((self.folder / "turn").iterdir()):
+            middle = subprocess.run(["ffmpeg", "-v", "error", "-i", path, "-vf", "crop=1:1", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
+                                    capture_output=True, check=True).stdout
+            for got, wanted in zip(middle, (60, 200, 90), strict=True):  # the film's first picture
+                self.assertAlmostEqual(got, wanted, delta=12, msg=path.name)
+        # A label alone shows nothing that could turn.
+        (self.folder / "modar.toml").write_text(re.sub(r"\[\[scene.video\]\].*?(?=\[\[scene.label)", "", PROJECT, flags=re.S))
+        shutil.rmtree(self.folder / "out")
+        self.assertEqual(self.modar("bake", "--quiet", cwd=self.folder).returncode, 0)
+        self.assert_fails(self.play(next((self.folder / "out").glob("*.modar")), "--turntable", "3", "--out", "none"), 3, "play.no-models")
 
 
 if __name__ == "__main__":
