@@ -57,6 +57,7 @@ struct Session {
   std::vector<modar_event> events;  ///< taps since the last frame, then what is seen in it
   std::vector<modar_item> items;
   std::size_t item_count = 0;  ///< that were drawn last
+  std::vector<float> poses;    ///< on which these stand, as org.modar.Poses has them
   Gesture gesture;
 };
 
@@ -354,6 +355,7 @@ modar_pose pose_of(const float* view) {
 void place_items(Session& session, const float* poses) {
   constexpr float kStill[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   session.item_count = 0;
+  session.poses.assign(poses, poses + modar_pattern_count(session.bundle) * kPoseFloats);
   const Gesture& gesture = session.gesture;
   const bool moved = gesture.scale != 1 || gesture.turn != 0 || gesture.x != 0 || gesture.y != 0;
   for (std::uint32_t p = 0; p < modar_pattern_count(session.bundle); ++p) {
@@ -404,6 +406,24 @@ void draw_orbit(Session& session, std::uint32_t pattern, double turn, double til
   place_items(session, poses.data());
   session.gesture = before;
   draw_items(session, surface, camera, nullptr);
+}
+
+/// A pixel of the frame that was drawn last to one of the screen, from its top left.
+std::array<float, 2> on_screen(const Session& session, double x, double y) {
+  std::array<double, 6> at{};  // the screen's pixels (0, 0), (1, 0) and (0, 1) in the frame
+  for (std::size_t i = 0; i < 3; ++i) {
+    modar_surface_to_frame(&session.drawn_surface, &session.drawn_camera, i == 1 ? 1.0 : 0.0,
+                           i == 2 ? 1.0 : 0.0, &at[2 * i], &at[2 * i + 1]);
+  }
+  const double xx = at[2] - at[0];
+  const double yx = at[3] - at[1];
+  const double xy = at[4] - at[0];
+  const double yy = at[5] - at[1];
+  const double area = xx * yy - xy * yx;
+  x -= at[0];
+  y -= at[1];
+  return {static_cast<float>((yy * x - xy * y) / area),
+          static_cast<float>((xx * y - yx * x) / area)};
 }
 
 /// False and an exception where there is no renderer or no surface yet.
@@ -730,6 +750,40 @@ MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) 
     session->events.push_back({sizeof(modar_event), MODAR_TAP, item.node - 1, hit.material});
   }
   return static_cast<jint>(item.model);
+}
+
+MODAR_NATIVE(void, tapNode)(JNIEnv* env, jclass, jlong number, jint node) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  session->events.push_back({sizeof(modar_event), MODAR_TAP, static_cast<std::uint32_t>(node), 0});
+}
+
+MODAR_NATIVE(jboolean, label)
+(JNIEnv* env, jclass, jlong number, jint index, jboolean look, jfloatArray place) {
+  const Use session(env, number, &Session::drawing);
+  auto node = modar::sized<modar_node>();
+  const auto wanted = static_cast<std::uint32_t>(index);
+  if (!session || modar_node_at(session->bundle, wanted, &node) == 0) return JNI_FALSE;
+  const std::size_t from = node.pattern * kPoseFloats;
+  if (from >= session->poses.size() || session->poses[from + 1] == 0) return JNI_FALSE;
+  auto label = modar::sized<modar_label>();
+  if (modar_label_project(
+          session->actions, wanted, &session->drawn_camera, session->poses.data() + from + kView,
+          look ? session->items.data() : nullptr, look ? session->item_count : 0, &label) == 0) {
+    return JNI_FALSE;
+  }
+  const auto [x, y] = on_screen(*session, double{label.x}, double{label.y});
+  const std::array<jfloat, 3> words = {x, y, static_cast<jfloat>(label.covered)};
+  env->SetFloatArrayRegion(place, 0, static_cast<jsize>(words.size()), words.data());
+  return JNI_TRUE;
+}
+
+MODAR_NATIVE(jstring, mark)(JNIEnv* env, jclass, jlong number, jint index) {
+  const Use session(env, number, &Session::tracking);
+  if (!session) return nullptr;
+  return text_or_null(env, [&](char* text, std::size_t size) {
+    return modar_node_mark(session->bundle, static_cast<std::uint32_t>(index), text, size);
+  });
 }
 
 MODAR_NATIVE(jintArray, act)

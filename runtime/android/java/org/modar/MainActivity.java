@@ -31,7 +31,7 @@ import java.util.List;
 import java.util.Locale;
 
 /** The one screen: the camera's picture with models on it, or the models alone; a line of advice, and buttons. */
-public final class MainActivity extends Activity implements Handler.Callback {
+public final class MainActivity extends Activity implements Handler.Callback, View.OnClickListener {
     /** How often the line of advice follows what the tracker says. */
     private static final int TICK_MS = 500;
     private static final int ASKED_FOR_CAMERA = 1;
@@ -47,6 +47,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
     /** How often captions follow what is heard. */
     private static final int CAPTION_MS = 100;
     private static final int CAPTION = 8;
+    private static final int MARKS = 9;
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
@@ -70,6 +71,8 @@ public final class MainActivity extends Activity implements Handler.Callback {
     private Texts texts;
     /** Null: the bundle plays nothing. */
     private Media media;
+    /** Null: the bundle has no labels. */
+    private Marks marks;
     /** The words of a label that an action showed, while its pattern is seen. */
     private String told;
     private int toldOn;
@@ -156,6 +159,9 @@ public final class MainActivity extends Activity implements Handler.Callback {
             case CAPTION:
                 followSound();
                 main.sendEmptyMessageDelayed(CAPTION, CAPTION_MS);
+                break;
+            case MARKS:
+                if (marks != null) marks.follow();
                 break;
             case SAVED:
                 showIf(findViewById(R.id.share), true);
@@ -359,6 +365,8 @@ public final class MainActivity extends Activity implements Handler.Callback {
             }
         });
         if (media.isEmpty()) media = null;
+        marks = new Marks(this, (ViewGroup) findViewById(R.id.marks), this, opened, texts.language);
+        if (marks.isEmpty()) marks = null;
         told = null;
         showIf(findViewById(R.id.sound), media != null);
         showIf(findViewById(R.id.pause), media != null);
@@ -366,7 +374,7 @@ public final class MainActivity extends Activity implements Handler.Callback {
         label(R.id.pause, "pause");
         main.removeMessages(CAPTION);
         if (media != null && resumed) main.sendEmptyMessage(CAPTION);
-        stage.show(opened, bundles.lens(), media);
+        stage.show(opened, bundles.lens(), media, marks);
         gestures = new Gestures();
         move();
         from.session = opened;
@@ -397,7 +405,9 @@ public final class MainActivity extends Activity implements Handler.Callback {
         closeCamera();
         session = 0;
         media = null;
-        stage.show(0, null, null);
+        marks = null;
+        ((ViewGroup) findViewById(R.id.marks)).removeAllViews();
+        stage.show(0, null, null, null);
         showNext();
         if (session == 0) trouble = words.get("bundle", damaged.damage);
         follow();
@@ -512,6 +522,12 @@ public final class MainActivity extends Activity implements Handler.Callback {
         } catch (ModarException gone) {
             diagnostics.error(gone.getMessage());
         }
+    }
+
+    /** From GL's thread: labels are elsewhere. */
+    void marksMoved() {
+        main.removeMessages(MARKS); // one is enough
+        main.sendEmptyMessage(MARKS);
     }
 
     /** From GL's thread: an action shows a label's words. */
@@ -681,8 +697,23 @@ public final class MainActivity extends Activity implements Handler.Callback {
         }
     }
 
-    /** Of the buttons, by res/layout/main.xml. */
+    private void touchMark(int node) {
+        try {
+            told = null;
+            Native.tapNode(session, node);
+            stage.tapped();
+        } catch (ModarException gone) {
+            diagnostics.error(gone.getMessage());
+        }
+    }
+
+    /** Of the buttons, by res/layout/main.xml, and of labels' marks. */
+    @Override
     public void onClick(View clicked) {
+        if (clicked.getTag() != null) {
+            touchMark((Integer) clicked.getTag());
+            return;
+        }
         switch (clicked.getId()) {
             case R.id.picture:
                 stage.takePicture();

@@ -137,13 +137,14 @@ public final class Native {
     public static final int PAUSE = 2;
     public static final int TEXT = 6;
     public static final int LINK = 7;
-    // Words of node(), and two of its kinds.
+    // Words of node(), and three of its kinds.
     public static final int KIND = 0;
     public static final int PATTERN = 1;
     public static final int LOOPS = 2;
     public static final int WIDTH = 3;
     public static final int HEIGHT = 4;
     public static final int HAS_SOUND = 5;
+    public static final int LABEL = 3;
     public static final int VIDEO = 4;
     public static final int SOUND = 5;
 
@@ -170,6 +171,21 @@ public final class Native {
 
     /** The title or the text of a label, or null. */
     public static native String nodeText(long session, int node, boolean title, String language) throws ModarException;
+
+    /** What is written on a label's mark: a number or a short word. */
+    public static native String mark(long session, int node) throws ModarException;
+
+    /**
+     * Where a label is in what was drawn last, on GL's thread.
+     *
+     * @param look whether something before it is looked for, which reads models: not for each label in each frame
+     * @param place x and y in pixels from the surface's top left, and 1 where something covers it
+     * @return false: it is hidden, or not on the side of the camera that is seen
+     */
+    public static native boolean label(long session, int node, boolean look, float[] place) throws ModarException;
+
+    /** The visitor touched what stands for a node elsewhere: told to the next act(). */
+    public static native void tapNode(long session, int node) throws ModarException;
 
     /** What is heard of a node at a time, seconds, or with a time below 0 all of it; null: nothing. */
     public static native String caption(long session, int node, String language, double seconds) throws ModarException;

@@ -28,6 +28,8 @@ final class Stage implements GLSurfaceView.Renderer {
     /** A camera has another clock: what acts begins anew. */
     private volatile boolean wantsReset;
     private volatile Media media;
+    /** Null: the bundle has no labels. */
+    private volatile Marks marks;
     private volatile boolean wantsPicture;
     private volatile int displayDegrees;
     private volatile int sensorDegrees;
@@ -49,10 +51,11 @@ final class Stage implements GLSurfaceView.Renderer {
     }
 
     /** The bundle to show; the camera is stopped. The one before is closed by GL's thread, which holds its buffers. */
-    void show(long opened, String lens, Media plays) {
+    void show(long opened, String lens, Media plays, Marks points) {
         final long before = session;
         final Media played = media;
         media = plays;
+        marks = points;
         cameraFile = lens;
         session = opened;
         seen = -1;
@@ -189,6 +192,11 @@ final class Stage implements GLSurfaceView.Renderer {
                 shown.draw(session);
             } else {
                 return;
+            }
+            Marks points = marks;
+            if (points != null) {
+                points.look();
+                screen.marksMoved();
             }
         } catch (ModarException error) {
             screen.failed(error);

@@ -218,6 +218,11 @@ public final class AppRun {
         return android.media.MediaPlayer.all.get(0);
     }
 
+    private static android.widget.Button mark() {
+        Handler.pump();
+        return (android.widget.Button) ((android.view.ViewGroup) app.findViewById(R.id.marks)).children.get(0);
+    }
+
     /** A scene that acts, as the screen shows it: frames with the cover first, then without it. */
     private static void scene() throws Exception {
         android.media.MediaPlayer.lasts = 2000;
@@ -228,6 +233,12 @@ public final class AppRun {
         android.media.MediaPlayer.pass(200);
         Handler.pump();
         check(((TextView) app.findViewById(R.id.caption)).text.equals("One & only"), "the caption");
+        android.widget.Button mark = mark();
+        check(mark.visibility == android.view.View.VISIBLE && mark.text.equals("1") && mark.described.equals("1: A note"), "a mark: " + mark.described);
+        check(mark.x > 0 && mark.x < Camera.width && mark.y > 0 && mark.y < Camera.height && mark.alpha == 1, "on the picture");
+        mark.click();
+        check(deliver(3), "a frame later");
+        check(status().equals("A note"), "a touched mark tells its words");
         click(R.id.sound);
         check(film().volume == 1, "sound");
         click(R.id.pause);
@@ -244,6 +255,7 @@ public final class AppRun {
         check(deliver(clip.length / size / 2 + 4), "a frame more");
         check(!film().isPlaying(), "a film that waits");
         Handler.pump();
+        check(mark.visibility == android.view.View.GONE, "no mark without its picture");
         check(android.app.AlertDialog.shown.asks.contains("https://museum.org/cover") && Context.started == null, "a question");
         android.app.AlertDialog.shown.yes.onClick(null, 0);
         check(Context.started.action.equals("android.intent.action.VIEW") && Context.started.data.path.equals("https://museum.org/cover"),

@@ -81,6 +81,7 @@ public final class BridgeRun {
                     py += share * poses.get(0, Poses.CORNERS + 2 * k + 1);
                 }
                 int from = 4 * ((height - 1 - (int) py) * width + (int) px);
+                pointed(session, poses, frames[i], i % 8);
                 line.append(", \"pixel\": [" + (rgba.get(from) & 255) + ", " + (rgba.get(from + 1) & 255) + ", " + (rgba.get(from + 2) & 255) + "]");
             }
             System.out.println(line + "}");
@@ -92,6 +93,35 @@ public final class BridgeRun {
         media.close();
         check(android.media.MediaPlayer.all.isEmpty() && new java.io.File(out).list().length == 0, "all is given back");
         Native.close(session);
+    }
+
+    /** The film's label lies where the cover's diagonals cross, however the screen shows the frame. */
+    private static void pointed(long session, Poses poses, byte[] frame, int way) throws Exception {
+        int[] about = Native.node(session, 0);
+        int label = 0;
+        while (about[Native.KIND] != Native.LABEL) about = Native.node(session, ++label);
+        check(Native.mark(session, label).equals("1"), "a mark: " + Native.mark(session, label));
+        float[] c = new float[8];
+        for (int k = 0; k < 8; k++) c[k] = poses.get(0, Poses.CORNERS + k);
+        double ax = c[4] - c[0], ay = c[5] - c[1], bx = c[6] - c[2], by = c[7] - c[3];
+        double along = ((c[2] - c[0]) * by - (c[3] - c[1]) * bx) / (ax * by - ay * bx);
+        double x = c[0] + along * ax + 0.5 - width / 2.0, y = c[1] + along * ay + 0.5 - height / 2.0;
+        int screenWidth = way % 2 == 0 ? 320 : 200, screenHeight = way % 2 == 0 ? 200 : 400, degrees = 90 * (way % 4);
+        Native.onSurfaceChanged(session, screenWidth, screenHeight, degrees, way > 3);
+        Native.onDrawFrame(session, frame, poses.bytes);
+        for (int turn = 0; turn < degrees; turn += 90) { // clockwise, y down
+            double before = x;
+            x = -y;
+            y = before;
+        }
+        boolean lies = degrees % 180 != 0;
+        double scale = Math.max((double) screenWidth / (lies ? height : width), (double) screenHeight / (lies ? width : height));
+        float[] at = new float[3];
+        check(Native.label(session, label, false, at), "a label is seen");
+        double off = Math.hypot(at[0] - screenWidth / 2.0 - (way > 3 ? -x : x) * scale, at[1] - screenHeight / 2.0 - y * scale);
+        check(off < 0.5, "the label is off by " + off + " in way " + way);
+        check(!Native.label(session, label - 1, false, at), "no label");
+        Native.onSurfaceChanged(session, width, height, 0, false);
     }
 
     private static long opened(String bundle) throws Exception {
